@@ -11,19 +11,15 @@ use std::time::{Duration, Instant};
 
 use common::paper_size_scenarios;
 use lanesweep::engine::{CpuBackend, Executor, Headway, Partial, Wanted};
-use lanesweep::model::criterion::Criterion;
-use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::{Countable, Journal, Ledger, Part, read_part, read_sealed_line, seal, write_part};
 use lanesweep::run::sampling::{
-    CrudeOptions, SampleHeadways, SamplePlanOptions, SampleSource, SampleTally, TallyOptions, cuts, plan_samples,
-    sample_into,
+    Estimator, SampleHeadways, SampleOptions, SampleTally, cuts, plan_samples, sample_into,
 };
 use lanesweep::run::study::{StudyCases, StudyHead, StudyOptions, outline_study};
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{DensityModel, FitOptions};
-use lanesweep::stats::estimate::{BinomialInterval, StopRule};
 use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
@@ -44,27 +40,16 @@ fn main() {
 
 fn sampling(folder: &Path) {
     let samples = 2_000_000;
-    let options = SamplePlanOptions {
-        samples,
-        seed: 157,
-        source: SampleSource::Random,
-        models: ModelId::ALL.to_vec(),
-        headways: SampleHeadways::Each(vec![Headway::ThwS(1.0)]),
+    let options = SampleOptions {
+        worst: 20,
+        ..SampleOptions::new(Estimator::CRUDE, samples, SampleHeadways::Each(vec![Headway::ThwS(1.0)]))
     };
     let density = density();
     let plan = plan_samples(&density, &density.mixture().unwrap(), &Profile::load("paper").unwrap(), &options).unwrap();
     let backend = CpuBackend::lane_arithmetic();
     let executor = Executor::new(&backend);
-    let counting = TallyOptions { worst: 20, criterion: Criterion::Collision, map: None };
-    let crude = CrudeOptions {
-        stop: StopRule::samples(samples),
-        interval: BinomialInterval::Wilson,
-        level: 0.95,
-        exposure: None,
-        is_sampled_headway: false,
-    };
     pairs("sample", folder, plan.unit_count(), &cuts(samples, &(0..samples)), |ledger: &mut Ledger<SampleTally>| {
-        sample_into(&plan, ledger, &executor, &counting, &crude, false, |_| Ok(())).unwrap();
+        sample_into(&plan, ledger, &executor, &options, None, false, |_| Ok(())).unwrap();
     });
 }
 

@@ -11,16 +11,12 @@ use std::time::Instant;
 
 use common::peak_memory_bytes;
 use lanesweep::engine::{CpuBackend, Executor, Headway};
-use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
-use lanesweep::run::sampling::{
-    CrudeOptions, SampleHeadways, SamplePlanOptions, SampleSource, TallyOptions, plan_samples, sample_crude,
-};
+use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, plan_samples, sample_crude};
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{DensityModel, FitOptions};
-use lanesweep::stats::estimate::{BinomialInterval, StopRule};
 use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
@@ -73,27 +69,17 @@ fn density(category: Category, key: &str, scenarios: &[Scenario]) -> DensityMode
 }
 
 fn run(part: &str, density: &DensityModel, models: &[ModelId], samples: u64, worst: usize) {
-    let options = SamplePlanOptions {
-        samples,
-        seed: 157,
-        source: SampleSource::Random,
+    let options = SampleOptions {
         models: models.to_vec(),
-        headways: SampleHeadways::Each(vec![Headway::ThwS(1.0)]),
+        worst,
+        ..SampleOptions::new(Estimator::CRUDE, samples, SampleHeadways::Each(vec![Headway::ThwS(1.0)]))
     };
     let profile = Profile::load("paper").unwrap();
     let plan = plan_samples(density, &density.mixture().unwrap(), &profile, &options).unwrap();
     let backend = CpuBackend::lane_arithmetic();
     let executor = Executor::new(&backend);
-    let counting = TallyOptions { worst, criterion: Criterion::Collision, map: None };
-    let crude = CrudeOptions {
-        stop: StopRule::samples(samples),
-        interval: BinomialInterval::Wilson,
-        level: 0.95,
-        exposure: None,
-        is_sampled_headway: false,
-    };
     let start = Instant::now();
-    let run = sample_crude(&plan, 0..samples, &executor, &counting, &crude, |_| Ok(())).unwrap();
+    let run = sample_crude(&plan, 0..samples, &executor, &options, None, |_| Ok(())).unwrap();
     let seconds = start.elapsed().as_secs_f64();
     let id = density.space.id();
     let name = format!("{} {}", id.category.key(), id.key);

@@ -10,10 +10,10 @@ use super::sample::{EstimatorFlag, PointsFlag, Sample};
 use super::sample_checks::only_crude;
 use crate::engine::Headway;
 use crate::interop::openscenario::{DistributionSamples, SampledFile};
-use crate::report::sampling::{DensityRecord, DrawRecord, EstimateFile, HostRecord, RunFacts};
+use crate::report::sampling::{DensityRecord, DrawRecord, EstimateFile, HostRecord};
 use crate::report::sampling_tables::convergence_csv;
 use crate::run::reopen::DISTRIBUTION_FILE;
-use crate::run::sampling::{CrudeOptions, TallyOptions, sample_crude};
+use crate::run::sampling::{Estimator, SampleHeadways, SampleOptions, sample_crude};
 use crate::scenario::Category;
 use crate::stats::density::Provenance;
 use crate::support::hex::sha256;
@@ -66,35 +66,31 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
     let folder = OutputDir::open(&flags.out, ESTIMATE_RECORD)?;
     let (plan, tries) = samples.plan((count, seed), &profile, &models, &headways)?;
     let executor = opened.executor().with_recheck(seed);
-    let counting = TallyOptions { worst: flags.worst(), criterion, map: None };
-    let options = CrudeOptions {
+    let headways = match samples.has_distance() {
+        true => SampleHeadways::Sampled,
+        false => SampleHeadways::Each(plan.headways.clone()),
+    };
+    let options = SampleOptions {
         stop: flags.stop(count),
-        interval: flags.interval(),
+        models,
+        criterion,
+        seed,
         level: flags.level,
-        // Nobody said how often such scenarios occur.
-        exposure: None,
-        is_sampled_headway: samples.has_distance(),
+        worst: flags.worst(),
+        ..SampleOptions::new(Estimator::Crude { interval: flags.interval() }, count, headways)
     };
     tracing::info!("{} samples on {}", readable::count(count), executor.backend.describe());
     let bar = console::progress(verbosity, count, "sampling");
-    let crude = sample_crude(&plan, 0..count, &executor, &counting, &options, |chunk| {
+    // Nobody said how often such scenarios occur: no exposure.
+    let crude = sample_crude(&plan, 0..count, &executor, &options, None, |chunk| {
         bar.inc(chunk.units.end - chunk.units.start);
         Ok(())
     })?;
     bar.finish_and_clear();
-    let facts = RunFacts {
-        estimator: "mc",
-        profile,
-        models,
-        headways: plan.headways.clone(),
-        points: "random",
-        samples: count,
-        seed,
-        given: Vec::new(),
-    };
     let host = HostRecord::of(&opened, crude.summary.rechecked_lanes, started);
     let record = record(&sampled, &samples);
-    let mut file = EstimateFile::of(record, samples.has_distance(), facts, crude.rows.clone(), host);
+    let mut file = EstimateFile::of(record, samples.has_distance(), (&profile, &options), crude.rows.clone(), host);
+    file.plan_headways = plan.headways.clone();
     file.plan_sha256 = Some(plan.hash().to_owned());
     let mut draws = DrawRecord::of(&crude.tally, &plan);
     if draws.samples == count {
@@ -105,7 +101,7 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
     let mut results = folder.results()?;
     results.add("convergence.csv", &convergence_csv(&crude.convergence)?)?;
     let names: Vec<String> = samples.parameters.iter().map(|p| p.parameter.key.to_owned()).collect();
-    file.add_worst(&mut results, &plan, &crude.tally, &counting, &names, |key| {
+    file.add_worst(&mut results, &plan, &crude.tally, &options, &names, |key| {
         let point = samples.draw(seed, key.unit, &plan.profile)?.values;
         Ok((point, samples.has_distance().then(|| "sampled".to_owned())))
     })?;

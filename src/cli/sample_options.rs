@@ -48,6 +48,10 @@ impl Sample {
             stop: self.stop(samples),
             given: self.given.clone(),
             worst: self.worst(),
+            source: match self.points {
+                PointsFlag::Random => SampleSource::Random,
+                PointsFlag::Sobol => SampleSource::Sobol,
+            },
             map: if self.is_crude() { self.map_axes(density)? } else { None },
             ..SampleOptions::new(self.estimator(density, settings)?, samples, headways)
         })
@@ -68,13 +72,7 @@ impl Sample {
 
     fn estimator(&self, density: &DensityModel, settings: &SampleSettings) -> Result<Estimator> {
         Ok(match self.estimator {
-            EstimatorFlag::Mc => Estimator::Crude {
-                points: match self.points {
-                    PointsFlag::Random => SampleSource::Random,
-                    PointsFlag::Sobol => SampleSource::Sobol,
-                },
-                interval: self.interval(),
-            },
+            EstimatorFlag::Mc => Estimator::Crude { interval: self.interval() },
             EstimatorFlag::Is if self.proposal.is_empty() => Estimator::Pilot(Pilot {
                 worst: settings.elite_fraction,
                 broad: settings.broad_weight,

@@ -14,8 +14,7 @@ use crate::engine::{Chunk, Executor, OpenBackend};
 use crate::report::lanes;
 use crate::report::sampling::{EstimateFile, HostRecord};
 use crate::run::parts::PLAN_FILE;
-use crate::run::sampling::crude_plan::CrudePlan;
-use crate::run::sampling::{self, SampleKind, SampleResult, conditional};
+use crate::run::sampling::{self, SampleKind, SampleResult, SampleSource, conditional};
 use crate::stats::density::read_density;
 use crate::support::atomic_file::StagedFile;
 use crate::support::files::check_folder;
@@ -97,14 +96,14 @@ impl Sample {
             self.format.print_plan(sample.lane_count(), &self.out.join(PLAN_FILE))?;
             return Ok(Exit::Ok);
         }
-        let executor = opened.executor().with_recheck(sample.seed());
-        if matches!(sample.0, SampleKind::Sequential(_)) {
+        let executor = opened.executor().with_recheck(sample.options.seed);
+        if matches!(sample.kind, SampleKind::Sequential) {
             let folder = OutputDir::open(&self.out, ESTIMATE_RECORD)?;
             let results = folder.results()?;
             let result = sample.run(&executor)?;
             return write(&sample, &result, HostRecord::of(opened, 0, started), results, self.format);
         }
-        let sample = if matches!(sample.0, SampleKind::Pilot(..)) {
+        let sample = if matches!(sample.kind, SampleKind::Pilot(_)) {
             // The proposals are kept in the folder, so the search needs the folder's lock too.
             let _folder = OutputDir::open(&self.out, ESTIMATE_RECORD)?;
             sample.searched(&executor, Some(&self.out))?
@@ -123,9 +122,7 @@ impl Sample {
         started: Instant,
         verbosity: Verbosity,
     ) -> Result<Exit> {
-        if let SampleKind::Crude(planned, _) = &sample.0 {
-            warn(planned)?;
-        }
+        warn(sample)?;
         // Rows are written on the way: a run that writes them begins anew.
         let Some(mut run) = sample.open(&self.out, self.shards.shard, self.rows.is_none())? else {
             tracing::info!("this part exists already and is complete");
@@ -165,13 +162,14 @@ impl Sample {
 }
 
 /// What limits the estimates of crude Monte Carlo.
-fn warn(planned: &CrudePlan) -> Result<()> {
-    if planned.facts.sobol {
+fn warn(sample: &sampling::Sample) -> Result<()> {
+    let (density, options) = (&sample.density, &sample.options);
+    if options.source == SampleSource::Sobol {
         tracing::warn!("Sobol points: the intervals are those of independent draws, so they are conservative");
     }
-    if !planned.facts.given.is_empty() {
-        let left = conditional(&planned.density, &planned.facts.given)?.effective_scenarios;
-        let of = planned.density.kde.points().len();
+    if !options.given.is_empty() {
+        let left = conditional(density, &options.given)?.effective_scenarios;
+        let of = density.kde.points().len();
         if left < FEW_SCENARIOS {
             tracing::warn!(
                 "only {left:.1} of {of} scenarios are near the given values: results depend on the kernels, not on data"

@@ -6,14 +6,13 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::close_following::{CloseRow, close_following};
-pub use super::run_record::RunFacts;
 use super::tables::{WIDTH, aligned, table, wrap};
 use crate::engine::generated::ATTEMPTS;
 use crate::engine::{DeviceRecord, ENGINE_VERSION, Headway, LanePlan, OpenBackend};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::close_following::CloseFollowing;
-use crate::run::sampling::{EstimateRow, Levels, RiskRate, SampleTally};
+use crate::run::sampling::{EstimateRow, Levels, RiskRate, Sample, SampleOptions, SampleTally};
 use crate::scenario::Category;
 use crate::stats::density::{DensityModel, Provenance};
 use crate::stats::estimate::{IntervalKind, Ratio, StopReason};
@@ -186,39 +185,36 @@ impl EstimateFile {
     ///
     /// # Errors
     /// As [`DensityModel::content_sha256`].
-    pub fn new(
-        density: &DensityModel,
-        facts: RunFacts,
-        estimates: Vec<EstimateRow>,
-        host: HostRecord,
-    ) -> Result<EstimateFile> {
-        Ok(EstimateFile::of(DensityRecord::of(density)?, density.space.has_thw(), facts, estimates, host))
+    pub fn new(sample: &Sample, estimates: Vec<EstimateRow>, host: HostRecord) -> Result<EstimateFile> {
+        let (density, is_sampled) = (DensityRecord::of(&sample.density)?, sample.density.space.has_thw());
+        Ok(EstimateFile::of(density, is_sampled, (&sample.profile, &sample.options), estimates, host))
     }
 
     /// The same of any density by its record; `is_sampled_headway` where the headway is one of its parameters.
     pub fn of(
         density: DensityRecord,
         is_sampled_headway: bool,
-        facts: RunFacts,
+        (profile, options): (&Profile, &SampleOptions),
         estimates: Vec<EstimateRow>,
         host: HostRecord,
     ) -> EstimateFile {
-        let names = facts.headways.iter().map(Headway::to_string);
+        let headways = options.headways();
+        let names = headways.iter().map(Headway::to_string);
         let stopped = estimates.iter().map(|r| r.estimate.stopped).max_by_key(|s| *s == StopReason::TimeLimit);
         EstimateFile {
             lanesweep_estimate: 1,
             program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
             engine: ENGINE_VERSION,
-            estimator: facts.estimator,
+            estimator: options.estimator.key(),
             density,
-            profile: facts.profile,
-            models: facts.models,
+            profile: profile.clone(),
+            models: options.models.clone(),
             headways: if is_sampled_headway { vec!["sampled".to_owned()] } else { names.collect() },
-            plan_headways: facts.headways,
-            points: facts.points,
-            samples: facts.samples,
-            seed: facts.seed,
-            given: facts.given,
+            plan_headways: headways.to_vec(),
+            points: options.source.key(),
+            samples: options.stop.samples,
+            seed: options.seed,
+            given: options.given.clone(),
             plan_sha256: None,
             draws: None,
             stopped: stopped.unwrap_or(StopReason::Samples),

@@ -5,10 +5,10 @@ use sha2::{Digest, Sha256};
 use super::convergence::ConvergenceFigure;
 use super::failure_map::FailureMap;
 use super::html::PageFigure;
-use super::sampling::{DrawRecord, EstimateFile, HostRecord, RunFacts};
+use super::sampling::{DrawRecord, EstimateFile, HostRecord};
 use super::sampling_tables::{WorstRow, convergence_csv, worst_csv};
 use crate::engine::{LaneKey, LanePlan, LaneRunner};
-use crate::run::sampling::{CrudeRun, Sample, SampleKind, SampleResult, SampleTally, TallyOptions, proposal_text};
+use crate::run::sampling::{CrudeRun, Estimator, Sample, SampleOptions, SampleResult, SampleTally, proposal_text};
 use crate::stats::density::DensityModel;
 use crate::support::hex::hex;
 use crate::support::run_dir::Results;
@@ -20,7 +20,7 @@ impl EstimateFile {
     /// # Errors
     /// As [`DensityModel::content_sha256`].
     pub fn of_sample(sample: &Sample, result: &SampleResult, host: HostRecord) -> Result<EstimateFile> {
-        let mut file = EstimateFile::new(sample.density(), RunFacts::of(sample), result.rows.clone(), host)?;
+        let mut file = EstimateFile::new(sample, result.rows.clone(), host)?;
         if let (Some(crude), Some(plan)) = (&result.crude, sample.lane_plan()) {
             file.plan_sha256 = Some(plan.hash().to_owned());
             file.draws = Some(DrawRecord::of(&crude.tally, plan));
@@ -35,10 +35,10 @@ impl EstimateFile {
     /// [`Error::Io`].
     pub fn write(&mut self, mut results: Results, sample: &Sample, result: &SampleResult) -> Result<()> {
         let (density, mut figures) = (sample.density(), Vec::new());
-        if let (Some(crude), SampleKind::Crude(planned, _)) = (&result.crude, &sample.0) {
-            figures = self.crude_files(&mut results, &planned.plan, density, crude, &planned.counting())?;
+        if let (Some(crude), Some(plan)) = (&result.crude, sample.lane_plan()) {
+            figures = self.crude_files(&mut results, plan, density, crude, &sample.options)?;
         }
-        if sample.has_given_proposals() {
+        if matches!(sample.options.estimator, Estimator::Given { .. }) {
             // A proposal in this folder may be one that was given.
             results.keep(|name| name.starts_with("proposal-"))?;
         }
@@ -56,7 +56,7 @@ impl EstimateFile {
         plan: &LanePlan,
         density: &DensityModel,
         run: &CrudeRun,
-        counting: &TallyOptions,
+        options: &SampleOptions,
     ) -> Result<Vec<PageFigure>> {
         let mut figures = Vec::new();
         if !run.convergence.is_empty() {
@@ -70,7 +70,7 @@ impl EstimateFile {
             return Err(Error::Internal("the plan has no generator".to_owned()));
         };
         let names: Vec<String> = density.space.parameters().iter().map(|p| p.name.clone()).collect();
-        self.add_worst(results, plan, &run.tally, counting, &names, |key| {
+        self.add_worst(results, plan, &run.tally, options, &names, |key| {
             let drawn = generator.draw(key.unit).values;
             let point: Vec<f64> = drawn[..names.len()].iter().map(|&v| f64::from(v)).collect();
             let headway = density.space.thw_s(&point).map(|thw_s| format!("{thw_s}s"));
@@ -78,7 +78,7 @@ impl EstimateFile {
         })?;
         if let Some(map) = &run.tally.map {
             for (model, id) in plan.models.iter().enumerate() {
-                let figure = FailureMap::of(density, map, model, *id, counting.criterion);
+                let figure = FailureMap::of(density, map, model, *id, options.criterion);
                 let (name, svg) = (format!("map-{}", id.name()), figure.figure().svg());
                 results.add(&format!("{name}.csv"), figure.csv().as_bytes())?;
                 results.add(&format!("{name}.svg"), svg.as_bytes())?;
@@ -98,11 +98,11 @@ impl EstimateFile {
         results: &mut Results,
         plan: &LanePlan,
         tally: &SampleTally,
-        counting: &TallyOptions,
+        options: &SampleOptions,
         names: &[String],
         drawn: impl Fn(&LaneKey) -> Result<(Vec<f64>, Option<String>)>,
     ) -> Result<()> {
-        if counting.worst == 0 {
+        if options.worst == 0 {
             return Ok(());
         }
         let (runner, mut rows) = (LaneRunner::<f32>::new(plan), Vec::new());
@@ -123,7 +123,7 @@ impl EstimateFile {
                 });
             }
         }
-        let table = worst_csv(&rows, names, counting.criterion)?;
+        let table = worst_csv(&rows, names, options.criterion)?;
         self.worst_sha256 = Some(hex(&Sha256::digest(&table)));
         results.add("worst.csv", &table)
     }

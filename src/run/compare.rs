@@ -5,7 +5,7 @@ use crate::engine::{Block, Executor, Headway, LanePlan, Partial, SweepSummary, W
 use crate::model::profile::Profile;
 use crate::run::close_following::{CloseFollowing, close_units};
 use crate::run::sampling::{
-    CategoryComparison, ComparedParameterization, SampleHeadways, SamplePlanOptions, SampleSource, ScenarioCounts,
+    CategoryComparison, ComparedParameterization, Estimator, SampleHeadways, SampleOptions, ScenarioCounts,
     compare_cells, kernel_scenarios, plan_samples, recorded_cells, sample_by_scenario,
 };
 use crate::run::study::{StudyOptions, plan_study};
@@ -235,15 +235,14 @@ impl<'a> Compare<'a> {
         let Some((block, variant)) = self.plan.blocks.iter().enumerate().find_map(find) else {
             return Err(Error::Internal(format!("{} {} has a density but no lanes", id.category.label(), id.key)));
         };
-        let plan_options = SamplePlanOptions {
-            samples: options.samples,
+        let headways = match density.space.has_thw() {
+            true => SampleHeadways::Sampled,
+            false => SampleHeadways::Each(options.study.headways.clone()),
+        };
+        let plan_options = SampleOptions {
             seed: options.seed,
-            source: SampleSource::Random,
             models: options.study.models.clone(),
-            headways: match density.space.has_thw() {
-                true => SampleHeadways::Sampled,
-                false => SampleHeadways::Each(options.study.headways.clone()),
-            },
+            ..SampleOptions::new(Estimator::CRUDE, options.samples, headways)
         };
         let plan = plan_samples(density, &density.mixture()?, &self.profile, &plan_options)?;
         let kernels = kernel_scenarios(density, self.scenarios)?;

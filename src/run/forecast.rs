@@ -5,8 +5,7 @@ use std::time::{Duration, Instant};
 use super::compare::Compare;
 use super::grid::{GridPlan, Map};
 use super::parts::Ledger;
-use super::sampling::weighted_plan::WeightedPlan;
-use super::sampling::{Estimator, Sample, SampleKind, SampleTally, TallyOptions};
+use super::sampling::{Estimator, Proposals, Sample, SampleKind, SampleOptions, SampleTally};
 use super::study::{Study, WINDOW};
 use crate::Result;
 use crate::engine::{
@@ -187,8 +186,9 @@ impl Sample {
     /// # Errors
     /// Of the lanes that are run.
     pub fn forecast(&self, executor: &Executor) -> Result<RunForecast> {
+        let options = &self.options;
         let run = RunForecast {
-            data: self.density().provenance.data.clone(),
+            data: self.density.provenance.data.clone(),
             parts: Vec::new(),
             units: "samples",
             is_at_most: false,
@@ -197,91 +197,85 @@ impl Sample {
             lanes: None,
             besides: "",
         };
-        let (estimator, lanes, models) = match &self.0 {
-            SampleKind::Crude(planned, stop) => {
-                let (plan, counting) = (&planned.plan, planned.counting());
+        Ok(match &self.kind {
+            SampleKind::Crude(plan) => {
                 // Few lanes are valued.
-                let verdicts = TallyOptions { worst: 0, ..counting.clone() };
+                let verdicts = SampleOptions { worst: 0, ..options.clone() };
                 let forecast = forecast(plan, &*executor.backend, Wanted::Verdicts, BUDGET, |chunk| {
                     SampleTally::of_chunk(plan, &chunk, &verdicts).map(drop)
                 })?;
-                let bytes_of_lane = if counting.worst > 0 { size_of::<Outcome<f64>>() as u64 } else { 1 };
-                return Ok(RunForecast {
+                let bytes_of_lane = if options.worst > 0 { size_of::<Outcome<f64>>() as u64 } else { 1 };
+                RunForecast {
                     parts: parts(plan),
-                    is_at_most: stop.relative_half_width.is_some() || stop.time_limit.is_some(),
+                    is_at_most: !options.stop.is_fixed(),
                     more_bytes: SAMPLE_COUNTS_BYTES + forecast.lanes_at_once * bytes_of_lane,
                     more: "lanes at once, counts and figures, however many samples",
                     lanes: Some(forecast),
                     besides: "figures; option `rows`",
                     ..run
-                });
+                }
             }
-            SampleKind::Weighted(planned) => {
-                let facts = &planned.facts;
-                let weighed = weighed(planned, executor)?;
-                return Ok(RunForecast {
-                    parts: parts_of_models(
-                        &facts.models,
-                        &format!("headway {}", planned.headway_name()),
-                        facts.samples,
-                    ),
+            SampleKind::Weighted(proposals) => {
+                let weighed = weighed(self, proposals, executor)?;
+                let what = format!("headway {}", options.headway_name());
+                RunForecast {
+                    parts: parts_of_models(&options.models, &what, self.samples()),
                     more_bytes: weighed.lanes_at_once * BYTES_PER_SAMPLE,
                     more: "the samples that are judged at once",
                     lanes: Some(weighed),
                     ..run
-                });
+                }
             }
-            SampleKind::Pilot(planned, pilot) => {
-                ("is", planned.facts.samples.saturating_add(pilot.runs), &planned.facts.models)
+            SampleKind::Pilot(_) | SampleKind::Sequential => {
+                let lanes = lanes_at_most(options);
+                RunForecast {
+                    parts: parts_of_models(&options.models, &format!("estimator {}", options.estimator.key()), lanes),
+                    is_at_most: true,
+                    // The points of a level or pilot, with their limit states and the fit's responsibilities.
+                    more_bytes: lanes.min(MAX_HELD) * (self.density.space.parameters().len() as u64 + 8) * 8,
+                    more: "the points that are held at once",
+                    ..run
+                }
             }
-            SampleKind::Sequential(run) => {
-                let (samples, seed) = (run.options.stop.samples, run.options.seed);
-                let lanes = match &run.options.estimator {
-                    Estimator::Subset => {
-                        let options = Subset::new(seed, samples);
-                        options.samples_per_level.saturating_mul(options.levels as u64)
-                    }
-                    Estimator::CrossEntropy { .. } => {
-                        let options = CrossEntropy::new(seed, (samples / 10).max(2000), samples);
-                        samples.saturating_add(options.samples_per_level.saturating_mul(options.levels as u64))
-                    }
-                    Estimator::Pilot(pilot) => samples.saturating_add(pilot.runs),
-                    Estimator::Crude { .. } | Estimator::Given { .. } => samples,
-                };
-                (run.options.estimator.key(), lanes, &run.options.models)
-            }
-        };
-        // At most: how many levels there are is seen on the way.
-        Ok(RunForecast {
-            parts: parts_of_models(models, &format!("estimator {estimator}"), lanes),
-            is_at_most: true,
-            // The points of a level or pilot, with their limit states and the fit's responsibilities.
-            more_bytes: lanes.min(MAX_HELD) * (self.density().space.parameters().len() as u64 + 8) * 8,
-            more: "the points that are held at once",
-            ..run
         })
     }
 }
 
+/// Lanes of a driver model, at most: how many levels there are is seen on the way.
+fn lanes_at_most(options: &SampleOptions) -> u64 {
+    let (samples, seed) = (options.stop.samples, options.seed);
+    match &options.estimator {
+        Estimator::Subset => {
+            let subset = Subset::new(seed, samples);
+            subset.samples_per_level.saturating_mul(subset.levels as u64)
+        }
+        Estimator::CrossEntropy { .. } => {
+            let levels = CrossEntropy::new(seed, (samples / 10).max(2000), samples);
+            samples.saturating_add(levels.samples_per_level.saturating_mul(levels.levels as u64))
+        }
+        Estimator::Pilot(pilot) => samples.saturating_add(pilot.runs),
+        Estimator::Crude { .. } | Estimator::Given { .. } => samples,
+    }
+}
+
 /// Drawing and weighing cost more than the lanes, so all of it is measured.
-fn weighed(planned: &WeightedPlan, executor: &Executor) -> Result<Forecast> {
-    let facts = &planned.facts;
-    let most = facts.samples.min(planned.chunk_samples());
+fn weighed(sample: &Sample, proposals: &Proposals, executor: &Executor) -> Result<Forecast> {
+    let all = sample.samples();
+    let most = all.min(sample.chunk_samples());
     let (mut samples, mut took) = (most.min(256), 0.0);
     loop {
         let started = Instant::now();
-        planned.sample(&mut Ledger::new(0..samples, &[]), executor, |_| ())?;
+        sample.sample_weighted(proposals, &mut Ledger::new(0..samples, &[]), executor, |_| ())?;
         let last = std::mem::replace(&mut took, started.elapsed().as_secs_f64());
         if samples >= most || took + last >= BUDGET.as_secs_f64() / 2.0 {
             break;
         }
         samples = (2 * samples).min(most);
     }
-    let models = facts.models.len() as u64;
     Ok(Forecast {
-        lanes: facts.samples.saturating_mul(models),
-        seconds: took / samples as f64 * facts.samples as f64,
-        measured_lanes: samples * models,
+        lanes: sample.lane_count(),
+        seconds: took / samples as f64 * all as f64,
+        measured_lanes: samples * sample.options.models.len() as u64,
         lanes_at_once: most,
     })
 }

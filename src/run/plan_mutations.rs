@@ -6,13 +6,9 @@ use std::path::Path;
 use serde_json::value::RawValue;
 
 use crate::engine::Headway;
-use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::parts::seal;
-use crate::run::sampling::crude_plan::{self, CrudeFacts, CrudePlan};
-use crate::run::sampling::weighted_plan::{self, WeightedFacts, WeightedPlan};
-use crate::run::sampling::{MapAxes, SampleHeadways, SamplePlanOptions, SampleSource};
+use crate::run::sampling::{Estimator, MapAxes, Sample, SampleHeadways, SampleOptions, plan_file};
 use crate::run::study::Study;
 use crate::scenario::parameterization::Parameterization;
 use crate::scenario::{Category, Scenario};
@@ -38,40 +34,20 @@ fn a_changed_plan_is_an_error_or_a_plan_and_never_a_panic() {
     let options = FitOptions { representativeness: false, valid_draws: 100, ..FitOptions::default() };
     let id = Parameterization::find(Category::CutIn, "2").unwrap();
     let density = DensityModel::fit(id, &scenarios, &facts, &options).unwrap().model;
-    let headway = Headway::ThwS(0.6);
-    let plan_options = SamplePlanOptions {
-        samples: 1000,
-        seed: 1,
-        source: SampleSource::Random,
-        models: ModelId::ALL.to_vec(),
-        headways: SampleHeadways::Each(vec![headway]),
-    };
+    let headways = SampleHeadways::Each(vec![Headway::ThwS(0.6)]);
     let map = MapAxes::of(&density, "v_ego_mps", "v_target_mps").unwrap();
-    let crude = CrudeFacts { map: Some(map), worst: 3, ..CrudeFacts::new(&plan_options, &profile, &[]) };
-    let crude = CrudePlan::new(density.clone(), crude).unwrap().facts;
-    let proposal = density.mixture().unwrap();
-    let weighted = WeightedFacts {
-        density: String::new(),
-        proposals: Vec::new(),
-        pilot: None,
-        pilots: Vec::new(),
-        defence: 0.1,
-        profile: profile.clone(),
-        models: ModelId::ALL.to_vec(),
-        headway: Some(headway),
-        criterion: Criterion::Collision,
-        samples: 1000,
-        seed: 1,
-        level: 0.95,
-    };
-    let weighted = WeightedPlan::new(density, vec![proposal], weighted).unwrap().facts;
-    let text = |facts: serde_json::Result<String>| facts.unwrap();
-    let crude = text(serde_json::to_string(&crude));
-    try_all(crude_plan::KIND, &crude, &[], &|path| CrudePlan::read(path).map(drop));
-    let weighted = text(serde_json::to_string(&weighted));
-    try_all(weighted_plan::KIND, &weighted, &[], &|path| WeightedPlan::read(path).map(drop));
+    let crude =
+        SampleOptions { map: Some(map), worst: 3, ..SampleOptions::new(Estimator::CRUDE, 1000, headways.clone()) };
+    let given = Estimator::Given { proposals: vec![density.mixture().unwrap()], defence: 0.1 };
+    let weighted = SampleOptions::new(given, 1000, headways);
+    for options in [crude, weighted] {
+        let sample = Sample::plan(density.clone(), &profile, &options).unwrap();
+        let content = content_of(&sample.plan_file().unwrap().0).to_string();
+        try_all(plan_file::KIND, &content, &[], &|path| Sample::read(path).map(drop));
+    }
     let study = study_of(scenarios, |scenario| scenario.category == Category::Lvd);
-    try_all(Study::KIND, &content_of(&study).to_string(), &lines_of(&study), &|path| Study::read(path, None).map(drop));
+    let content = content_of(&study.seal().unwrap().0).to_string();
+    try_all(Study::KIND, &content, &lines_of(&study), &|path| Study::read(path, None).map(drop));
 }
 
 /// A study of the first six scenarios of a kind.
@@ -87,8 +63,8 @@ fn lines_of(study: &Study) -> Vec<u8> {
     lines
 }
 
-fn content_of(study: &Study) -> serde_json::Value {
-    let mut sealed: serde_json::Value = serde_json::from_slice(&study.seal().unwrap().0).unwrap();
+fn content_of(sealed: &[u8]) -> serde_json::Value {
+    let mut sealed: serde_json::Value = serde_json::from_slice(sealed).unwrap();
     sealed["content"].take()
 }
 
@@ -103,7 +79,7 @@ fn changed_scenarios_under_checksums_that_fit_are_an_error_or_scenarios_with_pla
     let path = dir.path().join("plan.json");
     for category in Category::ALL {
         let study = study_of(scenarios.clone(), |scenario| scenario.category == category);
-        let (lines, mut content) = (lines_of(&study), content_of(&study));
+        let (lines, mut content) = (lines_of(&study), content_of(&study.seal().unwrap().0));
         let (mut accepted, mut refused) = (0, 0);
         for input in 0..INPUTS {
             let dice = &mut mutate::Dice(input);

@@ -11,7 +11,8 @@ use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::{MODELS, ModelId};
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{
-    SampleHeadways, SamplePlanOptions, SampleSource, generator_of, generator_of_points, plan_points, plan_samples,
+    Estimator, SampleHeadways, SampleOptions, SampleSource, generator_of, generator_of_points, plan_points,
+    plan_samples,
 };
 use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions};
@@ -41,9 +42,9 @@ fn density_with(id: Parameterization, options: FitOptions) -> DensityModel {
     DensityModel::fit(id, scenarios(), &facts, &options).unwrap().model
 }
 
-fn options(samples: u64, source: SampleSource) -> SamplePlanOptions {
+fn options(samples: u64, source: SampleSource) -> SampleOptions {
     let headways = SampleHeadways::Each(vec![Headway::ThwS(1.4), Headway::ThwS(0.4)]);
-    SamplePlanOptions { samples, seed: 2026, source, models: ModelId::ALL.to_vec(), headways }
+    SampleOptions { seed: 2026, source, ..SampleOptions::new(Estimator::CRUDE, samples, headways) }
 }
 
 fn outcomes(plan: &LanePlan, backend: &dyn Backend, cuts: &[u64]) -> Vec<[u64; 12]> {
@@ -222,7 +223,7 @@ fn a_device_draws_headways_weighted_components_and_given_points_alike() {
         factor.fill_lower_triangle(0.05, 1);
         let other = Mixture::new(vec![1.0], vec![mean], vec![factor], vec![0]).unwrap();
         let mixture = Mixture::join(&[(0.7, &kernels), (0.3, &other)]).unwrap();
-        let options = SamplePlanOptions { headways: SampleHeadways::Sampled, ..options(n, SampleSource::Random) };
+        let options = SampleOptions { headways: SampleHeadways::Sampled, ..options(n, SampleSource::Random) };
         let plan = plan_samples(&density, &mixture, &profile, &options).unwrap();
         let ours = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
         assert!(ours == outcomes(&plan, &*backend, &[0, 77, n]), "{}", id.key);

@@ -10,7 +10,7 @@ use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{
-    SampleHeadways, SamplePlanOptions, SampleSource, ScenarioCounts, kernel_scenarios, plan_points, plan_samples,
+    Estimator, SampleHeadways, SampleOptions, ScenarioCounts, kernel_scenarios, plan_points, plan_samples,
     sample_by_scenario,
 };
 use lanesweep::run::study::{StudyOptions, plan_study};
@@ -200,13 +200,7 @@ fn with_the_bandwidth_a_density_tends_to_the_replays_of_its_scenarios() {
             bandwidth.value *= factor;
             let kde = Kde::from_parts(points.clone(), density.kde.scale().to_vec(), bandwidth).unwrap();
             let narrow = DensityModel { kde, ..density.clone() };
-            let options = SamplePlanOptions {
-                samples: 4000,
-                seed: 7,
-                source: SampleSource::Random,
-                models: ModelId::ALL.to_vec(),
-                headways: each.clone(),
-            };
+            let options = SampleOptions { seed: 7, ..SampleOptions::new(Estimator::CRUDE, 4000, each.clone()) };
             let plan = plan_samples(&narrow, &narrow.mixture().unwrap(), &profile, &options).unwrap();
             let executor = Executor::new(&cpu);
             let units = replayed.lanes.len();

@@ -10,9 +10,7 @@ use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::close_following::{CloseFollowing, close_units};
 use lanesweep::run::parts::Shard;
-use lanesweep::run::sampling::{
-    SampleHeadways, SamplePlanOptions, SampleSource, SampleTally, TallyOptions, plan_samples,
-};
+use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, SampleTally, plan_samples};
 use lanesweep::run::study::{Study, StudyOptions, plan_study};
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
@@ -162,12 +160,10 @@ fn a_density_with_headways_draws_its_own_and_counts_those_below_half_a_second() 
         let options = FitOptions { with_thw, representativeness: false, valid_draws: 1000, ..FitOptions::default() };
         DensityModel::fit(id.clone(), &data.scenarios, &facts, &options).unwrap().model
     };
-    let options = |headways| SamplePlanOptions {
-        samples: 3000,
+    let options = |headways| SampleOptions {
         seed: 5,
-        source: SampleSource::Random,
         models: vec![ModelId::Cchdm, ModelId::Fsm],
-        headways,
+        ..SampleOptions::new(Estimator::CRUDE, 3000, headways)
     };
     let paper = Profile::load("paper").unwrap();
     let plan_of = |density: &DensityModel, headways| {
@@ -177,7 +173,7 @@ fn a_density_with_headways_draws_its_own_and_counts_those_below_half_a_second() 
     assert!(error.help().unwrap_or_default().contains("with_thw"), "{error}");
     let density = fit(true);
     let plan = plan_of(&density, SampleHeadways::Sampled).unwrap();
-    let counting = TallyOptions { worst: 0, criterion: Criterion::Collision, map: None };
+    let counting = options(SampleHeadways::Sampled);
     let backend = CpuBackend::lane_arithmetic();
     let mut tally = SampleTally::empty(&plan, &counting);
     let mut expected = CloseFollowing { failures: vec![[0; 2]; 6], ..Default::default() };

@@ -7,10 +7,10 @@ use std::sync::OnceLock;
 use crate::common::program::{flat, lanesweep};
 use lanesweep::Place;
 use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, LaneRunner, Outcome, Wanted, words};
-use lanesweep::model::driver::{MODELS, ModelId};
+use lanesweep::model::driver::MODELS;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::read_sealed_line;
-use lanesweep::run::sampling::{SampleHeadways, SamplePlanOptions, SampleSource, plan_samples};
+use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, plan_samples};
 use lanesweep::run::study::{StudyHead, StudyOptions, plan_study};
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
@@ -170,12 +170,13 @@ fn sampled_lanes_are_the_runs_lanes_too() {
     for (category, key) in [(Category::CutIn, "2"), (Category::CutOut, "b"), (Category::Lvd, "iv")] {
         let id = Parameterization::find(category, key).unwrap();
         let density = DensityModel::fit(id, scenarios(), &facts, &options).unwrap().model;
-        let options = SamplePlanOptions {
-            samples: 5000,
+        let options = SampleOptions {
             seed: 3,
-            source: SampleSource::Random,
-            models: ModelId::ALL.to_vec(),
-            headways: SampleHeadways::Each(vec![Headway::ThwS(1.4), Headway::ThwS(0.4)]),
+            ..SampleOptions::new(
+                Estimator::CRUDE,
+                5000,
+                SampleHeadways::Each(vec![Headway::ThwS(1.4), Headway::ThwS(0.4)]),
+            )
         };
         let plan = plan_samples(&density, &density.mixture().unwrap(), &profile, &options).unwrap();
         let outcomes = CpuBackend::lane_arithmetic().prepare(&plan).unwrap();

@@ -9,16 +9,14 @@ use std::sync::OnceLock;
 use crate::common::program::lanesweep;
 use lanesweep::engine::{Backend, Chunk, CpuBackend, Executor, Headway, LanePlan, RecheckOptions, Wanted};
 use lanesweep::model::criterion::Criterion;
-use lanesweep::model::driver::{MODELS, ModelId};
+use lanesweep::model::driver::MODELS;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{
-    CrudeOptions, MapAxes, SampleHeadways, SamplePlanOptions, SampleSource, SampleTally, TallyOptions, plan_samples,
-    sample_crude,
+    Estimator, MapAxes, SampleHeadways, SampleOptions, SampleSource, SampleTally, plan_samples, sample_crude,
 };
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{DensityModel, FitOptions, Kde, read_density, write_density};
-use lanesweep::stats::estimate::{BinomialInterval, StopRule};
 use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
@@ -46,19 +44,17 @@ fn folder() -> (tempfile::TempDir, PathBuf) {
     (dir, path)
 }
 
+fn asked(samples: u64) -> SampleOptions {
+    let headways = SampleHeadways::Each(vec![Headway::ThwS(1.0), Headway::ThwS(0.4)]);
+    SampleOptions { seed: 5, ..SampleOptions::new(Estimator::CRUDE, samples, headways) }
+}
+
 fn plan(density: &DensityModel, samples: u64, profile: &Profile) -> LanePlan {
-    let options = SamplePlanOptions {
-        samples,
-        seed: 5,
-        source: SampleSource::Random,
-        models: ModelId::ALL.to_vec(),
-        headways: SampleHeadways::Each(vec![Headway::ThwS(1.0), Headway::ThwS(0.4)]),
-    };
-    plan_samples(density, &density.mixture().unwrap(), profile, &options).unwrap()
+    plan_samples(density, &density.mixture().unwrap(), profile, &asked(samples)).unwrap()
 }
 
 /// Counts in chunks that end at these samples, joined in the order given.
-fn tally(plan: &LanePlan, backend: &dyn Backend, ranges: &[(u64, u64)], options: &TallyOptions) -> SampleTally {
+fn tally(plan: &LanePlan, backend: &dyn Backend, ranges: &[(u64, u64)], options: &SampleOptions) -> SampleTally {
     let mut session = backend.prepare(plan).unwrap();
     ranges.iter().fold(SampleTally::empty(plan, options), |all, &(from, to)| {
         let chunk = session.run(from..to, Wanted::Outcomes).unwrap();
@@ -75,7 +71,7 @@ fn counts_and_worst_lanes_are_the_same_however_a_run_is_cut_up() {
         let plan = plan(&density, n, &profile);
         let names: Vec<&str> = density.space.parameters().iter().map(|p| p.name.as_str()).collect();
         let map = Some(MapAxes::of(&density, names[0], names[1]).unwrap());
-        let options = TallyOptions { worst: 12, criterion: Criterion::Collision, map };
+        let options = SampleOptions { worst: 12, map, ..asked(n) };
         let cpu = CpuBackend::lane_arithmetic();
         let whole = tally(&plan, &cpu, &[(0, n)], &options);
         assert!(whole.failures.iter().sum::<u64>() > 0 && whole.worst.iter().all(|w| w.len() == 12));
@@ -103,14 +99,7 @@ fn a_list_of_worst_lanes_is_the_same_where_only_lanes_that_may_enter_it_are_valu
     for (category, key) in [(Category::CutIn, "2"), (Category::CutOut, "b"), (Category::Lvd, "ii")] {
         let plan = plan(&density(category, key), 30_000, &profile);
         for criterion in Criterion::ALL {
-            let counting = TallyOptions { worst: 7, criterion, map: None };
-            let crude = CrudeOptions {
-                stop: StopRule::samples(30_000),
-                interval: BinomialInterval::Wilson,
-                level: 0.95,
-                exposure: None,
-                is_sampled_headway: false,
-            };
+            let counting = SampleOptions { worst: 7, criterion, ..asked(30_000) };
             let every_value = tally(&plan, &cpu, &[(0, 30_000)], &counting);
             let valued = std::cell::Cell::new(0);
             let sampled = |backend: &dyn Backend, range: std::ops::Range<u64>| {
@@ -121,7 +110,7 @@ fn a_list_of_worst_lanes_is_the_same_where_only_lanes_that_may_enter_it_are_valu
                     valued.set(valued.get() + few.unwrap_or(chunk.outcomes.len()));
                     Ok(())
                 };
-                sample_crude(&plan, range, &executor, &counting, &crude, of_chunk).unwrap().tally
+                sample_crude(&plan, range, &executor, &counting, None, of_chunk).unwrap().tally
             };
             assert!(every_value == sampled(&cpu, 0..30_000), "{key}, {criterion:?}");
             // The first samples are valued whole, and from then on about as many again as stand in the lists.
@@ -142,7 +131,7 @@ fn parts_of_different_runs_and_doubled_parts_do_not_join() {
     let profile = Profile::load("paper").unwrap();
     let density = density(Category::CutIn, "2");
     let (one, other) = (plan(&density, 500, &profile), plan(&density, 501, &profile));
-    let options = TallyOptions { worst: 2, criterion: Criterion::Ttc, map: None };
+    let options = SampleOptions { worst: 2, criterion: Criterion::Ttc, ..asked(500) };
     let cpu = CpuBackend::lane_arithmetic();
     let part = |plan: &LanePlan, from, to| tally(plan, &cpu, &[(from, to)], &options);
     assert!(part(&one, 0, 100).merge(part(&other, 100, 200)).is_err(), "two runs");

@@ -8,10 +8,9 @@ use lanesweep::engine::{Backend, CpuBackend, Executor, Headway, Wanted};
 use lanesweep::interop::openscenario::{
     DistributionSamples, Names, Rename, parse_distribution, read_distribution, variations,
 };
-use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
-use lanesweep::run::sampling::{SampleTally, TallyOptions};
+use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, SampleTally};
 use lanesweep::scenario::Category;
 
 fn example(name: &str) -> PathBuf {
@@ -65,7 +64,8 @@ fn a_sample_is_a_function_of_seed_and_index_and_parts_count_what_the_whole_count
     assert_ne!(draw(157, 7), draw(158, 7));
     let (plan, tries) = samples.plan((600, 157), &profile, &ModelId::ALL, &[]).unwrap();
     assert_eq!(tries, 600);
-    let counting = TallyOptions { worst: 5, criterion: Criterion::Collision, map: None };
+    let asked = SampleOptions::new(Estimator::CRUDE, 600, SampleHeadways::Sampled);
+    let counting = SampleOptions { worst: 5, ..asked };
     let tally = |units: std::ops::Range<u64>, backend: &dyn Backend| {
         let mut tally = SampleTally::empty(&plan, &counting);
         Executor::new(backend)

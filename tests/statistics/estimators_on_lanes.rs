@@ -12,15 +12,14 @@ use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{
-    CrudeOptions, LaneLimitState, SampleHeadways, SamplePlanOptions, SampleSource, TallyOptions, plan_samples,
-    sample_crude, truncated,
+    Estimator, LaneLimitState, SampleHeadways, SampleOptions, plan_samples, sample_crude, truncated,
 };
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{BandwidthRule, DensityModel, FitOptions, Kde};
 use lanesweep::stats::estimate::{
-    BinomialInterval, CrossEntropy, Estimate, Importance, Pilot, StopRule, Subset, Technique, Verdict,
-    balance_heuristic, cross_entropy, defended, from_pilot, subset, wilson,
+    CrossEntropy, Estimate, Importance, Pilot, Subset, Technique, Verdict, balance_heuristic, cross_entropy, defended,
+    from_pilot, subset, wilson,
 };
 use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_folder, mine_generated};
@@ -37,25 +36,16 @@ fn density(id: Parameterization, scenarios: &[Scenario]) -> DensityModel {
 }
 
 fn crude(density: &DensityModel, profile: &Profile, model: ModelId, thw_s: f64, samples: u64) -> Estimate {
-    let options = SamplePlanOptions {
-        samples,
+    let options = SampleOptions {
         seed: 99,
-        source: SampleSource::Random,
         models: vec![model],
-        headways: SampleHeadways::Each(vec![Headway::ThwS(thw_s)]),
+        level: LEVEL,
+        ..SampleOptions::new(Estimator::CRUDE, samples, SampleHeadways::Each(vec![Headway::ThwS(thw_s)]))
     };
     let plan = plan_samples(density, &density.mixture().unwrap(), profile, &options).unwrap();
     let backend = CpuBackend::lane_arithmetic();
     let executor = Executor::new(&backend);
-    let counting = TallyOptions { worst: 0, criterion: Criterion::Collision, map: None };
-    let crude = CrudeOptions {
-        stop: StopRule::samples(samples),
-        interval: BinomialInterval::Wilson,
-        level: LEVEL,
-        exposure: None,
-        is_sampled_headway: false,
-    };
-    let run = sample_crude(&plan, 0..samples, &executor, &counting, &crude, |_| Ok(())).unwrap();
+    let run = sample_crude(&plan, 0..samples, &executor, &options, None, |_| Ok(())).unwrap();
     run.rows.into_iter().find(|r| r.criterion == Criterion::Collision).unwrap().estimate
 }
 

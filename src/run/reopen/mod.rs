@@ -17,7 +17,7 @@ use crate::engine::{Headway, LaneKey, LanePlan};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::parts::{PLAN_FILE, kind_of};
-use crate::run::sampling::crude_plan::{self, CrudePlan};
+use crate::run::sampling::{Sample, SampleKind};
 use crate::run::study::{Study, StudyOptions, plan_study};
 use crate::scenario::Scenario;
 use crate::stats::density::DensityModel;
@@ -80,10 +80,13 @@ impl Reopened {
             return Err(Error::input(Place::file(dir), "there is no run here", help));
         }
         match kind_of(&plan)?.as_str() {
-            crude_plan::KIND => {
-                let CrudePlan { plan, density, .. } = CrudePlan::read(&plan)?.0;
-                Ok(Reopened::sample(plan, density))
-            }
+            kind if Sample::is_kind(kind) => match Sample::read(&plan)? {
+                Sample { kind: SampleKind::Crude(plan), density, .. } => Ok(Reopened::sample(*plan, density)),
+                _ => {
+                    let help = "give the folder of a run of crude Monte Carlo";
+                    Err(Error::input(Place::file(&plan), "importance sampling has no numbered lanes", help))
+                }
+            },
             // Its reader refuses every other kind.
             _ => Ok(Reopened::study(Study::read(&plan, None)?)),
         }

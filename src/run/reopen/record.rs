@@ -8,7 +8,7 @@ use crate::engine::{ENGINE_VERSION, Headway, LanePlan};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::parts::{PLAN_FILE, RUN_PLAN_FILE, kind_of};
-use crate::run::sampling::{SampleHeadways, SamplePlanOptions, SampleSource, mixture_of, plan_samples};
+use crate::run::sampling::{Estimator, SampleHeadways, SampleOptions, SampleSource, mixture_of, plan_samples};
 use crate::run::study::Study;
 use crate::stats::density::{DensityModel, read_density};
 use crate::support::input_file::{MAX_TABLE_BYTES, read_json};
@@ -80,16 +80,15 @@ impl SampleRecord {
         if self.estimator != "mc" {
             return Err(wrong(format!("a run of estimator `{}` has no numbered lanes", self.estimator)));
         }
-        let options = SamplePlanOptions {
-            samples: self.samples,
+        let headways = match density.space.has_thw() {
+            true => SampleHeadways::Sampled,
+            false => SampleHeadways::Each(self.plan_headways.clone()),
+        };
+        let options = SampleOptions {
             seed: self.seed,
             source: if self.points == "sobol" { SampleSource::Sobol } else { SampleSource::Random },
             models: self.models.clone(),
-            headways: if density.space.has_thw() {
-                SampleHeadways::Sampled
-            } else {
-                SampleHeadways::Each(self.plan_headways.clone())
-            },
+            ..SampleOptions::new(Estimator::CRUDE, self.samples, headways)
         };
         let plan = plan_samples(&density, &mixture_of(&density, &self.given)?, &self.profile, &options)?;
         if self.plan_sha256.as_deref() != Some(plan.hash()) {

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::kernels::{KernelCounts, MAX_GROUPS};
 use super::plan::SampleHeadways;
 use super::rows::EstimateRow;
-use super::sample::{Sample, SampleKind};
+use super::sample::Sample;
 use super::sample_result::SampleResult;
 use crate::engine::{CpuBackend, Executor, Headway, Wanted};
 use crate::model::criterion::Criterion;
@@ -96,53 +96,31 @@ fn replay(
 }
 
 impl Sample {
-    /// What S and S' are replayed with: from the recorded gaps where the density draws the headway. `None` where a condition
-    /// leaves nothing to compare.
-    fn replayed_with(&self) -> Option<(&Profile, &[ModelId], Vec<Headway>, f64)> {
-        let (profile, models, headways, level) = match &self.0 {
-            SampleKind::Crude(plan, _) if plan.facts.given.is_empty() => {
-                let headways = plan.facts.headways.clone().unwrap_or_else(|| vec![Headway::Observed]);
-                (&plan.facts.profile, &plan.facts.models, headways, plan.facts.level)
-            }
-            SampleKind::Crude(..) => return None,
-            SampleKind::Weighted(plan) | SampleKind::Pilot(plan, _) => {
-                let headway = plan.facts.headway.unwrap_or(Headway::Observed);
-                (&plan.facts.profile, &plan.facts.models, vec![headway], plan.facts.level)
-            }
-            SampleKind::Sequential(run) => {
-                let headways = match &run.options.headways {
-                    SampleHeadways::Each(headways) => headways.clone(),
-                    _ => vec![Headway::Observed],
-                };
-                (&run.profile, &run.options.models, headways, run.options.level)
-            }
-        };
-        Some((profile, models.as_slice(), headways, level))
-    }
-
     /// The result with its rates beside those of the recorded scenarios, and a warning where they differ, where too few
     /// failures tell, or where the density does not hold its scenarios.
     ///
     /// # Errors
     /// Of the lanes of S and S'.
     pub(super) fn against_recorded(&self, mut result: SampleResult) -> Result<SampleResult> {
-        let density = self.density();
-        let with = self.replayed_with().filter(|_| !density.scenarios.is_empty());
-        let counts = match &with {
-            Some((profile, models, headways, _)) => replay(density, profile, models, headways)?,
-            None => None,
+        let (density, options) = (&self.density, &self.options);
+        // From the recorded gaps where the density draws the headway. A condition leaves nothing to compare.
+        let headways = match &options.headways {
+            SampleHeadways::Each(headways) => headways.clone(),
+            SampleHeadways::Sampled => vec![Headway::Observed],
         };
-        let (Some([recorded, replayed]), Some((_, models, headways, level))) = (counts, with) else {
+        let is_comparable = options.given.is_empty() && !density.scenarios.is_empty();
+        let replayed = is_comparable.then(|| replay(density, &self.profile, &options.models, &headways));
+        let Some([recorded, replayed]) = replayed.transpose()?.flatten() else {
             result.rows.iter_mut().for_each(|row| row.estimate.trust.warn_if(true, Warning::NotCompared));
             return Ok(result);
         };
         let sampled = result.crude.as_ref().and_then(|crude| crude.tally.by_kernel.as_ref());
         for row in &mut result.rows {
-            let cells = cells_of(row, models, &headways);
+            let cells = cells_of(row, &options.models, &headways);
             let (runs, failures) = recorded.over(&cells);
             let s = Clusters { runs: &runs, failures: &failures };
             let ratio = |(runs, failures): (Vec<u64>, Vec<u64>)| {
-                paired_ratio(Clusters { runs: &runs, failures: &failures }, s, Enough::default(), level)
+                paired_ratio(Clusters { runs: &runs, failures: &failures }, s, Enough::default(), options.level)
             };
             let sampled = sampled.map(|counts: &KernelCounts| ratio(counts.over(&cells)));
             let ratios = RecordedRatios { replayed: ratio(replayed.over(&cells)), sampled };

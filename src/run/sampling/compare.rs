@@ -11,10 +11,12 @@
 
 use serde::Serialize;
 
-use super::crude::{CrudeOptions, sample_crude};
+use super::crude::sample_crude;
+use super::plan::SampleHeadways;
 use super::risk::Risk;
 use super::rows::EstimateRow;
-use super::tally::{SampleTally, TallyOptions};
+use super::sample_options::{Estimator, SampleOptions};
+use super::tally::SampleTally;
 use crate::engine::{Chunk, Confusion, Executor, LanePlan, Partial, SweepSummary};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -22,8 +24,7 @@ use crate::run::close_following::CloseFollowing;
 use crate::scenario::{Category, Scenario};
 use crate::stats::density::{DensityModel, Exposure};
 use crate::stats::estimate::{
-    BinomialInterval, Clusters, Enough, Estimate, Ratio, StopReason, StopRule, cluster_rate, from_clusters,
-    paired_ratio,
+    Clusters, Enough, Estimate, Ratio, StopReason, cluster_rate, from_clusters, paired_ratio,
 };
 use crate::{Error, Result};
 
@@ -150,16 +151,10 @@ pub fn sample_by_scenario(
     exposure: Option<&Exposure>,
     level: f64,
 ) -> Result<SampledScenarios> {
-    let counting = TallyOptions { worst: 0, criterion: Criterion::Collision, map: None };
-    let options = CrudeOptions {
-        stop: StopRule::samples(plan.unit_count()),
-        interval: BinomialInterval::Wilson,
-        level,
-        exposure,
-        is_sampled_headway: false,
-    };
+    let headways = SampleHeadways::Each(plan.headways.clone());
+    let options = SampleOptions { level, ..SampleOptions::new(Estimator::CRUDE, plan.unit_count(), headways) };
     let mut counts = ScenarioCounts::empty(scenarios, plan.models.len() * Criterion::ALL.len());
-    let run = sample_crude(plan, 0..plan.unit_count(), executor, &counting, &options, |chunk| {
+    let run = sample_crude(plan, 0..plan.unit_count(), executor, &options, exposure, |chunk| {
         counts.add(plan, chunk, kernels)
     })?;
     let is_over_all = |row: &EstimateRow| plan.headways.len() == 1 || row.headway == "all";

@@ -5,31 +5,18 @@ use std::time::Instant;
 
 use serde::Serialize;
 
+use super::plan::SampleHeadways;
 use super::rows::{EstimateRow, crude_rows};
-use super::tally::{SampleTally, TallyOptions};
+use super::sample_options::SampleOptions;
+use super::tally::SampleTally;
 use super::watch;
 use crate::engine::{Chunk, Executor, LanePlan, SweepSummary, Wanted};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::parts::Ledger;
 use crate::stats::density::Exposure;
-use crate::stats::estimate::{BinomialInterval, Checkpoints, StopReason, StopRule};
+use crate::stats::estimate::{Checkpoints, StopReason, StopRule};
 use crate::{Error, Place, Result};
-
-/// How estimates are made of counts.
-#[derive(Debug, Clone, Copy)]
-pub struct CrudeOptions<'a> {
-    /// When to end; looked at only where the whole run is sampled.
-    pub stop: StopRule,
-    /// Kind of interval.
-    pub interval: BinomialInterval,
-    /// Its level.
-    pub level: f64,
-    /// The exposure that risks follow from.
-    pub exposure: Option<&'a Exposure>,
-    /// The headway is a parameter of the density.
-    pub is_sampled_headway: bool,
-}
 
 /// The estimates after so many samples.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -69,8 +56,8 @@ pub struct CrudeRun {
     pub summary: SweepSummary,
 }
 
-/// Samples `range` of a plan that makes its own cases. The stop rules are looked at after 4,096·2^k samples. `each`
-/// takes every chunk (rows on request, progress).
+/// Samples `range` of a plan that makes its own cases; risks follow from the exposure. The stop rules are looked at after
+/// 4,096·2^k samples. `each` takes every chunk (rows on request, progress).
 ///
 /// # Errors
 /// [`Error::Usage`] for stop rules or an end beyond the plan with a range that is not the whole; of the backends; of
@@ -79,13 +66,13 @@ pub fn sample_crude(
     plan: &LanePlan,
     range: Range<u64>,
     executor: &Executor,
-    counting: &TallyOptions,
-    options: &CrudeOptions,
+    options: &SampleOptions,
+    exposure: Option<&Exposure>,
     each: impl FnMut(&Chunk) -> Result<()>,
 ) -> Result<CrudeRun> {
     let cuts = cuts(plan.unit_count(), &range);
     let mut ledger = Ledger::new(range, &cuts);
-    sample_into(plan, &mut ledger, executor, counting, options, false, each)
+    sample_into(plan, &mut ledger, executor, options, exposure, false, each)
 }
 
 /// The sample sizes at which a run of so many samples is looked at.
@@ -108,8 +95,8 @@ pub fn sample_into(
     plan: &LanePlan,
     ledger: &mut Ledger<SampleTally>,
     executor: &Executor,
-    counting: &TallyOptions,
-    options: &CrudeOptions,
+    options: &SampleOptions,
+    exposure: Option<&Exposure>,
     every_value: bool,
     mut each: impl FnMut(&Chunk) -> Result<()>,
 ) -> Result<CrudeRun> {
@@ -124,11 +111,11 @@ pub fn sample_into(
         ));
     }
     let is_whole = range == (0..plan.unit_count());
-    if !is_whole && (options.stop.relative_half_width.is_some() || options.stop.time_limit.is_some()) {
+    if !is_whole && !options.stop.is_fixed() {
         let problem = "a part of a run cannot tell when the whole is good enough";
         return Err(Error::usage(Place::option("shard"), problem, "leave the stop rules out, or option `shard`"));
     }
-    let mut tally = SampleTally::empty(plan, counting);
+    let mut tally = SampleTally::empty(plan, options);
     let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
     let mut convergence = Vec::new();
     let looks = checkpoints(plan.unit_count());
@@ -137,18 +124,18 @@ pub fn sample_into(
         let look = looks[looks.partition_point(|look| *look <= at).min(looks.len() - 1)];
         let next = if is_whole { look } else { range.end };
         for missing in ledger.missing(at..next)? {
-            let wanted = match (every_value, counting.worst) {
+            let wanted = match (every_value, options.worst) {
                 (true, _) => Wanted::Outcomes,
                 (false, 0) => Wanted::Verdicts,
                 (false, _) => {
                     // Whole segments only: a run that resumes in a segment wants of it what the first one wanted.
                     let known = ledger.counts(range.start..ledger.segment_start(missing.start))?;
-                    known.map_or(Wanted::Outcomes, |known| watch::wanted(plan, &known, counting))
+                    known.map_or(Wanted::Outcomes, |known| watch::wanted(plan, &known, options))
                 }
             };
             let part = executor.sweep(plan, missing, wanted, |chunk| {
                 each(&chunk)?;
-                ledger.add(SampleTally::of_chunk(plan, &chunk, counting)?, chunk.redone_and_rechecked)
+                ledger.add(SampleTally::of_chunk(plan, &chunk, options)?, chunk.redone_and_rechecked)
             });
             summary.add(&ledger.kept(part)?);
         }
@@ -159,12 +146,12 @@ pub fn sample_into(
             tally = tally.merge(counts)?;
         }
         at = next;
-        let rows = rows_of(plan, &tally, options, StopReason::Samples);
+        let rows = rows_of(plan, &tally, options, exposure, StopReason::Samples);
         if is_whole {
             convergence.push(Checkpoint { samples: at, rows: overall(&rows) });
         }
-        if let Some(stopped) = stopped(options, counting.criterion, &rows, at, range.end, started) {
-            let rows = rows_of(plan, &tally, options, stopped);
+        if let Some(stopped) = stopped(options, &rows, at, range.end, started) {
+            let rows = rows_of(plan, &tally, options, exposure, stopped);
             return Ok(CrudeRun { tally, rows, convergence, summary });
         }
     }
@@ -177,12 +164,12 @@ pub fn sample_into(
 pub fn crude_of_segments(
     plan: &LanePlan,
     mut segments: Vec<SampleTally>,
-    counting: &TallyOptions,
-    options: &CrudeOptions,
+    options: &SampleOptions,
+    exposure: Option<&Exposure>,
 ) -> Result<CrudeRun> {
     segments.sort_by_key(|segment| segment.covered().first().map_or(0, |range| range.start));
     let looks = checkpoints(plan.unit_count());
-    let mut tally = SampleTally::empty(plan, counting);
+    let mut tally = SampleTally::empty(plan, options);
     let mut convergence = Vec::new();
     for segment in segments {
         tally = tally.merge(segment)?;
@@ -191,20 +178,26 @@ pub fn crude_of_segments(
             && covered.start == 0
             && looks.contains(&covered.end)
         {
-            let rows = overall(&rows_of(plan, &tally, options, StopReason::Samples));
+            let rows = overall(&rows_of(plan, &tally, options, exposure, StopReason::Samples));
             convergence.push(Checkpoint { samples: covered.end, rows });
         }
     }
     if tally.samples() < plan.unit_count() {
         convergence.clear();
     }
-    let rows = rows_of(plan, &tally, options, StopReason::Samples);
+    let rows = rows_of(plan, &tally, options, exposure, StopReason::Samples);
     Ok(CrudeRun { tally, rows, convergence, summary: SweepSummary::default() })
 }
 
-fn rows_of(plan: &LanePlan, tally: &SampleTally, options: &CrudeOptions, stopped: StopReason) -> Vec<EstimateRow> {
-    let &CrudeOptions { interval, level, exposure, is_sampled_headway, .. } = options;
-    crude_rows(plan, tally, exposure, is_sampled_headway, interval, level, stopped)
+fn rows_of(
+    plan: &LanePlan,
+    tally: &SampleTally,
+    options: &SampleOptions,
+    exposure: Option<&Exposure>,
+    stopped: StopReason,
+) -> Vec<EstimateRow> {
+    let is_sampled_headway = options.headways == SampleHeadways::Sampled;
+    crude_rows(plan, tally, exposure, is_sampled_headway, options.estimator.interval(), options.level, stopped)
 }
 
 /// The rows over all headways.
@@ -223,15 +216,14 @@ fn overall(rows: &[EstimateRow]) -> Vec<CheckpointRow> {
 
 /// The widest of the criterion's intervals decides, over all models.
 fn stopped(
-    options: &CrudeOptions,
-    criterion: Criterion,
+    options: &SampleOptions,
     rows: &[EstimateRow],
     samples: u64,
     end: u64,
     started: Instant,
 ) -> Option<StopReason> {
     let has_all = rows.iter().any(|row| row.headway == "all");
-    let judged = rows.iter().filter(|r| r.criterion == criterion && (!has_all || r.headway == "all"));
+    let judged = rows.iter().filter(|r| r.criterion == options.criterion && (!has_all || r.headway == "all"));
     // More samples make the draws' share of the uncertainty smaller, never that of the data.
     let widest = judged.max_by(|a, b| a.draws_half_width().total_cmp(&b.draws_half_width()))?;
     let rule = StopRule { samples: end, ..options.stop };

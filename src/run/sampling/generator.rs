@@ -1,5 +1,7 @@
 //! From a parameter space and a mixture to the numbers that a case generator holds.
 
+use serde::{Deserialize, Serialize};
+
 use crate::engine::attention_rules;
 use crate::engine::generated::{
     CasePath, ColumnBound, Generator, LateralPath, MAX_BOUNDS, MAX_PARAMETERS, NO_SLOT, PointSource, Points, Recipe,
@@ -17,12 +19,23 @@ use crate::{Error, Place, Result};
 pub const SAMPLE_PURPOSE: u32 = 0x5341_4d50;
 
 /// Where points come from.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum SampleSource {
     /// Independent draws.
     Random,
     /// Scrambled Sobol points.
     Sobol,
+}
+
+impl SampleSource {
+    /// As files name it: `random`, `sobol`.
+    pub fn key(self) -> &'static str {
+        match self {
+            SampleSource::Random => "random",
+            SampleSource::Sobol => "sobol",
+        }
+    }
 }
 
 /// The generator that draws from a mixture over a parameter space.

@@ -1,5 +1,7 @@
 //! The lane plan of a sampling run: one block whose units are sample indices.
 
+use serde::{Deserialize, Serialize};
+
 use crate::engine::generated::Generator;
 use crate::engine::{Block, CaseSource, Headway, LaneCase, LanePlan, Units};
 use crate::model::driver::ModelId;
@@ -10,29 +12,16 @@ use crate::stats::random::SOBOL_POINTS;
 use crate::{Error, Place, Result};
 
 use super::generator::{SampleSource, generator_of, generator_of_points};
+use super::sample_options::SampleOptions;
 
 /// Initial headways of sampled lanes.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
 pub enum SampleHeadways {
     /// Every sample from each of these.
     Each(Vec<Headway>),
     /// The parameter `thw_s` of the density.
     Sampled,
-}
-
-/// What is sampled and how lanes run.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SamplePlanOptions {
-    /// Samples: indices below this count.
-    pub samples: u64,
-    /// Seed of the draws.
-    pub seed: u64,
-    /// Kind of points.
-    pub source: SampleSource,
-    /// Models, in order.
-    pub models: Vec<ModelId>,
-    /// Headways.
-    pub headways: SampleHeadways,
 }
 
 struct Generated(Generator);
@@ -62,18 +51,19 @@ pub fn plan_samples(
     density: &DensityModel,
     proposal: &Mixture,
     profile: &Profile,
-    options: &SamplePlanOptions,
+    options: &SampleOptions,
 ) -> Result<LanePlan> {
+    let samples = options.stop.samples;
     let place = || Place::option("samples");
-    if options.samples == 0 {
+    if samples == 0 {
         return Err(Error::usage(place(), "0 samples estimate nothing", "give 1000000, for instance"));
     }
-    if options.source == SampleSource::Sobol && options.samples > SOBOL_POINTS {
-        let problem = format!("{} Sobol points are asked for, {SOBOL_POINTS} there are", options.samples);
+    if options.source == SampleSource::Sobol && samples > SOBOL_POINTS {
+        let problem = format!("{samples} Sobol points are asked for, {SOBOL_POINTS} there are");
         return Err(Error::usage(place(), problem, "use independent random points beyond"));
     }
     let generator = generator_of(&density.space, proposal, &density.sizes, profile, options.source, options.seed)?;
-    plan(density, profile, generator, options.samples, &options.models, &options.headways)
+    plan(density, profile, generator, samples, &options.models, &options.headways)
 }
 
 /// The plan whose unit `i` is point `i`.

@@ -2,16 +2,17 @@
 
 use std::path::Path;
 
-use super::crude_plan::{self, CrudeFacts, CrudePlan};
-use super::plan::SamplePlanOptions;
-use super::sample_options::{Estimator, SampleOptions, one_headway};
-use super::sequential::Sequential;
-use super::weighted_plan::{self, WeightedFacts, WeightedPlan};
+use super::conditional::mixture_of;
+use super::plan::{plan_points, plan_samples};
+use super::plan_file::KIND;
+use super::sample_options::{Estimator, SampleOptions};
+use super::tally::SampleTally;
+use super::weighted_tally::WeightedTally;
 use crate::engine::{Executor, LanePlan};
 use crate::model::profile::Profile;
-use crate::run::parts::{kind_of, leave_plan};
-use crate::stats::density::DensityModel;
-use crate::stats::estimate::{BinomialInterval, Pilot, StopRule};
+use crate::run::parts::leave_plan;
+use crate::stats::density::{DensityModel, Exposure, Mixture};
+use crate::stats::estimate::{Pilot, PilotCheck};
 use crate::{Error, Place, Result};
 
 /// A sampling run ready to be run: whole, or one shard of it where its samples are independent.
@@ -56,18 +57,32 @@ use crate::{Error, Place, Result};
 /// # Ok(())
 /// # }
 /// ```
-pub struct Sample(pub(crate) SampleKind);
+pub struct Sample {
+    pub(crate) density: DensityModel,
+    pub(crate) profile: Profile,
+    pub(crate) options: SampleOptions,
+    pub(crate) kind: SampleKind,
+}
 
 /// By how it is run.
 pub(crate) enum SampleKind {
-    /// Crude Monte Carlo.
-    Crude(Box<CrudePlan>, StopRule),
+    /// Crude Monte Carlo: its lanes.
+    Crude(Box<LanePlan>),
     /// Importance sampling of a fixed number of samples.
-    Weighted(Box<WeightedPlan>),
+    Weighted(Proposals),
     /// The same, whose proposals are to be found.
-    Pilot(Box<WeightedPlan>, Pilot),
+    Pilot(Pilot),
     /// Adaptive, of several proposals, or with a stop rule.
-    Sequential(Box<Sequential>),
+    Sequential,
+}
+
+/// What importance sampling draws from.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Proposals {
+    /// One for all driver models, or one for each.
+    pub mixtures: Vec<Mixture>,
+    /// What the pilot of each driver model counted; empty for a given proposal.
+    pub pilots: Vec<PilotCheck>,
 }
 
 impl Sample {
@@ -76,84 +91,35 @@ impl Sample {
     /// # Errors
     /// [`Error::Usage`] for options that contradict one another or the density.
     pub fn plan(density: DensityModel, profile: &Profile, options: &SampleOptions) -> Result<Sample> {
-        let is_fixed = options.stop.relative_half_width.is_none() && options.stop.time_limit.is_none();
-        let weighted = |density, proposals, defence, pilot| {
-            let facts = WeightedFacts {
-                density: String::new(),
-                proposals: Vec::new(),
-                pilot,
-                pilots: Vec::new(),
-                defence,
-                profile: profile.clone(),
-                models: options.models.clone(),
-                headway: one_headway(options)?,
-                criterion: options.criterion,
-                samples: options.stop.samples,
-                seed: options.seed,
-                level: options.level,
-            };
-            WeightedPlan::new(density, proposals, facts).map(Box::new)
+        let kind = match &options.estimator {
+            Estimator::Crude { .. } => {
+                let mixture = mixture_of(&density, &options.given)?;
+                SampleKind::Crude(Box::new(plan_samples(&density, &mixture, profile, options)?))
+            }
+            Estimator::Pilot(pilot) if options.stop.is_fixed() => SampleKind::Pilot(*pilot),
+            Estimator::Given { proposals, .. } if options.stop.is_fixed() && proposals.len() == 1 => {
+                SampleKind::Weighted(Proposals { mixtures: proposals.clone(), pilots: Vec::new() })
+            }
+            _ => SampleKind::Sequential,
         };
-        Ok(Sample(match &options.estimator {
-            Estimator::Crude { points, interval } => {
-                let plan_options = SamplePlanOptions {
-                    samples: options.stop.samples,
-                    seed: options.seed,
-                    source: *points,
-                    models: options.models.clone(),
-                    headways: options.headways.clone(),
-                };
-                let facts = CrudeFacts {
-                    criterion: options.criterion,
-                    worst: options.worst,
-                    map: options.map.clone(),
-                    clopper_pearson: *interval == BinomialInterval::ClopperPearson,
-                    level: options.level,
-                    ..CrudeFacts::new(&plan_options, profile, &options.given)
-                };
-                SampleKind::Crude(Box::new(CrudePlan::new(density, facts)?), options.stop)
-            }
-            Estimator::Pilot(pilot) if is_fixed => {
-                SampleKind::Pilot(weighted(density, Vec::new(), pilot.defence, Some(*pilot))?, *pilot)
-            }
-            Estimator::Given { proposals, defence } if is_fixed && proposals.len() == 1 => {
-                SampleKind::Weighted(weighted(density, proposals.clone(), *defence, None)?)
-            }
-            _ => SampleKind::Sequential(Box::new(Sequential::new(density, profile, options)?)),
-        }))
+        let sample = Sample { density, profile: profile.clone(), options: options.clone(), kind };
+        sample.check_lanes()?;
+        Ok(sample)
     }
 
-    /// Reads a plan file.
-    ///
-    /// # Errors
-    /// [`Error::Io`]; [`Error::Input`] for anything but a whole plan of this version.
-    pub fn read(path: &Path) -> Result<Sample> {
-        if kind_of(path)? == weighted_plan::KIND {
-            return Ok(Sample(SampleKind::Weighted(Box::new(WeightedPlan::read(path)?.0))));
+    /// One point as lanes where estimators make them on the way: complains before any work about what every point would.
+    pub(super) fn check_lanes(&self) -> Result<()> {
+        if matches!(self.kind, SampleKind::Crude(_)) {
+            return Ok(());
         }
-        let plan = CrudePlan::read(path)?.0;
-        let stop = StopRule::samples(plan.facts.samples);
-        Ok(Sample(SampleKind::Crude(Box::new(plan), stop)))
+        self.options.check_headways()?;
+        let first = self.density.kde.points()[0].clone();
+        plan_points(&self.density, &[first], &self.profile, &self.options.models, &self.options.headways).map(drop)
     }
 
     /// Whether a sealed file of this kind is the plan of a sampling run.
     pub fn is_kind(kind: &str) -> bool {
-        kind == crude_plan::KIND || kind == weighted_plan::KIND
-    }
-
-    /// Finds the proposals where a pilot has to; they are kept in the folder, so that an interrupted run need not
-    /// search again.
-    ///
-    /// # Errors
-    /// Of the lanes; [`Error::Io`].
-    pub fn searched(self, executor: &Executor, out: Option<&Path>) -> Result<Sample> {
-        Ok(Sample(match self.0 {
-            SampleKind::Pilot(plan, pilot) => {
-                let found = plan.after_pilot(out, |plan| plan.pilots(&pilot, executor))?;
-                SampleKind::Weighted(Box::new(found))
-            }
-            other => other,
-        }))
+        kind == KIND
     }
 
     /// Writes the plan file into a run's folder, or finds the same one there: many shards may do so at once.
@@ -168,10 +134,9 @@ impl Sample {
 
     /// The plan file's text and the hash of the run.
     pub(super) fn seal(&self) -> Result<(Vec<u8>, String)> {
-        match &self.0 {
-            SampleKind::Crude(plan, _) => plan.seal(),
-            SampleKind::Weighted(plan) => plan.seal(),
-            SampleKind::Pilot(..) | SampleKind::Sequential(_) => {
+        match &self.kind {
+            SampleKind::Crude(_) | SampleKind::Weighted(_) => self.plan_file(),
+            SampleKind::Pilot(_) | SampleKind::Sequential => {
                 let problem = "the adaptive estimators are sequential: they make no shards";
                 let help = "use crude Monte Carlo, or importance sampling with one given proposal";
                 Err(Error::usage(Place::item("estimator"), problem, help))
@@ -181,56 +146,65 @@ impl Sample {
 
     /// The density.
     pub fn density(&self) -> &DensityModel {
-        match &self.0 {
-            SampleKind::Crude(plan, _) => &plan.density,
-            SampleKind::Weighted(plan) | SampleKind::Pilot(plan, _) => &plan.density,
-            SampleKind::Sequential(run) => &run.density,
-        }
+        &self.density
     }
 
     /// The plan of crude Monte Carlo, whose lanes are numbered.
     pub fn lane_plan(&self) -> Option<&LanePlan> {
-        match &self.0 {
-            SampleKind::Crude(plan, _) => Some(&plan.plan),
+        match &self.kind {
+            SampleKind::Crude(plan) => Some(plan),
             _ => None,
         }
     }
 
     /// Samples, at most; of subset simulation per level.
     pub fn samples(&self) -> u64 {
-        match &self.0 {
-            SampleKind::Crude(plan, _) => plan.facts.samples,
-            SampleKind::Weighted(plan) | SampleKind::Pilot(plan, _) => plan.facts.samples,
-            SampleKind::Sequential(run) => run.options.stop.samples,
-        }
+        self.options.stop.samples
     }
 
     /// Lanes of a run of a fixed number of samples.
     pub fn lane_count(&self) -> u64 {
-        match &self.0 {
-            SampleKind::Crude(plan, _) => plan.plan.lane_count(),
-            SampleKind::Weighted(plan) | SampleKind::Pilot(plan, _) => {
-                plan.facts.samples.saturating_mul(plan.facts.models.len() as u64)
-            }
-            SampleKind::Sequential(run) => self.samples().saturating_mul(run.options.models.len() as u64),
-        }
+        let by_models = || self.samples().saturating_mul(self.options.models.len() as u64);
+        self.lane_plan().map_or_else(by_models, LanePlan::lane_count)
     }
 
-    /// Seed of the draws.
-    pub fn seed(&self) -> u64 {
-        match &self.0 {
-            SampleKind::Crude(plan, _) => plan.facts.seed,
-            SampleKind::Weighted(plan) | SampleKind::Pilot(plan, _) => plan.facts.seed,
-            SampleKind::Sequential(run) => run.options.seed,
-        }
+    /// The exposure that risks follow from: how often scenarios with given values occur is not known.
+    pub(super) fn exposure(&self) -> Option<&Exposure> {
+        self.density.exposure.as_ref().filter(|_| self.options.given.is_empty())
     }
 
-    /// Whether the proposals were given, not found.
-    pub fn has_given_proposals(&self) -> bool {
-        match &self.0 {
-            SampleKind::Crude(..) | SampleKind::Pilot(..) => false,
-            SampleKind::Weighted(plan) => plan.facts.pilot.is_none(),
-            SampleKind::Sequential(run) => matches!(run.options.estimator, Estimator::Given { .. }),
+    /// Whether counts that were read from a file can be those of a plan of crude Monte Carlo.
+    ///
+    /// # Errors
+    /// What differs.
+    pub(super) fn check_tally(&self, plan: &LanePlan, tally: &SampleTally) -> std::result::Result<(), String> {
+        let joined = SampleTally::empty(plan, &self.options).merge(tally.clone());
+        joined.map(drop).map_err(|error| error.to_string())
+    }
+
+    /// Whether sums that were read from a file can be those of this run.
+    ///
+    /// # Errors
+    /// What differs.
+    pub(super) fn check_sums(&self, tally: &WeightedTally) -> std::result::Result<(), String> {
+        let is_ours = tally.sums.iter().map(|(model, _)| model).eq(&self.options.models);
+        if is_ours { Ok(()) } else { Err("they are of other driver models".to_owned()) }
+    }
+
+    /// Finds the proposals where a pilot has to; they are kept in the folder, so that an interrupted run need not
+    /// search again. Both have the same bits; a pilot takes its time.
+    ///
+    /// # Errors
+    /// Of the lanes; [`Error::Io`].
+    pub fn searched(self, executor: &Executor, out: Option<&Path>) -> Result<Sample> {
+        let SampleKind::Pilot(pilot) = self.kind else { return Ok(self) };
+        if let Some(kept) = out.map(|out| self.kept_pilot(out)).transpose()?.flatten() {
+            tracing::info!("the pilot is done already");
+            return Ok(kept);
         }
+        let kind = SampleKind::Weighted(self.pilots(&pilot, executor)?);
+        let found = Sample { kind, ..self };
+        out.map_or(Ok(()), |out| found.keep_pilot(out))?;
+        Ok(found)
     }
 }

@@ -1,4 +1,6 @@
-//! What a sampling run is asked for.
+//! What a sampling run is asked for: as flags and settings give it, as its plan file holds it and as its record tells it.
+
+use serde::{Deserialize, Serialize};
 
 use super::generator::SampleSource;
 use super::map::MapAxes;
@@ -11,12 +13,11 @@ use crate::stats::estimate::{BinomialInterval, Pilot, StopRule};
 use crate::{Error, Place, Result};
 
 /// How probabilities are estimated.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case", deny_unknown_fields)]
 pub enum Estimator {
     /// Crude Monte Carlo.
     Crude {
-        /// Kind of points.
-        points: SampleSource,
         /// Kind of interval.
         interval: BinomialInterval,
     },
@@ -24,7 +25,8 @@ pub enum Estimator {
     Pilot(Pilot),
     /// Importance sampling of given proposals; several are combined by the balance heuristic.
     Given {
-        /// One for all driver models, or several.
+        /// One for all driver models, or several. A plan file holds them beside.
+        #[serde(skip)]
         proposals: Vec<Mixture>,
         /// Defensive mixture weight: the density's share in each proposal.
         defence: f64,
@@ -39,8 +41,8 @@ pub enum Estimator {
 }
 
 impl Estimator {
-    /// Crude Monte Carlo with independent points and Wilson's interval.
-    pub const CRUDE: Estimator = Estimator::Crude { points: SampleSource::Random, interval: BinomialInterval::Wilson };
+    /// Crude Monte Carlo with Wilson's interval.
+    pub const CRUDE: Estimator = Estimator::Crude { interval: BinomialInterval::Wilson };
 
     /// As files name it: `mc`, `is`, `ce`, `subset`.
     pub fn key(&self) -> &'static str {
@@ -51,15 +53,36 @@ impl Estimator {
             Estimator::Subset => "subset",
         }
     }
+
+    /// Kind of interval of crude Monte Carlo.
+    pub(super) fn interval(&self) -> BinomialInterval {
+        match self {
+            Estimator::Crude { interval } => *interval,
+            _ => BinomialInterval::Wilson,
+        }
+    }
+
+    /// Defensive mixture weight: the density's share in each proposal.
+    pub fn defence(&self) -> f64 {
+        match self {
+            Estimator::Crude { .. } | Estimator::Subset => 0.0,
+            Estimator::Pilot(Pilot { defence, .. })
+            | Estimator::Given { defence, .. }
+            | Estimator::CrossEntropy { defence } => *defence,
+        }
+    }
 }
 
 /// What a sampling run is asked for.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct SampleOptions {
     /// Estimator.
     pub estimator: Estimator,
     /// When to end. A rule beside the number of samples makes a run that cannot be split.
     pub stop: StopRule,
+    /// Kind of points (crude).
+    pub source: SampleSource,
     /// Models, in order.
     pub models: Vec<ModelId>,
     /// Headways: only crude Monte Carlo takes several.
@@ -72,18 +95,19 @@ pub struct SampleOptions {
     pub level: f64,
     /// Parameters that are given, with their values (crude).
     pub given: Vec<(String, f64)>,
-    /// Worst lanes to list per model (crude).
+    /// Worst lanes to list per model (crude); 0 needs verdicts only.
     pub worst: usize,
     /// Axes of the failure map (crude).
     pub map: Option<MapAxes>,
 }
 
 impl SampleOptions {
-    /// All models from these headways, collisions, seed 157, level 0.95.
+    /// Independent points, all models from these headways, collisions, seed 157, level 0.95.
     pub fn new(estimator: Estimator, samples: u64, headways: SampleHeadways) -> SampleOptions {
         SampleOptions {
             estimator,
             stop: StopRule::samples(samples),
+            source: SampleSource::Random,
             models: ModelId::ALL.to_vec(),
             headways,
             criterion: Criterion::Collision,
@@ -94,19 +118,29 @@ impl SampleOptions {
             map: None,
         }
     }
-}
 
-/// The one headway of an estimator that weighs; `None` where the density draws it.
-pub(super) fn one_headway(options: &SampleOptions) -> Result<Option<Headway>> {
-    match &options.headways {
-        SampleHeadways::Sampled => Ok(None),
-        SampleHeadways::Each(list) => match list[..] {
-            [one] => Ok(Some(one)),
-            _ => Err(Error::usage(
+    /// Refuses several headways where the estimator weighs.
+    pub(super) fn check_headways(&self) -> Result<()> {
+        match &self.headways {
+            SampleHeadways::Each(list) if list.len() != 1 => Err(Error::usage(
                 Place::item("headways"),
-                format!("estimator {} follows one headway at a time", options.estimator.key()),
+                format!("estimator {} follows one headway at a time", self.estimator.key()),
                 "give one, or a density that draws the headway",
             )),
-        },
+            _ => Ok(()),
+        }
+    }
+
+    /// Headways; none where the density draws them.
+    pub fn headways(&self) -> &[Headway] {
+        match &self.headways {
+            SampleHeadways::Each(list) => list,
+            SampleHeadways::Sampled => &[],
+        }
+    }
+
+    /// The one headway's name in tables.
+    pub(crate) fn headway_name(&self) -> String {
+        self.headways().first().map_or_else(|| "sampled".to_owned(), Headway::to_string)
     }
 }

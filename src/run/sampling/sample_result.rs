@@ -4,12 +4,9 @@ use serde::Serialize;
 
 use super::crude::CrudeRun;
 use super::rows::EstimateRow;
-use super::weighted_plan::WeightedPlan;
-use super::weighted_tally::WeightedTally;
 use crate::model::driver::ModelId;
 use crate::stats::density::Mixture;
 use crate::stats::estimate::{CrossEntropyStep, SubsetLevel};
-use crate::{Place, Result};
 
 /// How an adaptive estimator went.
 #[derive(Debug, Clone, PartialEq, Serialize)]
@@ -42,11 +39,5 @@ impl SampleResult {
     pub(super) fn of_crude(mut run: CrudeRun) -> SampleResult {
         let (rows, rechecked_lanes) = (std::mem::take(&mut run.rows), run.summary.rechecked_lanes);
         SampleResult { rows, rechecked_lanes, crude: Some(run), ..SampleResult::default() }
-    }
-
-    pub(super) fn of_weighted(plan: &WeightedPlan, tally: Option<WeightedTally>, place: Place) -> Result<SampleResult> {
-        let found = plan.facts.models.iter().copied().zip(plan.proposals.iter().cloned());
-        let proposals = found.filter(|_| plan.facts.pilot.is_some()).collect();
-        Ok(SampleResult { rows: plan.rows(tally, place)?, proposals, ..SampleResult::default() })
     }
 }

@@ -4,14 +4,14 @@ use std::ops::Range;
 use std::path::Path;
 
 use super::crude::{CrudeRun, crude_of_segments, cuts, sample_into};
-use super::sample::{Sample, SampleKind};
+use super::plan_file::PILOT_FILE;
+use super::sample::{Proposals, Sample, SampleKind};
+use super::sample_options::Estimator;
 use super::sample_result::SampleResult;
 use super::tally::SampleTally;
-use super::weighted_plan::PILOT_FILE;
 use super::weighted_tally::WeightedTally;
 use crate::engine::{Chunk, Executor};
 use crate::run::parts::{Countable, Ledger, PLAN_FILE, RunDir, RunState, Shard, read_parts, units_of};
-use crate::stats::estimate::StopRule;
 use crate::support::run_dir::{ESTIMATE_RECORD, Results};
 use crate::{Error, Place, Result};
 
@@ -42,24 +42,22 @@ impl Sample {
     }
 
     fn sampled(&self, executor: &Executor) -> Result<SampleResult> {
-        match &self.0 {
-            SampleKind::Crude(plan, stop) => {
-                let units = plan.plan.unit_count();
-                let (mut ledger, counting) = (Ledger::new(0..units, &cuts(units, &(0..units))), plan.counting());
-                let options = plan.options(*stop);
-                let run = sample_into(&plan.plan, &mut ledger, executor, &counting, &options, false, |_| Ok(()))?;
+        let units = 0..self.samples();
+        let weighted = |proposals: &Proposals| {
+            let mut ledger = Ledger::new(units.clone(), &[]);
+            self.sample_weighted(proposals, &mut ledger, executor, |_| ())?;
+            self.weighted_result(proposals, ledger.take()?, Place::item("samples"))
+        };
+        match &self.kind {
+            SampleKind::Crude(plan) => {
+                let mut ledger = Ledger::new(units.clone(), &cuts(units.end, &units));
+                let (options, exposure) = (&self.options, self.exposure());
+                let run = sample_into(plan, &mut ledger, executor, options, exposure, false, |_| Ok(()))?;
                 Ok(SampleResult::of_crude(run))
             }
-            SampleKind::Weighted(plan) => {
-                let mut ledger = Ledger::new(0..plan.facts.samples, &[]);
-                plan.sample(&mut ledger, executor, |_| ())?;
-                SampleResult::of_weighted(plan, ledger.take()?, Place::item("samples"))
-            }
-            SampleKind::Pilot(plan, pilot) => {
-                let found = plan.as_ref().clone().after_pilot(None, |plan| plan.pilots(pilot, executor))?;
-                Sample(SampleKind::Weighted(Box::new(found))).sampled(executor)
-            }
-            SampleKind::Sequential(run) => run.run(executor),
+            SampleKind::Weighted(proposals) => weighted(proposals),
+            SampleKind::Pilot(pilot) => weighted(&self.pilots(pilot, executor)?),
+            SampleKind::Sequential => self.run_sequential(executor),
         }
     }
 
@@ -72,23 +70,23 @@ impl Sample {
     pub fn open(&self, out: &Path, shard: Option<Shard>, is_journalled: bool) -> Result<Option<SampleRun<'_>>> {
         let (run_sha256, unit_count) = (self.seal()?.1, self.samples());
         let run_dir = RunDir { out: out.to_path_buf(), record: ESTIMATE_RECORD, run_sha256, shard, unit_count };
-        let state = match &self.0 {
-            SampleKind::Crude(plan, _) => {
-                let fits = |tally: &SampleTally| plan.check(tally);
+        let state = match &self.kind {
+            SampleKind::Crude(plan) => {
+                let fits = |tally: &SampleTally| self.check_tally(plan, tally);
                 if run_dir.is_done(&fits)? {
                     return Ok(None);
                 }
                 let cuts = cuts(unit_count, &units_of(shard, unit_count));
                 State::Crude(Box::new(run_dir.begin(&cuts, is_journalled, &fits)?))
             }
-            SampleKind::Weighted(plan) => {
-                let fits = |tally: &WeightedTally| plan.check(tally);
+            SampleKind::Weighted(_) => {
+                let fits = |tally: &WeightedTally| self.check_sums(tally);
                 if run_dir.is_done(&fits)? {
                     return Ok(None);
                 }
                 State::Weighted(Box::new(run_dir.begin(&[], is_journalled, &fits)?))
             }
-            SampleKind::Pilot(..) | SampleKind::Sequential(_) => {
+            SampleKind::Pilot(_) | SampleKind::Sequential => {
                 return Err(Error::Internal("a run that cannot be split was opened in a folder".to_owned()));
             }
         };
@@ -118,31 +116,29 @@ impl Sample {
     pub(crate) fn merge_or(out: &Path, again: &dyn Fn(Shard) -> String) -> Result<(Sample, SampleResult)> {
         let sample = Sample::read(&out.join(PLAN_FILE))?;
         let run_sha256 = sample.seal()?.1;
-        let result = match &sample.0 {
-            SampleKind::Crude(planned, _) => {
-                let (plan, counting) = (&planned.plan, planned.counting());
-                let parts = read_parts(out, &run_sha256, plan.unit_count(), again, &|tally| planned.check(tally))?;
+        let result = match &sample.kind {
+            SampleKind::Crude(plan) => {
+                let fits = |tally: &SampleTally| sample.check_tally(plan, tally);
+                let parts = read_parts(out, &run_sha256, plan.unit_count(), again, &fits)?;
                 let rechecked_lanes = parts.iter().map(|part| part.lanes_redone_and_rechecked[1]).sum();
                 let count = parts.len();
                 let segments = parts.into_iter().flat_map(|part| part.segments).collect();
-                let options = planned.options(StopRule::samples(planned.facts.samples));
-                let crude = crude_of_segments(plan, segments, &counting, &options)?;
+                let crude = crude_of_segments(plan, segments, &sample.options, sample.exposure())?;
                 if crude.tally.samples() != plan.unit_count() {
                     let problem = "the parts do not hold every sample that their names stand for";
                     return Err(Error::input(Place::file(out), problem, "make them again"));
                 }
                 SampleResult { parts: count, rechecked_lanes, ..SampleResult::of_crude(crude) }
             }
-            SampleKind::Weighted(planned) => {
-                let samples = planned.facts.samples;
-                let parts = read_parts(out, &run_sha256, samples, again, &|tally| planned.check(tally))?;
+            SampleKind::Weighted(proposals) => {
+                let parts = read_parts(out, &run_sha256, sample.samples(), again, &|tally| sample.check_sums(tally))?;
                 let count = parts.len();
                 let mut segments = parts.into_iter().flat_map(|part| part.segments);
                 let first = segments.next();
                 let tally = first.map(|first| segments.try_fold(first, WeightedTally::join)).transpose()?;
-                SampleResult { parts: count, ..SampleResult::of_weighted(planned, tally, Place::file(out))? }
+                SampleResult { parts: count, ..sample.weighted_result(proposals, tally, Place::file(out))? }
             }
-            SampleKind::Pilot(..) | SampleKind::Sequential(_) => {
+            SampleKind::Pilot(_) | SampleKind::Sequential => {
                 return Err(Error::Internal("a plan file of a run that cannot be split".to_owned()));
             }
         };
@@ -185,30 +181,23 @@ impl SampleRun<'_> {
         mut chunks: Option<&mut EachChunk>,
     ) -> Result<()> {
         let _resumable = self.is_journalled.then(|| executor.cancel.resumable());
-        match (&mut self.state, &self.sample.0) {
-            (State::Crude(state), SampleKind::Crude(planned, stop)) => {
+        match (&mut self.state, &self.sample.kind) {
+            (State::Crude(state), SampleKind::Crude(plan)) => {
                 if state.units.is_empty() {
                     return Ok(());
                 }
-                let (counting, every_value) = (planned.counting(), chunks.is_some());
-                let options = planned.options(*stop);
+                let (options, exposure) = (&self.sample.options, self.sample.exposure());
+                let every_value = chunks.is_some();
                 let each = |chunk: &Chunk| {
                     progress(chunk.units.end - chunk.units.start);
                     chunks.as_mut().map_or(Ok(()), |each| each(chunk))
                 };
-                self.crude = Some(sample_into(
-                    &planned.plan,
-                    &mut state.ledger,
-                    executor,
-                    &counting,
-                    &options,
-                    every_value,
-                    each,
-                )?);
+                let run = sample_into(plan, &mut state.ledger, executor, options, exposure, every_value, each)?;
+                self.crude = Some(run);
                 Ok(())
             }
-            (State::Weighted(state), SampleKind::Weighted(planned)) => {
-                planned.sample(&mut state.ledger, executor, progress)
+            (State::Weighted(state), SampleKind::Weighted(proposals)) => {
+                self.sample.sample_weighted(proposals, &mut state.ledger, executor, progress)
             }
             _ => Err(Error::Internal("a run has the counts of another estimator".to_owned())),
         }
@@ -230,10 +219,10 @@ impl SampleRun<'_> {
     /// # Errors
     /// [`Error::Internal`] before anything was sampled; of the lanes of recorded scenarios.
     pub fn take_result(&mut self) -> Result<SampleResult> {
-        let result = match (&mut self.state, &self.sample.0) {
-            (State::Weighted(state), SampleKind::Weighted(planned)) => {
-                let tally = state.ledger.counts(0..planned.facts.samples)?;
-                SampleResult::of_weighted(planned, tally, Place::file(&self.run_dir.out))?
+        let result = match (&mut self.state, &self.sample.kind) {
+            (State::Weighted(state), SampleKind::Weighted(proposals)) => {
+                let tally = state.ledger.counts(0..self.sample.samples())?;
+                self.sample.weighted_result(proposals, tally, Place::file(&self.run_dir.out))?
             }
             _ => {
                 let nothing = || Error::Internal("nothing was sampled".to_owned());
@@ -259,9 +248,7 @@ impl SampleRun<'_> {
     /// # Errors
     /// [`Error::Io`].
     pub fn close(self) -> Result<()> {
-        if let SampleKind::Weighted(planned) = &self.sample.0
-            && planned.facts.pilot.is_some()
-        {
+        if matches!(self.sample.options.estimator, Estimator::Pilot(_)) {
             // The journal that needs it goes next; without it the next run's pilot has the same bits.
             let path = self.run_dir.out.join(PILOT_FILE);
             match std::fs::remove_file(&path) {

@@ -1,67 +1,33 @@
 //! Estimators that decide on the way what to sample next: they run in one piece.
 
 use super::lanes::{LaneLimitState, scenario_shares, truncated};
-use super::plan::plan_points;
-use super::rows::EstimateRow;
-use super::sample_options::{Estimator, SampleOptions, one_headway};
+use super::sample::Sample;
+use super::sample_options::{Estimator, SampleOptions};
 use super::sample_result::{Levels, SampleResult};
-use super::weighted::fitted;
 use crate::Result;
 use crate::engine::Executor;
-use crate::model::profile::Profile;
-use crate::stats::density::{DensityModel, Mixture};
+use crate::stats::density::Mixture;
 use crate::stats::estimate::{
-    CrossEntropy, Defended, Density, Estimate, Importance, Pilot, Subset, Technique, balance_heuristic, cross_entropy,
+    CrossEntropy, Defended, Density, Estimate, Importance, Subset, Technique, balance_heuristic, cross_entropy,
     defended, from_pilot, importance, subset,
 };
 
 /// Draws that the valid share of each of several proposals is counted on.
 const VALIDITY_DRAWS: u64 = 1_000_000;
 
-/// A run of such an estimator, at one headway.
-pub(crate) struct Sequential {
-    pub density: DensityModel,
-    pub profile: Profile,
-    pub options: SampleOptions,
-    headway: String,
-}
-
-impl Sequential {
-    pub fn new(density: DensityModel, profile: &Profile, options: &SampleOptions) -> Result<Sequential> {
-        let headway = one_headway(options)?.map_or_else(|| "sampled".to_owned(), |headway| headway.to_string());
-        let (profile, options) = (profile.clone(), options.clone());
-        // The same complaint for every model: make it before any work.
-        let first = density.kde.points()[0].clone();
-        plan_points(&density, &[first], &profile, &options.models, &options.headways)?;
-        Ok(Sequential { density, profile, options, headway })
-    }
-
+impl Sample {
     /// One model after the other.
-    pub fn run(&self, executor: &Executor) -> Result<SampleResult> {
-        let (options, exposure) = (&self.options, self.density.exposure.as_ref());
-        let defence = match &options.estimator {
-            Estimator::Crude { .. } | Estimator::Subset => 0.0,
-            Estimator::Pilot(Pilot { defence, .. })
-            | Estimator::Given { defence, .. }
-            | Estimator::CrossEntropy { defence } => *defence,
-        };
+    pub(super) fn run_sequential(&self, executor: &Executor) -> Result<SampleResult> {
+        let options = &self.options;
         let nominal = truncated(&self.density)?;
         let mut result = SampleResult::default();
         for &model in &options.models {
             tracing::info!("{} on {}", model.name(), executor.backend.describe());
-            let lanes = LaneLimitState {
-                density: &self.density,
-                profile: &self.profile,
-                model,
-                criterion: options.criterion,
-                headway: options.headways.clone(),
-                executor: executor.clone(),
-            };
+            let lanes = self.limit_state(model, executor.clone());
             let (estimate, level, proposal) = self.estimate(&nominal, &lanes)?;
-            let of = |proposal| scenario_shares(&lanes, proposal, defence, options.seed);
+            let of = |proposal| scenario_shares(&lanes, proposal, options.estimator.defence(), options.seed);
             let shares = proposal.as_ref().map(of).transpose()?.flatten();
-            let row = EstimateRow::of_draws(model, options.criterion, self.headway.clone(), estimate, exposure);
-            result.rows.push(row.with_data(shares.as_ref(), exposure));
+            result.rows.push(self.row(model, estimate, shares.as_ref()));
             result.levels.extend(level);
             let found = proposal.filter(|_| !matches!(options.estimator, Estimator::Given { .. }));
             result.proposals.extend(found.map(|proposal| (model, proposal)));
@@ -94,7 +60,7 @@ impl Sequential {
                 Ok((run.estimate, Some(Levels::CrossEntropy(run.steps)), Some(run.proposal)))
             }
             Estimator::Pilot(pilot) => {
-                let fit = |points: &[Vec<f64>]| fitted(&self.density, points);
+                let fit = |points: &[Vec<f64>]| self.kernels_over(points);
                 let (estimate, proposal) = from_pilot(nominal, lanes, &fit, pilot, &importance_options)?;
                 Ok((estimate, None, Some(proposal)))
             }

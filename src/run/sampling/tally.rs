@@ -8,7 +8,8 @@ use serde::{Deserialize, Serialize};
 
 use super::kernels::{KernelCounts, NO_KERNEL};
 use super::limit_state::limit_state;
-use super::map::{MAP_CELLS, MapAxes, MapCounts};
+use super::map::{MAP_CELLS, MapCounts};
+use super::sample_options::SampleOptions;
 use crate::engine::generated::{ATTEMPTS, DrawnPoint, Generator};
 use crate::engine::{CLOSE_HEADWAY_S, Chunk, Headway, LanePlan};
 use crate::model::criterion::Criterion;
@@ -27,17 +28,6 @@ pub struct WorstSample {
     pub value: f64,
     /// Lane index in the plan.
     pub lane: u64,
-}
-
-/// What is counted beside the verdicts.
-#[derive(Debug, Clone, PartialEq)]
-pub struct TallyOptions {
-    /// Worst lanes kept per model; 0 needs verdicts only.
-    pub worst: usize,
-    /// Criterion of the worst lanes and of the map.
-    pub criterion: Criterion,
-    /// Failure map over two parameters.
-    pub map: Option<MapAxes>,
 }
 
 /// Counts over a set of samples of one plan.
@@ -72,7 +62,7 @@ pub struct SampleTally {
 
 impl SampleTally {
     /// Nothing yet.
-    pub fn empty(plan: &LanePlan, options: &TallyOptions) -> SampleTally {
+    pub fn empty(plan: &LanePlan, options: &SampleOptions) -> SampleTally {
         let (headways, models, criteria) = (plan.headways.len(), plan.models.len(), Criterion::ALL.len());
         SampleTally {
             plan_sha256: plan.hash().to_owned(),
@@ -96,7 +86,7 @@ impl SampleTally {
     ///
     /// # Errors
     /// [`Error::Internal`] for a chunk of another plan, without lanes, or without the outcomes that worst lanes need.
-    pub fn of_chunk(plan: &LanePlan, chunk: &Chunk, options: &TallyOptions) -> Result<SampleTally> {
+    pub fn of_chunk(plan: &LanePlan, chunk: &Chunk, options: &SampleOptions) -> Result<SampleTally> {
         let generator = plan.generator();
         if generator.is_none() && options.map.is_some() {
             return Err(Error::Internal("a plan that holds its cases has no points to map".to_owned()));
@@ -141,7 +131,7 @@ impl SampleTally {
         plan: &LanePlan,
         generator: Option<&Generator>,
         chunk: &Chunk,
-        options: &TallyOptions,
+        options: &SampleOptions,
         unit: u64,
     ) -> u32 {
         let drawn = generator.map(|generator| generator.draw(unit));

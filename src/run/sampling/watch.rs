@@ -3,7 +3,8 @@
 use std::ops::Range;
 
 use super::limit_state::MAX_BTN;
-use super::tally::{SampleTally, TallyOptions};
+use super::sample_options::SampleOptions;
+use super::tally::SampleTally;
 use crate::engine::{LanePlan, Marks, Wanted, Watch};
 use crate::model::criterion::Criterion;
 use crate::model::profile::Profile;
@@ -25,7 +26,7 @@ pub(super) fn ends(range: &Range<u64>) -> impl Iterator<Item = u64> {
 
 /// What the lanes of further samples must return, so that the lists of worst lanes become what they would be with all
 /// values. `options.worst` is at least 1, and the lanes of `tally` have smaller indices.
-pub(super) fn wanted(plan: &LanePlan, tally: &SampleTally, options: &TallyOptions) -> Wanted {
+pub(super) fn wanted(plan: &LanePlan, tally: &SampleTally, options: &SampleOptions) -> Wanted {
     let (mut watch, mut marked) = (Watch::NOTHING, 0.0);
     let lanes_per_model = (tally.valid() * plan.headways.len() as u64).max(1) as f64;
     for (at, model) in plan.models.iter().enumerate() {

@@ -2,15 +2,17 @@
 
 use super::lanes::{LaneLimitState, scenario_shares, truncated};
 use super::rows::EstimateRow;
-use super::weighted_plan::WeightedPlan;
+use super::sample::{Proposals, Sample};
+use super::sample_options::SampleOptions;
+use super::sample_result::SampleResult;
 use super::weighted_tally::WeightedTally;
 use crate::engine::{CpuBackend, Executor, lanes_within_seconds};
 use crate::model::driver::ModelId;
 use crate::run::parts::{Countable, Ledger};
-use crate::stats::density::{BandwidthRule, DensityModel, Kde, Mixture};
+use crate::stats::density::{BandwidthRule, Kde, Mixture};
 use crate::stats::estimate::{
-    BlockSums, Defended, Pilot, PilotCheck, StopReason, WeightSums, defended, from_weight_sums, importance_sums,
-    pilot_proposal,
+    BlockSums, Defended, Estimate, KernelShares, Pilot, PilotCheck, StopReason, WeightSums, defended, from_weight_sums,
+    importance_sums, pilot_proposal,
 };
 use crate::support::cancel::Cancel;
 use crate::{Error, Place, Result};
@@ -29,54 +31,50 @@ fn chunk_samples(step_cap: u32, models: u64, kernels: u64) -> u64 {
     1 << judged.min(weighed).clamp(1, CHUNK).ilog2()
 }
 
-/// The kernels of a pilot's worst points.
-pub(super) fn fitted(density: &DensityModel, points: &[Vec<f64>]) -> Result<Mixture> {
-    let names: Vec<&str> = density.space.parameters().iter().map(|p| p.name.as_str()).collect();
-    Kde::fit(points.to_vec(), &names, BandwidthRule::Reduction)?.mixture()
-}
-
-impl WeightedPlan {
+impl Sample {
     /// Samples between two looks at the journal.
     pub(crate) fn chunk_samples(&self) -> u64 {
-        let facts = &self.facts;
-        let kernels = self.density.kde.points().len();
-        chunk_samples(facts.profile.step_cap(), facts.models.len() as u64, kernels as u64)
+        let (models, kernels) = (self.options.models.len(), self.density.kde.points().len());
+        chunk_samples(self.profile.step_cap(), models as u64, kernels as u64)
     }
 
-    fn limit_state<'a>(&'a self, model: ModelId, executor: Executor<'a>) -> LaneLimitState<'a> {
-        LaneLimitState {
-            density: &self.density,
-            profile: &self.facts.profile,
-            model,
-            criterion: self.facts.criterion,
-            headway: self.headways(),
-            executor,
-        }
+    /// The lanes of a driver model as what an estimator follows.
+    pub(super) fn limit_state<'a>(&'a self, model: ModelId, executor: Executor<'a>) -> LaneLimitState<'a> {
+        let (density, profile, options) = (&self.density, &self.profile, &self.options);
+        let (criterion, headway) = (options.criterion, options.headways.clone());
+        LaneLimitState { density, profile, model, criterion, headway, executor }
+    }
+
+    /// The kernels of a pilot's worst points.
+    pub(super) fn kernels_over(&self, points: &[Vec<f64>]) -> Result<Mixture> {
+        let names: Vec<&str> = self.density.space.parameters().iter().map(|p| p.name.as_str()).collect();
+        Kde::fit(points.to_vec(), &names, BandwidthRule::Reduction)?.mixture()
     }
 
     /// The proposal of every driver model, with what its pilot counted.
-    pub(super) fn pilots(&self, pilot: &Pilot, executor: &Executor) -> Result<(Vec<Mixture>, Vec<PilotCheck>)> {
-        let nominal = truncated(&self.density)?;
-        let fit = |points: &[Vec<f64>]| fitted(&self.density, points);
+    pub(super) fn pilots(&self, pilot: &Pilot, executor: &Executor) -> Result<Proposals> {
+        let (nominal, fit) = (truncated(&self.density)?, |points: &[Vec<f64>]| self.kernels_over(points));
         let search = |&model: &ModelId| {
             tracing::info!("pilot of {} on {}", model.name(), executor.backend.describe());
-            pilot_proposal(&nominal, &self.limit_state(model, executor.clone()), &fit, pilot, self.facts.seed)
+            pilot_proposal(&nominal, &self.limit_state(model, executor.clone()), &fit, pilot, self.options.seed)
         };
-        let found: Vec<(Mixture, PilotCheck)> = self.facts.models.iter().map(search).collect::<Result<_>>()?;
-        Ok(found.into_iter().unzip())
+        let found: Vec<(Mixture, PilotCheck)> = self.options.models.iter().map(search).collect::<Result<_>>()?;
+        let (mixtures, pilots) = found.into_iter().unzip();
+        Ok(Proposals { mixtures, pilots })
     }
 
     /// Draws, judges and weighs what the ledger does not hold yet.
-    pub(crate) fn sample(
+    pub(crate) fn sample_weighted(
         &self,
+        proposals: &Proposals,
         ledger: &mut Ledger<WeightedTally>,
         executor: &Executor,
         mut progress: impl FnMut(u64),
     ) -> Result<()> {
-        let facts = &self.facts;
+        let SampleOptions { estimator, models, seed, .. } = &self.options;
         let nominal = truncated(&self.density)?;
-        let prepared = |proposal: &Mixture| defended(proposal.clone(), &nominal, facts.defence);
-        let proposals: Vec<Defended> = self.proposals.iter().map(prepared).collect::<Result<_>>()?;
+        let prepared = |proposal: &Mixture| defended(proposal.clone(), &nominal, estimator.defence());
+        let proposals: Vec<Defended> = proposals.mixtures.iter().map(prepared).collect::<Result<_>>()?;
         let (units, chunk) = (ledger.units(), self.chunk_samples());
         // The samples of a chunk are drawn, judged and weighed together or not at all.
         let whole = executor.clone().with_cancel(Cancel::default());
@@ -87,9 +85,9 @@ impl WeightedPlan {
                 // One proposal serves all models, or each has its own.
                 let sums_of = |(&model, proposal): (&ModelId, &Defended)| {
                     let lanes = self.limit_state(model, whole.clone());
-                    Ok((model, importance_sums(&nominal, proposal, &lanes, facts.seed, at..next)?))
+                    Ok((model, importance_sums(&nominal, proposal, &lanes, *seed, at..next)?))
                 };
-                let pairs = facts.models.iter().zip(proposals.iter().cycle());
+                let pairs = models.iter().zip(proposals.iter().cycle());
                 ledger.add(WeightedTally { sums: pairs.map(sums_of).collect::<Result<_>>()? }, [0; 2])?;
                 progress(next - at);
                 at = next;
@@ -103,29 +101,42 @@ impl WeightedPlan {
     ///
     /// # Errors
     /// [`Error::Input`] at `place` where a sample or a driver model is missing.
-    pub(super) fn rows(&self, tally: Option<WeightedTally>, place: Place) -> Result<Vec<EstimateRow>> {
-        let (facts, density) = (&self.facts, &self.density);
+    pub(super) fn weighted_result(
+        &self,
+        proposals: &Proposals,
+        tally: Option<WeightedTally>,
+        place: Place,
+    ) -> Result<SampleResult> {
+        let SampleOptions { estimator, models, seed, level, .. } = &self.options;
         let tally = tally.filter(|tally| {
-            let models: Vec<ModelId> = tally.sums.iter().map(|(model, _)| *model).collect();
-            tally.covered().as_slice() == std::slice::from_ref(&(0..facts.samples)) && models == facts.models
+            tally.covered().as_slice() == std::slice::from_ref(&(0..self.samples())) && self.check_sums(tally).is_ok()
         });
         let Some(tally) = tally else {
             let problem = "the parts do not hold every sample of every driver model";
             return Err(Error::input(place, problem, "make them again"));
         };
-        let (cpu, exposure) = (CpuBackend::lane_arithmetic(), density.exposure.as_ref());
+        let cpu = CpuBackend::lane_arithmetic();
         let row = |(at, (model, sums)): (usize, &(ModelId, BlockSums<WeightSums>))| {
             let total = sums.total().unwrap_or_default();
-            let mut estimate = from_weight_sums(&total, false, facts.level, StopReason::Samples);
-            facts.pilots.get(at).into_iter().for_each(|pilot| pilot.add_to(&mut estimate));
-            let row = EstimateRow::of_draws(*model, facts.criterion, self.headway_name(), estimate, exposure);
+            let mut estimate = from_weight_sums(&total, false, *level, StopReason::Samples);
+            proposals.pilots.get(at).into_iter().for_each(|pilot| pilot.add_to(&mut estimate));
             // A few lanes more, on the CPU: a merge has no other backend, and all have the same bits.
             let lanes = self.limit_state(*model, Executor::new(&cpu));
-            let proposal = &self.proposals[at % self.proposals.len()];
-            let shares = scenario_shares(&lanes, proposal, facts.defence, facts.seed)?;
-            Ok(row.with_data(shares.as_ref(), exposure))
+            let proposal = &proposals.mixtures[at % proposals.mixtures.len()];
+            let shares = scenario_shares(&lanes, proposal, estimator.defence(), *seed)?;
+            Ok(self.row(*model, estimate, shares.as_ref()))
         };
-        tally.sums.iter().enumerate().map(row).collect()
+        let rows = tally.sums.iter().enumerate().map(row).collect::<Result<_>>()?;
+        let found = models.iter().copied().zip(proposals.mixtures.iter().cloned());
+        let proposals = found.filter(|_| !proposals.pilots.is_empty()).collect();
+        Ok(SampleResult { rows, proposals, ..SampleResult::default() })
+    }
+
+    /// A row of an estimator that weighs.
+    pub(super) fn row(&self, model: ModelId, estimate: Estimate, shares: Option<&KernelShares>) -> EstimateRow {
+        let (exposure, options) = (self.exposure(), &self.options);
+        let row = EstimateRow::of_draws(model, options.criterion, options.headway_name(), estimate, exposure);
+        row.with_data(shares, exposure)
     }
 }
 

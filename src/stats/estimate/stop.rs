@@ -8,10 +8,10 @@ use serde::{Deserialize, Serialize};
 use super::blocks::BLOCK;
 
 /// Sample sizes at which the rules are looked at.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Checkpoints {
     /// 4,096 · 2^k: few looks, so the interval suffers little from being looked at repeatedly.
+    #[default]
     Doubling,
     /// Every so many samples, rounded up to blocks of 4,096.
     Every(u64),
@@ -36,17 +36,20 @@ impl Checkpoints {
     }
 }
 
-/// When to end.
+/// When to end. A plan file holds the number of samples alone: what is drawn does not depend on the other rules.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct StopRule {
     /// Maximum number of samples, ≥ 1. Always a limit.
     pub samples: u64,
     /// End at the first checkpoint at which half the interval's width over the estimate is at most this, there
     /// being at least [`StopRule::MIN_FAILURES`] failures.
+    #[serde(skip)]
     pub relative_half_width: Option<f64>,
     /// End at the first checkpoint after this time. The result then depends on the machine and says so.
+    #[serde(skip)]
     pub time_limit: Option<Duration>,
     /// Where the rules are looked at.
+    #[serde(skip)]
     pub checkpoints: Checkpoints,
 }
 
@@ -72,6 +75,11 @@ impl StopReason {
 impl StopRule {
     /// Failures before a narrow interval is believed: fewer can make intervals narrow by chance.
     pub const MIN_FAILURES: u64 = 10;
+
+    /// Whether nothing but the number of samples ends it.
+    pub fn is_fixed(&self) -> bool {
+        self.relative_half_width.is_none() && self.time_limit.is_none()
+    }
 
     /// So many samples and no other rule.
     pub fn samples(samples: u64) -> StopRule {

@@ -10,8 +10,7 @@ use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::{Countable, Counted, Journal, Ledger, read_part, read_sealed_line, seal};
 use lanesweep::run::sampling::{
-    SampleHeadways, SamplePlanOptions, SampleSource, SampleTally, TallyOptions, WeightedTally, plan_samples,
-    read_proposal,
+    Estimator, SampleHeadways, SampleOptions, SampleTally, WeightedTally, plan_samples, read_proposal,
 };
 use lanesweep::run::score::ScoreOptions;
 use lanesweep::run::study::{StudyHead, StudyOptions, plan_study};
@@ -176,12 +175,9 @@ pub fn small_plan(
     proposal: &lanesweep::stats::density::Mixture,
     profile: &Profile,
 ) -> Result<LanePlan> {
-    let options = SamplePlanOptions {
-        samples: 20,
+    let options = SampleOptions {
         seed: 5,
-        source: SampleSource::Random,
-        models: ModelId::ALL.to_vec(),
-        headways: SampleHeadways::Each(vec![Headway::ThwS(1.0)]),
+        ..SampleOptions::new(Estimator::CRUDE, 20, SampleHeadways::Each(vec![Headway::ThwS(1.0)]))
     };
     plan_samples(density, proposal, profile, &options)
 }
@@ -228,7 +224,8 @@ fn part(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
         tally.samples();
         tally.valid();
         let axes = tally.map.as_ref().map(|map| map.axes.clone());
-        let options = TallyOptions { worst: tally.worst_limit(), criterion: CRITERION, map: axes };
+        let asked = SampleOptions::new(Estimator::CRUDE, 20, SampleHeadways::Sampled);
+        let options = SampleOptions { worst: tally.worst_limit(), criterion: CRITERION, map: axes, ..asked };
         let plan = small_plan(density_of(seeds), &density_of(seeds).mixture()?, &seeds.profile)?;
         let joined = SampleTally::empty(&plan, &options).merge(tally.clone())?;
         let back = tally.clone().merge(SampleTally::empty(&plan, &options))?;

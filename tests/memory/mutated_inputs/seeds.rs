@@ -6,7 +6,9 @@ use lanesweep::engine::{Backend, CpuBackend, LanePlan, Partial, Wanted};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::{Counted, Journal, Part, seal, write_part};
-use lanesweep::run::sampling::{MapAxes, SampleTally, TallyOptions, WeightedTally, proposal_text};
+use lanesweep::run::sampling::{
+    Estimator, MapAxes, SampleHeadways, SampleOptions, SampleTally, WeightedTally, proposal_text,
+};
 use lanesweep::run::score::ScoreOptions;
 use lanesweep::run::study::{StudyOptions, outline_study};
 use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions};
@@ -143,7 +145,8 @@ impl Seeds {
         let map = MapAxes::of(&density, names[0], names[1]).unwrap();
         let chunk = CpuBackend::<f64>::reference().prepare(&plan).unwrap().run(PART_UNITS, Wanted::Outcomes).unwrap();
         let parts = [None, Some(map)].map(|map| {
-            let options = TallyOptions { worst: 3, criterion: CRITERION, map };
+            let asked = SampleOptions::new(Estimator::CRUDE, 20, SampleHeadways::Sampled);
+            let options = SampleOptions { worst: 3, criterion: CRITERION, map, ..asked };
             let tally = SampleTally::of_chunk(&plan, &chunk, &options).unwrap();
             (
                 tally.clone(),

@@ -1,0 +1,142 @@
+//! A sampling run as a plan file: the density, the proposals and everything that was asked for, so that every shard and the
+//! merge know the same run.
+
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+
+use super::conditional::mixture_of;
+use super::plan::plan_samples;
+use super::proposal_file::{proposal_from_text, proposal_text};
+use super::sample::{Proposals, Sample, SampleKind};
+use super::sample_options::{Estimator, SampleOptions};
+use crate::model::profile::Profile;
+use crate::run::parts::{kind_of, read_sealed, seal};
+use crate::stats::density::{DensityModel, Mixture};
+use crate::stats::estimate::PilotCheck;
+use crate::support::atomic_file::refuse_link;
+use crate::support::files::{make_folder, write_inside};
+use crate::{Error, Place, Result};
+
+/// What a run with a pilot of its own keeps until it ends.
+pub(super) const PILOT_FILE: &str = "pilot.json";
+/// Kind of the sealed file.
+pub(crate) const KIND: &str = "sampling plan";
+/// Largest plan that is read: a density, mostly.
+const MAX_PLAN_BYTES: u64 = 1 << 30;
+const AGAIN: &str = "make it by `sample` of this version, with option `plan_only`";
+
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct PlanFile {
+    /// The density file's text.
+    density: String,
+    profile: Profile,
+    options: SampleOptions,
+    /// Proposal files' texts: one for all driver models, or one for each.
+    proposals: Vec<String>,
+    /// What the pilot of each driver model counted; empty for a given proposal.
+    pilots: Vec<PilotCheck>,
+    /// Hash of the lanes of crude Monte Carlo.
+    plan_sha256: Option<String>,
+}
+
+impl Sample {
+    /// The run as the text of a file, with its hash.
+    pub(crate) fn plan_file(&self) -> Result<(Vec<u8>, String)> {
+        match &self.kind {
+            SampleKind::Weighted(proposals) => self.plan_file_over(proposals),
+            _ => self.plan_file_over(&Proposals::default()),
+        }
+    }
+
+    fn plan_file_over(&self, proposals: &Proposals) -> Result<(Vec<u8>, String)> {
+        let unreadable = |e: std::string::FromUtf8Error| Error::Internal(format!("a density is no text: {e}"));
+        let text = |proposal| proposal_text(&self.density, proposal);
+        let file = PlanFile {
+            density: String::from_utf8(self.density.to_json()?).map_err(unreadable)?,
+            profile: self.profile.clone(),
+            options: self.options.clone(),
+            proposals: proposals.mixtures.iter().map(text).collect::<Result<_>>()?,
+            pilots: proposals.pilots.clone(),
+            plan_sha256: self.lane_plan().map(|plan| plan.hash().to_owned()),
+        };
+        seal(KIND, &file)
+    }
+
+    /// Reads a plan file.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Input`] for anything but a whole plan of this version.
+    pub fn read(path: &Path) -> Result<Sample> {
+        let file: PlanFile = read_sealed(KIND, path, MAX_PLAN_BYTES, AGAIN)?.0;
+        let PlanFile { profile, options, pilots, .. } = file;
+        let place = Place::file(path);
+        let wrong = |problem: &str| Error::input(place.clone(), problem, AGAIN);
+        profile.check(&place)?;
+        if !(options.level > 0.0 && options.level < 1.0) {
+            return Err(wrong("its confidence level must lie between 0 and 1"));
+        }
+        if !(0.0..1.0).contains(&options.estimator.defence()) {
+            return Err(wrong("its defensive mixture weight must be at least 0 and below 1"));
+        }
+        if options.stop.samples == 0 || options.stop.samples >= 1 << 63 {
+            return Err(wrong("its number of samples is out of range"));
+        }
+        let density = DensityModel::from_json(file.density.as_bytes(), &place)?;
+        let parameters = density.space.parameters().len();
+        if options.map.as_ref().is_some_and(|map| map.x.parameter >= parameters || map.y.parameter >= parameters) {
+            return Err(wrong("its map is over parameters that the density does not have"));
+        }
+        let proposal = |text: &String| proposal_from_text(text.as_bytes(), &density, &place);
+        let mixtures: Vec<Mixture> = file.proposals.iter().map(proposal).collect::<Result<_>>()?;
+        let models = options.models.len();
+        let kind = match &options.estimator {
+            Estimator::Crude { .. } => {
+                let planned = mixture_of(&density, &options.given)
+                    .and_then(|mixture| plan_samples(&density, &mixture, &profile, &options));
+                let plan = planned.map_err(|error| match error {
+                    Error::Usage { problem, .. } => wrong(&problem),
+                    other => other,
+                })?;
+                if file.plan_sha256.as_deref() != Some(plan.hash()) {
+                    return Err(wrong("its content is not that of its hash: another version of lanesweep made it"));
+                }
+                SampleKind::Crude(Box::new(plan))
+            }
+            Estimator::Given { .. } if mixtures.len() == 1 && pilots.is_empty() => {
+                SampleKind::Weighted(Proposals { mixtures, pilots })
+            }
+            Estimator::Pilot(_) if mixtures.len() == models && pilots.len() == models => {
+                SampleKind::Weighted(Proposals { mixtures, pilots })
+            }
+            _ => return Err(wrong("its proposals are not one for all driver models or one for each")),
+        };
+        let sample = Sample { density, profile, options, kind };
+        sample.check_lanes()?;
+        Ok(sample)
+    }
+
+    /// The same run after its pilot, where an interrupted run left that in the folder.
+    pub(super) fn kept_pilot(&self, out: &Path) -> Result<Option<Sample>> {
+        let path = out.join(PILOT_FILE);
+        if path.symlink_metadata().is_err() {
+            return Ok(None);
+        }
+        refuse_link(&path)?;
+        if !kind_of(&path).is_ok_and(|kind| kind == KIND) {
+            let problem = "it would be overwritten, and it is not the pilot of an interrupted run";
+            return Err(Error::usage(Place::file(&path), problem, "move it away, or give another option `out`"));
+        }
+        let Ok(kept) = Sample::read(&path) else { return Ok(None) };
+        let is_same = kept.plan_file_over(&Proposals::default())?.1 == self.plan_file()?.1;
+        Ok(is_same.then_some(kept))
+    }
+
+    /// Leaves the run after its pilot in the folder.
+    pub(super) fn keep_pilot(&self, out: &Path) -> Result<()> {
+        make_folder(out)?;
+        let text = self.plan_file()?.0;
+        write_inside(&out.join(PILOT_FILE), |file| file.write_all(&text))
+    }
+}
