@@ -1,27 +1,13 @@
-//! Which backend computes the lanes: `--backend` and `--device`, from what was typed to what is open.
+//! Which backend computes the lanes: `--backend` and `--device`, from what is configured to what is open.
 
 use std::time::Instant;
 
-use clap::Args;
-
+use super::configured::Configured;
 use super::open_device::{OpenDevice, nothing_to_verify, open_checked, open_device};
 use crate::engine::{Backend, BackendChoice, CpuBackend, DeviceName, Executor};
 use crate::report::run_record::DeviceRecord;
 use crate::report::sampling::HostRecord;
 use crate::{Error, Place, Result};
-
-/// Flags of every verb that sweeps.
-#[derive(Debug, Clone, Args)]
-pub struct BackendFlags {
-    /// Backend; auto: a GPU if there is one
-    #[arg(long, value_name = "auto|cpu|gpu")]
-    backend: BackendChoice,
-    /// Device, by a part of its name, its PCI bus id or its index
-    ///
-    /// `lanesweep verify devices` lists the devices.
-    #[arg(long, value_name = "NAME|pci:BUS|INDEX")]
-    device: Option<DeviceName>,
-}
 
 /// What computes the lanes, open.
 pub struct Opened {
@@ -30,39 +16,49 @@ pub struct Opened {
     device: Option<OpenDevice>,
 }
 
-impl BackendFlags {
-    /// Opens what the flags and the environment say.
+impl Configured {
+    /// The backend and the device that are asked for.
+    fn backend(&self) -> Result<(BackendChoice, Option<DeviceName>)> {
+        let run = &self.settings.run;
+        let device = run.device.as_deref().map(str::parse).transpose();
+        Ok((run.backend, device.map_err(|error| self.at_origin("run.device", "device", error))?))
+    }
+
+    /// Opens what flags, files and the environment say.
     ///
     /// # Errors
     /// [`Error::Usage`] for a device that does not exist or contradicts the backend, [`Error::Device`] where
     /// a GPU is asked for and there is none, or where it does not compute as the CPU does.
     pub fn open(&self) -> Result<Opened> {
-        let cpu = CpuBackend::lane_arithmetic();
-        if self.backend == BackendChoice::Cpu && self.device.is_none() {
-            return Ok(Opened { cpu, device: None });
-        }
-        Ok(Opened { cpu, device: open_checked(self.backend, self.device.as_ref())? })
+        self.open_by(open_checked)
     }
 
     /// Opens what is to be verified: no check before the check, and no silent CPU.
     ///
     /// # Errors
-    /// As [`BackendFlags::open`]; [`Error::Device`] also where nothing was asked for and there is no GPU.
+    /// As [`Configured::open`]; [`Error::Device`] also where nothing was asked for and there is no GPU.
     pub fn open_to_verify(&self) -> Result<Opened> {
+        self.open_by(|backend, device| open_device(backend, device)?.ok_or_else(nothing_to_verify).map(Some))
+    }
+
+    fn open_by(
+        &self,
+        open: impl FnOnce(BackendChoice, Option<&DeviceName>) -> Result<Option<OpenDevice>>,
+    ) -> Result<Opened> {
         let cpu = CpuBackend::lane_arithmetic();
-        if self.backend == BackendChoice::Cpu && self.device.is_none() {
-            return Ok(Opened { cpu, device: None });
-        }
-        let device = open_device(self.backend, self.device.as_ref())?.ok_or_else(nothing_to_verify)?;
-        Ok(Opened { cpu, device: Some(device) })
+        Ok(match self.backend()? {
+            (BackendChoice::Cpu, None) => Opened { cpu, device: None },
+            (backend, device) => Opened { cpu, device: open(backend, device.as_ref())? },
+        })
     }
 
     /// The CPU, for a flag that leaves no choice.
     ///
     /// # Errors
     /// [`Error::Usage`] where another backend or a device is asked for.
-    pub fn none_but(&self, flag: &str) -> Result<Opened> {
-        if self.backend == BackendChoice::Gpu || self.device.is_some() {
+    pub fn open_cpu(&self, flag: &str) -> Result<Opened> {
+        let run = &self.settings.run;
+        if run.backend == BackendChoice::Gpu || run.device.is_some() {
             let problem = "it computes in binary64 on the CPU; a device computes in binary32".to_owned();
             return Err(Error::usage(Place::item(flag), problem, "leave out --backend and --device"));
         }

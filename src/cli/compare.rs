@@ -5,14 +5,13 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::backend_flags::{BackendFlags, Opened};
+use super::backend_flags::Opened;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::dry_run::{self, BUDGET, DryRun, ForecastPart};
 use super::format::FormatFlag;
 use super::source::{self, PlausibilityFlag, Source};
-use super::synth::GeneratorFlags;
-use super::{Exit, ProfileFlags, fit, lists};
+use super::{Exit, fit, lists};
 use crate::engine::{Forecast, Headway, LanePlan, Partial, Wanted, forecast};
 use crate::model::criterion::Criterion;
 use crate::report::compare::{CompareFile, rates};
@@ -25,7 +24,7 @@ use crate::support::files::check_folder;
 use crate::support::readable::count;
 use crate::support::run_dir::{COMPARE_RECORD, OutputDir, Results};
 use crate::traffic::mining::counts_text;
-use crate::{Error, Place, Result};
+use crate::{Error, Result};
 
 /// Memory of the counts of sampled lanes and of the figures, bytes, measured.
 const BYTES_OF_COUNTS: u64 = 8 << 20;
@@ -45,13 +44,13 @@ const BYTES_OF_COUNTS: u64 = 8 << 20;
                   --thw 0.6,1.0")]
 pub struct Compare {
     /// Folder of highD-format recordings [default: synthetic recordings]
-    #[arg(value_name = "DIR", conflicts_with = "scenarios")]
+    #[arg(value_name = "DIR", conflicts_with = "scenarios", help_heading = "Data")]
     dir: Option<PathBuf>,
     /// Scenario file (.jsonl, .parquet, .csv) instead of recordings
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Data")]
     scenarios: Option<PathBuf>,
     /// Folder for compare.csv, compare.json and compare.txt
-    #[arg(long, value_name = "DIR", default_value = "lanesweep-compare")]
+    #[arg(long, value_name = "DIR", default_value = "lanesweep-compare", help_heading = "Output")]
     out: PathBuf,
     #[command(flatten)]
     categories: lists::CategoriesFlag,
@@ -63,27 +62,17 @@ pub struct Compare {
     ///
     /// paper is 2.0, 1.8, … 0.2; r157 the minimum following distance of UN R157, 5.2.3.3. observed: S and S' start from
     /// the recorded gap of each scenario; a density draws the headway as one more parameter.
-    #[arg(long, value_name = "s,s,…|observed", default_value = "paper")]
+    #[arg(long, value_name = "s,s,…|observed", default_value = "paper", help_heading = "Scenario")]
     thw: String,
-    #[arg(long, value_name = "N", value_parser = lists::whole::<u64>)]
-    samples: u64,
-    #[arg(long, value_name = "N")]
-    seed: u64,
     /// Print lanes, memory and estimated time; write nothing
-    #[arg(long)]
+    #[arg(long, help_heading = "Run")]
     dry_run: bool,
     #[command(flatten)]
     exposure: lists::ExposureFlags,
     #[command(flatten)]
     format: FormatFlag,
     #[command(flatten)]
-    backend: BackendFlags,
-    #[command(flatten)]
-    profile: ProfileFlags,
-    #[command(flatten)]
     plausibility: PlausibilityFlag,
-    #[command(flatten)]
-    generator: GeneratorFlags,
 }
 
 impl Compare {
@@ -94,17 +83,16 @@ impl Compare {
         let ids = self.parameterizations.list(&categories)?;
         let models = self.models.list()?;
         let headways = lists::paper_or_headways(&self.thw)?;
-        self.check_samples()?;
         let typed = self.exposure.driven()?;
-        let profile = self.profile.load()?;
+        let profile = configured.profile()?;
         let source = match (&self.dir, &self.scenarios) {
             (Some(dir), _) => Source::Folder(dir.clone()),
             (None, Some(path)) => Source::Scenarios(path.clone()),
-            (None, None) => Source::Generated(self.generator.options(configured)?),
+            (None, None) => Source::Generated(configured.settings.generator.clone()),
         };
         self.guard_inputs(configured)?;
         check_folder(&self.out)?;
-        let opened = self.backend.open()?;
+        let opened = configured.open()?;
         tracing::info!("{}", source.describe(false));
         let collection = source.load(&config.mining, self.plausibility.policy(), verbosity)?;
         tracing::info!("{}", counts_text(&collection.scenarios));
@@ -123,23 +111,29 @@ impl Compare {
                 parameterization: config.of_densities(),
             },
             parameterizations: ids.clone(),
-            samples: self.samples,
-            seed: self.seed,
+            samples: config.compare.samples,
+            seed: config.compare.seed,
             enough: Enough { clusters: config.score.least_failures.into(), margin: config.compare.margin },
         };
         let enough = options.enough;
         let compare = compare::Compare::plan(&collection.scenarios, &facts, profile.clone(), options)?;
         let plan = compare.lane_plan();
         if self.dry_run {
-            return self.forecast(&facts.data, plan, &ids, &opened, started.elapsed().as_secs_f64());
+            return self.forecast(
+                &facts.data,
+                plan,
+                (&ids, config.compare.samples),
+                &opened,
+                started.elapsed().as_secs_f64(),
+            );
         }
         let folder = OutputDir::open(&self.out, COMPARE_RECORD)?;
         tracing::info!("{} lanes of S and S' on {}", count(plan.lane_count()), opened.backend().describe());
-        let executor = opened.executor().with_recheck(self.seed);
+        let executor = opened.executor().with_recheck(config.compare.seed);
         let bar = console::progress(verbosity, plan.unit_count(), "sweeping");
         let (counts, mut swept) = compare.replay(&executor, |units| bar.inc(units))?;
         bar.finish_and_clear();
-        let bar = console::progress(verbosity, ids.len() as u64 * self.samples, "fitting and sampling");
+        let bar = console::progress(verbosity, ids.len() as u64 * config.compare.samples, "fitting and sampling");
         let result = compare.sample(&counts, &executor, |samples| bar.inc(samples));
         bar.finish_and_clear();
         let CompareResult { categories, left_out, failed, summary } = result?;
@@ -159,8 +153,8 @@ impl Compare {
             profile: profile.name.clone(),
             models,
             headways: headways.iter().map(Headway::to_string).collect(),
-            samples: self.samples,
-            seed: self.seed,
+            samples: config.compare.samples,
+            seed: config.compare.seed,
             level: compare::Compare::LEVEL,
             enough,
             study_plan_sha256: plan.hash().to_owned(),
@@ -178,7 +172,7 @@ impl Compare {
         &self,
         data: &str,
         plan: &LanePlan,
-        ids: &[Parameterization],
+        (ids, samples): (&[Parameterization], u64),
         opened: &Opened,
         before_s: f64,
     ) -> Result<Exit> {
@@ -189,9 +183,9 @@ impl Compare {
         })?;
         let per_lane_s = whole.seconds / whole.lanes.max(1) as f64;
         for id in ids {
-            let lanes = self.samples.saturating_mul(per_sample);
+            let lanes = samples.saturating_mul(per_sample);
             let (of, what) = (id.category.label().to_owned(), format!("density {}", id.key));
-            parts.push(ForecastPart { of, what, units: self.samples, lanes });
+            parts.push(ForecastPart { of, what, units: samples, lanes });
             whole.add(&Forecast { lanes, seconds: lanes as f64 * per_lane_s, measured_lanes: 0, lanes_at_once: 0 });
         }
         DryRun {
@@ -231,15 +225,6 @@ impl Compare {
         self.format.print(|| text, || file.json())?;
         tracing::info!("results written to {}", self.out.display());
         Ok(())
-    }
-
-    fn check_samples(&self) -> Result<()> {
-        let problem = match self.samples {
-            0 => "0 samples give no estimate",
-            n if n >= 1 << 48 => "the number of samples must be below 2^48",
-            _ => return Ok(()),
-        };
-        Err(Error::usage(Place::item("--samples"), problem, "give 20000, for instance"))
     }
 
     /// Results must not replace an input.

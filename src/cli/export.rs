@@ -4,12 +4,13 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 
+use super::Exit;
 use super::case_flags::{CaseFlags, from_toml};
+use super::configured::Configured;
 use super::export_lanes::{Exported, Extras, Source, of_case, of_run, of_scenarios};
 use super::format::FormatFlag;
 use super::lists;
 use super::source::PlausibilityFlag;
-use super::{Exit, ProfileFlags};
 use crate::interop::openscenario::{EgoMotion, export_folder};
 use crate::report::records::document;
 use crate::scenario::Side;
@@ -33,9 +34,9 @@ enum Format {
 }
 
 impl Export {
-    pub fn run(&self) -> Result<Exit> {
+    pub fn run(&self, configured: &Configured) -> Result<Exit> {
         match &self.format {
-            Format::Xosc(xosc) => xosc.run(),
+            Format::Xosc(xosc) => xosc.run(configured),
         }
     }
 }
@@ -58,52 +59,57 @@ pub struct Xosc {
     #[command(flatten)]
     format: FormatFlag,
     /// TOML file with the case
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["from", "scenarios"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["from", "scenarios"], help_heading = "Data")]
     case_file: Option<PathBuf>,
     /// Folder (--out) of a study or sample, for --lane or --worst
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["profile", "dt"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["profile", "dt"], help_heading = "Data")]
     from: Option<PathBuf>,
     /// Scenario file for --lane
     ///
     /// With --from a study: the study's scenarios, for sizes, side and lane width.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Data")]
     scenarios: Option<PathBuf>,
     /// Lane key: scenario/variant/headway/model; repeatable
-    #[arg(long, value_name = "KEY")]
+    #[arg(long, value_name = "KEY", help_heading = "Data")]
     lane: Vec<String>,
     /// The N worst lanes of the run per model
     ///
     /// Of a sampling run: those of worst.csv. Of a study: the scenarios with the smallest margin of --criterion, each with
     /// its worst lane.
-    #[arg(long, value_name = "N", requires = "from", conflicts_with = "lane")]
+    #[arg(long, value_name = "N", requires = "from", conflicts_with = "lane", help_heading = "Output")]
     worst: Option<usize>,
     /// Criterion of --worst [default: collision]
     ///
     /// Of a sampling run it is that of its worst.csv.
-    #[arg(long, value_name = "collision|ttc|btn", requires = "worst")]
+    #[arg(long, value_name = "collision|ttc|btn", requires = "worst", help_heading = "Models and criteria")]
     criterion: Option<String>,
     /// Variants of --worst: S, keys of parameterizations [default: all]
-    #[arg(long, value_name = "LIST", requires = "worst", value_delimiter = ',')]
+    #[arg(
+        long,
+        value_name = "LIST",
+        requires = "worst",
+        value_delimiter = ',',
+        help_heading = "Scenario",
+        hide_short_help = true
+    )]
     variant: Vec<String>,
     /// Who drives the ego
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = "Scenario")]
     ego: EgoFlag,
     /// End with --ego external [default: 10 s after the lane's last event and end]
-    #[arg(long, value_name = "s")]
+    #[arg(long, value_name = "s", help_heading = "Scenario", hide_short_help = true)]
     duration: Option<f64>,
     /// Side that the other vehicle comes from or leaves to [default: the scenario's, else left]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = "Scenario", hide_short_help = true)]
     side: Option<SideFlag>,
     /// Width of the road's lanes [default: the scenario's, else 3.5]
-    #[arg(long, value_name = "m")]
+    #[arg(long, value_name = "m", help_heading = "Scenario", hide_short_help = true)]
     lane_width: Option<f64>,
     /// Folder of the files
-    #[arg(long, value_name = "DIR", default_value = "lanesweep-xosc")]
+    #[arg(long, value_name = "DIR", default_value = "lanesweep-xosc", help_heading = "Output")]
     out: PathBuf,
     #[command(flatten)]
     plausibility: PlausibilityFlag,
-    #[command(flatten)]
-    profile: ProfileFlags,
 }
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
@@ -122,10 +128,10 @@ enum SideFlag {
 }
 
 impl Xosc {
-    fn run(&self) -> Result<Exit> {
+    fn run(&self, configured: &Configured) -> Result<Exit> {
         let extras = self.extras()?;
         check_folder(&self.out)?;
-        let Exported { scenarios, notes, incomplete } = self.lanes(&extras)?;
+        let Exported { scenarios, notes, incomplete } = self.lanes(configured, &extras)?;
         notes.iter().for_each(|note| tracing::warn!("{note}"));
         let rows = export_folder(&self.out, &scenarios)?;
         let lines: String = rows.iter().map(|row| format!("{}  {}\n", row.file, row.lane)).collect();
@@ -138,7 +144,7 @@ impl Xosc {
         Ok(if incomplete { Exit::Incomplete } else { Exit::Ok })
     }
 
-    fn lanes(&self, extras: &Extras) -> Result<Exported> {
+    fn lanes(&self, configured: &Configured, extras: &Extras) -> Result<Exported> {
         let wrong = |flag: &str, problem: &str, help: &str| Err(Error::usage(Place::item(flag), problem, help));
         let is_lane = self.from.is_some() || self.scenarios.is_some();
         if is_lane && self.case.says_a_case() {
@@ -160,14 +166,14 @@ impl Xosc {
                 let problem = format!("{} has many lanes", path.display());
                 wrong("--scenarios", &problem, "add --lane SCENARIO/VARIANT/HEADWAY/MODEL")
             }
-            (None, Some(path)) => of_scenarios(path, &self.profile.load()?, &source, extras),
+            (None, Some(path)) => of_scenarios(path, &configured.profile()?, &source, extras),
             (None, None) if !self.lane.is_empty() => {
                 let help = "add --from DIR for a lane of a study or a sampling run, or --scenarios FILE";
                 wrong("--lane", "a key alone does not identify a lane", help)
             }
             (None, None) => {
                 let file = self.case_file.as_deref().map(from_toml).transpose()?.unwrap_or_default();
-                of_case(&self.case.over(file), &self.profile.load()?, extras)
+                of_case(&self.case.over(file), &configured.profile()?, extras)
             }
         }
     }

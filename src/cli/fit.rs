@@ -12,7 +12,6 @@ use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::lists;
 use super::source::{self, PlausibilityFlag, Source};
-use super::synth::GeneratorFlags;
 use crate::cli::settings::BandwidthInterval;
 use crate::report::density;
 use crate::report::records;
@@ -40,32 +39,28 @@ use crate::{Error, Place, Result};
                         --with-thw --out cut-in-2.json")]
 pub struct Fit {
     /// Folder of highD-format recordings [default: synthetic recordings]
-    #[arg(value_name = "DIR", conflicts_with = "scenarios")]
+    #[arg(value_name = "DIR", conflicts_with = "scenarios", help_heading = "Data")]
     dir: Option<PathBuf>,
     /// Scenario file (.jsonl, .parquet, .csv) instead of recordings
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Data")]
     scenarios: Option<PathBuf>,
     /// Folder of density files, or one file.json for one density
-    #[arg(long, value_name = "DIR|FILE", default_value = "lanesweep-densities")]
+    #[arg(long, value_name = "DIR|FILE", default_value = "lanesweep-densities", help_heading = "Output")]
     out: PathBuf,
     #[command(flatten)]
     categories: lists::CategoriesFlag,
     #[command(flatten)]
     parameterizations: lists::ParameterizationsFlag,
     /// Add the observed time headway as a parameter (thw_s)
-    #[arg(long)]
+    #[arg(long, help_heading = "Scenario")]
     with_thw: bool,
-    #[arg(long, value_name = "reduction|wide", value_enum, hide_possible_values = true)]
-    bandwidth_rule: BandwidthInterval,
-    #[arg(long, value_name = "N")]
-    seed: u64,
     /// Do not compare drawn with unseen scenarios
-    #[arg(long)]
+    #[arg(long, help_heading = "Models and criteria", hide_short_help = true)]
     no_comparison: bool,
     /// Leave the recorded series out of the density files
     ///
     /// `sample` then cannot compare its rates with those of the recorded scenarios. For a file that is passed on.
-    #[arg(long)]
+    #[arg(long, help_heading = "Models and criteria", hide_short_help = true)]
     without_scenarios: bool,
     #[command(flatten)]
     exposure: lists::ExposureFlags,
@@ -73,8 +68,6 @@ pub struct Fit {
     format: FormatFlag,
     #[command(flatten)]
     plausibility: PlausibilityFlag,
-    #[command(flatten)]
-    generator: GeneratorFlags,
 }
 
 impl Fit {
@@ -85,18 +78,18 @@ impl Fit {
         let options = FitOptions {
             parameterization: config.of_densities(),
             with_thw: self.with_thw,
-            rule: match self.bandwidth_rule {
+            rule: match config.fit.bandwidth_rule {
                 BandwidthInterval::Reduction => BandwidthRule::Reduction,
                 BandwidthInterval::Wide => BandwidthRule::Wide,
             },
             valid_draws: config.fit.valid_draws,
-            seed: self.seed,
+            seed: config.fit.seed,
             representativeness: !self.no_comparison,
         };
         let source = match (&self.dir, &self.scenarios) {
             (Some(dir), _) => Source::Folder(dir.clone()),
             (None, Some(path)) => Source::Scenarios(path.clone()),
-            (None, None) => Source::Generated(self.generator.options(configured)?),
+            (None, None) => Source::Generated(configured.settings.generator.clone()),
         };
         let files = self.files(&ids, configured)?;
         tracing::info!("{}", source.describe(false));

@@ -21,7 +21,7 @@ pub(super) struct FormatFlag {
     /// Output on stdout
     ///
     /// text: tables; json: one document with the same numbers.
-    #[arg(long, value_name = "text|json", value_enum, hide_possible_values = true, default_value_t = Format::Text)]
+    #[arg(long, value_name = "text|json", value_enum, hide_possible_values = true, default_value_t = Format::Text, help_heading = "Output")]
     pub format: Format,
 }
 

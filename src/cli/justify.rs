@@ -5,13 +5,11 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::backend_flags::BackendFlags;
 use super::configured::Configured;
 use super::console::Verbosity;
 use super::format::FormatFlag;
 use super::source::{self, PlausibilityFlag, Source};
-use super::synth::GeneratorFlags;
-use super::{Exit, ProfileFlags, fit, lists};
+use super::{Exit, fit, lists};
 use crate::interop::cluster::quoted_word;
 use crate::interop::conformance::check_shipped_tables;
 use crate::model::driver::ModelId;
@@ -42,41 +40,35 @@ use crate::{Error, Place, Result};
                   lanesweep justify --scenarios scenarios.jsonl --parameterization 6 --models Reg157")]
 pub struct Justify {
     /// Folder of highD-format recordings [default: synthetic recordings]
-    #[arg(value_name = "DIR", conflicts_with = "scenarios")]
+    #[arg(value_name = "DIR", conflicts_with = "scenarios", help_heading = "Data")]
     dir: Option<PathBuf>,
     /// Scenario file (.jsonl, .parquet, .csv) instead of recordings
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Data")]
     scenarios: Option<PathBuf>,
     /// Parameterization: 1…7 (cut-in), a…g (cut-out), i…v (LVD)
-    #[arg(long, value_name = "KEY")]
+    #[arg(long, value_name = "KEY", help_heading = "Scenario")]
     parameterization: String,
     /// Driver model: Reg157, CCHDM, RSS, FSM
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Models and criteria")]
     models: String,
     #[command(flatten)]
     criterion: lists::CriterionFlag,
     /// Time headways; paper is 2.0, 1.8, … 0.2; observed the recorded gaps
-    #[arg(long, value_name = "s,s,…|paper|r157|observed", default_value = "paper")]
+    #[arg(long, value_name = "s,s,…|paper|r157|observed", default_value = "paper", help_heading = "Scenario")]
     thw: String,
     /// Who answers for the dossier [default: a line to fill in]
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Output", hide_short_help = true)]
     author: Option<String>,
     /// Date of the dossier [default: a line to fill in]
-    #[arg(long, value_name = "YYYY-MM-DD", value_parser = date)]
+    #[arg(long, value_name = "YYYY-MM-DD", value_parser = date, help_heading = "Output", hide_short_help = true)]
     date: Option<String>,
     /// Folder for report.html, dossier.json and hidden.csv
-    #[arg(long, value_name = "DIR", default_value = "lanesweep-dossier")]
+    #[arg(long, value_name = "DIR", default_value = "lanesweep-dossier", help_heading = "Output")]
     out: PathBuf,
     #[command(flatten)]
     format: FormatFlag,
     #[command(flatten)]
-    backend: BackendFlags,
-    #[command(flatten)]
-    profile: ProfileFlags,
-    #[command(flatten)]
     plausibility: PlausibilityFlag,
-    #[command(flatten)]
-    generator: GeneratorFlags,
 }
 
 impl Justify {
@@ -90,18 +82,18 @@ impl Justify {
         })?;
         let criterion = self.criterion.get()?;
         let headways = lists::paper_or_headways(&self.thw)?;
-        let profile = self.profile.load()?;
+        let profile = configured.profile()?;
         let source = match (&self.dir, &self.scenarios) {
             (Some(dir), _) => Source::Folder(dir.clone()),
             (None, Some(path)) => Source::Scenarios(path.clone()),
-            (None, None) => Source::Generated(self.generator.options(configured)?),
+            (None, None) => Source::Generated(configured.settings.generator.clone()),
         };
         let inputs: Vec<PathBuf> = self.scenarios.iter().chain(configured.files()).cloned().collect();
         for name in ["report.html", DOSSIER_RECORD, "hidden.csv", "hidden.svg"] {
             source::refuse_overwriting(&self.out.join(name), &inputs, "--out")?;
         }
         check_folder(&self.out)?;
-        let opened = self.backend.open()?;
+        let opened = configured.open()?;
         tracing::info!("{}", source.describe(false));
         let collection = source.load(&config.mining, self.plausibility.policy(), verbosity)?;
         tracing::info!("{}", counts_text(&collection.scenarios));

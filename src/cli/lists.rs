@@ -32,7 +32,7 @@ pub fn whole<T: TryFrom<u64>>(text: &str) -> std::result::Result<T, String> {
 #[derive(Debug, Clone, Args)]
 pub struct CategoriesFlag {
     /// Kinds of scenario: cut-in, cut-out, lvd [default: all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Scenario")]
     categories: Vec<String>,
 }
 
@@ -52,7 +52,7 @@ pub struct ParameterizationsFlag {
     /// Parameterizations: 1…7, a…g, i…v [default: all]
     ///
     /// 1…7 are for cut-ins, a…g for cut-outs, i…v for leader decelerations.
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Scenario")]
     parameterizations: Vec<String>,
 }
 
@@ -69,7 +69,7 @@ impl ParameterizationsFlag {
 /// `--models`.
 #[derive(Debug, Clone, Args)]
 pub struct ModelsFlag {
-    #[arg(long, value_name = "LIST", value_delimiter = ',', help = models_help())]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', help = models_help(), help_heading = "Models and criteria")]
     models: Vec<String>,
 }
 
@@ -104,7 +104,7 @@ pub struct CriterionFlag {
     /// Criterion to map, rank or estimate
     ///
     /// For worst lanes, failure maps, fractions, stop rules and the adaptive estimators.
-    #[arg(long, value_name = "collision|ttc|btn", default_value = "collision")]
+    #[arg(long, value_name = "collision|ttc|btn", default_value = "collision", help_heading = "Models and criteria")]
     criterion: String,
 }
 
@@ -133,10 +133,10 @@ pub fn criterion(name: &str) -> Result<Criterion> {
 #[derive(Debug, Clone, Args)]
 pub struct ExposureFlags {
     /// Driven time of all egos [default: from the recordings]
-    #[arg(long, value_name = "h")]
+    #[arg(long, value_name = "h", help_heading = "Data")]
     hours: Option<f64>,
     /// Driven distance of all egos [default: from the recordings]
-    #[arg(long, value_name = "km")]
+    #[arg(long, value_name = "km", help_heading = "Data")]
     km: Option<f64>,
 }
 

@@ -28,7 +28,7 @@ use crate::{Error, Place, Result};
                         result\n  lanesweep cluster merge result")]
 pub struct Merge {
     /// The run's folder
-    #[arg(value_name = "DIR")]
+    #[arg(value_name = "DIR", help_heading = "Data")]
     dir: PathBuf,
     #[command(flatten)]
     tables: TablesFlag,

@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use super::Exit;
 use super::case_flags::{CaseFlags, from_table, from_toml};
+use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::simulate_lanes::{Asked, Lanes, Traced, of_run, of_scenarios};
 use super::source::{PlausibilityFlag, refuse_overwriting};
-use super::{Exit, ProfileFlags};
 use crate::engine::{EndReason, LaneCase, NO_STEP, Outcome, Trace, check_time_step};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -38,50 +39,48 @@ pub struct Simulate {
     #[command(flatten)]
     case: CaseFlags,
     /// TOML file with the case
-    #[arg(long, value_name = "FILE", conflicts_with = "table")]
+    #[arg(long, value_name = "FILE", conflicts_with = "table", help_heading = "Data")]
     case_file: Option<PathBuf>,
     /// Table (.csv, .parquet) with one case per row
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Data")]
     table: Option<PathBuf>,
     /// Row of the table, from 1 after the header
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Data")]
     row: usize,
     /// Scenario file (.jsonl, .parquet, .csv) for --lane
-    #[arg(long, value_name = "FILE", requires = "lane")]
+    #[arg(long, value_name = "FILE", requires = "lane", help_heading = "Data")]
     scenarios: Option<PathBuf>,
     /// Folder (--out) of a study or sample, for --lane
     ///
     /// Repeats that lane with the run's profile and options, bit for bit, and says whether f64 gives another outcome.
-    #[arg(long, value_name = "DIR", requires = "lane", conflicts_with_all = ["scenarios", "case_file", "table", "profile", "dt"])]
+    #[arg(long, value_name = "DIR", requires = "lane", conflicts_with_all = ["scenarios", "case_file", "table", "profile", "dt"], help_heading = "Data")]
     from: Option<PathBuf>,
     /// Lane key: scenario/variant/headway/model
-    #[arg(long, value_name = "KEY")]
+    #[arg(long, value_name = "KEY", help_heading = "Data")]
     lane: Option<String>,
     /// Also other variants of the lane's scenario
     ///
     /// S (recorded; also without a value), keys of parameterizations, or all.
-    #[arg(long, value_name = "VARIANTS", requires = "lane", value_delimiter = ',', num_args = 0..=1, default_missing_value = "S")]
+    #[arg(long, value_name = "VARIANTS", requires = "lane", value_delimiter = ',', num_args = 0..=1, default_missing_value = "S", help_heading = "Scenario")]
     compare: Vec<String>,
     /// Also draw the time series
     ///
     /// Speed, acceleration, gap, TTC, BTN, PFS, CFS and lateral position, with reaction, braking and contact.
-    #[arg(long, value_name = "FILE.svg")]
+    #[arg(long, value_name = "FILE.svg", help_heading = "Output")]
     plot: Option<PathBuf>,
     /// End of the figure's time axis [default: 2 s after the last change]
-    #[arg(long, value_name = "s", requires = "plot")]
+    #[arg(long, value_name = "s", requires = "plot", help_heading = "Output", hide_short_help = true)]
     plot_end: Option<f64>,
     #[command(flatten)]
     plausibility: PlausibilityFlag,
     #[command(flatten)]
     format: FormatFlag,
-    #[command(flatten)]
-    profile: ProfileFlags,
 }
 
 impl Simulate {
-    pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
+    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         self.guard_plot()?;
-        let lanes = self.lanes()?;
+        let lanes = self.lanes(configured)?;
         let named: Vec<(String, &Trace)> = lanes.traced.iter().map(|lane| (lane.key.clone(), &lane.trace)).collect();
         if let Some(path) = &self.plot {
             // Before the table: a reader of stdout that ends early must not cost the figure.
@@ -97,8 +96,8 @@ impl Simulate {
         Ok(if lanes.incomplete { Exit::Incomplete } else { Exit::Ok })
     }
 
-    fn lanes(&self) -> Result<Lanes> {
-        let Some(key) = &self.lane else { return self.lanes_of_flags() };
+    fn lanes(&self, configured: &Configured) -> Result<Lanes> {
+        let Some(key) = &self.lane else { return self.lanes_of_flags(configured) };
         if self.case.says_a_case() {
             return Err(Error::usage(
                 Place::item("--lane"),
@@ -109,7 +108,7 @@ impl Simulate {
         let asked = Asked { key, models: self.case.named_models()?, compare: &self.compare };
         match (&self.from, &self.scenarios) {
             (Some(dir), _) => of_run(dir, &asked),
-            (None, Some(path)) => of_scenarios(path, &self.profile.load()?, &asked, self.plausibility.policy()),
+            (None, Some(path)) => of_scenarios(path, &configured.profile()?, &asked, self.plausibility.policy()),
             (None, None) => {
                 let help = "add --from DIR for a lane of a study or a sampling run, or --scenarios FILE";
                 Err(Error::usage(Place::item("--lane"), "a key alone does not identify a lane", help))
@@ -118,8 +117,8 @@ impl Simulate {
     }
 
     /// One case from flags or files, in f64.
-    fn lanes_of_flags(&self) -> Result<Lanes> {
-        let profile = self.profile.load()?;
+    fn lanes_of_flags(&self, configured: &Configured) -> Result<Lanes> {
+        let profile = configured.profile()?;
         let flags = self.flags()?;
         let mut tables = Tables::default();
         let case = LaneCase::encode(&flags.case(&profile, self.plausibility.policy())?, &profile, &mut tables);

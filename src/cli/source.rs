@@ -97,7 +97,7 @@ pub fn complain_of(problems: &[Error], notes: &[String]) {
 #[derive(Debug, Clone, Copy, Args)]
 pub struct PlausibilityFlag {
     /// Use physically impossible values (a speed of 108 m/s) with a warning
-    #[arg(long)]
+    #[arg(long, help_heading = "Data", hide_short_help = true)]
     accept_implausible: bool,
 }
 

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::backend_flags::{BackendFlags, Opened};
+use super::backend_flags::Opened;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::dry_run::{self, BUDGET, DryRun};
@@ -13,8 +13,7 @@ use super::format::FormatFlag;
 use super::shard_flags::ShardFlags;
 use super::source::{self, PlausibilityFlag, Source};
 use super::study_run::{Host, TablesFlag, compare_reference, finish_study, lane_format, write_lanes};
-use super::synth::GeneratorFlags;
-use super::{Exit, ProfileFlags, lists};
+use super::{Exit, lists};
 use crate::Result;
 use crate::engine::{Backend, Block, Confusion, CpuBackend, Executor, Headway, Partial, Wanted, forecast};
 use crate::model::criterion::Criterion;
@@ -39,9 +38,9 @@ const FORECAST_BYTES: u64 = 64 << 20;
 /// runs on generated recordings. The answer goes to stdout, tables and figures to --out.
 #[derive(Debug, Args)]
 #[command(mut_args(|arg| match arg.get_id().as_str() {
-    "dir" | "scenarios" | "accept_implausible" | "seed" | "categories" | "models" | "thw" | "published" | "reference"
-    | "profile" | "dt"
-    | "synth_recordings" => arg.conflicts_with("plan"),
+    "dir" | "scenarios" | "accept_implausible" | "categories" | "models" | "thw" | "published" | "reference" => {
+        arg.conflicts_with("plan")
+    }
     "rows" | "compare_reference" | "keep_plan" => arg.conflicts_with_all(["shard", "plan_only"]),
     _ => arg,
 }))]
@@ -49,34 +48,31 @@ const FORECAST_BYTES: u64 = 64 << 20;
                         --scenarios scenarios.jsonl --rows lanes.csv")]
 pub struct Study {
     /// Folder of highD-format recordings [default: synthetic recordings]
-    #[arg(value_name = "DIR", conflicts_with = "scenarios")]
+    #[arg(value_name = "DIR", conflicts_with = "scenarios", help_heading = "Data")]
     dir: Option<PathBuf>,
     /// Scenario file (.jsonl, .parquet, .csv) instead of recordings
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Data")]
     scenarios: Option<PathBuf>,
     /// Folder for tables, figures and run.json
-    #[arg(long, value_name = "DIR", default_value = "lanesweep-out")]
+    #[arg(long, value_name = "DIR", default_value = "lanesweep-out", help_heading = "Output")]
     out: PathBuf,
     /// Also write one row per lane: .csv, .jsonl or .parquet
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
     rows: Option<PathBuf>,
     /// Tables and page have the paper's published numbers (of highD) too
-    #[arg(long)]
+    #[arg(long, help_heading = "Models and criteria")]
     published: bool,
     /// Compute in binary64 on the CPU, not in the f32 lane arithmetic
-    #[arg(long)]
+    #[arg(long, help_heading = "Models and criteria")]
     reference: bool,
     /// Run both arithmetics and list every verdict that differs (reference.csv in --out)
-    #[arg(long, conflicts_with = "reference")]
+    #[arg(long, conflicts_with = "reference", help_heading = "Models and criteria", hide_short_help = true)]
     compare_reference: bool,
-    /// Seed of the choice of lanes that are computed again [default: 157]
-    #[arg(long, value_name = "N")]
-    seed: Option<u64>,
     /// Keep the plan in --out for `simulate --from`
     ///
     /// The plan is run-plan.json; with it you can repeat each lane. auto keeps it up to 256 MiB, about 150,000
     /// scenarios.
-    #[arg(long, value_name = "auto|always|never", value_enum, hide_possible_values = true, default_value_t = KeepPlan::Auto)]
+    #[arg(long, value_name = "auto|always|never", value_enum, hide_possible_values = true, default_value_t = KeepPlan::Auto, help_heading = "Output", hide_short_help = true)]
     keep_plan: KeepPlan,
     #[command(flatten)]
     categories: lists::CategoriesFlag,
@@ -86,10 +82,10 @@ pub struct Study {
     ///
     /// The paper's claims need all of its headways. r157: the minimum following distance of UN R157, 5.2.3.3, by the
     /// ego's speed; may stand in a list. observed: each scenario starts from its recorded gap; stands alone.
-    #[arg(long, value_name = "s,s,…|paper|r157|observed", default_value = "paper")]
+    #[arg(long, value_name = "s,s,…|paper|r157|observed", default_value = "paper", help_heading = "Scenario")]
     thw: String,
     /// Print lanes, memory and estimated time; write nothing
-    #[arg(long, conflicts_with_all = ["shard", "plan_only"])]
+    #[arg(long, conflicts_with_all = ["shard", "plan_only"], help_heading = "Run")]
     dry_run: bool,
     #[command(flatten)]
     tables: TablesFlag,
@@ -98,13 +94,7 @@ pub struct Study {
     #[command(flatten)]
     shards: ShardFlags,
     #[command(flatten)]
-    backend: BackendFlags,
-    #[command(flatten)]
-    profile: ProfileFlags,
-    #[command(flatten)]
     plausibility: PlausibilityFlag,
-    #[command(flatten)]
-    generator: GeneratorFlags,
 }
 
 /// When a run in one piece leaves its plan.
@@ -137,10 +127,10 @@ impl Study {
         self.shards.start()?;
         if let Some(path) = &self.shards.plan {
             configured.refuse_with_plan()?;
-            let opened = self.backend.open()?;
+            let opened = configured.open()?;
             let study = study::Study::read(path, self.shards.shard)?;
             if study.facts().reference {
-                self.backend.none_but("--reference")?;
+                configured.open_cpu("--reference")?;
             }
             if self.dry_run {
                 return self.forecast(&study, &opened, None);
@@ -149,7 +139,7 @@ impl Study {
         }
         if self.shards.plan_only {
             if self.reference {
-                self.backend.none_but("--reference")?;
+                configured.open_cpu("--reference")?;
             }
             let (study, _) = self.prepare(configured, verbosity)?;
             study.write_plan(&self.out)?;
@@ -157,7 +147,7 @@ impl Study {
             return Ok(if study.facts().incomplete { Exit::Incomplete } else { Exit::Ok });
         }
         // Before the work: a device that is not there is known at once.
-        let opened = if self.reference { self.backend.none_but("--reference")? } else { self.backend.open()? };
+        let opened = if self.reference { configured.open_cpu("--reference")? } else { configured.open()? };
         let (study, timings) = self.prepare(configured, verbosity)?;
         if self.dry_run {
             return self.forecast(&study, &opened, Some(timings.mine_s + timings.plan_s));
@@ -179,7 +169,7 @@ impl Study {
 
     /// What is studied, with what.
     fn asked(&self, configured: &Configured) -> Result<(Profile, StudyOptions, Source)> {
-        let profile = self.profile.load()?;
+        let profile = configured.profile()?;
         let options = StudyOptions {
             categories: self.categories.list()?,
             models: self.models.list()?,
@@ -189,15 +179,14 @@ impl Study {
         let source = match (&self.dir, &self.scenarios) {
             (Some(dir), _) => Source::Folder(dir.clone()),
             (None, Some(path)) => Source::Scenarios(path.clone()),
-            (None, None) => Source::Generated(self.generator.options(configured)?),
+            (None, None) => Source::Generated(configured.settings.generator.clone()),
         };
         Ok((profile, options, source))
     }
 
     /// From data to a plan.
     fn prepare(&self, configured: &Configured, verbosity: Verbosity) -> Result<(study::Study, Timings)> {
-        let mut config = configured.settings.clone();
-        config.score.seed = self.seed.unwrap_or(config.score.seed);
+        let config = configured.settings.clone();
         let (profile, options, source) = self.asked(configured)?;
         let has_paper_headways = options.headways == Headway::paper();
         // What is generated is said with the answer.

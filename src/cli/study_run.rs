@@ -83,7 +83,7 @@ pub(super) struct Host {
 #[derive(Debug, Clone, Copy, Args)]
 pub(super) struct TablesFlag {
     /// Print all tables instead of the answer; they are in report.txt too
-    #[arg(long)]
+    #[arg(long, help_heading = "Data")]
     pub tables: bool,
 }
 

@@ -4,15 +4,13 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand};
 
-use super::backend_flags::BackendFlags;
 use super::configured::Configured;
 use super::conformance::Conformance;
 use super::console::{self, Verbosity};
 use super::devices::Devices;
 use super::format::FormatFlag;
 use super::source::{PlausibilityFlag, Source};
-use super::synth::GeneratorFlags;
-use super::{Exit, ProfileFlags, lists};
+use super::{Exit, lists};
 use crate::engine::verify::{RandomOptions, ThresholdOptions, compare, random_plan, threshold_plan};
 use crate::engine::{Backend, LanePlan, LaneRunner, Wanted};
 use crate::model::profile::Profile;
@@ -38,33 +36,27 @@ pub struct Verify {
     #[command(subcommand)]
     verb: Option<VerifyVerb>,
     /// Folder of highD-format recordings for the study [default: synthetic recordings]
-    #[arg(value_name = "DIR", conflicts_with = "scenarios")]
+    #[arg(value_name = "DIR", conflicts_with = "scenarios", help_heading = "Data")]
     dir: Option<PathBuf>,
     /// Scenario file (.jsonl, .parquet, .csv) for the study
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Data")]
     scenarios: Option<PathBuf>,
     /// Random lanes per model and category
-    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = lists::whole::<u64>)]
+    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = lists::whole::<u64>, help_heading = "Models and criteria")]
     random_lanes: u64,
     /// Units of 12 lanes per model, threshold and category
-    #[arg(long, value_name = "N", default_value_t = 64, value_parser = lists::whole::<u64>)]
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = lists::whole::<u64>, help_heading = "Models and criteria", hide_short_help = true)]
     threshold_units: u64,
     /// Seed of the random lanes and of those on thresholds
-    #[arg(long, value_name = "N", default_value_t = 157)]
+    #[arg(long, value_name = "N", default_value_t = 157, help_heading = "Run")]
     seed: u64,
     /// Run one lane again and print its words on each backend
-    #[arg(long, value_name = "KEY")]
+    #[arg(long, value_name = "KEY", help_heading = "Data")]
     lane: Option<String>,
     #[command(flatten)]
     format: FormatFlag,
     #[command(flatten)]
-    backend: BackendFlags,
-    #[command(flatten)]
-    profile: ProfileFlags,
-    #[command(flatten)]
     plausibility: PlausibilityFlag,
-    #[command(flatten)]
-    generator: GeneratorFlags,
 }
 
 #[derive(Debug, Subcommand)]
@@ -92,8 +84,8 @@ impl Verify {
                 return Err(Error::usage(Place::item(flag), problem, "choose a number in this range"));
             }
         }
-        let profile = self.profile.load()?;
-        let opened = self.backend.open_to_verify()?;
+        let profile = configured.profile()?;
+        let opened = configured.open_to_verify()?;
         let tested = opened.backend();
         if let Some(key) = &self.lane {
             return self.one_lane(key, configured, &profile, tested, verbosity);
@@ -170,7 +162,7 @@ impl Verify {
         let source = match (&self.dir, &self.scenarios) {
             (Some(dir), _) => Source::Folder(dir.clone()),
             (None, Some(path)) => Source::Scenarios(path.clone()),
-            (None, None) => Source::Generated(self.generator.options(configured)?),
+            (None, None) => Source::Generated(configured.settings.generator.clone()),
         };
         let collection = source.load(&configured.settings.mining, self.plausibility.policy(), verbosity)?;
         let options = StudyOptions { categories: Category::ALL.to_vec(), ..StudyOptions::default() };

@@ -175,14 +175,14 @@ impl Layers {
         self.set_word(&key, word, origin)
     }
 
-    /// What a flag of its own was given. A value that the key does not take is the flag's to complain of.
-    pub fn flag(&mut self, name: &str, flag: &str, word: &str) {
-        let Some(key) = Key::find(&self.keys, name) else { return };
-        let is_number = matches!(key.kind, KeyKind::Number { .. });
-        let read = |word: &str| from_word(key, word).ok().filter(|value| is_number || check(key, value).is_ok());
-        if let Some(value) = read(word).or_else(|| read(&word.to_ascii_lowercase())) {
-            self.set(name, value, Origin::Flag(flag.to_owned()));
-        }
+    /// What a flag of its own was given. Words are taken in any case.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a value that the key does not take.
+    pub fn flag(&mut self, name: &str, flag: &str, word: &str) -> Result<()> {
+        let Some(key) = Key::find(&self.keys, name).cloned() else { return Ok(()) };
+        let word = if matches!(key.kind, KeyKind::Choice(_)) { word.to_ascii_lowercase() } else { word.to_owned() };
+        self.set_word(&key, &word, Origin::Flag(flag.to_owned()))
     }
 
     fn set_word(&mut self, key: &Key, word: &str, origin: Origin) -> Result<()> {

@@ -43,7 +43,7 @@ pub(super) fn from_word(key: &Key, word: &str) -> Result<Value, Wrong> {
     let value = match key.kind {
         KeyKind::Text | KeyKind::Choice(_) => (!unquoted.is_empty()).then(|| Value::String(unquoted.to_owned())),
         KeyKind::Boolean => word.parse().ok().map(Value::Bool),
-        KeyKind::Number { .. } => match digits.parse::<i128>() {
+        KeyKind::Number(_) => match digits.parse::<i128>() {
             Ok(i) => whole(i),
             Err(_) => digits.parse().ok().and_then(Number::from_f64).map(Value::Number),
         },
@@ -54,10 +54,7 @@ pub(super) fn from_word(key: &Key, word: &str) -> Result<Value, Wrong> {
 /// Checks the range.
 pub(super) fn check(key: &Key, value: &Value) -> Result<(), Wrong> {
     let fits = match &key.kind {
-        KeyKind::Number { least, most, .. } => value.as_f64().is_some_and(|x| {
-            least.is_none_or(|(limit, open)| if open { x > limit } else { x >= limit })
-                && most.is_none_or(|(limit, open)| if open { x < limit } else { x <= limit })
-        }),
+        KeyKind::Number(range) => value.as_f64().is_some_and(|x| range.contains(x)),
         KeyKind::Choice(choices) => choices.iter().any(|choice| value == choice.word.as_str()),
         KeyKind::Boolean | KeyKind::Text => true,
     };
@@ -83,8 +80,8 @@ fn whole(i: i128) -> Option<Value> {
 /// A value of the key's type: whole numbers stand for others, and 1e6 for a whole one.
 fn fitted(key: &Key, value: Value) -> Option<Value> {
     match (&key.kind, value) {
-        (KeyKind::Number { is_whole: false, .. }, Value::Number(n)) => n.as_f64().map(Value::from),
-        (KeyKind::Number { is_whole: true, .. }, Value::Number(n)) => match n.as_f64().filter(|_| n.is_f64()) {
+        (KeyKind::Number(range), Value::Number(n)) if !range.is_whole => n.as_f64().map(Value::from),
+        (KeyKind::Number(_), Value::Number(n)) => match n.as_f64().filter(|_| n.is_f64()) {
             // Beyond 2^53 a floating-point number does not tell which whole one is meant.
             Some(x) => (x.fract() == 0.0 && x.abs() < 9e15).then(|| whole(x as i128)).flatten(),
             None => Some(Value::Number(n)),
