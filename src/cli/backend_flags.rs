@@ -18,7 +18,10 @@ pub struct Opened {
 
 impl Configured {
     /// The backend and the device that are asked for.
-    fn backend(&self) -> Result<(BackendChoice, Option<DeviceName>)> {
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for what names no device.
+    pub fn backend(&self) -> Result<(BackendChoice, Option<DeviceName>)> {
         let run = &self.settings.run;
         let device = run.device.as_deref().map(str::parse).transpose();
         Ok((run.backend, device.map_err(|error| self.at_origin("run.device", "device", error))?))

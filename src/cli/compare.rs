@@ -10,7 +10,7 @@ use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::dry_run::{self, BUDGET, DryRun, ForecastPart};
 use super::format::FormatFlag;
-use super::source::{self, PlausibilityFlag, Source};
+use super::source::SourceFlags;
 use super::{Exit, fit, lists};
 use crate::engine::{Forecast, Headway, LanePlan, Partial, Wanted, forecast};
 use crate::model::criterion::Criterion;
@@ -23,7 +23,6 @@ use crate::stats::estimate::Enough;
 use crate::support::files::check_folder;
 use crate::support::readable::count;
 use crate::support::run_dir::{COMPARE_RECORD, OutputDir, Results};
-use crate::traffic::mining::counts_text;
 use crate::{Error, Result};
 
 /// Memory of the counts of sampled lanes and of the figures, bytes, measured.
@@ -43,12 +42,8 @@ const BYTES_OF_COUNTS: u64 = 8 << 20;
                   lanesweep compare --scenarios scenarios.jsonl --parameterizations i,iii --models FSM,RSS \\\n      \
                   --thw 0.6,1.0")]
 pub struct Compare {
-    /// Folder of highD-format recordings [default: synthetic recordings]
-    #[arg(value_name = "DIR", conflicts_with = "scenarios", help_heading = "Data")]
-    dir: Option<PathBuf>,
-    /// Scenario file (.jsonl, .parquet, .csv) instead of recordings
-    #[arg(long, value_name = "FILE", help_heading = "Data")]
-    scenarios: Option<PathBuf>,
+    #[command(flatten)]
+    data: SourceFlags,
     /// Folder for compare.csv, compare.json and compare.txt
     #[arg(long, value_name = "DIR", default_value = "lanesweep-compare", help_heading = "Output")]
     out: PathBuf,
@@ -58,12 +53,8 @@ pub struct Compare {
     parameterizations: lists::ParameterizationsFlag,
     #[command(flatten)]
     models: lists::ModelsFlag,
-    /// Time headways; observed: the recorded gaps
-    ///
-    /// paper is 2.0, 1.8, … 0.2; r157 the minimum following distance of UN R157, 5.2.3.3. observed: S and S' start from
-    /// the recorded gap of each scenario; a density draws the headway as one more parameter.
-    #[arg(long, value_name = "s,s,…|observed", default_value = "paper", help_heading = "Scenario")]
-    thw: String,
+    #[command(flatten)]
+    headways: lists::HeadwaysFlag,
     /// Print lanes, memory and estimated time; write nothing
     #[arg(long, help_heading = "Run")]
     dry_run: bool,
@@ -71,8 +62,6 @@ pub struct Compare {
     exposure: lists::ExposureFlags,
     #[command(flatten)]
     format: FormatFlag,
-    #[command(flatten)]
-    plausibility: PlausibilityFlag,
 }
 
 impl Compare {
@@ -82,21 +71,14 @@ impl Compare {
         let categories = self.categories.list()?;
         let ids = self.parameterizations.list(&categories)?;
         let models = self.models.list()?;
-        let headways = lists::paper_or_headways(&self.thw)?;
+        let headways = self.headways.list()?;
         let typed = self.exposure.driven()?;
         let profile = configured.profile()?;
-        let source = match (&self.dir, &self.scenarios) {
-            (Some(dir), _) => Source::Folder(dir.clone()),
-            (None, Some(path)) => Source::Scenarios(path.clone()),
-            (None, None) => Source::Generated(configured.settings.generator.clone()),
-        };
         self.guard_inputs(configured)?;
         check_folder(&self.out)?;
         let opened = configured.open()?;
-        tracing::info!("{}", source.describe(false));
-        let collection = source.load(&config.mining, self.plausibility.policy(), verbosity)?;
-        tracing::info!("{}", counts_text(&collection.scenarios));
-        let facts = fit::facts(&source, &collection, typed)?;
+        let collection = self.data.load_told(configured, verbosity)?;
+        let facts = fit::facts(&self.data.source(configured), &collection, typed)?;
         if facts.driven.is_none() {
             tracing::warn!(
                 "exposure is unknown, because the scenarios have no driven time and distance; give --hours and --km"
@@ -229,10 +211,7 @@ impl Compare {
 
     /// Results must not replace an input.
     fn guard_inputs(&self, configured: &Configured) -> Result<()> {
-        let inputs: Vec<PathBuf> = self.scenarios.iter().chain(configured.files()).cloned().collect();
-        for name in ["compare.csv", "compare.txt", "compare.json"] {
-            source::refuse_overwriting(&self.out.join(name), &inputs, "--out")?;
-        }
-        Ok(())
+        let mut results = ["compare.csv", "compare.txt", "compare.json"].into_iter();
+        results.try_for_each(|name| self.data.refuse_overwriting(&self.out.join(name), configured, "--out"))
     }
 }

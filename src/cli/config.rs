@@ -138,6 +138,7 @@ impl Show {
     fn run(&self, configured: &Configured) -> Result<Exit> {
         // What only a profile can tell of its own time step.
         configured.profile()?;
+        configured.backend()?;
         let shown: Vec<Setting> = match self.changed {
             true => configured.layers.given().collect(),
             false => configured.layers.list().collect(),

@@ -219,11 +219,11 @@ impl Configured {
     }
 
     /// An error about an option, at the file or variable that sets its key.
-    pub fn at_origin(&self, key: &str, option: &str, error: Error) -> Error {
+    pub fn at_origin(&self, key: &str, option: &'static str, error: Error) -> Error {
         let origin = self.layers.get(key).map(|setting| setting.origin);
         match (error, origin) {
             (error, None | Some(Origin::Default | Origin::Flag(_))) => error,
-            (Error::Usage { place, problem, help }, Some(origin)) if *place == Place::option(option) => {
+            (Error::Usage { place, problem, help }, Some(origin)) if place.option == Some(option) => {
                 Error::usage(origin.place(key), problem, help)
             }
             (error, _) => error,

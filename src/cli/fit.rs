@@ -11,7 +11,7 @@ use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::lists;
-use super::source::{self, PlausibilityFlag, Source};
+use super::source::{self, Source, SourceFlags};
 use crate::cli::settings::BandwidthInterval;
 use crate::report::density;
 use crate::report::records;
@@ -23,7 +23,7 @@ use crate::support::files::{check_folder_of, make_folder};
 use crate::support::input_file;
 use crate::support::readable::counted;
 use crate::support::run_dir::OutputDir;
-use crate::traffic::mining::{Collection, counts_text};
+use crate::traffic::mining::Collection;
 use crate::{Error, Place, Result};
 
 /// How are the parameters of scenarios distributed?
@@ -38,12 +38,8 @@ use crate::{Error, Place, Result};
                         scenarios.jsonl --hours 44.5 --km 4450\n  lanesweep fit recordings --parameterizations 2 \
                         --with-thw --out cut-in-2.json")]
 pub struct Fit {
-    /// Folder of highD-format recordings [default: synthetic recordings]
-    #[arg(value_name = "DIR", conflicts_with = "scenarios", help_heading = "Data")]
-    dir: Option<PathBuf>,
-    /// Scenario file (.jsonl, .parquet, .csv) instead of recordings
-    #[arg(long, value_name = "FILE", help_heading = "Data")]
-    scenarios: Option<PathBuf>,
+    #[command(flatten)]
+    data: SourceFlags,
     /// Folder of density files, or one file.json for one density
     #[arg(long, value_name = "DIR|FILE", default_value = "lanesweep-densities", help_heading = "Output")]
     out: PathBuf,
@@ -66,8 +62,6 @@ pub struct Fit {
     exposure: lists::ExposureFlags,
     #[command(flatten)]
     format: FormatFlag,
-    #[command(flatten)]
-    plausibility: PlausibilityFlag,
 }
 
 impl Fit {
@@ -86,16 +80,9 @@ impl Fit {
             seed: config.fit.seed,
             representativeness: !self.no_comparison,
         };
-        let source = match (&self.dir, &self.scenarios) {
-            (Some(dir), _) => Source::Folder(dir.clone()),
-            (None, Some(path)) => Source::Scenarios(path.clone()),
-            (None, None) => Source::Generated(configured.settings.generator.clone()),
-        };
         let files = self.files(&ids, configured)?;
-        tracing::info!("{}", source.describe(false));
-        let collection = source.load(&config.mining, self.plausibility.policy(), verbosity)?;
-        tracing::info!("{}", counts_text(&collection.scenarios));
-        let facts = facts(&source, &collection, typed)?;
+        let collection = self.data.load_told(configured, verbosity)?;
+        let facts = facts(&self.data.source(configured), &collection, typed)?;
         if facts.driven.is_none() {
             tracing::warn!(
                 "exposure is unknown, because the scenarios have no driven time and distance; give --hours and --km"
@@ -160,10 +147,10 @@ impl Fit {
             false => self.out.join(format!("{}-{}.json", id.category.key().replace('_', "-"), id.key)),
         };
         let files: Vec<PathBuf> = ids.iter().map(name).collect();
-        let mut inputs: Vec<PathBuf> = self.scenarios.iter().chain(configured.files()).cloned().collect();
-        inputs.extend(self.scenarios.as_deref().map(ExposureFile::path_of));
+        let beside: Vec<PathBuf> = self.data.scenarios.as_deref().map(ExposureFile::path_of).into_iter().collect();
         for file in &files {
-            source::refuse_overwriting(file, &inputs, "--out")?;
+            self.data.refuse_overwriting(file, configured, "--out")?;
+            source::refuse_overwriting(file, &beside, "--out")?;
             check_folder_of(file)?;
         }
         Ok(files)

@@ -8,7 +8,7 @@ use clap::Args;
 use super::configured::Configured;
 use super::console::Verbosity;
 use super::format::FormatFlag;
-use super::source::{self, PlausibilityFlag, Source};
+use super::source::SourceFlags;
 use super::{Exit, fit, lists};
 use crate::interop::cluster::quoted_word;
 use crate::interop::conformance::check_shipped_tables;
@@ -23,7 +23,6 @@ use crate::stats::density::Driven;
 use crate::stats::estimate::Enough;
 use crate::support::files::check_folder;
 use crate::support::run_dir::{DOSSIER_RECORD, OutputDir};
-use crate::traffic::mining::counts_text;
 use crate::{Error, Place, Result};
 
 /// Is a parameterization appropriate for this driver model, scenario type and criterion?
@@ -39,12 +38,8 @@ use crate::{Error, Place, Result};
                   lanesweep justify recordings --parameterization iii --models CCHDM --criterion ttc --out dossier\n  \
                   lanesweep justify --scenarios scenarios.jsonl --parameterization 6 --models Reg157")]
 pub struct Justify {
-    /// Folder of highD-format recordings [default: synthetic recordings]
-    #[arg(value_name = "DIR", conflicts_with = "scenarios", help_heading = "Data")]
-    dir: Option<PathBuf>,
-    /// Scenario file (.jsonl, .parquet, .csv) instead of recordings
-    #[arg(long, value_name = "FILE", help_heading = "Data")]
-    scenarios: Option<PathBuf>,
+    #[command(flatten)]
+    data: SourceFlags,
     /// Parameterization: 1…7 (cut-in), a…g (cut-out), i…v (LVD)
     #[arg(long, value_name = "KEY", help_heading = "Scenario")]
     parameterization: String,
@@ -53,9 +48,8 @@ pub struct Justify {
     models: String,
     #[command(flatten)]
     criterion: lists::CriterionFlag,
-    /// Time headways; paper is 2.0, 1.8, … 0.2; observed the recorded gaps
-    #[arg(long, value_name = "s,s,…|paper|r157|observed", default_value = "paper", help_heading = "Scenario")]
-    thw: String,
+    #[command(flatten)]
+    headways: lists::HeadwaysFlag,
     /// Who answers for the dossier [default: a line to fill in]
     #[arg(long, value_name = "NAME", help_heading = "Output", hide_short_help = true)]
     author: Option<String>,
@@ -67,8 +61,6 @@ pub struct Justify {
     out: PathBuf,
     #[command(flatten)]
     format: FormatFlag,
-    #[command(flatten)]
-    plausibility: PlausibilityFlag,
 }
 
 impl Justify {
@@ -81,23 +73,15 @@ impl Justify {
             Error::usage(Place::item("--models"), problem, format!("use one of {}", ModelId::names()))
         })?;
         let criterion = self.criterion.get()?;
-        let headways = lists::paper_or_headways(&self.thw)?;
+        let headways = self.headways.list()?;
         let profile = configured.profile()?;
-        let source = match (&self.dir, &self.scenarios) {
-            (Some(dir), _) => Source::Folder(dir.clone()),
-            (None, Some(path)) => Source::Scenarios(path.clone()),
-            (None, None) => Source::Generated(configured.settings.generator.clone()),
-        };
-        let inputs: Vec<PathBuf> = self.scenarios.iter().chain(configured.files()).cloned().collect();
         for name in ["report.html", DOSSIER_RECORD, "hidden.csv", "hidden.svg"] {
-            source::refuse_overwriting(&self.out.join(name), &inputs, "--out")?;
+            self.data.refuse_overwriting(&self.out.join(name), configured, "--out")?;
         }
         check_folder(&self.out)?;
         let opened = configured.open()?;
-        tracing::info!("{}", source.describe(false));
-        let collection = source.load(&config.mining, self.plausibility.policy(), verbosity)?;
-        tracing::info!("{}", counts_text(&collection.scenarios));
-        let facts = fit::facts(&source, &collection, Driven { hours: None, kilometres: None })?;
+        let collection = self.data.load_told(configured, verbosity)?;
+        let facts = fit::facts(&self.data.source(configured), &collection, Driven { hours: None, kilometres: None })?;
         let options = JustifyOptions {
             compare: CompareOptions {
                 study: StudyOptions {

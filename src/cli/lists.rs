@@ -93,6 +93,32 @@ impl ModelsFlag {
     }
 }
 
+/// `--thw` of a verb that replays scenarios.
+#[derive(Debug, Clone, Args)]
+pub struct HeadwaysFlag {
+    /// Time headways; paper is 2.0, 1.8, … 0.2; observed the recorded gaps
+    ///
+    /// The paper's claims need all of its headways. r157: the minimum following distance of UN R157, 5.2.3.3, by the
+    /// ego's speed; may stand in a list. observed: each scenario starts from its recorded gap, and a density draws the
+    /// headway as one more parameter; stands alone.
+    #[arg(long, value_name = "s,s,…|paper|r157|observed", default_value = "paper", help_heading = "Scenario")]
+    thw: String,
+}
+
+impl HeadwaysFlag {
+    /// In the order given.
+    ///
+    /// # Errors
+    /// As [`headways`].
+    pub fn list(&self) -> Result<Vec<Headway>> {
+        match self.thw.trim() {
+            "paper" => Ok(Headway::paper()),
+            text if Headway::parse(text) == Some(Headway::Observed) => Ok(vec![Headway::Observed]),
+            list => headways(list, "`paper` or `observed`"),
+        }
+    }
+}
+
 /// What `--models` takes.
 pub fn models_help() -> String {
     format!("Driver models: {} [default: all]", ModelId::names())
@@ -200,18 +226,6 @@ pub fn headways(list: &str, words: &str) -> Result<Vec<Headway>> {
     let meanings = found.iter().map(|headway| headway.identity());
     refuse_repeats(|| Place::item("--thw"), meanings.zip(list.split(',').map(str::trim)))?;
     Ok(found)
-}
-
-/// The same, or `paper`: the ten of the paper, or `observed`: the recorded gaps.
-///
-/// # Errors
-/// As [`headways`].
-pub fn paper_or_headways(text: &str) -> Result<Vec<Headway>> {
-    match text.trim() {
-        "paper" => Ok(Headway::paper()),
-        text if Headway::parse(text) == Some(Headway::Observed) => Ok(vec![Headway::Observed]),
-        list => headways(list, "`paper` or `observed`"),
-    }
 }
 
 /// The parameterizations of `--parameterizations` among those of some categories, in the registry's order; all where

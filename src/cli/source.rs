@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use super::configured::Configured;
 use super::console::{self, Verbosity};
 use crate::scenario::{Category, Scenario, ScenarioFile, read_scenario_file};
 use crate::support::plausibility::Implausible;
 use crate::support::repeats::refuse_repeats;
-use crate::traffic::mining::{Collection, MiningOptions, mine_folder, mine_generated};
+use crate::traffic::mining::{Collection, MiningOptions, counts_text, mine_folder, mine_generated};
 use crate::traffic::trajectory::generator::GeneratorOptions;
 use crate::traffic::trajectory::highd::{self, made_up};
 use crate::{Error, Place, Result};
@@ -105,6 +106,54 @@ impl PlausibilityFlag {
     /// As readers take it.
     pub fn policy(self) -> Implausible {
         if self.accept_implausible { Implausible::Accepted } else { Implausible::Refused }
+    }
+}
+
+/// Where a verb's data come from.
+#[derive(Debug, Clone, Args)]
+pub struct SourceFlags {
+    /// Folder of highD-format recordings [default: synthetic recordings]
+    #[arg(value_name = "DIR", conflicts_with = "scenarios", help_heading = "Data")]
+    pub dir: Option<PathBuf>,
+    /// Scenario file (.jsonl, .parquet, .csv) instead of recordings
+    #[arg(long, value_name = "FILE", help_heading = "Data")]
+    pub scenarios: Option<PathBuf>,
+    #[command(flatten)]
+    plausibility: PlausibilityFlag,
+}
+
+impl SourceFlags {
+    /// What they name; the generator where they name nothing.
+    pub fn source(&self, configured: &Configured) -> Source {
+        match (&self.dir, &self.scenarios) {
+            (Some(dir), _) => Source::Folder(dir.clone()),
+            (None, Some(path)) => Source::Scenarios(path.clone()),
+            (None, None) => Source::Generated(configured.settings.generator.clone()),
+        }
+    }
+
+    /// As [`Source::check`].
+    pub fn check(&self, configured: &Configured) -> Result<()> {
+        self.source(configured).check(self.plausibility.policy())
+    }
+
+    /// As [`Source::load`].
+    pub fn load(&self, configured: &Configured, verbosity: Verbosity) -> Result<Collection> {
+        self.source(configured).load(&configured.settings.mining, self.plausibility.policy(), verbosity)
+    }
+
+    /// The same, with what it is of and what is found told.
+    pub fn load_told(&self, configured: &Configured, verbosity: Verbosity) -> Result<Collection> {
+        tracing::info!("{}", self.source(configured).describe(false));
+        let collection = self.load(configured, verbosity)?;
+        tracing::info!("{}", counts_text(&collection.scenarios));
+        Ok(collection)
+    }
+
+    /// No result may replace an input of the run.
+    pub fn refuse_overwriting(&self, output: &Path, configured: &Configured, flag: &str) -> Result<()> {
+        let inputs: Vec<PathBuf> = self.scenarios.iter().chain(configured.files()).cloned().collect();
+        refuse_overwriting(output, &inputs, flag)
     }
 }
 

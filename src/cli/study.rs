@@ -11,7 +11,7 @@ use super::console::{self, Verbosity};
 use super::dry_run::{self, BUDGET, DryRun};
 use super::format::FormatFlag;
 use super::shard_flags::ShardFlags;
-use super::source::{self, PlausibilityFlag, Source};
+use super::source::{self, Source, SourceFlags};
 use super::study_run::{Host, TablesFlag, compare_reference, finish_study, lane_format, write_lanes};
 use super::{Exit, lists};
 use crate::Result;
@@ -47,12 +47,8 @@ const FORECAST_BYTES: u64 = 64 << 20;
 #[command(after_help = "Examples:\n  lanesweep study\n  lanesweep study recordings --out result\n  lanesweep study \
                         --scenarios scenarios.jsonl --rows lanes.csv")]
 pub struct Study {
-    /// Folder of highD-format recordings [default: synthetic recordings]
-    #[arg(value_name = "DIR", conflicts_with = "scenarios", help_heading = "Data")]
-    dir: Option<PathBuf>,
-    /// Scenario file (.jsonl, .parquet, .csv) instead of recordings
-    #[arg(long, value_name = "FILE", help_heading = "Data")]
-    scenarios: Option<PathBuf>,
+    #[command(flatten)]
+    data: SourceFlags,
     /// Folder for tables, figures and run.json
     #[arg(long, value_name = "DIR", default_value = "lanesweep-out", help_heading = "Output")]
     out: PathBuf,
@@ -78,12 +74,8 @@ pub struct Study {
     categories: lists::CategoriesFlag,
     #[command(flatten)]
     models: lists::ModelsFlag,
-    /// Time headways; paper is 2.0, 1.8, … 0.2; observed the recorded gaps
-    ///
-    /// The paper's claims need all of its headways. r157: the minimum following distance of UN R157, 5.2.3.3, by the
-    /// ego's speed; may stand in a list. observed: each scenario starts from its recorded gap; stands alone.
-    #[arg(long, value_name = "s,s,…|paper|r157|observed", default_value = "paper", help_heading = "Scenario")]
-    thw: String,
+    #[command(flatten)]
+    headways: lists::HeadwaysFlag,
     /// Print lanes, memory and estimated time; write nothing
     #[arg(long, conflicts_with_all = ["shard", "plan_only"], help_heading = "Run")]
     dry_run: bool,
@@ -93,8 +85,6 @@ pub struct Study {
     format: FormatFlag,
     #[command(flatten)]
     shards: ShardFlags,
-    #[command(flatten)]
-    plausibility: PlausibilityFlag,
 }
 
 /// When a run in one piece leaves its plan.
@@ -162,40 +152,35 @@ impl Study {
     pub(super) fn check(&self, configured: &Configured) -> Result<()> {
         self.guard_inputs(configured)?;
         check_folder(&self.out)?;
-        let (profile, options, source) = self.asked(configured)?;
+        let (profile, options) = self.asked(configured)?;
         profile.check_time_step(&options.models)?;
-        source.check(self.plausibility.policy())
+        self.data.check(configured)
     }
 
     /// What is studied, with what.
-    fn asked(&self, configured: &Configured) -> Result<(Profile, StudyOptions, Source)> {
+    fn asked(&self, configured: &Configured) -> Result<(Profile, StudyOptions)> {
         let profile = configured.profile()?;
         let options = StudyOptions {
             categories: self.categories.list()?,
             models: self.models.list()?,
-            headways: lists::paper_or_headways(&self.thw)?,
+            headways: self.headways.list()?,
             parameterization: configured.settings.parameterization.clone(),
         };
-        let source = match (&self.dir, &self.scenarios) {
-            (Some(dir), _) => Source::Folder(dir.clone()),
-            (None, Some(path)) => Source::Scenarios(path.clone()),
-            (None, None) => Source::Generated(configured.settings.generator.clone()),
-        };
-        Ok((profile, options, source))
+        Ok((profile, options))
     }
 
     /// From data to a plan.
     fn prepare(&self, configured: &Configured, verbosity: Verbosity) -> Result<(study::Study, Timings)> {
         let config = configured.settings.clone();
-        let (profile, options, source) = self.asked(configured)?;
+        let (profile, options) = self.asked(configured)?;
+        let source = self.data.source(configured);
         let has_paper_headways = options.headways == Headway::paper();
         // What is generated is said with the answer.
         if !matches!(source, Source::Generated(_)) {
             tracing::info!("{}", source.describe(false));
         }
         let mut timings = Timings::default();
-        let collection =
-            timed(&mut timings.mine_s, || source.load(&config.mining, self.plausibility.policy(), verbosity))?;
+        let collection = timed(&mut timings.mine_s, || self.data.load(configured, verbosity))?;
         let data = source.describe(collection.synthetic);
         tracing::info!("{}", counts_text(&collection.scenarios));
         let builder = study::Study::builder(&collection, profile)
@@ -203,7 +188,7 @@ impl Study {
             .mining(config.mining)
             .score(config.score)
             .data(data)
-            .scenario_file_sha256(self.scenarios.as_deref().map(input_file::sha256).transpose()?)
+            .scenario_file_sha256(self.data.scenarios.as_deref().map(input_file::sha256).transpose()?)
             // What the synthetic recordings are calibrated to stands beside what they give, where the headways are the same.
             .published(self.published || (collection.synthetic && has_paper_headways))
             .reference(self.reference);
@@ -321,12 +306,12 @@ impl Study {
         let results = ["failures.csv", "f1.csv", "claims.csv", "report.txt", "reference.csv", "run.json"];
         let results = results.into_iter().chain([PLAN_FILE, RUN_PLAN_FILE]);
         let mut others: Vec<PathBuf> = results.map(|name| self.out.join(name)).collect();
-        others.extend(self.scenarios.clone());
+        others.extend(self.data.scenarios.clone());
         others.extend(configured.files().iter().cloned());
         others.extend(self.shards.plan.clone());
         source::refuse_overwriting(lanes, &others, "--rows")?;
         lane_format(lanes)?;
-        self.dir.as_deref().map_or(Ok(()), |dir| source::refuse_recording(lanes, dir, "--rows"))
+        self.data.dir.as_deref().map_or(Ok(()), |dir| source::refuse_recording(lanes, dir, "--rows"))
     }
 }
 

@@ -1,7 +1,5 @@
 //! `lanesweep verify`: does this device compute what the CPU computes?
 
-use std::path::PathBuf;
-
 use clap::{Args, Subcommand};
 
 use super::configured::Configured;
@@ -9,7 +7,7 @@ use super::conformance::Conformance;
 use super::console::{self, Verbosity};
 use super::devices::Devices;
 use super::format::FormatFlag;
-use super::source::{PlausibilityFlag, Source};
+use super::source::SourceFlags;
 use super::{Exit, lists};
 use crate::engine::verify::{RandomOptions, ThresholdOptions, compare, random_plan, threshold_plan};
 use crate::engine::{Backend, LanePlan, LaneRunner, Wanted};
@@ -35,12 +33,8 @@ use crate::{Error, Place, Result};
 pub struct Verify {
     #[command(subcommand)]
     verb: Option<VerifyVerb>,
-    /// Folder of highD-format recordings for the study [default: synthetic recordings]
-    #[arg(value_name = "DIR", conflicts_with = "scenarios", help_heading = "Data")]
-    dir: Option<PathBuf>,
-    /// Scenario file (.jsonl, .parquet, .csv) for the study
-    #[arg(long, value_name = "FILE", help_heading = "Data")]
-    scenarios: Option<PathBuf>,
+    #[command(flatten)]
+    data: SourceFlags,
     /// Random lanes per model and category
     #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = lists::whole::<u64>, help_heading = "Models and criteria")]
     random_lanes: u64,
@@ -55,8 +49,6 @@ pub struct Verify {
     lane: Option<String>,
     #[command(flatten)]
     format: FormatFlag,
-    #[command(flatten)]
-    plausibility: PlausibilityFlag,
 }
 
 #[derive(Debug, Subcommand)]
@@ -159,18 +151,17 @@ impl Verify {
     }
 
     fn study(&self, configured: &Configured, profile: &Profile, verbosity: Verbosity) -> Result<LanePlan> {
-        let source = match (&self.dir, &self.scenarios) {
-            (Some(dir), _) => Source::Folder(dir.clone()),
-            (None, Some(path)) => Source::Scenarios(path.clone()),
-            (None, None) => Source::Generated(configured.settings.generator.clone()),
-        };
-        let collection = source.load(&configured.settings.mining, self.plausibility.policy(), verbosity)?;
+        let collection = self.data.load(configured, verbosity)?;
         let options = StudyOptions { categories: Category::ALL.to_vec(), ..StudyOptions::default() };
         let plan = plan_study(&collection.scenarios, profile, &options)?.plan;
         if plan.unit_count() == 0 {
             let problem = format!("no scenario to simulate ({})", counts_text(&collection.scenarios));
             let help = "use more recordings or scenarios that pass the paper's filters";
-            return Err(Error::input(Place::item(source.describe(collection.synthetic)), problem, help));
+            return Err(Error::input(
+                Place::item(self.data.source(configured).describe(collection.synthetic)),
+                problem,
+                help,
+            ));
         }
         Ok(plan)
     }

@@ -361,7 +361,7 @@ fn bad_input_is_told_with_its_place_and_what_to_do() {
     let cases: [(&[&str], i32, &str); 26] = [
         (&[d, "--estimator", "is", "--thw", "1", "--samples", "99"], 2, "at least 100 and at most 100000000"),
         (&[d, "--estimator", "is", "--thw", "1", "--samples", "100000001"], 2, "at least 100 and at most 100000000"),
-        (&[d, "--samples", "0"], 2, "--samples: 0 cannot be used"),
+        (&[d, "--samples", "0"], 2, "--samples: `0` cannot be used"),
         (&[d, "--samples", "9223372036854775808"], 2, "more than can be counted"),
         (&[d, "--samples", "2000000000000000000"], 2, "more than can be counted"),
         (&[d, "--samples", "-1"], 2, "--samples"),

@@ -9,7 +9,7 @@ use serde_json::{Map, Value};
 
 use super::default_file::keys_in_order;
 use super::keys::{Key, KeyKind};
-use super::value::{Wrong, check, from_word};
+use super::value::from_word;
 use super::{FILE_VARIABLE, Settings, environment, file};
 use crate::{Error, Place, Result};
 
@@ -186,9 +186,7 @@ impl Layers {
     }
 
     fn set_word(&mut self, key: &Key, word: &str, origin: Origin) -> Result<()> {
-        let refused = |wrong: Wrong| Error::usage(origin.place(&key.name), wrong.problem, wrong.help);
-        let value = from_word(key, word).map_err(refused)?;
-        check(key, &value).map_err(refused)?;
+        let value = from_word(key, word, origin.place(&key.name))?;
         self.set(&key.name, value, origin);
         Ok(())
     }
