@@ -21,45 +21,45 @@ use crate::{Error, Place, Result};
 #[serde(deny_unknown_fields, default)]
 pub(super) struct CaseFlags {
     /// Kind of scenario: cut-in, cut-out, lvd
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Scenario")]
     category: Option<String>,
-    #[arg(long, value_name = "LIST", help = super::lists::models_help())]
+    #[arg(long, value_name = "LIST", help = super::lists::models_help(), help_heading = "Models and criteria")]
     models: Option<String>,
     /// Initial speed of the ego
-    #[arg(long, value_name = "m/s", value_parser = speed_mps)]
+    #[arg(long, value_name = "m/s", value_parser = speed_mps, help_heading = "Scenario")]
     ego_speed: Option<f64>,
     /// Initial speed of the other vehicle [default: the ego's]
-    #[arg(long, value_name = "m/s", value_parser = speed_mps)]
+    #[arg(long, value_name = "m/s", value_parser = speed_mps, help_heading = "Scenario")]
     speed: Option<f64>,
     /// Initial gap, bumper to bumper
-    #[arg(long, value_name = "m", value_parser = length_m, conflicts_with = "thw")]
+    #[arg(long, value_name = "m", value_parser = length_m, conflicts_with = "thw", help_heading = "Scenario")]
     gap: Option<f64>,
     /// Initial time headway instead of the gap
-    #[arg(long, value_name = "s", value_parser = time_s)]
+    #[arg(long, value_name = "s", value_parser = time_s, help_heading = "Scenario")]
     thw: Option<f64>,
     /// Cut-in, cut-out: lateral speed
-    #[arg(long, value_name = "m/s", value_parser = speed_mps)]
+    #[arg(long, value_name = "m/s", value_parser = speed_mps, help_heading = "Scenario")]
     lateral_speed: Option<f64>,
     /// Cut-in: lateral distance at the start; cut-out: at the end [default: 3.5]
-    #[arg(long, value_name = "m", value_parser = length_m)]
+    #[arg(long, value_name = "m", value_parser = length_m, help_heading = "Scenario", hide_short_help = true)]
     lateral_distance: Option<f64>,
     /// Acceleration of the other vehicle; an LVD needs one [default: 0]
-    #[arg(long, value_name = "m/s²", value_parser = acceleration_mps2, allow_hyphen_values = true)]
+    #[arg(long, value_name = "m/s²", value_parser = acceleration_mps2, allow_hyphen_values = true, help_heading = "Scenario")]
     acceleration: Option<f64>,
     /// Speed at which the acceleration ends [default: standstill, or never]
-    #[arg(long, value_name = "m/s", value_parser = speed_mps)]
+    #[arg(long, value_name = "m/s", value_parser = speed_mps, help_heading = "Scenario", hide_short_help = true)]
     end_speed: Option<f64>,
     /// Cut-out: speed of the vehicle ahead of the cutting-out one [default: 0]
-    #[arg(long, value_name = "m/s", value_parser = speed_mps)]
+    #[arg(long, value_name = "m/s", value_parser = speed_mps, help_heading = "Scenario", hide_short_help = true)]
     ahead_speed: Option<f64>,
     /// Cut-out: gap between the two, bumper to bumper
-    #[arg(long, value_name = "m", value_parser = length_m)]
+    #[arg(long, value_name = "m", value_parser = length_m, help_heading = "Scenario")]
     ahead_gap: Option<f64>,
     /// Length of every vehicle [default: the profile's]
-    #[arg(long, value_name = "m", value_parser = length_m)]
+    #[arg(long, value_name = "m", value_parser = length_m, help_heading = "Scenario", hide_short_help = true)]
     length: Option<f64>,
     /// Width of every vehicle [default: the profile's]
-    #[arg(long, value_name = "m", value_parser = length_m)]
+    #[arg(long, value_name = "m", value_parser = length_m, help_heading = "Scenario", hide_short_help = true)]
     width: Option<f64>,
     /// Of files: then the other vehicles keep their speed and lateral position, s.
     #[arg(skip)]

@@ -40,26 +40,26 @@ const PROFILES: [&str; 6] = ["un-r157", "eu-2022-1426", "eu-2022-1426-standing",
                   lanesweep check scenarios.jsonl --scenario 01_cut_in_97_91_957 --thw 1.2")]
 pub struct Check {
     /// TOML file, table (.csv, .parquet), scenario file (.jsonl) or OpenSCENARIO file (.xosc) with the case
-    #[arg(value_name = "FILE")]
+    #[arg(value_name = "FILE", help_heading = "Data")]
     file: Option<PathBuf>,
     /// Row of a table, from 1 after the header
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Data")]
     row: usize,
     /// Scenario of a scenario file, by its id
     ///
     /// It starts with its observed gap, or with --gap or --thw.
-    #[arg(long, value_name = "ID", requires = "file", conflicts_with = "row")]
+    #[arg(long, value_name = "ID", requires = "file", conflicts_with = "row", help_heading = "Data")]
     scenario: Option<String>,
     #[command(flatten)]
     case: CaseFlags,
     /// Profiles; the first decides [default: un-r157, the two of EU 2022/1426, jrc-2021, paper, paper-fit]
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Models and criteria")]
     profiles: Vec<String>,
     /// Also write the sheet as a page to print
-    #[arg(long, value_name = "FILE.html")]
+    #[arg(long, value_name = "FILE.html", help_heading = "Output")]
     sheet: Option<PathBuf>,
     /// Also write every step of every model under the first profile
-    #[arg(long, value_name = "FILE.csv")]
+    #[arg(long, value_name = "FILE.csv", help_heading = "Output")]
     series: Option<PathBuf>,
     #[command(flatten)]
     plausibility: PlausibilityFlag,

@@ -5,13 +5,12 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::backend_flags::BackendFlags;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::dry_run::DryRun;
 use super::format::FormatFlag;
-use super::source::{self, GeneratorFlags, PlausibilityFlag, source_of};
-use super::{Exit, ProfileFlags, lists};
+use super::source::SourceFlags;
+use super::{Exit, lists};
 use crate::report::compare::CompareFile;
 use crate::report::sampling::HostRecord;
 use crate::run::compare::{self, CompareOptions, CompareResult};
@@ -21,7 +20,7 @@ use crate::support::files::check_folder;
 use crate::support::readable::count;
 use crate::support::run_dir::{COMPARE_RECORD, OutputDir};
 use crate::traffic::DataProvenance;
-use crate::{Error, Place, Result};
+use crate::{Error, Result};
 
 /// Which parameterizations give the right risk, not only the right labels?
 ///
@@ -37,14 +36,10 @@ use crate::{Error, Place, Result};
                   lanesweep compare --scenarios scenarios.jsonl --parameterizations i,iii --models FSM,RSS \\\n      \
                   --thw 0.6,1.0")]
 pub struct Compare {
-    /// Folder of highD-format recordings [default: synthetic recordings]
-    #[arg(value_name = "DIR", conflicts_with = "scenarios")]
-    dir: Option<PathBuf>,
-    /// Scenario file (.jsonl, .parquet, .csv) instead of recordings
-    #[arg(long, value_name = "FILE")]
-    scenarios: Option<PathBuf>,
+    #[command(flatten)]
+    data: SourceFlags,
     /// Folder for compare.csv, compare.json and compare.txt
-    #[arg(long, value_name = "DIR", default_value = "lanesweep-compare")]
+    #[arg(long, value_name = "DIR", default_value = "lanesweep-compare", help_heading = "Output")]
     out: PathBuf,
     #[command(flatten)]
     categories: lists::CategoriesFlag,
@@ -52,31 +47,15 @@ pub struct Compare {
     parameterizations: lists::ParameterizationsFlag,
     #[command(flatten)]
     models: lists::ModelsFlag,
-    /// Time headways; observed: the recorded gaps
-    ///
-    /// paper is 2.0, 1.8, … 0.2; r157 the minimum following distance of UN R157, 5.2.3.3. observed: S and S' start from
-    /// the recorded gap of each scenario; a density draws the headway as one more parameter.
-    #[arg(long, value_name = "s,s,…|observed", default_value = "paper")]
-    thw: String,
-    #[arg(long, value_name = "N", value_parser = lists::whole::<u64>)]
-    samples: u64,
-    #[arg(long, value_name = "N")]
-    seed: u64,
+    #[command(flatten)]
+    headways: lists::HeadwaysFlag,
     /// Print lanes, memory and estimated time; write nothing
-    #[arg(long)]
+    #[arg(long, help_heading = "Run")]
     dry_run: bool,
     #[command(flatten)]
     exposure: lists::ExposureFlags,
     #[command(flatten)]
     format: FormatFlag,
-    #[command(flatten)]
-    backend: BackendFlags,
-    #[command(flatten)]
-    profile: ProfileFlags,
-    #[command(flatten)]
-    plausibility: PlausibilityFlag,
-    #[command(flatten)]
-    generator: GeneratorFlags,
 }
 
 impl Compare {
@@ -86,17 +65,14 @@ impl Compare {
         let categories = self.categories.list()?;
         let ids = self.parameterizations.list(&categories)?;
         let models = self.models.list()?;
-        let headways = lists::paper_or_headways(&self.thw)?;
-        self.check_samples()?;
+        let headways = self.headways.list()?;
         let typed = self.exposure.driven()?;
-        let profile = self.profile.load()?;
-        let source = source_of(self.dir.as_ref(), self.scenarios.as_ref(), &self.generator, configured)?;
+        let profile = configured.profile()?;
         self.guard_inputs(configured)?;
         check_folder(&self.out)?;
-        let opened = self.backend.open()?;
-        tracing::info!("{}", source.describe(false));
-        let collection = source::load(&source, &config.mining, self.plausibility.policy(), verbosity)?;
-        let facts = DataProvenance::of(&source, &collection, typed)?;
+        let opened = configured.open()?;
+        let collection = self.data.load_told(configured, verbosity)?;
+        let facts = DataProvenance::of(&self.data.source(configured), &collection, typed)?;
         if facts.driven.is_none() {
             tracing::warn!(
                 "exposure is unknown, because the scenarios have no driven time and distance; give --hours and --km"
@@ -106,8 +82,8 @@ impl Compare {
         let options = CompareOptions {
             study: StudyOptions { categories, models, headways, parameterization: config.of_densities() },
             parameterizations: ids,
-            samples: self.samples,
-            seed: self.seed,
+            samples: config.compare.samples,
+            seed: config.compare.seed,
             enough: Enough { clusters: config.score.least_failures.into(), margin: config.compare.margin },
         };
         let compare = compare::Compare::plan(&collection.scenarios, &facts, profile, options)?;
@@ -119,13 +95,13 @@ impl Compare {
         }
         let folder = OutputDir::open(&self.out, COMPARE_RECORD)?;
         tracing::info!("{} lanes of S and S' on {}", count(plan.lane_count()), opened.backend().describe());
-        let executor = opened.executor().with_recheck(self.seed);
+        let executor = opened.executor().with_recheck(config.compare.seed);
         let bar = console::progress(verbosity, plan.unit_count(), "sweeping");
         let (counts, mut swept) = compare.replay(&executor.clone().with_progress(console::inc(&bar)))?;
         bar.finish_and_clear();
         let bar = console::progress(
             verbosity,
-            compare.options().parameterizations.len() as u64 * self.samples,
+            compare.options().parameterizations.len() as u64 * config.compare.samples,
             "fitting and sampling",
         );
         let result = compare.sample(&counts, &executor.with_progress(console::inc(&bar)));
@@ -143,21 +119,9 @@ impl Compare {
         Ok(if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete })
     }
 
-    fn check_samples(&self) -> Result<()> {
-        let problem = match self.samples {
-            0 => "0 samples give no estimate",
-            n if n >= 1 << 48 => "the number of samples must be below 2^48",
-            _ => return Ok(()),
-        };
-        Err(Error::usage(Place::item("--samples"), problem, "give 20000, for instance"))
-    }
-
     /// Results must not replace an input.
     fn guard_inputs(&self, configured: &Configured) -> Result<()> {
-        let inputs: Vec<PathBuf> = self.scenarios.iter().chain(configured.files()).cloned().collect();
-        for name in ["compare.csv", "compare.txt", "compare.json"] {
-            source::refuse_overwriting(&self.out.join(name), &inputs, "--out")?;
-        }
-        Ok(())
+        let mut results = ["compare.csv", "compare.txt", "compare.json"].into_iter();
+        results.try_for_each(|name| self.data.refuse_overwriting(&self.out.join(name), configured, "--out"))
     }
 }

@@ -5,11 +5,9 @@ use std::path::{Path, PathBuf};
 use clap::{Args, Subcommand, ValueEnum};
 use serde_json::json;
 
-use super::backend_flags::BackendFlags;
 use super::configured::Configured;
 use super::shell::{Completions, Man};
-use super::source::GeneratorFlags;
-use super::{Exit, ProfileFlags, console};
+use super::{Exit, console};
 use crate::cli::settings::{
     Assignment, DEFAULT_FILE, DEFAULT_FILE_NAME, Layers, Setting, profile_schema, settings_schema, text_of,
 };
@@ -46,7 +44,7 @@ enum ConfigVerb {
 #[command(after_help = "Example:\n  lanesweep config init")]
 struct Init {
     /// File to write; `-` prints it
-    #[arg(value_name = "FILE", default_value = DEFAULT_FILE_NAME)]
+    #[arg(value_name = "FILE", default_value = DEFAULT_FILE_NAME, help_heading = "Data")]
     file: PathBuf,
 }
 
@@ -58,17 +56,11 @@ struct Init {
 #[command(after_help = "Example:\n  lanesweep config show --config mining.leader_max_thw_s=2.5 --backend cpu")]
 struct Show {
     /// How to print
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = "Output")]
     format: ShowFormat,
     /// Only values that differ from the default
-    #[arg(long)]
+    #[arg(long, help_heading = "Output")]
     changed: bool,
-    #[command(flatten)]
-    backend: BackendFlags,
-    #[command(flatten)]
-    profile: ProfileFlags,
-    #[command(flatten)]
-    generator: GeneratorFlags,
 }
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
@@ -87,7 +79,7 @@ enum ShowFormat {
 #[command(after_help = "Example:\n  lanesweep config check lanesweep.toml")]
 struct Check {
     /// The file
-    #[arg(value_name = "FILE")]
+    #[arg(value_name = "FILE", help_heading = "Data")]
     file: PathBuf,
 }
 
@@ -96,7 +88,7 @@ struct Check {
 #[command(after_help = "Example:\n  lanesweep config schema > lanesweep.schema.json")]
 struct Schema {
     /// Of what
-    #[arg(value_enum, default_value_t)]
+    #[arg(value_enum, default_value_t, help_heading = "Data")]
     of: SchemaOf,
 }
 
@@ -143,7 +135,8 @@ impl Init {
 impl Show {
     fn run(&self, configured: &Configured) -> Result<Exit> {
         // What only a profile can tell of its own time step.
-        self.profile.load()?;
+        configured.profile()?;
+        configured.backend()?;
         let shown: Vec<Setting> = match self.changed {
             true => configured.layers.given().collect(),
             false => configured.layers.list().collect(),
@@ -160,7 +153,7 @@ impl Show {
 impl Check {
     fn run(&self) -> Result<Exit> {
         let layers = Layers::read(&[Assignment::File(self.file.clone())], &[])?;
-        layers.settings()?.validate()?;
+        layers.settings()?;
         let count = layers.given().count();
         console::print(&format!("{}: {count} keys set, all of them known and in range\n", self.file.display()))?;
         Ok(Exit::Ok)

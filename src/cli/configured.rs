@@ -1,14 +1,15 @@
-//! From the command line to a configuration and back: which flag sets which key, and verbs that see what files and the
-//! environment set as if it were their flags' default.
+//! From the command line to a configuration: which flag sets which key. Verbs have these flags' values from the settings.
 
-use std::ffi::OsString;
 use std::path::PathBuf;
 
+use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, FromArgMatches};
 
-use super::Cli;
-use crate::cli::settings::{Assignment, Key, Layers, Origin, Setting, Settings};
+use super::help::{DATA, MODELS, OUTPUT, RUN};
+use super::{Cli, Verb};
+use crate::cli::settings::{Assignment, Key, KeyKind, Layers, Origin, Setting, Settings};
+use crate::engine::BackendChoice;
 use crate::model::profile::Profile;
 use crate::report::run_record::SettingRecord;
 use crate::{Error, Place, Result};
@@ -22,69 +23,124 @@ pub(super) struct Configured {
     pub layers: Layers,
 }
 
-/// A flag that sets a key: the verb (every one that has the flag where it is empty), the flag's id, the key.
-pub(super) const FLAGS: [(&str, &str, &str); 21] = [
-    ("", "threads", "run.threads"),
-    ("", "backend", "run.backend"),
-    ("", "device", "run.device"),
-    ("", "profile", "run.profile"),
-    ("", "dt", "run.dt_s"),
-    ("", "synth_recordings", "generator.recordings"),
-    ("study", "seed", "score.seed"),
-    ("fit", "bandwidth_rule", "fit.bandwidth_rule"),
-    ("fit", "seed", "fit.seed"),
-    ("sample", "estimator", "sample.estimator"),
-    ("sample", "samples", "sample.samples"),
-    ("sample", "criterion", "sample.criterion"),
-    ("sample", "points", "sample.points"),
-    ("sample", "interval", "sample.interval"),
-    ("sample", "level", "sample.level"),
-    ("sample", "half_width", "sample.half_width"),
-    ("sample", "time_limit", "sample.time_limit_s"),
-    ("sample", "worst", "sample.worst"),
-    ("sample", "seed", "sample.seed"),
-    ("compare", "samples", "compare.samples"),
-    ("compare", "seed", "compare.seed"),
+/// A flag that sets a key: the key, the flag, what its value is called where the key does not say it, its heading,
+/// whether only `--help` tells it, and the verbs that have it. Range, default and help are the key's.
+type KeyFlag = (&'static str, &'static str, &'static str, &'static str, bool, &'static [&'static str]);
+
+const SWEEPING: &[&str] = &["study", "sample", "compare", "justify", "map", "verify", "show"];
+const SIMULATING: &[&str] = &["study", "sample", "compare", "justify", "map", "verify", "show", "simulate", "xosc"];
+const GENERATING: &[&str] = &["study", "fit", "compare", "justify", "verify", "show"];
+
+#[rustfmt::skip] // a table: one line per flag
+pub(super) const FLAGS: [KeyFlag; 22] = [
+    ("run.threads", "threads", "", RUN, true, &["lanesweep"]),
+    ("run.backend", "backend", "", RUN, false, SWEEPING),
+    ("run.device", "device", "NAME|pci:BUS|INDEX", RUN, false, SWEEPING),
+    ("run.profile", "profile", "NAME|FILE", MODELS, false, SIMULATING),
+    ("run.dt_s", "dt", "", MODELS, true, SIMULATING),
+    ("generator.recordings", "synth_recordings", "", DATA, true, GENERATING),
+    ("generator.recordings", "synth_recordings", "", DATA, false, &["synth"]),
+    ("score.seed", "seed", "", RUN, false, &["study"]),
+    ("fit.bandwidth_rule", "bandwidth_rule", "", MODELS, true, &["fit"]),
+    ("fit.seed", "seed", "", RUN, false, &["fit"]),
+    ("sample.estimator", "estimator", "", MODELS, false, &["sample"]),
+    ("sample.samples", "samples", "", MODELS, false, &["sample"]),
+    ("sample.criterion", "criterion", "", MODELS, false, &["sample"]),
+    ("sample.points", "points", "", MODELS, true, &["sample"]),
+    ("sample.interval", "interval", "", MODELS, true, &["sample"]),
+    ("sample.level", "level", "", MODELS, true, &["sample"]),
+    ("sample.half_width", "half_width", "", MODELS, false, &["sample"]),
+    ("sample.time_limit_s", "time_limit", "", MODELS, true, &["sample"]),
+    ("sample.worst", "worst", "", OUTPUT, true, &["sample"]),
+    ("sample.seed", "seed", "", RUN, false, &["sample"]),
+    ("compare.samples", "samples", "", MODELS, false, &["compare"]),
+    ("compare.seed", "seed", "", RUN, false, &["compare"]),
 ];
 
 /// Tables and keys that decide what the lanes of a plan are: with a plan file they are decided.
 const OF_THE_PLAN: [&str; 7] =
     ["generator.", "mining.", "parameterization.", "score.", "sample.", "run.profile", "run.dt_s"];
 
-/// The command line, with `--config` for every verb.
+/// The command line, with `--config` for every verb and the flags that set keys.
 pub(super) fn command() -> Command {
-    let keys = Key::all();
-    let flags = FLAGS.iter().filter_map(|(verb, id, name)| Some((*verb, *id, Key::find(&keys, name)?)));
-    let command = flags.fold(Cli::command(), |command, (verb, id, key)| match verb {
-        "" => with_key(command, id, key),
-        verb => command.mut_subcommand(verb, |command| with_key(command, id, key)),
-    });
-    super::help::laid_out(with_config(command))
+    super::help::laid_out(with_flags(with_config(Cli::command()), &Key::all()))
 }
 
-/// A flag that always has a value takes its default from the key that it sets, and its text where it has none.
-fn with_key(mut command: Command, id: &str, key: &Key) -> Command {
+/// The flags of a verb that set keys.
+fn flags_of(verb: &str) -> impl Iterator<Item = KeyFlag> {
+    FLAGS.into_iter().filter(move |flag| flag.5.contains(&verb))
+}
+
+/// Adds the flags that set keys.
+fn with_flags(mut command: Command, keys: &[Key]) -> Command {
     let names: Vec<String> = command.get_subcommands().map(|verb| verb.get_name().to_owned()).collect();
     for name in names {
-        command = command.mut_subcommand(name, |command| with_key(command, id, key));
+        command = command.mut_subcommand(name, |command| with_flags(command, keys));
     }
-    if command.get_arguments().all(|arg| arg.get_id() != id) {
-        return command;
+    let has_plan = command.get_arguments().any(|arg| arg.get_id() == "plan");
+    let verb = command.get_name().to_owned();
+    for (name, id, value_name, heading, is_seldom, _) in flags_of(&verb) {
+        let Some(key) = Key::find(keys, name) else { continue };
+        let mut arg = flag(key, id, value_name).help_heading(heading).hide_short_help(is_seldom);
+        arg = arg.global(name == "run.threads");
+        if has_plan && is_of_plan(name) {
+            arg = arg.conflicts_with("plan");
+        }
+        command = command.arg(arg);
     }
-    command.mut_arg(id, |mut arg| {
-        if let (true, Some(default)) = (arg.is_required_set(), &key.default) {
-            arg = arg.required(false).default_value(word(default));
+    command
+}
+
+/// A flag as its key says. The first sentence of a description is the short help; `Without it: X.` is the default where
+/// there is no value.
+fn flag(key: &Key, id: &'static str, value_name: &'static str) -> Arg {
+    let (text, unset) = match key.description.split_once(" Without it: ") {
+        Some((text, unset)) => (text, format!(" [default: {}]", unset.trim_end_matches('.'))),
+        None => (&*key.description, String::new()),
+    };
+    let (short, more) = text.split_once(". ").unwrap_or((text, ""));
+    // The unit is the name of the value.
+    let short = format!("{}{unset}", short.trim_end_matches('.').trim_end_matches(", s"));
+    let mut arg = Arg::new(id).long(id.replace('_', "-")).help(short.clone());
+    if !more.is_empty() {
+        arg = arg.long_help(format!("{short}\n\n{more}"));
+    }
+    if let Some(default) = &key.default {
+        arg = arg.default_value(word(default));
+    }
+    match &key.kind {
+        KeyKind::Choice(choices) => {
+            let words: Vec<&str> = choices.iter().map(|choice| &*choice.word).collect();
+            let values = choices.iter().map(|choice| {
+                let value = PossibleValue::new(choice.word.clone());
+                if choice.description.is_empty() { value } else { value.help(choice.description.clone()) }
+            });
+            arg.value_name(words.join("|"))
+                .value_parser(PossibleValuesParser::new(values))
+                .hide_possible_values(true)
+                .ignore_case(true)
         }
-        match arg.get_help() {
-            Some(_) => arg,
-            None => arg.help(key.description.trim_end_matches('.').to_owned()),
+        KeyKind::Number(range) => {
+            let name = if range.is_whole {
+                "N"
+            } else if key.name.ends_with("_s") {
+                "s"
+            } else {
+                "FRACTION"
+            };
+            arg.value_name(name).allow_negative_numbers(true)
         }
-    })
+        KeyKind::Boolean | KeyKind::Text => arg.value_name(value_name),
+    }
 }
 
 /// A value as a flag takes it.
 fn word(value: &serde_json::Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_owned)
+}
+
+fn is_of_plan(key: &str) -> bool {
+    OF_THE_PLAN.iter().any(|part| key.starts_with(part))
 }
 
 /// A flag of each level's own: of a global one, what stands before the verb is lost where it stands after it too.
@@ -95,104 +151,88 @@ fn with_config(mut command: Command) -> Command {
     }
     let help = "Configuration file, or one key of it; repeatable";
     let more = "`lanesweep config init` writes such a file. Without --config, LANESWEEP_CONFIG names it.";
-    let arg = Arg::new("config").long("config").value_name("FILE|KEY=VALUE").action(ArgAction::Append);
+    let arg =
+        Arg::new("config").long("config").value_name("FILE|KEY=VALUE").action(ArgAction::Append).help_heading(RUN);
     command.arg(arg.help(help).long_help(format!("{help}\n\n{more}")))
 }
 
 impl Configured {
-    /// Puts the layers together, and gives the command line with what they set. `words` are those that `matches` are of.
+    /// Puts the layers together, beside the rest of the command line.
     ///
     /// # Errors
-    /// As [`Layers::read`]; [`Error::Usage`] for a value that the verb's flag does not take.
-    pub fn of(matches: &ArgMatches, words: &[OsString]) -> Result<(Cli, Configured)> {
+    /// As [`Layers::read`] and [`Layers::flag`].
+    pub fn of(matches: &ArgMatches) -> Result<(Cli, Configured)> {
+        let unread = |e: clap::Error| Error::Internal(format!("the command line cannot be read: {e}"));
+        let mut cli = Cli::from_arg_matches(matches).map_err(unread)?;
         let (path, typed, last) = verb_of(matches);
         if path.last() == Some(&"slurm") && !typed.is_empty() {
             let help = "give it to the run: lanesweep cluster slurm … -- study --config FILE";
             return Err(Error::usage(Place::item("--config"), "the scripts do not carry it", help));
         }
-        if !reads_configuration(&path) {
-            let cli = Cli::from_arg_matches(matches).map_err(broken)?;
-            return Ok((cli, Configured::default()));
-        }
-        let mut layers = Layers::read(&typed, &std::env::vars_os().collect::<Vec<_>>())?;
-        let command = command();
-        let flags: Vec<(&str, &str)> = flags_of(&command, &path);
-        for (id, key) in &flags {
-            if last.value_source(id) == Some(ValueSource::CommandLine)
-                && let Some(word) = last.get_raw(id).and_then(|mut words| words.next()).and_then(|word| word.to_str())
-            {
-                layers.flag(key, &format!("--{}", id.replace('_', "-")), word);
-            }
-        }
-        let configured = Configured { settings: layers.settings()?, layers };
-        configured.settings.validate().map_err(|error| configured.at_origin(error))?;
-        configured.check_profile()?;
-        let given: Vec<(&str, Setting)> = flags
-            .iter()
-            .filter_map(|(id, key)| Some((*id, configured.layers.get(key)?)))
-            .filter(|(id, setting)| configured.reaches(id, setting, last))
-            .collect();
-        if given.is_empty() {
-            let cli = Cli::from_arg_matches(matches).map_err(broken)?;
-            return Ok((cli, configured));
-        }
-        let with = |given: &[(&str, Setting)]| {
-            let command = with_defaults(command.clone(), &path, given);
-            command.try_get_matches_from(words).and_then(|matches| Cli::from_arg_matches(&matches))
+        let mut layers = match reads_configuration(&path) {
+            true => Layers::read(&typed, &std::env::vars_os().collect::<Vec<_>>())?,
+            false => Layers::defaults(),
         };
-        match with(&given) {
-            Ok(cli) => Ok((cli, configured)),
-            // Which of them the flag does not take.
-            Err(all) => {
-                let (at, error) = given
-                    .iter()
-                    .find_map(|one| Some((one, with(std::slice::from_ref(one)).err()?)))
-                    .ok_or_else(|| broken(all))?;
-                let problem =
-                    error.to_string().lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
-                let key = &at.1.key;
-                Err(Error::usage(at.1.origin.place(&key.name), problem, format!("expected {}", key.expected())))
+        let verb = path.last().unwrap_or(&"");
+        for (key, id, ..) in flags_of("lanesweep").chain(flags_of(verb)) {
+            if last.value_source(id) == Some(ValueSource::CommandLine)
+                && let Some(word) = last.get_raw(id).and_then(|mut words| words.next())
+            {
+                layers.flag(key, &format!("--{}", id.replace('_', "-")), &word.to_string_lossy())?;
             }
         }
-    }
-
-    /// An error about a key, at the flag, line or variable that sets it.
-    fn at_origin(&self, error: Error) -> Error {
-        let Error::Usage { place, problem, help } = error else { return error };
-        let setting = place.item.as_ref().and_then(|key| self.layers.get(key));
-        let origin = setting.map(|setting| setting.origin.place(&setting.key.name));
-        Error::Usage { place: origin.map_or(place, Box::new), problem, help }
-    }
-
-    /// Does a value of another source than the flag count for the verb?
-    fn reaches(&self, id: &str, setting: &Setting, typed: &ArgMatches) -> bool {
-        let layer = setting.origin.layer();
-        if setting.value.is_none() || [Origin::Default.layer(), Origin::Flag(String::new()).layer()].contains(&layer) {
-            return false;
-        }
+        let mut settings = layers.settings()?;
         // A flag that leaves one backend only wins over what a file says of it, as every flag does.
-        let is_there = |id: &str| typed.try_contains_id(id).is_ok_and(|known| known) && typed.get_flag(id);
-        let is_of_backend = ["backend", "device"].contains(&id);
-        if is_of_backend && is_there("reference") {
-            return false;
+        let is_reference = last.try_contains_id("reference").is_ok_and(|known| known) && last.get_flag("reference");
+        let layer = |key: &str| layers.get(key).map_or(0, |setting| setting.origin.layer());
+        let flags = Origin::Flag(String::new()).layer();
+        if is_reference && layer("run.backend") < flags {
+            settings.run.backend = BackendChoice::default();
         }
         // So does a backend without devices over a device of an earlier source.
-        let cpu = self.layers.get("run.backend").filter(|backend| backend.value.is_some_and(|value| value == "cpu"));
-        !(id == "device" && cpu.is_some_and(|backend| backend.origin.layer() > layer))
+        let is_cpu = settings.run.backend == BackendChoice::Cpu && layer("run.backend") > layer("run.device");
+        if is_cpu || (is_reference && layer("run.device") < flags) {
+            settings.run.device = None;
+        }
+        if let Verb::Sample(sample) = &mut cli.verb {
+            sample.settings = settings.sample.clone();
+        }
+        Ok((cli, Configured { settings, layers }))
     }
 
-    /// A profile that a file or the environment names: an error names that place.
-    fn check_profile(&self) -> Result<()> {
-        let Some(setting) = self.layers.get("run.profile") else { return Ok(()) };
-        if matches!(setting.origin, Origin::Default | Origin::Flag(_)) {
-            return Ok(());
-        }
-        match Profile::load(&self.settings.run.profile) {
-            Err(Error::Usage { place, problem, help }) if *place == Place::option("profile") => {
-                Err(Error::usage(setting.origin.place(&setting.key.name), problem, help))
+    /// The profile with its time step.
+    ///
+    /// # Errors
+    /// As [`Profile::load`] and [`Profile::with_dt`].
+    pub fn profile(&self) -> Result<Profile> {
+        self.profile_of(&self.settings.run.profile).map_err(|error| self.at_origin("run.profile", "profile", error))
+    }
+
+    /// The same of a profile by another name.
+    ///
+    /// # Errors
+    /// As [`Configured::profile`].
+    pub fn profile_of(&self, name: &str) -> Result<Profile> {
+        let profile = Profile::load(name)?;
+        let Some(dt_s) = self.settings.run.dt_s else { return Ok(profile) };
+        profile.with_dt(dt_s).map_err(|error| self.at_origin("run.dt_s", "dt", error))
+    }
+
+    /// An error about an option, at the file or variable that sets its key.
+    pub fn at_origin(&self, key: &str, option: &'static str, error: Error) -> Error {
+        let origin = self.layers.get(key).map(|setting| setting.origin);
+        match (error, origin) {
+            (error, None | Some(Origin::Default | Origin::Flag(_))) => error,
+            (Error::Usage { place, problem, help }, Some(origin)) if place.option == Some(option) => {
+                Error::usage(origin.place(key), problem, help)
             }
-            other => other.map(drop),
+            (error, _) => error,
         }
+    }
+
+    /// Whether somebody set a key.
+    pub fn is_set(&self, key: &str) -> bool {
+        self.layers.given().any(|setting| setting.key.name == key)
     }
 
     /// The configuration files, which no result may overwrite.
@@ -221,8 +261,7 @@ impl Configured {
             Origin::File { .. } => std::env::var_os(crate::cli::settings::FILE_VARIABLE).is_none(),
             _ => false,
         };
-        let of_plan = |key: &str| OF_THE_PLAN.iter().any(|part| key.starts_with(part));
-        match self.layers.given().find(|setting| is_typed(setting.origin) && of_plan(&setting.key.name)) {
+        match self.layers.given().find(|setting| is_typed(setting.origin) && is_of_plan(&setting.key.name)) {
             None => Ok(()),
             Some(setting) => {
                 let problem = format!("`{}` is decided by the plan (--plan)", setting.key.name);
@@ -252,69 +291,29 @@ fn verb_of(matches: &ArgMatches) -> (Vec<&str>, Vec<Assignment>, &ArgMatches) {
     }
 }
 
-/// The flags of a verb that set a key.
-fn flags_of(command: &Command, path: &[&str]) -> Vec<(&'static str, &'static str)> {
-    let mut verb = command;
-    for name in path {
-        verb = verb.find_subcommand(name).unwrap_or(verb);
-    }
-    let has = |id: &str| verb.get_arguments().chain(command.get_arguments()).any(|arg| arg.get_id() == id);
-    let belongs = |(of, id, _): &&(&str, &str, &str)| (of.is_empty() || path.first() == Some(of)) && has(id);
-    FLAGS.iter().filter(belongs).map(|(_, id, key)| (*id, *key)).collect()
-}
-
-/// The command with other defaults.
-fn with_defaults(command: Command, path: &[&str], given: &[(&str, Setting)]) -> Command {
-    let set = |mut command: Command| {
-        for (id, setting) in given {
-            if command.get_arguments().any(|arg| arg.get_id() == *id) {
-                command = command.mut_arg(id, |arg| arg.default_value(setting.value.map_or(String::new(), word)));
-            }
-        }
-        command
-    };
-    fn below(command: Command, path: &[&str], set: &dyn Fn(Command) -> Command) -> Command {
-        let command = set(command);
-        match path {
-            [first, rest @ ..] => command.mut_subcommand(*first, |inner| below(inner, rest, set)),
-            [] => command,
-        }
-    }
-    below(command, path, &set)
-}
-
-fn broken(error: clap::Error) -> Error {
-    Error::Internal(format!("the second parsing of the command line failed: {error}"))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::cli::settings::KeyKind;
 
     #[test]
-    fn every_flag_that_sets_a_key_exists_with_the_keys_default_and_words() {
-        let command = command();
+    fn every_flag_that_sets_a_key_is_of_a_verb_and_has_the_keys_default_and_words() {
         let keys = Key::all();
-        for (of, id, name) in FLAGS {
+        let find = |verb: &str| -> Option<Command> {
+            let command = command();
+            let inner = command.get_subcommands().flat_map(|verb| std::iter::once(verb).chain(verb.get_subcommands()));
+            std::iter::once(&command).chain(inner).find(|command| command.get_name() == verb).cloned()
+        };
+        for (name, id, .., verbs) in FLAGS {
             let key = Key::find(&keys, name).unwrap_or_else(|| panic!("{name}"));
-            let verbs: Vec<&Command> = match of {
-                "" => std::iter::once(&command).chain(command.get_subcommands()).collect(),
-                verb => vec![command.find_subcommand(verb).unwrap()],
-            };
-            let args: Vec<_> = verbs.iter().flat_map(|v| v.get_arguments()).filter(|arg| arg.get_id() == id).collect();
-            assert!(!args.is_empty(), "no flag {id} of `{of}`");
-            for arg in args {
-                if let [default] = arg.get_default_values() {
-                    let mut layers = Layers::defaults();
-                    layers.flag(name, id, default.to_str().unwrap());
-                    assert_eq!(layers.get(name).unwrap().value, key.default.as_ref(), "{name}");
-                }
-                let words: Vec<String> = arg.get_possible_values().iter().map(|v| v.get_name().to_owned()).collect();
-                if let (KeyKind::Choice(choices), false) = (&key.kind, words.is_empty()) {
-                    let known: Vec<String> = choices.iter().map(|choice| choice.word.clone()).collect();
-                    assert_eq!(words, known, "{name}");
-                }
+            for verb in verbs {
+                let verb = find(verb).unwrap_or_else(|| panic!("{verb}"));
+                let arg = verb.get_arguments().find(|arg| arg.get_id() == id).unwrap_or_else(|| panic!("{id}"));
+                assert!(arg.get_help().is_some_and(|help| help.to_string().len() > 4), "{name}");
+                let Some(default) = &key.default else { continue };
+                let [written] = arg.get_default_values() else { panic!("{name}") };
+                let mut layers = Layers::defaults();
+                layers.flag(name, id, written.to_str().unwrap()).unwrap();
+                assert_eq!(layers.get(name).unwrap().value, Some(default), "{name}");
             }
         }
     }

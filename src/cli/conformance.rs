@@ -28,13 +28,13 @@ use crate::{Error, Place, Result};
 #[command(after_help = "Example:\n  lanesweep verify conformance cutin.csv lvd.csv cutout.csv functions.csv")]
 pub struct Conformance {
     /// JRC case tables or function tables (CSV)
-    #[arg(value_name = "FILE")]
+    #[arg(value_name = "FILE", help_heading = "Data")]
     tables: Vec<PathBuf>,
     /// Scenarios of the lanes (JSON Lines)
-    #[arg(long, value_name = "FILE", requires = "golden_lanes")]
+    #[arg(long, value_name = "FILE", requires = "golden_lanes", help_heading = "Data")]
     scenarios: Option<PathBuf>,
     /// Golden lanes of the paper profile (CSV)
-    #[arg(long, value_name = "FILE", requires = "scenarios")]
+    #[arg(long, value_name = "FILE", requires = "scenarios", help_heading = "Data")]
     golden_lanes: Option<PathBuf>,
     #[command(flatten)]
     format: FormatFlag,

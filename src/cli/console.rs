@@ -109,27 +109,32 @@ pub fn progress(verbosity: Verbosity, length: u64, what: &str) -> ProgressBar {
     bar
 }
 
-/// A text of the library with flags for its options: `--dt` for option `dt`, `--backend cpu` for option `backend = cpu`.
+/// Fields of the library's options whose flag has another name. Every other one has its field's, with dashes.
+const OTHER_FLAGS: [(&str, &str); 2] = [("headways", "thw"), ("model", "models")];
+
+/// The flag of a field, without its dashes.
+fn flag_of(field: &str) -> String {
+    let other = OTHER_FLAGS.iter().find(|(name, _)| *name == field);
+    other.map_or_else(|| field.replace('_', "-"), |(_, flag)| (*flag).to_owned())
+}
+
+/// A text of the library, which marks fields, with their flags: `--dt` for option `dt`, `--backend cpu` for option
+/// `backend = cpu`.
 pub fn with_flags(text: &str) -> String {
     let (mut out, mut rest) = (String::with_capacity(text.len()), text);
-    while let Some((before, after)) = rest.split_once("option `") {
-        let flag = after.split_once('`').map(|(option, rest)| {
-            let (name, value) = option.split_once(" = ").map_or((option, None), |(name, value)| (name, Some(value)));
-            (name, value, rest)
-        });
-        let is_field = |name: &str| !name.is_empty() && name.bytes().all(|b| b.is_ascii_lowercase() || b == b'_');
+    while let Some((before, marked)) = rest.split_once("option `") {
+        let (option, after) = marked.split_once('`').unwrap_or(("", marked));
+        let (field, value) = option.split_once(" = ").map_or((option, None), |(field, value)| (field, Some(value)));
+        let is_field = !field.is_empty() && field.bytes().all(|b| b.is_ascii_lowercase() || b == b'_');
         out += before;
-        rest = match flag {
-            Some((name, value, rest)) if is_field(name) => {
-                out += "--";
-                out += &name.replace('_', "-");
-                value.iter().for_each(|value| out.extend([" ", value]));
-                rest
-            }
-            _ => {
-                out += "option `";
-                after
-            }
+        rest = if is_field {
+            out += "--";
+            out += &flag_of(field);
+            value.iter().for_each(|value| out.extend([" ", value]));
+            after
+        } else {
+            out += "option `";
+            marked
         };
     }
     out + rest
@@ -190,7 +195,7 @@ impl miette::Diagnostic for Diagnostic {
 
 #[cfg(test)]
 mod tests {
-    use super::with_flags;
+    use super::{flag_of, with_flags};
 
     #[test]
     fn an_option_of_the_library_is_a_flag_on_the_command_line() {
@@ -202,5 +207,35 @@ mod tests {
         ] {
             assert_eq!(with_flags(text), shown);
         }
+    }
+
+    /// Fields that a source text marks.
+    fn fields(text: &str) -> impl Iterator<Item = &str> {
+        let marks = ["option `", "Place::option(\""].into_iter().flat_map(|mark| text.split(mark).skip(1));
+        marks.filter_map(move |rest| rest.get(..rest.find(|c: char| !c.is_ascii_lowercase() && c != '_')?))
+    }
+
+    #[test]
+    fn every_field_that_an_error_names_has_a_flag() {
+        fn flags(command: &clap::Command, known: &mut Vec<String>) {
+            known.extend(command.get_arguments().filter_map(|arg| arg.get_long().map(str::to_owned)));
+            command.get_subcommands().for_each(|verb| flags(verb, known));
+        }
+        let mut known = Vec::new();
+        flags(&crate::cli::configured::command(), &mut known);
+        let mut folders = vec![std::path::PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/src"))];
+        let mut found = 0;
+        while let Some(path) = folders.pop() {
+            if path.is_dir() {
+                folders.extend(std::fs::read_dir(path).unwrap().map(|entry| entry.unwrap().path()));
+            } else if !path.ends_with("cli/console.rs") {
+                let text = std::fs::read_to_string(&path).unwrap();
+                for field in fields(&text).filter(|field| !field.is_empty()) {
+                    assert!(known.contains(&flag_of(field)), "{}: option `{field}`", path.display());
+                    found += 1;
+                }
+            }
+        }
+        assert!(found > 100, "{found}");
     }
 }

@@ -16,7 +16,7 @@ pub struct Devices {
     #[command(flatten)]
     format: FormatFlag,
     /// Leave out the self-check, which opens every device
-    #[arg(long)]
+    #[arg(long, help_heading = "Run")]
     no_self_check: bool,
 }
 

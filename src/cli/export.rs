@@ -4,11 +4,12 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 
+use super::Exit;
 use super::case_flags::{CaseFlags, from_toml};
+use super::configured::Configured;
 use super::format::FormatFlag;
 use super::lists;
 use super::source::{PlausibilityFlag, scenarios_of};
-use super::{Exit, ProfileFlags};
 use crate::interop::openscenario::{
     Concrete, EgoMotion, PlayOptions, concrete_case, concrete_lanes, export_folder, reopen,
 };
@@ -35,9 +36,9 @@ enum Format {
 }
 
 impl Export {
-    pub fn run(&self) -> Result<Exit> {
+    pub fn run(&self, configured: &Configured) -> Result<Exit> {
         match &self.format {
-            Format::Xosc(xosc) => xosc.run(),
+            Format::Xosc(xosc) => xosc.run(configured),
         }
     }
 }
@@ -60,52 +61,57 @@ pub struct Xosc {
     #[command(flatten)]
     format: FormatFlag,
     /// TOML file with the case
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["from", "scenarios"])]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["from", "scenarios"], help_heading = "Data")]
     case_file: Option<PathBuf>,
     /// Folder (--out) of a study or sample, for --lane or --worst
-    #[arg(long, value_name = "DIR", conflicts_with_all = ["profile", "dt"])]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["profile", "dt"], help_heading = "Data")]
     from: Option<PathBuf>,
     /// Scenario file for --lane
     ///
     /// With --from a study: the study's scenarios, for sizes, side and lane width.
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Data")]
     scenarios: Option<PathBuf>,
     /// Lane key: scenario/variant/headway/model; repeatable
-    #[arg(long, value_name = "KEY")]
+    #[arg(long, value_name = "KEY", help_heading = "Data")]
     lane: Vec<String>,
     /// The N worst lanes of the run per model
     ///
     /// Of a sampling run: those of worst.csv. Of a study: the scenarios with the smallest margin of --criterion, each with
     /// its worst lane.
-    #[arg(long, value_name = "N", requires = "from", conflicts_with = "lane")]
+    #[arg(long, value_name = "N", requires = "from", conflicts_with = "lane", help_heading = "Output")]
     worst: Option<usize>,
     /// Criterion of --worst [default: collision]
     ///
     /// Of a sampling run it is that of its worst.csv.
-    #[arg(long, value_name = "collision|ttc|btn", requires = "worst")]
+    #[arg(long, value_name = "collision|ttc|btn", requires = "worst", help_heading = "Models and criteria")]
     criterion: Option<String>,
     /// Variants of --worst: S, keys of parameterizations [default: all]
-    #[arg(long, value_name = "LIST", requires = "worst", value_delimiter = ',')]
+    #[arg(
+        long,
+        value_name = "LIST",
+        requires = "worst",
+        value_delimiter = ',',
+        help_heading = "Scenario",
+        hide_short_help = true
+    )]
     variant: Vec<String>,
     /// Who drives the ego
-    #[arg(long, value_enum, default_value_t)]
+    #[arg(long, value_enum, default_value_t, help_heading = "Scenario")]
     ego: EgoFlag,
     /// End with --ego external [default: 10 s after the lane's last event and end]
-    #[arg(long, value_name = "s")]
+    #[arg(long, value_name = "s", help_heading = "Scenario", hide_short_help = true)]
     duration: Option<f64>,
     /// Side that the other vehicle comes from or leaves to [default: the scenario's, else left]
-    #[arg(long, value_enum)]
+    #[arg(long, value_enum, help_heading = "Scenario", hide_short_help = true)]
     side: Option<SideFlag>,
     /// Width of the road's lanes [default: the scenario's, else 3.5]
-    #[arg(long, value_name = "m")]
+    #[arg(long, value_name = "m", help_heading = "Scenario", hide_short_help = true)]
     lane_width: Option<f64>,
     /// Folder of the files
-    #[arg(long, value_name = "DIR", default_value = "lanesweep-xosc")]
+    #[arg(long, value_name = "DIR", default_value = "lanesweep-xosc", help_heading = "Output")]
     out: PathBuf,
     #[command(flatten)]
     plausibility: PlausibilityFlag,
-    #[command(flatten)]
-    profile: ProfileFlags,
 }
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
@@ -124,10 +130,10 @@ enum SideFlag {
 }
 
 impl Xosc {
-    fn run(&self) -> Result<Exit> {
+    fn run(&self, configured: &Configured) -> Result<Exit> {
         let options = self.play_options()?;
         check_folder(&self.out)?;
-        let (scenarios, incomplete) = self.scenarios(&options)?;
+        let (scenarios, incomplete) = self.scenarios(configured, &options)?;
         let rows = export_folder(&self.out, &scenarios)?;
         let lines: String = rows.iter().map(|row| format!("{}  {}\n", row.file, row.lane)).collect();
         let list = || {
@@ -140,7 +146,7 @@ impl Xosc {
     }
 
     /// The scenarios, and whether others of the file were left out.
-    fn scenarios(&self, options: &PlayOptions) -> Result<(Vec<Concrete>, bool)> {
+    fn scenarios(&self, configured: &Configured, options: &PlayOptions) -> Result<(Vec<Concrete>, bool)> {
         let wrong = |flag: &str, problem: &str, help: &str| Err(Error::usage(Place::item(flag), problem, help));
         let is_lane = self.from.is_some() || self.scenarios.is_some();
         if is_lane && self.case.says_a_case() {
@@ -173,7 +179,7 @@ impl Xosc {
                 return wrong("--scenarios", &problem, "add --lane SCENARIO/VARIANT/HEADWAY/MODEL");
             }
             (None, Some(path)) => {
-                let profile = self.profile.load()?;
+                let profile = configured.profile()?;
                 let (mut mined, incomplete) = read(path)?;
                 let data = format!("scenarios of {}", path.file_name().unwrap_or_default().to_string_lossy());
                 let reopened = Reopened::scenarios(&mut mined, &self.lane, &profile, data)?;
@@ -186,7 +192,7 @@ impl Xosc {
             }
             (None, None) => {
                 let file = self.case_file.as_deref().map(from_toml).transpose()?.unwrap_or_default();
-                let profile = self.profile.load()?;
+                let profile = configured.profile()?;
                 let traced = self.case.over(file).traced(&profile, implausible)?;
                 return Ok((concrete_case(&traced, &profile, options)?, false));
             }

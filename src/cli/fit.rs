@@ -9,7 +9,7 @@ use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::lists;
-use super::source::{self, GeneratorFlags, PlausibilityFlag, source_of};
+use super::source::{self, SourceFlags};
 use crate::cli::settings::BandwidthInterval;
 use crate::report::density;
 use crate::report::records;
@@ -34,42 +34,30 @@ use crate::{Error, Place, Result};
                         scenarios.jsonl --hours 44.5 --km 4450\n  lanesweep fit recordings --parameterizations 2 \
                         --with-thw --out cut-in-2.json")]
 pub struct Fit {
-    /// Folder of highD-format recordings [default: synthetic recordings]
-    #[arg(value_name = "DIR", conflicts_with = "scenarios")]
-    dir: Option<PathBuf>,
-    /// Scenario file (.jsonl, .parquet, .csv) instead of recordings
-    #[arg(long, value_name = "FILE")]
-    scenarios: Option<PathBuf>,
+    #[command(flatten)]
+    data: SourceFlags,
     /// Folder of density files, or one file.json for one density
-    #[arg(long, value_name = "DIR|FILE", default_value = "lanesweep-densities")]
+    #[arg(long, value_name = "DIR|FILE", default_value = "lanesweep-densities", help_heading = "Output")]
     out: PathBuf,
     #[command(flatten)]
     categories: lists::CategoriesFlag,
     #[command(flatten)]
     parameterizations: lists::ParameterizationsFlag,
     /// Add the observed time headway as a parameter (thw_s)
-    #[arg(long)]
+    #[arg(long, help_heading = "Scenario")]
     with_thw: bool,
-    #[arg(long, value_name = "reduction|wide", value_enum, hide_possible_values = true)]
-    bandwidth_rule: BandwidthInterval,
-    #[arg(long, value_name = "N")]
-    seed: u64,
     /// Do not compare drawn with unseen scenarios
-    #[arg(long)]
+    #[arg(long, help_heading = "Models and criteria", hide_short_help = true)]
     no_comparison: bool,
     /// Leave the recorded series out of the density files
     ///
     /// `sample` then cannot compare its rates with those of the recorded scenarios. For a file that is passed on.
-    #[arg(long)]
+    #[arg(long, help_heading = "Models and criteria", hide_short_help = true)]
     without_scenarios: bool,
     #[command(flatten)]
     exposure: lists::ExposureFlags,
     #[command(flatten)]
     format: FormatFlag,
-    #[command(flatten)]
-    plausibility: PlausibilityFlag,
-    #[command(flatten)]
-    generator: GeneratorFlags,
 }
 
 impl Fit {
@@ -80,19 +68,17 @@ impl Fit {
         let options = FitOptions {
             parameterization: config.of_densities(),
             with_thw: self.with_thw,
-            rule: match self.bandwidth_rule {
+            rule: match config.fit.bandwidth_rule {
                 BandwidthInterval::Reduction => BandwidthRule::Reduction,
                 BandwidthInterval::Wide => BandwidthRule::Wide,
             },
             valid_draws: config.fit.valid_draws,
-            seed: self.seed,
+            seed: config.fit.seed,
             representativeness: !self.no_comparison,
         };
-        let source = source_of(self.dir.as_ref(), self.scenarios.as_ref(), &self.generator, configured)?;
         let files = self.files(&ids, configured)?;
-        tracing::info!("{}", source.describe(false));
-        let collection = source::load(&source, &config.mining, self.plausibility.policy(), verbosity)?;
-        let facts = DataProvenance::of(&source, &collection, typed)?;
+        let collection = self.data.load_told(configured, verbosity)?;
+        let facts = DataProvenance::of(&self.data.source(configured), &collection, typed)?;
         if facts.driven.is_none() {
             tracing::warn!(
                 "exposure is unknown, because the scenarios have no driven time and distance; give --hours and --km"
@@ -153,10 +139,10 @@ impl Fit {
             false => self.out.join(format!("{}-{}.json", id.category.key().replace('_', "-"), id.key)),
         };
         let files: Vec<PathBuf> = ids.iter().map(name).collect();
-        let mut inputs: Vec<PathBuf> = self.scenarios.iter().chain(configured.files()).cloned().collect();
-        inputs.extend(self.scenarios.as_deref().map(DataProvenance::path_of));
+        let beside: Vec<PathBuf> = self.data.scenarios.as_deref().map(DataProvenance::path_of).into_iter().collect();
         for file in &files {
-            source::refuse_overwriting(file, &inputs, "--out")?;
+            self.data.refuse_overwriting(file, configured, "--out")?;
+            source::refuse_overwriting(file, &beside, "--out")?;
             check_folder_of(file)?;
         }
         Ok(files)

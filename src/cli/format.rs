@@ -24,7 +24,7 @@ pub(super) struct FormatFlag {
     /// Output on stdout
     ///
     /// text: tables; json: one document with the same numbers.
-    #[arg(long, value_name = "text|json", value_enum, hide_possible_values = true, default_value_t = Format::Text)]
+    #[arg(long, value_name = "text|json", value_enum, hide_possible_values = true, default_value_t = Format::Text, help_heading = "Output")]
     pub format: Format,
 }
 
@@ -66,7 +66,7 @@ impl FormatFlag {
 #[derive(Debug, Clone, Copy, Args)]
 pub(super) struct TablesFlag {
     /// Print all tables instead of the answer; they are in report.txt too
-    #[arg(long)]
+    #[arg(long, help_heading = "Data")]
     pub tables: bool,
 }
 

@@ -12,155 +12,18 @@ const VERBS: [(&str, &[&str]); 5] = [
     ("Tools", &["verify", "config", "synth"]),
 ];
 
-/// A heading, the flags below it by their ids, and those that only `--help` tells.
-type Group = (&'static str, &'static [&'static str], &'static [&'static str]);
+pub(super) const DATA: &str = "Data";
+pub(super) const MODELS: &str = "Models and criteria";
+pub(super) const OUTPUT: &str = "Output";
+pub(super) const RUN: &str = "Run";
 
-/// Headings of flags, in order. The same flag stands below the same heading in every verb.
-const FLAGS: [Group; 5] = [
-    (
-        "Data",
-        &[
-            "dir",
-            "density",
-            "study",
-            "run",
-            "tables",
-            "file",
-            "of",
-            "shell",
-            "scenarios",
-            "distribution",
-            "from",
-            "lane",
-            "case_file",
-            "table",
-            "row",
-            "scenario",
-            "hours",
-            "km",
-            "proposal",
-            "kept",
-            "golden_lanes",
-        ],
-        &["accept_implausible", "synth_recordings"],
-    ),
-    (
-        "Scenario",
-        &[
-            "category",
-            "categories",
-            "parameterizations",
-            "parameterization",
-            "with_thw",
-            "preset",
-            "x",
-            "y",
-            "panel",
-            "ego_speed",
-            "speed",
-            "gap",
-            "thw",
-            "lateral_speed",
-            "acceleration",
-            "ahead_speed",
-            "ahead_gap",
-            "given",
-            "compare",
-            "variant",
-        ],
-        &[
-            "lateral_distance",
-            "end_speed",
-            "length",
-            "width",
-            "rename",
-            "set",
-            "closing",
-            "native_gap",
-            "side",
-            "lane_width",
-            "ego",
-            "duration",
-        ],
-    ),
-    (
-        "Models and criteria",
-        &[
-            "models",
-            "criterion",
-            "against",
-            "robust",
-            "profile",
-            "profiles",
-            "estimator",
-            "samples",
-            "half_width",
-            "random_lanes",
-        ],
-        &[
-            "dt",
-            "points",
-            "interval",
-            "level",
-            "time_limit",
-            "reference",
-            "compare_reference",
-            "bandwidth_rule",
-            "no_comparison",
-            "without_scenarios",
-            "published",
-            "threshold_units",
-        ],
-    ),
-    (
-        "Output",
-        &["out", "rows", "map", "worst", "plot", "sheet", "series", "format", "changed", "scripts"],
-        &["plot_end", "keep_plan", "author", "date"],
-    ),
-    (
-        "Run",
-        &[
-            "array",
-            "time",
-            "gpus",
-            "cpus",
-            "mem",
-            "partition",
-            "account",
-            "backend",
-            "device",
-            "seed",
-            "shard",
-            "dry_run",
-            "no_self_check",
-            "config",
-            "help",
-            "version",
-        ],
-        &["plan", "plan_only", "stop_after", "qos", "signal_before", "program", "threads", "quiet", "verbose"],
-    ),
-];
-
-/// Flags that are seldom used, but by this verb.
-const OFTEN: [(&str, &[&str]); 4] = [
-    ("synth", &["synth_recordings"]),
-    ("study", &["published", "reference"]),
-    ("map", &["set", "rename"]),
-    ("xosc", &["ego"]),
-];
-
-/// Flags that this verb uses seldom.
-const SELDOM: [(&str, &[&str]); 4] = [
-    ("sample", &["category", "worst"]),
-    ("simulate", &["ahead_speed"]),
-    ("check", &["ahead_speed"]),
-    ("xosc", &["ahead_speed", "variant"]),
-];
+/// Headings of flags, in order. The same flag stands below the same heading in every verb, those of `--help` alone last.
+const HEADINGS: [&str; 5] = [DATA, "Scenario", MODELS, OUTPUT, RUN];
 
 /// The command with its help laid out.
 pub(super) fn laid_out(command: Command) -> Command {
     let flags = root_flags();
-    let command = with_groups(command, "");
+    let command = with_groups(command);
     let mut text = String::from("{about-with-newline}\n{usage-heading} {usage}\n");
     for (heading, verbs) in VERBS {
         text += &format!("\n{heading}:\n");
@@ -186,23 +49,27 @@ fn root_flags() -> String {
     .concat()
 }
 
-/// Headings for the flags of a verb and of those below it.
-fn with_groups(mut command: Command, verb: &str) -> Command {
+/// Brings the flags of a verb, and of those below it, into the order of their headings.
+fn with_groups(mut command: Command) -> Command {
     let names: Vec<String> = command.get_subcommands().map(|verb| verb.get_name().to_owned()).collect();
     for name in names {
-        command = command.mut_subcommand(&name, |inner| with_groups(inner, &name));
+        command = command.mut_subcommand(&name, with_groups);
     }
     let help = Arg::new("help").short('h').long("help").action(ArgAction::Help).help("Print help; --help has more");
-    command = command.disable_help_flag(true).arg(help);
-    let ids = |of: &[(&str, &'static [&'static str])]| of.iter().find(|of| of.0 == verb).map_or(&[][..], |of| of.1);
-    let (often, seldom_here) = (ids(&OFTEN), ids(&SELDOM));
-    for (heading, shown, seldom) in FLAGS {
-        for (order, id) in shown.iter().chain(seldom).enumerate() {
-            if command.get_arguments().any(|arg| arg.get_id() == id) {
-                let is_seldom = (seldom.contains(id) || seldom_here.contains(id)) && !often.contains(id);
-                command = command
-                    .mut_arg(id, |arg| arg.help_heading(heading).display_order(order).hide_short_help(is_seldom));
-            }
+    command = command.disable_help_flag(true).arg(help.help_heading(RUN));
+    for heading in HEADINGS {
+        let ids = |is_seldom: bool| {
+            let of_heading = command.get_arguments().filter(|arg| arg.get_help_heading() == Some(heading));
+            of_heading.filter(move |arg| arg.is_hide_short_help_set() == is_seldom).map(|arg| arg.get_id().clone())
+        };
+        let ids: Vec<clap::Id> = ids(false).chain(ids(true)).collect();
+        for (at, id) in ids.into_iter().enumerate() {
+            // Those of `--help` alone stand below the flags that a verb has from the program too.
+            let order = |arg: &Arg| if arg.is_hide_short_help_set() { 100 + at } else { at };
+            command = command.mut_arg(id, |arg| {
+                let order = order(&arg);
+                arg.display_order(order)
+            });
         }
     }
     command

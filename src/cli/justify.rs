@@ -5,12 +5,11 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::backend_flags::BackendFlags;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
-use super::source::{self, GeneratorFlags, PlausibilityFlag, source_of};
-use super::{Exit, ProfileFlags, lists};
+use super::source::SourceFlags;
+use super::{Exit, lists};
 use crate::interop::conformance::check_shipped_tables;
 use crate::model::driver::ModelId;
 use crate::report::dossier::DossierReport;
@@ -39,42 +38,29 @@ use crate::{Error, Place, Result};
                   lanesweep justify recordings --parameterization iii --models CCHDM --criterion ttc --out dossier\n  \
                   lanesweep justify --scenarios scenarios.jsonl --parameterization 6 --models Reg157")]
 pub struct Justify {
-    /// Folder of highD-format recordings [default: synthetic recordings]
-    #[arg(value_name = "DIR", conflicts_with = "scenarios")]
-    dir: Option<PathBuf>,
-    /// Scenario file (.jsonl, .parquet, .csv) instead of recordings
-    #[arg(long, value_name = "FILE")]
-    scenarios: Option<PathBuf>,
+    #[command(flatten)]
+    data: SourceFlags,
     /// Parameterization: 1…7 (cut-in), a…g (cut-out), i…v (LVD)
-    #[arg(long, value_name = "KEY")]
+    #[arg(long, value_name = "KEY", help_heading = "Scenario")]
     parameterization: String,
     /// Driver model: Reg157, CCHDM, RSS, FSM
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Models and criteria")]
     models: String,
     #[command(flatten)]
     criterion: lists::CriterionFlag,
-    /// Time headways; paper is 2.0, 1.8, … 0.2; observed the recorded gaps
-    #[arg(long, value_name = "s,s,…|paper|r157|observed", default_value = "paper")]
-    thw: String,
+    #[command(flatten)]
+    headways: lists::HeadwaysFlag,
     /// Who answers for the dossier [default: a line to fill in]
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Output", hide_short_help = true)]
     author: Option<String>,
     /// Date of the dossier [default: a line to fill in]
-    #[arg(long, value_name = "YYYY-MM-DD", value_parser = date)]
+    #[arg(long, value_name = "YYYY-MM-DD", value_parser = date, help_heading = "Output", hide_short_help = true)]
     date: Option<String>,
     /// Folder for report.html, dossier.json and hidden.csv
-    #[arg(long, value_name = "DIR", default_value = "lanesweep-dossier")]
+    #[arg(long, value_name = "DIR", default_value = "lanesweep-dossier", help_heading = "Output")]
     out: PathBuf,
     #[command(flatten)]
     format: FormatFlag,
-    #[command(flatten)]
-    backend: BackendFlags,
-    #[command(flatten)]
-    profile: ProfileFlags,
-    #[command(flatten)]
-    plausibility: PlausibilityFlag,
-    #[command(flatten)]
-    generator: GeneratorFlags,
 }
 
 impl Justify {
@@ -87,18 +73,16 @@ impl Justify {
             Error::usage(Place::item("--models"), problem, format!("use one of {}", ModelId::names()))
         })?;
         let criterion = self.criterion.get()?;
-        let headways = lists::paper_or_headways(&self.thw)?;
-        let profile = self.profile.load()?;
-        let source = source_of(self.dir.as_ref(), self.scenarios.as_ref(), &self.generator, configured)?;
-        let inputs: Vec<PathBuf> = self.scenarios.iter().chain(configured.files()).cloned().collect();
+        let headways = self.headways.list()?;
+        let profile = configured.profile()?;
         for name in ["report.html", DOSSIER_RECORD, "hidden.csv", "hidden.svg"] {
-            source::refuse_overwriting(&self.out.join(name), &inputs, "--out")?;
+            self.data.refuse_overwriting(&self.out.join(name), configured, "--out")?;
         }
         check_folder(&self.out)?;
-        let opened = self.backend.open()?;
-        tracing::info!("{}", source.describe(false));
-        let collection = source::load(&source, &config.mining, self.plausibility.policy(), verbosity)?;
-        let facts = DataProvenance::of(&source, &collection, Driven { hours: None, kilometres: None })?;
+        let opened = configured.open()?;
+        let collection = self.data.load_told(configured, verbosity)?;
+        let facts =
+            DataProvenance::of(&self.data.source(configured), &collection, Driven { hours: None, kilometres: None })?;
         let options = JustifyOptions {
             compare: CompareOptions {
                 study: StudyOptions {

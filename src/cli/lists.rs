@@ -32,7 +32,7 @@ pub fn whole<T: TryFrom<u64>>(text: &str) -> std::result::Result<T, String> {
 #[derive(Debug, Clone, Args)]
 pub struct CategoriesFlag {
     /// Kinds of scenario: cut-in, cut-out, lvd [default: all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Scenario")]
     categories: Vec<String>,
 }
 
@@ -52,7 +52,7 @@ pub struct ParameterizationsFlag {
     /// Parameterizations: 1…7, a…g, i…v [default: all]
     ///
     /// 1…7 are for cut-ins, a…g for cut-outs, i…v for leader decelerations.
-    #[arg(long, value_name = "LIST", value_delimiter = ',')]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Scenario")]
     parameterizations: Vec<String>,
 }
 
@@ -69,7 +69,7 @@ impl ParameterizationsFlag {
 /// `--models`.
 #[derive(Debug, Clone, Args)]
 pub struct ModelsFlag {
-    #[arg(long, value_name = "LIST", value_delimiter = ',', help = models_help())]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', help = models_help(), help_heading = "Models and criteria")]
     models: Vec<String>,
 }
 
@@ -93,6 +93,32 @@ impl ModelsFlag {
     }
 }
 
+/// `--thw` of a verb that replays scenarios.
+#[derive(Debug, Clone, Args)]
+pub struct HeadwaysFlag {
+    /// Time headways; paper is 2.0, 1.8, … 0.2; observed the recorded gaps
+    ///
+    /// The paper's claims need all of its headways. r157: the minimum following distance of UN R157, 5.2.3.3, by the
+    /// ego's speed; may stand in a list. observed: each scenario starts from its recorded gap, and a density draws the
+    /// headway as one more parameter; stands alone.
+    #[arg(long, value_name = "s,s,…|paper|r157|observed", default_value = "paper", help_heading = "Scenario")]
+    thw: String,
+}
+
+impl HeadwaysFlag {
+    /// In the order given.
+    ///
+    /// # Errors
+    /// As [`headways`].
+    pub fn list(&self) -> Result<Vec<Headway>> {
+        match self.thw.trim() {
+            "paper" => Ok(Headway::paper()),
+            text if Headway::parse(text) == Some(Headway::Observed) => Ok(vec![Headway::Observed]),
+            list => headways(list, "`paper` or `observed`"),
+        }
+    }
+}
+
 /// What `--models` takes.
 pub fn models_help() -> String {
     format!("Driver models: {} [default: all]", ModelId::names())
@@ -104,7 +130,7 @@ pub struct CriterionFlag {
     /// Criterion to map, rank or estimate
     ///
     /// For worst lanes, failure maps, fractions, stop rules and the adaptive estimators.
-    #[arg(long, value_name = "collision|ttc|btn", default_value = "collision")]
+    #[arg(long, value_name = "collision|ttc|btn", default_value = "collision", help_heading = "Models and criteria")]
     criterion: String,
 }
 
@@ -133,10 +159,10 @@ pub fn criterion(name: &str) -> Result<Criterion> {
 #[derive(Debug, Clone, Args)]
 pub struct ExposureFlags {
     /// Driven time of all egos [default: from the recordings]
-    #[arg(long, value_name = "h")]
+    #[arg(long, value_name = "h", help_heading = "Data")]
     hours: Option<f64>,
     /// Driven distance of all egos [default: from the recordings]
-    #[arg(long, value_name = "km")]
+    #[arg(long, value_name = "km", help_heading = "Data")]
     km: Option<f64>,
 }
 
@@ -200,18 +226,6 @@ pub fn headways(list: &str, words: &str) -> Result<Vec<Headway>> {
     let meanings = found.iter().map(|headway| headway.identity());
     refuse_repeats(|| Place::item("--thw"), meanings.zip(list.split(',').map(str::trim)))?;
     Ok(found)
-}
-
-/// The same, or `paper`: the ten of the paper, or `observed`: the recorded gaps.
-///
-/// # Errors
-/// As [`headways`].
-pub fn paper_or_headways(text: &str) -> Result<Vec<Headway>> {
-    match text.trim() {
-        "paper" => Ok(Headway::paper()),
-        text if Headway::parse(text) == Some(Headway::Observed) => Ok(vec![Headway::Observed]),
-        list => headways(list, "`paper` or `observed`"),
-    }
 }
 
 /// The parameterizations of `--parameterizations` among those of some categories, in the registry's order; all where

@@ -5,7 +5,7 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::backend_flags::BackendFlags;
+use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::dry_run::DryRun;
 use super::format::FormatFlag;
@@ -35,74 +35,66 @@ const RECHECK_SEED: u64 = 1;
 #[command(after_help = EXAMPLES, after_long_help = after_long_help())]
 pub struct Map {
     /// Kind of scenario: cut-in, cut-out, lvd
-    #[arg(value_name = "CATEGORY")]
+    #[arg(value_name = "CATEGORY", help_heading = "Scenario")]
     category: String,
     /// Predefined grids with their models: jrc, r157
-    #[arg(long, value_name = "NAME", conflicts_with_all = ["x", "y", "panel", "set", "closing", "native_gap"])]
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["x", "y", "panel", "set", "closing", "native_gap"], help_heading = "Scenario")]
     preset: Option<String>,
     /// OpenSCENARIO file with deterministic distributions
     ///
     /// The first two parameters with several values are the axes, unless --x and --y name others; the others define
     /// the panels.
-    #[arg(long, value_name = "FILE", conflicts_with = "preset")]
+    #[arg(long, value_name = "FILE", conflicts_with = "preset", help_heading = "Data")]
     distribution: Option<PathBuf>,
     /// With --distribution: parameter of the file = our parameter, times a factor; repeatable
-    #[arg(long, value_name = "THEIRS=OURS[*FACTOR]", requires = "distribution")]
+    #[arg(long, value_name = "THEIRS=OURS[*FACTOR]", requires = "distribution", help_heading = "Scenario")]
     rename: Vec<Rename>,
     /// Parameter of the x axis: NAME=FROM..TO/STEP or NAME=A,B,C
     ///
     /// With --distribution also a NAME of the file.
-    #[arg(long, value_name = "NAME=RANGE")]
+    #[arg(long, value_name = "NAME=RANGE", help_heading = "Scenario")]
     x: Option<String>,
     /// Parameter of the y axis
-    #[arg(long, value_name = "NAME=RANGE")]
+    #[arg(long, value_name = "NAME=RANGE", help_heading = "Scenario")]
     y: Option<String>,
     /// Parameter of the panels; repeatable
     ///
     /// Several make a panel of every combination.
-    #[arg(long, value_name = "NAME=RANGE")]
+    #[arg(long, value_name = "NAME=RANGE", help_heading = "Scenario")]
     panel: Vec<String>,
     /// Value that is the same in every cell; repeatable
-    #[arg(long, value_name = "NAME=VALUE")]
+    #[arg(long, value_name = "NAME=VALUE", help_heading = "Scenario")]
     set: Vec<String>,
     /// Only panels in which the ego is faster than the other vehicle
-    #[arg(long)]
+    #[arg(long, help_heading = "Scenario", hide_short_help = true)]
     closing: bool,
     /// Start each model at its following distance in the JRC's simulator, not gap_m or thw_s
-    #[arg(long)]
+    #[arg(long, help_heading = "Scenario", hide_short_help = true)]
     native_gap: bool,
     #[command(flatten)]
     models: lists::ModelsFlag,
     #[command(flatten)]
     criterion: lists::CriterionFlag,
     /// Model or profile; maps where it and the models differ
-    #[arg(long, value_name = "MODEL|PROFILE")]
+    #[arg(long, value_name = "MODEL|PROFILE", help_heading = "Models and criteria")]
     against: Option<String>,
-    /// paper, paper-fit, jrc-2021, un-r157 [default: paper; of a preset: jrc-2021, un-r157]
-    #[arg(long, value_name = "NAME|FILE")]
-    profile: Option<String>,
-    /// Time step [default: the profile's]
-    #[arg(long, value_name = "s")]
-    dt: Option<f64>,
     /// Mark cells whose outcome changes with a tenth of the time step, 1 cm, 0.1 km/h
     ///
     /// They are undecided: each cell is simulated eight times, and sheets show them in their own colour.
-    #[arg(long)]
+    #[arg(long, help_heading = "Models and criteria")]
     robust: bool,
     #[command(flatten)]
     plausibility: PlausibilityFlag,
     #[command(flatten)]
     format: FormatFlag,
-    #[command(flatten)]
-    backend: BackendFlags,
     /// Compute in binary64 on the CPU: the reference of the lane arithmetic
-    #[arg(long)]
+    #[arg(long, help_heading = "Models and criteria", hide_short_help = true)]
     reference: bool,
     /// Print lanes, memory and estimated time; write nothing
-    #[arg(long)]
+    #[arg(long, help_heading = "Run")]
     dry_run: bool,
     /// Folder of the results
-    #[arg(long, value_name = "DIR", default_value = "lanesweep-map")]
+    #[arg(long, value_name = "DIR", default_value = "lanesweep-map", help_heading = "Output")]
     out: PathBuf,
 }
 
@@ -126,25 +118,25 @@ fn after_long_help() -> String {
 }
 
 impl Map {
-    pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
+    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         let category = Category::parse(&self.category).ok_or_else(|| {
             let problem = format!("there is no category `{}`", self.category);
             Error::usage(Place::item("CATEGORY"), problem, "use cut-in, cut-out or lvd")
         })?;
         let criterion = self.criterion.get()?;
-        let profile = self.profile()?;
+        let profile = self.profile(configured)?;
         let options = MapOptions {
             grids: self.grids(category)?,
             models: self.models.named()?,
             criterion,
-            against: self.against.as_deref().map(|text| against(text, self.dt)).transpose()?,
+            against: self.against.as_deref().map(|text| against(text, configured)).transpose()?,
             robust: self.robust,
         };
         let started = Instant::now();
         let against = options.against.clone();
         let map = grid::Map::plan(options, &profile)?;
         let plan_s = started.elapsed().as_secs_f64();
-        let opened = if self.reference { self.backend.reference()? } else { self.backend.open()? };
+        let opened = if self.reference { configured.open_reference()? } else { configured.open()? };
         if self.dry_run {
             let run = map.forecast(opened.backend())?;
             return DryRun { run, backend: opened.backend().describe(), before_s: None }.print(self.format);
@@ -177,10 +169,12 @@ impl Map {
         Ok(Exit::Ok)
     }
 
-    fn profile(&self) -> Result<Profile> {
-        let preset = self.preset.as_deref().and_then(Presets::find);
-        let otherwise = preset.map_or("paper", Presets::profile);
-        with_dt(Profile::load(self.profile.as_deref().unwrap_or(otherwise))?, self.dt)
+    /// That of a preset unless one is set.
+    fn profile(&self, configured: &Configured) -> Result<Profile> {
+        match self.preset.as_deref().and_then(Presets::find) {
+            Some(preset) if !configured.is_set("run.profile") => configured.profile_of(preset.profile()),
+            _ => configured.profile(),
+        }
     }
 
     /// The grids that the flags name.
@@ -216,24 +210,17 @@ impl Map {
     }
 }
 
-fn with_dt(profile: Profile, dt: Option<f64>) -> Result<Profile> {
-    match dt {
-        Some(dt) => profile.with_dt(dt),
-        None => Ok(profile),
-    }
-}
-
 /// A model's name, or else a profile.
-fn against(text: &str, dt: Option<f64>) -> Result<Against> {
+fn against(text: &str, configured: &Configured) -> Result<Against> {
     if let Some(model) = ModelId::parse(text) {
         return Ok(Against::Model(model));
     }
-    let profile = Profile::load(text).map_err(|error| match error {
+    let profile = configured.profile_of(text).map_err(|error| match error {
         Error::Usage { place, problem: _, help } if *place == Place::option("profile") => {
             let problem = format!("there is neither a driver model nor a profile `{text}`");
             Error::usage(Place::item("--against"), problem, format!("{help}. Models: {}", ModelId::names()))
         }
         other => other,
     })?;
-    Ok(Against::Profile(Box::new(with_dt(profile, dt)?)))
+    Ok(Against::Profile(Box::new(profile)))
 }

@@ -24,7 +24,7 @@ use crate::run::parts::PLAN_FILE;
                         result\n  lanesweep cluster merge result")]
 pub struct Merge {
     /// The run's folder
-    #[arg(value_name = "DIR")]
+    #[arg(value_name = "DIR", help_heading = "Data")]
     dir: PathBuf,
     #[command(flatten)]
     tables: TablesFlag,

@@ -25,13 +25,13 @@ use crate::traffic::{DataProvenance, Driven, Source};
 #[command(after_help = "Example:\n  lanesweep mine recordings --out scenarios.jsonl")]
 pub struct Mine {
     /// Folder of highD-format recordings
-    #[arg(value_name = "DIR")]
+    #[arg(value_name = "DIR", help_heading = "Data")]
     dir: PathBuf,
     /// File to write, .jsonl or .parquet [default: standard output, JSON Lines]
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
     out: Option<PathBuf>,
     /// Only scenarios that pass the paper's filters
-    #[arg(long)]
+    #[arg(long, help_heading = "Data")]
     kept: bool,
     #[command(flatten)]
     plausibility: PlausibilityFlag,

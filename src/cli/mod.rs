@@ -42,15 +42,13 @@ mod verify;
 
 pub use exit::Exit;
 
-use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::{Args, FromArgMatches, Parser, Subcommand};
 use configured::Configured;
 use console::Verbosity;
 
-use crate::model::profile::Profile;
-use crate::{Error, Place, Result};
+use crate::{Error, Result};
 
 #[derive(Parser)]
 #[command(
@@ -73,14 +71,11 @@ struct Cli {
 #[derive(Debug, Clone, Args)]
 struct Common {
     /// Errors only
-    #[arg(short, long, global = true, conflicts_with = "verbose")]
+    #[arg(short, long, global = true, conflicts_with = "verbose", help_heading = "Run", hide_short_help = true)]
     quiet: bool,
     /// More messages
-    #[arg(short, long, global = true)]
+    #[arg(short, long, global = true, help_heading = "Run", hide_short_help = true)]
     verbose: bool,
-    /// Threads; results do not depend on it [default: all cores]
-    #[arg(long, global = true, value_name = "N")]
-    threads: Option<usize>,
 }
 
 impl Common {
@@ -113,36 +108,9 @@ enum Verb {
     Config(config::Config),
 }
 
-/// Profile flags of every verb that simulates.
-#[derive(Debug, Clone, Args)]
-struct ProfileFlags {
-    /// paper, paper-fit, jrc-2021, un-r157
-    ///
-    /// Or a TOML file of your own.
-    #[arg(long, value_name = "NAME|FILE")]
-    profile: String,
-    /// Time step [default: the profile's]
-    #[arg(long, value_name = "s")]
-    dt: Option<f64>,
-}
-
-impl ProfileFlags {
-    fn load(&self) -> Result<Profile> {
-        let profile = Profile::load(&self.profile)?;
-        match self.dt {
-            Some(dt) => profile.with_dt(dt),
-            None => Ok(profile),
-        }
-    }
-}
-
-/// More threads than any machine has cores.
-const MAX_THREADS: usize = 4096;
-
 /// Parses the command line, runs the verb and tells how it ended.
 pub fn main() -> ExitCode {
-    let words: Vec<OsString> = std::env::args_os().collect();
-    let matches = match configured::command().try_get_matches_from(&words) {
+    let matches = match configured::command().try_get_matches() {
         Ok(matches) => matches,
         Err(error) => {
             return told(|| console::refuse(&error)).into();
@@ -153,7 +121,7 @@ pub fn main() -> ExitCode {
     }
     signals::install();
     told(|| {
-        let (cli, configured) = Configured::of(&matches, &words)?;
+        let (cli, configured) = Configured::of(&matches)?;
         run(&cli, &configured)
     })
     .into()
@@ -176,12 +144,7 @@ fn told(work: impl FnOnce() -> Result<Exit>) -> Exit {
 }
 
 fn run(cli: &Cli, configured: &Configured) -> Result<Exit> {
-    if let Some(threads) = cli.common.threads.filter(|threads| !(1..=MAX_THREADS).contains(threads)) {
-        let problem = format!("{threads} threads are out of range");
-        let help = format!("use at least 1 and at most {MAX_THREADS}; more threads than cores bring no gain");
-        return Err(Error::usage(Place::item("--threads"), problem, help));
-    }
-    start_threads(cli.common.threads)?;
+    start_threads(configured.settings.run.threads)?;
     match &cli.verb {
         Verb::Study(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Mine(verb) => verb.run(configured, cli.common.verbosity()),
@@ -190,10 +153,10 @@ fn run(cli: &Cli, configured: &Configured) -> Result<Exit> {
         Verb::Compare(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Justify(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Synth(verb) => verb.run(configured, cli.common.verbosity()),
-        Verb::Map(verb) => verb.run(cli.common.verbosity()),
-        Verb::Simulate(verb) => verb.run(cli.common.verbosity()),
+        Verb::Map(verb) => verb.run(configured, cli.common.verbosity()),
+        Verb::Simulate(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Check(verb) => verb.run(cli.common.verbosity()),
-        Verb::Export(verb) => verb.run(),
+        Verb::Export(verb) => verb.run(configured),
         Verb::Cluster(verb) => verb.run(),
         Verb::Verify(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Config(verb) => verb.run(configured),

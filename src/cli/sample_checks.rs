@@ -2,8 +2,9 @@
 
 use std::path::{Path, PathBuf};
 
-use super::sample::{EstimatorFlag, PointsFlag, Sample};
+use super::sample::Sample;
 use super::source::file_of;
+use crate::cli::settings::{EstimatorKind, PointKind};
 use crate::report::lanes::table_format;
 use crate::run::forecast::MAX_HELD;
 use crate::support::repeats::refuse_repeats;
@@ -21,34 +22,13 @@ pub(super) fn only_crude(flag: &str) -> Error {
 impl Sample {
     /// What no density is needed for.
     pub(super) fn check(&self) -> Result<()> {
-        if !(self.level > 0.0 && self.level < 1.0) {
-            let problem = format!("{} is out of range", self.level);
-            return Err(Error::usage(Place::item("--level"), problem, "give a number between 0 and 1"));
-        }
-        if self.half_width.is_some_and(|u| !(u > 0.0 && u.is_finite())) {
-            return Err(Error::usage(
-                Place::item("--half-width"),
-                "no half-width",
-                "give a number above 0, such as 0.05",
-            ));
-        }
-        if self.time_limit.is_some_and(|t| !(t > 0.0 && t < 1e9)) {
-            return Err(Error::usage(Place::item("--time-limit"), "no time", "give seconds above 0"));
-        }
-        if self.samples == Some(0) {
-            let help = "give 1000000, for instance";
-            return Err(Error::usage(Place::item("--samples"), "0 samples give no estimate", help));
-        }
-        if self.samples.is_some_and(|n| n >= 1 << 63) {
-            let problem = "the number of samples must be below 2^63";
-            return Err(Error::usage(Place::item("--samples"), problem, "give fewer"));
-        }
+        let settings = &self.settings;
         let is_crude = self.is_crude();
         let belongs_to_crude = [
             ("--rows", self.rows.is_some()),
             ("--map", self.map.is_some()),
             ("--given", !self.given.is_empty()),
-            ("--points sobol", self.points == PointsFlag::Sobol),
+            ("--points sobol", settings.points == PointKind::Sobol),
         ];
         if let Some((flag, _)) = belongs_to_crude.iter().find(|(_, given)| *given && !is_crude) {
             return Err(only_crude(flag));
@@ -60,13 +40,13 @@ impl Sample {
             let help = format!("give at least {least} and at most {most}");
             Err(Error::usage(Place::item(flag), format!("{value} is out of range"), help))
         };
-        match self.estimator {
-            EstimatorFlag::Is if self.is_weighted() => {
-                least("--samples", self.samples.unwrap_or(100_000), 1, MAX_SPLIT)?
+        match settings.estimator {
+            EstimatorKind::Is if self.is_weighted() => {
+                least("--samples", settings.samples.unwrap_or(100_000), 1, MAX_SPLIT)?
             }
-            EstimatorFlag::Subset => least("--samples", self.samples.unwrap_or(2000), 100, MAX_HELD)?,
-            EstimatorFlag::Is | EstimatorFlag::Ce => {
-                least("--samples", self.samples.unwrap_or(100_000), 100, 10 * MAX_HELD)?
+            EstimatorKind::Subset => least("--samples", settings.samples.unwrap_or(2000), 100, MAX_HELD)?,
+            EstimatorKind::Is | EstimatorKind::Ce => {
+                least("--samples", settings.samples.unwrap_or(100_000), 100, 10 * MAX_HELD)?
             }
             _ => (),
         }
@@ -76,11 +56,11 @@ impl Sample {
             let help = "use --estimator mc, or --estimator is with one given --proposal";
             return Err(Error::usage(Place::item("--shard"), problem, help));
         }
-        if is_split && (self.half_width.is_some() || self.time_limit.is_some()) {
+        if is_split && (settings.half_width.is_some() || settings.time_limit_s.is_some()) {
             let problem = "a part of a run cannot evaluate a stop rule of the whole run";
             return Err(Error::usage(Place::item("--shard"), problem, "leave out the stop rules, or --shard"));
         }
-        if !self.proposal.is_empty() && self.estimator != EstimatorFlag::Is {
+        if !self.proposal.is_empty() && settings.estimator != EstimatorKind::Is {
             return Err(Error::usage(
                 Place::item("--proposal"),
                 "a given proposal is sampled by importance sampling",

@@ -5,9 +5,11 @@ use std::path::Path;
 use std::time::Instant;
 
 use super::Exit;
+use super::configured::Configured;
 use super::console::{self, Verbosity};
-use super::sample::{EstimatorFlag, PointsFlag, Sample};
+use super::sample::Sample;
 use super::sample_checks::only_crude;
+use crate::cli::settings::{EstimatorKind, PointKind};
 use crate::engine::Headway;
 use crate::interop::openscenario::{DistributionSamples, SampledFile};
 use crate::report::sampling::{DensityRecord, DrawRecord, EstimateFile, HostRecord};
@@ -23,11 +25,18 @@ use crate::support::run_dir::{ESTIMATE_RECORD, OutputDir};
 use crate::{Error, Place, Result};
 
 /// Samples what a file says.
-pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verbosity) -> Result<Exit> {
-    if flags.estimator != EstimatorFlag::Mc {
+pub(super) fn run(
+    flags: &Sample,
+    configured: &Configured,
+    path: &Path,
+    started: Instant,
+    verbosity: Verbosity,
+) -> Result<Exit> {
+    let settings = &flags.settings;
+    if settings.estimator != EstimatorKind::Mc {
         return Err(only_crude("--distribution"));
     }
-    if flags.points == PointsFlag::Sobol {
+    if settings.points == PointKind::Sobol {
         let help = "leave out --points: draws of a distribution file are independent";
         return Err(Error::usage(
             Place::item("--points"),
@@ -59,10 +68,11 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
         return Err(Error::usage(Place::item("--thw"), problem, "leave out --thw"));
     }
     let headways = listed.unwrap_or_else(Headway::paper);
-    let (profile, models, criterion) = (flags.load_profile()?, flags.models()?, flags.criterion()?);
-    let seed = flags.given_seed().or(samples.seed).unwrap_or(flags.seed());
-    let count = flags.samples.unwrap_or(samples.runs);
-    let opened = flags.open()?;
+    let (profile, models, criterion) = (configured.profile()?, flags.models()?, settings.criterion);
+    let of_file = samples.seed.filter(|_| !configured.is_set("sample.seed"));
+    let seed = of_file.unwrap_or(settings.seed);
+    let count = settings.samples.unwrap_or(samples.runs);
+    let opened = configured.open()?;
     let folder = OutputDir::open(&flags.out, ESTIMATE_RECORD)?;
     let (plan, tries) = samples.plan((count, seed), &profile, &models, &headways)?;
     let executor = opened.executor().with_recheck(seed);
@@ -75,8 +85,8 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
         models,
         criterion,
         seed,
-        level: flags.level,
-        worst: flags.worst(),
+        level: settings.level,
+        worst: settings.worst,
         ..SampleOptions::new(Estimator::Crude { interval: flags.interval() }, count, headways)
     };
     tracing::info!("{} samples on {}", readable::count(count), executor.backend.describe());

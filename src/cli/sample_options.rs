@@ -3,8 +3,8 @@
 use std::path::PathBuf;
 use std::time::Duration;
 
-use super::sample::{EstimatorFlag, IntervalFlag, PointsFlag, Sample};
-use crate::cli::settings::SampleSettings;
+use super::sample::Sample;
+use crate::cli::settings::{EstimatorKind, IntervalKind, PointKind};
 use crate::run::sampling::{Estimator, MapAxes, SampleHeadways, SampleOptions, SampleSource, read_proposal};
 use crate::stats::density::DensityModel;
 use crate::stats::estimate::{BinomialInterval, Checkpoints, Pilot, StopRule};
@@ -16,16 +16,16 @@ impl Sample {
     pub(super) fn stop(&self, samples: u64) -> StopRule {
         StopRule {
             samples,
-            relative_half_width: self.half_width,
-            time_limit: self.time_limit.map(Duration::from_secs_f64),
+            relative_half_width: self.settings.half_width,
+            time_limit: self.settings.time_limit_s.map(Duration::from_secs_f64),
             checkpoints: Checkpoints::Doubling,
         }
     }
 
     /// Everything that a run over a density is asked for.
-    pub(super) fn options(&self, density: &DensityModel, settings: &SampleSettings) -> Result<SampleOptions> {
-        let samples = self.samples.unwrap_or(match self.estimator {
-            EstimatorFlag::Subset => 2000,
+    pub(super) fn options(&self, density: &DensityModel) -> Result<SampleOptions> {
+        let samples = self.settings.samples.unwrap_or(match self.settings.estimator {
+            EstimatorKind::Subset => 2000,
             _ => 100_000,
         });
         self.judge_given(density)?;
@@ -36,24 +36,24 @@ impl Sample {
         {
             return Err(Error::usage(
                 Place::item("--thw"),
-                format!("--estimator {} follows one headway at a time", self.estimator.key()),
+                format!("--estimator {} follows one headway at a time", self.settings.estimator.key()),
                 "give one, such as --thw 0.6, or a density fitted with --with-thw",
             ));
         }
         Ok(SampleOptions {
             models: self.models()?,
-            criterion: self.criterion()?,
-            seed: self.seed(),
-            level: self.level,
+            criterion: self.settings.criterion,
+            seed: self.settings.seed,
+            level: self.settings.level,
             stop: self.stop(samples),
             given: self.given.clone(),
-            worst: self.worst(),
-            source: match self.points {
-                PointsFlag::Random => SampleSource::Random,
-                PointsFlag::Sobol => SampleSource::Sobol,
+            worst: self.settings.worst,
+            source: match self.settings.points {
+                PointKind::Random => SampleSource::Random,
+                PointKind::Sobol => SampleSource::Sobol,
             },
             map: if self.is_crude() { self.map_axes(density)? } else { None },
-            ..SampleOptions::new(self.estimator(density, settings)?, samples, headways)
+            ..SampleOptions::new(self.estimator(density)?, samples, headways)
         })
     }
 
@@ -70,30 +70,31 @@ impl Sample {
         Ok(())
     }
 
-    fn estimator(&self, density: &DensityModel, settings: &SampleSettings) -> Result<Estimator> {
-        Ok(match self.estimator {
-            EstimatorFlag::Mc => Estimator::Crude { interval: self.interval() },
-            EstimatorFlag::Is if self.proposal.is_empty() => Estimator::Pilot(Pilot {
+    fn estimator(&self, density: &DensityModel) -> Result<Estimator> {
+        let settings = &self.settings;
+        Ok(match settings.estimator {
+            EstimatorKind::Mc => Estimator::Crude { interval: self.interval() },
+            EstimatorKind::Is if self.proposal.is_empty() => Estimator::Pilot(Pilot {
                 worst: settings.elite_fraction,
                 broad: settings.broad_weight,
                 defence: settings.defensive_weight,
                 ..Pilot::guarded(settings.pilot)
             }),
-            EstimatorFlag::Is => {
+            EstimatorKind::Is => {
                 let read = |path: &PathBuf| read_proposal(path, density);
                 let proposals = self.proposal.iter().map(read).collect::<Result<_>>()?;
                 Estimator::Given { proposals, defence: settings.defensive_weight }
             }
-            EstimatorFlag::Ce => Estimator::CrossEntropy { defence: settings.defensive_weight },
-            EstimatorFlag::Subset => Estimator::Subset,
+            EstimatorKind::Ce => Estimator::CrossEntropy { defence: settings.defensive_weight },
+            EstimatorKind::Subset => Estimator::Subset,
         })
     }
 
     /// Kind of interval of crude Monte Carlo.
     pub(super) fn interval(&self) -> BinomialInterval {
-        match self.interval {
-            IntervalFlag::Wilson => BinomialInterval::Wilson,
-            IntervalFlag::ClopperPearson => BinomialInterval::ClopperPearson,
+        match self.settings.interval {
+            IntervalKind::Wilson => BinomialInterval::Wilson,
+            IntervalKind::ClopperPearson => BinomialInterval::ClopperPearson,
         }
     }
 

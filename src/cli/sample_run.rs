@@ -40,13 +40,13 @@ impl Sample {
                 }
                 guard(rows, &self.out, std::iter::once(path))?;
             }
-            return self.run_sample(sample, &self.backend.open()?, started, verbosity);
+            return self.run_sample(sample, &configured.open()?, started, verbosity);
         }
         if let Some(path) = &self.distribution {
-            return sample_distribution::run(self, path, started, verbosity);
+            return sample_distribution::run(self, configured, path, started, verbosity);
         }
         let (sample, data) = self.planned(configured)?;
-        let opened = self.backend.open()?;
+        let opened = configured.open()?;
         tracing::info!("{data}");
         self.run_sample(sample, &opened, started, verbosity)
     }
@@ -68,8 +68,8 @@ impl Sample {
         if !self.dry_run {
             check_folder(&self.out)?;
         }
-        let profile = self.load_profile()?;
-        let options = self.options(&density, &configured.settings.sample)?;
+        let profile = configured.profile()?;
+        let options = self.options(&density)?;
         if let Some(rows) = &self.rows {
             guard(rows, &self.out, self.density.iter().chain(&self.proposal))?;
         }

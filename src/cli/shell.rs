@@ -18,7 +18,7 @@ use crate::{Error, Result};
 #[command(after_help = "Example:\n  lanesweep config completions bash")]
 pub struct Completions {
     /// The shell
-    #[arg(value_name = "SHELL")]
+    #[arg(value_name = "SHELL", help_heading = "Data")]
     shell: Shell,
 }
 
@@ -47,7 +47,7 @@ fn collect(name: String, command: &clap::Command, pages: &mut Vec<(String, clap:
 #[command(after_help = "Example:\n  lanesweep config man man1")]
 pub struct Man {
     /// Folder of the pages
-    #[arg(value_name = "DIR")]
+    #[arg(value_name = "DIR", help_heading = "Data")]
     dir: PathBuf,
 }
 

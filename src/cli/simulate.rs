@@ -4,11 +4,12 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use super::Exit;
 use super::case_flags::{CaseFlags, from_table, from_toml};
+use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::source::{PlausibilityFlag, refuse_overwriting, scenarios_of};
-use super::{Exit, ProfileFlags};
 use crate::interop::openscenario::reopen;
 use crate::run::reopen::{Reopened, TracedLanes};
 use crate::support::files::{make_folder_of, write_atomically};
@@ -32,50 +33,48 @@ pub struct Simulate {
     #[command(flatten)]
     case: CaseFlags,
     /// TOML file with the case
-    #[arg(long, value_name = "FILE", conflicts_with = "table")]
+    #[arg(long, value_name = "FILE", conflicts_with = "table", help_heading = "Data")]
     case_file: Option<PathBuf>,
     /// Table (.csv, .parquet) with one case per row
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Data")]
     table: Option<PathBuf>,
     /// Row of the table, from 1 after the header
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Data")]
     row: usize,
     /// Scenario file (.jsonl, .parquet, .csv) for --lane
-    #[arg(long, value_name = "FILE", requires = "lane")]
+    #[arg(long, value_name = "FILE", requires = "lane", help_heading = "Data")]
     scenarios: Option<PathBuf>,
     /// Folder (--out) of a study or sample, for --lane
     ///
     /// Repeats that lane with the run's profile and options, bit for bit, and says whether f64 gives another outcome.
-    #[arg(long, value_name = "DIR", requires = "lane", conflicts_with_all = ["scenarios", "case_file", "table", "profile", "dt"])]
+    #[arg(long, value_name = "DIR", requires = "lane", conflicts_with_all = ["scenarios", "case_file", "table", "profile", "dt"], help_heading = "Data")]
     from: Option<PathBuf>,
     /// Lane key: scenario/variant/headway/model
-    #[arg(long, value_name = "KEY")]
+    #[arg(long, value_name = "KEY", help_heading = "Data")]
     lane: Option<String>,
     /// Also other variants of the lane's scenario
     ///
     /// S (recorded; also without a value), keys of parameterizations, or all.
-    #[arg(long, value_name = "VARIANTS", requires = "lane", value_delimiter = ',', num_args = 0..=1, default_missing_value = "S")]
+    #[arg(long, value_name = "VARIANTS", requires = "lane", value_delimiter = ',', num_args = 0..=1, default_missing_value = "S", help_heading = "Scenario")]
     compare: Vec<String>,
     /// Also draw the time series
     ///
     /// Speed, acceleration, gap, TTC, BTN, PFS, CFS and lateral position, with reaction, braking and contact.
-    #[arg(long, value_name = "FILE.svg")]
+    #[arg(long, value_name = "FILE.svg", help_heading = "Output")]
     plot: Option<PathBuf>,
     /// End of the figure's time axis [default: 2 s after the last change]
-    #[arg(long, value_name = "s", requires = "plot")]
+    #[arg(long, value_name = "s", requires = "plot", help_heading = "Output", hide_short_help = true)]
     plot_end: Option<f64>,
     #[command(flatten)]
     plausibility: PlausibilityFlag,
     #[command(flatten)]
     format: FormatFlag,
-    #[command(flatten)]
-    profile: ProfileFlags,
 }
 
 impl Simulate {
-    pub fn run(&self, verbosity: Verbosity) -> Result<Exit> {
+    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         self.guard_plot()?;
-        let (lanes, incomplete) = self.lanes()?;
+        let (lanes, incomplete) = self.lanes(configured)?;
         if let Some(path) = &self.plot {
             // Before the table: a reader of stdout that ends early must not cost the figure.
             make_folder_of(path)?;
@@ -89,9 +88,9 @@ impl Simulate {
     }
 
     /// The lanes, and whether others of the file were left out.
-    fn lanes(&self) -> Result<(TracedLanes, bool)> {
+    fn lanes(&self, configured: &Configured) -> Result<(TracedLanes, bool)> {
         let Some(key) = &self.lane else {
-            let profile = self.profile.load()?;
+            let profile = configured.profile()?;
             let traced = self.flags()?.traced(&profile, self.plausibility.policy())?;
             return Ok((traced.into_lanes(&profile), false));
         };
@@ -105,7 +104,7 @@ impl Simulate {
         let (reopened, incomplete) = match (&self.from, &self.scenarios) {
             (Some(dir), _) => (reopen(dir, key)?, false),
             (None, Some(path)) => {
-                let profile = self.profile.load()?;
+                let profile = configured.profile()?;
                 let (mut scenarios, incomplete) = scenarios_of(path, self.plausibility.policy())?;
                 let data = format!("scenarios of {}", path.display());
                 (Reopened::scenarios(&mut scenarios, std::slice::from_ref(key), &profile, data)?, incomplete)

@@ -25,46 +25,46 @@ use crate::{Error, Place, Result};
 )]
 pub struct Slurm {
     /// Study options: short for `-- study --config STUDY.toml`
-    #[arg(value_name = "STUDY.toml", conflicts_with = "run", required_unless_present = "run")]
+    #[arg(value_name = "STUDY.toml", conflicts_with = "run", required_unless_present = "run", help_heading = "Data")]
     study: Option<PathBuf>,
     /// The run: study or sample with its arguments
-    #[arg(last = true, value_name = "VERB ARGUMENTS", allow_hyphen_values = true)]
+    #[arg(last = true, value_name = "VERB ARGUMENTS", allow_hyphen_values = true, help_heading = "Data")]
     run: Vec<String>,
     /// Tasks; each computes one shard
-    #[arg(long, value_name = "N")]
+    #[arg(long, value_name = "N", help_heading = "Run")]
     array: u32,
     /// Folder of the run: plan, parts and the result
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
     out: PathBuf,
     /// Time limit of a task, as Slurm writes it
-    #[arg(long, value_name = "TIME", default_value = "02:00:00")]
+    #[arg(long, value_name = "TIME", default_value = "02:00:00", help_heading = "Run")]
     time: String,
     /// GPUs per task: 1, or none to compute on the CPU
-    #[arg(long, value_name = "1|none", default_value = "none", value_parser = ["1", "none"])]
+    #[arg(long, value_name = "1|none", default_value = "none", value_parser = ["1", "none"], help_heading = "Run")]
     gpus: String,
     /// Processors per task
-    #[arg(long, value_name = "N", default_value_t = 1)]
+    #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Run")]
     cpus: u32,
     /// Memory per task, such as 4G [default: the cluster's]
-    #[arg(long, value_name = "SIZE")]
+    #[arg(long, value_name = "SIZE", help_heading = "Run")]
     mem: Option<String>,
     /// Partition [default: the cluster's]
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Run")]
     partition: Option<String>,
     /// Account [default: yours]
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Run")]
     account: Option<String>,
     /// Quality of service [default: the account's]
-    #[arg(long, value_name = "NAME")]
+    #[arg(long, value_name = "NAME", help_heading = "Run", hide_short_help = true)]
     qos: Option<String>,
     /// Time before the limit at which a task gets the stop signal
-    #[arg(long, value_name = "SECONDS", default_value_t = 120)]
+    #[arg(long, value_name = "SECONDS", default_value_t = 120, help_heading = "Run", hide_short_help = true)]
     signal_before: u32,
     /// Path of the program on the nodes
-    #[arg(long, value_name = "PATH", default_value = "lanesweep")]
+    #[arg(long, value_name = "PATH", default_value = "lanesweep", help_heading = "Run", hide_short_help = true)]
     program: String,
     /// Folder for scripts and logs [default: slurm in --out]
-    #[arg(long, value_name = "DIR")]
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
     scripts: Option<PathBuf>,
 }
 
@@ -142,12 +142,12 @@ fn check_plan(array: &SlurmArray) -> Result<()> {
     let own = ["--plan-only", "--out", &array.out];
     let typed = ["lanesweep", run.verb()].into_iter().chain(run.arguments().iter().map(String::as_str));
     let words: Vec<OsString> = typed.chain(own).map(OsString::from).collect();
-    let matches = command().try_get_matches_from(&words).map_err(|error| {
+    let matches = command().try_get_matches_from(words).map_err(|error| {
         let message = error.to_string();
         let problem = message.lines().next().unwrap_or_default().trim_start_matches("error: ").to_owned();
         Error::usage(Place::item("the run"), problem, format!("see lanesweep {} --help", run.verb()))
     })?;
-    let (cli, configured) = Configured::of(&matches, &words)?;
+    let (cli, configured) = Configured::of(&matches)?;
     match &cli.verb {
         Verb::Study(study) => study.check(&configured),
         Verb::Sample(sample) => sample.planned(&configured).map(drop),

@@ -11,28 +11,13 @@ use crate::support::plausibility::Implausible;
 use crate::support::repeats::refuse_repeats;
 use crate::traffic::Source;
 use crate::traffic::mining::{Collection, MiningOptions, counts_text};
-use crate::traffic::trajectory::generator::GeneratorOptions;
 use crate::traffic::trajectory::highd;
 use crate::{Error, Place, Result};
 
-/// The source that the flags of a verb name.
+/// Reads or generates, and mines, with a progress bar; tells what was left out and what was found.
 ///
 /// # Errors
-/// As [`GeneratorFlags::options`].
-pub fn source_of(
-    dir: Option<&PathBuf>,
-    scenarios: Option<&PathBuf>,
-    generator: &GeneratorFlags,
-    configured: &Configured,
-) -> Result<Source> {
-    Ok(match (dir, scenarios) {
-        (Some(dir), _) => Source::Folder(dir.clone()),
-        (None, Some(path)) => Source::Scenarios(path.clone()),
-        (None, None) => Source::Generated(generator.options(configured)?),
-    })
-}
-
-/// Reads or generates, and mines, with a progress bar; tells what was left out and what was found.
+/// As [`Source::load`].
 pub fn load(
     source: &Source,
     mining: &MiningOptions,
@@ -64,29 +49,11 @@ pub fn complain_of(problems: &[Error], notes: &[String]) {
     notes.iter().for_each(|note| tracing::warn!("{note}"));
 }
 
-/// Flags of the generator.
-#[derive(Debug, Clone, Args)]
-pub struct GeneratorFlags {
-    /// Number of generated recordings
-    #[arg(long, value_name = "N")]
-    pub synth_recordings: usize,
-}
-
-impl GeneratorFlags {
-    /// The flags, over what is configured of the rest.
-    pub fn options(&self, configured: &Configured) -> Result<GeneratorOptions> {
-        let generator = configured.settings.generator.clone();
-        let options = GeneratorOptions { recordings: self.synth_recordings, ..generator };
-        options.validate()?;
-        Ok(options)
-    }
-}
-
 /// What is done about input that no road has.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct PlausibilityFlag {
     /// Use physically impossible values (a speed of 108 m/s) with a warning
-    #[arg(long)]
+    #[arg(long, help_heading = "Data", hide_short_help = true)]
     accept_implausible: bool,
 }
 
@@ -94,6 +61,55 @@ impl PlausibilityFlag {
     /// As readers take it.
     pub fn policy(self) -> Implausible {
         if self.accept_implausible { Implausible::Accepted } else { Implausible::Refused }
+    }
+}
+
+/// Where a verb's data come from.
+#[derive(Debug, Clone, Args)]
+pub struct SourceFlags {
+    /// Folder of highD-format recordings [default: synthetic recordings]
+    #[arg(value_name = "DIR", conflicts_with = "scenarios", help_heading = "Data")]
+    pub dir: Option<PathBuf>,
+    /// Scenario file (.jsonl, .parquet, .csv) instead of recordings
+    #[arg(long, value_name = "FILE", help_heading = "Data")]
+    pub scenarios: Option<PathBuf>,
+    #[command(flatten)]
+    plausibility: PlausibilityFlag,
+}
+
+impl SourceFlags {
+    /// What they name; the generator where they name nothing.
+    pub fn source(&self, configured: &Configured) -> Source {
+        match (&self.dir, &self.scenarios) {
+            (Some(dir), _) => Source::Folder(dir.clone()),
+            (None, Some(path)) => Source::Scenarios(path.clone()),
+            (None, None) => Source::Generated(configured.settings.generator.clone()),
+        }
+    }
+
+    /// Checks that the data can be read.
+    ///
+    /// # Errors
+    /// As [`Source::check`].
+    pub fn check(&self, configured: &Configured) -> Result<()> {
+        self.source(configured).check(self.plausibility.policy())
+    }
+
+    /// As [`load`].
+    pub fn load(&self, configured: &Configured, verbosity: Verbosity) -> Result<Collection> {
+        load(&self.source(configured), &configured.settings.mining, self.plausibility.policy(), verbosity)
+    }
+
+    /// The same, with what is read told before.
+    pub fn load_told(&self, configured: &Configured, verbosity: Verbosity) -> Result<Collection> {
+        tracing::info!("{}", self.source(configured).describe(false));
+        self.load(configured, verbosity)
+    }
+
+    /// No result may replace an input of the run.
+    pub fn refuse_overwriting(&self, output: &Path, configured: &Configured, flag: &str) -> Result<()> {
+        let inputs: Vec<PathBuf> = self.scenarios.iter().chain(configured.files()).cloned().collect();
+        refuse_overwriting(output, &inputs, flag)
     }
 }
 

@@ -5,14 +5,13 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::backend_flags::BackendFlags;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::dry_run::DryRun;
 use super::format::{FormatFlag, TablesFlag};
 use super::shard_flags::ShardFlags;
-use super::source::{self, GeneratorFlags, PlausibilityFlag, source_of};
-use super::{Exit, ProfileFlags, lists};
+use super::source::{self, SourceFlags};
+use super::{Exit, lists};
 use crate::Result;
 use crate::engine::{Headway, OpenBackend};
 use crate::model::profile::Profile;
@@ -35,57 +34,46 @@ use crate::traffic::Source;
 /// runs on generated recordings. The answer goes to stdout, tables and figures to --out.
 #[derive(Debug, Args)]
 #[command(mut_args(|arg| match arg.get_id().as_str() {
-    "dir" | "scenarios" | "accept_implausible" | "seed" | "categories" | "models" | "thw" | "published" | "reference"
-    | "profile" | "dt"
-    | "synth_recordings" => arg.conflicts_with("plan"),
+    "dir" | "scenarios" | "accept_implausible" | "categories" | "models" | "thw" | "published" | "reference" => {
+        arg.conflicts_with("plan")
+    }
     "rows" | "compare_reference" | "keep_plan" => arg.conflicts_with_all(["shard", "plan_only"]),
     _ => arg,
 }))]
 #[command(after_help = "Examples:\n  lanesweep study\n  lanesweep study recordings --out result\n  lanesweep study \
                         --scenarios scenarios.jsonl --rows lanes.csv")]
 pub struct Study {
-    /// Folder of highD-format recordings [default: synthetic recordings]
-    #[arg(value_name = "DIR", conflicts_with = "scenarios")]
-    dir: Option<PathBuf>,
-    /// Scenario file (.jsonl, .parquet, .csv) instead of recordings
-    #[arg(long, value_name = "FILE")]
-    scenarios: Option<PathBuf>,
+    #[command(flatten)]
+    data: SourceFlags,
     /// Folder for tables, figures and run.json
-    #[arg(long, value_name = "DIR", default_value = "lanesweep-out")]
+    #[arg(long, value_name = "DIR", default_value = "lanesweep-out", help_heading = "Output")]
     out: PathBuf,
     /// Also write one row per lane: .csv, .jsonl or .parquet
-    #[arg(long, value_name = "FILE")]
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
     rows: Option<PathBuf>,
     /// Tables and page have the paper's published numbers (of highD) too
-    #[arg(long)]
+    #[arg(long, help_heading = "Models and criteria")]
     published: bool,
     /// Compute in binary64 on the CPU, not in the f32 lane arithmetic
-    #[arg(long)]
+    #[arg(long, help_heading = "Models and criteria")]
     reference: bool,
     /// Run both arithmetics and list every verdict that differs (reference.csv in --out)
-    #[arg(long, conflicts_with = "reference")]
+    #[arg(long, conflicts_with = "reference", help_heading = "Models and criteria", hide_short_help = true)]
     compare_reference: bool,
-    /// Seed of the choice of lanes that are computed again [default: 157]
-    #[arg(long, value_name = "N")]
-    seed: Option<u64>,
     /// Keep the plan in --out for `simulate --from`
     ///
     /// The plan is run-plan.json; with it you can repeat each lane. auto keeps it up to 256 MiB, about 135,000
     /// scenarios.
-    #[arg(long, value_name = "auto|always|never", value_enum, hide_possible_values = true, default_value_t = KeepPlan::Auto)]
+    #[arg(long, value_name = "auto|always|never", value_enum, hide_possible_values = true, default_value_t = KeepPlan::Auto, help_heading = "Output", hide_short_help = true)]
     keep_plan: KeepPlan,
     #[command(flatten)]
     categories: lists::CategoriesFlag,
     #[command(flatten)]
     models: lists::ModelsFlag,
-    /// Time headways; paper is 2.0, 1.8, … 0.2; observed the recorded gaps
-    ///
-    /// The paper's claims need all of its headways. r157: the minimum following distance of UN R157, 5.2.3.3, by the
-    /// ego's speed; may stand in a list. observed: each scenario starts from its recorded gap; stands alone.
-    #[arg(long, value_name = "s,s,…|paper|r157|observed", default_value = "paper")]
-    thw: String,
+    #[command(flatten)]
+    headways: lists::HeadwaysFlag,
     /// Print lanes, memory and estimated time; write nothing
-    #[arg(long, conflicts_with_all = ["shard", "plan_only"])]
+    #[arg(long, conflicts_with_all = ["shard", "plan_only"], help_heading = "Run")]
     dry_run: bool,
     #[command(flatten)]
     tables: TablesFlag,
@@ -93,14 +81,6 @@ pub struct Study {
     format: FormatFlag,
     #[command(flatten)]
     shards: ShardFlags,
-    #[command(flatten)]
-    backend: BackendFlags,
-    #[command(flatten)]
-    profile: ProfileFlags,
-    #[command(flatten)]
-    plausibility: PlausibilityFlag,
-    #[command(flatten)]
-    generator: GeneratorFlags,
 }
 
 /// When a run in one piece leaves its plan.
@@ -133,10 +113,10 @@ impl Study {
         self.shards.start()?;
         if let Some(path) = &self.shards.plan {
             configured.refuse_with_plan()?;
-            let mut opened = self.backend.open()?;
+            let mut opened = configured.open()?;
             let study = study::Study::read(path, self.shards.shard)?;
             if study.facts().reference {
-                opened = self.backend.reference()?;
+                opened = configured.open_reference()?;
             }
             if self.dry_run {
                 return self.forecast(&study, &opened, None);
@@ -145,7 +125,7 @@ impl Study {
         }
         if self.shards.plan_only {
             if self.reference {
-                self.backend.reference()?;
+                configured.open_reference()?;
             }
             let (study, _) = self.prepare(configured, verbosity)?;
             study.write_plan(&self.out)?;
@@ -153,7 +133,7 @@ impl Study {
             return Ok(if study.facts().incomplete { Exit::Incomplete } else { Exit::Ok });
         }
         // Before the work: a device that is not there is known at once.
-        let opened = if self.reference { self.backend.reference()? } else { self.backend.open()? };
+        let opened = if self.reference { configured.open_reference()? } else { configured.open()? };
         let (study, timings) = self.prepare(configured, verbosity)?;
         if self.dry_run {
             return self.forecast(&study, &opened, Some(timings.mine_s + timings.plan_s));
@@ -168,45 +148,42 @@ impl Study {
     pub(super) fn check(&self, configured: &Configured) -> Result<()> {
         self.guard_inputs(configured)?;
         check_folder(&self.out)?;
-        let (profile, options, source) = self.asked(configured)?;
+        let (profile, options) = self.asked(configured)?;
         profile.check_time_step(&options.models)?;
-        source.check(self.plausibility.policy())
+        self.data.check(configured)
     }
 
     /// What is studied, with what.
-    fn asked(&self, configured: &Configured) -> Result<(Profile, StudyOptions, Source)> {
-        let profile = self.profile.load()?;
+    fn asked(&self, configured: &Configured) -> Result<(Profile, StudyOptions)> {
+        let profile = configured.profile()?;
         let options = StudyOptions {
             categories: self.categories.list()?,
             models: self.models.list()?,
-            headways: lists::paper_or_headways(&self.thw)?,
+            headways: self.headways.list()?,
             parameterization: configured.settings.parameterization.clone(),
         };
-        let source = source_of(self.dir.as_ref(), self.scenarios.as_ref(), &self.generator, configured)?;
-        Ok((profile, options, source))
+        Ok((profile, options))
     }
 
     /// From data to a plan.
     fn prepare(&self, configured: &Configured, verbosity: Verbosity) -> Result<(study::Study, Timings)> {
-        let mut config = configured.settings.clone();
-        config.score.seed = self.seed.unwrap_or(config.score.seed);
-        let (profile, options, source) = self.asked(configured)?;
+        let config = configured.settings.clone();
+        let (profile, options) = self.asked(configured)?;
+        let source = self.data.source(configured);
         let has_paper_headways = options.headways == Headway::paper();
         // What is generated is said with the answer.
         if !matches!(source, Source::Generated(_)) {
             tracing::info!("{}", source.describe(false));
         }
         let mut timings = Timings::default();
-        let collection = timed(&mut timings.mine_s, || {
-            source::load(&source, &config.mining, self.plausibility.policy(), verbosity)
-        })?;
+        let collection = timed(&mut timings.mine_s, || self.data.load(configured, verbosity))?;
         let data = source.describe(collection.synthetic);
         let builder = study::Study::builder(&collection, profile)
             .options(options)
             .mining(config.mining)
             .score(config.score)
             .data(data)
-            .scenario_file_sha256(self.scenarios.as_deref().map(input_file::sha256).transpose()?)
+            .scenario_file_sha256(self.data.scenarios.as_deref().map(input_file::sha256).transpose()?)
             // What the synthetic recordings are calibrated to stands beside what they give, where the headways are the same.
             .published(self.published || (collection.synthetic && has_paper_headways))
             .reference(self.reference);
@@ -296,12 +273,12 @@ impl Study {
         let results = ["failures.csv", "f1.csv", "claims.csv", "report.txt", "reference.csv", "run.json"];
         let results = results.into_iter().chain([PLAN_FILE, RUN_PLAN_FILE]);
         let mut others: Vec<PathBuf> = results.map(|name| self.out.join(name)).collect();
-        others.extend(self.scenarios.clone());
+        others.extend(self.data.scenarios.clone());
         others.extend(configured.files().iter().cloned());
         others.extend(self.shards.plan.clone());
         source::refuse_overwriting(lanes, &others, "--rows")?;
         table_format(lanes)?;
-        self.dir.as_deref().map_or(Ok(()), |dir| source::refuse_recording(lanes, dir, "--rows"))
+        self.data.dir.as_deref().map_or(Ok(()), |dir| source::refuse_recording(lanes, dir, "--rows"))
     }
 }
 

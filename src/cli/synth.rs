@@ -7,7 +7,6 @@ use clap::Args;
 use super::Exit;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
-use super::source::GeneratorFlags;
 use crate::support::files::check_folder;
 use crate::support::run_dir::{OutputDir, unfinished};
 use crate::traffic::Source;
@@ -22,15 +21,13 @@ use crate::{Error, Place, Result};
 #[command(after_help = "Example:\n  lanesweep synth recordings")]
 pub struct Synth {
     /// Folder for the recordings; created if it does not exist
-    #[arg(value_name = "DIR")]
+    #[arg(value_name = "DIR", help_heading = "Data")]
     dir: PathBuf,
-    #[command(flatten)]
-    generator: GeneratorFlags,
 }
 
 impl Synth {
     pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
-        let options = self.generator.options(configured)?;
+        let options = &configured.settings.generator;
         check_folder(&self.dir)?;
         let folder = OutputDir::open(&self.dir, SYNTHETIC_MARKER)?;
         // What a killed run was giving its names is written again.
@@ -52,7 +49,7 @@ impl Synth {
         let mut results = folder.results()?;
         let bar = console::progress(verbosity, options.recordings as u64, "writing recordings");
         for index in 0..options.recordings {
-            let recording = generate_one(&options, index)?;
+            let recording = generate_one(options, index)?;
             let staged = highd::stage(&self.dir, &recording, &RecordingInfo::default())?;
             staged.into_iter().for_each(|file| results.join(file.closed()));
             bar.inc(1);

@@ -1,17 +1,14 @@
 //! `lanesweep verify`: does this device compute what the CPU computes?
 
-use std::path::PathBuf;
-
 use clap::{Args, Subcommand};
 
-use super::backend_flags::BackendFlags;
 use super::configured::Configured;
 use super::conformance::Conformance;
 use super::console::{self, Verbosity};
 use super::devices::Devices;
 use super::format::FormatFlag;
-use super::source::{self, GeneratorFlags, PlausibilityFlag, source_of};
-use super::{Exit, ProfileFlags, lists};
+use super::source::SourceFlags;
+use super::{Exit, lists};
 use crate::engine::verify::{RandomOptions, ThresholdOptions, compare, random_plan, threshold_plan};
 use crate::engine::{Backend, LanePlan, LaneRunner, Wanted};
 use crate::model::profile::Profile;
@@ -36,34 +33,22 @@ use crate::{Error, Place, Result};
 pub struct Verify {
     #[command(subcommand)]
     verb: Option<VerifyVerb>,
-    /// Folder of highD-format recordings for the study [default: synthetic recordings]
-    #[arg(value_name = "DIR", conflicts_with = "scenarios")]
-    dir: Option<PathBuf>,
-    /// Scenario file (.jsonl, .parquet, .csv) for the study
-    #[arg(long, value_name = "FILE")]
-    scenarios: Option<PathBuf>,
+    #[command(flatten)]
+    data: SourceFlags,
     /// Random lanes per model and category
-    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = lists::whole::<u64>)]
+    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = lists::whole::<u64>, help_heading = "Models and criteria")]
     random_lanes: u64,
     /// Units of 12 lanes per model, threshold and category
-    #[arg(long, value_name = "N", default_value_t = 64, value_parser = lists::whole::<u64>)]
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = lists::whole::<u64>, help_heading = "Models and criteria", hide_short_help = true)]
     threshold_units: u64,
     /// Seed of the random lanes and of those on thresholds
-    #[arg(long, value_name = "N", default_value_t = 157)]
+    #[arg(long, value_name = "N", default_value_t = 157, help_heading = "Run")]
     seed: u64,
     /// Run one lane again and print its words on each backend
-    #[arg(long, value_name = "KEY")]
+    #[arg(long, value_name = "KEY", help_heading = "Data")]
     lane: Option<String>,
     #[command(flatten)]
     format: FormatFlag,
-    #[command(flatten)]
-    backend: BackendFlags,
-    #[command(flatten)]
-    profile: ProfileFlags,
-    #[command(flatten)]
-    plausibility: PlausibilityFlag,
-    #[command(flatten)]
-    generator: GeneratorFlags,
 }
 
 #[derive(Debug, Subcommand)]
@@ -91,8 +76,8 @@ impl Verify {
                 return Err(Error::usage(Place::item(flag), problem, "choose a number in this range"));
             }
         }
-        let profile = self.profile.load()?;
-        let opened = self.backend.open_to_verify()?;
+        let profile = configured.profile()?;
+        let opened = configured.open_to_verify()?;
         let tested = opened.backend();
         if let Some(key) = &self.lane {
             return self.one_lane(key, configured, &profile, tested, verbosity);
@@ -166,14 +151,17 @@ impl Verify {
     }
 
     fn study(&self, configured: &Configured, profile: &Profile, verbosity: Verbosity) -> Result<LanePlan> {
-        let source = source_of(self.dir.as_ref(), self.scenarios.as_ref(), &self.generator, configured)?;
-        let collection = source::load(&source, &configured.settings.mining, self.plausibility.policy(), verbosity)?;
+        let collection = self.data.load(configured, verbosity)?;
         let options = StudyOptions { categories: Category::ALL.to_vec(), ..StudyOptions::default() };
         let plan = plan_study(&collection.scenarios, profile, &options)?;
         if plan.unit_count() == 0 {
             let problem = format!("no scenario to simulate ({})", counts_text(&collection.scenarios));
             let help = "use more recordings or scenarios that pass the paper's filters";
-            return Err(Error::input(Place::item(source.describe(collection.synthetic)), problem, help));
+            return Err(Error::input(
+                Place::item(self.data.source(configured).describe(collection.synthetic)),
+                problem,
+                help,
+            ));
         }
         Ok(plan)
     }

@@ -29,6 +29,8 @@ pub struct Place {
     pub column: Option<String>,
     /// The thing inside the file, of at most 80 characters: a vehicle, a scenario key, a lane key.
     pub item: Option<String>,
+    /// A field of the library's options.
+    pub option: Option<&'static str>,
 }
 
 impl Place {
@@ -42,9 +44,9 @@ impl Place {
         Place::default().of(item)
     }
 
-    /// An option of the library, by its field. The command line shows it as its flag.
-    pub fn option(name: &str) -> Self {
-        Place::item(format!("option `{name}`"))
+    /// A field of the library's options. The command line shows it as its flag.
+    pub fn option(name: &'static str) -> Self {
+        Place { option: Some(name), ..Place::default() }
     }
 
     /// Adds the line, counted from 1 and including the header.
@@ -94,6 +96,9 @@ impl fmt::Display for Place {
         }
         if let Some(item) = &self.item {
             parts.push(shown_in_line(item));
+        }
+        if let Some(option) = self.option {
+            parts.push(format!("option `{option}`"));
         }
         f.write_str(&parts.join(", "))
     }

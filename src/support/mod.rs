@@ -1,7 +1,7 @@
 //! Support that knows nothing of traffic: errors, files, tables, locks, words and numbers for people.
 //!
 //! Here live the error type, files that are never half-written, run directories and their locks, tables in three formats,
-//! and the ranges of plausible input. Every room uses it; it uses none.
+//! ranges of settings, and those of plausible input. Every room uses it; it uses none.
 
 pub(crate) mod atomic_file;
 pub mod cancel;
@@ -15,6 +15,7 @@ pub(crate) mod lock;
 pub(crate) mod near_name;
 pub(crate) mod plain_text;
 pub mod plausibility;
+pub mod ranges;
 pub(crate) mod readable;
 pub(crate) mod repeats;
 pub(crate) mod round_step;

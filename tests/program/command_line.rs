@@ -228,7 +228,7 @@ fn wrong_words_are_answered_with_what_to_write_instead() {
         (&["study", "--config", &range], 2, "score.confidence"),
         (&["study", "--config", &svd], 2, "svd_instants"),
         (&["study", "--categories", "cutin"], 2, "use cut-in, cut-out, lvd"),
-        (&["study", "--threads", "0"], 2, "use at least 1"),
+        (&["study", "--threads", "0"], 2, "from 1 to 4096"),
         (&["study", "--scenarios", "no-such-file.jsonl"], 6, "no-such-file.jsonl"),
         (&["simulate", "--category", "cutin"], 2, "use cut-in, cut-out or lvd"),
         (

@@ -170,7 +170,7 @@ fn a_wrong_word_is_answered_with_its_place_and_the_nearest_right_one() {
     let said = refused(dir, &[("LANESWEEP_RUN_BAKEND", "cpu")], &["study"]);
     assert!(said.contains("variable LANESWEEP_RUN_BAKEND") && said.contains("LANESWEEP_RUN_BACKEND?"), "{said}");
     let said = refused(dir, &[("LANESWEEP_SAMPLE_LEVEL", "2")], &["config", "show"]);
-    assert!(said.contains("variable LANESWEEP_SAMPLE_LEVEL: 2.0 cannot be used"), "{said}");
+    assert!(said.contains("variable LANESWEEP_SAMPLE_LEVEL: `2` cannot be used"), "{said}");
     let said = refused(dir, &[], &["study", "--config", "score.sed=3"]);
     assert!(said.contains("--config score.sed=3") && said.contains("`score.seed`"), "{said}");
     let said = refused(dir, &[], &["study", "--config", "score.seed=x"]);

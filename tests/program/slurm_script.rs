@@ -245,7 +245,7 @@ fn a_command_that_its_verb_refuses_is_refused_before_anything_is_written() {
         ("-- study --dt 0", "--dt"),
         ("-- study --config score.seed=x", "`x` cannot be used"),
         ("-- study --rows lanes.csv", "--plan-only"),
-        ("-- study --synth-recordings 0", "outside 1 to 99"),
+        ("-- study --synth-recordings 0", "from 1 to 99"),
         ("-- study --scenarios scenarios.csv", "column `acceleration`: it is missing"),
         ("-- study --scenarios nothing.jsonl", "nothing.jsonl: cannot read"),
         ("-- study nothing", "nothing"),

@@ -243,7 +243,7 @@ fn wrong_words_and_sets_that_tell_nothing_are_answered_with_what_to_do() {
         (&["--parameterizations", "9"], 2, "there is no parameterization `9`"),
         (&["--categories", "lvd", "--parameterizations", "2"], 2, "of LVD"),
         (&["--categories", "lane-change"], 2, "use cut-in, cut-out, lvd"),
-        (&["--samples", "0"], 2, "0 samples give no estimate"),
+        (&["--samples", "0"], 2, "--samples: `0` cannot be used"),
         (&["--models", "Nobody"], 2, "there is no driver model `Nobody`"),
         (&["--thw", "sampled"], 2, "with commas, `r157`, `paper` or `observed`"),
         (&["--scenarios", text(&none)], 3, "no scenario to simulate"),

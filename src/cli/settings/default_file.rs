@@ -37,6 +37,7 @@ mod tests {
     use super::super::{KeyKind, Layers, Settings, file};
     use super::*;
     use crate::Place;
+    use crate::support::ranges::Range;
 
     #[test]
     fn the_file_that_ships_is_the_defaults_and_names_every_key_once() {
@@ -68,12 +69,12 @@ mod tests {
     #[test]
     fn what_the_schema_lets_pass_at_its_bounds_the_types_take_too() {
         for key in Key::all() {
-            let KeyKind::Number { least, most, .. } = key.kind else { continue };
+            let KeyKind::Number(Range { least, most, .. }) = key.kind else { continue };
             let closed = [least, most].into_iter().flatten().filter(|(_, open)| !open);
             for (bound, _) in closed {
                 let mut layers = Layers::defaults();
                 layers.assign(&format!("{}={bound}", key.name)).unwrap();
-                layers.settings().unwrap().validate().unwrap();
+                layers.settings().unwrap();
             }
             let beyond = [least.map(|(x, _)| x - 1.0), most.map(|(x, _)| x + 1.0)];
             for bound in beyond.into_iter().flatten() {

@@ -7,7 +7,7 @@ use toml::Spanned;
 use toml::de::{DeTable, DeValue};
 
 use super::keys::{Key, nearest};
-use super::value::{Wrong, check, from_toml};
+use super::value::from_toml;
 use crate::support::input_file;
 use crate::support::plain_text::cut;
 use crate::{Error, Place, Result};
@@ -89,9 +89,7 @@ impl Reader<'_> {
         let Some(key) = Key::find(self.keys, name) else {
             return Err(unknown(place(), name, matches!(value.get_ref(), DeValue::Table(_)), self.keys));
         };
-        let refused = |wrong: Wrong| Error::usage(place(), wrong.problem, wrong.help);
-        let value = from_toml(key, value.get_ref()).map_err(refused)?;
-        check(key, &value).map_err(refused)?;
+        let value = from_toml(key, value.get_ref(), place())?;
         lines.push(Line { key: key.name.clone(), value, row });
         Ok(())
     }

@@ -4,6 +4,7 @@ use serde_json::Value;
 
 use super::schema::settings_schema;
 use crate::support::near_name;
+use crate::support::ranges::Range;
 
 /// One key with what it takes.
 #[derive(Debug, Clone, PartialEq)]
@@ -22,14 +23,7 @@ pub struct Key {
 #[derive(Debug, Clone, PartialEq)]
 pub enum KeyKind {
     /// A number.
-    Number {
-        /// A whole one.
-        is_whole: bool,
-        /// Smallest, and whether it is itself excluded.
-        least: Option<(f64, bool)>,
-        /// Largest, and whether it is itself excluded.
-        most: Option<(f64, bool)>,
-    },
+    Number(Range),
     /// True or false.
     Boolean,
     /// One of some words.
@@ -69,19 +63,7 @@ impl Key {
                 let words: Vec<String> = choices.iter().map(|choice| format!("\"{}\"", choice.word)).collect();
                 format!("one of {}", words.join(", "))
             }
-            KeyKind::Number { is_whole, least, most } => {
-                let mut text = if *is_whole { "a whole number" } else { "a number" }.to_owned();
-                let low = least.map(|(x, open)| format!(" {} {x}", if open { "above" } else { "of at least" }));
-                let high = most.map(|(x, open)| format!(" {} {x}", if open { "below" } else { "at most" }));
-                if let (Some((low, false)), Some((high, false))) = (least, most) {
-                    return format!("{text} from {low} to {high}");
-                }
-                text += &match (low, high) {
-                    (Some(low), Some(high)) => format!("{low} and{high}"),
-                    (low, high) => low.or(high).unwrap_or_default(),
-                };
-                text
-            }
+            KeyKind::Number(range) => range.to_string(),
         }
     }
 }
@@ -124,17 +106,9 @@ fn kind_of(property: &Value) -> KeyKind {
         };
         return KeyKind::Choice(choices.iter().flat_map(of_branch).collect());
     }
-    let bound = |closed: &str, open: &str| {
-        let closed = property[closed].as_f64().map(|x| (x, false));
-        property[open].as_f64().map(|x| (x, true)).or(closed)
-    };
     match property["type"].as_str() {
         Some("boolean") => KeyKind::Boolean,
-        Some(number @ ("integer" | "number")) => KeyKind::Number {
-            is_whole: number == "integer",
-            least: bound("minimum", "exclusiveMinimum"),
-            most: bound("maximum", "exclusiveMaximum"),
-        },
+        Some("integer" | "number") => KeyKind::Number(Range::of(property)),
         _ => KeyKind::Text,
     }
 }

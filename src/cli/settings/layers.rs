@@ -9,7 +9,7 @@ use serde_json::{Map, Value};
 
 use super::default_file::keys_in_order;
 use super::keys::{Key, KeyKind};
-use super::value::{Wrong, check, from_word};
+use super::value::from_word;
 use super::{FILE_VARIABLE, Settings, environment, file};
 use crate::{Error, Place, Result};
 
@@ -175,20 +175,18 @@ impl Layers {
         self.set_word(&key, word, origin)
     }
 
-    /// What a flag of its own was given. A value that the key does not take is the flag's to complain of.
-    pub fn flag(&mut self, name: &str, flag: &str, word: &str) {
-        let Some(key) = Key::find(&self.keys, name) else { return };
-        let is_number = matches!(key.kind, KeyKind::Number { .. });
-        let read = |word: &str| from_word(key, word).ok().filter(|value| is_number || check(key, value).is_ok());
-        if let Some(value) = read(word).or_else(|| read(&word.to_ascii_lowercase())) {
-            self.set(name, value, Origin::Flag(flag.to_owned()));
-        }
+    /// What a flag of its own was given. Words are taken in any case.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a value that the key does not take.
+    pub fn flag(&mut self, name: &str, flag: &str, word: &str) -> Result<()> {
+        let Some(key) = Key::find(&self.keys, name).cloned() else { return Ok(()) };
+        let word = if matches!(key.kind, KeyKind::Choice(_)) { word.to_ascii_lowercase() } else { word.to_owned() };
+        self.set_word(&key, &word, Origin::Flag(flag.to_owned()))
     }
 
     fn set_word(&mut self, key: &Key, word: &str, origin: Origin) -> Result<()> {
-        let refused = |wrong: Wrong| Error::usage(origin.place(&key.name), wrong.problem, wrong.help);
-        let value = from_word(key, word).map_err(refused)?;
-        check(key, &value).map_err(refused)?;
+        let value = from_word(key, word, origin.place(&key.name))?;
         self.set(&key.name, value, origin);
         Ok(())
     }

@@ -1,14 +1,13 @@
 //! The JSON Schema of a configuration, from the types.
 
-use schemars::generate::SchemaSettings;
 use serde_json::{Map, Value};
 
 use super::Settings;
+use crate::support::ranges;
 
 /// JSON Schema (draft 2020-12) of a configuration file.
 pub fn settings_schema() -> Value {
-    let settings = SchemaSettings::draft2020_12().with(|settings| settings.inline_subschemas = true);
-    let mut schema = settings.into_generator().into_root_schema_for::<Settings>().to_value();
+    let mut schema = ranges::schema_of::<Settings>();
     for_toml(&mut schema);
     // The tables' defaults are those of their keys.
     if let Some(tables) = schema["properties"].as_object_mut() {

@@ -1,10 +1,8 @@
 //! The tables of a configuration.
 
-use clap::ValueEnum;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::Result;
 use crate::engine::BackendChoice;
 use crate::model::criterion::Criterion;
 use crate::run::score::ScoreOptions;
@@ -38,18 +36,6 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Checks what goes beyond single keys.
-    ///
-    /// # Errors
-    /// [`crate::Error::Usage`] naming the key.
-    pub fn validate(&self) -> Result<()> {
-        self.generator.validate()?;
-        self.mining.validate()?;
-        self.parameterization.validate()?;
-        self.score.validate()?;
-        self.justify.validate()
-    }
-
     /// Options of the parameterizations of densities, and of replays that stand beside them.
     pub fn of_densities(&self) -> ParameterizationOptions {
         ParameterizationOptions { svd_lateral: self.fit.svd_lateral, ..self.parameterization.clone() }
@@ -64,9 +50,10 @@ pub struct RunSettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 4096))]
     pub threads: Option<usize>,
-    /// What computes the lanes.
+    /// Backend; auto: a GPU if there is one.
     pub backend: BackendChoice,
-    /// Device: a part of its name, pci:BUS or its index in `lanesweep verify devices`. Without it: the first GPU.
+    /// Device, by a part of its name, its PCI bus id or its index. `lanesweep verify devices` lists the devices. Without it:
+    /// the first GPU.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub device: Option<String>,
     /// Profile: paper, paper-fit, jrc-2021, un-r157, or a TOML file. `map --preset jrc` takes jrc-2021 unless it is set.
@@ -117,7 +104,7 @@ impl Default for FitSettings {
 }
 
 /// Interval that a bandwidth is searched in.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema, ValueEnum)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum BandwidthInterval {
     /// From 0.2 times Silverman's to Silverman's, as with the reduction of scenarios
@@ -131,9 +118,10 @@ pub enum BandwidthInterval {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SampleSettings {
-    /// Estimator.
+    /// Estimator: crude, importance sampling, cross-entropy, subset simulation. Importance sampling draws around the worst
+    /// points of a pilot.
     pub estimator: EstimatorKind,
-    /// Samples at most; of ce: of the final sample; of subset: per level. Without it: 100000, of subset 2000.
+    /// Samples at most. With ce: of the final sample. Without it: 100000; subset: 2000 per level.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1))]
     pub samples: Option<u64>,
@@ -146,11 +134,12 @@ pub struct SampleSettings {
     /// Level of the intervals.
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub level: f64,
-    /// End once the interval's half-width over the estimate is at most this. Without it: all samples are drawn.
+    /// Stop when half-width over estimate is at most this. The interval is checked after 4096·2^k samples. Without it: all
+    /// samples.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub half_width: Option<f64>,
-    /// End at the first look after so many seconds, s: not reproducible. Without it: no limit.
+    /// Stop at the first check after this time (not reproducible), s. Without it: no limit.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1e9))]
     pub time_limit_s: Option<f64>,
@@ -194,7 +183,7 @@ impl Default for SampleSettings {
 }
 
 /// Estimator of a probability of failure.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema, ValueEnum)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum EstimatorKind {
     #[default]
@@ -221,7 +210,7 @@ impl EstimatorKind {
 }
 
 /// Points of crude Monte Carlo.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema, ValueEnum)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum PointKind {
     /// Independent draws
@@ -232,7 +221,7 @@ pub enum PointKind {
 }
 
 /// Interval of crude Monte Carlo.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema, ValueEnum)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum IntervalKind {
     #[default]

@@ -97,7 +97,8 @@ impl Resources {
     }
 
     fn validate(&self) -> Result<()> {
-        let wrong = |option: &str, problem: String, help: &str| Err(Error::usage(Place::option(option), problem, help));
+        let wrong =
+            |option: &'static str, problem: String, help: &str| Err(Error::usage(Place::option(option), problem, help));
         if !is_time_limit(&self.time) {
             let help = "write hours:minutes:seconds, minutes, or days-hours, such as 02:00:00, 90 or 1-12";
             return wrong("time", format!("`{}` is no time limit of Slurm", self.time), help);

@@ -23,6 +23,7 @@ use crate::run::score::ScoreOptions;
 use crate::scenario::Scenario;
 use crate::scenario::parameterization::Parameterization;
 use crate::stats::density::Fitted;
+use crate::support::ranges;
 use crate::traffic::DataProvenance;
 use crate::{Error, Place, Result};
 
@@ -134,6 +135,7 @@ pub fn justify(
     options: &JustifyOptions,
     executor: &Executor,
 ) -> Result<Dossier> {
+    ranges::check("justify", &options.rules)?;
     let id = options.compare.parameterizations.first().cloned().ok_or_else(|| {
         Error::usage(Place::option("parameterization"), "it is missing", "name one, such as 2 or iii")
     })?;

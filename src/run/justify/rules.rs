@@ -8,7 +8,6 @@ use super::scores::{Scored, Share};
 use crate::run::sampling::ComparedCell;
 use crate::run::score::ScoreOptions;
 use crate::stats::estimate::{Ratio, RatioVerdict};
-use crate::{Error, Place, Result};
 
 /// Limits; a quantity passes where its whole interval does.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -100,24 +99,6 @@ impl Conclusion {
 }
 
 impl Rules {
-    /// Checks the ranges.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] that names the key.
-    pub fn validate(&self) -> Result<()> {
-        let limits = [
-            ("justify.min_recall", self.min_recall),
-            ("justify.min_precision", self.min_precision),
-            ("justify.min_coverage", self.min_coverage),
-        ];
-        match limits.iter().find(|(_, limit)| !(0.0..=1.0).contains(limit)) {
-            None => Ok(()),
-            Some((key, limit)) => {
-                Err(Error::usage(Place::item(*key), format!("{limit} is out of range"), "use a number from 0 to 1"))
-            }
-        }
-    }
-
     /// Recall and precision.
     pub(super) fn of_labels(&self, scored: &Scored, options: &ScoreOptions) -> Vec<Finding> {
         let least = u64::from(options.least_failures.max(1));

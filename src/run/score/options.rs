@@ -3,13 +3,14 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Error, Place, Result};
+use crate::Result;
+use crate::support::ranges;
 
 /// How scores are made.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ScoreOptions {
-    /// Chooses the lanes of a study that are computed again on the CPU; no score depends on it.
+    /// Seed of the choice of lanes that are computed again on the CPU. No score depends on it.
     pub seed: u64,
     /// Coverage of the intervals (0.95).
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
@@ -28,11 +29,6 @@ impl Default for ScoreOptions {
 impl ScoreOptions {
     /// Checks the ranges; the error names the option.
     pub fn validate(&self) -> Result<()> {
-        if !(self.confidence > 0.0 && self.confidence < 1.0) {
-            let problem = format!("{}", self.confidence);
-            let help = "use a number between 0 and 1, like 0.95";
-            return Err(Error::usage(Place::item("score.confidence"), problem, help));
-        }
-        Ok(())
+        ranges::check("score", self)
     }
 }

@@ -3,7 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::{Error, Place, Result};
+use crate::Result;
+use crate::support::ranges;
 
 /// What a constant acceleration does after the scenario's duration T.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -123,21 +124,6 @@ impl ParameterizationOptions {
 
     /// Checks the ranges; the error names the option.
     pub fn validate(&self) -> Result<()> {
-        let bad = |key: &str, value: &dyn std::fmt::Display, help: &str| {
-            Err(Error::usage(Place::item(format!("parameterization.{key}")), format!("{value} cannot be used"), help))
-        };
-        if !(self.lane_change_m > 0.0 && self.lane_change_m.is_finite()) {
-            return bad("lane_change_m", &self.lane_change_m, "give a length above 0, like 3.5");
-        }
-        if !(self.least_lateral_speed_mps > 0.0 && self.least_lateral_speed_mps.is_finite()) {
-            return bad("least_lateral_speed_mps", &self.least_lateral_speed_mps, "give a speed above 0, like 1e-3");
-        }
-        if !(2..=10_000).contains(&self.svd_instants) {
-            return bad("svd_instants", &self.svd_instants, "give 2 to 10000, like 50");
-        }
-        if self.sinusoid_intervals > 1_000_000 {
-            return bad("sinusoid_intervals", &self.sinusoid_intervals, "give 0 (exact) to 1000000");
-        }
-        Ok(())
+        ranges::check("parameterization", self)
     }
 }

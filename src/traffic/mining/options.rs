@@ -4,10 +4,12 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::support::error::{Error, Place, Result};
+use crate::support::error::Result;
+use crate::support::ranges;
 use crate::traffic::trajectory::{EgoViewOptions, LIMIT_TOLERANCE_M};
 
-/// All options of [`mine`](super::mine).
+/// All options of [`mine`](super::mine). Values above 10⁶ have no meaning in traffic, and their number of samples would
+/// overflow.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MiningOptions {
@@ -193,54 +195,9 @@ impl MiningOptions {
     /// [`Error::Usage`] naming the option: not finite, negative, above 10⁶, or zero where a duration or distance is
     /// needed.
     pub fn validate(&self) -> Result<()> {
-        let positive = [
-            ("ego_view.range_m", self.ego_view.range_m),
-            ("leader_max_thw_s", self.leader_max_thw_s),
-            ("longitudinal.window_s", self.longitudinal.window_s),
-            ("longitudinal.cruise_acceleration_mps2", self.longitudinal.cruise_acceleration_mps2),
-            ("lateral.window_s", self.lateral.window_s),
-            ("lateral.calm_speed_mps", self.lateral.calm_speed_mps),
-            ("lateral.search_s", self.lateral.search_s),
-        ];
-        let at_least_zero = [
-            ("ego_view.cut_m", self.ego_view.cut_m),
-            ("longitudinal.min_speed_change_mps", self.longitudinal.min_speed_change_mps),
-            ("longitudinal.min_cruise_s", self.longitudinal.min_cruise_s),
-            ("lateral.far_share", self.lateral.far_share),
-            ("lateral.near_share", self.lateral.near_share),
-            ("cut_in.min_duration_s", self.cut_in.min_duration_s),
-            ("cut_in.pause_s", self.cut_in.pause_s),
-            ("cut_in.max_speed_share", self.cut_in.max_speed_share),
-            ("cut_in.max_thw_s", self.cut_in.max_thw_s),
-            ("cut_out.min_duration_s", self.cut_out.min_duration_s),
-            ("cut_out.pause_s", self.cut_out.pause_s),
-            ("lvd.max_discarded_s", self.lvd.max_discarded_s),
-            ("lvd.min_duration_s", self.lvd.min_duration_s),
-            ("lvd.min_peak_deceleration_mps2", self.lvd.min_peak_deceleration_mps2),
-        ];
-        let refused = |name: &str, value: f64, expected: &str| {
-            Error::usage(
-                Place::item(format!("mining option `{name}`")),
-                format!("is {value}, but must be {expected}"),
-                "leave the option out to use the paper's value",
-            )
-        };
-        for (name, value) in positive {
-            if !(value > 0.0 && value <= MAX_SETTING) {
-                return Err(refused(name, value, "above 0 and at most 1e6"));
-            }
-        }
-        for (name, value) in at_least_zero {
-            if !(0.0..=MAX_SETTING).contains(&value) {
-                return Err(refused(name, value, "at least 0 and at most 1e6"));
-            }
-        }
-        Ok(())
+        ranges::check("mining", self)
     }
 }
-
-/// Maximum of all options: larger values have no meaning in traffic, and their number of samples would overflow.
-const MAX_SETTING: f64 = 1e6;
 
 /// Positions (m), filter values and times (s) within this distance of a limit count as equal to it.
 pub(super) const TOLERANCE: f64 = LIMIT_TOLERANCE_M;

@@ -3,8 +3,6 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::support::error::{Error, Place, Result};
-
 /// How drivers change lanes and brake. Rates and shares are those at rate factor 1.
 ///
 /// The defaults are fitted to the paper's 36 shares of failures of S and to published traffic figures
@@ -70,40 +68,4 @@ impl Default for Behaviour {
             overreaction: 0.226,
         }
     }
-}
-
-impl Behaviour {
-    /// Checks every number; the error names the first one outside its range.
-    pub fn validate(&self) -> Result<()> {
-        let ranges = [
-            ("car_speed_factor", self.car_speed_factor, 0.5, 1.5),
-            ("follower_braking_mps2", self.follower_braking_mps2, 0.001, 10.0),
-            ("accelerating_share", self.accelerating_share, 0.0, 1.0),
-            ("accelerating_follower_braking_mps2", self.accelerating_follower_braking_mps2, 0.001, 10.0),
-            ("change_acceleration_mps2", self.change_acceleration_mps2, 0.0, 2.8),
-            ("change_duration_s", self.change_duration_s, 2.9, 7.3),
-            ("truck_change_factor", self.truck_change_factor, 0.0, 20.0),
-            ("change_headway_share", self.change_headway_share, 0.0, 1.0),
-            ("brakings_per_s", self.brakings_per_s, 0.0, 1.0),
-            ("braking_hold_s", self.braking_hold_s, 0.1, 60.0),
-            ("braking_excess_mps2", self.braking_excess_mps2, 0.0, 5.0),
-            ("overreaction", self.overreaction, 0.0, 2.0),
-        ];
-        check_ranges("generator.behaviour", &ranges)
-    }
-}
-
-/// The error names the first (name, value, minimum, maximum) of a table that is outside its range.
-pub(super) fn check_ranges(table: &str, ranges: &[(&str, f64, f64, f64)]) -> Result<()> {
-    for (name, value, low, high) in ranges {
-        // NaN is in no range.
-        if !(low..=high).contains(&value) {
-            return Err(Error::usage(
-                Place::item(format!("{table}.{name}")),
-                format!("{value} is outside {low} to {high}"),
-                format!("choose a value from {low} to {high}"),
-            ));
-        }
-    }
-    Ok(())
 }

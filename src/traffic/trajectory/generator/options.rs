@@ -3,8 +3,9 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::behaviour::{Behaviour, check_ranges};
+use super::behaviour::Behaviour;
 use crate::support::error::Result;
+use crate::support::ranges;
 
 /// Options of the generator. `lanesweep study` without data uses the default.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -12,7 +13,7 @@ use crate::support::error::Result;
 pub struct GeneratorOptions {
     /// Seed of every random number. Same seed and options, same bits.
     pub seed: u64,
-    /// Number of recordings, 1 to 99 (they are called `01`, `02`, …).
+    /// Number of generated recordings. They are called `01`, `02`, ….
     #[schemars(range(min = 1, max = 99))]
     pub recordings: usize,
     /// Length of each recording, s.
@@ -60,17 +61,7 @@ impl Default for GeneratorOptions {
 impl GeneratorOptions {
     /// Checks every option; the error names the first one outside its range.
     pub fn validate(&self) -> Result<()> {
-        let ranges = [
-            ("recordings", self.recordings as f64, 1.0, 99.0),
-            ("duration_s", self.duration_s, 1.0, 7200.0),
-            ("frame_rate_hz", self.frame_rate_hz, 1.0, 200.0),
-            ("window_m", self.window_m, 50.0, 5000.0),
-            ("flow_vehph", self.flow_vehph, 60.0, 4500.0),
-            ("truck_share", self.truck_share, 0.0, 0.5),
-            ("event_rate_factor", self.event_rate_factor, 0.0, 20.0),
-        ];
-        check_ranges("generator", &ranges)?;
-        self.behaviour.validate()
+        ranges::check("generator", self)
     }
 
     /// Simulation steps per sample: the minimum with a step of at most 0.04 s.

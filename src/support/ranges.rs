@@ -1,0 +1,93 @@
+//! Ranges of settings. A range stands at the field that it is of (`#[schemars(range(…))]`); the schema, the configuration,
+//! the flags and the types' own checks read it there.
+
+use std::fmt;
+
+use schemars::{JsonSchema, generate::SchemaSettings};
+use serde::Serialize;
+use serde_json::Value;
+
+use crate::{Error, Place, Result};
+
+/// The numbers that a field takes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Range {
+    /// Only whole ones.
+    pub is_whole: bool,
+    /// Smallest, and whether it is itself excluded.
+    pub least: Option<(f64, bool)>,
+    /// Largest, and whether it is itself excluded.
+    pub most: Option<(f64, bool)>,
+}
+
+impl Range {
+    /// What the schema of a number says.
+    pub fn of(property: &Value) -> Range {
+        let bound = |closed: &str, open: &str| {
+            let closed = property[closed].as_f64().map(|x| (x, false));
+            property[open].as_f64().map(|x| (x, true)).or(closed)
+        };
+        Range {
+            is_whole: property["type"] == "integer",
+            least: bound("minimum", "exclusiveMinimum"),
+            most: bound("maximum", "exclusiveMaximum"),
+        }
+    }
+
+    /// Is the value one of them? NaN never is.
+    pub fn contains(&self, x: f64) -> bool {
+        x.is_finite()
+            && self.least.is_none_or(|(limit, open)| if open { x > limit } else { x >= limit })
+            && self.most.is_none_or(|(limit, open)| if open { x < limit } else { x <= limit })
+    }
+}
+
+/// In words: `a number above 0 and at most 1000000`.
+impl fmt::Display for Range {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(if self.is_whole { "a whole number" } else { "a number" })?;
+        if let (Some((low, false)), Some((high, false))) = (self.least, self.most) {
+            return write!(f, " from {low} to {high}");
+        }
+        if let Some((low, open)) = self.least {
+            write!(f, " {} {low}", if open { "above" } else { "of at least" })?;
+        }
+        if let Some((high, open)) = self.most {
+            let and = if self.least.is_some() { " and" } else { "" };
+            write!(f, "{and} {} {high}", if open { "below" } else { "at most" })?;
+        }
+        Ok(())
+    }
+}
+
+/// The JSON Schema (draft 2020-12) of settings, without references.
+pub fn schema_of<T: JsonSchema>() -> Value {
+    let settings = SchemaSettings::draft2020_12().with(|settings| settings.inline_subschemas = true);
+    settings.into_generator().into_root_schema_for::<T>().to_value()
+}
+
+/// Checks every number of a table of settings.
+///
+/// # Errors
+/// [`Error::Usage`] naming the first key whose value is not finite or outside the range of its field.
+pub fn check<T: Serialize + JsonSchema>(table: &str, settings: &T) -> Result<()> {
+    let value =
+        serde_json::to_value(settings).map_err(|e| Error::Internal(format!("settings cannot be written: {e}")))?;
+    check_value(table, &value, &schema_of::<T>())
+}
+
+fn check_value(name: &str, value: &Value, schema: &Value) -> Result<()> {
+    if let Value::Object(table) = value {
+        return table
+            .iter()
+            .try_for_each(|(key, value)| check_value(&format!("{name}.{key}"), value, &schema["properties"][key]));
+    }
+    let is_number = matches!(schema["type"].as_str(), Some("number" | "integer"));
+    let range = Range::of(schema);
+    // JSON writes a number that is not finite as null.
+    if !is_number || value.as_f64().is_some_and(|x| range.contains(x)) {
+        return Ok(());
+    }
+    let found = if value.is_null() { "a value that is not finite".to_owned() } else { value.to_string() };
+    Err(Error::usage(Place::item(name), format!("{found} cannot be used"), format!("give {range}")))
+}
