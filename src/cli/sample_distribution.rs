@@ -103,7 +103,7 @@ pub(super) fn run(flags: &Sample, path: &Path, started: Instant, verbosity: Verb
     }
     file.draws = Some(draws);
     let mut results = folder.results()?;
-    results.add("convergence.csv", &convergence_csv(&crude.convergence)?)?;
+    results.add("convergence.csv", convergence_csv(&crude.convergence).as_bytes())?;
     let names: Vec<String> = samples.parameters.iter().map(|p| p.parameter.key.to_owned()).collect();
     file.add_worst(&mut results, &plan, &crude.tally, &counting, &names, |key| {
         let point = samples.draw(seed, key.unit, &plan.profile)?.values;
