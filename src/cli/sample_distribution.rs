@@ -109,7 +109,7 @@ pub(super) fn run(
     }
     file.draws = Some(draws);
     let mut results = folder.results()?;
-    results.add("convergence.csv", &convergence_csv(&crude.convergence)?)?;
+    results.add("convergence.csv", convergence_csv(&crude.convergence).as_bytes())?;
     let names: Vec<String> = samples.parameters.iter().map(|p| p.parameter.key.to_owned()).collect();
     file.add_worst(&mut results, &plan, &crude.tally, &options, &names, |key| {
         let point = samples.draw(seed, key.unit, &plan.profile)?.values;

@@ -4,15 +4,16 @@
 use serde_json::{Value, json};
 
 use super::case_sentences::VARIED;
-use super::html::{Page, PageFigure, PageTable, Section};
+use super::html::{Page, PageFigure, Section};
 use super::records;
-use super::tables::{WIDTH, aligned, table, wrap};
+use super::tables::{WIDTH, wrap};
 use super::trace::{TraceFigure, TraceSeries};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::check::{Boundary, Change, Judged, Judgement, Reading, Subject, Verdict};
 use crate::run::grid::{MapQuantity, PARAMETERS};
 use crate::support::readable::value;
+use crate::support::table::{Column, NumberText, Table};
 use crate::{Error, Result};
 
 /// Metres per second in kilometres per hour.
@@ -84,70 +85,71 @@ impl CaseSheet<'_> {
         list
     }
 
-    fn drivers(&self) -> (Vec<String>, Vec<Vec<String>>) {
-        let header = [
-            "profile",
-            "model",
-            "collision",
-            "gap m",
-            "TTC s",
-            "BTN",
-            "contact",
-            "closing km/h",
-            "reacts s",
-            "brakes s",
-            "changes with",
-        ];
-        let mut rows = Vec::new();
-        for judgement in self.judgements {
-            judgement.models.iter().for_each(|judged| push_new(&mut rows, driver_row(judgement, judged)));
-        }
-        (header.map(str::to_owned).to_vec(), rows)
+    fn drivers(&self) -> Table {
+        let judged =
+            self.judgements.iter().flat_map(|judgement| judgement.models.iter().map(move |of| (judgement, of)));
+        let contact = |judged: &Judged| judged.trace.outcome.contact.label().split(' ').next();
+        let table = Table::of(judged)
+            .column("profile", |(judgement, _)| judgement.profile.as_str())
+            .column("model", |(_, judged)| judged.trace.model.name())
+            .column("collision", |(_, judged)| if judged.collides() { "COLLIDES" } else { "avoids" })
+            .column("gap m", |(_, judged)| judged.trace.outcome.min_gap)
+            .column("TTC s", |(_, judged)| judged.trace.outcome.min_ttc)
+            .column("BTN", |(_, judged)| judged.trace.outcome.max_btn)
+            .column(Column::from("contact").null("–"), |(_, judged)| {
+                contact(judged).filter(|_| judged.impact_closing_mps().is_some())
+            })
+            .column(Column::from("closing km/h").null("–"), |(_, judged)| {
+                judged.impact_closing_mps().map(|v| v * KMH)
+            })
+            .column(Column::from("reacts s").null("never"), |(_, judged)| judged.reaction_s())
+            .column(Column::from("brakes s").null("never"), |(_, judged)| judged.braking_s())
+            .column("changes with", |(_, judged)| judged.flips.join(", "))
+            .build();
+        without_repeats(table, 0)
     }
 
-    fn clauses(&self) -> (Vec<String>, Vec<Vec<String>>) {
-        let header = ["clause", "condition", "where it holds", "at s", "value", "", "threshold", "unit", "holds"];
-        let row = |reading: &Reading| {
-            vec![
-                reading.clause.clone(),
-                reading.quantity.to_owned(),
-                reading.then.to_owned(),
-                reading.time_s.map_or("never".to_owned(), value),
-                reading.value.map_or("–".to_owned(), value),
-                reading.relation.sign().to_owned(),
-                value(reading.threshold),
-                if reading.unit == "1" { String::new() } else { reading.unit.to_owned() },
-                if reading.holds() { "yes" } else { "no" }.to_owned(),
-            ]
-        };
-        let mut rows: Vec<Vec<String>> = self.first().readings.iter().map(row).collect();
+    fn clauses(&self) -> Table {
+        let mut readings: Vec<&Reading> = self.first().readings.iter().collect();
+        let own = readings.len();
         // Of another clause, the conditions that differ.
         let mut clauses = vec![&self.first().clause];
         for judgement in &self.judgements[1..] {
             if !clauses.contains(&&judgement.clause) {
-                judgement.conditions().map(row).for_each(|row| push_new(&mut rows, row));
+                readings.extend(judgement.conditions());
                 clauses.push(&judgement.clause);
             }
         }
-        (header.map(str::to_owned).to_vec(), rows)
+        let table = Table::of(readings)
+            .column("clause", |reading| reading.clause.as_str())
+            .column("condition", |reading| reading.quantity)
+            .column("where it holds", |reading| reading.then)
+            .column(Column::from("at s").null("never"), |reading| reading.time_s)
+            .column(Column::from("value").null("–"), |reading| reading.value)
+            .column("", |reading| reading.relation.sign())
+            .column("threshold", |reading| reading.threshold)
+            .column("unit", |reading| if reading.unit == "1" { "" } else { reading.unit })
+            .column("holds", |reading| if reading.holds() { "yes" } else { "no" })
+            .build();
+        without_repeats(table, own)
     }
 
-    fn boundaries(&self) -> (Vec<String>, Vec<Vec<String>>) {
-        let mut header = ["parameter", "value", "changes at", "distance"].map(str::to_owned).to_vec();
-        header.extend(ModelId::ALL.iter().map(|model| format!("{} at", model.name())));
-        let row = |boundary: &Boundary| {
-            let parameter = boundary.parameter;
-            let nearest = nearest(&boundary.answer, boundary.value);
-            let mut row = vec![
-                parameter.title(),
-                value(boundary.value),
-                becomes(boundary),
-                nearest.map_or("–".to_owned(), |at| Rounded(at - boundary.value).to_string()),
-            ];
-            row.extend(boundary.models.iter().map(change));
-            row
+    fn boundaries(&self) -> Table {
+        let distance = |boundary: &Boundary| {
+            let at = nearest(&boundary.answer, boundary.value)?;
+            Some(NumberText(signed(at - boundary.value)))
         };
-        (header, self.first().boundaries.iter().map(row).collect())
+        Table::of(&self.first().boundaries)
+            .column("parameter", |boundary| boundary.parameter.title())
+            .column("value", |boundary| boundary.value)
+            .column("changes at", becomes)
+            .column(Column::from("distance").null("–"), distance)
+            .columns(
+                ModelId::ALL.iter().enumerate(),
+                |(_, model)| format!("{} at", model.name()),
+                |boundary, (at, _)| boundary.models.get(at).map(change),
+            )
+            .build()
     }
 
     /// The sheet as text.
@@ -155,13 +157,6 @@ impl CaseSheet<'_> {
         let synthetic = if self.is_synthetic { "SYNTHETIC DATA: " } else { "" };
         let numbers: Vec<String> =
             self.numbers().iter().map(|(name, number)| format!("  {name}: {number}\n")).collect();
-        let rows = |(header, rows): (Vec<String>, Vec<Vec<String>>), texts| {
-            let mut table = table(header);
-            rows.into_iter().for_each(|row| {
-                table.add_row(row);
-            });
-            aligned(table, texts)
-        };
         let sentences = self.demand().into_iter().chain(self.silent());
         let demand: Vec<String> = sentences.map(|sentence| format!("  {sentence}\n")).collect();
         format!(
@@ -173,11 +168,11 @@ impl CaseSheet<'_> {
             demand.concat(),
             numbers.concat(),
             wrap(DRIVERS, WIDTH),
-            rows(self.drivers(), 3),
+            self.drivers().text(),
             self.first().profile,
-            rows(self.clauses(), 3),
+            self.clauses().text(),
             self.first().profile,
-            rows(self.boundaries(), 1),
+            self.boundaries().text(),
         )
     }
 
@@ -267,8 +262,6 @@ impl CaseSheet<'_> {
     /// [`Error::Internal`] where the template does not fit: a defect of this program.
     pub fn html(&self) -> Result<String> {
         let first = self.first();
-        let page_table =
-            |caption: &str, texts, (header, rows)| PageTable { caption: caption.to_owned(), header, texts, rows };
         let mut warnings = Vec::new();
         if self.is_synthetic {
             warnings.push("SYNTHETIC DATA: nothing on this sheet is a statement about real traffic.".to_owned());
@@ -286,7 +279,7 @@ impl CaseSheet<'_> {
                  negative where the ego is slower. \"Brakes\" is the time from which the ego brakes; CCHDM's coasting \
                  before it is no braking. \"Changes with\" names what turns the collision verdict, of {VARIED}."
             ),
-            tables: vec![page_table("Drivers", 3, self.drivers())],
+            tables: vec![self.drivers().captioned("Drivers")],
             ..Section::new("drivers", "Drivers")
         };
         let clauses = Section {
@@ -295,7 +288,7 @@ impl CaseSheet<'_> {
                  cut-ins that differ from these.",
                 first.profile
             ),
-            tables: vec![page_table("Clauses", 3, self.clauses())],
+            tables: vec![self.clauses().captioned("Clauses")],
             ..Section::new("clauses", "Clauses")
         };
         let boundaries = Section {
@@ -304,7 +297,7 @@ impl CaseSheet<'_> {
                     there: at least one change lies between, and one that lasts for less than a step of the scan is missed. \
                     The last columns say so of each model's collision."
                 .to_owned(),
-            tables: vec![page_table("Distance to the boundary", 1, self.boundaries())],
+            tables: vec![self.boundaries().captioned("Distance to the boundary")],
             ..Section::new("boundary", "Distance to another answer")
         };
         let course = Section {
@@ -340,40 +333,14 @@ impl CaseSheet<'_> {
     }
 }
 
-fn driver_row(judgement: &Judgement, judged: &Judged) -> Vec<String> {
-    let outcome = &judged.trace.outcome;
-    let closing_mps = judged.impact_closing_mps();
-    let time = |time: Option<f64>| time.map_or("never".to_owned(), value);
-    vec![
-        judgement.profile.clone(),
-        judged.trace.model.name().to_owned(),
-        if judged.collides() { "COLLIDES" } else { "avoids" }.to_owned(),
-        value(outcome.min_gap),
-        value(outcome.min_ttc),
-        value(outcome.max_btn),
-        judged
-            .trace
-            .outcome
-            .contact
-            .label()
-            .split(' ')
-            .next()
-            .filter(|_| closing_mps.is_some())
-            .unwrap_or("–")
-            .to_owned(),
-        closing_mps.map_or("–".to_owned(), |mps| value(mps * KMH)),
-        time(judged.reaction_s()),
-        time(judged.braking_s()),
-        judged.flips.join(", "),
-    ]
-}
-
-/// Adds a row that differs from all others in more than its first cell: profiles share most drivers, clauses most
-/// conditions.
-fn push_new(rows: &mut Vec<Vec<String>>, row: Vec<String>) {
-    if rows.iter().all(|known| known[1..] != row[1..]) {
-        rows.push(row);
-    }
+/// Leaves out rows from `first` on that people read as one above but for their first cell: profiles share most drivers,
+/// clauses most conditions.
+fn without_repeats(mut table: Table, first: usize) -> Table {
+    let (_, shown) = table.shown();
+    let is_new = |at: usize| at < first || shown[..at].iter().all(|known| known[1..] != shown[at][1..]);
+    let mut at = 0..;
+    table.rows.retain(|_| at.next().is_some_and(is_new));
+    table
 }
 
 fn nearest(change: &Change, from: f64) -> Option<f64> {
@@ -402,13 +369,8 @@ fn ends(change: &Change) -> Value {
 }
 
 /// A number with its sign.
-struct Rounded(f64);
-
-impl std::fmt::Display for Rounded {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        let sign = if self.0 < 0.0 { "-" } else { "+" };
-        write!(f, "{sign}{}", value(self.0.abs()))
-    }
+fn signed(number: f64) -> String {
+    format!("{}{}", if number < 0.0 { "-" } else { "+" }, value(number.abs()))
 }
 
 fn program() -> String {

@@ -8,7 +8,7 @@ use super::forest::{ForestFigure, ForestGroup, ForestRow};
 use super::html::{Page, PageFigure, Section};
 use super::plot::AxisScale;
 use super::sampling::HostRecord;
-use super::tables::{WIDTH, aligned, table, wrap};
+use super::tables::{WIDTH, wrap};
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -20,6 +20,7 @@ use crate::run::score::f1;
 use crate::stats::estimate::{Enough, Ratio, RatioVerdict};
 use crate::support::readable;
 use crate::support::run_dir::Results;
+use crate::support::table::{Column, Digits, NumberText, Table};
 use crate::traffic::Driven;
 use crate::{Error, Result};
 
@@ -100,7 +101,7 @@ impl CompareFile {
     /// # Errors
     /// [`Error::Io`].
     pub fn write(&mut self, mut results: Results) -> Result<()> {
-        results.add("compare.csv", &self.csv()?)?;
+        results.add("compare.csv", self.csv().as_bytes())?;
         results.add("compare.txt", self.text().as_bytes())?;
         let mut figures = Vec::new();
         for comparison in &self.categories {
@@ -126,91 +127,53 @@ impl CompareFile {
     }
 
     /// `compare.csv`: one row per category, parameterization, model and criterion.
-    ///
-    /// # Errors
-    /// None for what this program made.
-    pub fn csv(&self) -> Result<Vec<u8>> {
-        let header = [
-            "category",
-            "parameterization",
-            "parameters",
-            "model",
-            "criterion",
-            "s_rate",
-            "s_low",
-            "s_high",
-            "s_failures",
-            "s_lanes",
-            "s_failing_scenarios",
-            "s_prime_rate",
-            "s_prime_low",
-            "s_prime_high",
-            "s_prime_ratio",
-            "s_prime_ratio_low",
-            "s_prime_ratio_high",
-            "s_prime_verdict",
-            "f1",
-            "density_rate",
-            "density_low",
-            "density_high",
-            "density_low_with_data",
-            "density_high_with_data",
-            "density_failures",
-            "density_lanes",
-            "ratio",
-            "ratio_low",
-            "ratio_high",
-            "verdict",
-            "s_per_hour",
-            "s_per_hour_sd",
-            "s_per_1000_km",
-            "s_per_1000_km_sd",
-            "density_per_hour",
-            "density_per_hour_sd",
-            "density_per_1000_km",
-            "density_per_1000_km_sd",
-            "data",
-        ];
-        let mut rows = vec![header.map(str::to_owned).to_vec()];
-        for category in &self.categories {
-            for of in &category.parameterizations {
-                for (s, cell) in category.recorded.iter().zip(&of.cells) {
-                    rows.push(self.csv_row(category, of, s, cell));
-                }
-            }
-        }
-        super::csv::text(rows)
-    }
-
-    fn csv_row(
-        &self,
-        category: &CategoryComparison,
-        of: &ComparedParameterization,
-        s: &RecordedCell,
-        cell: &ComparedCell,
-    ) -> Vec<String> {
-        let rate = |r: &RateRecord| [r.rate, r.low, r.high].map(|v| v.to_string());
-        let number = |v: Option<f64>| v.map_or(String::new(), |v| v.to_string());
-        let ratio = |r: &Ratio| [number(r.ratio), number(r.low), number(r.high), r.verdict.text().to_owned()];
-        let risk = |r: Option<RiskRate>| [number(r.map(|r| r.estimate)), number(r.map(|r| r.standard_deviation))];
-        let (replayed, sampled) = (&cell.replayed, &cell.sampled);
-        let mut row: Vec<String> = [category.category.key(), &of.key].map(str::to_owned).to_vec();
-        row.extend([of.parameters.to_string(), s.model.name().to_owned(), s.criterion.key().to_owned()]);
-        row.extend(rate(&s.rate));
-        row.extend([s.rate.failures, s.rate.lanes, s.failing_scenarios].map(|n| n.to_string()));
-        row.extend(rate(&replayed.rate));
-        row.extend(ratio(&replayed.ratio));
-        row.push(number(f1(&replayed.labels)));
-        row.extend(rate(&sampled.rate));
-        row.extend(sampled.with_data.map(|v| v.to_string()));
-        row.extend([sampled.rate.failures, sampled.rate.lanes].map(|n| n.to_string()));
-        row.extend(ratio(&sampled.ratio));
-        for r in [s.risk, sampled.risk] {
-            row.extend(risk(r.per_hour));
-            row.extend(risk(r.per_1000_km));
-        }
-        row.push(self.data.clone());
-        row
+    pub fn csv(&self) -> String {
+        let rows = self.categories.iter().flat_map(|category| {
+            category.parameterizations.iter().flat_map(move |of| {
+                let cells = category.recorded.iter().zip(&of.cells);
+                cells.map(move |(s, cell)| (category.category, of, s, &cell.replayed, &cell.sampled))
+            })
+        });
+        type Pick = fn(RiskRate) -> f64;
+        let risks: [(&str, Pick); 2] = [("", |risk| risk.estimate), ("_sd", |risk| risk.standard_deviation)];
+        Table::of(rows)
+            .column("category", |(category, ..)| category.key())
+            .column("parameterization", |(_, of, ..)| of.key.as_str())
+            .column("parameters", |(_, of, ..)| of.parameters)
+            .column("model", |(_, _, s, ..)| s.model.name())
+            .column("criterion", |(_, _, s, ..)| s.criterion.key())
+            .column("s_rate", |(_, _, s, ..)| s.rate.rate)
+            .column("s_low", |(_, _, s, ..)| s.rate.low)
+            .column("s_high", |(_, _, s, ..)| s.rate.high)
+            .column("s_failures", |(_, _, s, ..)| s.rate.failures)
+            .column("s_lanes", |(_, _, s, ..)| s.rate.lanes)
+            .column("s_failing_scenarios", |(_, _, s, ..)| s.failing_scenarios)
+            .column("s_prime_rate", |(.., replayed, _)| replayed.rate.rate)
+            .column("s_prime_low", |(.., replayed, _)| replayed.rate.low)
+            .column("s_prime_high", |(.., replayed, _)| replayed.rate.high)
+            .column("s_prime_ratio", |(.., replayed, _)| replayed.ratio.ratio)
+            .column("s_prime_ratio_low", |(.., replayed, _)| replayed.ratio.low)
+            .column("s_prime_ratio_high", |(.., replayed, _)| replayed.ratio.high)
+            .column("s_prime_verdict", |(.., replayed, _)| replayed.ratio.verdict.text())
+            .column("f1", |(.., replayed, _)| f1(&replayed.labels))
+            .column("density_rate", |(.., sampled)| sampled.rate.rate)
+            .column("density_low", |(.., sampled)| sampled.rate.low)
+            .column("density_high", |(.., sampled)| sampled.rate.high)
+            .column("density_low_with_data", |(.., sampled)| sampled.with_data[0])
+            .column("density_high_with_data", |(.., sampled)| sampled.with_data[1])
+            .column("density_failures", |(.., sampled)| sampled.rate.failures)
+            .column("density_lanes", |(.., sampled)| sampled.rate.lanes)
+            .column("ratio", |(.., sampled)| sampled.ratio.ratio)
+            .column("ratio_low", |(.., sampled)| sampled.ratio.low)
+            .column("ratio_high", |(.., sampled)| sampled.ratio.high)
+            .column("verdict", |(.., sampled)| sampled.ratio.verdict.text())
+            .columns(risks, |of| format!("s_per_hour{}", of.0), |(_, _, s, ..), of| s.risk.per_hour.map(of.1))
+            .columns(risks, |of| format!("s_per_1000_km{}", of.0), |(_, _, s, ..), of| s.risk.per_1000_km.map(of.1))
+            .columns(risks, |of| format!("density_per_hour{}", of.0), |(.., s), of| s.risk.per_hour.map(of.1))
+            .columns(risks, |of| format!("density_per_1000_km{}", of.0), |(.., s), of| s.risk.per_1000_km.map(of.1))
+            .column("data", |_| self.data.as_str())
+            .build()
+            .csv()
     }
 
     /// The tables for the terminal, 120 columns wide at most; only an unbroken word of the data's description (a path)
@@ -325,16 +288,13 @@ impl CompareFile {
 
     /// One criterion: a row for S, its risk, and two per parameterization; a column per model.
     fn block(&self, category: &CategoryComparison, criterion: Criterion) -> String {
-        let mut header = vec![criterion.label().to_owned()];
-        header.extend(self.models.iter().map(|m| m.name().to_owned()));
-        let mut rows = table(header);
         let recorded: Vec<&RecordedCell> = category.recorded.iter().filter(|c| c.criterion == criterion).collect();
-        let line = |name: String, cells: Vec<String>| std::iter::once(name).chain(cells).collect::<Vec<_>>();
         let rate = |r: &RateRecord| {
             let range = if r.failures == 0 { format!("≤ {}", short(r.high)) } else { range(r.low, r.high) };
             format!("{} {range}", short(r.rate))
         };
-        rows.add_row(line("S".to_owned(), recorded.iter().map(|c| rate(&c.rate)).collect()));
+        let mut rows: Vec<(String, Vec<String>)> =
+            vec![("S".to_owned(), recorded.iter().map(|c| rate(&c.rate)).collect())];
         let risk = |r: RiskRate| match r.estimate {
             // No failure is no proof of none.
             e if e > 0.0 => format!("{} ± {}", short(e), short(r.standard_deviation)),
@@ -344,18 +304,21 @@ impl CompareFile {
         let risks: [(&str, Pick); 2] = [("S /h", |c| c.risk.per_hour), ("S /1000 km", |c| c.risk.per_1000_km)];
         for (name, pick) in risks {
             let values: Option<Vec<String>> = recorded.iter().map(|c| pick(c).map(risk)).collect();
-            values.into_iter().for_each(|values| {
-                rows.add_row(line(name.to_owned(), values));
-            });
+            rows.extend(values.map(|values| (name.to_owned(), values)));
         }
         for of in &category.parameterizations {
             let cells = || of.cells.iter().filter(|c| c.criterion == criterion);
             let replayed = cells().map(|c| cell(&c.replayed.rate, &c.replayed.ratio)).collect();
             let sampled = cells().map(|c| cell(&c.sampled.rate, &c.sampled.ratio)).collect();
-            rows.add_row(line(format!("{} S'", of.key), replayed));
-            rows.add_row(line(format!("{} density", of.key), sampled));
+            rows.extend([(format!("{} S'", of.key), replayed), (format!("{} density", of.key), sampled)]);
         }
-        aligned(rows, 1) + "\n"
+        let models = self.models.iter().enumerate();
+        let table = Table::of(&rows).column(criterion.label(), |(name, _)| name.as_str()).columns(
+            models,
+            |(_, model)| model.name(),
+            |(_, cells), (at, _)| cells.get(at).cloned().map(NumberText),
+        );
+        table.build().text() + "\n"
     }
 }
 
@@ -377,36 +340,30 @@ fn cell(rate: &RateRecord, ratio: &Ratio) -> String {
 /// Per parameterization: labels (F1) beside verdicts on the rate.
 fn summary(category: &CategoryComparison) -> String {
     let marks: String = RatioVerdict::ALL.iter().map(|v| format!(" {}", v.mark())).collect();
-    let header = [
-        "cells of each verdict".to_owned(),
-        "parameters".to_owned(),
-        "mean F1 of its defined cells".to_owned(),
-        format!("S'{marks}"),
-        format!("density{marks}"),
-        "ratios of its decided cells".to_owned(),
-    ];
-    let mut rows = table(header.to_vec());
-    for of in &category.parameterizations {
-        let verdicts = |pick: fn(&ComparedCell) -> &Ratio| {
-            let count = |v| of.cells.iter().filter(|c| pick(c).verdict == v).count();
-            RatioVerdict::ALL.map(|v| format!("{:2}", count(v))).join(" ")
-        };
-        let scores: Vec<f64> = of.cells.iter().filter_map(|c| f1(&c.replayed.labels)).collect();
-        let mean = scores.iter().sum::<f64>() / scores.len() as f64;
+    type Pick = fn(&ComparedCell) -> &Ratio;
+    let verdicts = |of: &ComparedParameterization, pick: Pick| {
+        let count = |v| of.cells.iter().filter(|c| pick(c).verdict == v).count();
+        NumberText(RatioVerdict::ALL.map(|v| format!("{:2}", count(v))).join(" "))
+    };
+    let ends = |of: &ComparedParameterization| {
         let decided = of.cells.iter().map(|c| &c.sampled.ratio).filter(|r| r.verdict != RatioVerdict::Undecided);
         let mut ratios: Vec<f64> = decided.filter_map(|r| r.ratio).collect();
         ratios.sort_by(f64::total_cmp);
-        let ends = ratios.first().zip(ratios.last());
-        rows.add_row([
-            of.key.to_owned(),
-            of.parameters.to_string(),
-            if scores.is_empty() { "-".to_owned() } else { format!("{mean:.3}") },
-            verdicts(|c| &c.replayed.ratio),
-            verdicts(|c| &c.sampled.ratio),
-            ends.map_or("-".to_owned(), |(low, high)| range(*low, *high)),
-        ]);
-    }
-    aligned(rows, 1)
+        let (low, high) = ratios.first().zip(ratios.last())?;
+        Some(NumberText(range(*low, *high)))
+    };
+    Table::of(&category.parameterizations)
+        .column("cells of each verdict", |of| of.key.as_str())
+        .column("parameters", |of| of.parameters)
+        .column(Column::from("mean F1 of its defined cells").digits(Digits::Fixed(3)).null("-"), |of| {
+            let scores: Vec<f64> = of.cells.iter().filter_map(|c| f1(&c.replayed.labels)).collect();
+            (!scores.is_empty()).then(|| scores.iter().sum::<f64>() / scores.len() as f64)
+        })
+        .column(format!("S'{marks}"), |of| verdicts(of, |c| &c.replayed.ratio))
+        .column(format!("density{marks}"), |of| verdicts(of, |c| &c.sampled.ratio))
+        .column(Column::from("ratios of its decided cells").null("-"), ends)
+        .build()
+        .text()
 }
 
 fn range(low: f64, high: f64) -> String {

@@ -2,11 +2,11 @@
 
 use std::fmt::Write;
 
-use super::tables::{aligned, table};
 use crate::stats::density::{
     DensityModel, Exposure, Rate, Refused, Representativeness, SearchEnd, ValidShare, standard_deviation,
 };
 use crate::support::readable::{count, count_of, significant};
+use crate::support::table::{Column, Digits, Table};
 
 /// Everything of one density but its kernels.
 pub fn text(model: &DensityModel) -> String {
@@ -22,18 +22,17 @@ pub fn text(model: &DensityModel) -> String {
         count(provenance.kept),
         count(provenance.left_out)
     );
-    let header = ["parameter", "unit", "mean", "deviation", "scale", "kernel", "valid"];
-    let mut parameters = table(header.map(str::to_owned).to_vec());
-    for (j, parameter) in model.space.parameters().iter().enumerate() {
-        let values: Vec<f64> = model.kde.points().iter().map(|p| p[j]).collect();
-        let mean = values.iter().sum::<f64>() / values.len() as f64;
-        let numbers = [mean, standard_deviation(&values), model.kde.scale()[j], model.kde.spread()[j]];
-        let mut row = vec![parameter.name.clone(), parameter.unit.clone()];
-        row.extend(numbers.map(short));
-        row.push(parameter.bounds_text());
-        parameters.add_row(row);
-    }
-    text.push_str(&aligned(parameters, 2));
+    let values = |j: usize| model.kde.points().iter().map(|p| p[j]).collect::<Vec<f64>>();
+    let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
+    let parameters = Table::of(model.space.parameters().iter().enumerate())
+        .column("parameter", |(_, parameter)| parameter.name.as_str())
+        .column("unit", |(_, parameter)| parameter.unit.as_str())
+        .column(number("mean"), |(j, _)| mean(values(j)))
+        .column(number("deviation"), |(j, _)| standard_deviation(&values(j)))
+        .column(number("scale"), |(j, _)| model.kde.scale()[j])
+        .column(number("kernel"), |(j, _)| model.kde.spread()[j])
+        .column("valid", |(_, parameter)| parameter.bounds_text());
+    text.push_str(&parameters.build().text());
     let bandwidth = model.kde.bandwidth();
     let end = match bandwidth.end {
         SearchEnd::Inside => "",
@@ -148,29 +147,29 @@ fn compared(r: &Representativeness) -> String {
 
 /// One row per density.
 pub fn summary(models: &[&DensityModel]) -> String {
-    let header = ["density", "parameters", "scenarios", "bandwidth", "P_valid", "M", "W(gen, test)", "W(train, test)"];
-    let mut rows = table(header.map(str::to_owned).to_vec());
-    for model in models {
-        let id = model.space.id();
-        let of = |value: fn(&Representativeness) -> f64| {
-            model.representativeness.as_ref().map_or("-".to_owned(), |r| short(value(r)))
-        };
-        rows.add_row([
-            format!("{} {}", id.category.label(), id.key),
-            model.space.dimensions().to_string(),
-            count_of(model.kde.points().len()),
-            short(model.kde.bandwidth().value),
-            format!("{:.4}", model.valid.estimate),
-            of(|r| r.metric),
-            of(|r| r.generated_test),
-            of(|r| r.train_test),
-        ]);
-    }
+    type Pick = fn(&Representativeness) -> f64;
+    let distances: [(&str, Pick); 3] =
+        [("M", |r| r.metric), ("W(gen, test)", |r| r.generated_test), ("W(train, test)", |r| r.train_test)];
+    let rows = Table::of(models.iter().copied())
+        .column("density", |model| format!("{} {}", model.space.id().category.label(), model.space.id().key))
+        .column("parameters", |model| model.space.dimensions())
+        .column("scenarios", |model| model.kde.points().len())
+        .column(number("bandwidth"), |model| model.kde.bandwidth().value)
+        .column(number("P_valid").digits(Digits::Fixed(4)), |model| model.valid.estimate)
+        .columns(
+            distances,
+            |(name, _)| number(name).null("-"),
+            |model, (_, of)| model.representativeness.as_ref().map(of),
+        );
     format!(
         "All densities. M and W compare SVD parameterizations of one category with each other; those of kinematic \
          ones\nhave their own units each.\n{}",
-        aligned(rows, 1)
+        rows.build().text()
     )
+}
+
+fn number(name: &'static str) -> Column {
+    Column::from(name).digits(Digits::Significant(4))
 }
 
 fn short(value: f64) -> String {

@@ -2,19 +2,19 @@
 
 use serde_json::json;
 
-use super::html::PageTable;
 use super::records;
 use super::sampling::HostRecord;
-use super::tables::{aligned, table};
 use super::trace::{TraceFigure, TraceSeries};
+use crate::Result;
 use crate::model::profile::Profile;
-use crate::run::justify::{Conclusion, Dossier, Finding, REGULATION, Rules, Scored, Share};
+use crate::run::justify::{Dossier, REGULATION, Rules, Scored, Share};
 use crate::run::sampling::RateRecord;
+use crate::scenario::parameterization::Parameterization;
 use crate::stats::estimate::Ratio;
 use crate::support::readable::{count, value};
 use crate::support::run_dir::Results;
+use crate::support::table::{Column, NumberText, Table};
 use crate::traffic::DataProvenance;
-use crate::{Error, Result};
 
 /// Hidden failures on the page at most; `hidden.csv` has all.
 pub(super) const SHOWN: usize = 20;
@@ -52,7 +52,7 @@ impl DossierReport<'_> {
     /// [`crate::Error::Io`].
     pub fn write(&self, mut results: Results) -> Result<Vec<String>> {
         results.add("report.html", self.html()?.as_bytes())?;
-        results.add("hidden.csv", &self.hidden_csv()?)?;
+        results.add("hidden.csv", self.hidden_csv().as_bytes())?;
         if let Some(svg) = self.example() {
             results.add("hidden.svg", svg.as_bytes())?;
         }
@@ -61,103 +61,76 @@ impl DossierReport<'_> {
         Ok(files)
     }
 
-    pub(super) fn findings(&self) -> (Vec<String>, Vec<Vec<String>>) {
-        let header = ["quantity", "rule", "result", "value", "interval", "more data"];
-        let row = |finding: &Finding| {
-            vec![
-                finding.quantity.to_owned(),
-                finding.rule.clone(),
-                finding.conclusion.of_rule().to_owned(),
-                finding.value.map_or("–".to_owned(), value),
-                interval(finding.interval),
-                finding.need.map_or(String::new(), |need| format!("{} times", value(need.times))),
-            ]
+    pub(super) fn findings(&self) -> Table {
+        Table::of(&self.dossier.findings)
+            .column("quantity", |finding| finding.quantity)
+            .column("rule", |finding| finding.rule.as_str())
+            .column("result", |finding| finding.conclusion.of_rule())
+            .column(Column::from("value").null("–"), |finding| finding.value)
+            .column("interval", |finding| interval(finding.interval))
+            .column("more data", |finding| finding.need.map(|need| format!("{} times", value(need.times))))
+            .build()
+    }
+
+    pub(super) fn alternatives(&self) -> Table {
+        let name = |id: &Parameterization| {
+            format!("{}{}", id.name(), if *id == self.dossier.parameterization { " ←" } else { "" })
         };
-        (owned(&header), self.dossier.findings.iter().map(row).collect())
+        let table = Table::of(&self.dossier.alternatives)
+            .column("name", |(id, ..)| name(id))
+            .column("by its labels", |(.., conclusion)| conclusion.of_rule())
+            .column("parameters", |(id, ..)| id.parameter_count())
+            .column("hidden", |(_, of, _)| of.counts.fn_)
+            .column("false alarms", |(_, of, _)| of.counts.fp);
+        table.columns(SCORES, |(score, _)| score, |(_, scored, _), (_, of)| share(of(scored))).build()
     }
 
-    pub(super) fn alternatives(&self) -> (Vec<String>, Vec<Vec<String>>) {
-        let header = ["name", "by its labels", "parameters", "hidden", "false alarms", "recall", "precision", "F1"];
-        let row = |(id, scored, conclusion): &(_, Scored, Conclusion)| {
-            let id: &crate::scenario::parameterization::Parameterization = id;
-            let mark = if *id == self.dossier.parameterization { " ←" } else { "" };
-            vec![
-                format!("{}{mark}", id.name()),
-                conclusion.of_rule().to_owned(),
-                id.parameter_count().to_string(),
-                count(scored.counts.fn_),
-                count(scored.counts.fp),
-                share(&scored.recall),
-                share(&scored.precision),
-                share(&scored.f1),
-            ]
-        };
-        (owned(&header), self.dossier.alternatives.iter().map(row).collect())
+    pub(super) fn groups(&self) -> Table {
+        Table::of(&self.dossier.groups)
+            .column("by", |group| group.by)
+            .column("group", |group| group.name.as_str())
+            .column("failures of S", |group| group.scored.counts.tp + group.scored.counts.fn_)
+            .column("hidden", |group| group.scored.counts.fn_)
+            .column("false alarms", |group| group.scored.counts.fp)
+            .columns(SCORES, |(score, _)| score, |group, (_, of)| share(of(&group.scored)))
+            .build()
     }
 
-    pub(super) fn groups(&self) -> (Vec<String>, Vec<Vec<String>>) {
-        let header = ["by", "group", "failures of S", "hidden", "false alarms", "recall", "precision", "F1"];
-        let rows = self.dossier.groups.iter().map(|group| {
-            let counts = &group.scored.counts;
-            vec![
-                group.by.to_owned(),
-                group.name.clone(),
-                count(counts.tp + counts.fn_),
-                count(counts.fn_),
-                count(counts.fp),
-                share(&group.scored.recall),
-                share(&group.scored.precision),
-                share(&group.scored.f1),
-            ]
-        });
-        (owned(&header), rows.collect())
+    pub(super) fn hidden(&self, most: usize) -> Table {
+        Table::of(self.dossier.hidden.iter().take(most))
+            .column("lane of S'", |hidden| hidden.key.as_str())
+            .column("S: impact km/h", |hidden| hidden.recorded.impact_closing_speed * 3.6)
+            .column("S: TTC s", |hidden| hidden.recorded.min_ttc)
+            .column("S: BTN", |hidden| hidden.recorded.max_btn)
+            .column("S': TTC s", |hidden| hidden.parameterized.min_ttc)
+            .column("S': BTN", |hidden| hidden.parameterized.max_btn)
+            .column("S': gap m", |hidden| hidden.parameterized.min_gap)
+            .build()
     }
 
-    pub(super) fn hidden(&self, most: usize) -> (Vec<String>, Vec<Vec<String>>) {
-        let header = ["lane of S'", "S: impact km/h", "S: TTC s", "S: BTN", "S': TTC s", "S': BTN", "S': gap m"];
-        let rows = self.dossier.hidden.iter().take(most).map(|hidden| {
-            let (s, parameterized) = (&hidden.recorded, &hidden.parameterized);
-            vec![
-                hidden.key.clone(),
-                value(s.impact_closing_speed * 3.6),
-                value(s.min_ttc),
-                value(s.max_btn),
-                value(parameterized.min_ttc),
-                value(parameterized.max_btn),
-                value(parameterized.min_gap),
-            ]
-        });
-        (owned(&header), rows.collect())
-    }
-
-    pub(super) fn risk(&self) -> Option<(Vec<String>, Vec<Vec<String>>)> {
+    pub(super) fn risk(&self) -> Option<Table> {
         let cell = self.dossier.compared.as_ref()?;
         let counts = &self.dossier.scored.counts;
-        let failures = counts.tp + counts.fn_;
-        let recorded = failures as f64 / self.dossier.lanes.max(1) as f64;
-        let row = |name: &str, rate: &RateRecord, ratio: &Ratio| {
-            vec![
-                name.to_owned(),
-                format!("{} of {}", count(rate.failures), count(rate.lanes)),
-                value(rate.rate),
-                format!("[{} {}]", value(rate.low), value(rate.high)),
-                ratio.ratio.map_or("–".to_owned(), value),
-                interval(ratio.interval()),
-                ratio.verdict.text().to_owned(),
-            ]
-        };
-        let mut rows = vec![vec![
-            "S, recorded".to_owned(),
-            format!("{} of {}", count(failures), count(self.dossier.lanes)),
-            value(recorded),
-            String::new(),
-            "1".to_owned(),
-            String::new(),
-            String::new(),
-        ]];
-        rows.push(row("S', replayed", &cell.replayed.rate, &cell.replayed.ratio));
-        rows.push(row("P, density", &cell.sampled.rate, &cell.sampled.ratio));
-        Some((owned(&["scenarios", "failures", "rate", "interval", "ratio to S", "its interval", "verdict"]), rows))
+        let (failures, lanes) = (counts.tp + counts.fn_, self.dossier.lanes);
+        let recorded = failures as f64 / lanes.max(1) as f64;
+        let of = |rate: &RateRecord| (rate.failures, rate.lanes, rate.rate);
+        let (replayed, sampled) = (&cell.replayed, &cell.sampled);
+        let rows: [(&str, (u64, u64, f64), Option<(&RateRecord, &Ratio)>); 3] = [
+            ("S, recorded", (failures, lanes, recorded), None),
+            ("S', replayed", of(&replayed.rate), Some((&replayed.rate, &replayed.ratio))),
+            ("P, density", of(&sampled.rate), Some((&sampled.rate, &sampled.ratio))),
+        ];
+        let table = Table::of(rows)
+            .column("scenarios", |(name, ..)| name)
+            .column("failures", |(_, (failures, lanes, _), _)| {
+                NumberText(format!("{} of {}", count(failures), count(lanes)))
+            })
+            .column("rate", |(_, (.., rate), _)| rate)
+            .column("interval", |(.., of)| of.map(|(rate, _)| format!("[{} {}]", value(rate.low), value(rate.high))))
+            .column(Column::from("ratio to S").null("–"), |(.., of)| of.map_or(Some(1.0), |(_, ratio)| ratio.ratio))
+            .column("its interval", |(.., of)| of.map(|(_, ratio)| interval(ratio.interval())))
+            .column("verdict", |(.., of)| of.map(|(_, ratio)| ratio.verdict.text()));
+        Some(table.build())
     }
 
     /// The figure of the most severe hidden failure.
@@ -176,62 +149,36 @@ impl DossierReport<'_> {
 
     /// The dossier as text.
     pub fn text(&self) -> String {
-        let rows = |(header, rows): (Vec<String>, Vec<Vec<String>>), texts| {
-            let mut table = table(header);
-            rows.into_iter().for_each(|row| {
-                table.add_row(row);
-            });
-            aligned(table, texts)
-        };
         let need = self.need().map_or(String::new(), |need| format!("{need}\n"));
         let sentences = [self.answer(), self.recall(), self.close_following()];
         let sentences: Vec<String> = sentences.into_iter().filter(|sentence| !sentence.is_empty()).collect();
         let hidden = match self.dossier.hidden.len() {
             0 => String::new(),
-            n => format!("\nHidden failures, the most severe of {}\n{}", count(n as u64), rows(self.hidden(5), 1)),
+            n => format!("\nHidden failures, the most severe of {}\n{}", count(n as u64), self.hidden(5).text()),
         };
         format!(
             "{}\n{}\n{need}\n{}{hidden}\nThe alternatives\n{}",
             self.provenance.data,
             sentences.join("\n"),
-            rows(self.findings(), 3),
-            rows(self.alternatives(), 2)
+            self.findings().text(),
+            self.alternatives().text()
         )
     }
 
     /// All hidden failures as CSV.
-    ///
-    /// # Errors
-    /// [`Error::Internal`] where the table cannot be written.
-    pub fn hidden_csv(&self) -> Result<Vec<u8>> {
-        let broken = |e: csv::Error| Error::Internal(format!("hidden.csv cannot be written: {e}"));
-        let mut out = csv::Writer::from_writer(Vec::new());
-        out.write_record([
-            "scenario",
-            "headway",
-            "lane",
-            "s_impact_closing_speed_mps",
-            "s_min_ttc_s",
-            "s_max_btn",
-            "sp_min_ttc_s",
-            "sp_max_btn",
-            "sp_min_gap_m",
-        ])
-        .map_err(broken)?;
-        for hidden in &self.dossier.hidden {
-            let (s, parameterized) = (&hidden.recorded, &hidden.parameterized);
-            let numbers = [
-                s.impact_closing_speed,
-                s.min_ttc,
-                s.max_btn,
-                parameterized.min_ttc,
-                parameterized.max_btn,
-                parameterized.min_gap,
-            ];
-            let words = [&hidden.scenario, &hidden.headway, &hidden.key].map(Clone::clone);
-            out.write_record(words.into_iter().chain(numbers.map(|number| number.to_string()))).map_err(broken)?;
-        }
-        out.into_inner().map_err(|e| Error::Internal(format!("hidden.csv cannot be written: {e}")))
+    pub fn hidden_csv(&self) -> String {
+        Table::of(&self.dossier.hidden)
+            .column("scenario", |hidden| hidden.scenario.as_str())
+            .column("headway", |hidden| hidden.headway.as_str())
+            .column("lane", |hidden| hidden.key.as_str())
+            .column("s_impact_closing_speed_mps", |hidden| hidden.recorded.impact_closing_speed)
+            .column("s_min_ttc_s", |hidden| hidden.recorded.min_ttc)
+            .column("s_max_btn", |hidden| hidden.recorded.max_btn)
+            .column("sp_min_ttc_s", |hidden| hidden.parameterized.min_ttc)
+            .column("sp_max_btn", |hidden| hidden.parameterized.max_btn)
+            .column("sp_min_gap_m", |hidden| hidden.parameterized.min_gap)
+            .build()
+            .csv()
     }
 
     /// The dossier as one document.
@@ -313,13 +260,9 @@ impl DossierReport<'_> {
     }
 }
 
-pub(super) fn owned(header: &[&str]) -> Vec<String> {
-    header.iter().map(|name| (*name).to_owned()).collect()
-}
-
-pub(super) fn page_table(caption: &str, texts: usize, (header, rows): (Vec<String>, Vec<Vec<String>>)) -> PageTable {
-    PageTable { caption: caption.to_owned(), header, texts, rows }
-}
+/// Names of scores, and which they are.
+const SCORES: [(&str, fn(&Scored) -> &Share); 3] =
+    [("recall", |of| &of.recall), ("precision", |of| &of.precision), ("F1", |of| &of.f1)];
 
 pub(super) fn share(share: &Share) -> String {
     match (share.value, share.interval) {

@@ -1,8 +1,9 @@
 //! The dossier's page: its chapters.
 
-use super::dossier::{DossierReport, SHOWN, owned, page_table, program, share};
+use super::dossier::{DossierReport, SHOWN, program, share};
 use super::html::{Page, PageFigure, Section};
 use crate::support::readable::{count, value};
+use crate::support::table::Table;
 use crate::{Error, Result};
 
 impl DossierReport<'_> {
@@ -28,7 +29,7 @@ impl DossierReport<'_> {
                             the contact, else the shortfall of TTC or the excess of BTN. Precision has no meaning within \
                             failures of S."
                         .to_owned(),
-                    tables: vec![page_table("Scores by group, [interval over scenarios]", 2, self.groups())],
+                    tables: vec![self.groups().captioned("Scores by group, [interval over scenarios]")],
                     ..Section::new("groups", "By headway, speed and severity")
                 },
                 self.risk_section(),
@@ -37,7 +38,7 @@ impl DossierReport<'_> {
                     intro: "Every parameterization of this kind of scenario on the same data, by the rules for recall and \
                             precision alone."
                         .to_owned(),
-                    tables: vec![page_table("Alternatives, [interval over scenarios]", 2, self.alternatives())],
+                    tables: vec![self.alternatives().captioned("Alternatives, [interval over scenarios]")],
                     ..Section::new("alternatives", "The alternatives")
                 },
                 self.credibility_section(),
@@ -54,7 +55,7 @@ impl DossierReport<'_> {
         let (margin, lower) = (self.margin, value(1.0 / self.margin));
         Section {
             intro: [self.need().unwrap_or_default(), self.close_following()].join(" ").trim().to_owned(),
-            tables: vec![page_table("What each rule finds; the worst decides", 3, self.findings())],
+            tables: vec![self.findings().captioned("What each rule finds; the worst decides")],
             facts: vec![
                 ("recall, limit".to_owned(), share(self.rules.min_recall)),
                 ("precision, limit".to_owned(), share(self.rules.min_precision)),
@@ -94,7 +95,7 @@ impl DossierReport<'_> {
         };
         let mut section = Section { intro, ..Section::new("hidden", "Failures that are hidden") };
         if counts.fn_ > 0 {
-            section.tables.push(page_table("Hidden failures, the most severe first", 1, self.hidden(SHOWN)));
+            section.tables.push(self.hidden(SHOWN).captioned("Hidden failures, the most severe first"));
         }
         section.figures.extend(self.example().map(|svg| PageFigure::new(&svg, &["hidden.svg"])));
         section
@@ -108,7 +109,7 @@ impl DossierReport<'_> {
                     "Rates of failure of the recorded scenarios (S), of their parameterized replays (S') and of a \
                                  density fitted on their parameters (P)."
                         .to_owned();
-                section.tables.push(page_table("Rates and risk ratios", 1, risk));
+                section.tables.push(risk.captioned("Rates and risk ratios"));
             }
             (None, Some(error)) => section.intro = format!("There is no density: {error}."),
             (None, None) => section.intro = "There is no density.".to_owned(),
@@ -158,11 +159,12 @@ impl DossierReport<'_> {
     }
 
     fn credibility_section(&self) -> Section {
-        let rows = self.conformance.iter().map(|(what, rows, passes)| {
-            vec![what.clone(), if *passes { "passes" } else { "FAILS" }.to_owned(), count(*rows)]
-        });
-        let table = (owned(&["table", "in this build", "rows"]), rows.collect());
-        let tables = if self.conformance.is_empty() { Vec::new() } else { vec![page_table("Conformance", 2, table)] };
+        let table = Table::of(&self.conformance)
+            .column("table", |(what, ..)| what.as_str())
+            .column("in this build", |(.., passes)| if *passes { "passes" } else { "FAILS" })
+            .column("rows", |(_, rows, _)| *rows)
+            .build();
+        let tables = if self.conformance.is_empty() { Vec::new() } else { vec![table.captioned("Conformance")] };
         let recheck = format!(
             "{} lanes were computed again on the CPU with every step, and were equal to the bit",
             count(self.host.rechecked_lanes)

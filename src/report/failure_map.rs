@@ -5,8 +5,6 @@
 //! a cell with few samples is a smaller square, and a cell without failures has its own grey, so that "none seen" and
 //! "few" differ.
 
-use std::fmt::Write;
-
 use super::convergence::sampled;
 use super::plot::{Cells, ColourBar, Figure, Fill, FilledCell, Hatch, Height, Plot, PlotAxis};
 use super::plot::{number, plain_end};
@@ -14,6 +12,7 @@ use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::sampling::{self, MapCounts};
 use crate::stats::density::DensityModel;
+use crate::support::table::Table;
 
 /// One parameter, cut into cells.
 #[derive(Debug, Clone, PartialEq)]
@@ -199,21 +198,21 @@ impl FailureMap {
     /// The cells as CSV, one row each in the order of [`FailureMap::samples`]: edges in the axes' units, counts, and
     /// the share, empty without samples or with more failures than samples. Numbers in full precision.
     pub fn csv(&self) -> String {
-        let mut table = "x_lower,x_upper,y_lower,y_upper,samples,failures,share\n".to_string();
-        if self.problem().is_some() {
-            return table;
-        }
-        for cell in 0..self.samples.len() {
-            let (i, j) = (cell % self.x.cells(), cell / self.x.cells());
-            let share = match self.share(cell) {
-                Share::Known { share, .. } => share.to_string(),
-                Share::Empty | Share::Wrong => String::new(),
-            };
-            let (x, y) = (&self.x.edges[i..], &self.y.edges[j..]);
-            let (samples, failures) = (self.samples[cell], self.failures[cell]);
-            let _ = writeln!(table, "{},{},{},{},{samples},{failures},{share}", x[0], x[1], y[0], y[1]);
-        }
-        table
+        let cells = if self.problem().is_some() { 0 } else { self.samples.len() };
+        let (x, y) = (&self.x.edges, &self.y.edges);
+        Table::of((0..cells).map(|cell| (cell, cell % self.x.cells(), cell / self.x.cells())))
+            .column("x_lower", |(_, i, _)| x[i])
+            .column("x_upper", |(_, i, _)| x[i + 1])
+            .column("y_lower", |(.., j)| y[j])
+            .column("y_upper", |(.., j)| y[j + 1])
+            .column("samples", |(cell, ..)| self.samples[cell])
+            .column("failures", |(cell, ..)| self.failures[cell])
+            .column("share", |(cell, ..)| match self.share(cell) {
+                Share::Known { share, .. } => Some(share),
+                Share::Empty | Share::Wrong => None,
+            })
+            .build()
+            .csv()
     }
 }
 

@@ -6,6 +6,7 @@ use minijinja::{Environment, escape_formatter};
 use serde::Serialize;
 
 use crate::support::plain_text::shown;
+use crate::support::table::Table;
 use crate::{Error, Result};
 
 const TEMPLATE: &str = include_str!("templates/report.html");
@@ -13,19 +14,6 @@ const STYLE: &str = include_str!("templates/style.css");
 
 /// Narrower figures, such as a column of a paper, do not fill the page.
 const NARROW_PX: f64 = 700.0;
-
-/// A table; the first `texts` columns hold words, the others numbers.
-#[derive(Debug, Clone, Default, Serialize)]
-pub struct PageTable {
-    /// What it shows.
-    pub caption: String,
-    /// Names of the columns.
-    pub header: Vec<String>,
-    /// Columns with words.
-    pub texts: usize,
-    /// Rows; a line break in a cell stays one.
-    pub rows: Vec<Vec<String>>,
-}
 
 /// A figure with the names of its files beside the page.
 #[derive(Debug, Clone, Serialize)]
@@ -53,7 +41,7 @@ pub struct Section {
     /// A text whose columns stand below one another; may be empty.
     pub text: String,
     /// Tables, before the figures.
-    pub tables: Vec<PageTable>,
+    pub tables: Vec<Table>,
     /// Figures.
     pub figures: Vec<PageFigure>,
     /// Names and values.
@@ -132,20 +120,19 @@ fn inline(svg: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::support::table::NumberText;
 
     fn page() -> Page {
-        let table = PageTable {
-            caption: "A & B".into(),
-            header: vec!["name".into(), "value".into()],
-            texts: 1,
-            rows: vec![vec!["<script>alert(1)</script>\u{202e}\u{1b}".into(), "1\n[0 2]".into()]],
-        };
+        let table = Table::of([("<script>alert(1)</script>\u{202e}\u{1b}", "1\n[0 2]")])
+            .column("name", |row| row.0)
+            .column("value", |row| NumberText(row.1.into()))
+            .build();
         let svg = "<?xml version=\"1.0\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"1000\" height=\"50\" \
                    fill=\"#000\"><rect width=\"100%\" height=\"100%\"/></svg>\n";
         let section = Section {
             id: "a".into(),
             title: "Part".into(),
-            tables: vec![table],
+            tables: vec![table.captioned("A & B")],
             figures: vec![PageFigure::new(svg, &["a.svg", "a.csv"])],
             facts: vec![("seed".into(), "1".into())],
             host: vec![("device".into(), "none".into())],

@@ -185,11 +185,9 @@ pub fn sampled_columns(density: &DensityModel) -> Vec<Column> {
         c("impact_speed_mps", ColumnKind::Binary32, "m/s", "Speed of the ego at contact; null without one."),
         c("impact_closing_speed_mps", ColumnKind::Binary32, "m/s", "Closing speed at contact; null without one."),
     ];
-    columns.extend(density.space.parameters().iter().map(|parameter| Column {
-        name: parameter.name.clone().into(),
-        kind: ColumnKind::Binary32,
-        unit: parameter.unit.clone().into(),
-        description: "Parameter that was drawn.".into(),
+    columns.extend(density.space.parameters().iter().map(|parameter| {
+        let (name, unit) = (parameter.name.clone(), parameter.unit.clone());
+        Column::new(name, ColumnKind::Binary32, unit, "Parameter that was drawn.".to_owned())
     }));
     columns
 }

@@ -3,11 +3,10 @@
 use std::io::{self, Write};
 
 use super::map::{Difference, MapReport};
-use super::tables::{aligned, table};
 use crate::model::criterion::Criterion;
 use crate::run::grid::{CellOutcome, Grid, MapParameter, MappedGrid, count};
 use crate::support::readable;
-use crate::support::table::csv_field;
+use crate::support::table::{Column, Digits, NumberText, Table, csv_field};
 
 impl MapReport {
     /// Shares and differences as tables.
@@ -15,35 +14,35 @@ impl MapReport {
         let criterion = self.criterion.label();
         let any_known = self.grids.iter().any(|mapped| mapped.known_percent.iter().any(Option::is_some));
         let outcomes = self.shown_outcomes();
-        let words = ["map", "model", "cells"].into_iter().chain(outcomes.iter().map(|outcome| outcome.label()));
-        let mut header: Vec<String> = words.chain(["share %"]).map(str::to_owned).collect();
+        let known = Column::from("known %").digits(Digits::Fixed(1)).null("-");
+        let rows = self.grids.iter().flat_map(|mapped| (0..mapped.map.models.len()).map(move |at| (mapped, at)));
+        let percent = |(mapped, at): (&MappedGrid, usize)| {
+            100.0 * mapped.map.failures(at, self.criterion) as f64 / mapped.map.cell_count() as f64
+        };
+        let difference = |(mapped, at): (&MappedGrid, usize)| {
+            let mark = if mapped.is_chosen_to_match { "*" } else { "" };
+            Some(NumberText(format!("{:+.2}{mark}", percent((mapped, at)) - mapped.known_percent[at]?)))
+        };
+        let mut shares = Table::of(rows)
+            .column("map", |(mapped, _)| mapped.plan.grid.name())
+            .column("model", |(mapped, at)| mapped.map.models[at].name())
+            .column("cells", |(mapped, _)| mapped.map.cell_count())
+            .columns(
+                outcomes.iter(),
+                |of| of.label(),
+                |(mapped, at), of| mapped.map.outcomes(at, self.criterion)[*of as usize],
+            )
+            .column(Column::from("share %").digits(Digits::Fixed(2)), percent);
         if any_known {
-            header.extend(["known %", "difference"].map(str::to_owned));
-        }
-        let mut shares = table(header);
-        for mapped in &self.grids {
-            for (at, model) in mapped.map.models.iter().enumerate() {
-                let (failures, cells) = (mapped.map.failures(at, self.criterion), mapped.map.cell_count());
-                let percent = 100.0 * failures as f64 / cells as f64;
-                let mut row =
-                    vec![mapped.plan.grid.name().to_owned(), model.name().to_owned(), readable::count_of(cells)];
-                let counts = mapped.map.outcomes(at, self.criterion);
-                row.extend(outcomes.iter().map(|outcome| readable::count(counts[*outcome as usize])));
-                row.push(format!("{percent:.2}"));
-                if any_known {
-                    let known = mapped.known_percent[at];
-                    row.push(known.map_or("-".to_owned(), |k| format!("{k:.1}")));
-                    let mark = if mapped.is_chosen_to_match { "*" } else { "" };
-                    row.push(known.map_or("-".to_owned(), |k| format!("{:+.2}{mark}", percent - k)));
-                }
-                shares.add_row(row);
-            }
+            shares = shares
+                .column(known, |(mapped, at)| mapped.known_percent[at])
+                .column(Column::from("difference").null("-"), difference);
         }
         let mut text = format!(
             "Share of cells that fail {criterion} under {}, of {} simulations\n{}",
             self.profile.name,
             readable::count(self.simulations()),
-            aligned(shares, 2)
+            shares.build().text()
         );
         if self.grids.iter().any(|mapped| mapped.is_chosen_to_match) {
             text.push_str(
@@ -55,17 +54,13 @@ impl MapReport {
         let differences = self.differences();
         if !differences.is_empty() {
             let shown = self.shown_agreements();
-            let header = ["map", "first", "second"].into_iter().chain(shown.iter().map(|kind| kind.label()));
-            let header = header.map(str::to_owned).collect();
-            let mut table = table(header);
-            for difference in &differences {
-                let mut row = vec![difference.grid.name().to_owned(), difference.first.clone()];
-                row.push(difference.second.clone());
-                let counts = count(&difference.cells);
-                row.extend(shown.iter().map(|kind| readable::count(counts[*kind as usize])));
-                table.add_row(row);
-            }
-            text.push_str(&format!("\nDifferences in {criterion}\n{}", aligned(table, 3)));
+            let table = Table::of(&differences)
+                .column("map", |of| of.grid.name())
+                .column("first", |of| of.first.as_str())
+                .column("second", |of| of.second.as_str())
+                .columns(shown.iter(), |kind| kind.label(), |of, kind| count(&of.cells)[*kind as usize])
+                .build();
+            text.push_str(&format!("\nDifferences in {criterion}\n{}", table.text()));
         }
         text
     }

@@ -8,7 +8,6 @@ pub mod case_sheet;
 mod close_following;
 pub mod compare;
 pub mod convergence;
-pub mod csv;
 pub mod density;
 pub mod dossier;
 mod dossier_page;

@@ -1,13 +1,12 @@
 //! The lane arithmetic against the f64 reference, lane by lane: which verdicts differ, and how near to the
 //! threshold each lies.
 
-use super::records::{Table, whole, words};
 use crate::Result;
 use crate::engine::{Backend, Chunk, CpuBackend, LanePlan, Outcome, Wanted, chunks};
 use crate::model::criterion::Criterion;
 use crate::run::study::{StudyCases, WINDOW};
 use crate::support::readable::{count, count_of};
-use crate::support::table::Cell;
+use crate::support::table::Table;
 
 /// A verdict that differs between f32 and f64.
 #[derive(Debug, Clone, PartialEq)]
@@ -88,12 +87,12 @@ impl ReferenceComparison {
 
     /// All differences, one per row.
     pub fn table(&self) -> Table {
-        let mut table = Table::new(&["lane", "criterion", "failed_in_f32", "distance_to_threshold"]);
-        for d in &self.differences {
-            let failed = whole(u8::from(d.failed_in_f32));
-            table.push(vec![words(d.lane.as_str()), words(d.criterion.key()), failed, Cell::Number(d.distance)]);
-        }
-        table
+        Table::of(&self.differences)
+            .column("lane", |of| of.lane.as_str())
+            .column("criterion", |of| of.criterion.key())
+            .column("failed_in_f32", |of| u8::from(of.failed_in_f32))
+            .column("distance_to_threshold", |of| of.distance)
+            .build()
     }
 }
 

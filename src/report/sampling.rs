@@ -6,7 +6,7 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::close_following::{CloseRow, close_following};
-use super::tables::{WIDTH, aligned, table, wrap};
+use super::tables::{WIDTH, wrap};
 use crate::engine::generated::ATTEMPTS;
 use crate::engine::{DeviceRecord, ENGINE_VERSION, Headway, LanePlan, OpenBackend};
 use crate::model::driver::ModelId;
@@ -17,6 +17,7 @@ use crate::scenario::Category;
 use crate::stats::density::{DensityModel, Provenance};
 use crate::stats::estimate::{IntervalKind, Ratio, StopReason};
 use crate::support::readable::{count, count_of, counted, significant, value};
+use crate::support::table::{Column, Digits, NumberText, Table};
 use crate::{Error, Result};
 
 /// The density of a run.
@@ -281,40 +282,7 @@ impl EstimateFile {
             let list: Vec<String> = self.given.iter().map(|(name, v)| format!("{name} = {}", value(*v))).collect();
             let _ = writeln!(text, "given {}: probabilities are conditional, risks are not known", list.join(", "));
         }
-        let has_hours = self.estimates.iter().any(|r| r.risk.per_hour.is_some());
-        let has_kilometres = self.estimates.iter().any(|r| r.risk.per_1000_km.is_some());
-        let mut header = ["model", "criterion", "THW", "failures", "P", "interval", "±"].map(str::to_owned).to_vec();
-        header.extend(has_hours.then(|| "per hour".to_owned()));
-        header.extend(has_kilometres.then(|| "per 1000 km".to_owned()));
-        let has_recorded = self.estimates.iter().any(|r| r.recorded.is_some_and(|recorded| recorded.sampled.is_some()));
-        header.extend(has_recorded.then(|| "P/S".to_owned()));
-        header.push("verdict".to_owned());
-        let mut rows = table(header);
-        for row in self.estimates.iter().filter(|r| r.is_overall(&self.estimates)) {
-            let e = &row.estimate;
-            let is_wide = !e.relative_half_width.is_finite();
-            let mut fields = vec![
-                row.model.name().to_owned(),
-                row.criterion.label().to_owned(),
-                self.headway_cell(row),
-                count(e.failures),
-                short(e.probability),
-                interval_text(e.interval.low, e.interval.high, e.interval.kind),
-                match 100.0 * e.relative_half_width {
-                    _ if is_wide => "–".to_owned(),
-                    wide if wide >= 1000.0 => "> 999 %".to_owned(),
-                    percent => format!("{percent:.1} %"),
-                },
-            ];
-            fields.extend(has_hours.then(|| rate_text(row.risk.per_hour)));
-            fields.extend(has_kilometres.then(|| rate_text(row.risk.per_1000_km)));
-            let ratio = row.recorded.and_then(|recorded| recorded.sampled);
-            let ratio = ratio.and_then(|r| Some(format!("{} {}", short(r.ratio?), r.verdict.mark())));
-            fields.extend(has_recorded.then(|| ratio.unwrap_or_else(|| "–".to_owned())));
-            fields.push(e.trust.verdict().to_string());
-            rows.add_row(fields);
-        }
-        text.push_str(&aligned(rows, 3));
+        text.push_str(&self.table().text());
         for row in self.estimates.iter().filter(|r| r.is_overall(&self.estimates)) {
             for warning in &row.estimate.trust.warnings {
                 let _ = writeln!(text, "{} {} {}: {warning}", row.model.name(), row.criterion.label(), row.headway);
@@ -371,24 +339,52 @@ impl EstimateFile {
         close_following(&[row], "the density", &self.plan_headways, WIDTH)
     }
 
+    /// The estimates over all headways.
+    fn table(&self) -> Table {
+        let estimates = &self.estimates;
+        let half_width = |row: &EstimateRow| {
+            NumberText(match 100.0 * row.estimate.relative_half_width {
+                width if !width.is_finite() => "–".to_owned(),
+                wide if wide >= 1000.0 => "> 999 %".to_owned(),
+                percent => format!("{percent:.1} %"),
+            })
+        };
+        let sampled = |row: &EstimateRow| row.recorded.and_then(|recorded| recorded.sampled);
+        let ratio = |row| sampled(row).and_then(|r| Some(format!("{} {}", short(r.ratio?), r.verdict.mark())));
+        let mut table = Table::of(estimates.iter().filter(|row| row.is_overall(estimates)))
+            .column("model", |row| row.model.name())
+            .column("criterion", |row| row.criterion.label())
+            .column("THW", |row| self.headway_cell(row))
+            .column("failures", |row| row.estimate.failures)
+            .column(three_digits("P"), |row| row.estimate.probability)
+            .column("interval", |EstimateRow { estimate: e, .. }| {
+                NumberText(interval_text(e.interval.low, e.interval.high, e.interval.kind))
+            })
+            .column("±", half_width);
+        if estimates.iter().any(|row| row.risk.per_hour.is_some()) {
+            table = table.column("per hour", |row| rate_text(row.risk.per_hour));
+        }
+        if estimates.iter().any(|row| row.risk.per_1000_km.is_some()) {
+            table = table.column("per 1000 km", |row| rate_text(row.risk.per_1000_km));
+        }
+        if estimates.iter().any(|row| sampled(row).is_some()) {
+            table = table.column(Column::from("P/S").null("–"), ratio);
+        }
+        table.column("verdict", |row| row.estimate.trust.verdict().to_string()).build()
+    }
+
     /// What the weights of importance samples say.
     fn weights_text(&self) -> String {
-        let header =
-            ["model", "criterion", "variance reduction", "ESS", "ESS of failures", "largest share", "mean weight"];
-        let mut rows = table(header.map(str::to_owned).to_vec());
-        for row in &self.estimates {
-            let Some(w) = &row.estimate.weights else { continue };
-            rows.add_row(vec![
-                row.model.name().to_owned(),
-                row.criterion.label().to_owned(),
-                short(row.estimate.variance_reduction),
-                value(w.effective_size),
-                value(w.effective_size_failures),
-                format!("{:.2} %", 100.0 * w.largest_share_failures),
-                format!("{} ± {}", value(w.mean_weight), short(w.mean_weight_error)),
-            ]);
-        }
-        aligned(rows, 2)
+        let rows = self.estimates.iter().filter_map(|row| Some((row, row.estimate.weights.as_ref()?)));
+        let table = Table::of(rows)
+            .column("model", |(row, _)| row.model.name())
+            .column("criterion", |(row, _)| row.criterion.label())
+            .column(three_digits("variance reduction"), |(row, _)| row.estimate.variance_reduction)
+            .column("ESS", |(_, w)| w.effective_size)
+            .column("ESS of failures", |(_, w)| w.effective_size_failures)
+            .column("largest share", |(_, w)| NumberText(format!("{:.2} %", 100.0 * w.largest_share_failures)))
+            .column("mean weight", |(_, w)| format!("{} ± {}", value(w.mean_weight), short(w.mean_weight_error)));
+        table.build().text()
     }
 }
 
@@ -409,6 +405,11 @@ impl EstimateRow {
     pub(super) fn is_overall(&self, all: &[EstimateRow]) -> bool {
         self.headway == "all" || !all.iter().any(|row| row.headway == "all")
     }
+}
+
+/// A column of numbers with three digits.
+pub(super) fn three_digits(name: &'static str) -> Column {
+    Column::from(name).digits(Digits::Significant(3))
 }
 
 /// Three digits.

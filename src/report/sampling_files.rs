@@ -60,7 +60,7 @@ impl EstimateFile {
     ) -> Result<Vec<PageFigure>> {
         let mut figures = Vec::new();
         if !run.convergence.is_empty() {
-            results.add("convergence.csv", &convergence_csv(&run.convergence)?)?;
+            results.add("convergence.csv", convergence_csv(&run.convergence).as_bytes())?;
             let level = self.estimates.first().map_or(0.95, |row| row.estimate.interval.level);
             let svg = ConvergenceFigure::of(density, &run.convergence, level).figure().svg();
             results.add("convergence.svg", svg.as_bytes())?;
@@ -123,9 +123,9 @@ impl EstimateFile {
                 });
             }
         }
-        let table = worst_csv(&rows, names, options.criterion)?;
+        let table = worst_csv(&rows, names, options.criterion);
         self.worst_sha256 = Some(hex(&Sha256::digest(&table)));
-        results.add("worst.csv", &table)
+        results.add("worst.csv", table.as_bytes())
     }
 
     /// Adds table and page of the estimates; then everything gets its name, with the record.
@@ -136,10 +136,10 @@ impl EstimateFile {
         if let Some(figure) = self.headways_figure() {
             let svg = figure.svg();
             results.add("headways.svg", svg.as_bytes())?;
-            results.add("headways.csv", &figure.csv()?)?;
+            results.add("headways.csv", figure.csv().as_bytes())?;
             figures.insert(0, PageFigure::new(&svg, &["headways.svg", "headways.csv"]));
         }
-        results.add("estimates.csv", &self.csv()?)?;
+        results.add("estimates.csv", self.csv().as_bytes())?;
         results.add("report.html", self.html(figures)?.as_bytes())?;
         self.files = results.names();
         results.publish(self.json()?.as_bytes())

@@ -1,14 +1,15 @@
 //! A sampling run as one page.
 
-use super::html::{Page, PageFigure, PageTable, Section};
+use super::html::{Page, PageFigure, Section};
 use super::plot::{Figure, HOLLOW, Layer, Mark, Plot, PlotAxis, Series, Value, is_few};
-use super::sampling::{EstimateFile, interval_text, rate_text, ratio_text, short};
+use super::sampling::{EstimateFile, interval_text, rate_text, ratio_text, short, three_digits};
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::sampling::EstimateRow;
 use crate::scenario::Category;
 use crate::support::readable::{count, count_of, value};
+use crate::support::table::{Column, Digits, Table};
 use crate::{Error, Result};
 
 impl EstimateFile {
@@ -57,76 +58,44 @@ impl EstimateFile {
     }
 
     fn estimates_section(&self) -> Section {
-        let line = |row: &EstimateRow| {
-            let e = &row.estimate;
-            let width = e.relative_half_width;
-            let mut fields = vec![
-                row.model.name().to_owned(),
-                row.criterion.label().to_owned(),
-                self.headway_cell(row),
-                count(e.runs),
-                count(e.failures),
-                short(e.probability),
-                interval_text(e.interval.low, e.interval.high, e.interval.kind),
-                if width.is_finite() { format!("{:.1}", 100.0 * width) } else { "–".to_owned() },
-            ];
-            fields.push(rate_text(row.risk.per_hour));
-            fields.push(rate_text(row.risk.per_1000_km));
-            fields.push(ratio_text(row.recorded.and_then(|recorded| recorded.sampled)));
-            fields.push(e.trust.verdict().to_string());
-            fields
-        };
-        let header = [
-            "model",
-            "criterion",
-            "THW",
-            "runs",
-            "failures",
-            "P",
-            "interval",
-            "± in %",
-            "per hour",
-            "per 1000 km",
-            "P/S",
-            "verdict",
-        ];
         let overall: Vec<&EstimateRow> = self.estimates.iter().filter(|r| r.is_overall(&self.estimates)).collect();
         let level = self.estimates.first().map_or(0.95, |row| row.estimate.interval.level);
-        let mut tables = vec![PageTable {
-            caption: format!(
-                "Probability of failure, and risk where the exposure is known. Intervals at {} %{}",
-                value(100.0 * level),
-                self.interval_rule()
-            ),
-            header: header.map(str::to_owned).to_vec(),
-            texts: 3,
-            rows: overall.iter().map(|row| line(row)).collect(),
-        }];
-        let weighted = |row: &&EstimateRow| {
-            let w = row.estimate.weights.as_ref()?;
-            Some(vec![
-                row.model.name().to_owned(),
-                row.criterion.label().to_owned(),
-                short(row.estimate.variance_reduction),
-                value(w.effective_size),
-                value(w.effective_size_failures),
-                format!("{:.2}", 100.0 * w.largest_share_failures),
-                format!("{} ± {}", value(w.mean_weight), short(w.mean_weight_error)),
-            ])
-        };
-        let weights: Vec<Vec<String>> = overall.iter().filter_map(weighted).collect();
-        if !weights.is_empty() {
-            let header = [
-                "model",
-                "criterion",
-                "variance reduction",
-                "effective sample size",
-                "of the failures",
-                "largest weight's share in %",
-                "mean weight",
-            ];
-            let caption = "Weights: how much of the sample counts".to_owned();
-            tables.push(PageTable { caption, header: header.map(str::to_owned).to_vec(), texts: 2, rows: weights });
+        let wide = |row: &EstimateRow| Some(100.0 * row.estimate.relative_half_width).filter(|width| width.is_finite());
+        let estimates = Table::of(overall.iter().copied())
+            .column("model", |row| row.model.name())
+            .column("criterion", |row| row.criterion.label())
+            .column("THW", |row| self.headway_cell(row))
+            .column("runs", |row| row.estimate.runs)
+            .column("failures", |row| row.estimate.failures)
+            .column(three_digits("P"), |row| row.estimate.probability)
+            .column("interval", |EstimateRow { estimate: e, .. }| {
+                interval_text(e.interval.low, e.interval.high, e.interval.kind)
+            })
+            .column(Column::from("± in %").digits(Digits::Fixed(1)).null("–"), wide)
+            .column("per hour", |row| rate_text(row.risk.per_hour))
+            .column("per 1000 km", |row| rate_text(row.risk.per_1000_km))
+            .column("P/S", |row| ratio_text(row.recorded.and_then(|recorded| recorded.sampled)))
+            .column("verdict", |row| row.estimate.trust.verdict().to_string())
+            .build();
+        let mut tables = vec![estimates.captioned(format!(
+            "Probability of failure, and risk where the exposure is known. Intervals at {} %{}",
+            value(100.0 * level),
+            self.interval_rule()
+        ))];
+        let weighted = overall.iter().filter_map(|row| Some((*row, row.estimate.weights.as_ref()?)));
+        let weights = Table::of(weighted)
+            .column("model", |(row, _)| row.model.name())
+            .column("criterion", |(row, _)| row.criterion.label())
+            .column(three_digits("variance reduction"), |(row, _)| row.estimate.variance_reduction)
+            .column("effective sample size", |(_, w)| w.effective_size)
+            .column("of the failures", |(_, w)| w.effective_size_failures)
+            .column(Column::from("largest weight's share in %").digits(Digits::Fixed(2)), |(_, w)| {
+                100.0 * w.largest_share_failures
+            })
+            .column("mean weight", |(_, w)| format!("{} ± {}", value(w.mean_weight), short(w.mean_weight_error)))
+            .build();
+        if !weights.rows.is_empty() {
+            tables.push(weights.captioned("Weights: how much of the sample counts"));
         }
         let said = overall.iter().flat_map(|row| {
             let name = format!("{}, {}, {}", row.model.name(), row.criterion.label(), row.headway);

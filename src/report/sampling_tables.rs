@@ -2,133 +2,96 @@
 //! to be read, in words that the terminal and the page share.
 
 use super::sampling::EstimateFile;
-use crate::Result;
 use crate::engine::{NO_STEP, Outcome};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::sampling::{Checkpoint, EstimateRow, RiskRate, WorstSample};
-use crate::stats::estimate::{IntervalKind, Ratio};
+use crate::stats::estimate::{IntervalKind, Ratio, WeightFigures};
+use crate::support::table::Table;
 
 impl EstimateFile {
     /// `estimates.csv`.
-    ///
-    /// # Errors
-    /// None for what this program made.
-    pub fn csv(&self) -> Result<Vec<u8>> {
-        let header = [
-            "category",
-            "parameterization",
-            "estimator",
-            "model",
-            "criterion",
-            "headway",
-            "runs",
-            "failures",
-            "probability",
-            "low",
-            "high",
-            "level",
-            "interval",
-            "draws_low",
-            "draws_high",
-            "failing_scenarios",
-            "relative_half_width",
-            "coefficient_of_variation",
-            "variance_reduction",
-            "ess",
-            "ess_failures",
-            "largest_weight_share",
-            "mean_weight",
-            "risk_per_hour",
-            "risk_per_hour_sd",
-            "risk_per_hour_low",
-            "risk_per_hour_high",
-            "risk_per_1000_km",
-            "risk_per_1000_km_sd",
-            "risk_per_1000_km_low",
-            "risk_per_1000_km_high",
-            "replayed_ratio",
-            "replayed_ratio_low",
-            "replayed_ratio_high",
-            "sampled_ratio",
-            "sampled_ratio_low",
-            "sampled_ratio_high",
-            "verdict",
-            "data",
+    pub fn csv(&self) -> String {
+        type Weight = fn(&WeightFigures) -> f64;
+        let weights: [(&str, Weight); 4] = [
+            ("ess", |w| w.effective_size),
+            ("ess_failures", |w| w.effective_size_failures),
+            ("largest_weight_share", |w| w.largest_share_failures),
+            ("mean_weight", |w| w.mean_weight),
         ];
-        let mut rows = vec![header.map(str::to_owned).to_vec()];
-        for row in &self.estimates {
-            let e = &row.estimate;
-            let weight = |f: fn(&crate::stats::estimate::WeightFigures) -> f64| e.weights.as_ref().map(f);
-            let rate = |r: Option<RiskRate>| {
-                [r.map(|r| r.estimate), r.map(|r| r.standard_deviation), r.map(|r| r.low), r.map(|r| r.high)]
-            };
-            let mut fields = vec![
-                self.density.category.to_owned(),
-                self.density.parameterization.clone(),
-                self.estimator.to_owned(),
-                row.model.name().to_owned(),
-                row.criterion.key().to_owned(),
-                row.headway.clone(),
-                e.runs.to_string(),
-                e.failures.to_string(),
-            ];
-            let numbers = [Some(e.probability), Some(e.interval.low), Some(e.interval.high), Some(e.interval.level)];
-            fields.extend(numbers.map(number));
-            fields.push(kind_name(e.interval.kind).to_owned());
-            fields.extend([Some(row.draws[0]), Some(row.draws[1]), row.failing_scenarios].map(number));
-            let numbers = [
-                Some(e.relative_half_width),
-                Some(e.coefficient_of_variation),
-                Some(e.variance_reduction),
-                weight(|w| w.effective_size),
-                weight(|w| w.effective_size_failures),
-                weight(|w| w.largest_share_failures),
-                weight(|w| w.mean_weight),
-            ];
-            fields.extend(numbers.map(number));
-            fields.extend(rate(row.risk.per_hour).map(number));
-            fields.extend(rate(row.risk.per_1000_km).map(number));
-            let of = |r: Option<Ratio>| r.map_or([None; 3], |r| [r.ratio, r.low, r.high]);
-            fields.extend(of(row.recorded.map(|recorded| recorded.replayed)).map(number));
-            fields.extend(of(row.recorded.and_then(|recorded| recorded.sampled)).map(number));
-            fields.push(e.trust.verdict().to_string());
-            fields.push(self.density.provenance.data.clone());
-            rows.push(fields);
-        }
-        super::csv::text(rows)
+        type Pick = fn(RiskRate) -> f64;
+        let risks: [(&str, Pick); 4] =
+            [("", |r| r.estimate), ("_sd", |r| r.standard_deviation), ("_low", |r| r.low), ("_high", |r| r.high)];
+        type End = fn(Ratio) -> Option<f64>;
+        let ends: [(&str, End); 3] = [("", |r| r.ratio), ("_low", |r| r.low), ("_high", |r| r.high)];
+        let replayed = |row: &EstimateRow| row.recorded.map(|recorded| recorded.replayed);
+        let sampled = |row: &EstimateRow| row.recorded.and_then(|recorded| recorded.sampled);
+        let per_hour = |row: &EstimateRow| row.risk.per_hour;
+        let per_1000_km = |row: &EstimateRow| row.risk.per_1000_km;
+        let [hour, kilometres] = ["risk_per_hour", "risk_per_1000_km"];
+        Table::of(&self.estimates)
+            .column("category", |_| self.density.category)
+            .column("parameterization", |_| self.density.parameterization.as_str())
+            .column("estimator", |_| self.estimator)
+            .column("model", |row| row.model.name())
+            .column("criterion", |row| row.criterion.key())
+            .column("headway", |row| row.headway.as_str())
+            .column("runs", |row| row.estimate.runs)
+            .column("failures", |row| row.estimate.failures)
+            .column("probability", |row| finite(row.estimate.probability))
+            .column("low", |row| finite(row.estimate.interval.low))
+            .column("high", |row| finite(row.estimate.interval.high))
+            .column("level", |row| finite(row.estimate.interval.level))
+            .column("interval", |row| kind_name(row.estimate.interval.kind))
+            .column("draws_low", |row| finite(row.draws[0]))
+            .column("draws_high", |row| finite(row.draws[1]))
+            .column("failing_scenarios", |row| row.failing_scenarios.and_then(finite))
+            .column("relative_half_width", |row| finite(row.estimate.relative_half_width))
+            .column("coefficient_of_variation", |row| finite(row.estimate.coefficient_of_variation))
+            .column("variance_reduction", |row| finite(row.estimate.variance_reduction))
+            .columns(
+                weights,
+                |(name, _)| name,
+                |row, (_, of)| row.estimate.weights.as_ref().and_then(|w| finite(of(w))),
+            )
+            .columns(risks, |(end, _)| format!("{hour}{end}"), |row, (_, of)| per_hour(row).and_then(|r| finite(of(r))))
+            .columns(
+                risks,
+                |(end, _)| format!("{kilometres}{end}"),
+                |row, (_, of)| per_1000_km(row).and_then(|r| finite(of(r))),
+            )
+            .columns(
+                ends,
+                |(end, _)| format!("replayed_ratio{end}"),
+                |row, (_, of)| replayed(row).and_then(of).and_then(finite),
+            )
+            .columns(
+                ends,
+                |(end, _)| format!("sampled_ratio{end}"),
+                |row, (_, of)| sampled(row).and_then(of).and_then(finite),
+            )
+            .column("verdict", |row| row.estimate.trust.verdict().to_string())
+            .column("data", |_| self.density.provenance.data.as_str())
+            .build()
+            .csv()
     }
 }
 
-const CONVERGENCE: [&str; 9] = [
-    "samples",
-    "model",
-    "criterion",
-    "probability",
-    "low",
-    "high",
-    "low_with_data",
-    "high_with_data",
-    "failing_scenarios",
-];
-
 /// `convergence.csv`.
-///
-/// # Errors
-/// None for what this program made.
-pub fn convergence_csv(checkpoints: &[Checkpoint]) -> Result<Vec<u8>> {
-    let mut rows = vec![CONVERGENCE.map(str::to_owned).to_vec()];
-    for checkpoint in checkpoints {
-        for row in &checkpoint.rows {
-            let [low, high] = [0, 1].map(|end: usize| row.with_data.map(|(ends, _)| ends[end]));
-            let mut fields = vec![checkpoint.samples.to_string(), row.model.name().to_owned()];
-            fields.push(row.criterion.key().to_owned());
-            fields.extend([row.probability, row.interval[0], row.interval[1]].map(|v| v.to_string()));
-            fields.extend([low, high, row.with_data.map(|(_, scenarios)| scenarios)].map(number));
-            rows.push(fields);
-        }
-    }
-    super::csv::text(rows)
+pub fn convergence_csv(checkpoints: &[Checkpoint]) -> String {
+    let rows = checkpoints.iter().flat_map(|of| of.rows.iter().map(move |row| (of.samples, row)));
+    Table::of(rows)
+        .column("samples", |(samples, _)| samples)
+        .column("model", |(_, row)| row.model.name())
+        .column("criterion", |(_, row)| row.criterion.key())
+        .column("probability", |(_, row)| row.probability)
+        .column("low", |(_, row)| row.interval[0])
+        .column("high", |(_, row)| row.interval[1])
+        .column("low_with_data", |(_, row)| row.with_data.and_then(|(ends, _)| finite(ends[0])))
+        .column("high_with_data", |(_, row)| row.with_data.and_then(|(ends, _)| finite(ends[1])))
+        .column("failing_scenarios", |(_, row)| row.with_data.and_then(|(_, scenarios)| finite(scenarios)))
+        .build()
+        .csv()
 }
 
 /// One of the worst lanes, with what it was.
@@ -152,50 +115,29 @@ pub struct WorstRow {
 }
 
 /// `worst.csv`: the lanes with the smallest limit state of `criterion`, rerunnable by key.
-///
-/// # Errors
-/// None for what this program made.
-pub fn worst_csv(rows: &[WorstRow], parameters: &[String], criterion: Criterion) -> Result<Vec<u8>> {
-    let mut header: Vec<String> =
-        ["model", "rank", "lane", "sample", "headway", "criterion", "limit_state"].map(str::to_owned).to_vec();
-    header.extend(
-        [
-            "collision",
-            "ttc",
-            "btn",
-            "min_ttc_s",
-            "max_btn",
-            "min_gap_m",
-            "impact_speed_mps",
-            "impact_closing_speed_mps",
-        ]
-        .map(str::to_owned),
-    );
-    header.extend(parameters.iter().cloned());
-    let mut table = vec![header];
-    for row in rows {
-        let o = &row.outcome;
-        let mut fields = vec![
-            row.model.name().to_owned(),
-            row.rank.to_string(),
-            row.key.clone(),
-            row.sample.to_string(),
-            row.headway.clone(),
-            criterion.key().to_owned(),
-            row.lane.value.to_string(),
-        ];
-        fields.extend(Criterion::ALL.map(|c| u8::from(o.verdicts.failed(c)).to_string()));
-        let at_contact = |v: f64| (o.contact_step != NO_STEP).then_some(v);
-        fields.extend([o.min_ttc, o.max_btn, o.min_gap].map(|v| number(Some(v))));
-        fields.extend([o.impact_speed, o.impact_closing_speed].map(|v| number(at_contact(v))));
-        fields.extend(row.point.iter().map(f64::to_string));
-        table.push(fields);
-    }
-    super::csv::text(table)
+pub fn worst_csv(rows: &[WorstRow], parameters: &[String], criterion: Criterion) -> String {
+    let at_contact = |row: &WorstRow, v: f64| finite(v).filter(|_| row.outcome.contact_step != NO_STEP);
+    Table::of(rows)
+        .column("model", |row| row.model.name())
+        .column("rank", |row| row.rank)
+        .column("lane", |row| row.key.as_str())
+        .column("sample", |row| row.sample)
+        .column("headway", |row| row.headway.as_str())
+        .column("criterion", |_| criterion.key())
+        .column("limit_state", |row| row.lane.value)
+        .columns(Criterion::ALL, |of| of.key(), |row, of| u8::from(row.outcome.verdicts.failed(of)))
+        .column("min_ttc_s", |row| finite(row.outcome.min_ttc))
+        .column("max_btn", |row| finite(row.outcome.max_btn))
+        .column("min_gap_m", |row| finite(row.outcome.min_gap))
+        .column("impact_speed_mps", |row| at_contact(row, row.outcome.impact_speed))
+        .column("impact_closing_speed_mps", |row| at_contact(row, row.outcome.impact_closing_speed))
+        .columns(parameters.iter().enumerate(), |(_, name)| name.clone(), |row, (at, _)| row.point[at])
+        .build()
+        .csv()
 }
 
-fn number(value: Option<f64>) -> String {
-    value.filter(|v| v.is_finite()).map_or(String::new(), |v| v.to_string())
+fn finite(value: f64) -> Option<f64> {
+    Some(value).filter(|v| v.is_finite())
 }
 
 fn kind_name(kind: IntervalKind) -> &'static str {

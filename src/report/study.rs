@@ -9,7 +9,7 @@ use super::run_record::{RunRecord, StudyHost};
 use super::study_figures::{
     HeadwayFailures, distributions, f1_by_parameters, legend_name, modes, recall_and_precision,
 };
-use super::{csv, tables};
+use super::tables;
 use crate::Result;
 use crate::engine::{CLOSE_HEADWAY_S, Headway, Partial};
 use crate::model::criterion::Criterion;
@@ -23,6 +23,7 @@ use crate::run::study::{CategoryFacts, ParameterHistogram, Study};
 use crate::scenario::Category;
 use crate::scenario::parameterization::{ModeShape, Parameterization};
 use crate::support::run_dir::Results;
+use crate::support::table::Table;
 use serde_json::Value;
 
 /// What the figures of one category need beside the scores.
@@ -135,16 +136,16 @@ impl StudyReport {
     /// [`crate::Error::Io`].
     pub fn write(&mut self, mut results: Results) -> Result<()> {
         let data = if self.run.synthetic { "synthetic" } else { "recorded" };
-        results.add("failures.csv", csv::failures(&self.scores, data)?.csv().as_bytes())?;
-        results.add("f1.csv", csv::f1_scores(&self.scores, data).csv().as_bytes())?;
-        results.add("claims.csv", csv::claims(&self.claims, data).csv().as_bytes())?;
+        results.add("failures.csv", tables::failure_records(&self.scores, data)?.csv().as_bytes())?;
+        results.add("f1.csv", tables::f1_records(&self.scores, data).csv().as_bytes())?;
+        results.add("claims.csv", tables::claim_records(&self.claims, data).csv().as_bytes())?;
         results.add("report.txt", self.text(tables::WIDTH).as_bytes())?;
-        results.add("headways.csv", &self.headways(data)?)?;
+        results.add("headways.csv", self.headways(data).csv().as_bytes())?;
         for (at, category) in self.scores.categories.iter().enumerate() {
             results.add(&file_name("radar", category.category, "svg"), self.radar(category).as_bytes())?;
             for (name, figure) in self.figures(at) {
                 results.add(&file_name(name, category.category, "svg"), figure.svg().as_bytes())?;
-                results.add(&file_name(name, category.category, "csv"), &figure.csv()?)?;
+                results.add(&file_name(name, category.category, "csv"), figure.csv().as_bytes())?;
             }
         }
         if let Some(comparison) = &self.comparison {
@@ -195,13 +196,23 @@ impl StudyReport {
     }
 
     /// Failures of every variant by headway.
-    fn headways(&self, data: &str) -> Result<Vec<u8>> {
-        let header = ["category", "variant", "headway", "model", "criterion", "failures", "scenarios", "data"];
-        let mut rows = vec![header.map(str::to_owned).to_vec()];
-        for (scores, pictures) in self.scores.categories.iter().zip(&self.pictures) {
-            rows.extend(pictures.headways.rows(scores, data));
-        }
-        csv::text(rows)
+    fn headways(&self, data: &str) -> Table {
+        let rows = self
+            .scores
+            .categories
+            .iter()
+            .zip(&self.pictures)
+            .flat_map(|(scores, pictures)| pictures.headways.rows().map(move |row| (scores, row)));
+        Table::of(rows)
+            .column("category", |(scores, _)| scores.category.key())
+            .column("variant", |(_, row)| row.variant)
+            .column("headway", |(_, row)| row.headway.to_string())
+            .column("model", |(_, row)| row.model.name())
+            .column("criterion", |(_, row)| row.criterion.key())
+            .column("failures", |(_, row)| row.failures)
+            .column("scenarios", |(scores, _)| scores.scenarios)
+            .column("data", |_| data)
+            .build()
     }
 }
 
@@ -223,9 +234,9 @@ impl StudyReport {
             "plan_sha256": self.run.plan_sha256,
             "lanes": self.run.lanes,
             "left_out": self.run.left_out,
-            "failures": csv::failures(&self.scores, "")?.records(),
-            "f1": csv::f1_scores(&self.scores, "").records(),
-            "claims": csv::claims(&self.claims, "").records(),
+            "failures": tables::failure_records(&self.scores, "")?.records(),
+            "f1": tables::f1_records(&self.scores, "").records(),
+            "claims": tables::claim_records(&self.claims, "").records(),
         });
         value["best"] = self.best.iter().map(best).collect();
         let close = self.scores.categories.iter().zip(&self.pictures).map(|(scores, pictures)| {

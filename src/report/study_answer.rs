@@ -2,9 +2,10 @@
 //! does not tell.
 
 use super::study::StudyReport;
-use super::tables::{fitted, wrap};
+use super::tables::wrap;
 use crate::run::score::Best;
 use crate::support::readable::{count, count_of, counted};
+use crate::support::table::{NumberText, Table};
 
 /// Columns of the screen, and of a narrower one at least.
 const WIDTH: usize = 80;
@@ -76,8 +77,12 @@ impl StudyReport {
         };
         let mut lines: Vec<String> = std::iter::once(&header).chain(&known).map(line).collect();
         if lines.iter().any(|line| line.chars().count() > screen) {
-            let rows: Vec<Vec<String>> = known.iter().map(|row| row.to_vec()).collect();
-            lines = fitted(&header, &rows, (2, 4), screen).lines().map(str::to_owned).collect();
+            let table = Table::of(&known).columns(0..4, |at| HEADER[at], |row, at| row[at].as_str()).columns(
+                4..7,
+                |at| HEADER[at],
+                |row, at| NumberText(row[at].clone()),
+            );
+            lines = table.build().fitted(2, screen).lines().map(str::to_owned).collect();
         }
         let more = self.best.len().saturating_sub(MAX_ROWS);
         if more > 0 {

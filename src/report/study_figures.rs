@@ -22,6 +22,16 @@ pub struct HeadwayFailures {
     failures: Vec<u64>,
 }
 
+/// Failures of a variant at a headway.
+#[derive(Clone, Copy)]
+pub(super) struct HeadwayRow<'a> {
+    pub variant: &'a str,
+    pub headway: Headway,
+    pub model: ModelId,
+    pub criterion: Criterion,
+    pub failures: u64,
+}
+
 impl HeadwayFailures {
     /// Of a block of a plan.
     ///
@@ -53,28 +63,16 @@ impl HeadwayFailures {
         self.failures[lane * Criterion::ALL.len() + criterion.index()]
     }
 
-    /// One row per variant, headway, model and criterion.
-    pub fn rows(&self, scores: &CategoryScores, data: &str) -> Vec<Vec<String>> {
-        let mut rows = Vec::new();
-        for (variant, name) in self.variants.iter().enumerate() {
-            for (at, headway) in self.headways.iter().enumerate() {
-                for (model, id) in self.models.iter().enumerate() {
-                    for criterion in Criterion::ALL {
-                        rows.push(vec![
-                            scores.category.key().to_owned(),
-                            name.clone(),
-                            headway.to_string(),
-                            id.name().to_owned(),
-                            criterion.key().to_owned(),
-                            self.count((variant, at, model, criterion)).to_string(),
-                            scores.scenarios.to_string(),
-                            data.to_owned(),
-                        ]);
-                    }
-                }
-            }
-        }
-        rows
+    /// Per variant, headway, model and criterion, in this order.
+    pub(super) fn rows(&self) -> impl Iterator<Item = HeadwayRow<'_>> {
+        let lanes = self.variants.iter().flat_map(move |variant| {
+            let starts = self.headways.iter().map(move |&headway| (variant, headway));
+            starts.flat_map(|(variant, headway)| self.models.iter().map(move |&model| (variant, headway, model)))
+        });
+        lanes.zip(self.failures.chunks(Criterion::ALL.len())).flat_map(|((variant, headway, model), failures)| {
+            let row = move |(criterion, &failures)| HeadwayRow { variant, headway, model, criterion, failures };
+            Criterion::ALL.into_iter().zip(failures).map(row)
+        })
     }
 
     /// Share of the recorded scenarios that fail, over the headway: a panel per model, a line per criterion.

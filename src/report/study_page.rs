@@ -1,15 +1,15 @@
 //! A study as one page.
 
-use super::html::{Page, PageFigure, PageTable, Section};
+use super::html::{Page, PageFigure, Section};
 use super::reference::ReferenceComparison;
 use super::run_record::Timings;
 use super::study::{StudyReport, file_name};
 use super::tables;
-use crate::model::criterion::Criterion;
-use crate::run::score::{CategoryScores, ClaimVerdict, Misfit, precision, recall};
+use crate::run::score::{CategoryScores, ClaimVerdict, Misfit};
 use crate::scenario::Category;
 use crate::scenario::parameterization::Parameterization;
 use crate::support::readable::{count, value};
+use crate::support::table::Table;
 use crate::traffic::mining::RecordingSummary;
 use crate::{Error, Result};
 
@@ -60,14 +60,16 @@ impl StudyReport {
 
     fn data(&self) -> Section {
         let run = &self.run;
-        let header = ["scenario", "found", "simulated", "lanes", "ended at the time cap", "F1 undefined (0/0)"];
-        let rows = run.categories.iter().map(|category| {
-            let numbers = [category.found, category.kept, category.lanes, category.capped_lanes, category.undefined_f1];
-            let key = category.category;
-            let label = Category::ALL.into_iter().find(|c| c.key() == key).map_or(key, Category::label);
-            [label.to_owned()].into_iter().chain(numbers.map(count)).collect()
-        });
-        let counts = table("Mined scenarios, and what became of them", &header, 1, rows.collect());
+        let label = |key| Category::ALL.into_iter().find(|c| c.key() == key).map_or(key, Category::label);
+        let counts = Table::of(&run.categories)
+            .column("scenario", |category| label(category.category))
+            .column("found", |category| category.found)
+            .column("simulated", |category| category.kept)
+            .column("lanes", |category| category.lanes)
+            .column("ended at the time cap", |category| category.capped_lanes)
+            .column("F1 undefined (0/0)", |category| category.undefined_f1)
+            .build()
+            .captioned("Mined scenarios, and what became of them");
         let shown = run.recordings.iter().take(MAX_RECORDINGS);
         let line = |recording: &RecordingSummary| {
             let files = recording.files.iter().map(|file| format!("\n  {} {}", file.sha256, file.file));
@@ -94,11 +96,7 @@ impl StudyReport {
     }
 
     fn failures(&self) -> Section {
-        let mut header = vec!["scenario", "model", "collision", "TTC", "BTN", "simulations", "at the time cap"];
-        if self.published {
-            header.extend(tables::PUBLISHED_COLUMNS);
-        }
-        let rows = tables::failure_rows(&self.scores, self.published);
+        let table = tables::failure_table(&self.scores, self.published, "at the time cap");
         Section {
             intro: [
                 "How often each driver model fails each criterion when the recorded motions of the others are replayed \
@@ -109,7 +107,7 @@ impl StudyReport {
             .chain(Misfit::of(&self.scores).filter(|_| self.published).map(|misfit| misfit.sentence()))
             .collect::<Vec<_>>()
             .join(" "),
-            tables: vec![table("Failed simulations of S", &header, 2, rows)],
+            tables: vec![table.captioned("Failed simulations of S")],
             ..Section::new("failures", "Failures of the recorded scenarios")
         }
     }
@@ -122,6 +120,7 @@ impl StudyReport {
             figures.push(PageFigure::new(&drawn.svg(), &[&name(figure, "svg"), &name(figure, "csv")]));
         }
         let key = scores.category.key().replace('_', "-");
+        let level = value(100.0 * self.scores.options.confidence);
         Section {
             id: key,
             title: format!("{}: agreement of S' with S", scores.category.label()),
@@ -131,32 +130,29 @@ impl StudyReport {
                  undefined, because neither side fails.",
                 scores.scenarios, scores.simulations
             ),
-            tables: vec![self.f1_table(scores), shares_table(scores), variants_table(scores)],
+            tables: vec![
+                tables::f1_scores(scores, self.published, "S fails")
+                    .captioned(format!("F1 with its {level} % interval over scenarios")),
+                tables::share_table(scores).captioned("Recall / precision"),
+                variants_table(scores),
+            ],
             figures,
             ..Section::default()
         }
     }
 
-    fn f1_table(&self, scores: &CategoryScores) -> PageTable {
-        let mut header = vec!["model".to_owned(), "criterion".to_owned(), "S fails".to_owned()];
-        header.extend(scores.variants.iter().skip(1).cloned());
-        let rows = tables::f1_rows(scores, self.published);
-        let level = value(100.0 * self.scores.options.confidence);
-        PageTable { caption: format!("F1 with its {level} % interval over scenarios"), header, texts: 2, rows }
-    }
-
     /// `None` where no claim could be computed: of a single model, say.
     fn claims(&self) -> Option<Section> {
-        let rows = tables::claim_rows(&self.claims);
+        let table = tables::claim_table(&self.claims, usize::MAX);
         let level = value(100.0 * self.scores.options.confidence);
-        (!rows.is_empty()).then(|| Section {
+        (!table.rows.is_empty()).then(|| Section {
             intro: format!(
                 "What de Gelder and Op den Camp found on highD, tested here. A cell holds or contradicts a claim where \
                  the {level} % interval of its difference over scenarios excludes 0. {} Mean difference: over the \
                  cells that are judged. File: claims.csv.",
                 ClaimVerdict::RULE
             ),
-            tables: vec![table("Claims", &tables::CLAIM_COLUMNS, 2, rows)],
+            tables: vec![table.captioned("Claims")],
             ..Section::new("claims", "The paper's claims on this data")
         })
     }
@@ -210,47 +206,21 @@ impl StudyReport {
     }
 }
 
-fn shares_table(scores: &CategoryScores) -> PageTable {
-    let mut header = vec!["model".to_owned(), "criterion".to_owned()];
-    header.extend(scores.variants.iter().skip(1).cloned());
-    let share = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.3}"));
-    let mut rows = Vec::new();
-    for &model in &scores.models {
-        for criterion in Criterion::ALL {
-            let mut row = vec![model.name().to_owned(), criterion.label().to_owned()];
-            for variant in 1..scores.variants.len() {
-                let counts = scores.index(variant, model, criterion).map(|i| scores.cells[i].counts);
-                let both = |c| format!("{} / {}", share(recall(&c)), share(precision(&c)));
-                row.push(counts.map_or("-".to_owned(), both));
-            }
-            rows.push(row);
-        }
-    }
-    PageTable { caption: "Recall / precision".to_owned(), header, texts: 2, rows }
-}
-
-fn variants_table(scores: &CategoryScores) -> PageTable {
+fn variants_table(scores: &CategoryScores) -> Table {
     let known = scores.variants.iter().skip(1).filter_map(|key| Parameterization::find(scores.category, key));
-    let rows = known.map(|id| {
-        vec![id.key.to_string(), id.description(), id.family.name().to_owned(), id.parameter_count().to_string()]
-    });
-    let header = ["parameterization", "what is kept", "kind", "parameters beside the headway"];
-    table("Parameterizations", &header, 3, rows.collect())
+    Table::of(&known.collect::<Vec<_>>())
+        .column("parameterization", |id| id.key.to_string())
+        .column("what is kept", |id| id.description())
+        .column("kind", |id| id.family.name())
+        .column("parameters beside the headway", |id| id.parameter_count())
+        .build()
+        .captioned("Parameterizations")
 }
 
 fn compared(comparison: &ReferenceComparison) -> Section {
     Section {
         details: vec![("Every lane in f32 and in f64".to_owned(), comparison.text())],
         ..Section::new("reference", "Lane arithmetic against double precision")
-    }
-}
-
-fn table(caption: &str, header: &[&str], texts: usize, rows: Vec<Vec<String>>) -> PageTable {
-    PageTable {
-        caption: caption.to_owned(),
-        header: header.iter().map(|name| (*name).to_owned()).collect(),
-        texts,
-        rows,
     }
 }
 

@@ -1,186 +1,100 @@
-//! Tables for the terminal, as plain text.
-
-use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Table, Width, presets};
+//! The tables of a study: for people as the paper has them, for files with one row per number.
 
 use crate::model::criterion::Criterion;
 use crate::run::score::{
-    CategoryScores, ClaimResult, ClaimRow, ClaimVerdict, Misfit, PublishedFailures, ScoreInterval, ScoreTable, f1,
-    published_failures, published_lvd_f1,
+    CategoryScores, ClaimResult, ClaimVerdict, Misfit, PublishedFailures, ScoreCell, ScoreInterval, ScoreTable, f1,
+    precision, published_failures, published_lvd_f1, recall,
 };
+use crate::scenario::parameterization::Parameterization;
 use crate::support::readable;
+pub(crate) use crate::support::table::WIDTH;
+use crate::support::table::{Column, Digits, NumberText, Table};
+use crate::{Error, Result};
 
-/// Columns that every table fits in where no terminal says how wide it is.
-pub(crate) const WIDTH: usize = 120;
-
-/// A blank at which no line is broken.
-const NO_BREAK: char = '\u{a0}';
-
-/// An empty table that breaks its cells rather than the terminal's lines.
-pub(super) fn table(header: Vec<String>) -> Table {
-    let mut table = Table::new();
-    table.load_style(presets::ASCII_MARKDOWN);
-    table.set_content_arrangement(ContentArrangement::Dynamic).set_width(WIDTH as u16).set_header(header);
-    table
-}
-
-/// Numbers to the right, the first `texts` columns to the left. No word and no number is broken: the table is rather wider
-/// than it was set.
-pub(super) fn aligned(mut table: Table, texts: usize) -> String {
-    let widths = column_widths(&table);
-    for (column, width) in table.column_iter_mut().zip(widths) {
-        // With a space on either side.
-        column.set_constraint(ColumnConstraint::Absolute(Width::Fixed(width as u16 + 2)));
-    }
-    for (at, column) in table.column_iter_mut().enumerate() {
-        column.set_cell_alignment(if at < texts { CellAlignment::Left } else { CellAlignment::Right });
-    }
-    format!("{table}\n")
-}
-
-/// Widths of the columns' texts: each holds its longest word, and columns with longer lines share what is left of the
-/// table's width.
-fn column_widths(table: &Table) -> Vec<usize> {
-    let mut sizes: Vec<[usize; 2]> = Vec::new();
-    for row in table.header().into_iter().chain(table.row_iter()) {
-        for (at, cell) in row.cell_iter().enumerate() {
-            sizes.resize(sizes.len().max(at + 1), [0; 2]);
-            let text = cell.content();
-            let longest =
-                |parts: &mut dyn Iterator<Item = &str>| parts.map(|part| part.chars().count()).max().unwrap_or(0);
-            let [word, line] = &mut sizes[at];
-            *word = longest(&mut text.split_ascii_whitespace()).max(*word);
-            *line = longest(&mut text.lines()).max(*line);
-        }
-    }
-    let words: usize = sizes.iter().map(|[word, _]| word).sum();
-    let wanted: usize = sizes.iter().map(|[word, line]| line - word).sum();
-    let width = table.width().map_or(WIDTH, usize::from);
-    let left = wanted.min(width.saturating_sub(3 * sizes.len() + 1 + words));
-    sizes.iter().map(|[word, line]| word + (line - word) * left / wanted.max(1)).collect()
-}
-
-/// A table within so many columns of the terminal, its first `texts` columns to the left. Where it is too wide it becomes
-/// several, each with the first `keys` columns, so that no number and no interval is broken.
-pub(super) fn fitted(header: &[String], rows: &[Vec<String>], (keys, texts): (usize, usize), width: usize) -> String {
-    let lines = |at: usize| {
-        let cells = std::iter::once(header).chain(rows.iter().map(Vec::as_slice)).filter_map(move |row| row.get(at));
-        cells.flat_map(|cell| cell.lines()).map(|line| line.chars().count())
-    };
-    // With the bars and spaces of the style.
-    let column = |at: usize| lines(at).max().unwrap_or(0) + 3;
-    let fixed: usize = 1 + (0..keys).map(column).sum::<usize>();
-    let (mut parts, mut used) = (vec![(0..keys).collect::<Vec<usize>>()], fixed);
-    for at in keys..header.len() {
-        let last = parts.len() - 1;
-        if used + column(at) > width && parts[last].len() > keys {
-            (used, _) = (fixed, parts.push((0..keys).collect()));
-        }
-        used += column(at);
-        let last = parts.len() - 1;
-        parts[last].push(at);
-    }
-    // Nothing is broken within brackets, and no table is narrower than its words.
-    let held = |cell: &String| {
-        let mut depth = 0;
-        let hold = |c: char| {
-            depth += i32::from(c == '[') - i32::from(c == ']');
-            if c == ' ' && depth > 0 { NO_BREAK } else { c }
-        };
-        cell.chars().map(hold).collect::<String>()
-    };
-    let longest = |at: usize| {
-        let cells = std::iter::once(header).chain(rows.iter().map(Vec::as_slice)).filter_map(|row| row.get(at));
-        let words = |cell: &String| held(cell).split([' ', '\n']).map(|word| word.chars().count()).max();
-        cells.filter_map(words).max().unwrap_or(0) + 3
-    };
-    let text = |columns: &Vec<usize>| {
-        let of =
-            |row: &[String]| columns.iter().map(|&at| row.get(at).map(held).unwrap_or_default()).collect::<Vec<_>>();
-        let mut table = table(of(header));
-        let least = fixed + columns.iter().skip(keys).map(|at| longest(*at)).sum::<usize>();
-        table.set_width(width.max(least) as u16);
-        for row in rows {
-            table.add_row(of(row));
-        }
-        aligned(table, columns.iter().filter(|at| **at < texts).count()).replace(NO_BREAK, " ")
-    };
-    parts.iter().map(text).collect::<Vec<_>>().join("\n")
-}
-
-/// Failures of S per category, model and criterion, as in the paper's table; where asked, the shares beside the
-/// published ones, with the misfit.
+/// [`failure_table`] with its heading and the misfit.
 pub fn failures(scores: &ScoreTable, published: bool, width: usize) -> String {
-    let mut header: Vec<String> = ["scenario", "model"].map(str::to_owned).to_vec();
-    header.extend(["collision", "TTC", "BTN", "simulations", "capped"].map(str::to_owned));
-    if published {
-        header.extend(PUBLISHED_COLUMNS.map(str::to_owned));
-    }
     let misfit = Misfit::of(scores).filter(|_| published).map(|misfit| wrap(&misfit.sentence(), width) + "\n");
-    let table = fitted(&header, &failure_rows(scores, published), (2, 2), width);
+    let table = failure_table(scores, published, "capped").fitted(2, width);
     format!("Failures of the recorded scenarios (S)\n{table}{}", misfit.unwrap_or_default())
 }
 
-/// Columns of [`failures`] with the published numbers: collision, TTC and BTN.
-pub(super) const PUBLISHED_COLUMNS: [&str; 2] = ["share, %", "published, %"];
-
-/// The rows of [`failures`].
-pub(super) fn failure_rows(scores: &ScoreTable, published: bool) -> Vec<Vec<String>> {
-    let mut rows = Vec::new();
-    for category in &scores.categories {
-        for (at, &model) in category.models.iter().enumerate() {
-            let count = |c: Criterion| category.index(0, model, c).map_or(0, |i| category.cells[i].counts.tp);
-            let mut row = vec![category.category.label().to_owned(), model.name().to_owned()];
-            row.extend(Criterion::ALL.map(|c| readable::count(count(c))));
-            row.extend([category.simulations, category.capped[at]].map(readable::count));
-            if published {
-                let ours = |c| 100.0 * count(c) as f64 / category.simulations as f64;
-                let theirs = |c| published_failures(category.category, model, c).map(PublishedFailures::percent);
-                let shares = |percent: &dyn Fn(Criterion) -> Option<f64>| {
-                    let text = |c| percent(c).map_or_else(|| "-".to_owned(), |percent| format!("{percent:.1}"));
-                    Criterion::ALL.map(text).join("  ")
-                };
-                row.extend([shares(&|c| Some(ours(c))), shares(&theirs)]);
-            }
-            rows.push(row);
-        }
+/// Failures of S per category, model and criterion, as in the paper's table; where asked, the shares of collision, TTC and
+/// BTN beside the published ones.
+pub(super) fn failure_table(scores: &ScoreTable, published: bool, capped: &'static str) -> Table {
+    let rows = scores.categories.iter().flat_map(|c| (0..c.models.len()).map(move |at| (c, at, c.models[at])));
+    let failures =
+        |c: &CategoryScores, model, criterion| c.index(0, model, criterion).map_or(0, |cell| c.cells[cell].counts.tp);
+    let table = Table::of(rows)
+        .column("scenario", |(c, ..)| c.category.label())
+        .column("model", |(.., model)| model.name())
+        .columns(Criterion::ALL, |criterion| criterion.label(), |(c, _, model), of| failures(c, model, of))
+        .column("simulations", |(c, ..)| c.simulations)
+        .column(capped, |(c, at, _)| c.capped[at]);
+    if !published {
+        return table.build();
     }
-    rows
+    let shares = |percent: &dyn Fn(Criterion) -> Option<f64>| {
+        let text = |c| percent(c).map_or_else(|| "-".to_owned(), |percent| format!("{percent:.1}"));
+        NumberText(Criterion::ALL.map(text).join("  "))
+    };
+    table
+        .column("share, %", |(c, _, model)| {
+            shares(&|of| Some(100.0 * failures(c, model, of) as f64 / c.simulations as f64))
+        })
+        .column("published, %", |(c, _, model)| {
+            shares(&|of| published_failures(c.category, model, of).map(PublishedFailures::percent))
+        })
+        .build()
 }
 
-/// F1 per parameterization, model and criterion, with its interval.
+/// [`f1_scores`] with its heading.
 pub fn f1_table(scores: &CategoryScores, published: bool, width: usize) -> String {
-    let mut header = vec!["model".to_owned(), "criterion".to_owned(), "fails".to_owned()];
-    header.extend(scores.variants.iter().skip(1).cloned());
     let heading = format!(
         "{}: F1 of S' against S over {} scenarios, [interval]; - is undefined (0/0), [few]: S fails \
          in too few scenarios",
         scores.category.label(),
         readable::count(scores.scenarios)
     );
-    format!("{}\n{}", wrap(&heading, width), fitted(&header, &f1_rows(scores, published), (3, 2), width))
+    format!("{}\n{}", wrap(&heading, width), f1_scores(scores, published, "fails").fitted(3, width))
 }
 
-/// The rows of [`f1_table`].
-pub(super) fn f1_rows(scores: &CategoryScores, published: bool) -> Vec<Vec<String>> {
-    let mut rows = Vec::new();
-    for &model in &scores.models {
-        for criterion in Criterion::ALL {
-            let Some(s) = scores.index(0, model, criterion) else { continue };
-            let mut row = vec![model.name().to_owned(), criterion.label().to_owned()];
-            row.push(readable::count(scores.cells[s].counts.tp));
-            for variant in 1..scores.variants.len() {
-                let cell = scores.index(variant, model, criterion).map(|i| &scores.cells[i]);
-                let mut text = cell.map_or("-".to_owned(), |c| value(f1(&c.counts), c.f1_interval));
-                let theirs = published_lvd_f1(&scores.variants[variant], model, criterion);
-                if let Some(theirs) = theirs.filter(|_| published) {
-                    text += &format!("\npaper {theirs:.3}");
-                }
-                row.push(text);
-            }
-            rows.push(row);
-        }
-    }
-    rows
+/// F1 per parameterization, model and criterion, with its interval; `fails` is the name of the column with the failures
+/// of S.
+pub(super) fn f1_scores(scores: &CategoryScores, published: bool, fails: &'static str) -> Table {
+    let text = |s: &ScoreCell, variant: usize| {
+        let text = same(scores, s, variant).map_or("-".to_owned(), |c| value(f1(&c.counts), c.f1_interval));
+        let theirs = published_lvd_f1(&scores.variants[variant], s.model, s.criterion).filter(|_| published);
+        NumberText(text + &theirs.map_or(String::new(), |theirs| format!("\npaper {theirs:.3}")))
+    };
+    per_variant(scores, Some(fails), text)
+}
+
+/// Recall and precision per parameterization, model and criterion.
+pub(super) fn share_table(scores: &CategoryScores) -> Table {
+    let share = |value: Option<f64>| value.map_or("-".to_owned(), |v| format!("{v:.3}"));
+    per_variant(scores, None, |s, variant| {
+        let both = |c: &ScoreCell| format!("{} / {}", share(recall(&c.counts)), share(precision(&c.counts)));
+        NumberText(same(scores, s, variant).map_or("-".to_owned(), both))
+    })
+}
+
+/// A row per model and criterion, a column per parameterization, of the cells of S.
+fn per_variant(
+    scores: &CategoryScores,
+    fails: Option<&'static str>,
+    text: impl Fn(&ScoreCell, usize) -> NumberText,
+) -> Table {
+    Table::of(scores.cells.iter().filter(|cell| cell.variant == 0))
+        .column("model", |s| s.model.name())
+        .column("criterion", |s| s.criterion.label())
+        .columns(fails, |name| name, |s, _| s.counts.tp)
+        .columns(1..scores.variants.len(), |variant| scores.variants[variant].clone(), text)
+        .build()
+}
+
+/// The cell of a variant beside one of S.
+fn same<'a>(scores: &'a CategoryScores, s: &ScoreCell, variant: usize) -> Option<&'a ScoreCell> {
+    scores.index(variant, s.model, s.criterion).map(|at| &scores.cells[at])
 }
 
 fn value(value: Option<f64>, interval: Option<ScoreInterval>) -> String {
@@ -197,39 +111,123 @@ fn short(value: f64) -> String {
     text.strip_prefix('0').map_or_else(|| format!("{value:.1}"), str::to_owned)
 }
 
-/// The paper's claims with their numbers and verdicts, in a text; nothing where none could be computed.
+/// [`claim_table`] with its heading and rule; nothing where no claim could be computed.
 pub fn claims(results: &[ClaimResult], width: usize) -> String {
-    let mut rows = claim_rows(results);
-    if rows.is_empty() {
+    let table = claim_table(results, 34);
+    if table.rows.is_empty() {
         return String::new();
     }
-    rows.iter_mut().for_each(|row| row[1] = wrap(&row[1], 34));
-    format!(
-        "The paper's claims on this data\n{}{}\n",
-        fitted(&CLAIM_COLUMNS.map(str::to_owned), &rows, (1, 2), width),
-        wrap(ClaimVerdict::RULE, width)
-    )
+    let rule = wrap(ClaimVerdict::RULE, width);
+    format!("The paper's claims on this data\n{}{rule}\n", table.fitted(1, width))
 }
 
-/// Columns of [`claims`].
-pub(super) const CLAIM_COLUMNS: [&str; 6] =
-    ["claim", "the paper says", "failing\nscenarios", "mean\ndifference", "verdict", "cells"];
+/// The paper's claims with their numbers and verdicts, without those that could not be computed; statements in lines of
+/// so many characters.
+pub(super) fn claim_table(results: &[ClaimResult], width: usize) -> Table {
+    Table::of(results.iter().filter(|result| result.verdict != ClaimVerdict::NotRun))
+        .column("claim", |result| result.claim.id)
+        .column("the paper says", |result| wrap(result.claim.statement, width))
+        .column("failing\nscenarios", |result| result.failing_scenarios)
+        .column(Column::from("mean\ndifference").digits(Digits::Signed(3)).null("-"), |result| result.mean)
+        .column("verdict", |result| result.verdict.text())
+        .column("cells", |result| {
+            let count = |verdict| result.rows.iter().filter(|r| r.verdict == verdict).count();
+            let cells = ClaimVerdict::ALL.into_iter().filter(|verdict| count(*verdict) > 0);
+            cells.map(|verdict| format!("{} {}", count(verdict), verdict.text())).collect::<Vec<_>>().join("\n")
+        })
+        .build()
+}
 
-/// The rows of [`claims`], without those that could not be computed.
-pub(super) fn claim_rows(results: &[ClaimResult]) -> Vec<Vec<String>> {
-    let row = |result: &ClaimResult| {
-        let count = |verdict| result.rows.iter().filter(|r: &&ClaimRow| r.verdict == verdict).count();
-        let cells = ClaimVerdict::ALL.into_iter().filter(|verdict| count(*verdict) > 0);
-        vec![
-            result.claim.id.to_owned(),
-            result.claim.statement.to_owned(),
-            readable::count(result.failing_scenarios),
-            result.mean.map_or("-".to_owned(), |mean| format!("{mean:+.3}")),
-            result.verdict.text().to_owned(),
-            cells.map(|verdict| format!("{} {}", count(verdict), verdict.text())).collect::<Vec<_>>().join("\n"),
-        ]
-    };
-    results.iter().filter(|result| result.verdict != ClaimVerdict::NotRun).map(row).collect()
+/// Failures of S and S': one row per category, variant, model and criterion. `data` says what was swept.
+///
+/// # Errors
+/// [`Error::Internal`] where there are fewer counts of capped lanes than cells.
+pub fn failure_records(scores: &ScoreTable, data: &str) -> Result<Table> {
+    let mut rows = Vec::new();
+    for category in &scores.categories {
+        for (at, cell) in category.cells.iter().enumerate() {
+            // Cells are variant × model × criterion, these counts variant × model.
+            let capped = category.capped.get(at / Criterion::ALL.len()).ok_or_else(|| {
+                let what = format!("{} of {}", cell.model.name(), category.variants[cell.variant]);
+                Error::Internal(format!("no count of lanes at the time cap for {what}"))
+            })?;
+            rows.push((category, cell, *capped));
+        }
+    }
+    let failures = |cell: &ScoreCell| cell.counts.tp + if cell.variant == 0 { 0 } else { cell.counts.fp };
+    Ok(Table::of(rows)
+        .column("category", |(category, ..)| category.category.key())
+        .column("variant", |(category, cell, _)| category.variants[cell.variant].as_str())
+        .column("model", |(_, cell, _)| cell.model.name())
+        .column("criterion", |(_, cell, _)| cell.criterion.key())
+        .column("failures", |(_, cell, _)| failures(cell))
+        .column("simulations", |(category, ..)| category.simulations)
+        .column("capped", |(.., capped)| capped)
+        .column("data", |_| data)
+        .build())
+}
+
+/// Scores: one row per category, parameterization, model and criterion.
+pub fn f1_records(scores: &ScoreTable, data: &str) -> Table {
+    let rows = scores.categories.iter().flat_map(|category| {
+        let cells = category.cells.iter().filter(|cell| cell.variant > 0);
+        cells.map(|cell| (category.category, category.variants[cell.variant].as_str(), cell))
+    });
+    Table::of(rows)
+        .column("category", |(category, ..)| category.key())
+        .column("parameterization", |(_, name, _)| name)
+        .column("parameters", |(category, name, _)| {
+            Parameterization::find(category, name).map(|found| found.parameter_count())
+        })
+        .column("model", |(.., cell)| cell.model.name())
+        .column("criterion", |(.., cell)| cell.criterion.key())
+        .column("tp", |(.., cell)| cell.counts.tp)
+        .column("fn", |(.., cell)| cell.counts.fn_)
+        .column("fp", |(.., cell)| cell.counts.fp)
+        .column("tn", |(.., cell)| cell.counts.tn)
+        .column("recall", |(.., cell)| recall(&cell.counts))
+        .column("precision", |(.., cell)| precision(&cell.counts))
+        .column("f1", |(.., cell)| f1(&cell.counts))
+        .column("f1_low", |(.., cell)| cell.f1_interval.map(|interval| interval.low))
+        .column("f1_high", |(.., cell)| cell.f1_interval.map(|interval| interval.high))
+        .column("f1_no_interval", |(.., cell)| no_interval(cell))
+        .column("failing_scenarios", |(.., cell)| cell.failing_scenarios)
+        .column("data", |_| data)
+        .build()
+}
+
+/// Why F1 has no interval; empty where it has one.
+fn no_interval(cell: &ScoreCell) -> &'static str {
+    match (f1(&cell.counts), cell.f1_interval) {
+        (_, Some(_)) => "",
+        (None, None) => "undefined",
+        (Some(_), None) => "S fails in too few scenarios",
+    }
+}
+
+/// Claims: per claim one row over all cells (`model` and `criterion` empty), then one per cell.
+pub fn claim_records(results: &[ClaimResult], data: &str) -> Table {
+    let rows = results.iter().flat_map(|of| {
+        let all = (&of.claim, None, of.failing_scenarios, of.mean, None, of.verdict);
+        let cells = of
+            .rows
+            .iter()
+            .map(|row| (&of.claim, Some(row.cell), row.failing_scenarios, row.value, row.interval, row.verdict));
+        std::iter::once(all).chain(cells)
+    });
+    Table::of(rows)
+        .column("claim", |(claim, ..)| claim.id)
+        .column("category", |(claim, ..)| claim.category.key())
+        .column("statement", |(claim, ..)| claim.statement)
+        .column("model", |(_, cell, ..)| cell.map(|(model, _)| model.name()))
+        .column("criterion", |(_, cell, ..)| cell.map(|(_, criterion)| criterion.key()))
+        .column("failing_scenarios", |(_, _, failing, ..)| failing)
+        .column("difference", |(_, _, _, value, ..)| value)
+        .column("low", |(.., interval, _)| interval.map(|interval| interval.low))
+        .column("high", |(.., interval, _)| interval.map(|interval| interval.high))
+        .column("verdict", |(.., verdict)| verdict.text())
+        .column("data", |_| data)
+        .build()
 }
 
 /// The text broken between words; a longer word stays whole.
@@ -252,23 +250,41 @@ pub(crate) fn wrap(text: &str, width: usize) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::engine::{Confusion, Headway};
+    use crate::model::driver::ModelId;
+    use crate::run::score::ScoreOptions;
+    use crate::scenario::Category;
+
+    fn scores(capped: Vec<u64>) -> ScoreTable {
+        let cell = |model, criterion| {
+            let counts = Confusion::default();
+            ScoreCell { variant: 0, model, criterion, counts, f1_interval: None, failing_scenarios: 0 }
+        };
+        let models = [ModelId::Rss, ModelId::Fsm];
+        let scores = CategoryScores {
+            category: Category::Lvd,
+            scenarios: 1,
+            simulations: 10,
+            variants: vec!["S".to_owned()],
+            // One model that the cells have is not in the list.
+            models: vec![ModelId::Rss],
+            cells: models.into_iter().flat_map(|m| Criterion::ALL.map(|c| cell(m, c))).collect(),
+            capped,
+        };
+        ScoreTable { categories: vec![scores], headways: Headway::paper(), options: ScoreOptions::default() }
+    }
+
+    #[test]
+    fn no_model_gets_the_capped_lanes_of_another_one() {
+        let text = failure_records(&scores(vec![3, 8]), "synthetic").unwrap().csv();
+        assert!(text.contains("lvd,S,RSS,collision,0,10,3,") && text.contains("lvd,S,FSM,btn,0,10,8,"), "{text}");
+        let Err(error) = failure_records(&scores(vec![3]), "synthetic") else { panic!("a table") };
+        assert!(error.to_string().contains("FSM of S"), "{error}");
+    }
 
     #[test]
     fn short_numbers_have_three_characters() {
         assert_eq!([0.0, 0.8687, 0.9949, 0.9951, 1.0].map(short), [".00", ".87", ".99", "1.0", "1.0"]);
-    }
-
-    #[test]
-    fn a_table_that_is_too_wide_becomes_several_and_breaks_no_interval() {
-        let header: Vec<String> = ["model", "1", "2", "3", "4"].map(str::to_owned).to_vec();
-        let rows =
-            vec![["FSM", "0.5\n[.40 .60]", "0.6\n[.50 .70]", "0.7\n[.60 .80]", "0.8"].map(str::to_owned).to_vec()];
-        let one = fitted(&header, &rows, (1, 1), 60);
-        let two = fitted(&header, &rows, (1, 1), 35);
-        assert_eq!((one.matches("FSM").count(), two.matches("FSM").count()), (1, 2), "{two}");
-        for text in [one, two, fitted(&header, &rows, (1, 1), 20)] {
-            assert!(["[.40 .60]", "[.50 .70]", "[.60 .80]"].iter().all(|interval| text.contains(interval)), "{text}");
-        }
     }
 
     #[test]

@@ -2,34 +2,32 @@
 
 use std::fmt::Write;
 
-use super::tables::{aligned, table};
-use crate::engine::verify::{Comparison, WORDS};
+use crate::engine::verify::{Comparison, GroupComparison, WORDS};
 use crate::engine::{Outcome, words};
 use crate::model::criterion::Criterion;
 use crate::support::readable::{count, value};
+use crate::support::table::{NumberText, Table};
 
 /// One set of lanes: per category and model what was compared, and what differs.
 pub fn comparison(comparison: &Comparison) -> String {
-    let header =
-        ["scenario", "model", "lanes", "fail: coll %", "TTC %", "BTN %", "steps", "words ≠", "verdicts ≠", "f32≠f64"];
-    let mut rows = table(header.map(str::to_owned).to_vec());
-    let mut untested = Vec::new();
-    for tally in &comparison.tallies {
-        let share = |criterion: Criterion| {
-            let mark = if tally.tests(criterion) { "" } else { "*" };
-            format!("{:.1}{mark}", 100.0 * tally.share(criterion))
-        };
-        if Criterion::ALL.iter().any(|c| !tally.tests(*c)) {
-            untested.push(tally.model);
-        }
-        let mut row = vec![tally.category.label().to_owned(), tally.model.name().to_owned(), count(tally.lanes)];
-        row.extend(Criterion::ALL.map(share));
-        row.push(value(tally.steps as f64 / tally.lanes.max(1) as f64));
-        row.extend([tally.words_differing, tally.verdicts_differing, tally.reference_differing].map(count));
-        rows.add_row(row);
-    }
-    let mut text = format!("{} (plan {})\n{}", comparison.set, &comparison.plan_sha256[..12], aligned(rows, 2));
-    if !untested.is_empty() {
+    let share = |tally: &GroupComparison, criterion: Criterion| {
+        let mark = if tally.tests(criterion) { "" } else { "*" };
+        NumberText(format!("{:.1}{mark}", 100.0 * tally.share(criterion)))
+    };
+    let shares = [(Criterion::Collision, "fail: coll %"), (Criterion::Ttc, "TTC %"), (Criterion::Btn, "BTN %")];
+    let rows = Table::of(&comparison.tallies)
+        .column("scenario", |tally| tally.category.label())
+        .column("model", |tally| tally.model.name())
+        .column("lanes", |tally| tally.lanes)
+        .columns(shares, |(_, name)| name, |tally, (criterion, _)| share(tally, criterion))
+        .column("steps", |tally| tally.steps as f64 / tally.lanes.max(1) as f64)
+        .column("words ≠", |tally| tally.words_differing)
+        .column("verdicts ≠", |tally| tally.verdicts_differing)
+        .column("f32≠f64", |tally| tally.reference_differing)
+        .build();
+    let mut text = format!("{} (plan {})\n{}", comparison.set, &comparison.plan_sha256[..12], rows.text());
+    let is_tested = |tally: &GroupComparison| Criterion::ALL.iter().all(|criterion| tally.tests(*criterion));
+    if !comparison.tallies.iter().all(is_tested) {
         text += "* outside 5–95 %: these lanes hardly test this criterion\n";
     }
     if comparison.modes_differing > 0 {
@@ -75,15 +73,14 @@ pub fn record(comparison: &Comparison) -> serde_json::Value {
 
 /// One lane's words on each backend, side by side.
 pub fn lane(key: &str, names: [&str; 3], outcomes: &[Outcome<f64>; 3]) -> String {
-    let mut rows = table(["word"].into_iter().chain(names).map(str::to_owned).collect());
     let all = outcomes.map(|o| words(&o));
     let shown = outcomes.map(|o| shown(&o));
-    for (at, name) in WORDS.into_iter().enumerate() {
-        let mark = if all[2][at] == all[1][at] { "" } else { "  ≠" };
-        let cells = shown.iter().enumerate().map(|(k, v)| format!("{}{}", v[at], if k == 2 { mark } else { "" }));
-        rows.add_row(std::iter::once(name.to_owned()).chain(cells));
-    }
-    format!("{key}\n{}", aligned(rows, 1))
+    let word = |at: usize, k: usize| {
+        let mark = if k < 2 || all[2][at] == all[1][at] { "" } else { "  ≠" };
+        NumberText(format!("{}{mark}", shown[k][at]))
+    };
+    let rows = Table::of(0..WORDS.len()).column("word", |at| WORDS[at]).columns(0..3, |k| names[k].to_owned(), word);
+    format!("{key}\n{}", rows.build().text())
 }
 
 /// The words as people read them. Numbers with every digit: a difference may be in the last one.

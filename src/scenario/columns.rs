@@ -78,7 +78,7 @@ impl Leaf {
             Some("lead") => format!("Cut-out, vehicle ahead of the target: {}", uncapitalized(about)),
             _ => about.to_owned(),
         };
-        Column { name: self.flat.clone().into(), kind, unit: self.field.unit.into(), description: description.into() }
+        Column::new(self.flat.clone(), kind, self.field.unit.to_owned(), description)
     }
 
     /// The leaf's value in a scenario as JSON.

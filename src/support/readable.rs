@@ -14,6 +14,11 @@ pub(crate) fn count_of(length: usize) -> String {
     grouped(&length.to_string())
 }
 
+/// The same for a number with a sign.
+pub(crate) fn whole(number: i64) -> String {
+    grouped(&number.to_string())
+}
+
 /// `1 scenario`, `2 scenarios`.
 pub(crate) fn counted(length: usize, noun: &str) -> String {
     format!("{} {noun}{}", count_of(length), if length == 1 { "" } else { "s" })

@@ -6,8 +6,8 @@ use super::concrete::Concrete;
 use super::road::{Road, road_file};
 use super::scenario_file::scenario_file;
 use crate::Result;
-use crate::report::csv;
 use crate::support::run_dir::OutputDir;
+use crate::support::table::Table;
 
 /// Name of the index.
 pub const INDEX: &str = "index.csv";
@@ -41,21 +41,23 @@ pub fn export_folder(dir: &Path, scenarios: &[Concrete]) -> Result<Vec<IndexRow>
     let names: Vec<String> = scenarios.first().map_or(Vec::new(), |s| {
         s.properties.iter().map(|(name, _)| name.clone()).filter(|name| name != "lanesweep.lane").collect()
     });
-    let header =
-        ["file", "road", "lane", "category"].map(str::to_owned).into_iter().chain(names.iter().map(|n| plain(n)));
-    let mut table = vec![header.collect::<Vec<String>>()];
     let mut rows = Vec::new();
-    for ((text, road, row), scenario) in made.into_iter().zip(scenarios) {
+    for (text, road, row) in made {
         results.add(&row.road, &road)?;
         results.add(&row.file, &text)?;
-        let value = |name: &String| {
-            scenario.properties.iter().find(|(n, _)| n == name).map_or(String::new(), |(_, value)| value.clone())
-        };
-        let first = [row.file.clone(), row.road.clone(), row.lane.clone(), scenario.category.key().to_owned()];
-        table.push(first.into_iter().chain(names.iter().map(value)).collect());
         rows.push(row);
     }
-    results.publish(&csv::text(table)?)?;
+    let property = |scenario: &Concrete, name: &String| {
+        scenario.properties.iter().find(|(n, _)| n == name).map(|(_, value)| value.clone())
+    };
+    let table = Table::of(rows.iter().zip(scenarios))
+        .column("file", |(row, _)| row.file.as_str())
+        .column("road", |(row, _)| row.road.as_str())
+        .column("lane", |(row, _)| row.lane.as_str())
+        .column("category", |(_, scenario)| scenario.category.key())
+        .columns(&names, |name| plain(name), |(_, scenario), name| property(scenario, name))
+        .build();
+    results.publish(table.csv().as_bytes())?;
     Ok(rows)
 }
 

@@ -174,8 +174,8 @@ mod tests {
         let mut points = series("one, two", &[Mark::Points], &[(0.5, 1.0), (2.0, f64::NAN)]);
         points.values[0].label = "\"q\"".into();
         points.values[1].label = "b".into();
-        let text = figure(vec![plot(vec![points])]).csv().unwrap();
-        let mut reader = ::csv::Reader::from_reader(text.as_slice());
+        let text = figure(vec![plot(vec![points])]).csv();
+        let mut reader = ::csv::Reader::from_reader(text.as_bytes());
         let rows: Vec<::csv::StringRecord> = reader.records().map(std::result::Result::unwrap).collect();
         assert_eq!(rows.len(), 2);
         assert_eq!((&rows[0][1], &rows[0][2], &rows[0][4], &rows[1][6]), ("one, two", "\"q\"", "0.5", "NaN"));

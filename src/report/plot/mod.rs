@@ -25,8 +25,7 @@ pub(super) use layer::{HOLLOW, TICK, is_few};
 pub(super) use svg::tests::words;
 pub(super) use svg::{Anchor, Canvas, GREY, GRID, INK, Paint, Position, Type, WHITE, set};
 
-use super::csv;
-use crate::Result;
+use crate::support::table::Table;
 use axis::{Axes, on_circle};
 use frame::{colour_bar, numbers_left, spoke_name};
 
@@ -180,21 +179,19 @@ impl Figure {
     }
 
     /// The numbers of the series: one row per value.
-    ///
-    /// # Errors
-    /// None for what this program makes.
-    pub fn csv(&self) -> Result<Vec<u8>> {
-        let header = ["panel", "series", "label", "x_quantity", "x", "y_quantity", "y"];
-        let mut rows = vec![header.map(str::to_owned).to_vec()];
-        for plot in &self.plots {
-            for series in plot.series() {
-                for Value { x, y, label, .. } in &series.values {
-                    let words = [&plot.heading, &series.name, label, &plot.x.label, &x.to_string(), &plot.y.label];
-                    rows.push(words.into_iter().cloned().chain([y.to_string()]).collect());
-                }
-            }
-        }
-        csv::text(rows)
+    pub fn csv(&self) -> String {
+        let series = self.plots.iter().flat_map(|plot| plot.series().map(move |series| (plot, series)));
+        let rows = series.flat_map(|(plot, series)| series.values.iter().map(move |value| (plot, series, value)));
+        Table::of(rows)
+            .column("panel", |(plot, ..)| plot.heading.as_str())
+            .column("series", |(_, series, _)| series.name.as_str())
+            .column("label", |(.., value)| value.label.as_str())
+            .column("x_quantity", |(plot, ..)| plot.x.label.as_str())
+            .column("x", |(.., value)| value.x)
+            .column("y_quantity", |(plot, ..)| plot.y.label.as_str())
+            .column("y", |(.., value)| value.y)
+            .build()
+            .csv()
     }
 
     /// The names of the series, in the order of the legend.

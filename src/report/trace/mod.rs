@@ -9,9 +9,8 @@ mod panels;
 
 use super::plot::{Anchor, Canvas, Ends, Height, INK, Look, Paint, Series, TICK, Type, WHITE, set};
 use super::plot::{Axis, number};
-use super::records::{Table, whole, words};
-use crate::engine::{StepMark, Trace, TracedVehicle};
-use crate::support::table::Cell;
+use crate::engine::{StepMark, Trace, TracedStep, TracedVehicle};
+use crate::support::table::Table;
 pub use panels::TraceSeries;
 use panels::{Column, Panel, Shown, mark_dash, mark_look};
 
@@ -182,44 +181,53 @@ fn worst(value: f64, unit: &str) -> String {
 }
 
 const VEHICLES: [&str; 2] = ["other", "ahead"];
-const COLUMNS: [&str; 11] =
-    ["x_m", "y_m", "v_mps", "gap_m", "lateral_gap_m", "ttc_s", "btn", "pfs", "cfs", "present", "judged"];
 
 /// The traces, one row per step. Several traces stand one below the other, named by a first column `lane`; a single one
 /// does without. The last column names the marks of a step (`reaction`, `braking`, `contact`, joined by `+`). Infinite
 /// is `inf`; a vehicle that there is not leaves its columns empty.
 pub fn table(traces: &[(String, &Trace)]) -> Table {
     let vehicles = traces.iter().map(|(_, trace)| trace.vehicles).max().unwrap_or(1);
-    let is_named = traces.len() > 1;
-    let mut columns: Vec<String> = if is_named { vec!["lane".to_owned()] } else { Vec::new() };
-    columns.extend(["t_s", "x_ego_m", "v_ego_mps", "a_ego_mps2", "unsafe", "demand_mps2"].map(str::to_owned));
-    columns.extend(VEHICLES[..vehicles].iter().flat_map(|v| COLUMNS.iter().map(move |column| format!("{v}_{column}"))));
-    columns.push("mark".to_owned());
-    let mut table = Table::new(&columns.iter().map(String::as_str).collect::<Vec<_>>());
-    for (name, trace) in traces {
-        let marks = StepMark::ALL.map(|mark| (mark, trace.step_of(mark)));
-        for step in &trace.steps {
-            let mut row = if is_named { vec![words(name.as_str())] } else { Vec::new() };
-            row.extend([step.time_s, step.x_ego_m, step.v_ego_mps, step.a_ego_mps2].map(Cell::Number));
-            row.extend([whole(u8::from(step.is_unsafe)), Cell::number(step.demand_mps2)]);
-            for (k, other) in step.others[..vehicles].iter().enumerate() {
-                row.extend(if k < trace.vehicles { vehicle_cells(other) } else { COLUMNS.map(|_| Cell::Null) });
-            }
-            let here = marks.iter().filter(|(_, at)| *at == Some(step.step));
-            row.push(words(here.map(|(mark, _)| mark.label()).collect::<Vec<_>>().join("+")));
-            table.push(row);
-        }
+    let rows = traces.iter().flat_map(|(name, trace)| trace.steps.iter().map(move |step| (name, *trace, step)));
+    let mut table = Table::of(rows)
+        .columns((traces.len() > 1).then_some("lane"), |lane| lane, |(name, ..), _| name.as_str())
+        .column("t_s", |(.., step)| step.time_s)
+        .column("x_ego_m", |(.., step)| step.x_ego_m)
+        .column("v_ego_mps", |(.., step)| step.v_ego_mps)
+        .column("a_ego_mps2", |(.., step)| step.a_ego_mps2)
+        .column("unsafe", |(.., step)| u8::from(step.is_unsafe))
+        .column("demand_mps2", |(.., step)| step.demand_mps2);
+    for (k, vehicle) in VEHICLES[..vehicles].iter().enumerate() {
+        let numbers: [(&str, fn(&TracedVehicle) -> f64); 9] = [
+            ("x_m", |of| of.x_m),
+            ("y_m", |of| of.y_m),
+            ("v_mps", |of| of.v_mps),
+            ("gap_m", |of| of.gap_m),
+            ("lateral_gap_m", |of| of.lateral_gap_m),
+            ("ttc_s", |of| of.ttc_s),
+            ("btn", |of| of.btn),
+            ("pfs", |of| of.pfs),
+            ("cfs", |of| of.cfs),
+        ];
+        let flags: [(&str, fn(&TracedVehicle) -> bool); 2] =
+            [("present", |of| of.is_present), ("judged", |of| of.is_judged)];
+        let other = |(_, trace, step): Row| (k < trace.vehicles).then(|| step.others[k]);
+        table = table
+            .columns(numbers, |(name, _)| format!("{vehicle}_{name}"), |row, (_, of)| other(row).map(|v| of(&v)))
+            .columns(
+                flags,
+                |(name, _)| format!("{vehicle}_{name}"),
+                |row, (_, of)| other(row).map(|v| u8::from(of(&v))),
+            );
     }
-    table
+    let mark = |(_, trace, step): Row| {
+        let here = StepMark::ALL.into_iter().filter(|mark| trace.step_of(*mark) == Some(step.step));
+        here.map(StepMark::label).collect::<Vec<_>>().join("+")
+    };
+    table.column("mark", mark).build()
 }
 
-fn vehicle_cells(other: &TracedVehicle) -> [Cell<'static>; COLUMNS.len()] {
-    let TracedVehicle { x_m, y_m, v_mps, gap_m, lateral_gap_m, ttc_s, btn, pfs, cfs, is_present, is_judged } = *other;
-    let [x, y, v, gap, lateral, ttc, btn, pfs, cfs] =
-        [x_m, y_m, v_mps, gap_m, lateral_gap_m, ttc_s, btn, pfs, cfs].map(Cell::Number);
-    let [present, judged] = [is_present, is_judged].map(|is| whole(u8::from(is)));
-    [x, y, v, gap, lateral, ttc, btn, pfs, cfs, present, judged]
-}
+/// A step of a named trace.
+type Row<'a> = (&'a String, &'a Trace, &'a TracedStep);
 
 #[cfg(test)]
 mod trace_tests;

@@ -4,6 +4,8 @@ use std::borrow::Cow;
 
 use serde_json::Value;
 
+use crate::support::readable;
+
 /// How the values of a column are kept.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ColumnKind {
@@ -52,12 +54,60 @@ pub struct Column {
     pub unit: Cow<'static, str>,
     /// One sentence, with when a field is empty.
     pub description: Cow<'static, str>,
+    /// How people read its numbers; files have every digit.
+    pub digits: Digits,
+    /// What people read where there is none.
+    pub null: &'static str,
+}
+
+/// How many digits of a number people read.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub enum Digits {
+    /// Four significant ones at most, without idle zeros.
+    #[default]
+    Readable,
+    /// So many significant ones, with idle zeros.
+    Significant(usize),
+    /// So many after the point.
+    Fixed(usize),
+    /// The same with a sign, of a difference.
+    Signed(usize),
+}
+
+impl Digits {
+    /// A number as people read it.
+    pub fn text(self, number: f64) -> String {
+        match self {
+            Digits::Readable => readable::value(number),
+            Digits::Significant(digits) => readable::significant(number, digits),
+            Digits::Fixed(digits) => format!("{number:.digits$}"),
+            Digits::Signed(digits) => format!("{number:+.digits$}"),
+        }
+    }
 }
 
 impl Column {
-    /// A column whose words are constants.
-    pub fn new(name: &'static str, kind: ColumnKind, unit: &'static str, description: &'static str) -> Column {
-        Column { name: name.into(), kind, unit: unit.into(), description: description.into() }
+    /// A column of a table that is written to files.
+    pub fn new<T: Into<Cow<'static, str>>>(name: T, kind: ColumnKind, unit: T, description: T) -> Column {
+        Column { kind, unit: unit.into(), description: description.into(), ..Column::from(name) }
+    }
+
+    /// The same column with numbers of so many digits.
+    pub fn digits(self, digits: Digits) -> Column {
+        Column { digits, ..self }
+    }
+
+    /// The same column with a mark for what there is not.
+    pub fn null(self, null: &'static str) -> Column {
+        Column { null, ..self }
+    }
+}
+
+/// A column of a table for people: its type is that of its values.
+impl<N: Into<Cow<'static, str>>> From<N> for Column {
+    fn from(name: N) -> Column {
+        let (unit, description) = (Cow::default(), Cow::default());
+        Column { name: name.into(), kind: ColumnKind::Text, unit, description, digits: Digits::default(), null: "" }
     }
 }
 

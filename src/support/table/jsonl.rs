@@ -16,7 +16,8 @@ pub(super) fn append(line: &mut String, columns: &[Column], row: &[Cell]) {
     line.push_str("}\n");
 }
 
-fn value(kind: ColumnKind, cell: &Cell) -> Value {
+/// A cell as JSON.
+pub(super) fn value(kind: ColumnKind, cell: &Cell) -> Value {
     match cell {
         Cell::Null => Value::Null,
         Cell::Text(text) => Value::from(text.as_ref()),

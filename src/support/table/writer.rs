@@ -111,7 +111,7 @@ fn fits(kind: ColumnKind, cell: &Cell) -> bool {
 }
 
 /// A row as CSV. Numbers have as many digits as they need in their arithmetic.
-fn append_csv(text: &mut String, columns: &[Column], row: &[Cell]) {
+pub(super) fn append_csv(text: &mut String, columns: &[Column], row: &[Cell]) {
     for (at, (column, cell)) in columns.iter().zip(row).enumerate() {
         if at > 0 {
             text.push(',');

@@ -1,0 +1,260 @@
+//! A table in memory: text for the terminal, CSV, JSON, a page and files of every format are renderings of it.
+
+use std::path::Path;
+
+use serde::Serialize;
+use serde::ser::{SerializeStruct, Serializer};
+use serde_json::{Map, Value};
+
+use super::writer::append_csv;
+use super::{Cell, Column, ColumnKind, TableFacts, TableFormat, TableWriter, csv_field, jsonl};
+use crate::Result;
+use crate::support::readable;
+
+/// Columns and rows; every row has one cell per column.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct Table {
+    /// What it shows; only pages have a place for it.
+    pub caption: String,
+    /// The columns.
+    pub columns: Vec<Column>,
+    /// The rows.
+    pub rows: Vec<Vec<Cell<'static>>>,
+}
+
+/// A table whose columns are being added, each with the value that it has of an item.
+pub struct TableOf<T> {
+    items: Vec<T>,
+    table: Table,
+}
+
+impl Table {
+    /// A table with one row per item and no column yet.
+    pub fn of<T: Copy>(items: impl IntoIterator<Item = T>) -> TableOf<T> {
+        let items: Vec<T> = items.into_iter().collect();
+        let rows = items.iter().map(|_| Vec::new()).collect();
+        TableOf { items, table: Table { rows, ..Table::default() } }
+    }
+
+    /// The same table under a caption.
+    pub fn captioned(self, caption: impl Into<String>) -> Table {
+        Table { caption: caption.into(), ..self }
+    }
+
+    /// The table as CSV: numbers in full precision, nothing for null.
+    pub fn csv(&self) -> String {
+        let names: Vec<String> = self.columns.iter().map(|column| csv_field(&column.name)).collect();
+        let mut text = names.join(",") + "\n";
+        self.rows.iter().for_each(|row| append_csv(&mut text, &self.columns, row));
+        text
+    }
+
+    /// The rows as a list of objects. A number that JSON does not have (infinite) is null. The column `data` is left
+    /// out: a document says once what it is about.
+    pub fn records(&self) -> Value {
+        let record = |row: &Vec<Cell>| {
+            let fields = self.columns.iter().zip(row).filter(|(column, _)| column.name != "data");
+            let fields = fields.map(|(column, cell)| (column.name.to_string(), jsonl::value(column.kind, cell)));
+            Value::Object(fields.collect::<Map<_, _>>())
+        };
+        Value::Array(self.rows.iter().map(record).collect())
+    }
+
+    /// Writes the table to a file whose format its name's ending chooses.
+    ///
+    /// # Errors
+    /// As [`TableFormat::of`] and [`TableWriter::row`].
+    pub fn save(&self, path: &Path, facts: &TableFacts) -> Result<()> {
+        let format = TableFormat::of(path, &TableFormat::EVERY, "table")?;
+        let mut file = TableWriter::create(path, format, self.columns.clone(), facts)?;
+        self.rows.iter().try_for_each(|row| file.row(row))?;
+        file.finish()
+    }
+
+    /// The leading columns of words: they stand to the left, what follows to the right.
+    pub(super) fn words(&self) -> usize {
+        self.columns.iter().take_while(|c| matches!(c.kind, ColumnKind::Text | ColumnKind::Name)).count()
+    }
+
+    /// Names of the columns and the rows as people read them.
+    pub(crate) fn shown(&self) -> (Vec<String>, Vec<Vec<String>>) {
+        let row = |row: &Vec<Cell>| self.columns.iter().zip(row).map(|(column, cell)| shown(column, cell)).collect();
+        (self.columns.iter().map(|column| column.name.to_string()).collect(), self.rows.iter().map(row).collect())
+    }
+}
+
+impl<T: Copy> TableOf<T> {
+    /// Adds a column with a value per item; the value's type is the column's.
+    pub fn column<V: CellValue>(mut self, column: impl Into<Column>, value: impl Fn(T) -> V) -> TableOf<T> {
+        self.table.columns.push(Column { kind: V::KIND, ..column.into() });
+        for (row, item) in self.table.rows.iter_mut().zip(&self.items) {
+            row.push(value(*item).cell());
+        }
+        self
+    }
+
+    /// Adds columns of the same type, as many as there are keys.
+    pub fn columns<K: Copy, C: Into<Column>, V: CellValue>(
+        self,
+        keys: impl IntoIterator<Item = K>,
+        name: impl Fn(K) -> C,
+        value: impl Fn(T, K) -> V,
+    ) -> TableOf<T> {
+        keys.into_iter().fold(self, |table, key| table.column(name(key), |item| value(item, key)))
+    }
+
+    /// The table.
+    pub fn build(self) -> Table {
+        self.table
+    }
+}
+
+/// A value that a cell can hold.
+pub trait CellValue {
+    /// The column's type.
+    const KIND: ColumnKind;
+
+    /// The cell.
+    fn cell(self) -> Cell<'static>;
+}
+
+/// Numbers that are text already, such as an interval or a part of a whole.
+pub struct NumberText(pub String);
+
+impl CellValue for NumberText {
+    const KIND: ColumnKind = ColumnKind::Binary64;
+
+    fn cell(self) -> Cell<'static> {
+        Cell::text(self.0)
+    }
+}
+
+/// An empty text is null.
+impl CellValue for String {
+    const KIND: ColumnKind = ColumnKind::Text;
+
+    fn cell(self) -> Cell<'static> {
+        if self.is_empty() { Cell::Null } else { Cell::text(self) }
+    }
+}
+
+impl CellValue for &str {
+    const KIND: ColumnKind = ColumnKind::Text;
+
+    fn cell(self) -> Cell<'static> {
+        self.to_owned().cell()
+    }
+}
+
+impl CellValue for f64 {
+    const KIND: ColumnKind = ColumnKind::Binary64;
+
+    fn cell(self) -> Cell<'static> {
+        Cell::Number(self)
+    }
+}
+
+/// Counts; null beyond 63 bits.
+macro_rules! whole {
+    ($($kind:ty),*) => {$(
+        impl CellValue for $kind {
+            const KIND: ColumnKind = ColumnKind::Whole;
+
+            fn cell(self) -> Cell<'static> {
+                i64::try_from(self).map_or(Cell::Null, Cell::Whole)
+            }
+        }
+    )*};
+}
+whole!(u8, u32, u64, usize);
+
+impl<V: CellValue> CellValue for Option<V> {
+    const KIND: ColumnKind = V::KIND;
+
+    fn cell(self) -> Cell<'static> {
+        self.map_or(Cell::Null, CellValue::cell)
+    }
+}
+
+/// A cell as people read it.
+fn shown(column: &Column, cell: &Cell) -> String {
+    match cell {
+        Cell::Null => column.null.to_owned(),
+        Cell::Text(text) => text.to_string(),
+        Cell::Flag(flag) => if *flag { "yes" } else { "no" }.to_owned(),
+        Cell::Whole(number) => readable::whole(*number),
+        Cell::Number(number) | Cell::Decimal(number) => column.digits.text(*number),
+        Cell::Series(series) => series.iter().map(|number| column.digits.text(*number)).collect::<Vec<_>>().join(" "),
+        Cell::Wholes(numbers) => numbers.iter().map(|number| readable::whole(*number)).collect::<Vec<_>>().join(" "),
+    }
+}
+
+/// As the template of pages reads it.
+impl Serialize for Table {
+    fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
+        let (header, rows) = self.shown();
+        let mut table = serializer.serialize_struct("Table", 4)?;
+        table.serialize_field("caption", &self.caption)?;
+        table.serialize_field("header", &header)?;
+        table.serialize_field("texts", &self.words())?;
+        table.serialize_field("rows", &rows)?;
+        table.end()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::support::table::Digits;
+
+    type Row = (&'static str, Option<f64>, u64, &'static str);
+
+    fn table() -> Table {
+        let rows: [Row; 3] =
+            [("1", Some(1.0), 3, "1.2"), ("-i", None, 0, ""), ("a,b", Some(f64::INFINITY), u64::MAX, "inf")];
+        Table::of(rows)
+            .column("parameterization", |row| row.0)
+            .column(Column::from("f1").digits(Digits::Fixed(3)).null("–"), |row| row.1)
+            .column("fn", |row| row.2)
+            .column("headway", |row| row.3)
+            .column("data", |_| "synthetic")
+            .build()
+    }
+
+    #[test]
+    fn a_field_has_its_type_whatever_it_looks_like() {
+        // `is_f64`: 1 as a number is 1.0 in every row, 3 as a count is 3.
+        let rows = table().records();
+        assert!(rows[0]["f1"].is_f64() && rows[0]["fn"].is_i64() && rows[0]["parameterization"].is_string());
+        assert_eq!(
+            rows,
+            serde_json::json!([
+                {"parameterization": "1", "f1": 1.0, "fn": 3, "headway": "1.2"},
+                {"parameterization": "-i", "f1": null, "fn": 0, "headway": null},
+                {"parameterization": "a,b", "f1": null, "fn": null, "headway": "inf"},
+            ])
+        );
+        let csv = "parameterization,f1,fn,headway,data\n1,1,3,1.2,synthetic\n'-i,,0,,synthetic\n\
+                   \"a,b\",inf,,inf,synthetic\n";
+        assert_eq!(table().csv(), csv);
+        assert_eq!(Table::of([0_u8; 0]).column("f1", |row| row).build().records(), serde_json::json!([]));
+    }
+
+    #[test]
+    fn a_page_and_a_terminal_show_the_digits_of_the_column() {
+        let page = serde_json::to_value(table()).unwrap();
+        assert_eq!((&page["texts"], &page["header"][1]), (&1.into(), &"f1".into()));
+        assert_eq!(page["rows"][0], serde_json::json!(["1", "1.000", "3", "1.2", "synthetic"]));
+        assert_eq!(page["rows"][1], serde_json::json!(["-i", "–", "0", "", "synthetic"]));
+        assert!(table().text().contains("| -i               |     – |"), "{}", table().text());
+    }
+
+    #[test]
+    fn a_saved_table_reads_back() {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("t.jsonl");
+        table().save(&path, &TableFacts::default()).unwrap();
+        let first = std::fs::read_to_string(&path).unwrap().lines().next().unwrap().to_owned();
+        assert_eq!(first, r#"{"parameterization":"1","f1":1.0,"fn":3,"headway":"1.2","data":"synthetic"}"#);
+    }
+}

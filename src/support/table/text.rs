@@ -1,0 +1,124 @@
+//! A table for the terminal, as plain text.
+
+use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Width, presets};
+
+use super::Table;
+
+/// Columns that every table fits in where no terminal says how wide it is.
+pub(crate) const WIDTH: usize = 120;
+
+/// A blank at which no line is broken.
+const NO_BREAK: char = '\u{a0}';
+
+impl Table {
+    /// The table in [`WIDTH`] columns: numbers to the right, the leading columns of words to the left. Cells are broken
+    /// between words; where a word or number does not fit, the table is wider.
+    pub fn text(&self) -> String {
+        let (header, rows) = self.shown();
+        drawn(header, rows, self.words(), WIDTH)
+    }
+
+    /// The table within so many columns of the terminal. Where it is too wide it becomes several, each with the first
+    /// `keys` columns, so that no number and no interval is broken.
+    pub fn fitted(&self, keys: usize, width: usize) -> String {
+        let (header, rows) = self.shown();
+        // Nothing is broken within brackets, and no table is narrower than its words.
+        let [header, rows @ ..] = &[vec![header], rows].concat().iter().map(|row| held(row)).collect::<Vec<_>>()[..]
+        else {
+            return String::new();
+        };
+        let cells = |at: usize| std::iter::once(header).chain(rows).filter_map(move |row| row.get(at));
+        // With the bars and spaces of the style.
+        let longest = |at: usize, breaks: &[char]| {
+            let parts = cells(at).flat_map(|cell| cell.split(breaks)).map(|part| part.chars().count());
+            parts.max().unwrap_or(0) + 3
+        };
+        let column = |at: usize| longest(at, &['\n']);
+        let fixed: usize = 1 + (0..keys).map(column).sum::<usize>();
+        let (mut parts, mut used) = (vec![(0..keys).collect::<Vec<usize>>()], fixed);
+        for at in keys..header.len() {
+            let last = parts.len() - 1;
+            if used + column(at) > width && parts[last].len() > keys {
+                (used, _) = (fixed, parts.push((0..keys).collect()));
+            }
+            used += column(at);
+            let last = parts.len() - 1;
+            parts[last].push(at);
+        }
+        let text = |columns: &Vec<usize>| {
+            let of = |row: &Vec<String>| columns.iter().map(|&at| row[at].clone()).collect::<Vec<_>>();
+            let least = fixed + columns.iter().skip(keys).map(|at| longest(*at, &[' ', '\n'])).sum::<usize>();
+            let words = columns.iter().filter(|at| **at < self.words()).count();
+            drawn(of(header), rows.iter().map(of).collect(), words, width.max(least)).replace(NO_BREAK, " ")
+        };
+        parts.iter().map(text).collect::<Vec<_>>().join("\n")
+    }
+}
+
+/// A row in which nothing is broken within brackets.
+fn held(row: &[String]) -> Vec<String> {
+    let held = |cell: &String| {
+        let mut depth = 0;
+        let hold = |c: char| {
+            depth += i32::from(c == '[') - i32::from(c == ']');
+            if c == ' ' && depth > 0 { NO_BREAK } else { c }
+        };
+        cell.chars().map(hold).collect::<String>()
+    };
+    row.iter().map(held).collect()
+}
+
+/// Draws a table that breaks its cells rather than the terminal's lines, the first `words` columns to the left.
+fn drawn(header: Vec<String>, rows: Vec<Vec<String>>, words: usize, width: usize) -> String {
+    let mut table = comfy_table::Table::new();
+    table.load_style(presets::ASCII_MARKDOWN);
+    table.set_content_arrangement(ContentArrangement::Dynamic).set_width(width as u16);
+    let widths = column_widths(&header, &rows, width);
+    table.set_header(header).add_rows(rows);
+    for ((at, column), width) in table.column_iter_mut().enumerate().zip(widths) {
+        // With a space on either side.
+        column.set_constraint(ColumnConstraint::Absolute(Width::Fixed(width as u16 + 2)));
+        column.set_cell_alignment(if at < words { CellAlignment::Left } else { CellAlignment::Right });
+    }
+    format!("{table}\n")
+}
+
+/// Widths of the columns' texts: each holds its longest word, and columns with longer lines share what is left of the
+/// table's width.
+fn column_widths(header: &[String], rows: &[Vec<String>], width: usize) -> Vec<usize> {
+    let longest = |at: usize, of: fn(&str) -> usize| {
+        let cells = std::iter::once(&header[at]).chain(rows.iter().filter_map(|row| row.get(at)));
+        cells.map(|cell| of(cell)).max().unwrap_or(0)
+    };
+    fn widest<'a>(parts: impl Iterator<Item = &'a str>) -> usize {
+        parts.map(|part| part.chars().count()).max().unwrap_or(0)
+    }
+    let sizes: Vec<[usize; 2]> = (0..header.len())
+        .map(|at| [longest(at, |cell| widest(cell.split_ascii_whitespace())), longest(at, |cell| widest(cell.lines()))])
+        .collect();
+    let words: usize = sizes.iter().map(|[word, _]| word).sum();
+    let wanted: usize = sizes.iter().map(|[word, line]| line - word).sum();
+    let left = wanted.min(width.saturating_sub(3 * sizes.len() + 1 + words));
+    sizes.iter().map(|[word, line]| word + (line - word) * left / wanted.max(1)).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::NumberText;
+    use super::*;
+
+    #[test]
+    fn a_table_that_is_too_wide_becomes_several_and_breaks_no_interval() {
+        let scores = ["0.5\n[.40 .60]", "0.6\n[.50 .70]", "0.7\n[.60 .80]", "0.8"];
+        let table = Table::of([scores])
+            .column("model", |_| "FSM")
+            .columns(0..4, |at| (at + 1).to_string(), |row, at| NumberText(row[at].to_owned()))
+            .build();
+        let one = table.fitted(1, 60);
+        let two = table.fitted(1, 35);
+        assert_eq!((one.matches("FSM").count(), two.matches("FSM").count()), (1, 2), "{two}");
+        for text in [one, two, table.fitted(1, 20)] {
+            assert!(["[.40 .60]", "[.50 .70]", "[.60 .80]"].iter().all(|interval| text.contains(interval)), "{text}");
+        }
+    }
+}
