@@ -38,11 +38,13 @@ impl Merge {
         let again = |verb: &str, shard| format!("lanesweep {verb} --plan {plan} --shard {shard} --out {out}");
         let (folder, merged) = merge(&self.dir, &again)?;
         match merged {
-            Merged::Study(study, result) => {
+            Merged::Study(merged) => {
+                let (study, result) = *merged;
                 let report = StudyReport::of(&study, &result.counts, None, StudyHost::of_parts(&result))?;
                 self.tables.finish(report, folder.results()?, study.facts().incomplete, self.format)
             }
-            Merged::Sample(sample, result) => {
+            Merged::Sample(merged) => {
+                let (sample, result) = *merged;
                 let host = HostRecord::of_parts(result.parts, result.rechecked_lanes);
                 let mut file = EstimateFile::of_sample(&sample, &result, host)?;
                 file.write(folder.results()?, &sample, &result)?;

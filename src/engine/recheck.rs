@@ -368,7 +368,7 @@ mod tests {
         let recheck = Recheck { plan: &plan, again: Box::new(left_out), seed: 157, one_in: 20 };
         let run = |every_step| {
             let backend = Instead { every_step, ..left_out };
-            let (executor, units) = (Executor::new(&backend), 0..plan.unit_count());
+            let (executor, units) = (Executor::new(backend), 0..plan.unit_count());
             executor.sweep_checked(&plan, units, Wanted::Verdicts, Some(&recheck), |_| Ok(()))
         };
         (run(false).expect_err(&format!("{category:?} {}", id.name())), run(true).unwrap())

@@ -115,7 +115,8 @@ impl DossierReport<'_> {
         let recorded = failures as f64 / lanes.max(1) as f64;
         let of = |rate: &RateRecord| (rate.failures, rate.lanes, rate.rate);
         let (replayed, sampled) = (&cell.replayed, &cell.sampled);
-        let rows: [(&str, (u64, u64, f64), Option<(&RateRecord, &Ratio)>); 3] = [
+        type RiskRow<'r> = (&'static str, (u64, u64, f64), Option<(&'r RateRecord, &'r Ratio)>);
+        let rows: [RiskRow; 3] = [
             ("S, recorded", (failures, lanes, recorded), None),
             ("S', replayed", of(&replayed.rate), Some((&replayed.rate, &replayed.ratio))),
             ("P, density", of(&sampled.rate), Some((&sampled.rate, &sampled.ratio))),
@@ -260,8 +261,10 @@ impl DossierReport<'_> {
     }
 }
 
+type ScoreOf = fn(&Scored) -> &Share;
+
 /// Names of scores, and which they are.
-const SCORES: [(&str, fn(&Scored) -> &Share); 3] =
+const SCORES: [(&str, ScoreOf); 3] =
     [("recall", |of| &of.recall), ("precision", |of| &of.precision), ("F1", |of| &of.f1)];
 
 pub(super) fn share(share: &Share) -> String {

@@ -12,9 +12,9 @@ use crate::{Error, Place, Result};
 /// A run with the result of its parts, bit for bit that of the run in one piece.
 pub enum Merged {
     /// A study.
-    Study(Box<Study>, StudyResult),
+    Study(Box<(Study, StudyResult)>),
     /// A sampling run.
-    Sample(Box<Sample>, SampleResult),
+    Sample(Box<(Sample, SampleResult)>),
 }
 
 /// Merges the parts of a folder, which is locked from now on. `again` gives the command of a verb that makes a shard.
@@ -31,13 +31,13 @@ pub(crate) fn merge(dir: &Path, again: &dyn Fn(&str, Shard) -> String) -> Result
     match kind_of(&plan)?.as_str() {
         Study::KIND => {
             let folder = OutputDir::open(dir, STUDY_RECORD)?;
-            let (study, result) = Study::merge_or(dir, &|shard| again("study", shard))?;
-            Ok((folder, Merged::Study(Box::new(study), result)))
+            let merged = Study::merge_or(dir, &|shard| again("study", shard))?;
+            Ok((folder, Merged::Study(Box::new(merged))))
         }
         kind if Sample::is_kind(kind) => {
             let folder = OutputDir::open(dir, ESTIMATE_RECORD)?;
-            let (sample, result) = Sample::merge_or(dir, &|shard| again("sample", shard))?;
-            Ok((folder, Merged::Sample(Box::new(sample), result)))
+            let merged = Sample::merge_or(dir, &|shard| again("sample", shard))?;
+            Ok((folder, Merged::Sample(Box::new(merged))))
         }
         other => {
             let help = "give the folder (option `out`) of a run in parts";

@@ -144,7 +144,7 @@ pub fn without_times(files: Files) -> Files {
 /// Without what belongs to the machine and to the way in which the run was divided.
 pub fn without_host(mut files: Files) -> Files {
     let is_plan = |name: &str| ["plan.json", "run-plan.json", "lanesweep-files.json"].contains(&name);
-    files.retain(|name, _| !is_plan(name) && !(name.starts_with("part-") && name.ends_with(".json")));
+    files.retain(|name, _| !(is_plan(name) || name.starts_with("part-") && name.ends_with(".json")));
     let record = |record: &mut serde_json::Value| {
         for host in ["timings", "backend", "device", "sweep", "host", "settings"] {
             record.as_object_mut().unwrap().remove(host);

@@ -197,7 +197,8 @@ pub fn table(traces: &[(String, &Trace)]) -> Table {
         .column("unsafe", |(.., step)| u8::from(step.is_unsafe))
         .column("demand_mps2", |(.., step)| step.demand_mps2);
     for (k, vehicle) in VEHICLES[..vehicles].iter().enumerate() {
-        let numbers: [(&str, fn(&TracedVehicle) -> f64); 9] = [
+        type Of<T> = fn(&TracedVehicle) -> T;
+        let numbers: [(&str, Of<f64>); 9] = [
             ("x_m", |of| of.x_m),
             ("y_m", |of| of.y_m),
             ("v_mps", |of| of.v_mps),
@@ -208,8 +209,7 @@ pub fn table(traces: &[(String, &Trace)]) -> Table {
             ("pfs", |of| of.pfs),
             ("cfs", |of| of.cfs),
         ];
-        let flags: [(&str, fn(&TracedVehicle) -> bool); 2] =
-            [("present", |of| of.is_present), ("judged", |of| of.is_judged)];
+        let flags: [(&str, Of<bool>); 2] = [("present", |of| of.is_present), ("judged", |of| of.is_judged)];
         let other = |(_, trace, step): Row| (k < trace.vehicles).then(|| step.others[k]);
         table = table
             .columns(numbers, |(name, _)| format!("{vehicle}_{name}"), |row, (_, of)| other(row).map(|v| of(&v)))
