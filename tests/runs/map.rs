@@ -542,7 +542,7 @@ fn an_undecided_cell_has_a_neighbour_with_the_other_verdict_and_a_decided_one_ke
         robust: true,
     };
     let map = Map::plan(options, &profile("un-r157")).unwrap();
-    let result = map.run(&Executor::new(&CpuBackend::lane_arithmetic())).unwrap();
+    let result = map.run(&Executor::new(CpuBackend::lane_arithmetic())).unwrap();
     for mapped in &result.grids {
         let (grid, map) = (&mapped.plan.grid, &mapped.map);
         let failed = |cell| (map.verdicts(0, cell).failed(Criterion::Collision), map.is_conflict(0, cell));
@@ -588,7 +588,7 @@ fn a_cell_is_undecided_where_the_single_case_is() {
         robust: true,
     };
     let map = Map::plan(options, &profile).unwrap();
-    let result = map.run(&Executor::new(&CpuBackend::lane_arithmetic())).unwrap();
+    let result = map.run(&Executor::new(CpuBackend::lane_arithmetic())).unwrap();
     let map = &result.grids[0].map;
     for cell in 0..map.cell_count() {
         let point = grid.point(cell);
