@@ -12,7 +12,7 @@ use std::time::{Duration, Instant};
 use common::paper_size_scenarios;
 use lanesweep::engine::{CpuBackend, Executor, Headway, Partial, Wanted};
 use lanesweep::model::profile::Profile;
-use lanesweep::run::parts::{Countable, Journal, Ledger, Part, read_part, read_sealed_line, seal, write_part};
+use lanesweep::run::parts::{Journal, Ledger, MergeableCounts, Part, read_part, read_sealed_line, seal, write_part};
 use lanesweep::run::sampling::{
     Estimator, SampleHeadways, SampleOptions, SampleTally, cuts, plan_samples, sample_into,
 };
@@ -76,7 +76,7 @@ fn study(folder: &Path) {
 }
 
 /// Runs with and without a journal in turn; what is counted last is written as a part and read again.
-fn pairs<T: Countable>(name: &str, folder: &Path, units: u64, cuts: &[u64], run: impl Fn(&mut Ledger<T>)) {
+fn pairs<T: MergeableCounts>(name: &str, folder: &Path, units: u64, cuts: &[u64], run: impl Fn(&mut Ledger<T>)) {
     let (mut ratios, mut shares) = (Vec::new(), Vec::new());
     for repetition in 0..PAIRS {
         let timed = |with: bool| {

@@ -2,7 +2,7 @@
 //!
 //! ```text
 //! cargo run --release --example calibrate_generator -- fit 600 > fit.txt      # evaluations; about 3 s each
-//! cargo run --release --example calibrate_generator -- show 1 2 accelerating_share=0.05   # seeds
+//! cargo run --release --example calibrate_generator -- show 1 2 accelerating_fraction=0.05   # seeds
 //! ```
 //!
 //! The fit sees the 36 shares of failures of S in the paper's table, the number of scenarios found and kept, the density,
@@ -19,7 +19,7 @@ use cmaes::{CMAESOptions, DVector};
 use lanesweep::engine::{CpuBackend, Executor};
 use lanesweep::model::profile::Profile;
 use lanesweep::run::score::{
-    CategoryScores, ClaimResult, Misfit, ScoreTable, f1, judge_claims, published_failures, published_lvd_f1,
+    CategoryScores, ClaimResult, Misfit, ScoreTable, check_claims, f1, published_failures, published_lvd_f1,
 };
 use lanesweep::run::study::Study;
 use lanesweep::scenario::Category;
@@ -36,12 +36,12 @@ const FITTED_RECORDINGS: usize = 80;
 const RANGES: [(&str, f64, f64); 12] = [
     ("car_speed_factor", 0.8, 1.05),
     ("follower_braking_mps2", 0.002, 0.1),
-    ("accelerating_share", 0.0, 0.2),
+    ("accelerating_fraction", 0.0, 0.2),
     ("change_acceleration_mps2", 0.0, 2.8),
     ("accelerating_follower_braking_mps2", 0.5, 10.0),
     ("change_duration_s", 4.0, 7.2),
     ("truck_change_factor", 0.3, 8.0),
-    ("change_headway_share", 0.0, 0.8),
+    ("change_headway_fraction", 0.0, 0.8),
     ("brakings_per_s", 0.0, 0.0002),
     ("braking_hold_s", 0.5, 10.0),
     ("braking_excess_mps2", 0.1, 1.0),
@@ -136,7 +136,7 @@ impl Outcome {
         let backend = CpuBackend::lane_arithmetic();
         let counts = study.run(&Executor::new(&backend))?.counts;
         let scores = study.score(&counts)?;
-        let claims = judge_claims(&scores, study.plan(), &counts);
+        let claims = check_claims(&scores, study.plan(), &counts);
         Ok(Outcome { collection, scores, claims, rate_factor: options.event_rate_factor, traffic })
     }
 

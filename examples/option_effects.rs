@@ -14,7 +14,7 @@ use std::error::Error;
 
 use lanesweep::engine::{Chunk, CpuBackend, Executor, Partial, Wanted};
 use lanesweep::model::profile::Profile;
-use lanesweep::run::score::{ClaimResult, Misfit, ScoreTable, f1, judge_claims};
+use lanesweep::run::score::{ClaimResult, Misfit, ScoreTable, check_claims, f1};
 use lanesweep::run::study::{Study, StudyOptions};
 use lanesweep::scenario::parameterization::ParameterizationOptions;
 use lanesweep::scenario::{Other, Scenario};
@@ -69,7 +69,7 @@ const OPTIONS: [(&str, &str, &str); 60] = [
     ("mining.longitudinal", "min_speed_change_mps", "2.0"),
     ("mining.longitudinal", "min_cruise_s", "2.0"),
     ("mining.lateral", "window_s", "0.5"),
-    ("mining.lateral", "calm_speed_mps", "0.1"),
+    ("mining.lateral", "quiescent_speed_mps", "0.1"),
     ("mining.lateral", "search_s", "5.0"),
     ("mining.lateral", "lc_end", "\"published\""),
     ("mining.cut_in", "max_speed_share", "0.9"),
@@ -193,7 +193,7 @@ struct Scored {
 impl Scored {
     fn of(study: &Study, counts: &Partial) -> lanesweep::Result<Scored> {
         let table = study.score(counts)?;
-        let claims = judge_claims(&table, study.plan(), counts);
+        let claims = check_claims(&table, study.plan(), counts);
         Ok(Scored { table, claims })
     }
 }

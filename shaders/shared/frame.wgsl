@@ -102,7 +102,7 @@ fn advance(before: LaneState, lane: LaneCase) -> LaneState {
     let ego = EgoState(v_ego, (v_ego - state.v_before) * frame_inverse_dt, lane.ego_width);
     let first = see(ego, lane.others[0], state.gap_0, index);
     state.gap_0 = first.view.gap;
-    state.record = judge(state.record, first);
+    state.record = update_record(state.record, first);
     var hazard = attentive_check(first, lane.others[0], index);
     var touching = is_touched(first, lane.others[0]);
     var touching_second = false;
@@ -113,7 +113,7 @@ fn advance(before: LaneState, lane: LaneCase) -> LaneState {
         if lane.pair != 0u {
             let second = see(ego, lane.others[1], state.gap_1, index);
             state.gap_1 = second.view.gap;
-            state.record = judge(state.record, second);
+            state.record = update_record(state.record, second);
             let other_hazard = attentive_check(second, lane.others[1], index);
             // The nearest unsafe vehicle determines the reaction.
             let nearer = other_hazard.is_unsafe & (!hazard.is_unsafe | (state.gap_1 < state.gap_0));
@@ -171,7 +171,7 @@ fn see(ego: EgoState, other: LaneOther, before: f32, index: u32) -> Seen {
     return Seen(view, present, judged);
 }
 
-fn judge(record: Record, seen: Seen) -> Record {
+fn update_record(record: Record, seen: Seen) -> Record {
     let gap = seen.view.gap;
     let dv = closing(seen.view);
     return Record(

@@ -161,11 +161,11 @@ impl CaseFlags {
         parameters.settle(&mut doubts, str::to_owned);
         let plain = parameters.plain_case(frame.default_length_m, frame.default_width_m)?;
         self.headway()?;
-        parameters.judge(&mut doubts)?;
+        parameters.check_plausible(&mut doubts)?;
         // An acceleration without an end leads far within the time cap.
         let last_mps = plain.last_speed_mps(frame.time_cap_s)?;
         let judged =
-            doubts.judge(Quantity::Speed, last_mps, || "the speed that results from the acceleration".to_owned());
+            doubts.check(Quantity::Speed, last_mps, || "the speed that results from the acceleration".to_owned());
         judged.map_err(|text| {
             let problem = format!("it results in a speed that no vehicle has: {text}");
             let help = "a deceleration is negative; an acceleration needs an end: option `end_speed`";

@@ -68,7 +68,7 @@ pub struct Check {
 }
 
 /// What is checked, and what a reader should know of it.
-struct Asked {
+struct CheckRequest {
     subject: Subject,
     origin: String,
     is_synthetic: bool,
@@ -119,7 +119,7 @@ impl Check {
         })
     }
 
-    fn asked(&self, profile: &Profile) -> Result<Asked> {
+    fn asked(&self, profile: &Profile) -> Result<CheckRequest> {
         let Some(path) = &self.file else {
             return self.of_flags(CaseFlags::default(), profile, "a case of flags".to_owned());
         };
@@ -152,7 +152,7 @@ impl Check {
         }
     }
 
-    fn of_flags(&self, file: CaseFlags, profile: &Profile, origin: String) -> Result<Asked> {
+    fn of_flags(&self, file: CaseFlags, profile: &Profile, origin: String) -> Result<CheckRequest> {
         let flags = self.case.over(file);
         if !flags.says_a_case() {
             let help = "give a case (--category, --ego-speed, …) or a FILE";
@@ -160,10 +160,10 @@ impl Check {
         }
         let plain = flags.plain_case(profile, self.plausibility.policy())?;
         let subject = Subject::plain(&plain, flags.headway()?);
-        Ok(Asked { subject, origin, is_synthetic: false, incomplete: false })
+        Ok(CheckRequest { subject, origin, is_synthetic: false, incomplete: false })
     }
 
-    fn of_scenario(&self, scenario: Scenario, origin: String, incomplete: bool) -> Result<Asked> {
+    fn of_scenario(&self, scenario: Scenario, origin: String, incomplete: bool) -> Result<CheckRequest> {
         let headway = if self.case.says_a_start() { Some(self.case.headway()?) } else { None };
         if self.case.says_more_than_a_start() {
             return Err(Error::usage(
@@ -173,7 +173,7 @@ impl Check {
             ));
         }
         let is_synthetic = scenario.synthetic;
-        Ok(Asked { subject: Subject::recorded(scenario, headway)?, origin, is_synthetic, incomplete })
+        Ok(CheckRequest { subject: Subject::recorded(scenario, headway)?, origin, is_synthetic, incomplete })
     }
 
     /// Outputs must have their kind's name and replace no input.

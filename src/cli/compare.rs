@@ -84,7 +84,7 @@ impl Compare {
             parameterizations: ids,
             samples: config.compare.samples,
             seed: config.compare.seed,
-            enough: Enough { clusters: config.score.least_failures.into(), margin: config.compare.margin },
+            enough: Enough { clusters: config.score.min_failures.into(), margin: config.compare.margin },
         };
         let compare = compare::Compare::plan(&collection.scenarios, &facts, profile, options)?;
         let plan = compare.lane_plan();

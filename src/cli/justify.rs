@@ -94,7 +94,7 @@ impl Justify {
                 parameterizations: vec![id],
                 samples: config.compare.samples,
                 seed: config.compare.seed,
-                enough: Enough { clusters: config.score.least_failures.into(), margin: config.compare.margin },
+                enough: Enough { clusters: config.score.min_failures.into(), margin: config.compare.margin },
             },
             criterion,
             score: config.score.clone(),

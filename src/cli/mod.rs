@@ -113,14 +113,14 @@ pub fn main() -> ExitCode {
     let matches = match configured::command().try_get_matches() {
         Ok(matches) => matches,
         Err(error) => {
-            return told(|| console::refuse(&error)).into();
+            return run_and_report(|| console::refuse(&error)).into();
         }
     };
     if let Ok(common) = Common::from_arg_matches(&matches) {
         console::start_log(common.verbosity());
     }
     signals::install();
-    told(|| {
+    run_and_report(|| {
         let (cli, configured) = Configured::of(&matches)?;
         run(&cli, &configured)
     })
@@ -129,7 +129,7 @@ pub fn main() -> ExitCode {
 
 /// Does the work and tells the user how it ended. A defect, in any thread that the work waits for, must not look like
 /// a crash of the user's making.
-fn told(work: impl FnOnce() -> Result<Exit>) -> Exit {
+fn run_and_report(work: impl FnOnce() -> Result<Exit>) -> Exit {
     let error = match std::panic::catch_unwind(std::panic::AssertUnwindSafe(work)) {
         Ok(Ok(exit)) => return exit,
         Ok(Err(error)) => error,
@@ -201,7 +201,7 @@ fn start_threads(asked: Option<usize>) -> Result<()> {
 
 #[cfg(test)]
 mod tests {
-    use super::{Exit, told};
+    use super::{Exit, run_and_report};
     use rayon::prelude::*;
 
     #[test]
@@ -221,9 +221,9 @@ mod tests {
             });
             Ok(Exit::Ok)
         };
-        assert_eq!(told(in_a_task), Exit::Internal);
-        assert_eq!(told(in_a_thread), Exit::Internal);
-        assert_eq!(told(|| Ok(Exit::Ok)), Exit::Ok, "the pool works on");
+        assert_eq!(run_and_report(in_a_task), Exit::Internal);
+        assert_eq!(run_and_report(in_a_thread), Exit::Internal);
+        assert_eq!(run_and_report(|| Ok(Exit::Ok)), Exit::Ok, "the pool works on");
         assert_eq!((0..1000).into_par_iter().sum::<i32>(), 499_500);
     }
 }

@@ -20,7 +20,7 @@ pub(super) fn only_crude(flag: &str) -> Error {
 }
 
 impl Sample {
-    /// What no density is needed for.
+    /// Checks what needs no density.
     pub(super) fn check(&self) -> Result<()> {
         let settings = &self.settings;
         let is_crude = self.is_crude();

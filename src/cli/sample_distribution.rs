@@ -51,7 +51,7 @@ pub(super) fn run(
     })?;
     let sampled = SampledFile::read(path, category, &flags.rename, &flags.set)?;
     let samples = sampled.samples()?;
-    judge(&samples, Doubts::new(flags.plausibility.policy()))?;
+    check_plausible(&samples, Doubts::new(flags.plausibility.policy()))?;
     for p in samples.parameters.iter().filter(|p| p.kept_share < 1.0) {
         tracing::warn!(
             "{:.3} % of the distribution of {} are outside {} … {} {} and are not drawn",
@@ -122,13 +122,13 @@ pub(super) fn run(
 }
 
 /// Looks at the fixed values and at the quartiles of the distributions: their tails are cut off anyway.
-fn judge(samples: &DistributionSamples, mut doubts: Doubts) -> Result<()> {
+fn check_plausible(samples: &DistributionSamples, mut doubts: Doubts) -> Result<()> {
     for (parameter, value) in &samples.fixed {
-        parameter.judge(*value, &mut doubts)?;
+        parameter.check_plausible(*value, &mut doubts)?;
     }
     for p in &samples.parameters {
         for share in [0.25, 0.75] {
-            p.parameter.judge(p.draw.value(share) * p.factor, &mut doubts)?;
+            p.parameter.check_plausible(p.draw.value(share) * p.factor, &mut doubts)?;
         }
     }
     doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));

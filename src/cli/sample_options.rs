@@ -28,7 +28,7 @@ impl Sample {
             EstimatorKind::Subset => 2000,
             _ => 100_000,
         });
-        self.judge_given(density)?;
+        self.check_given(density)?;
         let headways = self.headways(density)?;
         if let SampleHeadways::Each(list) = &headways
             && list.len() != 1
@@ -58,12 +58,12 @@ impl Sample {
     }
 
     /// Looks at the values of `--given`, and tells what is doubtful.
-    fn judge_given(&self, density: &DensityModel) -> Result<()> {
+    fn check_given(&self, density: &DensityModel) -> Result<()> {
         let mut doubts = Doubts::new(self.plausibility.policy());
         for (name, value) in &self.given {
             let parameter = &density.space.parameters()[density.space.index_of(name)?];
             let Some(quantity) = parameter.quantity() else { continue };
-            let judged = doubts.judge(quantity, *value, || format!("--given {name}"));
+            let judged = doubts.check(quantity, *value, || format!("--given {name}"));
             judged.map_err(|problem| Error::usage(Place::item("--given"), format!("`{name}`: {problem}"), HELP))?;
         }
         doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));

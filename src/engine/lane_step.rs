@@ -185,7 +185,7 @@ pub fn advance<R: Real, M: DriverModel<R>>(
     let mut gaps = state.gaps;
     gaps[0] = moves.choose(moved_gap(simulation, &ego, &lane.others[0], &places[0], gaps[0], index), gaps[0]);
     let first = see(simulation, &ego, &lane.others[0], &places[0], gaps[0], index, runs);
-    let mut record = judge(criteria, &state.record, &first);
+    let mut record = update_record(criteria, &state.record, &first);
     let mut hazard = check(simulation, &first, &lane.others[0], index);
     let mut touched = is_touched(scene, &first, &lane.others[0]);
     let mut settled = is_settled(scene, &first);
@@ -194,7 +194,7 @@ pub fn advance<R: Real, M: DriverModel<R>>(
     if scene.is_pair {
         gaps[1] = moves.choose(moved_gap(simulation, &ego, &lane.others[1], &places[1], gaps[1], index), gaps[1]);
         second = see(simulation, &ego, &lane.others[1], &places[1], gaps[1], index, runs);
-        record = judge(criteria, &record, &second);
+        record = update_record(criteria, &record, &second);
         let other_hazard = check(simulation, &second, &lane.others[1], index);
         // The nearest unsafe vehicle drives the reaction.
         let nearer = other_hazard.is_unsafe & (!hazard.is_unsafe | gaps[1].is_below(gaps[0]));
@@ -297,7 +297,7 @@ pub(super) fn see<R: Real, M>(
 }
 
 #[inline(always)]
-pub(super) fn judge<R: Real>(criteria: &Criteria<R>, record: &Record<R>, seen: &Seen<R>) -> Record<R> {
+pub(super) fn update_record<R: Real>(criteria: &Criteria<R>, record: &Record<R>, seen: &Seen<R>) -> Record<R> {
     let (gap, closing) = (seen.view.gap, seen.view.closing());
     let keeps_values = criteria.keeps_values;
     let ttc = criteria.ttc.update(record.ttc, seen.judged, gap, closing, keeps_values);

@@ -26,7 +26,7 @@ const TASK: usize = 1024;
 /// not on chunks.
 pub(super) struct Recheck<'p> {
     plan: &'p LanePlan,
-    again: Box<dyn Again + 'p>,
+    recompute: Box<dyn Recompute + 'p>,
     seed: u64,
     one_in: u64,
 }
@@ -48,14 +48,14 @@ impl RecheckOptions {
 }
 
 /// Makes every step of a lane again.
-trait Again: Sync {
+trait Recompute: Sync {
     /// Outcome of a single lane.
     fn single(&self, key: &LaneKey) -> Outcome<f32>;
     /// Verdicts of lanes of one block and model in batches, with their position in `keys`.
     fn batched(&self, keys: &[LaneKey], each: &mut dyn FnMut(usize, Verdicts));
 }
 
-impl Again for LaneRunner<'_, f32> {
+impl Recompute for LaneRunner<'_, f32> {
     fn single(&self, key: &LaneKey) -> Outcome<f32> {
         self.run(key)
     }
@@ -67,7 +67,7 @@ impl Again for LaneRunner<'_, f32> {
 
 impl<'p> Recheck<'p> {
     pub fn new(plan: &'p LanePlan, RecheckOptions { seed, one_in }: RecheckOptions) -> Self {
-        Recheck { plan, again: Box::new(LaneRunner::of_few(plan)), seed, one_in: one_in.max(1) }
+        Recheck { plan, recompute: Box::new(LaneRunner::of_few(plan)), seed, one_in: one_in.max(1) }
     }
 
     /// Computes the chosen lanes of a chunk again and compares every word that it has. Gives their number. `backend`
@@ -103,14 +103,14 @@ impl<'p> Recheck<'p> {
         };
         let is_batched = by == RecheckBy::Batches;
         for key in keys.iter().filter(|key| !is_batched || self.is_single(key)) {
-            let ours = self.again.single(key);
+            let ours = self.recompute.single(key);
             compare(key, &|at| match chunk.outcomes.get(at) {
                 Some(theirs) => same_words(&ours.widen(), theirs),
                 None => chunk.verdicts[at] == ours.verdicts && !self.misses_mark(chunk, wanted, key, &ours),
             });
         }
         if is_batched {
-            self.again.batched(keys, &mut |at, ours| compare(&keys[at], &|at| chunk.verdicts[at] == ours));
+            self.recompute.batched(keys, &mut |at, ours| compare(&keys[at], &|at| chunk.verdicts[at] == ours));
         }
         first
     }
@@ -139,7 +139,7 @@ impl<'p> Recheck<'p> {
         let Some(key) = self.plan.key(lane) else {
             return Error::Internal(format!("lane {lane} was checked and is beyond the plan"));
         };
-        let (at, ours) = ((lane - chunk.first_lane) as usize, self.again.single(&key));
+        let (at, ours) = ((lane - chunk.first_lane) as usize, self.recompute.single(&key));
         let verdict_bits = |verdicts: Verdicts| format!("verdict bits {:#06b}", verdicts.0);
         let (found, expected) = match chunk.outcomes.get(at) {
             Some(theirs) => (format!("{theirs:?}"), format!("{:?}", ours.widen())),
@@ -309,7 +309,7 @@ mod tests {
         }
     }
 
-    impl<M: DriverModel<f32>> Again for Instead<'_, M> {
+    impl<M: DriverModel<f32>> Recompute for Instead<'_, M> {
         fn single(&self, key: &LaneKey) -> Outcome<f32> {
             let constants = Constants::<f32>::resolve(&self.plan.profile, self.plan.blocks[0].category);
             let (frame, criteria) = (&constants.frames[self.id.index()], &constants.criteria);
@@ -365,7 +365,7 @@ mod tests {
         };
         let plan = random_plan(&Profile::load("paper").unwrap(), &options).unwrap();
         let left_out = Instead { plan: &plan, id, model, every_step: false };
-        let recheck = Recheck { plan: &plan, again: Box::new(left_out), seed: 157, one_in: 20 };
+        let recheck = Recheck { plan: &plan, recompute: Box::new(left_out), seed: 157, one_in: 20 };
         let run = |every_step| {
             let backend = Instead { every_step, ..left_out };
             let (executor, units) = (Executor::new(backend), 0..plan.unit_count());

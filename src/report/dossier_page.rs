@@ -65,7 +65,7 @@ impl DossierReport<'_> {
                 ),
                 (
                     "least data".to_owned(),
-                    "as many failing scenarios as score.least_failures; with fewer, recall and precision are undecided and have no interval"
+                    "as many failing scenarios as score.min_failures; with fewer, recall and precision are undecided and have no interval"
                         .to_owned(),
                 ),
                 ("coverage, limit".to_owned(), format!("{} of the kept scenarios", self.rules.min_coverage)),

@@ -14,7 +14,7 @@ use crate::run::study::Study;
 use crate::stats::density::DensityModel;
 use crate::support::atomic_file::StagedFile;
 use crate::support::files::make_folder_of;
-use crate::support::table::{Cell, Column, ColumnKind, TableFacts, TableFormat, TableWriter};
+use crate::support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter};
 use crate::{Error, Result};
 
 /// Writes one row per lane of a study, chunk by chunk, so that memory does not grow with the lanes. The table gets its
@@ -57,7 +57,7 @@ fn create(
     columns: Vec<Column>,
 ) -> Result<TableWriter> {
     let (profile, plan_sha256) = (Some(plan.profile.name.clone()), Some(plan.hash().to_owned()));
-    TableWriter::create(path, table_format(path)?, columns, &TableFacts { table, profile, plan_sha256, synthetic })
+    TableWriter::create(path, table_format(path)?, columns, &TableMetadata { table, profile, plan_sha256, synthetic })
 }
 
 /// Numbers in the arithmetic they were computed in: the shortest text that reads back to the same bits.

@@ -5,7 +5,7 @@ use serde::Serialize;
 use crate::engine::{Block, DeviceRecord, ENGINE_VERSION, SweepSummary};
 use crate::model::profile::Profile;
 use crate::run::score::{ScoreOptions, ScoreTable, f1};
-use crate::run::study::{CategoryFacts, Study, StudyResult};
+use crate::run::study::{CategoryProvenance, Study, StudyResult};
 use crate::scenario::parameterization::ParameterizationOptions;
 use crate::support::readable::counted;
 use crate::traffic::mining::{MiningOptions, RecordingSummary};
@@ -189,7 +189,7 @@ impl RunRecord {
 
 fn category_records(study: &Study, scores: &ScoreTable) -> Vec<CategoryRecord> {
     let plan = study.plan();
-    let record = |(block, of): (&Block, &CategoryFacts)| {
+    let record = |(block, of): (&Block, &CategoryProvenance)| {
         let scored = scores.categories.iter().find(|c| c.category == block.category);
         let cells = || scored.iter().flat_map(|c| &c.cells).filter(|c| c.variant > 0);
         CategoryRecord {

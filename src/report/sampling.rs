@@ -76,7 +76,7 @@ pub struct DrawRecord {
 }
 
 impl DrawRecord {
-    /// Of a tally.
+    /// The draws of one tally.
     pub fn of(tally: &SampleTally, plan: &LanePlan) -> DrawRecord {
         let rejected = tally.tries - tally.valid().min(tally.tries);
         DrawRecord {

@@ -16,10 +16,10 @@ use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::close_following::CloseFollowing;
 use crate::run::score::{
-    Best, CategoryScores, ClaimResult, Misfit, ScoreTable, best_parameterizations, f1, judge_claims,
+    Best, CategoryScores, ClaimResult, Misfit, ScoreTable, best_parameterizations, check_claims, f1,
     published_failures, published_lvd_f1,
 };
-use crate::run::study::{CategoryFacts, ParameterHistogram, Study};
+use crate::run::study::{CategoryProvenance, ParameterHistogram, Study};
 use crate::scenario::Category;
 use crate::scenario::parameterization::{ModeShape, Parameterization};
 use crate::support::run_dir::Results;
@@ -75,9 +75,9 @@ impl StudyReport {
         let scores = study.score(counts)?;
         host.timings.score_s = started.elapsed().as_secs_f64();
         let run = RunRecord::of(study, &scores, host);
-        let claims = judge_claims(&scores, plan, counts);
+        let claims = check_claims(&scores, plan, counts);
         let best = best_parameterizations(&scores, plan, counts, Criterion::Collision);
-        let picture = |(block, of): (usize, &CategoryFacts)| {
+        let picture = |(block, of): (usize, &CategoryProvenance)| {
             Ok(CategoryPictures {
                 headways: HeadwayFailures::of(plan, counts, block)?,
                 parameters: of.parameters.clone(),

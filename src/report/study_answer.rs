@@ -92,7 +92,7 @@ impl StudyReport {
     }
 
     fn row(&self, best: &Best) -> [String; 7] {
-        let least = u64::from(self.scores.options.least_failures.max(1));
+        let least = u64::from(self.scores.options.min_failures.max(1));
         let name = [best.category.label(), best.model.name()].map(str::to_owned);
         let Some(score) = &best.score else {
             let scenarios = best.failing_scenarios;

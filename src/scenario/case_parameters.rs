@@ -63,11 +63,11 @@ impl CaseParameters {
     ///
     /// # Errors
     /// [`Error::Usage`] for a value beyond the physical range, unless such are accepted.
-    pub fn judge(&self, doubts: &mut Doubts) -> Result<()> {
+    pub fn check_plausible(&self, doubts: &mut Doubts) -> Result<()> {
         for (key, quantity, value) in self.numbers() {
             let Some(value) = value else { continue };
             doubts
-                .judge(quantity, value, || key.to_owned())
+                .check(quantity, value, || key.to_owned())
                 .map_err(|problem| Error::usage(Place::item(key), problem, HELP))?;
         }
         Ok(())

@@ -31,7 +31,7 @@ pub(super) struct Problem {
     pub help: &'static str,
 }
 
-/// What no type says: lengths, signs and what a category needs.
+/// Checks what the types cannot express: lengths, signs and what a category needs.
 pub(super) fn check(scenario: &Scenario) -> std::result::Result<(), Problem> {
     let s = scenario;
     for (field, text) in [("id", &s.id), ("recording", &s.recording)] {
@@ -146,29 +146,29 @@ pub(super) fn admit(
     }
     check(scenario)?;
     let s = &*scenario;
-    let mut judge = |quantity, field: &str, value, words: &dyn Fn(String) -> String| {
-        let judged = doubts.judge(quantity, value, || place(field));
+    let mut check_plausible = |quantity, field: &str, value, words: &dyn Fn(String) -> String| {
+        let judged = doubts.check(quantity, value, || place(field));
         judged.map_err(|text| Problem { field: field.to_owned(), problem: words(text), help: HELP })
     };
     let is = |text: String| text;
-    judge(Quantity::Rate, "fps", s.fps, &is)?;
-    judge(Quantity::LaneWidth, "lane_width", s.lane_width, &is)?;
-    judge(Quantity::Speed, "ego.v0", s.ego.v0, &is)?;
-    judge(Quantity::Length, "ego.length", s.ego.length, &is)?;
-    judge(Quantity::Width, "ego.width", s.ego.width, &is)?;
+    check_plausible(Quantity::Rate, "fps", s.fps, &is)?;
+    check_plausible(Quantity::LaneWidth, "lane_width", s.lane_width, &is)?;
+    check_plausible(Quantity::Speed, "ego.v0", s.ego.v0, &is)?;
+    check_plausible(Quantity::Length, "ego.length", s.ego.length, &is)?;
+    check_plausible(Quantity::Width, "ego.width", s.ego.width, &is)?;
     for (field, quantity, value) in
         [("gap0", Quantity::Gap, s.gap0), ("D", Quantity::Gap, s.lead_gap), ("thw0", Quantity::Headway, s.thw0)]
     {
-        value.map_or(Ok(()), |value| judge(quantity, field, value, &is))?;
+        value.map_or(Ok(()), |value| check_plausible(quantity, field, value, &is))?;
     }
     for (role, other) in [("target", Some(&s.target)), ("lead", s.lead.as_ref())] {
         let Some(other) = other else { continue };
-        judge(Quantity::Length, &format!("{role}.length"), other.length, &is)?;
-        judge(Quantity::Width, &format!("{role}.width"), other.width, &is)?;
+        check_plausible(Quantity::Length, &format!("{role}.length"), other.length, &is)?;
+        check_plausible(Quantity::Width, &format!("{role}.width"), other.width, &is)?;
         let mut worst =
             |quantity, series: &str, values: &mut dyn Iterator<Item = f64>, words: &dyn Fn(String) -> String| {
                 let Some((k, value)) = farthest(quantity, values) else { return Ok(()) };
-                judge(quantity, &format!("{role}.{series}[{k}]"), value, words)
+                check_plausible(quantity, &format!("{role}.{series}[{k}]"), value, words)
             };
         worst(Quantity::Speed, "v", &mut other.v.iter().copied(), &is)?;
         worst(Quantity::LateralPosition, "y", &mut other.y.iter().copied(), &is)?;

@@ -10,7 +10,7 @@ use super::columns::{Leaf, leaves};
 use super::found::ScenarioFile;
 use super::{Scenario, jsonl, table_reader};
 use crate::support::plausibility::Implausible;
-use crate::support::table::{Cell, Column, ColumnKind, TableFacts, TableFormat, TableWriter};
+use crate::support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter};
 use crate::{Error, Result};
 
 /// Formats that scenarios are written in, the one for names without an ending first.
@@ -76,7 +76,7 @@ pub fn scenario_columns() -> Vec<Column> {
 /// A table with one row per scenario and series as lists. The caller has checked that the scenarios can be read again.
 fn write_table(path: &Path, format: TableFormat, scenarios: &[&Scenario]) -> Result<()> {
     let synthetic = scenarios.iter().any(|scenario| scenario.synthetic);
-    let facts = TableFacts { table: "scenarios", synthetic, ..TableFacts::default() };
+    let facts = TableMetadata { table: "scenarios", synthetic, ..TableMetadata::default() };
     let (leaves, columns) = (leaves(), scenario_columns());
     let mut table = TableWriter::create(path, format, columns.clone(), &facts)?;
     for scenario in scenarios {

@@ -168,7 +168,7 @@ impl Doubts {
     /// # Errors
     /// What is wrong with one beyond the physical range, unless such are accepted.
     #[inline]
-    pub fn judge(&mut self, quantity: Quantity, value: f64, place: impl FnOnce() -> String) -> Result<(), String> {
+    pub fn check(&mut self, quantity: Quantity, value: f64, place: impl FnOnce() -> String) -> Result<(), String> {
         if quantity.is_plausible(value) { Ok(()) } else { self.doubt(quantity, value, place()) }
     }
 
@@ -222,12 +222,12 @@ mod tests {
     #[test]
     fn kilometres_per_hour_for_metres_per_second_are_refused_by_name_and_accepted_on_request() {
         let mut doubts = Doubts::default();
-        let text = doubts.judge(Quantity::Speed, 108.0, String::new).unwrap_err();
+        let text = doubts.check(Quantity::Speed, 108.0, String::new).unwrap_err();
         assert_eq!(text, "108 m/s is beyond what is physical for a speed (0 to 100 m/s); 108 looks like km/h: 30 m/s");
         assert!(doubts.sentences().is_empty());
         let mut doubts = Doubts::new(Implausible::Accepted);
-        doubts.judge(Quantity::Speed, 108.0, || "line 2".to_owned()).unwrap();
-        doubts.judge(Quantity::Speed, 90.0, || "line 3".to_owned()).unwrap();
+        doubts.check(Quantity::Speed, 108.0, || "line 2".to_owned()).unwrap();
+        doubts.check(Quantity::Speed, 90.0, || "line 3".to_owned()).unwrap();
         let [said] = &doubts.sentences()[..] else { panic!("one sentence") };
         assert!(said.contains("2 times, first: line 2: 108 m/s"), "{said}");
     }

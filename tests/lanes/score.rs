@@ -8,7 +8,7 @@ use lanesweep::engine::{Confusion, LaneKey, LanePlan, Partial, Verdicts};
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::{MODELS, ModelId};
 use lanesweep::run::score::{
-    ScoreOptions, ScoreTable, best_parameterizations, f1, judge_claims, precision, recall, score,
+    ScoreOptions, ScoreTable, best_parameterizations, check_claims, f1, precision, recall, score,
 };
 use lanesweep::scenario::Category;
 
@@ -120,7 +120,7 @@ fn threads_and_chunks_do_not_change_a_bit() {
     };
     let (one, two) = (with_threads(1, &whole), with_threads(2, &parts));
     assert_eq!(one, two);
-    assert_eq!(judge_claims(&one, &plan, &whole), judge_claims(&two, &plan, &parts));
+    assert_eq!(check_claims(&one, &plan, &whole), check_claims(&two, &plan, &parts));
 }
 
 #[test]
@@ -213,7 +213,7 @@ fn a_plan_without_variants_or_with_one_scenario_scores_without_a_panic() {
     for blocks in [&[(Category::Lvd, 1, LVD)][..], &[(Category::CutIn, 1, &[])], &[(Category::Lvd, 0, LVD)]] {
         let plan = plan(blocks);
         let counts = part(&plan, 0..plan.unit_count(), &|lane| Verdicts((lane % 8) as u8));
-        judge_claims(&score(&plan, &counts, &ScoreOptions::default()).unwrap(), &plan, &counts);
+        check_claims(&score(&plan, &counts, &ScoreOptions::default()).unwrap(), &plan, &counts);
     }
 }
 

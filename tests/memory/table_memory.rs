@@ -18,7 +18,7 @@ use lanesweep::support::plausibility::Implausible;
 use parquet::basic::Compression;
 
 use lanesweep::report::lanes::{Digits, columns};
-use lanesweep::support::table::{Cell, ColumnKind, TableFacts, TableFormat, TableWriter};
+use lanesweep::support::table::{Cell, ColumnKind, TableFormat, TableMetadata, TableWriter};
 use lanesweep::traffic::trajectory::highd;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
@@ -26,7 +26,8 @@ use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 fn write(path: &Path, rows: u64) -> u64 {
     let columns = columns(Digits::Binary32);
     memory::begin(rows);
-    let mut table = TableWriter::create(path, TableFormat::Parquet, columns.clone(), &TableFacts::default()).unwrap();
+    let mut table =
+        TableWriter::create(path, TableFormat::Parquet, columns.clone(), &TableMetadata::default()).unwrap();
     let mut word = 157_u64;
     for row in 0..rows {
         let cells: Vec<Cell> = columns

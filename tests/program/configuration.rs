@@ -78,7 +78,7 @@ fn every_verb_takes_its_values_from_all_layers() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     let tables = "[run]\nbackend = \"cpu\"\n[generator]\nrecordings = 2\nduration_s = 100\n[score]\nseed = 11\n\
-                  least_failures = 20\n[fit]\nseed = 12\nvalid_draws = 1000\n[sample]\nseed = 13\nsamples = 1e2\n\
+                  min_failures = 20\n[fit]\nseed = 12\nvalid_draws = 1000\n[sample]\nseed = 13\nsamples = 1e2\n\
                   [compare]\nseed = 14\nsamples = 50\n";
     std::fs::write(dir.join("a.toml"), tables).unwrap();
     let fit = ["fit", "--categories", "lvd", "--parameterizations", "i", "--no-comparison", "--out", "lvd-i.json"];
@@ -107,8 +107,8 @@ fn every_verb_takes_its_values_from_all_layers() {
     let settings = record["settings"].as_array().unwrap();
     let of = |key: &str| settings.iter().find(|one| one["key"] == key).unwrap_or_else(|| panic!("{key}"));
     assert_eq!(of("score.seed")["source"], "flag --seed");
-    assert_eq!(of("score.least_failures")["source"], "file a.toml, line 8");
-    assert_eq!(record["score"]["least_failures"], 20);
+    assert_eq!(of("score.min_failures")["source"], "file a.toml, line 8");
+    assert_eq!(record["score"]["min_failures"], 20);
     assert!(record["data"].as_str().unwrap().contains("2 generated recordings of 100 s"));
 }
 

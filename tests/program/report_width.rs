@@ -8,7 +8,7 @@ use crate::common::plans::{chunk, mixed, plan};
 use assert_cmd::Command;
 use lanesweep::engine::{Partial, Verdicts};
 use lanesweep::report::tables;
-use lanesweep::run::score::{ClaimVerdict, ScoreOptions, judge_claims, score};
+use lanesweep::run::score::{ClaimVerdict, ScoreOptions, check_claims, score};
 use lanesweep::scenario::Category;
 
 fn assert_fits(text: &str, width: usize) {
@@ -42,7 +42,7 @@ fn seven_variants_with_intervals_and_large_counts_fit() {
     let lane = |lane: u64| (Verdicts((mixed(3, lane) & 0xf) as u8), 1.0);
     let partial = Partial::from_chunk(&plan, &chunk(&plan, 0..plan.unit_count(), &lane, false)).unwrap();
     let table = score(&plan, &partial, &ScoreOptions::default()).unwrap();
-    let claims = judge_claims(&table, &plan, &partial);
+    let claims = check_claims(&table, &plan, &partial);
     assert!(claims.iter().any(|c| c.verdict != ClaimVerdict::NotRun));
     for width in [60, 80, 100, 120] {
         for published in [false, true] {

@@ -6,7 +6,7 @@
 //! ```
 
 use lanesweep::engine::Confusion;
-use lanesweep::run::score::{ClaimVerdict, Contrast, ScenarioRate, ScoreInterval, f1, least_contrast};
+use lanesweep::run::score::{ClaimVerdict, Contrast, ScenarioRate, ScoreInterval, f1, min_contrast};
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
@@ -83,7 +83,7 @@ impl Population {
         let rates: Vec<_> =
             (0..self.wrong.len()).map(|at| ScenarioRate::f1(scenarios.iter().map(|s| &s[at]))).collect();
         let pairs = (0..self.better).flat_map(|a| (self.better..rates.len()).map(move |b| Contrast::difference(a, b)));
-        least_contrast(&rates, &pairs.collect::<Vec<_>>(), 0.95).expect("failures").1
+        min_contrast(&rates, &pairs.collect::<Vec<_>>(), 0.95).expect("failures").1
     }
 
     /// The percentiles of resampled differences, mean over cells of the same scenarios: what the claims had before.

@@ -119,7 +119,7 @@ fn the_default_recordings_look_like_published_motorway_traffic() {
         table.ratio_row(&figure, published, quantile(&t.headways_s, share), 0.65, 1.2);
     }
     // Two cars a minute, so that nobody meets anybody: what is left is the noise.
-    let quiet = GeneratorOptions { flow_vehph: 120.0, truck_share: 0.0, event_rate_factor: 0.0, ..options };
+    let quiet = GeneratorOptions { flow_vehph: 120.0, truck_fraction: 0.0, event_rate_factor: 0.0, ..options };
     let (sd, correlation_s) = noise_sd_and_correlation(&generate(&quiet).unwrap());
     table.row("acceleration noise on an empty road, sd, m/s²", "0.20 – 0.24", sd, 0.2, 0.24);
     table.row("its correlation time, s", "1.5", correlation_s, 1.3, 1.7);

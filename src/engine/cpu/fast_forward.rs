@@ -16,7 +16,8 @@ use crate::model::scalar::Real;
 use crate::engine::cpu::ROWS;
 use crate::engine::frame::Simulation;
 use crate::engine::lane_step::{
-    Ego, LaneConstants, LaneState, OtherConstants, OtherState, Record, advance, check, criteria_safe_gap, judge, see,
+    Ego, LaneConstants, LaneState, OtherConstants, OtherState, Record, advance, check, criteria_safe_gap, see,
+    update_record,
 };
 
 /// Fewer steps are cheaper to make than to count.
@@ -166,7 +167,7 @@ fn quiescent_gap<M: DriverModel<f32>>(
     let ego = Ego { v: state.v_ego, a: 0.0, width: lane.ego_width };
     let seen = see(simulation, &ego, other, place, lowest, index, Flag::TRUE);
     // Every criterion that a record keeps is evaluated here.
-    let Record { ttc, btn, min_gap: _ } = judge(criteria, record, &seen);
+    let Record { ttc, btn, min_gap: _ } = update_record(criteria, record, &seen);
     let fails = (ttc.failed & !record.ttc.failed) | (btn.failed & !record.btn.failed);
     // The driver may not attend to it yet: then fewer steps count as quiescent than could.
     let reacts = check(simulation, &seen, other, Flag::LATEST_STEP).is_unsafe;

@@ -46,7 +46,7 @@ struct Stage<'s, M> {
     fleet: Fleet<'s>,
     pending: Pending,
     /// Quiescent steps are skipped.
-    leaves_out: bool,
+    skips_steps: bool,
     /// The stage for lanes that need fewer checks.
     apart: Option<Box<Stage<'s, M>>>,
 }
@@ -63,15 +63,15 @@ impl<'s, M: DriverModel<f32>> Stage<'s, M> {
         let rules_of = |scene| Rules::of(simulation.frame, simulation.criteria, scene, E::HAS_VALUES).expect(RUNS);
         // Some rules have no loop for verdicts.
         let values = !rules_of(simulation.scene).is_verdict_only;
-        let leaves_out = !values && !stream.every_step;
-        let knows_steady = leaves_out && M::KNOWS_STEADY_FOLLOWING;
+        let skips_steps = !values && !stream.every_step;
+        let knows_steady = skips_steps && M::KNOWS_STEADY_FOLLOWING;
         // A stage whose lanes look at these vehicles.
         let stage = |scene: Scene, rules, vehicles: [usize; 2], apart: Option<Stage<'s, M>>| Stage {
             simulation: Simulation { scene, ..simulation },
             burst: burst_for(instructions, rules).expect(RUNS),
             fleet: Fleet::new(stream, entries, vehicles),
             pending: Pending::new(values, apart.is_some() && !scene.is_pair),
-            leaves_out,
+            skips_steps,
             apart: apart.map(Box::new),
         };
         let single = |scene, vehicles| {
@@ -83,7 +83,7 @@ impl<'s, M: DriverModel<f32>> Stage<'s, M> {
             return single(scene, [0, 0]);
         }
         // The ego may still pass the second vehicle, which batches of single vehicles do not test.
-        let alone = (leaves_out && !scene.may_cross).then(|| single(Scene::of_lead_only(stream.cases), [1, 1]));
+        let alone = (skips_steps && !scene.may_cross).then(|| single(Scene::of_lead_only(stream.cases), [1, 1]));
         stage(scene, rules_of(scene), [0, 1], alone)
     }
 
@@ -137,7 +137,7 @@ impl<'s, M: DriverModel<f32>> Stage<'s, M> {
                 each(batch.lane(k) as usize, E::of(simulation, &constants, &state, &places));
             }
             batch.free_finished();
-            let mut quiescent = if self.leaves_out { batch.quiescent } else { 0 };
+            let mut quiescent = if self.skips_steps { batch.quiescent } else { 0 };
             while quiescent != 0 {
                 batch.jump_ahead(simulation, quiescent.trailing_zeros() as usize);
                 quiescent &= quiescent - 1;

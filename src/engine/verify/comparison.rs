@@ -28,7 +28,7 @@ pub const WORDS: [&str; 12] = [
 ];
 
 /// Differing lanes that a comparison keeps.
-const KEPT: usize = 10;
+const MAX_EXAMPLES: usize = 10;
 
 /// Results of the lanes of one category and model.
 #[derive(Debug, Clone, PartialEq)]
@@ -234,5 +234,5 @@ fn add(comparison: &mut Comparison, plan: &LanePlan, [tested, cpu, reference]: [
     comparison.worst.extend(differing);
     // Stable: among equally bad ones the first in the plan's order stays.
     comparison.worst.sort_by_key(|lane| std::cmp::Reverse(lane.severity()));
-    comparison.worst.truncate(KEPT);
+    comparison.worst.truncate(MAX_EXAMPLES);
 }

@@ -107,7 +107,7 @@ impl DriverProfile for FsmProfile {
 /// 0 beyond the safe distance, 1 below the unsafe one, linear between.
 #[inline(always)]
 fn fuzzy<R: Real>(distance: R, safe: R, dangerous: R) -> R {
-    // Before the choice, so that batches of lanes choose without a branch; what is not chosen may be no number.
+    // Before the choice, so that batches of lanes choose without a branch; what is not chosen may be NaN.
     let between = (distance - safe).exact_div(dangerous - safe);
     let is_safe = distance.is_at_least(safe);
     let is_dangerous = distance.is_at_most(dangerous);

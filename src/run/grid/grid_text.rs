@@ -126,8 +126,8 @@ impl GridParts {
     /// [`Error::Usage`] for a value that no road has, where those are refused.
     pub fn check_plausible(&self, doubts: &mut Doubts) -> Result<()> {
         for axis in [&self.x, &self.y].into_iter().chain(&self.panel_axes) {
-            axis.values.iter().try_for_each(|value| axis.parameter.judge(*value, doubts))?;
+            axis.values.iter().try_for_each(|value| axis.parameter.check_plausible(*value, doubts))?;
         }
-        self.fixed.iter().try_for_each(|(parameter, value)| parameter.judge(*value, doubts))
+        self.fixed.iter().try_for_each(|(parameter, value)| parameter.check_plausible(*value, doubts))
     }
 }

@@ -212,9 +212,9 @@ impl MapParameter {
     ///
     /// # Errors
     /// [`Error::Usage`] for one beyond the physical range, unless such are accepted.
-    pub fn judge(&self, value: f64, doubts: &mut Doubts) -> Result<()> {
+    pub fn check_plausible(&self, value: f64, doubts: &mut Doubts) -> Result<()> {
         let (quantity, sign) = self.plausible();
-        let judged = doubts.judge(quantity, sign * self.si(value), || self.key.to_owned());
+        let judged = doubts.check(quantity, sign * self.si(value), || self.key.to_owned());
         judged.map_err(|problem| Error::usage(Place::item(self.key), problem, plausibility::HELP))
     }
 

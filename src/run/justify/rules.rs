@@ -101,12 +101,12 @@ impl Conclusion {
 impl Rules {
     /// Recall and precision.
     pub(super) fn of_labels(&self, scored: &Scored, options: &ScoreOptions) -> Vec<Finding> {
-        let least = u64::from(options.least_failures.max(1));
+        let least = u64::from(options.min_failures.max(1));
         let failing = scored.failing_scenarios;
         let share = |quantity, share: Share, limit: f64| {
             // Few scenarios say little, however many headways fail in each.
             let (conclusion, need) = match share.value.zip(share.interval) {
-                Some((value, interval)) if failing >= least => judge(value, interval, limit),
+                Some((value, interval)) if failing >= least => conclude(value, interval, limit),
                 _ => {
                     // Without any failure nothing tells how many scenarios would have one.
                     let times = least as f64 / failing as f64;
@@ -157,7 +157,7 @@ impl Rules {
 }
 
 /// A share passes where its whole interval lies at or above the limit, and fails where it lies below.
-fn judge(value: f64, (low, high): (f64, f64), limit: f64) -> (Conclusion, Option<Need>) {
+fn conclude(value: f64, (low, high): (f64, f64), limit: f64) -> (Conclusion, Option<Need>) {
     if low >= limit {
         (Conclusion::Appropriate, None)
     } else if high < limit {

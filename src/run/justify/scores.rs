@@ -75,7 +75,7 @@ impl Labels<'_> {
         let share = |value, of: fn(&Confusion<u32>) -> u32| {
             let clusters = units.iter().map(|c| (u64::from(of(c)), u64::from(c.tp))).filter(|(runs, _)| *runs > 0);
             let (runs, agreed): (Vec<u64>, Vec<u64>) = clusters.unzip();
-            let is_enough = runs.len() as u64 >= u64::from(options.least_failures.max(2));
+            let is_enough = runs.len() as u64 >= u64::from(options.min_failures.max(2));
             let interval = is_enough.then(|| {
                 let interval = cluster_rate(Clusters { runs: &runs, failures: &agreed }, options.confidence).interval;
                 (interval.low, interval.high)

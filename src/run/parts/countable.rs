@@ -2,11 +2,11 @@
 
 use std::ops::Range;
 
-use super::ledger::Countable;
+use super::ledger::MergeableCounts;
 use crate::Result;
 use crate::engine::Partial;
 
-impl Countable for Partial {
+impl MergeableCounts for Partial {
     fn covered(&self) -> Vec<Range<u64>> {
         Partial::covered(self)
     }

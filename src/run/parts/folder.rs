@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-use super::ledger::{Countable, Fits};
+use super::ledger::{Fits, MergeableCounts};
 use super::part::{Part, read_part};
 use super::shard::Shard;
 use crate::{Error, Place, Result};
@@ -56,7 +56,7 @@ pub fn collect(dir: &Path, units: u64, again: impl Fn(Shard) -> String) -> Resul
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] naming what is missing, doubled, foreign or damaged, and with `again` how it is made.
-pub fn read_parts<T: Countable>(
+pub fn read_parts<T: MergeableCounts>(
     dir: &Path,
     run_sha256: &str,
     units: u64,
@@ -70,7 +70,7 @@ pub fn read_parts<T: Countable>(
             let help = format!("delete it and make it again: {}", again(*shard));
             Error::input(Place::file(path), problem, help)
         };
-        let mut covered: Vec<_> = part.segments.iter().flat_map(Countable::covered).collect();
+        let mut covered: Vec<_> = part.segments.iter().flat_map(MergeableCounts::covered).collect();
         covered.sort_by_key(|range| range.start);
         let mut at = part.units.start;
         for range in covered {

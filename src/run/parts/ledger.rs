@@ -9,7 +9,7 @@ use super::journal::{Journal, Records};
 use crate::{Error, Place, Result};
 
 /// Counts over a set of units of one plan that join in any order.
-pub trait Countable: Sized + Clone + Serialize + DeserializeOwned {
+pub trait MergeableCounts: Sized + Clone + Serialize + DeserializeOwned {
     /// The units counted, as disjoint intervals, ascending.
     fn covered(&self) -> Vec<Range<u64>>;
     /// Counts over both sets.
@@ -54,7 +54,7 @@ pub struct Ledger<T> {
     journal: Option<CountsJournal<T>>,
 }
 
-impl<T: Countable> Ledger<T> {
+impl<T: MergeableCounts> Ledger<T> {
     /// Nothing counted yet, cut at these units; without a journal nothing outlives the process.
     pub fn new(units: Range<u64>, cuts: &[u64]) -> Ledger<T> {
         let inside = cuts.iter().copied().filter(|cut| units.start < *cut && *cut < units.end);
@@ -188,7 +188,7 @@ impl<T: Countable> Ledger<T> {
 
     /// Number of units counted, pending ones left out.
     fn done(&self) -> u64 {
-        self.segments.iter().flatten().flat_map(Countable::covered).map(|range| range.end - range.start).sum()
+        self.segments.iter().flatten().flat_map(MergeableCounts::covered).map(|range| range.end - range.start).sum()
     }
 
     /// Lanes of everything counted, by this process and by earlier ones: those that the fallback computed, and those that
@@ -207,10 +207,10 @@ impl<T: Countable> Ledger<T> {
     /// The intervals of a range that are not counted yet, cut at the cuts, ascending.
     ///
     /// # Errors
-    /// Of [`Countable::join`].
+    /// Of [`MergeableCounts::join`].
     pub fn missing(&mut self, range: Range<u64>) -> Result<Vec<Range<u64>>> {
         self.settle()?;
-        let mut covered: Vec<Range<u64>> = self.segments.iter().flatten().flat_map(Countable::covered).collect();
+        let mut covered: Vec<Range<u64>> = self.segments.iter().flatten().flat_map(MergeableCounts::covered).collect();
         covered.sort_by_key(|range| range.start);
         let mut missing = Vec::new();
         let mut at = range.start;
@@ -235,7 +235,7 @@ impl<T: Countable> Ledger<T> {
     /// The counts of the segments that lie in a range, joined; `None` where nothing is counted there.
     ///
     /// # Errors
-    /// Of [`Countable::join`].
+    /// Of [`MergeableCounts::join`].
     pub fn counts(&mut self, range: Range<u64>) -> Result<Option<T>> {
         self.settle()?;
         let inside = self.segments.iter().flatten().filter(|counts| {
@@ -254,7 +254,7 @@ impl<T: Countable> Ledger<T> {
     /// The counts of all segments, joined; nothing is counted afterwards, so that no count is held twice.
     ///
     /// # Errors
-    /// Of [`Countable::join`].
+    /// Of [`MergeableCounts::join`].
     pub fn take(&mut self) -> Result<Option<T>> {
         self.settle()?;
         self.unwritten.clear();
@@ -266,7 +266,7 @@ impl<T: Countable> Ledger<T> {
     /// Everything counted, segment by segment, and the journal, to be removed once the result stands.
     ///
     /// # Errors
-    /// Of [`Countable::join`].
+    /// Of [`MergeableCounts::join`].
     pub fn finish(mut self) -> Result<(Vec<T>, Option<CountsJournal<T>>)> {
         self.settle()?;
         Ok((self.segments.into_iter().flatten().collect(), self.journal))
@@ -289,7 +289,7 @@ mod tests {
     #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
     struct Units(Vec<u64>);
 
-    impl Countable for Units {
+    impl MergeableCounts for Units {
         fn covered(&self) -> Vec<Range<u64>> {
             self.0.iter().map(|&unit| unit..unit + 1).collect()
         }

@@ -15,7 +15,7 @@ mod shard;
 
 pub use folder::{Found, collect, read_parts};
 pub use journal::{Journal, Records};
-pub use ledger::{Countable, Counted, CountsJournal, Fits, Ledger};
+pub use ledger::{Counted, CountsJournal, Fits, Ledger, MergeableCounts};
 pub use part::{Part, read_part, write_part};
 pub use run_dir::{PLAN_FILE, RUN_PLAN_FILE, RunDir, RunState, leave_plan, units_of};
 pub use sealed::{kind_of, read_sealed, read_sealed_line, seal, unseal};

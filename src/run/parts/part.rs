@@ -5,7 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::ledger::{Countable, Fits};
+use super::ledger::{Fits, MergeableCounts};
 use super::sealed::{read_sealed, seal};
 use crate::support::files::write_inside;
 use crate::{Error, Place, Result};
@@ -41,7 +41,7 @@ pub fn write_part<T: Serialize>(path: &Path, part: &Part<T>) -> Result<()> {
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] for a damaged part, one of another run, or of another interval.
-pub fn read_part<T: Countable>(
+pub fn read_part<T: MergeableCounts>(
     path: &Path,
     run_sha256: &str,
     units: &Range<u64>,

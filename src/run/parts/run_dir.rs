@@ -6,7 +6,7 @@ use std::ops::Range;
 use std::path::{Path, PathBuf};
 
 use super::journal::Journal;
-use super::ledger::{Countable, Fits, Ledger};
+use super::ledger::{Fits, Ledger, MergeableCounts};
 use super::part::{Part, read_part, write_part};
 use super::shard::Shard;
 use crate::support::files::{make_folder, write_inside};
@@ -67,7 +67,7 @@ impl RunDir {
     ///
     /// # Errors
     /// [`Error::Input`] for a damaged or foreign file in its place.
-    pub fn is_done<T: Countable>(&self, fits: &Fits<T>) -> Result<bool> {
+    pub fn is_done<T: MergeableCounts>(&self, fits: &Fits<T>) -> Result<bool> {
         let Some(path) = self.part().filter(|path| path.exists()) else { return Ok(false) };
         read_part::<T>(&path, &self.run_sha256, &self.units(), "run this command again", fits).map(|_| true)
     }
@@ -76,7 +76,7 @@ impl RunDir {
     ///
     /// # Errors
     /// [`Error::Busy`] where another process is at it; [`Error::Io`]; as [`Ledger::resume`].
-    pub fn begin<T: Countable>(&self, cuts: &[u64], is_journalled: bool, fits: &Fits<T>) -> Result<RunState<T>> {
+    pub fn begin<T: MergeableCounts>(&self, cuts: &[u64], is_journalled: bool, fits: &Fits<T>) -> Result<RunState<T>> {
         let stem = self.shard.map(|shard| shard.stem());
         let (folder, part) = match &stem {
             None => (OutputDir::open(&self.out, self.record)?, None),
@@ -123,7 +123,7 @@ impl RunDir {
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Internal`] where the ledger is not complete.
-    pub fn finish<T: Countable>(&self, mut state: RunState<T>) -> Result<()> {
+    pub fn finish<T: MergeableCounts>(&self, mut state: RunState<T>) -> Result<()> {
         let Some(path) = self.part() else { return Err(Error::Internal("the whole run is no part".to_owned())) };
         if !state.ledger.missing(state.units.clone())?.is_empty() {
             return Err(Error::Internal("a part is not complete".to_owned()));
@@ -141,7 +141,7 @@ impl RunDir {
     }
 }
 
-impl<T: Countable> RunState<T> {
+impl<T: MergeableCounts> RunState<T> {
     /// The result stands: the journal goes, then the lock.
     ///
     /// # Errors

@@ -24,7 +24,7 @@ pub(super) const PILOT_FILE: &str = "pilot.json";
 pub(crate) const KIND: &str = "sampling plan";
 /// Largest plan that is read: a density, mostly.
 const MAX_PLAN_BYTES: u64 = 1 << 30;
-const AGAIN: &str = "make it by `sample` of this version, with option `plan_only`";
+const HOW_TO_REMAKE: &str = "make it by `sample` of this version, with option `plan_only`";
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
@@ -69,10 +69,10 @@ impl Sample {
     /// # Errors
     /// [`Error::Io`]; [`Error::Input`] for anything but a whole plan of this version.
     pub fn read(path: &Path) -> Result<Sample> {
-        let file: PlanFile = read_sealed(KIND, path, MAX_PLAN_BYTES, AGAIN)?.0;
+        let file: PlanFile = read_sealed(KIND, path, MAX_PLAN_BYTES, HOW_TO_REMAKE)?.0;
         let PlanFile { profile, options, pilots, .. } = file;
         let place = Place::file(path);
-        let wrong = |problem: &str| Error::input(place.clone(), problem, AGAIN);
+        let wrong = |problem: &str| Error::input(place.clone(), problem, HOW_TO_REMAKE);
         profile.check(&place)?;
         if !(options.level > 0.0 && options.level < 1.0) {
             return Err(wrong("its confidence level must lie between 0 and 1"));

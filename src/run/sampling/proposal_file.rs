@@ -11,7 +11,7 @@ use crate::{Error, Place, Result};
 
 const VERSION: u64 = 1;
 
-const AGAIN: &str = "write it again by `sample`, with option `estimator = ce` or option `estimator = is`";
+const HOW_TO_REMAKE: &str = "write it again by `sample`, with option `estimator = ce` or option `estimator = is`";
 
 /// The mixture of a proposal over the parameters of a density.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -54,7 +54,11 @@ pub fn proposal_text(density: &DensityModel, proposal: &Mixture) -> Result<Strin
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] for anything but a proposal of this version over the density's parameters.
 pub fn read_proposal(path: &Path, density: &DensityModel) -> Result<Mixture> {
-    proposal_from_text(&input_file::read_json(path, MAX_FILE_BYTES, "a proposal", AGAIN)?, density, &Place::file(path))
+    proposal_from_text(
+        &input_file::read_json(path, MAX_FILE_BYTES, "a proposal", HOW_TO_REMAKE)?,
+        density,
+        &Place::file(path),
+    )
 }
 
 /// A proposal for a density from the text of a file.
@@ -62,7 +66,7 @@ pub fn read_proposal(path: &Path, density: &DensityModel) -> Result<Mixture> {
 /// # Errors
 /// [`Error::Input`] at `place`, as [`read_proposal`].
 pub fn proposal_from_text(text: &[u8], density: &DensityModel, place: &Place) -> Result<Mixture> {
-    let wrong = |problem: String| Error::input(place.clone(), problem, AGAIN);
+    let wrong = |problem: String| Error::input(place.clone(), problem, HOW_TO_REMAKE);
     let value: serde_json::Value = serde_json::from_slice(text).map_err(|e| wrong(format!("it is no JSON: {e}")))?;
     match value.get("lanesweep_proposal").map(serde_json::Value::as_u64) {
         None => return Err(wrong("it is no proposal: `lanesweep_proposal` is missing".to_owned())),

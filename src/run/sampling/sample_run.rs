@@ -11,7 +11,7 @@ use super::sample_result::SampleResult;
 use super::tally::SampleTally;
 use super::weighted_tally::WeightedTally;
 use crate::engine::{Chunk, Executor};
-use crate::run::parts::{Countable, Ledger, PLAN_FILE, RunDir, RunState, Shard, read_parts, units_of};
+use crate::run::parts::{Ledger, MergeableCounts, PLAN_FILE, RunDir, RunState, Shard, read_parts, units_of};
 use crate::support::run_dir::{ESTIMATE_RECORD, Results};
 use crate::{Error, Place, Result};
 

@@ -14,7 +14,7 @@ use crate::engine::generated::{ATTEMPTS, DrawnPoint, Generator};
 use crate::engine::{CLOSE_HEADWAY_S, Chunk, Headway, LanePlan};
 use crate::model::criterion::Criterion;
 use crate::run::close_following::CloseFollowing;
-use crate::run::parts::Countable;
+use crate::run::parts::MergeableCounts;
 use crate::scenario::parameterization::Variable;
 use crate::{Error, Place, Result};
 
@@ -345,7 +345,7 @@ impl SampleTally {
     }
 }
 
-impl Countable for SampleTally {
+impl MergeableCounts for SampleTally {
     fn covered(&self) -> Vec<Range<u64>> {
         self.covered.clone()
     }

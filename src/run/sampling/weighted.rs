@@ -8,7 +8,7 @@ use super::sample_result::SampleResult;
 use super::weighted_tally::WeightedTally;
 use crate::engine::{CpuBackend, Executor, lanes_within_seconds};
 use crate::model::driver::ModelId;
-use crate::run::parts::{Countable, Ledger};
+use crate::run::parts::{Ledger, MergeableCounts};
 use crate::stats::density::{BandwidthRule, Kde, Mixture};
 use crate::stats::estimate::{
     BlockSums, Defended, Estimate, KernelShares, Pilot, PilotCheck, StopReason, WeightSums, defended, from_weight_sums,

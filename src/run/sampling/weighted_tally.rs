@@ -5,7 +5,7 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use crate::model::driver::ModelId;
-use crate::run::parts::Countable;
+use crate::run::parts::MergeableCounts;
 use crate::stats::estimate::{BlockSums, WeightSums};
 use crate::{Error, Place, Result};
 
@@ -24,7 +24,7 @@ impl WeightedTally {
     }
 }
 
-impl Countable for WeightedTally {
+impl MergeableCounts for WeightedTally {
     fn covered(&self) -> Vec<Range<u64>> {
         self.sums.first().map_or_else(Vec::new, |(_, sums)| sums.ranges())
     }

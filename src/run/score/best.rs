@@ -1,7 +1,7 @@
 //! The parameterization that agrees best with S, per category and driver model, and what the data leaves open about it.
 
 use super::claims::units_of;
-use super::difference::{Contrast, ScenarioRate, ScoreInterval, least_contrast};
+use super::difference::{Contrast, ScenarioRate, ScoreInterval, min_contrast};
 use super::table::{CategoryScores, ScoreTable, f1};
 use crate::engine::{LanePlan, Partial, UnitCounts};
 use crate::model::criterion::Criterion;
@@ -19,7 +19,7 @@ pub struct Best {
     pub failures: u64,
     /// Scenarios in which S fails.
     pub failing_scenarios: u64,
-    /// The answer; `None` where S fails in fewer scenarios than [`super::ScoreOptions::least_failures`].
+    /// The answer; `None` where S fails in fewer scenarios than [`super::ScoreOptions::min_failures`].
     pub score: Option<BestScore>,
 }
 
@@ -50,7 +50,7 @@ pub fn best_parameterizations(
 ) -> Vec<Best> {
     let of = |scores: &CategoryScores, model: ModelId| {
         let s = &scores.cells[scores.index(0, model, criterion)?];
-        let is_enough = s.failing_scenarios >= u64::from(table.options.least_failures.max(1));
+        let is_enough = s.failing_scenarios >= u64::from(table.options.min_failures.max(1));
         let units = units_of(plan, counts, scores.category);
         let score = || best_score(scores, units, (model, criterion), table.options.confidence);
         Some(Best {
@@ -82,7 +82,7 @@ fn best_score(
     let (mut rivals, mut more_data) = (Vec::new(), 1.0_f64);
     for &(other, theirs) in scored.iter().filter(|(at, _)| *at != best) {
         let contrast = [Contrast::difference(0, 1)];
-        let (_, interval) = least_contrast(&[rate(best), rate(other)], &contrast, shared)?;
+        let (_, interval) = min_contrast(&[rate(best), rate(other)], &contrast, shared)?;
         if interval.low <= 0.0 {
             rivals.push(name(other));
             let distance = value - theirs;

@@ -145,10 +145,10 @@ pub struct ClaimResult {
 
 /// Judges every claim whose category was simulated. The paper's are about all its headways and models: without one of
 /// them a claim is [`ClaimVerdict::NotRun`]. `counts` are those that the table scores.
-pub fn judge_claims(table: &ScoreTable, plan: &LanePlan, counts: &Partial) -> Vec<ClaimResult> {
+pub fn check_claims(table: &ScoreTable, plan: &LanePlan, counts: &Partial) -> Vec<ClaimResult> {
     let judge = |claim: Claim| {
         let scores = table.categories.iter().find(|c| c.category == claim.category)?;
-        Some(judge_claim(claim, Scenarios { scores, units: units_of(plan, counts, scores.category) }, table))
+        Some(check_claim(claim, Scenarios { scores, units: units_of(plan, counts, scores.category) }, table))
     };
     paper_claims().into_iter().filter_map(judge).collect()
 }
@@ -163,7 +163,7 @@ pub(super) fn units_of<'a>(plan: &LanePlan, counts: &'a Partial, category: Categ
     block.and_then(|block| counts.units().get(range(block))).unwrap_or_default()
 }
 
-fn judge_claim(claim: Claim, of: Scenarios, table: &ScoreTable) -> ClaimResult {
+fn check_claim(claim: Claim, of: Scenarios, table: &ScoreTable) -> ClaimResult {
     let statistic = claim.statistic;
     let paper = Headway::paper();
     let has_headways = table.headways.len() == paper.len() && paper.iter().all(|h| table.headways.contains(h));
@@ -176,7 +176,7 @@ fn judge_claim(claim: Claim, of: Scenarios, table: &ScoreTable) -> ClaimResult {
         let measured = statistic.value(of, cell, table.options.confidence).filter(|_| has_run);
         let verdict = match measured {
             _ if !has_run => ClaimVerdict::NotRun,
-            _ if failing_scenarios < u64::from(table.options.least_failures) => ClaimVerdict::TooFew,
+            _ if failing_scenarios < u64::from(table.options.min_failures) => ClaimVerdict::TooFew,
             None => ClaimVerdict::Undecided,
             Some((_, interval)) if matches!(statistic, Statistic::F1Near(..)) => ClaimVerdict::of_nearness(interval),
             Some((_, interval)) => ClaimVerdict::of_sign(interval),
@@ -254,7 +254,7 @@ mod tests {
             let table = ScoreTable { categories: Vec::new(), headways, options };
             let of = Scenarios { scores: &scores, units: &units };
             let claims = paper_claims().into_iter().filter(|claim| claim.category == Category::CutOut);
-            claims.map(|claim| judge_claim(claim, of, &table)).collect()
+            claims.map(|claim| check_claim(claim, of, &table)).collect()
         }
 
         fn of(&self, id: &str) -> ClaimResult {

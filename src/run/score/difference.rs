@@ -93,7 +93,7 @@ impl Contrast {
 /// The lower end is the smallest lower end at `level`: the smallest contrast lies below its own end as often as any
 /// other does. The upper end is the smallest upper end at 1 − (1 − level)/n for n contrasts (Bonferroni), since each of
 /// them may be the one that is too low by chance.
-pub fn least_contrast(rates: &[ScenarioRate], contrasts: &[Contrast], level: f64) -> Option<(f64, ScoreInterval)> {
+pub fn min_contrast(rates: &[ScenarioRate], contrasts: &[Contrast], level: f64) -> Option<(f64, ScoreInterval)> {
     let values = rates.iter().map(ScenarioRate::value).collect::<Option<Vec<f64>>>()?;
     let directions: Vec<Vec<f64>> = rates.iter().map(ScenarioRate::direction).collect();
     let correlation = |k: usize, l: usize| match k == l {
@@ -141,7 +141,7 @@ mod tests {
     fn one_rate_keeps_its_own_interval() {
         let rates = [rate(&some(50))];
         let one = [Contrast { constant: 0.5, terms: vec![(-1.0, 0)] }];
-        let (value, interval) = least_contrast(&rates, &one, 0.95).unwrap();
+        let (value, interval) = min_contrast(&rates, &one, 0.95).unwrap();
         let own = rates[0].interval(0.95);
         assert!((value - (0.5 - rates[0].value().unwrap())).abs() < 1e-12);
         assert!((interval.low - (0.5 - own.high)).abs() < 1e-12 && (interval.high - (0.5 - own.low)).abs() < 1e-12);
@@ -153,8 +153,7 @@ mod tests {
         let shifted: Vec<u64> = hits.iter().map(|k| (k + 1).min(10)).collect();
         let turned: Vec<u64> = shifted.iter().rev().copied().collect();
         let width = |other: &[u64]| {
-            let (_, interval) =
-                least_contrast(&[rate(&hits), rate(other)], &[Contrast::difference(1, 0)], 0.95).unwrap();
+            let (_, interval) = min_contrast(&[rate(&hits), rate(other)], &[Contrast::difference(1, 0)], 0.95).unwrap();
             interval.high - interval.low
         };
         assert!(width(&shifted) < 0.5 * width(&turned), "{} {}", width(&shifted), width(&turned));
@@ -165,15 +164,15 @@ mod tests {
         let hits = some(40);
         let equal = vec![rate(&hits); 6];
         let contrasts = |n: usize| (1..=n).map(|k| Contrast::difference(0, k)).collect::<Vec<_>>();
-        let (value, one) = least_contrast(&equal, &contrasts(1), 0.95).unwrap();
+        let (value, one) = min_contrast(&equal, &contrasts(1), 0.95).unwrap();
         assert!(value == 0.0 && one.low <= 0.0 && one.high >= 0.0);
-        let (_, five) = least_contrast(&equal, &contrasts(5), 0.95).unwrap();
+        let (_, five) = min_contrast(&equal, &contrasts(5), 0.95).unwrap();
         assert!(five.high >= one.high && five.low == one.low);
     }
 
     #[test]
     fn without_a_run_there_is_no_difference() {
         let none = ScenarioRate::new(vec![0; 5], vec![0; 5]);
-        assert_eq!(least_contrast(&[rate(&some(5)), none], &[Contrast::difference(0, 1)], 0.95), None);
+        assert_eq!(min_contrast(&[rate(&some(5)), none], &[Contrast::difference(0, 1)], 0.95), None);
     }
 }

@@ -15,8 +15,8 @@ mod statistic;
 mod table;
 
 pub use best::{Best, BestScore, best_parameterizations};
-pub use claims::{Claim, ClaimResult, ClaimRow, ClaimVerdict, judge_claims};
-pub use difference::{Contrast, ScenarioRate, ScoreInterval, least_contrast};
+pub use claims::{Claim, ClaimResult, ClaimRow, ClaimVerdict, check_claims};
+pub use difference::{Contrast, ScenarioRate, ScoreInterval, min_contrast};
 pub use options::ScoreOptions;
 pub use paper_claims::paper_claims;
 pub use published::{Misfit, PublishedFailures, published_failures, published_lvd_f1};

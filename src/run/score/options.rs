@@ -17,12 +17,12 @@ pub struct ScoreOptions {
     pub confidence: f64,
     /// Below so many failures in S F1 has no interval; below so many scenarios with one a claim is not judged (10).
     #[schemars(range(min = 0, max = 4_294_967_295_u32))]
-    pub least_failures: u32,
+    pub min_failures: u32,
 }
 
 impl Default for ScoreOptions {
     fn default() -> Self {
-        ScoreOptions { seed: 157, confidence: 0.95, least_failures: 10 }
+        ScoreOptions { seed: 157, confidence: 0.95, min_failures: 10 }
     }
 }
 

@@ -1,6 +1,6 @@
 //! The statistics that claims are about: the smallest of some differences of scores, per model and criterion.
 
-use super::difference::{Contrast, ScenarioRate, ScoreInterval, least_contrast};
+use super::difference::{Contrast, ScenarioRate, ScoreInterval, min_contrast};
 use super::table::CategoryScores;
 use crate::engine::{Confusion, UnitCounts};
 use crate::model::criterion::Criterion;
@@ -112,7 +112,7 @@ impl Statistic {
                 (vec![of.failures(model, criterion)?, of.failures(model, other)?], pairs(1, 1))
             }
         };
-        least_contrast(&rates, &contrasts, level)
+        min_contrast(&rates, &contrasts, level)
     }
 
     /// The cells of S whose failures a cell judges the claim by: those of every model and criterion compared.

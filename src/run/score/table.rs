@@ -45,13 +45,13 @@ fn ratio(numerator: f64, denominator: f64) -> Option<f64> {
 
 /// The interval of F1 from the counts of each scenario, with scenarios as clusters ([`ScenarioRate::f1`]).
 ///
-/// `None` where S fails in fewer than [`ScoreOptions::least_failures`] scenarios.
+/// `None` where S fails in fewer than [`ScoreOptions::min_failures`] scenarios.
 pub fn f1_interval<'a>(
     scenarios: impl Iterator<Item = &'a Confusion<u32>> + Clone,
     options: &ScoreOptions,
 ) -> Option<ScoreInterval> {
     let failing = scenarios.clone().filter(|c| c.tp > 0 || c.fn_ > 0).count();
-    let is_enough = failing >= options.least_failures.max(1) as usize;
+    let is_enough = failing >= options.min_failures.max(1) as usize;
     is_enough.then(|| ScenarioRate::f1(scenarios).interval(options.confidence))
 }
 
@@ -66,7 +66,7 @@ pub struct ScoreCell {
     pub criterion: Criterion,
     /// Counts over (scenario, THW) pairs.
     pub counts: Confusion,
-    /// Interval of F1 over scenarios; `None` where S fails in fewer than [`ScoreOptions::least_failures`] of them.
+    /// Interval of F1 over scenarios; `None` where S fails in fewer than [`ScoreOptions::min_failures`] of them.
     pub f1_interval: Option<ScoreInterval>,
     /// Scenarios in which S fails from some headway.
     pub failing_scenarios: u64,

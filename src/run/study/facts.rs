@@ -15,7 +15,7 @@ use crate::traffic::mining::{Collection, MiningOptions, RecordingSummary, count}
 /// One category's scenarios.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct CategoryFacts {
+pub struct CategoryProvenance {
     /// Scenarios found.
     pub found: u64,
     /// Those that passed the filters.
@@ -34,7 +34,7 @@ pub struct CategoryFacts {
 /// What a report says beside the lanes' outcomes.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct StudyFacts {
+pub struct StudyProvenance {
     /// What the scenarios are of.
     pub data: String,
     /// Made up by the program, in whole or in part.
@@ -54,7 +54,7 @@ pub struct StudyFacts {
     /// What the data leave open or what looks wrong in them.
     pub notes: Vec<String>,
     /// One per block of the plan.
-    pub categories: Vec<CategoryFacts>,
+    pub categories: Vec<CategoryProvenance>,
     /// How the scenarios were mined.
     pub mining: MiningOptions,
     /// Options of the parameterizations.
@@ -68,7 +68,7 @@ pub(super) fn category_facts(
     collection: &Collection,
     planned: &StudyCases,
     options: &ParameterizationOptions,
-) -> Result<Vec<CategoryFacts>> {
+) -> Result<Vec<CategoryProvenance>> {
     let facts = |(block, reduction): (&Block, &Option<Reduction>)| {
         let of = count(&collection.scenarios, block.category);
         let reduction = reduction.as_ref();
@@ -79,7 +79,7 @@ pub(super) fn category_facts(
         let parameters = parameter_histograms(block.category, &kept, options)?;
         let is_observed = Headway::is_observed(&planned.outline().headways);
         let close_units = if is_observed { close_units(kept.iter().copied()) } else { Vec::new() };
-        Ok(CategoryFacts { found: of.found, kept: of.kept, svd_explained, parameters, modes, close_units })
+        Ok(CategoryProvenance { found: of.found, kept: of.kept, svd_explained, parameters, modes, close_units })
     };
     planned.outline().blocks.iter().zip(&planned.reductions).map(facts).collect()
 }

@@ -12,7 +12,7 @@ mod run;
 
 pub use cases::StudyCases;
 pub(crate) use cases::WINDOW;
-pub use facts::{CategoryFacts, StudyFacts};
+pub use facts::{CategoryProvenance, StudyProvenance};
 pub use histogram::{ParameterHistogram, parameter_histograms};
 pub use plan::{StudyOptions, outline_study, plan_study};
 pub use plan_file::StudyHead;

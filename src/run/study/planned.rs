@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::cases::StudyCases;
-use super::facts::{StudyFacts, category_facts};
+use super::facts::{StudyProvenance, category_facts};
 use super::plan::{StudyOptions, outline_study};
 use super::plan_file::StudyHead;
 use crate::engine::{LanePlan, Partial};
@@ -28,7 +28,7 @@ const MAX_HEAD_BYTES: u64 = 1 << 30;
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct StudyPlanFile {
-    facts: StudyFacts,
+    facts: StudyProvenance,
     plan: StudyHead,
 }
 
@@ -71,7 +71,7 @@ struct StudyPlanFile {
 /// ```
 pub struct Study {
     pub(super) cases: StudyCases,
-    facts: StudyFacts,
+    facts: StudyProvenance,
     /// Where it was read, with the hash of the run.
     file: Option<(PathBuf, String)>,
 }
@@ -141,7 +141,7 @@ impl StudyBuilder<'_> {
                 "use more recordings, or relax the filters ([mining] in option `config`)",
             ));
         }
-        let facts = StudyFacts {
+        let facts = StudyProvenance {
             data,
             synthetic: collection.synthetic,
             published: self.published,
@@ -190,7 +190,7 @@ impl Study {
     }
 
     /// What a report says beside the outcomes.
-    pub fn facts(&self) -> &StudyFacts {
+    pub fn facts(&self) -> &StudyProvenance {
         &self.facts
     }
 
@@ -255,17 +255,17 @@ impl Study {
 
     /// The same with an interval of the scenarios, of so many: nothing else of the file is read.
     pub(super) fn read_units(path: &Path, wanted: impl FnOnce(u64) -> Range<u64>) -> Result<Study> {
-        let (file, run_sha256, mut scenarios) = read_sealed_line(Study::KIND, path, MAX_HEAD_BYTES, AGAIN)?;
+        let (file, run_sha256, mut scenarios) = read_sealed_line(Study::KIND, path, MAX_HEAD_BYTES, HOW_TO_REMAKE)?;
         let StudyPlanFile { facts, plan } = file;
         let place = Place::file(path);
         facts.score.validate()?;
         let cases = plan.read(&mut scenarios, &place, wanted)?;
         if facts.categories.len() != cases.outline().blocks.len() {
             let problem = "it does not have the facts of every category";
-            return Err(Error::input(place, problem, AGAIN));
+            return Err(Error::input(place, problem, HOW_TO_REMAKE));
         }
         Ok(Study { cases, facts, file: Some((path.to_path_buf(), run_sha256)) })
     }
 }
 
-const AGAIN: &str = "make it by `study` of this version, with option `plan_only`";
+const HOW_TO_REMAKE: &str = "make it by `study` of this version, with option `plan_only`";

@@ -82,7 +82,7 @@ pub struct ParameterizationOptions {
     pub lane_change_m: f64,
     /// Least lateral speed, m/s (1e-3).
     #[schemars(extend("exclusiveMinimum" = 0.0))]
-    pub least_lateral_speed_mps: f64,
+    pub min_lateral_speed_mps: f64,
     /// LVD ii: 0 samples the sinusoid itself at every step; n > 0 joins n + 1 points of it by lines, as an
     /// independent implementation does with 200 (largest effect on a speed: Δ·π²/(16 n²)).
     #[schemars(range(max = 1_000_000))]
@@ -105,7 +105,7 @@ impl Default for ParameterizationOptions {
             lateral_speed: LateralSpeed::Mean,
             lateral_start: LateralStart::LaneWidth,
             lane_change_m: 3.5,
-            least_lateral_speed_mps: 1e-3,
+            min_lateral_speed_mps: 1e-3,
             sinusoid_intervals: 0,
             svd_instants: 50,
             series_scale: SeriesScale::PerInstant,

@@ -88,7 +88,7 @@ impl Variable {
         let (name, unit, lower, lower_excluded, upper) = match self {
             Variable::TargetSpeed if category == Category::Lvd => ("v0_mps", "m/s", Some(0.0), false, None),
             Variable::TargetSpeed => ("v_target_mps", "m/s", Some(0.0), false, None),
-            Variable::LateralSpeed => ("lateral_speed_mps", "m/s", Some(options.least_lateral_speed_mps), false, None),
+            Variable::LateralSpeed => ("lateral_speed_mps", "m/s", Some(options.min_lateral_speed_mps), false, None),
             Variable::EgoSpeed => ("v_ego_mps", "m/s", Some(0.0), false, None),
             Variable::TargetAcceleration => ("acceleration_target_mps2", "m/s²", None, false, None),
             Variable::LeadSpeed => ("v_lead_mps", "m/s", Some(0.0), false, None),

@@ -139,7 +139,7 @@ pub fn lateral_speed(scenario: &Scenario, options: &ParameterizationOptions) -> 
     };
     let change = y[0] - at(y, scenario.fps, over);
     let speed = if over > 0.0 { (change / over).abs() } else { 0.0 };
-    speed.max(options.least_lateral_speed_mps)
+    speed.max(options.min_lateral_speed_mps)
 }
 
 /// (v(T) − v(0))/T of a vehicle, m/s²; 0 where T is 0.

@@ -6,7 +6,7 @@
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-use super::draws::judged;
+use super::draws::evaluated;
 use super::importance::{Importance, defended, importance, no_valid_point};
 use super::problem::{Density, LimitState, purpose};
 use super::stop::StopRule;
@@ -110,7 +110,7 @@ pub fn cross_entropy(
         let indices = 0..options.samples_per_level;
         let guarded = proposal.as_ref().map(|p| defended(p.clone(), nominal, 0.0)).transpose()?;
         let source: &dyn Density = guarded.as_ref().map_or(nominal, |g| g);
-        let sample = judged(source, limit_state, stream, indices)?;
+        let sample = evaluated(source, limit_state, stream, indices)?;
         if sample.points.is_empty() {
             return Err(no_valid_point("level of cross-entropy"));
         }

@@ -4,7 +4,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::problem::{Density, Draw, LimitState, judge};
+use super::problem::{Density, Draw, LimitState, evaluate_checked};
 use crate::Result;
 use crate::stats::random::Stream;
 
@@ -17,27 +17,27 @@ pub(crate) fn draw(density: &dyn Density, stream: Stream, indices: Range<u64>) -
 }
 
 /// Valid points of a range of indices with their values, in index order, and the tries of all.
-pub(crate) struct Judged {
+pub(crate) struct Evaluated {
     pub points: Vec<Vec<f64>>,
     pub values: Vec<f64>,
     pub voids: u64,
 }
 
 /// Draws and judges a range of indices, however long, keeping the points.
-pub(crate) fn judged(
+pub(crate) fn evaluated(
     density: &dyn Density,
     limit_state: &dyn LimitState,
     stream: Stream,
     indices: Range<u64>,
-) -> Result<Judged> {
+) -> Result<Evaluated> {
     let draws = draw(density, stream, indices.clone());
     let points: Vec<Vec<f64>> = draws.into_iter().flatten().map(|d| d.point).collect();
     let mut values = Vec::with_capacity(points.len());
     for batch in points.chunks(BATCH as usize) {
-        values.extend(judge(limit_state, batch)?);
+        values.extend(evaluate_checked(limit_state, batch)?);
     }
     let voids = indices.end - indices.start - points.len() as u64;
-    Ok(Judged { points, values, voids })
+    Ok(Evaluated { points, values, voids })
 }
 
 /// A range in batches.

@@ -10,9 +10,9 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::blocks::BlockSums;
-use super::draws::{batches, draw, judged};
+use super::draws::{batches, draw, evaluated};
 use super::interval::{Interval, log_normal};
-use super::problem::{Density, Draw, LimitState, judge, purpose};
+use super::problem::{Density, Draw, LimitState, evaluate_checked, purpose};
 use super::stop::{StopReason, StopRule};
 use super::summary::Estimate;
 use super::trust::Warning;
@@ -207,7 +207,7 @@ pub(crate) fn sums_of_stream(
     for batch in batches(indices) {
         let mut draws = draw(drawn_from, stream, batch.clone());
         let points: Vec<Vec<f64>> = draws.iter_mut().flatten().map(|drawn| std::mem::take(&mut drawn.point)).collect();
-        let values = judge(limit_state, &points)?;
+        let values = evaluate_checked(limit_state, &points)?;
         let mut judged = points.into_iter().zip(values);
         let judged: Vec<(Option<Draw>, f64)> = draws
             .into_iter()
@@ -346,7 +346,7 @@ pub fn pilot_proposal(
     seed: u64,
 ) -> Result<(Mixture, PilotCheck)> {
     let stream = Stream { seed, purpose: purpose::NOMINAL };
-    let first = judged(nominal, limit_state, stream, 0..pilot.runs)?;
+    let first = evaluated(nominal, limit_state, stream, 0..pilot.runs)?;
     if first.points.is_empty() {
         return Err(no_valid_point("pilot"));
     }

@@ -3,7 +3,7 @@
 
 use rayon::prelude::*;
 
-use super::draws::judged;
+use super::draws::evaluated;
 use super::interval::log_normal;
 use super::problem::{Density, LimitState, purpose};
 use super::summary::Estimate;
@@ -40,7 +40,7 @@ pub fn kernel_shares(
     limit_state: &dyn LimitState,
     seed: u64,
 ) -> Result<Option<KernelShares>> {
-    let drawn = judged(proposal, limit_state, Stream { seed, purpose: purpose::SHARES }, 0..DRAWS)?;
+    let drawn = evaluated(proposal, limit_state, Stream { seed, purpose: purpose::SHARES }, 0..DRAWS)?;
     let failing: Vec<&Vec<f64>> =
         drawn.points.iter().zip(&drawn.values).filter(|(_, v)| **v <= 0.0).map(|(p, _)| p).collect();
     let n = kernels.weights().len();

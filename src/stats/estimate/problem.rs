@@ -204,7 +204,7 @@ impl<F: Fn(&[Vec<f64>]) -> Result<Vec<f64>> + Sync> LimitState for F {
 }
 
 /// The values of a batch, checked: one per point, none of them NaN.
-pub(crate) fn judge(limit_state: &dyn LimitState, points: &[Vec<f64>]) -> Result<Vec<f64>> {
+pub(crate) fn evaluate_checked(limit_state: &dyn LimitState, points: &[Vec<f64>]) -> Result<Vec<f64>> {
     if points.is_empty() {
         return Ok(Vec::new());
     }

@@ -9,10 +9,10 @@ use nalgebra::{DMatrix, DVector, DVectorView};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::draws::judged;
+use super::draws::evaluated;
 use super::importance::no_valid_point;
 use super::interval::{Interval, log_normal};
-use super::problem::{Density, LimitState, judge, normals, purpose};
+use super::problem::{Density, LimitState, evaluate_checked, normals, purpose};
 use super::stop::StopReason;
 use super::summary::Estimate;
 use super::trust::Warning;
@@ -88,7 +88,7 @@ struct State {
 /// The limit state's; [`crate::Error::Usage`] where the density has no valid point.
 pub fn subset(density: &dyn Density, limit_state: &dyn LimitState, options: &Subset) -> Result<SubsetRun> {
     let stream = Stream { seed: options.seed, purpose: purpose::NOMINAL };
-    let first = judged(density, limit_state, stream, 0..options.samples_per_level.max(20))?;
+    let first = evaluated(density, limit_state, stream, 0..options.samples_per_level.max(20))?;
     if first.points.is_empty() {
         return Err(no_valid_point("subset simulation"));
     }
@@ -272,7 +272,7 @@ impl<'a> Walk<'a> {
                 })
                 .collect();
             let points: Vec<Vec<f64>> = candidates.iter().flatten().map(|(point, _)| point.clone()).collect();
-            let mut values = judge(limit_state, &points)?.into_iter();
+            let mut values = evaluate_checked(limit_state, &points)?.into_iter();
             runs += points.len() as u64;
             steps[kind] += chains.len() as u64;
             for (state, candidate) in chains.iter_mut().zip(candidates) {
@@ -307,14 +307,14 @@ impl<'a> Walk<'a> {
             (0..d).map(|j| self.mean[j] + keep * (state.point[j] - self.mean[j]) + self.turn * step[j]).collect();
         // The correction: ln reference, up to its constant, at the point left and at the point proposed.
         let gain = self.log_reference(&state.point) - self.log_reference(&point);
-        self.judged_by_density(state, point, gain, stream, index)
+        self.evaluated_by_density(state, point, gain, stream, index)
     }
 
     /// A step of a random walk, or `None` where the density refuses it.
     fn walked(&self, state: &State, seeds: &DMatrix<f64>, stream: &Stream, index: u64) -> Option<(Vec<f64>, f64)> {
         let step = seeds * DVector::from_vec(normals(stream, index, 1, self.density.dimensions()));
         let point: Vec<f64> = state.point.iter().zip(&step).map(|(x, s)| x + self.stride * s).collect();
-        self.judged_by_density(state, point, 0.0, stream, index)
+        self.evaluated_by_density(state, point, 0.0, stream, index)
     }
 
     fn log_reference(&self, point: &[f64]) -> f64 {
@@ -323,7 +323,7 @@ impl<'a> Walk<'a> {
         -0.5 * z.norm_squared()
     }
 
-    fn judged_by_density(
+    fn evaluated_by_density(
         &self,
         state: &State,
         point: Vec<f64>,

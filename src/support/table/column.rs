@@ -146,7 +146,7 @@ impl<'a> Cell<'a> {
 
 /// What a file says of its table; only Parquet has a place for it.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
-pub struct TableFacts {
+pub struct TableMetadata {
     /// Kind of rows: `lanes`, `samples`, `scenarios`.
     pub table: &'static str,
     /// Name of the profile, where lanes were run.

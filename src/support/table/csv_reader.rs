@@ -18,19 +18,19 @@ const MAX_ROW_BYTES: u64 = 16 << 20;
 
 pub(super) struct CsvRows {
     path: PathBuf,
-    reader: csv::Reader<Rationed>,
+    reader: csv::Reader<BudgetedFile>,
     ration: Rc<Cell<u64>>,
     record: csv::StringRecord,
     wanted: Vec<usize>,
 }
 
 /// A file that gives so many bytes and then an error.
-struct Rationed {
+struct BudgetedFile {
     file: BufReader<File>,
     left: Rc<Cell<u64>>,
 }
 
-impl Read for Rationed {
+impl Read for BudgetedFile {
     fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
         if self.left.get() == 0 {
             return Err(std::io::Error::from(std::io::ErrorKind::OutOfMemory));
@@ -44,7 +44,7 @@ impl Read for Rationed {
 impl CsvRows {
     pub(super) fn open(path: &Path) -> Result<(Vec<String>, CsvRows)> {
         let ration = Rc::new(Cell::new(MAX_ROW_BYTES));
-        let file = Rationed { file: BufReader::new(input_file::open(path)?), left: ration.clone() };
+        let file = BudgetedFile { file: BufReader::new(input_file::open(path)?), left: ration.clone() };
         let reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(file);
         let mut rows =
             CsvRows { path: path.to_path_buf(), reader, ration, record: csv::StringRecord::new(), wanted: Vec::new() };

@@ -7,7 +7,7 @@ use serde::ser::{SerializeStruct, Serializer};
 use serde_json::{Map, Value};
 
 use super::writer::append_csv;
-use super::{Cell, Column, ColumnKind, TableFacts, TableFormat, TableWriter, csv_field, jsonl};
+use super::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter, csv_field, jsonl};
 use crate::Result;
 use crate::support::readable;
 
@@ -64,7 +64,7 @@ impl Table {
     ///
     /// # Errors
     /// As [`TableFormat::of`] and [`TableWriter::row`].
-    pub fn save(&self, path: &Path, facts: &TableFacts) -> Result<()> {
+    pub fn save(&self, path: &Path, facts: &TableMetadata) -> Result<()> {
         let format = TableFormat::of(path, &TableFormat::EVERY, "table")?;
         let mut file = TableWriter::create(path, format, self.columns.clone(), facts)?;
         self.rows.iter().try_for_each(|row| file.row(row))?;
@@ -253,7 +253,7 @@ mod tests {
     fn a_saved_table_reads_back() {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("t.jsonl");
-        table().save(&path, &TableFacts::default()).unwrap();
+        table().save(&path, &TableMetadata::default()).unwrap();
         let first = std::fs::read_to_string(&path).unwrap().lines().next().unwrap().to_owned();
         assert_eq!(first, r#"{"parameterization":"1","f1":1.0,"fn":3,"headway":"1.2","data":"synthetic"}"#);
     }

@@ -24,7 +24,7 @@ mod text;
 mod writer;
 
 pub(crate) use column::Row;
-pub use column::{Cell, Column, ColumnKind, Digits, TableFacts};
+pub use column::{Cell, Column, ColumnKind, Digits, TableMetadata};
 pub use format::TableFormat;
 pub use memory::{CellValue, NumberText, Table, TableOf};
 pub(crate) use names::{Named, Resolved, nearest, resolve};

@@ -19,7 +19,7 @@ use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
 
-use super::{Cell, Column, ColumnKind, TableFacts};
+use super::{Cell, Column, ColumnKind, TableMetadata};
 use crate::support::atomic_file::AtomicFile;
 use crate::{Error, Result};
 
@@ -42,7 +42,7 @@ pub(super) struct ParquetFile {
 }
 
 impl ParquetFile {
-    pub(super) fn create(path: &Path, columns: &[Column], facts: &TableFacts) -> Result<ParquetFile> {
+    pub(super) fn create(path: &Path, columns: &[Column], facts: &TableMetadata) -> Result<ParquetFile> {
         let has_series = columns.iter().any(|column| column.kind == ColumnKind::Series);
         let (batch_rows, group_rows) =
             if has_series { (SERIES_BATCH_ROWS, SERIES_GROUP_ROWS) } else { (BATCH_ROWS, GROUP_ROWS) };
@@ -122,7 +122,7 @@ fn field(column: &Column) -> Field {
 
 /// What stands in the footer. The columns' words are there once more as JSON: not every reader shows those that Arrow
 /// keeps with a column.
-fn key_values(columns: &[Column], facts: &TableFacts) -> Vec<KeyValue> {
+fn key_values(columns: &[Column], facts: &TableMetadata) -> Vec<KeyValue> {
     let words: Vec<serde_json::Value> = columns
         .iter()
         .map(|c| serde_json::json!({"name": c.name, "type": c.kind.name(), "unit": c.unit, "description": c.description}))

@@ -6,7 +6,7 @@ use std::path::Path;
 #[cfg(feature = "parquet")]
 use super::parquet_writer::ParquetFile;
 use super::spreadsheet::csv_field;
-use super::{Cell, Column, ColumnKind, TableFacts, TableFormat, jsonl};
+use super::{Cell, Column, ColumnKind, TableFormat, TableMetadata, jsonl};
 use crate::support::atomic_file::{AtomicFile, StagedFile};
 use crate::{Error, Result};
 
@@ -30,7 +30,12 @@ impl TableWriter {
     ///
     /// # Errors
     /// [`Error::Io`] if the folder cannot be written to; as [`TableFormat::of`] without the feature `parquet`.
-    pub fn create(path: &Path, format: TableFormat, columns: Vec<Column>, facts: &TableFacts) -> Result<TableWriter> {
+    pub fn create(
+        path: &Path,
+        format: TableFormat,
+        columns: Vec<Column>,
+        facts: &TableMetadata,
+    ) -> Result<TableWriter> {
         #[cfg(not(feature = "parquet"))]
         let _ = facts;
         let out = match format {

@@ -111,7 +111,7 @@ impl<'a> LineDistance<'a> {
             least: trailing_min(s, window),
             window,
             reach: samples(options.search_s, frame_rate_hz),
-            quiescent_gap_m: options.calm_speed_mps * options.window_s,
+            quiescent_gap_m: options.quiescent_speed_mps * options.window_s,
             far_m: options.far_share * lane_width_m,
             near_m: options.near_share * lane_width_m,
             lc_end: options.lc_end,

@@ -57,7 +57,7 @@ pub struct LateralOptions {
     pub window_s: f64,
     /// Mean lateral speed over the window below which lateral motion is steady, m/s. Default 0.25 (v_lat).
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
-    pub calm_speed_mps: f64,
+    pub quiescent_speed_mps: f64,
     /// Beyond this fraction of the lane width from the line, the change has certainly ended or not yet begun. Default
     /// 0.5 (α_max).
     #[schemars(range(min = 0.0, max = 1e6))]
@@ -161,7 +161,7 @@ impl Default for LateralOptions {
     fn default() -> Self {
         LateralOptions {
             window_s: 1.0,
-            calm_speed_mps: 0.25,
+            quiescent_speed_mps: 0.25,
             far_share: 0.5,
             near_share: 0.1,
             search_s: 10.0,

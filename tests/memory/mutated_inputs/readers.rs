@@ -8,7 +8,7 @@ use lanesweep::interop::openscenario::{DistributionSamples, Distributions, Names
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
-use lanesweep::run::parts::{Countable, Counted, Journal, Ledger, read_part, read_sealed_line, seal};
+use lanesweep::run::parts::{Counted, Journal, Ledger, MergeableCounts, read_part, read_sealed_line, seal};
 use lanesweep::run::sampling::{
     Estimator, SampleHeadways, SampleOptions, SampleTally, WeightedTally, plan_samples, read_proposal,
 };

@@ -19,7 +19,7 @@ pub struct Behaviour {
     pub follower_braking_mps2: f64,
     /// Share of decisions by a driver who accelerates during the change and lets a faster follower brake, 0 to 1.
     #[schemars(range(min = 0.0, max = 1.0))]
-    pub accelerating_share: f64,
+    pub accelerating_fraction: f64,
     /// The same braking of the new follower, for such a driver, m/s².
     #[schemars(range(min = 0.001, max = 10.0))]
     pub accelerating_follower_braking_mps2: f64,
@@ -35,7 +35,7 @@ pub struct Behaviour {
     pub truck_change_factor: f64,
     /// Fraction of the time headway that a driver keeps to the new leader during a lane change.
     #[schemars(range(min = 0.0, max = 1.0))]
-    pub change_headway_share: f64,
+    pub change_headway_fraction: f64,
     /// Rate of hard brakings of a vehicle with a follower, 1/s.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub brakings_per_s: f64,
@@ -56,12 +56,12 @@ impl Default for Behaviour {
         Behaviour {
             car_speed_factor: 0.896,
             follower_braking_mps2: 0.00556,
-            accelerating_share: 0.0464,
+            accelerating_fraction: 0.0464,
             accelerating_follower_braking_mps2: 9.0,
             change_acceleration_mps2: 2.35,
             change_duration_s: 6.45,
             truck_change_factor: 1.2,
-            change_headway_share: 0.203,
+            change_headway_fraction: 0.203,
             brakings_per_s: 0.00009,
             braking_hold_s: 9.0,
             braking_excess_mps2: 0.543,

@@ -26,7 +26,7 @@ pub(super) struct LaneDemand {
     mean_headway_s: f64,
     /// Fraction of followers.
     followers: f64,
-    truck_share: f64,
+    truck_fraction: f64,
     /// Mean desired speed of cars in this lane, m/s.
     car_speed_mps: f64,
     /// Of its drivers.
@@ -49,14 +49,14 @@ pub(super) fn demand(
         _ => (&[0.37, 0.38, 0.25], &[0.0, 0.06, 0.94], &[41.0, 38.0, 34.0]),
     };
     let total_vehph = QUEUED * options.flow_vehph * flow_level * lanes as f64 / MEAN_LANES;
-    let truck_share = (options.truck_share * truck_level).min(0.6);
+    let truck_fraction = (options.truck_fraction * truck_level).min(0.6);
     (0..lanes)
         .map(|lane| {
             let lane_vehph = total_vehph * flow[lane];
             LaneDemand {
                 mean_headway_s: 3600.0 / lane_vehph,
                 followers: FOLLOWERS * (options.flow_vehph / PUBLISHED_FLOW_VEHPH).min(1.0),
-                truck_share: (truck_share * trucks[lane] / flow[lane]).min(0.95),
+                truck_fraction: (truck_fraction * trucks[lane] / flow[lane]).min(0.95),
                 car_speed_mps: speeds[lane] * speed_level * options.behaviour.car_speed_factor,
                 overreaction: options.behaviour.overreaction,
             }
@@ -124,7 +124,7 @@ impl Inflow {
     fn headway_s(&self, speed_mps: f64, stream: &mut TrafficRandom) -> f64 {
         let own_s = |driver_s: f64, length_m: f64| driver_s + (length_m + 3.4) / speed_mps.max(10.0);
         let following_s = own_s(self.next.driver.time_headway_s, self.next.length_m);
-        let share = self.demand.truck_share;
+        let share = self.demand.truck_fraction;
         let mean_following_s = (1.0 - share) * own_s(1.5, 4.6) + share * own_s(1.85, 12.0);
         let free_s = (self.demand.mean_headway_s - mean_following_s) / (1.0 - self.demand.followers);
         if free_s <= 0.0 || stream.chance(self.demand.followers) {
@@ -136,7 +136,7 @@ impl Inflow {
 }
 
 fn draw(demand: &LaneDemand, lane: usize, centre_m: f64, lane_width_m: f64, stream: &mut TrafficRandom) -> Vehicle {
-    let class = if stream.chance(demand.truck_share) { VehicleClass::Truck } else { VehicleClass::Car };
+    let class = if stream.chance(demand.truck_fraction) { VehicleClass::Truck } else { VehicleClass::Car };
     let mut vehicle = Vehicle::draw(class, demand.car_speed_mps, demand.overreaction, stream);
     vehicle.place(lane, centre_m, lane_width_m, stream);
     vehicle

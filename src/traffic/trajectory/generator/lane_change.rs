@@ -82,7 +82,7 @@ pub(super) enum Manner {
 impl Manner {
     /// That of one decision.
     pub fn draw(behaviour: &Behaviour, stream: &mut TrafficRandom) -> Manner {
-        if stream.chance(behaviour.accelerating_share) { Manner::Accelerating } else { Manner::Considerate }
+        if stream.chance(behaviour.accelerating_fraction) { Manner::Accelerating } else { Manner::Considerate }
     }
 }
 

@@ -31,7 +31,7 @@ pub struct GeneratorOptions {
     pub flow_vehph: f64,
     /// Share of trucks among all vehicles, 0 to 0.5 (published: about 0.2).
     #[schemars(range(min = 0.0, max = 0.5))]
-    pub truck_share: f64,
+    pub truck_fraction: f64,
     /// Factor on the rates of lane changes and hard braking in the camera's view.
     /// 1 stands for the published rates, which the traffic meets in part (`docs/src/validation.md`). The default gives as
     /// many kept cut-outs as the paper has, more cut-ins and LVDs, in a third of highD's time. A larger one disturbs the
@@ -51,7 +51,7 @@ impl Default for GeneratorOptions {
             frame_rate_hz: 25.0,
             window_m: 420.0,
             flow_vehph: 3350.0,
-            truck_share: 0.2,
+            truck_fraction: 0.2,
             event_rate_factor: 3.0,
             behaviour: Behaviour::default(),
         }

@@ -205,8 +205,11 @@ impl Traffic {
             }
 
             // During a lane change the driver keeps less.
-            let kept_s =
-                if own.change.is_some() { self.setting.behaviour.change_headway_share * headway_s } else { headway_s };
+            let kept_s = if own.change.is_some() {
+                self.setting.behaviour.change_headway_fraction * headway_s
+            } else {
+                headway_s
+            };
             let mut command = leader.map_or_else(
                 || free_acceleration(own.speed_mps, &driver),
                 |k| following_acceleration(own.speed_mps, kept_s, view_of(k, perceived), &driver),

@@ -77,9 +77,11 @@ pub(super) fn read_recording_meta(files: &HighdFiles, doubts: &mut Doubts) -> Re
             "y points down: the upper lane lines must have the smaller values",
         ));
     }
-    judge(&table, frame_rate, Quantity::Rate, frame_rate_hz, doubts)?;
+    check_plausible(&table, frame_rate, Quantity::Rate, frame_rate_hz, doubts)?;
     for (lines, column) in [(&upper, upper_column), (&lower, lower_column)] {
-        lines.array_windows().try_for_each(|[a, b]| judge(&table, column, Quantity::LaneWidth, b - a, doubts))?;
+        lines
+            .array_windows()
+            .try_for_each(|[a, b]| check_plausible(&table, column, Quantity::LaneWidth, b - a, doubts))?;
     }
     if table.next_row()? {
         return Err(Error::input(
@@ -97,8 +99,14 @@ pub(super) fn read_recording_meta(files: &HighdFiles, doubts: &mut Doubts) -> Re
     Ok(RecordingMeta { frame_rate_hz, lane_numbers, carriageways, synthetic, checksum: table.finish(), place })
 }
 
-fn judge(table: &CsvTable, column: CsvColumn, quantity: Quantity, value: f64, doubts: &mut Doubts) -> Result<()> {
-    let judged = doubts.judge(quantity, value, || table.field(column).to_string());
+fn check_plausible(
+    table: &CsvTable,
+    column: CsvColumn,
+    quantity: Quantity,
+    value: f64,
+    doubts: &mut Doubts,
+) -> Result<()> {
+    let judged = doubts.check(quantity, value, || table.field(column).to_string());
     judged.map_err(|problem| table.bad(column, problem, HELP))
 }
 
@@ -173,8 +181,8 @@ pub(super) fn read_tracks_meta(
     let mut vehicles: Vec<(VehicleMeta, Place)> = Vec::new();
     while table.next_row()? {
         let vehicle = columns.vehicle(&table, recording)?;
-        judge(&table, columns.length, Quantity::Length, vehicle.length_m, doubts)?;
-        judge(&table, columns.width, Quantity::Width, vehicle.width_m, doubts)?;
+        check_plausible(&table, columns.length, Quantity::Length, vehicle.length_m, doubts)?;
+        check_plausible(&table, columns.width, Quantity::Width, vehicle.width_m, doubts)?;
         vehicles.push((vehicle, table.place()));
     }
     if vehicles.is_empty() {

@@ -293,14 +293,14 @@ fn report(
     track: &Track,
     doubts: &mut Doubts,
 ) -> Result<()> {
-    let mut judge = |quantity, value, column| {
+    let mut check_plausible = |quantity, value, column| {
         let place = || table.field(column).of(format!("vehicle {}", track.id)).to_string();
-        doubts.judge(quantity, value, place).map_err(|problem| table.bad(column, problem, HELP))
+        doubts.check(quantity, value, place).map_err(|problem| table.bad(column, problem, HELP))
     };
-    judge(Quantity::Speed, sample.speed_mps, columns.velocity_x)?;
-    judge(Quantity::LateralSpeed, sample.lateral_speed_mps, columns.velocity_y)?;
-    judge(Quantity::LateralSpeed, sample.lateral_change_mps, columns.y)?;
-    judge(Quantity::Acceleration, sample.acceleration_mps2, columns.acceleration_x)
+    check_plausible(Quantity::Speed, sample.speed_mps, columns.velocity_x)?;
+    check_plausible(Quantity::LateralSpeed, sample.lateral_speed_mps, columns.velocity_y)?;
+    check_plausible(Quantity::LateralSpeed, sample.lateral_change_mps, columns.y)?;
+    check_plausible(Quantity::Acceleration, sample.acceleration_mps2, columns.acceleration_x)
 }
 
 /// The error for a frame that is not the one after the vehicle's last.
