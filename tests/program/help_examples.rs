@@ -102,7 +102,7 @@ fn every_example_of_the_help_runs() {
             }
             let case = "category,ego_speed,speed,gap,lateral_speed\n";
             std::fs::write(dir.join("cases.csv"), format!("{case}cut-in,30,20,20,1\ncut-in,30,20,40,1\n")).unwrap();
-            std::fs::write(dir.join("study.toml"), "[score]\nleast_failures = 5\n").unwrap();
+            std::fs::write(dir.join("study.toml"), "[score]\nmin_failures = 5\n").unwrap();
             if verb == "verify conformance" {
                 let Some(tables) = shared("golden/jrc") else { continue };
                 for name in ["cutin.csv", "lvd.csv", "cutout.csv", "functions.csv"] {

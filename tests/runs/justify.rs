@@ -153,7 +153,7 @@ fn recall_under_the_regulation_stands_beside_that_of_another_profile_and_once_un
 
 /// Nine scenarios in which S fails have no interval, from however many headways; ten have one.
 #[test]
-fn least_failures_counts_scenarios_in_the_dossier_as_in_the_study_and_the_comparison() {
+fn min_failures_counts_scenarios_in_the_dossier_as_in_the_study_and_the_comparison() {
     let data = recordings(3);
     let mut seen = [0, 0];
     for model in ModelId::ALL {
