@@ -66,7 +66,7 @@ impl FormatFlag {
 #[derive(Debug, Clone, Copy, Args)]
 pub(super) struct TablesFlag {
     /// Print all tables instead of the answer; they are in report.txt too
-    #[arg(long, help_heading = "Data")]
+    #[arg(long, help_heading = "Output")]
     pub tables: bool,
 }
 

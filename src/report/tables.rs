@@ -27,7 +27,11 @@ pub(super) fn failure_table(scores: &ScoreTable, published: bool, capped: &'stat
     let table = Table::of(rows)
         .column("scenario", |(c, ..)| c.category.label())
         .column("model", |(.., model)| model.name())
-        .columns(Criterion::ALL, |criterion| criterion.label(), |(c, _, model), of| failures(c, model, of))
+        .columns(
+            Criterion::ALL,
+            |criterion| if criterion == Criterion::Collision { "collision" } else { criterion.label() },
+            |(c, _, model), of| failures(c, model, of),
+        )
         .column("simulations", |(c, ..)| c.simulations)
         .column(capped, |(c, at, _)| c.capped[at]);
     if !published {

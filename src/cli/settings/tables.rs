@@ -52,11 +52,11 @@ pub struct RunSettings {
     pub threads: Option<usize>,
     /// Backend; auto: a GPU if there is one.
     pub backend: BackendChoice,
-    /// Device, by a part of its name, its PCI bus id or its index. `lanesweep verify devices` lists the devices. Without it:
-    /// the first GPU.
+    /// Device: part of its name, PCI bus id or index. `lanesweep verify devices` lists the devices. Without it: the first
+    /// GPU.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub device: Option<String>,
-    /// Profile: paper, paper-fit, jrc-2021, un-r157, or a TOML file. `map --preset jrc` takes jrc-2021 unless it is set.
+    /// Profile: paper, paper-fit, jrc-2021, un-r157, a TOML file. `map --preset jrc` takes jrc-2021 unless it is set.
     pub profile: String,
     /// Time step, s. Without it: the profile's.
     #[serde(skip_serializing_if = "Option::is_none")]

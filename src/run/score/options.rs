@@ -10,7 +10,7 @@ use crate::support::ranges;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ScoreOptions {
-    /// Seed of the choice of lanes that are computed again on the CPU. No score depends on it.
+    /// Seed that chooses the lanes to check on the CPU. No score depends on it.
     pub seed: u64,
     /// Coverage of the intervals (0.95).
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
