@@ -291,7 +291,7 @@ fn flags_that_would_not_be_heeded_and_absurd_numbers_of_threads_are_refused() {
     let scenarios = common::golden("paper_sumo_01_02_scenarios.jsonl");
     let lane = "01_cut_in_81_74_836/S/1.2s/RSS";
     refused(&["simulate", "--scenarios", text(&scenarios), "--lane", lane, "--gap", "5"], "would be ignored");
-    refused(&["study", "--threads", "100000000"], "at most 4096");
+    refused(&["study", "--threads", "100000000"], "expected a whole number from 1 to");
 }
 
 /// What a folder of results or a document says of its data.
