@@ -106,6 +106,7 @@ impl fmt::Display for Place {
 
 /// What can go wrong, by whose turn it is to act.
 #[derive(Debug, thiserror::Error)]
+#[non_exhaustive]
 pub enum Error {
     /// The data is not what it must be: missing file or column, a bad number, a broken order.
     #[error("{place}: {problem}")]
