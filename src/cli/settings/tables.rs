@@ -56,7 +56,7 @@ pub struct RunSettings {
     /// GPU.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub device: Option<String>,
-    /// Profile: paper, paper-fit, jrc-2021, un-r157 or a file. `map --preset jrc` takes jrc-2021 unless it is set.
+    /// Profile: paper, paper-fit, jrc-2021, un-r157, file. `map --preset jrc` takes jrc-2021 unless it is set.
     pub profile: String,
     /// Time step, s. Without it: the profile's.
     #[serde(skip_serializing_if = "Option::is_none")]
