@@ -27,7 +27,11 @@ pub(super) fn failure_table(scores: &ScoreTable, published: bool, capped: &'stat
     let table = Table::of(rows)
         .column("scenario", |(c, ..)| c.category.label())
         .column("model", |(.., model)| model.name())
-        .columns(Criterion::ALL, |criterion| criterion.label(), |(c, _, model), of| failures(c, model, of))
+        .columns(
+            Criterion::ALL.into_iter().zip(["collision", "TTC", "BTN"]),
+            |(_, name)| name,
+            |(c, _, model), (criterion, _)| failures(c, model, criterion),
+        )
         .column("simulations", |(c, ..)| c.simulations)
         .column(capped, |(c, at, _)| c.capped[at]);
     if !published {
