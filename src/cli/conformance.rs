@@ -4,7 +4,6 @@ use std::fmt::Write;
 use std::path::PathBuf;
 
 use clap::Args;
-use comfy_table::{Table as TextTable, presets};
 
 use super::Exit;
 use super::format::FormatFlag;
@@ -12,11 +11,13 @@ use super::source::file_of;
 use crate::interop::conformance::{
     LaneComparison, Table, TableKind, Tally, compare_functions, compare_jrc, compare_lanes,
 };
+use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::report::records;
 use crate::scenario::read_scenarios;
 use crate::support::readable::{count, count_of};
 use crate::support::repeats::refuse_repeats;
+use crate::support::table::Table as SummaryTable;
 use crate::{Error, Place, Result};
 
 /// Compare golden tables of simulated cases with our own lanes
@@ -128,24 +129,20 @@ fn document(tallies: &[Tally], compared: Option<&LaneComparison>) -> Result<Stri
 }
 
 fn render(tallies: &[Tally]) -> String {
-    let mut table = TextTable::new();
-    table.load_style(presets::ASCII_MARKDOWN);
-    table.set_header(["what", "model", "rows", "robust", "reacted", "collided", "labels", "types", "fragile", "ok"]);
-    for t in tallies {
-        table.add_row([
-            t.label.clone(),
-            t.model.map_or("-".to_owned(), |m| m.name().to_owned()),
-            count(t.rows),
-            count(t.robust),
-            count(t.reacted),
-            count(t.collided),
-            format!("{}/{}", count(t.labels_equal), count(t.rows)),
-            format!("{}/{}", count(t.types_equal), count(t.robust)),
-            count(t.fragile_different),
-            if t.passes() { "yes" } else { "NO" }.to_owned(),
-        ]);
-    }
-    let mut text = format!("{table}\n\nLargest deviations on robust rows:\n");
+    // Without a number's type: every column of this table stands to the left.
+    let table = SummaryTable::of(tallies)
+        .column("what", |t| t.label.as_str())
+        .column("model", |t| t.model.map_or("-", ModelId::name))
+        .column("rows", |t| count(t.rows))
+        .column("robust", |t| count(t.robust))
+        .column("reacted", |t| count(t.reacted))
+        .column("collided", |t| count(t.collided))
+        .column("labels", |t| format!("{}/{}", count(t.labels_equal), count(t.rows)))
+        .column("types", |t| format!("{}/{}", count(t.types_equal), count(t.robust)))
+        .column("fragile", |t| count(t.fragile_different))
+        .column("ok", |t| if t.passes() { "yes" } else { "NO" })
+        .build();
+    let mut text = format!("{}\nLargest deviations on robust rows:\n", table.text());
     let mut largest: Vec<(&str, u64, f64, &str)> = Vec::new();
     for deviation in tallies.iter().flat_map(|t| &t.deviations) {
         match largest.iter_mut().find(|l| l.0 == deviation.quantity) {

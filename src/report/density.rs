@@ -22,17 +22,7 @@ pub fn text(model: &DensityModel) -> String {
         count(provenance.kept),
         count(provenance.left_out)
     );
-    let values = |j: usize| model.kde.points().iter().map(|p| p[j]).collect::<Vec<f64>>();
-    let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
-    let parameters = Table::of(model.space.parameters().iter().enumerate())
-        .column("parameter", |(_, parameter)| parameter.name.as_str())
-        .column("unit", |(_, parameter)| parameter.unit.as_str())
-        .column(number("mean"), |(j, _)| mean(values(j)))
-        .column(number("deviation"), |(j, _)| standard_deviation(&values(j)))
-        .column(number("scale"), |(j, _)| model.kde.scale()[j])
-        .column(number("kernel"), |(j, _)| model.kde.spread()[j])
-        .column("valid", |(_, parameter)| parameter.bounds_text());
-    text.push_str(&parameters.build().text());
+    text.push_str(&parameters(model).text());
     let bandwidth = model.kde.bandwidth();
     let end = match bandwidth.end {
         SearchEnd::Inside => "",
@@ -71,18 +61,8 @@ pub fn text(model: &DensityModel) -> String {
 pub fn record(model: &DensityModel) -> serde_json::Value {
     let id = model.space.id();
     let provenance = &model.provenance;
-    let parameters = model.space.parameters().iter().enumerate().map(|(j, parameter)| {
-        let values: Vec<f64> = model.kde.points().iter().map(|p| p[j]).collect();
-        serde_json::json!({
-            "name": parameter.name,
-            "unit": parameter.unit,
-            "mean": values.iter().sum::<f64>() / values.len() as f64,
-            "deviation": standard_deviation(&values),
-            "scale": model.kde.scale()[j],
-            "kernel": model.kde.spread()[j],
-            "valid": parameter.bounds_text(),
-        })
-    });
+    let mut parameters = parameters(model);
+    parameters.columns[0].name = "name".into();
     serde_json::json!({
         "category": id.category.key(),
         "parameterization": id.key,
@@ -91,12 +71,27 @@ pub fn record(model: &DensityModel) -> serde_json::Value {
         "found": provenance.found,
         "kept": provenance.kept,
         "left_out": provenance.left_out,
-        "parameters": parameters.collect::<Vec<_>>(),
+        "parameters": parameters.records(),
         "bandwidth": model.kde.bandwidth(),
         "valid": model.valid,
         "exposure": model.exposure,
         "representativeness": model.representativeness,
     })
+}
+
+/// Location, spread and bounds of every parameter.
+fn parameters(model: &DensityModel) -> Table {
+    let values = |j: usize| model.kde.points().iter().map(|p| p[j]).collect::<Vec<f64>>();
+    let mean = |values: Vec<f64>| values.iter().sum::<f64>() / values.len() as f64;
+    Table::of(model.space.parameters().iter().enumerate())
+        .column("parameter", |(_, parameter)| parameter.name.as_str())
+        .column("unit", |(_, parameter)| parameter.unit.as_str())
+        .column(number("mean"), |(j, _)| mean(values(j)))
+        .column(number("deviation"), |(j, _)| standard_deviation(&values(j)))
+        .column(number("scale"), |(j, _)| model.kde.scale()[j])
+        .column(number("kernel"), |(j, _)| model.kde.spread()[j])
+        .column("valid", |(_, parameter)| parameter.bounds_text())
+        .build()
 }
 
 /// Which fraction of the draws every bound refuses.

@@ -22,16 +22,6 @@ pub struct HeadwayFailures {
     failures: Vec<u64>,
 }
 
-/// Failures of a variant at a headway.
-#[derive(Clone, Copy)]
-pub(super) struct HeadwayRow<'a> {
-    pub variant: &'a str,
-    pub headway: Headway,
-    pub model: ModelId,
-    pub criterion: Criterion,
-    pub failures: u64,
-}
-
 impl HeadwayFailures {
     /// Of a block of a plan.
     ///
@@ -64,14 +54,14 @@ impl HeadwayFailures {
     }
 
     /// Per variant, headway, model and criterion, in this order.
-    pub(super) fn rows(&self) -> impl Iterator<Item = HeadwayRow<'_>> {
+    pub(super) fn rows(&self) -> impl Iterator<Item = (&str, Headway, ModelId, Criterion, u64)> {
         let lanes = self.variants.iter().flat_map(move |variant| {
             let starts = self.headways.iter().map(move |&headway| (variant, headway));
             starts.flat_map(|(variant, headway)| self.models.iter().map(move |&model| (variant, headway, model)))
         });
         lanes.zip(self.failures.chunks(Criterion::ALL.len())).flat_map(|((variant, headway, model), failures)| {
-            let row = move |(criterion, &failures)| HeadwayRow { variant, headway, model, criterion, failures };
-            Criterion::ALL.into_iter().zip(failures).map(row)
+            let counts = Criterion::ALL.into_iter().zip(failures);
+            counts.map(move |(criterion, &failures)| (variant.as_str(), headway, model, criterion, failures))
         })
     }
 

@@ -28,9 +28,9 @@ pub(super) fn failure_table(scores: &ScoreTable, published: bool, capped: &'stat
         .column("scenario", |(c, ..)| c.category.label())
         .column("model", |(.., model)| model.name())
         .columns(
-            Criterion::ALL,
-            |criterion| if criterion == Criterion::Collision { "collision" } else { criterion.label() },
-            |(c, _, model), of| failures(c, model, of),
+            Criterion::ALL.into_iter().zip(["collision", "TTC", "BTN"]),
+            |(_, name)| name,
+            |(c, _, model), (criterion, _)| failures(c, model, criterion),
         )
         .column("simulations", |(c, ..)| c.simulations)
         .column(capped, |(c, at, _)| c.capped[at]);

@@ -9,7 +9,7 @@ mod panels;
 
 use super::plot::{Anchor, Canvas, Ends, Height, INK, Look, Paint, Series, TICK, Type, WHITE, set};
 use super::plot::{Axis, number};
-use crate::engine::{StepMark, Trace, TracedStep, TracedVehicle};
+use crate::engine::{StepMark, Trace, TracedStep};
 use crate::support::table::Table;
 pub use panels::TraceSeries;
 use panels::{Column, Panel, Shown, mark_dash, mark_look};
@@ -197,27 +197,20 @@ pub fn table(traces: &[(String, &Trace)]) -> Table {
         .column("unsafe", |(.., step)| u8::from(step.is_unsafe))
         .column("demand_mps2", |(.., step)| step.demand_mps2);
     for (k, vehicle) in VEHICLES[..vehicles].iter().enumerate() {
-        type Of<T> = fn(&TracedVehicle) -> T;
-        let numbers: [(&str, Of<f64>); 9] = [
-            ("x_m", |of| of.x_m),
-            ("y_m", |of| of.y_m),
-            ("v_mps", |of| of.v_mps),
-            ("gap_m", |of| of.gap_m),
-            ("lateral_gap_m", |of| of.lateral_gap_m),
-            ("ttc_s", |of| of.ttc_s),
-            ("btn", |of| of.btn),
-            ("pfs", |of| of.pfs),
-            ("cfs", |of| of.cfs),
-        ];
-        let flags: [(&str, Of<bool>); 2] = [("present", |of| of.is_present), ("judged", |of| of.is_judged)];
+        let name = |name: &str| format!("{vehicle}_{name}");
         let other = |(_, trace, step): Row| (k < trace.vehicles).then(|| step.others[k]);
         table = table
-            .columns(numbers, |(name, _)| format!("{vehicle}_{name}"), |row, (_, of)| other(row).map(|v| of(&v)))
-            .columns(
-                flags,
-                |(name, _)| format!("{vehicle}_{name}"),
-                |row, (_, of)| other(row).map(|v| u8::from(of(&v))),
-            );
+            .column(name("x_m"), |row| other(row).map(|of| of.x_m))
+            .column(name("y_m"), |row| other(row).map(|of| of.y_m))
+            .column(name("v_mps"), |row| other(row).map(|of| of.v_mps))
+            .column(name("gap_m"), |row| other(row).map(|of| of.gap_m))
+            .column(name("lateral_gap_m"), |row| other(row).map(|of| of.lateral_gap_m))
+            .column(name("ttc_s"), |row| other(row).map(|of| of.ttc_s))
+            .column(name("btn"), |row| other(row).map(|of| of.btn))
+            .column(name("pfs"), |row| other(row).map(|of| of.pfs))
+            .column(name("cfs"), |row| other(row).map(|of| of.cfs))
+            .column(name("present"), |row| other(row).map(|of| u8::from(of.is_present)))
+            .column(name("judged"), |row| other(row).map(|of| u8::from(of.is_judged)));
     }
     let mark = |(_, trace, step): Row| {
         let here = StepMark::ALL.into_iter().filter(|mark| trace.step_of(*mark) == Some(step.step));

@@ -82,7 +82,7 @@ pub struct ParameterizationOptions {
     pub lane_change_m: f64,
     /// Least lateral speed, m/s (1e-3).
     #[schemars(extend("exclusiveMinimum" = 0.0))]
-    #[serde(alias = "least_lateral_speed_mps")] // in density files of earlier builds
+    #[serde(alias = "min_lateral_speed_mps")] // in density files of earlier builds
     pub min_lateral_speed_mps: f64,
     /// LVD ii: 0 samples the sinusoid itself at every step; n > 0 joins n + 1 points of it by lines, as an
     /// independent implementation does with 200 (largest effect on a speed: Δ·π²/(16 n²)).
