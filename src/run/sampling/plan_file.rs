@@ -5,8 +5,7 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::conditional::mixture_of;
-use super::plan::plan_samples;
+use super::plan::{mixture_of, plan_samples};
 use super::proposal_file::{proposal_from_text, proposal_text};
 use super::sample::{Proposals, Sample, SampleKind};
 use super::sample_options::{Estimator, SampleOptions};

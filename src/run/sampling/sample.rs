@@ -2,12 +2,11 @@
 
 use std::path::Path;
 
-use super::conditional::mixture_of;
-use super::plan::{plan_points, plan_samples};
+use super::plan::{mixture_of, plan_points, plan_samples};
 use super::plan_file::KIND;
 use super::sample_options::{Estimator, SampleOptions};
 use super::tally::SampleTally;
-use super::weighted_tally::WeightedTally;
+use super::weighted::WeightedTally;
 use crate::engine::{Executor, LanePlan};
 use crate::model::profile::Profile;
 use crate::run::parts::leave_plan;

@@ -6,9 +6,7 @@
 
 mod best;
 mod claims;
-mod contradiction;
 mod difference;
-mod options;
 mod paper_claims;
 mod published;
 mod statistic;
@@ -17,8 +15,7 @@ mod table;
 pub use best::{Best, BestScore, best_parameterizations};
 pub use claims::{Claim, ClaimResult, ClaimRow, ClaimVerdict, check_claims};
 pub use difference::{Contrast, ScenarioRate, ScoreInterval, min_contrast};
-pub use options::ScoreOptions;
 pub use paper_claims::paper_claims;
 pub use published::{Misfit, PublishedFailures, published_failures, published_lvd_f1};
 pub use statistic::Statistic;
-pub use table::{CategoryScores, ScoreCell, ScoreTable, f1, f1_interval, precision, recall, score};
+pub use table::{CategoryScores, ScoreCell, ScoreOptions, ScoreTable, f1, f1_interval, precision, recall, score};

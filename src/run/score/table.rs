@@ -1,15 +1,16 @@
 //! The score table: per category, parameterization, model and criterion the agreement of S' with S over
-//! (scenario, THW) pairs.
+//! (scenario, THW) pairs; how it is made, and whether counts can be those of a plan's lanes.
 
 use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
 
-use super::contradiction::contradiction;
 use super::difference::{ScenarioRate, ScoreInterval};
-use super::options::ScoreOptions;
 use crate::engine::{Confusion, Headway, LanePlan, Partial, UnitCounts};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::scenario::Category;
+use crate::support::ranges;
 use crate::{Error, Place, Result};
 
 /// Recall TP/(TP + FN); `None` where S never fails.
@@ -64,7 +65,7 @@ pub struct ScoreCell {
     pub model: ModelId,
     /// Criterion.
     pub criterion: Criterion,
-    /// Counts over (scenario, THW) pairs.
+    /// Counts over (scenario, THW) pairs; how it is made, and whether counts can be those of a plan's lanes.
     pub counts: Confusion,
     /// Interval of F1 over scenarios; `None` where S fails in fewer than [`ScoreOptions::min_failures`] of them.
     pub f1_interval: Option<ScoreInterval>,
@@ -176,6 +177,70 @@ pub fn score(plan: &LanePlan, partial: &Partial, options: &ScoreOptions) -> Resu
         });
     }
     Ok(ScoreTable { categories, headways: plan.headways.clone(), options: options.clone() })
+}
+
+/// What is wrong with the counts of a partial that has as many units as the plan; `None` where nothing is.
+pub(super) fn contradiction(plan: &LanePlan, partial: &Partial) -> Option<String> {
+    let units = partial.units();
+    if let Some((at, unit)) = (0..).zip(units).find(|(at, unit)| unit.unit != *at) {
+        return Some(format!("unit {} stands where unit {at} is expected", unit.unit));
+    }
+    if !partial.fits(plan) {
+        return Some("a unit has other variants, models or criteria than the plan".to_owned());
+    }
+    let of_units =
+        units.iter().find_map(|unit| of_unit(unit, plan).map(|problem| format!("unit {}: {problem}", unit.unit)));
+    let by_headway = || (!partial.adds_up(plan)).then(|| "failures by headway do not add up".to_owned());
+    of_units.or_else(by_headway)
+}
+
+/// The same for one unit, whose counts are as many as they must be.
+fn of_unit(unit: &UnitCounts, plan: &LanePlan) -> Option<String> {
+    let (headways, per_variant) = (plan.headways.len() as u64, plan.models.len() * Criterion::ALL.len());
+    let sum = |counts: &[u32]| counts.iter().map(|&count| u64::from(count)).sum::<u64>();
+    if let Some(capped) = unit.capped.iter().find(|&&capped| u64::from(capped) > headways) {
+        return Some(format!("{capped} of {headways} lanes ended at the time cap"));
+    }
+    unit.cells.iter().enumerate().find_map(|(at, cell)| {
+        let Confusion { tp, fn_, fp, tn } = *cell;
+        let lanes = sum(&[tp, fn_, fp, tn]);
+        if lanes != headways {
+            return Some(format!("{lanes} lanes of {headways} headways"));
+        }
+        if at < per_variant && (fn_ > 0 || fp > 0) {
+            return Some("S does not agree with itself".to_owned());
+        }
+        let failures = u64::from(unit.cells[at % per_variant].tp);
+        let here = sum(&[tp, fn_]);
+        (here != failures).then(|| format!("S fails {failures} times by itself and {here} times beside S'"))
+    })
+}
+
+/// How scores are made.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ScoreOptions {
+    /// Seed of the choice of lanes that are computed again on the CPU. No score depends on it.
+    pub seed: u64,
+    /// Coverage of the intervals (0.95).
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
+    pub confidence: f64,
+    /// Below so many failures in S F1 has no interval; below so many scenarios with one a claim is not judged (10).
+    #[schemars(range(min = 0, max = 4_294_967_295_u32))]
+    pub min_failures: u32,
+}
+
+impl Default for ScoreOptions {
+    fn default() -> Self {
+        ScoreOptions { seed: 157, confidence: 0.95, min_failures: 10 }
+    }
+}
+
+impl ScoreOptions {
+    /// Checks the ranges; the error names the option.
+    pub fn validate(&self) -> Result<()> {
+        ranges::check("score", self)
+    }
 }
 
 #[cfg(test)]

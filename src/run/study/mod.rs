@@ -3,7 +3,6 @@
 
 mod cases;
 mod facts;
-mod histogram;
 mod plan;
 pub(crate) mod plan_file;
 mod planned;
@@ -12,8 +11,7 @@ mod run;
 
 pub use cases::StudyCases;
 pub(crate) use cases::WINDOW;
-pub use facts::{CategoryProvenance, StudyProvenance};
-pub use histogram::{ParameterHistogram, parameter_histograms};
+pub use facts::{CategoryProvenance, ParameterHistogram, StudyProvenance, parameter_histograms};
 pub use plan::{StudyOptions, outline_study, plan_study};
 pub use plan_file::StudyHead;
 pub use planned::{Study, StudyBuilder};
