@@ -2,9 +2,8 @@
 //! cells have in common, in words.
 
 use super::axis::GridAxis;
-use super::grid::{CaseStyle, Grid, GridParts, MAX_PANELS};
-use super::jrc_case;
 use super::parameter::{MapParameter, MapQuantity};
+use super::{CaseStyle, Grid, GridParts, MAX_PANELS, jrc_case};
 use crate::model::profile::Profile;
 use crate::scenario::{Category, LATERAL_DISTANCE_M};
 use crate::support::plausibility::Doubts;

@@ -6,7 +6,7 @@ use crate::model::driver::ModelId;
 use crate::run::check::Answer;
 use crate::{Error, Place, Result};
 
-use super::grid::Grid;
+use super::Grid;
 use super::plan::{GridPart, GridPlan};
 
 /// The verdicts of a grid.

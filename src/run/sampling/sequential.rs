@@ -1,7 +1,7 @@
 //! Estimators that decide on the way what to sample next: they run in one piece.
 
+use super::Sample;
 use super::limit_state::{LaneLimitState, scenario_shares, truncated};
-use super::sample::Sample;
 use super::sample_options::{Estimator, SampleOptions};
 use super::sample_run::{Levels, SampleResult};
 use crate::Result;

@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 
 use super::limit_state::{LaneLimitState, scenario_shares, truncated};
 use super::rows::EstimateRow;
-use super::sample::{Proposals, Sample};
 use super::sample_options::SampleOptions;
 use super::sample_run::SampleResult;
+use super::{Proposals, Sample};
 use crate::engine::{CpuBackend, Executor, lanes_within_seconds};
 use crate::model::driver::ModelId;
 use crate::run::parts::{Ledger, MergeableCounts};
