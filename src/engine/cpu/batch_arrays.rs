@@ -365,7 +365,7 @@ impl<const N: usize> StateArrays<N> {
 }
 
 /// Arrays of `N` words each, which can be handled without their names.
-pub(super) trait Rows<const N: usize>: Pod {
+trait Rows<const N: usize>: Pod {
     /// Each of them.
     fn rows(&self) -> &[[u32; N]] {
         bytemuck::cast_slice(std::slice::from_ref(self))
@@ -379,7 +379,7 @@ pub(super) trait Rows<const N: usize>: Pod {
 
 /// Puts entry `k` of every row into place `to`.
 #[inline(always)]
-pub(super) fn copy<const N: usize>(rows: &mut [[u32; N]], to: usize, from: &[[u32; LANES]], k: usize) {
+fn copy<const N: usize>(rows: &mut [[u32; N]], to: usize, from: &[[u32; LANES]], k: usize) {
     for (row, from) in rows.iter_mut().zip(from) {
         row[to] = from[k];
     }
@@ -387,7 +387,7 @@ pub(super) fn copy<const N: usize>(rows: &mut [[u32; N]], to: usize, from: &[[u3
 
 /// Writes a value for [`LANES`] lanes.
 #[inline(always)]
-pub(super) fn fill<T: Copy, const N: usize>(row: &mut [T; N], from: usize, value: T) {
+fn fill<T: Copy, const N: usize>(row: &mut [T; N], from: usize, value: T) {
     row[from..from + LANES].fill(value);
 }
 

@@ -448,7 +448,7 @@ fn next_other(x: f32, up: bool, f: impl Fn(f32) -> f32) -> f32 {
 
 /// The two neighbours in [low, high] between which `holds` changes from its value at `low` to that at `high`; `None`
 /// if both are equal.
-pub(super) fn turn(low: f32, high: f32, holds: impl Fn(f32) -> bool) -> Option<(f32, f32)> {
+fn turn(low: f32, high: f32, holds: impl Fn(f32) -> bool) -> Option<(f32, f32)> {
     let first = holds(low);
     if low >= high || holds(high) == first {
         return None;

@@ -239,7 +239,7 @@ const MARKED_ONE_IN: f64 = 1000.0;
 
 /// Ends of pieces of an interval of samples. Each is as long as all before it, so that a list of worst lanes finds as many
 /// new lanes in one piece as in the next.
-pub(super) fn ends(range: &Range<u64>) -> impl Iterator<Item = u64> {
+fn ends(range: &Range<u64>) -> impl Iterator<Item = u64> {
     let (first, end) = (range.start, range.end);
     std::iter::successors(Some(FIRST_SAMPLES), |length| length.checked_mul(2))
         .map(move |length| first.saturating_add(length))
@@ -248,7 +248,7 @@ pub(super) fn ends(range: &Range<u64>) -> impl Iterator<Item = u64> {
 
 /// What the lanes of further samples must return, so that the lists of worst lanes become what they would be with all
 /// values. `options.worst` is at least 1, and the lanes of `tally` have smaller indices.
-pub(super) fn wanted(plan: &LanePlan, tally: &SampleTally, options: &SampleOptions) -> Wanted {
+fn wanted(plan: &LanePlan, tally: &SampleTally, options: &SampleOptions) -> Wanted {
     let (mut watch, mut marked) = (Watch::NOTHING, 0.0);
     let lanes_per_model = (tally.valid() * plan.headways.len() as u64).max(1) as f64;
     for (at, model) in plan.models.iter().enumerate() {
