@@ -11,8 +11,8 @@ use crate::interop::cluster::quoted_word;
 use crate::report::run_record::StudyHost;
 use crate::report::sampling::{EstimateFile, HostRecord};
 use crate::report::study::StudyReport;
-use crate::run::merge::{Merged, merge};
 use crate::run::parts::PLAN_FILE;
+use crate::run::{Merged, merge};
 
 /// Merge the parts of a run into its result
 ///

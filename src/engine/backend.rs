@@ -1,10 +1,16 @@
 //! What every backend offers. No type of a thread pool or a device appears here.
+//!
+//! A sweep may return verdicts, and the values of those lanes only that may be wanted: a [`Watch`] marks them by their
+//! verdicts. The [executor](super::Executor) computes marked lanes again, one by one.
 
 use std::ops::Range;
 
 use super::outcome::{Outcome, Verdicts};
 use super::plan::LanePlan;
-use super::watch::Watch;
+use crate::model::criterion::{Criteria, Criterion};
+use crate::model::driver::{MODELS, ModelId};
+use crate::model::profile::Profile;
+use crate::model::scalar::Real;
 use crate::{Error, Result};
 
 /// How much of a lane comes back.
@@ -130,5 +136,174 @@ pub trait Session {
     /// Time that the device itself has computed so far, s, where it can tell.
     fn device_seconds(&self) -> Option<f64> {
         None
+    }
+}
+
+/// Which lanes of a model are valued. More may be marked than are meant, never fewer.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Marks {
+    /// None.
+    Nothing,
+    /// Contacts at this closing speed, m/s ≥ 0, or a greater one.
+    Contacts(f64),
+    /// Lanes whose smallest TTC is below this, s, and all contacts. No less than the profile's threshold: the TTC
+    /// criterion itself marks, and so unmarked lanes keep their verdicts.
+    TtcBelow(f64),
+    /// Lanes that fail the BTN criterion.
+    BtnFailures,
+}
+
+/// The marks of every model, in the order of [`ModelId::ALL`].
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Watch(pub [Marks; MODELS]);
+
+impl Watch {
+    /// No lane of any model.
+    pub const NOTHING: Watch = Watch([Marks::Nothing; MODELS]);
+
+    /// The criteria by which lanes of a model run, so that their verdicts show which are marked.
+    pub(super) fn criteria<R: Real>(&self, profile: &Profile, model: ModelId, criteria: Criteria<R>) -> Criteria<R> {
+        let mut criteria = criteria;
+        match self.0[model.index()] {
+            Marks::Nothing | Marks::BtnFailures => {}
+            Marks::Contacts(closing_mps) => criteria.marks_contacts_from = R::from_f64(closing_mps),
+            Marks::TtcBelow(ttc_s) => {
+                // A quotient below the limit may be a product that is rounded down to it.
+                let above = ttc_s.max(profile.criteria.ttc_threshold_s) * (1.0 + 1e-6);
+                criteria.ttc.threshold = R::from_f64(above);
+            }
+        }
+        criteria
+    }
+
+    /// Whether the verdicts of a lane mark it.
+    pub(super) fn marks(&self, model: ModelId, verdicts: Verdicts) -> bool {
+        match self.0[model.index()] {
+            Marks::Nothing => false,
+            Marks::Contacts(_) => verdicts.0 & Verdicts::MARKED_CONTACT == Verdicts::MARKED_CONTACT,
+            Marks::TtcBelow(_) => verdicts.failed(Criterion::Ttc) || verdicts.failed(Criterion::Collision),
+            Marks::BtnFailures => verdicts.failed(Criterion::Btn),
+        }
+    }
+
+    /// Whether a lane with this outcome must have been marked.
+    pub(super) fn means(&self, model: ModelId, outcome: &Outcome<f64>) -> bool {
+        let collided = outcome.verdicts.failed(Criterion::Collision);
+        match self.0[model.index()] {
+            Marks::Nothing => false,
+            Marks::Contacts(closing_mps) => collided && outcome.impact_closing_speed.abs() >= closing_mps,
+            Marks::TtcBelow(ttc_s) => collided || outcome.min_ttc < ttc_s,
+            Marks::BtnFailures => outcome.verdicts.failed(Criterion::Btn),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::ops::Range;
+
+    use crate::engine::verify::{RandomOptions, random_plan};
+    use crate::engine::{
+        Backend, Chunk, CpuBackend, Executor, LanePlan, RecheckBy, RecheckOptions, Session, Wanted, same_words,
+    };
+    use crate::{Error, Result};
+
+    fn plan() -> LanePlan {
+        let options = RandomOptions { lanes_per_model_and_category: 3000, ..Default::default() };
+        random_plan(&Profile::load("paper").unwrap(), &options).unwrap()
+    }
+
+    fn chunk(plan: &LanePlan, backend: &dyn Backend, wanted: Wanted) -> Result<Chunk> {
+        let mut all = None;
+        let executor = Executor {
+            recheck: Some(RecheckOptions { seed: 3, one_in: 5 }),
+            chunk_lanes: Some(u64::MAX),
+            ..Executor::new(backend)
+        };
+        executor.sweep(plan, 0..plan.unit_count(), wanted, |chunk| {
+            match &mut all {
+                None => all = Some(chunk),
+                Some(all) => {
+                    all.verdicts.extend(chunk.verdicts);
+                    all.outcomes.extend(chunk.outcomes);
+                    all.valued = all.valued.take().zip(chunk.valued).map(|(a, b)| [a, b].concat());
+                }
+            }
+            Ok(())
+        })?;
+        Ok(all.unwrap())
+    }
+
+    const WATCHES: [Marks; 6] = [
+        Marks::Nothing,
+        Marks::Contacts(0.0),
+        Marks::Contacts(7.5),
+        Marks::TtcBelow(1.0),
+        Marks::TtcBelow(4.0),
+        Marks::BtnFailures,
+    ];
+
+    #[test]
+    fn every_lane_that_is_meant_is_valued_and_no_verdict_changes() {
+        let (plan, cpu) = (plan(), CpuBackend::lane_arithmetic());
+        let every_value = chunk(&plan, &cpu, Wanted::Outcomes).unwrap();
+        for marks in WATCHES {
+            let watch = Watch([marks; MODELS]);
+            let watched = chunk(&plan, &cpu, Wanted::Watched(watch)).unwrap();
+            assert!(watched.verdicts == every_value.verdicts, "{marks:?}");
+            let Some(valued) = watched.valued else { continue };
+            for (lane, outcome) in &valued {
+                assert!(same_words(outcome, &every_value.outcomes[*lane as usize]), "{marks:?}, lane {lane}");
+            }
+            let mut meant = 0;
+            for (outcome, lane) in every_value.outcomes.iter().zip(0_u64..) {
+                let model = plan.models[plan.model_of(lane)];
+                if watch.means(model, outcome) {
+                    meant += 1;
+                    assert!(valued.binary_search_by_key(&lane, |(lane, _)| *lane).is_ok(), "{marks:?}, lane {lane}");
+                }
+            }
+            assert_eq!(marks == Marks::Nothing, meant == 0, "{marks:?}");
+            assert!(valued.len() <= meant + plan.lane_count() as usize / 50, "{marks:?}: {} of {meant}", valued.len());
+        }
+    }
+
+    /// A backend whose verdicts are right and that marks nothing.
+    struct WithoutMarks(CpuBackend<f32>);
+
+    struct SessionWithoutMarks<'p>(Box<dyn Session + 'p>);
+
+    impl Backend for WithoutMarks {
+        fn rechecked_by(&self, _: Wanted) -> RecheckBy {
+            RecheckBy::Lanes
+        }
+
+        fn describe(&self) -> String {
+            "a device that marks nothing".to_owned()
+        }
+
+        fn prepare<'p>(&self, plan: &'p LanePlan) -> Result<Box<dyn Session + 'p>> {
+            Ok(Box::new(SessionWithoutMarks(self.0.prepare(plan)?)))
+        }
+    }
+
+    impl Session for SessionWithoutMarks<'_> {
+        fn chunk_lanes(&self, wanted: Wanted) -> u64 {
+            self.0.chunk_lanes(wanted)
+        }
+
+        fn run(&mut self, units: Range<u64>, _: Wanted) -> Result<Chunk> {
+            self.0.run(units, Wanted::Verdicts)
+        }
+    }
+
+    #[test]
+    fn a_mark_that_is_missing_stops_the_run() {
+        let (plan, defective) = (plan(), WithoutMarks(CpuBackend::lane_arithmetic()));
+        for marks in [Marks::Contacts(7.5), Marks::TtcBelow(4.0)] {
+            let error = chunk(&plan, &defective, Wanted::Watched(Watch([marks; MODELS]))).unwrap_err();
+            assert!(matches!(error, Error::Verification(_)), "{marks:?}: {error}");
+        }
     }
 }

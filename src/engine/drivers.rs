@@ -6,10 +6,10 @@ use crate::model::profile::Profile;
 use crate::model::scalar::Real;
 use crate::scenario::{Category, Tables};
 
-use super::cpu::instructions::Instructions;
 use super::cpu::lane_result::Ending;
 use super::cpu::pending::Lanes;
 use super::cpu::rules::Rules;
+use super::cpu::simd::Instructions;
 use super::cpu::stream::run_stream;
 use super::frame::{Frame, Simulation, Start};
 use super::lane::{Observer, run_lane};

@@ -6,11 +6,10 @@ use std::sync::Arc;
 
 use rayon::prelude::*;
 
-use super::backend::{Backend, Chunk, Session, Wanted};
+use super::backend::{Backend, Chunk, Session, Wanted, Watch};
 use super::cpu::runner::LaneRunner;
 use super::plan::LanePlan;
 use super::recheck::{Recheck, RecheckOptions};
-use super::watch::Watch;
 use crate::support::cancel::Cancel;
 use crate::{Error, Result};
 

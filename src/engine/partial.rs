@@ -18,7 +18,7 @@ pub struct UnitCounts {
     /// Unit, counted over all blocks.
     pub unit: u64,
     /// One per variant × model × criterion.
-    #[serde(with = "crate::engine::packed_counts")]
+    #[serde(with = "crate::engine::confusion::packed")]
     pub cells: Vec<Confusion<u32>>,
     /// Lanes that ended at the time cap, one per variant × model.
     pub capped: Vec<u32>,

@@ -6,8 +6,8 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use super::backend::{Chunk, RecheckBy, Wanted};
-use super::cpu::instructions::Instructions;
 use super::cpu::runner::LaneRunner;
+use super::cpu::simd::Instructions;
 use super::outcome::{Outcome, Verdicts};
 use super::plan::{LaneKey, LanePlan};
 use crate::{Error, Result};

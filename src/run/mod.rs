@@ -4,7 +4,7 @@
 //! one another, [`grid`] sweeps maps, [`check`] judges single cases, [`justify`] a parameterization.
 //! [`forecast`] says before a run how large it will be. [`close_following`] tells how many failures come from headways below 0.5 s.
 //! [`reopen`] runs single lanes of a finished run again.
-//! [`parts`] splits and journals them, [`merge`](mod@merge) joins their parts; [`score`] turns a study's counts into recall, precision and F1.
+//! [`parts`] splits and journals them, [`Merged`] is what their parts give; [`score`] turns a study's counts into recall, precision and F1.
 
 pub mod check;
 pub mod close_following;
@@ -12,7 +12,6 @@ pub mod compare;
 pub mod forecast;
 pub mod grid;
 pub mod justify;
-pub mod merge;
 pub mod parts;
 #[cfg(test)]
 mod plan_mutations;
@@ -20,3 +19,65 @@ pub mod reopen;
 pub mod sampling;
 pub mod score;
 pub mod study;
+
+use std::path::Path;
+
+use crate::support::files::check_folder;
+use crate::support::run_dir::{ESTIMATE_RECORD, OutputDir, STUDY_RECORD};
+use crate::{Error, Place, Result};
+use parts::{PLAN_FILE, Shard, kind_of};
+use sampling::{Sample, SampleResult};
+use study::{Study, StudyResult};
+
+/// A run with the result of its parts, bit for bit that of the run in one piece.
+pub enum Merged {
+    /// A study.
+    Study(Box<(Study, StudyResult)>),
+    /// A sampling run.
+    Sample(Box<(Sample, SampleResult)>),
+}
+
+/// Merges the parts of a folder, which is locked from now on. `again` gives the command of a verb that makes a shard.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Busy`] where another process writes there; [`Error::Input`] naming what is missing, doubled,
+/// foreign or damaged.
+pub(crate) fn merge(dir: &Path, again: &dyn Fn(&str, Shard) -> String) -> Result<(OutputDir, Merged)> {
+    check_folder(dir)?;
+    let plan = dir.join(PLAN_FILE);
+    if !plan.exists() {
+        return Err(no_parts(dir));
+    }
+    match kind_of(&plan)?.as_str() {
+        Study::KIND => {
+            let folder = OutputDir::open(dir, STUDY_RECORD)?;
+            let merged = Study::merge_or(dir, &|shard| again("study", shard))?;
+            Ok((folder, Merged::Study(Box::new(merged))))
+        }
+        kind if Sample::is_kind(kind) => {
+            let folder = OutputDir::open(dir, ESTIMATE_RECORD)?;
+            let merged = Sample::merge_or(dir, &|shard| again("sample", shard))?;
+            Ok((folder, Merged::Sample(Box::new(merged))))
+        }
+        other => {
+            let help = "give the folder (option `out`) of a run in parts";
+            Err(Error::input(Place::file(plan), format!("this is a `{other}`, not the plan of a run"), help))
+        }
+    }
+}
+
+/// Why there is nothing to merge.
+fn no_parts(dir: &Path) -> Error {
+    let has = |name: &str| dir.join(name).exists();
+    let names = || std::fs::read_dir(dir).into_iter().flatten().flatten().map(|entry| entry.file_name());
+    let (problem, help) = if !dir.is_dir() {
+        ("there is no such folder", "check the path for typing errors")
+    } else if has(STUDY_RECORD) || has(ESTIMATE_RECORD) {
+        ("there is nothing to merge: this is the result of an unsplit run", "give the folder of a run in parts")
+    } else if names().any(|name| name.to_string_lossy().ends_with(".journal")) {
+        ("there is nothing to merge: an unsplit run was interrupted here", "run its command again: it continues")
+    } else {
+        ("there is nothing to merge: plan.json is missing", "give the folder of the parts")
+    };
+    Error::input(Place::file(dir), problem, help)
+}

@@ -7,13 +7,12 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::Result;
-use crate::engine::backend::{Backend, Chunk, RecheckBy, Session, Wanted};
-use crate::engine::cpu::instructions::Instructions;
+use crate::engine::backend::{Backend, Chunk, RecheckBy, Session, Wanted, Watch};
 use crate::engine::cpu::runner::LaneRunner;
 use crate::engine::cpu::series::max_entries;
+use crate::engine::cpu::simd::Instructions;
 use crate::engine::outcome::{Outcome, Verdicts};
 use crate::engine::plan::LanePlan;
-use crate::engine::watch::Watch;
 use crate::model::scalar::Real;
 use crate::scenario::Category;
 

@@ -6,19 +6,18 @@
 //! A lane that is over stays as it is until the burst ends. A lane in steady following goes on to its end, which
 //! changes no verdict. [`crate::engine::cpu::simd`] chooses the instruction set; nothing here depends on it.
 
-use crate::model::driver::DriverModel;
-use crate::model::flag::Flag;
-use crate::model::scalar::Real;
-
 use crate::engine::cpu::batch_arrays::{FixedArrays, Floats, LaneArrays, Slots, StateArrays, TrackArrays, Words};
 use crate::engine::cpu::fast_forward::quiescent_steps;
 use crate::engine::cpu::pending::{Lanes, Pending, ROOM};
 use crate::engine::cpu::rules::Rules;
+use crate::engine::cpu::series::Window;
 use crate::engine::cpu::steady_following::steady_steps;
-use crate::engine::cpu::transpose::Window;
 use crate::engine::cpu::{LANES, ROWS};
 use crate::engine::frame::Simulation;
 use crate::engine::lane_step::{LaneConstants, LaneState, OtherState, advance};
+use crate::model::driver::DriverModel;
+use crate::model::flag::Flag;
+use crate::model::scalar::Real;
 
 /// Batches of a burst.
 pub(in crate::engine) const BATCHES: usize = 3;

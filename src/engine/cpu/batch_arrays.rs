@@ -5,16 +5,14 @@
 
 use bytemuck::{Pod, Zeroable};
 
-use crate::model::criterion::{BrakeThreatMaximum, TtcMinimum};
-use crate::model::driver::{DriverModel, DriverState};
-use crate::model::flag::Flag;
-
 use crate::engine::cpu::LANES;
-use crate::engine::cpu::rows::{Rows, copy, fill, made_of_rows};
 use crate::engine::cpu::rules::Rules;
 use crate::engine::cpu::series::{Track, VehicleTracks};
 use crate::engine::lane_step::{LaneConstants, LaneState, OtherConstants, Record};
 use crate::engine::outcome::NO_STEP;
+use crate::model::criterion::{BrakeThreatMaximum, TtcMinimum};
+use crate::model::driver::{DriverModel, DriverState};
+use crate::model::flag::Flag;
 
 /// Marks a lane that never leaves its batch.
 pub(in crate::engine) const NEVER_LEAVES: u32 = Flag::LATEST_STEP;
@@ -127,6 +125,18 @@ pub(in crate::engine) struct ValueArrays<const N: usize> {
     btn_numerator: [f32; N],
     btn_denominator: [f32; N],
     min_gap: [f32; N],
+}
+
+macro_rules! made_of_rows {
+    ($($arrays:ident)+) => {
+        $(
+            // SAFETY: arrays of binary32 or 32-bit words, in the order of the source: 0 is one, and every word is.
+            unsafe impl<const N: usize> Zeroable for $arrays<N> {}
+            // SAFETY: the same; all have 4 bytes per entry and their alignment, so nothing lies between them.
+            unsafe impl<const N: usize> Pod for $arrays<N> {}
+            impl<const N: usize> Rows<N> for $arrays<N> {}
+        )+
+    };
 }
 
 made_of_rows! { EgoArrays OtherArrays TrackArrays MovingArrays AheadArrays ValueArrays }
@@ -352,6 +362,33 @@ impl<const N: usize> StateArrays<N> {
         values.btn_denominator[k] = lane.record.btn.denominator;
         values.min_gap[k] = lane.record.min_gap;
     }
+}
+
+/// Arrays of `N` words each, which can be handled without their names.
+trait Rows<const N: usize>: Pod {
+    /// Each of them.
+    fn rows(&self) -> &[[u32; N]] {
+        bytemuck::cast_slice(std::slice::from_ref(self))
+    }
+
+    /// The same, to be changed.
+    fn rows_mut(&mut self) -> &mut [[u32; N]] {
+        bytemuck::cast_slice_mut(std::slice::from_mut(self))
+    }
+}
+
+/// Puts entry `k` of every row into place `to`.
+#[inline(always)]
+fn copy<const N: usize>(rows: &mut [[u32; N]], to: usize, from: &[[u32; LANES]], k: usize) {
+    for (row, from) in rows.iter_mut().zip(from) {
+        row[to] = from[k];
+    }
+}
+
+/// Writes a value for [`LANES`] lanes.
+#[inline(always)]
+fn fill<T: Copy, const N: usize>(row: &mut [T; N], from: usize, value: T) {
+    row[from..from + LANES].fill(value);
 }
 
 #[cfg(test)]

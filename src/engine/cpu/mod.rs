@@ -5,18 +5,15 @@ pub(crate) mod backend;
 mod batch;
 mod batch_arrays;
 mod fast_forward;
-pub(in crate::engine) mod instructions;
 pub(in crate::engine) mod lane_result;
 mod lead_only;
 pub(in crate::engine) mod pending;
-mod rows;
 pub(in crate::engine) mod rules;
 pub(in crate::engine) mod runner;
 pub(in crate::engine) mod series;
-mod simd;
+pub(in crate::engine) mod simd;
 mod steady_following;
 pub(in crate::engine) mod stream;
-mod transpose;
 
 /// Lanes of a batch: one AVX-512 register of binary32.
 pub(in crate::engine) const LANES: usize = 16;

@@ -3,17 +3,15 @@
 //! stage: one that continues with the second vehicle only, and one that follows steadily, for as long as it does. A
 //! stage runs batches of its own when many lanes are pending there, or no others are left.
 
-use crate::model::driver::DriverModel;
-
 use crate::engine::cpu::LANES;
 use crate::engine::cpu::batch::{BATCHES, Fleet};
-use crate::engine::cpu::instructions::Instructions;
 use crate::engine::cpu::lane_result::Ending;
 use crate::engine::cpu::pending::{Lanes, Pending};
 use crate::engine::cpu::rules::Rules;
-use crate::engine::cpu::simd::{Burst, burst_for};
+use crate::engine::cpu::simd::{Burst, Instructions, burst_for};
 use crate::engine::frame::Simulation;
 use crate::engine::scene::Scene;
+use crate::model::driver::DriverModel;
 
 /// Lanes of a fleet.
 const FLEET: usize = BATCHES * LANES;

@@ -1,7 +1,7 @@
 //! The series that all cases of a set share: some hundred random speeds and lateral motions of at most [`LONGEST`]
 //! steps. A case refers to them, so a set of any size has the same tables.
 
-use super::draw::{CaseRandom, Purpose};
+use super::{CaseRandom, Purpose};
 use crate::scenario::{Category, Lateral, Speed, Tables};
 
 /// Entries of the longest series.

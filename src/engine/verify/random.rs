@@ -1,9 +1,8 @@
 //! The random set: cases of every kind with plausible numbers, at headways from far ahead to behind. The fraction of
 //! failing lanes stays away from 0 and 1, so that a wrong verdict is detected.
 
-use super::check_categories;
-use super::draw::{CaseRandom, Purpose};
 use super::pool::{LateralRole, Pool, Slice};
+use super::{CaseRandom, Purpose, check_categories};
 use crate::engine::{Block, CaseSource, Headway, LaneCase, LaneOther, LanePlan, NO_STEP};
 use crate::model::driver::{MODELS, ModelId};
 use crate::model::profile::{CutOutTarget, Profile};

@@ -5,13 +5,9 @@
 //! maps to [`crate::report`]. The cases of the JRC's simulator also serve [`crate::interop::conformance`].
 
 mod axis;
-#[allow(clippy::module_inception)]
-mod grid;
 mod grid_text;
-mod held;
 pub mod jrc_case;
 mod map;
-mod outcome;
 mod parameter;
 mod plan;
 pub mod presets;
@@ -19,14 +15,378 @@ mod robustness;
 mod run;
 
 pub use axis::{GridAxis, MAX_VALUES};
-pub(crate) use grid::check_complete;
-pub use grid::{CaseStyle, Grid, GridParts, MAX_CELLS, MAX_PANELS};
 pub use grid_text::{GridText, Variations};
-pub use map::{Agreement, GridMap, boundary, count, runs};
-pub use outcome::CellOutcome;
+use jrc_case::Front;
+pub use map::{Agreement, CellOutcome, GridMap, boundary, count, runs};
 pub use parameter::{MapParameter, MapQuantity, PARAMETERS, Point};
 pub use plan::{GridPart, GridPlan};
 pub use robustness::{Perturbation, SPEED_MPS, without_reaction};
 pub use run::{Against, Map, MapGrids, MapOptions, MapResult, MappedGrid};
 
 pub use crate::scenario::{LATERAL_DISTANCE_M, PlainCase};
+
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
+use crate::scenario::{Case, Category, missing_parameter};
+use crate::support::repeats::refuse_repeats;
+use crate::{Error, Place, Result};
+
+/// Cells of a grid at most.
+pub const MAX_CELLS: usize = 1_000_000;
+
+/// Panels of a grid at most: a sheet shows every one.
+pub const MAX_PANELS: usize = 1000;
+
+/// How a point becomes a case.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum CaseStyle {
+    /// As `simulate` makes it: see [`PlainCase`](crate::scenario::PlainCase).
+    Plain,
+    /// As the JRC's simulator makes it.
+    Jrc,
+    /// The same with the lateral run-up of its comparison sweep of cut-ins, which also aborts CCHDM at large TTC.
+    JrcComparison,
+}
+
+/// A grid of cases of one category. Cells are counted panel by panel, in a panel row by row of `y` from its first
+/// value on, in a row along `x`.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Grid {
+    name: String,
+    category: Category,
+    x: GridAxis,
+    y: GridAxis,
+    panel_axes: Vec<GridAxis>,
+    panels: Vec<Vec<f64>>,
+    fixed: Vec<(&'static MapParameter, f64)>,
+    style: CaseStyle,
+    native_gap: bool,
+    perturbation: Option<Perturbation>,
+}
+
+/// What a grid is made of.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GridParts {
+    /// Name, for files and tables.
+    pub name: String,
+    /// Kind of scenario.
+    pub category: Category,
+    /// Across.
+    pub x: GridAxis,
+    /// Up.
+    pub y: GridAxis,
+    /// Every combination of their values is a panel.
+    pub panel_axes: Vec<GridAxis>,
+    /// Values that are the same in every cell.
+    pub fixed: Vec<(&'static MapParameter, f64)>,
+    /// How a point becomes a case.
+    pub style: CaseStyle,
+    /// Each model starts at its own distance ([`jrc_case::native_distance`]) and not at a gap or headway.
+    pub native_gap: bool,
+    /// Panels in which the ego is not faster than the other vehicle are left out.
+    pub closing_only: bool,
+    /// The panels themselves, where they are not every combination: a value for each of `panel_axes`.
+    pub panel_rows: Option<Vec<Vec<f64>>>,
+}
+
+impl Grid {
+    /// Checks that every number is given once, that nothing is missing, and that the cells are not too many.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the parameter.
+    pub fn new(parts: GridParts) -> Result<Grid> {
+        let GridParts { name, category, x, y, panel_axes, fixed, style, native_gap, closing_only, panel_rows } = parts;
+        let axes = || [&x, &y].into_iter().chain(&panel_axes);
+        let given: Vec<&MapParameter> = axes().map(|a| a.parameter).chain(fixed.iter().map(|(p, _)| *p)).collect();
+        for (at, parameter) in given.iter().enumerate() {
+            if let Some(before) = given[..at].iter().find(|p| p.quantity == parameter.quantity) {
+                let problem = format!("`{}` and `{}` say the same twice", before.key, parameter.key);
+                return Err(Error::usage(Place::item(parameter.key), problem, "keep one of them"));
+            }
+        }
+        for axis in axes() {
+            refuse_repeats(|| Place::item(axis.parameter.key), axis.values.iter().map(|v| (v.to_bits(), v)))?;
+        }
+        let has = |quantity| given.iter().any(|p| p.quantity == quantity);
+        check_complete(category, native_gap, &has, FOR_A_MAP)?;
+        let panels = match panel_rows {
+            Some(rows) => checked(rows, &panel_axes)?,
+            None => combinations(&panel_axes)?,
+        };
+        let cells = panels.len().saturating_mul(x.len()).saturating_mul(y.len());
+        if cells > MAX_CELLS {
+            let problem = format!("{} panels of {} × {} cells are {cells} cells", panels.len(), x.len(), y.len());
+            let help = format!("use longer steps or fewer panels: {MAX_CELLS} cells at most");
+            return Err(Error::usage(Place::item(name), problem, help));
+        }
+        let mut grid = Grid { name, category, x, y, panel_axes, panels, fixed, style, native_gap, perturbation: None };
+        if closing_only {
+            grid.leave_out_receding()?;
+        }
+        Ok(grid)
+    }
+
+    fn leave_out_receding(&mut self) -> Result<()> {
+        let speeds = |point: &Point| point.get(MapQuantity::EgoSpeed).zip(point.get(MapQuantity::OtherSpeed));
+        let mut kept = Vec::new();
+        for panel in &self.panels {
+            let Some((ego_mps, other_mps)) = speeds(&self.panel_point(panel)) else {
+                let problem = "the speeds of both vehicles must be the panel's or fixed".to_owned();
+                let help = "give both by option `panel` or option `set`, or leave option `closing` out";
+                return Err(Error::usage(Place::option("closing"), problem, help));
+            };
+            if ego_mps > other_mps {
+                kept.push(panel.clone());
+            }
+        }
+        if kept.is_empty() {
+            let problem = "in no panel is the ego faster than the other vehicle".to_owned();
+            return Err(Error::usage(
+                Place::option("closing"),
+                problem,
+                "give other speeds, or leave option `closing` out",
+            ));
+        }
+        self.panels = kept;
+        Ok(())
+    }
+
+    /// Name, for files and tables.
+    pub fn name(&self) -> &str {
+        &self.name
+    }
+
+    /// Kind of scenario.
+    pub fn category(&self) -> Category {
+        self.category
+    }
+
+    /// The axis across.
+    pub fn x(&self) -> &GridAxis {
+        &self.x
+    }
+
+    /// The axis upwards.
+    pub fn y(&self) -> &GridAxis {
+        &self.y
+    }
+
+    /// Parameters that part the panels.
+    pub fn panel_axes(&self) -> &[GridAxis] {
+        &self.panel_axes
+    }
+
+    /// The panels: a value for each of [`Grid::panel_axes`]. At least one.
+    pub fn panels(&self) -> &[Vec<f64>] {
+        &self.panels
+    }
+
+    /// Values that are the same in every cell.
+    pub fn fixed(&self) -> &[(&'static MapParameter, f64)] {
+        &self.fixed
+    }
+
+    /// How a point becomes a case.
+    pub fn style(&self) -> CaseStyle {
+        self.style
+    }
+
+    /// Does each model start at its own distance?
+    pub fn has_native_gap(&self) -> bool {
+        self.native_gap
+    }
+
+    /// Number of cells.
+    pub fn cell_count(&self) -> usize {
+        self.panels.len() * self.x.len() * self.y.len()
+    }
+
+    /// Index of a cell from panel, place across and place upwards.
+    pub fn cell(&self, panel: usize, i: usize, j: usize) -> usize {
+        (panel * self.y.len() + j) * self.x.len() + i
+    }
+
+    /// Panel, place across and place upwards of a cell below [`Grid::cell_count`].
+    pub fn places(&self, cell: usize) -> (usize, usize, usize) {
+        let (nx, ny) = (self.x.len(), self.y.len());
+        (cell / (nx * ny), cell % nx, cell / nx % ny)
+    }
+
+    /// The values of a cell in the units of their parameters: panel's, `y`, `x`.
+    pub fn values(&self, cell: usize) -> Vec<(&'static MapParameter, f64)> {
+        let (panel, i, j) = self.places(cell);
+        let of_panel = self.panel_axes.iter().map(|a| a.parameter).zip(self.panels[panel].iter().copied());
+        of_panel.chain([(self.y.parameter, self.y.values[j]), (self.x.parameter, self.x.values[i])]).collect()
+    }
+
+    /// The point of a cell, in SI units, fixed values included.
+    pub fn point(&self, cell: usize) -> Point {
+        let (panel, i, j) = self.places(cell);
+        let mut point = self.panel_point(&self.panels[panel]);
+        point.set(self.y.parameter, self.y.values[j]);
+        point.set(self.x.parameter, self.x.values[i]);
+        self.perturbation.map_or(point, |perturbation| perturbation.of_speeds(point))
+    }
+
+    /// The same cells, each case changed a little.
+    fn perturbed(&self, perturbation: Perturbation) -> Grid {
+        Grid { perturbation: Some(perturbation), ..self.clone() }
+    }
+
+    fn panel_point(&self, panel: &[f64]) -> Point {
+        let mut point = Point::default();
+        for (parameter, value) in &self.fixed {
+            point.set(parameter, *value);
+        }
+        for (axis, value) in self.panel_axes.iter().zip(panel) {
+            point.set(axis.parameter, *value);
+        }
+        point
+    }
+
+    /// The profile that the grid is swept with: the JRC's comparison sweep has rules of its own.
+    pub fn profile(&self, profile: &Profile) -> Profile {
+        let mut profile = profile.clone();
+        if self.style == CaseStyle::JrcComparison {
+            profile.cchdm.abort_on_large_ttc = true;
+            let of = |cell| run_up(self.style, &self.point(cell), profile.frame.dt_s);
+            let longest = (0..self.cell_count()).map(of).max().unwrap_or(0);
+            profile.frame.time_cap_s += f64::from(longest) * profile.frame.dt_s;
+        }
+        profile
+    }
+
+    /// The case of a cell.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for values that contradict one another, as [`PlainCase::case`](crate::scenario::PlainCase::case).
+    pub fn case(&self, cell: usize, profile: &Profile) -> Result<Case> {
+        let (point, dt_s) = (self.point(cell), profile.frame.dt_s);
+        let value = |quantity, otherwise: f64| point.get(quantity).unwrap_or(otherwise);
+        let ego_mps = value(MapQuantity::EgoSpeed, 0.0);
+        let other_mps = value(MapQuantity::OtherSpeed, ego_mps);
+        let lateral_mps = value(MapQuantity::LateralSpeed, 0.0);
+        if self.style == CaseStyle::Plain {
+            return point.plain_case(self.category, profile)?.case(profile.frame.time_cap_s);
+        }
+        Ok(match self.category {
+            Category::CutIn => {
+                jrc_case::cut_in(ego_mps, other_mps, lateral_mps, run_up(self.style, &point, dt_s), dt_s)
+            }
+            Category::Lvd => {
+                let (end, deceleration) = (value(MapQuantity::EndSpeed, 0.0), value(MapQuantity::Deceleration, 0.0));
+                jrc_case::lvd(ego_mps, end, deceleration)
+            }
+            Category::CutOut => {
+                let speed_mps = value(MapQuantity::AheadSpeed, 0.0);
+                let length_m = if speed_mps > 0.0 { jrc_case::LENGTH_M } else { jrc_case::STANDING_LENGTH_M };
+                let front = Front { speed_mps, length_m, distance_m: value(MapQuantity::AheadGap, 0.0) };
+                jrc_case::cut_out(ego_mps, lateral_mps, front, dt_s)
+            }
+        })
+    }
+
+    /// The initial gap of a cell's lane of a model, m, bumper to bumper at the nominal start.
+    pub fn gap_m(&self, cell: usize, model: ModelId, profile: &Profile) -> f64 {
+        let point = self.point(cell);
+        let ego_mps = point.get(MapQuantity::EgoSpeed).unwrap_or(0.0);
+        if self.native_gap {
+            return jrc_case::native_distance(profile, model, ego_mps);
+        }
+        let of_headway = point.get(MapQuantity::Thw).map(|thw_s| thw_s * ego_mps);
+        point.get(MapQuantity::Gap).or(of_headway).unwrap_or(0.0)
+    }
+
+    /// What a cell's run-up and a perturbation add to its gap, m.
+    fn added_gap_m(&self, cell: usize, dt_s: f64) -> f64 {
+        let point = self.point(cell);
+        let ego_mps = point.get(MapQuantity::EgoSpeed).unwrap_or(0.0);
+        let other_mps = point.get(MapQuantity::OtherSpeed).unwrap_or(ego_mps);
+        let of_run_up = jrc_case::gap_before_run_up(0.0, ego_mps, other_mps, run_up(self.style, &point, dt_s), dt_s);
+        of_run_up + self.perturbation.map_or(0.0, Perturbation::gap_m)
+    }
+}
+
+/// Steps of a case's lateral run-up.
+fn run_up(style: CaseStyle, point: &Point, dt_s: f64) -> u32 {
+    match (style, point.get(MapQuantity::LateralSpeed)) {
+        (CaseStyle::JrcComparison, Some(lateral_mps)) => jrc_case::run_up_steps(lateral_mps, dt_s),
+        _ => 0,
+    }
+}
+
+/// What needs the parameters, and how they are given.
+type Needing = (&'static str, &'static str);
+const FOR_A_MAP: Needing = ("a map", "give it by option `x`, option `y`, option `panel` or option `set`");
+
+/// Panels that are given one by one, each value within its parameter's range.
+fn checked(rows: Vec<Vec<f64>>, axes: &[GridAxis]) -> Result<Vec<Vec<f64>>> {
+    if rows.is_empty() || rows.len() > MAX_PANELS {
+        let problem = format!("they make {} panels", rows.len());
+        let help = format!("give fewer values: a sheet has {MAX_PANELS} panels at most");
+        return Err(Error::usage(Place::item("panels"), problem, help));
+    }
+    if rows.iter().any(|row| row.len() != axes.len()) {
+        return Err(Error::Internal("a panel has another number of values than there are parameters".to_owned()));
+    }
+    let text = |row: &Vec<f64>| row.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
+    refuse_repeats(|| Place::item("panels"), rows.iter().map(text).map(|row| (row.clone(), row)))?;
+    Ok(rows)
+}
+
+/// Everything that a case of the category cannot do without.
+///
+/// # Errors
+/// [`Error::Usage`] naming what is missing or given twice.
+pub(crate) fn check_complete(
+    category: Category,
+    native_gap: bool,
+    has: &dyn Fn(MapQuantity) -> bool,
+    (needing, how): Needing,
+) -> Result<()> {
+    let missing = |what: &str, example: &str| {
+        let problem = format!("{needing} of {}s needs {what}", category.label());
+        Err(Error::usage(Place::item(what), problem, format!("{how} {example}")))
+    };
+    let has_gap = has(MapQuantity::Gap) || has(MapQuantity::Thw);
+    let has_parameter = |key: &str| match key {
+        "ego_speed" => has(MapQuantity::EgoSpeed),
+        "lateral_speed" => has(MapQuantity::LateralSpeed),
+        "acceleration" => has(MapQuantity::Deceleration),
+        "ahead_gap" => has(MapQuantity::AheadGap),
+        _ => true,
+    };
+    match missing_parameter(category, has_parameter) {
+        None => {}
+        Some("ego_speed") => return missing("the ego's speed", "ego_speed_kmh=60"),
+        Some("lateral_speed") => return missing("the lateral speed", "lateral_speed_mps=1"),
+        Some("acceleration") => return missing("the leader's deceleration", "deceleration_mps2=6"),
+        Some(_) => return missing("the gap to the vehicle ahead", "ahead_gap_m=50"),
+    }
+    if has(MapQuantity::Gap) && has(MapQuantity::Thw) || native_gap && has_gap {
+        let problem = "the initial distance is given twice".to_owned();
+        let help = "keep one of gap_m, thw_s and option `native_gap`";
+        return Err(Error::usage(Place::item("gap_m, thw_s"), problem, help));
+    }
+    if !native_gap && !has_gap {
+        return missing("the initial distance", "thw_s=2 (or option `native_gap`)");
+    }
+    Ok(())
+}
+
+/// Every combination of the axes' values, the last axis fastest; one empty combination where there is no axis.
+fn combinations(axes: &[GridAxis]) -> Result<Vec<Vec<f64>>> {
+    let count = axes.iter().fold(1_usize, |n, axis| n.saturating_mul(axis.len()));
+    if count > MAX_PANELS {
+        let problem = format!("they make {count} panels");
+        let help = format!("give fewer values: a sheet has {MAX_PANELS} panels at most");
+        return Err(Error::usage(Place::option("panel"), problem, help));
+    }
+    let mut panels = vec![Vec::new()];
+    for axis in axes {
+        let with = |panel: &Vec<f64>, value: f64| panel.iter().copied().chain([value]).collect::<Vec<f64>>();
+        panels = panels.iter().flat_map(|panel| axis.values.iter().map(move |&v| with(panel, v))).collect();
+    }
+    Ok(panels)
+}

@@ -11,10 +11,9 @@ use crate::scenario::Tables;
 use crate::{Error, Place, Result};
 
 use super::axis::GridAxis;
-use super::grid::Grid;
-use super::jrc_case;
 use super::parameter::{MapParameter, MapQuantity};
 use super::robustness::{Perturbation, without_reaction};
+use super::{Grid, jrc_case};
 
 /// Name of the only variant.
 const VARIANT: &str = "cell";

@@ -12,8 +12,8 @@ use crate::model::profile::Profile;
 use crate::scenario::Category;
 
 use super::axis::GridAxis;
-use super::grid::{CaseStyle, Grid, GridParts};
 use super::parameter::MapParameter;
+use super::{CaseStyle, Grid, GridParts};
 
 /// A grid with its models and what is known of it.
 pub struct Preset {

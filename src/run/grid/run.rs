@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::grid::Grid;
+use super::Grid;
 use super::map::GridMap;
 use super::plan::GridPlan;
 use super::presets::{self, Preset, Presets};

@@ -4,12 +4,11 @@
 //! Here lives what is computed: which failures are hidden, scores with their intervals, groups, risk ratios, coverage and
 //! the conclusion by rules. Lanes and densities come from [`crate::run::compare`]; the page is made by [`crate::report`].
 
-mod replay;
 mod rules;
 mod scores;
 
-use replay::Replay;
 pub use rules::{Conclusion, Finding, Need, Rules};
+use scores::Replay;
 pub use scores::{Group, Scored, Share};
 
 use crate::engine::{Executor, Headway, LaneKey, LaneRunner, Outcome, SweepSummary, Trace};

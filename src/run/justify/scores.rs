@@ -1,9 +1,16 @@
-//! Labels of S' against those of S, lane by lane: recall, precision and F1 with intervals over scenarios, and the same by
-//! groups.
+//! Labels of S' against those of S, lane by lane: the replay that gives them, then recall, precision and F1 with intervals
+//! over scenarios, and the same by groups.
 
-use crate::engine::Confusion;
+use super::JustifyOptions;
+use crate::engine::{Confusion, Executor, LanePlan, Partial, SweepSummary, Verdicts, Wanted};
+use crate::model::profile::Profile;
+use crate::run::compare::Compare;
 use crate::run::score::{ScoreOptions, f1, f1_interval, precision, recall};
+use crate::scenario::Scenario;
+use crate::scenario::parameterization::Parameterization;
 use crate::stats::estimate::{Clusters, cluster_rate};
+use crate::traffic::DataProvenance;
+use crate::{Error, Place, Result};
 
 /// A share with its interval; `None` where it is 0/0, no interval with too few failing scenarios.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -145,5 +152,69 @@ fn interval_name(third: usize, [low, high]: [f64; 2], unit: &str) -> String {
         0 => format!("below {low:.0} {unit}"),
         1 => format!("{low:.0} to {high:.0} {unit}"),
         _ => format!("from {high:.0} {unit} on"),
+    }
+}
+
+/// The lanes of one model, with every verdict kept: which failures are hidden is a question of single lanes.
+pub(super) struct Replay<'a> {
+    pub compare: Compare<'a>,
+    pub counts: Partial,
+    verdicts: Vec<Verdicts>,
+    data: &'a str,
+}
+
+impl<'a> Replay<'a> {
+    /// Runs them.
+    ///
+    /// # Errors
+    /// As [`Compare::plan`] and [`Executor::sweep`].
+    pub fn run(
+        scenarios: &'a [Scenario],
+        facts: &'a DataProvenance,
+        profile: &Profile,
+        options: &JustifyOptions,
+        executor: &Executor,
+        summary: &mut SweepSummary,
+    ) -> Result<Replay<'a>> {
+        let compare = Compare::plan(scenarios, facts, profile.clone(), options.compare.clone())?;
+        let (mut verdicts, mut parts) = (Vec::new(), Vec::new());
+        let plan = compare.lane_plan();
+        let swept = executor.sweep(plan, 0..plan.unit_count(), Wanted::Verdicts, |chunk| {
+            verdicts.extend(chunk.verdicts.iter().copied());
+            parts.push(Partial::from_chunk(plan, &chunk)?);
+            Ok(())
+        })?;
+        let counts = parts.into_iter().try_fold(Partial::empty(plan), Partial::merge)?;
+        summary.add(&swept);
+        Ok(Replay { compare, counts, verdicts, data: &facts.data })
+    }
+
+    pub fn plan(&self) -> &LanePlan {
+        self.compare.lane_plan()
+    }
+
+    /// Position of a parameterization among the variants.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for one that the data cannot have.
+    pub fn variant(&self, id: &Parameterization) -> Result<usize> {
+        let found = self.plan().blocks[0].variants.iter().position(|name| *name == id.key);
+        found.ok_or_else(|| {
+            let problem = format!("the data has no {}", id.name());
+            let help = "its decomposition needs more scenarios: use more recordings, or another parameterization";
+            Error::input(Place::item(self.data), problem, help)
+        })
+    }
+
+    /// The verdicts of a lane.
+    pub fn verdicts(&self, unit: usize, variant: usize, headway: usize) -> Verdicts {
+        let plan = self.plan();
+        self.verdicts[(unit * plan.blocks[0].variants.len() + variant) * plan.headways.len() + headway]
+    }
+
+    /// Labels by what says whether a lane failed.
+    pub fn labels<'f>(&self, failed: &'f dyn Fn(usize, usize, usize) -> bool) -> Labels<'f> {
+        let plan = self.plan();
+        Labels { units: plan.blocks[0].units.len() as usize, headways: plan.headways.len(), failed }
     }
 }

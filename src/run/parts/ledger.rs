@@ -6,6 +6,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::journal::{Journal, Records};
+use crate::engine::Partial;
 use crate::{Error, Place, Result};
 
 /// Counts over a set of units of one plan that join in any order.
@@ -278,6 +279,20 @@ pub type Fits<'f, T> = dyn Fn(&T) -> std::result::Result<(), String> + 'f;
 
 fn add(sum: &mut [u64; 2], more: [u64; 2]) {
     sum.iter_mut().zip(more).for_each(|(sum, more)| *sum = sum.saturating_add(more));
+}
+
+impl MergeableCounts for Partial {
+    fn covered(&self) -> Vec<Range<u64>> {
+        Partial::covered(self)
+    }
+
+    fn join(self, other: Self) -> Result<Self> {
+        self.merge(other)
+    }
+
+    fn check(&self) -> std::result::Result<(), String> {
+        Partial::check(self)
+    }
 }
 
 #[cfg(test)]

@@ -5,9 +5,9 @@ use std::io::{BufRead, BufReader, ErrorKind, Read, Seek, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use super::folder::{Part, read_part, write_part};
 use super::journal::Journal;
 use super::ledger::{Fits, Ledger, MergeableCounts};
-use super::part::{Part, read_part, write_part};
 use super::shard::Shard;
 use crate::support::files::{make_folder, write_inside};
 use crate::support::input_file;

@@ -4,11 +4,11 @@
 
 use serde::Serialize;
 
+use super::Sample;
 use super::kernels::{KernelCounts, MAX_GROUPS};
 use super::plan::SampleHeadways;
 use super::rows::EstimateRow;
-use super::sample::Sample;
-use super::sample_result::SampleResult;
+use super::sample_run::SampleResult;
 use crate::engine::{CpuBackend, Executor, Headway, Wanted};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;

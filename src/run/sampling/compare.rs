@@ -13,8 +13,7 @@ use serde::Serialize;
 
 use super::crude::sample_crude;
 use super::plan::SampleHeadways;
-use super::risk::Risk;
-use super::rows::EstimateRow;
+use super::rows::{EstimateRow, Risk};
 use super::sample_options::{Estimator, SampleOptions};
 use super::tally::SampleTally;
 use crate::engine::{Chunk, Confusion, Executor, LanePlan, Partial, SweepSummary};

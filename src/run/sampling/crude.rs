@@ -1,16 +1,17 @@
 //! Crude Monte Carlo: sampled lanes on a backend, counted chunk by chunk. Memory does not grow with the samples.
+//! Once some samples are known, only lanes that may still be among the worst are valued.
 
 use std::ops::Range;
 use std::time::Instant;
 
 use serde::Serialize;
 
+use super::limit_state::marks_of;
 use super::plan::SampleHeadways;
 use super::rows::{EstimateRow, crude_rows};
 use super::sample_options::SampleOptions;
 use super::tally::SampleTally;
-use super::watch;
-use crate::engine::{Chunk, Executor, LanePlan, SweepSummary, Wanted};
+use crate::engine::{Chunk, Executor, LanePlan, SweepSummary, Wanted, Watch};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::parts::Ledger;
@@ -83,7 +84,7 @@ pub fn checkpoints(samples: u64) -> Vec<u64> {
 
 /// Where the counts of an interval are cut: at the checkpoints, and where lanes begin to be watched for other values.
 pub fn cuts(samples: u64, range: &Range<u64>) -> Vec<u64> {
-    checkpoints(samples).into_iter().chain(watch::ends(range)).collect()
+    checkpoints(samples).into_iter().chain(ends(range)).collect()
 }
 
 /// The same, as far as the ledger does not hold it already; its cuts must be those of [`cuts`]. With
@@ -130,7 +131,7 @@ pub fn sample_into(
                 (false, _) => {
                     // Whole segments only: a run that resumes in a segment wants of it what the first one wanted.
                     let known = ledger.counts(range.start..ledger.segment_start(missing.start))?;
-                    known.map_or(Wanted::Outcomes, |known| watch::wanted(plan, &known, options))
+                    known.map_or(Wanted::Outcomes, |known| wanted(plan, &known, options))
                 }
             };
             let part = executor.sweep(plan, missing, wanted, |chunk| {
@@ -228,4 +229,38 @@ fn stopped(
     let widest = judged.max_by(|a, b| a.draws_half_width().total_cmp(&b.draws_half_width()))?;
     let rule = StopRule { samples: end, ..options.stop };
     rule.at(samples, widest.estimate.failures, widest.draws_half_width(), started)
+}
+
+/// The first samples are valued whole.
+const FIRST_SAMPLES: u64 = 4096;
+/// Where more lanes than one in so many would be marked, all are valued: a single lane costs about forty times its
+/// verdicts.
+const MARKED_ONE_IN: f64 = 1000.0;
+
+/// Ends of pieces of an interval of samples. Each is as long as all before it, so that a list of worst lanes finds as many
+/// new lanes in one piece as in the next.
+fn ends(range: &Range<u64>) -> impl Iterator<Item = u64> {
+    let (first, end) = (range.start, range.end);
+    std::iter::successors(Some(FIRST_SAMPLES), |length| length.checked_mul(2))
+        .map(move |length| first.saturating_add(length))
+        .take_while(move |to| *to < end)
+}
+
+/// What the lanes of further samples must return, so that the lists of worst lanes become what they would be with all
+/// values. `options.worst` is at least 1, and the lanes of `tally` have smaller indices.
+fn wanted(plan: &LanePlan, tally: &SampleTally, options: &SampleOptions) -> Wanted {
+    let (mut watch, mut marked) = (Watch::NOTHING, 0.0);
+    let lanes_per_model = (tally.valid() * plan.headways.len() as u64).max(1) as f64;
+    for (at, model) in plan.models.iter().enumerate() {
+        let last = tally.worst[at].get(options.worst - 1);
+        let marks = last.and_then(|last| marks_of(&plan.profile, options.criterion, last.value));
+        let Some((of_model, failures_of)) = marks else { return Wanted::Outcomes };
+        watch.0[model.index()] = of_model;
+        if let Some(criterion) = failures_of {
+            let cells = tally.failures.chunks(Criterion::ALL.len()).skip(at).step_by(plan.models.len());
+            let failures: u64 = cells.map(|cell| cell[criterion.index()]).sum();
+            marked += failures as f64 / lanes_per_model / plan.models.len() as f64;
+        }
+    }
+    if marked * MARKED_ONE_IN > 1.0 { Wanted::Outcomes } else { Wanted::Watched(watch) }
 }

@@ -1,13 +1,19 @@
-//! One number per lane that is ≤ 0 exactly where a criterion failed, and shrinks on the way there.
+//! One number per lane that is ≤ 0 exactly where a criterion failed, and shrinks on the way there; lanes as the limit
+//! state that estimators follow: points in, one number per point out.
 
-use crate::engine::Outcome;
+use super::plan::{SampleHeadways, plan_points};
+use crate::engine::{Executor, Marks, Outcome, Wanted};
 use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
+use crate::stats::density::{DensityModel, Mixture};
+use crate::stats::estimate::{KernelShares, LimitState, Truncated, defended, kernel_shares};
+use crate::{Error, Result};
 
 /// Far from any failure: nothing ever closed in.
 const FAR: f64 = 1e3;
 /// No demand counts for more: an infinite Brake Threat Number says only that no braking helps.
-pub(super) const MAX_BTN: f64 = 10.0;
+const MAX_BTN: f64 = 10.0;
 /// Values that rounding would put on the wrong side stand this close to the limit.
 const MIN_UNFAILED: f64 = 1e-12;
 
@@ -32,4 +38,81 @@ pub fn limit_state(profile: &Profile, criterion: Criterion, outcome: &Outcome<f6
         Criterion::Btn => profile.criteria.btn_threshold - outcome.max_btn.min(MAX_BTN),
     };
     if failed { value.min(0.0) } else { value.max(MIN_UNFAILED) }
+}
+
+/// One driver model under one criterion at one headway.
+pub struct LaneLimitState<'a> {
+    /// The density whose points are judged.
+    pub density: &'a DensityModel,
+    /// Profile.
+    pub profile: &'a Profile,
+    /// Driver model.
+    pub model: ModelId,
+    /// Criterion.
+    pub criterion: Criterion,
+    /// A single headway, or the density's own.
+    pub headway: SampleHeadways,
+    /// What computes; no lane is computed again.
+    pub executor: Executor<'a>,
+}
+
+impl LimitState for LaneLimitState<'_> {
+    fn evaluate(&self, points: &[Vec<f64>]) -> Result<Vec<f64>> {
+        let plan = plan_points(self.density, points, self.profile, &[self.model], &self.headway)?;
+        if plan.headways.len() != 1 {
+            return Err(Error::Internal("a limit state has one headway".to_owned()));
+        }
+        let executor = Executor { recheck: None, ..self.executor.clone() };
+        let mut values = Vec::with_capacity(points.len());
+        executor.sweep(&plan, 0..plan.unit_count(), Wanted::Outcomes, |chunk| {
+            values.extend(chunk.outcomes.iter().map(|o| limit_state(self.profile, self.criterion, o)));
+            Ok(())
+        })?;
+        Ok(values)
+    }
+}
+
+/// A density file's density, cut off at its valid region.
+///
+/// # Errors
+/// As [`Truncated::with_share`].
+pub fn truncated(density: &DensityModel) -> Result<Truncated<impl Fn(&[f64]) -> bool + Sync + '_>> {
+    Truncated::with_share(density.mixture()?, |point: &[f64]| density.space.is_valid(point), density.valid.estimate)
+}
+
+/// Which scenarios failures come from, by draws of a proposal that keeps a share `defence` of the density. `None` where
+/// none of them fails.
+///
+/// # Errors
+/// Of the lanes.
+pub fn scenario_shares(
+    lanes: &LaneLimitState,
+    proposal: &Mixture,
+    defence: f64,
+    seed: u64,
+) -> Result<Option<KernelShares>> {
+    let nominal = truncated(lanes.density)?;
+    let proposal = defended(proposal.clone(), &nominal, defence)?;
+    kernel_shares(nominal.mixture(), &nominal, &proposal, lanes, seed)
+}
+
+/// The marks of lanes with a smaller [limit state](limit_state()) than the last of a list, and the criterion whose
+/// failures all have them, where one's do; the few that enter the list have them in any case. `None` where every lane's
+/// value is needed.
+pub(crate) fn marks_of(profile: &Profile, criterion: Criterion, last: f64) -> Option<(Marks, Option<Criterion>)> {
+    let criteria = &profile.criteria;
+    let below = |ttc_s: f64| {
+        let is_rare = ttc_s > criteria.ttc_threshold_s;
+        (Marks::TtcBelow(ttc_s.max(criteria.ttc_threshold_s)), (!is_rare).then_some(Criterion::Ttc))
+    };
+    match criterion {
+        Criterion::Collision if last <= 0.0 => Some((Marks::Contacts(-last), None)),
+        Criterion::Collision => Some(below(last)),
+        // No value is smaller, and of equal ones the first lane is worse.
+        Criterion::Ttc if last <= -criteria.ttc_threshold_s => Some((Marks::Nothing, None)),
+        Criterion::Btn if last <= criteria.btn_threshold - MAX_BTN => Some((Marks::Nothing, None)),
+        Criterion::Ttc => Some(below(last + criteria.ttc_threshold_s)),
+        Criterion::Btn if last <= 0.0 => Some((Marks::BtnFailures, Some(Criterion::Btn))),
+        Criterion::Btn => None,
+    }
 }

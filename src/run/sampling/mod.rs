@@ -5,49 +5,240 @@
 
 mod against_recorded;
 mod compare;
-mod conditional;
 mod crude;
 mod generator;
 mod kernels;
-mod lanes;
 mod limit_state;
 mod map;
 mod plan;
 pub(crate) mod plan_file;
 mod proposal_file;
-mod risk;
 mod rows;
-mod sample;
 mod sample_options;
-mod sample_result;
 mod sample_run;
 mod sequential;
 mod tally;
-mod watch;
 mod weighted;
-mod weighted_tally;
 
 pub use against_recorded::RecordedRatios;
 pub use compare::{
     CategoryComparison, ComparedCell, ComparedParameterization, RateRecord, RecordedCell, ReplayedCell, SampledCell,
     SampledScenarios, ScenarioCounts, compare_cells, kernel_scenarios, recorded_cells, sample_by_scenario,
 };
-pub use conditional::{Conditional, conditional, mixture_of};
 pub use crude::{Checkpoint, CheckpointRow, CrudeRun, checkpoints, crude_of_segments, cuts, sample_crude, sample_into};
 pub use generator::{SAMPLE_PURPOSE, SampleSource, generator_of, generator_of_points};
 pub use kernels::KernelCounts;
-pub use lanes::{LaneLimitState, scenario_shares, truncated};
-pub use limit_state::limit_state;
+pub(crate) use limit_state::marks_of;
+pub use limit_state::{LaneLimitState, limit_state, scenario_shares, truncated};
 pub use map::{MAP_CELLS, MapAxes, MapAxis, MapCounts};
-pub use plan::{SampleHeadways, plan_points, plan_samples};
+pub use plan::{Conditional, SampleHeadways, conditional, mixture_of, plan_points, plan_samples};
+use plan_file::KIND;
 pub use proposal_file::{proposal_from_text, proposal_text, read_proposal};
-pub use risk::{Risk, RiskRate};
-pub use rows::{EstimateRow, crude_rows, headway_name};
-pub use sample::Sample;
-pub(crate) use sample::{Proposals, SampleKind};
+pub use rows::{EstimateRow, Risk, RiskRate, crude_rows, headway_name};
 pub use sample_options::{Estimator, SampleOptions};
-pub use sample_result::{Levels, SampleResult};
-pub use sample_run::{EachChunk, SampleRun};
+pub use sample_run::{EachChunk, Levels, SampleResult, SampleRun};
 pub use tally::{SampleTally, WorstSample};
-pub(crate) use watch::marks_of;
-pub use weighted_tally::WeightedTally;
+pub use weighted::WeightedTally;
+
+use std::path::Path;
+
+use crate::engine::{Executor, LanePlan};
+use crate::model::profile::Profile;
+use crate::run::parts::leave_plan;
+use crate::stats::density::{DensityModel, Exposure, Mixture};
+use crate::stats::estimate::{Pilot, PilotCheck};
+use crate::{Error, Place, Result};
+
+/// A sampling run ready to be run: whole, or one shard of it where its samples are independent.
+///
+/// As two shards in a folder; together they give the estimates of the run in one piece:
+///
+/// ```
+/// use lanesweep::engine::{CpuBackend, Executor, Headway};
+/// use lanesweep::model::profile::Profile;
+/// use lanesweep::run::parts::Shard;
+/// use lanesweep::run::sampling::{Estimator, Sample, SampleHeadways, SampleOptions};
+/// # use lanesweep::scenario::Category;
+/// # use lanesweep::scenario::parameterization::Parameterization;
+/// # use lanesweep::stats::density::{DensityModel, FitOptions};
+/// # use lanesweep::traffic::DataProvenance;
+/// # use lanesweep::traffic::mining::{MiningOptions, mine_generated};
+/// # use lanesweep::traffic::trajectory::generator::GeneratorOptions;
+///
+/// # fn main() -> lanesweep::Result<()> {
+/// # let recordings = GeneratorOptions { recordings: 2, ..GeneratorOptions::default() };
+/// # let scenarios = mine_generated(&recordings, &MiningOptions::default(), || ())?.scenarios;
+/// # let facts = DataProvenance { data: "synthetic".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+/// # let options = FitOptions { representativeness: false, valid_draws: 100, ..FitOptions::default() };
+/// # let id = Parameterization::find(Category::CutIn, "2").unwrap();
+/// # let density = DensityModel::fit(id, &scenarios, &facts, &options)?.model;
+/// # let folder = tempfile::tempdir().unwrap();
+/// # let folder = folder.path();
+/// let headways = SampleHeadways::Each(vec![Headway::ThwS(0.6)]);
+/// let options = SampleOptions::new(Estimator::CRUDE, 10_000, headways);
+/// let sample = Sample::plan(density, &Profile::load("paper")?, &options)?;
+/// let backend = CpuBackend::lane_arithmetic();
+/// let executor = Executor::new(&backend);
+/// let whole = sample.run(&executor)?;
+/// for row in &whole.rows {
+///     assert!(row.estimate.interval.low <= row.estimate.probability);
+/// }
+/// for index in 0..2 {
+///     sample.run_shard(folder, Shard { index, of: 2 }, &executor)?;
+/// }
+/// let (_, merged) = Sample::merge(folder)?;
+/// assert_eq!(merged.rows, whole.rows);
+/// # Ok(())
+/// # }
+/// ```
+pub struct Sample {
+    pub(crate) density: DensityModel,
+    pub(crate) profile: Profile,
+    pub(crate) options: SampleOptions,
+    pub(crate) kind: SampleKind,
+}
+
+/// By how it is run.
+pub(crate) enum SampleKind {
+    /// Crude Monte Carlo: its lanes.
+    Crude(Box<LanePlan>),
+    /// Importance sampling of a fixed number of samples.
+    Weighted(Proposals),
+    /// The same, whose proposals are to be found.
+    Pilot(Pilot),
+    /// Adaptive, of several proposals, or with a stop rule.
+    Sequential,
+}
+
+/// What importance sampling draws from.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Proposals {
+    /// One for all driver models, or one for each.
+    pub mixtures: Vec<Mixture>,
+    /// What the pilot of each driver model counted; empty for a given proposal.
+    pub pilots: Vec<PilotCheck>,
+}
+
+impl Sample {
+    /// Plans a run.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for options that contradict one another or the density.
+    pub fn plan(density: DensityModel, profile: &Profile, options: &SampleOptions) -> Result<Sample> {
+        let kind = match &options.estimator {
+            Estimator::Crude { .. } => {
+                let mixture = mixture_of(&density, &options.given)?;
+                SampleKind::Crude(Box::new(plan_samples(&density, &mixture, profile, options)?))
+            }
+            Estimator::Pilot(pilot) if options.stop.is_fixed() => SampleKind::Pilot(*pilot),
+            Estimator::Given { proposals, .. } if options.stop.is_fixed() && proposals.len() == 1 => {
+                SampleKind::Weighted(Proposals { mixtures: proposals.clone(), pilots: Vec::new() })
+            }
+            _ => SampleKind::Sequential,
+        };
+        let sample = Sample { density, profile: profile.clone(), options: options.clone(), kind };
+        sample.check_lanes()?;
+        Ok(sample)
+    }
+
+    /// One point as lanes where estimators make them on the way: complains before any work about what every point would.
+    fn check_lanes(&self) -> Result<()> {
+        if matches!(self.kind, SampleKind::Crude(_)) {
+            return Ok(());
+        }
+        self.options.check_headways()?;
+        let first = self.density.kde.points()[0].clone();
+        plan_points(&self.density, &[first], &self.profile, &self.options.models, &self.options.headways).map(drop)
+    }
+
+    /// Whether a sealed file of this kind is the plan of a sampling run.
+    pub fn is_kind(kind: &str) -> bool {
+        kind == KIND
+    }
+
+    /// Writes the plan file into a run's folder, or finds the same one there: many shards may do so at once.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where the folder holds the plan of another run; [`Error::Io`]; [`Error::Usage`] for a run that
+    /// cannot be split.
+    pub fn write_plan(&self, out: &Path) -> Result<()> {
+        let text = self.seal()?.0;
+        leave_plan(out, &text, |file| file.write_all(&text))
+    }
+
+    /// The plan file's text and the hash of the run.
+    fn seal(&self) -> Result<(Vec<u8>, String)> {
+        match &self.kind {
+            SampleKind::Crude(_) | SampleKind::Weighted(_) => self.plan_file(),
+            SampleKind::Pilot(_) | SampleKind::Sequential => {
+                let problem = "the adaptive estimators are sequential: they make no shards";
+                let help = "use crude Monte Carlo, or importance sampling with one given proposal";
+                Err(Error::usage(Place::item("estimator"), problem, help))
+            }
+        }
+    }
+
+    /// The density.
+    pub fn density(&self) -> &DensityModel {
+        &self.density
+    }
+
+    /// The plan of crude Monte Carlo, whose lanes are numbered.
+    pub fn lane_plan(&self) -> Option<&LanePlan> {
+        match &self.kind {
+            SampleKind::Crude(plan) => Some(plan),
+            _ => None,
+        }
+    }
+
+    /// Samples, at most; of subset simulation per level.
+    pub fn samples(&self) -> u64 {
+        self.options.stop.samples
+    }
+
+    /// Lanes of a run of a fixed number of samples.
+    pub fn lane_count(&self) -> u64 {
+        let by_models = || self.samples().saturating_mul(self.options.models.len() as u64);
+        self.lane_plan().map_or_else(by_models, LanePlan::lane_count)
+    }
+
+    /// The exposure that risks follow from: how often scenarios with given values occur is not known.
+    fn exposure(&self) -> Option<&Exposure> {
+        self.density.exposure.as_ref().filter(|_| self.options.given.is_empty())
+    }
+
+    /// Whether counts that were read from a file can be those of a plan of crude Monte Carlo.
+    ///
+    /// # Errors
+    /// What differs.
+    fn check_tally(&self, plan: &LanePlan, tally: &SampleTally) -> std::result::Result<(), String> {
+        let joined = SampleTally::empty(plan, &self.options).merge(tally.clone());
+        joined.map(drop).map_err(|error| error.to_string())
+    }
+
+    /// Whether sums that were read from a file can be those of this run.
+    ///
+    /// # Errors
+    /// What differs.
+    fn check_sums(&self, tally: &WeightedTally) -> std::result::Result<(), String> {
+        let is_ours = tally.sums.iter().map(|(model, _)| model).eq(&self.options.models);
+        if is_ours { Ok(()) } else { Err("they are of other driver models".to_owned()) }
+    }
+
+    /// Finds the proposals where a pilot has to; they are kept in the folder, so that an interrupted run need not
+    /// search again. Both have the same bits; a pilot takes its time.
+    ///
+    /// # Errors
+    /// Of the lanes; [`Error::Io`].
+    pub fn searched(self, executor: &Executor, out: Option<&Path>) -> Result<Sample> {
+        let SampleKind::Pilot(pilot) = self.kind else { return Ok(self) };
+        if let Some(kept) = out.map(|out| self.kept_pilot(out)).transpose()?.flatten() {
+            tracing::info!("the pilot is done already");
+            return Ok(kept);
+        }
+        let kind = SampleKind::Weighted(self.pilots(&pilot, executor)?);
+        let found = Sample { kind, ..self };
+        out.map_or(Ok(()), |out| found.keep_pilot(out))?;
+        Ok(found)
+    }
+}

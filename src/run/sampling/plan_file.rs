@@ -5,11 +5,10 @@ use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 
-use super::conditional::mixture_of;
-use super::plan::plan_samples;
+use super::plan::{mixture_of, plan_samples};
 use super::proposal_file::{proposal_from_text, proposal_text};
-use super::sample::{Proposals, Sample, SampleKind};
 use super::sample_options::{Estimator, SampleOptions};
+use super::{Proposals, Sample, SampleKind};
 use crate::model::profile::Profile;
 use crate::run::parts::{kind_of, read_sealed, seal};
 use crate::stats::density::{DensityModel, Mixture};

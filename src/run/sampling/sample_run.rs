@@ -3,15 +3,20 @@
 use std::ops::Range;
 use std::path::Path;
 
+use serde::Serialize;
+
 use super::crude::{CrudeRun, crude_of_segments, cuts, sample_into};
 use super::plan_file::PILOT_FILE;
-use super::sample::{Proposals, Sample, SampleKind};
+use super::rows::EstimateRow;
 use super::sample_options::Estimator;
-use super::sample_result::SampleResult;
 use super::tally::SampleTally;
-use super::weighted_tally::WeightedTally;
+use super::weighted::WeightedTally;
+use super::{Proposals, Sample, SampleKind};
 use crate::engine::{Chunk, Executor};
+use crate::model::driver::ModelId;
 use crate::run::parts::{Ledger, MergeableCounts, PLAN_FILE, RunDir, RunState, Shard, read_parts, units_of};
+use crate::stats::density::Mixture;
+use crate::stats::estimate::{CrossEntropyStep, SubsetLevel};
 use crate::support::run_dir::{ESTIMATE_RECORD, Results};
 use crate::{Error, Place, Result};
 
@@ -260,5 +265,39 @@ impl SampleRun<'_> {
             State::Crude(state) => state.forget(),
             State::Weighted(state) => state.forget(),
         }
+    }
+}
+
+/// How an adaptive estimator went.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Levels {
+    /// Cross-entropy.
+    CrossEntropy(Vec<CrossEntropyStep>),
+    /// Subset simulation.
+    Subset(Vec<SubsetLevel>),
+}
+
+/// What a sampling run gave.
+#[derive(Debug, Clone, Default)]
+pub struct SampleResult {
+    /// The estimates.
+    pub rows: Vec<EstimateRow>,
+    /// Counts and convergence of crude Monte Carlo.
+    pub crude: Option<CrudeRun>,
+    /// How an adaptive estimator went, model by model.
+    pub levels: Vec<Levels>,
+    /// The proposals that were found, model by model.
+    pub proposals: Vec<(ModelId, Mixture)>,
+    /// Parts that were merged; 0 of a run in one piece.
+    pub parts: usize,
+    /// Lanes that were computed again as a check.
+    pub rechecked_lanes: u64,
+}
+
+impl SampleResult {
+    fn of_crude(mut run: CrudeRun) -> SampleResult {
+        let (rows, rechecked_lanes) = (std::mem::take(&mut run.rows), run.summary.rechecked_lanes);
+        SampleResult { rows, rechecked_lanes, crude: Some(run), ..SampleResult::default() }
     }
 }

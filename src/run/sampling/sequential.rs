@@ -1,9 +1,9 @@
 //! Estimators that decide on the way what to sample next: they run in one piece.
 
-use super::lanes::{LaneLimitState, scenario_shares, truncated};
-use super::sample::Sample;
+use super::Sample;
+use super::limit_state::{LaneLimitState, scenario_shares, truncated};
 use super::sample_options::{Estimator, SampleOptions};
-use super::sample_result::{Levels, SampleResult};
+use super::sample_run::{Levels, SampleResult};
 use crate::Result;
 use crate::engine::Executor;
 use crate::stats::density::Mixture;

@@ -2,7 +2,7 @@
 
 use super::claims::units_of;
 use super::difference::{Contrast, ScenarioRate, ScoreInterval, min_contrast};
-use super::table::{CategoryScores, ScoreTable, f1};
+use super::{CategoryScores, ScoreTable, f1};
 use crate::engine::{LanePlan, Partial, UnitCounts};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;

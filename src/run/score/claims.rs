@@ -7,10 +7,10 @@
 //!
 //! The cells decide about the claim: [`ClaimVerdict::of_cells`].
 
+use super::ScoreTable;
 use super::difference::ScoreInterval;
 use super::paper_claims::paper_claims;
 use super::statistic::{Scenarios, Statistic};
-use super::table::ScoreTable;
 use crate::engine::{Headway, LanePlan, Partial, UnitCounts};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -197,8 +197,8 @@ fn check_claim(claim: Claim, of: Scenarios, table: &ScoreTable) -> ClaimResult {
 
 #[cfg(test)]
 mod tests {
+    use super::super::CategoryScores;
     use super::super::published::PAPER_MODELS;
-    use super::super::table::CategoryScores;
     use super::*;
     use crate::engine::Confusion;
     use crate::run::score::ScoreOptions;

@@ -6,19 +6,288 @@
 
 mod best;
 mod claims;
-mod contradiction;
 mod difference;
-mod options;
 mod paper_claims;
 mod published;
 mod statistic;
-mod table;
 
 pub use best::{Best, BestScore, best_parameterizations};
 pub use claims::{Claim, ClaimResult, ClaimRow, ClaimVerdict, check_claims};
 pub use difference::{Contrast, ScenarioRate, ScoreInterval, min_contrast};
-pub use options::ScoreOptions;
 pub use paper_claims::paper_claims;
 pub use published::{Misfit, PublishedFailures, published_failures, published_lvd_f1};
 pub use statistic::Statistic;
-pub use table::{CategoryScores, ScoreCell, ScoreTable, f1, f1_interval, precision, recall, score};
+
+use rayon::prelude::*;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use crate::engine::{Confusion, Headway, LanePlan, Partial, UnitCounts};
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::scenario::Category;
+use crate::support::ranges;
+use crate::{Error, Place, Result};
+
+/// Recall TP/(TP + FN); `None` where S never fails.
+pub fn recall(c: &Confusion) -> Option<f64> {
+    ratio(c.tp as f64, c.tp as f64 + c.fn_ as f64)
+}
+
+/// Precision TP/(TP + FP); `None` where S' never fails.
+pub fn precision(c: &Confusion) -> Option<f64> {
+    ratio(c.tp as f64, c.tp as f64 + c.fp as f64)
+}
+
+/// F1 = 2TP/(2TP + FP + FN); `None` where neither ever fails: 0/0 is no score.
+///
+/// ```
+/// use lanesweep::run::score::f1;
+/// use lanesweep::engine::Confusion;
+///
+/// // S and S' fail together 8 times, S alone twice, S' alone never.
+/// let counts = Confusion { tp: 8, fn_: 2, fp: 0, tn: 90 };
+/// assert_eq!(f1(&counts), Some(16.0 / 18.0));
+/// assert_eq!(f1(&Confusion { tp: 0, fn_: 0, fp: 0, tn: 100 }), None);
+/// ```
+pub fn f1(c: &Confusion) -> Option<f64> {
+    let twice = 2.0 * c.tp as f64;
+    ratio(twice, twice + c.fn_ as f64 + c.fp as f64)
+}
+
+/// In f64, where no sum wraps; sums below 2^53 are exact.
+fn ratio(numerator: f64, denominator: f64) -> Option<f64> {
+    (denominator > 0.0).then(|| numerator / denominator)
+}
+
+/// The interval of F1 from the counts of each scenario, with scenarios as clusters ([`ScenarioRate::f1`]).
+///
+/// `None` where S fails in fewer than [`ScoreOptions::min_failures`] scenarios.
+pub fn f1_interval<'a>(
+    scenarios: impl Iterator<Item = &'a Confusion<u32>> + Clone,
+    options: &ScoreOptions,
+) -> Option<ScoreInterval> {
+    let failing = scenarios.clone().filter(|c| c.tp > 0 || c.fn_ > 0).count();
+    let is_enough = failing >= options.min_failures.max(1) as usize;
+    is_enough.then(|| ScenarioRate::f1(scenarios).interval(options.confidence))
+}
+
+/// One cell of the table.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScoreCell {
+    /// Index into [`CategoryScores::variants`]; 0 is S itself.
+    pub variant: usize,
+    /// Driver model.
+    pub model: ModelId,
+    /// Criterion.
+    pub criterion: Criterion,
+    /// Counts over (scenario, THW) pairs; how it is made, and whether counts can be those of a plan's lanes.
+    pub counts: Confusion,
+    /// Interval of F1 over scenarios; `None` where S fails in fewer than [`ScoreOptions::min_failures`] of them.
+    pub f1_interval: Option<ScoreInterval>,
+    /// Scenarios in which S fails from some headway.
+    pub failing_scenarios: u64,
+}
+
+/// Scores of one category.
+#[derive(Debug, Clone, PartialEq)]
+pub struct CategoryScores {
+    /// Kind of scenario.
+    pub category: Category,
+    /// Scenarios that were simulated.
+    pub scenarios: u64,
+    /// Simulations of S per model: scenarios × headways.
+    pub simulations: u64,
+    /// Names of the variants; the first is `S`.
+    pub variants: Vec<String>,
+    /// Models, in order.
+    pub models: Vec<ModelId>,
+    /// One per variant × model × criterion, in that order.
+    pub cells: Vec<ScoreCell>,
+    /// Lanes that ended at the time cap, one per variant × model.
+    pub capped: Vec<u64>,
+}
+
+impl CategoryScores {
+    /// Position of a cell in [`CategoryScores::cells`]; `None` for a model that was not run.
+    pub fn index(&self, variant: usize, model: ModelId, criterion: Criterion) -> Option<usize> {
+        let model = self.models.iter().position(|m| *m == model)?;
+        Some((variant * self.models.len() + model) * Criterion::ALL.len() + criterion.index())
+    }
+
+    /// Scenarios in which S fails a criterion with a model; 0 for a model that was not run.
+    pub fn failing_scenarios(&self, model: ModelId, criterion: Criterion) -> u64 {
+        self.index(0, model, criterion).and_then(|at| self.cells.get(at)).map_or(0, |cell| cell.failing_scenarios)
+    }
+
+    /// A variant by its name.
+    pub fn variant(&self, name: &str) -> Option<usize> {
+        self.variants.iter().position(|v| v == name)
+    }
+}
+
+/// Scores of a whole study.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ScoreTable {
+    /// One per category of the plan.
+    pub categories: Vec<CategoryScores>,
+    /// Headways of the simulations.
+    pub headways: Vec<Headway>,
+    /// How they were made.
+    pub options: ScoreOptions,
+}
+
+/// Scores a complete partial.
+///
+/// # Errors
+/// [`Error::Input`] if units are missing, the partial belongs to another plan, or its counts contradict themselves or
+/// the plan.
+pub fn score(plan: &LanePlan, partial: &Partial, options: &ScoreOptions) -> Result<ScoreTable> {
+    if !partial.is_complete(plan) {
+        let problem = if partial.plan_hash() == plan.hash() {
+            format!("{} of {} units are there", partial.units().len(), plan.unit_count())
+        } else {
+            format!("it belongs to plan {}, not to {}", partial.plan_hash(), plan.hash())
+        };
+        return Err(Error::input(Place::item("partial result"), problem, "compute the missing units first"));
+    }
+    // Counts that this program made never fail here; a file may hold anything under a checksum that fits.
+    if let Some(problem) = contradiction(plan, partial) {
+        let help = "compute it again: take the parts and journals of this run away first";
+        return Err(Error::input(Place::item("partial result"), format!("its counts cannot be: {problem}"), help));
+    }
+    let criteria = Criterion::ALL.len();
+    let mut categories = Vec::new();
+    for block in &plan.blocks {
+        let first = block.first_unit as usize;
+        let units: &[UnitCounts] = &partial.units()[first..first + block.units.len() as usize];
+        let width = block.variants.len() * plan.models.len() * criteria;
+        let mut totals = vec![Confusion::default(); width];
+        let mut capped = vec![0_u64; block.variants.len() * plan.models.len()];
+        for unit in units {
+            totals.iter_mut().zip(&unit.cells).for_each(|(total, cell)| total.add(cell));
+            capped.iter_mut().zip(&unit.capped).for_each(|(total, &count)| *total += u64::from(count));
+        }
+        let cells = (0..width)
+            .into_par_iter()
+            .map(|at| {
+                let counts = units.iter().map(|unit| &unit.cells[at]);
+                ScoreCell {
+                    variant: at / (plan.models.len() * criteria),
+                    model: plan.models[at / criteria % plan.models.len()],
+                    criterion: Criterion::ALL[at % criteria],
+                    counts: totals[at],
+                    failing_scenarios: counts.clone().filter(|c| c.tp + c.fn_ > 0).count() as u64,
+                    f1_interval: f1_interval(counts, options),
+                }
+            })
+            .collect();
+        categories.push(CategoryScores {
+            category: block.category,
+            scenarios: block.units.len(),
+            simulations: block.units.len() * plan.headways.len() as u64,
+            variants: block.variants.clone(),
+            models: plan.models.clone(),
+            cells,
+            capped,
+        });
+    }
+    Ok(ScoreTable { categories, headways: plan.headways.clone(), options: options.clone() })
+}
+
+/// What is wrong with the counts of a partial that has as many units as the plan; `None` where nothing is.
+fn contradiction(plan: &LanePlan, partial: &Partial) -> Option<String> {
+    let units = partial.units();
+    if let Some((at, unit)) = (0..).zip(units).find(|(at, unit)| unit.unit != *at) {
+        return Some(format!("unit {} stands where unit {at} is expected", unit.unit));
+    }
+    if !partial.fits(plan) {
+        return Some("a unit has other variants, models or criteria than the plan".to_owned());
+    }
+    let of_units =
+        units.iter().find_map(|unit| of_unit(unit, plan).map(|problem| format!("unit {}: {problem}", unit.unit)));
+    let by_headway = || (!partial.adds_up(plan)).then(|| "failures by headway do not add up".to_owned());
+    of_units.or_else(by_headway)
+}
+
+/// The same for one unit, whose counts are as many as they must be.
+fn of_unit(unit: &UnitCounts, plan: &LanePlan) -> Option<String> {
+    let (headways, per_variant) = (plan.headways.len() as u64, plan.models.len() * Criterion::ALL.len());
+    let sum = |counts: &[u32]| counts.iter().map(|&count| u64::from(count)).sum::<u64>();
+    if let Some(capped) = unit.capped.iter().find(|&&capped| u64::from(capped) > headways) {
+        return Some(format!("{capped} of {headways} lanes ended at the time cap"));
+    }
+    unit.cells.iter().enumerate().find_map(|(at, cell)| {
+        let Confusion { tp, fn_, fp, tn } = *cell;
+        let lanes = sum(&[tp, fn_, fp, tn]);
+        if lanes != headways {
+            return Some(format!("{lanes} lanes of {headways} headways"));
+        }
+        if at < per_variant && (fn_ > 0 || fp > 0) {
+            return Some("S does not agree with itself".to_owned());
+        }
+        let failures = u64::from(unit.cells[at % per_variant].tp);
+        let here = sum(&[tp, fn_]);
+        (here != failures).then(|| format!("S fails {failures} times by itself and {here} times beside S'"))
+    })
+}
+
+/// How scores are made.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields, default)]
+pub struct ScoreOptions {
+    /// Seed that chooses the lanes to check on the CPU. No score depends on it.
+    pub seed: u64,
+    /// Coverage of the intervals (0.95).
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
+    pub confidence: f64,
+    /// Below so many failures in S F1 has no interval; below so many scenarios with one a claim is not judged (10).
+    #[schemars(range(min = 0, max = 4_294_967_295_u32))]
+    pub min_failures: u32,
+}
+
+impl Default for ScoreOptions {
+    fn default() -> Self {
+        ScoreOptions { seed: 157, confidence: 0.95, min_failures: 10 }
+    }
+}
+
+impl ScoreOptions {
+    /// Checks the ranges; the error names the option.
+    pub fn validate(&self) -> Result<()> {
+        ranges::check("score", self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_confusion_by_hand() {
+        let c = Confusion { tp: 6, fn_: 2, fp: 4, tn: 88 };
+        assert_eq!(recall(&c), Some(0.75));
+        assert_eq!(precision(&c), Some(0.6));
+        assert_eq!(f1(&c), Some(12.0 / 18.0));
+    }
+
+    #[test]
+    fn counts_past_2_to_the_32_score_as_their_shares_do() {
+        let c = Confusion { tp: 6 << 40, fn_: 2 << 40, fp: 4 << 40, tn: 88 << 40 };
+        assert_eq!((recall(&c), precision(&c), f1(&c)), (Some(0.75), Some(0.6), Some(12.0 / 18.0)));
+        let most = Confusion { tp: u64::MAX, ..Confusion::default() };
+        assert_eq!(f1(&most), Some(1.0));
+    }
+
+    #[test]
+    fn where_nothing_ever_fails_there_is_no_score() {
+        let c = Confusion { tn: 100, ..Confusion::default() };
+        assert_eq!((recall(&c), precision(&c), f1(&c)), (None, None, None));
+    }
+
+    #[test]
+    fn a_parameterization_that_misses_every_failure_scores_0_and_has_no_precision() {
+        let c = Confusion { fn_: 3, tn: 7, ..Confusion::default() };
+        assert_eq!((recall(&c), precision(&c), f1(&c)), (Some(0.0), None, Some(0.0)));
+    }
+}

@@ -2,7 +2,7 @@
 //! from them. They belong to highD. The synthetic recordings are calibrated to the failures, not to F1; other data must
 //! agree in shape, not in these numbers.
 
-use super::table::{ScoreTable, f1};
+use super::{ScoreTable, f1};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::scenario::Category;

@@ -1,7 +1,7 @@
 //! The statistics that claims are about: the smallest of some differences of scores, per model and criterion.
 
+use super::CategoryScores;
 use super::difference::{Contrast, ScenarioRate, ScoreInterval, min_contrast};
-use super::table::CategoryScores;
 use crate::engine::{Confusion, UnitCounts};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;

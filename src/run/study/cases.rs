@@ -7,9 +7,7 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::engine::lane_case::LaneCase;
-use crate::engine::plan::check_cases;
-use crate::engine::plan::{Block, CaseSource, LanePlan};
-use crate::engine::units::Units;
+use crate::engine::plan::{Block, CaseSource, LanePlan, Units, check_cases};
 use crate::engine::{Chunk, Executor, SweepSummary, Wanted};
 use crate::run::study::plan_file::StudyHead;
 use crate::scenario::parameterization::{

@@ -3,18 +3,281 @@
 
 mod cases;
 mod facts;
-mod histogram;
 mod plan;
 pub(crate) mod plan_file;
-mod planned;
 mod read;
 mod run;
 
 pub use cases::StudyCases;
 pub(crate) use cases::WINDOW;
-pub use facts::{CategoryProvenance, StudyProvenance};
-pub use histogram::{ParameterHistogram, parameter_histograms};
+use facts::category_facts;
+pub use facts::{CategoryProvenance, ParameterHistogram, StudyProvenance, parameter_histograms};
 pub use plan::{StudyOptions, outline_study, plan_study};
 pub use plan_file::StudyHead;
-pub use planned::{Study, StudyBuilder};
 pub use run::{StudyResult, StudyRun};
+
+use std::fs::File;
+use std::io::{BufRead, BufReader};
+use std::ops::Range;
+use std::path::{Path, PathBuf};
+
+use serde::{Deserialize, Serialize};
+
+use crate::engine::{LanePlan, Partial};
+use crate::model::profile::Profile;
+use crate::run::parts::{Shard, leave_plan, read_sealed_line, seal, units_of};
+use crate::run::score::{ScoreOptions, ScoreTable, score};
+use crate::support::hex::sha256;
+use crate::support::input_file;
+use crate::support::run_dir::Results;
+use crate::traffic::mining::{Collection, MiningOptions, counts_text};
+use crate::{Error, Place, Result};
+
+/// Largest first line that is read: checksums of a page of scenarios, facts of the recordings.
+const MAX_HEAD_BYTES: u64 = 1 << 30;
+
+/// The first line of the file. The scenarios follow it.
+#[derive(Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+struct StudyPlanFile {
+    facts: StudyProvenance,
+    plan: StudyHead,
+}
+
+/// A study ready to be run: whole, or one shard of it. [`Study::builder`] plans one from scenarios.
+///
+/// The [crate] runs one in memory. Here two shards run in a folder, the first of them interrupted and resumed; together they give the counts of the whole:
+///
+/// ```
+/// use lanesweep::Error;
+/// use lanesweep::engine::{CpuBackend, Executor};
+/// # use lanesweep::model::profile::Profile;
+/// use lanesweep::run::parts::Shard;
+/// use lanesweep::run::study::Study;
+/// # use lanesweep::traffic::mining::{MiningOptions, mine_generated};
+/// # use lanesweep::traffic::trajectory::generator::GeneratorOptions;
+///
+/// # fn main() -> lanesweep::Result<()> {
+/// # let recordings = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
+/// # let mined = mine_generated(&recordings, &MiningOptions::default(), || ())?;
+/// # let folder = tempfile::tempdir().unwrap();
+/// # let folder = folder.path();
+/// let study = Study::builder(&mined, Profile::load("paper")?).plan()?;
+/// let backend = CpuBackend::lane_arithmetic();
+/// // Small chunks, as the run ends early only between them.
+/// let executor = Executor { chunk_lanes: Some(1000), ..Executor::new(&backend) };
+/// executor.cancel.request();
+/// let first = study.run_shard(folder, Shard { index: 0, of: 2 }, &executor);
+/// assert!(matches!(first, Err(Error::Interrupted { .. })));
+/// executor.cancel.withdraw();
+/// // The plan in the folder is enough from now on, in another process too.
+/// for index in 0..2 {
+///     let shard = Shard { index, of: 2 };
+///     Study::read(&folder.join("plan.json"), Some(shard))?.run_shard(folder, shard, &executor)?;
+/// }
+/// let (merged, result) = Study::merge(folder)?;
+/// assert_eq!(result.counts, study.run(&executor)?.counts);
+/// assert_eq!(merged.score(&result.counts)?, study.score(&result.counts)?);
+/// # Ok(())
+/// # }
+/// ```
+pub struct Study {
+    cases: StudyCases,
+    facts: StudyProvenance,
+    /// Where it was read, with the hash of the run.
+    file: Option<(PathBuf, String)>,
+}
+
+/// Plans a [`Study`] of scenarios.
+pub struct StudyBuilder<'a> {
+    collection: &'a Collection,
+    profile: Profile,
+    options: StudyOptions,
+    mining: MiningOptions,
+    score: ScoreOptions,
+    data: String,
+    scenario_file_sha256: Option<String>,
+    published: bool,
+    reference: bool,
+}
+
+impl StudyBuilder<'_> {
+    /// Categories, models, headways, parameterizations [default: all, with the paper's headways].
+    pub fn options(self, options: StudyOptions) -> Self {
+        StudyBuilder { options, ..self }
+    }
+
+    /// How counts are scored.
+    pub fn score(self, score: ScoreOptions) -> Self {
+        StudyBuilder { score, ..self }
+    }
+
+    /// How the scenarios were mined, for the record.
+    pub fn mining(self, mining: MiningOptions) -> Self {
+        StudyBuilder { mining, ..self }
+    }
+
+    /// What the scenarios are of, for the report.
+    pub fn data(self, data: impl Into<String>) -> Self {
+        StudyBuilder { data: data.into(), ..self }
+    }
+
+    /// SHA-256 of the file that the scenarios were read from, for the record.
+    pub fn scenario_file_sha256(self, sha256: Option<String>) -> Self {
+        StudyBuilder { scenario_file_sha256: sha256, ..self }
+    }
+
+    /// Sets the paper's published numbers beside the results.
+    pub fn published(self, published: bool) -> Self {
+        StudyBuilder { published, ..self }
+    }
+
+    /// Says that the lanes are to be run in f64, by [`CpuBackend::reference`](crate::engine::CpuBackend::reference).
+    pub fn reference(self, reference: bool) -> Self {
+        StudyBuilder { reference, ..self }
+    }
+
+    /// Plans the study.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where no scenario of these categories was kept, or where scenarios are too long for their
+    /// sample rate.
+    pub fn plan(self) -> Result<Study> {
+        let StudyBuilder { collection, profile, options, mining, score, data, .. } = self;
+        score.validate()?;
+        let cases = outline_study(&collection.scenarios, &profile, &options)?;
+        if cases.outline().unit_count() == 0 {
+            return Err(Error::input(
+                Place::item(data),
+                format!("no scenario to simulate ({})", counts_text(&collection.scenarios)),
+                "use more recordings, or relax the filters ([mining] in option `config`)",
+            ));
+        }
+        let facts = StudyProvenance {
+            data,
+            synthetic: collection.synthetic,
+            published: self.published,
+            reference: self.reference,
+            incomplete: !collection.problems.is_empty(),
+            scenario_file_sha256: self.scenario_file_sha256,
+            categories: category_facts(collection, &cases, &options.parameterization)?,
+            left_out: collection.problems.iter().chain(cases.left_out()).map(Error::to_string).collect(),
+            notes: collection.notes.clone(),
+            recordings: collection.recordings.clone(),
+            mining,
+            parameterization: options.parameterization,
+            score,
+        };
+        Ok(Study { cases, facts, file: None })
+    }
+}
+
+impl Study {
+    /// Kind of the sealed plan file.
+    pub const KIND: &str = "study plan";
+
+    /// Begins a study of the scenarios that were kept.
+    pub fn builder(collection: &Collection, profile: Profile) -> StudyBuilder<'_> {
+        StudyBuilder {
+            collection,
+            profile,
+            options: StudyOptions::default(),
+            mining: MiningOptions::default(),
+            score: ScoreOptions::default(),
+            data: "scenarios".to_owned(),
+            scenario_file_sha256: None,
+            published: false,
+            reference: false,
+        }
+    }
+
+    /// The plan without cases: counts, keys, hash.
+    pub fn plan(&self) -> &LanePlan {
+        self.cases.outline()
+    }
+
+    /// The cases, window by window.
+    pub fn cases(&self) -> &StudyCases {
+        &self.cases
+    }
+
+    /// What a report says beside the outcomes.
+    pub fn facts(&self) -> &StudyProvenance {
+        &self.facts
+    }
+
+    /// Scores the counts of the whole study.
+    ///
+    /// # Errors
+    /// As [`score`].
+    pub fn score(&self, counts: &Partial) -> Result<ScoreTable> {
+        score(self.plan(), counts, &self.facts.score)
+    }
+
+    /// The first line of the plan file, with the hash of the run. The line holds the checksums of all that follows.
+    pub(crate) fn seal(&self) -> Result<(Vec<u8>, String)> {
+        seal(Study::KIND, &StudyPlanFile { facts: self.facts.clone(), plan: self.cases.head().clone() })
+    }
+
+    /// Hash of the run. Parts agree on the plan file's; the counts of a run in one piece follow from plan and
+    /// arithmetic alone, so that it may be resumed under other score options.
+    fn run_sha256(&self, is_part: bool) -> Result<String> {
+        match &self.file {
+            Some((_, run_sha256)) => Ok(run_sha256.clone()),
+            None if is_part => Ok(self.seal()?.1),
+            None => Ok(sha256(format!("{} reference {}", self.plan().hash(), self.facts.reference))),
+        }
+    }
+
+    /// Writes the plan file into a run's folder, or finds the same one there: many shards may do so at once.
+    ///
+    /// # Errors
+    /// [`Error::Input`] where the folder holds the plan of another run; [`Error::Io`].
+    pub fn write_plan(&self, out: &Path) -> Result<()> {
+        let Some((path, _)) = &self.file else {
+            let line = self.seal()?.0;
+            return leave_plan(out, &line, |file| self.cases.write_file(&line, file));
+        };
+        // The file as it is: of a shard's scenarios alone the plan could not be written.
+        let mut line = Vec::new();
+        BufReader::new(input_file::open(path)?).read_until(b'\n', &mut line).map_err(|e| Error::io(path, "read", e))?;
+        leave_plan(out, &line, |file| std::io::copy(&mut File::open(path)?, file).map(drop))
+    }
+
+    /// Adds the plan file to the results, unless it would be larger than so many bytes; tells whether it did.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub(crate) fn keep(&self, results: &mut Results, name: &str, max_bytes: u64) -> Result<bool> {
+        let line = self.seal()?.0;
+        let is_kept = line.len() as u64 + self.cases.head().scenario_bytes() <= max_bytes;
+        if is_kept {
+            results.add_with(name, |file| self.cases.write_file(&line, file))?;
+        }
+        Ok(is_kept)
+    }
+
+    /// Reads a plan file; of a shard, its scenarios only.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Input`] for anything but a whole plan of this version and engine.
+    pub fn read(path: &Path, shard: Option<Shard>) -> Result<Study> {
+        Study::read_units(path, |count| units_of(shard, count))
+    }
+
+    /// The same with an interval of the scenarios, of so many: nothing else of the file is read.
+    fn read_units(path: &Path, wanted: impl FnOnce(u64) -> Range<u64>) -> Result<Study> {
+        let (file, run_sha256, mut scenarios) = read_sealed_line(Study::KIND, path, MAX_HEAD_BYTES, HOW_TO_REMAKE)?;
+        let StudyPlanFile { facts, plan } = file;
+        let place = Place::file(path);
+        facts.score.validate()?;
+        let cases = plan.read(&mut scenarios, &place, wanted)?;
+        if facts.categories.len() != cases.outline().blocks.len() {
+            let problem = "it does not have the facts of every category";
+            return Err(Error::input(place, problem, HOW_TO_REMAKE));
+        }
+        Ok(Study { cases, facts, file: Some((path.to_path_buf(), run_sha256)) })
+    }
+}
+
+const HOW_TO_REMAKE: &str = "make it by `study` of this version, with option `plan_only`";

@@ -3,7 +3,7 @@
 use std::ops::Range;
 use std::path::Path;
 
-use super::planned::Study;
+use super::Study;
 use crate::engine::{Executor, Partial, SweepSummary, Wanted};
 use crate::run::parts::{PLAN_FILE, RunDir, RunState, Shard, read_parts};
 use crate::support::run_dir::{Results, STUDY_RECORD};
