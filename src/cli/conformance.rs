@@ -15,8 +15,8 @@ use crate::interop::conformance::{
 use crate::model::profile::Profile;
 use crate::report::records;
 use crate::scenario::read_scenarios;
+use crate::support::ranges::refuse_repeats;
 use crate::support::readable::{count, count_of};
-use crate::support::repeats::refuse_repeats;
 use crate::{Error, Place, Result};
 
 /// Compare golden tables of simulated cases with our own lanes

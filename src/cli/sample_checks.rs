@@ -7,7 +7,7 @@ use super::source::file_of;
 use crate::cli::settings::{EstimatorKind, PointKind};
 use crate::report::lanes::table_format;
 use crate::run::forecast::MAX_HELD;
-use crate::support::repeats::refuse_repeats;
+use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
 /// Samples of a run that can be split and resumed, at most: as of `compare`.

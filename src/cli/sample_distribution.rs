@@ -18,7 +18,7 @@ use crate::run::reopen::DISTRIBUTION_FILE;
 use crate::run::sampling::{Estimator, SampleHeadways, SampleOptions, sample_crude};
 use crate::scenario::Category;
 use crate::stats::density::Provenance;
-use crate::support::hex::sha256;
+use crate::support::plain_text::sha256;
 use crate::support::plausibility::Doubts;
 use crate::support::readable;
 use crate::support::run_dir::{ESTIMATE_RECORD, OutputDir};

@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 use super::schema::settings_schema;
-use crate::support::near_name;
+use crate::support::plain_text;
 use crate::support::ranges::Range;
 
 /// One key with what it takes.
@@ -70,7 +70,7 @@ impl Key {
 
 /// The name nearest to a wrong one, where one is near.
 pub(super) fn nearest<'a>(wrong: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    near_name::nearest(wrong, names, 0.7)
+    plain_text::nearest(wrong, names, 0.7)
 }
 
 fn collect(schema: &Value, prefix: &str, keys: &mut Vec<Key>) {

@@ -21,7 +21,7 @@ pub use random::{RandomOptions, RandomUnit, VARIANTS, random_plan};
 pub use thresholds::{SIDES, ThresholdOptions, threshold_plan};
 
 use crate::scenario::Category;
-use crate::support::repeats::refuse_repeats;
+use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
 /// Refuses an empty list of categories and one that names a category twice: keys would stand for two lanes.

@@ -3,7 +3,7 @@
 use super::distribution_file::{Deterministic, DistributionFile, Distributions};
 use super::parameters::Names;
 use crate::run::grid::{GridAxis, MAX_PANELS, MapParameter, Variations};
-use crate::support::repeats::{GIVE_ONCE, repeated};
+use crate::support::ranges::{GIVE_ONCE, repeated};
 use crate::{Error, Place, Result};
 
 /// The variations of a file.

@@ -3,7 +3,7 @@
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::scenario::{Case, Category, missing_parameter};
-use crate::support::repeats::refuse_repeats;
+use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
 use super::axis::GridAxis;

@@ -3,7 +3,7 @@
 use nalgebra::{DMatrix, DVector};
 
 use crate::stats::density::{DensityModel, Mixture};
-use crate::support::repeats::refuse_repeats;
+use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
 /// Spread of a given parameter, in spreads of its kernels: nothing in the lane arithmetic, and not zero.

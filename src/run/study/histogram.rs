@@ -7,7 +7,7 @@ use crate::Result;
 use crate::scenario::parameterization::{Parameter, Parameterization, ParameterizationOptions, SpeedProfile};
 use crate::scenario::{Category, Scenario};
 use crate::stats::density::ParameterSpace;
-use crate::support::round_step::plain_step;
+use crate::support::readable::plain_step;
 
 /// Most bins of a histogram.
 const MAX_BINS: f64 = 40.0;

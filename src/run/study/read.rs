@@ -12,7 +12,7 @@ use crate::engine::plan::{Block, CaseSource, LanePlan};
 use crate::engine::units::Units;
 use crate::scenario::parameterization::Reduction;
 use crate::scenario::{Scenario, Tables};
-use crate::support::hex::hex;
+use crate::support::plain_text::hex;
 use crate::{Error, Place, Result};
 
 /// The source of a plan without cases.

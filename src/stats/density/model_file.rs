@@ -24,8 +24,8 @@ use crate::scenario::parameterization::{
 use crate::scenario::problem_of;
 use crate::scenario::{Category, Scenario};
 use crate::support::atomic_file::AtomicFile;
-use crate::support::hex::hex;
 use crate::support::input_file;
+use crate::support::plain_text::hex;
 use crate::{Error, Place, Result};
 
 /// The version that this program writes and reads.
