@@ -8,7 +8,7 @@ use super::Exit;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::sample::Sample;
-use super::sample_checks::only_crude;
+use super::sample_options::only_crude;
 use crate::cli::settings::{EstimatorKind, PointKind};
 use crate::engine::Headway;
 use crate::interop::openscenario::{DistributionSamples, SampledFile};

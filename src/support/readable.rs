@@ -1,7 +1,5 @@
 //! Numbers for people: thousands separators, at most four significant digits, ∞ and – instead of `inf` and `NaN`. Every
-//! text and page writes its numbers here; files have every digit.
-//!
-//! Round steps: 1, 2 or 5 times a power of ten.
+//! text and page writes its numbers here; files have every digit. Also round steps, 1, 2 or 5 times a power of ten.
 
 /// Significant digits of a number for people.
 const DIGITS: usize = 4;

@@ -7,8 +7,7 @@
 //! changes no verdict. [`crate::engine::cpu::simd`] chooses the instruction set; nothing here depends on it.
 
 use crate::model::driver::DriverModel;
-use crate::model::flag::Flag;
-use crate::model::scalar::Real;
+use crate::model::scalar::{Flag, Real};
 
 use crate::engine::cpu::batch_arrays::{FixedArrays, Floats, LaneArrays, Slots, StateArrays, TrackArrays, Words};
 use crate::engine::cpu::fast_forward::quiescent_steps;

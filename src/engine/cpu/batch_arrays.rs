@@ -7,7 +7,7 @@ use bytemuck::{Pod, Zeroable};
 
 use crate::model::criterion::{BrakeThreatMaximum, TtcMinimum};
 use crate::model::driver::{DriverModel, DriverState};
-use crate::model::flag::Flag;
+use crate::model::scalar::Flag;
 
 use crate::engine::cpu::LANES;
 use crate::engine::cpu::rows::{Rows, copy, fill, made_of_rows};
