@@ -10,10 +10,10 @@ use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::reopen::TracedCase;
 use crate::scenario::{CaseParameters, ParameterRows, PlainCase, RowPlace};
+use crate::support::input_file;
 use crate::support::plausibility::{Doubts, Implausible, Quantity};
 use crate::support::readable::value;
 use crate::support::table::{TableFormat, TableReader};
-use crate::support::toml_file;
 use crate::{Error, Place, Result};
 
 /// A case in words. Speeds in m/s, lengths in m, accelerations in m/s², times in s.
@@ -255,7 +255,7 @@ fn acceleration_mps2(text: &str) -> std::result::Result<f64, String> {
 
 /// The flags that a TOML file holds.
 pub(super) fn from_toml(path: &Path) -> Result<CaseFlags> {
-    toml_file::read(path, "the keys are the flags of `simulate --help` with `_`")
+    input_file::read_toml(path, "the keys are the flags of `simulate --help` with `_`")
 }
 
 /// The flags that a row of a table holds, of CSV or Parquet; rows count from 1 after the header.

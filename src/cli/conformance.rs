@@ -15,8 +15,9 @@ use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::report::records;
 use crate::scenario::read_scenarios;
+use crate::support::ranges::refuse_repeats;
 use crate::support::readable::{count, count_of};
-use crate::support::repeats::refuse_repeats;
+
 use crate::support::table::Table as SummaryTable;
 use crate::{Error, Place, Result};
 

@@ -9,7 +9,7 @@ use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::scenario::Category;
 use crate::scenario::parameterization::Parameterization;
-use crate::support::repeats::refuse_repeats;
+use crate::support::ranges::refuse_repeats;
 use crate::traffic::Driven;
 use crate::{Error, Place, Result};
 

@@ -1,7 +1,6 @@
 //! The command line: one file per verb. What was typed is parsed here; what it means is decided in the
 //! library. Data goes to stdout, log and progress to stderr.
 
-mod backend_flags;
 mod case_flags;
 mod check;
 mod cluster;
@@ -25,7 +24,6 @@ mod map;
 mod merge;
 mod mine;
 mod sample;
-mod sample_checks;
 mod sample_distribution;
 mod sample_options;
 mod sample_run;

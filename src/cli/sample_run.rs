@@ -2,14 +2,13 @@
 
 use std::time::Instant;
 
-use super::Exit;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::dry_run::DryRun;
 use super::format::FormatFlag;
 use super::sample::Sample;
-use super::sample_checks::{guard, only_crude};
-use super::sample_distribution;
+use super::sample_options::{guard, only_crude};
+use super::{Exit, sample_distribution};
 use crate::engine::{Chunk, Executor, OpenBackend};
 use crate::report::lanes;
 use crate::report::sampling::{EstimateFile, HostRecord};

@@ -98,7 +98,7 @@ fn end_at_once(signal: i32) -> ! {
 #[cfg(unix)]
 fn end_with(status: i32) -> ! {
     // Nobody begins another file until the end.
-    let _live = crate::support::live_files::remove_live();
+    let _live = crate::support::atomic_file::remove_live();
     // Without the exit handlers of libraries (a driver's, say) whose threads are at work.
     signal_hook::low_level::exit(status)
 }

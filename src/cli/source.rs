@@ -8,7 +8,7 @@ use super::configured::Configured;
 use super::console::{self, Verbosity};
 use crate::scenario::{Category, Scenario, ScenarioFile, read_scenario_file};
 use crate::support::plausibility::Implausible;
-use crate::support::repeats::refuse_repeats;
+use crate::support::ranges::refuse_repeats;
 use crate::traffic::Source;
 use crate::traffic::mining::{Collection, MiningOptions, counts_text};
 use crate::traffic::trajectory::highd;

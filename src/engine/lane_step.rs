@@ -10,8 +10,7 @@
 
 use crate::model::criterion::{BrakeThreatMaximum, Criteria, TtcMinimum, held_in_contact, overlaps_along};
 use crate::model::driver::{DriverModel, DriverState, Hazard, View};
-use crate::model::flag::Flag;
-use crate::model::scalar::Real;
+use crate::model::scalar::{Flag, Real};
 use crate::scenario::{Motion, Tables};
 
 use super::frame::{Frame, Simulation, Start};

@@ -206,9 +206,8 @@ mod tests {
     use crate::engine::verify::{RandomOptions, random_plan};
     use crate::engine::{Backend, CpuBackend, Executor, LaneCase, Session, SweepSummary, Wanted};
     use crate::model::driver::{DriverModel, DriverState, Hazard, ModelId, View};
-    use crate::model::flag::Flag;
     use crate::model::profile::Profile;
-    use crate::model::scalar::Real;
+    use crate::model::scalar::{Flag, Real};
     use crate::scenario::{Category, Tables};
 
     #[derive(Debug, Clone, Copy, PartialEq)]

@@ -9,7 +9,7 @@ use sha2::{Digest, Sha256};
 use super::generated::{Generator, PointSource};
 use super::lane_case::{LaneCase, LaneOther};
 use crate::scenario::{Motion, Tables};
-use crate::support::hex::hex;
+use crate::support::plain_text::hex;
 
 /// Version of what a lane computes, from a scenario or a sample's index to its verdicts and values. Raise it whenever a
 /// bit of any lane can change: plans, parts, journals and records of another version are refused. Versions of the

@@ -1,9 +1,14 @@
 //! A concrete case: what is simulated before headway and driver model are chosen. A recorded scenario,
 //! each of its parameterizations, a sampled point, a row of a table and a `simulate` call are all cases.
+//!
+//! [`PlainCase`] is a case from a handful of numbers: constant speeds or one deceleration, a lane change at constant lateral
+//! speed; what `simulate` takes from flags and what a map's cells are.
 
 use serde::{Deserialize, Serialize};
 
 use super::motion::{Lateral, Speed};
+use crate::support::readable::value;
+use crate::{Error, Place, Result};
 
 /// The three kinds of scenario of UN R157, Annex 3.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
@@ -85,4 +90,157 @@ pub struct Ahead {
     pub vehicle: Participant,
     /// D: gap from the cutting-out vehicle's front to this one's rear at t = 0, m.
     pub gap_m: f64,
+}
+
+/// Default lateral distance of a lane change, m.
+pub const LATERAL_DISTANCE_M: f64 = 3.5;
+
+/// The numbers; speeds in m/s, lengths in m. Fields that a category does not have are ignored.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PlainCase {
+    /// Kind of scenario.
+    pub category: Category,
+    /// Speed of the ego, ≥ 0.
+    pub ego_speed_mps: f64,
+    /// Initial speed of the other vehicle, ≥ 0.
+    pub speed_mps: f64,
+    /// Its acceleration, m/s².
+    pub acceleration_mps2: f64,
+    /// Speed at which the acceleration ends; without one, at standstill or never.
+    pub end_speed_mps: Option<f64>,
+    /// Lane changes: lateral speed, ≥ 0; at 0 there is no change.
+    pub lateral_speed_mps: f64,
+    /// Cut-in: lateral distance at the start; cut-out: at the end; > 0.
+    pub lateral_distance_m: f64,
+    /// Cut-out: speed of the vehicle ahead, ≥ 0.
+    pub ahead_speed_mps: f64,
+    /// Cut-out: gap between the two, ≥ 0.
+    pub ahead_gap_m: f64,
+    /// Length of every vehicle, > 0.
+    pub length_m: f64,
+    /// Width of every vehicle, > 0.
+    pub width_m: f64,
+    /// Duration, s, > 0: then speed and lateral position keep their last values. Without one, all motions go on to
+    /// their ends.
+    pub duration_s: Option<f64>,
+}
+
+impl PlainCase {
+    /// The case; no event is later than `time_cap_s`.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] where speed, acceleration and end speed contradict one another, or an acceleration the category.
+    pub fn case(&self, time_cap_s: f64) -> Result<Case> {
+        let until_s = self.acceleration_until_s(time_cap_s)?;
+        let (lateral, change_s) = self.lateral();
+        let participant =
+            |speed, lateral| Participant { length_m: self.length_m, width_m: self.width_m, speed, lateral };
+        let ahead = (self.category == Category::CutOut).then(|| Ahead {
+            vehicle: participant(Speed::constant(self.ahead_speed_mps), Lateral::Centred),
+            gap_m: self.ahead_gap_m,
+        });
+        let speed =
+            Speed::Kinematic { initial_mps: self.speed_mps, acceleration_mps2: self.acceleration_mps2, until_s };
+        Ok(Case {
+            category: self.category,
+            ego_length_m: self.length_m,
+            ego_width_m: self.width_m,
+            ego_speed_mps: self.ego_speed_mps,
+            principal: participant(speed, lateral),
+            ahead,
+            horizon_s: self.duration_s.unwrap_or(until_s.max(change_s)).min(time_cap_s),
+        })
+    }
+
+    /// Its speed when its acceleration ends, m/s; no event is later than `time_cap_s`.
+    ///
+    /// # Errors
+    /// As [`PlainCase::case`].
+    pub fn last_speed_mps(&self, time_cap_s: f64) -> Result<f64> {
+        let until_s = self.acceleration_until_s(time_cap_s)?.min(time_cap_s);
+        Ok((self.speed_mps + self.acceleration_mps2 * until_s).max(0.0))
+    }
+
+    fn acceleration_until_s(&self, time_cap_s: f64) -> Result<f64> {
+        self.check_speeds()?;
+        let (from_mps, to_mps) = (self.speed_mps, self.end_speed_mps.unwrap_or(0.0));
+        let until_s = match (self.acceleration_mps2, self.end_speed_mps) {
+            (0.0, _) => 0.0,
+            (a, None) if a > 0.0 => time_cap_s,
+            (a, _) => (to_mps - from_mps) / a,
+        };
+        Ok(until_s.min(self.duration_s.unwrap_or(f64::INFINITY)))
+    }
+
+    /// Does the acceleration lead from the initial to the end speed, and does the leader of an LVD not accelerate?
+    fn check_speeds(&self) -> Result<()> {
+        let (acceleration, from_mps) = (self.acceleration_mps2, self.speed_mps);
+        let wrong = |key: &str, problem: String, help: &str| Err(Error::usage(Place::item(key), problem, help));
+        if self.category == Category::Lvd && acceleration > 0.0 {
+            let problem = format!("{acceleration} m/s² would make the leader of an LVD faster");
+            return wrong("acceleration", problem, "a deceleration is negative; give a number of at most 0");
+        }
+        let Some(end_mps) = self.end_speed_mps else { return Ok(()) };
+        let (change_mps, from, end) = (end_mps - from_mps, value(from_mps), value(end_mps));
+        if acceleration == 0.0 && change_mps != 0.0 {
+            let problem = format!("{end} m/s cannot be reached from {from} m/s without an acceleration");
+            return wrong("end_speed", problem, "give an acceleration too, or leave the end speed out");
+        }
+        if acceleration != 0.0 && change_mps == 0.0 {
+            let problem = format!("{end} m/s is the initial speed: {acceleration} m/s² would have no effect");
+            return wrong("end_speed", problem, "change the end speed, or leave out the acceleration");
+        }
+        if acceleration * change_mps < 0.0 {
+            let problem = format!("{end} m/s cannot be reached from {from} m/s with {acceleration} m/s²");
+            return wrong("end_speed", problem, "change the sign of the acceleration or the end speed");
+        }
+        Ok(())
+    }
+
+    /// The lateral motion and how long it lasts, s.
+    fn lateral(&self) -> (Lateral, f64) {
+        let (rate_mps, distance_m) = (self.lateral_speed_mps, self.lateral_distance_m);
+        let covered_m = distance_m.min(rate_mps * self.duration_s.unwrap_or(f64::INFINITY));
+        let change_s = if rate_mps > 0.0 { covered_m / rate_mps } else { 0.0 };
+        let lateral = match self.category {
+            Category::Lvd => return (Lateral::Centred, 0.0),
+            // A kinematic change without speed would be over at once.
+            Category::CutIn if rate_mps <= 0.0 => {
+                Lateral::Sampled { position_m: vec![distance_m], towards_mps: vec![0.0] }
+            }
+            Category::CutOut if rate_mps <= 0.0 => Lateral::Centred,
+            Category::CutIn => {
+                Lateral::Kinematic { start_m: distance_m, rate_mps: -rate_mps, end_m: distance_m - covered_m }
+            }
+            Category::CutOut => Lateral::Kinematic { start_m: 0.0, rate_mps, end_m: covered_m },
+        };
+        (lateral, change_s)
+    }
+}
+
+/// What a case of a category cannot do without, by the names of `simulate`'s flags: the first that is missing.
+pub(crate) fn missing_parameter(category: Category, has: impl Fn(&str) -> bool) -> Option<&'static str> {
+    let changes_lane = category != Category::Lvd;
+    let needs = [
+        ("ego_speed", true),
+        ("lateral_speed", changes_lane),
+        ("acceleration", !changes_lane),
+        ("ahead_gap", category == Category::CutOut),
+    ];
+    needs.into_iter().find(|(key, is_needed)| *is_needed && !has(key)).map(|(key, _)| key)
+}
+
+/// A time headway of an ego at rest is no distance.
+///
+/// # Errors
+/// [`Error::Usage`].
+pub(crate) fn check_headway(ego_speed_mps: f64, thw_s: Option<f64>) -> Result<()> {
+    match thw_s {
+        Some(thw_s) if ego_speed_mps == 0.0 => Err(Error::usage(
+            Place::item("thw"),
+            format!("{thw_s} s of an ego at rest is no distance"),
+            "give the initial gap in metres, or a speed of the ego above 0",
+        )),
+        _ => Ok(()),
+    }
 }

@@ -7,8 +7,6 @@ pub mod case;
 #[macro_use]
 pub mod driver;
 pub mod criterion;
-pub mod flag;
 pub mod motion;
-pub mod plain_case;
 pub mod profile;
 pub mod scalar;

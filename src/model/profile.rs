@@ -9,9 +9,8 @@ use serde::{Deserialize, Serialize};
 use crate::model::criterion::CriteriaProfile;
 use crate::model::driver::{self, Bound, DriverProfile, ModelId};
 use crate::support::input_file;
-use crate::support::near_name::nearest;
-use crate::support::repeats::refuse_repeats;
-use crate::support::toml_file;
+use crate::support::plain_text::nearest;
+use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
 /// Steps of a run at most.
@@ -170,7 +169,7 @@ impl Profile {
 
     fn parse(text: &str, place: &Place) -> Result<Profile> {
         let help = "compare with configs/profiles/paper.toml, which has every key with its unit";
-        let profile: Profile = toml_file::parse(text, place, help)?;
+        let profile: Profile = input_file::parse_toml(text, place, help)?;
         profile.check(place)?;
         Ok(profile)
     }

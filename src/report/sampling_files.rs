@@ -10,7 +10,7 @@ use super::sampling_tables::{WorstRow, convergence_csv, worst_csv};
 use crate::engine::{LaneKey, LanePlan, LaneRunner};
 use crate::run::sampling::{CrudeRun, Estimator, Sample, SampleOptions, SampleResult, SampleTally, proposal_text};
 use crate::stats::density::DensityModel;
-use crate::support::hex::hex;
+use crate::support::plain_text::hex;
 use crate::support::run_dir::Results;
 use crate::{Error, Result};
 

@@ -9,22 +9,20 @@ mod check;
 mod columns;
 mod file;
 mod found;
-mod jsonl;
 mod mined;
 mod parameter_table;
 pub mod parameterization;
 mod schema;
 mod table_reader;
-mod tracks_table;
 
-pub use crate::model::case::{Ahead, Case, Category, Participant};
+pub use crate::model::case::{Ahead, Case, Category, LATERAL_DISTANCE_M, Participant, PlainCase};
+pub(crate) use crate::model::case::{check_headway, missing_parameter};
 pub use crate::model::motion::{LATERAL_SAMPLED, Lateral, LateralState, Motion, SPEED_SAMPLED, Speed, Tables};
-pub use crate::model::plain_case::{LATERAL_DISTANCE_M, PlainCase};
-pub(crate) use crate::model::plain_case::{check_headway, missing_parameter};
 pub use case_parameters::CaseParameters;
 pub(crate) use check::problem_of;
-pub use file::{check_scenario_file, read_scenario_file, read_scenarios, scenario_columns, write_scenarios};
+pub use file::{
+    check_scenario_file, read_scenario_file, read_scenarios, scenario_columns, write_scenarios, write_scenarios_to,
+};
 pub use found::ScenarioFile;
-pub use jsonl::write_scenarios_to;
 pub use mined::{Ego, Other, Scenario, Side};
 pub(crate) use parameter_table::{ParameterRows, RowPlace};

@@ -1,6 +1,8 @@
 //! Scenarios from tables that this or any other program wrote: one row per scenario with series as lists, one row per
 //! scenario and instant, or one row per concrete case ([`super::parameter_table`]). The columns tell which it is.
+//! A table of tracks is recognised and refused: recordings must be mined first.
 
+use std::io::Read;
 use std::path::Path;
 
 use serde_json::{Map, Value};
@@ -9,8 +11,9 @@ use super::check::name;
 use super::columns::{Chosen, HELP, Leaf, choose, leaves, names};
 use super::found::{ScenarioFile, ScenariosRead};
 use super::schema::wrong_field;
-use super::{Scenario, parameter_table, tracks_table};
+use super::{Scenario, parameter_table};
 use crate::support::error::{Error, Place, Result};
+use crate::support::input_file;
 use crate::support::plausibility::Implausible;
 use crate::support::table::{Named, Resolved, Row, TableFormat, TableReader, resolve};
 
@@ -19,8 +22,8 @@ use crate::support::table::{Named, Resolved, Row, TableFormat, TableReader, reso
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] naming file, row, scenario and column.
 pub(super) fn read(path: &Path, format: TableFormat, implausible: Implausible) -> Result<ScenarioFile> {
-    let table = TableReader::open(path, format).map_err(|error| tracks_table::of_unreadable(path, error))?;
-    tracks_table::refuse(table.columns(), table.header())?;
+    let table = TableReader::open(path, format).map_err(|error| of_unreadable_tracks(path, error))?;
+    refuse_tracks(table.columns(), table.header())?;
     let (leaves, time) = (leaves(), [Named { name: "time".to_owned(), unit: "s" }]);
     let names = names(&leaves);
     let known: Vec<Named> = names.iter().map(|(named, ..)| named.clone()).collect();
@@ -273,6 +276,64 @@ fn odd_instant(times_s: &[f64]) -> (usize, f64) {
     let off = |step: &f64| (step - usual_s).abs();
     let largest = steps.iter().map(off).fold(0.0, f64::max);
     (1 + steps.iter().position(|step| off(step) >= 0.5 * largest).unwrap_or(0), usual_s)
+}
+
+/// Column names of recordings, in lower case without punctuation: vehicle, instant, place along and across.
+const VEHICLE: &[&str] = &["id", "trackid", "vehicleid", "carid", "objectid", "idx"];
+const INSTANT: &[&str] = &[
+    "frame",
+    "frameid",
+    "framenum",
+    "frameindex",
+    "time",
+    "times",
+    "timesteptime",
+    "timestep",
+    "totalnanos",
+    "timestamp",
+];
+const ALONG: &[&str] = &["x", "xm", "xcenter", "vehiclex", "localx", "posx", "xloc", "xlockf", "carcenterx"];
+const ACROSS: &[&str] = &["y", "ym", "ycenter", "vehicley", "localy", "posy", "yloc", "ylockf", "carcentery"];
+/// What a table of scenarios has and a recording has not.
+const SCENARIO: &[&str] = &["category", "targetv", "targetvmps", "targety", "targetym"];
+
+const TRACKS_HELP: &str = "scenarios are mined from recordings: give the folder of the recording as data, or mine it first (`mine`) and \
+                    give the scenarios that it writes. Recordings are read in highD's three files; convert others to these";
+
+/// Bytes of a file in which its header must end.
+const HEADER_BYTES: u64 = 1 << 16;
+
+/// Refuses the columns of a recording.
+///
+/// # Errors
+/// [`Error::Input`] at `header`, naming the columns that give it away.
+fn refuse_tracks(columns: &[String], header: Place) -> Result<()> {
+    let plain = |name: &str| name.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_ascii_lowercase();
+    let find = |known: &[&str]| columns.iter().find(|column| known.contains(&plain(column).as_str()));
+    let (Some(vehicle), Some(instant), Some(along), Some(across), None) =
+        (find(VEHICLE), find(INSTANT), find(ALONG), find(ACROSS), find(SCENARIO))
+    else {
+        return Ok(());
+    };
+    let problem = format!(
+        "this is a table of tracks, not of scenarios: it has a vehicle (`{vehicle}`), its instants (`{instant}`) and its places \
+         (`{along}`, `{across}`)"
+    );
+    Err(Error::input(header, problem, TRACKS_HELP))
+}
+
+/// The error of a table that cannot be read: that it holds tracks, where its first line says so. Some simulators part their
+/// columns by semicolons.
+fn of_unreadable_tracks(path: &Path, error: Error) -> Error {
+    let mut head = Vec::new();
+    let is_read = input_file::open(path).is_ok_and(|file| file.take(HEADER_BYTES).read_to_end(&mut head).is_ok());
+    let text = String::from_utf8_lossy(&head);
+    let line = text.lines().next().unwrap_or_default().trim_start_matches('\u{feff}');
+    let columns: Vec<String> = line.split([';', '\t', ',']).map(|name| name.trim().to_owned()).collect();
+    match refuse_tracks(&columns, Place::file(path).row(1)) {
+        Err(tracks) if is_read => tracks,
+        _ => error,
+    }
 }
 
 #[cfg(test)]

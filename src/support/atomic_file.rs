@@ -1,14 +1,18 @@
 //! Files that are there whole or not at all: written beside their place under a hidden name, brought to
 //! the disk, then renamed. Used by everything that leaves results behind.
+//!
+//! A register says what a process takes away when a signal ends it: the files that it has not finished, its lock, and a folder that it
+//! made and put nothing into.
 
+use std::collections::BTreeSet;
 use std::ffi::OsString;
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::{NamedTempFile, TempPath};
 
-use crate::support::live_files::{Live, live};
 use crate::{Error, Place, Result};
 
 /// Hidden names are `.lanesweep-<file name>-XXXXXX.part`.
@@ -287,10 +291,58 @@ impl StagedFile {
     }
 }
 
+/// The hidden files of this process that exist now, and the folders and locks that go with them.
+static LIVE: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
+
+fn live() -> MutexGuard<'static, BTreeSet<PathBuf>> {
+    LIVE.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// An entry in the registry of hidden files, for as long as the file has that name.
+#[derive(Debug)]
+pub(crate) struct Live(PathBuf);
+
+impl Live {
+    /// Enters a lock file, or a folder that goes where nothing is in it.
+    pub(crate) fn enter(path: PathBuf) -> Live {
+        live().insert(path.clone());
+        Live(path)
+    }
+}
+
+impl Drop for Live {
+    fn drop(&mut self) {
+        live().remove(&self.0);
+    }
+}
+
+/// Removes the hidden files of this process, which is about to end. While the answer is kept, no other begins.
+#[cfg(unix)]
+pub(crate) fn remove_live() -> Option<MutexGuard<'static, BTreeSet<PathBuf>>> {
+    // A file system that hangs while a file is begun there must not keep the process from ending.
+    for _ in 0..100 {
+        let paths = match LIVE.try_lock() {
+            Ok(paths) => paths,
+            Err(std::sync::TryLockError::Poisoned(poisoned)) => poisoned.into_inner(),
+            Err(std::sync::TryLockError::WouldBlock) => {
+                std::thread::sleep(std::time::Duration::from_millis(10));
+                continue;
+            }
+        };
+        // What is in a folder goes before the folder. A file that has just got its proper name is not there any more.
+        for path in paths.iter().rev() {
+            let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir(path));
+        }
+        return Some(paths);
+    }
+    None
+}
+
 #[cfg(test)]
 mod tests {
-    use super::*;
     use std::fs;
+
+    use super::*;
 
     #[test]
     fn a_file_appears_when_it_is_complete_and_an_abandoned_one_never() {

@@ -6,8 +6,8 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use crate::support::files::write_inside;
-use crate::support::hex::hex;
 use crate::support::input_file;
+use crate::support::plain_text::hex;
 use crate::{Error, Place, Result};
 
 /// Lists the files of the runs in a folder.

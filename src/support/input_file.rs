@@ -1,13 +1,16 @@
 //! Opening files that a user names: regular files only, and no larger than their kind can be.
 //!
 //! A pipe without a writer would be waited on for ever, and a device such as `/dev/zero` never ends.
+//! Settings in TOML have one reader, so that an error in any such file names its line.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 use std::path::Path;
 
+use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
 
+use crate::support::plain_text::{cut_names, hex, nearest};
 use crate::{Error, Place, Result};
 
 /// Largest file of settings (configurations, profiles, exposures): those that the program writes have a few kilobytes.
@@ -109,12 +112,68 @@ pub(crate) fn sha256(path: &Path) -> Result<String> {
     let mut piece = vec![0; 1 << 16];
     loop {
         match file.read(&mut piece) {
-            Ok(0) => return Ok(crate::support::hex::hex(&hash.finalize())),
+            Ok(0) => return Ok(hex(&hash.finalize())),
             Ok(count) => hash.update(&piece[..count]),
             Err(e) if e.kind() == std::io::ErrorKind::Interrupted => {}
             Err(e) => return Err(Error::io(path, "read", e)),
         }
     }
+}
+
+/// The settings in a text; `place` is what errors name, `help` tells where the keys are described.
+///
+/// # Errors
+/// [`Error::Usage`] with the line for what is not TOML, an unknown key or a value of another type.
+pub(crate) fn parse_toml<T: DeserializeOwned>(text: &str, place: &Place, help: &str) -> Result<T> {
+    toml::from_str(text).map_err(|e| {
+        let mut place = place.clone();
+        if let Some(span) = e.span() {
+            let before = text.bytes().take(span.start);
+            place.row = Some(1 + before.filter(|&byte| byte == b'\n').count() as u64);
+            if place.item.is_none() {
+                place.item = key_before(text, span.start).map(|key| format!("`{key}`"));
+            }
+        }
+        let message = cut_names(e.message());
+        let problem = in_words(&message);
+        match meant(&message) {
+            Some(name) => Error::usage(place, problem, format!("did you mean `{name}`? {help}")),
+            None => Error::usage(place, problem, help),
+        }
+    })
+}
+
+/// The key whose value begins at `at`.
+fn key_before(text: &str, at: usize) -> Option<String> {
+    let line = text.get(..at)?.lines().next_back()?;
+    let key = line.strip_suffix(['=', ' ']).and_then(|_| line.split('=').next())?.trim();
+    (!key.is_empty() && !key.starts_with(['#', '['])).then(|| key.to_owned())
+}
+
+/// The reader's types in a user's words.
+fn in_words(message: &str) -> String {
+    let words = [("floating point", "number"), ("f64", "a number"), ("f32", "a number"), ("usize", "a whole number")];
+    let whole = ["u8", "u16", "u32", "u64"].map(|name| (name, "a whole number of at least 0"));
+    let mut text = message.to_owned();
+    for (name, word) in words.into_iter().chain(whole) {
+        text = text.replace(&format!("expected {name}"), &format!("expected {word}"));
+    }
+    text
+}
+
+/// The name that an unknown one resembles, of those that the message lists.
+fn meant(message: &str) -> Option<&str> {
+    let mut names = message.strip_prefix("unknown field `")?.split('`').step_by(2);
+    let unknown = names.next()?;
+    nearest(unknown, names, 0.75)
+}
+
+/// The settings in a regular file.
+///
+/// # Errors
+/// As [`parse_toml`]; [`Error::Io`]; [`Error::Input`] where it is not a text file, or larger than a few megabytes.
+pub(crate) fn read_toml<T: DeserializeOwned>(path: &Path, help: &str) -> Result<T> {
+    parse_toml(&read_text(path, MAX_SETTINGS_BYTES)?, &Place::file(path), help)
 }
 
 #[cfg(all(test, unix))]
@@ -150,7 +209,47 @@ mod tests {
         for size in [0, 1, (1 << 16) - 1, 1 << 16, (1 << 17) + 3] {
             let content: Vec<u8> = (0..size).map(|at| (at % 251) as u8).collect();
             std::fs::write(&path, &content).unwrap();
-            assert_eq!(sha256(&path).unwrap(), crate::support::hex::hex(&Sha256::digest(&content)), "{size}");
+            assert_eq!(sha256(&path).unwrap(), hex(&Sha256::digest(&content)), "{size}");
+        }
+    }
+
+    #[derive(Debug, serde::Deserialize)]
+    #[serde(deny_unknown_fields)]
+    struct Lengths {
+        #[allow(dead_code)]
+        gap_m: f64,
+        #[allow(dead_code)]
+        rows: Option<u32>,
+    }
+
+    #[test]
+    fn an_error_names_the_key_and_what_was_meant() {
+        let problem = |text: &str| {
+            let error = parse_toml::<Lengths>(text, &Place::file("a.toml"), "see there").unwrap_err();
+            (error.to_string(), error.help().unwrap_or_default())
+        };
+        let (text, _) = problem("# far\ngap_m = 'far'\n");
+        assert!(text.contains("line 2") && text.contains("`gap_m`") && text.ends_with("expected a number"), "{text}");
+        let (text, _) = problem("gap_m = 1.0\nrows = -1\n");
+        assert!(text.contains("`rows`") && text.contains("a whole number"), "{text}");
+        let (text, help) = problem("gap = 1.0\n");
+        assert!(text.contains("unknown field `gap`") && help == "did you mean `gap_m`? see there", "{text}; {help}");
+        let (_, help) = problem("colour = 1.0\n");
+        assert_eq!(help, "see there");
+    }
+
+    #[test]
+    fn an_error_names_the_line_also_after_letters_of_several_bytes() {
+        #[derive(Debug, serde::Deserialize)]
+        #[serde(deny_unknown_fields)]
+        struct Settings {
+            #[allow(dead_code)]
+            gap: f64,
+        }
+        for text in ["# größer als 1 µm\ngap = 'é'\n", "gap = 1\nspeed = 2\n", "gap = 1\n\u{e9} ="] {
+            let error = parse_toml::<Settings>(text, &Place::item("here"), "see there").unwrap_err();
+            assert!(error.to_string().starts_with("line 2, here: "), "{error}");
+            assert_eq!(error.help().unwrap(), "see there");
         }
     }
 }

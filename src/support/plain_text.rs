@@ -1,7 +1,10 @@
 //! Foreign text (names of files, ids, contents) as a terminal, a page and a spreadsheet may show it: characters that
 //! would act instead of being seen are written as escapes.
+//! Also the known name that an unknown one was probably meant to be, and digests as text.
 
 use std::borrow::Cow;
+
+use sha2::{Digest, Sha256};
 
 /// Does a terminal or a browser act on it instead of showing it? Control characters (C0, DEL, C1), marks that turn the
 /// direction of reading, line separators, and what has no width.
@@ -99,6 +102,29 @@ pub(crate) fn shown_json(json: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
+/// The likeliest of some names, if its likeness, 0 to 1, is above `least`. Case and separators do not count. A text that is
+/// longer than any name resembles none.
+pub(crate) fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>, least: f64) -> Option<&'a str> {
+    if wrong.len() > 4 * MAX_NAME {
+        return None;
+    }
+    let plain = |text: &str| text.trim().to_ascii_lowercase().replace(['_', '-', ' ', '.'], "");
+    let wrong = plain(wrong);
+    let likeness = |name: &str| strsim::jaro_winkler(&wrong, &plain(name));
+    let scored = names.into_iter().map(|name| (likeness(name), name)).filter(|&(likeness, _)| likeness > least);
+    scored.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, name)| name)
+}
+
+/// Bytes as lower-case hexadecimal digits.
+pub(crate) fn hex(bytes: &[u8]) -> String {
+    bytes.iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+/// SHA-256 of some bytes, as [`hex`].
+pub(crate) fn sha256(bytes: impl AsRef<[u8]>) -> String {
+    hex(&Sha256::digest(bytes))
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -148,5 +174,14 @@ mod tests {
         assert!(!text.chars().any(|c| acts(c) && c != '\n'), "{text:?}");
         let read = |text: &str| serde_json::from_str::<serde_json::Value>(text).unwrap();
         assert_eq!(read(&text), read(&json));
+    }
+
+    #[test]
+    fn the_name_that_was_meant_is_found_and_a_strange_one_is_not() {
+        let names = ["laneId", "precedingId", "xVelocity"];
+        assert_eq!(nearest("lane_id", names, 0.75), Some("laneId"));
+        assert_eq!(nearest("X-Velocty", names, 0.75), Some("xVelocity"));
+        assert_eq!(nearest("weather", names, 0.75), None);
+        assert_eq!(nearest("laneId", [], 0.0), None);
     }
 }

@@ -1,9 +1,15 @@
 //! Ranges of settings. A range stands at the field that it is of (`#[schemars(range(…))]`); the schema, the configuration,
 //! the flags and the types' own checks read it there.
+//!
+//! Lists of settings hold every value once: a repeated headway or model would count its failures twice, and two
+//! lanes would have one key.
 
-use std::fmt;
+use std::collections::HashMap;
+use std::fmt::{self, Display};
+use std::hash::Hash;
 
-use schemars::{JsonSchema, generate::SchemaSettings};
+use schemars::JsonSchema;
+use schemars::generate::SchemaSettings;
 use serde::Serialize;
 use serde_json::Value;
 
@@ -91,3 +97,35 @@ fn check_value(name: &str, value: &Value, schema: &Value) -> Result<()> {
     let found = if value.is_null() { "a value that is not finite".to_owned() } else { value.to_string() };
     Err(Error::usage(Place::item(name), format!("{found} cannot be used"), format!("give {range}")))
 }
+
+/// The first value that repeats an earlier one, in words. The list has pairs of what a value means and how it was
+/// written: `0.60` repeats `0.6`.
+pub(crate) fn repeated<K: Eq + Hash, S: Display>(list: impl IntoIterator<Item = (K, S)>) -> Option<String> {
+    let mut known: HashMap<K, S> = HashMap::new();
+    for (meaning, written) in list {
+        if let Some(before) = known.get(&meaning) {
+            let (before, written) = (before.to_string(), written.to_string());
+            return Some(match before == written {
+                true => format!("`{written}` is given twice"),
+                false => format!("`{written}` repeats `{before}`"),
+            });
+        }
+        known.insert(meaning, written);
+    }
+    None
+}
+
+/// Checks that no value of a list repeats an earlier one.
+///
+/// # Errors
+/// [`Error::Usage`] at `place`, as [`repeated`] says it.
+pub(crate) fn refuse_repeats<K: Eq + Hash, S: Display>(
+    place: impl FnOnce() -> Place,
+    list: impl IntoIterator<Item = (K, S)>,
+) -> Result<()> {
+    let refused = |problem| Error::usage(place(), problem, GIVE_ONCE);
+    repeated(list).map_or(Ok(()), |problem| Err(refused(problem)))
+}
+
+/// What to do about a repeated value.
+pub(crate) const GIVE_ONCE: &str = "give every value once";

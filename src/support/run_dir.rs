@@ -12,10 +12,10 @@ use std::collections::BTreeSet;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
+use crate::support::atomic_file::Live;
 use crate::support::atomic_file::{AtomicFile, StagedFile, clear_stale, refuse_link, sync_folder};
 use crate::support::file_list::{FileList, LIST, RunFiles};
 use crate::support::files::make_folder;
-use crate::support::live_files::Live;
 use crate::support::lock::FolderLock;
 use crate::{Error, Place, Result};
 

@@ -11,8 +11,8 @@ use super::trajectory::generator::GeneratorOptions;
 use super::trajectory::highd::{self, made_up};
 use crate::scenario::{ScenarioFile, read_scenario_file, write_scenarios_to};
 use crate::support::files::write_atomically;
-use crate::support::hex::hex;
 use crate::support::input_file;
+use crate::support::plain_text::hex;
 use crate::support::plausibility::Implausible;
 use crate::{Error, Place, Result};
 

@@ -3,8 +3,7 @@
 use std::cell::Cell;
 use std::ops::{Add, Mul, Neg, Sub};
 
-use lanesweep::model::flag::Flag;
-use lanesweep::model::scalar::Real;
+use lanesweep::model::scalar::{Flag, Real};
 
 /// Operations of the counting type, by kind.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]

@@ -5,7 +5,7 @@ use crate::common;
 use lanesweep::traffic::mining::lateral::{LaneChangeKind, lane_changes};
 use lanesweep::traffic::mining::longitudinal::{Longitudinal, longitudinal_events};
 use lanesweep::traffic::mining::tags::Tags;
-use lanesweep::traffic::mining::{LaneChangeEnd, LateralOptions, LongitudinalOptions, cut_in, lvd, search};
+use lanesweep::traffic::mining::{LaneChangeEnd, LateralOptions, LongitudinalOptions, cut_in, lvd, tags};
 use lanesweep::traffic::trajectory::Lane;
 use serde_json::Value;
 
@@ -144,14 +144,14 @@ fn the_search_finds_the_golden_intervals() {
                     .with(Tags::EGO_KEEPS_LANE, ego.is_none_or(|rows| row_at(rows, t)[2] == "fl"))
             })
             .collect();
-        let (items, pause): (&[search::Item<Tags>], usize) = match case["kind"].as_str().unwrap() {
+        let (items, pause): (&[tags::Item<Tags>], usize) = match case["kind"].as_str().unwrap() {
             "cut-in" => (&cut_in::ITEMS, (5.0 / STEP_S) as usize),
             "LVD" => (&lvd::ITEMS, 0),
             other => panic!("{other}"),
         };
         let mut found = Vec::new();
         let mut from = 0;
-        while let Some(m) = search::find(&tags, items, from) {
+        while let Some(m) = tags::find_match(&tags, items, from) {
             found.push(vec![m.start() as f64 * STEP_S, m.end as f64 * STEP_S]);
             from = m.end.max(m.last_item().end) + pause;
         }

@@ -1,10 +1,15 @@
 //! The keys of a configuration, as the types' own schema tells them.
+//!
+//! Values come from TOML, from a word of the environment or the command line, and are checked against what the key takes.
+//! The commented configuration that ships with the program tells the order of the keys.
 
-use serde_json::Value;
+use serde_json::{Number, Value};
+use toml::de::DeValue;
 
 use super::schema::settings_schema;
-use crate::support::near_name;
+use crate::support::plain_text;
 use crate::support::ranges::Range;
+use crate::{Error, Place, Result};
 
 /// One key with what it takes.
 #[derive(Debug, Clone, PartialEq)]
@@ -70,7 +75,7 @@ impl Key {
 
 /// The name nearest to a wrong one, where one is near.
 pub(super) fn nearest<'a>(wrong: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    near_name::nearest(wrong, names, 0.7)
+    plain_text::nearest(wrong, names, 0.7)
 }
 
 fn collect(schema: &Value, prefix: &str, keys: &mut Vec<Key>) {
@@ -110,5 +115,182 @@ fn kind_of(property: &Value) -> KeyKind {
         Some("boolean") => KeyKind::Boolean,
         Some("integer" | "number") => KeyKind::Number(Range::of(property)),
         _ => KeyKind::Text,
+    }
+}
+
+/// The complaint about a value, with what to write instead.
+fn refused(key: &Key, found: &str, place: Place) -> Error {
+    let near = match &key.kind {
+        KeyKind::Choice(choices) => nearest(found.trim_matches(['"', '`']), choices.iter().map(|c| c.word.as_str())),
+        _ => None,
+    };
+    let near = near.map_or(String::new(), |word| format!("did you mean \"{word}\"? "));
+    let problem = format!("{found} cannot be used; expected {}", key.expected());
+    Error::usage(place, problem, near + &key.description)
+}
+
+/// What stands in a file, as a value for a key.
+///
+/// # Errors
+/// [`Error::Usage`] at `place` for a value that the key does not take.
+pub(super) fn from_toml(key: &Key, found: &DeValue, place: Place) -> Result<Value> {
+    let value = match found {
+        DeValue::Boolean(b) => Some(Value::Bool(*b)),
+        DeValue::String(s) => Some(Value::String(s.clone().into_owned())),
+        DeValue::Integer(i) => i128::from_str_radix(i.as_str(), i.radix()).ok().and_then(whole),
+        DeValue::Float(f) => f.as_str().parse().ok().and_then(Number::from_f64).map(Value::Number),
+        DeValue::Datetime(_) | DeValue::Array(_) | DeValue::Table(_) => None,
+    };
+    value.and_then(|value| fitted(key, value)).ok_or_else(|| refused(key, &shown(found), place))
+}
+
+/// A word of the environment or the command line, as a value for a key; quotes around it may be there.
+///
+/// # Errors
+/// As [`from_toml`].
+pub(super) fn from_word(key: &Key, word: &str, place: Place) -> Result<Value> {
+    let word = word.trim();
+    let unquoted = ['"', '\''].iter().find_map(|q| word.strip_prefix(*q)?.strip_suffix(*q)).unwrap_or(word);
+    let digits = unquoted.replace('_', "");
+    let value = match key.kind {
+        KeyKind::Text | KeyKind::Choice(_) => (!unquoted.is_empty()).then(|| Value::String(unquoted.to_owned())),
+        KeyKind::Boolean => word.parse().ok().map(Value::Bool),
+        KeyKind::Number(_) => match digits.parse::<i128>() {
+            Ok(i) => whole(i),
+            Err(_) => digits.parse().ok().and_then(Number::from_f64).map(Value::Number),
+        },
+    };
+    value.and_then(|value| fitted(key, value)).ok_or_else(|| refused(key, &format!("`{word}`"), place))
+}
+
+/// A value as TOML writes it.
+pub fn text_of(value: &Value) -> String {
+    match value {
+        Value::String(text) => toml::Value::String(text.clone()).to_string(),
+        Value::Number(number) => match number.as_f64().filter(|_| number.is_f64()) {
+            Some(x) => toml::Value::Float(x).to_string(),
+            None => number.to_string(),
+        },
+        other => other.to_string(),
+    }
+}
+
+fn whole(i: i128) -> Option<Value> {
+    u64::try_from(i).map(Value::from).or_else(|_| i64::try_from(i).map(Value::from)).ok()
+}
+
+/// A value of the key's type and in its range: whole numbers stand for others, and 1e6 for a whole one.
+fn fitted(key: &Key, value: Value) -> Option<Value> {
+    match (&key.kind, value) {
+        (KeyKind::Number(range), Value::Number(n)) => {
+            let value = match n.as_f64().filter(|_| n.is_f64()) {
+                _ if !range.is_whole => n.as_f64().map(Value::from),
+                // Beyond 2^53 a floating-point number does not tell which whole one is meant.
+                Some(x) => (x.fract() == 0.0 && x.abs() < 9e15).then(|| whole(x as i128)).flatten(),
+                None => Some(Value::Number(n)),
+            };
+            value.filter(|value| value.as_f64().is_some_and(|x| range.contains(x)))
+        }
+        (KeyKind::Choice(choices), Value::String(word)) => {
+            choices.iter().any(|choice| choice.word == word).then_some(Value::String(word))
+        }
+        (KeyKind::Boolean, value @ Value::Bool(_)) | (KeyKind::Text, value @ Value::String(_)) => Some(value),
+        _ => None,
+    }
+}
+
+/// What was found, as a message shows it.
+fn shown(value: &DeValue) -> String {
+    match value {
+        DeValue::Boolean(b) => b.to_string(),
+        DeValue::String(s) => format!("\"{s}\""),
+        DeValue::Integer(i) => i.to_string(),
+        DeValue::Float(f) => f.to_string(),
+        DeValue::Datetime(_) => "a date".to_owned(),
+        DeValue::Array(_) => "an array".to_owned(),
+        DeValue::Table(_) => "a table".to_owned(),
+    }
+}
+
+/// Its text: every key with its default; those that are not set unless somebody sets them stand in comments.
+pub const DEFAULT_FILE: &str = include_str!("../../../configs/default.toml");
+
+/// The name that `lanesweep config init` gives it.
+pub const DEFAULT_FILE_NAME: &str = "lanesweep.toml";
+
+/// All keys in the order of the file, which is the order in which they are read best.
+pub fn keys_in_order() -> Vec<Key> {
+    let names: Vec<String> = names(DEFAULT_FILE);
+    let mut keys = Key::all();
+    keys.sort_by_key(|key| names.iter().position(|name| *name == key.name).unwrap_or(usize::MAX));
+    keys
+}
+
+/// The keys that a text mentions, also in comments (`# threads = 8`).
+fn names(text: &str) -> Vec<String> {
+    let (mut table, mut names) = (String::new(), Vec::new());
+    for line in text.lines() {
+        let line = line.strip_prefix("# ").unwrap_or(line);
+        if let Some(name) = line.strip_prefix('[').and_then(|rest| rest.split(']').next()) {
+            table = name.to_owned();
+        } else if let Some((name, _)) = line.split_once(" = ")
+            && name.bytes().all(|b| b.is_ascii_lowercase() || b.is_ascii_digit() || b == b'_')
+        {
+            names.push(format!("{table}.{name}"));
+        }
+    }
+    names
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{KeyKind, Layers, Settings, file};
+    use super::*;
+    use crate::Place;
+    use crate::support::ranges::Range;
+
+    #[test]
+    fn the_file_that_ships_is_the_defaults_and_names_every_key_once() {
+        let keys = Key::all();
+        let lines = file::parse(DEFAULT_FILE, &Place::item("default"), &keys).unwrap();
+        for key in &keys {
+            let value = lines.iter().find(|line| line.key == key.name).map(|line| line.value.clone());
+            assert_eq!(value, key.default, "{}", key.name);
+        }
+        let mut found = names(DEFAULT_FILE);
+        found.sort();
+        let mut wanted: Vec<String> = keys.into_iter().map(|key| key.name).collect();
+        wanted.sort();
+        assert_eq!(found, wanted);
+        assert_eq!(Layers::defaults().settings().unwrap(), Settings::default());
+        assert_eq!(toml::from_str::<Settings>(DEFAULT_FILE).unwrap(), Settings::default());
+    }
+
+    #[test]
+    fn every_key_is_explained_and_no_two_have_the_same_variable() {
+        let keys = Key::all();
+        assert!(keys.iter().all(|key| key.description.len() > 8), "{keys:?}");
+        let mut variables: Vec<String> = keys.iter().map(|key| super::super::variable_of(&key.name)).collect();
+        variables.sort();
+        variables.dedup();
+        assert_eq!(variables.len(), keys.len());
+    }
+
+    #[test]
+    fn what_the_schema_lets_pass_at_its_bounds_the_types_take_too() {
+        for key in Key::all() {
+            let KeyKind::Number(Range { least, most, .. }) = key.kind else { continue };
+            let closed = [least, most].into_iter().flatten().filter(|(_, open)| !open);
+            for (bound, _) in closed {
+                let mut layers = Layers::defaults();
+                layers.assign(&format!("{}={bound}", key.name)).unwrap();
+                layers.settings().unwrap();
+            }
+            let beyond = [least.map(|(x, _)| x - 1.0), most.map(|(x, _)| x + 1.0)];
+            for bound in beyond.into_iter().flatten() {
+                let error = Layers::defaults().assign(&format!("{}={bound}", key.name)).unwrap_err();
+                assert!(error.to_string().contains("expected"), "{error}");
+            }
+        }
     }
 }

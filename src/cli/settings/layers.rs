@@ -7,10 +7,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value};
 
-use super::default_file::keys_in_order;
-use super::keys::{Key, KeyKind};
-use super::value::from_word;
-use super::{FILE_VARIABLE, Settings, environment, file};
+use super::keys::{Key, KeyKind, from_word, keys_in_order};
+use super::{FILE_VARIABLE, Settings, file};
 use crate::{Error, Place, Result};
 
 /// Where a value comes from; a later one wins.
@@ -136,7 +134,7 @@ impl Layers {
         let mut files: Vec<PathBuf> = named.collect();
         if files.is_empty() {
             let value = variables.iter().find(|(name, _)| name == FILE_VARIABLE).map(|(_, value)| value);
-            files.extend(environment::file(value.map(OsString::as_os_str)));
+            files.extend(file::config_file(value.map(OsString::as_os_str)));
         }
         for path in files {
             for line in file::read(&path, &layers.keys)? {
@@ -145,7 +143,7 @@ impl Layers {
             layers.files.push(path);
         }
         let keys = layers.keys.clone();
-        for (key, name, word) in environment::read(variables, &keys)? {
+        for (key, name, word) in file::read_variables(variables, &keys)? {
             layers.set_word(key, &word, Origin::Environment(name))?;
         }
         for one in typed {

@@ -16,7 +16,7 @@ use crate::engine::cpu::{LANES, ROWS};
 use crate::engine::frame::Simulation;
 use crate::engine::lane_step::{LaneConstants, LaneState, OtherState, advance};
 use crate::model::driver::DriverModel;
-use crate::model::flag::Flag;
+use crate::model::scalar::Flag;
 use crate::model::scalar::Real;
 
 /// Batches of a burst.

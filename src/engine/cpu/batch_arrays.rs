@@ -12,7 +12,7 @@ use crate::engine::lane_step::{LaneConstants, LaneState, OtherConstants, Record}
 use crate::engine::outcome::NO_STEP;
 use crate::model::criterion::{BrakeThreatMaximum, TtcMinimum};
 use crate::model::driver::{DriverModel, DriverState};
-use crate::model::flag::Flag;
+use crate::model::scalar::Flag;
 
 /// Marks a lane that never leaves its batch.
 pub(in crate::engine) const NEVER_LEAVES: u32 = Flag::LATEST_STEP;

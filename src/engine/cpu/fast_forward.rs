@@ -10,8 +10,7 @@
 
 use crate::model::criterion::{BrakeThreatMaximum, TtcMinimum};
 use crate::model::driver::{DriverModel, DriverState};
-use crate::model::flag::Flag;
-use crate::model::scalar::Real;
+use crate::model::scalar::{Flag, Real};
 
 use crate::engine::cpu::ROWS;
 use crate::engine::frame::Simulation;

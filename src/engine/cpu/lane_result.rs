@@ -1,8 +1,7 @@
 //! The result of a finished lane: an outcome, or only verdicts.
 
 use crate::model::criterion::{BtnContact, Contact, Criterion, contact};
-use crate::model::flag::Flag;
-use crate::model::scalar::Real;
+use crate::model::scalar::{Flag, Real};
 
 use crate::engine::frame::Simulation;
 use crate::engine::lane_step::{

@@ -5,7 +5,7 @@
 //! with a single vehicle, at half the cost.
 
 use crate::model::driver::DriverModel;
-use crate::model::flag::Flag;
+use crate::model::scalar::Flag;
 
 use crate::engine::cpu::ROWS;
 use crate::engine::cpu::batch_arrays::NEVER_LEAVES;

@@ -54,8 +54,8 @@ mod tests {
     use crate::engine::scene::Scene;
     use crate::model::criterion::{BrakeThreatMaximum, Criteria, TtcMinimum};
     use crate::model::driver::{DriverProfile, DriverState};
-    use crate::model::flag::Flag;
     use crate::model::profile::Profile;
+    use crate::model::scalar::Flag;
     use crate::scenario::Category;
     use crate::stats::random::{philox4x32_10, unit_uniform};
 

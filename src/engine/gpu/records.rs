@@ -10,7 +10,7 @@ use bytemuck::{Pod, Zeroable};
 use crate::engine::{EndReason, LaneCase, LaneOther, NO_STEP, Outcome, Start, Verdicts};
 use crate::model::criterion::{BrakeThreatMaximum, Contact, Criteria};
 use crate::model::driver::MODELS;
-use crate::model::flag::Flag;
+use crate::model::scalar::Flag;
 use crate::scenario::Motion;
 
 const _: () = assert!(size_of::<Motion<f32>>() == 64);

@@ -7,8 +7,8 @@ use super::{CaseRandom, Purpose};
 use crate::engine::{CaseSource, Constants, LaneCase, LaneOther, NO_STEP};
 use crate::model::criterion::{BrakeThreatMaximum, BtnForm};
 use crate::model::driver::{DriverModel, MODELS, View};
-use crate::model::flag::Flag;
 use crate::model::profile::Profile;
+use crate::model::scalar::Flag;
 use crate::scenario::{Category, Lateral, Motion, Tables};
 
 /// Neighbours of gap 0 for starts of 10 m, where 2⁻³² is too small: one ULP of 10 m.

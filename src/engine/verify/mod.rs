@@ -26,7 +26,7 @@ use crate::engine::{Backend, Chunk, CpuBackend, LanePlan, Outcome, Session, Want
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::scenario::Category;
-use crate::support::repeats::refuse_repeats;
+use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
 /// Refuses an empty list of categories and one that names a category twice: keys would stand for two lanes.

@@ -3,11 +3,8 @@
 //! Here live text and the quoting that keeps it safe. Nothing here starts a process or knows a lane: a shard, its
 //! part file and the merge belong to the verbs that the scripts call.
 
-mod shell;
 mod slurm;
 mod slurm_text;
-mod split_run;
 
-pub use shell::{directive_quoted, log_pattern, quoted_word, shell_quoted};
-pub use slurm::{Resources, Scripts, SlurmArray};
-pub use split_run::SplitRun;
+pub use slurm::{Resources, Scripts, SlurmArray, SplitRun};
+pub use slurm_text::{directive_quoted, log_pattern, quoted_word, shell_quoted};

@@ -4,16 +4,12 @@
 //! profile) and the comparison. Here lives no physics: every row becomes an ordinary case and an ordinary
 //! lane. Tables come from files; the comparison goes to the command line.
 
-mod functions;
 mod jrc;
 mod lanes;
-mod shipped;
 mod table;
 mod tally;
 
-pub use functions::compare_functions;
-pub use jrc::compare_jrc;
+pub use jrc::{check_shipped_tables, compare_functions, compare_jrc};
 pub use lanes::{LaneComparison, compare_lanes};
-pub use shipped::check_shipped_tables;
 pub use table::{Row, Table, TableKind};
 pub use tally::{Deviation, Tally};

@@ -8,36 +8,28 @@ mod concrete;
 mod distribution;
 mod distribution_file;
 mod elements;
-mod folder;
 mod lanes;
 mod parameters;
-mod path;
 mod road;
 mod sampled_file;
 mod samples;
 mod scenario_file;
 mod scenario_reader;
-mod sizes;
-mod variations;
 mod xml_at;
 mod xml_tree;
 
-pub use concrete::{Concrete, EgoMotion, PlayedVehicle};
+pub use concrete::{Concrete, EgoMotion, PlayedVehicle, Vertex, paths};
 pub use distribution::{Distribution, Draw, MAX_POISSON, Range};
 pub use distribution_file::{
     Deterministic, DistributionFile, Distributions, Stochastic, parse_distribution, read_distribution,
 };
-pub use folder::{IndexRow, export_folder};
-pub use lanes::{PlayOptions, concrete_case, concrete_lanes};
-pub use parameters::{Names, Rename};
-pub use path::{Vertex, paths};
+pub use lanes::{KnownSizes, PlayOptions, concrete_case, concrete_lanes, sizes_of_case};
+pub use parameters::{Names, Rename, variations};
 pub use road::{Road, road_file};
 pub use sampled_file::{SampledFile, reopen};
 pub use samples::{ATTEMPTS, DISTRIBUTION_PURPOSE, DistributionSamples, MAX_SAMPLES, Sampled, SampledParameter};
-pub use scenario_file::scenario_file;
+pub use scenario_file::{IndexRow, export_folder, scenario_file};
 pub use scenario_reader::read_scenario;
-pub use sizes::{KnownSizes, sizes_of_case};
-pub use variations::variations;
 
 /// Author of every file.
 pub(crate) const AUTHOR: &str = concat!("lanesweep ", env!("CARGO_PKG_VERSION"));

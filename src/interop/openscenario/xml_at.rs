@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::distribution::Range;
 use super::xml_tree::Node;
-use crate::support::near_name;
+use crate::support::plain_text;
 use crate::{Error, Place, Result};
 
 /// An element and where it is.
@@ -136,6 +136,6 @@ impl<'a> At<'a> {
 
 /// `; did you mean …?` where a name is near one of a list.
 fn nearest(name: &str, list: &[&str]) -> String {
-    near_name::nearest(name, list.iter().copied(), 0.8)
+    plain_text::nearest(name, list.iter().copied(), 0.8)
         .map_or(String::new(), |near| format!("; did you mean `{near}`?"))
 }

@@ -6,8 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::model::flag::Flag;
-use crate::model::scalar::Real;
+use crate::model::scalar::{Flag, Real};
 
 /// Form of the number.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

@@ -1,7 +1,6 @@
 //! Collision: the boxes overlap along and across the road. Side contacts count.
 
-use crate::model::flag::Flag;
-use crate::model::scalar::Real;
+use crate::model::scalar::{Flag, Real};
 
 /// How two vehicles touch.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -18,8 +18,7 @@ pub use ttc::{TimeToCollision, TtcMinimum};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::model::flag::Flag;
-use crate::model::scalar::Real;
+use crate::model::scalar::{Flag, Real};
 
 /// The registry of criteria, in the order of every table.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]

@@ -1,7 +1,6 @@
 //! Time to collision: gap over closing speed, 0 at contact.
 
-use crate::model::flag::Flag;
-use crate::model::scalar::Real;
+use crate::model::scalar::{Flag, Real};
 
 /// The threshold.
 #[derive(Debug, Clone, Copy, PartialEq)]

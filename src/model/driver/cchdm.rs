@@ -8,8 +8,7 @@ use super::{
     delay_steps, latched_braking,
 };
 use crate::model::case::Category;
-use crate::model::flag::Flag;
-use crate::model::scalar::Real;
+use crate::model::scalar::{Flag, Real};
 
 /// Constants of the model as a profile gives them.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -7,8 +7,7 @@ use super::{
     Bound, DriverModel, DriverProfile, DriverState, Hazard, View, delay_bound_s, delay_steps, latched_braking,
 };
 use crate::model::case::Category;
-use crate::model::flag::Flag;
-use crate::model::scalar::Real;
+use crate::model::scalar::{Flag, Real};
 
 /// Which acceleration the CFS step divides by when the ego would be slower than the other vehicle after τ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]

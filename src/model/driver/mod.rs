@@ -19,8 +19,7 @@ pub use attention::{
 };
 pub use profile::{Bound, DriverProfile, SHORT_STEP_S, delay_bound_s};
 
-use crate::model::flag::Flag;
-use crate::model::scalar::Real;
+use crate::model::scalar::{Flag, Real};
 
 /// Makes the modules, their public names and [`ModelId`] from the registry.
 macro_rules! declare_models {

@@ -1,7 +1,7 @@
 //! Axes of the figures: linear or logarithmic, with ticks at plain numbers.
 
 use super::svg::Position;
-use crate::support::round_step::{OneTwoFive, next, one_two_five, plain_step};
+use crate::support::readable::{OneTwoFive, next, one_two_five, plain_step};
 
 /// How an axis places its values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]

@@ -25,7 +25,7 @@ use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::grid::{Perturbation, Point, without_reaction};
 use crate::scenario::Category;
-use crate::support::repeats::refuse_repeats;
+use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
 /// The drivers of Annex 3: a collision is *preventable* where one of them avoids it.

@@ -28,7 +28,7 @@ pub use crate::scenario::{LATERAL_DISTANCE_M, PlainCase};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::scenario::{Case, Category, missing_parameter};
-use crate::support::repeats::refuse_repeats;
+use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
 /// Cells of a grid at most.

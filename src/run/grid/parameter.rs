@@ -2,7 +2,7 @@
 
 use crate::model::profile::Profile;
 use crate::scenario::{Category, LATERAL_DISTANCE_M, PlainCase, check_headway};
-use crate::support::near_name::nearest;
+use crate::support::plain_text::nearest;
 use crate::support::plausibility::{self, Doubts};
 use crate::{Error, Place, Result};
 

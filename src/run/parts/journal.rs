@@ -15,7 +15,7 @@ use sha2::{Digest, Sha256};
 use super::sealed::json_line;
 use crate::engine::ENGINE_VERSION;
 use crate::support::atomic_file::{is_named, refuse_link};
-use crate::support::hex::hex;
+use crate::support::plain_text::hex;
 use crate::{Error, Place, Result};
 
 /// Records are not written more often.

@@ -10,8 +10,8 @@ use serde_json::value::RawValue;
 use sha2::{Digest, Sha256};
 
 use crate::engine::ENGINE_VERSION;
-use crate::support::hex::hex;
 use crate::support::input_file::{ends, open, read};
+use crate::support::plain_text::hex;
 use crate::{Error, Place, Result};
 
 const VERSION: u64 = 2;

@@ -22,7 +22,7 @@ use crate::run::study::{Study, StudyOptions, plan_study};
 use crate::scenario::Scenario;
 use crate::stats::density::DensityModel;
 use crate::support::files::check_folder;
-use crate::support::repeats::refuse_repeats;
+use crate::support::ranges::refuse_repeats;
 use crate::support::run_dir::{ESTIMATE_RECORD, STUDY_RECORD};
 use crate::{Error, Place, Result};
 

@@ -7,7 +7,7 @@ use crate::model::profile::Profile;
 use crate::model::scalar::Real;
 use crate::scenario::parameterization::{Sizes, VehicleSize};
 use crate::scenario::{Case, Tables};
-use crate::support::repeats::refuse_repeats;
+use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
 /// A lane with every step.

@@ -10,9 +10,9 @@ use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::sampling::{limit_state, marks_of};
 use crate::run::study::{Study, WINDOW};
-use crate::support::hex::hex;
 use crate::support::input_file;
-use crate::support::repeats::refuse_repeats;
+use crate::support::plain_text::hex;
+use crate::support::ranges::refuse_repeats;
 use crate::support::table::text_of_cell;
 use crate::{Error, Place, Result};
 

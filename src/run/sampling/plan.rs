@@ -11,7 +11,7 @@ use crate::model::profile::Profile;
 use crate::scenario::Tables;
 use crate::stats::density::{DensityModel, Mixture};
 use crate::stats::random::SOBOL_POINTS;
-use crate::support::repeats::refuse_repeats;
+use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
 use super::generator::{SampleSource, generator_of, generator_of_points};

@@ -13,7 +13,7 @@ use crate::scenario::parameterization::{
 };
 use crate::scenario::{Category, Scenario};
 use crate::stats::density::ParameterSpace;
-use crate::support::round_step::plain_step;
+use crate::support::readable::plain_step;
 use crate::traffic::mining::{Collection, MiningOptions, RecordingSummary, count};
 
 /// One category's scenarios.

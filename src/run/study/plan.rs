@@ -9,7 +9,7 @@ use crate::scenario::parameterization::{
     ParameterizationOptions, Reduction, SvdFit, TimeGrid, steps_of, vehicle_ahead,
 };
 use crate::scenario::{Category, Scenario};
-use crate::support::repeats::refuse_repeats;
+use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
 /// What a study sweeps.

@@ -11,8 +11,8 @@ use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction, SvdBasis};
 use crate::scenario::{Category, Scenario, problem_of};
-use crate::support::hex::hex;
-use crate::support::repeats::repeated;
+use crate::support::plain_text::hex;
+use crate::support::ranges::repeated;
 use crate::{Error, Place, Result};
 
 /// Scenarios of a page.

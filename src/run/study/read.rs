@@ -11,7 +11,7 @@ use crate::engine::lane_case::LaneCase;
 use crate::engine::plan::{Block, CaseSource, LanePlan, Units};
 use crate::scenario::parameterization::Reduction;
 use crate::scenario::{Scenario, Tables};
-use crate::support::hex::hex;
+use crate::support::plain_text::hex;
 use crate::{Error, Place, Result};
 
 /// The source of a plan without cases.

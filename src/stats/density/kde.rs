@@ -3,8 +3,8 @@
 
 use super::bandwidth::{Bandwidth, BandwidthRule, LeaveOneOut};
 use super::mixture::Mixture;
+use super::moments::scale_of;
 use super::normal::Draws;
-use super::scaling::scale_of;
 use crate::stats::random::Stream;
 use crate::{Error, Place, Result};
 

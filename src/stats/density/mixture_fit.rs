@@ -4,7 +4,7 @@
 use nalgebra::DMatrix;
 
 use super::Mixture;
-use super::covariance::{factor_or_diagonal, moments};
+use super::moments::{factor_or_diagonal, moments};
 use super::normal::uniform;
 use crate::stats::random::Stream;
 use crate::{Error, Place, Result};

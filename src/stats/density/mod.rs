@@ -7,33 +7,30 @@
 
 mod bandwidth;
 mod constrained;
-pub(crate) mod covariance;
-mod exposure;
 mod json_rows;
 mod kde;
 mod mixture;
 mod mixture_fit;
 mod model;
 mod model_file;
+pub(crate) mod moments;
 pub(crate) mod normal;
 mod parameters;
 mod representativeness;
-mod scaling;
 mod transport;
 mod valid;
 
 pub use bandwidth::{Bandwidth, BandwidthRule, LeaveOneOut, SearchEnd, silverman};
 pub use constrained::ConstrainedKde;
-pub use exposure::{Exposure, Rate, garwood};
 pub use kde::Kde;
 pub use mixture::{MAX_DIMENSIONS, Mixture};
 pub use mixture_fit::FitOptions as MixtureFitOptions;
-pub use model::{DensityModel, FitOptions, Fitted, Provenance};
+pub use model::{DensityModel, Exposure, FitOptions, Fitted, Provenance, Rate, garwood};
 pub use model_file::{MAX_FILE_BYTES, read_density, write_density};
+pub use moments::{quantile, scale_of, standard_deviation};
 pub(crate) use normal::Draws;
 pub use normal::{normal_cdf, normal_quantile};
 pub use parameters::{BoundedColumn, Invalid, ParameterSpace};
 pub use representativeness::{BETA, MAX_SET, REPETITIONS, Representativeness, metric};
-pub use scaling::{quantile, scale_of, standard_deviation};
 pub use transport::wasserstein;
 pub use valid::{Refused, VALID_SHARE_DRAWS, VALID_SHARE_PURPOSE, ValidShare};

@@ -11,21 +11,19 @@ use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
 use super::bandwidth::Bandwidth;
-use super::exposure::Exposure;
 use super::json_rows::to_readable_json;
 use super::kde::Kde;
-use super::model::{DensityModel, Provenance};
+use super::model::{DensityModel, Exposure, Provenance};
 use super::parameters::ParameterSpace;
 use super::representativeness::Representativeness;
 use super::valid::ValidShare;
 use crate::scenario::parameterization::{
     Parameter, Parameterization, ParameterizationOptions, Reduction, Sizes, SvdBasis,
 };
-use crate::scenario::problem_of;
-use crate::scenario::{Category, Scenario};
+use crate::scenario::{Category, Scenario, problem_of};
 use crate::support::atomic_file::AtomicFile;
-use crate::support::hex::hex;
 use crate::support::input_file;
+use crate::support::plain_text::hex;
 use crate::{Error, Place, Result};
 
 /// The version that this program writes and reads.

@@ -23,7 +23,7 @@ use crate::scenario::parameterization::{
     ReducedScenario, ReducedSeries, Reduction, Sizes, Variable,
 };
 use crate::scenario::{Case, Category, Scenario};
-use crate::support::near_name::nearest;
+use crate::support::plain_text::nearest;
 use crate::{Error, Place, Result};
 
 /// Ordered parameters of one parameterization.

@@ -16,9 +16,9 @@ use serde::{Deserialize, Serialize};
 
 use super::bandwidth::BandwidthRule;
 use super::kde::Kde;
+use super::moments::{scale_of, standard_deviation};
 use super::normal::Draws;
 use super::parameters::ParameterSpace;
-use super::scaling::{scale_of, standard_deviation};
 use super::transport::wasserstein;
 use crate::scenario::Scenario;
 use crate::scenario::parameterization::Reduction;

@@ -6,14 +6,13 @@
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
 
-use super::draws::evaluated;
 use super::importance::{Importance, defended, importance, no_valid_point};
-use super::problem::{Density, LimitState, purpose};
+use super::problem::{Density, LimitState, evaluated, purpose};
 use super::stop::StopRule;
 use super::summary::Estimate;
 use super::trust::Warning;
 use crate::Result;
-use crate::stats::density::covariance::moments;
+use crate::stats::density::moments::moments;
 use crate::stats::density::{Mixture, MixtureFitOptions as FitOptions};
 use crate::stats::random::Stream;
 

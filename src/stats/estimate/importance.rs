@@ -10,14 +10,13 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::blocks::BlockSums;
-use super::draws::{batches, draw, evaluated};
 use super::interval::{Interval, log_normal};
-use super::problem::{Density, Draw, LimitState, evaluate_checked, purpose};
+use super::problem::{Density, Draw, LimitState, batches, draw, evaluate_checked, evaluated, purpose};
 use super::stop::{StopReason, StopRule};
 use super::summary::Estimate;
 use super::trust::Warning;
 use super::weights::{WeightSums, WeightedDraw};
-use crate::stats::density::covariance::moments;
+use crate::stats::density::moments::moments;
 use crate::stats::density::normal::uniform;
 use crate::stats::density::{Mixture, MixtureFitOptions as FitOptions};
 use crate::stats::random::Stream;

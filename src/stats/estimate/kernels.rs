@@ -3,9 +3,8 @@
 
 use rayon::prelude::*;
 
-use super::draws::evaluated;
 use super::interval::log_normal;
-use super::problem::{Density, LimitState, purpose};
+use super::problem::{Density, LimitState, evaluated, purpose};
 use super::summary::Estimate;
 use super::trust::Warning;
 use crate::Result;

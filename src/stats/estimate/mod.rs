@@ -7,9 +7,7 @@
 
 mod balance;
 mod blocks;
-mod clusters;
 mod cross_entropy;
-mod draws;
 mod importance;
 mod interval;
 mod kernels;
@@ -24,7 +22,6 @@ mod weights;
 
 pub use balance::{Technique, balance_heuristic};
 pub use blocks::{BLOCK, BlockSums, Join};
-pub use clusters::from_clusters;
 pub use cross_entropy::{CrossEntropy, CrossEntropyRun, CrossEntropyStep, cross_entropy};
 pub use importance::{
     Defended, FitProposal, Importance, Pilot, PilotCheck, defended, from_pilot, from_weight_sums, importance,
@@ -32,7 +29,7 @@ pub use importance::{
 };
 pub use interval::{Interval, IntervalKind, clopper_pearson, log_normal, rule_of_three, wilson};
 pub use kernels::{KernelShares, kernel_shares};
-pub use monte_carlo::{BinomialInterval, Counts, from_counts};
+pub use monte_carlo::{BinomialInterval, Counts, from_clusters, from_counts};
 pub use problem::{ATTEMPTS, Density, Draw, LimitState, StandardNormal, Truncated};
 pub use ratio::{ClusterRate, Clusters, Enough, Ratio, RatioMethod, RatioVerdict, cluster_rate, paired_ratio};
 pub use stop::{Checkpoints, StopReason, StopRule};

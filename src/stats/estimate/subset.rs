@@ -9,15 +9,14 @@ use nalgebra::{DMatrix, DVector, DVectorView};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::draws::evaluated;
 use super::importance::no_valid_point;
 use super::interval::{Interval, log_normal};
-use super::problem::{Density, LimitState, evaluate_checked, normals, purpose};
+use super::problem::{Density, LimitState, evaluate_checked, evaluated, normals, purpose};
 use super::stop::StopReason;
 use super::summary::Estimate;
 use super::trust::Warning;
 use crate::Result;
-use crate::stats::density::covariance::{factor_or_diagonal, moments};
+use crate::stats::density::moments::{factor_or_diagonal, moments};
 use crate::stats::density::normal::uniform;
 use crate::stats::random::Stream;
 

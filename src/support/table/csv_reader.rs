@@ -9,7 +9,7 @@ use std::rc::Rc;
 use serde_json::Value;
 
 use super::Row;
-use super::spreadsheet::text_of_cell;
+use super::writer::text_of_cell;
 use crate::support::input_file;
 use crate::{Error, Place, Result};
 

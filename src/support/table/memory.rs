@@ -7,7 +7,7 @@ use serde::ser::{SerializeStruct, Serializer};
 use serde_json::{Map, Value};
 
 use super::writer::append_csv;
-use super::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter, csv_field, jsonl};
+use super::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter, csv_field, writer};
 use crate::Result;
 use crate::support::readable;
 
@@ -54,7 +54,7 @@ impl Table {
     pub fn records(&self) -> Value {
         let record = |row: &Vec<Cell>| {
             let fields = self.columns.iter().zip(row).filter(|(column, _)| column.name != "data");
-            let fields = fields.map(|(column, cell)| (column.name.to_string(), jsonl::value(column.kind, cell)));
+            let fields = fields.map(|(column, cell)| (column.name.to_string(), writer::json_value(column.kind, cell)));
             Value::Object(fields.collect::<Map<_, _>>())
         };
         Value::Array(self.rows.iter().map(record).collect())

@@ -8,8 +8,6 @@
 
 mod column;
 mod csv_reader;
-mod format;
-mod jsonl;
 mod memory;
 mod names;
 #[cfg(feature = "parquet")]
@@ -19,24 +17,113 @@ mod parquet_reader;
 #[cfg(feature = "parquet")]
 mod parquet_writer;
 mod reader;
-mod spreadsheet;
 mod text;
 mod writer;
 
 pub(crate) use column::Row;
 pub use column::{Cell, Column, ColumnKind, Digits, TableMetadata};
-pub use format::TableFormat;
 pub use memory::{CellValue, NumberText, Table, TableOf};
 pub(crate) use names::{Named, Resolved, nearest, resolve};
 #[cfg(feature = "parquet")]
 pub use parquet_reader::is_panic_caught;
 pub(crate) use reader::TableReader;
-pub(crate) use spreadsheet::{csv_field, text_of_cell};
 pub(crate) use text::WIDTH;
 pub use writer::TableWriter;
+pub(crate) use writer::{csv_field, text_of_cell};
+
+use std::path::Path;
+
+use crate::{Error, Place, Result};
 
 /// No reader here panics without Parquet; see the function of this name with it.
 #[cfg(not(feature = "parquet"))]
 pub fn is_panic_caught() -> bool {
     false
+}
+
+/// A format of tables.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TableFormat {
+    /// Comma-separated values with a header: `.csv`.
+    Csv,
+    /// One JSON object a line: `.jsonl`, also `.json` and `.ndjson`.
+    JsonLines,
+    /// Apache Parquet: `.parquet`.
+    Parquet,
+}
+
+impl TableFormat {
+    /// All, for tables of lanes and samples; CSV is what names without an ending have.
+    pub const EVERY: [TableFormat; 3] = [TableFormat::Csv, TableFormat::JsonLines, TableFormat::Parquet];
+
+    /// Endings of names, the customary one first.
+    fn endings(self) -> &'static [&'static str] {
+        match self {
+            TableFormat::Csv => &["csv"],
+            TableFormat::JsonLines => &["jsonl", "json", "ndjson"],
+            TableFormat::Parquet => &["parquet"],
+        }
+    }
+
+    /// The format of a file among those that can be used there. A name without an ending has the first of them; another
+    /// ending is refused, so that no table hides under the name of another format.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] that names `what` (a flag), the file and the known endings; or says that the program was built
+    /// without Parquet.
+    pub fn of(path: &Path, usable: &[TableFormat], what: &str) -> Result<TableFormat> {
+        let Some(ending) = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase()) else {
+            return Ok(usable.first().copied().unwrap_or(TableFormat::Csv));
+        };
+        let place = || Place::item(format!("{what} {}", path.display()));
+        match usable.iter().find(|format| format.endings().contains(&ending.as_str())) {
+            #[cfg(not(feature = "parquet"))]
+            Some(TableFormat::Parquet) => Err(Error::usage(
+                place(),
+                "this program was built without Parquet",
+                "use another format, or build it with the feature `parquet`",
+            )),
+            Some(format) => Ok(*format),
+            None => {
+                let known: Vec<String> = usable.iter().map(|format| format!(".{}", format.endings()[0])).collect();
+                Err(Error::usage(
+                    place(),
+                    format!("`.{ending}` is no format of tables here"),
+                    format!("use a name that ends in {}", or_list(&known)),
+                ))
+            }
+        }
+    }
+}
+
+fn or_list(words: &[String]) -> String {
+    match words {
+        [first @ .., last] if !first.is_empty() => format!("{} or {last}", first.join(", ")),
+        _ => words.concat(),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_ending_decides_and_an_unknown_one_is_answered_with_the_known_ones() {
+        let all = [TableFormat::Csv, TableFormat::JsonLines, TableFormat::Parquet];
+        let of = |name: &str| TableFormat::of(Path::new(name), &all, "--lanes");
+        assert_eq!(of("a/lanes.CSV").unwrap(), TableFormat::Csv);
+        assert_eq!(of("lanes.ndjson").unwrap(), TableFormat::JsonLines);
+        assert_eq!(of("lanes").unwrap(), TableFormat::Csv);
+        let error = of("lanes.xlsx").unwrap_err();
+        assert!(error.to_string().contains("--lanes lanes.xlsx: `.xlsx`"), "{error}");
+        assert_eq!(error.help().unwrap(), "use a name that ends in .csv, .jsonl or .parquet");
+        assert!(TableFormat::of(Path::new("s.csv"), &all[1..], "--output").is_err());
+    }
+
+    #[cfg(not(feature = "parquet"))]
+    #[test]
+    fn without_the_feature_parquet_is_refused_by_name() {
+        let error = TableFormat::of(Path::new("s.parquet"), &[TableFormat::Parquet], "--lanes").unwrap_err();
+        assert!(error.to_string().contains("built without Parquet"), "{error}");
+    }
 }

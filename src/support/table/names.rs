@@ -1,6 +1,6 @@
 //! Which field a column of a user's table is: by its name, with or without its unit at the end.
 
-use crate::support::near_name;
+use crate::support::plain_text;
 
 /// A field that a table can have.
 #[derive(Debug, Clone)]
@@ -78,7 +78,7 @@ pub(crate) fn resolve(column: &str, fields: &[Named]) -> Resolved {
 
 /// The name that is most like one that is not known, if one is.
 pub(crate) fn nearest<'a>(column: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
-    near_name::nearest(column, names, 0.8)
+    plain_text::nearest(column, names, 0.8)
 }
 
 #[cfg(test)]

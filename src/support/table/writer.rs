@@ -1,12 +1,19 @@
 //! Writing a table row by row to a file that is there whole or not at all.
+//!
+//! **CSV.** A spreadsheet takes a field that begins with `=`, `+`, `-` or `@` for a formula, and an id
+//! may come from anybody: such a text gets an apostrophe in front, which our readers take away again. Numbers stay.
+//!
+//! **JSON Lines.** JSON has neither NaN nor infinity: both become null.
 
+use std::borrow::Cow;
 use std::fmt::Write as _;
 use std::path::Path;
 
+use serde_json::Value;
+
 #[cfg(feature = "parquet")]
 use super::parquet_writer::ParquetFile;
-use super::spreadsheet::csv_field;
-use super::{Cell, Column, ColumnKind, TableFormat, TableMetadata, jsonl};
+use super::{Cell, Column, ColumnKind, TableFormat, TableMetadata};
 use crate::support::atomic_file::{AtomicFile, StagedFile};
 use crate::{Error, Result};
 
@@ -73,7 +80,7 @@ impl TableWriter {
             }
             Out::JsonLines(file, text) => {
                 text.clear();
-                jsonl::append(text, &self.columns, row);
+                append_json(text, &self.columns, row);
                 file.append(text.as_bytes())
             }
             #[cfg(feature = "parquet")]
@@ -139,4 +146,82 @@ pub(super) fn append_csv(text: &mut String, columns: &[Column], row: &[Cell]) {
 
 fn joined<T: ToString>(values: &[T]) -> String {
     values.iter().map(T::to_string).collect::<Vec<_>>().join(" ")
+}
+
+/// What makes a formula of a field, directly or (tab, carriage return) once the blank before it is skipped.
+const BEGINS_FORMULA: [char; 6] = ['=', '+', '-', '@', '\t', '\r'];
+
+/// Does a text begin as a formula does, after apostrophes that are there already?
+fn begins_formula(text: &str) -> bool {
+    text.trim_start_matches('\'').starts_with(BEGINS_FORMULA)
+}
+
+/// The text as a spreadsheet shows it and computes nothing: `=1+1` is `'=1+1`. What is a number stays.
+pub(crate) fn cell_text(text: &str) -> Cow<'_, str> {
+    match begins_formula(text) && text.parse::<f64>().is_err() {
+        true => Cow::Owned(format!("'{text}")),
+        false => Cow::Borrowed(text),
+    }
+}
+
+/// The text that [`cell_text`] made a field of.
+pub(crate) fn text_of_cell(field: &str) -> &str {
+    field.strip_prefix('\'').filter(|text| begins_formula(text)).unwrap_or(field)
+}
+
+/// A text as a field of CSV, in quotes where it needs them.
+pub(crate) fn csv_field(text: &str) -> String {
+    let field = cell_text(text);
+    match field.contains([',', '"', '\n', '\r']) {
+        true => format!("\"{}\"", field.replace('"', "\"\"")),
+        false => field.into_owned(),
+    }
+}
+
+/// Appends a row to a text; fields are in the order of the columns.
+fn append_json(line: &mut String, columns: &[Column], row: &[Cell]) {
+    let separator = |at: usize| if at == 0 { '{' } else { ',' };
+    for (at, (column, cell)) in columns.iter().zip(row).enumerate() {
+        line.push(separator(at));
+        line.push_str(&Value::from(column.name.as_ref()).to_string());
+        line.push(':');
+        line.push_str(&json_value(column.kind, cell).to_string());
+    }
+    line.push_str("}\n");
+}
+
+/// A cell as JSON.
+pub(super) fn json_value(kind: ColumnKind, cell: &Cell) -> Value {
+    match cell {
+        Cell::Null => Value::Null,
+        Cell::Text(text) => Value::from(text.as_ref()),
+        Cell::Flag(flag) => Value::from(*flag),
+        Cell::Whole(number) => Value::from(*number),
+        // The shortest text that reads back to the same binary32.
+        Cell::Number(number) | Cell::Decimal(number) if kind == ColumnKind::Binary32 => {
+            (*number as f32).to_string().parse::<f64>().map_or(Value::Null, Value::from)
+        }
+        Cell::Number(number) | Cell::Decimal(number) => Value::from(*number),
+        Cell::Series(series) => Value::from(series.to_vec()),
+        Cell::Wholes(numbers) => Value::from(numbers.to_vec()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn no_text_begins_a_formula_and_each_reads_back_the_same() {
+        for text in ["=1+1", "+a", "-b", "@SUM(A1)", "\t=1", "\r=1", "'=1", "''-x", "-2+3+cmd|' /C calc'!A0"] {
+            let field = cell_text(text);
+            assert!(field.starts_with('\''), "{field}");
+            assert_eq!(text_of_cell(&field), text);
+        }
+        for text in ["", "a", "1", "-1.5", "+2e3", "-inf", "it's", "'a", "01_cut_in_24_22_1/2/1.2s/RSS"] {
+            assert_eq!(cell_text(text), text);
+            assert_eq!(text_of_cell(text), text);
+        }
+        assert_eq!(csv_field("=a,b"), "\"'=a,b\"");
+    }
 }

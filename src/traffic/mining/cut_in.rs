@@ -8,12 +8,10 @@
 //! t = 0 is the first sample of item 1 inside the data set; the end is the first of: end of the lane
 //! change, target no longer leader, ego no longer keeps its lane, end of the data.
 
-use super::data_set::DataSet;
-use super::found::FoundScenario;
+use super::data_set::{DataSet, FoundScenario};
 use super::lateral::LaneChangeKind;
 use super::options::{CutInOptions, TOLERANCE};
-use super::search::{Item, Match};
-use super::tags::Tags;
+use super::tags::{Item, Match, Tags};
 use crate::scenario::{Category, Scenario, Side};
 use crate::traffic::trajectory::Track;
 

@@ -10,12 +10,10 @@
 //! in that lane and in range until the end, and is slower than the ego at t = 0.
 
 use super::cut_in::{describe, end_cause, lane_change_of};
-use super::data_set::DataSet;
-use super::found::{FoundScenario, micrometres};
+use super::data_set::{DataSet, FoundScenario, micrometres};
 use super::lateral::LaneChangeKind;
 use super::options::{CutOutOptions, TOLERANCE};
-use super::search::{Item, Match};
-use super::tags::Tags;
+use super::tags::{Item, Match, Tags};
 use crate::scenario::{Category, Scenario, Side};
 use crate::traffic::trajectory::Track;
 

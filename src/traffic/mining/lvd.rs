@@ -4,11 +4,9 @@
 //! The interval of the tags is trimmed to the first maximum and the first minimum of the leader's speed, so that it
 //! contains exactly the loss of speed.
 
-use super::data_set::DataSet;
-use super::found::FoundScenario;
+use super::data_set::{DataSet, FoundScenario};
 use super::options::{LvdOptions, TOLERANCE};
-use super::search::{Item, Match};
-use super::tags::Tags;
+use super::tags::{Item, Match, Tags};
 use crate::scenario::{Category, Scenario, Side};
 
 /// The items, in order.

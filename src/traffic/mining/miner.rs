@@ -2,9 +2,8 @@
 
 use super::data_set::{DataSet, RecordingTags, Stretch};
 use super::options::{MiningOptions, TOLERANCE, samples};
-use super::search::{self, Item, Match};
-use super::tags::Tags;
-use super::{cut_in, cut_out, lvd};
+use super::tags::{Item, Match, Tags};
+use super::{cut_in, cut_out, lvd, tags};
 use crate::scenario::Scenario;
 use crate::traffic::trajectory::Recording;
 
@@ -82,7 +81,7 @@ fn each_match(
 ) {
     let mut from: usize = 0; // the ego's sample
     for stretch in stretches {
-        while let Some(matched) = search::find(&stretch.tags, items, from.saturating_sub(stretch.first)) {
+        while let Some(matched) = tags::find_match(&stretch.tags, items, from.saturating_sub(stretch.first)) {
             from = stretch.first + matched.last_item().end;
             if !discarded(&matched) {
                 from = from.max(stretch.first + matched.end + pause);

@@ -1,7 +1,7 @@
 //! Mining: recordings in, scenarios out, by tags (Gelder et al. 2020, arXiv 2006.00483).
 //!
 //! This room has the detectors of activities ([`longitudinal`], [`lateral`]), the tags of an ego and a target
-//! ([`tags`]), and the search for sequences of items ([`search`]). Each category has a file with its items, its
+//! with the search for sequences of items ([`tags`]). Each category has a file with its items, its
 //! trimming and the filters of the paper ([`cut_in`], [`cut_out`], [`lvd`]). [`MiningOptions`] has every threshold;
 //! [`mine`] runs over a recording. Mining depends neither on file formats nor on the use of scenarios. Data comes
 //! from [`crate::traffic::trajectory`] and goes, as [`Scenario`](crate::scenario::Scenario)s, to
@@ -18,14 +18,11 @@ mod collection;
 pub mod cut_in;
 pub mod cut_out;
 mod data_set;
-mod found;
-mod frame_index;
 pub mod lateral;
 pub mod longitudinal;
 pub mod lvd;
 mod miner;
 mod options;
-pub mod search;
 pub mod tags;
 
 pub use collection::{Collection, RecordingSummary, count, counts_text, mine_folder, mine_generated};

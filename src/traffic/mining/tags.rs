@@ -1,4 +1,9 @@
-//! The tags of an ego and a target per sample, on which items are tests.
+//! The tags of an ego and a target per sample, and the search for a sequence of items in them (*scenario = sequence of
+//! items*).
+//!
+//! An item is a test on the tags of all actors at one sample; it holds over a whole interval; item i + 1 begins
+//! exactly when item i ends. Intervals are half open: from the first sample with the item to the first without, or to
+//! the last sample.
 
 use super::lateral::{LaneChange, lane_change_at, lane_changes};
 use super::longitudinal::{Longitudinal, LongitudinalEvent, longitudinal_events};
@@ -85,5 +90,107 @@ impl Activities {
     pub fn longitudinal_at(&self, k: usize) -> Option<Longitudinal> {
         let after = self.longitudinal.partition_point(|e| e.start <= k);
         Some(self.longitudinal.get(after.checked_sub(1)?)?.activity)
+    }
+}
+
+/// A test on the tags of one sample.
+pub type Item<'a, T> = &'a dyn Fn(&T) -> bool;
+
+/// The samples of a match.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Match {
+    /// First sample of each item.
+    pub starts: Vec<usize>,
+    /// First sample after the last item, or the last sample of the tags if the item still holds there.
+    pub end: usize,
+    /// The last item holds to the end of the tags, so `end` is one sample with the item.
+    pub clamped: bool,
+}
+
+impl Match {
+    /// First sample.
+    pub fn start(&self) -> usize {
+        self.starts[0]
+    }
+
+    /// Samples from start to end.
+    pub fn len(&self) -> usize {
+        self.end - self.start()
+    }
+
+    /// True if it starts and ends at the same sample.
+    pub fn is_empty(&self) -> bool {
+        self.len() == 0
+    }
+
+    /// The samples at which the last item holds.
+    pub fn last_item(&self) -> std::ops::Range<usize> {
+        let from = self.starts[self.starts.len() - 1];
+        from..if self.clamped { self.end + 1 } else { self.end }
+    }
+}
+
+/// First sequence that begins at `from` or later. The search ignores tags before `from`: an item that already holds
+/// at `from` begins there.
+pub fn find_match<T>(tags: &[T], items: &[Item<T>], from: usize) -> Option<Match> {
+    let mut k = from;
+    let first = items.first()?;
+    while k < tags.len() {
+        if !first(&tags[k]) {
+            k += 1;
+            continue;
+        }
+        let mut starts = Vec::with_capacity(items.len());
+        let mut at = k;
+        for item in items {
+            let end = run_end(tags, *item, at);
+            if end == at {
+                break;
+            }
+            starts.push(at);
+            at = end;
+        }
+        if starts.len() == items.len() {
+            let clamped = at == tags.len();
+            return Some(Match { starts, end: at.min(tags.len() - 1), clamped });
+        }
+        k = run_end(tags, *first, k);
+    }
+    None
+}
+
+/// First sample from `k` on without the item.
+fn run_end<T>(tags: &[T], item: Item<T>, k: usize) -> usize {
+    tags[k..].iter().position(|t| !item(t)).map_or(tags.len(), |n| k + n)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Items `a` then `b` in a word.
+    fn ab(word: &str, from: usize) -> Option<Match> {
+        let letters: Vec<char> = word.chars().collect();
+        find_match(&letters, &[&|&c| c == 'a', &|&c| c == 'b'], from)
+    }
+
+    #[test]
+    fn an_item_begins_exactly_when_the_one_before_ends() {
+        assert_eq!(ab("..aabbb.", 0), Some(Match { starts: vec![2, 4], end: 7, clamped: false }));
+        assert_eq!(ab("..aa.bbb.", 0), None);
+        assert_eq!(ab("..bbaa.aab.", 0), Some(Match { starts: vec![7, 9], end: 10, clamped: false }));
+    }
+
+    #[test]
+    fn an_item_that_already_holds_begins_where_the_search_begins() {
+        assert_eq!(ab("aaab.", 2).map(|m| m.starts), Some(vec![2, 3]));
+        assert_eq!(ab("aaab.ab.", 3).map(|m| m.starts), Some(vec![5, 6]));
+        assert_eq!(ab("aaab.", 9), None);
+    }
+
+    #[test]
+    fn a_match_that_lasts_to_the_end_ends_at_the_last_sample() {
+        let found = ab(".aabb", 0).unwrap();
+        assert_eq!((found.end, found.clamped, found.last_item(), found.len()), (4, true, 3..5, 3));
     }
 }

@@ -4,10 +4,8 @@
 //! format, the ego-centric view and the generator of synthetic recordings. Here lives nothing about
 //! scenarios. Data comes from files or from the generator and goes to [`crate::traffic::mining`].
 
-mod ego;
 pub mod generator;
 pub mod highd;
 mod recording;
 
-pub use ego::{EgoViewOptions, LIMIT_TOLERANCE_M};
-pub use recording::{Carriageway, Lane, NO_LANE, Recording, Track, VehicleClass};
+pub use recording::{Carriageway, EgoViewOptions, LIMIT_TOLERANCE_M, Lane, NO_LANE, Recording, Track, VehicleClass};

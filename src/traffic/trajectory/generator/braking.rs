@@ -1,7 +1,7 @@
 //! Scheduled braking of a leader without a cause in the traffic: one or two phases, each with a rise, a hold and a
 //! release.
 
-use super::behaviour::Behaviour;
+use super::options::Behaviour;
 use super::random::TrafficRandom;
 
 /// Minimum peak of a scheduled braking, m/s². Weaker braking occurs in the traffic anyway, so the rate factor does

@@ -1,7 +1,7 @@
 //! The decision to change lanes: a motive (a rate per second) times the acceptance of the gaps.
 
-use super::behaviour::Behaviour;
 use super::idm::DriverParameters;
+use super::options::Behaviour;
 use super::random::TrafficRandom;
 
 /// The motive to change to a faster lane increases up to this gain in speed, m/s.

@@ -1,6 +1,6 @@
 //! Lateral motion: the lane change as a quintic, and the wander within a lane.
 
-use super::behaviour::Behaviour;
+use super::options::Behaviour;
 use super::random::TrafficRandom;
 use crate::traffic::trajectory::VehicleClass;
 

@@ -2,11 +2,11 @@
 //! arrive upstream, follow, change lanes, brake and leave downstream. All decisions and accelerations of
 //! a step read the state at its start; then every vehicle moves.
 
-use super::behaviour::Behaviour;
-use super::hazards::{DECISION_S, Hazards, SETTLE_S};
+use super::events::{DECISION_S, Hazards, SETTLE_S};
 use super::idm::{HARDEST_BRAKING_MPS2, LeaderView, following_acceleration, free_acceleration};
 use super::inflow::{Inflow, LaneDemand};
 use super::lane_change::{LaneView, Neighbour};
+use super::options::Behaviour;
 use super::random::{Purpose, TrafficRandom};
 use super::vehicle::{Samples, Vehicle};
 use crate::traffic::trajectory::VehicleClass;

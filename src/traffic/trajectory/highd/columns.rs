@@ -4,7 +4,7 @@
 //! Accepted, because they change no value: Windows line ends, a byte order mark, blank lines, quotes, blanks around a
 //! field, columns in another order, additional columns.
 
-use crate::support::hex::hex;
+use crate::support::plain_text::hex;
 use std::fs::File;
 use std::io::{self, Read};
 use std::path::{Path, PathBuf};
@@ -14,7 +14,7 @@ use sha2::{Digest, Sha256};
 
 use super::number;
 use crate::support::input_file;
-use crate::support::near_name::nearest;
+use crate::support::plain_text::nearest;
 use crate::{Error, Place, Result};
 
 /// Identity of a file's content in the run record.

@@ -13,14 +13,13 @@ mod inventory;
 mod meta;
 mod neighbours;
 mod number;
-mod precision;
 mod read;
 mod writable;
 mod write;
 
 pub use columns::FileChecksum;
 pub use inventory::{HighdFiles, Inventory, SYNTHETIC_MARKER, inventory, made_up};
-pub use precision::Precision;
+pub use number::Precision;
 pub use read::{Loaded, read, read_judged};
 pub use writable::quantize;
 pub(crate) use write::stage;

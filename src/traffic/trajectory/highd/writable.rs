@@ -2,8 +2,7 @@
 
 use super::format::{FRAME_LIMIT, FRAME_RATES_HZ, LANE_LINES_LIMIT};
 use super::frame::{Direction, LaneNumbers};
-use super::number::REAL_LIMIT;
-use super::precision::Precision;
+use super::number::{Precision, REAL_LIMIT};
 use crate::traffic::trajectory::{NO_LANE, Recording, Track};
 use crate::{Error, Place, Result};
 

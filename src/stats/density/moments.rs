@@ -1,6 +1,40 @@
-//! Scale of each parameter before an isotropic kernel: min(σ, IQR/1.349), the robust estimate of a standard
+//! Mean, covariance and triangular factor of weighted points.
+//!
+//! Also the scale of each parameter before an isotropic kernel: min(σ, IQR/1.349), the robust estimate of a standard
 //! deviation (Silverman 1986). σ with ddof 0; quantiles interpolate linearly between order statistics, the
 //! first at probability 0 and the last at 1 (R's type 7, NumPy's default).
+
+use nalgebra::{Cholesky, DMatrix, DVector, DVectorView};
+
+/// Mean and covariance (d × d) of weighted points; the weights need not sum to 1. A covariance of the population: divided
+/// by the sum of the weights.
+pub(crate) fn moments<'a>(
+    points: impl Iterator<Item = (&'a [f64], f64)> + Clone,
+    d: usize,
+) -> (DVector<f64>, DMatrix<f64>) {
+    let total: f64 = points.clone().map(|(_, weight)| weight).sum();
+    let mut mean = DVector::zeros(d);
+    for (point, weight) in points.clone() {
+        mean.axpy(weight, &DVectorView::from_slice(point, d), 1.0);
+    }
+    mean /= total;
+    let mut covariance = DMatrix::zeros(d, d);
+    for (point, weight) in points {
+        let from_mean = DVectorView::from_slice(point, d) - &mean;
+        covariance.ger(weight, &from_mean, &from_mean, 1.0);
+    }
+    covariance /= total;
+    // Rounding depends on the order of a product's factors.
+    covariance.fill_lower_triangle_with_upper_triangle();
+    (mean, covariance)
+}
+
+/// L, lower triangular, with L Lᵀ = `covariance`; the root of its diagonal where it is not positive definite in this
+/// arithmetic.
+pub(crate) fn factor_or_diagonal(covariance: DMatrix<f64>) -> DMatrix<f64> {
+    let diagonal = covariance.diagonal();
+    Cholesky::new(covariance).map_or_else(|| DMatrix::from_diagonal(&diagonal.map(f64::sqrt)), Cholesky::unpack)
+}
 
 /// Interquartile range of the standard normal distribution, as the published program rounds it.
 const NORMAL_IQR: f64 = 1.349;
