@@ -41,7 +41,7 @@ pub const MAX_PANELS: usize = 1000;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CaseStyle {
-    /// As `simulate` makes it: see [`PlainCase`](crate::scenario::PlainCase).
+    /// As `simulate` makes it: see [`PlainCase`].
     Plain,
     /// As the JRC's simulator makes it.
     Jrc,

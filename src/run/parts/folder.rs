@@ -6,9 +6,9 @@ use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
 
+use super::Shard;
 use super::ledger::{Fits, MergeableCounts};
 use super::sealed::{read_sealed, seal};
-use super::shard::Shard;
 use crate::support::files::write_inside;
 use crate::{Error, Place, Result};
 

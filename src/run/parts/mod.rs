@@ -9,11 +9,144 @@ mod journal;
 mod ledger;
 mod run_dir;
 mod sealed;
-mod shard;
 
 pub use folder::{Found, Part, collect, read_part, read_parts, write_part};
 pub use journal::{Journal, Records};
 pub use ledger::{Counted, CountsJournal, Fits, Ledger, MergeableCounts};
 pub use run_dir::{PLAN_FILE, RUN_PLAN_FILE, RunDir, RunState, leave_plan, units_of};
 pub use sealed::{kind_of, read_sealed, read_sealed_line, seal, unseal};
-pub use shard::Shard;
+
+use std::ops::Range;
+use std::str::FromStr;
+
+/// Shard `index` of `of`, from 0. Shards of one plan cover its units exactly once and differ by one unit at most.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Shard {
+    /// From 0, below [`Shard::of`].
+    pub index: u64,
+    /// Number of shards, 1 to [`Shard::MAX_SHARDS`].
+    pub of: u64,
+}
+
+/// Environment of a Kubernetes Indexed Job.
+const KUBERNETES: &str = "JOB_COMPLETION_INDEX";
+/// Environment of a Slurm job array: index of the task, smallest index of the array.
+const SLURM: [&str; 2] = ["SLURM_ARRAY_TASK_ID", "SLURM_ARRAY_TASK_MIN"];
+
+impl Shard {
+    /// More parts than any cluster runs at once.
+    pub const MAX_SHARDS: u64 = 100_000;
+
+    /// The units that this shard computes, of so many.
+    pub fn units(&self, count: u64) -> Range<u64> {
+        // 128 bits: index × count may not fit in 64.
+        let cut = |index: u64| (u128::from(count) * u128::from(index) / u128::from(self.of)) as u64;
+        cut(self.index)..cut(self.index + 1)
+    }
+
+    /// Name of its files without the ending: `part-00003-of-00020`.
+    pub fn stem(&self) -> String {
+        format!("part-{:05}-of-{:05}", self.index, self.of)
+    }
+
+    /// The shard that a file name begins with.
+    pub fn of_stem(stem: &str) -> Option<Shard> {
+        let (index, of) = stem.strip_prefix("part-")?.split_once("-of-")?;
+        let shard = Shard { index: index.parse().ok()?, of: of.parse().ok()? };
+        (shard.stem() == stem).then_some(shard)
+    }
+
+    /// `i/n`, or `auto/n` with the index that Kubernetes or Slurm gives in `environment`.
+    ///
+    /// # Errors
+    /// What is wrong and what to write, in a sentence.
+    pub fn parse(text: &str, environment: impl Fn(&str) -> Option<String>) -> Result<Shard, String> {
+        let form = "write i/n with i from 0 to n - 1, such as 0/20, or auto/n in a Slurm array or an Indexed Job";
+        let (index, of) = text.split_once('/').ok_or(form)?;
+        let number = |text: &str| text.trim().parse::<u64>().map_err(|_| form.to_owned());
+        let of = number(of)?;
+        let index = if index.trim() == "auto" { from_environment(environment)? } else { number(index)? };
+        if of == 0 || of > Self::MAX_SHARDS {
+            return Err(format!("there can be 1 to {} shards", Self::MAX_SHARDS));
+        }
+        if index >= of {
+            return Err(format!("there is no shard {index} of {of}: they count from 0 to {}", of - 1));
+        }
+        Ok(Shard { index, of })
+    }
+}
+
+fn from_environment(environment: impl Fn(&str) -> Option<String>) -> Result<u64, String> {
+    let value = |name: &str| match environment(name) {
+        None => Ok(None),
+        Some(text) => text.trim().parse::<u64>().map(Some).map_err(|_| format!("{name} is `{text}`, not an index")),
+    };
+    if let Some(index) = value(KUBERNETES)? {
+        return Ok(index);
+    }
+    let [id, least] = SLURM;
+    let index = value(id)?.ok_or_else(|| format!("auto needs {KUBERNETES} or {id} in the environment"))?;
+    let least = value(least)?.unwrap_or(0);
+    index.checked_sub(least).ok_or_else(|| format!("{id} is {index}, below the array's first index {least}"))
+}
+
+impl FromStr for Shard {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Shard, String> {
+        Shard::parse(text, |name| std::env::var(name).ok())
+    }
+}
+
+impl std::fmt::Display for Shard {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "{}/{}", self.index, self.of)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::Shard;
+
+    #[test]
+    fn shards_cover_every_unit_exactly_once_whatever_their_number() {
+        for count in [0, 1, 2, 99, 100, 101, 12_345, u64::MAX] {
+            for of in [1, 2, 7, 100, 99_999] {
+                let mut at = 0;
+                for index in 0..of {
+                    let units = Shard { index, of }.units(count);
+                    assert_eq!(units.start, at);
+                    assert!(units.end - units.start <= (count / of).saturating_add(1));
+                    at = units.end;
+                }
+                assert_eq!(at, count);
+            }
+        }
+    }
+
+    #[test]
+    fn an_index_comes_from_the_flag_or_from_the_cluster() {
+        let none = |_: &str| None;
+        assert_eq!(Shard::parse("3/20", none), Ok(Shard { index: 3, of: 20 }));
+        for wrong in ["3", "3/0", "20/20", "-1/3", "a/3", "auto/3", "1/100001", ""] {
+            assert!(Shard::parse(wrong, none).is_err(), "{wrong}");
+        }
+        let kubernetes = |name: &str| (name == "JOB_COMPLETION_INDEX").then(|| "4".to_owned());
+        assert_eq!(Shard::parse("auto/5", kubernetes), Ok(Shard { index: 4, of: 5 }));
+        let slurm = |name: &str| match name {
+            "SLURM_ARRAY_TASK_ID" => Some("12".to_owned()),
+            "SLURM_ARRAY_TASK_MIN" => Some("10".to_owned()),
+            _ => None,
+        };
+        assert_eq!(Shard::parse("auto/5", slurm), Ok(Shard { index: 2, of: 5 }));
+        assert!(Shard::parse("auto/2", slurm).unwrap_err().contains("no shard 2 of 2"));
+    }
+
+    #[test]
+    fn names_of_files_lead_back_to_their_shards() {
+        let shard = Shard { index: 3, of: 20 };
+        assert_eq!(shard.stem(), "part-00003-of-00020");
+        assert_eq!(Shard::of_stem(&shard.stem()), Some(shard));
+        assert_eq!(Shard::of_stem("part-3-of-20"), None);
+    }
+}

@@ -5,10 +5,10 @@ use std::io::{BufRead, BufReader, ErrorKind, Read, Seek, Write};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
+use super::Shard;
 use super::folder::{Part, read_part, write_part};
 use super::journal::Journal;
 use super::ledger::{Fits, Ledger, MergeableCounts};
-use super::shard::Shard;
 use crate::support::files::{make_folder, write_inside};
 use crate::support::input_file;
 use crate::support::lock::FolderLock;
