@@ -1,7 +1,7 @@
 //! Lanes become concrete scenarios: run again in their own arithmetic, with the sizes, paths and numbers of their case.
 //!
-//! A lane knows the ego's width and half the sums of two lengths: where the
-//! lengths themselves are not told, they are chosen so that the sums, and with them every gap and contact, stay.
+//! A lane knows the ego's width and half the sums of two lengths: where the lengths themselves are not told, they are
+//! chosen so that the sums, and with them every gap and contact, stay.
 
 use super::{Concrete, EgoMotion, PlayedVehicle, paths};
 use crate::engine::{EndReason, LaneCase, LaneKey, LaneOther, LanePlan, LaneRunner, NO_STEP, Trace};
