@@ -1,8 +1,8 @@
 //! A concrete case: what is simulated before headway and driver model are chosen. A recorded scenario,
 //! each of its parameterizations, a sampled point, a row of a table and a `simulate` call are all cases.
 //!
-//! [`PlainCase`] is a case from a handful of numbers: constant speeds or one deceleration, a lane change at constant lateral
-//! speed; what `simulate` takes from flags and what a map's cells are.
+//! [`PlainCase`] is a case from a handful of numbers: constant speeds or one deceleration, a lane change at constant
+//! lateral speed; what `simulate` takes from flags and what a map's cells are.
 
 use serde::{Deserialize, Serialize};
 

@@ -7,9 +7,10 @@
 //! rounded, and no sum, difference or magnitude of such numbers is -0; a product or a negated number may be, and is
 //! compared only where another condition excludes it.
 //!
-//! [`Flag`] is the truth value of the lane arithmetic, the sign bit of a word. A step of a lane has no branches, so that it can run for many lanes side by side. Its comparisons end in sign
-//! bits and are combined by the vector units' plain word operations; as `bool`s, a compiler would keep them in
-//! AVX-512's mask registers, whose operations are a quarter to a half as fast on Zen 5.
+//! [`Flag`] is the truth value of the lane arithmetic, the sign bit of a word. A step of a lane has no branches, so
+//! that it can run for many lanes side by side. Its comparisons end in sign bits and are combined by the vector units'
+//! plain word operations; as `bool`s, a compiler would keep them in AVX-512's mask registers, whose operations are a
+//! quarter to a half as fast on Zen 5.
 
 use std::fmt::Debug;
 use std::ops::{Add, BitAnd, BitOr, Mul, Neg, Not, Sub};

@@ -1,8 +1,8 @@
 //! Files that are there whole or not at all: written beside their place under a hidden name, brought to
 //! the disk, then renamed. Used by everything that leaves results behind.
 //!
-//! A register says what a process takes away when a signal ends it: the files that it has not finished, its lock, and a folder that it
-//! made and put nothing into.
+//! A register says what a process takes away when a signal ends it: the files that it has not finished, its lock, and
+//! a folder that it made and put nothing into.
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;

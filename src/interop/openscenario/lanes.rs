@@ -1,7 +1,7 @@
 //! Lanes become concrete scenarios: run again in their own arithmetic, with the sizes, paths and numbers of their case.
 //!
-//! A lane knows the ego's width and half the sums of two lengths: where the
-//! lengths themselves are not told, they are chosen so that the sums, and with them every gap and contact, stay.
+//! A lane knows the ego's width and half the sums of two lengths: where the lengths themselves are not told, they are
+//! chosen so that the sums, and with them every gap and contact, stay.
 
 use super::{Concrete, EgoMotion, PlayedVehicle, paths};
 use crate::engine::{EndReason, LaneCase, LaneKey, LaneOther, LanePlan, LaneRunner, NO_STEP, Trace};
@@ -286,11 +286,11 @@ fn properties(
 
 /// Sizes of a lane's vehicles and where they come from.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct KnownSizes {
+struct KnownSizes {
     /// The sizes.
-    pub sizes: Sizes,
+    sizes: Sizes,
     /// The lengths are of the scenario; otherwise only their sums are.
-    pub are_lengths_known: bool,
+    are_lengths_known: bool,
 }
 
 /// Most that told sizes may differ from the lane's, m: the rounding of binary32.
@@ -301,7 +301,7 @@ const TOLERANCE_M: f64 = 1e-3;
 ///
 /// # Errors
 /// [`Error::Input`] where the sizes told are not those of the lane.
-pub fn sizes_of_case(lane: &str, case: &LaneCase<f64>, told: Option<&Sizes>, ego_length_m: f64) -> Result<KnownSizes> {
+fn sizes_of_case(lane: &str, case: &LaneCase<f64>, told: Option<&Sizes>, ego_length_m: f64) -> Result<KnownSizes> {
     let is_pair = case.pair != 0;
     let sums = |of: fn(&crate::engine::LaneOther<f64>) -> f64| case.others.each_ref().map(|o| 2.0 * of(o));
     let (lengths, widths) = (sums(|o| o.half_lengths), sums(|o| o.half_widths));

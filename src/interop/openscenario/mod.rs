@@ -23,7 +23,7 @@ pub use distribution::{Distribution, Draw, MAX_POISSON, Range};
 pub use distribution_file::{
     Deterministic, DistributionFile, Distributions, Stochastic, parse_distribution, read_distribution,
 };
-pub use lanes::{KnownSizes, PlayOptions, concrete_case, concrete_lanes, sizes_of_case};
+pub use lanes::{PlayOptions, concrete_case, concrete_lanes};
 pub use parameters::{Names, Rename, variations};
 pub use road::{Road, road_file};
 pub use sampled_file::{SampledFile, reopen};

@@ -278,7 +278,7 @@ impl Rate {
 
 /// Exact interval of a Poisson mean from one count (Garwood 1936): α/2 and 1 − α/2 quantiles of gamma
 /// distributions with shapes n and n + 1.
-pub fn garwood(events: u64, level: f64) -> [f64; 2] {
+fn garwood(events: u64, level: f64) -> [f64; 2] {
     let tail = 0.5 * (1.0 - level);
     let quantile = |shape: f64, p: f64| match Gamma::new(shape, 1.0) {
         Ok(gamma) => gamma.inverse_cdf(p),

@@ -1,5 +1,5 @@
 //! The ego-centric data set: one ego, the part of its track in the data set, the vehicles in range, and the leader.
-//! Its extent is that of [`EgoViewOptions`](crate::traffic::trajectory::EgoViewOptions); neighbours come from the frame index.
+//! Its extent is that of [`EgoViewOptions`](crate::traffic::trajectory::EgoViewOptions).
 //!
 //! [`FoundScenario`] is what all categories take from the tracks of a match. [`FrameIndex`] has the vehicles of one
 //! carriageway per frame, from rear to front, so that a search visits only the ego's neighbours.
