@@ -74,7 +74,7 @@ pub struct SettingRecord {
 pub struct RunRecord {
     /// Program and version.
     pub program: String,
-    /// [`ENGINE_VERSION`](crate::engine::ENGINE_VERSION) of the program: what the bits of its lanes are.
+    /// [`ENGINE_VERSION`] of the program: what the bits of its lanes are.
     pub engine: u64,
     /// What was swept, in one line.
     pub data: String,

@@ -11,7 +11,7 @@ pub(crate) use crate::support::table::WIDTH;
 use crate::support::table::{Column, Digits, NumberText, Table};
 use crate::{Error, Result};
 
-/// [`failure_table`] with its heading and the misfit.
+/// The table of failures with its heading and the misfit.
 pub fn failures(scores: &ScoreTable, published: bool, width: usize) -> String {
     let misfit = Misfit::of(scores).filter(|_| published).map(|misfit| wrap(&misfit.sentence(), width) + "\n");
     let table = failure_table(scores, published, "capped").fitted(2, width);
@@ -51,7 +51,7 @@ pub(super) fn failure_table(scores: &ScoreTable, published: bool, capped: &'stat
         .build()
 }
 
-/// [`f1_scores`] with its heading.
+/// The table of F1 with its heading.
 pub fn f1_table(scores: &CategoryScores, published: bool, width: usize) -> String {
     let heading = format!(
         "{}: F1 of S' against S over {} scenarios, [interval]; - is undefined (0/0), [few]: S fails \
@@ -115,7 +115,7 @@ fn short(value: f64) -> String {
     text.strip_prefix('0').map_or_else(|| format!("{value:.1}"), str::to_owned)
 }
 
-/// [`claim_table`] with its heading and rule; nothing where no claim could be computed.
+/// The table of claims with its heading and rule; nothing where no claim could be computed.
 pub fn claims(results: &[ClaimResult], width: usize) -> String {
     let table = claim_table(results, 34);
     if table.rows.is_empty() {

@@ -11,7 +11,7 @@ pub(crate) const WIDTH: usize = 120;
 const NO_BREAK: char = '\u{a0}';
 
 impl Table {
-    /// The table in [`WIDTH`] columns: numbers to the right, the leading columns of words to the left. Cells are broken
+    /// The table in 120 columns: numbers to the right, the leading columns of words to the left. Cells are broken
     /// between words; where a word or number does not fit, the table is wider.
     pub fn text(&self) -> String {
         let (header, rows) = self.shown();

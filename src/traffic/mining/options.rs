@@ -192,7 +192,7 @@ impl MiningOptions {
     /// Refuses values for which the definitions have no meaning.
     ///
     /// # Errors
-    /// [`Error::Usage`] naming the option: not finite, negative, above 10⁶, or zero where a duration or distance is
+    /// [`Error::Usage`](crate::Error::Usage) naming the option: not finite, negative, above 10⁶, or zero where a duration or distance is
     /// needed.
     pub fn validate(&self) -> Result<()> {
         ranges::check("mining", self)
