@@ -219,7 +219,7 @@ pub const DEFAULT_FILE: &str = include_str!("../../../configs/default.toml");
 pub const DEFAULT_FILE_NAME: &str = "lanesweep.toml";
 
 /// All keys in the order of the file, which is the order in which they are read best.
-pub fn keys_in_order() -> Vec<Key> {
+pub(super) fn keys_in_order() -> Vec<Key> {
     let names: Vec<String> = names(DEFAULT_FILE);
     let mut keys = Key::all();
     keys.sort_by_key(|key| names.iter().position(|name| *name == key.name).unwrap_or(usize::MAX));

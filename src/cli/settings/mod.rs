@@ -11,7 +11,7 @@ mod schema;
 mod tables;
 
 pub use file::{FILE_VARIABLE, TEST_VARIABLES, variable_of};
-pub use keys::{Choice, DEFAULT_FILE, DEFAULT_FILE_NAME, Key, KeyKind, keys_in_order, text_of};
+pub use keys::{Choice, DEFAULT_FILE, DEFAULT_FILE_NAME, Key, KeyKind, text_of};
 pub use layers::{Assignment, Layers, Origin, Setting};
 pub use schema::{profile_schema, settings_schema};
 pub use tables::{

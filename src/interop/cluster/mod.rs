@@ -7,4 +7,4 @@ mod slurm;
 mod slurm_text;
 
 pub use slurm::{Resources, Scripts, SlurmArray, SplitRun};
-pub use slurm_text::{directive_quoted, log_pattern, quoted_word, shell_quoted};
+pub use slurm_text::{quoted_word, shell_quoted};

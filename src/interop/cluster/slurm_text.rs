@@ -190,7 +190,7 @@ pub fn shell_quoted(place: Place, word: &str) -> Result<String> {
 ///
 /// # Errors
 /// [`Error::Usage`] naming `place` for control characters.
-pub fn directive_quoted(place: Place, value: &str) -> Result<String> {
+pub(super) fn directive_quoted(place: Place, value: &str) -> Result<String> {
     refuse_control(place, value)?;
     if !value.is_empty() && value.chars().all(is_plain) {
         return Ok(value.to_owned());
@@ -203,7 +203,7 @@ pub fn directive_quoted(place: Place, value: &str) -> Result<String> {
 ///
 /// # Errors
 /// [`Error::Usage`] for a folder with a backslash, after which Slurm takes no pattern, or with control characters.
-pub fn log_pattern(place: Place, folder: &str, name: &str) -> Result<String> {
+fn log_pattern(place: Place, folder: &str, name: &str) -> Result<String> {
     if folder.contains('\\') {
         let problem =
             format!("Slurm cannot write logs to `{folder}`: a backslash in a path ends its file name patterns");

@@ -27,7 +27,7 @@ pub use mixture::{MAX_DIMENSIONS, Mixture};
 pub use mixture_fit::FitOptions as MixtureFitOptions;
 pub use model::{DensityModel, Exposure, FitOptions, Fitted, Provenance, Rate};
 pub use model_file::{MAX_FILE_BYTES, read_density, write_density};
-pub use moments::{quantile, scale_of, standard_deviation};
+pub use moments::{quantile, standard_deviation};
 pub(crate) use normal::Draws;
 pub use normal::{normal_cdf, normal_quantile};
 pub use parameters::{BoundedColumn, Invalid, ParameterSpace};

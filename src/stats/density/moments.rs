@@ -41,7 +41,7 @@ const NORMAL_IQR: f64 = 1.349;
 
 /// Scale of one parameter; 0 where all values are equal. Where the middle half of the values is one value, the
 /// IQR says nothing and σ is taken.
-pub fn scale_of(values: &[f64]) -> f64 {
+pub(super) fn scale_of(values: &[f64]) -> f64 {
     let sigma = standard_deviation(values);
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);
