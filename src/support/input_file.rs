@@ -176,10 +176,11 @@ pub(crate) fn read_toml<T: DeserializeOwned>(path: &Path, help: &str) -> Result<
     parse_toml(&read_text(path, MAX_SETTINGS_BYTES)?, &Place::file(path), help)
 }
 
-#[cfg(all(test, unix))]
+#[cfg(test)]
 mod tests {
     use super::*;
 
+    #[cfg(unix)]
     #[test]
     fn a_pipe_and_a_device_are_refused_and_not_waited_for() {
         let dir = tempfile::tempdir().unwrap();
@@ -191,6 +192,7 @@ mod tests {
         }
     }
 
+    #[cfg(unix)]
     #[test]
     fn a_file_that_is_too_large_is_refused_and_a_link_is_followed() {
         let dir = tempfile::tempdir().unwrap();
