@@ -96,12 +96,12 @@ impl ModelsFlag {
 /// `--thw` of a verb that replays scenarios.
 #[derive(Debug, Clone, Args)]
 pub struct HeadwaysFlag {
-    /// Time headways; paper is 2.0, 1.8, … 0.2; observed the recorded gaps
+    /// Time headways, s; paper: 2.0, 1.8, … 0.2; r157; observed: the recorded gaps
     ///
     /// The paper's claims need all of its headways. r157: the minimum following distance of UN R157, 5.2.3.3, by the
     /// ego's speed; may stand in a list. observed: each scenario starts from its recorded gap, and a density draws the
     /// headway as one more parameter; stands alone.
-    #[arg(long, value_name = "s,s,…|paper|r157|observed", default_value = "paper", help_heading = "Scenario")]
+    #[arg(long, value_name = "LIST", default_value = "paper", help_heading = "Scenario")]
     thw: String,
 }
 

@@ -68,11 +68,11 @@ pub struct Sample {
     pub(super) set: Vec<(String, f64)>,
     #[command(flatten)]
     models: lists::ModelsFlag,
-    /// Time headways [default: the density's, else paper]
+    /// Time headways, s, or paper or observed [default: the density's, else paper]
     ///
     /// paper is 2.0, 1.8, … 0.2. observed (or sampled): the headway is drawn from the recorded ones, as a parameter of
     /// the density, which needs `fit --with-thw`. The adaptive estimators take one headway.
-    #[arg(long, value_name = "s,s,…|paper|observed", help_heading = "Scenario")]
+    #[arg(long, value_name = "LIST", help_heading = "Scenario")]
     thw: Option<String>,
     /// Failure map over two parameters, or `none` [default: the first two]
     #[arg(long, value_name = "X,Y|none", help_heading = "Output")]

@@ -235,7 +235,7 @@ pub enum IntervalKind {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct CompareSettings {
-    /// Samples of each density; every sample runs from every headway.
+    /// Samples of each density; each runs from every headway.
     #[schemars(range(min = 1, max = 281_474_976_710_655_u64))]
     pub samples: u64,
     /// Seed of the draws.

@@ -10,7 +10,7 @@
 //!
 //! [`SplitRun`] is the run that the tasks share: its verb and arguments, without what the scripts add themselves.
 
-use super::slurm_text::directive_quoted;
+use super::shell::directive_quoted;
 use crate::{Error, Place, Result};
 
 /// Exit status of a run that was told to stop: complete so far, to be continued by the same command.
