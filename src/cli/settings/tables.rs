@@ -52,11 +52,11 @@ pub struct RunSettings {
     pub threads: Option<usize>,
     /// Backend; auto: a GPU if there is one.
     pub backend: BackendChoice,
-    /// Device: part of its name, PCI bus id or index. `lanesweep verify devices` lists the devices. Without it: the first
-    /// GPU.
+    /// Device, by part of its name, PCI bus id or index. `lanesweep verify devices` lists the devices. The default is the
+    /// first GPU.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub device: Option<String>,
-    /// Profile: paper, paper-fit, jrc-2021, un-r157, file. `map --preset jrc` takes jrc-2021 unless it is set.
+    /// paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc` takes jrc-2021 unless it is set.
     pub profile: String,
     /// Time step, s. Without it: the profile's.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -118,14 +118,13 @@ pub enum BandwidthInterval {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SampleSettings {
-    /// Estimator: crude, importance sampling, cross-entropy, subset simulation. Importance sampling draws around the worst
-    /// points of a pilot.
+    /// Crude, importance, cross-entropy, subset. Importance sampling draws around the worst points of a pilot.
     pub estimator: EstimatorKind,
     /// Samples at most. With ce: of the final sample. Without it: 100000; subset: 2000 per level.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1))]
     pub samples: Option<u64>,
-    /// Criterion of the adaptive estimators, of the worst lanes, the map and the stop rule.
+    /// Criterion to map, rank, stop by or estimate.
     pub criterion: Criterion,
     /// Kind of points of mc.
     pub points: PointKind,
@@ -134,8 +133,8 @@ pub struct SampleSettings {
     /// Level of the intervals.
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub level: f64,
-    /// Stop when half-width over estimate is at most this. The interval is checked after 4096·2^k samples. Without it: all
-    /// samples.
+    /// Stop when half-width over estimate is at most this. The interval is checked after 4096·2^k samples. The default is
+    /// to draw all samples.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub half_width: Option<f64>,
