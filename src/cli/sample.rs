@@ -68,7 +68,7 @@ pub struct Sample {
     pub(super) set: Vec<(String, f64)>,
     #[command(flatten)]
     models: lists::ModelsFlag,
-    /// Time headways, s, or paper or observed [default: the density's, else paper]
+    /// Time headways, s [default: the density's, else paper]
     ///
     /// paper is 2.0, 1.8, … 0.2. observed (or sampled): the headway is drawn from the recorded ones, as a parameter of
     /// the density, which needs `fit --with-thw`. The adaptive estimators take one headway.

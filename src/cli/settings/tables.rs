@@ -124,7 +124,7 @@ pub struct SampleSettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1))]
     pub samples: Option<u64>,
-    /// Criterion to map, rank, stop by or estimate.
+    /// Criterion to map, rank or estimate.
     pub criterion: Criterion,
     /// Kind of points of mc.
     pub points: PointKind,
