@@ -19,7 +19,8 @@ pub enum Wanted {
     /// Verdict bits only.
     Verdicts,
     /// Verdict bits, and the continuous values of the lanes that the watch marks. A backend's verdicts show the marks;
-    /// the [executor](super::Executor) values these lanes. A backend without marks returns every outcome.
+    /// the [executor](super::Executor) computes the values of these lanes. A backend without marks returns every
+    /// outcome.
     Watched(Watch),
     /// Verdict bits and the continuous values.
     Outcomes,
@@ -147,8 +148,8 @@ pub enum Marks {
     Nothing,
     /// Contacts with at least this closing speed, m/s ≥ 0.
     Contacts(f64),
-    /// Lanes whose smallest TTC is below this, s, and all contacts. No less than the profile's threshold: the TTC
-    /// criterion itself marks, and so unmarked lanes keep their verdicts.
+    /// Lanes with a minimum TTC below this, s, and all contacts. At least the profile's threshold: the TTC criterion
+    /// itself marks, so unmarked lanes keep their verdicts.
     TtcBelow(f64),
     /// Lanes that fail the BTN criterion.
     BtnFailures,

@@ -25,8 +25,8 @@ const TASKS_PER_THREAD: u64 = 4;
 /// Maximum number of entries in a task's unrolled motions, 64 MiB, if every motion lasts as long as its lane.
 const TASK_ENTRIES: u64 = 1 << 24;
 
-/// Steps per thread of the lanes of a chunk, should each make every step: about two seconds in batches, one or two as
-/// single lanes, up to five where their criterion iterates.
+/// Maximum steps per thread in a chunk, if each lane makes every step: about two seconds in batches, one or two seconds
+/// as single lanes, up to five seconds if the criterion iterates.
 const CHUNK_STEPS: u64 = 1 << 29;
 const CHUNK_STEPS_OF_SINGLE_LANES: u64 = 1 << 25;
 /// Maximum number of lanes in a chunk.

@@ -231,7 +231,7 @@ impl Batch {
 }
 
 /// Makes the next steps of all lanes; pending lanes take the free slots. Each instruction set has its own `take`, which
-/// gathers the entries of every row from a place on for the free slots, and its own `turn`, which is [`Window::turn`].
+/// gathers consecutive entries of every row for the free slots. Its own `turn` is [`Window::turn`].
 #[inline(always)]
 pub(in crate::engine) fn burst<M: DriverModel<f32>, const RULES: u32>(
     simulation: &Simulation<f32, M>,
