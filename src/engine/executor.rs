@@ -40,13 +40,13 @@ pub struct Executor<'a> {
 pub struct SweepSummary {
     /// Lanes computed.
     pub lanes: u64,
-    /// Chunks of the fallback, of what the first backend could not compute.
+    /// Chunks computed by the fallback because the backend failed.
     pub redone_chunks: u64,
-    /// Their lanes.
+    /// Lanes of these chunks.
     pub redone_lanes: u64,
-    /// Lanes that were computed again on the CPU with every step made, all equal.
+    /// Lanes recomputed on the CPU with every step, all equal.
     pub rechecked_lanes: u64,
-    /// Time that the device itself computed, s, where it can tell.
+    /// Device time, s; `None` if the device cannot measure it.
     pub device_s: Option<f64>,
 }
 

@@ -15,9 +15,9 @@ use crate::scenario::{Category, Tables};
 /// Another vehicle at one step. The measures are computed in f64 from the values that the lane used.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TracedVehicle {
-    /// Position along the road of its centre, m; the ego's starts at 0.
+    /// Longitudinal position of its centre, m; the ego's starts at 0.
     pub x_m: f64,
-    /// Position across the road of its centre, m; 0 is the middle of the ego's lane.
+    /// Lateral position of its centre, m; 0 is the middle of the ego's lane.
     pub y_m: f64,
     /// Speed, m/s.
     pub v_mps: f64,

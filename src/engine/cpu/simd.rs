@@ -245,8 +245,8 @@ impl Instructions {
         Instructions::ALL.into_iter().filter(|set| set.is_available()).collect()
     }
 
-    /// The fastest of this machine. NEON only where it is asked for: LLVM's cost model leaves the batch's loop
-    /// scalar there (Rust 1.95), and then lanes one by one are faster.
+    /// The fastest of this machine, except NEON: LLVM's cost model leaves the batch's loop scalar there (Rust 1.95),
+    /// so single lanes are faster.
     pub fn best() -> Instructions {
         let chosen = |set: &Instructions| set.is_available() && *set != Instructions::Neon;
         Instructions::ALL.into_iter().rev().find(chosen).unwrap_or(Instructions::Scalar)

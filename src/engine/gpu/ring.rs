@@ -129,7 +129,7 @@ impl Slot {
                 finished_word: model as u32,
                 lanes_per_group,
                 ttc_threshold_s: job.criteria[model].ttc.threshold,
-                // Any limit above all closing speeds marks no contact; ∞ has no literal in WGSL.
+                // f32::MAX stands for ∞: no closing speed exceeds it.
                 marks_contacts_from: job.criteria[model].marks_contacts_from.min(f32::MAX),
             };
             let at = stride as usize * model;

@@ -44,7 +44,7 @@ struct FirstStep {
     horizon: u32,
     /// Index of the headway that the gap is solved for.
     start: usize,
-    /// Second vehicle: 0 none, 1 ahead of this one and without effect, 2 this one is behind it.
+    /// Slot of the deciding vehicle: 0 the only one, 1 the first of two, 2 the second of two; the other has no effect.
     pairing: u64,
 }
 
