@@ -153,7 +153,7 @@ impl<'a> Compare<'a> {
     /// Fits and samples every density and compares its rates with those of the counts of S and S'.
     ///
     /// # Errors
-    /// Those of the lanes; those of the densities if there is none.
+    /// Those of the lanes; those of the densities if none can be fitted.
     pub fn sample(&self, counts: &Partial, executor: &Executor) -> Result<CompareResult> {
         let recorded = (0..self.plan.blocks.len()).map(|block| self.recorded(counts, block));
         let summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };

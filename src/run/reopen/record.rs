@@ -1,4 +1,4 @@
-//! What a finished run's records say of it: `run.json` of a study, `estimate.json` of a sampling run.
+//! Records of a finished run: `run.json` of a study, `estimate.json` of a sampling run.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,7 @@ use crate::support::input_file::{MAX_TABLE_BYTES, read_json};
 use crate::support::run_dir::{ESTIMATE_RECORD, STUDY_RECORD};
 use crate::{Error, Place, Result};
 
-/// What `estimate.json` says of a sampling run.
+/// Fields read from `estimate.json` of a sampling run.
 #[derive(Debug, Clone, Deserialize)]
 pub struct SampleRecord {
     lanesweep_estimate: u64,
