@@ -11,7 +11,7 @@ use crate::scenario::{Ahead, Case, Category, Lateral, Participant, Speed};
 pub const LENGTH_M: f64 = 4.3;
 /// Width of a vehicle, m.
 pub const WIDTH_M: f64 = 1.9;
-/// Length of a vehicle that stands ahead of a cutting-out one, m.
+/// Length of a stationary vehicle ahead of a cutting-out one, m.
 pub const STANDING_LENGTH_M: f64 = 5.0;
 /// Lateral distance that a cut-in covers, m.
 pub const CUT_IN_LATERAL_M: f64 = 3.5;

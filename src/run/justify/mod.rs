@@ -36,7 +36,7 @@ pub struct JustifyOptions {
     pub compare: CompareOptions,
     /// Criterion.
     pub criterion: Criterion,
-    /// Confidence and least failures.
+    /// Confidence level and minimum number of failures.
     pub score: ScoreOptions,
     /// When a parameterization is appropriate.
     pub rules: Rules,

@@ -19,8 +19,8 @@ use crate::{Error, Place, Result};
 /// File name of the plan in a run's folder.
 pub const PLAN_FILE: &str = "plan.json";
 
-/// Name of the plan that a run in one piece leaves in its folder, for its lanes to be run again. Another name than that
-/// of a run in parts, whose processes share their plan and hold no common lock.
+/// File name of the plan that a run in one piece leaves in its folder, so that its lanes can be rerun. It differs from
+/// that of a run in parts, whose processes share their plan and hold no common lock.
 pub const RUN_PLAN_FILE: &str = "run-plan.json";
 
 /// A running interval of a run: its lock, its journal, its counts.
