@@ -21,9 +21,9 @@ use crate::{Error, Result};
 /// Ratios of failure rates to that of S, over the same scenarios, headways, model and criterion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RecordedRatios {
-    /// S'/S: the parameterized replays.
+    /// S'/S: rates of the parameterized replays.
     pub replayed: Ratio,
-    /// P/S: the samples; of crude Monte Carlo, whose draws tell their scenario.
+    /// P/S: rates of the samples. Only for crude Monte Carlo, whose draws identify their scenario.
     pub sampled: Option<Ratio>,
 }
 

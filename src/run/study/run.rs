@@ -9,18 +9,18 @@ use crate::run::parts::{PLAN_FILE, RunDir, RunState, Shard, read_parts};
 use crate::support::run_dir::{Results, STUDY_RECORD};
 use crate::{Error, Place, Result};
 
-/// What the lanes of a whole study gave.
+/// Result of a whole study.
 #[derive(Debug, Clone)]
 pub struct StudyResult {
-    /// The counts of every unit; [`Study::score`] makes the score table of them.
+    /// The counts of every unit; [`Study::score`] computes the score table from them.
     pub counts: Partial,
-    /// How the sweep went.
+    /// Summary of the sweep.
     pub summary: SweepSummary,
-    /// Parts that were merged; 0 of a run in one piece.
+    /// Number of merged parts; 0 for a run in one piece.
     pub parts: usize,
 }
 
-/// A run of a study, or of one of its shards, in a folder. It continues what an earlier process left in the journal.
+/// A run of a study, or of one of its shards, in a folder. It continues from the journal of an earlier process.
 pub struct StudyRun<'s> {
     study: &'s Study,
     run_dir: RunDir,
@@ -44,7 +44,7 @@ impl Study {
         Ok(StudyResult { counts, summary, parts: 0 })
     }
 
-    /// Opens a run in a folder; `None` where the shard's part is there already, and whole.
+    /// Opens a run in a folder; `None` if the shard's complete part exists already.
     ///
     /// # Errors
     /// [`Error::Busy`] where another process runs it; [`Error::Input`] for a damaged or foreign file in its place;
@@ -66,7 +66,7 @@ impl Study {
         Ok(Some(StudyRun { study: self, run_dir, state, summary }))
     }
 
-    /// Runs a shard in a folder and leaves plan and part there. An interrupted one continues at the next call.
+    /// Runs a shard in a folder and writes plan and part there. An interrupted run continues at the next call.
     ///
     /// # Errors
     /// As [`Study::open`] and [`Study::run`]; [`Error::Interrupted`].
@@ -77,10 +77,10 @@ impl Study {
         run.write_part()
     }
 
-    /// The study of a folder of parts with its counts: bit for bit those of the run in one piece.
+    /// The study and the counts of a folder of parts, bit for bit equal to those of the run in one piece.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Input`] naming what is missing, doubled, foreign or damaged.
+    /// [`Error::Io`]; [`Error::Input`] with the missing, duplicate, foreign or damaged parts.
     pub fn merge(out: &Path) -> Result<(Study, StudyResult)> {
         Study::merge_or(out, &|shard| format!("run shard {shard}"))
     }
