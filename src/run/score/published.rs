@@ -75,7 +75,7 @@ pub fn published_lvd_f1(variant: &str, model: ModelId, criterion: Criterion) -> 
 /// Misfit between a study and the published numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Misfit {
-    /// Shares of failures of S that are published and were simulated, at most 36.
+    /// Number of these rates that are near the published ones; see [`Misfit::beyond_points`].
     pub shares: usize,
     /// How many of them are near the published ones; see [`Misfit::beyond_points`].
     pub near: usize,

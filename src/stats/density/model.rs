@@ -1,10 +1,10 @@
-//! The density of one category under one parameterization, with everything that sampling needs from it: valid
-//! region, P_valid, sizes, exposure, and where it comes from.
+//! The density of one category under one parameterization, with everything that sampling needs: valid region, P_valid,
+//! sizes, exposure, and provenance.
 //!
-//! Exposure is how often scenarios occur: events per driven hour and kilometre, with the Poisson interval.
+//! Exposure is the frequency of scenarios: events per driven hour and kilometre, with the Poisson interval.
 //!
-//! Driven are the egos' data sets: every vehicle is an ego once, from its first sample to the end of its data
-//! set. Events are the kept scenarios of the category.
+//! The driven time and distance are those of all egos: every vehicle is an ego once, from its first sample to the end
+//! of its data set. Events are the kept scenarios of the category.
 
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, Gamma};
@@ -20,7 +20,7 @@ use crate::scenario::{Category, Scenario};
 use crate::traffic::{DataProvenance, Driven};
 use crate::{Error, Place, Result};
 
-/// Where a density comes from.
+/// Provenance of a density.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Provenance {
