@@ -12,7 +12,7 @@ struct Generation {
     seed_low: u32,
     seed_high: u32,
     purpose: u32,
-    // Components of the mixture, or points given.
+    // Components of the mixture, or number of given points.
     components: u32,
     // 1 where components have weights.
     weighted: u32,

@@ -1,9 +1,9 @@
 // Entry point: bindings, and the lanes of an invocation. Other functions read their arguments, constants
 // and the launch only; those of shared/verdicts.wgsl also write results.
 //
-// Lanes are ordered by unit, variant, headway: neighbours in a warp share the case and its motion. Their numbers of
-// steps differ by far: an invocation whose lane has ended takes the next one of its workgroup, so that a warp does not
-// wait for its longest lane.
+// Lanes are ordered by unit, variant, headway: neighbours in a warp share the case and its motion. The number of steps
+// differs greatly between lanes. An invocation whose lane has ended takes the next lane of its workgroup, so that a
+// warp does not wait for its longest lane.
 
 @group(0) @binding(0) var<uniform> launch: Launch;
 @group(0) @binding(1) var<storage, read> cases: array<LaneCase>;
@@ -15,7 +15,7 @@
 @group(0) @binding(7) var<storage, read_write> finished: array<atomic<u32>>;
 
 const WORKGROUP: u32 = 64u;
-// More than any dispatch has.
+// Larger than the number of turns of any dispatch.
 const MAX_TURNS: u32 = 0x7fffffffu;
 
 // First lane of the workgroup that no invocation has taken.

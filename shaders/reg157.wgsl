@@ -29,7 +29,7 @@ fn check(view: View) -> Hazard {
     return Hazard(is_unsafe, driver_deceleration);
 }
 
-// Hold the speed for 0.35 s, then 6 m/s² at once, no jerk limit.
+// Hold the speed for 0.35 s, then brake at 6 m/s² at once, without a jerk limit.
 fn react(state: DriverState, hazard: Hazard, v_ego: f32) -> Reaction {
     return latched_braking(state, 0.0, hazard.demand, v_ego);
 }

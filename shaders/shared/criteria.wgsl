@@ -16,7 +16,7 @@ struct Record {
     min_gap: f32,
 }
 
-// Do TTC and BTN judge a vehicle here? Its centre must be in front, and it must be near enough across the road.
+// Whether TTC and BTN evaluate a vehicle here: its centre is in front, and it is close enough laterally.
 fn criteria_sees(gap: f32, half_lengths: f32, lateral_gap: f32, lateral_position: f32, ego_width: f32) -> bool {
     let near = select(lateral_gap < 0.0, abs(lateral_position) <= ego_width, criteria_gate == GATE_EGO_WIDTH);
     return (gap + half_lengths >= 0.0) & near;

@@ -1,5 +1,5 @@
-// Exact arithmetic, as src/model/scalar.rs: binary32, to nearest even, in the written order. No fma, no root, no
-// transcendental function; `%`, min, max and clamp are not used, because devices differ on them.
+// Exact arithmetic, as src/model/scalar.rs: binary32, rounded to nearest even, in the written order. No fma, no root,
+// no transcendental function. `%`, min, max and clamp are not used, because devices differ on them.
 
 const INFINITY_BITS: u32 = 0x7f800000u;
 // Represents +∞ until the end of a lane: larger than every number that a lane computes.

@@ -1,8 +1,8 @@
 // The frame: the start, one step and the outcome of a lane, with the latched step of all models. Twin of
 // src/engine/lane_step.rs and src/engine/lane.rs.
 //
-// Order inside a step: the gap moves to i (a contact on the way holds it), the state at i gives the criteria and the
-// contact, then the check, then v[i+1] (semi-implicit Euler). The state is the gap, not the positions.
+// Order inside a step: the gap moves to i (a contact between two steps holds it), the state at i gives the criteria and
+// the contact, then the check, then v[i+1] (semi-implicit Euler). The state is the gap, not the positions.
 
 // s
 override frame_dt: f32;
@@ -18,7 +18,7 @@ override frame_abort_above_ttc: f32;
 override frame_model: u32;
 // At least one case has a second vehicle.
 override frame_paired: bool;
-// The continuous values are wanted. Verdicts need none of them.
+// The sweep returns continuous values, not only verdicts.
 override frame_values: bool;
 // An invocation whose lane has ended takes the next one of its workgroup.
 override frame_queue: bool;
@@ -131,7 +131,7 @@ fn advance(before: LaneState, lane: LaneCase) -> LaneState {
     state.reaction_step = select(state.reaction_step, index, hazard.is_unsafe & (state.reaction_step == NO_STEP));
     let over = (index >= lane.horizon) & frame_end_when_settled;
     let is_capped = index + 1u >= frame_step_cap;
-    // What ended the lane is asked once, not at every step.
+    // The reason for the end is evaluated once, not at every step.
     if touching | aborting | (over & (settled | (v_ego <= 0.0))) | is_capped {
         state.end = END_CAP;
         state.end = select(state.end, END_SETTLED, over & settled);

@@ -39,7 +39,7 @@ struct ReducedColumns {
     duration: u32,
 }
 
-// A column of a reconstruction that makes a draw invalid if it is out of bounds.
+// A column of a reconstruction that makes a draw invalid if it is out of range.
 struct ColumnBound {
     column: u32,
     is_distance: u32,

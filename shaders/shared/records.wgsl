@@ -62,9 +62,9 @@ struct Launch {
     finished_word: u32,
     // Lanes of a workgroup, at least WORKGROUP.
     lanes_per_group: u32,
-    // A smaller TTC fails, s: the profile's, or a watch's.
+    // A TTC below this fails, s: the threshold of the profile or of a watch.
     ttc_threshold_s: f32,
-    // Verdicts mark contacts at this closing speed, m/s, or a greater one.
+    // Verdicts mark contacts with at least this closing speed, m/s.
     marks_contacts_from: f32,
 }
 

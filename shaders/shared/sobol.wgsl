@@ -3,7 +3,7 @@
 
 const SOBOL_DIGITS: u32 = 32u;
 const SOBOL_ROW: u32 = 34u;
-// Digits in chunks of SOBOL_LEVELS, whose coins come from one hash.
+// Binary digits are processed in chunks of SOBOL_LEVELS; one hash gives the random bits of a chunk.
 const SOBOL_LEVELS: u32 = 4u;
 const SOBOL_CHUNKS: u32 = 8u;
 

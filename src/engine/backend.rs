@@ -1,7 +1,7 @@
-//! What every backend offers. No type of a thread pool or a device appears here.
+//! The interface of every backend. No type of a thread pool or a device appears here.
 //!
-//! A sweep may return verdicts, and the values of those lanes only that may be wanted: a [`Watch`] marks them by their
-//! verdicts. The [executor](super::Executor) computes marked lanes again, one by one.
+//! A sweep may return verdicts for all lanes and values for some: a [`Watch`] selects these by their verdicts. The
+//! [executor](super::Executor) then recomputes the marked lanes one by one.
 
 use std::ops::Range;
 
@@ -13,20 +13,21 @@ use crate::model::profile::Profile;
 use crate::model::scalar::Real;
 use crate::{Error, Result};
 
-/// How much of a lane comes back.
+/// Which results a sweep returns.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Wanted {
     /// Verdict bits only.
     Verdicts,
     /// Verdict bits, and the continuous values of the lanes that the watch marks. A backend's verdicts show the marks;
-    /// the [executor](super::Executor) values these lanes. A backend without marks returns every outcome.
+    /// the [executor](super::Executor) computes the values of these lanes. A backend without marks returns every
+    /// outcome.
     Watched(Watch),
     /// Verdict bits and the continuous values.
     Outcomes,
 }
 
 impl Wanted {
-    /// The watch of a sweep that has one.
+    /// The watch of a watched sweep; else `None`.
     pub(super) fn watch(self) -> Option<Watch> {
         match self {
             Wanted::Watched(watch) => Some(watch),
@@ -44,11 +45,11 @@ pub struct Chunk {
     pub first_lane: u64,
     /// One per lane.
     pub verdicts: Vec<Verdicts>,
-    /// One per lane where outcomes were wanted, else empty. Values are exact widenings of the lane's own.
+    /// One per lane if outcomes were requested, else empty. Values are exact widenings of the lane's values.
     pub outcomes: Vec<Outcome<f64>>,
     /// The lanes that a [watch](Watch) marked, ascending, with their outcomes; `None` without a watch.
     pub valued: Option<Vec<(u64, Outcome<f64>)>>,
-    /// Lanes that the fallback computed, and lanes that were computed again on the CPU and are equal. The executor sets both.
+    /// Lanes computed by the fallback, and lanes recomputed on the CPU with equal results. Set by the executor.
     pub redone_and_rechecked: [u64; 2],
 }
 
@@ -58,10 +59,10 @@ impl Chunk {
         self.verdicts.len() as u64
     }
 
-    /// Checks that it is what was asked for; see [`Chunk::check`].
+    /// Checks that the chunk holds the requested units and results; see [`Chunk::check`].
     ///
     /// # Errors
-    /// [`Error::Internal`] where it is not.
+    /// [`Error::Internal`] if it does not.
     pub fn check_asked(&self, plan: &LanePlan, units: &Range<u64>, wanted: Wanted) -> Result<()> {
         let complete = wanted != Wanted::Outcomes || self.outcomes.len() == self.verdicts.len();
         if self.units == *units && complete {
@@ -71,10 +72,10 @@ impl Chunk {
         }
     }
 
-    /// Checks that it holds exactly the lanes of its units in this plan.
+    /// Checks that the chunk holds exactly the lanes of its units in this plan.
     ///
     /// # Errors
-    /// [`Error::Internal`] where it does not: its backend has a defect.
+    /// [`Error::Internal`] if it does not: its backend has a defect.
     pub fn check(&self, plan: &LanePlan) -> Result<()> {
         let first_lane = plan.first_lane_of(self.units.start);
         let lanes = plan.first_lane_of(self.units.end).saturating_sub(first_lane) as usize;
@@ -91,26 +92,27 @@ impl Chunk {
     }
 }
 
-/// How one lane in so many of a backend is [computed again](super::RecheckOptions).
+/// How a sample of a backend's lanes is [recomputed](super::RecheckOptions).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum RecheckBy {
-    /// Not at all: its lanes are single lanes of the CPU or make every step in its batches.
+    /// Not at all: the backend runs single lanes on the CPU, or its batches make every step.
     Nothing,
-    /// In batches of the CPU that make every step, some of them as single lanes: what steps are left out by is checked.
+    /// In CPU batches that make every step, some of them also as single lanes. This checks the rules for skipping
+    /// steps.
     Batches,
-    /// As single lanes of the CPU, which take no promise of a driver model.
+    /// As single lanes on the CPU, which do not rely on any promise of a driver model.
     Lanes,
 }
 
-/// A place where lanes are computed.
+/// A device or processor that computes lanes.
 pub trait Backend: Send + Sync {
-    /// How a sample of its lanes is checked where an [executor](super::Executor) is to check.
+    /// How an [executor](super::Executor) with rechecks verifies a sample of the lanes.
     fn rechecked_by(&self, _wanted: Wanted) -> RecheckBy {
         RecheckBy::Lanes
     }
-    /// One line: what computes, with how many threads or on which device, in which arithmetic.
+    /// One line: processor with number of threads, or device; and the arithmetic.
     fn describe(&self) -> String;
-    /// Uploads or casts what the plan holds, once.
+    /// Uploads or converts the plan's data, once.
     fn prepare<'p>(&self, plan: &'p LanePlan) -> Result<Box<dyn Session + 'p>>;
 }
 
@@ -126,28 +128,28 @@ impl<B: Backend + ?Sized> Backend for &B {
     }
 }
 
-/// A backend at work on one plan.
+/// A backend with one prepared plan.
 pub trait Session {
-    /// Computes all lanes of an interval of units. On an error the interval can be given to another session.
+    /// Computes all lanes of an interval of units. After an error another session can compute the interval.
     fn run(&mut self, units: Range<u64>, wanted: Wanted) -> Result<Chunk>;
-    /// Lanes that one call should hold: enough to keep the backend busy, and so few that it ends within seconds, because
-    /// a run looks between its calls whether it is to end. Results do not depend on it.
+    /// Recommended number of lanes per call: enough to keep the backend busy, but few enough to end within seconds,
+    /// because a run can be cancelled only between calls. Results do not depend on it.
     fn chunk_lanes(&self, _wanted: Wanted) -> u64;
-    /// Time that the device itself has computed so far, s, where it can tell.
+    /// Device time so far, s; `None` if the device cannot measure it.
     fn device_seconds(&self) -> Option<f64> {
         None
     }
 }
 
-/// Which lanes of a model are valued. More may be marked than are meant, never fewer.
+/// Which lanes of a model get values. Backends may mark more lanes than requested, never fewer.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Marks {
     /// None.
     Nothing,
-    /// Contacts at this closing speed, m/s ≥ 0, or a greater one.
+    /// Contacts with at least this closing speed, m/s ≥ 0.
     Contacts(f64),
-    /// Lanes whose smallest TTC is below this, s, and all contacts. No less than the profile's threshold: the TTC
-    /// criterion itself marks, and so unmarked lanes keep their verdicts.
+    /// Lanes with a minimum TTC below this, s, and all contacts. At least the profile's threshold: the TTC criterion
+    /// itself marks, so unmarked lanes keep their verdicts.
     TtcBelow(f64),
     /// Lanes that fail the BTN criterion.
     BtnFailures,
@@ -161,14 +163,14 @@ impl Watch {
     /// No lane of any model.
     pub const NOTHING: Watch = Watch([Marks::Nothing; MODELS]);
 
-    /// The criteria by which lanes of a model run, so that their verdicts show which are marked.
+    /// The criteria for lanes of a model under which their verdicts show the marks.
     pub(super) fn criteria<R: Real>(&self, profile: &Profile, model: ModelId, criteria: Criteria<R>) -> Criteria<R> {
         let mut criteria = criteria;
         match self.0[model.index()] {
             Marks::Nothing | Marks::BtnFailures => {}
             Marks::Contacts(closing_mps) => criteria.marks_contacts_from = R::from_f64(closing_mps),
             Marks::TtcBelow(ttc_s) => {
-                // A quotient below the limit may be a product that is rounded down to it.
+                // Rounding may reduce the product to the limit although the quotient is below it.
                 let above = ttc_s.max(profile.criteria.ttc_threshold_s) * (1.0 + 1e-6);
                 criteria.ttc.threshold = R::from_f64(above);
             }
@@ -186,7 +188,7 @@ impl Watch {
         }
     }
 
-    /// Whether a lane with this outcome must have been marked.
+    /// Whether a lane with this outcome must be marked.
     pub(super) fn means(&self, model: ModelId, outcome: &Outcome<f64>) -> bool {
         let collided = outcome.verdicts.failed(Criterion::Collision);
         match self.0[model.index()] {
@@ -269,7 +271,7 @@ mod tests {
         }
     }
 
-    /// A backend whose verdicts are right and that marks nothing.
+    /// A backend with correct verdicts that marks nothing.
     struct WithoutMarks(CpuBackend<f32>);
 
     struct SessionWithoutMarks<'p>(Box<dyn Session + 'p>);

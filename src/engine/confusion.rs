@@ -23,7 +23,7 @@ pub struct Confusion<N = u64> {
     pub tn: N,
 }
 
-// Four numbers instead of four names: a unit of a study has a hundred of them.
+// Serialized as four numbers without names: a unit of a study has about a hundred confusions.
 impl<N> From<[N; 4]> for Confusion<N> {
     fn from([tp, fn_, fp, tn]: [N; 4]) -> Confusion<N> {
         Confusion { tp, fn_, fp, tn }
@@ -63,16 +63,16 @@ impl<N: From<u32> + AddAssign> Confusion<N> {
     }
 }
 
-/// Confusions in files. A unit of a study has a hundred of them, each with four small counts: where all are below 64
-/// they are one text with a character per count, else a list of numbers. A tenth of the time and a third of the size of
-/// numbers, in journals and parts that are written while lanes wait.
+/// Serializes confusions compactly. A unit of a study has about a hundred, each with four small counts. If all counts
+/// are below 64, the confusions become one text with a character per count; else a list of numbers. The text takes a
+/// tenth of the time and a third of the size; journals and parts are written while lanes wait.
 pub(super) mod packed {
     use serde::de::Error as _;
     use serde::{Deserialize, Deserializer, Serialize, Serializer};
 
     use super::Confusion;
 
-    /// Characters of the counts 0 … 63, as in base 64.
+    /// Digits of the counts 0 … 63, as in base 64.
     const DIGITS: &[u8; 64] = b"ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
 
     #[derive(Serialize, Deserialize)]

@@ -1,4 +1,4 @@
-//! What a user may write for `--backend` and `--device`. It is read and checked in programs built without a GPU too.
+//! Values of `--backend` and `--device`. Also parsed and checked in programs built without a GPU.
 
 use std::fmt;
 use std::str::FromStr;
@@ -23,7 +23,7 @@ impl FromStr for DeviceName {
     type Err = Error;
 
     /// # Errors
-    /// [`Error::Usage`] for an empty text and for a `pci:` that no bus id follows.
+    /// [`Error::Usage`] for an empty text, or for `pci:` without a bus id.
     fn from_str(text: &str) -> Result<Self> {
         let text = text.trim();
         let help = "write the index, a part of the name or pci:BUS of a device; `lanesweep verify devices` lists them";
@@ -74,7 +74,7 @@ impl FromStr for BackendChoice {
     type Err = Error;
 
     /// # Errors
-    /// [`Error::Usage`] for any other word than `auto`, `cpu` and `gpu`.
+    /// [`Error::Usage`] for any word except `auto`, `cpu` and `gpu`.
     fn from_str(text: &str) -> Result<Self> {
         match text {
             "auto" => Ok(BackendChoice::Auto),
@@ -90,10 +90,10 @@ impl FromStr for BackendChoice {
 }
 
 impl BackendChoice {
-    /// Refuses a device that is named beside the processor.
+    /// Refuses a device name together with the processor.
     ///
     /// # Errors
-    /// [`Error::Usage`] naming the device.
+    /// [`Error::Usage`] with the name of the device.
     pub fn check(self, device: Option<&DeviceName>) -> Result<()> {
         match (self, device) {
             (BackendChoice::Cpu, Some(device)) => Err(Error::usage(
@@ -106,10 +106,10 @@ impl BackendChoice {
     }
 }
 
-/// A place on the PCI bus in one form: `dddd:bb:dd.f`, hexadecimal, lower case.
+/// The canonical form of a PCI bus id: `dddd:bb:dd.f`, hexadecimal, lower case.
 ///
-/// Takes what tools print: `65:00.0`, `0000:65:00.0`, `00000000:65:00.0`, with or without `pci:` and the function.
-/// `None` if the text is no PCI bus id.
+/// Accepts what tools print: `65:00.0`, `0000:65:00.0`, `00000000:65:00.0`, with or without `pci:` and the function.
+/// `None` if the text is not a PCI bus id.
 pub fn pci_bus_id(text: &str) -> Option<String> {
     let text = text.trim();
     let text = match text.get(..4) {

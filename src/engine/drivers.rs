@@ -17,7 +17,7 @@ use super::lane_case::LaneCase;
 use super::outcome::Outcome;
 use super::scene::Scene;
 
-/// Makes [`Constants`] and its dispatch from the registry of driver models.
+/// Defines [`Constants`] and its dispatch from the registry of driver models.
 macro_rules! declare_constants {
     ($($(#[$attribute:meta])* $file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
         /// Everything a lane of one category takes from the profile, as plain constants.
@@ -57,7 +57,7 @@ macro_rules! declare_constants {
                 self.run_in(id, Scene::unknown(case.pair != 0), case, tables, start, observer)
             }
 
-            /// The same where something is known of the case.
+            /// The same, with known properties of the case.
             #[inline]
             pub(super) fn run_in(
                 &self,
@@ -79,7 +79,7 @@ macro_rules! declare_constants {
                 }
             }
 
-            /// The constants of a model by the names that its shader gives them.
+            /// The constants of a model by their names in its shader.
             pub fn driver_shader_constants(&self, id: ModelId) -> Vec<(&'static str, f64)> {
                 match id {
                     $(ModelId::$model => self.$file.shader_constants(),)+
@@ -88,15 +88,15 @@ macro_rules! declare_constants {
         }
 
         impl Constants<f32> {
-            /// Do lanes run in batches on such instructions, or one by one?
+            /// Whether lanes run in batches on these instructions.
             pub(super) fn run_in_batches(&self, instructions: Instructions) -> bool {
                 let has_burst = instructions != Instructions::Scalar && instructions.is_available();
                 has_burst && Rules::of(&self.frames[0], &self.criteria, Scene::unknown(true), true).is_some()
             }
 
-            /// Runs a stream of lanes of the chosen model in batches, where they [run in
-            /// batches](Constants::run_in_batches), and gives what they say in the order in which they end: lane,
-            /// counted within the stream, and its end. `entries` are the series that the stream's tracks point into.
+            /// Runs a stream of lanes of the selected model in batches if they [run in
+            /// batches](Constants::run_in_batches). `each` receives the lane's index within the stream and its result,
+            /// in the order in which lanes end. `entries` are the series that the stream's tracks index.
             pub(super) fn run_stream<E: Ending>(
                 &self,
                 id: ModelId,

@@ -1,5 +1,5 @@
-//! The executor: the one loop above the backends. It runs chunks of units, checks a sample of a device's lanes on the
-//! CPU, and gives a failed chunk to another backend.
+//! The executor: the loop above the backends. It runs chunks of units, rechecks a sample of a device's lanes on the
+//! CPU, and passes a failed chunk to the fallback backend.
 
 use std::ops::Range;
 use std::sync::Arc;
@@ -13,44 +13,45 @@ use super::recheck::{Recheck, RecheckOptions};
 use crate::support::cancel::Cancel;
 use crate::{Error, Result};
 
-/// Lanes of one task that values marked lanes.
+/// Lanes of one task that computes values of marked lanes.
 const VALUING_TASK: usize = 4096;
 
-/// What computes the lanes of a run, what stands in where it fails, and which lanes are computed again. `Executor<'static>`
-/// owns its backends; one of a borrowed backend (`Executor::new(&backend)`) lives as long as that.
+/// The backend of a run, its fallback, and the lanes to recheck. `Executor<'static>` owns its backends;
+/// `Executor::new(&backend)` borrows one and lives as long as the backend.
 #[derive(Clone)]
 pub struct Executor<'a> {
     /// Computes the lanes.
     pub backend: Arc<dyn Backend + 'a>,
-    /// Computes what the backend cannot.
+    /// Computes the chunks that the backend cannot compute.
     pub fallback: Option<Arc<dyn Backend + 'a>>,
-    /// The lanes that the CPU computes again, as [`Backend::rechecked_by`] says; `None` checks none.
+    /// Which lanes the CPU recomputes, as [`Backend::rechecked_by`] says; `None` recomputes none.
     pub recheck: Option<RecheckOptions>,
-    /// Maximum lanes of a chunk; `None` leaves it to the backend. A run is journalled and interrupted between chunks.
+    /// Maximum number of lanes in a chunk; `None` selects the backend's default. A run is journalled and cancelled
+    /// between chunks.
     pub chunk_lanes: Option<u64>,
-    /// Ends a sweep after the chunk at which it is requested.
+    /// Ends a sweep after the current chunk when requested.
     pub cancel: Cancel,
-    /// Is told the units of every chunk that is done.
+    /// Called with the number of units of every finished chunk.
     pub progress: Option<Arc<dyn Fn(u64) + Send + Sync>>,
 }
 
-/// How a sweep went.
+/// Summary of a sweep.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct SweepSummary {
     /// Lanes computed.
     pub lanes: u64,
-    /// Chunks of the fallback, of what the first backend could not compute.
+    /// Chunks computed by the fallback because the backend failed.
     pub redone_chunks: u64,
-    /// Their lanes.
+    /// Lanes of these chunks.
     pub redone_lanes: u64,
-    /// Lanes that were computed again on the CPU with every step made, all equal.
+    /// Lanes recomputed on the CPU with every step, all equal.
     pub rechecked_lanes: u64,
-    /// Time that the device itself computed, s, where it can tell.
+    /// Device time, s; `None` if the device cannot measure it.
     pub device_s: Option<f64>,
 }
 
 impl SweepSummary {
-    /// Two sweeps of the same run.
+    /// Adds the summary of another sweep of the same run.
     pub fn add(&mut self, other: &SweepSummary) {
         self.lanes += other.lanes;
         self.redone_chunks += other.redone_chunks;
@@ -61,7 +62,7 @@ impl SweepSummary {
 }
 
 impl<'a> Executor<'a> {
-    /// A backend without fallback or check.
+    /// An executor without fallback and recheck.
     pub fn new(backend: impl Backend + 'a) -> Self {
         Executor {
             backend: Arc::new(backend),
@@ -73,27 +74,27 @@ impl<'a> Executor<'a> {
         }
     }
 
-    /// The same with a fallback, where there is one.
+    /// Sets the fallback.
     pub fn with_fallback(self, fallback: impl Backend + 'a) -> Self {
         Executor { fallback: Some(Arc::new(fallback)), ..self }
     }
 
-    /// The same, ended by this token.
+    /// Sets the cancellation token.
     pub fn with_cancel(self, cancel: Cancel) -> Self {
         Executor { cancel, ..self }
     }
 
-    /// The same with one lane in [`ONE_IN`](super::ONE_IN) computed again; the seed chooses which.
+    /// Rechecks one lane in [`ONE_IN`](super::ONE_IN); the seed selects which.
     pub fn with_recheck(self, seed: u64) -> Self {
         Executor { recheck: Some(RecheckOptions::of_seed(seed)), ..self }
     }
 
-    /// The same, which tells the units of every chunk that is done.
+    /// Sets the callback for finished units.
     pub fn with_progress(self, progress: impl Fn(u64) + Send + Sync + 'static) -> Self {
         Executor { progress: Some(Arc::new(progress)), ..self }
     }
 
-    /// Ends a run of which so many units are done, where that is requested and there are more.
+    /// Ends a run with `done` of `of` units if cancellation is requested and units are left.
     ///
     /// # Errors
     /// [`Error::Interrupted`].
@@ -104,12 +105,12 @@ impl<'a> Executor<'a> {
         Ok(())
     }
 
-    /// Computes an interval of units and gives every chunk, in order, to `each`. A chunk that the backend cannot
-    /// compute is computed by the fallback, where there is one.
+    /// Computes an interval of units and passes every chunk, in order, to `each`. If the backend cannot compute a
+    /// chunk, the fallback does.
     ///
     /// # Errors
-    /// Of the backend where there is no fallback, of the fallback, of `each`; [`Error::Verification`] where a
-    /// checked lane differs; [`Error::Interrupted`] between chunks once [`Executor::cancel`] is requested.
+    /// Those of the backend if there is no fallback, of the fallback, and of `each`. [`Error::Verification`] if a
+    /// rechecked lane differs. [`Error::Interrupted`] between chunks after [`Executor::cancel`] is requested.
     pub fn sweep(
         &self,
         plan: &LanePlan,
@@ -121,7 +122,7 @@ impl<'a> Executor<'a> {
         self.sweep_checked(plan, units, wanted, recheck.as_ref(), each)
     }
 
-    /// The same with a check of the caller's.
+    /// The same with a check by the caller.
     pub(super) fn sweep_checked(
         &self,
         plan: &LanePlan,
@@ -144,7 +145,7 @@ impl<'a> Executor<'a> {
             (Err(error), None) => return Err(error),
         };
         let valuing = wanted.watch().map(|watch| (watch, LaneRunner::of_few(plan)));
-        // Values the marked lanes of a chunk, checks it and hands it on.
+        // Computes the values of the marked lanes of a chunk, rechecks the chunk and passes it on.
         let mut deliver = |mut chunk: Chunk, computed_by: &dyn Backend, redone: u64| {
             if let Some((watch, runner)) = &valuing {
                 value_marked(plan, watch, runner, &mut chunk);
@@ -165,7 +166,7 @@ impl<'a> Executor<'a> {
             self.check_cancelled(done, units.end - units.start)
         };
         let mut from = units.start;
-        // The backend is not asked for units before this one.
+        // The backend computes no units before this one.
         let mut redo_until = if session.is_some() { units.start } else { units.end };
         while from < units.end {
             if let Some(session) = session.as_mut().filter(|_| from >= redo_until) {
@@ -202,15 +203,15 @@ impl<'a> Executor<'a> {
     }
 }
 
-/// A chunk that is checked to be what was asked for.
+/// Computes a chunk and checks that it holds what was requested.
 fn compute(plan: &LanePlan, session: &mut dyn Session, units: &Range<u64>, wanted: Wanted) -> Result<Chunk> {
     let chunk = session.run(units.clone(), wanted)?;
     chunk.check_asked(plan, units, wanted)?;
     Ok(chunk)
 }
 
-/// Values the marked lanes of a chunk, one by one, and gives them their own verdicts. A backend that returned every
-/// outcome leaves nothing to value.
+/// Computes the values of the marked lanes of a chunk one by one, and sets their own verdicts. Does nothing if the
+/// backend returned every outcome.
 fn value_marked(plan: &LanePlan, watch: &Watch, runner: &LaneRunner<'_, f32>, chunk: &mut Chunk) {
     if !chunk.outcomes.is_empty() {
         return;
@@ -244,7 +245,7 @@ pub fn chunks(plan: &LanePlan, units: Range<u64>) -> Vec<Range<u64>> {
     ranges
 }
 
-/// End of a chunk that begins at a unit and holds about so many lanes, at least one unit.
+/// End of a chunk that begins at a unit and holds about `lanes` lanes, at least one unit.
 fn next_cut(plan: &LanePlan, from: u64, end: u64, lanes: u64) -> u64 {
     let most = plan.blocks.iter().map(|b| plan.lanes_per_unit(b)).max().unwrap_or(1).max(1);
     end.min(from + (lanes / most).max(1))

@@ -1,4 +1,4 @@
-//! How long a sweep will take: a fixed share of the plan's own lanes is run, and the rest follows.
+//! Predicts the duration of a sweep from a fixed fraction of the plan's own lanes.
 
 use std::time::{Duration, Instant};
 
@@ -6,24 +6,24 @@ use super::backend::{Backend, Chunk, Wanted};
 use super::plan::{Block, LanePlan};
 use crate::Result;
 
-/// Lanes of the first piece: enough for every thread of a common machine.
+/// Lanes of the first piece: enough for every thread of a typical machine.
 const FIRST_PIECE: u64 = 4096;
 
-/// What a measurement of some lanes says of all.
+/// Predicted size and duration of a sweep.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Forecast {
-    /// All lanes.
+    /// Number of lanes.
     pub lanes: u64,
-    /// Time that they will take, s, on this machine as it is loaded now.
+    /// Predicted time, s, on this machine at its present load.
     pub seconds: f64,
-    /// Lanes that were run to know.
+    /// Lanes that were run for the measurement.
     pub measured_lanes: u64,
-    /// Most lanes whose results are held at once.
+    /// Maximum number of lanes whose results are held at once.
     pub lanes_at_once: u64,
 }
 
 impl Forecast {
-    /// Of a sweep after another.
+    /// Adds the forecast of a subsequent sweep.
     pub fn add(&mut self, other: &Forecast) {
         self.lanes += other.lanes;
         self.seconds += other.seconds;
@@ -32,12 +32,12 @@ impl Forecast {
     }
 }
 
-/// Runs lanes of every block for about `budget` in all and concludes on the whole. Pieces are spread over a block, as
-/// its scenarios differ; they grow until one is long enough to be timed, and the first ones do not count: a backend is
-/// slower there. `each` does with a chunk what the run itself will do, as that takes time too.
+/// Runs lanes of every block for about `budget` in total and extrapolates. Pieces are spread over a block, because its
+/// scenarios differ. They grow until one takes long enough to be timed; the first pieces do not count, because a
+/// backend is slower there. `each` processes a chunk as the run itself does, because that takes time too.
 ///
 /// # Errors
-/// Of the backend and of `each`.
+/// Those of the backend and of `each`.
 pub fn forecast(
     plan: &LanePlan,
     backend: &dyn Backend,
@@ -80,7 +80,7 @@ pub fn forecast(
     Ok(whole)
 }
 
-/// Where the pieces begin: golden sections never come near one another.
+/// First units of the pieces, by the golden section, so that they are spread evenly.
 fn position(block: &Block, count: u64, piece: u64) -> u64 {
     let share = (count as f64 * 0.618_033_988_749_895).fract();
     block.first_unit + (share * (block.units.len() - piece) as f64) as u64

@@ -1,5 +1,5 @@
-//! The frame around a lane's steps: time and end rules, the headway it starts from, and what all lanes of one
-//! model have in common.
+//! The frame around a lane's steps: time and end rules, the initial headway, and the constants common to all lanes of
+//! one model.
 
 use crate::model::criterion::Criteria;
 use crate::model::profile::FrameProfile;
@@ -14,18 +14,18 @@ pub struct Frame<R> {
     pub dt: R,
     /// 1/dt, 1/s.
     pub inverse_dt: R,
-    /// Number of steps that are evaluated at most.
+    /// Maximum number of evaluated steps.
     pub step_cap: u32,
     /// Index 0 is one step after the nominal start.
     pub start_shift: bool,
-    /// End where nothing can happen any more.
+    /// Ends the lane when no further event is possible.
     pub end_when_settled: bool,
-    /// Abort at lateral overlap with |TTC| above this, s (the JRC's rule for CCHDM); off where not positive.
+    /// Abort at lateral overlap with |TTC| above this, s (the JRC's rule for CCHDM); off unless positive.
     pub abort_above_ttc: R,
 }
 
 impl<R: Real> Frame<R> {
-    /// Plain constants; `abort_above_ttc_s` is the driver model's.
+    /// Resolves the constants; `abort_above_ttc_s` is that of the driver model.
     pub fn resolve(profile: &FrameProfile, abort_above_ttc_s: f64) -> Self {
         Frame {
             dt: R::from_f64(profile.dt_s),
@@ -37,7 +37,7 @@ impl<R: Real> Frame<R> {
         }
     }
 
-    /// The constants by the names that the shaders give them; flags are 0 or 1.
+    /// The constants by their names in the shaders; flags are 0 or 1.
     pub fn shader_constants(&self) -> Vec<(&'static str, f64)> {
         vec![
             ("frame_dt", self.dt.to_f64()),
@@ -73,9 +73,9 @@ impl<R: Real> Start<R> {
     }
 }
 
-/// The table of 5.2.3.3 with linear interpolation: 1.0 s at 7.2 km/h, 1.1 s at 10 km/h, 0.1 s more per 10 km/h, 1.6 s at
-/// 60 km/h, never below 2 m. Above 60 km/h the regulation refers to national rules; here the line goes on to 2.0 s at
-/// 100 km/h and stays.
+/// The table of 5.2.3.3 with linear interpolation: 1.0 s at 7.2 km/h, 1.1 s at 10 km/h, 0.1 s more per 10 km/h, 1.6 s
+/// at 60 km/h, at least 2 m. Above 60 km/h the regulation refers to national rules. Here the line continues to 2.0 s at
+/// 100 km/h and is constant above.
 #[inline(always)]
 fn min_following_gap<R: Real>(v: R) -> R {
     // From 7.2 to 10 km/h the table is steeper: 0.1 s in 2.8 km/h.
@@ -85,7 +85,7 @@ fn min_following_gap<R: Real>(v: R) -> R {
     (thw * v).larger(R::from_f64(2.0))
 }
 
-/// What all lanes of one model have in common.
+/// The constants that all lanes of one model have in common.
 #[derive(Debug, Clone, Copy)]
 pub struct Simulation<'a, R, M> {
     /// Time and end rules.
@@ -94,9 +94,9 @@ pub struct Simulation<'a, R, M> {
     pub criteria: &'a Criteria<R>,
     /// The ego's driver.
     pub model: &'a M,
-    /// Its position in the registry: selects the attention windows.
+    /// Index of the model in the registry; selects the attention windows.
     pub model_index: usize,
-    /// What is known of the other vehicles.
+    /// Known properties of the other vehicles.
     pub scene: Scene,
 }
 
@@ -104,7 +104,7 @@ pub struct Simulation<'a, R, M> {
 mod tests {
     use super::Start;
 
-    /// Speed in km/h, distance in m, as 5.2.3.3 has them, to its one decimal.
+    /// Speeds in km/h, distances in m, as in 5.2.3.3, to its one decimal.
     #[test]
     fn the_minimum_following_distance_is_that_of_the_table() {
         for (kmh, metres) in

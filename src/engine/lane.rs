@@ -19,17 +19,17 @@ pub struct Step<R> {
     pub v_ego: R,
     /// The other vehicles; the second only where the case has one.
     pub seen: [Seen<R>; 2],
-    /// The result of the check that counts.
+    /// The hazard that determines the reaction.
     pub hazard: Hazard<R>,
 }
 
-/// Listens to the steps of a lane. Sweeps listen to nothing and pay nothing.
+/// Receives the steps of a lane. Sweeps use [`Silent`], which costs nothing.
 pub trait Observer<R> {
     /// Called once per evaluated step.
     fn step(&mut self, step: &Step<R>);
 }
 
-/// Listens to nothing.
+/// Ignores every step.
 pub struct Silent;
 
 impl<R> Observer<R> for Silent {

@@ -1,9 +1,9 @@
-//! From a [`Case`] to the record that lanes read: motions encoded, sizes summed, everything that depends
-//! on the other vehicles alone (attention, exposure, freezing) computed once on the host.
+//! From a [`Case`] to the record that lanes read. Motions are encoded and sizes are summed. Everything that depends on
+//! the other vehicles alone (attention, exposure, freezing) is computed once on the host.
 //!
-//! Time steps that are too long for a case: contacts along the road are found between two steps; across the road a
-//! vehicle is looked at once per step, and must not get from one side of the ego to the other unseen.
-//! Derivation: docs/src/methods/lane.md, time step.
+//! Also checks that the time step is short enough for a case. Contacts along the road are found between two steps.
+//! Laterally, a vehicle is evaluated once per step, so it must not pass from one side of the ego to the other within a
+//! step. Derivation: docs/src/methods/lane.md, time step.
 
 pub use crate::model::driver::NEVER;
 use crate::model::driver::{AttentionRule, DriverProfile, MODELS};
@@ -24,20 +24,20 @@ pub struct LaneOther<R> {
     pub half_widths: R,
     /// Added to the lane's initial gap, m: 0 for the principal vehicle, L_c + D for the one ahead of it.
     pub gap_offset: R,
-    /// First step at which it exists for the ego.
+    /// First step at which it is present for the ego.
     pub present_from: u32,
-    /// First step at which it does no longer.
+    /// First step at which it is no longer present.
     pub present_until: u32,
     /// First step at which each driver model may react to it, in the order of
     /// [`ModelId::ALL`](crate::model::driver::ModelId::ALL).
     pub attend_from: [u32; MODELS],
-    /// 1 where the slot is used.
+    /// 1 if the slot is used.
     pub used: u32,
-    /// 1 where the criteria judge it.
+    /// 1 if the criteria evaluate it.
     pub judged: u32,
 }
 
-/// What all lanes of one case share.
+/// Data that all lanes of one case share.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LaneCase<R> {
@@ -47,14 +47,14 @@ pub struct LaneCase<R> {
     pub ego_speed: R,
     /// Width of the ego, m.
     pub ego_width: R,
-    /// Steps to the later of T and the last parameter event: the run goes on at least so long.
+    /// Steps to the later of T and the last parameter event: a lane runs at least this long.
     pub horizon: u32,
-    /// 1 where a second vehicle is used.
+    /// 1 if a second vehicle is used.
     pub pair: u32,
 }
 
 impl LaneCase<f64> {
-    /// Encodes a case under a profile; series go to the end of `tables`.
+    /// Encodes a case under a profile; its series are appended to `tables`.
     pub fn encode(case: &Case, profile: &Profile, tables: &mut Tables<f64>) -> Self {
         let dt_s = profile.frame.dt_s;
         let exposed = case.category == Category::CutOut && profile.frame.cut_out_target == CutOutTarget::Exposed;
@@ -82,14 +82,14 @@ impl LaneCase<f64> {
         }
     }
 
-    /// The same case with the others this much farther ahead, m: of a headway or gap that belongs to the case.
+    /// The same case with the other vehicles this much farther ahead, m, for a headway or gap that is part of the case.
     #[must_use]
     pub(crate) fn ahead_by(mut self, gap_m: f64) -> Self {
         self.others.iter_mut().for_each(|other| other.gap_offset += gap_m);
         self
     }
 
-    /// The host's one rounding.
+    /// Rounds every number once to the lane arithmetic.
     pub fn cast<R: Real>(&self) -> LaneCase<R> {
         LaneCase {
             others: self.others.map(|o| LaneOther {
@@ -110,7 +110,7 @@ impl LaneCase<f64> {
         }
     }
 
-    /// The same; the series that it takes from `all` go to the end of `tables`.
+    /// The same; the series that it reads from `all` are appended to `tables`.
     pub(super) fn cast_with_series<R: Real>(&self, all: &Tables<f64>, tables: &mut Tables<R>) -> LaneCase<R> {
         let mut case: LaneCase<R> = self.cast();
         for LaneOther { motion, .. } in &mut case.others {
@@ -149,14 +149,14 @@ fn encode_other(
     }
 }
 
-/// The principal vehicle's motion as series, for the rules that look at it.
+/// Series of the principal vehicle's motion, for the attention and exposure rules.
 struct Series {
     lateral_m: Vec<f64>,
     speed_mps: Vec<f64>,
 }
 
 impl Series {
-    /// Long enough to see every event: motions are constant after their last event.
+    /// Covers every event, because motions are constant after their last event.
     fn of(motion: &Motion<f64>, tables: &Tables<f64>, step_cap: u32) -> Series {
         let events = [motion.speed_len, motion.lateral_len, motion.speed_until, motion.lateral_until];
         let steps = step_cap.min(events.into_iter().max().unwrap_or(0).saturating_add(2));
@@ -167,7 +167,7 @@ impl Series {
     }
 }
 
-/// Perception rules: when each model may react.
+/// Sets when each model may react.
 fn attend(case: &Case, profile: &Profile, series: &Series, others: &mut [LaneOther<f64>; 2]) {
     let half_widths = others[0].half_widths;
     let steps = series.lateral_m.len() as u32;
@@ -180,10 +180,10 @@ fn attend(case: &Case, profile: &Profile, series: &Series, others: &mut [LaneOth
     }
 }
 
-/// Makes [`attention_rules`] from the registry of driver models.
+/// Defines [`attention_rules`] from the registry of driver models.
 macro_rules! declare_attention {
     ($($(#[$attribute:meta])* $file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
-        /// What each driver model waits for, in the order of [`ModelId::ALL`](crate::model::driver::ModelId::ALL).
+        /// Attention rule of each driver model, in the order of [`ModelId::ALL`](crate::model::driver::ModelId::ALL).
         pub(crate) fn attention_rules(profile: &Profile, category: Category) -> [AttentionRule<f64>; MODELS] {
             [$(profile.$file.attention(profile.frame.dt_s, category)),+]
         }
@@ -191,8 +191,8 @@ macro_rules! declare_attention {
 }
 for_every_driver_model!(declare_attention);
 
-/// The JRC's cut-out: nothing before the exposure, then the vehicle ahead; a cutting-out vehicle that hits
-/// it freezes there and takes its place.
+/// The JRC's cut-out: no vehicle is present before the exposure, then the vehicle ahead. A cutting-out vehicle that
+/// hits it freezes there and takes its place.
 fn expose(case: &Case, profile: &Profile, series: &Series, others: &mut [LaneOther<f64>; 2], tables: &mut Tables<f64>) {
     let Some(ahead) = &case.ahead else { return };
     let dt = profile.frame.dt_s;
@@ -206,7 +206,7 @@ fn expose(case: &Case, profile: &Profile, series: &Series, others: &mut [LaneOth
     let shift = if profile.frame.start_shift { front.speed(tables, 0) - cutter.speed(tables, 0) } else { 0.0 };
     let mut distance = ahead.gap_m + overlap_lengths + shift * dt;
     let mut freeze = NEVER;
-    // How far it drives beyond the middle of the other one within the step, m.
+    // Distance that it drives beyond the middle of the other vehicle within the step, m.
     let mut beyond = 0.0;
     for i in 0..cap {
         let before = distance;
@@ -225,7 +225,7 @@ fn expose(case: &Case, profile: &Profile, series: &Series, others: &mut [LaneOth
     others[1].present_until = freeze;
     others[0].present_from = freeze;
     if freeze != NEVER {
-        // Its position at the freeze holds the step it moved; its speed from there on is 0.
+        // The position at the freeze includes the step made; the speed is 0 from there on.
         let speed: Vec<f64> = (0..freeze).map(|i| cutter.speed(tables, i)).chain([0.0]).collect();
         let lateral = cutter.lateral(tables, freeze).position;
         let moved = cutter.speed(tables, freeze) * dt - beyond;
@@ -235,10 +235,11 @@ fn expose(case: &Case, profile: &Profile, series: &Series, others: &mut [LaneOth
     }
 }
 
-/// Does the time step show every vehicle of a case that passes across the ego's lane? `place` is the case's.
+/// Checks that the time step shows every vehicle of a case that passes across the ego's lane. `place` names the case in
+/// errors.
 ///
 /// # Errors
-/// [`Error::Usage`] with the longest time step that does.
+/// [`Error::Usage`] with the longest valid time step.
 pub fn check_time_step(case: &LaneCase<f64>, tables: &Tables<f64>, dt_s: f64, place: impl Fn() -> Place) -> Result<()> {
     for (vehicle, other) in case.others.iter().enumerate().filter(|(_, other)| other.used != 0) {
         let Some(across_m) = passes(&other.motion, tables, other.half_widths) else { continue };
@@ -253,19 +254,20 @@ pub fn check_time_step(case: &LaneCase<f64>, tables: &Tables<f64>, dt_s: f64, pl
     Ok(())
 }
 
-/// How far a vehicle moves across the road, m, in a step that takes it past the ego: it overlaps with the ego neither
-/// before nor after, and is on another side.
+/// Lateral distance, m, of a step in which a vehicle passes the ego: it overlaps with the ego neither before nor after
+/// the step, and changes sides.
 fn passes(motion: &Motion<f64>, tables: &Tables<f64>, half_widths: f64) -> Option<f64> {
     let of_step = |before: f64, after: f64| {
         let is_clear = before.abs() >= half_widths && after.abs() >= half_widths;
         (is_clear && (before < 0.0) != (after < 0.0)).then_some((after - before).abs())
     };
     if motion.kind & LATERAL_SAMPLED == 0 {
-        // The lateral speed is constant; the last step is no longer than the others.
+        // The lateral speed is constant; the last step is not longer than the others.
         if motion.lateral_per_step.abs() < 2.0 * half_widths {
             return None;
         }
-        // The position is monotone, so one step at most changes the side: a search, because there may be 2³² steps.
+        // The position is monotone, so at most one step changes the side. A binary search, because there may be 2³²
+        // steps.
         let position = |step| motion.lateral(tables, step).position;
         let side = position(0) < 0.0;
         let (mut before, mut after) = (0, motion.lateral_until.saturating_add(1));
@@ -310,7 +312,7 @@ mod tests {
         check_time_step(&lane, &tables, dt_s, || Place::item("a case"))
     }
 
-    /// Vehicles 1.9 m wide: 3.8 m at once lead from one side to the other.
+    /// Vehicles 1.9 m wide: a step of 3.8 m leads from one side to the other.
     #[test]
     fn a_vehicle_that_passes_across_the_ego_within_a_step_is_refused_with_the_step_that_shows_it() {
         let change = |end_m: f64, rate_mps: f64| Lateral::Kinematic { start_m: 3.5, rate_mps: -rate_mps, end_m };
@@ -320,7 +322,7 @@ mod tests {
         let help = error.help().unwrap();
         assert!(error.to_string().contains("7.0 m") && help.contains("below 5.43e-2 s"), "{error} {help}");
         assert!(check(change(-3.5, 70.0), 0.05).is_ok());
-        // Billions of steps on the way: checked at once.
+        // Billions of steps; the check must not iterate over them.
         assert!(check(change(-1e10, 30.0), 0.1).is_ok());
         assert!(check(Lateral::Kinematic { start_m: 1e10 + 5.0, rate_mps: -100.0, end_m: -1e10 }, 0.1).is_err());
         let recorded = |position_m: Vec<f64>| Lateral::Sampled { towards_mps: vec![0.0; position_m.len()], position_m };

@@ -1,12 +1,13 @@
-//! One step of a lane as a pure function, written once for the scalar lane and for batches of lanes. The latched
-//! step stands here, once for all models.
+//! One step of a lane as a pure function, written once for single lanes and for batches. The latched step of all models
+//! is here too.
 //!
-//! Order inside a step: the gap moves to i (held by a contact on the way), the state at i gives the criteria and the
-//! contact, then the check, then v[i+1] (semi-implicit Euler). The state is the gap: positions never enter, so f32
-//! keeps millimetres.
+//! Order inside a step: the gap moves to i (a contact between two steps holds it), the state at i gives the criteria
+//! and the contact, then the check, then v[i+1] (semi-implicit Euler). The state is the gap, not the positions, so f32
+//! resolves millimetres.
 //!
-//! No loop, no early return and no effect: so a compiler can run the step for many lanes at once. Truth values are
-//! [`Flag`]s, which vector units combine fastest; steps are at most [`Flag::LATEST_STEP`], which stands for "never".
+//! There is no loop, no early return and no side effect, so that a compiler can vectorize the step over many lanes.
+//! Truth values are [`Flag`]s, which vector units combine fastest. Step indices are at most [`Flag::LATEST_STEP`],
+//! which stands for "never".
 
 use crate::model::criterion::{BrakeThreatMaximum, Criteria, TtcMinimum, held_in_contact, overlaps_along};
 use crate::model::driver::{DriverModel, DriverState, Hazard, View};
@@ -18,31 +19,31 @@ use super::lane_case::{LaneCase, LaneOther};
 use super::outcome::NO_STEP;
 use super::scene::Scene;
 
-/// What a lane's steps need to know of another vehicle, constant within the lane.
+/// Constants of another vehicle within a lane.
 #[derive(Debug, Clone, Copy)]
 pub struct OtherConstants<R> {
     /// (L_e + L_o)/2, m.
     pub half_lengths: R,
     /// (W_e + W_o)/2, m.
     pub half_widths: R,
-    /// First step at which it exists for the ego.
+    /// First step at which it is present for the ego.
     pub present_from: u32,
-    /// First step at which it does no longer.
+    /// First step at which it is no longer present.
     pub present_until: u32,
     /// First step at which the lane's driver may react to it.
     pub attend_from: u32,
-    /// The criteria judge it.
+    /// The criteria evaluate it.
     pub judged: Flag,
 }
 
-/// What a lane's steps need to know, constant within the lane.
+/// Constants of a lane.
 #[derive(Debug, Clone, Copy)]
 pub struct LaneConstants<R> {
     /// Principal vehicle, then the one ahead of it.
     pub others: [OtherConstants<R>; 2],
     /// Width of the ego, m.
     pub ego_width: R,
-    /// First step that may end a lane in which nothing happens any more.
+    /// First step that may end a lane in which no further event is possible.
     pub horizon: u32,
 }
 
@@ -62,13 +63,13 @@ impl<R: Real> LaneConstants<R> {
         LaneConstants {
             others: [of(&case.others[0]), of(&case.others[1])],
             ego_width: case.ego_width,
-            // No step has this index: the step cap is below it.
+            // LATEST_STEP is never reached, because the step cap is below it.
             horizon: known(if simulation.frame.end_when_settled { case.horizon } else { Flag::LATEST_STEP }),
         }
     }
 }
 
-/// Where another vehicle is at one step.
+/// State of another vehicle at one step.
 #[derive(Debug, Clone, Copy)]
 pub struct OtherState<R> {
     /// Speed, m/s.
@@ -97,45 +98,45 @@ pub struct Seen<R> {
     pub lateral: R,
     /// Present for the ego at this step.
     pub present: Flag,
-    /// TTC and BTN look at it.
+    /// TTC and BTN evaluate it.
     pub judged: Flag,
 }
 
-/// What the steps of a lane have gathered so far.
+/// Minima and maxima over the steps so far.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Record<R> {
-    /// Smallest time to collision.
+    /// Minimum time to collision.
     pub ttc: TtcMinimum<R>,
-    /// Largest Brake Threat Number.
+    /// Maximum Brake Threat Number.
     pub btn: BrakeThreatMaximum<R>,
-    /// Smallest gap to a vehicle that TTC and BTN look at, m.
+    /// Minimum gap to a vehicle that TTC and BTN evaluate, m.
     pub min_gap: R,
 }
 
 /// A lane between two steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LaneState<R> {
-    /// The step to come.
+    /// Index of the next step.
     pub index: u32,
-    /// Speed of the ego at the step to come, m/s.
+    /// Speed of the ego at the next step, m/s.
     pub v_ego: R,
     /// Speed of the ego one step before, m/s.
     pub v_before: R,
-    /// Gaps at the last step, m; the step to come moves them first.
+    /// Gaps at the last step, m; the next step updates them first.
     pub gaps: [R; 2],
     /// The driver's latched state.
     pub driver: DriverState<R>,
     /// First unsafe step, or [`NO_STEP`].
     pub reaction_step: u32,
-    /// What the steps have gathered.
+    /// Minima and maxima over the steps so far.
     pub record: Record<R>,
-    /// The last step has been made, even if the time cap is far: its [ending](crate::engine::cpu::lane_result) says
-    /// why. Later steps change nothing; where only verdicts are wanted, nothing that verdicts look at.
+    /// The last step has been made, possibly long before the time cap; the [result](crate::engine::cpu::lane_result)
+    /// says why. Later steps change nothing, or in verdict-only sweeps nothing that affects a verdict.
     pub over: Flag,
 }
 
 impl<R: Real> LaneState<R> {
-    /// Before the first step.
+    /// State before the first step.
     #[inline(always)]
     pub fn new<M: DriverModel<R>>(simulation: &Simulation<R, M>, case: &LaneCase<R>, start: Start<R>) -> Self {
         let gap_start = start.gap(case.ego_speed);
@@ -152,19 +153,19 @@ impl<R: Real> LaneState<R> {
     }
 }
 
-/// What one step did.
+/// Result of one step.
 #[derive(Debug, Clone, Copy)]
 pub struct Moved<R> {
-    /// The lane after it.
+    /// State of the lane after the step.
     pub state: LaneState<R>,
-    /// The other vehicles as the ego saw them; the second is the first where there is none.
+    /// The other vehicles as the ego sees them; without a second vehicle, both are the first.
     pub seen: [Seen<R>; 2],
-    /// The result of the check that counts.
+    /// The hazard that determines the reaction.
     pub hazard: Hazard<R>,
 }
 
-/// One step; `places` are the other vehicles at `state.index`. The lane is over where its state says so, or where the
-/// next index reaches the step cap; one that is over stays as it is (see [`LaneState::over`]).
+/// Makes one step; `places` are the other vehicles at `state.index`. The lane is over if its state says so, or if the
+/// next index reaches the step cap. A lane that is over stays unchanged (see [`LaneState::over`]).
 #[inline(always)]
 pub fn advance<R: Real, M: DriverModel<R>>(
     simulation: &Simulation<R, M>,
@@ -195,7 +196,7 @@ pub fn advance<R: Real, M: DriverModel<R>>(
         second = see(simulation, &ego, &lane.others[1], &places[1], gaps[1], index, runs);
         record = update_record(criteria, &record, &second);
         let other_hazard = check(simulation, &second, &lane.others[1], index);
-        // The nearest unsafe vehicle drives the reaction.
+        // The nearest unsafe vehicle determines the reaction.
         let nearer = other_hazard.is_unsafe & (!hazard.is_unsafe | gaps[1].is_below(gaps[0]));
         hazard = Hazard {
             is_unsafe: hazard.is_unsafe | other_hazard.is_unsafe,
@@ -209,13 +210,13 @@ pub fn advance<R: Real, M: DriverModel<R>>(
     let past_horizon = Flag::reached(index, lane.horizon);
     let over = state.over | touched | aborted | (past_horizon & (at_rest | settled));
 
-    // Latched: not unsafe holds the present speed (the ego never accelerates again), unsafe reacts.
+    // Latched: without a hazard the ego holds its present speed (it never accelerates again); with a hazard it reacts.
     hazard.is_unsafe = hazard.is_unsafe | (runs & model.keeps_braking(&state.driver, &first.view));
     let (reacting, v_reacting) = model.react(state.driver, &hazard, v_ego);
     let is_first = hazard.is_unsafe & Flag::of(state.reaction_step == NO_STEP);
     let state = LaneState {
         index: index + runs.one(),
-        // A contact keeps its speed.
+        // The speed at a contact is kept.
         v_ego: (hazard.is_unsafe & !touched).choose(v_reacting, v_ego),
         v_before: if keeps_values { runs.choose(v_ego, state.v_before) } else { v_ego },
         gaps,
@@ -237,7 +238,7 @@ pub(super) struct Ego<R> {
     pub width: R,
 }
 
-/// The gap a step later; a contact between the two steps holds it.
+/// The gap one step later; a contact between the two steps holds it.
 #[inline(always)]
 fn moved_gap<R: Real, M>(
     simulation: &Simulation<R, M>,
@@ -256,13 +257,13 @@ fn moved_gap<R: Real, M>(
     stops.choose(held_in_contact(gap, moved, other.half_lengths), moved)
 }
 
-/// It exists for the ego.
+/// Whether the vehicle is present for the ego.
 #[inline(always)]
 fn is_present<R>(other: &OtherConstants<R>, index: u32) -> Flag {
     Flag::reached(index, other.present_from) & !Flag::reached(index, other.present_until)
 }
 
-/// `runs`: the lane is not over; else nothing is there to be seen.
+/// `runs`: the lane is not over; otherwise no vehicle is present.
 #[inline(always)]
 pub(super) fn see<R: Real, M>(
     simulation: &Simulation<R, M>,
@@ -305,8 +306,8 @@ pub(super) fn update_record<R: Real>(criteria: &Criteria<R>, record: &Record<R>,
     Record { ttc, btn, min_gap: seen.judged.choose(smaller, record.min_gap) }
 }
 
-/// The gap, m ≥ 0, beyond which no criterion that a record keeps begins to fail at this closing speed, m/s, or a
-/// smaller one, but for rounding.
+/// The gap, m ≥ 0, above which no criterion in the record begins to fail at this closing speed, m/s, or a lower one.
+/// Rounding is not included.
 #[inline(always)]
 pub(super) fn criteria_safe_gap<R: Real>(criteria: &Criteria<R>, record: &Record<R>, closing: R) -> R {
     let Record { ttc, btn, min_gap: _ } = record;
@@ -342,7 +343,7 @@ pub(super) fn is_touched<R: Real>(scene: Scene, seen: &Seen<R>, other: &OtherCon
     seen.present & judged & across & along
 }
 
-/// Nothing can happen with this vehicle any more: it is behind, out of the lane, or not slower.
+/// No further event is possible with this vehicle: it is behind, out of the lane, or not slower.
 #[inline(always)]
 pub(super) fn is_settled<R: Real>(scene: Scene, seen: &Seen<R>) -> Flag {
     let across = if scene.in_lane { Flag::TRUE } else { seen.view.lateral_gap.is_negative() };

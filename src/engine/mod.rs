@@ -1,9 +1,9 @@
 //! The engine: cases become lanes, lanes become outcomes.
 //!
-//! Here live the lane's record and step, the lane plan, the backends (`cpu`, `gpu`), the checks of one against the
-//! other ([`verify`], rechecks during a sweep), outcomes and partial counts. Cases come from [`model`](crate::model) and
-//! [`scenario`](crate::scenario::parameterization); partials go to [`run`](crate::run). A driver or a criterion lives in
-//! [`model`](crate::model).
+//! This module contains the lane's record and step, the lane plan and the backends (`cpu`, `gpu`). It also contains the
+//! checks of one backend against another ([`verify`], rechecks during a sweep), outcomes and partial counts. Cases come
+//! from [`model`](crate::model) and [`scenario`](crate::scenario::parameterization); partials go to
+//! [`run`](crate::run). Driver models and criteria are in [`model`](crate::model).
 
 mod backend;
 mod confusion;

@@ -1,5 +1,5 @@
-//! What computes the lanes of a run, open: the processor, or the device that a user means. The one place that chooses,
-//! opens and checks a device, and falls back to the processor where nobody named one.
+//! Opens the backend of a run: the CPU, or the device that a user names. Only this module selects, opens and checks a
+//! device, and falls back to the CPU if no device was named.
 
 use serde::Serialize;
 
@@ -19,14 +19,14 @@ pub struct DeviceRecord {
     pub api: &'static str,
     /// Driver and its version.
     pub driver: String,
-    /// Place on the PCI bus, where it is known.
+    /// Place on the PCI bus; `None` if unknown.
     pub pci_bus_id: Option<String>,
-    /// Float operations reached the driver as written.
+    /// Float operations reach the driver unchanged.
     pub exact_path: bool,
 }
 
 impl DeviceRecord {
-    /// In one line, as pages show it.
+    /// One line for reports.
     pub(crate) fn line(&self) -> String {
         let path = if self.exact_path { "exact path" } else { "plain path" };
         let at = self.pci_bus_id.as_ref().map_or(String::new(), |id| format!(", PCI {id}"));
@@ -34,24 +34,24 @@ impl DeviceRecord {
     }
 }
 
-/// What computes the lanes, open.
+/// An open backend.
 pub struct OpenBackend {
-    /// The processor in the lane arithmetic stands in for a device.
+    /// With a device, the CPU in the lane arithmetic is the fallback.
     executor: Executor<'static>,
     device: Option<DeviceRecord>,
 }
 
 impl OpenBackend {
-    /// The processor in binary64.
+    /// The CPU in binary64.
     pub fn reference() -> OpenBackend {
         OpenBackend { executor: Executor::new(CpuBackend::reference()), device: None }
     }
 
-    /// Opens what computes as the processor does: where a device does not promise it, the self-check decides.
+    /// Opens a backend whose results equal the CPU's. If a device does not guarantee this, the self-check decides.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a device that does not exist or contradicts the backend, [`Error::Device`] where a GPU is
-    /// asked for and there is none, or where it does not compute as the processor does.
+    /// [`Error::Usage`] for a device that does not exist or contradicts the backend. [`Error::Device`] if a GPU is
+    /// required and none is available, or if its results differ from the CPU's.
     pub fn open(choice: BackendChoice, device: Option<&DeviceName>) -> Result<OpenBackend> {
         let cpu = || OpenBackend { executor: Executor::new(CpuBackend::lane_arithmetic()), device: None };
         if choice == BackendChoice::Cpu && device.is_none() {
@@ -60,10 +60,10 @@ impl OpenBackend {
         Ok(open_device(choice, device, true)?.unwrap_or_else(cpu))
     }
 
-    /// Opens what is to be verified: no check before the check, and no silent processor.
+    /// Opens a backend for verification: without the self-check, and without falling back to the CPU.
     ///
     /// # Errors
-    /// As [`OpenBackend::open`]; [`Error::Device`] also where nothing was asked for and there is no GPU.
+    /// As [`OpenBackend::open`]; [`Error::Device`] also if nothing was specified and there is no GPU.
     pub fn open_to_verify(choice: BackendChoice, device: Option<&DeviceName>) -> Result<OpenBackend> {
         if choice == BackendChoice::Cpu && device.is_none() {
             return OpenBackend::open(choice, None);
@@ -71,28 +71,28 @@ impl OpenBackend {
         open_device(choice, device, false)?.ok_or_else(nothing_to_verify)
     }
 
-    /// What computes.
+    /// The backend.
     pub fn backend(&self) -> &dyn Backend {
         &*self.executor.backend
     }
 
-    /// The device, where one computes.
+    /// The device; `None` on the CPU.
     pub fn device(&self) -> Option<&DeviceRecord> {
         self.device.as_ref()
     }
 
-    /// What computes, with what stands in for a device.
+    /// The executor, with a fallback if a device computes.
     pub fn executor(&self) -> Executor<'static> {
         self.executor.clone()
     }
 
-    /// The same, whose runs end by this token.
+    /// Sets the cancellation token of the runs.
     pub fn with_cancel(self, cancel: Cancel) -> Self {
         OpenBackend { executor: self.executor.with_cancel(cancel), ..self }
     }
 }
 
-/// Opens a device; `None` where the processor is to compute.
+/// Opens a device; `None` if the CPU is to compute.
 #[cfg(feature = "gpu")]
 fn open_device(choice: BackendChoice, device: Option<&DeviceName>, is_checked: bool) -> Result<Option<OpenBackend>> {
     use super::gpu::{Adapters, GpuBackend, GpuOptions, choose, visible_here};
@@ -106,7 +106,7 @@ fn open_device(choice: BackendChoice, device: Option<&DeviceName>, is_checked: b
             let executor = Executor::new(gpu).with_fallback(CpuBackend::lane_arithmetic());
             Ok(Some(OpenBackend { executor, device }))
         }
-        // Nobody named it: the CPU computes the same.
+        // The device was not named explicitly, and the CPU gives the same results.
         Err(error) if is_checked && choice == BackendChoice::Auto && device.is_none() => {
             tracing::warn!("{error}; the CPU computes instead");
             Ok(None)
@@ -152,7 +152,7 @@ fn nothing_to_verify() -> Error {
     no_gpu("lanesweep verify")
 }
 
-/// What a program without GPUs says where one is asked for.
+/// The error of a program without GPU support if a GPU is required.
 #[cfg(not(feature = "gpu"))]
 pub(crate) fn no_gpu(asked: &str) -> Error {
     let help = "use option `backend = cpu`, or build it with the feature `gpu`";

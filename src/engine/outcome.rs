@@ -1,4 +1,4 @@
-//! What a lane says when it is over.
+//! The results of a finished lane.
 
 use crate::model::criterion::{Contact, Criterion};
 use crate::model::scalar::Real;
@@ -6,8 +6,8 @@ use crate::model::scalar::Real;
 /// "Did not happen" as a step index.
 pub const NO_STEP: u32 = u32::MAX;
 
-/// Verdict bits of a lane: bit [`Criterion::index`] is set where the criterion failed, [`Verdicts::CAPPED`]
-/// where the lane ran into the time cap.
+/// Verdict bits of a lane: bit [`Criterion::index`] is set if the criterion failed, [`Verdicts::CAPPED`] if the lane
+/// reached the time cap.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Hash)]
 #[repr(transparent)]
 pub struct Verdicts(pub u8);
@@ -18,12 +18,12 @@ impl Verdicts {
     /// A contact that a [watch](super::Watch) marks: no lane ends both by contact and at the cap.
     pub(super) const MARKED_CONTACT: u8 = Verdicts::CAPPED | 1 << Criterion::Collision as u8;
 
-    /// Did this criterion fail?
+    /// Whether this criterion failed.
     pub fn failed(self, criterion: Criterion) -> bool {
         self.0 & (1 << criterion.index()) != 0
     }
 
-    /// Did the lane end at the time cap?
+    /// Whether the lane ended at the time cap.
     pub fn capped(self) -> bool {
         self.0 & Verdicts::CAPPED != 0
     }
@@ -34,7 +34,7 @@ impl Verdicts {
 pub enum EndReason {
     /// The vehicles touched.
     Contact,
-    /// The ego is not faster than anything ahead in its lane, or everything is behind.
+    /// The ego is not faster than any vehicle ahead in its lane, or all vehicles are behind.
     Settled,
     /// The ego stands.
     Standstill,
@@ -44,7 +44,7 @@ pub enum EndReason {
     Aborted,
 }
 
-/// Outcome of one lane, in the lane's own numbers; times are integer steps.
+/// Outcome of one lane in its own arithmetic; times are step indices.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Outcome<R> {
     /// Verdicts.
@@ -61,20 +61,20 @@ pub struct Outcome<R> {
     pub contact_step: u32,
     /// Last evaluated step.
     pub end_step: u32,
-    /// Speed of the ego at the contact, m/s; 0 without one.
+    /// Speed of the ego at the contact, m/s; 0 without a contact.
     pub impact_speed: R,
-    /// Closing speed at the contact, m/s; 0 without one.
+    /// Closing speed at the contact, m/s; 0 without a contact.
     pub impact_closing_speed: R,
-    /// Smallest TTC, s, ≥ 0; infinite where the ego never closed in.
+    /// Minimum TTC, s, ≥ 0; infinite if the ego never closed in.
     pub min_ttc: R,
-    /// Largest BTN, ≥ 0; infinite where no braking helped.
+    /// Maximum BTN, ≥ 0; infinite if no braking helped.
     pub max_btn: R,
-    /// Smallest gap to a vehicle that TTC and BTN look at, m; infinite where there was none.
+    /// Minimum gap to a vehicle that TTC and BTN evaluate, m; infinite if there was none.
     pub min_gap: R,
 }
 
 impl Outcome<f64> {
-    /// Fills the place of a lane that is to come.
+    /// Placeholder for a lane that has not been computed.
     pub(super) const NONE: Self = Outcome {
         verdicts: Verdicts(0),
         contact: Contact::None,
@@ -92,7 +92,7 @@ impl Outcome<f64> {
 }
 
 impl<R: Real> Outcome<R> {
-    /// The same in f64, exactly.
+    /// The same in f64; exact.
     pub fn widen(&self) -> Outcome<f64> {
         Outcome {
             verdicts: self.verdicts,

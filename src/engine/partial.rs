@@ -1,5 +1,5 @@
-//! Results of lanes as exact integer counts per unit. A chunk, a journal record and a shard's part are partials. Merging
-//! is associative and commutative.
+//! Results of lanes as exact integer counts per unit. A chunk, a journal record and a shard's part are partials.
+//! Merging is associative and commutative.
 
 use std::ops::Range;
 
@@ -36,7 +36,7 @@ pub struct Partial {
 }
 
 impl Partial {
-    /// Nothing yet.
+    /// A partial without units.
     pub fn empty(plan: &LanePlan) -> Partial {
         Partial {
             plan_hash: plan.hash().to_owned(),
@@ -68,7 +68,7 @@ impl Partial {
             for unit in inside {
                 let lanes = &chunk.verdicts[at..at + per_unit];
                 self.units.push(count_unit(plan, block.first_unit + unit, block.variants.len(), lanes));
-                // Lanes lie in the order of the cells: variant, headway, model.
+                // Lanes are in the order of the cells: variant, headway, model.
                 for (lane, cells) in lanes.iter().zip(failures.chunks_mut(Criterion::ALL.len())) {
                     Criterion::ALL.iter().zip(cells).for_each(|(c, cell)| *cell += u64::from(lane.failed(*c)));
                 }
@@ -78,7 +78,7 @@ impl Partial {
         self
     }
 
-    /// Joins the counts of other units of the same plan: associative, and the same in any order.
+    /// Merges the counts of other units of the same plan: associative and commutative.
     ///
     /// # Errors
     /// If the plans differ, or a unit is in both.
@@ -119,10 +119,10 @@ impl Partial {
         &self.units
     }
 
-    /// Failed lanes of a block, over all units counted: variant × headway × model × criterion, the last innermost.
+    /// Failed lanes of a block over all counted units: variant × headway × model × criterion, the last innermost.
     ///
     /// # Errors
-    /// [`Error::Internal`] where the counts are not those of this plan.
+    /// [`Error::Internal`] if the counts do not belong to this plan.
     pub fn headway_failures(&self, plan: &LanePlan, block: usize) -> Result<&[u64]> {
         let first: usize = plan.blocks[..block].iter().map(|before| plan.headway_cells(before)).sum();
         let cells = self.headway_failures.get(first..first + plan.headway_cells(&plan.blocks[block]));
@@ -141,10 +141,10 @@ impl Partial {
         intervals
     }
 
-    /// Whether counts that were read from a file can be those of a study.
+    /// Checks whether counts read from a file can be those of a study.
     ///
     /// # Errors
-    /// What contradicts itself.
+    /// The contradiction found.
     pub fn check(&self) -> std::result::Result<(), String> {
         if self.units.windows(2).any(|pair| pair[0].unit >= pair[1].unit) {
             return Err("its units are not in order, or not each there once".to_owned());
@@ -155,10 +155,10 @@ impl Partial {
         Ok(())
     }
 
-    /// Whether counts that were read from a file can be those of this plan.
+    /// Checks whether counts read from a file can be those of this plan.
     ///
     /// # Errors
-    /// What differs.
+    /// The difference found.
     pub fn check_of(&self, plan: &LanePlan) -> std::result::Result<(), String> {
         if self.plan_hash != plan.hash() {
             return Err(format!("they belong to plan {}, not to {}", self.plan_hash, plan.hash()));
@@ -169,7 +169,7 @@ impl Partial {
         Ok(())
     }
 
-    /// Do the counts by headway add up to the failures of the units? The units must fit the plan.
+    /// Whether the counts by headway add up to the failures of the units. The units must fit the plan.
     pub fn adds_up(&self, plan: &LanePlan) -> bool {
         (0..plan.blocks.len()).all(|block| self.block_adds_up(plan, block))
     }
@@ -195,7 +195,7 @@ impl Partial {
         sums == of_units
     }
 
-    /// Has every unit the counts that the plan's variants, models and criteria make?
+    /// Whether every unit has as many counts as the plan's variants, models and criteria require.
     pub fn fits(&self, plan: &LanePlan) -> bool {
         let models = plan.models.len();
         self.units.iter().all(|unit| {
@@ -209,7 +209,7 @@ impl Partial {
         })
     }
 
-    /// Does it hold every unit of the plan?
+    /// Whether it contains every unit of the plan.
     pub fn is_complete(&self, plan: &LanePlan) -> bool {
         self.plan_hash == plan.hash() && self.units.len() as u64 == plan.unit_count()
     }

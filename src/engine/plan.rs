@@ -1,9 +1,8 @@
-//! The lane plan: the lanes of a sweep and their order, everything that the host computes in f64 before the lanes (or
-//! its inputs), and the hash.
+//! The lane plan: the lanes of a sweep and their order, the f64 input that the host computes before the lanes, and the
+//! hash.
 //!
-//! A lane's index is its identity: category block, unit (scenario), variant (0 is S), headway, model, by
-//! mixed radix from the plan's own counts. Ranges are intervals of units, so a shard boundary
-//! never separates S from its S'.
+//! A lane's index is its identity: category block, unit (scenario), variant (0 is S), headway, model, by mixed radix
+//! from the plan's counts. Ranges are intervals of units, so a shard boundary never separates S from its S'.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -25,7 +24,7 @@ use super::version::Canonical;
 const R157: &str = "r157";
 /// Text of [`Headway::Observed`].
 const OBSERVED: &str = "observed";
-/// Headways below this are close following, s: reports say how many failures come from them.
+/// Headways below this are close following, s: reports state how many failures come from them.
 pub const CLOSE_HEADWAY_S: f64 = 0.5;
 
 /// Headway of a lane.
@@ -39,8 +38,8 @@ pub enum Headway {
     /// Minimum following distance of UN R157, 5.2.3.3, at the ego's initial speed: `r157`.
     #[serde(rename = "r157")]
     MinFollowing,
-    /// The recorded gap of each scenario: `observed`. The case has it in its gap offsets, so no other headway stands
-    /// beside it.
+    /// The recorded gap of each scenario: `observed`. The gap offsets of the case contain it, so it cannot be combined
+    /// with another headway.
     Observed,
 }
 
@@ -50,7 +49,7 @@ impl Headway {
         (1..=10).rev().map(|k| Headway::ThwS(f64::from(k) / 5.0)).collect()
     }
 
-    /// From its text, `1.2s`, `30m`, `r157` or `observed`; `2.0s`, as tables have it, is `2s`.
+    /// Parses `1.2s`, `30m`, `r157` or `observed`; also `2.0s`, as in tables, for `2s`.
     pub fn parse(text: &str) -> Option<Headway> {
         match text {
             R157 => return Some(Headway::MinFollowing),
@@ -64,7 +63,7 @@ impl Headway {
         }
     }
 
-    /// What tells it from others: two that start every lane alike are one.
+    /// Identity of a headway: two that start every lane alike are equal.
     pub(crate) fn identity(self) -> (u8, u32) {
         match (self, self.start::<f32>()) {
             (Headway::Observed, _) => (3, 0),
@@ -74,12 +73,12 @@ impl Headway {
         }
     }
 
-    /// Whether these are the recorded gaps.
+    /// Whether the list consists of the recorded gap.
     pub(crate) fn is_observed(list: &[Headway]) -> bool {
         list.contains(&Headway::Observed)
     }
 
-    /// Refuses the recorded gap beside another headway: the gap is part of the case, which all headways share.
+    /// Refuses the recorded gap together with another headway: the gap is part of the case, which all headways share.
     ///
     /// # Errors
     /// [`Error::Usage`].
@@ -91,7 +90,7 @@ impl Headway {
         Ok(())
     }
 
-    /// As a lane starts, rounded once.
+    /// The start of a lane, rounded once.
     pub fn start<R: crate::model::scalar::Real>(self) -> Start<R> {
         match self {
             Headway::ThwS(s) => Start::Headway(R::from_f64(s)),
@@ -113,15 +112,15 @@ impl std::fmt::Display for Headway {
     }
 }
 
-/// Gives the case of (unit, variant) as a pure function: a table for the study; generators and grids for
+/// Returns the case of (unit, variant) as a pure function: from a table for studies; from generators and grids for
 /// sampling and maps.
 pub trait CaseSource: Send + Sync {
     /// The case; `block` and `unit` count from 0 (unit within its block), variant 0 is S.
     fn case(&self, block: usize, unit: u64, variant: usize) -> LaneCase<f64>;
-    /// The series that motions point into.
+    /// The series that motions index.
     fn tables(&self) -> &Tables<f64>;
-    /// Makes the cases where the lanes run, where that is so: then unit `i` is sample `i` of the first variant, and
-    /// [`CaseSource::case`] and [`CaseSource::tables`] are not asked.
+    /// The generator, if cases are made where the lanes run. Then unit `i` is sample `i` of the first variant, and
+    /// [`CaseSource::case`] and [`CaseSource::tables`] are not called.
     fn generator(&self) -> Option<&Generator> {
         None
     }
@@ -172,7 +171,8 @@ pub struct LaneKey {
 }
 
 impl LanePlan {
-    /// Makes and hashes a plan. `blocks` need categories, units and variants only; their firsts are set here.
+    /// Makes and hashes a plan. Only categories, units and variants of `blocks` are read; the first units and lanes are
+    /// set here.
     pub fn new(
         profile: Profile,
         models: Vec<ModelId>,
@@ -186,10 +186,10 @@ impl LanePlan {
         Ok(plan)
     }
 
-    /// A plan whose hash is that of what its cases follow from.
+    /// A plan whose hash is that of the input from which its cases follow.
     ///
     /// # Errors
-    /// [`Error::Usage`] without models or headways, for one that is there twice, and for too many lanes.
+    /// [`Error::Usage`] without models or headways, for a duplicate one, and for too many lanes.
     pub(crate) fn with_hash(
         hash: String,
         profile: Profile,
@@ -229,7 +229,8 @@ impl LanePlan {
         Ok(LanePlan { profile, models, headways, blocks, source, hash })
     }
 
-    /// The same plan with the cases of some units only: those held of each block, and their cases.
+    /// The same plan that holds the cases of some units only: the units held of each block, and the source of their
+    /// cases.
     pub(crate) fn holding(&self, units: Vec<Units>, source: Box<dyn CaseSource>) -> LanePlan {
         let blocks = self.blocks.iter().zip(units).map(|(block, units)| Block { units, ..block.clone() });
         LanePlan {
@@ -247,17 +248,17 @@ impl LanePlan {
         self.source.case(block, unit, variant)
     }
 
-    /// The series that motions point into.
+    /// The series that motions index.
     pub fn tables(&self) -> &Tables<f64> {
         self.source.tables()
     }
 
-    /// What makes the cases where the lanes run, in place of [`LanePlan::case`] and [`LanePlan::tables`].
+    /// The generator, if cases are made where the lanes run; replaces [`LanePlan::case`] and [`LanePlan::tables`].
     pub fn generator(&self) -> Option<&Generator> {
         self.source.generator()
     }
 
-    /// SHA-256 over everything that decides the outcomes, in hexadecimal.
+    /// SHA-256 over everything that determines the outcomes, in hexadecimal.
     pub fn hash(&self) -> &str {
         &self.hash
     }
@@ -288,7 +289,7 @@ impl LanePlan {
         found.map_or(0, |b| b.first_lane + (unit - b.first_unit).min(b.units.len()) * self.lanes_per_unit(b))
     }
 
-    /// Splits an interval of units (over all blocks) at the blocks' borders: (block, units within it).
+    /// Splits an interval of units (over all blocks) at the block boundaries: (block, units within it).
     pub fn segments(&self, units: Range<u64>) -> Vec<(usize, Range<u64>)> {
         let mut segments = Vec::new();
         for (index, block) in self.blocks.iter().enumerate() {
@@ -308,12 +309,13 @@ impl LanePlan {
         block.first_lane + key.unit * self.lanes_per_unit(block) + inner as u64
     }
 
-    /// Position of a lane's model in the plan: the innermost part of the lane index, because every block holds whole units.
+    /// Position of a lane's model in the plan: the innermost part of the lane index, because every block holds whole
+    /// units.
     pub fn model_of(&self, lane: u64) -> usize {
         (lane % self.models.len() as u64) as usize
     }
 
-    /// Key of a lane index; `None` beyond the plan.
+    /// Key of a lane index; `None` if out of range.
     pub fn key(&self, lane: u64) -> Option<LaneKey> {
         if lane >= self.lane_count() {
             return None;
@@ -344,13 +346,13 @@ impl LanePlan {
         )
     }
 
-    /// The key that a text stands for.
+    /// Parses a lane key.
     pub fn parse_key(&self, text: &str) -> Option<LaneKey> {
         let parts: Vec<&str> = text.rsplitn(4, '/').collect();
         let [model, headway, variant, unit] = parts[..] else { return None };
         let model = ModelId::parse(model)?;
         let model = self.models.iter().position(|m| *m == model)?;
-        // As it is written first: a random plan's gap may be negative, which nobody may ask for.
+        // Compares with the written form first: the gap of a random plan may be negative, which the parser refuses.
         let written = self.headways.iter().position(|h| h.to_string() == headway);
         let meant = || Headway::parse(headway).and_then(|meant| self.headways.iter().position(|h| *h == meant));
         let headway = written.or_else(meant)?;
@@ -385,8 +387,8 @@ impl LanePlan {
     }
 }
 
-/// Checks the cases of these units of blocks, where they are known before their lanes run. What a
-/// [generator](crate::engine::generated) makes ends or begins in the ego's lane and passes nobody.
+/// Checks the cases of these units of blocks if they are known before their lanes run. Vehicles of a
+/// [generated](crate::engine::generated) case start or end in the ego's lane and never pass across it.
 ///
 /// # Errors
 /// As [`check_time_step`].
@@ -415,10 +417,10 @@ pub(crate) fn check_cases(
 /// Units of one block, in order.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Units {
-    /// Scenarios or cells, of which this process holds an interval: total number, index of the first held, keys of those
-    /// held.
+    /// Scenarios or cells, of which this process holds an interval: total number, index of the first held, keys of
+    /// those held.
     Held(u64, u64, Arc<[String]>),
-    /// Samples `#0`, `#1`, … below this count: a run over 10¹⁰ of them keeps no names.
+    /// Samples `#0`, `#1`, … below this count: a run over 10¹⁰ samples stores no names.
     Numbered(u64),
 }
 
@@ -430,7 +432,7 @@ impl Units {
         }
     }
 
-    /// Those whose cases are there: all, but of a study that is read or made in part.
+    /// Units whose cases are available: all, unless a study is read or made in part.
     pub fn held(&self) -> Range<u64> {
         match self {
             Units::Held(_, first, names) => *first..first + names.len() as u64,
@@ -454,7 +456,7 @@ impl Units {
         }
     }
 
-    /// The unit that a name stands for.
+    /// The unit with this name.
     pub fn find(&self, name: &str) -> Option<u64> {
         match self {
             Units::Held(_, first, names) => names.iter().position(|n| n == name).map(|at| first + at as u64),

@@ -1,5 +1,5 @@
-//! One in a thousand lanes of a device, and of batches that skip steps, is computed again on the CPU with every step.
-//! A difference stops the run.
+//! Recomputes one in a thousand lanes of a device, or of batches that skip steps, on the CPU with every step. A
+//! difference stops the run.
 
 use std::ops::Range;
 
@@ -12,18 +12,18 @@ use super::outcome::{Outcome, Verdicts};
 use super::plan::{LaneKey, LanePlan};
 use crate::{Error, Result};
 
-/// Default: one lane in so many is checked.
+/// Default sampling rate: one lane in 1000 is rechecked.
 pub const ONE_IN: u64 = 1000;
 
-/// One in so many of the lanes checked in batches is also checked as a single lane. A single lane costs about forty
-/// times a lane of batches that skip steps, and four to ten times a lane of batches that do not.
+/// One in this many of the lanes rechecked in batches is also rechecked as a single lane. A single lane costs about
+/// forty times a lane of batches that skip steps, and four to ten times a lane of other batches.
 const SINGLE_ONE_IN: u64 = 4;
 
 /// Lanes of one task.
 const TASK: usize = 1024;
 
-/// A seeded sample of a plan's lanes: one of each `one_in` consecutive ones. The choice depends only on seed and lane,
-/// not on chunks.
+/// A seeded sample of a plan's lanes: one of each `one_in` consecutive lanes. The selection depends only on seed and
+/// lane, not on chunks.
 pub(super) struct Recheck<'p> {
     plan: &'p LanePlan,
     recompute: Box<dyn Recompute + 'p>,
@@ -31,12 +31,12 @@ pub(super) struct Recheck<'p> {
     one_in: u64,
 }
 
-/// Which lanes are computed again.
+/// Which lanes are recomputed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RecheckOptions {
-    /// Chooses the lanes.
+    /// Selects the lanes.
     pub seed: u64,
-    /// One lane in so many, at least 1.
+    /// One lane in this many, at least 1.
     pub one_in: u64,
 }
 
@@ -47,11 +47,11 @@ impl RecheckOptions {
     }
 }
 
-/// Makes every step of a lane again.
+/// Recomputes lanes with every step.
 trait Recompute: Sync {
     /// Outcome of a single lane.
     fn single(&self, key: &LaneKey) -> Outcome<f32>;
-    /// Verdicts of lanes of one block and model in batches, with their position in `keys`.
+    /// Verdicts of lanes of one block and model in batches; `each` receives the position in `keys` and the verdicts.
     fn batched(&self, keys: &[LaneKey], each: &mut dyn FnMut(usize, Verdicts));
 }
 
@@ -70,10 +70,11 @@ impl<'p> Recheck<'p> {
         Recheck { plan, recompute: Box::new(LaneRunner::of_few(plan)), seed, one_in: one_in.max(1) }
     }
 
-    /// Computes the chosen lanes of a chunk again and compares every word that it has. Gives their number. `backend`
-    /// describes what computed it.
+    /// Recomputes the selected lanes of a chunk and compares every word that the chunk has. Returns their number.
+    /// `backend` describes what computed the chunk.
     ///
     /// # Errors
+    /// [`Error::Verification`] with the first lane that differs.
     /// [`Error::Verification`] with the first lane that differs.
     pub fn check(&self, chunk: &Chunk, wanted: Wanted, backend: &str, by: RecheckBy) -> Result<u64> {
         if chunk.verdicts.is_empty() || by == RecheckBy::Nothing {
@@ -115,19 +116,19 @@ impl<'p> Recheck<'p> {
         first
     }
 
-    /// Whether a lane should have been valued and was not.
+    /// Whether the chunk lacks the values of a lane that should be marked.
     fn misses_mark(&self, chunk: &Chunk, wanted: Wanted, key: &LaneKey, ours: &Outcome<f32>) -> bool {
         let model = self.plan.models[key.model];
         wanted.watch().is_some_and(|watch| watch.means(model, &ours.widen()))
             && !chunk.valued.iter().flatten().any(|(lane, _)| *lane == self.plan.lane(key))
     }
 
-    /// Whether a lane that is checked in a batch is also checked as a single lane.
+    /// Whether a lane that is rechecked in a batch is also rechecked as a single lane.
     fn is_single(&self, key: &LaneKey) -> bool {
         mixed(!self.seed, self.plan.lane(key)).is_multiple_of(SINGLE_ONE_IN)
     }
 
-    /// The chosen lanes of an interval, ascending.
+    /// The selected lanes of an interval, ascending.
     fn chosen(&self, lanes: Range<u64>) -> impl Iterator<Item = u64> {
         let &Recheck { seed, one_in, .. } = self;
         (lanes.start / one_in..lanes.end.div_ceil(one_in))
@@ -162,7 +163,7 @@ impl<'p> Recheck<'p> {
     }
 }
 
-/// Every word equal, bit for bit: NaN equals itself, 0 does not equal −0.
+/// Whether all words are equal, bit for bit: NaN equals itself, 0 does not equal −0.
 pub fn same_words(a: &Outcome<f64>, b: &Outcome<f64>) -> bool {
     words(a) == words(b)
 }
@@ -185,7 +186,7 @@ pub fn words(outcome: &Outcome<f64>) -> [u64; 12] {
     ]
 }
 
-/// A well-mixed number per seed and index (SplitMix64).
+/// A pseudorandom number for each seed and index (SplitMix64).
 fn mixed(seed: u64, index: u64) -> u64 {
     let mut z = seed.wrapping_add(index.wrapping_add(1).wrapping_mul(0x9E37_79B9_7F4A_7C15));
     z = (z ^ (z >> 30)).wrapping_mul(0xBF58_476D_1CE4_E5B9);
@@ -269,7 +270,7 @@ mod tests {
         }
     }
 
-    /// The lanes of a plan of one block and model, with this model instead.
+    /// The lanes of a plan of one block and model, with this model in its place.
     #[derive(Clone, Copy)]
     struct Instead<'p, M> {
         plan: &'p LanePlan,
@@ -279,7 +280,7 @@ mod tests {
     }
 
     impl<M: DriverModel<f32>> Instead<'_, M> {
-        /// Runs the lanes of one case at a time, so that lanes share their properties.
+        /// Runs the lanes of one case at a time, so that they share their properties.
         fn run(&self, keys: &[LaneKey], every_step: bool, mut each: impl FnMut(usize, Verdicts)) {
             let mut from = 0;
             for lanes in keys.chunk_by(|a, b| (a.unit, a.variant) == (b.unit, b.variant)) {
@@ -354,7 +355,8 @@ mod tests {
         }
     }
 
-    /// Sweeps random lanes of a category whose steps are left out by a false promise; the same with every step made.
+    /// Sweeps random lanes of a category whose steps are skipped because of a false promise, and the same lanes with
+    /// every step.
     fn swept<M: DriverModel<f32> + 'static>(category: Category, id: ModelId, model: M) -> (Error, SweepSummary) {
         let options = RandomOptions {
             lanes_per_model_and_category: 20_000,
@@ -373,7 +375,7 @@ mod tests {
         (run(false).expect_err(&format!("{category:?} {}", id.name())), run(true).unwrap())
     }
 
-    /// One for each way to skip work: quiescent steps, lanes with the lead only, steady following.
+    /// One test for each way to skip work: quiescent steps, lanes with the lead only, steady following.
     #[test]
     fn a_false_promise_of_every_kind_stops_the_run_and_names_the_lane() {
         if Instructions::best() == Instructions::Scalar {
@@ -395,7 +397,7 @@ mod tests {
         }
     }
 
-    /// The same lanes are chosen however they are cut into chunks; the CPU's own batches pass.
+    /// The same lanes are selected for any division into chunks; the CPU's own batches pass.
     #[test]
     fn seed_and_lane_alone_choose_what_is_checked() {
         let options = RandomOptions { lanes_per_model_and_category: 3000, ..Default::default() };

@@ -1,4 +1,4 @@
-//! Properties of the other vehicles that are decided before a lane runs, so that its steps need not test them.
+//! Properties of the other vehicles that are known before a lane runs, so that its steps need not test them.
 
 use crate::model::scalar::Real;
 use crate::scenario::{LATERAL_SAMPLED, SPEED_SAMPLED, Tables};
@@ -8,9 +8,9 @@ use super::lane_case::{LaneCase, LaneOther, NEVER};
 /// Properties that all lanes of a stream share.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Scene {
-    /// Two other vehicles are looked at.
+    /// Two other vehicles are evaluated.
     pub is_pair: bool,
-    /// The principal vehicle is present from the first step to the last, and judged.
+    /// The principal vehicle is present from the first step to the last, and evaluated by the criteria.
     pub always_there: bool,
     /// It also stays in the middle of the ego's lane, and the driver attends to it from the first step on.
     pub in_lane: bool,
@@ -31,9 +31,9 @@ impl Scene {
         Scene { is_pair: false, always_there: true, in_lane: true, is_steady: false, may_cross: false }
     }
 
-    /// Common properties of these cases under a model. Where one vehicle appears or leaves, there is a second one as
-    /// well, possibly one that is never present. Lanes that may cross have no further properties, because such time
-    /// steps are rare.
+    /// Common properties of these cases under a model. If a vehicle appears or leaves, the scene counts as a pair, even
+    /// if the second vehicle is never present. Lanes that may cross have no further properties, because such time steps
+    /// are rare.
     pub fn of<R: Real>(cases: &[LaneCase<R>], model_index: usize, may_cross: bool) -> Scene {
         if may_cross {
             return Scene::unknown(true);
@@ -43,8 +43,8 @@ impl Scene {
         Scene { is_pair: !always_there, always_there, in_lane, is_steady: false, may_cross: false }
     }
 
-    /// Properties of lanes of these cases [once only their second vehicles matter](crate::engine::cpu::lead_only):
-    /// these are present, judged and attended to.
+    /// Properties of lanes of these cases [once only their second vehicles matter](crate::engine::cpu::lead_only).
+    /// These are present, evaluated and attended to.
     pub(super) fn of_lead_only<R: Real>(cases: &[LaneCase<R>]) -> Scene {
         let in_lane = cases.iter().all(|case| case.pair == 0 || is_centred(&case.others[1], case.ego_width));
         Scene { is_pair: false, always_there: true, in_lane, is_steady: false, may_cross: false }
@@ -54,7 +54,7 @@ impl Scene {
 /// Whether one step of a lane of this case can move a vehicle's centre past the ego's from wholly ahead or behind. No
 /// driver accelerates and no speed is negative, so the faster of the two vehicles bounds the change of the gap.
 pub(super) fn may_cross<R: Real>(case: &LaneCase<R>, tables: &Tables<R>, dt: R) -> bool {
-    // A thousandth less, for rounding.
+    // One thousandth less, for rounding.
     let reach = R::from_f64(0.999);
     case.others.iter().filter(|other| other.used != 0).any(|other| {
         let motion = &other.motion;
@@ -70,18 +70,18 @@ pub(super) fn may_cross<R: Real>(case: &LaneCase<R>, tables: &Tables<R>, dt: R) 
     })
 }
 
-/// One other vehicle, which neither appears nor leaves.
+/// Whether there is one other vehicle, which neither appears nor leaves.
 fn is_always_there<R: Real>(case: &LaneCase<R>) -> bool {
     let other = &case.others[0];
     case.pair == 0 && other.used != 0 && other.judged != 0 && other.present_from == 0 && other.present_until == NEVER
 }
 
-/// The same, in the middle of the ego's lane from the first step to the last.
+/// The same, and it stays in the middle of the ego's lane.
 fn is_in_lane<R: Real>(case: &LaneCase<R>, model_index: usize) -> bool {
     is_centred(&case.others[0], case.ego_width) && case.others[0].attend_from[model_index] == 0
 }
 
-/// The vehicle keeps to the middle of the ego's lane.
+/// Whether the vehicle stays in the middle of the ego's lane.
 fn is_centred<R: Real>(other: &LaneOther<R>, ego_width: R) -> bool {
     let motion = &other.motion;
     let positions = [motion.lateral_initial, motion.lateral_per_step, motion.lateral_end, motion.lateral_towards];
@@ -109,8 +109,8 @@ mod tests {
         LaneCase::encode(&case, &Profile::load("paper").unwrap(), &mut Tables::default())
     }
 
-    /// A leader is in the lane, a cutting-in vehicle is present, and a cutting-out vehicle has another one ahead. One
-    /// case without a property removes it from all.
+    /// A leader is in the lane, a cutting-in vehicle is present, and a cutting-out vehicle has another one ahead. A
+    /// property holds only if every case has it.
     #[test]
     fn only_what_holds_for_all_cases_is_known() {
         let leader = case(Category::Lvd, Lateral::Centred, false);
@@ -125,7 +125,7 @@ mod tests {
         assert_eq!(Scene::of(&[leader, cut_out], 0, false), known(false, false));
     }
 
-    /// A vehicle that appears, leaves, is not judged, or is not attended to from the start must be tested at every
+    /// A vehicle that appears, leaves, is not evaluated, or is not attended to from the start must be tested at every
     /// step.
     #[test]
     fn what_changes_within_a_lane_is_not_known() {
@@ -144,7 +144,7 @@ mod tests {
         assert!(!with(|case| case.others[0].motion.lateral_end = 0.5).in_lane);
     }
 
-    /// Where a step is shorter than the vehicles' half lengths, no centre passes another from wholly ahead or behind.
+    /// If a step is shorter than the vehicles' half lengths, no centre passes another from wholly ahead or behind.
     #[test]
     fn a_vehicle_crosses_only_where_a_step_is_as_long_as_the_half_lengths() {
         let case = |speed: Speed, tables: &mut Tables<f64>| {

@@ -1,4 +1,4 @@
-//! A lane step by step, as data: what an engineer checks by hand, and what tables and figures of one case are made of.
+//! Every step of a lane as data, for checks by hand and for tables and figures of one case.
 
 use super::cpu::runner::LaneRunner;
 use super::drivers::Constants;
@@ -12,30 +12,30 @@ use crate::model::profile::Profile;
 use crate::model::scalar::Real;
 use crate::scenario::{Category, Tables};
 
-/// Another vehicle at one step. The measures are worked out in f64 from what the lane saw.
+/// Another vehicle at one step. The measures are computed in f64 from the values that the lane used.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TracedVehicle {
-    /// Position along the road of its centre, m; the ego's starts at 0.
+    /// Longitudinal position of its centre, m; the ego's starts at 0.
     pub x_m: f64,
-    /// Position across the road of its centre, m; 0 is the middle of the ego's lane.
+    /// Lateral position of its centre, m; 0 is the middle of the ego's lane.
     pub y_m: f64,
     /// Speed, m/s.
     pub v_mps: f64,
-    /// Gap, bumper to bumper, m; negative where the vehicles overlap along the road.
+    /// Gap, bumper to bumper, m; negative if the vehicles overlap along the road.
     pub gap_m: f64,
-    /// Gap across the road, m; negative where they overlap across it.
+    /// Lateral gap, m; negative if the vehicles overlap laterally.
     pub lateral_gap_m: f64,
-    /// Time to collision, s, ≥ 0; infinite where the ego does not close in.
+    /// Time to collision, s, ≥ 0; infinite if the ego does not close in.
     pub ttc_s: f64,
-    /// Brake Threat Number, ≥ 0; infinite where no braking helps.
+    /// Brake Threat Number, ≥ 0; infinite if no braking helps.
     pub btn: f64,
     /// Proactive fuzzy surrogate of the FSM, 0…1.
     pub pfs: f64,
     /// Critical fuzzy surrogate of the FSM, 0…1.
     pub cfs: f64,
-    /// It is there for the ego.
+    /// It is present for the ego.
     pub is_present: bool,
-    /// TTC and BTN look at it: only such steps count for the smallest TTC and the largest BTN.
+    /// TTC and BTN evaluate it: only such steps count for the minimum TTC and the maximum BTN.
     pub is_judged: bool,
 }
 
@@ -50,22 +50,22 @@ pub struct TracedStep {
     pub x_ego_m: f64,
     /// Speed of the ego, m/s.
     pub v_ego_mps: f64,
-    /// Acceleration of the ego over the step before, m/s².
+    /// Mean acceleration of the ego since the step before, m/s².
     pub a_ego_mps2: f64,
     /// The driver finds the situation unsafe.
     pub is_unsafe: bool,
-    /// Deceleration that the driver asks for, m/s², where it is unsafe.
+    /// Deceleration demanded by the driver, m/s²; `None` if the situation is safe.
     pub demand_mps2: Option<f64>,
     /// Principal vehicle, then the one ahead of it; see [`Trace::vehicles`].
     pub others: [TracedVehicle; 2],
 }
 
-/// What a trace marks.
+/// An event that a trace marks.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum StepMark {
     /// First step that the driver finds unsafe: the reaction time begins.
     Reaction,
-    /// The ego begins to brake: from this step on it decelerates by more than CCHDM coasts at during its delay.
+    /// The ego begins to brake: from this step on it decelerates by more than CCHDM coasts during its delay.
     Braking,
     /// The vehicles touch.
     Contact,
@@ -94,8 +94,8 @@ pub struct Trace {
     pub model: ModelId,
     /// Time step, s.
     pub dt_s: f64,
-    /// Gap at the first step, m, bumper to bumper. Where the profile's runs start one step later (`start_shift`), that of
-    /// the case differs by what the vehicles drive until then.
+    /// Gap at the first step, m, bumper to bumper. If the profile's runs start one step later (`start_shift`), it
+    /// differs from the gap of the case by the relative motion in that step.
     pub initial_gap_m: f64,
     /// Width of the ego, m.
     pub ego_width_m: f64,
@@ -107,11 +107,11 @@ pub struct Trace {
     pub ttc_threshold_s: f64,
     /// A BTN above this fails.
     pub btn_threshold: f64,
-    /// How many other vehicles there are: 1 or 2.
+    /// Number of other vehicles: 1 or 2.
     pub vehicles: usize,
     /// The steps; at least one.
     pub steps: Vec<TracedStep>,
-    /// How it ended.
+    /// The outcome of the lane.
     pub outcome: Outcome<f64>,
 }
 
@@ -168,12 +168,12 @@ impl Trace {
         }
     }
 
-    /// The step of a mark; `None` where it did not happen.
+    /// The step of a mark; `None` if it did not happen.
     pub fn step_of(&self, mark: StepMark) -> Option<u32> {
         let happened = |step: u32| (step != NO_STEP).then_some(step);
         match mark {
             StepMark::Reaction => happened(self.outcome.reaction_step),
-            // The acceleration of a step is that since the step before.
+            // The acceleration of a step is the mean since the step before.
             StepMark::Braking => {
                 let brakes = |step: &&TracedStep| step.a_ego_mps2 < -(self.coasting_mps2 + 1e-6);
                 self.steps.iter().find(brakes).map(|step| step.step.saturating_sub(1))
@@ -189,7 +189,7 @@ impl Trace {
 }
 
 impl<R: Real> LaneRunner<'_, R> {
-    /// One lane with every step: its outcome is that of [`LaneRunner::run`], word for word.
+    /// Runs one lane and keeps every step; its outcome equals that of [`LaneRunner::run`], word for word.
     pub fn trace(&self, key: &LaneKey) -> Trace {
         let plan = self.plan();
         let (case, tables) = self.case(key.block, key.unit, key.variant);
@@ -216,7 +216,7 @@ fn vehicle<R: Real>(measures: &Constants<f64>, seen: &Seen<R>, x_ego_m: f64) -> 
     }
 }
 
-/// What the driver sees, exactly, for what is worked out beside the lane.
+/// The driver's view, exact, for measures that are computed beside the lane.
 fn widened<R: Real>(view: &View<R>) -> View<f64> {
     View {
         v_ego: view.v_ego.to_f64(),

@@ -1,7 +1,7 @@
-//! Which arithmetic made a number, and the bytes that stand for it in a hash.
+//! The version of the lane arithmetic, and the canonical bytes that plan hashes are computed from.
 //!
-//! Every hash of a plan begins with [`ENGINE_VERSION`], and so does every sealed file. What is hashed are numbers and
-//! texts in the form below, never what a formatter makes of them.
+//! Every plan hash and every sealed file begins with [`ENGINE_VERSION`]. Numbers and texts are hashed in the form
+//! below, never as formatted text.
 
 use serde::Serialize;
 use sha2::{Digest, Sha256};
@@ -11,21 +11,21 @@ use super::lane_case::{LaneCase, LaneOther};
 use crate::scenario::{Motion, Tables};
 use crate::support::plain_text::hex;
 
-/// Version of what a lane computes, from a scenario or a sample's index to its verdicts and values. Raise it whenever a
-/// bit of any lane can change: plans, parts, journals and records of another version are refused. Versions of the
-/// package with the same engine continue and merge each other's runs.
+/// Version of the lane computation, from a scenario or a sample's index to its verdicts and values. Raise it whenever a
+/// bit of any lane can change: plans, parts, journals and records of another version are refused. Package versions with
+/// the same engine version continue and merge each other's runs.
 pub const ENGINE_VERSION: u64 = 4;
 
-/// A version and the SHA-256 of what a small set of lanes is in it, by which a test knows that [`ENGINE_VERSION`] must be
-/// raised.
+/// A version, and the SHA-256 of a small set of lanes computed with it. A test uses it to detect that
+/// [`ENGINE_VERSION`] must be raised.
 #[cfg(test)]
 const PINNED_LANES: (u64, &str) = (4, "940130bdd0471e27efb87416174a0f88637088959ef35409640c75634ec9ad77");
 
-/// A hash over numbers and texts: little-endian, texts and lists behind their length, floats by their bits.
+/// A hash over numbers and texts: little-endian, texts and lists preceded by their length, floats as bits.
 pub(crate) struct Canonical(Sha256);
 
 impl Canonical {
-    /// Begins with the engine's version and what is hashed.
+    /// Begins with the engine version and the kind of content.
     pub fn new(what: &str) -> Canonical {
         let mut canonical = Canonical(Sha256::new());
         canonical.text("lanesweep");
@@ -53,7 +53,7 @@ impl Canonical {
         self.0.update(text.as_bytes());
     }
 
-    /// What serializes: every value with its kind, the fields of a structure by name and in the order of their names.
+    /// A serializable value: every value with its kind, the fields of a structure with their names, sorted by name.
     pub fn value(&mut self, value: &impl Serialize) -> crate::Result<()> {
         let value = serde_json::to_value(value)
             .map_err(|e| crate::Error::Internal(format!("a plan has something that cannot be hashed: {e}")))?;
@@ -91,7 +91,7 @@ impl Canonical {
         }
     }
 
-    /// The series that cases point into.
+    /// The series that cases index.
     pub fn tables(&mut self, tables: &Tables<f64>) {
         for list in [&tables.speed[..], tables.lateral.as_flattened()] {
             self.word(list.len() as u64);
@@ -111,7 +111,7 @@ impl Canonical {
         self.0.update(&bytes);
     }
 
-    /// What makes cases where lanes run.
+    /// A generator of cases.
     pub fn generator(&mut self, generator: &Generator) {
         let Generator { points, recipe, basis } = generator;
         match &points.source {
@@ -134,7 +134,7 @@ impl Canonical {
         self.floats(basis);
     }
 
-    /// In hexadecimal.
+    /// The hash in hexadecimal.
     pub fn finish(self) -> String {
         hex(&self.0.finalize())
     }
@@ -199,7 +199,7 @@ mod tests {
     use crate::scenario::{Category, Scenario};
     use crate::stats::density::{Mixture, ParameterSpace};
 
-    /// Formulas instead of recordings and fits: the same bits wherever they are made.
+    /// Formulas instead of recordings and fits, so that the bits are the same on every machine.
     fn scenario(category: Category, number: u32) -> Scenario {
         let k = f64::from(number);
         let series = |of: &dyn Fn(f64) -> f64| (0..61).map(|i| of(f64::from(i))).collect::<Vec<f64>>();
@@ -221,7 +221,7 @@ mod tests {
         serde_json::from_value(text).unwrap()
     }
 
-    /// Those that are never without a version: one that is added changes no lane of theirs.
+    /// The models of every version; a new model changes no lane of these.
     fn models() -> Vec<ModelId> {
         ["Reg157", "CCHDM", "RSS", "FSM"].map(|name| ModelId::parse(name).unwrap()).to_vec()
     }

@@ -1,5 +1,5 @@
-//! How many failures come from close following: headways below [`CLOSE_HEADWAY_S`]. Drivers rarely follow so closely, so
-//! a count of failures that rests on such headways says little about how often a driver fails on the road.
+//! Failures from close following: headways below [`CLOSE_HEADWAY_S`]. Drivers rarely follow so closely, so a failure
+//! count dominated by such headways says little about how often a driver fails on the road.
 
 use serde::Serialize;
 
@@ -8,7 +8,7 @@ use crate::model::criterion::Criterion;
 use crate::scenario::Scenario;
 use crate::{Error, Result};
 
-/// Lanes and failures, each with the part of them from headways below [`CLOSE_HEADWAY_S`].
+/// Lanes and failures, in total and from headways below [`CLOSE_HEADWAY_S`].
 #[derive(Debug, Clone, Default, PartialEq, Eq, Serialize)]
 pub struct CloseFollowing {
     /// Lanes per driver model that start below it.
@@ -19,18 +19,18 @@ pub struct CloseFollowing {
     pub failures: Vec<[u64; 2]>,
 }
 
-/// Units of a block whose recorded headway is below [`CLOSE_HEADWAY_S`]; `kept` are its scenarios in order.
+/// Units of a block with a recorded headway below [`CLOSE_HEADWAY_S`]; `kept` are its scenarios in order.
 pub fn close_units<'a>(kept: impl Iterator<Item = &'a Scenario>) -> Vec<u64> {
     let is_close = |scenario: &Scenario| scenario.start_headway_s().is_some_and(|thw_s| thw_s < CLOSE_HEADWAY_S);
     kept.zip(0..).filter(|(scenario, _)| is_close(scenario)).map(|(_, unit)| unit).collect()
 }
 
 impl CloseFollowing {
-    /// Of the recorded scenarios (S) of a block. `close_units` are those of [`close_units`], for a plan that starts from
-    /// the recorded gaps. `None` for a plan of gaps in metres.
+    /// Counts of the recorded scenarios (S) of a block. `close_units` are those of [`close_units`], for a plan that
+    /// starts from the recorded gaps. `None` for a plan of gaps in metres.
     ///
     /// # Errors
-    /// [`Error::Internal`] where the counts are not those of the whole plan.
+    /// [`Error::Internal`] if the counts are not those of the whole plan.
     pub fn of_recorded(
         plan: &LanePlan,
         partial: &Partial,
@@ -44,7 +44,7 @@ impl CloseFollowing {
         for (headway, by_cell) in plan.headways.iter().zip(by_headway.chunks(cells)) {
             let is_close = match headway {
                 Headway::ThwS(thw_s) => *thw_s < CLOSE_HEADWAY_S,
-                // From 0.74 s on at any speed.
+                // At least 0.74 s at any speed.
                 Headway::MinFollowing => false,
                 Headway::Observed => false,
                 Headway::GapM(_) => return Ok(None),

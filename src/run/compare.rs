@@ -1,5 +1,5 @@
-//! A comparison: rates of failure of recorded scenarios (S), of their parameterized replays (S') and of densities fitted on
-//! the same scenarios, set beside one another.
+//! Compares failure rates of recorded scenarios (S), of their parameterized replays (S') and of densities fitted on the
+//! same scenarios.
 
 use crate::engine::{Block, Executor, Headway, LanePlan, Partial, SweepSummary, Wanted};
 use crate::model::profile::Profile;
@@ -18,7 +18,7 @@ use crate::traffic::DataProvenance;
 use crate::traffic::mining::counts_text;
 use crate::{Error, Place, Result};
 
-/// What is compared.
+/// Options of a comparison.
 #[derive(Debug, Clone)]
 pub struct CompareOptions {
     /// Categories, models, headways, options of the parameterizations.
@@ -29,7 +29,7 @@ pub struct CompareOptions {
     pub samples: u64,
     /// Seed of the draws.
     pub seed: u64,
-    /// How many failures a ratio needs, and how near to 1 agrees.
+    /// Required number of failures, and margin of agreement around 1.
     pub enough: Enough,
 }
 
@@ -72,16 +72,16 @@ pub struct Compare<'a> {
     plan: LanePlan,
 }
 
-/// What a comparison gave.
+/// Result of a comparison.
 #[derive(Debug, Default)]
 pub struct CompareResult {
     /// The rates, category by category.
     pub categories: Vec<CategoryComparison>,
-    /// Scenarios that a density leaves out, with the reason.
+    /// Scenarios that a density excludes, with the reason.
     pub left_out: Vec<Error>,
-    /// Parameterizations that have no density, with the reason.
+    /// Parameterizations without a density, with the reason.
     pub failed: Vec<Error>,
-    /// How the sweeps went.
+    /// Summary of the sweeps.
     pub summary: SweepSummary,
 }
 
@@ -89,10 +89,10 @@ impl<'a> Compare<'a> {
     /// Nominal level of every interval.
     pub const LEVEL: f64 = 0.95;
 
-    /// Plans the lanes of S and S'. Categories without a wanted parameterization have nothing to be compared with.
+    /// Plans the lanes of S and S'. Skips categories without a selected parameterization.
     ///
     /// # Errors
-    /// [`Error::Input`] where no scenario of these categories was kept; as [`plan_study`].
+    /// [`Error::Input`] if no scenario of these categories was kept; as [`plan_study`].
     pub fn plan(
         scenarios: &'a [Scenario],
         facts: &'a DataProvenance,
@@ -111,12 +111,12 @@ impl<'a> Compare<'a> {
         Ok(Compare { scenarios, facts, profile, options, plan })
     }
 
-    /// What the scenarios are of.
+    /// Provenance of the scenarios.
     pub fn provenance(&self) -> &DataProvenance {
         self.facts
     }
 
-    /// What is compared.
+    /// The options.
     pub fn options(&self) -> &CompareOptions {
         &self.options
     }
@@ -150,10 +150,10 @@ impl<'a> Compare<'a> {
         Ok((parts.into_iter().try_fold(Partial::empty(plan), Partial::merge)?, summary))
     }
 
-    /// Fits and samples every density and sets its rates beside those of the counts of S and S'.
+    /// Fits and samples every density and compares its rates with those of the counts of S and S'.
     ///
     /// # Errors
-    /// Of the lanes; of the densities where there is none.
+    /// Those of the lanes; those of the densities if none can be fitted.
     pub fn sample(&self, counts: &Partial, executor: &Executor) -> Result<CompareResult> {
         let recorded = (0..self.plan.blocks.len()).map(|block| self.recorded(counts, block));
         let summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
@@ -171,7 +171,7 @@ impl<'a> Compare<'a> {
                     let of = result.categories.iter_mut().find(|c| c.category == id.category);
                     of.into_iter().for_each(|c| c.parameterizations.push(cells.clone()));
                 }
-                // A profile whose cut-outs cannot be sampled is a usage error of that category alone.
+                // If the profile cannot sample cut-outs, only this category fails with a usage error.
                 Err(error @ (Error::Input { .. } | Error::Usage { .. })) => {
                     push_once(&mut result.failed, error);
                 }
@@ -201,7 +201,7 @@ impl<'a> Compare<'a> {
         })
     }
 
-    /// Fits the density of a parameterization; where S starts from the recorded gaps, with the headway as a parameter.
+    /// Fits the density of a parameterization. If S starts from the recorded gaps, the headway is a parameter.
     ///
     /// # Errors
     /// As [`DensityModel::fit`].

@@ -1,4 +1,4 @@
-//! What a run will be, before it is run: its lanes, the memory that it adds, the time of its lanes.
+//! Predicts a run before it starts: number of lanes, additional memory and duration.
 
 use std::time::{Duration, Instant};
 
@@ -15,21 +15,22 @@ use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::stats::estimate::{CrossEntropy, Subset};
 
-/// Time that lanes are run for to know their speed.
+/// Time for which lanes are run to measure their speed.
 const BUDGET: Duration = Duration::from_millis(200);
 
-/// Series that the forecast of a study makes, beside one scenario of each category: enough to know the speed of the lanes.
+/// Series memory for the forecast of a study, in addition to one scenario of each category: enough to measure the speed
+/// of the lanes.
 const STUDY_SERIES_BYTES: u64 = 64 << 20;
 /// Memory of the counts of every checkpoint of a sampling run and of its figures, bytes, measured.
 const SAMPLE_COUNTS_BYTES: u64 = 6 << 20;
-/// Memory of a weighted sample while it is judged (point, case, motion, outcome), bytes, measured.
+/// Memory of a weighted sample during its evaluation (point, case, motion, outcome), bytes, measured.
 const BYTES_PER_SAMPLE: u64 = 280;
 /// Memory of the counts of a comparison's sampled lanes and of its figures, bytes, measured.
 const COMPARE_COUNTS_BYTES: u64 = 8 << 20;
-/// Memory of a map's sheets that are being drawn, bytes: those of the presets, measured.
+/// Memory of a map's sheets while they are drawn, bytes: those of the presets, measured.
 const SHEETS_BYTES: u64 = 3 << 20;
 
-/// Points that an adaptive estimator holds at once, at most.
+/// Maximum number of points that an adaptive estimator holds at once.
 pub const MAX_HELD: u64 = 10_000_000;
 
 /// A part of a run's lanes.
@@ -44,23 +45,23 @@ pub struct ForecastPart {
     pub lanes: u64,
 }
 
-/// What a run will be.
+/// Prediction for a run.
 pub struct RunForecast {
-    /// What it runs on.
+    /// Data of the run.
     pub data: String,
     /// Its lanes.
     pub parts: Vec<ForecastPart>,
     /// What a part's units are: `scenarios`, `samples`, `cells`.
     pub units: &'static str,
-    /// The lanes are the most that there can be.
+    /// The number of lanes is an upper bound.
     pub is_at_most: bool,
-    /// Bytes that the run will hold beyond what is held now.
+    /// Additional memory of the run, bytes.
     pub more_bytes: u64,
-    /// What those are.
+    /// Contents of this memory.
     pub more: &'static str,
-    /// Time of the lanes. None where they follow from one another.
+    /// Predicted duration of the lanes. `None` if they depend on one another.
     pub lanes: Option<Forecast>,
-    /// What comes on top of the lanes' time.
+    /// Work in addition to the lanes.
     pub besides: &'static str,
 }
 
@@ -75,7 +76,7 @@ fn parts(plan: &LanePlan) -> Vec<ForecastPart> {
     plan.blocks.iter().flat_map(of_block).collect()
 }
 
-/// Parts of the driver models, each with so many samples.
+/// Parts of the driver models, each with this number of samples.
 fn parts_of_models(models: &[ModelId], what: &str, samples: u64) -> Vec<ForecastPart> {
     let part = |model: &ModelId| ForecastPart {
         of: model.name().to_owned(),
@@ -91,17 +92,17 @@ fn counted(plan: &LanePlan, backend: &dyn Backend) -> Result<Forecast> {
 }
 
 impl Study {
-    /// What the study will be.
+    /// Predicts the study.
     ///
     /// # Errors
-    /// Of the lanes that are run.
+    /// Those of the measured lanes.
     pub fn forecast(&self, backend: &dyn Backend) -> Result<RunForecast> {
         let plan = self.plan();
         let some = self.cases().thinned(WINDOW, STUDY_SERIES_BYTES)?;
         let mut forecast = counted(&some, backend)?;
         forecast.seconds *= plan.lane_count() as f64 / some.lane_count().max(1) as f64;
         forecast.lanes = plan.lane_count();
-        // The counts of every unit, in the ledger and joined.
+        // The counts of every unit, in the ledger and merged.
         let cells_of = |block: &Block| (block.variants.len() * plan.models.len() * Criterion::ALL.len()) as u64;
         let of_unit = size_of::<Confusion<u32>>() as u64;
         let counts = |block: &Block| 2 * block.units.len() * (cells_of(block) * (of_unit + 2) + 100);
@@ -120,10 +121,10 @@ impl Study {
 }
 
 impl Compare<'_> {
-    /// What the comparison will be. Sampled lanes are taken to cost what those of their category's scenarios do.
+    /// Predicts the comparison. Assumes that sampled lanes take as long as those of their category's scenarios.
     ///
     /// # Errors
-    /// Of the lanes that are run.
+    /// Those of the measured lanes.
     pub fn forecast(&self, backend: &dyn Backend) -> Result<RunForecast> {
         let (plan, options) = (self.lane_plan(), self.options());
         let mut parts = parts(plan);
@@ -149,10 +150,10 @@ impl Compare<'_> {
 }
 
 impl Map {
-    /// What the maps will be.
+    /// Predicts the maps.
     ///
     /// # Errors
-    /// Of the lanes that are run.
+    /// Those of the measured lanes.
     pub fn forecast(&self, backend: &dyn Backend) -> Result<RunForecast> {
         let all = self.lane_count();
         let mut whole = Forecast::default();
@@ -171,7 +172,7 @@ impl Map {
             parts: self.plans().map(part).collect(),
             units: "cells",
             is_at_most: false,
-            // A verdict per cell and model, and the sheets drawn of them.
+            // A verdict per cell and model, and the sheets.
             more_bytes: all * (size_of::<Verdicts>() as u64 + 1) + SHEETS_BYTES,
             more: "verdicts and sheets",
             lanes: Some(whole),
@@ -181,10 +182,10 @@ impl Map {
 }
 
 impl Sample {
-    /// What the sampling run will be.
+    /// Predicts the sampling run.
     ///
     /// # Errors
-    /// Of the lanes that are run.
+    /// Those of the measured lanes.
     pub fn forecast(&self, executor: &Executor) -> Result<RunForecast> {
         let options = &self.options;
         let run = RunForecast {
@@ -199,7 +200,7 @@ impl Sample {
         };
         Ok(match &self.kind {
             SampleKind::Crude(plan) => {
-                // Few lanes are valued.
+                // Values are computed for few lanes only.
                 let verdicts = SampleOptions { worst: 0, ..options.clone() };
                 let forecast = forecast(plan, &*executor.backend, Wanted::Verdicts, BUDGET, |chunk| {
                     SampleTally::of_chunk(plan, &chunk, &verdicts).map(drop)
@@ -241,7 +242,7 @@ impl Sample {
     }
 }
 
-/// Lanes of a driver model, at most: how many levels there are is seen on the way.
+/// Maximum number of lanes of a driver model; the number of levels is known only during the run.
 fn lanes_at_most(options: &SampleOptions) -> u64 {
     let (samples, seed) = (options.stop.samples, options.seed);
     match &options.estimator {
@@ -258,7 +259,7 @@ fn lanes_at_most(options: &SampleOptions) -> u64 {
     }
 }
 
-/// Drawing and weighing cost more than the lanes, so all of it is measured.
+/// Measures drawing and weighting as well, because they cost more than the lanes.
 fn weighed(sample: &Sample, proposals: &Proposals, executor: &Executor) -> Result<Forecast> {
     let all = sample.samples();
     let most = all.min(sample.chunk_samples());

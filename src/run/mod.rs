@@ -1,10 +1,10 @@
 //! Runs: what is planned, computed in parts, merged and scored.
 //!
-//! [`study`] compares parameterizations with recordings, [`sampling`] estimates probabilities, [`compare`] sets both beside
-//! one another, [`grid`] sweeps maps, [`check`] judges single cases, [`justify`] a parameterization.
-//! [`forecast`] says before a run how large it will be. [`close_following`] tells how many failures come from headways below 0.5 s.
-//! [`reopen`] runs single lanes of a finished run again.
-//! [`parts`] splits and journals them, [`Merged`] is what their parts give; [`score`] turns a study's counts into recall, precision and F1.
+//! [`study`] compares parameterizations with recordings, [`sampling`] estimates probabilities, [`compare`] compares the
+//! two. [`grid`] sweeps maps, [`check`] evaluates single cases, [`justify`] a parameterization. [`forecast`] predicts
+//! the size and duration of a run. [`close_following`] counts the failures from headways below 0.5 s. [`reopen`] reruns
+//! single lanes of a finished run. [`parts`] splits and journals runs, [`Merged`] is the result of merged parts.
+//! [`score`] computes recall, precision and F1 from a study's counts.
 
 pub mod check;
 pub mod close_following;
@@ -29,7 +29,7 @@ use parts::{PLAN_FILE, Shard, kind_of};
 use sampling::{Sample, SampleResult};
 use study::{Study, StudyResult};
 
-/// A run with the result of its parts, bit for bit that of the run in one piece.
+/// A run with the merged result of its parts, bit for bit equal to that of the run in one piece.
 pub enum Merged {
     /// A study.
     Study(Box<(Study, StudyResult)>),
@@ -37,11 +37,11 @@ pub enum Merged {
     Sample(Box<(Sample, SampleResult)>),
 }
 
-/// Merges the parts of a folder, which is locked from now on. `again` gives the command of a verb that makes a shard.
+/// Merges the parts of a folder and locks it. `again` returns the command that makes a shard.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Busy`] where another process writes there; [`Error::Input`] naming what is missing, doubled,
-/// foreign or damaged.
+/// [`Error::Io`]; [`Error::Busy`] if another process writes there; [`Error::Input`] with the missing, duplicate,
+/// foreign or damaged parts.
 pub(crate) fn merge(dir: &Path, again: &dyn Fn(&str, Shard) -> String) -> Result<(OutputDir, Merged)> {
     check_folder(dir)?;
     let plan = dir.join(PLAN_FILE);
@@ -66,7 +66,7 @@ pub(crate) fn merge(dir: &Path, again: &dyn Fn(&str, Shard) -> String) -> Result
     }
 }
 
-/// Why there is nothing to merge.
+/// The reason why there is nothing to merge.
 fn no_parts(dir: &Path) -> Error {
     let has = |name: &str| dir.join(name).exists();
     let names = || std::fs::read_dir(dir).into_iter().flatten().flatten().map(|entry| entry.file_name());

@@ -1,5 +1,5 @@
-//! Plan files that were changed and sealed again: an error or a plan that can be used, never a panic. The readers of
-//! the library have the same test, with more inputs, in `tests/memory/mutated_inputs.rs`.
+//! Modified and resealed plan files give an error or a usable plan, never a panic. The library's readers have the same
+//! test, with more inputs, in `tests/memory/mutated_inputs.rs`.
 
 use std::path::Path;
 
@@ -21,7 +21,7 @@ use crate::{Error, Result};
 #[path = "../../tests/memory/mutated_inputs/mutate.rs"]
 mod mutate;
 
-/// Changed files of each kind.
+/// Number of modified files of each kind.
 const INPUTS: u64 = 1500;
 
 #[test]
@@ -68,7 +68,7 @@ fn content_of(sealed: &[u8]) -> serde_json::Value {
     sealed["content"].take()
 }
 
-/// Floats that a scenario or a case stumbles over.
+/// Floats that are critical for a scenario or a case.
 const FLOATS: [f64; 11] = [-0.0, 0.0, 5e-324, f64::MIN_POSITIVE, 1e-9, 0.1, -1.0, 1e6, 1e15, f64::MAX, f64::MIN];
 
 #[test]
@@ -108,7 +108,7 @@ fn changed_scenarios_under_checksums_that_fit_are_an_error_or_scenarios_with_pla
     }
 }
 
-/// Lines with another number in one of them: a size, a rate, a value of a series, the length of a series.
+/// Modifies a number in one of the lines: a size, a rate, a value of a series, the length of a series.
 fn with_changed_number(dice: &mut mutate::Dice, lines: &[u8]) -> Vec<u8> {
     let mut lines: Vec<&[u8]> = lines.split_inclusive(|byte| *byte == b'\n').collect();
     let at = dice.below(lines.len());
@@ -134,7 +134,7 @@ fn with_changed_number(dice: &mut mutate::Dice, lines: &[u8]) -> Vec<u8> {
     lines.concat()
 }
 
-/// Content as it is and changed, each with a checksum that fits and followed by the same bytes.
+/// Tests the original content and modified contents, each with a matching checksum and followed by the same bytes.
 fn try_all(kind: &str, content: &str, rest: &[u8], read: &dyn Fn(&Path) -> Result<()>) {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("plan.json");
@@ -153,7 +153,7 @@ fn try_all(kind: &str, content: &str, rest: &[u8], read: &dyn Fn(&Path) -> Resul
                 assert!(!matches!(error, Error::Internal(_)), "input {input} of {kind}: {error}");
                 refused += 1;
             }
-            // No JSON: the seal itself would be broken.
+            // Not JSON: the seal would be invalid.
             None => {}
         }
     }

@@ -1,5 +1,5 @@
-//! The CPU backend: parts of the units are tasks of the rayon pool. f32 computes the lane arithmetic that all
-//! backends share, in batches on the widest instructions of the machine; f64 is the reference, lane by lane.
+//! The CPU backend: intervals of units are tasks of the rayon pool. f32 is the lane arithmetic that all backends share,
+//! in batches on the widest vector instructions of the machine; f64 is the reference, lane by lane.
 
 use std::marker::PhantomData;
 use std::ops::Range;
@@ -16,35 +16,35 @@ use crate::engine::plan::LanePlan;
 use crate::model::scalar::Real;
 use crate::scenario::Category;
 
-/// Lanes per model from which on a task keeps its batches full nearly all the time.
+/// Lanes per model above which a task keeps its batches nearly full.
 const FULL_TASK: u64 = 8192;
-/// Lanes per model below which tasks are not cut for the sake of more of them.
+/// Minimum lanes per model of a task; smaller tasks are not split further.
 const SMALL_TASK: u64 = 2048;
-/// Tasks per thread, so that no thread idles for long at the end.
+/// Tasks per thread, so that threads do not idle at the end.
 const TASKS_PER_THREAD: u64 = 4;
 /// Maximum number of entries in a task's unrolled motions, 64 MiB, if every motion lasts as long as its lane.
 const TASK_ENTRIES: u64 = 1 << 24;
 
-/// Steps per thread of the lanes of a chunk, should each make every step: about two seconds in batches, one or two as
-/// single lanes, up to five where their criterion iterates.
+/// Maximum steps per thread in a chunk, if each lane makes every step: about two seconds in batches, one or two seconds
+/// as single lanes, up to five seconds if the criterion iterates.
 const CHUNK_STEPS: u64 = 1 << 29;
 const CHUNK_STEPS_OF_SINGLE_LANES: u64 = 1 << 25;
 /// Maximum number of lanes in a chunk.
 const CHUNK_LANES: u64 = 1 << 17;
 
-/// Number of lanes with so many steps that all threads together compute in batches within seconds; at least one.
+/// Number of lanes with this many steps that all threads together compute in batches within seconds; at least one.
 pub(crate) fn lanes_within_seconds(step_cap: u32) -> u64 {
     lanes_of_steps(CHUNK_STEPS, step_cap)
 }
 
 fn lanes_of_steps(steps_per_thread: u64, step_cap: u32) -> u64 {
-    // Threads beyond the cores make no chunk faster, and a run is interrupted between chunks.
+    // More threads than cores do not speed up a chunk, and a run can be cancelled only between chunks.
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let threads = rayon::current_num_threads().min(cores) as u64;
     (steps_per_thread.saturating_mul(threads) / u64::from(step_cap.max(1))).clamp(1, CHUNK_LANES)
 }
 
-/// Rayon over units, in the arithmetic `R`. Results depend neither on the threads nor on the instructions.
+/// Runs units on the rayon pool in the arithmetic `R`. Results depend neither on the threads nor on the instructions.
 #[derive(Debug)]
 pub struct CpuBackend<R> {
     instructions: Instructions,
@@ -53,33 +53,33 @@ pub struct CpuBackend<R> {
 }
 
 impl CpuBackend<f32> {
-    /// The lane arithmetic: binary32, on the best instructions of the machine.
+    /// The lane arithmetic: binary32 with the fastest instructions of the machine.
     pub fn lane_arithmetic() -> Self {
         CpuBackend { instructions: Instructions::best(), every_step: false, arithmetic: PhantomData }
     }
 
-    /// The lane arithmetic lane by lane: what every other backend is compared with.
+    /// The lane arithmetic lane by lane: the reference for every other backend.
     pub fn scalar() -> Self {
         CpuBackend { instructions: Instructions::Scalar, every_step: true, arithmetic: PhantomData }
     }
 
-    /// The lane arithmetic on chosen instructions.
+    /// The lane arithmetic on the given instructions.
     ///
     /// # Errors
-    /// [`Error::Usage`](crate::Error::Usage) where this machine does not have them.
+    /// [`Error::Usage`](crate::Error::Usage) if this machine does not support them.
     pub fn with_instructions(instructions: Instructions) -> Result<Self> {
         Ok(CpuBackend { instructions: instructions.checked()?, every_step: false, arithmetic: PhantomData })
     }
 
-    /// Makes every step of every lane with all its vehicles. By default verdict-only batches skip steps that change no
-    /// verdict. The verdicts are the same. For benchmarks and tests.
+    /// Makes every step of every lane with all its vehicles, for benchmarks and tests. By default verdict-only batches
+    /// skip steps that change no verdict. The verdicts are equal.
     pub fn every_step(self) -> Self {
         CpuBackend { every_step: true, ..self }
     }
 }
 
 impl CpuBackend<f64> {
-    /// The reference: binary64, same source, lane by lane.
+    /// The reference: binary64, the same source code, lane by lane.
     pub fn reference() -> Self {
         CpuBackend { instructions: Instructions::Scalar, every_step: true, arithmetic: PhantomData }
     }
@@ -133,14 +133,14 @@ impl Backend for CpuBackend<f64> {
     }
 }
 
-/// A session that runs scalar lanes.
+/// A session that runs single lanes.
 fn lane_by_lane<'p, R: Real>(plan: &'p LanePlan, runner: LaneRunner<'p, R>) -> CpuSession<'p, LaneRunner<'p, R>, R> {
     CpuSession { plan, run: runner, in_batches: false, arithmetic: PhantomData }
 }
 
 /// Runs the lanes of some units of a block.
 trait RunUnits<R>: Sync {
-    /// Gives each outcome with its position, counted from the first unit on.
+    /// Passes each outcome with its position, counted from the first unit.
     fn outcomes(&self, block: usize, units: Range<u64>, each: &mut dyn FnMut(usize, Outcome<R>));
 
     /// Verdicts only, with the marks of a watch.
@@ -180,13 +180,13 @@ impl<R: Real> RunUnits<R> for LaneRunner<'_, R> {
 struct CpuSession<'p, F, R> {
     plan: &'p LanePlan,
     run: F,
-    /// Tasks want many lanes.
+    /// Batches need tasks with many lanes.
     in_batches: bool,
     arithmetic: PhantomData<fn(R)>,
 }
 
 impl<F: RunUnits<R>, R: Real> CpuSession<'_, F, R> {
-    /// Units per task: enough lanes to fill batches, but some tasks for every thread where there are more.
+    /// Units per task: enough lanes to fill batches, and if possible several tasks per thread.
     fn task_units(&self, block: usize, units: u64) -> u64 {
         if !self.in_batches {
             return 1;
@@ -216,7 +216,7 @@ impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
     }
 
     fn run(&mut self, units: Range<u64>, wanted: Wanted) -> Result<Chunk> {
-        // Single lanes gather the values in any case.
+        // Single lanes compute the values anyway.
         let wanted = if self.in_batches || wanted.watch().is_none() { wanted } else { Wanted::Outcomes };
         let plan = self.plan;
         let run = &self.run;

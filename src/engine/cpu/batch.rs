@@ -1,10 +1,10 @@
-//! Many lanes side by side: the step of [`crate::engine::lane_step`] looped over arrays, which a compiler turns into
-//! vector instructions. No second source of any model.
+//! Many lanes in parallel: the step of [`crate::engine::lane_step`] in a loop over arrays, which the compiler
+//! vectorizes. The source code of the models is shared with single lanes.
 //!
-//! A burst is [`ROWS`] steps of some batches in turn. One step of a batch needs the step before it, and so does its
-//! next one; the batches need nothing of one another, which keeps the machine busy while results are on their way.
-//! A lane that is over stays as it is until the burst ends. A lane in steady following goes on to its end, which
-//! changes no verdict. [`crate::engine::cpu::simd`] chooses the instruction set; nothing here depends on it.
+//! A burst is [`ROWS`] steps of [`BATCHES`] batches in turn. Each step of a batch depends on the previous one, but
+//! batches are independent, which hides the latency of the instructions. A finished lane stays unchanged until the
+//! burst ends. A lane in steady following continues to its end, which changes no verdict. [`crate::engine::cpu::simd`]
+//! selects the instruction set; nothing here depends on it.
 
 use crate::engine::cpu::batch_arrays::{FixedArrays, Floats, LaneArrays, Slots, StateArrays, TrackArrays, Words};
 use crate::engine::cpu::fast_forward::quiescent_steps;
@@ -23,11 +23,11 @@ use crate::model::scalar::Real;
 pub(in crate::engine) const BATCHES: usize = 3;
 
 /// Minimum number of steps before a lane that did not qualify is examined again. For quiescent steps the wait also
-/// grows with the steps already made.
+/// grows with the number of steps already made.
 const LOOK_AGAIN: u32 = 4 * ROWS as u32;
 const LOOK_AGAIN_SHARE: u32 = 4;
 
-/// Fewer steady-following steps are cheaper to make in place.
+/// Fewer steady-following steps are cheaper without moving the lane to another stage.
 const MIN_STEADY_STEPS: u32 = 6 * ROWS as u32;
 
 /// The batches in flight, and the series that their lanes read.
@@ -59,7 +59,7 @@ pub(in crate::engine) struct Batch {
 }
 
 impl<'c> Fleet<'c> {
-    /// All slots are free. `vehicles` are the other vehicles that the batches look at.
+    /// All slots are free. `vehicles` are the other vehicles that the batches evaluate.
     pub fn new(stream: &Lanes<'_>, entries: &'c [f32], vehicles: [usize; 2]) -> Self {
         let window = |vehicle: usize, quantity: usize| {
             Window::new(stream.tracks.iter().map(|tracks| tracks[vehicle].all()[quantity]), entries)
@@ -83,7 +83,7 @@ impl<'c> Fleet<'c> {
 }
 
 impl Batch {
-    /// Which of the stream's lanes stands there.
+    /// Index of the slot's lane within the stream.
     #[inline(always)]
     pub fn lane(&self, k: usize) -> u32 {
         self.lanes.fixed.ego.lane[k]
@@ -133,7 +133,7 @@ impl Batch {
     fn end_steady_following(&mut self) {
         let LaneArrays { fixed, state } = &mut self.lanes;
         let moving = &mut state.moving;
-        // The state before the last step stands where that step read it.
+        // The state before the last step is still in the buffer that the step read.
         moving.v_before = self.after.moving.v_ego;
         for k in 0..LANES {
             let last = moving.index[k] + ROWS as u32 - 1;
@@ -158,7 +158,8 @@ impl Batch {
                 *eventful_until = arrays.moving.index[k];
             }
             None => {
-                // A lane that stood still was examined for that reason only; the other may be due later.
+                // A lane at standstill was examined only because it stands still; its regular examination may be due
+                // later.
                 if state.index > *eventful_until {
                     *eventful_until = state.index + LOOK_AGAIN.max(state.index / LOOK_AGAIN_SHARE);
                 }
@@ -182,7 +183,7 @@ impl Batch {
         }
     }
 
-    /// Moves lanes out that follow steadily for long enough; the others are examined again later.
+    /// Moves out lanes with enough steady-following steps; the others are examined again later.
     pub fn set_apart_steady_following<M: DriverModel<f32>>(
         &mut self,
         simulation: &Simulation<f32, M>,
@@ -230,7 +231,7 @@ impl Batch {
 }
 
 /// Makes the next steps of all lanes; pending lanes take the free slots. Each instruction set has its own `take`, which
-/// gathers the entries of every row from a place on for the free slots, and its own `turn`, which is [`Window::turn`].
+/// gathers consecutive entries of every row for the free slots. Its own `turn` is [`Window::turn`].
 #[inline(always)]
 pub(in crate::engine) fn burst<M: DriverModel<f32>, const RULES: u32>(
     simulation: &Simulation<f32, M>,
@@ -276,7 +277,7 @@ pub(in crate::engine) fn burst<M: DriverModel<f32>, const RULES: u32>(
             }
         }
     }
-    // No lane steps beyond the cap, so no step tests it; a steadily following lane is far from it.
+    // No lane steps beyond the cap, so no step tests for it; a steadily following lane is far from it.
     let left = frame.step_cap.max(1).saturating_sub(largest(furthest)) as usize;
     let rows = if rules.scene.is_steady { ROWS } else { left.min(ROWS) };
     for row in 0..rows {
@@ -322,7 +323,7 @@ fn step<M: DriverModel<f32>>(
     }
 }
 
-/// The other vehicles as a lane sees them at a row.
+/// The other vehicles as a lane sees them at row `row`.
 #[inline(always)]
 fn places(windows: &[[Window; 3]; 2], row: usize, k: usize) -> [OtherState<f32>; 2] {
     let place = |vehicle: usize| {
@@ -332,7 +333,7 @@ fn places(windows: &[[Window; 3]; 2], row: usize, k: usize) -> [OtherState<f32>;
     [place(0), place(1)]
 }
 
-/// The largest, found by halves: side by side as long as it pays.
+/// The maximum, by halving, so that the compiler can vectorize it.
 #[inline(always)]
 fn largest(mut words: Words) -> u32 {
     let mut half = LANES / 2;
@@ -345,7 +346,7 @@ fn largest(mut words: Words) -> u32 {
     words[0]
 }
 
-/// The first so many of these slots.
+/// The first `count` of these slots.
 #[inline(always)]
 fn lowest(slots: Slots, count: usize) -> Slots {
     let mut beyond = slots;

@@ -1,6 +1,6 @@
-//! Lanes side by side: what [`crate::engine::lane_step`] calls one lane, as arrays over `N` lanes.
+//! Lanes in parallel: the types of [`crate::engine::lane_step`] as arrays over `N` lanes.
 
-// Arrays of words seen as rows of words.
+// Arrays of words are cast to rows of words.
 #![allow(unsafe_code)]
 
 use bytemuck::{Pod, Zeroable};
@@ -28,7 +28,7 @@ pub(in crate::engine) type Floats = [f32; LANES];
 /// One word per lane.
 pub(in crate::engine) type Words = [u32; LANES];
 
-/// All of `N` lanes but the other vehicles' motions, which lie in series.
+/// All data of `N` lanes except the other vehicles' motions, which are in series.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
 pub(in crate::engine) struct LaneArrays<const N: usize> {
@@ -36,7 +36,7 @@ pub(in crate::engine) struct LaneArrays<const N: usize> {
     pub state: StateArrays<N>,
 }
 
-/// [`LaneConstants`] as arrays, and where the motions of the other vehicles lie.
+/// [`LaneConstants`] as arrays, and the positions of the other vehicles' series.
 #[derive(Debug, Clone, Copy)]
 #[repr(C, align(64))]
 pub(in crate::engine) struct FixedArrays<const N: usize> {
@@ -44,15 +44,15 @@ pub(in crate::engine) struct FixedArrays<const N: usize> {
     pub others: [OtherArrays<N>; 2],
 }
 
-/// What is constant within the lanes and no other vehicle's.
+/// Constants of the lanes that do not belong to another vehicle.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub(in crate::engine) struct EgoArrays<const N: usize> {
-    /// Which of the stream's lanes it is.
+    /// Index of the lane within the stream.
     pub lane: [u32; N],
     width: [f32; N],
     pub horizon: [u32; N],
-    /// Quiescent steps are not searched for before this step.
+    /// No search for quiescent steps before this step.
     pub eventful_until: [u32; N],
     /// From this step on the lane may be quiescent: the other vehicles keep speed and lateral position.
     pub still_from: [u32; N],
@@ -60,7 +60,7 @@ pub(in crate::engine) struct EgoArrays<const N: usize> {
     pub leaves_from: [u32; N],
 }
 
-/// What is constant within the lanes for another vehicle.
+/// Constants of another vehicle.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub(in crate::engine) struct OtherArrays<const N: usize> {
@@ -70,17 +70,17 @@ pub(in crate::engine) struct OtherArrays<const N: usize> {
     present_until: [u32; N],
     attend_from: [u32; N],
     judged: [u32; N],
-    /// Its speed, lateral position and lateral speed.
+    /// Speed, lateral position and lateral speed of the vehicle.
     pub tracks: [TrackArrays<N>; 3],
 }
 
-/// Where the series of one quantity lie.
+/// Positions of the series of one quantity.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub(in crate::engine) struct TrackArrays<const N: usize> {
-    /// First entries.
+    /// Index of the first entry.
     pub first: [u32; N],
-    /// Last ones, counted from the first.
+    /// Offset of the last entry from the first.
     pub last: [u32; N],
 }
 
@@ -93,7 +93,7 @@ pub(in crate::engine) struct StateArrays<const N: usize> {
     pub values: ValueArrays<N>,
 }
 
-/// What every step moves.
+/// Fields that every step changes.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub(in crate::engine) struct MovingArrays<const N: usize> {
@@ -108,14 +108,14 @@ pub(in crate::engine) struct MovingArrays<const N: usize> {
     pub over: [u32; N],
 }
 
-/// What a step moves where there is a second vehicle.
+/// Fields that a step changes if there is a second vehicle.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub(in crate::engine) struct AheadArrays<const N: usize> {
     pub gap: [f32; N],
 }
 
-/// Moved by every step of a sweep that returns more than verdicts.
+/// Fields that every step changes in a sweep that returns values.
 #[derive(Debug, Clone, Copy)]
 #[repr(C)]
 pub(in crate::engine) struct ValueArrays<const N: usize> {
@@ -130,9 +130,9 @@ pub(in crate::engine) struct ValueArrays<const N: usize> {
 macro_rules! made_of_rows {
     ($($arrays:ident)+) => {
         $(
-            // SAFETY: arrays of binary32 or 32-bit words, in the order of the source: 0 is one, and every word is.
+            // SAFETY: arrays of binary32 or 32-bit words; all zeros are valid for both.
             unsafe impl<const N: usize> Zeroable for $arrays<N> {}
-            // SAFETY: the same; all have 4 bytes per entry and their alignment, so nothing lies between them.
+            // SAFETY: as above; all entries have size and alignment 4, so there is no padding.
             unsafe impl<const N: usize> Pod for $arrays<N> {}
             impl<const N: usize> Rows<N> for $arrays<N> {}
         )+
@@ -142,14 +142,14 @@ macro_rules! made_of_rows {
 made_of_rows! { EgoArrays OtherArrays TrackArrays MovingArrays AheadArrays ValueArrays }
 
 impl<const N: usize> LaneArrays<N> {
-    /// No lane anywhere: all are over.
+    /// No lanes: all slots are over.
     pub fn idle() -> Self {
         let moving = MovingArrays { over: [Flag::TRUE.to_bits(); N], ..Zeroable::zeroed() };
         let state = StateArrays { moving, ahead: Zeroable::zeroed(), values: Zeroable::zeroed() };
         LaneArrays { fixed: FixedArrays { ego: Zeroable::zeroed(), others: Zeroable::zeroed() }, state }
     }
 
-    /// All rows that such a stream needs, part by part.
+    /// All rows that a stream with these properties needs, part by part.
     #[inline(always)]
     pub fn parts(&self, is_pair: bool, values: bool) -> [&[[u32; N]]; PARTS] {
         let FixedArrays { ego, others: [principal, second] } = &self.fixed;
@@ -159,7 +159,7 @@ impl<const N: usize> LaneArrays<N> {
         [ego.rows(), principal.rows(), second, moving.rows(), ahead, gathered]
     }
 
-    /// The same, to be changed.
+    /// Mutable version of `parts`.
     #[inline(always)]
     pub fn parts_mut(&mut self, is_pair: bool, values: bool) -> [&mut [[u32; N]]; PARTS] {
         let FixedArrays { ego, others: [principal, second] } = &mut self.fixed;
@@ -170,8 +170,8 @@ impl<const N: usize> LaneArrays<N> {
         [ego.rows_mut(), principal.rows_mut(), second, moving.rows_mut(), ahead, gathered]
     }
 
-    /// Puts one case into [`LANES`] lanes; `state` may differ between them in its gaps, which
-    /// [`LaneArrays::start`] gives.
+    /// Writes one case into [`LANES`] lanes. Only the gaps in `state` may differ between them; [`LaneArrays::start`]
+    /// sets these.
     #[inline(always)]
     pub fn fill(
         &mut self,
@@ -242,7 +242,7 @@ impl<const N: usize> LaneArrays<N> {
         speed.last[k].max(position.last[k]).max(towards.last[k])
     }
 
-    /// Sets which lane of the stream is in this slot, and its distances to the other vehicles.
+    /// Sets the lane index of this slot, and its gaps to the other vehicles.
     #[inline(always)]
     pub fn start(&mut self, k: usize, lane: u32, gaps: [f32; 2]) {
         self.fixed.ego.lane[k] = lane;
@@ -304,8 +304,8 @@ impl<const N: usize> StateArrays<N> {
         }
     }
 
-    /// Sets the state of a steadily following lane: the fields that its steps read. These steps are not the first, the
-    /// reaction time is over, and no criterion is judged.
+    /// State of a steadily following lane: the fields that its steps read. These steps are not the first, the reaction
+    /// time is over, and no criterion is evaluated.
     #[inline(always)]
     pub fn is_steady(&self, k: usize) -> LaneState<f32> {
         let moving = &self.moving;
@@ -322,7 +322,7 @@ impl<const N: usize> StateArrays<N> {
         }
     }
 
-    /// Copies the fields that a steady-following step moves.
+    /// Copies the fields that a steady-following step changes.
     #[inline(always)]
     pub fn set_steady_following<M: DriverModel<f32>>(&mut self, k: usize, lane: &LaneState<f32>) {
         self.moving.v_ego[k] = lane.v_ego;
@@ -332,7 +332,7 @@ impl<const N: usize> StateArrays<N> {
         }
     }
 
-    /// Rows that a step of a model moves under these rules.
+    /// Sets the rows that a step of a model changes under these rules.
     #[inline(always)]
     pub fn set<M: DriverModel<f32>>(&mut self, k: usize, lane: &LaneState<f32>, rules: Rules) {
         let StateArrays { moving, ahead, values } = self;
@@ -364,20 +364,20 @@ impl<const N: usize> StateArrays<N> {
     }
 }
 
-/// Arrays of `N` words each, which can be handled without their names.
+/// A structure of arrays of `N` words each, accessible as rows.
 trait Rows<const N: usize>: Pod {
-    /// Each of them.
+    /// All rows.
     fn rows(&self) -> &[[u32; N]] {
         bytemuck::cast_slice(std::slice::from_ref(self))
     }
 
-    /// The same, to be changed.
+    /// All rows, mutable.
     fn rows_mut(&mut self) -> &mut [[u32; N]] {
         bytemuck::cast_slice_mut(std::slice::from_mut(self))
     }
 }
 
-/// Puts entry `k` of every row into place `to`.
+/// Copies entry `k` of every row to place `to`.
 #[inline(always)]
 fn copy<const N: usize>(rows: &mut [[u32; N]], to: usize, from: &[[u32; LANES]], k: usize) {
     for (row, from) in rows.iter_mut().zip(from) {
@@ -385,7 +385,7 @@ fn copy<const N: usize>(rows: &mut [[u32; N]], to: usize, from: &[[u32; LANES]],
     }
 }
 
-/// Writes a value for [`LANES`] lanes.
+/// Writes a value for [`LANES`] lanes, starting at `from`.
 #[inline(always)]
 fn fill<T: Copy, const N: usize>(row: &mut [T; N], from: usize, value: T) {
     row[from..from + LANES].fill(value);
@@ -406,7 +406,7 @@ mod tests {
         assert_eq!(moving.over, [0, 5, 0, 0]);
     }
 
-    /// What is put into a slot, and what a step gives it, reaches every row, and comes back.
+    /// Writing a lane into a slot, or its state after a step, reaches every row and can be read back.
     #[test]
     fn no_row_of_a_lane_is_forgotten() {
         let other = OtherConstants {

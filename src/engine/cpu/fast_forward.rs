@@ -1,9 +1,9 @@
 //! Quiescent steps, which batches skip in verdict-only sweeps.
 //!
-//! Once the other vehicles have ended their manoeuvres and the ego keeps its speed, only the gap changes, by the same
-//! number each step. This often lasts for minutes, until the gap is small enough for the driver or a criterion. The
-//! lane jumps over these steps: [`quiescent_gap`] is the gap down to which no event is possible, and [`carried`] counts
-//! the steps above it and computes the gap after them to the bit.
+//! When the other vehicles have ended their manoeuvres and the ego keeps its speed, only the gap changes, by the same
+//! amount each step. This often lasts for minutes, until the gap is small enough for the driver or a criterion. The
+//! lane skips these steps: [`quiescent_gap`] is the gap down to which no event is possible, and [`carried`] counts the
+//! steps above it and computes the resulting gap to the bit.
 //!
 //! This needs two promises of a driver model, [`DriverModel::safe_gap`] and [`DriverModel::ignores`]. Steps that change
 //! no bit of a lane need no promise: no later step changes a bit either.
@@ -19,19 +19,19 @@ use crate::engine::lane_step::{
     update_record,
 };
 
-/// Fewer steps are cheaper to make than to count.
+/// Fewer steps are cheaper to make than to skip.
 const MIN_STEPS: u32 = 4 * ROWS as u32;
 
-/// Steps without an event, and the gaps after them.
+/// Quiescent steps, and the gaps after them.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(in crate::engine) struct Quiescent {
     pub steps: u32,
     pub gaps: [f32; 2],
 }
 
-/// Number of a lane's next steps that can be skipped, where that pays: no reaction, criterion or end comes before.
-/// `state` is between two steps, at `state.index` at least 1. The other vehicles keep speed and lateral position of
-/// `places` for ever.
+/// Number of a lane's next steps that can be skipped, if that saves time: no reaction, criterion or end occurs before.
+/// `state` is between two steps, at `state.index` at least 1. The other vehicles keep the speed and lateral position in
+/// `places` forever.
 pub(in crate::engine) fn quiescent_steps<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     lane: &LaneConstants<f32>,
@@ -39,7 +39,7 @@ pub(in crate::engine) fn quiescent_steps<M: DriverModel<f32>>(
     places: &[OtherState<f32>; 2],
 ) -> Option<Quiescent> {
     let index = state.index;
-    // One burst remains, so that the lane reaches its end like any other.
+    // One burst of steps remains, so that the lane ends in the regular way.
     let mut most = simulation.frame.step_cap.saturating_sub(index + ROWS as u32);
     let vehicles = if simulation.scene.is_pair { 2 } else { 1 };
     for other in &lane.others[..vehicles] {
@@ -61,7 +61,7 @@ pub(in crate::engine) fn quiescent_steps<M: DriverModel<f32>>(
     if simulation.model.keeps_braking(&state.driver, &first.view).holds() {
         return None;
     }
-    // A model that does not see its acceleration does not keep the previous speed.
+    // For a model that does not read its acceleration, the state does not hold the previous speed.
     if M::SEES_OWN_ACCELERATION && state.v_before != state.v_ego {
         return None;
     }
@@ -85,7 +85,7 @@ pub(in crate::engine) fn quiescent_steps<M: DriverModel<f32>>(
     let mut gaps = state.gaps;
     let mut steps = most;
     for vehicle in 0..vehicles {
-        // The gap of a vehicle out of the way is never read again.
+        // The gap of a vehicle outside the ego's lane is never read again.
         let Some(lowest) = lowest[vehicle] else { continue };
         let by = |vehicle: usize| (places[vehicle].speed - state.v_ego) * simulation.frame.dt;
         if steps < MIN_STEPS || gaps[vehicle] + by(vehicle) * (MIN_STEPS as f32) < lowest {
@@ -108,18 +108,18 @@ fn is_still<M: DriverModel<f32>>(
     state: &LaneState<f32>,
     places: &[OtherState<f32>; 2],
 ) -> bool {
-    // The rare condition first: it decides most calls.
+    // The rarest condition comes first: it decides most calls.
     let change = (places[0].speed - state.v_ego) * simulation.frame.dt;
     if state.gaps[0] + change != state.gaps[0] {
         return false;
     }
-    // Every field by name, so that a new field must be compared here or excluded because verdicts do not depend on it.
+    // Destructures every field, so that a new field must be compared here or explicitly excluded.
     let bits = |state: &LaneState<f32>| {
         let &LaneState { index: _, v_ego, v_before, gaps, driver, reaction_step: _, record, over } = state;
         let (DriverState { deceleration, delay_steps }, Record { ttc, btn, min_gap: _ }) = (driver, record);
         let TtcMinimum { failed: ttc_failed, gap: _, closing: _ } = ttc;
         let BrakeThreatMaximum { failed: btn_failed, numerator: _, denominator: _ } = btn;
-        // A field that a model does not read is not kept: see `StateArrays::set`.
+        // A field that a model does not read is not stored: see `StateArrays::set`.
         let v_before = if M::SEES_OWN_ACCELERATION { v_before } else { 0.0 };
         let deceleration = if M::KEEPS_DECELERATION { deceleration } else { 0.0 };
         let numbers = [v_ego, v_before, gaps[0], gaps[1], deceleration];
@@ -141,7 +141,8 @@ pub(in crate::engine) fn is_out_of_the_way<M: DriverModel<f32>>(
     !lateral_gap.is_negative() & !judged & simulation.model.ignores(lateral_gap, place.towards)
 }
 
-/// The gap down to which no event with a vehicle is possible; none if it is not in the ego's lane or already too near.
+/// The gap down to which no event with a vehicle is possible; `None` if it is not in the ego's lane or already too
+/// near.
 fn quiescent_gap<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     lane: &LaneConstants<f32>,
@@ -157,7 +158,7 @@ fn quiescent_gap<M: DriverModel<f32>>(
     let of_criteria = criteria_safe_gap(criteria, record, state.v_ego - place.speed);
     // `larger` returns its second operand when unordered, so NaN propagates.
     let safe = of_criteria.larger(simulation.model.safe_gap(state.v_ego, place.speed));
-    // A margin for rounding. A gap that does not shrink stays safe if it is safe now.
+    // A margin for rounding. A gap that does not shrink remains safe if it is safe now.
     let lowest = 1.001 * safe + 0.001;
     if lowest.is_nan() || lowest > state.gaps[vehicle] {
         return None;
@@ -165,19 +166,20 @@ fn quiescent_gap<M: DriverModel<f32>>(
     // The safe distances only propose a gap; the step's own check decides.
     let ego = Ego { v: state.v_ego, a: 0.0, width: lane.ego_width };
     let seen = see(simulation, &ego, other, place, lowest, index, Flag::TRUE);
-    // Every criterion that a record keeps is evaluated here.
+    // Evaluates every criterion that the record holds.
     let Record { ttc, btn, min_gap: _ } = update_record(criteria, record, &seen);
     let fails = (ttc.failed & !record.ttc.failed) | (btn.failed & !record.btn.failed);
-    // The driver may not attend to it yet: then fewer steps count as quiescent than could.
+    // The driver may not attend to the vehicle yet; then this underestimates the quiescent steps.
     let reacts = check(simulation, &seen, other, Flag::LATEST_STEP).is_unsafe;
     (!(fails | reacts).holds()).then_some(lowest)
 }
 
-/// Adds `change` repeatedly to a positive gap, each sum rounded as a step rounds it, up to a maximum count and while
-/// the gap is not below `lowest`. Returns the number of sums and the result.
+/// Adds `change` repeatedly to a positive gap, with the rounding of a step, up to a maximum count and while the gap is
+/// at least `lowest`. Returns the number of additions and the result.
 ///
-/// Between two powers of two, binary32 numbers are equally spaced, so every sum advances by the same whole number of
-/// spacings. A tie rounds to even, which settles it after one sum. Hence only a few sums per power of two are computed.
+/// Between two powers of two, binary32 numbers are equally spaced, so every addition advances by the same whole number
+/// of spacings. A tie rounds to even, so ties end after one addition. Hence only a few additions per power of two are
+/// computed.
 fn carried(gap: f32, change: f32, most: u32, lowest: f32) -> (u32, f32) {
     const BINADE: u32 = 1 << f32::MANTISSA_DIGITS >> 1;
     let (mut gap, mut made) = (gap, 0);
@@ -186,10 +188,10 @@ fn carried(gap: f32, change: f32, most: u32, lowest: f32) -> (u32, f32) {
         if next < lowest || next <= 0.0 {
             break;
         }
-        // This sum settles ties; the next one gives the advance of every later sum.
+        // This addition resolves ties; the next one gives the advance of every later addition.
         let (before, bits, after) = (gap.to_bits(), next.to_bits(), (next + change).to_bits());
         if bits == before || bits == after {
-            // Rounding absorbs the change for good.
+            // Rounding absorbs the change from here on.
             return (most, next);
         }
         (gap, made) = (next, made + 1);
@@ -197,7 +199,7 @@ fn carried(gap: f32, change: f32, most: u32, lowest: f32) -> (u32, f32) {
         if before / BINADE != binade || after / BINADE != binade {
             continue;
         }
-        // One spacing inside both powers of two, the sum lies between them, rounded or not.
+        // The sum stays between the two powers of two, rounded or not, if it is one spacing inside both.
         let way = if after > bits {
             (binade + 1) * BINADE - 1 - bits
         } else {
@@ -222,7 +224,7 @@ mod tests {
     use crate::model::profile::Profile;
     use crate::scenario::Category;
 
-    /// Reference: the same, sum by sum.
+    /// Reference: the same by repeated addition.
     fn added(gap: f32, change: f32, most: u32, lowest: f32) -> (u32, f32) {
         let mut gap = gap;
         for made in 0..most {
@@ -235,7 +237,7 @@ mod tests {
         (most, gap)
     }
 
-    /// A word, other for every number.
+    /// A pseudorandom word for each number.
     fn mixed(number: u64) -> u64 {
         let word = (number ^ number >> 30).wrapping_mul(0xbf58_476d_1ce4_e5b9);
         let word = (word ^ word >> 27).wrapping_mul(0x94d0_49bb_1331_11eb);
@@ -248,7 +250,7 @@ mod tests {
             let word = mixed(number + 1);
             let unit = |shift: u32| f32::from((word >> shift) as u16) / 65536.0;
             let gap = 2f32.powf(unit(0) * 12.0 - 3.0);
-            // From changes that rounding absorbs to changes that consume the gap in one step.
+            // From changes that rounding absorbs to changes that close the gap in one step.
             let size = 2f32.powf(unit(16) * 30.0 - 26.0);
             let change = if word >> 63 == 0 { size } else { -size };
             let lowest = if number % 3 == 0 { 0.0 } else { gap * unit(32) };
@@ -261,8 +263,7 @@ mod tests {
         }
     }
 
-    /// Ties: changes of a whole number and a half of the numbers' distance, from even and odd gaps, across powers of
-    /// two.
+    /// Ties: changes of a whole number of spacings plus one half, from even and odd gaps, across powers of two.
     #[test]
     fn ties_are_settled_as_sums_settle_them() {
         for odd in 0..4_u32 {
@@ -278,7 +279,7 @@ mod tests {
         }
     }
 
-    /// A lane among vehicles that keep speed and lateral position, somewhere in its run.
+    /// A lane with vehicles that keep speed and lateral position, at some step of its run.
     fn lane(number: u64) -> (LaneConstants<f32>, LaneState<f32>, [OtherState<f32>; 2]) {
         let mut drawn = 0;
         let mut between = |least: f32, most: f32| {
@@ -372,8 +373,8 @@ mod tests {
         state
     }
 
-    /// FSM approaches the speed ahead until rounding absorbs both braking and gap change. From there on one test skips
-    /// all steps to the end, although the driver counts as unsafe at every one.
+    /// FSM approaches the leader's speed until rounding absorbs both braking and gap change. From there on one test
+    /// skips all remaining steps, although every step is unsafe for the driver.
     #[test]
     fn one_who_follows_comes_to_stand_still_in_rounding() {
         let constants = Constants::<f32>::resolve(&Profile::load("paper").unwrap(), Category::Lvd);

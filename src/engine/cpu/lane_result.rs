@@ -9,12 +9,12 @@ use crate::engine::lane_step::{
 };
 use crate::engine::outcome::{EndReason, NO_STEP, Outcome, Verdicts};
 
-/// The result that a sweep returns per lane. An outcome has everything.
+/// The result that a sweep returns per lane: an outcome or only verdicts.
 pub trait Ending: From<Outcome<f32>> {
-    /// The result has minima and maxima, which the steps must gather.
+    /// The result has minima and maxima, which the steps must accumulate.
     const HAS_VALUES: bool;
 
-    /// Result of a lane after its last step, with the other vehicles at these places.
+    /// Result of a lane after its last step, with the other vehicles in these states.
     fn of<M>(
         simulation: &Simulation<f32, M>,
         lane: &LaneConstants<f32>,
@@ -57,8 +57,8 @@ impl Ending for Outcome<f32> {
     }
 }
 
-/// Verdicts of a lane after its last step. Verdict-only batches know the ego's speed there only after a contact, which
-/// keeps it, so no speed may decide a verdict.
+/// Verdicts of a lane after its last step. Verdict-only batches know the ego's final speed only after a contact, which
+/// keeps it. Therefore no speed may decide a verdict.
 #[inline(always)]
 pub fn verdicts<R: Real, M>(
     simulation: &Simulation<R, M>,
@@ -77,7 +77,7 @@ pub fn verdicts<R: Real, M>(
     let is_marked = touched.holds() && closing.abs() >= simulation.criteria.marks_contacts_from;
     let record = &state.record;
     let bit = |criterion: Criterion, failed: Flag| u8::from(failed.holds()) << criterion.index();
-    // No other reason remains: the time cap.
+    // The only remaining reason is the time cap.
     let capped = if state.over.holds() && !is_marked { 0 } else { Verdicts::CAPPED };
     let contact_counts = Flag::of(simulation.criteria.btn_contact == BtnContact::Any);
     Verdicts(

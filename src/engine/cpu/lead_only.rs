@@ -1,8 +1,8 @@
-//! Two vehicles ahead of which only the farther one, the lead, still matters.
+//! Lanes with two vehicles ahead of which only the farther one, the lead, still matters.
 //!
-//! A vehicle that cuts out may reach a place beside the lane where no contact, criterion or reaction is possible, and
-//! stay there. The lane then continues with the other vehicle only. Verdict-only batches make these steps among lanes
-//! with a single vehicle, at half the cost.
+//! A vehicle that cuts out may reach a position beside the lane where no contact, criterion or reaction is possible,
+//! and stay there. The lane then continues with the other vehicle only. Verdict-only batches make these steps together
+//! with single-vehicle lanes, at half the cost.
 
 use crate::model::driver::DriverModel;
 use crate::model::scalar::Flag;
@@ -15,7 +15,7 @@ use crate::engine::frame::Simulation;
 use crate::engine::lane_step::{LaneConstants, OtherState};
 
 /// The first step from which only the second vehicle matters under this model, and the driver attends to it.
-/// [`NEVER_LEAVES`] if there is none, or if the second vehicle may leave or is not judged. `tracks` are in `entries`.
+/// [`NEVER_LEAVES`] if there is none, or if the second vehicle may leave or is not evaluated. `tracks` index `entries`.
 pub(in crate::engine) fn lead_only_from<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     lane: &LaneConstants<f32>,
@@ -27,12 +27,12 @@ pub(in crate::engine) fn lead_only_from<M: DriverModel<f32>>(
         return NEVER_LEAVES;
     }
     let VehicleTracks { position, towards, .. } = tracks[0];
-    // The number of entries from a step on; the last entry is repeated.
+    // Up to `count` entries from a step on; the last entry is repeated.
     let at = |track: Track, step: u32, count: usize| {
         let from = (track.first + step.min(track.last)) as usize;
         &entries[from..from + count]
     };
-    // The vehicle is beside the lane at all these steps. Without a branch the compiler tests many at once.
+    // Whether the vehicle is beside the lane at all these steps. Without a branch, so that the compiler vectorizes it.
     let is_out = |step: u32, count: usize| {
         let mut is_out = Flag::TRUE;
         for (&position, &towards) in at(position, step, count).iter().zip(at(towards, step, count)) {
@@ -82,8 +82,8 @@ mod tests {
         plan_study(&mined.scenarios, profile, &options).unwrap()
     }
 
-    /// Steps two lanes together: one with both vehicles, and one with only the second from that step on. Ego, gap,
-    /// criteria and end agree at every step. Returns the number of steps with only the second.
+    /// Steps two lanes together: one with both vehicles, and one with only the second vehicle after it leaves. Ego,
+    /// gap, criteria and end agree at every step. Returns the number of steps with only the second vehicle.
     fn steps_side_by_side<M: DriverModel<f32>>(
         pair: &Simulation<f32, M>,
         case: &LaneCase<f32>,

@@ -15,7 +15,7 @@ pub(in crate::engine) mod simd;
 mod steady_following;
 pub(in crate::engine) mod stream;
 
-/// Lanes of a batch: one AVX-512 register of binary32.
+/// Lanes of a batch: one AVX-512 register of binary32 values.
 pub(in crate::engine) const LANES: usize = 16;
-/// Steps of a burst: a square of lanes and rows is turned in registers.
+/// Steps of a burst. Equal to [`LANES`], so that a square of lanes and rows is transposed in registers.
 pub(in crate::engine) const ROWS: usize = 16;

@@ -1,5 +1,5 @@
-//! Pending lanes in the layout of a batch: a case is written once for all its headways, and free slots take their rows
-//! one by one.
+//! Pending lanes in the layout of a batch. A case is written once for all its headways; free slots take its rows one by
+//! one.
 
 use crate::model::driver::DriverModel;
 
@@ -11,13 +11,14 @@ use crate::engine::frame::{Simulation, Start};
 use crate::engine::lane_case::LaneCase;
 use crate::engine::lane_step::{LaneConstants, LaneState};
 
-/// Maximum number of pending lanes: 29 KiB with one other vehicle for verdicts, 49 KiB with everything, room included.
+/// Maximum number of pending lanes: 29 KiB with one other vehicle for verdicts, 49 KiB with all fields, padding
+/// included.
 pub(in crate::engine) const MAX_PENDING: usize = 256;
 
-/// Their room. A case is written, and lanes are read, for [`LANES`] lanes at once, however few they are.
+/// Capacity with padding: cases are written, and lanes are read, for [`LANES`] lanes at once.
 pub(in crate::engine) const ROOM: usize = MAX_PENDING + LANES;
 
-/// The lanes of a stream: every case with every start, the starts of a case one after the other.
+/// The lanes of a stream: every case with every start, all starts of a case in sequence.
 #[derive(Clone, Copy)]
 pub(in crate::engine) struct Lanes<'c> {
     /// Its cases.
@@ -26,7 +27,7 @@ pub(in crate::engine) struct Lanes<'c> {
     pub tracks: &'c [[VehicleTracks; 2]],
     /// The headways.
     pub starts: &'c [Start<f32>],
-    /// Every case has one start, the one with its number, instead of all of them.
+    /// Each case has only the start with its own index, instead of all starts.
     pub one_start_each: bool,
     /// Every step is made with all vehicles; no lane moves to another stage.
     pub every_step: bool,
@@ -42,7 +43,7 @@ impl<'c> Lanes<'c> {
     }
 }
 
-/// Lanes pending for one stage: the next lanes of a stream, and those that moved here.
+/// Lanes pending for one stage: the next lanes of a stream, and those moved here from another stage.
 pub(in crate::engine) struct Pending {
     lanes: Box<LaneArrays<ROOM>>,
     /// The sweep returns values, not only verdicts.
@@ -53,15 +54,15 @@ pub(in crate::engine) struct Pending {
     first: usize,
     /// One past the last pending lane.
     end: usize,
-    /// The next case, and its next start.
+    /// Index of the next case, and of its next start.
     case: usize,
     start: usize,
-    /// The next lane, counted within the stream.
+    /// Index of the next lane within the stream.
     lane: u32,
 }
 
 impl Pending {
-    /// At the start of a stream.
+    /// State at the start of a stream.
     pub fn new(values: bool, asks_steady: bool) -> Self {
         Pending {
             lanes: Box::new(LaneArrays::idle()),
@@ -95,9 +96,9 @@ impl Pending {
         &self.lanes
     }
 
-    /// Ensures that at least this many lanes are pending, if there are more.
+    /// Ensures that at least this many lanes are pending, if the stream has more.
     ///
-    /// `sets_apart`: the series, where lanes move out that continue with the second vehicle only.
+    /// `sets_apart`: the series, if lanes that continue with the second vehicle only move out.
     #[inline]
     pub fn have<M: DriverModel<f32>>(
         &mut self,
@@ -127,7 +128,7 @@ impl Pending {
         self.add_single(lanes, k, 1, leaves_from);
     }
 
-    /// Adds a lane as it is, with a single vehicle.
+    /// Adds a lane with a single vehicle, unchanged.
     pub fn add_lane(&mut self, lanes: &LaneArrays<LANES>, k: usize, leaves_from: u32) {
         self.add_single(lanes, k, 0, leaves_from);
     }

@@ -1,4 +1,4 @@
-//! Rules that all lanes of a stream share: each set of rules has its own compiled loop, which tests none of them.
+//! Rules that all lanes of a stream share. Each set of rules has its own compiled loop, so the loop tests none of them.
 
 use crate::model::criterion::{BtnForm, Criteria, LateralGate};
 
@@ -40,9 +40,9 @@ impl Rules {
         };
         let sees_overlap = criteria.gate == LateralGate::Overlap;
         let aborts = frame.abort_above_ttc > 0.0;
-        // Rare rules have no loop of their own for verdicts.
+        // Rarely used rules have no verdict-only loop.
         let is_verdict_only = !values && !is_ratio && !aborts;
-        // Rare rules always test for contacts between two steps.
+        // Rarely used rules always test for contacts between two steps.
         let may_cross = scene.may_cross || is_ratio || aborts;
         let scene = Scene { in_lane: scene.in_lane && is_verdict_only, may_cross, ..scene };
         Some(Rules { scene, is_ratio, sees_overlap, aborts, is_verdict_only })
@@ -53,13 +53,13 @@ impl Rules {
         Rules::from_bits(Rules::STEADY_FOLLOWING)
     }
 
-    /// As a number below [`Rules::SETS`].
+    /// Encoded as a number below [`Rules::SETS`].
     pub(in crate::engine) const fn bits(self) -> u32 {
         if self.scene.is_steady {
             return Rules::STEADY_FOLLOWING;
         }
         if self.scene.in_lane {
-            // Nothing is seen across the road, so there is no gate.
+            // Lateral motion is not evaluated, so there is no gate.
             return Rules::IN_LANE;
         }
         let seldom = if self.is_verdict_only { 4 } else { self.is_ratio as u32 | (self.aborts as u32) << 1 };
@@ -69,7 +69,7 @@ impl Rules {
         self.scene.is_pair as u32 | (self.sees_overlap as u32) << 1 | seldom << 2
     }
 
-    /// Inverse of the number above.
+    /// Inverse of [`Rules::bits`].
     pub(in crate::engine) const fn from_bits(bits: u32) -> Rules {
         if bits >= Rules::CROSSING {
             let scene = Scene { is_pair: true, always_there: false, in_lane: false, is_steady: false, may_cross: true };
@@ -98,7 +98,7 @@ impl Rules {
         }
     }
 
-    /// The constants of the simulation, with those that the rules fix written as constants.
+    /// The constants of the simulation; those that the rules fix become compile-time constants.
     #[inline(always)]
     pub(in crate::engine) fn applied(
         self,

@@ -1,4 +1,4 @@
-//! Single lanes on the CPU: the CPU backend consists of them, and other backends are checked against them.
+//! Single lanes on the CPU. They make up the scalar CPU backend, and other backends are checked against them.
 
 use std::borrow::Cow;
 use std::ops::Range;
@@ -23,17 +23,17 @@ use crate::scenario::Tables;
 /// Runs lanes of a plan one by one, in the arithmetic `R`.
 pub struct LaneRunner<'p, R> {
     plan: &'p LanePlan,
-    /// All series, rounded; empty where each case brings its own.
+    /// All series, rounded; empty if each case brings its own.
     tables: Tables<R>,
     /// One per block.
     constants: Vec<Constants<R>>,
     starts: Vec<Start<R>>,
     has_tables: bool,
-    /// Lanes gather no more than batches do for verdicts.
+    /// Lanes accumulate only what batches do for verdicts.
     as_in_batches: bool,
     /// Batches make every step.
     every_step: bool,
-    /// Memory of finished tasks for later ones: fresh pages cost more than writing into them.
+    /// Memory of finished tasks, reused by later tasks because writing to fresh pages is slower.
     spare: Mutex<Vec<Series>>,
 }
 
@@ -44,7 +44,7 @@ impl<'p, R: Real> LaneRunner<'p, R> {
         LaneRunner { tables, has_tables: true, ..LaneRunner::of_few(plan) }
     }
 
-    /// Rounds the numbers of each lane when it runs: for a few lanes, so that the plan's series are not held twice.
+    /// Rounds the numbers of each lane when it runs. For a few lanes, so that the plan's series are not held twice.
     pub(in crate::engine) fn of_few(plan: &'p LanePlan) -> Self {
         LaneRunner {
             plan,
@@ -58,7 +58,7 @@ impl<'p, R: Real> LaneRunner<'p, R> {
         }
     }
 
-    /// Each lane gathers no more than batches do for verdicts: no minima and maxima. Only verdicts and steps of its
+    /// Each lane accumulates only what batches do for verdicts: no minima and maxima. Only verdicts and steps of its
     /// outcome are valid.
     pub fn verdicts_as_in_batches(mut self) -> Self {
         self.constants.iter_mut().for_each(|constants| constants.criteria.keeps_values = false);
@@ -67,13 +67,13 @@ impl<'p, R: Real> LaneRunner<'p, R> {
     }
 
     /// Batches make every step with all vehicles. By default verdict-only batches skip steps that change no verdict.
-    /// The verdicts are the same.
+    /// The verdicts are equal.
     pub fn every_step(mut self, every_step: bool) -> Self {
         self.every_step = every_step;
         self
     }
 
-    /// Runs one lane without rules from its stream.
+    /// Runs one lane without stream rules.
     pub fn run(&self, key: &LaneKey) -> Outcome<R> {
         let (case, tables) = self.case(key.block, key.unit, key.variant);
         let scene = Scene::unknown(case.pair != 0);
@@ -96,7 +96,7 @@ impl<'p, R: Real> LaneRunner<'p, R> {
         self.plan
     }
 
-    /// A case and the tables that it points into.
+    /// A case and the tables that it references.
     pub(crate) fn case(&self, block: usize, unit: u64, variant: usize) -> (LaneCase<R>, Cow<'_, Tables<R>>) {
         if self.has_tables && self.plan.generator().is_none() {
             return (self.plan.case(block, unit, variant).cast(), Cow::Borrowed(&self.tables));
@@ -106,7 +106,7 @@ impl<'p, R: Real> LaneRunner<'p, R> {
         (case, Cow::Owned(tables))
     }
 
-    /// A case whose series go to the end of `tables`.
+    /// A case whose series are appended to `tables`.
     fn case_with_series(&self, block: usize, unit: u64, variant: usize, tables: &mut Tables<R>) -> LaneCase<R> {
         match self.plan.generator() {
             Some(generator) => generator.case(unit, tables),
@@ -114,7 +114,7 @@ impl<'p, R: Real> LaneRunner<'p, R> {
         }
     }
 
-    /// All lanes of one unit, in the plan's order: position within the unit, outcome.
+    /// Runs all lanes of one unit in the plan's order; passes position within the unit and outcome.
     pub fn run_unit(&self, block: usize, unit: u64, mut each: impl FnMut(usize, Outcome<R>)) {
         let mut at = 0;
         for variant in 0..self.plan.blocks[block].variants.len() {
@@ -148,8 +148,8 @@ impl<'p, R: Real> LaneRunner<'p, R> {
 }
 
 impl LaneRunner<'_, f32> {
-    /// All lanes of some units of a block, in batches: position counted from the first unit on, and result. The order
-    /// is unspecified. Verdicts show the marks of a watch.
+    /// Runs all lanes of some units of a block in batches; passes the position, counted from the first unit, and the
+    /// result. The order is unspecified. Verdicts show the marks of a watch.
     pub fn run_units<E: Ending>(
         &self,
         instructions: Instructions,
@@ -194,13 +194,13 @@ impl LaneRunner<'_, f32> {
         }
     }
 
-    /// Whether all lanes run in batches on these instructions. Some criteria iterate and run lane by lane.
+    /// Whether all lanes run in batches on these instructions. Lanes with a criterion that iterates run one by one.
     pub(in crate::engine) fn runs_in_batches(&self, instructions: Instructions) -> bool {
         self.constants.iter().all(|constants| constants.run_in_batches(instructions))
     }
 
-    /// Chosen lanes of one block and model in a batch that makes every step; one by one where they do not run in
-    /// batches. Gives the verdicts with their position in `keys`.
+    /// Runs selected lanes of one block and model in a batch that makes every step; one by one if they do not run in
+    /// batches. Passes the position in `keys` and the verdicts.
     pub(in crate::engine) fn run_keys(
         &self,
         instructions: Instructions,
@@ -225,7 +225,7 @@ impl LaneRunner<'_, f32> {
         constants.run_stream(model, criteria, instructions, &stream, series.entries(), each);
     }
 
-    /// All lanes of a model, one by one.
+    /// Runs all lanes of a model one by one.
     fn one_by_one<E: Ending>(
         &self,
         block: usize,

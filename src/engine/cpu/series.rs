@@ -1,7 +1,6 @@
-//! The motions of a task's cases, unrolled: one series per quantity and vehicle, made once for all lanes of a case.
-//! Every series is followed by repetitions of its last entry, so that a batch reads [`ROWS`] entries at a time
-//! without asking where it ends. A [`Window`] is what all lanes of a batch see of one quantity over the rows of a
-//! burst.
+//! The motions of a task's cases as unrolled series: one series per quantity and vehicle, made once for all lanes of a
+//! case. The last entry of every series is repeated, so that a batch reads [`ROWS`] entries at a time without testing
+//! for the end. A [`Window`] holds one quantity for all lanes of a batch over the rows of a burst.
 
 use crate::engine::cpu::batch_arrays::{Floats, TrackArrays, Words};
 use crate::engine::cpu::{LANES, ROWS};
@@ -15,16 +14,16 @@ pub(in crate::engine) struct Series {
     entries: Vec<f32>,
 }
 
-/// One series in the pool; from its last entry on nothing changes.
+/// One series in the pool; it is constant from its last entry on.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::engine) struct Track {
     /// Its first entry.
     pub first: u32,
-    /// Its last entry, counted from the first.
+    /// Offset of the last entry from the first.
     pub last: u32,
 }
 
-/// Where another vehicle is, step by step.
+/// Series of another vehicle's motion.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::engine) struct VehicleTracks {
     /// Speed, m/s.
@@ -43,13 +42,13 @@ impl VehicleTracks {
     }
 }
 
-/// Entries that a vehicle's motion takes at most.
+/// Maximum number of entries of a vehicle's motion.
 pub(in crate::engine) fn max_entries(step_cap: u32) -> u64 {
     3 * (u64::from(step_cap) + 1 + ROWS as u64)
 }
 
 impl Series {
-    /// Empty, with its memory.
+    /// Empties the pool but keeps its memory.
     pub fn clear(&mut self) {
         self.entries.clear();
     }
@@ -112,7 +111,7 @@ impl Series {
         let held = self.entries[first..].iter().rev().take_while(|v| v.to_bits() == end.to_bits()).count();
         let last = self.entries.len() - held;
         self.entries.resize(last + ROWS, end);
-        // A task's share of memory is far below this.
+        // The size of a task is limited far below this.
         let place = |at: usize| u32::try_from(at).expect("a task's series have less than 2^32 entries");
         Track { first: place(first), last: place(last - first) }
     }
@@ -124,9 +123,9 @@ impl Series {
 pub(in crate::engine) struct Window {
     /// One row per step.
     pub rows: [Floats; ROWS],
-    /// Some lane's rows are not what it will see for ever.
+    /// The series of at least one lane continues beyond these rows.
     pub moves: bool,
-    /// All lanes of the stream see the same at all steps.
+    /// The value is the same for all lanes of the stream at all steps.
     pub stands: bool,
 }
 
@@ -137,7 +136,7 @@ impl Window {
         Window { rows: [[value.unwrap_or(0.0); LANES]; ROWS], moves: false, stands: value.is_some() }
     }
 
-    /// Takes the rows from the series: entry by entry, on every machine.
+    /// Copies the rows from the series entry by entry; portable.
     #[inline(always)]
     pub fn turn(&mut self, tracks: &TrackArrays<LANES>, steps: &Words, entries: &[f32]) {
         let places = places(tracks, steps);
@@ -151,7 +150,7 @@ impl Window {
     }
 }
 
-/// Where the lanes at these steps read their series.
+/// Positions in the pool at which the lanes read their series at these steps.
 #[inline(always)]
 pub(in crate::engine) fn places(tracks: &TrackArrays<LANES>, steps: &Words) -> Words {
     let mut places = tracks.first;
@@ -161,7 +160,7 @@ pub(in crate::engine) fn places(tracks: &TrackArrays<LANES>, steps: &Words) -> W
     places
 }
 
-/// Some lane's series goes on beyond its step.
+/// Whether the series of some lane continues beyond its step.
 #[inline(always)]
 pub(in crate::engine) fn goes_on(tracks: &TrackArrays<LANES>, steps: &Words) -> bool {
     let mut on = 0;
@@ -171,7 +170,7 @@ pub(in crate::engine) fn goes_on(tracks: &TrackArrays<LANES>, steps: &Words) -> 
     on != 0
 }
 
-/// What all of these series are at every step, if they are all the same and constant.
+/// The value of all these series if they are equal and constant.
 fn standing(tracks: impl Iterator<Item = Track>, entries: &[f32]) -> Option<f32> {
     let mut found: Option<f32> = None;
     for track in tracks {
@@ -190,7 +189,7 @@ mod tests {
     use super::*;
     use crate::scenario::{Lateral, Speed};
 
-    /// What a lane of the task sees is what the motion itself says, at every step, beyond the end too.
+    /// The unrolled series equal the motion at every step, also beyond its end.
     #[test]
     fn unrolled_series_are_the_motions() {
         let sampled = Speed::Sampled(vec![10.0, 9.0, 8.5, 8.5, 8.5]);
@@ -218,7 +217,7 @@ mod tests {
         }
     }
 
-    /// A motion that goes on to the cap takes no more entries than the lane has steps.
+    /// A motion that continues to the cap has as many entries as the lane has steps.
     #[test]
     fn a_motion_without_end_is_unrolled_to_the_cap() {
         let speed = Speed::Kinematic { initial_mps: 3.0, acceleration_mps2: 0.5, until_s: f64::MAX };
@@ -228,7 +227,7 @@ mod tests {
         assert!(series.entries.len() as u64 <= max_entries(100));
     }
 
-    /// What no lane ever sees move is known once for the stream; the first one counts too.
+    /// A value is constant for the stream only if all lanes, including the first, have the same constant.
     #[test]
     fn only_equal_constants_stand() {
         let entries = [1.0, 1.0, 2.0, 2.0];

@@ -1,9 +1,10 @@
-//! The instruction sets that a batch of lanes can run on, chosen at run time: one binary is fast everywhere.
-//! Which of them this machine has.
+//! The instruction sets for batches of lanes, and their detection. The set is chosen at run time, so that one binary is
+//! fast on every machine.
 //!
-//! Every set computes the same words. None has a fused multiply-add switched on: lanes round after every operation.
+//! Every set computes the same words. None enables fused multiply-add: lanes round after every operation.
 
-// Calls of functions compiled for an instruction set, after the machine was asked for it; loads and stores in them.
+// Calls functions compiled for an instruction set, after detecting that the machine supports it; their loads and
+// stores.
 #![allow(unsafe_code)]
 
 #[cfg(target_arch = "x86_64")]
@@ -32,8 +33,8 @@ impl<M> Burst<M> {
     /// Runs it.
     #[inline]
     pub(in crate::engine) fn run(&self, simulation: &Simulation<f32, M>, fleet: &mut Fleet<'_>, pending: &mut Pending) {
-        // SAFETY: the functions are unsafe for one reason, the instructions that they may use; `burst_for` has
-        // asked the machine for them.
+        // SAFETY: the functions are unsafe only because of the instructions that they use; `burst_for` has detected
+        // that the machine supports these.
         unsafe { (self.run)(simulation, fleet, pending) }
     }
 }
@@ -124,7 +125,7 @@ fn burst_neon<M: DriverModel<f32>, const RULES: u32>(
     burst::<M, RULES>(simulation, fleet, pending, take, Window::turn);
 }
 
-/// [`take`] in registers: the entries of a row, expanded into the slots.
+/// [`take`] in registers: expands consecutive entries of a row into the slots.
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx512f,avx512vl,avx512dq,avx512bw")]
 #[inline]
@@ -132,8 +133,8 @@ fn take_avx512(rows: &mut [Words], pending: &[[u32; ROOM]], from: usize, slots: 
     use std::arch::x86_64::*;
     assert!(from + LANES <= ROOM, "lanes are taken from beyond the room");
     for (row, pending) in rows.iter_mut().zip(pending) {
-        // SAFETY: a row of pending lanes has LANES entries from there on, as just asserted; a row of a
-        // batch has LANES.
+        // SAFETY: the row of pending lanes has LANES entries from this position on, as asserted above; a row of a batch
+        // has LANES.
         unsafe {
             let next = _mm512_loadu_si512(pending.as_ptr().add(from).cast());
             let old = _mm512_loadu_si512(row.as_ptr().cast());
@@ -155,13 +156,13 @@ fn turn_avx512(window: &mut Window, tracks: &TrackArrays<LANES>, steps: &Words, 
         furthest = furthest.max(from);
     }
     assert!(furthest as usize + ROWS <= entries.len(), "a lane reads beyond the series");
-    // No closure and no adapter here: those of the standard library are not compiled for these instructions.
+    // No closures or iterator adapters here: those of the standard library are not compiled for these instructions.
     let mut r = [_mm512_setzero_ps(); 16];
     for (register, &from) in r.iter_mut().zip(&places) {
-        // SAFETY: each place has ROWS entries after it, as has just been asserted.
+        // SAFETY: ROWS entries follow each position, as asserted above.
         *register = unsafe { _mm512_loadu_ps(entries.as_ptr().add(from as usize)) };
     }
-    // Squares of 4 by 4, within the quarters of the registers.
+    // Transposes blocks of 4 × 4 within the quarters of the registers.
     for lanes in r.chunks_exact_mut(4) {
         let low_01 = _mm512_castps_pd(_mm512_unpacklo_ps(lanes[0], lanes[1]));
         let high_01 = _mm512_castps_pd(_mm512_unpackhi_ps(lanes[0], lanes[1]));
@@ -172,7 +173,7 @@ fn turn_avx512(window: &mut Window, tracks: &TrackArrays<LANES>, steps: &Words, 
         lanes[2] = _mm512_castpd_ps(_mm512_unpacklo_pd(high_01, high_23));
         lanes[3] = _mm512_castpd_ps(_mm512_unpackhi_pd(high_01, high_23));
     }
-    // Register 4q + j has, in quarter p, step 4p + j of lanes 4q to 4q + 3: the quarters change places.
+    // Quarter p of register 4q + j holds step 4p + j of lanes 4q to 4q + 3: transposes the quarters.
     for j in 0..4 {
         let (a, b, c, d) = (r[j], r[4 + j], r[8 + j], r[12 + j]);
         let (low_ab, high_ab) = (_mm512_shuffle_f32x4::<0x44>(a, b), _mm512_shuffle_f32x4::<0xee>(a, b));
@@ -200,7 +201,7 @@ pub enum Instructions {
     Avx2,
     /// x86-64, 512 bits (F, VL, DQ, BW): Skylake-X (2017), Zen 4 (2022) and later.
     Avx512,
-    /// AArch64, 128 bits: every one.
+    /// AArch64, 128 bits: every AArch64 processor.
     Neon,
 }
 
@@ -219,7 +220,7 @@ impl Instructions {
         }
     }
 
-    /// Does this machine have it?
+    /// Whether this machine supports it.
     pub fn is_available(self) -> bool {
         match self {
             Instructions::Scalar => true,
@@ -239,22 +240,22 @@ impl Instructions {
         }
     }
 
-    /// Those of this machine, slowest first.
+    /// The instruction sets of this machine, slowest first.
     pub fn available() -> Vec<Instructions> {
         Instructions::ALL.into_iter().filter(|set| set.is_available()).collect()
     }
 
-    /// The fastest of this machine. NEON only where it is asked for: LLVM's cost model leaves the batch's loop
-    /// scalar there (Rust 1.95), and then lanes one by one are faster.
+    /// The fastest of this machine, except NEON: LLVM's cost model leaves the batch's loop scalar there (Rust 1.95),
+    /// so single lanes are faster.
     pub fn best() -> Instructions {
         let chosen = |set: &Instructions| set.is_available() && *set != Instructions::Neon;
         Instructions::ALL.into_iter().rev().find(chosen).unwrap_or(Instructions::Scalar)
     }
 
-    /// Itself, where this machine has it.
+    /// Returns the instruction set if this machine supports it.
     ///
     /// # Errors
-    /// [`Error::Usage`] where it has not.
+    /// [`Error::Usage`] if it does not.
     pub fn checked(self) -> Result<Instructions> {
         if self.is_available() {
             return Ok(self);

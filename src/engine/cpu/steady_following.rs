@@ -1,10 +1,10 @@
-//! Lanes in which a driver only follows, in steady state.
+//! Lanes in which the driver follows in steady state.
 //!
 //! A driver who keeps a comfortable distance from a vehicle at constant speed often closes in ever more slowly.
-//! Hundreds of steps then change the speed, but no contact and no criterion is possible. Only a part of the driver's
-//! check can trigger, [`DriverModel::check_steady`], however hard it brakes. Verdict-only batches make these steps
-//! among lanes of the same kind, with that part only. [`steady_steps`] says for how long this equals the whole step, to
-//! the bit.
+//! Hundreds of steps then change the speed, but no contact and no criterion is possible. Only
+//! [`DriverModel::check_steady`], a part of the driver's check, can trigger, however hard the driver brakes.
+//! Verdict-only batches make these steps together with similar lanes, with that part only. [`steady_steps`] returns for
+//! how long this equals the whole step, to the bit.
 
 use crate::model::driver::DriverModel;
 use crate::model::scalar::Real;
@@ -13,11 +13,11 @@ use crate::engine::cpu::ROWS;
 use crate::engine::frame::Simulation;
 use crate::engine::lane_step::{LaneConstants, LaneState, OtherState, criteria_safe_gap};
 
-/// Maximum number of steps foreseen at once: few enough to bound the rounding of their gaps.
+/// Maximum number of steps predicted at once; it bounds the rounding error of their gaps.
 const MAX_STEPS: u32 = 1024;
 
-/// Number of a lane's next steps that surely follow steadily, bounded by the constant above. `state` is between two
-/// steps, at `state.index` at least 1. The only other vehicle keeps speed and lateral position of `place` for ever.
+/// Number of a lane's next steps that certainly follow steadily, at most `MAX_STEPS`. `state` is between two steps, at
+/// `state.index` at least 1. The only other vehicle keeps the speed and lateral position in `place` forever.
 pub(in crate::engine) fn steady_steps<M: DriverModel<f32>>(
     simulation: &Simulation<f32, M>,
     lane: &LaneConstants<f32>,
@@ -28,20 +28,21 @@ pub(in crate::engine) fn steady_steps<M: DriverModel<f32>>(
     let (other, index, gap) = (&lane.others[0], state.index, state.gaps[0]);
     let in_lane = scene.in_lane || place.position.abs() - other.half_widths < 0.0 && index >= other.attend_from;
     let there = scene.always_there || index >= other.present_from && other.present_until >= frame.step_cap;
-    // Behind a vehicle that drives backwards a lane can stop without being settled, which steady steps do not test.
+    // Behind a vehicle that drives backwards a lane can stop without being settled; steady-following steps do not test
+    // this.
     if !in_lane || !there || state.driver.delay_steps > 0 || place.speed < 0.0 {
         return 0;
     }
-    // The closing speed does not grow from here on, so what is safe now is safe at every later closing speed.
+    // The closing speed does not grow from here on, so a gap that is safe now is safe at every later closing speed.
     let closing = (state.v_ego - place.speed).max(0.0);
     let of_criteria = criteria_safe_gap(criteria, &state.record, closing);
     // `larger` returns its second operand when unordered, so NaN propagates.
     let safe = of_criteria.larger(model.steady_gap(state.v_ego, place.speed));
-    // A thousandth and a millimetre bound the rounding of the distances and sums.
+    // A relative margin of 1/1000 and a margin of 1 mm bound the rounding of distances and sums.
     let room = gap - (1.001 * safe + 0.001 * gap + 0.001);
     let by = 1.001 * closing * frame.dt;
     let max_steps = MAX_STEPS.min(frame.step_cap.saturating_sub(index + ROWS as u32));
-    // No steps if there is no room or the bound is NaN.
+    // Zero if there is no room or the bound is NaN.
     ((room / by) as u32).min(max_steps)
 }
 
@@ -59,7 +60,7 @@ mod tests {
     use crate::scenario::Category;
     use crate::stats::random::{philox4x32_10, unit_uniform};
 
-    /// A lane behind a vehicle that keeps its speed, somewhere in its run: the ego brakes or has braked.
+    /// A lane behind a vehicle that keeps its speed, at some step of its run: the ego brakes or has braked.
     fn lane(number: u32) -> (LaneConstants<f32>, LaneState<f32>, OtherState<f32>) {
         let mut drawn = 0;
         let mut between = |least: f32, most: f32| {
@@ -97,9 +98,8 @@ mod tests {
         (lane, state, place)
     }
 
-    /// Steady-following steps equal whole steps: same speed, gap and deceleration, to the bit, and no verdict
-    /// changes. A lane that ends among them does so because it is settled, from the first such step past the horizon
-    /// on.
+    /// Steady-following steps equal whole steps: same speed, gap and deceleration, to the bit, and no verdict changes.
+    /// A lane that ends during these steps is settled, at the first such step past the horizon.
     #[test]
     fn steady_following_steps_equal_the_whole_step() {
         for name in Profile::names() {
@@ -174,12 +174,12 @@ mod tests {
         assert_eq!(steps(&lane, &state, &OtherState { position: 3.5, ..place }), 0);
         assert_eq!(steps(&lane, &state, &OtherState { speed: -1.0, ..place }), 0);
         assert_eq!(steps(&lane, &LaneState { index: frame.step_cap - ROWS as u32, ..state }, &place), 0);
-        // Nearer, and faster: fewer steps.
+        // A smaller gap or a higher speed gives fewer steps.
         let nearer = LaneState { gaps: [10.0; 2], ..state };
         let faster = LaneState { v_ego: 25.0, ..state };
         let near = (steps(&lane, &nearer, &place), steps(&lane, &faster, &place));
         assert!(near.0 > 10 && near.0 < 250 && near.1 > 100 && near.1 < 500, "{near:?}");
-        // A model promises nothing where its distance is NaN.
+        // A model makes no promise if its distance is NaN.
         let mut profile = Profile::load("paper").unwrap().fsm;
         profile.comfortable_deceleration_mps2 = 0.0;
         let model = &profile.resolve::<f32>(0.04, Category::Lvd);

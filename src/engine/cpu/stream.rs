@@ -1,7 +1,7 @@
-//! A stream of lanes through the slots of the batches. After each burst the slot of a finished lane takes the next
-//! lane, so no lane blocks another and nothing is allocated per lane. A lane that needs fewer checks moves to another
-//! stage: one that continues with the second vehicle only, and one that follows steadily, for as long as it does. A
-//! stage runs batches of its own when many lanes are pending there, or no others are left.
+//! Runs a stream of lanes through the slots of the batches. After each burst the slot of a finished lane takes the next
+//! lane, so no lane blocks another and no memory is allocated per lane. A lane that needs fewer checks moves to another
+//! stage: one for lanes with the second vehicle only, and one for steady following. A stage runs its own batches when
+//! many lanes are pending there, or no other lanes are left.
 
 use crate::engine::cpu::LANES;
 use crate::engine::cpu::batch::{BATCHES, Fleet};
@@ -16,9 +16,9 @@ use crate::model::driver::DriverModel;
 /// Lanes of a fleet.
 const FLEET: usize = BATCHES * LANES;
 
-/// Runs a stream of lanes of one model on an instruction set, where they run in batches. `each` takes every finished
-/// lane, in the order in which they end: the lane, counted within the stream, and its result.
-/// `entries` are the series that the stream's tracks point into.
+/// Runs a stream of lanes of one model on an instruction set; all must run in batches. `each` receives every finished
+/// lane, in the order in which they end: its index within the stream and its result. `entries` are the series that the
+/// stream's tracks index.
 pub(in crate::engine) fn run_stream<M: DriverModel<f32>, E: Ending>(
     simulation: &Simulation<'_, f32, M>,
     instructions: Instructions,
@@ -43,14 +43,14 @@ struct Stage<'s, M> {
     burst: Burst<M>,
     fleet: Fleet<'s>,
     pending: Pending,
-    /// Quiescent steps are skipped.
+    /// The stage skips quiescent steps.
     skips_steps: bool,
     /// The stage for lanes that need fewer checks.
     apart: Option<Box<Stage<'s, M>>>,
 }
 
 impl<'s, M: DriverModel<f32>> Stage<'s, M> {
-    /// Without lanes, and with the stages that its lanes may need later.
+    /// A stage without lanes, with the stages that its lanes may need later.
     fn new<E: Ending>(
         simulation: Simulation<'s, f32, M>,
         instructions: Instructions,
@@ -59,11 +59,11 @@ impl<'s, M: DriverModel<f32>> Stage<'s, M> {
     ) -> Self {
         const RUNS: &str = "these lanes do not run in batches";
         let rules_of = |scene| Rules::of(simulation.frame, simulation.criteria, scene, E::HAS_VALUES).expect(RUNS);
-        // Some rules have no loop for verdicts.
+        // Some rules have no verdict-only loop.
         let values = !rules_of(simulation.scene).is_verdict_only;
         let skips_steps = !values && !stream.every_step;
         let knows_steady = skips_steps && M::KNOWS_STEADY_FOLLOWING;
-        // A stage whose lanes look at these vehicles.
+        // Makes a stage whose lanes evaluate these vehicles.
         let stage = |scene: Scene, rules, vehicles: [usize; 2], apart: Option<Stage<'s, M>>| Stage {
             simulation: Simulation { scene, ..simulation },
             burst: burst_for(instructions, rules).expect(RUNS),
@@ -102,12 +102,12 @@ impl<'s, M: DriverModel<f32>> Stage<'s, M> {
                 batch.set_apart_steady_following(simulation, &mut apart.pending);
             }
         }
-        // Rare before the stream's end: this stage has run dry, and gets more lanes when the next one returns.
+        // Rare before the stream's end: this stage has no lanes, but gets more when lanes return from the next stage.
         let no_others = has_no_lane(fleet, pending);
         if !no_others && apart.pending.has_room(FLEET) {
             return;
         }
-        // Many bursts of one kind in a row keep their data in the caches.
+        // Many bursts of one stage in a row keep their data in the caches.
         while apart.pending.count() >= FLEET || no_others && !apart.is_idle() {
             if is_pair {
                 apart.advance(each);

@@ -8,9 +8,9 @@ use crate::scenario::{LATERAL_SAMPLED, Motion, SPEED_SAMPLED, Tables};
 
 use super::recipe::{CasePath, LateralPath, NO_SLOT, Recipe};
 
-/// An event this close behind a step, in steps, counts as at the step.
+/// An event up to this many steps after a step counts as at that step.
 const STEP_TOLERANCE: f64 = 1e-4;
-/// No event is later, in steps.
+/// Latest step of an event.
 const MAX_STEPS: f64 = 1e6;
 
 /// sin(πx/2) on [0, 1] as x·p(x²): the series to degree 11. With binary32's rounding its error is below 2·10⁻⁷.
@@ -48,7 +48,7 @@ pub(super) fn is_valid(recipe: &Recipe, basis: &[f32], point: &[f32]) -> bool {
     true
 }
 
-/// The case of a valid point; series go to the end of `tables`.
+/// The case of a valid point; its series are appended to `tables`.
 pub(super) fn case<R: Real>(recipe: &Recipe, basis: &[f32], point: &[f32], tables: &mut Tables<R>) -> LaneCase<R> {
     let number = |value: f32| R::from_f64(value.into());
     let is_reduced = recipe.path() == CasePath::Reduced;
@@ -121,14 +121,14 @@ pub(super) fn case<R: Real>(recipe: &Recipe, basis: &[f32], point: &[f32], table
     LaneCase { others: [first, second], ego_speed, ego_width: number(recipe.ego_width), horizon, pair: recipe.pair }
 }
 
-/// The value of a variable; 0 where no parameter gives it.
+/// The value of a variable; 0 if no parameter gives it.
 #[inline]
 fn at(recipe: &Recipe, point: &[f32], variable: Variable) -> f32 {
     let slot = recipe.slots[variable as usize];
     if slot == NO_SLOT { 0.0 } else { point[slot as usize] }
 }
 
-/// A column of the vector that belongs to coefficients.
+/// A column of the vector that the coefficients of a point give.
 #[inline]
 fn column<R: Real>(recipe: &Recipe, basis: &[f32], point: &[f32], column: u32) -> R {
     let width = recipe.columns.width as usize;
@@ -140,7 +140,7 @@ fn column<R: Real>(recipe: &Recipe, basis: &[f32], point: &[f32], column: u32) -
     value
 }
 
-/// Whole steps that cover a time, given in steps.
+/// Number of whole steps that cover a time given in steps.
 #[inline]
 fn steps_up<R: Real>(time: R) -> u32 {
     let late = (time.smaller(R::from_f64(MAX_STEPS)) - R::from_f64(STEP_TOLERANCE)).larger(R::ZERO);
@@ -148,7 +148,7 @@ fn steps_up<R: Real>(time: R) -> u32 {
     if late > R::from_step(below) { below + 1 } else { below }
 }
 
-/// Steps in which something happens, and a few more.
+/// Number of steps that contain all events of a motion, and a few more.
 fn steps_seen<R: Real>(recipe: &Recipe, motion: &Motion<R>) -> u32 {
     let events = [motion.speed_len, motion.lateral_len, motion.speed_until, motion.lateral_until];
     recipe.step_cap.min(events.into_iter().fold(0, u32::max) + 2)
@@ -163,7 +163,7 @@ fn kinematic_speed<R: Real>(recipe: &Recipe, initial: R, acceleration: R, durati
     motion.speed_end = (initial + acceleration * duration).larger(R::ZERO);
 }
 
-/// Lateral motion at constant speed; gives the time of the lane change, s.
+/// Lateral motion at constant speed; returns the time of the lane change, s.
 fn kinematic_lateral<R: Real>(recipe: &Recipe, lateral_speed: R, motion: &mut Motion<R>) -> R {
     let (dt, way) = (R::from_f64(recipe.dt.into()), R::from_f64(recipe.lane_change.into()));
     if recipe.lateral == LateralPath::Gone as u32 {
@@ -184,7 +184,7 @@ fn kinematic_lateral<R: Real>(recipe: &Recipe, lateral_speed: R, motion: &mut Mo
     change
 }
 
-/// Entries of a series of this duration.
+/// Number of entries of a series of this duration.
 fn entries<R: Real>(recipe: &Recipe, duration: R) -> u32 {
     steps_up(duration * R::from_f64(recipe.inverse_dt.into())).min(recipe.step_cap) + 1
 }
@@ -221,7 +221,7 @@ fn quarter_sine<R: Real>(x: R) -> R {
     x * sum
 }
 
-/// Place of a step between the instants of a reduced series.
+/// Position of a step between two instants of a reduced series.
 struct Between<R> {
     below: u32,
     above: u32,

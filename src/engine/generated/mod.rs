@@ -1,8 +1,8 @@
-//! Cases that are made where their lanes run: sample index → point → case, a pure function of the seed and the
-//! index. The CPU makes them here, a device in `shaders/generate.wgsl`, with the same bits.
+//! Cases generated where their lanes run: sample index → point → case, a pure function of seed and index. The CPU
+//! generates them here, a device in `shaders/generate.wgsl`, with the same bits.
 //!
-//! Points are binary32 everywhere, whatever a lane computes with. No division but the exact one, no root, no
-//! transcendental: the sinusoid is a polynomial, the normal deviates come from a table.
+//! Points are binary32 everywhere, in every lane arithmetic. Only exact division, no root, no transcendental function:
+//! the sinusoid is a polynomial, the normal deviates come from a table.
 
 mod decode;
 mod points;
@@ -23,7 +23,7 @@ pub struct Generator {
     pub points: Points,
     /// Point → case.
     pub recipe: Recipe,
-    /// The basis of a reduction, column by column divided by the weights: mean, then every direction; else empty.
+    /// The basis of a reduction: mean, then every direction, each column divided by its weight; else empty.
     pub basis: Vec<f32>,
 }
 
@@ -34,18 +34,18 @@ impl Generator {
         self.points.draw(index, |point| decode::is_valid(&self.recipe, &self.basis, point))
     }
 
-    /// The case of a sample index; series go to the end of `tables`.
+    /// The case of a sample index; its series are appended to `tables`.
     pub fn case<R: Real>(&self, index: u64, tables: &mut Tables<R>) -> LaneCase<R> {
         let drawn = self.draw(index);
         if drawn.is_void() { self.recipe.void() } else { self.decode(&drawn.values, tables) }
     }
 
-    /// The case of a valid point; series go to the end of `tables`.
+    /// The case of a valid point; its series are appended to `tables`.
     pub fn decode<R: Real>(&self, point: &[f32], tables: &mut Tables<R>) -> LaneCase<R> {
         decode::case(&self.recipe, &self.basis, point, tables)
     }
 
-    /// Entries of the tables that one case fills at most: speeds, lateral states.
+    /// Maximum number of table entries of one case: speeds, lateral states.
     pub fn table_entries(&self) -> [u32; 2] {
         let entries = self.recipe.longest_series();
         match self.recipe.path() {

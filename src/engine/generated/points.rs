@@ -3,22 +3,22 @@
 
 use crate::stats::random::{AliasTable, SOBOL_POINTS, Sobol, Stream, choose, standard_normal};
 
-/// Parameters of a point at most.
+/// Maximum number of parameters of a point.
 pub const MAX_PARAMETERS: usize = 14;
 
-/// Draws of a sample index at most: where all are invalid, the sample is void.
+/// Maximum number of draws of a sample index. If all are invalid, the sample is void.
 pub const ATTEMPTS: u32 = 64;
 
 /// Blocks of four words per draw.
 const BLOCKS: u32 = 4;
 
-/// Where a sample's words come from.
+/// Source of a sample's random words.
 #[derive(Debug, Clone, PartialEq)]
 pub enum PointSource {
-    /// Philox: independent, redrawn where a point is invalid.
+    /// Philox: independent draws; an invalid point is redrawn.
     Random(Stream),
-    /// Owen-scrambled Sobol points; an invalid point is void, as a redraw would break their balance. Two coordinates
-    /// choose the component, one more per parameter.
+    /// Owen-scrambled Sobol points. An invalid point is void, because a redraw would destroy their balance. Two
+    /// coordinates select the component, one more is used per parameter.
     Sobol(Sobol),
     /// Point `i` is mean `i`.
     Given,
@@ -27,27 +27,27 @@ pub enum PointSource {
 /// A sample's point.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DrawnPoint {
-    /// One value per parameter, then zeros. Means nothing where the sample is void.
+    /// One value per parameter, then zeros. Undefined if the sample is void.
     pub values: [f32; MAX_PARAMETERS],
-    /// Draws that it took; [`ATTEMPTS`] + 1 where all were invalid.
+    /// Number of draws; [`ATTEMPTS`] + 1 if all were invalid.
     pub tries: u32,
 }
 
 impl DrawnPoint {
-    /// No draw was valid: the sample has no case.
+    /// Whether no draw was valid: the sample has no case.
     pub fn is_void(&self) -> bool {
         self.tries > ATTEMPTS
     }
 }
 
-/// How points are drawn, in the numbers of every backend.
+/// How points are drawn, in the number format of every backend.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Points {
-    /// Where words come from.
+    /// Source of random words.
     pub source: PointSource,
     /// Parameters of a point, 1 to [`MAX_PARAMETERS`].
     pub dimensions: usize,
-    /// Component by its weight; `None` where all weigh the same.
+    /// Alias table of the components' weights; `None` if all are equal.
     pub weights: Option<AliasTable>,
     /// Means, `dimensions` per component.
     pub means: Vec<f32>,
@@ -63,7 +63,7 @@ impl Points {
         self.factor_of.len() as u32
     }
 
-    /// Number of points; `None` where every index has one. A [plan](crate::engine::LanePlan) holds no sample beyond.
+    /// Number of points; `None` if every index has one. A [plan](crate::engine::LanePlan) holds no sample beyond.
     pub fn count(&self) -> Option<u64> {
         match &self.source {
             PointSource::Random(_) => None,
@@ -75,7 +75,7 @@ impl Points {
     /// The first valid draw of an index.
     ///
     /// # Panics
-    /// For an index beyond [`Points::count`]: there is no such point, and none may stand in for it.
+    /// For an index beyond [`Points::count`], because no such point exists.
     #[inline]
     pub fn draw(&self, index: u64, is_valid: impl Fn(&[f32]) -> bool) -> DrawnPoint {
         let attempts = if matches!(self.source, PointSource::Random(_)) { ATTEMPTS } else { 1 };
@@ -88,7 +88,7 @@ impl Points {
         DrawnPoint { values: [0.0; MAX_PARAMETERS], tries: ATTEMPTS + 1 }
     }
 
-    /// The component that a draw comes from: that of draw `tries` (from 1) of an index. `None` for given points.
+    /// The component of draw `tries` (from 1) of an index. `None` for given points.
     pub fn component(&self, index: u64, tries: u32) -> Option<u32> {
         let [a, b] = match &self.source {
             PointSource::Random(stream) => {
@@ -109,7 +109,7 @@ impl Points {
         }
     }
 
-    /// Draw `attempt` of an index, valid or not. Words 0 and 1 choose the component, the rest are normal deviates.
+    /// Draw `attempt` of an index, valid or not. Words 0 and 1 select the component, the others are normal deviates.
     #[inline]
     fn candidate(&self, index: u64, attempt: u32) -> [f32; MAX_PARAMETERS] {
         let d = self.dimensions;
@@ -123,7 +123,7 @@ impl Points {
             }
             PointSource::Sobol(sobol) => {
                 for (dimension, word) in words.iter_mut().take(2 + d).enumerate() {
-                    // A plan holds no index beyond the points, and `Sobol` was made with 2 + d dimensions.
+                    // A plan holds no index beyond the points, and `Sobol` has 2 + d dimensions.
                     *word = sobol.word(index, dimension as u32).expect("the sequence has this point");
                 }
             }

@@ -1,8 +1,8 @@
-//! What a point's numbers mean, as one flat record that host and device share. Twin: `Recipe` in
+//! Meaning of a point's numbers, as one flat record that host and device share. Twin: `Recipe` in
 //! `shaders/shared/recipe.wgsl`.
 
-// A record may be seen as bytes where it is `repr(C)`, of 32-bit fields only and thus without padding: the sizes
-// below are checked when this is compiled.
+// The record may be cast to bytes because it is `repr(C)` with 32-bit fields only and no padding; its sizes are checked
+// at compile time below.
 #![allow(unsafe_code)]
 
 use bytemuck::{Pod, Zeroable};
@@ -31,7 +31,7 @@ pub enum CasePath {
 }
 
 impl CasePath {
-    /// That of a parameterization.
+    /// The path of a parameterization.
     pub fn of(id: &Parameterization) -> CasePath {
         match id.features().map(|features| features.speed) {
             None => CasePath::Reduced,
@@ -56,7 +56,7 @@ pub enum LateralPath {
 }
 
 impl LateralPath {
-    /// That of a parameterization; unused on reduced paths.
+    /// The lateral path of a parameterization; unused on reduced paths.
     pub fn of(id: &Parameterization) -> LateralPath {
         let is_gradual = id.features().is_some_and(|features| features.lane_change == LaneChange::Gradual);
         match (id.category, is_gradual) {
@@ -72,7 +72,7 @@ impl LateralPath {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ReducedColumns {
-    /// Columns of the vector in all.
+    /// Total number of columns of the vector.
     pub width: u32,
     /// Instants per series, at least 2.
     pub instants: u32,
@@ -82,34 +82,34 @@ pub struct ReducedColumns {
     pub lateral: u32,
     /// First column of the target's speed.
     pub speed: u32,
-    /// First column of the speed ahead; [`NO_SLOT`] but in cut-out.
+    /// First column of the speed ahead; [`NO_SLOT`] except in cut-outs.
     pub lead_speed: u32,
     /// Column of the ego's speed; LVD: first column of the leader's.
     pub ego_speed: u32,
-    /// Column of D; [`NO_SLOT`] but in cut-out.
+    /// Column of D; [`NO_SLOT`] except in cut-outs.
     pub lead_gap: u32,
     /// Column of T.
     pub duration: u32,
 }
 
-/// Bounded columns of a reconstruction at most.
+/// Maximum number of bounded columns of a reconstruction.
 pub const MAX_BOUNDS: usize = 8;
 
-/// A column of a reconstruction that makes a draw invalid where it is out of bounds.
+/// A column of a reconstruction that makes a draw invalid if it is out of range.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ColumnBound {
     /// The column.
     pub column: u32,
-    /// 1 where its size is bounded.
+    /// 1 if its absolute value is bounded.
     pub is_distance: u32,
-    /// Least valid value.
+    /// Minimum valid value.
     pub lower: f32,
-    /// Largest valid value.
+    /// Maximum valid value.
     pub upper: f32,
 }
 
-/// From a point to a case. Words and binary32 numbers only: host and device hold the same bytes.
+/// Constants for making a case from a point. Words and binary32 numbers only: host and device hold the same bytes.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Recipe {
@@ -119,13 +119,13 @@ pub struct Recipe {
     pub lateral: u32,
     /// Parameters of a point.
     pub dimensions: u32,
-    /// 1 where a second vehicle stands ahead of the principal one.
+    /// 1 if a second vehicle is ahead of the principal one.
     pub pair: u32,
-    /// 1 where v1 < v0 and T = (v0 − v1)/ā in its range are asked for (LVD i and ii).
+    /// 1 if v1 < v0 and T = (v0 − v1)/ā in its range are required (LVD i and ii).
     pub decelerates: u32,
-    /// 1 where accelerations go on after T.
+    /// 1 if accelerations continue after T.
     pub unlimited: u32,
-    /// 1 where the criteria judge the principal vehicle.
+    /// 1 if the criteria evaluate the principal vehicle.
     pub judged: u32,
     /// Last step of every lane.
     pub step_cap: u32,
@@ -133,23 +133,23 @@ pub struct Recipe {
     pub slots: [u32; Variable::ALL.len()],
     /// Columns of the reduction.
     pub columns: ReducedColumns,
-    /// Least valid value of each parameter.
+    /// Minimum valid value of each parameter.
     pub lower: [f32; MAX_PARAMETERS],
-    /// Largest valid value of each parameter.
+    /// Maximum valid value of each parameter.
     pub upper: [f32; MAX_PARAMETERS],
-    /// Bounded columns; 0 on kinematic paths.
+    /// Number of bounded columns; 0 on kinematic paths.
     pub bounded: u32,
     /// The bounds of a reconstruction.
     pub bounds: [ColumnBound; MAX_BOUNDS],
-    /// Least valid T that follows from other numbers, s.
+    /// Minimum valid T that follows from other numbers, s.
     pub min_duration: f32,
-    /// Largest valid T that follows from other numbers, s.
+    /// Maximum valid T that follows from other numbers, s.
     pub longest_duration: f32,
     /// Time step, s.
     pub dt: f32,
     /// 1/dt, 1/s.
     pub inverse_dt: f32,
-    /// Lateral way of a lane change, m.
+    /// Lateral distance of a lane change, m.
     pub lane_change: f32,
     /// (L_e + L_o)/2 of the principal vehicle and of the one ahead, m.
     pub half_lengths: [f32; 2],
@@ -159,7 +159,7 @@ pub struct Recipe {
     pub principal_length: f32,
     /// Width of the ego, m.
     pub ego_width: f32,
-    /// What each driver model waits for, in the order of [`ModelId::ALL`](crate::model::driver::ModelId::ALL).
+    /// Attention rule of each driver model, in the order of [`ModelId::ALL`](crate::model::driver::ModelId::ALL).
     pub attention: [AttentionRule<f32>; MODELS],
 }
 
@@ -175,7 +175,7 @@ unsafe impl Zeroable for Recipe {}
 unsafe impl Pod for Recipe {}
 
 impl Recipe {
-    /// How motions follow from a point.
+    /// How the motions follow from a point.
     pub fn path(&self) -> CasePath {
         match self.path {
             0 => CasePath::Kinematic,
@@ -184,23 +184,24 @@ impl Recipe {
         }
     }
 
-    /// Entries of the longest series that a valid point can have.
+    /// Number of entries of the longest series of a valid point.
     pub fn longest_series(&self) -> u32 {
         let steps = (f64::from(self.longest_duration) * f64::from(self.inverse_dt)).ceil() as u32;
         steps.min(self.step_cap) + 1
     }
 
-    /// Speed series of a reduced case.
+    /// Number of speed series of a reduced case.
     pub(super) fn speed_series(&self) -> u32 {
         1 + u32::from(self.columns.lead_speed != NO_SLOT)
     }
 
-    /// Lateral series of a reduced case.
+    /// Number of lateral series of a reduced case.
     pub(super) fn lateral_series(&self) -> u32 {
         u32::from(self.columns.lateral != NO_SLOT)
     }
 
-    /// The case of a void sample: nobody is there, and the ego stands. Its lanes end at once and fail nothing.
+    /// The case of a void sample: no vehicle is present, and the ego stands. Its lanes end at once and fail no
+    /// criterion.
     pub(super) fn void<R: Real>(&self) -> LaneCase<R> {
         let nobody = LaneOther {
             motion: Motion::resting(),

@@ -162,13 +162,13 @@ impl AdapterCard {
         })
     }
 
-    /// Does the driver report a GPU? `Other` counts as none.
+    /// Whether the driver reports a GPU. `Other` counts as none.
     pub fn is_real(&self) -> bool {
         matches!(self.kind, DeviceKind::Discrete | DeviceKind::Virtual | DeviceKind::Integrated)
     }
 
-    /// Does the environment hide it ([`super::visible()`])? It hides GPUs outside the list of allowed PCI bus ids,
-    /// and those without an id, but never software rasterizers.
+    /// Whether the environment hides it ([`super::visible()`]). It hides GPUs that are not in the list of allowed PCI
+    /// bus ids or have no id, but never software rasterizers.
     pub fn is_hidden_by(&self, visible: Option<&[String]>) -> bool {
         let Some(visible) = visible else { return false };
         self.kind != DeviceKind::Software && !self.pci_bus_id.as_ref().is_some_and(|bus| visible.contains(bus))
@@ -226,7 +226,7 @@ impl Adapters {
 fn ask(backends: wgpu::Backends) -> Vec<(AdapterCard, wgpu::Adapter)> {
     let mut descriptor = wgpu::InstanceDescriptor::new_without_display_handle();
     descriptor.backends = backends;
-    // The same in every build: validation layers are slow and write messages.
+    // The same flags in every build: validation layers are slow and write messages.
     descriptor.flags = wgpu::InstanceFlags::VALIDATION_INDIRECT_CALL;
     let instance = wgpu::Instance::new(descriptor);
     let adapters = pollster::block_on(instance.enumerate_adapters(backends));

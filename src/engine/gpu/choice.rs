@@ -87,8 +87,8 @@ fn matching<'a>(cards: &'a [AdapterCard], device: &DeviceName) -> Vec<&'a Adapte
     }
 }
 
-/// Are two cards one physical device? The bus id decides, or the same name under another interface (OpenGL appends to
-/// it: `NVIDIA L4/PCIe/SSE2`).
+/// Whether two cards are one physical device. The bus id decides; without it, the same name under another interface
+/// (OpenGL appends to it: `NVIDIA L4/PCIe/SSE2`).
 fn same_device(a: &AdapterCard, b: &AdapterCard) -> bool {
     match (&a.pci_bus_id, &b.pci_bus_id) {
         _ if a.index == b.index => true,
@@ -166,7 +166,7 @@ mod tests {
     const B: &str = "0000:65:00.0";
     const INTEGRATED: &str = "0000:00:02.0";
 
-    /// An integrated GPU, two discrete twins, llvmpipe; one twin and llvmpipe again under OpenGL.
+    /// An integrated GPU, two equal discrete GPUs and llvmpipe; one of the GPUs and llvmpipe also under OpenGL.
     fn workstation() -> Vec<AdapterCard> {
         vec![
             card(0, "Intel(R) UHD Graphics 770", DeviceKind::Integrated, Api::Vulkan, Some(INTEGRATED)),

@@ -16,11 +16,11 @@ use crate::{Error, Result};
 /// Options of a device.
 #[derive(Debug, Clone)]
 pub struct GpuOptions {
-    /// Time-out of a dispatch; after it the device counts as lost.
+    /// Timeout of a dispatch; after it the device counts as lost.
     pub timeout: Duration,
-    /// Lanes per model of the first job; later ones follow the device's speed.
+    /// Lanes per model of the first job; later jobs follow the device's speed.
     pub first_lanes: u64,
-    /// Lanes that an invocation computes on average, at least 1; `None` follows the number of lanes, but on a software
+    /// Average number of lanes per invocation, at least 1. `None` derives it from the number of lanes; on a software
     /// device it is 1.
     pub lanes_per_invocation: Option<u32>,
 }
@@ -31,18 +31,18 @@ impl Default for GpuOptions {
     }
 }
 
-/// What a test does to a device, to see that it is noticed; nothing by default.
+/// Faults that a test injects into a device; none by default.
 #[derive(Clone, Default)]
 pub struct Tampering {
     /// Uses the plain path instead of the exact one.
     pub plain: bool,
     /// Replaces text of the shaders before compilation.
     pub shader_patch: Option<(String, String)>,
-    /// Is called before each job with its index since the device was opened. An error is the job's.
+    /// Called before each job with its index since the device was opened. The job returns its error.
     pub before_job: Option<BeforeJob>,
 }
 
-/// A call before a job.
+/// A callback before a job.
 pub type BeforeJob = Arc<dyn Fn(u64, &wgpu::Device) -> std::result::Result<(), &'static str> + Send + Sync>;
 
 /// Key of a model's pipeline.
@@ -254,10 +254,10 @@ impl Device {
         Ok(buffer)
     }
 
-    /// Maximum number of lanes per model of a job, limited by the result buffers.
+    /// Maximum number of lanes per model of a job, limited by the size of the result buffers.
     pub fn max_lanes(&self, models: u64, bytes_per_lane: f64) -> u64 {
         let limits = self.device.limits();
-        // The read-back buffer holds the counts and times as well.
+        // The read-back buffer also holds counts and times.
         let room = limits.max_buffer_size.saturating_sub(SMALL_RESULT_BYTES);
         let most = limits.max_storage_buffer_binding_size.min(room).min(MAX_RESULT_BYTES);
         ((most as f64 / (models as f64 * bytes_per_lane)) as u64).min(MAX_LANES)
@@ -271,7 +271,7 @@ impl Device {
         (groups.div_ceil(rows), rows)
     }
 
-    /// Lanes that one invocation computes on average: as many as leave all multiprocessors busy.
+    /// Average number of lanes per invocation, chosen so that all multiprocessors are busy.
     pub fn lanes_per_invocation(&self, lanes: u32) -> u32 {
         let busy = || (lanes / (WORKGROUP * BUSY_WORKGROUPS)).clamp(1, MAX_LANES_PER_INVOCATION);
         self.options.lanes_per_invocation.unwrap_or_else(busy)
@@ -301,7 +301,7 @@ const SMALL_RESULT_BYTES: u64 = 4 << 20;
 const MAX_LANES: u64 = 1 << 27;
 /// Workgroups that keep the largest devices of today busy: 132 multiprocessors of 32 workgroups each.
 const BUSY_WORKGROUPS: u32 = 4224;
-/// With more, a warp's lanes are hardly busier, and the end of a dispatch is longer.
+/// A larger value hardly increases the use of a warp's lanes, and lengthens the end of a dispatch.
 const MAX_LANES_PER_INVOCATION: u32 = 32;
 
 /// The bindings of `shaders/lane.wgsl`, in their order: launch, four inputs, three results.

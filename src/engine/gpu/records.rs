@@ -68,9 +68,9 @@ pub struct Launch {
     pub finished_word: u32,
     /// Lanes of a workgroup, at least [`WORKGROUP`](super::shader::WORKGROUP).
     pub lanes_per_group: u32,
-    /// A smaller TTC fails, s: the profile's, or a watch's.
+    /// A TTC below this fails, s: the threshold of the profile or of a watch.
     pub ttc_threshold_s: f32,
-    /// Verdicts mark contacts at this closing speed, m/s, or a greater one.
+    /// Verdicts mark contacts with at least this closing speed, m/s.
     pub marks_contacts_from: f32,
 }
 
@@ -157,9 +157,9 @@ pub struct Generation {
     pub seed_high: u32,
     /// Purpose of the stream.
     pub purpose: u32,
-    /// Components of the mixture, or points given.
+    /// Components of the mixture, or number of given points.
     pub components: u32,
-    /// 1 where components have weights.
+    /// 1 if components have weights.
     pub weighted: u32,
     /// Offset of the first mean in the numbers.
     pub first_mean: u32,

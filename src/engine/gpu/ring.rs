@@ -129,7 +129,7 @@ impl Slot {
                 finished_word: model as u32,
                 lanes_per_group,
                 ttc_threshold_s: job.criteria[model].ttc.threshold,
-                // No closing speed is larger.
+                // f32::MAX stands for ∞: no closing speed exceeds it.
                 marks_contacts_from: job.criteria[model].marks_contacts_from.min(f32::MAX),
             };
             let at = stride as usize * model;
@@ -303,7 +303,7 @@ fn read(device: &Device, flight: &Flight, bytes: &[u8], wall_s: f64) -> Result<A
     let measured: Vec<f64> = if device.timestamps { dispatches.collect() } else { Vec::new() };
     let device_s: f64 = measured.iter().sum();
     let slowest_s = measured.iter().fold(0.0, |a: f64, b| a.max(*b));
-    // Without working timestamps, the wall clock bounds it.
+    // Without working timestamps, the wall-clock time is an upper bound.
     let timed = slowest_s > 0.0;
     Ok(Answer {
         words: (0..models).map(|m| bytemuck::pod_collect_to_vec(&per_model(verdicts, m))).collect(),

@@ -241,7 +241,7 @@ fn cases_of(plan: &LanePlan, block: usize, units: Range<u64>) -> Vec<LaneCase<f3
         .collect()
 }
 
-/// Verdict words of each model into the plan's order, the model innermost.
+/// Writes the verdict words of each model in the plan's order, the model innermost.
 fn spread(words: &[Vec<u32>], lanes: &mut [Verdicts]) {
     let models = words.len();
     lanes.par_chunks_mut(8 * models).enumerate().for_each(|(word, lanes)| {
@@ -276,7 +276,7 @@ impl GpuBackend {
         GpuBackend::open_tampered(adapters, index, options, Tampering::default())
     }
 
-    /// The same with what a test does to the device.
+    /// The same, with faults that a test injects.
     ///
     /// # Errors
     /// As [`GpuBackend::open`].
@@ -290,7 +290,8 @@ impl GpuBackend {
         let adapter = adapters.take(index)?;
         let card = adapters.cards()[index].clone();
         if card.kind == DeviceKind::Software {
-            // It has no warps that wait for their longest lane, and llvmpipe limits the turns of an invocation.
+            // A software device has no warps that wait for their longest lane, and llvmpipe limits the turns of an
+            // invocation.
             options.lanes_per_invocation.get_or_insert(1);
         }
         let (commands, opened, thread) = owner::start(adapter, card.clone(), options.clone(), tampering)?;
@@ -370,7 +371,7 @@ impl Pacer {
         if lanes == 0 || !slowest_s.is_finite() || slowest_s <= 0.0 {
             return;
         }
-        // A small last piece is not representative, because its start takes as long.
+        // A small last piece is not representative, because its start takes as long as that of a large one.
         let change = (TARGET_S / slowest_s).clamp(1.0 / MAX_CHANGE, MAX_CHANGE);
         let wanted = lanes as f64 * change;
         if change < 1.0 || wanted > self.lanes as f64 {

@@ -37,7 +37,7 @@ pub const RANDOM: [(&str, &str); 4] = [
 /// Entry point of the generator's pipeline.
 pub const GENERATE: &str = "generate";
 
-/// Fragments of the generator beside [`RANDOM`], in the order in which they are joined.
+/// Fragments of the generator in addition to [`RANDOM`], in the order in which they are joined.
 pub const GENERATOR: [(&str, &str); 8] = [
     ("shared/records.wgsl", include_str!("../../../shaders/shared/records.wgsl")),
     ("generate.wgsl", include_str!("../../../shaders/generate.wgsl")),
@@ -49,7 +49,7 @@ pub const GENERATOR: [(&str, &str); 8] = [
     ("shared/decode.wgsl", include_str!("../../../shaders/shared/decode.wgsl")),
 ];
 
-/// Makes the list of the models' files from the registry.
+/// Defines the list of the models' files from the registry.
 macro_rules! declare_shaders {
     ($($(#[$attribute:meta])* $file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
         /// File name and text of a model's shader.
@@ -65,7 +65,7 @@ macro_rules! declare_shaders {
 }
 for_every_driver_model!(declare_shaders);
 
-/// What holds of a model whose shader does not say otherwise, as in its trait.
+/// Default of models whose shader does not define this function, as in its trait.
 const NO_LATCH: &str = "fn keeps_braking(state: DriverState, view: View) -> bool { return false; }\n";
 
 /// The source of a model's pipeline: constants of the registry, the shared fragments, the model.
@@ -92,12 +92,12 @@ pub fn assemble_generator() -> String {
     source
 }
 
-/// What a pipeline is compiled for, beside the profile.
+/// Properties that a pipeline is compiled for, in addition to the profile.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Specialization {
     /// At least one case has a second vehicle; without one the pipeline skips half of the work.
     pub paired: bool,
-    /// The continuous values are wanted, not only verdicts.
+    /// The pipeline returns continuous values, not only verdicts.
     pub values: bool,
     /// An invocation whose lane has ended takes the next one of its workgroup.
     pub queue: bool,

@@ -45,7 +45,7 @@ pub fn exact_spirv(source: &str, entry: &str, constants: &[(&str, f64)]) -> Resu
             image_load: policy,
             binding_array: policy,
         },
-        // Every loop ends at a constant or at the step cap; a test reads the shaders for it.
+        // Every loop ends at a constant or at the step cap; a test checks the shaders for this.
         force_loop_bounding: false,
         emit_int_div_checks: true,
         ..spv::Options::default()

@@ -177,7 +177,7 @@ mod tests {
     const UUIDS: [&str; 3] = ["GPU-1111aaaa-0000", "GPU-1111bbbb-0000", "GPU-2222cccc-0000"];
     const BUSES: [&str; 3] = ["0000:17:00.0", "0000:65:00.0", "0000:ca:00.0"];
 
-    /// A node with three GPUs whose device files run against the bus: 2, 1, 0.
+    /// A node with three GPUs whose device files have the reverse order of the bus: 2, 1, 0.
     fn node() -> tempfile::TempDir {
         let root = tempfile::tempdir().unwrap();
         for at in 0..3 {
@@ -283,7 +283,7 @@ mod tests {
     fn a_job_confined_to_one_gpu_finds_it_under_index_0() {
         let node = node();
         std::fs::create_dir(node.path().join("dev")).unwrap();
-        // The cgroup leaves the file of the last GPU on the bus.
+        // The cgroup allows only the file of the last GPU on the bus.
         std::fs::write(node.path().join("dev/nvidia0"), "").unwrap();
         assert_eq!(on(node.path(), &[(CUDA, "0")]).unwrap(), buses([2]));
         assert_eq!(on(node.path(), &[(CUDA, "0"), ("SLURM_JOB_GPUS", "0")]).unwrap(), buses([2]));

@@ -1,4 +1,4 @@
-//! The decisions of the threshold set, and the starts that its cases need.
+//! The decisions of the threshold set, and the starts of its cases.
 
 use crate::engine::Headway;
 
@@ -6,7 +6,7 @@ use crate::engine::Headway;
 pub(super) const HEADWAYS: [Headway; 4] =
     [Headway::GapM(0.0), Headway::ThwS(0.0), Headway::GapM(10.0), Headway::ThwS(1.0)];
 
-/// A decision of the lanes.
+/// A decision of a lane.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Threshold {
     /// TTC criterion: gap = threshold·dv.

@@ -1,5 +1,5 @@
-//! Cases on a threshold: the numbers of a first step, solved in f32 so that both sides of one comparison are equal
-//! (or the two neighbours between which a decision changes), and the lane records that begin with these numbers.
+//! Cases on a threshold. The numbers of a first step are solved in f32 so that both sides of one comparison are equal,
+//! or so that they are the two neighbours between which a decision changes. The lane records begin with these numbers.
 
 use super::decision::{HEADWAYS, Threshold};
 use super::series::{LateralStart, TINY, ThresholdSeries, rounded};
@@ -44,7 +44,7 @@ struct FirstStep {
     horizon: u32,
     /// Index of the headway that the gap is solved for.
     start: usize,
-    /// 0 alone, 1 before a second vehicle without effect, 2 behind one.
+    /// Slot of the deciding vehicle: 0 the only one, 1 the first of two, 2 the second of two; the other has no effect.
     pairing: u64,
 }
 

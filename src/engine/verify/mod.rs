@@ -1,9 +1,10 @@
 //! Verification: lanes for which a backend must give the same words as the CPU, and the comparison.
 //!
-//! This room has the comparison of a backend with the CPU and the f64 reference ([`compare`]), a random set of cases with
-//! plausible numbers ([`random_plan`]), and a set on the decision thresholds ([`threshold_plan`]), where one unit in the
-//! last place decides. Cases are pure functions of (seed, category, unit, variant), so the key of a lane is sufficient to
-//! repeat it: one stream of random numbers per (purpose, seed, category, unit, variant). Plans go to [`crate::engine`].
+//! This module compares a backend with the CPU and the f64 reference ([`compare`]). It makes a random set of cases with
+//! plausible numbers ([`random_plan`]), and a set on the decision thresholds ([`threshold_plan`]), where one unit in
+//! the last place decides. Cases are pure functions of (seed, category, unit, variant), so the key of a lane suffices
+//! to repeat it: each (purpose, seed, category, unit, variant) has its own stream of random numbers. Plans go to
+//! [`crate::engine`].
 
 mod decision;
 mod first_step;
@@ -29,7 +30,7 @@ use crate::scenario::Category;
 use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
-/// Refuses an empty list of categories and one that names a category twice: keys would stand for two lanes.
+/// Refuses an empty list of categories, and a category named twice, because lane keys would be ambiguous.
 fn check_categories(categories: &[Category]) -> Result<()> {
     let place = || Place::item("categories");
     if categories.is_empty() {
@@ -57,7 +58,7 @@ enum Purpose {
 struct CaseRandom(ChaCha8Rng);
 
 impl CaseRandom {
-    /// The stream of one thing.
+    /// The stream of one purpose, seed, category, unit and variant.
     pub fn new(purpose: Purpose, seed: u64, category: Category, unit: u64, variant: usize) -> CaseRandom {
         let mut key = [0_u8; 32];
         key[..8].copy_from_slice(&seed.to_le_bytes());
@@ -143,7 +144,7 @@ impl GroupComparison {
         self.failed[criterion.index()] as f64 / self.lanes.max(1) as f64
     }
 
-    /// Does a criterion fail nearly always or nearly never, so that the test is weak?
+    /// Whether a criterion fails neither nearly always nor nearly never; otherwise the test is weak.
     pub fn tests(&self, criterion: Criterion) -> bool {
         (0.05..=0.95).contains(&self.share(criterion))
     }
@@ -167,7 +168,7 @@ impl DifferingLane {
         WORDS.into_iter().enumerate().filter(|(at, _)| a[*at] != b[*at]).map(|(_, name)| name).collect()
     }
 
-    /// Verdicts first, then steps, then the most words.
+    /// Sort key: differences in verdicts first, then in steps, then the number of words.
     fn severity(&self) -> (bool, bool, usize) {
         let (a, b) = (words(&self.tested), words(&self.cpu));
         (a[0] != b[0], a[4..7] != b[4..7], self.names().len())
@@ -181,7 +182,7 @@ pub struct Comparison {
     pub set: String,
     /// Hash of its plan.
     pub plan_sha256: String,
-    /// Per category and model.
+    /// Results per category and model.
     pub tallies: Vec<GroupComparison>,
     /// The worst lanes that differ, worst first.
     pub worst: Vec<DifferingLane>,
@@ -190,7 +191,7 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// Is every word of every lane equal, and are there lanes at all?
+    /// Whether every word of every lane is equal, and there is at least one lane.
     pub fn is_equal(&self) -> bool {
         self.modes_differing == 0 && self.lanes() > 0 && self.tallies.iter().all(|t| t.words_differing == 0)
     }

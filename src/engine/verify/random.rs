@@ -36,7 +36,7 @@ impl Default for RandomOptions {
     }
 }
 
-/// A unit's key, from which its cases can be made again.
+/// A unit's key, from which its cases can be regenerated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct RandomUnit {
     /// Kind of scenario.
@@ -63,7 +63,7 @@ impl std::fmt::Display for RandomUnit {
     }
 }
 
-/// Ten starts: by time and by distance, far, near, touching, overlapping along the road, and behind.
+/// Ten starts by time and by distance: far, near, touching, overlapping along the road, and behind.
 fn headways() -> Vec<Headway> {
     let by_time = [2.0, 1.2, 0.7, 0.3].map(Headway::ThwS);
     let by_distance = [45.0, 12.0, 3.0, 0.0, -2.0, -14.0].map(Headway::GapM);
@@ -286,7 +286,7 @@ impl CaseSource for RandomCases {
 }
 
 impl Frozen {
-    /// The frozen pair before the ego of another case, because the freezing does not depend on the ego.
+    /// The frozen pair ahead of the ego of another case; the freezing does not depend on the ego.
     fn before(&self, ego: &Case) -> LaneCase<f64> {
         let mut lane = self.lane;
         let closing = ego.ego_speed_mps - initial_speed(&ego.principal.speed);

@@ -1,6 +1,6 @@
-//! What Annex 3 of UN R157 describes and where it is silent: the danger that a profile's CCHDM waits for, cases outside
-//! the annex, and readings of ours that decide a case. All follow from the profile, so a profile without the annex's rules
-//! has none.
+//! What Annex 3 of UN R157 describes: the danger that a profile's CCHDM detects, cases outside the annex, and our
+//! interpretations where the annex is silent. All follow from the profile; a profile without the annex's rules has
+//! none.
 
 use super::subject::Lane;
 use crate::model::driver::{BelowTrigger, CutInBraking};
@@ -28,7 +28,8 @@ pub(super) fn danger(profile: &Profile, category: Category) -> String {
     }
 }
 
-/// Why Annex 3 does not describe a case. Only the initial speeds of a deceleration and the headway of a cut-out are looked at.
+/// Why Annex 3 does not describe a case. Evaluates only the initial speeds of a deceleration and the headway of a
+/// cut-out.
 pub(super) fn outside(profile: &Profile, category: Category, point: &Point) -> Option<String> {
     let cchdm = &profile.cchdm;
     let ego_mps = point.get(MapQuantity::EgoSpeed)?;
@@ -57,7 +58,7 @@ pub(super) fn outside(profile: &Profile, category: Category, point: &Point) -> O
     }
 }
 
-/// Readings where the annex is silent, each with a profile that reads otherwise.
+/// Interpretations where the annex is silent, each with a profile that interprets it otherwise.
 pub(super) fn readings_where_silent(profile: &Profile, category: Category) -> Vec<(String, Profile)> {
     let mut all = Vec::new();
     let (coasting_mps2, ttc_s) = (value(profile.cchdm.coasting_mps2), value(profile.cchdm.ttc_s));
@@ -68,7 +69,7 @@ pub(super) fn readings_where_silent(profile: &Profile, category: Category) -> Ve
             all.push((sentence, other));
         }
     };
-    // A profile that does not read the annex has no silence of it.
+    // A profile without the annex's wandering zone has no such interpretation.
     if profile.cchdm.wandering_m <= 0.0 {
         return all;
     }
@@ -90,7 +91,8 @@ pub(super) fn readings_where_silent(profile: &Profile, category: Category) -> Ve
     all
 }
 
-/// A cutter that overlaps the ego's path at the start has no deviation to show: that it is perceived at once is ours.
+/// A cutter that overlaps the ego's path at the start shows no deviation. That it is perceived at once is our
+/// interpretation.
 pub(super) fn attends_at_once(profile: &Profile, category: Category, lane: &Lane) -> Option<&'static str> {
     let cutter = &lane.case.others[0];
     let overlaps = cutter.motion.lateral(&lane.tables, 0).position.abs() <= cutter.half_widths;

@@ -1,6 +1,6 @@
-//! How far a case lies from the boundary at which the answer is another one: one number is changed, all others stay. A scan
-//! of evenly spaced values finds the nearest change on either side, bisection then finds the value. At least one change lies
-//! between the case and that value; a change between two values of the scan and back is missed.
+//! Distance of a case from the boundary at which the answer changes: one number varies, all others stay. A scan of
+//! evenly spaced values finds the nearest change on either side; bisection then refines the value. At least one change
+//! lies between the case and that value. Two changes between neighbouring scan values are missed.
 
 use super::subject::Subject;
 use super::{CaseVerdicts, StepBudget, Verdict};
@@ -9,10 +9,10 @@ use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::grid::{MapParameter, MapQuantity, PARAMETERS};
 
-/// Values of a scan on each side.
+/// Number of scanned values on each side.
 const SCANNED: u32 = 100;
 
-/// What is varied: quantity, unit, smallest and largest value, resolution, in that unit.
+/// Varied quantities: name, minimum and maximum, resolution, all in the unit of the name.
 const VARIED: [(&str, f64, f64, f64); 8] = [
     ("gap_m", 0.0, 300.0, 0.01),
     ("thw_s", 0.0, 10.0, 0.001),
@@ -24,7 +24,7 @@ const VARIED: [(&str, f64, f64, f64); 8] = [
     ("ahead_speed_kmh", 0.0, 250.0, 0.01),
 ];
 
-/// Nearest values on both sides at which a verdict is another one; `None` where it stays to the end of the range.
+/// Nearest values on both sides at which a verdict changes; `None` if it stays the same to the end of the range.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Change {
     /// Below the case's value.
@@ -36,15 +36,15 @@ pub struct Change {
 /// One parameter of the case.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Boundary {
-    /// The parameter; all values are in its unit.
+    /// The parameter; all values have its unit.
     pub parameter: &'static MapParameter,
     /// Value of the case.
     pub value: f64,
     /// Range that is searched.
     pub range: (f64, f64),
-    /// Where the answer becomes another one.
+    /// Values at which the answer changes.
     pub answer: Change,
-    /// What it becomes below and above.
+    /// The answer below and above.
     pub becomes: [Option<Verdict>; 2],
     /// The same for every model, in the order of [`ModelId::ALL`].
     pub models: Vec<Change>,
@@ -56,7 +56,7 @@ pub(super) fn boundaries(subject: &Subject, profile: &Profile, budget: &StepBudg
     for (key, least, most, resolution) in VARIED {
         let Some(parameter) = PARAMETERS.iter().find(|parameter| parameter.key == key) else { continue };
         let Some(si) = subject.point().get(parameter.quantity) else { continue };
-        // An acceleration has no place on the axis of decelerations.
+        // An acceleration is outside the axis of decelerations.
         if parameter.quantity == MapQuantity::Deceleration && si < 0.0 {
             continue;
         }
@@ -64,7 +64,7 @@ pub(super) fn boundaries(subject: &Subject, profile: &Profile, budget: &StepBudg
         let verdicts = |value: f64| verdicts(subject, profile, parameter, value, budget);
         let side = |end: f64| -> Vec<(f64, CaseVerdicts)> {
             let step = (end - value) / f64::from(SCANNED);
-            // The first is the case itself; a value that makes no case ends the scan.
+            // The first value is that of the case; an invalid case ends the scan.
             let values = (0..=SCANNED).map(|k| value + step * f64::from(k));
             values.map_while(|value| Some((value, verdicts(value)?))).collect()
         };
@@ -87,7 +87,7 @@ pub(super) fn boundaries(subject: &Subject, profile: &Profile, budget: &StepBudg
     Ok(found)
 }
 
-/// The nearest values below and above at which something is another one, and what it is there.
+/// The nearest values below and above at which a result changes, and the result there.
 fn nearest<T: PartialEq>(
     below: &[(f64, CaseVerdicts)],
     above: &[(f64, CaseVerdicts)],
@@ -115,7 +115,7 @@ fn change_of<T>([below, above]: &[Option<(f64, T)>; 2]) -> Change {
     Change { below: at(below), above: at(above) }
 }
 
-/// The verdicts with another value of one parameter. `None` too where no more steps may be made.
+/// The verdicts with another value of one parameter. `None` also if the step budget is spent.
 fn verdicts(
     subject: &Subject,
     profile: &Profile,

@@ -1,5 +1,5 @@
-//! What the clauses of UN R157 say of a case: each threshold beside the value that the case has. The numbers of a clause
-//! are the profile's, so that a reading shows what the lane did.
+//! The clauses of UN R157 applied to a case: each threshold with the value of the case. The numbers of a clause are
+//! those of the profile, so that a reading shows what the lane did.
 
 use crate::engine::{Trace, TracedStep, TracedVehicle};
 use crate::model::driver::ModelId;
@@ -7,7 +7,7 @@ use crate::model::profile::Profile;
 use crate::run::grid::SPEED_MPS;
 use crate::scenario::Category;
 
-/// How a value stands to its threshold where the clause applies.
+/// Required relation of a value to its threshold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Relation {
     /// Greater than it.
@@ -46,31 +46,31 @@ pub struct Reading {
     pub clause: String,
     /// A condition under which the clause demands that the system avoids the collision.
     pub is_condition: bool,
-    /// What is compared.
+    /// The compared quantity.
     pub quantity: &'static str,
     /// Unit of value and threshold.
     pub unit: &'static str,
-    /// Value of the case; `None` where the event of the clause does not happen.
+    /// Value of the case; `None` if the event of the clause does not happen.
     pub value: Option<f64>,
-    /// How it has to stand to the threshold.
+    /// Required relation of the value to the threshold.
     pub relation: Relation,
     /// Threshold of the clause.
     pub threshold: f64,
     /// Time of the reading, s.
     pub time_s: Option<f64>,
-    /// What follows where the condition holds.
+    /// Consequence if the condition holds.
     pub then: &'static str,
 }
 
 impl Reading {
-    /// Does the condition hold? Not where its event does not happen.
+    /// Whether the condition holds; false if its event does not happen.
     pub fn holds(&self) -> bool {
         self.value.is_some_and(|value| self.relation.holds(value, self.threshold))
     }
 }
 
-/// The readings of a category, in the order of the clauses; `unreacting` is the ego that keeps its speed. A driver that
-/// attends at once reads no deviation.
+/// The readings of a category in the order of the clauses; `unreacting` is the trace of an ego that keeps its speed.
+/// There is no reading of the deviation for a driver that attends at once.
 pub(super) fn readings(
     profile: &Profile,
     category: Category,
@@ -89,14 +89,15 @@ pub(super) fn readings(
     list
 }
 
-/// Do all conditions of the clause of cut-ins hold? `None` where it says nothing.
+/// Whether all conditions of the cut-in clause hold. `None` if the clause does not apply.
 pub(super) fn is_demanded(readings: &[Reading]) -> Option<bool> {
     let mut conditions = readings.iter().filter(|reading| reading.is_condition).peekable();
     conditions.peek()?;
     Some(conditions.all(Reading::holds))
 }
 
-/// The other vehicle as it intrudes into the ego's lane: between two steps, where the lateral gap is that of the clause.
+/// The other vehicle at its intrusion into the ego's lane, interpolated between two steps to the lateral gap of the
+/// clause.
 struct Intrusion {
     time_s: f64,
     closing_mps: f64,
@@ -117,8 +118,8 @@ impl Intrusion {
     }
 }
 
-/// The clause of cut-ins (UN R157, 5.2.5.2; EU 2022/1426, 1.4.2): a collision has to be avoided where (a), (b) and (c)
-/// hold. A profile without a time of visible movement has no (b).
+/// The cut-in clause (UN R157, 5.2.5.2; EU 2022/1426, 1.4.2): a collision must be avoided if (a), (b) and (c) hold. A
+/// profile without a time of visible movement has no (b).
 pub(super) fn lane_intrusion(profile: &Profile, trace: &Trace) -> Vec<Reading> {
     let constants = &profile.reg157;
     let other = |step: &TracedStep| step.others[0];
@@ -126,7 +127,7 @@ pub(super) fn lane_intrusion(profile: &Profile, trace: &Trace) -> Vec<Reading> {
     let first = trace.steps.first().map(other);
     let start_m = first.map_or(0.0, |other| other.y_m);
     let moves = |step: &&TracedStep| (other(step).y_m - start_m).abs() > 1e-9;
-    // Movement is seen at the step that it begins from.
+    // Movement counts from the step before its first change.
     let moved_s = trace.steps.iter().find(moves).map(|step| trace.time_s(step.step.saturating_sub(1)));
     let change_mps = |step: &TracedStep| first.map_or(0.0, |first| (other(step).v_mps - first.v_mps).abs());
     let changed = first_largest(trace.steps.iter().map(|step| (step.time_s, change_mps(step))));
@@ -186,12 +187,12 @@ pub(super) fn lane_intrusion(profile: &Profile, trace: &Trace) -> Vec<Reading> {
     list
 }
 
-/// The largest value and the first time of it.
+/// The maximum value and the first time at which it occurs.
 fn first_largest(values: impl Iterator<Item = (f64, f64)>) -> Option<(f64, f64)> {
     values.reduce(|largest, next| if next.1 > largest.1 + 1e-9 { next } else { largest })
 }
 
-/// The first value above a threshold with its time; the largest where none is.
+/// The first value above a threshold with its time; the maximum if there is none.
 fn first_above(values: impl Iterator<Item = (f64, f64)> + Clone, threshold: f64) -> Option<(f64, f64)> {
     values.clone().find(|(_, value)| *value > threshold + 1e-9).or_else(|| first_largest(values))
 }
@@ -217,7 +218,7 @@ fn competent_driver(profile: &Profile, category: Category, trace: &Trace) -> Vec
         then,
     };
     if category == Category::Lvd {
-        // The deceleration of a step acts from the step before on.
+        // The deceleration of a step acts from the step before.
         let decelerations = trace
             .steps
             .windows(2)
@@ -255,13 +256,13 @@ fn competent_driver(profile: &Profile, category: Category, trace: &Trace) -> Vec
         _ => {
             let ego_mps = seen.map_or(f64::INFINITY, |step| step.v_ego_mps.max(1e-9));
             let headway_s = seen.map(|step| step.others[0].gap_m / ego_mps);
-            // As the driver compares it: the tolerance is one of the gap.
+            // The driver's tolerance is a distance; this converts it to a headway.
             let tolerance_s = constants.cut_out_headway_tolerance_m / ego_mps;
             ("headway when perceived", headway_s, constants.cut_out_headway_s + tolerance_s)
         }
     };
     let (quantity, value, threshold) = danger;
-    // Profiles without the headway test a TTC there as well.
+    // Profiles without the headway test a TTC instead.
     if threshold > 0.0 {
         let then = "braking begins after the delay; else once it holds";
         list.push(reading(quantity, "s", value, Relation::AtMost, threshold, seen.map(|step| step.time_s), then));
@@ -269,7 +270,7 @@ fn competent_driver(profile: &Profile, category: Category, trace: &Trace) -> Vec
     list
 }
 
-/// Annex 3, the driver of the fuzzy safety model: it reacts where a surrogate is above 0.
+/// Annex 3, the driver of the fuzzy safety model: it reacts if a surrogate is above 0.
 fn fuzzy_driver(trace: &Trace) -> Vec<Reading> {
     let first = trace.steps.iter().find(|step| step.is_unsafe);
     let largest = |of: fn(&TracedVehicle) -> f64| {

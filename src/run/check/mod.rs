@@ -1,8 +1,7 @@
-//! One concrete case against the regulation: every profile and model, the margins, the clauses, and how far the case
-//! lies from another answer.
+//! Checks one concrete case against the regulation: every profile and model, the margins, the clauses, and the distance
+//! to another answer.
 //!
-//! Here lives what is computed, in f64. The case comes from [`crate::scenario`]; the sheet is made by
-//! [`crate::report`].
+//! All computations here are in f64. The case comes from [`crate::scenario`]; [`crate::report`] makes the sheet.
 
 mod annex;
 mod boundary;
@@ -28,15 +27,15 @@ use crate::scenario::Category;
 use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
-/// The drivers of Annex 3: a collision is *preventable* where one of them avoids it.
+/// The drivers of Annex 3: a collision is *preventable* if one of them avoids it.
 pub const REFERENCE_DRIVERS: [ModelId; 2] = [ModelId::Cchdm, ModelId::Fsm];
 
-/// What is asked.
+/// Input of a check.
 #[derive(Debug, Clone)]
 pub struct Check {
     /// The case.
     pub subject: Subject,
-    /// Profiles, in order; the first one decides. At least one.
+    /// Profiles, in order; the first one determines the answer. At least one.
     pub profiles: Vec<Profile>,
     /// Models, in order. At least one.
     pub models: Vec<ModelId>,
@@ -47,7 +46,7 @@ pub struct Check {
 pub struct Judged {
     /// The lane, step by step.
     pub trace: Trace,
-    /// Perturbations under which the collision verdict is another one.
+    /// Perturbations that change the collision verdict.
     pub flips: Vec<&'static str>,
 }
 
@@ -58,32 +57,32 @@ pub struct Judgement {
     pub profile: String,
     /// One entry per model.
     pub models: Vec<Judged>,
-    /// The verdicts of the case as it is.
+    /// The verdicts of the unperturbed case.
     pub verdicts: CaseVerdicts,
-    /// Perturbations under which the answer is another one.
+    /// Perturbations that change the answer.
     pub flips: Vec<&'static str>,
-    /// The same for each driver's collision, in the order of [`ModelId::ALL`].
+    /// Perturbations that change each driver's collision verdict, in the order of [`ModelId::ALL`].
     pub driver_flips: Vec<Vec<&'static str>>,
-    /// The same for the demand of the clause of cut-ins.
+    /// Perturbations that change whether the cut-in clause demands avoidance.
     pub demand_flips: Vec<&'static str>,
-    /// Clause of cut-ins, by the profile.
+    /// Clause of cut-ins, according to the profile.
     pub clause: String,
-    /// The danger that the profile's CCHDM waits for, in a few words.
+    /// The danger that the profile's CCHDM detects, in a few words.
     pub danger: String,
-    /// Why the case is none that Annex 3 describes; `None` where it is one, or the profile does not read Annex 3.
+    /// Why Annex 3 does not describe the case; `None` if it does, or if the profile does not implement Annex 3.
     pub outside_annex: Option<String>,
-    /// Perturbations under which that is another one.
+    /// Perturbations that change whether Annex 3 describes the case.
     pub annex_flips: Vec<&'static str>,
-    /// Readings where the regulation is silent, of which another one changes the answer or the verdict of CCHDM.
+    /// Interpretations where the regulation is silent whose alternative changes the answer or the verdict of CCHDM.
     pub silent: Vec<String>,
-    /// What the clauses say of the case.
+    /// The clauses applied to the case.
     pub readings: Vec<Reading>,
-    /// Where along each parameter the answer becomes another one.
+    /// Values of each parameter at which the answer changes.
     pub boundaries: Vec<Boundary>,
 }
 
 impl Judged {
-    /// Does the driver collide?
+    /// Whether the driver collides.
     pub fn collides(&self) -> bool {
         collides(&self.trace.outcome)
     }
@@ -106,7 +105,8 @@ impl Judged {
 }
 
 impl Judgement {
-    /// The answer, where no perturbation changes it, and Annex 3 describes the case. No conflict needs no driver.
+    /// The answer, if no perturbation changes it and Annex 3 describes the case. An answer of no conflict does not need
+    /// Annex 3.
     pub fn verdict(&self) -> Verdict {
         match self.verdicts.verdict() {
             Verdict::OutsideAnnex => Verdict::OutsideAnnex,
@@ -115,7 +115,8 @@ impl Judgement {
         }
     }
 
-    /// Do all conditions of the clause hold, so that the system has to avoid the collision? `None` but for cut-ins.
+    /// Whether all conditions of the clause hold, so that the system must avoid the collision. `None` except for
+    /// cut-ins.
     pub fn is_demanded(&self) -> Option<bool> {
         clauses::is_demanded(&self.readings)
     }
@@ -125,19 +126,19 @@ impl Judgement {
         self.readings.iter().filter(|reading| reading.is_condition)
     }
 
-    /// Those that do not hold.
+    /// The conditions that do not hold.
     pub fn unmet(&self) -> impl Iterator<Item = &Reading> {
         self.conditions().filter(|reading| !reading.holds())
     }
 
-    /// Perturbations under which a driver's collision is another one.
+    /// Perturbations that change a driver's collision verdict.
     pub fn flips_of(&self, model: ModelId) -> &[&'static str] {
         let at = ModelId::ALL.iter().position(|m| *m == model);
         at.map_or(&[], |at| &self.driver_flips[at])
     }
 }
 
-/// Does each model collide, and an ego that never reacts?
+/// Whether each model collides, and whether an ego that never reacts collides.
 fn verdicts(lane: &Lane, point: &Point, profile: &Profile, category: Category, budget: &StepBudget) -> CaseVerdicts {
     let ran = |profile: &Profile, model| {
         let outcome = lane.run(profile, category, model);
@@ -155,19 +156,19 @@ fn collides(outcome: &Outcome<f64>) -> bool {
     outcome.verdicts.failed(Criterion::Collision)
 }
 
-/// Steps of the lanes of a check under one profile: seconds. A common check needs some millions.
+/// Maximum steps of the lanes of a check under one profile: some seconds. A typical check makes some millions.
 const MAX_STEPS: u64 = 1 << 28;
-/// Steps that are kept for sheet and table under one profile, 0.2 kB each.
+/// Maximum steps kept for sheet and table under one profile, 0.2 kB each.
 const MAX_TRACED_STEPS: u64 = 1 << 20;
 
-/// The steps that the lanes of a check may still make under a profile.
+/// The remaining steps of a check under a profile.
 struct StepBudget<'p> {
     profile: &'p Profile,
     left: Cell<u64>,
 }
 
 impl StepBudget<'_> {
-    /// Takes the steps of a lane.
+    /// Subtracts the steps of a lane.
     fn take(&self, outcome: &Outcome<f64>) {
         self.left.set(self.left.get().saturating_sub(u64::from(outcome.end_step) + 1));
     }
@@ -177,7 +178,7 @@ impl StepBudget<'_> {
     }
 
     /// # Errors
-    /// [`Error::Usage`] once it is spent.
+    /// [`Error::Usage`] if the budget is spent.
     fn check(&self) -> Result<()> {
         if self.is_spent() { Err(too_many_steps(self.profile)) } else { Ok(()) }
     }
@@ -199,8 +200,8 @@ impl Check {
     /// Runs every model under every profile.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a case that cannot be made, a time step that is too long for it, lanes with too many steps, and a
-    /// profile or model that is there twice.
+    /// [`Error::Usage`] for an invalid case, a time step that is too long for it, lanes with too many steps, and a
+    /// duplicate profile or model.
     pub fn run(&self) -> Result<Vec<Judgement>> {
         refuse_repeats(|| Place::option("profiles"), self.profiles.iter().map(|p| (&p.name, &p.name)))?;
         refuse_repeats(|| Place::option("models"), self.models.iter().map(|model| (*model, model.name())))?;
@@ -248,7 +249,7 @@ impl Check {
         })
     }
 
-    /// Readings where the regulation is silent that the answer rests on.
+    /// Interpretations where the regulation is silent on which the answer depends.
     fn silent(
         &self,
         profile: &Profile,
@@ -273,7 +274,7 @@ impl Check {
         Ok(all)
     }
 
-    /// The verdicts of the case and of each perturbation. The case itself comes first.
+    /// The verdicts of the case, then those of each perturbation.
     fn perturbed(&self, profile: &Profile, budget: &StepBudget) -> Result<Vec<Changed>> {
         let category = self.subject.category();
         let changed = |by, profile: &Profile, point: &Point| -> Result<Changed> {
@@ -302,7 +303,7 @@ struct Changed {
     is_demanded: Option<bool>,
 }
 
-/// Perturbations under which something is not what it is in the first.
+/// Perturbations under which a result differs from that of the first entry.
 fn flips<T: PartialEq>(all: &[Changed], of: impl Fn(&Changed) -> T) -> Vec<&'static str> {
     let differs = |changed: &&Changed| of(changed) != of(&all[0]);
     all.iter().filter(differs).map(|changed| changed.by).collect()

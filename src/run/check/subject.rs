@@ -1,4 +1,4 @@
-//! The case that is checked, and its neighbours: the same case with one number changed.
+//! The checked case and its neighbours: the same case with one number changed.
 
 use crate::engine::{Constants, Headway, LaneCase, Outcome, Silent, Trace};
 use crate::model::driver::ModelId;
@@ -13,18 +13,18 @@ use crate::{Error, Place, Result};
 pub enum Subject {
     /// Constant speeds, one deceleration, a lane change at constant lateral speed: the case, and its numbers.
     Plain(PlainCase, Point),
-    /// A scenario whose other vehicles follow their series; the point has the ego's speed, the first speed of the
-    /// other vehicle and the initial gap.
+    /// A scenario whose other vehicles follow their series. The point has the ego's speed, the first speed of the other
+    /// vehicle and the initial gap.
     Recorded(Box<Scenario>, Point),
 }
 
 /// A case as a lane runs it.
 pub struct Lane {
-    /// The record.
+    /// The lane record.
     pub case: LaneCase<f64>,
     /// Its series.
     pub tables: Tables<f64>,
-    /// Where the ego starts.
+    /// The initial headway or gap.
     pub headway: Headway,
 }
 
@@ -56,10 +56,10 @@ impl Subject {
         Subject::Plain(*case, point)
     }
 
-    /// From a recorded scenario; it starts as it was recorded unless a headway is given.
+    /// From a recorded scenario; it starts as recorded unless a headway is given.
     ///
     /// # Errors
-    /// [`Error::Usage`] where neither is known.
+    /// [`Error::Usage`] if neither is known.
     pub fn recorded(scenario: Scenario, headway: Option<Headway>) -> Result<Subject> {
         let missing = || {
             let problem = format!("scenario {} has no observed gap", scenario.id);
@@ -86,7 +86,7 @@ impl Subject {
         }
     }
 
-    /// Duration after which the other vehicles keep their speed and lateral position, where one was given, s.
+    /// Duration after which the other vehicles keep their speed and lateral position, s; `None` if not given.
     pub fn duration_s(&self) -> Option<f64> {
         match self {
             Subject::Plain(case, _) => case.duration_s,
@@ -104,7 +104,7 @@ impl Subject {
     /// The case with the numbers of a point, ready to run.
     ///
     /// # Errors
-    /// [`Error::Usage`] for numbers that contradict one another; [`Error::Input`] for a cut-out without a vehicle ahead.
+    /// [`Error::Usage`] for contradictory numbers; [`Error::Input`] for a cut-out without a vehicle ahead.
     pub fn lane(&self, profile: &Profile, point: &Point) -> Result<Lane> {
         let case = match self {
             Subject::Plain(case, _) => plain(case, point, profile)?,
@@ -124,7 +124,7 @@ impl Subject {
     }
 }
 
-/// What a headway sets; the regulation's distance is a gap.
+/// The quantity and value that a headway sets; the regulation's distance is a gap.
 fn start(headway: Headway, ego_mps: f64) -> (MapQuantity, f64) {
     match headway {
         Headway::ThwS(thw_s) => (MapQuantity::Thw, thw_s),
@@ -136,7 +136,7 @@ fn start(headway: Headway, ego_mps: f64) -> (MapQuantity, f64) {
 
 fn plain(of: &PlainCase, point: &Point, profile: &Profile) -> Result<Case> {
     let case = PlainCase {
-        // A map has decelerations alone, and no durations.
+        // A map has only decelerations and no durations.
         acceleration_mps2: point.get(MapQuantity::Deceleration).map_or(0.0, |a| 0.0 - a),
         duration_s: of.duration_s,
         ..point.plain_case(of.category, profile)?
@@ -144,7 +144,7 @@ fn plain(of: &PlainCase, point: &Point, profile: &Profile) -> Result<Case> {
     case.case(profile.frame.time_cap_s)
 }
 
-/// Moves a recorded case to other initial speeds: series keep their shape.
+/// Changes the initial speeds of a recorded case; series keep their shape.
 fn move_to(case: &mut Case, from: &Point, to: &Point) {
     let change = |quantity| to.get(quantity).zip(from.get(quantity)).map_or(0.0, |(to, from)| to - from);
     case.ego_speed_mps = (case.ego_speed_mps + change(MapQuantity::EgoSpeed)).max(0.0);

@@ -1,4 +1,4 @@
-//! What a check answers, from the collisions of the drivers and of an ego that never reacts.
+//! The answer of a check, derived from the collisions of the drivers and of an ego that never reacts.
 
 use super::REFERENCE_DRIVERS;
 use crate::model::driver::{MODELS, ModelId};
@@ -10,7 +10,7 @@ pub enum Answer {
     Preventable,
     /// A collision threatens, and both drivers of Annex 3 collide.
     NotPreventable,
-    /// Nothing collides even where the ego never reacts.
+    /// No collision occurs even if the ego never reacts.
     NoConflict,
 }
 
@@ -32,7 +32,7 @@ pub enum Verdict {
     Answer(Answer),
     /// A perturbation changes it.
     Undecided,
-    /// Annex 3 does not describe such a case, so its drivers do not tell what is preventable.
+    /// Annex 3 does not describe the case, so its drivers do not determine what is preventable.
     OutsideAnnex,
 }
 
@@ -47,7 +47,7 @@ impl Verdict {
     }
 }
 
-/// Who collides in one case.
+/// Collisions of one case.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct CaseVerdicts {
     /// Each driver, in the order of [`ModelId::ALL`].
@@ -59,7 +59,7 @@ pub struct CaseVerdicts {
 }
 
 impl CaseVerdicts {
-    /// Does a driver collide?
+    /// Whether a driver collides.
     pub fn collides(&self, model: ModelId) -> bool {
         ModelId::ALL.into_iter().zip(self.collide).any(|(m, collides)| m == model && collides)
     }
@@ -69,7 +69,7 @@ impl CaseVerdicts {
         REFERENCE_DRIVERS.into_iter().filter(|model| !self.collides(*model)).collect()
     }
 
-    /// The answer where Annex 3 describes the case; no conflict needs no driver.
+    /// The answer if Annex 3 describes the case. An answer of no conflict does not need Annex 3.
     pub fn verdict(&self) -> Verdict {
         match self.answer() {
             Answer::NoConflict => Verdict::Answer(Answer::NoConflict),
@@ -78,7 +78,7 @@ impl CaseVerdicts {
         }
     }
 
-    /// What they answer.
+    /// The answer that follows from the collisions.
     pub fn answer(&self) -> Answer {
         match (self.conflict, self.avoided_by().is_empty()) {
             (false, _) => Answer::NoConflict,

@@ -1,11 +1,11 @@
-//! One parameter and the values that a grid gives it.
+//! One parameter and its values on a grid.
 
 use crate::scenario::Category;
 use crate::{Error, Place, Result};
 
 use super::parameter::MapParameter;
 
-/// Values of one axis at most.
+/// Maximum number of values of one axis.
 pub const MAX_VALUES: usize = 100_000;
 
 /// A parameter with its values.
@@ -18,12 +18,12 @@ pub struct GridAxis {
 }
 
 impl GridAxis {
-    /// From `NAME=FROM..TO/STEP` (both ends included where the step meets them), `NAME=A,B,C` or `NAME=A`; `flag`
-    /// names the place of an error.
+    /// Parses `NAME=FROM..TO/STEP` (both ends included if the steps reach them), `NAME=A,B,C` or `NAME=A`; `flag` names
+    /// the option in errors.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a name that the category does not have, and for numbers that are none, are out of the
-    /// parameter's range, or make no values.
+    /// [`Error::Usage`] for a name that the category does not have, for values that are not numbers or are out of the
+    /// parameter's range, and for an empty list.
     pub fn parse(category: Category, text: &str, flag: &str) -> Result<GridAxis> {
         const FORM: &str = "write NAME=FROM..TO/STEP or NAME=A,B,C, for instance gap_m=1..60/1";
         let wrong = |problem: String, help: &str| Error::usage(Place::item(flag), problem, help);
@@ -48,7 +48,7 @@ impl GridAxis {
         Ok(GridAxis { parameter, values })
     }
 
-    /// For presets: a parameter and a range that are known to be good.
+    /// For presets, whose parameter and range are valid.
     ///
     /// # Errors
     /// As [`GridAxis::parse`].
@@ -57,10 +57,10 @@ impl GridAxis {
         Ok(GridAxis { parameter, values: range(ends, step, key, "preset")? })
     }
 
-    /// The values of an interval at steps, both ends included where the step meets them; `what` names it in an error.
+    /// The values of an interval at steps, both ends included if the steps reach them; `what` names it in errors.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a step that leads nowhere, an empty interval, and too many values.
+    /// [`Error::Usage`] for an invalid step, an empty interval, and too many values.
     pub fn steps(ends: (f64, f64), step: f64, what: &str) -> Result<Vec<f64>> {
         range(ends, step, what, what)
     }
@@ -70,12 +70,13 @@ impl GridAxis {
         self.values.len()
     }
 
-    /// No value at all? Never true of a parsed axis.
+    /// Whether there are no values; false for every parsed axis.
     pub fn is_empty(&self) -> bool {
         self.values.is_empty()
     }
 
-    /// Edges of the values' cells: halfway between neighbours, as far beyond the outermost ones. One more than values.
+    /// Edges of the values' cells: midpoints between neighbours; the outermost cells are symmetric around their values.
+    /// One more than values.
     pub fn edges(&self) -> Vec<f64> {
         let v = &self.values;
         let Some((&first, &last)) = v.first().zip(v.last()) else { return Vec::new() };
@@ -86,7 +87,7 @@ impl GridAxis {
     }
 }
 
-/// FROM, FROM + STEP, … up to TO. Values are decimals again: 0.3 and not 3 · 0.1.
+/// FROM, FROM + STEP, … up to TO, rounded to decimals: 0.3 instead of 3 · 0.1.
 fn range((from, to): (f64, f64), step: f64, text: &str, flag: &str) -> Result<Vec<f64>> {
     let wrong = |problem: String, help: &str| Error::usage(Place::item(flag), problem, help);
     if step <= 0.0 {
@@ -103,7 +104,7 @@ fn range((from, to): (f64, f64), step: f64, text: &str, flag: &str) -> Result<Ve
     Ok((0..=steps as u32).map(|k| decimal(from + f64::from(k) * step)).collect())
 }
 
-/// The nearest number of nine decimals.
+/// Rounds to nine decimals.
 fn decimal(value: f64) -> f64 {
     (value * 1e9).round() / 1e9
 }

@@ -1,5 +1,5 @@
-//! A grid from the words of a user, and from the variations of a file of distributions; the numbers that all its
-//! cells have in common, in words.
+//! Makes a grid from the text of options, and from the variations of a distribution file. Describes the fixed values of
+//! all its cells.
 
 use super::axis::GridAxis;
 use super::parameter::{MapParameter, MapQuantity};
@@ -9,40 +9,40 @@ use crate::scenario::{Category, LATERAL_DISTANCE_M};
 use crate::support::plausibility::Doubts;
 use crate::{Error, Place, Result};
 
-/// A grid in words: an axis is `NAME=FROM..TO/STEP` or `NAME=A,B,C`.
+/// A grid as text: an axis is `NAME=FROM..TO/STEP` or `NAME=A,B,C`.
 #[derive(Debug, Clone, Default)]
 pub struct GridText {
-    /// Across; with variations also a name among them.
+    /// Horizontal axis; with variations also the name of one of them.
     pub x: Option<String>,
-    /// Up, as `x`.
+    /// Vertical axis, as `x`.
     pub y: Option<String>,
     /// Axes of the panels.
     pub panel: Vec<String>,
-    /// `NAME=VALUE`: values that are the same in every cell.
+    /// `NAME=VALUE`: values that are equal in every cell.
     pub set: Vec<String>,
     /// Each model starts at its own distance.
     pub native_gap: bool,
-    /// Panels in which the ego is not faster than the other vehicle are left out.
+    /// Skips panels in which the ego is not faster than the other vehicle.
     pub closing_only: bool,
 }
 
-/// What a file of distributions varies.
+/// The variations of a distribution file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Variations {
-    /// Parameters of their own, in the file's order; values rise.
+    /// Independent parameters in the file's order; values ascend.
     pub axes: Vec<GridAxis>,
-    /// Parameters that belong together; values are those of all rows.
+    /// Parameters that vary together; values are those of all rows.
     pub set_axes: Vec<GridAxis>,
-    /// Their rows: every combination of the file's value sets. One empty row where there are none.
+    /// Their rows: every combination of the file's value sets. One empty row if there are none.
     pub set_rows: Vec<Vec<f64>>,
 }
 
 impl GridText {
-    /// The grid. Of variations the first two parameters with several values are the axes, unless `x` and `y` name others;
-    /// the others make the panels.
+    /// Makes the grid. With variations, the first two parameters with several values are the axes, unless `x` and `y`
+    /// name others; the remaining ones make the panels.
     ///
     /// # Errors
-    /// [`Error::Usage`] naming the option of what is missing, is no axis, or makes too many panels.
+    /// [`Error::Usage`] with the option that is missing, is not an axis, or makes too many panels.
     pub fn parts(&self, category: Category, variations: Option<Variations>) -> Result<GridParts> {
         let is_of_file = variations.is_some();
         let none = Variations { axes: Vec::new(), set_axes: Vec::new(), set_rows: vec![Vec::new()] };
@@ -74,7 +74,7 @@ impl GridText {
                 }
             }
         };
-        // What `y` names must not be taken for `x`.
+        // Excludes the parameter of `y` from the candidates for `x`.
         let (x, y) = if self.x.is_none() && self.y.is_some() {
             let y = axis(&self.y, "option `y`")?;
             (axis(&self.x, "option `x`")?, y)
@@ -122,10 +122,10 @@ fn value(category: Category, text: &str) -> Result<(&'static MapParameter, f64)>
 }
 
 impl GridParts {
-    /// Looks at every value, and collects what is doubtful.
+    /// Checks the plausibility of every value and collects implausible ones.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a value that no road has, where those are refused.
+    /// [`Error::Usage`] for a physically impossible value, unless such values are accepted.
     pub fn check_plausible(&self, doubts: &mut Doubts) -> Result<()> {
         for axis in [&self.x, &self.y].into_iter().chain(&self.panel_axes) {
             axis.values.iter().try_for_each(|value| axis.parameter.check_plausible(*value, doubts))?;
@@ -135,7 +135,8 @@ impl GridParts {
 }
 
 impl Grid {
-    /// Phrases such as `initial time headway 2 s`: the fixed values, then what no parameter of the grid sets.
+    /// Phrases such as `initial time headway 2 s`: the fixed values, then defaults of parameters that the grid does not
+    /// set.
     pub fn held(&self, profile: &Profile) -> Vec<String> {
         let number = |value: f64| format!("{}", (value * 1e6).round() / 1e6);
         let mut held: Vec<String> = (self.fixed().iter())

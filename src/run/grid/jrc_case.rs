@@ -1,7 +1,7 @@
-//! Cases as the JRC's simulator of 2021 makes them: vehicles of 4.3 m × 1.9 m, lateral motion as a running sum that
-//! begins one step after the nominal start, and, in its comparison sweep, a lateral run-up before it. The simulator's
-//! time step is 0.1 s; here cases are given in seconds, and their steps follow from the time step. Conformance replays
-//! the JRC's tables with these; maps sweep its grids.
+//! Cases as the JRC's simulator of 2021 makes them: vehicles of 4.3 m × 1.9 m, and lateral motion as a running sum that
+//! begins one step after the nominal start. Its comparison sweep adds a lateral run-up before the start. The
+//! simulator's time step is 0.1 s; here cases are given in seconds, and their steps follow from the time step.
+//! Conformance tests replay the JRC's tables with these cases; maps sweep its grids.
 
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -11,21 +11,21 @@ use crate::scenario::{Ahead, Case, Category, Lateral, Participant, Speed};
 pub const LENGTH_M: f64 = 4.3;
 /// Width of a vehicle, m.
 pub const WIDTH_M: f64 = 1.9;
-/// Length of a vehicle that stands ahead of a cutting-out one, m.
+/// Length of a stationary vehicle ahead of a cutting-out one, m.
 pub const STANDING_LENGTH_M: f64 = 5.0;
 /// Lateral distance that a cut-in covers, m.
 pub const CUT_IN_LATERAL_M: f64 = 3.5;
 /// Lateral distance that a cut-out covers, m.
 pub const CUT_OUT_LATERAL_M: f64 = 4.0;
-/// Slowest lane change that has a series, m/s: it takes longer than any run.
+/// Minimum lateral speed of a lane change that has a series, m/s: such a lane change takes longer than any run.
 pub const MIN_LATERAL_MPS: f64 = 1e-3;
 /// Time headway at which a following Reg157 or CCHDM starts, s.
 pub const NATIVE_THW_S: f64 = 2.0;
 /// Lateral acceleration of the run-up, m/s².
 const RUN_UP_MPS2: f64 = 1.5;
 
-/// A cut-in at constant speeds; `lateral_mps` is 0 or at least [`MIN_LATERAL_MPS`], `run_up` counts the steps before
-/// the nominal start.
+/// A cut-in at constant speeds; `lateral_mps` is 0 or at least [`MIN_LATERAL_MPS`], `run_up` is the number of steps
+/// before the nominal start.
 pub fn cut_in(ego_mps: f64, cutter_mps: f64, lateral_mps: f64, run_up: u32, dt_s: f64) -> Case {
     Case {
         category: Category::CutIn,
@@ -43,35 +43,35 @@ pub fn cut_in(ego_mps: f64, cutter_mps: f64, lateral_mps: f64, run_up: u32, dt_s
     }
 }
 
-/// The gap at the frame's nominal start: the last step of the run-up has the case's gap `gap_m`, and the frame's start
+/// The gap at the frame's nominal start. The last step of the run-up has the case's gap `gap_m`, and the frame's start
 /// shift adds one step.
 pub fn gap_before_run_up(gap_m: f64, ego_mps: f64, cutter_mps: f64, run_up: u32, dt_s: f64) -> f64 {
     gap_m - f64::from(run_up) * (cutter_mps - ego_mps) * dt_s
 }
 
-/// Steps of the comparison sweep's run-up: lateral speeds that grow from 0 to below the full one, at 0.1 s 0, 0.15,
-/// 0.30, … m/s, then a step at it.
+/// Number of steps of the comparison sweep's run-up: lateral speeds that increase from 0 to below the full speed (0,
+/// 0.15, 0.30, … m/s at 0.1 s), then one step at the full speed.
 pub fn run_up_steps(lateral_mps: f64, dt_s: f64) -> u32 {
-    // The quotient of 0.3 and 0.15 may lie above 2 by its rounding error.
+    // Rounding may put the quotient of 0.3 and 0.15 above 2.
     (lateral_mps / run_up_step_mps(dt_s) - 1e-9).ceil().max(0.0) as u32 + 1
 }
 
-/// What a step adds to the lateral speed in the run-up, m/s.
+/// Increase of the lateral speed per step of the run-up, m/s.
 fn run_up_step_mps(dt_s: f64) -> f64 {
     RUN_UP_MPS2 / rate_hz(dt_s)
 }
 
-/// Steps per second: 10 exactly at 0.1 s, so that products and quotients with it are the JRC's.
+/// Steps per second: exactly 10 at 0.1 s, so that products and quotients with it equal the JRC's.
 fn rate_hz(dt_s: f64) -> f64 {
     1.0 / dt_s
 }
 
-/// Steps of a lateral change, the last one at its end or beyond it.
+/// Number of steps of a lateral change; the last one is at its end or beyond.
 fn change_steps(distance_m: f64, lateral_mps: f64, dt_s: f64) -> usize {
     if lateral_mps > 0.0 { (rate_hz(dt_s) * distance_m / lateral_mps).floor() as usize + 1 } else { 1 }
 }
 
-/// A leader that decelerates from `initial_mps` to `end_mps` at once; the ego is as fast as it.
+/// A leader that decelerates from `initial_mps` to `end_mps` from the start; the ego has the same initial speed.
 pub fn lvd(initial_mps: f64, end_mps: f64, deceleration_mps2: f64) -> Case {
     let until_s = if deceleration_mps2 > 0.0 { (initial_mps - end_mps).max(0.0) / deceleration_mps2 } else { 0.0 };
     let speed = Speed::Kinematic { initial_mps, acceleration_mps2: -deceleration_mps2, until_s };
@@ -91,13 +91,13 @@ pub fn lvd(initial_mps: f64, end_mps: f64, deceleration_mps2: f64) -> Case {
 pub struct Front {
     /// Speed, m/s.
     pub speed_mps: f64,
-    /// Length, m: [`STANDING_LENGTH_M`] where it stands.
+    /// Length, m: [`STANDING_LENGTH_M`] if it is stationary.
     pub length_m: f64,
-    /// Distance to it, m: between centres less [`LENGTH_M`], whatever its own length.
+    /// Distance to it, m: between centres minus [`LENGTH_M`], independent of its own length.
     pub distance_m: f64,
 }
 
-/// A cut-out: ego and cutting-out vehicle are equally fast, the lateral motion begins at once.
+/// A cut-out: ego and cutting-out vehicle have the same speed, and the lateral motion begins at the start.
 pub fn cut_out(speed_mps: f64, lateral_mps: f64, front: Front, dt_s: f64) -> Case {
     Case {
         category: Category::CutOut,
@@ -123,14 +123,14 @@ pub fn cut_out(speed_mps: f64, lateral_mps: f64, front: Front, dt_s: f64) -> Cas
     }
 }
 
-/// The distance at which a following FSM starts to be unconcerned: v τ + v²/(2 b_comf) − v²/(2 b_lead) + 2 d1.
+/// The initial distance at which a following FSM does not react: v τ + v²/(2 b_comf) − v²/(2 b_lead) + 2 d1, m.
 pub fn native_distance_fsm(profile: &Profile, v: f64) -> f64 {
     let p = &profile.fsm;
     v * p.reaction_time_s + v * v / (2.0 * p.comfortable_deceleration_mps2) - v * v / (2.0 * p.lead_deceleration_mps2)
         + 2.0 * p.margin_m
 }
 
-/// The same of RSS: v ρ + a ρ²/2 + (v + ρ a)²/(2 b) − max(v − b ρ, 0)²/(2 b) + a ρ² with the leader's response.
+/// The same for RSS, with the leader's response, m: v ρ + a ρ²/2 + (v + ρ a)²/(2 b) − max(v − b ρ, 0)²/(2 b) + a ρ².
 pub fn native_distance_rss(profile: &Profile, v: f64) -> f64 {
     let p = &profile.rss;
     let (rho, a, b) = (p.response_time_s, p.max_acceleration_mps2, p.ego_deceleration_mps2);
@@ -140,7 +140,7 @@ pub fn native_distance_rss(profile: &Profile, v: f64) -> f64 {
         + a * rho * rho
 }
 
-/// The distance at which a following model starts in the JRC's simulator, m; `speed_mps` is that of both vehicles.
+/// The initial distance of a following model in the JRC's simulator, m; both vehicles have `speed_mps`.
 pub fn native_distance(profile: &Profile, model: ModelId, speed_mps: f64) -> f64 {
     match model {
         ModelId::Fsm => native_distance_fsm(profile, speed_mps),
@@ -149,7 +149,7 @@ pub fn native_distance(profile: &Profile, model: ModelId, speed_mps: f64) -> f64
     }
 }
 
-/// Lateral speeds, counted towards the ego: the run-up, one sample at full speed, then the plain change.
+/// Lateral speeds towards the ego: the run-up, one sample at full speed, then the constant speed.
 fn cut_in_lateral(lateral_mps: f64, run_up: u32, dt_s: f64) -> Lateral {
     let m = run_up as usize;
     let plain = change_steps(CUT_IN_LATERAL_M, lateral_mps, dt_s);
@@ -170,7 +170,7 @@ fn cut_in_lateral(lateral_mps: f64, run_up: u32, dt_s: f64) -> Lateral {
     Lateral::Sampled { position_m: position, towards_mps: towards }
 }
 
-/// From the lane centre to −4 m, starting at once.
+/// From the lane centre to −4 m, from the start.
 fn cut_out_lateral(lateral_mps: f64, dt_s: f64) -> Lateral {
     let steps = change_steps(CUT_OUT_LATERAL_M, lateral_mps, dt_s);
     let position: Vec<f64> = (1..=steps).map(|i| -lateral_mps * dt_s * i as f64).collect();
@@ -183,7 +183,7 @@ mod tests {
 
     #[test]
     fn a_run_up_has_one_step_for_every_slower_speed_and_one_at_full_speed() {
-        // The counts of the JRC's own table at its lateral speeds.
+        // The numbers of steps in the JRC's table at its lateral speeds.
         for (lateral_mps, steps) in [(0.23, 3), (0.53, 5), (0.83, 7), (1.13, 9), (1.43, 11), (1.73, 13)] {
             assert_eq!(run_up_steps(lateral_mps, 0.1), steps);
         }
@@ -200,7 +200,7 @@ mod tests {
         assert!((position_m[5] - (CUT_IN_LATERAL_M - 0.05)).abs() < 1e-12);
     }
 
-    /// What the JRC's simulator has at 10 Hz comes out to the last bit.
+    /// At 10 Hz the values equal the JRC simulator's, to the bit.
     #[test]
     fn at_a_tenth_of_a_second_the_steps_are_those_of_the_jrc() {
         assert_eq!(run_up_step_mps(0.1), 0.15);
@@ -213,8 +213,8 @@ mod tests {
         }
     }
 
-    /// The vehicle arrives, and as soon as at 10 Hz but for three steps (its start, the end of the run-up, that of the
-    /// change), whatever the time step.
+    /// At every time step the vehicle arrives, within three steps (start, end of the run-up, end of the change) of the
+    /// time at 10 Hz.
     #[test]
     fn a_change_takes_its_time_at_every_time_step() {
         for dt_s in [0.001, 0.01, 0.03, 0.04, 0.045, 0.07, 0.1, 0.17, 0.35] {

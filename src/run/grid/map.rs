@@ -1,4 +1,4 @@
-//! A swept grid: the verdicts of every cell and model, what a map says of them, shares, and the difference of two maps.
+//! A swept grid: the verdicts of every cell and model, outcomes per cell, counts, and the difference of two maps.
 
 use crate::engine::{Executor, LanePlan, LaneRunner, SweepSummary, Verdicts, Wanted};
 use crate::model::criterion::Criterion;
@@ -16,13 +16,13 @@ pub struct GridMap {
     pub models: Vec<ModelId>,
     /// Per model, per cell.
     verdicts: Vec<Vec<Verdicts>>,
-    /// Per model, per cell: does an ego that never reacts collide? Models differ where each starts at its own distance.
+    /// Per model and cell: whether an ego that never reacts collides. Models differ if each starts at its own distance.
     conflicts: Vec<Vec<bool>>,
-    /// Per model and criterion, the cells whose outcome a perturbation changes; empty where none was swept.
+    /// Per model and criterion: the cells whose outcome a perturbation changes; empty if none was swept.
     undecided: Vec<[Vec<bool>; Criterion::ALL.len()]>,
 }
 
-/// Two verdicts on one cell.
+/// Comparison of two verdicts on one cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Agreement {
     /// Neither fails.
@@ -33,7 +33,7 @@ pub enum Agreement {
     OnlyFirst,
     /// The second fails alone.
     OnlySecond,
-    /// Both pass, and nothing collides even if the ego never reacts.
+    /// Both pass, and no collision occurs even if the ego never reacts.
     NoConflict,
     /// They differ, but one of them is undecided.
     Undecided,
@@ -50,7 +50,7 @@ impl Agreement {
         Agreement::Undecided,
     ];
 
-    /// From the two.
+    /// The agreement of two verdicts.
     pub fn of(first_fails: bool, second_fails: bool) -> Agreement {
         match (first_fails, second_fails) {
             (false, false) => Agreement::BothPass,
@@ -72,7 +72,7 @@ impl Agreement {
         }
     }
 
-    /// The words of tables and legends.
+    /// Text for tables and legends.
     pub fn label(self) -> &'static str {
         match self {
             Agreement::BothPass => "both pass",
@@ -89,15 +89,15 @@ impl GridMap {
     /// Sweeps a planned grid.
     ///
     /// # Errors
-    /// Of the backend; [`Error::Verification`] where a checked lane differs; [`Error::Usage`] where every lane ends at
-    /// the time cap, so that the map says nothing.
+    /// Those of the backend; [`Error::Verification`] if a rechecked lane differs; [`Error::Usage`] if every lane ends
+    /// at the time cap, because the map would have no information.
     pub fn sweep(plan: &GridPlan, executor: &Executor) -> Result<(GridMap, SweepSummary)> {
         let cells = plan.grid.cell_count();
         let mut verdicts = vec![vec![Verdicts::default(); cells]; plan.models.len()];
         let mut conflicts = vec![vec![false; cells]; plan.models.len()];
         let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
         for part in &plan.parts {
-            // Where the part's models stand among all.
+            // Index of the part's model in the whole plan.
             let position = |model: &ModelId| plan.models.iter().position(|m| m == model);
             let of_part: Vec<Option<usize>> = part.plan.models.iter().map(position).collect();
             let swept = sweep_cells(plan, part, &part.plan, executor, |at, cell, verdict| {
@@ -118,7 +118,7 @@ impl GridMap {
         Ok((map, summary))
     }
 
-    /// Marks the cells whose outcome is another one in a perturbed sweep of the same grid.
+    /// Marks the cells whose outcome changes in a perturbed sweep of the same grid.
     pub fn mark_undecided(&mut self, perturbed: &GridMap) {
         let cells = self.cell_count();
         self.undecided.resize_with(self.models.len(), || std::array::from_fn(|_| vec![false; cells]));
@@ -134,25 +134,25 @@ impl GridMap {
         }
     }
 
-    /// Were perturbed grids swept too?
+    /// Whether perturbed grids were swept.
     pub fn has_undecided(&self) -> bool {
         !self.undecided.is_empty()
     }
 
-    /// Does a perturbation change the outcome of a model's cell? `false` where none was swept.
+    /// Whether a perturbation changes the outcome of a model's cell; `false` if none was swept.
     pub fn is_undecided(&self, model: usize, cell: usize, criterion: Criterion) -> bool {
         self.undecided.get(model).is_some_and(|of_model| of_model[criterion as usize][cell])
     }
 
-    /// Does an ego that never reacts collide, from where the model starts?
+    /// Whether an ego that never reacts collides when it starts where the model starts.
     pub fn is_conflict(&self, model: usize, cell: usize) -> bool {
         self.conflicts[model][cell]
     }
 
-    /// What the map says of a model's cell.
+    /// The outcome of a model's cell.
     pub fn outcome(&self, model: usize, cell: usize, criterion: Criterion) -> CellOutcome {
         let fails = self.verdicts[model][cell].failed(criterion);
-        // A conflict is a threatening collision: of the other criteria it says nothing.
+        // A conflict is an imminent collision; it has no meaning for the other criteria.
         let is_conflict = criterion != Criterion::Collision || self.is_conflict(model, cell);
         match (self.is_undecided(model, cell, criterion), is_conflict, fails) {
             (true, ..) => CellOutcome::Undecided,
@@ -172,8 +172,8 @@ impl GridMap {
         counts
     }
 
-    /// Some lane must end before the time cap; under a profile whose runs all go on to it, another vehicle must come
-    /// into the ego's lane.
+    /// Checks that some lane ends before the time cap. Under a profile whose runs all last until the cap, it checks
+    /// instead that another vehicle enters the ego's lane.
     fn check_ends(&self, plan: &GridPlan) -> Result<()> {
         let lanes = plan.lane_count();
         let Some(frame) = plan.parts.first().map(|part| &part.plan.profile.frame) else { return Ok(()) };
@@ -207,7 +207,7 @@ impl GridMap {
         self.verdicts[model].iter().filter(|v| v.failed(criterion)).count() as u64
     }
 
-    /// Where two models' verdicts agree and differ, cell by cell; the second may be of another map of the same grid.
+    /// Agreement of two models' verdicts, cell by cell; the second model may be of another map of the same grid.
     pub fn difference(&self, first: usize, (other, second): (&GridMap, usize), criterion: Criterion) -> Vec<Agreement> {
         let agreement = |cell: usize| {
             let found = Agreement::of(
@@ -227,7 +227,7 @@ impl GridMap {
     }
 }
 
-/// Sweeps the lanes of a part; `take` receives the model's place in the plan, the cell and the verdict.
+/// Sweeps the lanes of a part; `take` receives the model's index in the plan, the cell and the verdict.
 fn sweep_cells(
     plan: &GridPlan,
     part: &GridPart,
@@ -247,7 +247,7 @@ fn sweep_cells(
     })
 }
 
-/// Is there a lane in which TTC and BTN look at another vehicle?
+/// Whether TTC and BTN evaluate another vehicle in some lane.
 fn meets(plan: &LanePlan) -> bool {
     let runner = LaneRunner::<f32>::new(plan);
     let keys = (0..plan.lane_count()).filter_map(|lane| plan.key(lane));
@@ -259,8 +259,8 @@ pub fn count(cells: &[Agreement]) -> [u64; Agreement::ALL.len()] {
     Agreement::ALL.map(|kind| cells.iter().filter(|c| **c == kind).count() as u64)
 }
 
-/// Ends of the lines between neighbouring cells of a panel that differ in kind: a line along a row's edge from place
-/// to place, in cells from the panel's lower left corner, `((x, y), (x, y))`. Straight runs are one line.
+/// Boundary lines between neighbouring cells of a panel that differ in kind. Each line follows cell edges from `(x, y)`
+/// to `(x, y)`, in cells from the panel's lower left corner. Straight runs are one line.
 pub fn boundary(grid: &Grid, kind: &dyn Fn(usize, usize) -> usize) -> Vec<((usize, usize), (usize, usize))> {
     let (nx, ny) = (grid.x().len(), grid.y().len());
     let mut lines = Vec::new();
@@ -277,7 +277,7 @@ pub fn boundary(grid: &Grid, kind: &dyn Fn(usize, usize) -> usize) -> Vec<((usiz
     lines
 }
 
-/// Longest intervals of places at which something holds.
+/// Maximal intervals of indices for which a condition holds.
 pub fn runs(count: usize, holds: &dyn Fn(usize) -> bool) -> Vec<(usize, usize)> {
     let mut found = Vec::new();
     let mut from = None;
@@ -294,14 +294,14 @@ pub fn runs(count: usize, holds: &dyn Fn(usize) -> bool) -> Vec<(usize, usize)> 
     found
 }
 
-/// What a map says of a model's cell. Without a conflict nothing collides even if the ego never reacts.
+/// Outcome of a model's cell. No conflict means that no collision occurs even if the ego never reacts.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum CellOutcome {
-    /// There is no conflict, and the driver does not collide. Maps of collisions alone have it.
+    /// There is no conflict, and the driver does not collide. Only maps of collisions have it.
     NoConflict,
-    /// The driver passes; in a map of collisions, one threatens.
+    /// The driver passes; in a map of collisions, there is a conflict.
     Pass,
-    /// The driver fails; in a map of collisions, one threatens.
+    /// The driver fails; in a map of collisions, there is a conflict.
     Fail,
     /// There is no conflict, but the driver reacts and collides.
     FailByReaction,
@@ -319,7 +319,7 @@ impl CellOutcome {
         CellOutcome::Undecided,
     ];
 
-    /// The word of tables, legends and files; that of a case without a conflict is the one of its sheet.
+    /// Text for tables, legends and files; the outcome without a conflict has the same word as on a sheet.
     pub fn label(self) -> &'static str {
         match self {
             CellOutcome::NoConflict => Answer::NoConflict.label(),

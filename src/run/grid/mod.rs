@@ -1,8 +1,9 @@
 //! Grids of concrete cases: what `map` sweeps.
 //!
-//! Here live the parameters and axes, the way from a cell to its case and from a grid to lane plans, the presets, and
-//! the swept map with its differences. Here lives no physics, and no drawing. Cases and plans go to [`crate::engine`],
-//! maps to [`crate::report`]. The cases of the JRC's simulator also serve [`crate::interop::conformance`].
+//! This module contains parameters and axes, the conversion of cells to cases and of grids to lane plans, the presets,
+//! and the swept map with its differences. It contains no physics and no drawing. Cases and plans go to
+//! [`crate::engine`], maps to [`crate::report`]. The cases of the JRC's simulator also serve
+//! [`crate::interop::conformance`].
 
 mod axis;
 mod grid_text;
@@ -31,10 +32,10 @@ use crate::scenario::{Case, Category, missing_parameter};
 use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
-/// Cells of a grid at most.
+/// Maximum number of cells of a grid.
 pub const MAX_CELLS: usize = 1_000_000;
 
-/// Panels of a grid at most: a sheet shows every one.
+/// Maximum number of panels of a grid: a sheet shows every one.
 pub const MAX_PANELS: usize = 1000;
 
 /// How a point becomes a case.
@@ -45,12 +46,12 @@ pub enum CaseStyle {
     Plain,
     /// As the JRC's simulator makes it.
     Jrc,
-    /// The same with the lateral run-up of its comparison sweep of cut-ins, which also aborts CCHDM at large TTC.
+    /// The same with the lateral run-up of the JRC's comparison sweep of cut-ins, which also aborts CCHDM at large TTC.
     JrcComparison,
 }
 
-/// A grid of cases of one category. Cells are counted panel by panel, in a panel row by row of `y` from its first
-/// value on, in a row along `x`.
+/// A grid of cases of one category. Cells are numbered panel by panel, within a panel row by row of `y` from its first
+/// value, within a row along `x`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid {
     name: String,
@@ -65,33 +66,33 @@ pub struct Grid {
     perturbation: Option<Perturbation>,
 }
 
-/// What a grid is made of.
+/// Definition of a grid.
 #[derive(Debug, Clone, PartialEq)]
 pub struct GridParts {
     /// Name, for files and tables.
     pub name: String,
     /// Kind of scenario.
     pub category: Category,
-    /// Across.
+    /// Horizontal axis.
     pub x: GridAxis,
-    /// Up.
+    /// Vertical axis.
     pub y: GridAxis,
     /// Every combination of their values is a panel.
     pub panel_axes: Vec<GridAxis>,
-    /// Values that are the same in every cell.
+    /// Values that are equal in every cell.
     pub fixed: Vec<(&'static MapParameter, f64)>,
     /// How a point becomes a case.
     pub style: CaseStyle,
-    /// Each model starts at its own distance ([`jrc_case::native_distance`]) and not at a gap or headway.
+    /// Each model starts at its own distance ([`jrc_case::native_distance`]) instead of a gap or headway.
     pub native_gap: bool,
-    /// Panels in which the ego is not faster than the other vehicle are left out.
+    /// Skips panels in which the ego is not faster than the other vehicle.
     pub closing_only: bool,
-    /// The panels themselves, where they are not every combination: a value for each of `panel_axes`.
+    /// Explicit panels, if they are not every combination: a value for each of `panel_axes`.
     pub panel_rows: Option<Vec<Vec<f64>>>,
 }
 
 impl Grid {
-    /// Checks that every number is given once, that nothing is missing, and that the cells are not too many.
+    /// Checks that every quantity is given once, that none is missing, and that there are not too many cells.
     ///
     /// # Errors
     /// [`Error::Usage`] with the parameter.
@@ -162,17 +163,17 @@ impl Grid {
         self.category
     }
 
-    /// The axis across.
+    /// The horizontal axis.
     pub fn x(&self) -> &GridAxis {
         &self.x
     }
 
-    /// The axis upwards.
+    /// The vertical axis.
     pub fn y(&self) -> &GridAxis {
         &self.y
     }
 
-    /// Parameters that part the panels.
+    /// Parameters that distinguish the panels.
     pub fn panel_axes(&self) -> &[GridAxis] {
         &self.panel_axes
     }
@@ -182,7 +183,7 @@ impl Grid {
         &self.panels
     }
 
-    /// Values that are the same in every cell.
+    /// Values that are equal in every cell.
     pub fn fixed(&self) -> &[(&'static MapParameter, f64)] {
         &self.fixed
     }
@@ -192,7 +193,7 @@ impl Grid {
         self.style
     }
 
-    /// Does each model start at its own distance?
+    /// Whether each model starts at its own distance.
     pub fn has_native_gap(&self) -> bool {
         self.native_gap
     }
@@ -202,18 +203,18 @@ impl Grid {
         self.panels.len() * self.x.len() * self.y.len()
     }
 
-    /// Index of a cell from panel, place across and place upwards.
+    /// Index of a cell from panel, horizontal index and vertical index.
     pub fn cell(&self, panel: usize, i: usize, j: usize) -> usize {
         (panel * self.y.len() + j) * self.x.len() + i
     }
 
-    /// Panel, place across and place upwards of a cell below [`Grid::cell_count`].
+    /// Panel, horizontal index and vertical index of a cell below [`Grid::cell_count`].
     pub fn places(&self, cell: usize) -> (usize, usize, usize) {
         let (nx, ny) = (self.x.len(), self.y.len());
         (cell / (nx * ny), cell % nx, cell / nx % ny)
     }
 
-    /// The values of a cell in the units of their parameters: panel's, `y`, `x`.
+    /// The values of a cell in the units of their parameters: first the panel's, then `y`, then `x`.
     pub fn values(&self, cell: usize) -> Vec<(&'static MapParameter, f64)> {
         let (panel, i, j) = self.places(cell);
         let of_panel = self.panel_axes.iter().map(|a| a.parameter).zip(self.panels[panel].iter().copied());
@@ -229,7 +230,7 @@ impl Grid {
         self.perturbation.map_or(point, |perturbation| perturbation.of_speeds(point))
     }
 
-    /// The same cells, each case changed a little.
+    /// The same cells with a perturbed case each.
     fn perturbed(&self, perturbation: Perturbation) -> Grid {
         Grid { perturbation: Some(perturbation), ..self.clone() }
     }
@@ -245,7 +246,7 @@ impl Grid {
         point
     }
 
-    /// The profile that the grid is swept with: the JRC's comparison sweep has rules of its own.
+    /// The profile for sweeping the grid: the JRC's comparison sweep has its own rules.
     pub fn profile(&self, profile: &Profile) -> Profile {
         let mut profile = profile.clone();
         if self.style == CaseStyle::JrcComparison {
@@ -260,7 +261,7 @@ impl Grid {
     /// The case of a cell.
     ///
     /// # Errors
-    /// [`Error::Usage`] for values that contradict one another, as [`PlainCase::case`](crate::scenario::PlainCase::case).
+    /// [`Error::Usage`] for contradictory values, as [`PlainCase::case`](crate::scenario::PlainCase::case).
     pub fn case(&self, cell: usize, profile: &Profile) -> Result<Case> {
         let (point, dt_s) = (self.point(cell), profile.frame.dt_s);
         let value = |quantity, otherwise: f64| point.get(quantity).unwrap_or(otherwise);
@@ -298,7 +299,7 @@ impl Grid {
         point.get(MapQuantity::Gap).or(of_headway).unwrap_or(0.0)
     }
 
-    /// What a cell's run-up and a perturbation add to its gap, m.
+    /// The gap that a run-up and a perturbation add to a cell's gap, m.
     fn added_gap_m(&self, cell: usize, dt_s: f64) -> f64 {
         let point = self.point(cell);
         let ego_mps = point.get(MapQuantity::EgoSpeed).unwrap_or(0.0);
@@ -308,7 +309,7 @@ impl Grid {
     }
 }
 
-/// Steps of a case's lateral run-up.
+/// Number of steps of a case's lateral run-up.
 fn run_up(style: CaseStyle, point: &Point, dt_s: f64) -> u32 {
     match (style, point.get(MapQuantity::LateralSpeed)) {
         (CaseStyle::JrcComparison, Some(lateral_mps)) => jrc_case::run_up_steps(lateral_mps, dt_s),
@@ -316,11 +317,11 @@ fn run_up(style: CaseStyle, point: &Point, dt_s: f64) -> u32 {
     }
 }
 
-/// What needs the parameters, and how they are given.
+/// A required quantity, and how it is specified.
 type Needing = (&'static str, &'static str);
 const FOR_A_MAP: Needing = ("a map", "give it by option `x`, option `y`, option `panel` or option `set`");
 
-/// Panels that are given one by one, each value within its parameter's range.
+/// Explicit panels, with each value in its parameter's range.
 fn checked(rows: Vec<Vec<f64>>, axes: &[GridAxis]) -> Result<Vec<Vec<f64>>> {
     if rows.is_empty() || rows.len() > MAX_PANELS {
         let problem = format!("they make {} panels", rows.len());
@@ -335,10 +336,10 @@ fn checked(rows: Vec<Vec<f64>>, axes: &[GridAxis]) -> Result<Vec<Vec<f64>>> {
     Ok(rows)
 }
 
-/// Everything that a case of the category cannot do without.
+/// Checks that all quantities required by the category are given once.
 ///
 /// # Errors
-/// [`Error::Usage`] naming what is missing or given twice.
+/// [`Error::Usage`] with the quantity that is missing or duplicate.
 pub(crate) fn check_complete(
     category: Category,
     native_gap: bool,
@@ -375,7 +376,7 @@ pub(crate) fn check_complete(
     Ok(())
 }
 
-/// Every combination of the axes' values, the last axis fastest; one empty combination where there is no axis.
+/// Every combination of the axes' values, the last axis fastest; one empty combination if there is no axis.
 fn combinations(axes: &[GridAxis]) -> Result<Vec<Vec<f64>>> {
     let count = axes.iter().fold(1_usize, |n, axis| n.saturating_mul(axis.len()));
     if count > MAX_PANELS {

@@ -6,7 +6,7 @@ use crate::support::plain_text::nearest;
 use crate::support::plausibility::{self, Doubts};
 use crate::{Error, Place, Result};
 
-/// What a parameter sets.
+/// The quantity that a parameter sets.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum MapQuantity {
     /// Initial speed of the ego.
@@ -15,13 +15,13 @@ pub enum MapQuantity {
     OtherSpeed,
     /// Initial gap to it, bumper to bumper.
     Gap,
-    /// The same as a time headway.
+    /// The initial gap as a time headway.
     Thw,
     /// Lateral speed of a lane change.
     LateralSpeed,
     /// Lateral distance of a lane change.
     LateralDistance,
-    /// Deceleration of that vehicle.
+    /// Deceleration of that other vehicle.
     Deceleration,
     /// Speed at which its deceleration ends.
     EndSpeed,
@@ -36,26 +36,26 @@ pub enum MapQuantity {
 }
 
 impl MapQuantity {
-    /// How many there are.
+    /// Number of quantities.
     pub const COUNT: usize = 12;
 }
 
-/// A parameter by the name that flags, tables and files give it.
+/// A parameter as named in flags, tables and files.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct MapParameter {
-    /// Name with its unit.
+    /// Name, including its unit.
     pub key: &'static str,
-    /// Name on an axis.
+    /// Label of an axis.
     pub label: &'static str,
-    /// Unit on an axis.
+    /// Unit shown on an axis.
     pub unit: &'static str,
-    /// What it sets.
+    /// The quantity that it sets.
     pub quantity: MapQuantity,
-    /// So many of its units are one SI unit.
+    /// Number of its units in one SI unit.
     pub per_si: f64,
-    /// Smallest value, in its unit.
+    /// Minimum value, in its unit.
     pub least: f64,
-    /// Largest value, in its unit.
+    /// Maximum value, in its unit.
     pub most: f64,
     /// Categories that have it.
     pub categories: &'static [Category],
@@ -163,10 +163,10 @@ pub const PARAMETERS: [MapParameter; 16] = [
 ];
 
 impl MapParameter {
-    /// By name, among those of a category; `flag` names the place of an error.
+    /// Finds a parameter of a category by name; `flag` names the option in errors.
     ///
     /// # Errors
-    /// [`Error::Usage`] with the nearest name.
+    /// [`Error::Usage`] with the most similar name.
     pub fn find(category: Category, key: &str, flag: &str) -> Result<&'static MapParameter> {
         let of_category = || PARAMETERS.iter().filter(|p| p.categories.contains(&category));
         if let Some(found) = of_category().find(|p| p.key == key) {
@@ -191,7 +191,7 @@ impl MapParameter {
         format!("{} ({})", self.label, self.unit)
     }
 
-    /// What it is to a table of plausible values, and in which sign that has it.
+    /// Its quantity in the table of plausible values, and the sign of this quantity.
     fn plausible(&self) -> (plausibility::Quantity, f64) {
         use plausibility::Quantity as Of;
         match self.quantity {
@@ -208,17 +208,17 @@ impl MapParameter {
         }
     }
 
-    /// Looks at a value that a user gave.
+    /// Checks the plausibility of a user's value.
     ///
     /// # Errors
-    /// [`Error::Usage`] for one beyond the physical range, unless such are accepted.
+    /// [`Error::Usage`] for a value beyond the physical range, unless such values are accepted.
     pub fn check_plausible(&self, value: f64, doubts: &mut Doubts) -> Result<()> {
         let (quantity, sign) = self.plausible();
         let judged = doubts.check(quantity, sign * self.si(value), || self.key.to_owned());
         judged.map_err(|problem| Error::usage(Place::item(self.key), problem, plausibility::HELP))
     }
 
-    /// A value in the range; a speed that is noise of a standing vehicle is 0, which is told.
+    /// Checks the range of a value. A speed that is noise of a stationary vehicle becomes 0, with a warning.
     ///
     /// # Errors
     /// [`Error::Usage`] with the range.
@@ -242,27 +242,27 @@ impl MapParameter {
 pub struct Point([Option<f64>; MapQuantity::COUNT]);
 
 impl Point {
-    /// Sets what a parameter stands for, from its own unit.
+    /// Sets the quantity of a parameter from a value in the parameter's unit.
     pub fn set(&mut self, parameter: &MapParameter, value: f64) {
         self.0[parameter.quantity as usize] = Some(parameter.si(value));
     }
 
-    /// The same with another value of a quantity, in SI units.
+    /// The same point with another value of a quantity, in SI units.
     #[must_use]
     pub fn with(mut self, quantity: MapQuantity, si: f64) -> Point {
         self.0[quantity as usize] = Some(si);
         self
     }
 
-    /// The value of a quantity, where it has one.
+    /// The value of a quantity; `None` if not set.
     pub fn get(&self, quantity: MapQuantity) -> Option<f64> {
         self.0[quantity as usize]
     }
 
-    /// The plain case of these values; what they do not set has the value that `simulate` gives it.
+    /// The plain case of these values; unset quantities have the defaults of `simulate`.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a headway of an ego at rest.
+    /// [`Error::Usage`] for a time headway of a stationary ego.
     pub fn plain_case(&self, category: Category, profile: &Profile) -> Result<PlainCase> {
         let value = |quantity, otherwise: f64| self.get(quantity).unwrap_or(otherwise);
         let ego_speed_mps = value(MapQuantity::EgoSpeed, 0.0);
@@ -272,7 +272,7 @@ impl Point {
             category,
             ego_speed_mps,
             speed_mps: value(MapQuantity::OtherSpeed, ego_speed_mps),
-            // No negative zero.
+            // Avoids a negative zero.
             acceleration_mps2: if deceleration > 0.0 { -deceleration } else { 0.0 },
             end_speed_mps: self.get(MapQuantity::EndSpeed),
             lateral_speed_mps: value(MapQuantity::LateralSpeed, 0.0),

@@ -1,6 +1,6 @@
-//! From a grid to lane plans. Where the gap is an axis it is the plan's headways and a unit is a row of cells, whose
-//! lanes share one case; otherwise a unit is a cell and its gap is part of its case. Models that start at distances of
-//! their own have plans of their own. Each plan has a second one: the same cases with an ego that never reacts.
+//! From a grid to lane plans. If the gap is an axis, its values are the plan's headways, and a unit is a row of cells
+//! whose lanes share one case. Otherwise a unit is a cell whose case contains the gap. Models with different initial
+//! distances have separate plans. Each plan has a second one: the same cases with an ego that never reacts.
 
 use std::sync::Arc;
 
@@ -22,29 +22,29 @@ const VARIANT: &str = "cell";
 pub struct GridPlan {
     /// The grid.
     pub grid: Grid,
-    /// Models, in order; every one is in exactly one of the parts.
+    /// Models, in order; each belongs to exactly one part.
     pub models: Vec<ModelId>,
     /// The plans.
     pub parts: Vec<GridPart>,
 }
 
-/// The lanes of some models on every cell.
+/// The lanes of some models on all cells.
 pub struct GridPart {
-    /// The plan: units are an interval, so it can be cut as any other.
+    /// The plan. Its units form an interval, so it can be split like any other plan.
     pub plan: LanePlan,
-    /// The same cases with an ego that never reacts: one lane per cell. What collides there is a conflict.
+    /// The same cases with an ego that never reacts: one lane per cell. A collision there is a conflict.
     pub unreacting: LanePlan,
     layout: Layout,
 }
 
-/// How units and headways lead to cells.
+/// Mapping of units and headways to cells.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 enum Layout {
     /// A unit is a cell.
     Cells,
-    /// Headways are the values across; a unit is a row.
+    /// Headways are the horizontal axis; a unit is a row.
     HeadwaysAcross,
-    /// Headways are the values upwards; a unit is a column of a panel.
+    /// Headways are the vertical axis; a unit is a column of a panel.
     HeadwaysUp,
 }
 
@@ -72,12 +72,12 @@ impl GridPlan {
     /// Plans every cell with every model.
     ///
     /// # Errors
-    /// [`crate::Error::Usage`] without a model and for a case that cannot be.
+    /// [`crate::Error::Usage`] without a model, and for an invalid case.
     pub fn new(grid: Grid, profile: &Profile, models: &[ModelId]) -> Result<GridPlan> {
         let profile = grid.profile(profile);
         let mut groups: Vec<Vec<ModelId>> = Vec::new();
         if grid.has_native_gap() {
-            // The same distance at every speed: the same plan.
+            // Models with the same distance at two speeds share a plan.
             let distances = |model| [0.0, 40.0].map(|v| jrc_case::native_distance(&profile, model, v));
             for &model in models {
                 match groups.iter_mut().find(|group| distances(group[0]) == distances(model)) {
@@ -92,7 +92,7 @@ impl GridPlan {
         Ok(GridPlan { grid, models: models.to_vec(), parts })
     }
 
-    /// The same cells, each case or its time step changed a little.
+    /// The same cells with perturbed cases or a perturbed time step.
     ///
     /// # Errors
     /// As [`GridPlan::new`].
@@ -173,7 +173,7 @@ impl Layout {
     }
 }
 
-/// An error about a case names its cell.
+/// Adds the cell to an error about a case.
 fn of_cell(grid: &Grid, cell: usize, error: Error) -> Error {
     let Error::Usage { place, problem, help } = error else { return error };
     let values = grid.values(cell).into_iter().map(|(parameter, value)| format!("{}={value}", parameter.key));

@@ -1,10 +1,10 @@
-//! Predefined grids: the JRC's evidence with the shares of crashes that are known of it, and the critical scenarios of the
-//! regulation's annex.
+//! Predefined grids: the JRC's evidence with its published crash rates, and the critical scenarios of the regulation's
+//! annex.
 //!
-//! The JRC's cut-in grids are the JRC's. Its public simulator has no grid for the other two categories; theirs are ours:
-//! the leader's decelerations were chosen to give the known share of RSS, and the cut-outs complete the size of the evidence,
-//! 140,793 simulations: 4 models × 29,970 cut-ins, 3 × 209 decelerations, 3 × 6,762 cut-outs. No share of Reg157 is
-//! known of the latter two: it is left out there unless it is asked for.
+//! The JRC published its cut-in grids. Its public simulator has no grid for the other two categories, so we chose
+//! theirs. The leader's decelerations were chosen to reproduce the published crash rate of RSS. The cut-outs complete
+//! the size of the evidence, 140,793 simulations: 4 models × 29,970 cut-ins, 3 × 209 decelerations, 3 × 6,762 cut-outs.
+//! No crash rate of Reg157 is published for these two; it runs there only if requested.
 
 use crate::Result;
 use crate::model::driver::ModelId;
@@ -15,20 +15,20 @@ use super::axis::GridAxis;
 use super::parameter::MapParameter;
 use super::{CaseStyle, Grid, GridParts};
 
-/// A grid with its models and what is known of it.
+/// A grid with its models and published results.
 pub struct Preset {
     /// The grid.
     pub grid: Grid,
-    /// Models unless told otherwise.
+    /// Default models.
     pub models: Vec<ModelId>,
-    /// Known shares of crashes in per cent, as published: one decimal.
+    /// Published crash rates, per cent, with one decimal.
     pub known_percent: Vec<(ModelId, f64)>,
-    /// The grid is ours and was chosen so that a known share comes out: that it does confirms nothing.
+    /// The grid was chosen by us to reproduce a published rate, so agreement confirms nothing.
     pub is_chosen_to_match: bool,
 }
 
 impl Preset {
-    /// The known share of a model, per cent.
+    /// The published crash rate of a model, per cent; `None` if there is none.
     pub fn known(&self, model: ModelId) -> Option<f64> {
         self.known_percent.iter().find(|(m, _)| *m == model).map(|(_, share)| *share)
     }
@@ -58,12 +58,12 @@ impl Presets {
         }
     }
 
-    /// From its name.
+    /// Finds a preset by name.
     pub fn find(name: &str) -> Option<Presets> {
         Presets::ALL.into_iter().find(|presets| presets.name() == name)
     }
 
-    /// Name of the profile that it is swept with unless told otherwise.
+    /// Name of the default profile.
     pub fn profile(self) -> &'static str {
         match self {
             Presets::Jrc => JRC_PROFILE,
@@ -71,10 +71,10 @@ impl Presets {
         }
     }
 
-    /// The grids of a category, as a profile makes their cases.
+    /// The grids of a category, with cases as the profile makes them.
     ///
     /// # Errors
-    /// None on the grids as they stand.
+    /// None for the grids as defined here.
     pub fn of(self, category: Category, profile: &Profile) -> Result<Vec<Preset>> {
         match self {
             Presets::Jrc => jrc(category, profile),
@@ -83,11 +83,11 @@ impl Presets {
     }
 }
 
-/// The JRC's grids of a category. Cases are made as its simulator makes them where the profile starts its runs as it
-/// does (`start_shift`), and as [`CaseStyle::Plain`] otherwise.
+/// The JRC's grids of a category. If the profile starts its runs as the JRC's simulator does (`start_shift`), cases are
+/// made as in the simulator; otherwise as [`CaseStyle::Plain`].
 ///
 /// # Errors
-/// None on the grids as they stand.
+/// None for the grids as defined here.
 fn jrc(category: Category, profile: &Profile) -> Result<Vec<Preset>> {
     use ModelId::{Cchdm, Fsm, Reg157, Rss};
     let is_jrc = profile.frame.start_shift;
@@ -153,13 +153,13 @@ fn jrc(category: Category, profile: &Profile) -> Result<Vec<Preset>> {
     }
 }
 
-/// The critical scenarios of Annex 3 (guidance on traffic disturbances, data sheets), in two ranges of speed: to 60 km/h
-/// (00 series of amendments) and to 130 km/h (01 series).
+/// The critical scenarios of Annex 3 (guidance on traffic disturbances, data sheets) in two speed ranges: up to 60 km/h
+/// (00 series of amendments) and up to 130 km/h (01 series).
 ///
-/// The regulation gives what varies and what is held: cut-in, the initial gap and the lateral speed for pairs of speeds;
-/// cut-out, both vehicles at one speed, 2 s of headway, a stationary vehicle ahead, its distance and the lateral speed;
-/// deceleration, 2 s of headway and up to 1 g. The steps and the ends of gaps and lateral speeds are ours (1.8 m/s is the
-/// annex's example).
+/// The regulation specifies varied and fixed quantities. Cut-in: initial gap and lateral speed for pairs of speeds.
+/// Cut-out: both vehicles at one speed, a headway of 2 s, a stationary vehicle ahead, its distance and the lateral
+/// speed. Deceleration: a headway of 2 s and up to 1 g. We chose the steps and the ranges of gaps and lateral speeds
+/// (1.8 m/s is the annex's example).
 fn r157(category: Category) -> Result<Vec<Preset>> {
     let range = |key, ends, step| GridAxis::range(category, key, ends, step);
     let fixed = |values: &[(&str, f64)]| -> Result<Vec<(&'static MapParameter, f64)>> {

@@ -1,5 +1,5 @@
-//! Robust verdicts: does a verdict survive a tenth of the time step, a centimetre of gap, a tenth of a kilometre per hour? A case
-//! whose verdict does not is *undecided*: rounding decides it, or a measurement would have to be better than it is.
+//! Robust verdicts: whether a verdict is unchanged by a tenth of the time step, 1 cm of gap, or 0.1 km/h of speed. If
+//! not, the case is *undecided*: rounding decides it, or measurements are not accurate enough.
 
 use super::parameter::{MapQuantity, Point};
 use crate::Result;
@@ -13,8 +13,8 @@ pub const SPEED_MPS: f64 = 0.1 / 3.6;
 /// A small change of a case or of how it is computed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Perturbation {
-    /// A tenth of the time step, in binary64: what steps and rounding decide. Half a step would keep half of the error of
-    /// whole steps, and round a delay as the step itself does.
+    /// A tenth of the time step, in binary64: shows the effect of steps and rounding. Half a step would keep half of
+    /// the step error, and round a delay as the whole step does.
     FinerStep,
     /// One centimetre of initial gap more.
     GapMore,
@@ -42,7 +42,7 @@ impl Perturbation {
         Perturbation::OtherSlower,
     ];
 
-    /// What it is, in words.
+    /// Description.
     pub fn label(self) -> &'static str {
         match self {
             Perturbation::FinerStep => "a tenth of the time step",
@@ -55,7 +55,7 @@ impl Perturbation {
         }
     }
 
-    /// What is added to the initial gap, m.
+    /// Change of the initial gap, m.
     pub fn gap_m(self) -> f64 {
         match self {
             Perturbation::GapMore => GAP_M,
@@ -64,7 +64,7 @@ impl Perturbation {
         }
     }
 
-    /// The profile that the changed case runs under.
+    /// The profile for the perturbed case.
     ///
     /// # Errors
     /// [`crate::Error::Usage`] for a time step that is too short.
@@ -78,13 +78,13 @@ impl Perturbation {
         }
     }
 
-    /// Is the changed case computed in binary64, whatever the sweep computes in?
+    /// Whether the perturbed case is computed in binary64, independent of the sweep's arithmetic.
     pub fn is_binary64(self) -> bool {
         self == Perturbation::FinerStep
     }
 
-    /// The same point with other speeds; a vehicle without a speed of its own has the ego's. A speed stays where its change
-    /// would make the case a contradiction.
+    /// The same point with other speeds; a vehicle without its own speed has the ego's. A speed that would make the
+    /// case contradictory stays unchanged.
     pub fn of_speeds(self, mut point: Point) -> Point {
         let ego_mps = point.get(MapQuantity::EgoSpeed).unwrap_or(0.0);
         let (quantity, by_mps) = match self {
@@ -98,7 +98,7 @@ impl Perturbation {
         point = point.with(MapQuantity::OtherSpeed, other_mps);
         let from_mps = point.get(quantity).unwrap_or(0.0);
         let to_mps = (from_mps + by_mps).max(0.0);
-        // Beyond its end speed, or with a headway at rest, it would be no case.
+        // A speed below the end speed, or a headway of a stationary ego, makes the case invalid.
         let is_no_case = match quantity {
             MapQuantity::EgoSpeed => to_mps == 0.0,
             _ => point.get(MapQuantity::EndSpeed).is_some_and(|end| (from_mps - end) * (to_mps - end) <= 0.0),
@@ -106,7 +106,7 @@ impl Perturbation {
         if is_no_case { point } else { point.with(quantity, to_mps) }
     }
 
-    /// The same point with another gap or other speeds; a time headway becomes longer or shorter by the centimetre.
+    /// The same point with another gap or other speeds; a time headway is changed by the time equivalent of 1 cm.
     pub fn of_point(self, point: Point) -> Point {
         let point = self.of_speeds(point);
         let ego_mps = point.get(MapQuantity::EgoSpeed).unwrap_or(0.0);
@@ -120,13 +120,13 @@ impl Perturbation {
     }
 }
 
-/// The profile under which Reg157 never reacts: the ego keeps its speed. What collides there is a conflict.
+/// The profile under which Reg157 never reacts: the ego keeps its speed. A collision there is a conflict.
 pub fn without_reaction(profile: &Profile) -> Profile {
     let mut without = profile.clone();
     without.reg157.always_unsafe.clear();
-    // No vehicle overlaps the ego so far across the road.
+    // No lateral gap is below this.
     without.reg157.lateral_gate_m = -100.0;
-    // The delays of a driver that never reacts bound no time step.
+    // The delays of a driver that never reacts do not limit the time step.
     (without.reg157.reaction_time_s, without.reg157.visible_lateral_movement_s) = (0.0, 0.0);
     without.reg157.margin_s = 10.0;
     without

@@ -1,4 +1,5 @@
-//! Maps: the grids of a category under a profile, and what they are compared with; planned, then swept.
+//! Maps: the grids of a category under a profile, and their comparison with another model or profile; planned, then
+//! swept.
 
 use std::sync::Arc;
 
@@ -14,16 +15,16 @@ use crate::model::profile::Profile;
 use crate::scenario::Category;
 use crate::{Error, Place, Result};
 
-/// Which cells are mapped.
+/// The cells of a map.
 #[derive(Debug, Clone)]
 pub enum MapGrids {
-    /// Predefined grids of a category, with models of their own.
+    /// Predefined grids of a category, with their models.
     Preset(Presets, Category),
     /// One grid.
     Own(Grid),
 }
 
-/// What the maps are compared with.
+/// The other side of a comparison.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Against {
     /// Another model of the same map.
@@ -32,16 +33,16 @@ pub enum Against {
     Profile(Box<Profile>),
 }
 
-/// What is mapped.
+/// Options of maps.
 #[derive(Debug, Clone)]
 pub struct MapOptions {
     /// Cells.
     pub grids: MapGrids,
-    /// Models; `None`: those of the grids, which are all of them for a grid of one's own.
+    /// Models; `None`: those of the presets, or all models for a user's grid.
     pub models: Option<Vec<ModelId>>,
-    /// Criterion of shares and differences.
+    /// Criterion of counts and differences.
     pub criterion: Criterion,
-    /// What the maps are compared with.
+    /// Comparison with another model or profile.
     pub against: Option<Against>,
     /// Also sweep every grid with each [`Perturbation`]: cells whose verdict changes are undecided.
     pub robust: bool,
@@ -81,21 +82,21 @@ struct PlannedGrid {
     known_percent: Vec<Option<f64>>,
     is_chosen_to_match: bool,
     other: Option<(String, GridPlan)>,
-    /// The same cells, perturbed.
+    /// Perturbed plans of the same cells.
     perturbed: Vec<(Perturbation, GridPlan)>,
-    /// Those of the other profile.
+    /// Perturbed plans under the other profile.
     other_perturbed: Vec<(Perturbation, GridPlan)>,
 }
 
-/// A swept grid with what is known of it.
+/// A swept grid with its published results.
 pub struct MappedGrid {
     /// Grid and plans.
     pub plan: GridPlan,
     /// The verdicts.
     pub map: GridMap,
-    /// Known shares, per cent, by model of the map.
+    /// Published crash rates, per cent, by model of the map.
     pub known_percent: Vec<Option<f64>>,
-    /// The grid was chosen to give a known share, so agreement confirms nothing.
+    /// The grid was chosen to reproduce a published rate, so agreement confirms nothing.
     pub is_chosen_to_match: bool,
     /// The same grid under another profile, with the profile's name.
     pub other: Option<(String, GridPlan, GridMap)>,
@@ -140,7 +141,7 @@ impl Map {
     /// Plans every cell of every grid with every model.
     ///
     /// # Errors
-    /// [`Error::Usage`] without a model, for a case that cannot be, and where a map would be compared with itself.
+    /// [`Error::Usage`] without a model, for an invalid case, and if a map would be compared with itself.
     pub fn plan(options: MapOptions, profile: &Profile) -> Result<Map> {
         let itself = match (&options.against, options.models.as_deref()) {
             (Some(Against::Profile(other)), _) if **other == *profile => Some(other.name.as_str()),
@@ -155,7 +156,7 @@ impl Map {
             && options.criterion == Criterion::Collision
             && *profile == Profile::load(presets::JRC_PROFILE)?;
         let others = match &options.against {
-            // The same cells: a preset's cases follow the other profile's way of making them.
+            // The same cells; the cases of a preset follow the other profile.
             Some(Against::Profile(other)) => Some((&**other, options.presets(other)?)),
             _ => None,
         };
@@ -190,7 +191,7 @@ impl Map {
         Ok(Map { grids })
     }
 
-    /// Every grid's plan, with the name of the other profile where it is under that.
+    /// Every grid's plan, with the name of the other profile if the plan uses it.
     pub fn plans(&self) -> impl Iterator<Item = (Option<&str>, &GridPlan)> {
         self.grids.iter().flat_map(|grid| {
             let other = grid.other.iter().map(|(name, plan)| (Some(name.as_str()), plan));
@@ -200,12 +201,12 @@ impl Map {
         })
     }
 
-    /// The lanes of all plans, those of an ego that never reacts included.
+    /// The lanes of all plans, including those of an ego that never reacts.
     pub fn lane_plans(&self) -> impl Iterator<Item = &LanePlan> {
         self.plans().flat_map(|(_, plan)| plan.parts.iter().flat_map(|part| [&part.plan, &part.unreacting]))
     }
 
-    /// Units that the run sweeps, those of the unreacting ego too.
+    /// Number of units that the run sweeps, including those of the unreacting ego.
     pub fn unit_count(&self) -> u64 {
         let parts = self.plans().flat_map(|(_, plan)| &plan.parts);
         parts.map(|part| part.plan.unit_count() + part.unreacting.unit_count()).sum()

@@ -1,8 +1,8 @@
-//! A dossier: is a parameterization appropriate for one driver model, one kind of scenario and one criterion on this data?
-//! The question that the paper ends with.
+//! A dossier: whether a parameterization is appropriate for one driver model, one kind of scenario and one criterion on
+//! this data. The paper ends with this question.
 //!
-//! Here lives what is computed: which failures are hidden, scores with their intervals, groups, risk ratios, coverage and
-//! the conclusion by rules. Lanes and densities come from [`crate::run::compare`]; the page is made by [`crate::report`].
+//! This module computes hidden failures, scores with intervals, groups, risk ratios, coverage and the conclusion by
+//! rules. Lanes and densities come from [`crate::run::compare`]; [`crate::report`] makes the page.
 
 mod rules;
 mod scores;
@@ -26,17 +26,17 @@ use crate::support::ranges;
 use crate::traffic::DataProvenance;
 use crate::{Error, Place, Result};
 
-/// Profile whose recall stands beside that of the chosen one.
+/// Profile whose recall is reported in addition to that of the selected profile.
 pub const REGULATION: &str = "un-r157";
 
-/// What is asked.
+/// Options of a dossier.
 #[derive(Debug, Clone)]
 pub struct JustifyOptions {
     /// Data and density: one category, one model, one parameterization.
     pub compare: CompareOptions,
     /// Criterion.
     pub criterion: Criterion,
-    /// Confidence and least failures.
+    /// Confidence level and minimum number of failures.
     pub score: ScoreOptions,
     /// When a parameterization is appropriate.
     pub rules: Rules,
@@ -59,22 +59,23 @@ pub struct Hidden {
     pub parameterized: Outcome<f64>,
 }
 
-/// How much of the recorded scenarios the parameters and their density cover.
+/// Coverage of the recorded scenarios by the parameters and their density.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coverage {
-    /// Scenarios of the category that were found.
+    /// Number of scenarios of the category that were found.
     pub found: u64,
-    /// Those that passed the filters of mining.
+    /// Number that passed the filters of mining.
     pub kept: u64,
-    /// Those of the kept ones that are points of the parameter space.
+    /// Number of kept scenarios that are points of the parameter space.
     pub points: u64,
-    /// Share of the fitted density inside its valid region.
+    /// Fraction of the fitted density inside its valid region.
     pub valid_share: f64,
-    /// Representativeness metric M of the density and what as many recorded scenarios reach; `None` with too few.
+    /// Representativeness metric M of the density, and the value for the same number of recorded scenarios; `None` with
+    /// too few.
     pub representativeness: Option<(f64, f64)>,
 }
 
-/// What a dossier says.
+/// Content of a dossier.
 pub struct Dossier {
     /// The parameterization.
     pub parameterization: Parameterization,
@@ -82,7 +83,7 @@ pub struct Dossier {
     pub model: ModelId,
     /// Criterion.
     pub criterion: Criterion,
-    /// Scenarios, and lanes of S.
+    /// Number of scenarios.
     pub scenarios: u64,
     /// Lanes of S.
     pub lanes: u64,
@@ -90,27 +91,27 @@ pub struct Dossier {
     pub headways: Vec<Headway>,
     /// Scores of the parameterization.
     pub scored: Scored,
-    /// The same under [`REGULATION`]; `None` where that is the profile.
+    /// The same under [`REGULATION`]; `None` if that is the selected profile.
     pub regulation: Option<Scored>,
-    /// Failures of S from headways below 0.5 s; `None` where the headways are gaps in metres.
+    /// Failures of S from headways below 0.5 s; `None` if the headways are gaps in metres.
     pub close_following: Option<CloseFollowing>,
-    /// By headway, speed and severity.
+    /// Scores by headway, speed and severity.
     pub groups: Vec<Group>,
     /// Hidden failures, the most severe first.
     pub hidden: Vec<Hidden>,
     /// S and S' of the most severe hidden failure, step by step.
     pub example: Option<[Trace; 2]>,
-    /// S' and density against S; `None` where there is no density.
+    /// S' and density compared with S; `None` if there is no density.
     pub compared: Option<ComparedCell>,
-    /// Coverage; `None` where there is no density.
+    /// Coverage; `None` if there is no density.
     pub coverage: Option<Coverage>,
     /// Why there is no density.
     pub no_density: Option<Error>,
-    /// All parameterizations of the category, this one too.
+    /// All parameterizations of the category, including this one.
     pub alternatives: Vec<(Parameterization, Scored, Conclusion)>,
-    /// What each rule finds.
+    /// The finding of each rule.
     pub findings: Vec<Finding>,
-    /// What follows.
+    /// The conclusion from the findings.
     pub conclusion: Conclusion,
     /// SHA-256 of the plan of S and S'.
     pub plan_sha256: String,
@@ -118,15 +119,15 @@ pub struct Dossier {
     pub density_sha256: Option<String>,
     /// How the sweeps went.
     pub summary: SweepSummary,
-    /// What was left out, with the reason.
+    /// Skipped input, with the reason.
     pub left_out: Vec<Error>,
 }
 
-/// Runs the study of one parameterization, model and criterion, and concludes.
+/// Runs the study of one parameterization, model and criterion, and draws the conclusion.
 ///
 /// # Errors
-/// [`Error::Input`] where no scenario of the category was kept; [`Error::Usage`] for a parameterization that the data
-/// cannot have; of the lanes.
+/// [`Error::Input`] if no scenario of the category was kept; [`Error::Usage`] for a parameterization that is impossible
+/// with this data; those of the lanes.
 pub fn justify(
     scenarios: &[Scenario],
     facts: &DataProvenance,
@@ -246,8 +247,8 @@ pub fn justify(
     })
 }
 
-/// How severe a failure is, larger is worse: closing speed at the contact, m/s; for TTC and BTN a contact first, then the
-/// shortfall of TTC, s, or the excess of BTN.
+/// Severity of a failure, larger is worse. Collision: closing speed at the contact, m/s. TTC and BTN: contacts first,
+/// then the shortfall of TTC, s, or the excess of BTN.
 fn severity(outcome: &Outcome<f64>, criterion: Criterion) -> f64 {
     let contact = if outcome.verdicts.failed(Criterion::Collision) { 1e3 + outcome.impact_closing_speed } else { 0.0 };
     match criterion {
@@ -258,7 +259,7 @@ fn severity(outcome: &Outcome<f64>, criterion: Criterion) -> f64 {
 }
 
 impl Coverage {
-    /// Of a density and the scenarios that it was fitted on.
+    /// The coverage of a density and of its scenarios.
     fn of(fitted: &Fitted) -> Coverage {
         let Fitted { model, left_out, .. } = fitted;
         Coverage {

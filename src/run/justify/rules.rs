@@ -30,7 +30,7 @@ impl Default for Rules {
     }
 }
 
-/// What a rule, or all of them, say.
+/// Conclusion of one rule or of all rules.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Conclusion {
@@ -38,36 +38,36 @@ pub enum Conclusion {
     Appropriate,
     /// A rule does not hold.
     NotAppropriate,
-    /// The data does not decide.
+    /// The data is not sufficient for a decision.
     Undecided,
 }
 
 /// What would decide an undecided rule, at the same rates.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Need {
-    /// So many times as many scenarios as now.
+    /// Required number of scenarios as a multiple of the present number.
     pub times: f64,
 }
 
-/// What a rule finds.
+/// Finding of a rule.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Finding {
     /// Quantity.
     pub quantity: &'static str,
     /// Its value.
     pub value: Option<f64>,
-    /// Its interval; the upper end is ∞ (null in JSON) for a ratio to S where S never fails.
+    /// Its interval; the upper end is ∞ (null in JSON) for a ratio to S if S never fails.
     pub interval: Option<(f64, f64)>,
     /// The rule in words.
     pub rule: String,
-    /// What it says.
+    /// Conclusion of the rule.
     pub conclusion: Conclusion,
-    /// What would decide it.
+    /// What would decide the rule, if it is undecided.
     pub need: Option<Need>,
 }
 
 impl Conclusion {
-    /// In words.
+    /// Text for reports.
     pub fn text(self) -> &'static str {
         match self {
             Conclusion::Appropriate => "appropriate",
@@ -76,7 +76,7 @@ impl Conclusion {
         }
     }
 
-    /// Of one rule: what it says is no conclusion on the parameterization.
+    /// Text for a single rule, which is not a conclusion about the parameterization.
     pub fn of_rule(self) -> &'static str {
         match self {
             Conclusion::Appropriate => "passes",
@@ -85,7 +85,7 @@ impl Conclusion {
         }
     }
 
-    /// Of several rules: the worst.
+    /// The worst conclusion of several rules.
     pub fn of(findings: &[Finding]) -> Conclusion {
         let any = |conclusion| findings.iter().any(|finding| finding.conclusion == conclusion);
         if any(Conclusion::NotAppropriate) {
@@ -99,16 +99,16 @@ impl Conclusion {
 }
 
 impl Rules {
-    /// Recall and precision.
+    /// Findings on recall and precision.
     pub(super) fn of_labels(&self, scored: &Scored, options: &ScoreOptions) -> Vec<Finding> {
         let least = u64::from(options.min_failures.max(1));
         let failing = scored.failing_scenarios;
         let share = |quantity, share: Share, limit: f64| {
-            // Few scenarios say little, however many headways fail in each.
+            // Few scenarios give little evidence, independent of the number of headways that fail in each.
             let (conclusion, need) = match share.value.zip(share.interval) {
                 Some((value, interval)) if failing >= least => conclude(value, interval, limit),
                 _ => {
-                    // Without any failure nothing tells how many scenarios would have one.
+                    // Without any failure the required number of scenarios is unknown.
                     let times = least as f64 / failing as f64;
                     (Conclusion::Undecided, (failing > 0).then_some(Need { times: times.max(1.1) }))
                 }
@@ -119,7 +119,7 @@ impl Rules {
         vec![share("recall", scored.recall, self.min_recall), share("precision", scored.precision, self.min_precision)]
     }
 
-    /// Risk ratio of the density, and coverage; undecided where there is no density.
+    /// Findings on the risk ratio of the density and on coverage; undecided if there is no density.
     pub(super) fn of_density(
         &self,
         compared: Option<&ComparedCell>,
@@ -156,14 +156,14 @@ impl Rules {
     }
 }
 
-/// A share passes where its whole interval lies at or above the limit, and fails where it lies below.
+/// A fraction passes if its whole interval is at or above the limit, and fails if it is below.
 fn conclude(value: f64, (low, high): (f64, f64), limit: f64) -> (Conclusion, Option<Need>) {
     if low >= limit {
         (Conclusion::Appropriate, None)
     } else if high < limit {
         (Conclusion::NotAppropriate, None)
     } else {
-        // The width of an interval falls with the square root of the number of scenarios.
+        // The width of an interval decreases with the square root of the number of scenarios.
         let (distance, half_width) =
             if value >= limit { (value - limit, value - low) } else { (limit - value, high - value) };
         let times = (half_width / distance).powi(2);
@@ -171,14 +171,15 @@ fn conclude(value: f64, (low, high): (f64, f64), limit: f64) -> (Conclusion, Opt
     }
 }
 
-/// What would decide an undecided ratio: its logarithm is nearly normal, so its interval narrows like that of a share.
+/// What would decide an undecided ratio. Its logarithm is nearly normal, so its interval narrows like that of a
+/// fraction.
 fn need_of_ratio(ratio: &Ratio, margin: f64) -> Option<Need> {
     let (value, (low, high)) = ratio.ratio.zip(ratio.low.zip(ratio.high))?;
     if ratio.verdict != RatioVerdict::Undecided || value <= 0.0 || low <= 0.0 {
         return None;
     }
     let log = value.ln();
-    // To the limit of agreement from within it, else to 1.
+    // Distance to the limit of agreement if the ratio is inside it, else to 1.
     let distance = if log.abs() < margin.ln() { margin.ln() - log.abs() } else { log.abs() };
     let half_width = if log > 0.0 { (high / value).ln() } else { (value / low).ln() };
     let times = (half_width / distance).powi(2);

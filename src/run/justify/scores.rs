@@ -1,5 +1,5 @@
-//! Labels of S' against those of S, lane by lane: the replay that gives them, then recall, precision and F1 with intervals
-//! over scenarios, and the same by groups.
+//! Compares the labels of S' with those of S, lane by lane: the replay that produces them, then recall, precision and
+//! F1 with intervals over scenarios, in total and by groups.
 
 use super::JustifyOptions;
 use crate::engine::{Confusion, Executor, LanePlan, Partial, SweepSummary, Verdicts, Wanted};
@@ -12,10 +12,10 @@ use crate::stats::estimate::{Clusters, cluster_rate};
 use crate::traffic::DataProvenance;
 use crate::{Error, Place, Result};
 
-/// A share with its interval; `None` where it is 0/0, no interval with too few failing scenarios.
+/// A fraction with its interval. The value is `None` for 0/0; the interval is `None` with too few failing scenarios.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Share {
-    /// The share.
+    /// The fraction.
     pub value: Option<f64>,
     /// Its interval over scenarios.
     pub interval: Option<(f64, f64)>,
@@ -26,13 +26,13 @@ pub struct Share {
 pub struct Scored {
     /// Counts over lanes.
     pub counts: Confusion,
-    /// Scenarios in which S fails from some headway.
+    /// Number of scenarios in which S fails from some headway.
     pub failing_scenarios: u64,
-    /// Failures of S that S' has too.
+    /// Fraction of failures of S that S' has too.
     pub recall: Share,
-    /// Failures of S' that S has too.
+    /// Fraction of failures of S' that S has too.
     pub precision: Share,
-    /// Both in one number.
+    /// Harmonic mean of recall and precision.
     pub f1: Share,
 }
 
@@ -41,7 +41,7 @@ pub struct Scored {
 pub struct Group {
     /// What the lanes are grouped by.
     pub by: &'static str,
-    /// Which group.
+    /// Name of the group.
     pub name: String,
     /// Its scores.
     pub scored: Scored,
@@ -51,7 +51,7 @@ pub struct Group {
 pub(super) struct Labels<'a> {
     pub units: usize,
     pub headways: usize,
-    /// Unit, variant, headway.
+    /// Whether the lane (unit, variant, headway) failed.
     pub failed: &'a dyn Fn(usize, usize, usize) -> bool,
 }
 
@@ -60,7 +60,7 @@ impl Labels<'_> {
         self.score_of(variant, options, &|_, _| true)
     }
 
-    /// Scores of the lanes (unit, headway) of which `holds` is true.
+    /// Scores of the lanes (unit, headway) for which `holds` is true.
     fn score_of(&self, variant: usize, options: &ScoreOptions, holds: &dyn Fn(usize, usize) -> bool) -> Scored {
         let of_unit = |unit: usize| {
             let mut counts = Confusion::<u32>::default();
@@ -78,7 +78,7 @@ impl Labels<'_> {
         let units: Vec<Confusion<u32>> = (0..self.units).map(of_unit).collect();
         let sum = |of: fn(&Confusion<u32>) -> u32| units.iter().map(|c| u64::from(of(c))).sum::<u64>();
         let counts = Confusion { tp: sum(|c| c.tp), fn_: sum(|c| c.fn_), fp: sum(|c| c.fp), tn: sum(|c| c.tn) };
-        // The interval of a share of failures counts scenarios as clusters.
+        // The interval of a fraction of failures treats scenarios as clusters.
         let share = |value, of: fn(&Confusion<u32>) -> u32| {
             let clusters = units.iter().map(|c| (u64::from(of(c)), u64::from(c.tp))).filter(|(runs, _)| *runs > 0);
             let (runs, agreed): (Vec<u64>, Vec<u64>) = clusters.unzip();
@@ -99,7 +99,7 @@ impl Labels<'_> {
         }
     }
 
-    /// By headway, by thirds of the ego's speed, and by thirds of the severity of the failures of S.
+    /// Scores by headway, by thirds of the ego's speed, and by thirds of the severity of the failures of S.
     pub fn groups(
         &self,
         variant: usize,
@@ -136,7 +136,7 @@ impl Labels<'_> {
     }
 }
 
-/// Limits between the lower, middle and upper third of some values.
+/// Boundaries between the lower, middle and upper third of the values.
 fn thirds(mut values: Vec<f64>) -> [f64; 2] {
     values.sort_by(f64::total_cmp);
     let at = |share: usize| values.get(values.len() * share / 3).copied().unwrap_or(0.0);
@@ -155,7 +155,7 @@ fn interval_name(third: usize, [low, high]: [f64; 2], unit: &str) -> String {
     }
 }
 
-/// The lanes of one model, with every verdict kept: which failures are hidden is a question of single lanes.
+/// The lanes of one model with all verdicts kept, because hidden failures are identified lane by lane.
 pub(super) struct Replay<'a> {
     pub compare: Compare<'a>,
     pub counts: Partial,
@@ -164,7 +164,7 @@ pub(super) struct Replay<'a> {
 }
 
 impl<'a> Replay<'a> {
-    /// Runs them.
+    /// Runs the lanes.
     ///
     /// # Errors
     /// As [`Compare::plan`] and [`Executor::sweep`].
@@ -193,10 +193,10 @@ impl<'a> Replay<'a> {
         self.compare.lane_plan()
     }
 
-    /// Position of a parameterization among the variants.
+    /// Index of a parameterization among the variants.
     ///
     /// # Errors
-    /// [`Error::Input`] for one that the data cannot have.
+    /// [`Error::Input`] for one that is impossible with this data.
     pub fn variant(&self, id: &Parameterization) -> Result<usize> {
         let found = self.plan().blocks[0].variants.iter().position(|name| *name == id.key);
         found.ok_or_else(|| {
@@ -212,7 +212,7 @@ impl<'a> Replay<'a> {
         self.verdicts[(unit * plan.blocks[0].variants.len() + variant) * plan.headways.len() + headway]
     }
 
-    /// Labels by what says whether a lane failed.
+    /// Labels by a function that says whether a lane failed.
     pub fn labels<'f>(&self, failed: &'f dyn Fn(usize, usize, usize) -> bool) -> Labels<'f> {
         let plan = self.plan();
         Labels { units: plan.blocks[0].units.len() as usize, headways: plan.headways.len(), failed }

@@ -1,5 +1,5 @@
-//! A finished part as a sealed file: the run it belongs to, the interval, the counts. A folder of parts: what is there, and
-//! whether it covers every unit exactly once.
+//! A finished part as a sealed file with its run, interval and counts. A folder of parts, and whether it covers every
+//! unit exactly once.
 
 use std::ops::Range;
 use std::path::{Path, PathBuf};
@@ -12,20 +12,21 @@ use super::sealed::{read_sealed, seal};
 use crate::support::files::write_inside;
 use crate::{Error, Place, Result};
 
-/// Part files of a folder by their names.
+/// Part files of a folder, identified by their names.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Found {
-    /// Shards with their files, in order of their units.
+    /// Shards with their files, in the order of their units.
     pub parts: Vec<(Shard, PathBuf)>,
 }
 
-/// Lists most of these by name.
+/// Maximum number of parts listed by name in an error.
 const NAMED: usize = 10;
 
-/// The parts in a folder, which must cover `units` units exactly once. `again` gives the command that makes a shard.
+/// Finds the parts in a folder, which must cover `units` units exactly once. `again` returns the command that makes a
+/// shard.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Input`] naming what is missing or doubled, and the commands that make it.
+/// [`Error::Io`]; [`Error::Input`] with the missing or duplicate parts and the commands that make them.
 pub fn collect(dir: &Path, units: u64, again: impl Fn(Shard) -> String) -> Result<Found> {
     let io = |e| Error::io(dir, "list", e);
     let mut parts: Vec<(Shard, PathBuf)> = Vec::new();
@@ -56,10 +57,10 @@ pub fn collect(dir: &Path, units: u64, again: impl Fn(Shard) -> String) -> Resul
     Ok(Found { parts })
 }
 
-/// All parts of a folder, checked: of this run, whole, together everything exactly once.
+/// Reads all parts of a folder and checks that they are whole, belong to this run, and cover everything exactly once.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Input`] naming what is missing, doubled, foreign or damaged, and with `again` how it is made.
+/// [`Error::Io`]; [`Error::Input`] with the missing, duplicate, foreign or damaged parts, and the command from `again`.
 pub fn read_parts<T: MergeableCounts>(
     dir: &Path,
     run_sha256: &str,
@@ -92,7 +93,7 @@ fn check_cover(dir: &Path, units: u64, parts: &[(Shard, PathBuf)], again: impl F
     let mut at = 0;
     let mut before: Option<&(Shard, PathBuf)> = None;
     let mut gaps: Vec<Range<u64>> = Vec::new();
-    // A shard of more shards than there are units may be empty: it neither covers nor doubles.
+    // If there are more shards than units, some are empty: these neither cover nor duplicate units.
     for part in parts.iter().filter(|(shard, _)| !shard.units(units).is_empty()) {
         let own = part.0.units(units);
         if own.start < at {
@@ -115,7 +116,7 @@ fn check_cover(dir: &Path, units: u64, parts: &[(Shard, PathBuf)], again: impl F
     }
     let missing: u64 = gaps.iter().map(|gap| gap.end - gap.start).sum();
     let problem = format!("{missing} of {units} units are missing");
-    // Commands are known where all parts are of one number of shards.
+    // The command is known only if all parts have the same number of shards.
     let of = parts[0].0.of;
     if parts.iter().any(|(shard, _)| shard.of != of) {
         let list: Vec<String> = gaps.iter().take(NAMED).map(|gap| format!("{}..{}", gap.start, gap.end)).collect();
@@ -138,24 +139,24 @@ fn check_cover(dir: &Path, units: u64, parts: &[(Shard, PathBuf)], again: impl F
     Err(Error::input(Place::file(dir), problem, format!("make them:\n{}", help.join("\n"))))
 }
 
-/// Largest part that is read.
+/// Maximum size of a part that is read, bytes.
 const MAX_BYTES: u64 = 4 << 30;
 
 /// Counts of an interval of units.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Part<T> {
-    /// Hash of the run: of its plan file's content.
+    /// Hash of the run, that is, of its plan file's content.
     pub run_sha256: String,
     /// The interval.
     pub units: Range<u64>,
-    /// Did the part's host leave lanes of a device to the CPU, and how many were checked: `[redone, rechecked]`.
+    /// Lanes that the part's host recomputed with the fallback, and lanes that it rechecked: `[redone, rechecked]`.
     pub lanes_redone_and_rechecked: [u64; 2],
     /// The counts, segment by segment.
     pub segments: Vec<T>,
 }
 
-/// Writes a part: whole or not at all.
+/// Writes a part atomically.
 ///
 /// # Errors
 /// [`Error::Io`].
@@ -164,8 +165,7 @@ pub fn write_part<T: Serialize>(path: &Path, part: &Part<T>) -> Result<()> {
     write_inside(path, |file| file.write_all(&text))
 }
 
-/// Reads a part of a run. `again` is the command that makes it; `fits` says what is wrong with counts that are not the
-/// run's.
+/// Reads a part of a run. `again` is the command that makes it; `fits` checks that the counts belong to the run.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] for a damaged part, one of another run, or of another interval.
@@ -231,7 +231,7 @@ mod tests {
         let dir = folder(&["part-00000-of-00002.json", "part-00002-of-00004.json", "part-00003-of-00004.json"]);
         let found = collect(dir.path(), 8, |_| String::new()).unwrap();
         assert_eq!(found.parts.len(), 3);
-        // More shards than units: the empty ones need not be there.
+        // More shards than units: the empty ones may be missing.
         let dir = folder(&["part-00001-of-00002.json"]);
         assert!(collect(dir.path(), 1, |_| String::new()).is_ok());
     }

@@ -1,5 +1,5 @@
-//! The journal of a part that is not finished: one record per line, each with its checksum. The first line says which
-//! run and which interval. A torn or damaged record ends what is believed; all after it is computed again.
+//! The journal of an unfinished part: one record per line, each with its checksum. The first line identifies the run
+//! and the interval. Reading stops at the first torn or damaged record; everything after it is recomputed.
 
 use std::fs::{File, OpenOptions};
 use std::io::{BufRead, BufReader, Read, Seek, SeekFrom, Write};
@@ -18,17 +18,18 @@ use crate::support::atomic_file::{is_named, refuse_link};
 use crate::support::plain_text::hex;
 use crate::{Error, Place, Result};
 
-/// Records are not written more often.
+/// Minimum time between two records.
 const MIN_WAIT: Duration = Duration::from_millis(250);
-/// A record waits this many times as long as the last one took to reach the disk, so that journals cost at most 1 %.
+/// The wait between records is at least this multiple of the time that the last write took, so that journals cost at
+/// most 1 %.
 const PATIENCE: u32 = 100;
-/// Longest first line.
+/// Maximum length of the first line, bytes.
 const MAX_HEAD_BYTES: u64 = 4096;
-/// A larger file without a whole first line is no journal that was torn while it was begun.
+/// A larger file without a complete first line is not a journal torn at its start, bytes.
 const MAX_FIRST_BYTES: u64 = 16 << 20;
-/// Largest journal that is read.
+/// Maximum size of a journal that is read, bytes.
 const MAX_BYTES: u64 = 4 << 30;
-/// Characters of a checksum in hexadecimal.
+/// Hexadecimal characters of a checksum.
 const CHECKSUM: usize = 64;
 
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -40,7 +41,7 @@ struct Head {
     units: Range<u64>,
 }
 
-/// An open journal. The file begins with the first record: a run that ends before leaves none.
+/// An open journal. The file is created with the first record: a run that ends earlier leaves none.
 pub struct Journal<T> {
     path: PathBuf,
     head: Head,
@@ -50,19 +51,19 @@ pub struct Journal<T> {
     kind: PhantomData<T>,
 }
 
-/// What an earlier process left.
+/// Records of an earlier process.
 pub struct Records<T> {
-    /// The whole records, in the order in which they were written.
+    /// The complete records, in the order in which they were written.
     pub records: Vec<T>,
-    /// A record was torn or damaged; it and all after it were dropped.
+    /// A record was torn or damaged; it and all later records were dropped.
     pub torn: bool,
 }
 
 impl<T: Serialize + DeserializeOwned> Journal<T> {
-    /// Opens the journal of a run's interval; what is whole in it is kept and given back.
+    /// Opens the journal of a run's interval; keeps and returns its complete records.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Input`] where the file is the journal of another run or interval.
+    /// [`Error::Io`]; [`Error::Input`] if the file is the journal of another run or interval.
     pub fn open(path: &Path, run_sha256: &str, units: Range<u64>) -> Result<(Journal<T>, Records<T>)> {
         let engine = ENGINE_VERSION;
         let head = Head { lanesweep_journal: 3, engine, run_sha256: run_sha256.to_owned(), units };
@@ -95,13 +96,13 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
         if whole > 0 {
             journal.file = Some(file);
         } else {
-            // Not even the head is whole: it is begun anew.
+            // Even the first line is incomplete, so the journal is recreated.
             std::fs::remove_file(path).map_err(io)?;
         }
         Ok((journal, Records { records, torn }))
     }
 
-    /// The whole records and where they end; a line at a time is in memory.
+    /// The complete records and their end in the file; only one line at a time is in memory.
     fn parse(&self, file: &mut impl BufRead) -> Result<(Vec<T>, u64)> {
         let (mut records, mut whole) = (Vec::new(), 0);
         let longest = |whole: u64| if whole == 0 { MAX_HEAD_BYTES } else { MAX_BYTES };
@@ -134,15 +135,15 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
         Ok((records, whole))
     }
 
-    /// Is it time for the next record?
+    /// Whether the next record is due.
     pub fn is_due(&self) -> bool {
         Instant::now() >= self.due
     }
 
-    /// Appends records and brings them to the disk.
+    /// Appends records and syncs them to the disk.
     ///
     /// # Errors
-    /// [`Error::Io`]: what was there before stays whole, unless the error says that the file itself is gone.
+    /// [`Error::Io`]: earlier records stay intact, unless the error says that the file was deleted.
     pub fn append(&mut self, records: &[T]) -> Result<()> {
         let started = Instant::now();
         let mut text = Vec::new();
@@ -153,7 +154,7 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
             text.extend(line_of(record)?);
         }
         match &self.file {
-            // The system would go on writing into a file that nobody finds again.
+            // Otherwise the system would continue to write to a deleted file.
             Some(file) if !is_named(&self.path, file) => return Err(self.gone()),
             Some(_) => {}
             None => {
@@ -173,18 +174,18 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
         Ok(())
     }
 
-    /// Time that appending has taken so far.
+    /// Total time spent on appending.
     pub fn spent(&self) -> Duration {
         self.spent
     }
 
-    /// A write that failed leaves a torn record at most.
+    /// A failed write leaves at most one torn record.
     fn failed(&self, source: std::io::Error) -> Error {
         let kept = "the records before are whole: once this is mended, the same command goes on from them";
         Error::io(&self.path, "write", std::io::Error::new(source.kind(), format!("{source}; {kept}")))
     }
 
-    /// The file or its folder was taken away while the run was at work.
+    /// The file or its folder was deleted during the run.
     fn gone(&self) -> Error {
         let folder = self.path.parent().filter(|folder| !folder.as_os_str().is_empty()).unwrap_or(Path::new("."));
         let what = if folder.is_dir() {
@@ -196,7 +197,7 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
         Error::io(&self.path, "write", std::io::Error::other(why))
     }
 
-    /// The part is finished, or is to be forgotten: takes the file away.
+    /// Deletes the file, because the part is finished or discarded.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -208,13 +209,13 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
         }
     }
 
-    /// Where it is.
+    /// The path of the file.
     pub fn path(&self) -> &Path {
         &self.path
     }
 }
 
-/// `checksum content` and an end of line.
+/// Formats a record as `checksum content` and a line end.
 fn line_of<R: Serialize>(record: &R) -> Result<Vec<u8>> {
     let body =
         serde_json::to_vec(record).map_err(|e| Error::Internal(format!("a journal record cannot be written: {e}")))?;
@@ -225,7 +226,7 @@ fn line_of<R: Serialize>(record: &R) -> Result<Vec<u8>> {
     Ok(line)
 }
 
-/// Whether a file may be a journal that was torn while it was begun: as far as it goes, it begins with a checksum.
+/// Whether a file may be a journal that was torn at its start: its available bytes begin with a checksum.
 fn begins_as_journal(mut file: &File) -> std::io::Result<bool> {
     let mut begin = Vec::new();
     file.rewind()?;
@@ -233,7 +234,7 @@ fn begins_as_journal(mut file: &File) -> std::io::Result<bool> {
     Ok(begin.iter().all(|byte| byte.is_ascii_hexdigit()))
 }
 
-/// The content of a whole line.
+/// The content of a complete line.
 fn checked(line: &[u8]) -> Option<&[u8]> {
     let line = line.strip_suffix(b"\n")?;
     let (checksum, body) = line.split_at_checked(CHECKSUM)?;
@@ -321,7 +322,7 @@ mod tests {
             assert!(error.to_string().contains("another run"), "{error}");
         }
         assert_eq!(std::fs::read(&path).unwrap(), before);
-        // Of another engine, whose version is part of the head and its checksum; and as earlier versions began.
+        // Journals of another engine, whose version is part of the first line and its checksum, and of earlier formats.
         let units = 0..10;
         let head = Head { lanesweep_journal: 3, engine: ENGINE_VERSION + 1, run_sha256: "run".to_owned(), units };
         let earlier =

@@ -1,4 +1,4 @@
-//! What a running part has counted: in memory and, now and then, in its journal.
+//! The counts of a running part: in memory and, periodically, in its journal.
 
 use std::ops::Range;
 
@@ -9,19 +9,19 @@ use super::journal::{Journal, Records};
 use crate::engine::Partial;
 use crate::{Error, Place, Result};
 
-/// Counts over a set of units of one plan that join in any order.
+/// Counts over a set of units of one plan that can be merged in any order.
 pub trait MergeableCounts: Sized + Clone + Serialize + DeserializeOwned {
     /// The units counted, as disjoint intervals, ascending.
     fn covered(&self) -> Vec<Range<u64>>;
-    /// Counts over both sets.
+    /// Merges the counts of both sets.
     ///
     /// # Errors
-    /// Where a unit is in both, or the plans differ.
+    /// If a unit is in both, or the plans differ.
     fn join(self, other: Self) -> Result<Self>;
-    /// Whether counts that were read from a file can be those of a run.
+    /// Checks whether counts read from a file can be those of a run.
     ///
     /// # Errors
-    /// What contradicts itself.
+    /// The contradiction found.
     fn check(&self) -> std::result::Result<(), String>;
 }
 
@@ -31,22 +31,22 @@ pub trait MergeableCounts: Sized + Clone + Serialize + DeserializeOwned {
 pub struct Counted<T> {
     /// Counts of some units.
     pub counts: T,
-    /// Of their lanes, those that the fallback computed, and those that were computed again.
+    /// Number of lanes computed by the fallback, and of lanes rechecked.
     pub redone_and_rechecked: [u64; 2],
 }
 
 /// The journal of a ledger.
 pub type CountsJournal<T> = Journal<Counted<T>>;
 
-/// Finished counts of an interval of units. Where the interval has cuts (the checkpoints of a sampling run), counts on
-/// the two sides of a cut stay apart.
+/// Finished counts of an interval of units. If the interval has cuts (the checkpoints of a sampling run), counts on the
+/// two sides of a cut are kept apart.
 pub struct Ledger<T> {
     units: Range<u64>,
-    /// Ends of the segments, ascending; the last is that of the interval.
+    /// Ends of the segments, ascending; the last one is the end of the interval.
     ends: Vec<u64>,
     /// Counts per segment.
     segments: Vec<Option<T>>,
-    /// Lanes of the segments: those that the fallback computed, and those that were computed again.
+    /// Lanes of the segments: those computed by the fallback, and those rechecked.
     redone_and_rechecked: [u64; 2],
     /// The newest counts, all of one segment.
     pending: Option<Counted<T>>,
@@ -56,7 +56,7 @@ pub struct Ledger<T> {
 }
 
 impl<T: MergeableCounts> Ledger<T> {
-    /// Nothing counted yet, cut at these units; without a journal nothing outlives the process.
+    /// A ledger without counts, cut at these units. Without a journal the counts are lost when the process ends.
     pub fn new(units: Range<u64>, cuts: &[u64]) -> Ledger<T> {
         let inside = cuts.iter().copied().filter(|cut| units.start < *cut && *cut < units.end);
         let mut ends: Vec<u64> = inside.chain([units.end]).collect();
@@ -67,12 +67,12 @@ impl<T: MergeableCounts> Ledger<T> {
         Ledger { units, ends, segments, redone_and_rechecked: [0; 2], pending, unwritten, journal }
     }
 
-    /// Takes over what a journal holds and writes on in it. Returns the number of units that need not be computed. `fits`
-    /// says what is wrong with counts that are not the run's.
+    /// Takes over the records of a journal and continues it. Returns the number of units that need not be computed.
+    /// `fits` checks that counts belong to the run.
     ///
     /// # Errors
-    /// [`Error::Input`] naming the journal where a record's counts cannot be, are there twice, or fit no segment of the
-    /// interval: its checksum is whole all the same.
+    /// [`Error::Input`] with the journal's path if a record's counts are invalid, duplicate, or fit no segment of the
+    /// interval, although its checksum matches.
     pub fn resume(&mut self, journal: CountsJournal<T>, found: Records<Counted<T>>, fits: &Fits<T>) -> Result<u64> {
         if found.torn {
             tracing::warn!("{}: the last record is not whole; it is computed again", journal.path().display());
@@ -97,7 +97,7 @@ impl<T: MergeableCounts> Ledger<T> {
         self.ends.partition_point(|end| *end <= unit)
     }
 
-    /// The one segment that holds all of these intervals.
+    /// The segment that contains all of these intervals.
     fn segment_holding(&self, covered: &[Range<u64>]) -> Option<usize> {
         let (first, last) = (covered.first()?, covered.last()?);
         let segment = self.segment_of(first.start);
@@ -126,8 +126,8 @@ impl<T: MergeableCounts> Ledger<T> {
         Ok(())
     }
 
-    /// Adds the counts of a chunk, which crosses no cut, with [`Chunk::redone_and_rechecked`](crate::engine::Chunk); now and then they go to the
-    /// journal.
+    /// Adds the counts of a chunk, which must not cross a cut, with
+    /// [`Chunk::redone_and_rechecked`](crate::engine::Chunk). Writes to the journal periodically.
     ///
     /// # Errors
     /// [`Error::Io`] of the journal.
@@ -153,10 +153,11 @@ impl<T: MergeableCounts> Ledger<T> {
         Ok(())
     }
 
-    /// What came of a sweep, after an interruption with everything counted in the journal, where there is one.
+    /// Returns the result of a sweep. After an interruption, it first writes all counts to the journal, if there is
+    /// one.
     ///
     /// # Errors
-    /// Of the sweep, of the journal.
+    /// Those of the sweep and of the journal.
     pub fn kept<R>(&mut self, swept: Result<R>) -> Result<R> {
         match swept {
             Err(Error::Interrupted { .. }) if self.journal.is_some() => {
@@ -168,7 +169,7 @@ impl<T: MergeableCounts> Ledger<T> {
         }
     }
 
-    /// Puts the newest counts into their segment.
+    /// Moves the newest counts into their segment.
     fn settle(&mut self) -> Result<()> {
         let Some(counts) = self.pending.take() else { return Ok(()) };
         if self.journal.is_some() {
@@ -177,7 +178,7 @@ impl<T: MergeableCounts> Ledger<T> {
         self.place(counts)
     }
 
-    /// Brings everything to the journal.
+    /// Writes all counts to the journal.
     fn flush(&mut self) -> Result<()> {
         self.settle()?;
         if let Some(journal) = self.journal.as_mut().filter(|_| !self.unwritten.is_empty()) {
@@ -187,13 +188,12 @@ impl<T: MergeableCounts> Ledger<T> {
         Ok(())
     }
 
-    /// Number of units counted, pending ones left out.
+    /// Number of counted units, without pending ones.
     fn done(&self) -> u64 {
         self.segments.iter().flatten().flat_map(MergeableCounts::covered).map(|range| range.end - range.start).sum()
     }
 
-    /// Lanes of everything counted, by this process and by earlier ones: those that the fallback computed, and those that
-    /// were computed again.
+    /// Lanes of all counts, of this process and of earlier ones: those computed by the fallback, and those rechecked.
     pub fn redone_and_rechecked(&self) -> [u64; 2] {
         let mut sum = self.redone_and_rechecked;
         self.pending.iter().for_each(|pending| add(&mut sum, pending.redone_and_rechecked));
@@ -205,10 +205,10 @@ impl<T: MergeableCounts> Ledger<T> {
         self.units.clone()
     }
 
-    /// The intervals of a range that are not counted yet, cut at the cuts, ascending.
+    /// The intervals of a range that are not counted yet, split at the cuts, ascending.
     ///
     /// # Errors
-    /// Of [`MergeableCounts::join`].
+    /// Those of [`MergeableCounts::join`].
     pub fn missing(&mut self, range: Range<u64>) -> Result<Vec<Range<u64>>> {
         self.settle()?;
         let mut covered: Vec<Range<u64>> = self.segments.iter().flatten().flat_map(MergeableCounts::covered).collect();
@@ -233,10 +233,10 @@ impl<T: MergeableCounts> Ledger<T> {
         Ok(missing)
     }
 
-    /// The counts of the segments that lie in a range, joined; `None` where nothing is counted there.
+    /// The merged counts of the segments inside a range; `None` if nothing is counted there.
     ///
     /// # Errors
-    /// Of [`MergeableCounts::join`].
+    /// Those of [`MergeableCounts::join`].
     pub fn counts(&mut self, range: Range<u64>) -> Result<Option<T>> {
         self.settle()?;
         let inside = self.segments.iter().flatten().filter(|counts| {
@@ -252,10 +252,10 @@ impl<T: MergeableCounts> Ledger<T> {
         Ok(joined)
     }
 
-    /// The counts of all segments, joined; nothing is counted afterwards, so that no count is held twice.
+    /// Removes and returns the merged counts of all segments, so that no count is held twice.
     ///
     /// # Errors
-    /// Of [`MergeableCounts::join`].
+    /// Those of [`MergeableCounts::join`].
     pub fn take(&mut self) -> Result<Option<T>> {
         self.settle()?;
         self.unwritten.clear();
@@ -264,17 +264,17 @@ impl<T: MergeableCounts> Ledger<T> {
         all.try_fold(first, T::join).map(Some)
     }
 
-    /// Everything counted, segment by segment, and the journal, to be removed once the result stands.
+    /// All counts, segment by segment, and the journal, to be deleted after the result is written.
     ///
     /// # Errors
-    /// Of [`MergeableCounts::join`].
+    /// Those of [`MergeableCounts::join`].
     pub fn finish(mut self) -> Result<(Vec<T>, Option<CountsJournal<T>>)> {
         self.settle()?;
         Ok((self.segments.into_iter().flatten().collect(), self.journal))
     }
 }
 
-/// Says what is wrong with counts that are not of the run at hand, whatever their checksum.
+/// Checks that counts belong to the present run, independent of their checksum; the error says what is wrong.
 pub type Fits<'f, T> = dyn Fn(&T) -> std::result::Result<(), String> + 'f;
 
 fn add(sum: &mut [u64; 2], more: [u64; 2]) {
@@ -325,7 +325,7 @@ mod tests {
         Units(range.collect())
     }
 
-    /// What a ledger says of a journal with these records; it names the journal.
+    /// The ledger's error for a journal with these records; it must name the journal.
     fn refused(path: &std::path::Path, records: &[Units], fits: &Fits<Units>) -> String {
         let mut journal = Journal::open(path, "run", 10..100).unwrap().0;
         for record in records {
@@ -369,13 +369,13 @@ mod tests {
         }
         assert_eq!(ledger.redone_and_rechecked(), [4, 43]);
         assert_eq!(ledger.counts(10..40).unwrap(), Some(units(10..40)));
-        // A record that is whole but of other units, or of two segments: the file's fault.
+        // Intact records of other units, or of two segments: an error of the file.
         for strange in [units(15..25), units(0..11), units(99..101)] {
             let path = dir.path().join("strange");
             let error = refused(&path, &[strange], &|_| Ok(()));
             assert!(error.contains("no segment"), "{error}");
         }
-        // The same units twice, and counts of another run.
+        // Duplicate units, and counts of another run.
         let path = dir.path().join("twice");
         assert!(refused(&path, &[units(20..30), units(25..27)], &|_| Ok(())).contains("twice"));
         assert!(refused(&path, &[units(20..30)], &|_| Err("of another run".to_owned())).contains("of another run"));

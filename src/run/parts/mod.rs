@@ -1,8 +1,8 @@
 //! Runs in parts: shards of a plan, journals of finished chunks, part files, and what merging checks.
 //!
-//! A part is an interval of units. While it runs, a [`Ledger`] keeps what is counted and appends it to a journal; when
-//! it is done, it becomes a part file. Both say which run they belong to, by its hash. Counts themselves live
-//! in the [`engine`](crate::engine) and [`sampling`](crate::run::sampling).
+//! A part is an interval of units. While it runs, a [`Ledger`] holds its counts and appends them to a journal; a
+//! finished part becomes a part file. Both identify their run by its hash. The types of the counts are in the
+//! [`engine`](crate::engine) and [`sampling`](crate::run::sampling).
 
 mod folder;
 mod journal;
@@ -34,32 +34,32 @@ const KUBERNETES: &str = "JOB_COMPLETION_INDEX";
 const SLURM: [&str; 2] = ["SLURM_ARRAY_TASK_ID", "SLURM_ARRAY_TASK_MIN"];
 
 impl Shard {
-    /// More parts than any cluster runs at once.
+    /// Maximum number of shards: more than any cluster runs at once.
     pub const MAX_SHARDS: u64 = 100_000;
 
-    /// The units that this shard computes, of so many.
+    /// The units of this shard, out of `count`.
     pub fn units(&self, count: u64) -> Range<u64> {
-        // 128 bits: index × count may not fit in 64.
+        // 128 bits, because index × count may exceed 64 bits.
         let cut = |index: u64| (u128::from(count) * u128::from(index) / u128::from(self.of)) as u64;
         cut(self.index)..cut(self.index + 1)
     }
 
-    /// Name of its files without the ending: `part-00003-of-00020`.
+    /// File name of its files without the extension: `part-00003-of-00020`.
     pub fn stem(&self) -> String {
         format!("part-{:05}-of-{:05}", self.index, self.of)
     }
 
-    /// The shard that a file name begins with.
+    /// The shard at the beginning of a file name.
     pub fn of_stem(stem: &str) -> Option<Shard> {
         let (index, of) = stem.strip_prefix("part-")?.split_once("-of-")?;
         let shard = Shard { index: index.parse().ok()?, of: of.parse().ok()? };
         (shard.stem() == stem).then_some(shard)
     }
 
-    /// `i/n`, or `auto/n` with the index that Kubernetes or Slurm gives in `environment`.
+    /// Parses `i/n`, or `auto/n` with the index that Kubernetes or Slurm sets in `environment`.
     ///
     /// # Errors
-    /// What is wrong and what to write, in a sentence.
+    /// A sentence that says what is wrong and what to write.
     pub fn parse(text: &str, environment: impl Fn(&str) -> Option<String>) -> Result<Shard, String> {
         let form = "write i/n with i from 0 to n - 1, such as 0/20, or auto/n in a Slurm array or an Indexed Job";
         let (index, of) = text.split_once('/').ok_or(form)?;

@@ -1,4 +1,4 @@
-//! A run or one of its parts in a folder: the lock, the journal, the part file, the plan that all parts share.
+//! A run or one of its parts in a folder: the lock, the journal, the part file, and the plan that all parts share.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, ErrorKind, Read, Seek, Write};
@@ -16,29 +16,29 @@ use crate::support::readable::count;
 use crate::support::run_dir::OutputDir;
 use crate::{Error, Place, Result};
 
-/// Name of the plan in a run's folder.
+/// File name of the plan in a run's folder.
 pub const PLAN_FILE: &str = "plan.json";
 
-/// Name of the plan that a run in one piece leaves in its folder, for its lanes to be run again. Another name than that
-/// of a run in parts, whose processes share their plan and hold no common lock.
+/// File name of the plan that a run in one piece leaves in its folder, so that its lanes can be rerun. It differs from
+/// that of a run in parts, whose processes share their plan and hold no common lock.
 pub const RUN_PLAN_FILE: &str = "run-plan.json";
 
-/// An interval of a run at work: its lock, its journal, what is counted.
+/// A running interval of a run: its lock, its journal, its counts.
 pub struct RunState<T> {
     /// The interval.
     pub units: Range<u64>,
-    /// What is counted.
+    /// The counts.
     pub ledger: Ledger<T>,
-    /// Where it is done; of a part, together with other parts.
+    /// The run's folder; other parts may use it too.
     pub folder: OutputDir,
     part: Option<FolderLock>,
 }
 
-/// The place of a run or of one of its parts in its folder.
+/// The files of a run or of one of its parts in its folder.
 pub struct RunDir {
     /// The run's folder.
     pub out: PathBuf,
-    /// Name of the whole run's record.
+    /// File name of the whole run's record.
     pub record: &'static str,
     /// Hash of the run.
     pub run_sha256: String,
@@ -58,12 +58,12 @@ impl RunDir {
         units_of(self.shard, self.unit_count)
     }
 
-    /// The part's file.
+    /// The path of the part file.
     pub fn part(&self) -> Option<PathBuf> {
         self.shard.map(|shard| self.out.join(format!("{}.json", shard.stem())))
     }
 
-    /// Is the part there, whole and of this run? Then nothing is to be done.
+    /// Whether the part exists, is complete and belongs to this run; then there is nothing to compute.
     ///
     /// # Errors
     /// [`Error::Input`] for a damaged or foreign file in its place.
@@ -72,10 +72,11 @@ impl RunDir {
         read_part::<T>(&path, &self.run_sha256, &self.units(), "run this command again", fits).map(|_| true)
     }
 
-    /// Takes the place: no other process computes the same. What an earlier one left is taken over, cut at `cuts`.
+    /// Locks the interval, so that no other process computes it, and takes over the counts of an earlier process, cut
+    /// at `cuts`.
     ///
     /// # Errors
-    /// [`Error::Busy`] where another process is at it; [`Error::Io`]; as [`Ledger::resume`].
+    /// [`Error::Busy`] if another process computes it; [`Error::Io`]; as [`Ledger::resume`].
     pub fn begin<T: MergeableCounts>(&self, cuts: &[u64], is_journalled: bool, fits: &Fits<T>) -> Result<RunState<T>> {
         let stem = self.shard.map(|shard| shard.stem());
         let (folder, part) = match &stem {
@@ -102,7 +103,7 @@ impl RunDir {
         Ok(RunState { units, ledger, folder, part })
     }
 
-    /// Parts of two splits double one another: better said before the work than by the merge.
+    /// Parts of two splits overlap; this warns before the computation, not only at the merge.
     fn warn_of_another_split(&self, stem: &str) {
         let split = |name: &str| name.strip_prefix("part-")?.split_once("-of-").map(|(_, count)| count.to_owned());
         let Some(ours) = split(stem) else { return };
@@ -119,10 +120,10 @@ impl RunDir {
         }
     }
 
-    /// Writes the part and takes its journal away.
+    /// Writes the part and deletes its journal.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Internal`] where the ledger is not complete.
+    /// [`Error::Io`]; [`Error::Internal`] if the ledger is not complete.
     pub fn finish<T: MergeableCounts>(&self, mut state: RunState<T>) -> Result<()> {
         let Some(path) = self.part() else { return Err(Error::Internal("the whole run is no part".to_owned())) };
         if !state.ledger.missing(state.units.clone())?.is_empty() {
@@ -131,7 +132,7 @@ impl RunDir {
         let lanes_redone_and_rechecked = state.ledger.redone_and_rechecked();
         let (segments, journal) = state.ledger.finish()?;
         let run_sha256 = self.run_sha256.clone();
-        // It was there before the work; where it vanished meanwhile, the part is worth another one.
+        // The folder existed at the start; if it was deleted since, it is recreated to save the part.
         make_folder(&self.out)?;
         write_part(&path, &Part { run_sha256, units: state.units, lanes_redone_and_rechecked, segments })?;
         journal.map_or(Ok(()), Journal::remove)?;
@@ -142,7 +143,7 @@ impl RunDir {
 }
 
 impl<T: MergeableCounts> RunState<T> {
-    /// The result stands: the journal goes, then the lock.
+    /// After the result is written, deletes the journal, then releases the lock.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -154,12 +155,12 @@ impl<T: MergeableCounts> RunState<T> {
     }
 }
 
-/// Writes a plan into a run's folder, or finds the same one there: many shards may do so at once. A plan is told by its
-/// first line, which holds the checksums of all that follows. One with this line and other bytes behind it was damaged
-/// and is written again. `write` writes the whole plan.
+/// Writes a plan into a run's folder, or checks that the same one exists; many shards may do so at once. The first line
+/// of a plan identifies it and holds the checksums of the rest. A plan with the same first line and a different rest is
+/// damaged and is rewritten. `write` writes the whole plan.
 ///
 /// # Errors
-/// [`Error::Input`] where the folder holds the plan of another run; [`Error::Io`].
+/// [`Error::Input`] if the folder holds the plan of another run; [`Error::Io`].
 pub fn leave_plan(out: &Path, line: &[u8], write: impl Fn(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
     let (_folder, path) = (OutputDir::share(out)?, out.join(PLAN_FILE));
     let io = |e| Error::io(&path, "read", e);
@@ -185,7 +186,7 @@ pub fn leave_plan(out: &Path, line: &[u8], write: impl Fn(&mut dyn Write) -> std
     write_inside(&path, write)
 }
 
-/// Compares what is written with a file.
+/// A writer that compares its input with a file.
 struct SameAs {
     file: BufReader<File>,
     is_same: bool,

@@ -1,4 +1,4 @@
-//! JSON with kind, version and checksum around it: whole and unchanged, or refused.
+//! JSON with kind, version and checksum: a file is intact, or refused.
 
 use std::fs::File;
 use std::io::{BufRead, BufReader, Read};
@@ -19,7 +19,7 @@ const VERSION: u64 = 2;
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Sealed<'a> {
-    /// What the content is: `part`, `plan`.
+    /// Kind of the content: `part`, `plan`.
     lanesweep: String,
     version: u64,
     /// [`ENGINE_VERSION`] of the program that wrote it.
@@ -30,16 +30,16 @@ struct Sealed<'a> {
     content: &'a RawValue,
 }
 
-/// A checksum detects damage. It is no signature: whoever changes a file can make its checksum anew.
+/// A checksum detects damage. It is not a signature: anyone who changes a file can recompute its checksum.
 fn checksum(kind: &str, content: &RawValue) -> String {
     let digest = Sha256::new().chain_update(format!("{kind} {VERSION} {ENGINE_VERSION}\n"));
     hex(&digest.chain_update(content.get()).finalize())
 }
 
-/// The text of a sealed file, with its content's hash.
+/// Returns the text of a sealed file, and the hash of its content.
 ///
 /// # Errors
-/// None for what this program makes.
+/// None for types of this program.
 pub fn seal<T: Serialize>(kind: &str, content: &T) -> Result<(Vec<u8>, String)> {
     let unwritable = |e: serde_json::Error| unwritable(kind, &e);
     let content = serde_json::value::to_raw_value(content).map_err(unwritable)?;
@@ -55,10 +55,10 @@ fn unwritable(kind: &str, e: &serde_json::Error) -> Error {
     Error::Internal(format!("a {kind} cannot be written: {e}"))
 }
 
-/// The content of a sealed text with its checksum. `again` says how such a file is made.
+/// Returns the content of a sealed text and its checksum. `again` says how to remake such a file.
 ///
 /// # Errors
-/// [`Error::Input`] for another kind or version, or anything but the bytes that were written.
+/// [`Error::Input`] for another kind or version, or a checksum mismatch.
 pub fn unseal<T: DeserializeOwned>(kind: &str, text: &[u8], place: &Place, again: &str) -> Result<(T, String)> {
     let wrong = |problem: String| Error::input(place.clone(), problem, again);
     check_begin(kind, text).map_err(wrong)?;
@@ -71,10 +71,11 @@ pub fn unseal<T: DeserializeOwned>(kind: &str, text: &[u8], place: &Place, again
     Ok((content, sealed.sha256))
 }
 
-/// Reads a sealed file of at most so many bytes. Whether it is one, and not cut off, is known by its first and last bytes
-/// before all is read.
+/// Reads a sealed file of at most `max_bytes` bytes. Its first and last bytes are checked before all is read, to detect
+/// other and truncated files.
 ///
 /// # Errors
+/// [`Error::Io`]; as [`unseal`].
 /// [`Error::Io`]; as [`unseal`].
 pub fn read_sealed<T: DeserializeOwned>(kind: &str, path: &Path, max_bytes: u64, again: &str) -> Result<(T, String)> {
     let (begin, end) = ends(&mut open(path)?).map_err(|e| Error::io(path, "read", e))?;
@@ -86,16 +87,16 @@ pub fn read_sealed<T: DeserializeOwned>(kind: &str, path: &Path, max_bytes: u64,
     unseal(kind, &read(path, max_bytes)?, &Place::file(path), again)
 }
 
-/// What a sealed file calls itself before its content.
+/// The header of a sealed file, before its content.
 struct Head {
     kind: String,
     version: u64,
-    /// None before version 2.
+    /// `None` before version 2.
     engine: Option<u64>,
 }
 
 impl Head {
-    /// Whether this program may use the file.
+    /// Checks whether this program may use the file.
     fn check(&self) -> std::result::Result<(), String> {
         if self.version != VERSION {
             return Err(format!("its version is {}, this program reads {VERSION}", self.version));
@@ -111,7 +112,7 @@ impl Head {
     }
 }
 
-/// Whether a text begins as a sealed file of this kind that this program may use.
+/// Checks whether a text begins as a sealed file of this kind that this program may use.
 fn check_begin(kind: &str, text: &[u8]) -> std::result::Result<(), String> {
     match head_of(text) {
         None => Err(format!("this is no whole {kind}")),
@@ -120,7 +121,7 @@ fn check_begin(kind: &str, text: &[u8]) -> std::result::Result<(), String> {
     }
 }
 
-/// The beginning of a sealed file, as [`seal`] writes it.
+/// Parses the beginning of a sealed file, as [`seal`] writes it.
 fn head_of(text: &[u8]) -> Option<Head> {
     fn number<'a>(rest: &'a str, before: &str) -> Option<(u64, &'a str)> {
         let rest = rest.strip_prefix(before)?;
@@ -134,10 +135,10 @@ fn head_of(text: &[u8]) -> Option<Head> {
     Some(Head { kind: kind.to_owned(), version, engine })
 }
 
-/// Bytes in which a sealed file tells its kind and versions.
+/// Maximum number of bytes that hold the kind and versions of a sealed file.
 const MAX_HEAD: usize = 256;
 
-/// Reads the first line of a sealed file, behind which more may come: that is left in the reader.
+/// Reads the first line of a sealed file; further content stays in the reader.
 ///
 /// # Errors
 /// [`Error::Io`]; as [`unseal`].
@@ -157,8 +158,8 @@ pub fn read_sealed_line<T: DeserializeOwned>(
     Ok((content, sha256, file))
 }
 
-/// Reads a line of JSON with its end; `None` where a file has none of at most so many bytes. JSON has no control characters:
-/// the first one ends the reading, so that foreign bytes are not held in memory.
+/// Reads a line of JSON with its line end; `None` if the file has none within `max_bytes` bytes. JSON has no control
+/// characters: reading stops at the first one, so that other files are not held in memory.
 pub(super) fn json_line(file: &mut impl BufRead, max_bytes: u64) -> std::io::Result<Option<Vec<u8>>> {
     let mut line = Vec::new();
     loop {
@@ -179,7 +180,7 @@ pub(super) fn json_line(file: &mut impl BufRead, max_bytes: u64) -> std::io::Res
 /// The kind of a sealed file, without reading its content.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Input`] for what is not sealed.
+/// [`Error::Io`]; [`Error::Input`] for a file that is not sealed.
 pub fn kind_of(path: &Path) -> Result<String> {
     let mut text = Vec::new();
     let file = open(path)?;
@@ -209,7 +210,7 @@ mod tests {
         let other = told(&engine, "\"engine\":999");
         assert!(other.contains(&format!("of engine 999, this program has engine {ENGINE_VERSION}")), "{other}");
         assert!(told(&format!("\"version\":{VERSION},{engine}"), "\"version\":1").contains("its version is 1"));
-        // The number alone does not pass for another one: it is in the checksum.
+        // Changing only the version number is detected, because the checksum includes it.
         let of_other = hex(&Sha256::digest(format!("part {VERSION} {}\n[1.5]", ENGINE_VERSION + 1)));
         assert!(told(&sha256, &of_other).contains("checksum"));
     }

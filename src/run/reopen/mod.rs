@@ -1,7 +1,7 @@
-//! Lanes run again, one by one: of a finished study or sampling run by its folder, or of a scenario file.
+//! Reruns lanes one by one: of a finished study or sampling run in a folder, or of a scenario file.
 //!
-//! Every kind becomes a [`Reopened`], with its own arithmetic and what is known of its data. Its lanes are bit for bit
-//! those of the run.
+//! Every kind becomes a [`Reopened`] with its own arithmetic and data provenance. Its lanes equal those of the run, bit
+//! for bit.
 
 mod record;
 mod traced;
@@ -26,10 +26,10 @@ use crate::support::ranges::refuse_repeats;
 use crate::support::run_dir::{ESTIMATE_RECORD, STUDY_RECORD};
 use crate::{Error, Place, Result};
 
-/// Lanes that can be run again.
+/// Lanes that can be rerun.
 pub struct Reopened {
     lanes: Lanes,
-    /// What the lanes are of.
+    /// Provenance of the lanes' data.
     pub data: String,
     /// The program generated the data, in whole or in part.
     pub is_synthetic: bool,
@@ -37,7 +37,7 @@ pub struct Reopened {
     pub is_reference: bool,
 }
 
-/// Where the lanes come from. The cases of a study are made when they are needed.
+/// Source of the lanes. The cases of a study are made on demand.
 enum Lanes {
     Study(Box<Study>),
     Sample(Box<LanePlan>, Box<DensityModel>),
@@ -45,15 +45,15 @@ enum Lanes {
     Scenarios(Box<LanePlan>),
 }
 
-/// The file of a sampling run of somebody's distributions: from it and the record its plan is made again.
+/// The file of a sampling run of a user's distributions; the plan is remade from it and the record.
 pub const DISTRIBUTION_FILE: &str = "distribution.json";
 
 impl Reopened {
-    /// The run of a folder. Where it holds a study's results and a sampling run's, the key tells: samples are numbered.
-    /// `of_distribution` plans a run with a [`DISTRIBUTION_FILE`] and says what it is of.
+    /// Reopens the run in a folder. If the folder has the results of a study and of a sampling run, the key decides:
+    /// samples are numbered. `of_distribution` plans a run with a [`DISTRIBUTION_FILE`] and returns its provenance.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Input`] for a folder without a run's plan, or with another's.
+    /// [`Error::Io`]; [`Error::Input`] for a folder without a run's plan, or with that of another run.
     pub fn run(
         dir: &Path,
         key: &str,
@@ -87,7 +87,7 @@ impl Reopened {
                     Err(Error::input(Place::file(&plan), "importance sampling has no numbered lanes", help))
                 }
             },
-            // Its reader refuses every other kind.
+            // The reader refuses every other kind.
             _ => Ok(Reopened::study(Study::read(&plan, None)?)),
         }
     }
@@ -103,7 +103,7 @@ impl Reopened {
         Reopened { lanes: Lanes::Sample(Box::new(plan), Box::new(density)), data, is_synthetic, is_reference: false }
     }
 
-    /// The lanes of these keys of scenarios, in f64: a scenario that the filters dropped too, and any headway.
+    /// The lanes of these keys of scenarios, in f64; also for scenarios dropped by the filters, and any headway.
     ///
     /// # Errors
     /// As [`plan_study`].
@@ -128,7 +128,7 @@ impl Reopened {
         Ok(Reopened { lanes, data, is_synthetic, is_reference: true })
     }
 
-    /// The plan; that of a study is without cases.
+    /// The plan; for a study it has no cases.
     pub fn plan(&self) -> &LanePlan {
         match &self.lanes {
             Lanes::Study(study) => study.plan(),
@@ -144,7 +144,7 @@ impl Reopened {
         }
     }
 
-    /// The study, of one.
+    /// The study, if it is one.
     pub fn as_study(&self) -> Option<&Study> {
         match &self.lanes {
             Lanes::Study(study) => Some(study),
@@ -152,15 +152,15 @@ impl Reopened {
         }
     }
 
-    /// Every vehicle has the same size.
+    /// Whether all vehicles have the same size.
     pub fn has_one_size(&self) -> bool {
         matches!(self.lanes, Lanes::Distribution(_))
     }
 
-    /// Gives the plan with the cases of these lanes.
+    /// Passes the plan with the cases of these lanes to `work`.
     ///
     /// # Errors
-    /// Of `work`, and as [`StudyCases::window`](crate::run::study::StudyCases::window).
+    /// Those of `work`, and as [`StudyCases::window`](crate::run::study::StudyCases::window).
     pub fn with_cases<T>(&self, keys: &[LaneKey], work: impl FnOnce(&LanePlan) -> Result<T>) -> Result<T> {
         let Some(study) = self.as_study() else { return work(self.plan()) };
         let units = keys.iter().map(|key| study.plan().blocks[key.block].first_unit + key.unit);
@@ -168,10 +168,11 @@ impl Reopened {
         work(&study.cases().window(span)?)
     }
 
-    /// The lanes of these keys, or those of other models in their place.
+    /// The lanes of these keys, or the corresponding lanes of other models.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a lane that is not there, is void or is named twice, and for a model that is not there.
+    /// [`Error::Usage`] for a lane that does not exist, is void or is named twice, and for a model that is not in the
+    /// plan.
     pub fn named(&self, keys: &[String], models: Option<&[ModelId]>) -> Result<Vec<LaneKey>> {
         let mut found = Vec::new();
         for text in keys {
@@ -192,7 +193,7 @@ impl Reopened {
     /// The lane of a key.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a lane that is not there, and for a void sample, which has no case.
+    /// [`Error::Usage`] for a lane that does not exist, and for a void sample, which has no case.
     pub fn find(&self, text: &str) -> Result<LaneKey> {
         let plan = self.plan();
         let key = plan.parse_key(text).ok_or_else(|| {
@@ -214,7 +215,7 @@ impl Reopened {
     /// Index of a model.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a model that is not there.
+    /// [`Error::Usage`] for a model that is not in the plan.
     pub fn model(&self, id: ModelId) -> Result<usize> {
         let models = &self.plan().models;
         models.iter().position(|m| *m == id).ok_or_else(|| {
@@ -225,7 +226,7 @@ impl Reopened {
     }
 }
 
-/// What of a key is in no lane of the plan.
+/// The part of a key that matches no lane of the plan.
 fn wrong_part(plan: &LanePlan, key: &str) -> String {
     let parts: Vec<&str> = key.rsplitn(4, '/').collect();
     let [model, headway, variant, scenario] = parts[..] else {

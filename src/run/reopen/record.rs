@@ -1,4 +1,4 @@
-//! What a finished run's records say of it: `run.json` of a study, `estimate.json` of a sampling run.
+//! Records of a finished run: `run.json` of a study, `estimate.json` of a sampling run.
 
 use std::path::{Path, PathBuf};
 
@@ -15,7 +15,7 @@ use crate::support::input_file::{MAX_TABLE_BYTES, read_json};
 use crate::support::run_dir::{ESTIMATE_RECORD, STUDY_RECORD};
 use crate::{Error, Place, Result};
 
-/// What `estimate.json` says of a sampling run.
+/// Fields read from `estimate.json` of a sampling run.
 #[derive(Debug, Clone, Deserialize)]
 pub struct SampleRecord {
     lanesweep_estimate: u64,
@@ -25,7 +25,7 @@ pub struct SampleRecord {
     points: String,
     #[serde(default)]
     given: Vec<(String, f64)>,
-    /// Samples asked for.
+    /// Requested number of samples.
     pub samples: u64,
     /// Seed of the draws.
     pub seed: u64,
@@ -45,7 +45,7 @@ impl SampleRecord {
     /// Reads the record of a folder.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Input`] where the folder does not hold a run of this version and engine.
+    /// [`Error::Io`]; [`Error::Input`] if the folder does not hold a run of this version and engine.
     pub fn read(dir: &Path) -> Result<SampleRecord> {
         let path = dir.join(ESTIMATE_RECORD);
         let wrong = |problem: String| {
@@ -66,10 +66,10 @@ impl SampleRecord {
         Ok(run)
     }
 
-    /// The plan of crude Monte Carlo, made again of the density beside the record.
+    /// The plan of crude Monte Carlo, remade from the density in the same folder.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Input`] where the folder does not hold a run of crude Monte Carlo, whole and unchanged.
+    /// [`Error::Io`]; [`Error::Input`] if the folder does not hold a complete and unchanged run of crude Monte Carlo.
     pub(super) fn plan(&self, dir: &Path) -> Result<(LanePlan, DensityModel)> {
         let density = read_density(&dir.join("density.json"))?;
         let wrong = |problem: String| {
@@ -98,7 +98,7 @@ impl SampleRecord {
     }
 }
 
-/// Whether a record is of this program's engine.
+/// Checks whether a record was made with this program's engine version.
 fn check_engine(recorded: Option<u64>) -> std::result::Result<(), String> {
     match recorded {
         Some(ENGINE_VERSION) => Ok(()),
@@ -109,7 +109,7 @@ fn check_engine(recorded: Option<u64>) -> std::result::Result<(), String> {
     }
 }
 
-/// The study of a folder: the plan beside its record that has the record's hash.
+/// The study of a folder: the plan in the same folder that has the record's hash.
 pub(super) fn study_of(dir: &Path) -> Result<Study> {
     #[derive(Deserialize)]
     struct Recorded {
@@ -129,7 +129,7 @@ pub(super) fn study_of(dir: &Path) -> Result<Study> {
     let plans: Vec<PathBuf> =
         [RUN_PLAN_FILE, PLAN_FILE].iter().map(|name| dir.join(name)).filter(|path| path.exists()).collect();
     for path in &plans {
-        // Another verb's plan may stand in the same folder.
+        // The folder may also contain the plan of another command.
         if kind_of(path)? == Study::KIND {
             let study = Study::read(path, None)?;
             if study.plan().hash() == recorded.plan_sha256 {

@@ -1,4 +1,4 @@
-//! Lanes with every step: a reopened one beside other variants and models of its scenario, or those of one case.
+//! Lanes with every step: a reopened lane with other variants and models of its scenario, or the lanes of one case.
 
 use super::Reopened;
 use crate::engine::{Headway, LaneCase, LaneKey, LanePlan, LaneRunner, Outcome, Trace, check_time_step};
@@ -12,21 +12,21 @@ use crate::{Error, Place, Result};
 
 /// A lane with every step.
 pub struct TracedLane {
-    /// The lane's key; without one what tells it from the others.
+    /// The lane's key; without one, a text that distinguishes it from the others.
     pub key: String,
-    /// Name on a sheet with others.
+    /// Name on a sheet with several lanes.
     pub name: String,
     /// The steps.
     pub trace: Trace,
-    /// The same lane in f64, where the trace is in the lane arithmetic.
+    /// The outcome of the same lane in f64, if the trace is in the lane arithmetic.
     pub reference: Option<Outcome<f64>>,
 }
 
-/// Lanes with every step, and what a reader should know of all of them.
+/// Lanes with every step, and their common properties.
 pub struct TracedLanes {
     /// At least one.
     pub lanes: Vec<TracedLane>,
-    /// What they are of, in a few words.
+    /// Origin of the lanes, in a few words.
     pub origin: String,
     /// The program generated the data, in whole or in part.
     pub is_synthetic: bool,
@@ -34,11 +34,11 @@ pub struct TracedLanes {
 
 /// One concrete case with every step of each model, in f64.
 pub struct TracedCase {
-    /// The case as lanes have it.
+    /// The case record of its lanes.
     pub case: LaneCase<f64>,
-    /// The series that it points into.
+    /// The series that the case indexes.
     pub tables: Tables<f64>,
-    /// Where the ego starts.
+    /// The initial headway or gap.
     pub headway: Headway,
     /// Sizes of its vehicles.
     pub sizes: Sizes,
@@ -67,7 +67,7 @@ impl TracedCase {
         Ok(TracedCase { case, tables, headway, sizes, traces })
     }
 
-    /// Its lanes under the profile that they were run with.
+    /// Its lanes, for the profile that they were run with.
     pub fn into_lanes(self, profile: &Profile) -> TracedLanes {
         let lane = |trace: Trace| {
             let name = trace.model.name().to_owned();
@@ -82,10 +82,11 @@ impl TracedCase {
 }
 
 impl Reopened {
-    /// Runs a lane and those beside it: the variants `compare` (S, keys of parameterizations, or `all`) before its own, and
-    /// of each the models, where some are given in place of the key's own.
+    /// Runs a lane and the lanes to compare it with: first the variants `compare` (S, keys of parameterizations, or
+    /// `all`), then its own. Each runs with the given models, or with the key's own model if none is given.
     ///
     /// # Errors
+    /// [`Error::Usage`] for a lane, variant or model that does not exist.
     /// [`Error::Usage`] for a lane, variant or model that is not there.
     pub fn traced(&self, key: &str, models: Option<&[ModelId]>, compare: &[String]) -> Result<TracedLanes> {
         let key = self.find(key)?;
@@ -133,7 +134,7 @@ fn traced<R: Real>(
     all
 }
 
-/// Those to compare with, in the plan's order of variants, then the lane's own.
+/// The variants to compare with, in the plan's order, then the lane's own.
 fn variants(plan: &LanePlan, key: &LaneKey, compare: &[String]) -> Result<Vec<usize>> {
     let names = &plan.blocks[key.block].variants;
     let mut variants = Vec::new();
@@ -158,7 +159,7 @@ fn variants(plan: &LanePlan, key: &LaneKey, compare: &[String]) -> Result<Vec<us
         let help = format!("name other variants: {}", others.collect::<Vec<_>>().join(", "));
         return Err(Error::usage(Place::option("compare"), problem, help));
     }
-    // S first, wherever it comes from: the others are read against it.
+    // S first, because the others are compared with it.
     variants.push(key.variant);
     variants.sort_by_key(|variant| *variant != 0);
     Ok(variants)

@@ -1,4 +1,4 @@
-//! The worst lanes of a reopened run: of a study by its lanes, of a sampling run by its table.
+//! The worst lanes of a reopened run: for a study, of its lanes; for a sampling run, of its table.
 
 use std::path::Path;
 
@@ -16,19 +16,19 @@ use crate::support::ranges::refuse_repeats;
 use crate::support::table::text_of_cell;
 use crate::{Error, Place, Result};
 
-/// Lanes that are returned at most.
+/// Maximum number of returned lanes.
 const MAX_LANES: usize = 10_000;
 
-/// The first scenarios are valued whole.
+/// Values of all lanes of the first scenarios are computed.
 const FIRST_UNITS: u64 = 64;
 
-/// Which of the worst lanes are wanted.
+/// Which of the worst lanes are requested.
 pub struct WorstOptions<'a> {
-    /// So many of each model, at least 1.
+    /// Number of lanes of each model, at least 1.
     pub count: usize,
-    /// What they are ranked by [default: collision, or that of the table].
+    /// Criterion of the ranking [default: collision, or that of the table].
     pub criterion: Option<Criterion>,
-    /// Variants of a study; all where none is named.
+    /// Variants of a study; empty selects all.
     pub variants: &'a [String],
     /// Models [default: all].
     pub models: Option<&'a [ModelId]>,
@@ -38,9 +38,9 @@ pub struct WorstOptions<'a> {
 type Ranked = (f64, u64);
 
 impl Reopened {
-    /// Of a study: per model the scenarios with the smallest [limit state](limit_state) of the criterion, each with its
-    /// worst lane over the variants and headways; smallest first, equal ones in the plan's order. Of a sampling run: the
-    /// first lanes of each model in the table `worst.csv` of its folder.
+    /// For a study: per model, the scenarios with the smallest [limit state](limit_state) of the criterion. Each
+    /// contributes its worst lane over variants and headways; ascending, equal ones in the plan's order. For a sampling
+    /// run: the first lanes of each model in the table `worst.csv` of its folder.
     ///
     /// # Errors
     /// [`Error::Usage`] for variants, models or a criterion that the run does not have, and for too many lanes;
@@ -107,7 +107,7 @@ impl Reopened {
     }
 }
 
-/// Runs the lanes again on the CPU; once lists are full, only those that may enter one are valued.
+/// Reruns the lanes on the CPU. Once the lists are full, values are computed only for lanes that may enter one.
 fn worst_of_study(study: &Study, options: &WorstOptions, models: &[usize]) -> Result<Vec<LaneKey>> {
     let &WorstOptions { count, variants, .. } = options;
     let (plan, criterion) = (study.plan(), options.criterion.unwrap_or(Criterion::Collision));
@@ -132,7 +132,7 @@ fn worst_of_study(study: &Study, options: &WorstOptions, models: &[usize]) -> Re
     study.cases().in_windows(0..plan.unit_count(), WINDOW, |plan, units| {
         let mut from = units.start;
         while from < units.end {
-            // As many scenarios as all before: a list finds as many new lanes in one piece as in the next.
+            // The number of scenarios doubles: a list then finds as many new lanes in each piece.
             let to = units.end.min(FIRST_UNITS.max(2 * from));
             let wanted = wanted(plan, &worst, options, criterion, models);
             executor.sweep(plan, from..to, wanted, |chunk| {
@@ -147,7 +147,7 @@ fn worst_of_study(study: &Study, options: &WorstOptions, models: &[usize]) -> Re
     Ok(lanes.filter_map(|(_, lane)| plan.key(*lane)).collect())
 }
 
-/// What further lanes must return, so that the lists become what they would be with all values.
+/// Results that further lanes must return, so that the lists equal those from all values.
 fn wanted(
     plan: &LanePlan,
     worst: &[Vec<Ranked>],
@@ -158,7 +158,8 @@ fn wanted(
     let mut watch = Watch::NOTHING;
     for &model in models {
         let last = worst[model].get(options.count - 1).map(|(value, _)| *value);
-        // Failures are so common in a study that all lanes are valued where the criterion's own failures are marked.
+        // Failures are so frequent in a study that marking all failures of the criterion would mark too many lanes;
+        // then all values are computed.
         match last.and_then(|last| marks_of(&plan.profile, criterion, last)) {
             Some((marks, None)) => watch.0[plan.models[model].index()] = marks,
             _ => return Wanted::Outcomes,
@@ -167,7 +168,7 @@ fn wanted(
     Wanted::Watched(watch)
 }
 
-/// Moves the worst lane of each of a chunk's units among those of the run.
+/// Inserts the worst lane of each unit of a chunk into the lists.
 fn add(
     plan: &LanePlan,
     chunk: &Chunk,
@@ -177,7 +178,7 @@ fn add(
     count: usize,
 ) {
     let valued = chunk.valued.iter().flatten().map(|(lane, outcome)| (*lane, outcome));
-    // The unit whose lanes are looked at, and its worst lane so far, per model.
+    // The current unit, and its worst lane so far, per model.
     let (mut unit, mut of_unit) = (None, vec![None; worst.len()]);
     for (lane, outcome) in (chunk.first_lane..).zip(&chunk.outcomes).chain(valued) {
         let Some(key) = plan.key(lane).filter(is_wanted) else { continue };

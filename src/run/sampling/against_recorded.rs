@@ -1,6 +1,6 @@
-//! Rates of a density's samples beside those of the scenarios that it was fitted on, as recorded (S) and replayed under
-//! the parameterization (S'). An interval of P holds the draws and what other scenarios would change; what the
-//! parameterization itself changes is only seen here.
+//! Compares the rates of a density's samples with those of the scenarios that it was fitted on, as recorded (S) and
+//! replayed under the parameterization (S'). The interval of P includes the uncertainty of draws and data. The error of
+//! the parameterization itself is visible only in this comparison.
 
 use serde::Serialize;
 
@@ -21,9 +21,9 @@ use crate::{Error, Result};
 /// Ratios of failure rates to that of S, over the same scenarios, headways, model and criterion.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct RecordedRatios {
-    /// S'/S: the parameterized replays.
+    /// S'/S: rates of the parameterized replays.
     pub replayed: Ratio,
-    /// P/S: the samples; of crude Monte Carlo, whose draws tell their scenario.
+    /// P/S: rates of the samples. Only for crude Monte Carlo, whose draws identify their scenario.
     pub sampled: Option<Ratio>,
 }
 
@@ -34,7 +34,7 @@ struct GroupedFailures {
 }
 
 impl GroupedFailures {
-    /// Runs and failures over some cells.
+    /// Runs and failures per group, summed over some cells.
     fn over(&self, cells: &[usize]) -> (Vec<u64>, Vec<u64>) {
         let runs = self.scenarios.iter().map(|n| n * cells.len() as u64).collect();
         let of_group = |group: usize| cells.iter().map(|cell| self.failures[*cell][group]).sum();
@@ -42,7 +42,7 @@ impl GroupedFailures {
     }
 }
 
-/// The lanes of S and of S' under the density's parameterization; `None` where the density cannot be replayed.
+/// The lanes of S and of S' under the density's parameterization; `None` if the density cannot be replayed.
 fn replay(
     density: &DensityModel,
     profile: &Profile,
@@ -58,13 +58,13 @@ fn replay(
     };
     let plan = match plan_study(&density.scenarios, profile, &options) {
         Ok(plan) => plan,
-        // The samples are there: what cannot stand beside them does not take them away.
+        // A failed comparison does not invalidate the samples.
         Err(Error::Input { .. } | Error::Usage { .. }) => return Ok(None),
         Err(error) => return Err(error),
     };
     let Some(block) = plan.blocks.first() else { return Ok(None) };
     let Some(variant) = block.variants.iter().position(|name| *name == id.key) else { return Ok(None) };
-    // The same bits as on any device, and few lanes beside those of the samples.
+    // The CPU gives the same bits as any device, and there are few lanes compared with those of the samples.
     let backend = CpuBackend::lane_arithmetic();
     let executor = Executor::new(&backend);
     let mut verdicts = Vec::new();
@@ -96,14 +96,15 @@ fn replay(
 }
 
 impl Sample {
-    /// The result with its rates beside those of the recorded scenarios, and a warning where they differ, where too few
-    /// failures tell, or where the density does not hold its scenarios.
+    /// Adds the rates of the recorded scenarios to the result. Adds a warning if the rates differ, if there are too few
+    /// failures, or if the density does not contain its scenarios.
     ///
     /// # Errors
-    /// Of the lanes of S and S'.
+    /// Those of the lanes of S and S'.
     pub(super) fn against_recorded(&self, mut result: SampleResult) -> Result<SampleResult> {
         let (density, options) = (&self.density, &self.options);
-        // From the recorded gaps where the density draws the headway. A condition leaves nothing to compare.
+        // If the density draws the headway, S starts from the recorded gaps. A conditional density has no recorded
+        // counterpart.
         let headways = match &options.headways {
             SampleHeadways::Each(headways) => headways.clone(),
             SampleHeadways::Sampled => vec![Headway::Observed],
@@ -135,12 +136,12 @@ impl Sample {
 fn cells_of(row: &EstimateRow, models: &[ModelId], headways: &[Headway]) -> Vec<usize> {
     let model = models.iter().position(|model| *model == row.model).unwrap_or_default();
     let cell = |headway: usize| (headway * models.len() + model) * Criterion::ALL.len() + row.criterion.index();
-    // Headways of the density's own have one name or another, and are one.
+    // A density with its own headway has a single headway, independent of its name.
     let is_of = |at: &usize| headways.len() == 1 || row.headway == "all" || headways[*at].to_string() == row.headway;
     (0..headways.len()).filter(is_of).map(cell).collect()
 }
 
-/// What is decided comes first, then S': where the replay of the same scenarios fails differently, its samples do so too.
+/// Decided differences come first, then S': if the replays of the same scenarios differ, the samples differ too.
 fn warn(row: &mut EstimateRow, ratios: &RecordedRatios) {
     let named = [("S'/S", Some(ratios.replayed)), ("P/S", ratios.sampled)];
     let differing = || named.into_iter().filter_map(|(name, ratio)| Some((name, ratio?))).filter(|(_, r)| !r.agrees());

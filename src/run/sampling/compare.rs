@@ -1,13 +1,15 @@
-//! Rates of failure of recorded scenarios, of their parameterized replays and of densities fitted on them, set beside
-//! one another: a parameterization may label most scenarios rightly and still give a wrong risk, and the reverse.
+//! Compares failure rates of recorded scenarios, of their parameterized replays and of densities fitted on them. A
+//! parameterization may label most scenarios correctly and still give a wrong risk, and vice versa.
 //!
-//! All three rest on the same scenarios, so they go up and down together: a set that happens to hold hard scenarios
-//! has a high rate of S and of the density. Each draw of a kernel density comes from one kernel, which is one
-//! scenario. So every scenario is a cluster with three shares: its recorded lanes, its replayed lanes and the lanes
-//! drawn around it. The ratio's interval is that of [`paired_ratio`]: what the three share cancels, the noise of the
-//! draws is in it. It is conditional on the density's scale, bandwidth and mean sizes, and on a decomposition's
-//! basis. A difference that data alone make is not in it either: S and the density see the same data, so agreement
-//! says that the parameterization and the density represent *these* scenarios, not that these are enough.
+//! All three depend on the same scenarios, so their rates are correlated: if the sample contains many hard scenarios,
+//! the rates of S and of the density are both high. Each draw of a kernel density comes from one kernel, which is one
+//! scenario. So every scenario is a cluster with three measurements: its recorded lanes, its replayed lanes and the
+//! lanes drawn around it. The ratio's interval is that of [`paired_ratio`], which cancels the common variation and
+//! includes the noise of the draws.
+//!
+//! The interval is conditional on the density's scale, bandwidth and mean sizes, and on the basis of a decomposition.
+//! It does not include differences caused by the data alone: S and the density see the same data. Agreement therefore
+//! means that the parameterization and the density represent *these* scenarios, not that these are enough.
 
 use serde::Serialize;
 
@@ -37,15 +39,15 @@ pub struct ScenarioCounts {
 }
 
 impl ScenarioCounts {
-    /// Nothing yet.
+    /// Counts of zero.
     pub fn empty(scenarios: usize, cells: usize) -> ScenarioCounts {
         ScenarioCounts { lanes: vec![0; scenarios], failures: vec![vec![0; scenarios]; cells] }
     }
 
-    /// Those of a variant of a study (0 is S).
+    /// The counts of a variant of a study (0 is S).
     ///
     /// # Errors
-    /// [`Error::Internal`] for a partial that is not the whole of the plan, or a variant that there is not.
+    /// [`Error::Internal`] for a partial that does not cover the whole plan, or a variant that does not exist.
     pub fn of_variant(plan: &LanePlan, partial: &Partial, block: usize, variant: usize) -> Result<ScenarioCounts> {
         let cells = plan.models.len() * Criterion::ALL.len();
         let mut counts = ScenarioCounts::empty(0, cells);
@@ -58,7 +60,7 @@ impl ScenarioCounts {
         Ok(counts)
     }
 
-    /// Adds the lanes of a chunk of samples. `scenarios` tells which scenario a kernel is.
+    /// Adds the lanes of a chunk of samples. `scenarios` maps kernels to scenarios.
     fn add(&mut self, plan: &LanePlan, chunk: &Chunk, scenarios: &[usize]) -> Result<()> {
         let missing = || Error::Internal("a sample does not tell its kernel".to_owned());
         let generator = plan.generator().ok_or_else(missing)?;
@@ -88,7 +90,7 @@ impl ScenarioCounts {
     }
 }
 
-/// The cells of one variant, scenario by scenario.
+/// The cells of one variant per scenario.
 fn units<'a>(
     plan: &LanePlan,
     partial: &'a Partial,
@@ -110,10 +112,10 @@ fn failures(confusion: &Confusion<u32>, variant: usize) -> u64 {
     u64::from(confusion.tp) + if variant == 0 { 0 } else { u64::from(confusion.fp) }
 }
 
-/// Which of the category's kept scenarios each kernel of a density is.
+/// The index of each kernel of a density among the category's kept scenarios.
 ///
 /// # Errors
-/// [`Error::Internal`] where the density was fitted on others.
+/// [`Error::Internal`] if the density was fitted on other scenarios.
 pub fn kernel_scenarios(density: &DensityModel, scenarios: &[Scenario]) -> Result<Vec<usize>> {
     let kept = scenarios.iter().filter(|s| s.category == density.category() && s.kept);
     let is_kernel = |s: &Scenario| density.space.point(s).is_ok_and(|point| density.space.check(&point).is_ok());
@@ -125,22 +127,23 @@ pub fn kernel_scenarios(density: &DensityModel, scenarios: &[Scenario]) -> Resul
     Ok(used)
 }
 
-/// Failures of a density's samples, in all and per scenario.
+/// Failures of a density's samples, in total and per scenario.
 pub struct SampledScenarios {
-    /// Per scenario of the category's kept ones.
+    /// Counts per kept scenario of the category.
     pub counts: ScenarioCounts,
-    /// Over all headways: model × criterion.
+    /// Estimates over all headways: model × criterion.
     pub rows: Vec<EstimateRow>,
-    /// The draws.
+    /// Counts of the draws.
     pub tally: SampleTally,
-    /// How the sweep went.
+    /// Summary of the sweep.
     pub summary: SweepSummary,
 }
 
-/// Crude Monte Carlo over the whole of a plan, with the failures told apart by scenario. `kernels` is of
+/// Crude Monte Carlo over a whole plan, with failures counted per scenario. `kernels` is the result of
 /// [`kernel_scenarios`], `scenarios` the number of kept ones.
 ///
 /// # Errors
+/// As [`sample_crude`].
 /// As [`sample_crude`].
 pub fn sample_by_scenario(
     plan: &LanePlan,
@@ -190,7 +193,7 @@ pub struct RecordedCell {
     pub model: ModelId,
     /// Criterion.
     pub criterion: Criterion,
-    /// The rate; its interval counts scenarios as clusters.
+    /// The rate; its interval treats scenarios as clusters.
     pub rate: RateRecord,
     /// Scenarios with a failure.
     pub failing_scenarios: u64,
@@ -198,23 +201,23 @@ pub struct RecordedCell {
     pub risk: Risk,
 }
 
-/// The same of parameterized replays (S').
+/// Failures of parameterized replays (S') in one cell.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct ReplayedCell {
     /// The rate; its interval counts scenarios as clusters.
     pub rate: RateRecord,
     /// S'/S.
     pub ratio: Ratio,
-    /// Its labels against those of S, lane by lane.
+    /// Its labels compared with those of S, lane by lane.
     pub labels: Confusion,
 }
 
-/// The same of a density's samples.
+/// Failures of a density's samples in one cell.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct SampledCell {
-    /// The rate; its interval is Monte Carlo's, of this density.
+    /// The rate; its interval covers Monte Carlo noise only, for this density.
     pub rate: RateRecord,
-    /// Ends of the interval that counts scenarios as clusters: of other data too.
+    /// Ends of the interval that treats scenarios as clusters; it covers the uncertainty of the data too.
     pub with_data: [f64; 2],
     /// P/S.
     pub ratio: Ratio,
@@ -238,7 +241,7 @@ pub struct ComparedCell {
 /// One parameterization.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct ComparedParameterization {
-    /// Its name in the paper.
+    /// Name of the parameterization in the paper.
     pub key: String,
     /// Number of its parameters.
     pub parameters: usize,
@@ -248,7 +251,7 @@ pub struct ComparedParameterization {
     pub kernels: usize,
     /// SHA-256 of the plan of its samples.
     pub plan_sha256: String,
-    /// Samples without a valid point, which no rate counts.
+    /// Samples without a valid point; no rate counts them.
     pub voids: u64,
     /// Model × criterion.
     pub cells: Vec<ComparedCell>,
@@ -261,11 +264,11 @@ pub struct CategoryComparison {
     pub category: Category,
     /// Kept scenarios.
     pub scenarios: u64,
-    /// Events per hour and kilometre, where they are known.
+    /// Events per hour and kilometre; `None` if unknown.
     pub exposure: Option<Exposure>,
     /// S: model × criterion.
     pub recorded: Vec<RecordedCell>,
-    /// Failures of S from headways below 0.5 s; `None` where the headways are gaps in metres.
+    /// Failures of S from headways below 0.5 s; `None` if the headways are gaps in metres.
     pub close_following: Option<CloseFollowing>,
     /// Parameterizations, in the registry's order.
     pub parameterizations: Vec<ComparedParameterization>,
@@ -277,7 +280,7 @@ fn cells(plan: &LanePlan) -> impl Iterator<Item = (usize, ModelId, Criterion)> +
     pairs.enumerate().map(|(at, (m, c))| (at, m, c))
 }
 
-/// Scenarios as clusters of as many lanes as there are headways.
+/// The rate over scenarios as clusters, with one lane per headway each.
 fn clustered(counts: &ScenarioCounts, cell: usize, headways: usize, level: f64) -> Estimate {
     let failures = &counts.failures[cell];
     let squares = failures.iter().map(|k| k * k).sum();

@@ -1,5 +1,5 @@
-//! Crude Monte Carlo: sampled lanes on a backend, counted chunk by chunk. Memory does not grow with the samples.
-//! Once some samples are known, only lanes that may still be among the worst are valued.
+//! Crude Monte Carlo: sampled lanes on a backend, counted chunk by chunk. Memory does not grow with the number of
+//! samples. After the first samples, values are computed only for lanes that may still be among the worst.
 
 use std::ops::Range;
 use std::time::Instant;
@@ -19,12 +19,12 @@ use crate::stats::density::Exposure;
 use crate::stats::estimate::{Checkpoints, StopReason, StopRule};
 use crate::{Error, Place, Result};
 
-/// The estimates after so many samples.
+/// Estimates after a number of samples.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Checkpoint {
-    /// Samples, void ones included.
+    /// Number of samples, including void ones.
     pub samples: u64,
-    /// One per model and criterion: probability, interval. Over all headways where there are several.
+    /// One per model and criterion: probability and interval. Over all headways if there are several.
     pub rows: Vec<CheckpointRow>,
 }
 
@@ -37,31 +37,31 @@ pub struct CheckpointRow {
     pub criterion: Criterion,
     /// Estimate.
     pub probability: f64,
-    /// Ends of the interval of the draws alone: more samples make it smaller.
+    /// Ends of the interval of the draws alone; more samples narrow it.
     pub interval: [f64; 2],
-    /// Ends of the interval that has the data's uncertainty in it too, and how many scenarios failures come from;
-    /// unknown where draws do not come from scenarios.
+    /// Ends of the interval that includes the uncertainty of the data, and the effective number of failing scenarios.
+    /// `None` if draws do not come from scenarios.
     pub with_data: Option<([f64; 2], f64)>,
 }
 
-/// What a run of crude Monte Carlo gave.
+/// Result of a run of crude Monte Carlo.
 #[derive(Debug, Clone)]
 pub struct CrudeRun {
     /// The counts.
     pub tally: SampleTally,
     /// The estimates.
     pub rows: Vec<EstimateRow>,
-    /// How they came about; empty for a range that does not begin at 0.
+    /// Estimates at the checkpoints; empty for a range that does not begin at 0.
     pub convergence: Vec<Checkpoint>,
     /// How the sweep went.
     pub summary: SweepSummary,
 }
 
-/// Samples `range` of a plan that makes its own cases; risks follow from the exposure. The stop rules are looked at after
-/// 4,096·2^k samples. `each` takes every chunk (rows on request, progress).
+/// Samples `range` of a plan that generates its own cases; risks follow from the exposure. The stop rules are evaluated
+/// after 4,096·2^k samples. `each` receives every chunk (for rows and progress).
 ///
 /// # Errors
-/// [`Error::Usage`] for stop rules or an end beyond the plan with a range that is not the whole; of the backends; of
+/// [`Error::Usage`] for stop rules with a partial range, or for an end beyond the plan; those of the backends and of
 /// `each`.
 pub fn sample_crude(
     plan: &LanePlan,
@@ -76,22 +76,23 @@ pub fn sample_crude(
     sample_into(plan, &mut ledger, executor, options, exposure, false, each)
 }
 
-/// The sample sizes at which a run of so many samples is looked at.
+/// The sample sizes at which a run of `samples` samples is evaluated.
 pub fn checkpoints(samples: u64) -> Vec<u64> {
     let next = |at: &u64| Some(Checkpoints::Doubling.next(*at)).filter(|next| *next > *at);
     std::iter::successors(next(&0), next).take_while(|at| *at < samples).chain([samples]).collect()
 }
 
-/// Where the counts of an interval are cut: at the checkpoints, and where lanes begin to be watched for other values.
+/// Units at which the counts of an interval are cut: the checkpoints, and the samples at which the watch of lanes
+/// changes.
 pub fn cuts(samples: u64, range: &Range<u64>) -> Vec<u64> {
     checkpoints(samples).into_iter().chain(ends(range)).collect()
 }
 
-/// The same, as far as the ledger does not hold it already; its cuts must be those of [`cuts`]. With
-/// `every_value` the chunks that `each` takes have the outcome of every lane.
+/// The same for samples that the ledger does not hold; its cuts must be those of [`cuts`]. With `every_value`, chunks
+/// passed to `each` have the outcome of every lane.
 ///
 /// # Errors
-/// As [`sample_crude`], and of the ledger's journal; [`Error::Interrupted`].
+/// As [`sample_crude`], and those of the ledger's journal; [`Error::Interrupted`].
 pub fn sample_into(
     plan: &LanePlan,
     ledger: &mut Ledger<SampleTally>,
@@ -129,7 +130,8 @@ pub fn sample_into(
                 (true, _) => Wanted::Outcomes,
                 (false, 0) => Wanted::Verdicts,
                 (false, _) => {
-                    // Whole segments only: a run that resumes in a segment wants of it what the first one wanted.
+                    // Whole segments only, so that a resumed run requests the same results in a segment as the first
+                    // run.
                     let known = ledger.counts(range.start..ledger.segment_start(missing.start))?;
                     known.map_or(Wanted::Outcomes, |known| wanted(plan, &known, options))
                 }
@@ -141,7 +143,7 @@ pub fn sample_into(
             summary.add(&ledger.kept(part)?);
         }
         ledger.kept(executor.check_cancelled(next - range.start, range.end - range.start))?;
-        // What earlier processes checked is in the journal.
+        // Rechecks of earlier processes are recorded in the journal.
         [summary.redone_lanes, summary.rechecked_lanes] = ledger.redone_and_rechecked();
         if let Some(counts) = ledger.counts(at..next)? {
             tally = tally.merge(counts)?;
@@ -158,10 +160,10 @@ pub fn sample_into(
     }
 }
 
-/// The run that parts of it make together: with the convergence of the run in one piece where they are all there.
+/// Combines parts to a run. Its convergence equals that of the run in one piece if all parts are given.
 ///
 /// # Errors
-/// [`Error::Input`] where parts are of different runs or hold the same samples.
+/// [`Error::Input`] if parts are of different runs or contain the same samples.
 pub fn crude_of_segments(
     plan: &LanePlan,
     mut segments: Vec<SampleTally>,
@@ -174,7 +176,7 @@ pub fn crude_of_segments(
     let mut convergence = Vec::new();
     for segment in segments {
         tally = tally.merge(segment)?;
-        // Only what begins at the first sample and has no gap was ever looked at.
+        // Checkpoints are evaluated only on samples from the first one on without a gap.
         if let [covered] = tally.covered()
             && covered.start == 0
             && looks.contains(&covered.end)
@@ -215,7 +217,7 @@ fn overall(rows: &[EstimateRow]) -> Vec<CheckpointRow> {
     kept.map(of).collect()
 }
 
-/// The widest of the criterion's intervals decides, over all models.
+/// The widest of the criterion's intervals over all models decides.
 fn stopped(
     options: &SampleOptions,
     rows: &[EstimateRow],
@@ -225,20 +227,20 @@ fn stopped(
 ) -> Option<StopReason> {
     let has_all = rows.iter().any(|row| row.headway == "all");
     let judged = rows.iter().filter(|r| r.criterion == options.criterion && (!has_all || r.headway == "all"));
-    // More samples make the draws' share of the uncertainty smaller, never that of the data.
+    // More samples reduce the uncertainty of the draws, never that of the data.
     let widest = judged.max_by(|a, b| a.draws_half_width().total_cmp(&b.draws_half_width()))?;
     let rule = StopRule { samples: end, ..options.stop };
     rule.at(samples, widest.estimate.failures, widest.draws_half_width(), started)
 }
 
-/// The first samples are valued whole.
+/// Values of all lanes of the first samples are computed.
 const FIRST_SAMPLES: u64 = 4096;
-/// Where more lanes than one in so many would be marked, all are valued: a single lane costs about forty times its
-/// verdicts.
+/// If more than one in this many lanes would be marked, all values are computed: recomputing a single lane costs about
+/// forty times its verdicts.
 const MARKED_ONE_IN: f64 = 1000.0;
 
-/// Ends of pieces of an interval of samples. Each is as long as all before it, so that a list of worst lanes finds as many
-/// new lanes in one piece as in the next.
+/// Ends of pieces of an interval of samples. Each piece is as long as all earlier ones together, so that a list of
+/// worst lanes finds as many new lanes in each piece.
 fn ends(range: &Range<u64>) -> impl Iterator<Item = u64> {
     let (first, end) = (range.start, range.end);
     std::iter::successors(Some(FIRST_SAMPLES), |length| length.checked_mul(2))
@@ -246,8 +248,8 @@ fn ends(range: &Range<u64>) -> impl Iterator<Item = u64> {
         .take_while(move |to| *to < end)
 }
 
-/// What the lanes of further samples must return, so that the lists of worst lanes become what they would be with all
-/// values. `options.worst` is at least 1, and the lanes of `tally` have smaller indices.
+/// Results that lanes of further samples must return, so that the lists of worst lanes equal those from all values.
+/// `options.worst` is at least 1, and the lanes of `tally` have smaller indices.
 fn wanted(plan: &LanePlan, tally: &SampleTally, options: &SampleOptions) -> Wanted {
     let (mut watch, mut marked) = (Watch::NOTHING, 0.0);
     let lanes_per_model = (tally.valid() * plan.headways.len() as u64).max(1) as f64;

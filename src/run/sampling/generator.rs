@@ -1,4 +1,4 @@
-//! From a parameter space and a mixture to the numbers that a case generator holds.
+//! Makes a case generator from a parameter space and a mixture.
 
 use serde::{Deserialize, Serialize};
 
@@ -15,10 +15,10 @@ use crate::stats::density::{Mixture, ParameterSpace};
 use crate::stats::random::{AliasTable, Sobol, Stream};
 use crate::{Error, Place, Result};
 
-/// Purpose of the stream that samples are drawn from.
+/// Purpose of the random stream of the samples.
 pub const SAMPLE_PURPOSE: u32 = 0x5341_4d50;
 
-/// Where points come from.
+/// Type of the sample points.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SampleSource {
@@ -29,7 +29,7 @@ pub enum SampleSource {
 }
 
 impl SampleSource {
-    /// As files name it: `random`, `sobol`.
+    /// Name in files: `random`, `sobol`.
     pub fn key(self) -> &'static str {
         match self {
             SampleSource::Random => "random",
@@ -42,7 +42,7 @@ impl SampleSource {
 ///
 /// # Errors
 /// [`Error::Usage`] for more than [`MAX_PARAMETERS`] parameters, a profile whose cut-outs begin at the exposure, or
-/// Sobol points that there are not; [`Error::Input`] for a cut-out without the size of the vehicle ahead.
+/// more Sobol dimensions than available; [`Error::Input`] for a cut-out without the size of the vehicle ahead.
 pub fn generator_of(
     space: &ParameterSpace,
     mixture: &Mixture,
@@ -68,7 +68,7 @@ pub fn generator_of(
     for component in 0..n {
         points.means.extend(mixture.mean(component).iter().map(|&v| rounded(v)));
         let factor: Vec<f32> = mixture.factor(component).transpose().iter().map(|&v| v as f32).collect();
-        // Kernels share one factor.
+        // All kernels share one factor.
         let known = points.factors.len() / (d * d);
         let last = known.checked_sub(1).filter(|&at| points.factors[at * d * d..] == factor);
         points.factor_of.push(last.unwrap_or(known) as u32);
@@ -82,7 +82,7 @@ pub fn generator_of(
 /// The generator whose sample `i` is point `i`.
 ///
 /// # Errors
-/// As [`generator_of`]; [`Error::Internal`] without points or for one of another length.
+/// As [`generator_of`]; [`Error::Internal`] without points or for one of the wrong length.
 pub fn generator_of_points(
     space: &ParameterSpace,
     points: &[Vec<f64>],
@@ -177,12 +177,12 @@ fn recipe(space: &ParameterSpace, sizes: &Sizes, profile: &Profile) -> Result<Re
     })
 }
 
-/// A place in a record of the device.
+/// An index in a record of the device.
 fn slot(place: Option<usize>) -> u32 {
     place.map_or(NO_SLOT, |place| place as u32)
 }
 
-/// The least number of the lane arithmetic that keeps a lower bound; never a subnormal one.
+/// The smallest number of the lane arithmetic that satisfies a lower bound; never subnormal.
 fn at_least(bound: f64, excluded: bool) -> f32 {
     let rounded = bound as f32;
     let kept = |v: f32| if excluded { f64::from(v) > bound } else { f64::from(v) >= bound };
@@ -190,13 +190,13 @@ fn at_least(bound: f64, excluded: bool) -> f32 {
     if least.is_subnormal() { f32::MIN_POSITIVE } else { least }
 }
 
-/// The largest number of the lane arithmetic that keeps an upper bound.
+/// The largest number of the lane arithmetic that satisfies an upper bound.
 fn at_most(bound: f64) -> f32 {
     let rounded = bound as f32;
     if f64::from(rounded) <= bound { rounded } else { rounded.next_down() }
 }
 
-/// What a draw's reconstruction must keep.
+/// Bounds of a draw's reconstruction.
 fn bounds(space: &ParameterSpace) -> Result<[ColumnBound; MAX_BOUNDS]> {
     let mut bounds = [ColumnBound::default(); MAX_BOUNDS];
     if space.bounded_columns().len() > MAX_BOUNDS {
@@ -238,7 +238,7 @@ fn columns(space: &ParameterSpace) -> ReducedColumns {
     }
 }
 
-/// The host's one rounding; -0 becomes 0, as no number of a lane is -0.
+/// Rounds once to the lane arithmetic; −0 becomes 0, because no number of a lane is −0.
 fn rounded(value: f64) -> f32 {
     f32::from_f64(value)
 }

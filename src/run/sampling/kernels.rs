@@ -1,5 +1,5 @@
-//! Samples and failures by the kernel that they were drawn from. A kernel is one scenario, so these counts tell how far
-//! other data would give another estimate.
+//! Samples and failures by the kernel that they were drawn from. A kernel is one scenario, so these counts give the
+//! uncertainty of the estimate caused by the data.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -8,11 +8,11 @@ use crate::engine::{Chunk, LanePlan};
 use crate::model::criterion::Criterion;
 use crate::stats::estimate::{ClusterRate, Clusters, cluster_rate};
 
-/// Groups that kernels are counted in, at most: kernel k counts in group k mod 512. Fewer kernels are groups of their
-/// own; of more, groups vary as much as kernels do, and a journal stays small.
+/// Maximum number of groups of kernels: kernel k counts in group k mod 512. With fewer kernels, each is a group. With
+/// more kernels, groups vary as much as kernels do, and a journal stays small.
 pub(super) const MAX_GROUPS: usize = 512;
 
-/// A sample without a kernel: void.
+/// Kernel of a void sample.
 pub(super) const NO_KERNEL: u32 = u32::MAX;
 
 /// Counts over a set of samples, per group of kernels.
@@ -28,10 +28,10 @@ pub struct KernelCounts {
 }
 
 impl KernelCounts {
-    /// Nothing yet; `None` for a plan whose points come from no kernels.
+    /// Counts of zero; `None` for a plan whose points do not come from kernels.
     pub(super) fn empty(plan: &LanePlan) -> Option<KernelCounts> {
         let points = &plan.generator()?.points;
-        // Whether a point has a kernel is the same for all points.
+        // Either all points have a kernel or none.
         points.component(0, 1)?;
         let groups = (points.components() as usize).min(MAX_GROUPS);
         let cells = plan.headways.len() * plan.models.len() * Criterion::ALL.len();
@@ -45,7 +45,7 @@ impl KernelCounts {
         let valid = || kernels.iter().enumerate().filter(|(_, kernel)| **kernel != NO_KERNEL);
         valid().for_each(|(_, kernel)| self.samples[group(*kernel)] += 1);
         let lanes = plan.headways.len() * plan.models.len();
-        // One task per lane of a sample: each has counts of its own.
+        // One task per lane of a sample, because each has separate counts.
         self.failures.par_chunks_mut(Criterion::ALL.len() * groups).enumerate().for_each(|(at, counts)| {
             for (sample, kernel) in valid() {
                 let verdicts = chunk.verdicts[sample * lanes + at];
@@ -63,7 +63,7 @@ impl KernelCounts {
         sum(&mut self.failures, &other.failures);
     }
 
-    /// Numbers of groups and counts.
+    /// Number of groups and of counts.
     pub(super) fn shape(&self) -> [usize; 2] {
         [self.samples.len(), self.failures.len()]
     }
@@ -78,13 +78,13 @@ impl KernelCounts {
             && self.failures.chunks_exact(groups).zip(failures).all(|(counts, of_all)| sum(counts) == *of_all)
     }
 
-    /// The rate of failed lanes over some cells (headway × model × criterion), each kernel being a cluster.
+    /// The rate of failed lanes over some cells (headway × model × criterion), with kernels as clusters.
     pub(super) fn rate(&self, cells: &[usize], level: f64) -> ClusterRate {
         let (runs, failures) = self.over(cells);
         cluster_rate(Clusters { runs: &runs, failures: &failures }, level)
     }
 
-    /// Lanes and failed ones over some cells, group by group.
+    /// Lanes and failed lanes over some cells, group by group.
     pub(super) fn over(&self, cells: &[usize]) -> (Vec<u64>, Vec<u64>) {
         let groups = self.samples.len();
         let runs = self.samples.iter().map(|n| n * cells.len() as u64).collect();
@@ -93,8 +93,8 @@ impl KernelCounts {
     }
 }
 
-/// Counts in files: base-32 digits, the most significant first, small letters and digits for the last one of a number
-/// and capitals for the others. Most counts of a journal's record are one character.
+/// Serializes counts as base-32 digits, the most significant first. The last digit of a number is a lower-case letter
+/// or a digit, the others are capital letters. Most counts of a journal's record are one character.
 mod packed {
     use serde::de::Error as _;
     use serde::{Deserialize, Deserializer, Serializer};

@@ -1,5 +1,5 @@
-//! One number per lane that is ≤ 0 exactly where a criterion failed, and shrinks on the way there; lanes as the limit
-//! state that estimators follow: points in, one number per point out.
+//! The limit state of a lane: one number that is ≤ 0 exactly if a criterion failed, and decreases towards failure. Also
+//! evaluates points as lanes for the estimators.
 
 use super::plan::{SampleHeadways, plan_points};
 use crate::engine::{Executor, Marks, Outcome, Wanted};
@@ -10,14 +10,14 @@ use crate::stats::density::{DensityModel, Mixture};
 use crate::stats::estimate::{KernelShares, LimitState, Truncated, defended, kernel_shares};
 use crate::{Error, Result};
 
-/// Far from any failure: nothing ever closed in.
+/// Value far from any failure: the ego never closed in.
 const FAR: f64 = 1e3;
-/// No demand counts for more: an infinite Brake Threat Number says only that no braking helps.
+/// Larger Brake Threat Numbers count as this one: an infinite value says only that no braking helps.
 const MAX_BTN: f64 = 10.0;
-/// Values that rounding would put on the wrong side stand this close to the limit.
+/// Minimum value of a lane that did not fail, against rounding to the wrong side.
 const MIN_UNFAILED: f64 = 1e-12;
 
-/// Limit state of a lane. The verdict decides the sign, as the lane itself decides it.
+/// Limit state of a lane. The verdict decides the sign.
 ///
 /// | criterion | before failure | after |
 /// |---|---|---|
@@ -25,9 +25,9 @@ const MIN_UNFAILED: f64 = 1e-12;
 /// | TTC | smallest TTC − threshold, s | the same |
 /// | BTN | threshold − largest BTN | the same, −(10 − threshold) at least |
 ///
-/// The smallest TTC of a near miss goes to 0 with the gap that was left (braking ends √(2·gap/deceleration) before
-/// it), and the closing speed of a contact goes to 0 towards the near miss: the value is continuous through the
-/// collision. A contact by the side of a vehicle that is passed is not.
+/// The minimum TTC of a near miss goes to 0 with the remaining gap (braking ends √(2·gap/deceleration) before it). The
+/// closing speed of a contact goes to 0 towards the near miss. So the value is continuous at the collision limit,
+/// except for a side contact with a vehicle that is being passed.
 pub fn limit_state(profile: &Profile, criterion: Criterion, outcome: &Outcome<f64>) -> f64 {
     let failed = outcome.verdicts.failed(criterion);
     let ttc = outcome.min_ttc.min(FAR);
@@ -42,7 +42,7 @@ pub fn limit_state(profile: &Profile, criterion: Criterion, outcome: &Outcome<f6
 
 /// One driver model under one criterion at one headway.
 pub struct LaneLimitState<'a> {
-    /// The density whose points are judged.
+    /// The density of the points.
     pub density: &'a DensityModel,
     /// Profile.
     pub profile: &'a Profile,
@@ -52,7 +52,7 @@ pub struct LaneLimitState<'a> {
     pub criterion: Criterion,
     /// A single headway, or the density's own.
     pub headway: SampleHeadways,
-    /// What computes; no lane is computed again.
+    /// Computes the lanes, without rechecks.
     pub executor: Executor<'a>,
 }
 
@@ -72,7 +72,7 @@ impl LimitState for LaneLimitState<'_> {
     }
 }
 
-/// A density file's density, cut off at its valid region.
+/// The density of a density file, truncated to its valid region.
 ///
 /// # Errors
 /// As [`Truncated::with_share`].
@@ -80,11 +80,11 @@ pub fn truncated(density: &DensityModel) -> Result<Truncated<impl Fn(&[f64]) -> 
     Truncated::with_share(density.mixture()?, |point: &[f64]| density.space.is_valid(point), density.valid.estimate)
 }
 
-/// Which scenarios failures come from, by draws of a proposal that keeps a share `defence` of the density. `None` where
-/// none of them fails.
+/// Determines which scenarios failures come from, by draws of a proposal with the defensive mixture weight `defence`.
+/// `None` if no draw fails.
 ///
 /// # Errors
-/// Of the lanes.
+/// Those of the lanes.
 pub fn scenario_shares(
     lanes: &LaneLimitState,
     proposal: &Mixture,
@@ -96,9 +96,9 @@ pub fn scenario_shares(
     kernel_shares(nominal.mixture(), &nominal, &proposal, lanes, seed)
 }
 
-/// The marks of lanes with a smaller [limit state](limit_state()) than the last of a list, and the criterion whose
-/// failures all have them, where one's do; the few that enter the list have them in any case. `None` where every lane's
-/// value is needed.
+/// The marks of lanes with a smaller [limit state](limit_state()) than the last one of a list. Also the criterion whose
+/// failures all have these marks, if there is one; the few failures that enter the list always have them. `None` if
+/// values of all lanes are needed.
 pub(crate) fn marks_of(profile: &Profile, criterion: Criterion, last: f64) -> Option<(Marks, Option<Criterion>)> {
     let criteria = &profile.criteria;
     let below = |ttc_s: f64| {
@@ -108,7 +108,7 @@ pub(crate) fn marks_of(profile: &Profile, criterion: Criterion, last: f64) -> Op
     match criterion {
         Criterion::Collision if last <= 0.0 => Some((Marks::Contacts(-last), None)),
         Criterion::Collision => Some(below(last)),
-        // No value is smaller, and of equal ones the first lane is worse.
+        // No value is smaller, and among equal values the first lane comes first.
         Criterion::Ttc if last <= -criteria.ttc_threshold_s => Some((Marks::Nothing, None)),
         Criterion::Btn if last <= criteria.btn_threshold - MAX_BTN => Some((Marks::Nothing, None)),
         Criterion::Ttc => Some(below(last + criteria.ttc_threshold_s)),

@@ -1,4 +1,4 @@
-//! Failure maps: how often lanes fail over two parameters.
+//! Failure maps: failure rates of lanes over two parameters.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,14 +7,14 @@ use crate::{Error, Place, Result};
 
 /// Cells along each axis.
 pub const MAP_CELLS: usize = 40;
-/// Standard deviations of the kernels that a map shows beyond the outermost kernel.
+/// Margin of a map beyond the outermost kernel, in standard deviations of the kernels.
 const MARGIN: f64 = 2.0;
 
 /// One axis: a parameter and its range.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MapAxis {
-    /// Parameter's place in a point.
+    /// Index of the parameter in a point.
     pub parameter: usize,
     /// Its name.
     pub name: String,
@@ -30,14 +30,14 @@ pub struct MapAxis {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MapAxes {
-    /// Across.
+    /// Horizontal axis.
     pub x: MapAxis,
-    /// Up.
+    /// Vertical axis.
     pub y: MapAxis,
 }
 
 impl MapAxis {
-    /// The range that a parameter's kernels fill.
+    /// The range that covers a parameter's kernels.
     fn of(density: &DensityModel, name: &str) -> Result<MapAxis> {
         let parameter = density.space.index_of(name)?;
         let described = &density.space.parameters()[parameter];
@@ -55,14 +55,14 @@ impl MapAxis {
 
     fn cell(&self, value: f64) -> Option<usize> {
         let share = (value - self.lower) / (self.upper - self.lower);
-        // Written so that NaN is refused.
+        // The condition also refuses NaN.
         if !(0.0..1.0).contains(&share) {
             return None;
         }
         Some(((share * MAP_CELLS as f64) as usize).min(MAP_CELLS - 1))
     }
 
-    /// Borders of the cells, one more than cells.
+    /// Edges of the cells, one more than cells.
     pub fn edges(&self) -> Vec<f64> {
         let width = (self.upper - self.lower) / MAP_CELLS as f64;
         (0..=MAP_CELLS).map(|k| self.lower + width * k as f64).collect()
@@ -70,10 +70,10 @@ impl MapAxis {
 }
 
 impl MapAxes {
-    /// Of two parameters of a density.
+    /// Axes for two parameters of a density.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a name that is no parameter, or the same one twice.
+    /// [`Error::Usage`] for an unknown parameter, or the same one twice.
     pub fn of(density: &DensityModel, x: &str, y: &str) -> Result<MapAxes> {
         let axes = MapAxes { x: MapAxis::of(density, x)?, y: MapAxis::of(density, y)? };
         if axes.x.parameter == axes.y.parameter {
@@ -83,7 +83,7 @@ impl MapAxes {
         Ok(axes)
     }
 
-    /// Cell of a point, row by row from below; `None` outside.
+    /// Cell of a point, row by row from below; `None` outside the axes.
     pub fn cell(&self, point: &[f32]) -> Option<usize> {
         let along = |axis: &MapAxis| axis.cell(f64::from(*point.get(axis.parameter)?));
         Some(along(&self.y)? * MAP_CELLS + along(&self.x)?)

@@ -1,7 +1,7 @@
 //! Sampling: a density becomes lanes, and their outcomes become probabilities of failure.
 //!
-//! [`Sample`] is the way in: it plans a run of any estimator, runs it whole or in shards, resumes and merges it. Densities
-//! and estimators come from [`crate::stats`], lanes run in [`crate::engine`].
+//! [`Sample`] is the entry point: it plans a run of any estimator, runs it whole or in shards, resumes and merges it.
+//! Densities and estimators come from [`crate::stats`]; lanes run in [`crate::engine`].
 
 mod against_recorded;
 mod compare;
@@ -49,9 +49,9 @@ use crate::stats::density::{DensityModel, Exposure, Mixture};
 use crate::stats::estimate::{Pilot, PilotCheck};
 use crate::{Error, Place, Result};
 
-/// A sampling run ready to be run: whole, or one shard of it where its samples are independent.
+/// A planned sampling run: whole, or one shard of it if its samples are independent.
 ///
-/// As two shards in a folder; together they give the estimates of the run in one piece:
+/// The example runs two shards in a folder; together they give the estimates of the run in one piece:
 ///
 /// ```
 /// use lanesweep::engine::{CpuBackend, Executor, Headway};
@@ -98,24 +98,24 @@ pub struct Sample {
     pub(crate) kind: SampleKind,
 }
 
-/// By how it is run.
+/// Kinds of sampling runs.
 pub(crate) enum SampleKind {
     /// Crude Monte Carlo: its lanes.
     Crude(Box<LanePlan>),
-    /// Importance sampling of a fixed number of samples.
+    /// Importance sampling with a fixed number of samples.
     Weighted(Proposals),
-    /// The same, whose proposals are to be found.
+    /// The same with proposals that a pilot must find.
     Pilot(Pilot),
-    /// Adaptive, of several proposals, or with a stop rule.
+    /// Adaptive, with several proposals, or with a stop rule.
     Sequential,
 }
 
-/// What importance sampling draws from.
+/// Proposals of importance sampling.
 #[derive(Debug, Clone, Default)]
 pub(crate) struct Proposals {
     /// One for all driver models, or one for each.
     pub mixtures: Vec<Mixture>,
-    /// What the pilot of each driver model counted; empty for a given proposal.
+    /// Counts of the pilot of each driver model; empty for a given proposal.
     pub pilots: Vec<PilotCheck>,
 }
 
@@ -141,7 +141,8 @@ impl Sample {
         Ok(sample)
     }
 
-    /// One point as lanes where estimators make them on the way: complains before any work about what every point would.
+    /// Tests one point as lanes if estimators make the points during the run, so that errors common to all points
+    /// appear early.
     fn check_lanes(&self) -> Result<()> {
         if matches!(self.kind, SampleKind::Crude(_)) {
             return Ok(());
@@ -156,10 +157,10 @@ impl Sample {
         kind == KIND
     }
 
-    /// Writes the plan file into a run's folder, or finds the same one there: many shards may do so at once.
+    /// Writes the plan file into a run's folder, or checks that the same one exists; many shards may do so at once.
     ///
     /// # Errors
-    /// [`Error::Input`] where the folder holds the plan of another run; [`Error::Io`]; [`Error::Usage`] for a run that
+    /// [`Error::Input`] if the folder holds the plan of another run; [`Error::Io`]; [`Error::Usage`] for a run that
     /// cannot be split.
     pub fn write_plan(&self, out: &Path) -> Result<()> {
         let text = self.seal()?.0;
@@ -183,7 +184,7 @@ impl Sample {
         &self.density
     }
 
-    /// The plan of crude Monte Carlo, whose lanes are numbered.
+    /// The plan of crude Monte Carlo; its lanes have indices.
     pub fn lane_plan(&self) -> Option<&LanePlan> {
         match &self.kind {
             SampleKind::Crude(plan) => Some(plan),
@@ -191,45 +192,46 @@ impl Sample {
         }
     }
 
-    /// Samples, at most; of subset simulation per level.
+    /// Maximum number of samples; for subset simulation per level.
     pub fn samples(&self) -> u64 {
         self.options.stop.samples
     }
 
-    /// Lanes of a run of a fixed number of samples.
+    /// Number of lanes of a run with a fixed number of samples.
     pub fn lane_count(&self) -> u64 {
         let by_models = || self.samples().saturating_mul(self.options.models.len() as u64);
         self.lane_plan().map_or_else(by_models, LanePlan::lane_count)
     }
 
-    /// The exposure that risks follow from: how often scenarios with given values occur is not known.
+    /// The exposure for the risks; `None` for a conditional density, because the frequency of such scenarios is
+    /// unknown.
     fn exposure(&self) -> Option<&Exposure> {
         self.density.exposure.as_ref().filter(|_| self.options.given.is_empty())
     }
 
-    /// Whether counts that were read from a file can be those of a plan of crude Monte Carlo.
+    /// Checks whether counts read from a file can be those of a plan of crude Monte Carlo.
     ///
     /// # Errors
-    /// What differs.
+    /// The difference found.
     fn check_tally(&self, plan: &LanePlan, tally: &SampleTally) -> std::result::Result<(), String> {
         let joined = SampleTally::empty(plan, &self.options).merge(tally.clone());
         joined.map(drop).map_err(|error| error.to_string())
     }
 
-    /// Whether sums that were read from a file can be those of this run.
+    /// Checks whether sums read from a file can be those of this run.
     ///
     /// # Errors
-    /// What differs.
+    /// The difference found.
     fn check_sums(&self, tally: &WeightedTally) -> std::result::Result<(), String> {
         let is_ours = tally.sums.iter().map(|(model, _)| model).eq(&self.options.models);
         if is_ours { Ok(()) } else { Err("they are of other driver models".to_owned()) }
     }
 
-    /// Finds the proposals where a pilot has to; they are kept in the folder, so that an interrupted run need not
-    /// search again. Both have the same bits; a pilot takes its time.
+    /// Finds the proposals if a pilot is needed, and saves them in the folder, so that an interrupted run need not
+    /// repeat the search. A repeated search gives the same bits, but takes time.
     ///
     /// # Errors
-    /// Of the lanes; [`Error::Io`].
+    /// Those of the lanes; [`Error::Io`].
     pub fn searched(self, executor: &Executor, out: Option<&Path>) -> Result<Sample> {
         let SampleKind::Pilot(pilot) = self.kind else { return Ok(self) };
         if let Some(kept) = out.map(|out| self.kept_pilot(out)).transpose()?.flatten() {

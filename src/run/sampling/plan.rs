@@ -1,5 +1,5 @@
-//! The lane plan of a sampling run: one block whose units are sample indices; and the density given some parameters, which
-//! a run may draw from.
+//! The lane plan of a sampling run: one block whose units are sample indices. Also the density conditional on given
+//! parameters, which a run may draw from.
 
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
@@ -21,7 +21,7 @@ use super::sample_options::SampleOptions;
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SampleHeadways {
-    /// Every sample from each of these.
+    /// Every sample starts from each of these.
     Each(Vec<Headway>),
     /// The parameter `thw_s` of the density.
     Sampled,
@@ -31,7 +31,7 @@ struct Generated(Generator);
 
 impl CaseSource for Generated {
     fn case(&self, _block: usize, unit: u64, _variant: usize) -> LaneCase<f64> {
-        // Only for what asks without tables: series are not kept.
+        // Only for callers that need no series: the tables are discarded.
         self.0.case(unit, &mut Tables::default())
     }
 
@@ -48,8 +48,8 @@ impl CaseSource for Generated {
 /// The plan whose unit `i` is draw `i` of `proposal` (the density itself for crude Monte Carlo).
 ///
 /// # Errors
-/// [`Error::Usage`] for no samples, more than 2⁶³ lanes or than there are Sobol points, headways that the density
-/// does not have, and as [`generator_of`].
+/// [`Error::Usage`] without samples, for more than 2⁶³ lanes or more samples than Sobol points, for headways that the
+/// density does not have, and as [`generator_of`].
 pub fn plan_samples(
     density: &DensityModel,
     proposal: &Mixture,
@@ -128,23 +128,22 @@ fn plan(
     LanePlan::new(profile.clone(), models.to_vec(), headways, vec![block], Box::new(Generated(generator)))
 }
 
-/// Spread of a given parameter, in spreads of its kernels: nothing in the lane arithmetic, and not zero.
+/// Spread of a given parameter, relative to the spread of its kernels: negligible in the lane arithmetic, but not zero.
 const NO_SPREAD: f64 = 1e-12;
 
-/// A conditional density with the number of scenarios that it still rests on.
+/// A conditional density, and its effective number of scenarios.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Conditional {
     /// f̂ given the values.
     pub mixture: Mixture,
-    /// (Σw)²/Σw² over the kernels' weights: how many scenarios are near the given values.
+    /// (Σw)²/Σw² over the kernels' weights: the number of scenarios near the given values.
     pub effective_scenarios: f64,
 }
 
-/// The density given these parameters, by name. Each kernel weighs as it fits the values.
+/// The density given the values of these parameters, by name. The weight of each kernel is its density at the values.
 ///
 /// # Errors
-/// [`Error::Usage`] for a name that is no parameter, one that comes twice, all of them given, or a value outside the
-/// valid range.
+/// [`Error::Usage`] for an unknown or duplicate parameter, if all are given, or for a value outside the valid range.
 pub fn conditional(density: &DensityModel, given: &[(String, f64)]) -> Result<Conditional> {
     refuse_repeats(|| Place::option("given"), given.iter().map(|(name, _)| (name, name)))?;
     let mut places: Vec<(usize, f64)> = Vec::new();
@@ -175,7 +174,7 @@ pub fn conditional(density: &DensityModel, given: &[(String, f64)]) -> Result<Co
     Ok(Conditional { mixture: Mixture::new(weights, means, vec![factor], vec![0; n])?, effective_scenarios })
 }
 
-/// The mixture that a run draws from: the density itself, or given some parameters.
+/// The mixture that a run draws from: the density, or the conditional density if parameters are given.
 ///
 /// # Errors
 /// As [`conditional`].

@@ -1,5 +1,5 @@
-//! A sampling run as a plan file: the density, the proposals and everything that was asked for, so that every shard and the
-//! merge know the same run.
+//! The plan file of a sampling run: the density, the proposals and all options, so that every shard and the merge use
+//! the same run.
 
 use std::path::Path;
 
@@ -17,11 +17,11 @@ use crate::support::atomic_file::refuse_link;
 use crate::support::files::{make_folder, write_inside};
 use crate::{Error, Place, Result};
 
-/// What a run with a pilot of its own keeps until it ends.
+/// File of a run with its own pilot; kept until the run ends.
 pub(super) const PILOT_FILE: &str = "pilot.json";
 /// Kind of the sealed file.
 pub(crate) const KIND: &str = "sampling plan";
-/// Largest plan that is read: a density, mostly.
+/// Maximum size of a plan that is read, bytes: mostly the density.
 const MAX_PLAN_BYTES: u64 = 1 << 30;
 const HOW_TO_REMAKE: &str = "make it by `sample` of this version, with option `plan_only`";
 
@@ -34,7 +34,7 @@ struct PlanFile {
     options: SampleOptions,
     /// Proposal files' texts: one for all driver models, or one for each.
     proposals: Vec<String>,
-    /// What the pilot of each driver model counted; empty for a given proposal.
+    /// Counts of the pilot of each driver model; empty for a given proposal.
     pilots: Vec<PilotCheck>,
     /// Hash of the lanes of crude Monte Carlo.
     plan_sha256: Option<String>,
@@ -66,7 +66,7 @@ impl Sample {
     /// Reads a plan file.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Input`] for anything but a whole plan of this version.
+    /// [`Error::Io`]; [`Error::Input`] for any other or incomplete file, or another version.
     pub fn read(path: &Path) -> Result<Sample> {
         let file: PlanFile = read_sealed(KIND, path, MAX_PLAN_BYTES, HOW_TO_REMAKE)?.0;
         let PlanFile { profile, options, pilots, .. } = file;
@@ -116,7 +116,7 @@ impl Sample {
         Ok(sample)
     }
 
-    /// The same run after its pilot, where an interrupted run left that in the folder.
+    /// The same run after its pilot, if an interrupted run saved the pilot in the folder.
     pub(super) fn kept_pilot(&self, out: &Path) -> Result<Option<Sample>> {
         let path = out.join(PILOT_FILE);
         if path.symlink_metadata().is_err() {
@@ -132,7 +132,7 @@ impl Sample {
         Ok(is_same.then_some(kept))
     }
 
-    /// Leaves the run after its pilot in the folder.
+    /// Saves the run after its pilot in the folder.
     pub(super) fn keep_pilot(&self, out: &Path) -> Result<()> {
         make_folder(out)?;
         let text = self.plan_file()?.0;

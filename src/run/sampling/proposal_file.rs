@@ -1,4 +1,4 @@
-//! Proposals as files, so that one that was found can be sampled again, in parts or with other seeds.
+//! Proposal files, so that a proposal can be reused in parts or with other seeds.
 
 use std::path::Path;
 
@@ -35,7 +35,7 @@ fn names(density: &DensityModel) -> Vec<String> {
 /// A proposal for a density as the text of a file.
 ///
 /// # Errors
-/// None for what this program makes.
+/// None for types of this program.
 pub fn proposal_text(density: &DensityModel, proposal: &Mixture) -> Result<String> {
     let components = 0..proposal.weights().len();
     let file = File {
@@ -52,7 +52,7 @@ pub fn proposal_text(density: &DensityModel, proposal: &Mixture) -> Result<Strin
 /// Reads a proposal for a density.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Input`] for anything but a proposal of this version over the density's parameters.
+/// [`Error::Io`]; [`Error::Input`] if it is not a proposal of this version over the density's parameters.
 pub fn read_proposal(path: &Path, density: &DensityModel) -> Result<Mixture> {
     proposal_from_text(
         &input_file::read_json(path, MAX_FILE_BYTES, "a proposal", HOW_TO_REMAKE)?,

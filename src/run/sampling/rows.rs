@@ -1,5 +1,5 @@
-//! From counts to estimates: one row per model, criterion and headway, and one over all headways. Risk: how often failures
-//! happen, λ̂·P̂ per hour and per 1,000 km.
+//! From counts to estimates: one row per model, criterion and headway, and one over all headways. Risk: frequency of
+//! failures, λ̂·P̂ per hour and per 1,000 km.
 
 use serde::Serialize;
 
@@ -13,30 +13,30 @@ use crate::stats::estimate::{
     BinomialInterval, Counts, Estimate, Interval, KernelShares, StopReason, Warning, from_clusters, from_counts,
 };
 
-/// An estimate and what it is of.
+/// An estimate with its model, criterion and headway.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct EstimateRow {
     /// Driver model.
     pub model: ModelId,
     /// Criterion.
     pub criterion: Criterion,
-    /// Headway: `1.4s`, `sampled`, or `all` for the mean over those of the plan.
+    /// Headway: `1.4s`, `sampled`, or `all` for the mean over the headways of the plan.
     pub headway: String,
-    /// The probability that a sampled lane fails. Where samples tell their scenarios, the uncertainty of the data is in
-    /// its variance and interval.
+    /// The probability that a sampled lane fails. If samples identify their scenarios, variance and interval include
+    /// the uncertainty of the data.
     pub estimate: Estimate,
-    /// Ends of the interval of the draws alone: as if the density were the truth.
+    /// Ends of the interval of the draws alone, given the density.
     pub draws: [f64; 2],
-    /// Effective number of scenarios that the failures come from, where samples tell their scenarios.
+    /// Effective number of scenarios that the failures come from; `None` if samples do not identify their scenarios.
     pub failing_scenarios: Option<f64>,
-    /// Failures per hour and per 1,000 km, where the exposure is known.
+    /// Failures per hour and per 1,000 km, if the exposure is known.
     pub risk: Risk,
-    /// Ratios to the rate of the recorded scenarios, where the density holds them.
+    /// Ratios to the rate of the recorded scenarios; `None` if the density does not contain them.
     pub recorded: Option<RecordedRatios>,
 }
 
 impl EstimateRow {
-    /// A row whose interval is that of the draws alone.
+    /// A row whose interval covers the draws alone.
     pub fn of_draws(
         model: ModelId,
         criterion: Criterion,
@@ -49,7 +49,7 @@ impl EstimateRow {
         EstimateRow { model, criterion, headway, estimate, draws, failing_scenarios: None, risk, recorded: None }
     }
 
-    /// The same with the uncertainty of the data in it, or a warning that it is not.
+    /// Adds the uncertainty of the data, or a warning that it is missing.
     pub fn with_data(mut self, shares: Option<&KernelShares>, exposure: Option<&Exposure>) -> EstimateRow {
         let Some(shares) = shares else {
             self.estimate.trust.warn_if(true, Warning::DataLeftOut);
@@ -61,7 +61,7 @@ impl EstimateRow {
         self
     }
 
-    /// Half the width of the draws' interval over the probability, which more samples make smaller; ∞ at zero.
+    /// Half the width of the draws' interval over the probability, which more samples reduce; ∞ at zero.
     pub fn draws_half_width(&self) -> f64 {
         let [low, high] = self.draws;
         Interval { low, high, ..self.estimate.interval }.relative_half_width(self.estimate.probability)
@@ -73,7 +73,7 @@ pub fn headway_name(plan: &LanePlan, headway: usize, is_sampled: bool) -> String
     if is_sampled { "sampled".to_owned() } else { plan.headways[headway].to_string() }
 }
 
-/// All rows of crude Monte Carlo. Headways share their samples, so the mean over them counts samples as clusters.
+/// All rows of crude Monte Carlo. Headways share their samples, so the mean over them treats samples as clusters.
 pub fn crude_rows(
     plan: &LanePlan,
     tally: &SampleTally,
@@ -122,16 +122,18 @@ pub fn crude_rows(
 pub struct RiskRate {
     /// λ̂·P̂.
     pub estimate: f64,
-    /// Standard deviation of the product, √(λ²σ_P² + P²σ_λ² + σ_λ²σ_P²): λ̂ and P̂ come from independent counts.
+    /// Standard deviation of the product, √(λ²σ_P² + P²σ_λ² + σ_λ²σ_P²), because λ̂ and P̂ come from independent
+    /// counts.
     pub standard_deviation: f64,
-    /// Lower end of the interval at the estimate's level: that of P and a log-normal one of λ, whose distances from the
-    /// estimate add as squares on the logarithm (Zou and Donner, Statistics in Medicine 27, 2008); 0 without failures.
+    /// Lower end of the interval at the estimate's level; 0 without failures. It combines the interval of P and a
+    /// log-normal interval of λ: their distances from the estimate on the log scale add as squares (Zou and Donner,
+    /// Statistics in Medicine 27, 2008).
     pub low: f64,
-    /// Upper end; without failures the upper ends of both intervals multiplied.
+    /// Upper end; without failures the product of the upper ends of both intervals.
     pub high: f64,
 }
 
-/// Risk in both units, where they are known.
+/// Risk in both units; `None` if unknown.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize)]
 pub struct Risk {
     /// Failures per hour driven.
@@ -161,7 +163,7 @@ impl RiskRate {
 }
 
 impl Risk {
-    /// Of an estimate under an exposure.
+    /// Risk of an estimate under an exposure.
     pub fn of(estimate: &Estimate, exposure: Option<&Exposure>) -> Risk {
         let product = |rate: Option<&Rate>, scale: f64| rate.map(|rate| RiskRate::of(rate, scale, estimate));
         Risk {
@@ -188,7 +190,7 @@ mod tests {
         let none = of(0);
         assert!(none.estimate == 0.0 && none.high > 2.0 * 2.9e-4 && none.high < 3.0 * 3.0e-4);
         let some = of(100);
-        // 10 % from the events, 10 % from the failures.
+        // 10 % error of the events and 10 % of the failures.
         assert!((some.estimate - 0.02).abs() < 1e-12);
         assert!((some.standard_deviation / some.estimate - 0.141).abs() < 2e-3);
         assert!(some.low < some.estimate && some.high > some.estimate);

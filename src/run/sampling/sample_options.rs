@@ -1,4 +1,4 @@
-//! What a sampling run is asked for: as flags and settings give it, as its plan file holds it and as its record tells it.
+//! Options of a sampling run, as set by flags and settings, stored in its plan file and written to its record.
 
 use serde::{Deserialize, Serialize};
 
@@ -21,14 +21,14 @@ pub enum Estimator {
         /// Kind of interval.
         interval: BinomialInterval,
     },
-    /// Importance sampling of what a pilot finds for each driver model.
+    /// Importance sampling with a proposal that a pilot finds for each driver model.
     Pilot(Pilot),
-    /// Importance sampling of given proposals; several are combined by the balance heuristic.
+    /// Importance sampling with given proposals; several are combined by the balance heuristic.
     Given {
-        /// One for all driver models, or several. A plan file holds them beside.
+        /// One for all driver models, or several. A plan file stores them separately.
         #[serde(skip)]
         proposals: Vec<Mixture>,
-        /// Defensive mixture weight: the density's share in each proposal.
+        /// Defensive mixture weight: the weight of the density in each proposal.
         defence: f64,
     },
     /// Cross-entropy.
@@ -44,7 +44,7 @@ impl Estimator {
     /// Crude Monte Carlo with Wilson's interval.
     pub const CRUDE: Estimator = Estimator::Crude { interval: BinomialInterval::Wilson };
 
-    /// As files name it: `mc`, `is`, `ce`, `subset`.
+    /// Name in files: `mc`, `is`, `ce`, `subset`.
     pub fn key(&self) -> &'static str {
         match self {
             Estimator::Crude { .. } => "mc",
@@ -62,7 +62,7 @@ impl Estimator {
         }
     }
 
-    /// Defensive mixture weight: the density's share in each proposal.
+    /// Defensive mixture weight: the weight of the density in each proposal.
     pub fn defence(&self) -> f64 {
         match self {
             Estimator::Crude { .. } | Estimator::Subset => 0.0,
@@ -73,36 +73,36 @@ impl Estimator {
     }
 }
 
-/// What a sampling run is asked for.
+/// Options of a sampling run.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SampleOptions {
     /// Estimator.
     pub estimator: Estimator,
-    /// When to end. A rule beside the number of samples makes a run that cannot be split.
+    /// When to end. A run with a rule in addition to the number of samples cannot be split.
     pub stop: StopRule,
     /// Kind of points (crude).
     pub source: SampleSource,
     /// Models, in order.
     pub models: Vec<ModelId>,
-    /// Headways: only crude Monte Carlo takes several.
+    /// Headways: only crude Monte Carlo accepts several.
     pub headways: SampleHeadways,
-    /// Criterion of the estimators other than crude Monte Carlo, of the worst lanes, the map and the stop rules.
+    /// Criterion of the estimators other than crude Monte Carlo, of the worst lanes, of the map and of the stop rules.
     pub criterion: Criterion,
     /// Seed of the draws.
     pub seed: u64,
     /// Level of the intervals.
     pub level: f64,
-    /// Parameters that are given, with their values (crude).
+    /// Given parameters with their values (crude).
     pub given: Vec<(String, f64)>,
-    /// Worst lanes to list per model (crude); 0 needs verdicts only.
+    /// Number of worst lanes listed per model (crude); with 0, only verdicts are computed.
     pub worst: usize,
     /// Axes of the failure map (crude).
     pub map: Option<MapAxes>,
 }
 
 impl SampleOptions {
-    /// Independent points, all models from these headways, collisions, seed 157, level 0.95.
+    /// Independent points, all models, collision criterion, seed 157, level 0.95, and these headways.
     pub fn new(estimator: Estimator, samples: u64, headways: SampleHeadways) -> SampleOptions {
         SampleOptions {
             estimator,
@@ -119,7 +119,7 @@ impl SampleOptions {
         }
     }
 
-    /// Refuses several headways where the estimator weighs.
+    /// Refuses several headways for a weighting estimator.
     pub(super) fn check_headways(&self) -> Result<()> {
         match &self.headways {
             SampleHeadways::Each(list) if list.len() != 1 => Err(Error::usage(
@@ -131,7 +131,7 @@ impl SampleOptions {
         }
     }
 
-    /// Headways; none where the density draws them.
+    /// Headways; empty if the density draws them.
     pub fn headways(&self) -> &[Headway] {
         match &self.headways {
             SampleHeadways::Each(list) => list,

@@ -1,4 +1,5 @@
-//! A sampling run at work: whole in memory, or whole or as a shard in a folder with a journal; and the merge of the shards.
+//! A running sampling run: whole in memory, or whole or as a shard in a folder with a journal; and the merge of the
+//! shards.
 
 use std::ops::Range;
 use std::path::Path;
@@ -20,10 +21,10 @@ use crate::stats::estimate::{CrossEntropyStep, SubsetLevel};
 use crate::support::run_dir::{ESTIMATE_RECORD, Results};
 use crate::{Error, Place, Result};
 
-/// Takes the chunks of crude Monte Carlo.
+/// Receives the chunks of crude Monte Carlo.
 pub type EachChunk<'c> = dyn FnMut(&Chunk) -> Result<()> + 'c;
 
-/// A sampling run, or one of its shards, in a folder. It continues what an earlier process left in the journal.
+/// A sampling run, or one of its shards, in a folder. It continues from the journal of an earlier process.
 pub struct SampleRun<'s> {
     sample: &'s Sample,
     run_dir: RunDir,
@@ -38,10 +39,10 @@ enum State {
 }
 
 impl Sample {
-    /// Runs it in one piece, in memory.
+    /// Runs in one piece, in memory.
     ///
     /// # Errors
-    /// Of the lanes.
+    /// Those of the lanes.
     pub fn run(&self, executor: &Executor) -> Result<SampleResult> {
         self.against_recorded(self.sampled(executor)?)
     }
@@ -66,11 +67,11 @@ impl Sample {
         }
     }
 
-    /// Opens a run in a folder; `None` where the shard's part is there already, and whole. Without a journal nothing
-    /// outlives the process.
+    /// Opens a run in a folder; `None` if the shard's complete part exists already. Without a journal, counts are lost
+    /// when the process ends.
     ///
     /// # Errors
-    /// [`Error::Busy`] where another process runs it; [`Error::Input`] for a damaged or foreign file in its place;
+    /// [`Error::Busy`] if another process runs it; [`Error::Input`] for a damaged or foreign file in its place;
     /// [`Error::Io`]; [`Error::Usage`] for a run that cannot be split.
     pub fn open(&self, out: &Path, shard: Option<Shard>, is_journalled: bool) -> Result<Option<SampleRun<'_>>> {
         let (run_sha256, unit_count) = (self.seal()?.1, self.samples());
@@ -98,7 +99,7 @@ impl Sample {
         Ok(Some(SampleRun { sample: self, run_dir, state, crude: None, is_journalled }))
     }
 
-    /// Runs a shard in a folder and leaves plan and part there. An interrupted one continues at the next call.
+    /// Runs a shard in a folder and writes plan and part there. An interrupted run continues at the next call.
     ///
     /// # Errors
     /// As [`Sample::open`] and [`Sample::run`]; [`Error::Interrupted`].
@@ -109,15 +110,15 @@ impl Sample {
         run.write_part()
     }
 
-    /// The run of a folder of parts with its estimates: bit for bit those of the run in one piece.
+    /// The run and the estimates of a folder of parts, bit for bit equal to those of the run in one piece.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Input`] naming what is missing, doubled, foreign or damaged.
+    /// [`Error::Io`]; [`Error::Input`] with the missing, duplicate, foreign or damaged parts.
     pub fn merge(out: &Path) -> Result<(Sample, SampleResult)> {
         Sample::merge_or(out, &|shard| format!("run shard {shard}"))
     }
 
-    /// The same; `again` says how a shard is made.
+    /// The same; `again` returns the command that makes a shard.
     pub(crate) fn merge_or(out: &Path, again: &dyn Fn(Shard) -> String) -> Result<(Sample, SampleResult)> {
         let sample = Sample::read(&out.join(PLAN_FILE))?;
         let run_sha256 = sample.seal()?.1;
@@ -153,7 +154,7 @@ impl Sample {
 }
 
 impl SampleRun<'_> {
-    /// The samples: of the shard, or all.
+    /// The samples of the shard, or of the whole run.
     pub fn units(&self) -> Range<u64> {
         match &self.state {
             State::Crude(state) => state.units.clone(),
@@ -161,10 +162,10 @@ impl SampleRun<'_> {
         }
     }
 
-    /// Samples that no earlier process has counted.
+    /// Number of samples that no earlier process has counted.
     ///
     /// # Errors
-    /// Of the journal's counts.
+    /// Those of the journal's counts.
     pub fn missing(&mut self) -> Result<u64> {
         let units = self.units();
         let missing = match &mut self.state {
@@ -174,11 +175,12 @@ impl SampleRun<'_> {
         Ok(missing.iter().map(|range| range.end - range.start).sum())
     }
 
-    /// Samples what is missing. `progress` is told the samples of every chunk; `chunks` takes the chunks of crude Monte
-    /// Carlo, with every value.
+    /// Samples what is missing. `progress` receives the number of samples of every chunk; `chunks` receives the chunks
+    /// of crude Monte Carlo, with all values.
     ///
     /// # Errors
-    /// Of the lanes and of `chunks`; [`Error::Interrupted`] once an end was asked for: what is done is in the journal.
+    /// Those of the lanes and of `chunks`; [`Error::Interrupted`] after cancellation: finished counts are in the
+    /// journal.
     pub fn sample(
         &mut self,
         executor: &Executor,
@@ -208,10 +210,10 @@ impl SampleRun<'_> {
         }
     }
 
-    /// Writes the part of a shard and removes its journal.
+    /// Writes the part of a shard and deletes its journal.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Internal`] where samples are missing or the run is no shard.
+    /// [`Error::Io`]; [`Error::Internal`] if samples are missing or the run is not a shard.
     pub fn write_part(self) -> Result<()> {
         match self.state {
             State::Crude(state) => self.run_dir.finish(*state),
@@ -237,7 +239,7 @@ impl SampleRun<'_> {
         self.sample.against_recorded(result)
     }
 
-    /// The files that a whole run leaves in its folder.
+    /// The result files of a whole run in its folder.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -248,13 +250,14 @@ impl SampleRun<'_> {
         }
     }
 
-    /// Removes the journal of a whole run whose results are written, and what a pilot left.
+    /// Deletes the journal of a whole run after its results are written, and the file of its pilot.
     ///
     /// # Errors
     /// [`Error::Io`].
     pub fn close(self) -> Result<()> {
         if matches!(self.sample.options.estimator, Estimator::Pilot(_)) {
-            // The journal that needs it goes next; without it the next run's pilot has the same bits.
+            // The journal depends on this file and is deleted next; without the file the next run's pilot gives the
+            // same bits.
             let path = self.run_dir.out.join(PILOT_FILE);
             match std::fs::remove_file(&path) {
                 Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(Error::io(&path, "remove", e)),
@@ -268,7 +271,7 @@ impl SampleRun<'_> {
     }
 }
 
-/// How an adaptive estimator went.
+/// Levels of an adaptive estimator.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Levels {
@@ -278,20 +281,20 @@ pub enum Levels {
     Subset(Vec<SubsetLevel>),
 }
 
-/// What a sampling run gave.
+/// Result of a sampling run.
 #[derive(Debug, Clone, Default)]
 pub struct SampleResult {
     /// The estimates.
     pub rows: Vec<EstimateRow>,
     /// Counts and convergence of crude Monte Carlo.
     pub crude: Option<CrudeRun>,
-    /// How an adaptive estimator went, model by model.
+    /// Levels of an adaptive estimator, by model.
     pub levels: Vec<Levels>,
-    /// The proposals that were found, model by model.
+    /// The proposals found, by model.
     pub proposals: Vec<(ModelId, Mixture)>,
-    /// Parts that were merged; 0 of a run in one piece.
+    /// Number of merged parts; 0 for a run in one piece.
     pub parts: usize,
-    /// Lanes that were computed again as a check.
+    /// Lanes that were rechecked.
     pub rechecked_lanes: u64,
 }
 

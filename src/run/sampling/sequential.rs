@@ -1,4 +1,4 @@
-//! Estimators that decide on the way what to sample next: they run in one piece.
+//! Estimators that choose the next samples during the run: they run in one piece.
 
 use super::Sample;
 use super::limit_state::{LaneLimitState, scenario_shares, truncated};
@@ -12,11 +12,11 @@ use crate::stats::estimate::{
     defended, from_pilot, importance, subset,
 };
 
-/// Draws that the valid share of each of several proposals is counted on.
+/// Draws for counting the valid fraction of each of several proposals.
 const VALIDITY_DRAWS: u64 = 1_000_000;
 
 impl Sample {
-    /// One model after the other.
+    /// Runs one model after the other.
     pub(super) fn run_sequential(&self, executor: &Executor) -> Result<SampleResult> {
         let options = &self.options;
         let nominal = truncated(&self.density)?;
@@ -35,7 +35,7 @@ impl Sample {
         Ok(result)
     }
 
-    /// The estimate of one model, its levels, and the proposal that was sampled.
+    /// The estimate of one model, its levels, and the sampled proposal.
     fn estimate(
         &self,
         nominal: &dyn Density,
@@ -70,7 +70,7 @@ impl Sample {
                 let all = Mixture::join(&equal)?;
                 let prepared = |mixture: &Mixture| {
                     let proposal = defended(mixture.clone(), nominal, *defence)?;
-                    // One proposal's valid share comes out of its own draws.
+                    // The valid fraction of a single proposal follows from its own draws.
                     let is_one = proposals.len() == 1;
                     Ok(if is_one { proposal } else { proposal.with_counted_validity(seed, VALIDITY_DRAWS) })
                 };

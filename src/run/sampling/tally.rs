@@ -1,5 +1,5 @@
-//! What remains of sampled lanes: exact integer counts and the worst lanes, for any set of sample indices. Tallies
-//! of disjoint sets join in any order.
+//! Counts of sampled lanes: exact integers and the worst lanes, for any set of sample indices. Tallies of disjoint sets
+//! can be merged in any order.
 
 use std::ops::Range;
 
@@ -18,7 +18,7 @@ use crate::run::parts::MergeableCounts;
 use crate::scenario::parameterization::Variable;
 use crate::{Error, Place, Result};
 
-/// Samples that one task counts.
+/// Number of samples of one task.
 const TASK: usize = 4096;
 
 /// A lane with its limit state.
@@ -37,13 +37,13 @@ pub struct SampleTally {
     plan_sha256: String,
     /// Disjoint, ascending, no two touch.
     covered: Vec<Range<u64>>,
-    /// Indices without a valid point.
+    /// Number of indices without a valid point.
     pub voids: u64,
-    /// Draws in all.
+    /// Total number of draws.
     pub tries: u64,
     /// Failed lanes: headway × model × criterion, the last innermost.
     pub failures: Vec<u64>,
-    /// Σ over samples of (headways that failed)²: model × criterion.
+    /// Σ over samples of (number of failed headways)²: model × criterion.
     pub squares: Vec<u64>,
     /// Lanes that ended at the time cap: headway × model.
     pub capped: Vec<u64>,
@@ -54,14 +54,14 @@ pub struct SampleTally {
     /// The worst lanes of each model, ascending by (value, lane).
     pub worst: Vec<Vec<WorstSample>>,
     worst_limit: usize,
-    /// The failure map, one count of failures per model.
+    /// The failure map, with failures counted per model.
     pub map: Option<MapCounts>,
-    /// The same samples and failures by kernel, where the points come from kernels.
+    /// Samples and failures by kernel; `None` if the points do not come from kernels.
     pub by_kernel: Option<KernelCounts>,
 }
 
 impl SampleTally {
-    /// Nothing yet.
+    /// A tally without samples.
     pub fn empty(plan: &LanePlan, options: &SampleOptions) -> SampleTally {
         let (headways, models, criteria) = (plan.headways.len(), plan.models.len(), Criterion::ALL.len());
         SampleTally {
@@ -81,8 +81,8 @@ impl SampleTally {
         }
     }
 
-    /// Counts a chunk of a plan whose units are samples. Where the plan holds the cases, every sample is valid at once, and
-    /// there is no map.
+    /// Counts a chunk of a plan whose units are samples. If the plan holds the cases, every sample is valid at the
+    /// first draw, and there is no map.
     ///
     /// # Errors
     /// [`Error::Internal`] for a chunk of another plan, without lanes, or without the outcomes that worst lanes need.
@@ -106,7 +106,7 @@ impl SampleTally {
             }
             tally
         });
-        // Whole numbers and a total order: how tasks are joined does not matter.
+        // Integers and a total order, so the order of merging has no effect.
         let mut tally = counted.reduce(empty, |mut a, b| {
             a.add(b);
             a
@@ -183,10 +183,10 @@ impl SampleTally {
         kernel.unwrap_or(NO_KERNEL)
     }
 
-    /// Keeps a lane where it is among the worst.
+    /// Inserts a lane if it is among the worst.
     fn offer(&mut self, model: usize, lane: WorstSample) {
         let worst = &mut self.worst[model];
-        // Most lanes are refused at once.
+        // Fast path: most lanes are not among the worst.
         if worst.len() >= self.worst_limit && worst.last().is_some_and(|last| !is_worse(&lane, last)) {
             return;
         }
@@ -195,7 +195,7 @@ impl SampleTally {
         worst.truncate(self.worst_limit);
     }
 
-    /// Adds counts of other samples; the covered intervals are the caller's to join.
+    /// Adds counts of other samples; the caller joins the covered intervals.
     fn add(&mut self, other: SampleTally) {
         let sum =
             |ours: &mut [u64], theirs: &[u64]| ours.iter_mut().zip(theirs).for_each(|(a, b)| *a = a.saturating_add(*b));
@@ -219,10 +219,10 @@ impl SampleTally {
         }
     }
 
-    /// Joins the counts of other samples of the same plan: associative, and the same in any order.
+    /// Merges the counts of other samples of the same plan: associative and commutative.
     ///
     /// # Errors
-    /// [`Error::Input`] where the plans or what was counted differ, or a sample is in both.
+    /// [`Error::Input`] if the plans or the kinds of counts differ, or a sample is in both.
     pub fn merge(mut self, other: SampleTally) -> Result<SampleTally> {
         let place = || Place::item("part of a sampling run");
         if self.plan_sha256 != other.plan_sha256 {
@@ -256,14 +256,14 @@ impl SampleTally {
         Ok(self)
     }
 
-    /// Numbers of cells: they follow from models, headways and criteria.
+    /// Sizes of the lists of counts, which follow from models, headways and criteria.
     fn shape(&self) -> [usize; 7] {
         let [groups, counts] = self.by_kernel.as_ref().map_or([0, 0], KernelCounts::shape);
         let close = self.close_failures.len();
         [self.failures.len(), self.squares.len(), self.capped.len(), self.worst.len(), groups, counts, close]
     }
 
-    /// Whether counts that were read from a file can be those of a run.
+    /// Checks whether counts read from a file can be those of a run.
     pub(super) fn check(&self) -> std::result::Result<(), String> {
         let mut free_from = 0;
         for range in &self.covered {
@@ -296,14 +296,14 @@ impl SampleTally {
         problems.into_iter().find(|(wrong, _)| *wrong).map_or(Ok(()), |(_, problem)| Err(problem.to_owned()))
     }
 
-    /// Are no more failures from short headways than there are failures?
+    /// Whether failures from short headways do not exceed all failures.
     fn holds_its_close(&self) -> bool {
         let cells = self.close_failures.len().max(1);
         let all = |at: usize| self.failures.iter().skip(at).step_by(cells).fold(0, |a: u64, b| a.saturating_add(*b));
         self.close_failures.iter().enumerate().all(|(at, close)| *close <= all(at))
     }
 
-    /// Lanes and failures, with those from short headways.
+    /// Lanes and failures, in total and from short headways.
     pub fn close_following(&self) -> CloseFollowing {
         let cells = self.close_failures.len().max(1);
         let all = |at: usize| self.failures.iter().skip(at).step_by(cells).sum();
@@ -312,8 +312,8 @@ impl SampleTally {
         CloseFollowing { close_lanes: self.close_lanes, lanes, failures: failures.collect() }
     }
 
-    /// Does every worst lane belong to its model and to a sample that was counted? A sample has its lanes in a row, headway
-    /// by headway and within it model by model.
+    /// Whether every worst lane belongs to its model and to a counted sample. The lanes of a sample are consecutive:
+    /// headway by headway, then model by model.
     fn holds_its_worst(&self) -> bool {
         let (models, lanes_per_sample) = (self.worst.len() as u64, self.capped.len() as u64);
         self.worst.iter().zip(0..).all(|(lanes, model)| {
@@ -359,8 +359,8 @@ impl MergeableCounts for SampleTally {
     }
 }
 
-/// Does the lane of a sample start below [`CLOSE_HEADWAY_S`]? A drawn headway is the point's; where the plan holds the
-/// cases, it is in the gap of the case.
+/// Whether the lane of a sample starts below [`CLOSE_HEADWAY_S`]. A drawn headway is in the point; if the plan holds
+/// the cases, the headway follows from the gap of the case.
 fn is_close(plan: &LanePlan, drawn: Option<&DrawnPoint>, unit: u64, headway: usize) -> bool {
     let start = match (plan.headways[headway], plan.generator().zip(drawn)) {
         (Headway::ThwS(thw_s), _) => return thw_s < CLOSE_HEADWAY_S,

@@ -1,4 +1,5 @@
-//! Importance sampling over given proposals, or those of a pilot: draws, judges and weighs what a ledger does not hold.
+//! Importance sampling over given proposals, or those of a pilot: draws, evaluates and weights the samples that a
+//! ledger does not hold.
 
 use std::ops::Range;
 
@@ -20,14 +21,14 @@ use crate::stats::estimate::{
 use crate::support::cancel::Cancel;
 use crate::{Error, Place, Result};
 
-/// Samples that are judged between two looks at the journal, at most.
+/// Maximum number of samples evaluated between two journal updates.
 const CHUNK: u64 = 1 << 16;
 
-/// Kernels up to which weighing so many samples takes about a second.
+/// Maximum number of kernels for which weighting `CHUNK` samples takes about one second.
 const KERNELS: u64 = 1 << 10;
 
-/// Samples between two looks at the journal and at a signal: so few that they take seconds, whatever a lane costs. A
-/// power of two, as the sums' tree has it.
+/// Number of samples between two checks of the journal and of cancellation: small enough to take seconds for any lane
+/// duration. A power of two, to fit the tree of sums.
 fn chunk_samples(step_cap: u32, models: u64, kernels: u64) -> u64 {
     let judged = lanes_within_seconds(step_cap) / models.max(1);
     let weighed = CHUNK / (kernels / KERNELS).max(1);
@@ -35,26 +36,26 @@ fn chunk_samples(step_cap: u32, models: u64, kernels: u64) -> u64 {
 }
 
 impl Sample {
-    /// Samples between two looks at the journal.
+    /// Number of samples between two checks of the journal.
     pub(crate) fn chunk_samples(&self) -> u64 {
         let (models, kernels) = (self.options.models.len(), self.density.kde.points().len());
         chunk_samples(self.profile.step_cap(), models as u64, kernels as u64)
     }
 
-    /// The lanes of a driver model as what an estimator follows.
+    /// The lanes of a driver model as a limit state for estimators.
     pub(super) fn limit_state<'a>(&'a self, model: ModelId, executor: Executor<'a>) -> LaneLimitState<'a> {
         let (density, profile, options) = (&self.density, &self.profile, &self.options);
         let (criterion, headway) = (options.criterion, options.headways.clone());
         LaneLimitState { density, profile, model, criterion, headway, executor }
     }
 
-    /// The kernels of a pilot's worst points.
+    /// The kernels over a pilot's worst points.
     pub(super) fn kernels_over(&self, points: &[Vec<f64>]) -> Result<Mixture> {
         let names: Vec<&str> = self.density.space.parameters().iter().map(|p| p.name.as_str()).collect();
         Kde::fit(points.to_vec(), &names, BandwidthRule::Reduction)?.mixture()
     }
 
-    /// The proposal of every driver model, with what its pilot counted.
+    /// The proposal of every driver model, with the counts of its pilot.
     pub(super) fn pilots(&self, pilot: &Pilot, executor: &Executor) -> Result<Proposals> {
         let (nominal, fit) = (truncated(&self.density)?, |points: &[Vec<f64>]| self.kernels_over(points));
         let search = |&model: &ModelId| {
@@ -66,7 +67,7 @@ impl Sample {
         Ok(Proposals { mixtures, pilots })
     }
 
-    /// Draws, judges and weighs what the ledger does not hold yet.
+    /// Draws, evaluates and weights the samples that the ledger does not hold.
     pub(crate) fn sample_weighted(
         &self,
         proposals: &Proposals,
@@ -79,7 +80,7 @@ impl Sample {
         let prepared = |proposal: &Mixture| defended(proposal.clone(), &nominal, estimator.defence());
         let proposals: Vec<Defended> = proposals.mixtures.iter().map(prepared).collect::<Result<_>>()?;
         let (units, chunk) = (ledger.units(), self.chunk_samples());
-        // The samples of a chunk are drawn, judged and weighed together or not at all.
+        // The samples of a chunk are drawn, evaluated and weighted together, so a chunk cannot be cancelled.
         let whole = executor.clone().with_cancel(Cancel::default());
         for missing in ledger.missing(units.clone())? {
             let mut at = missing.start;
@@ -103,7 +104,7 @@ impl Sample {
     /// The estimates from the sums over all samples.
     ///
     /// # Errors
-    /// [`Error::Input`] at `place` where a sample or a driver model is missing.
+    /// [`Error::Input`] at `place` if a sample or a driver model is missing.
     pub(super) fn weighted_result(
         &self,
         proposals: &Proposals,
@@ -123,7 +124,7 @@ impl Sample {
             let total = sums.total().unwrap_or_default();
             let mut estimate = from_weight_sums(&total, false, *level, StopReason::Samples);
             proposals.pilots.get(at).into_iter().for_each(|pilot| pilot.add_to(&mut estimate));
-            // A few lanes more, on the CPU: a merge has no other backend, and all have the same bits.
+            // Some more lanes, on the CPU: a merge has no other backend, and all backends give the same bits.
             let lanes = self.limit_state(*model, Executor::new(&cpu));
             let proposal = &proposals.mixtures[at % proposals.mixtures.len()];
             let shares = scenario_shares(&lanes, proposal, estimator.defence(), *seed)?;
@@ -135,7 +136,7 @@ impl Sample {
         Ok(SampleResult { rows, proposals, ..SampleResult::default() })
     }
 
-    /// A row of an estimator that weighs.
+    /// A row of a weighting estimator.
     pub(super) fn row(&self, model: ModelId, estimate: Estimate, shares: Option<&KernelShares>) -> EstimateRow {
         let (exposure, options) = (self.exposure(), &self.options);
         let row = EstimateRow::of_draws(model, options.criterion, options.headway_name(), estimate, exposure);
@@ -143,8 +144,8 @@ impl Sample {
     }
 }
 
-/// Sums over a set of samples of one run; all models over the same ones. Tallies of disjoint sets join in any order to
-/// the same bits: the sums follow a binary tree over the indices.
+/// Sums over a set of samples of one run; all models use the same samples. Tallies of disjoint sets can be merged in
+/// any order to the same bits, because the sums follow a binary tree over the indices.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WeightedTally {
@@ -190,7 +191,7 @@ mod tests {
     use super::*;
     use crate::stats::estimate::WeightedDraw;
 
-    /// A look at the signal comes after a bounded number of lane-steps and of weighed kernels, whatever the time step.
+    /// Cancellation is checked after a bounded number of lane-steps and of weighted kernels, for every time step.
     #[test]
     fn a_chunk_is_bounded_by_its_work() {
         for step_cap in [1, 349, 3000, 120_000, 1_200_000, 4_000_000] {

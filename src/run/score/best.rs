@@ -1,4 +1,4 @@
-//! The parameterization that agrees best with S, per category and driver model, and what the data leaves open about it.
+//! The parameterization that agrees best with S, per category and driver model, and how certain this is.
 
 use super::claims::units_of;
 use super::difference::{Contrast, ScenarioRate, ScoreInterval, min_contrast};
@@ -19,29 +19,30 @@ pub struct Best {
     pub failures: u64,
     /// Scenarios in which S fails.
     pub failing_scenarios: u64,
-    /// The answer; `None` where S fails in fewer scenarios than [`super::ScoreOptions::min_failures`].
+    /// The result; `None` if S fails in fewer scenarios than [`super::ScoreOptions::min_failures`].
     pub score: Option<BestScore>,
 }
 
-/// What is known of a best parameterization.
+/// Scores of a best parameterization.
 #[derive(Debug, Clone, PartialEq)]
 pub struct BestScore {
     /// Its name.
     pub variant: String,
-    /// Its F1, the largest of the category's.
+    /// Its F1, the maximum in the category.
     pub f1: f64,
     /// Interval of F1 over scenarios.
     pub interval: ScoreInterval,
-    /// Failures of S that it does not have.
+    /// Number of failures of S that it hides.
     pub hidden: u64,
-    /// Those whose F1 the data does not tell from its own.
+    /// Parameterizations whose F1 is not significantly different.
     pub rivals: Vec<String>,
-    /// Times as many scenarios that would tell it from all of them, if the scores stay as they are; infinite where one
-    /// has the same F1.
+    /// Required multiple of the number of scenarios to distinguish it from all rivals, if the scores stay the same;
+    /// infinite if a rival has the same F1.
     pub more_data: f64,
 }
 
-/// One per category and model of a table, for a criterion. `counts` are those that the table scores.
+/// The best parameterization per category and model of a table, for a criterion. `counts` are the counts that the table
+/// scores.
 pub fn best_parameterizations(
     table: &ScoreTable,
     plan: &LanePlan,
@@ -77,7 +78,8 @@ fn best_score(
     let &(best, value) = scored.iter().rev().max_by(|a, b| a.1.total_cmp(&b.1))?;
     let rate = |at: usize| ScenarioRate::f1(units.iter().filter_map(|unit| unit.cells.get(at)));
     let name = |at: usize| scores.variants[scores.cells[at].variant].clone();
-    // The best is chosen by the data: every other is compared at a share of the level (Bonferroni).
+    // The best is selected with the same data, so every other one is compared at a fraction of the error level
+    // (Bonferroni).
     let shared = 1.0 - (1.0 - level) / scored.len().saturating_sub(1).max(1) as f64;
     let (mut rivals, mut more_data) = (Vec::new(), 1.0_f64);
     for &(other, theirs) in scored.iter().filter(|(at, _)| *at != best) {
@@ -86,7 +88,7 @@ fn best_score(
         if interval.low <= 0.0 {
             rivals.push(name(other));
             let distance = value - theirs;
-            // An interval narrows with the square root of the number of scenarios.
+            // The width of an interval decreases with the square root of the number of scenarios.
             let times = ((distance - interval.low) / distance).powi(2);
             more_data = more_data.max(if distance > 0.0 { times } else { f64::INFINITY });
         }

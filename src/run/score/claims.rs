@@ -1,11 +1,11 @@
-//! The paper's qualitative claims, judged on the user's data.
+//! Checks the paper's qualitative claims on the user's data.
 //!
-//! A cell (model and criterion) of a claim holds if the interval of its statistic excludes 0 with the claimed sign, is
-//! contradicted if it excludes 0 with the other, and undecided otherwise. A claimed equality holds in a cell if the
-//! interval lies within ±0.05 and is contradicted if it lies wholly outside. A cell in which S fails in few scenarios
-//! is not judged.
+//! A cell (model and criterion) of a claim holds if the interval of its statistic excludes 0 with the claimed sign. It
+//! is contradicted if the interval excludes 0 with the other sign, and undecided otherwise. A claimed equality holds in
+//! a cell if the interval lies within ±0.05, and is contradicted if it lies wholly outside. A cell in which S fails in
+//! few scenarios is not evaluated.
 //!
-//! The cells decide about the claim: [`ClaimVerdict::of_cells`].
+//! [`ClaimVerdict::of_cells`] combines the cells to a verdict on the claim.
 
 use super::ScoreTable;
 use super::difference::ScoreInterval;
@@ -28,24 +28,24 @@ pub struct Claim {
     pub category: Category,
     /// What the paper says.
     pub statement: &'static str,
-    /// The cells it speaks of. A claim that compares models has one cell per criterion, under its first model.
+    /// Its cells. A claim that compares models has one cell per criterion, under its first model.
     pub cells: Vec<(ModelId, Criterion)>,
-    /// The number it is about.
+    /// The statistic of the claim.
     pub statistic: Statistic,
 }
 
-/// What the data says.
+/// Verdict on a claim or a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ClaimVerdict {
     /// The interval has the claimed sign.
     Holds,
     /// The interval has the other sign.
     Contradicted,
-    /// The interval holds 0.
+    /// The interval contains 0.
     Undecided,
     /// S fails in fewer scenarios than needed.
     TooFew,
-    /// A variant, a model or a headway that it speaks of was not run.
+    /// A variant, model or headway of the claim was not run.
     NotRun,
 }
 
@@ -59,13 +59,13 @@ impl ClaimVerdict {
         ClaimVerdict::NotRun,
     ];
 
-    /// How cells decide about a claim, in words.
+    /// Text of the rule that combines cells to a verdict.
     pub const RULE: &'static str = "A claim holds if at least half of its cells (driver model and criterion) hold and \
                                     none contradicts it. It is contradicted if at least half contradict it and none \
                                     holds. It has too few failing scenarios if more than half of its cells have. \
                                     Otherwise it is undecided.";
 
-    /// In words.
+    /// Text for reports.
     pub fn text(self) -> &'static str {
         match self {
             ClaimVerdict::Holds => "holds",
@@ -76,7 +76,7 @@ impl ClaimVerdict {
         }
     }
 
-    /// Of a number that is claimed to be positive.
+    /// Verdict on a number that is claimed to be positive.
     pub fn of_sign(interval: ScoreInterval) -> ClaimVerdict {
         match interval {
             ScoreInterval { low, .. } if low > 0.0 => ClaimVerdict::Holds,
@@ -85,7 +85,7 @@ impl ClaimVerdict {
         }
     }
 
-    /// Of a number that is claimed to be nearly 0.
+    /// Verdict on a number that is claimed to be nearly 0.
     fn of_nearness(interval: ScoreInterval) -> ClaimVerdict {
         match interval {
             ScoreInterval { low, high } if low >= -NEAR && high <= NEAR => ClaimVerdict::Holds,
@@ -94,8 +94,8 @@ impl ClaimVerdict {
         }
     }
 
-    /// Of a claim, from the verdicts of its cells. If each cell errs in 2.5 % of repeats, at most 5 % of claims that are
-    /// false in all cells hold, however the cells depend on one another (Markov's inequality).
+    /// Verdict on a claim from the verdicts of its cells. If each cell errs in 2.5 % of repeats, at most 5 % of the
+    /// claims that are false in all cells hold, for any dependence between cells (Markov's inequality).
     pub fn of_cells(cells: &[ClaimVerdict]) -> ClaimVerdict {
         let count = |verdict: ClaimVerdict| cells.iter().filter(|cell| **cell == verdict).count();
         let [holding, contradicting, _, too_few, not_run] = ClaimVerdict::ALL.map(count);
@@ -118,7 +118,7 @@ impl ClaimVerdict {
 pub struct ClaimRow {
     /// The cell.
     pub cell: (ModelId, Criterion),
-    /// Scenarios in which S fails, in any of the cells that are compared.
+    /// Scenarios in which S fails in any of the compared cells.
     pub failing_scenarios: u64,
     /// Value on the whole sample.
     pub value: Option<f64>,
@@ -135,16 +135,16 @@ pub struct ClaimResult {
     pub claim: Claim,
     /// Scenarios in which S fails in any cell of the claim.
     pub failing_scenarios: u64,
-    /// Mean over the cells that are judged; of a claimed equality the mean size.
+    /// Mean over the evaluated cells; for a claimed equality the mean absolute value.
     pub mean: Option<f64>,
-    /// The verdict of the cells together.
+    /// The combined verdict of the cells.
     pub verdict: ClaimVerdict,
     /// Each cell.
     pub rows: Vec<ClaimRow>,
 }
 
-/// Judges every claim whose category was simulated. The paper's are about all its headways and models: without one of
-/// them a claim is [`ClaimVerdict::NotRun`]. `counts` are those that the table scores.
+/// Evaluates every claim whose category was simulated. The paper's claims cover all its headways and models: if one of
+/// them was not run, a claim is [`ClaimVerdict::NotRun`]. `counts` are the counts that the table scores.
 pub fn check_claims(table: &ScoreTable, plan: &LanePlan, counts: &Partial) -> Vec<ClaimResult> {
     let judge = |claim: Claim| {
         let scores = table.categories.iter().find(|c| c.category == claim.category)?;

@@ -1,8 +1,8 @@
-//! Differences of scores that are measured on the same scenarios, with intervals over scenarios.
+//! Differences of scores measured on the same scenarios, with intervals over scenarios.
 //!
-//! Each score is a rate with scenarios as clusters and has an interval of its own. The intervals are combined with the
+//! Each score is a rate with scenarios as clusters and has its own interval. The intervals are combined with the
 //! correlation of the scores (Zou, "Toward using confidence intervals to compare correlations", Psychological Methods
-//! 12, 2007). Percentiles of resampled differences cover far less: see the chapter on validation.
+//! 12, 2007). Percentiles of resampled differences have a much lower coverage: see the chapter on validation.
 
 use crate::engine::Confusion;
 use crate::stats::estimate::{Clusters, cluster_rate};
@@ -16,7 +16,7 @@ pub struct ScoreInterval {
     pub high: f64,
 }
 
-/// What a score counts in each scenario.
+/// Counts of a score in each scenario.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ScenarioRate {
     runs: Vec<u64>,
@@ -25,12 +25,12 @@ pub struct ScenarioRate {
 }
 
 impl ScenarioRate {
-    /// Hits over runs. Both are one per scenario, in the same order for all rates of a contrast.
+    /// Hits over runs; both have one entry per scenario, in the same order for all rates of a contrast.
     pub fn new(runs: Vec<u64>, hits: Vec<u64>) -> ScenarioRate {
         ScenarioRate { runs, hits, is_f1: false }
     }
 
-    /// F1 = 2J/(1 + J), which rises with J = TP/(TP + FP + FN), the rate of agreement among all failures.
+    /// F1 = 2J/(1 + J), a monotonic function of J = TP/(TP + FP + FN), the rate of agreement among all failures.
     pub fn f1<'a>(scenarios: impl Iterator<Item = &'a Confusion<u32>>) -> ScenarioRate {
         let any = |c: &Confusion<u32>| u64::from(c.tp) + u64::from(c.fn_) + u64::from(c.fp);
         let (runs, hits) = scenarios.map(|c| (any(c), u64::from(c.tp))).unzip();
@@ -46,7 +46,7 @@ impl ScenarioRate {
         Clusters { runs: &self.runs, failures: &self.hits }
     }
 
-    /// The score; `None` where it is 0/0.
+    /// The score; `None` for 0/0.
     pub fn value(&self) -> Option<f64> {
         self.runs.iter().any(|runs| *runs > 0).then(|| self.score(self.clusters().rate()))
     }
@@ -59,7 +59,7 @@ impl ScenarioRate {
         ScoreInterval { low: self.score(rate.low), high: self.score(rate.high) }
     }
 
-    /// What each scenario adds to the rate, scaled to a length of 1; all 0 where every scenario has the same rate.
+    /// Contribution of each scenario to the rate, normalized to length 1; all 0 if every scenario has the same rate.
     fn direction(&self) -> Vec<f64> {
         let rate = self.clusters().rate();
         let influence = self.hits.iter().zip(&self.runs).map(|(&hits, &runs)| hits as f64 - rate * runs as f64);
@@ -72,12 +72,12 @@ impl ScenarioRate {
     }
 }
 
-/// A constant and rates with factors.
+/// A linear combination of rates, plus a constant.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Contrast {
     /// Added to the sum.
     pub constant: f64,
-    /// Factors and places of the rates.
+    /// Factors and indices of the rates.
     pub terms: Vec<(f64, usize)>,
 }
 
@@ -88,11 +88,11 @@ impl Contrast {
     }
 }
 
-/// The smallest of some contrasts and its interval; `None` where a rate is 0/0.
+/// The minimum of some contrasts and its interval; `None` if a rate is 0/0.
 ///
-/// The lower end is the smallest lower end at `level`: the smallest contrast lies below its own end as often as any
-/// other does. The upper end is the smallest upper end at 1 − (1 − level)/n for n contrasts (Bonferroni), since each of
-/// them may be the one that is too low by chance.
+/// The lower end is the minimum lower end at `level`, because the smallest contrast lies below its own lower end as
+/// often as any other. The upper end is the minimum upper end at 1 − (1 − level)/n for n contrasts (Bonferroni),
+/// because each of them may be too low by chance.
 pub fn min_contrast(rates: &[ScenarioRate], contrasts: &[Contrast], level: f64) -> Option<(f64, ScoreInterval)> {
     let values = rates.iter().map(ScenarioRate::value).collect::<Option<Vec<f64>>>()?;
     let directions: Vec<Vec<f64>> = rates.iter().map(ScenarioRate::direction).collect();
@@ -104,7 +104,7 @@ pub fn min_contrast(rates: &[ScenarioRate], contrasts: &[Contrast], level: f64) 
         (0..rates.len()).map(|k| (0..rates.len()).map(|l| correlation(k, l)).collect()).collect();
     let intervals_at = |level: f64| rates.iter().map(|rate| rate.interval(level)).collect::<Vec<_>>();
     let (own, shared) = (intervals_at(level), intervals_at(1.0 - (1.0 - level) / contrasts.len().max(1) as f64));
-    // How far a sum may lie below its value (`sign` −1) or above.
+    // Distance of an end of a sum's interval from its value: below (`sign` −1) or above.
     let reach = |contrast: &Contrast, intervals: &[ScoreInterval], sign: f64| {
         let part = |&(factor, at): &(f64, usize)| {
             let ScoreInterval { low, high } = intervals[at];

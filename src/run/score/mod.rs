@@ -1,8 +1,9 @@
 //! Scores: how far S' agrees with S.
 //!
-//! Here live recall, precision and F1 ([`ScoreTable`]), intervals of their differences over scenarios, the best
-//! parameterizations, the paper's claims as data with their verdicts, and the paper's published numbers. Here lives
-//! nothing about lanes. Counts come from [`crate::engine`]'s partials; scores go to [`crate::report`].
+//! This module contains recall, precision and F1 ([`ScoreTable`]), intervals of their differences over scenarios, and
+//! the best parameterizations. It also contains the paper's claims as data with their verdicts, and the paper's
+//! published numbers. It contains nothing about lanes. Counts come from [`crate::engine`]'s partials; scores go to
+//! [`crate::report`].
 
 mod best;
 mod claims;
@@ -29,17 +30,17 @@ use crate::scenario::Category;
 use crate::support::ranges;
 use crate::{Error, Place, Result};
 
-/// Recall TP/(TP + FN); `None` where S never fails.
+/// Recall TP/(TP + FN); `None` if S never fails.
 pub fn recall(c: &Confusion) -> Option<f64> {
     ratio(c.tp as f64, c.tp as f64 + c.fn_ as f64)
 }
 
-/// Precision TP/(TP + FP); `None` where S' never fails.
+/// Precision TP/(TP + FP); `None` if S' never fails.
 pub fn precision(c: &Confusion) -> Option<f64> {
     ratio(c.tp as f64, c.tp as f64 + c.fp as f64)
 }
 
-/// F1 = 2TP/(2TP + FP + FN); `None` where neither ever fails: 0/0 is no score.
+/// F1 = 2TP/(2TP + FP + FN); `None` if neither ever fails, because 0/0 is undefined.
 ///
 /// ```
 /// use lanesweep::run::score::f1;
@@ -55,14 +56,14 @@ pub fn f1(c: &Confusion) -> Option<f64> {
     ratio(twice, twice + c.fn_ as f64 + c.fp as f64)
 }
 
-/// In f64, where no sum wraps; sums below 2^53 are exact.
+/// In f64, where no sum overflows; sums below 2^53 are exact.
 fn ratio(numerator: f64, denominator: f64) -> Option<f64> {
     (denominator > 0.0).then(|| numerator / denominator)
 }
 
 /// The interval of F1 from the counts of each scenario, with scenarios as clusters ([`ScenarioRate::f1`]).
 ///
-/// `None` where S fails in fewer than [`ScoreOptions::min_failures`] scenarios.
+/// `None` if S fails in fewer than [`ScoreOptions::min_failures`] scenarios.
 pub fn f1_interval<'a>(
     scenarios: impl Iterator<Item = &'a Confusion<u32>> + Clone,
     options: &ScoreOptions,
@@ -81,11 +82,11 @@ pub struct ScoreCell {
     pub model: ModelId,
     /// Criterion.
     pub criterion: Criterion,
-    /// Counts over (scenario, THW) pairs; how it is made, and whether counts can be those of a plan's lanes.
+    /// Counts over (scenario, headway) pairs.
     pub counts: Confusion,
-    /// Interval of F1 over scenarios; `None` where S fails in fewer than [`ScoreOptions::min_failures`] of them.
+    /// Interval of F1 over scenarios; `None` if S fails in fewer than [`ScoreOptions::min_failures`] of them.
     pub f1_interval: Option<ScoreInterval>,
-    /// Scenarios in which S fails from some headway.
+    /// Number of scenarios in which S fails from some headway.
     pub failing_scenarios: u64,
 }
 
@@ -94,7 +95,7 @@ pub struct ScoreCell {
 pub struct CategoryScores {
     /// Kind of scenario.
     pub category: Category,
-    /// Scenarios that were simulated.
+    /// Number of simulated scenarios.
     pub scenarios: u64,
     /// Simulations of S per model: scenarios × headways.
     pub simulations: u64,
@@ -109,18 +110,18 @@ pub struct CategoryScores {
 }
 
 impl CategoryScores {
-    /// Position of a cell in [`CategoryScores::cells`]; `None` for a model that was not run.
+    /// Index of a cell in [`CategoryScores::cells`]; `None` for a model that was not run.
     pub fn index(&self, variant: usize, model: ModelId, criterion: Criterion) -> Option<usize> {
         let model = self.models.iter().position(|m| *m == model)?;
         Some((variant * self.models.len() + model) * Criterion::ALL.len() + criterion.index())
     }
 
-    /// Scenarios in which S fails a criterion with a model; 0 for a model that was not run.
+    /// Number of scenarios in which S fails a criterion with a model; 0 for a model that was not run.
     pub fn failing_scenarios(&self, model: ModelId, criterion: Criterion) -> u64 {
         self.index(0, model, criterion).and_then(|at| self.cells.get(at)).map_or(0, |cell| cell.failing_scenarios)
     }
 
-    /// A variant by its name.
+    /// Index of a variant by its name.
     pub fn variant(&self, name: &str) -> Option<usize> {
         self.variants.iter().position(|v| v == name)
     }
@@ -133,14 +134,14 @@ pub struct ScoreTable {
     pub categories: Vec<CategoryScores>,
     /// Headways of the simulations.
     pub headways: Vec<Headway>,
-    /// How they were made.
+    /// Options of the scores.
     pub options: ScoreOptions,
 }
 
 /// Scores a complete partial.
 ///
 /// # Errors
-/// [`Error::Input`] if units are missing, the partial belongs to another plan, or its counts contradict themselves or
+/// [`Error::Input`] if units are missing, the partial belongs to another plan, or its counts contradict each other or
 /// the plan.
 pub fn score(plan: &LanePlan, partial: &Partial, options: &ScoreOptions) -> Result<ScoreTable> {
     if !partial.is_complete(plan) {
@@ -151,7 +152,7 @@ pub fn score(plan: &LanePlan, partial: &Partial, options: &ScoreOptions) -> Resu
         };
         return Err(Error::input(Place::item("partial result"), problem, "compute the missing units first"));
     }
-    // Counts that this program made never fail here; a file may hold anything under a checksum that fits.
+    // Counts of this program always pass; a file may hold invalid counts with a matching checksum.
     if let Some(problem) = contradiction(plan, partial) {
         let help = "compute it again: take the parts and journals of this run away first";
         return Err(Error::input(Place::item("partial result"), format!("its counts cannot be: {problem}"), help));
@@ -195,7 +196,7 @@ pub fn score(plan: &LanePlan, partial: &Partial, options: &ScoreOptions) -> Resu
     Ok(ScoreTable { categories, headways: plan.headways.clone(), options: options.clone() })
 }
 
-/// What is wrong with the counts of a partial that has as many units as the plan; `None` where nothing is.
+/// What is wrong with the counts of a partial that has as many units as the plan; `None` if nothing is.
 fn contradiction(plan: &LanePlan, partial: &Partial) -> Option<String> {
     let units = partial.units();
     if let Some((at, unit)) = (0..).zip(units).find(|(at, unit)| unit.unit != *at) {
@@ -210,7 +211,7 @@ fn contradiction(plan: &LanePlan, partial: &Partial) -> Option<String> {
     of_units.or_else(by_headway)
 }
 
-/// The same for one unit, whose counts are as many as they must be.
+/// The same for one unit with the correct number of counts.
 fn of_unit(unit: &UnitCounts, plan: &LanePlan) -> Option<String> {
     let (headways, per_variant) = (plan.headways.len() as u64, plan.models.len() * Criterion::ALL.len());
     let sum = |counts: &[u32]| counts.iter().map(|&count| u64::from(count)).sum::<u64>();

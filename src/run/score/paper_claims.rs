@@ -1,4 +1,4 @@
-//! The statements of the paper as data: sections on results and discussion.
+//! The claims of the paper as data, from its sections on results and discussion.
 
 use super::claims::Claim;
 use super::published::PAPER_MODELS;

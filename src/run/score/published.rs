@@ -1,6 +1,6 @@
-//! The paper's published numbers (arXiv 2409.01117, table of failures and figure of LVD results), and how far a study is
-//! from them. They belong to highD. The synthetic recordings are calibrated to the failures, not to F1; other data must
-//! agree in shape, not in these numbers.
+//! The paper's published numbers (arXiv 2409.01117, table of failures and figure of LVD results), and the misfit of a
+//! study. They are results on highD. The synthetic recordings are calibrated to the failures, not to F1; other data
+//! should agree qualitatively, not in these numbers.
 
 use super::{ScoreTable, f1};
 use crate::model::criterion::Criterion;
@@ -25,8 +25,8 @@ impl PublishedFailures {
 
 const SIMULATIONS: [u64; 3] = [3620, 8190, 4820];
 
-/// The models that the paper studies, in the order of its tables. It says nothing about any other, and a model
-/// that the registry puts between them must not move its numbers.
+/// The models of the paper, in the order of its tables. The paper has no numbers for other models, and new models in
+/// the registry must not shift its numbers.
 pub(super) const PAPER_MODELS: [ModelId; 4] = [ModelId::Reg157, ModelId::Cchdm, ModelId::Rss, ModelId::Fsm];
 
 /// Category, model, then collision, TTC, BTN.
@@ -72,25 +72,25 @@ pub fn published_lvd_f1(variant: &str, model: ModelId, criterion: Criterion) -> 
     Some(LVD_F1[row_of(model)? * 3 + criterion.index()][at])
 }
 
-/// How far a study is from the published numbers.
+/// Misfit between a study and the published numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Misfit {
-    /// Shares of failures of S that are published and were simulated, at most 36.
+    /// Number of these rates that are near the published ones; see [`Misfit::beyond_points`].
     pub shares: usize,
     /// How many of them are near the published ones; see [`Misfit::beyond_points`].
     pub near: usize,
-    /// Root mean square difference of these shares, percentage points.
+    /// Root mean square difference of these rates, percentage points.
     pub share_rms_points: f64,
-    /// F1 of LVD parameterizations that are published and defined here, at most 60.
+    /// Number of F1 values of LVD parameterizations that are published and defined here, at most 60.
     pub f1_values: usize,
     /// Mean absolute difference of these F1; 0 without any.
     pub f1_mean: f64,
-    /// Largest absolute difference of these F1.
+    /// Maximum absolute difference of these F1 values.
     pub f1_largest: f64,
 }
 
 impl Misfit {
-    /// `None` where no share of the study is published.
+    /// The misfit; `None` if no failure rate of the study is published.
     pub fn of(scores: &ScoreTable) -> Option<Misfit> {
         let (mut squares, mut differences, mut near) = (Vec::new(), Vec::new(), 0);
         for category in &scores.categories {
@@ -119,8 +119,8 @@ impl Misfit {
         })
     }
 
-    /// Percentage points by which a share misses what counts as near: within 3 points of the published one or within a
-    /// factor 1.5, whichever is wider.
+    /// Percentage points by which a rate exceeds the limit for near: within 3 points of the published rate or within a
+    /// factor of 1.5, whichever is wider.
     pub fn beyond_points(ours: f64, theirs: f64) -> f64 {
         let (low, high) = ((theirs - 3.0).min(theirs / 1.5), (theirs + 3.0).max(theirs * 1.5));
         (low - ours).max(ours - high).max(0.0)

@@ -1,4 +1,4 @@
-//! The statistics that claims are about: the smallest of some differences of scores, per model and criterion.
+//! The statistics of claims: the minimum of some differences of scores, per model and criterion.
 
 use super::CategoryScores;
 use super::difference::{Contrast, ScenarioRate, ScoreInterval, min_contrast};
@@ -6,21 +6,21 @@ use crate::engine::{Confusion, UnitCounts};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 
-/// A number whose sign (or smallness) a claim is about.
+/// A number whose sign (or closeness to 0) a claim is about.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Statistic {
-    /// Least F1 of the first minus largest F1 of the second.
+    /// Minimum F1 of the first variants minus maximum F1 of the second.
     F1Above(&'static [&'static str], &'static [&'static str]),
     /// A bound minus the F1 of a variant.
     F1Below(&'static str, f64),
     /// F1 difference of two variants, claimed to be nearly 0.
     F1Near(&'static str, &'static str),
-    /// (FP − FN)/(2TP + FP + FN), mean over variants: > 0 where false positives dominate. Has the sign of
-    /// recall − precision and stays defined where S' never fails.
+    /// (FP − FN)/(2TP + FP + FN), mean over variants: > 0 if false positives dominate. It has the sign of recall −
+    /// precision and is defined even if S' never fails.
     FalsePositivesDominate(&'static [&'static str]),
-    /// The same with the other sign: > 0 where false negatives dominate.
+    /// The same with the opposite sign: > 0 if false negatives dominate.
     FalseNegativesDominate(&'static [&'static str]),
-    /// Least failure rate of S among the first models minus the largest among the others, same criterion.
+    /// Minimum failure rate of S among the first models minus the maximum among the others, same criterion.
     FailsMoreOften(&'static [ModelId], &'static [ModelId]),
     /// Failure rate of S in this criterion minus that in another one, same model.
     FailsMoreThan(Criterion),
@@ -34,7 +34,7 @@ pub(super) struct Scenarios<'a> {
 }
 
 impl<'a> Scenarios<'a> {
-    /// The counts of a cell in every scenario; `None` where it was not run.
+    /// The counts of a cell in every scenario; `None` if it was not run.
     fn counts(
         self,
         variant: &str,
@@ -68,7 +68,7 @@ impl<'a> Scenarios<'a> {
         Some(ScenarioRate::new(runs, hits))
     }
 
-    /// Scenarios in which S fails in one of these cells.
+    /// Number of scenarios in which S fails in one of these cells.
     pub fn failing(self, cells: &[(ModelId, Criterion)]) -> u64 {
         let places: Vec<usize> = cells.iter().filter_map(|&(m, c)| self.scores.index(0, m, c)).collect();
         let fails = |unit: &&UnitCounts| places.iter().any(|&at| unit.cells.get(at).is_some_and(|c| c.tp > 0));
@@ -77,7 +77,7 @@ impl<'a> Scenarios<'a> {
 }
 
 impl Statistic {
-    /// Its value with its interval; `None` where it is 0/0 or was not run.
+    /// The value with its interval; `None` if it is 0/0 or was not run.
     pub(super) fn value(&self, of: Scenarios, cell: (ModelId, Criterion), level: f64) -> Option<(f64, ScoreInterval)> {
         let (model, criterion) = cell;
         let f1 = |variant: &&str| of.f1(variant, model, criterion);
@@ -115,7 +115,7 @@ impl Statistic {
         min_contrast(&rates, &contrasts, level)
     }
 
-    /// The cells of S whose failures a cell judges the claim by: those of every model and criterion compared.
+    /// The cells of S whose failures count for a cell of the claim: those of every compared model and criterion.
     pub(super) fn judged_by(&self, (model, criterion): (ModelId, Criterion)) -> Vec<(ModelId, Criterion)> {
         match *self {
             Statistic::FailsMoreOften(often, seldom) => often.iter().chain(seldom).map(|m| (*m, criterion)).collect(),
@@ -124,7 +124,7 @@ impl Statistic {
         }
     }
 
-    /// The models that it compares beyond the cell's own.
+    /// The compared models other than the cell's own.
     pub fn models(&self) -> Vec<ModelId> {
         match *self {
             Statistic::FailsMoreOften(often, seldom) => [often, seldom].concat(),
@@ -132,7 +132,7 @@ impl Statistic {
         }
     }
 
-    /// The variants that it needs.
+    /// The required variants.
     pub fn variants(&self) -> Vec<&'static str> {
         match *self {
             Statistic::F1Above(a, b) => [a, b].concat(),

@@ -16,8 +16,8 @@ use crate::scenario::parameterization::{
 use crate::scenario::{Case, Category, Scenario, Tables};
 use crate::{Error, Place, Result};
 
-/// The cases of a study, or of an interval of its scenarios, as what they follow from: about 2 kB per scenario. Cases, ten
-/// times as large, are made for a window of scenarios at a time.
+/// The input of a study's cases, or of an interval of its scenarios: about 2 kB per scenario. Cases are ten times as
+/// large; they are made for one window of scenarios at a time.
 pub struct StudyCases {
     pub(crate) head: StudyHead,
     pub(crate) outline: LanePlan,
@@ -49,12 +49,12 @@ impl CaseSource for CaseTable {
     }
 }
 
-/// Scenarios whose cases are held at once, with some 25 kB each.
+/// Number of scenarios whose cases are held at once, about 25 kB each.
 pub(crate) const WINDOW: u64 = 2048;
-/// The same for a device, which wants many lanes at once.
+/// The same for a device, which needs many lanes at once.
 const DEVICE_WINDOW: u64 = 16_384;
 
-/// Scenarios whose cases are held before they are encoded.
+/// Number of scenarios whose cases are held before they are encoded.
 const ENCODED_AT_ONCE: u64 = 256;
 
 impl StudyCases {
@@ -63,7 +63,7 @@ impl StudyCases {
         &self.outline
     }
 
-    /// Parts that could not be planned, with the reason: too few scenarios for a decomposition, for instance.
+    /// Parts that could not be planned, with the reason; for example too few scenarios for a decomposition.
     pub fn left_out(&self) -> &[Error] {
         &self.left_out
     }
@@ -81,8 +81,8 @@ impl StudyCases {
     /// The plan with the cases of these units, which must be held.
     ///
     /// # Errors
-    /// [`Error::Internal`] for other units; [`Error::Usage`] for a time step that is too long for a case, or too short
-    /// for so many.
+    /// [`Error::Internal`] for other units; [`Error::Usage`] for a time step that is too long for a case, or so short
+    /// that the series are too large.
     pub fn window(&self, units: Range<u64>) -> Result<LanePlan> {
         let (plan, profile) = (&self.outline, &self.outline.profile);
         let entries = self.entries(units.clone());
@@ -108,7 +108,8 @@ impl StudyCases {
             let mut from = inside.start;
             while from < inside.end {
                 let to = inside.end.min(from + ENCODED_AT_ONCE);
-                // Cases in parallel, records in order: the tables must not depend on the number of threads.
+                // Makes cases in parallel but encodes them in order, so that the tables do not depend on the number of
+                // threads.
                 let cases: Vec<(Vec<Case>, f64)> =
                     (from..to).into_par_iter().map(|unit| self.cases(at, unit)).collect::<Result<_>>()?;
                 for (cases, gap_m) in &cases {
@@ -122,10 +123,10 @@ impl StudyCases {
         Ok(plan.holding(held, Box::new(table)))
     }
 
-    /// Gives plans of consecutive windows of an interval, each with at most so many units' cases.
+    /// Passes plans of consecutive windows of an interval to `each`, each with the cases of a limited number of units.
     ///
     /// # Errors
-    /// Of `each`, and as [`StudyCases::window`].
+    /// Those of `each`, and as [`StudyCases::window`].
     pub fn in_windows(
         &self,
         units: Range<u64>,
@@ -144,7 +145,7 @@ impl StudyCases {
         Ok(())
     }
 
-    /// Sweeps an interval, window by window; chunks come with the plan of their window.
+    /// Sweeps an interval, window by window; passes chunks with the plan of their window.
     ///
     /// # Errors
     /// As [`StudyCases::window`] and [`Executor::sweep`].
@@ -166,20 +167,20 @@ impl StudyCases {
         Ok(summary)
     }
 
-    /// Bytes of the series of these units' cases, at most.
+    /// Maximum size of the series of these units' cases, bytes.
     pub(super) fn series_bytes(&self, units: Range<u64>) -> u64 {
         (self.entries(units) * size_of::<f64>() as f64) as u64
     }
 
-    /// Bytes of the series that a sweep holds at once, about: those of its first window, and as many again for their copy in
-    /// binary32 and what a batch unrolls.
+    /// Approximate size of the series that a sweep holds at once, bytes: those of its first window, and as much again
+    /// for their binary32 copy and for unrolled series.
     pub(crate) fn window_bytes(&self) -> u64 {
         let first = self.held_units();
         let bytes = self.series_bytes(first.start..first.end.min(first.start + WINDOW));
         2 * bytes.min((MAX_ENTRIES_AT_ONCE * size_of::<f64>() as f64) as u64)
     }
 
-    /// How many values the series of these units' cases have together, at most.
+    /// Maximum total number of values in the series of these units' cases.
     fn entries(&self, units: Range<u64>) -> f64 {
         let grid = TimeGrid::of(&self.outline.profile);
         let of_segment = |(at, inside): (usize, Range<u64>)| {
@@ -192,7 +193,7 @@ impl StudyCases {
         self.outline.segments(units).into_iter().map(of_segment).sum()
     }
 
-    /// S, then every S', of a unit of a block, and the gap that all of them start from where no headway sets it, m.
+    /// S, then every S', of a unit of a block. Also the common initial gap if no headway sets it, m.
     fn cases(&self, at: usize, unit: u64) -> Result<(Vec<Case>, f64)> {
         let block = &self.outline.blocks[at];
         let scenario = self.scenario(block.first_unit + unit);
@@ -205,16 +206,16 @@ impl StudyCases {
     }
 }
 
-/// Those of a category, with or without a decomposition.
+/// The parameterizations of a category, with or without those that need a decomposition.
 pub(crate) fn parameterizations(category: Category, has_reduction: bool) -> impl Iterator<Item = Parameterization> {
     Parameterization::of(category).filter(move |id| id.features().is_some() || has_reduction)
 }
 
-/// Entries of the cases that are in memory at once, at any time step: 2 GiB.
+/// Maximum number of entries of the cases in memory at once, for any time step: 2 GiB.
 const MAX_ENTRIES_AT_ONCE: f64 = (1 << 28) as f64;
 
-/// Values in the series of a scenario per step, with its parameterizations: speed, lateral position and lateral speed of
-/// each that is sampled; in a cut-out the speed of the vehicle ahead; an LVD is centred.
+/// Number of series values of a scenario per step, with its parameterizations: speed, lateral position and lateral
+/// speed of each sampled one. A cut-out adds the speed of the vehicle ahead; an LVD has no lateral series.
 pub(super) fn entries_per_step(category: Category, ids: impl Iterator<Item = Parameterization>) -> f64 {
     let sampled = ids.filter(Parameterization::has_series).count() + 1;
     let series = match category {

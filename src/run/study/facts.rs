@@ -1,5 +1,5 @@
-//! What a study's report says beside the lanes' outcomes, such as histograms of the parameters: a plan file carries
-//! it, so that a report needs no scenarios.
+//! Data of a study's report in addition to the lanes' outcomes, such as histograms of the parameters. A plan file
+//! contains it, so that a report needs no scenarios.
 
 use serde::{Deserialize, Serialize};
 
@@ -20,54 +20,54 @@ use crate::traffic::mining::{Collection, MiningOptions, RecordingSummary, count}
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CategoryProvenance {
-    /// Scenarios found.
+    /// Number of scenarios found.
     pub found: u64,
-    /// Those that passed the filters.
+    /// Number that passed the filters.
     pub kept: u64,
-    /// Explained variance of the decomposition by its first coefficients, where there is one.
+    /// Explained variance of the decomposition by its first coefficients; empty without a decomposition.
     pub svd_explained: Vec<f64>,
     /// Histograms of the parameters.
     pub parameters: Vec<ParameterHistogram>,
     /// Shapes of the decomposition's first directions.
     pub modes: Vec<ModeShape>,
-    /// Scenarios (by index among the kept ones) whose recorded headway is below 0.5 s; empty where headways are imposed.
+    /// Indices among the kept scenarios of those whose recorded headway is below 0.5 s; empty if headways are imposed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub close_units: Vec<u64>,
 }
 
-/// What a report says beside the lanes' outcomes.
+/// Data of a report in addition to the lanes' outcomes.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StudyProvenance {
-    /// What the scenarios are of.
+    /// Origin of the scenarios.
     pub data: String,
-    /// Made up by the program, in whole or in part.
+    /// The program generated the data, in whole or in part.
     pub synthetic: bool,
-    /// The paper's published numbers stand beside the results.
+    /// The report shows the paper's published numbers with the results.
     pub published: bool,
     /// The lanes are run in f64.
     pub reference: bool,
-    /// Parts of the input were left out.
+    /// Parts of the input were skipped.
     pub incomplete: bool,
-    /// SHA-256 of the scenario file, where they were read from one.
+    /// SHA-256 of the scenario file; `None` if the scenarios were not read from one.
     pub scenario_file_sha256: Option<String>,
-    /// The recordings that were used.
+    /// The recordings used.
     pub recordings: Vec<RecordingSummary>,
-    /// What was left out, and why.
+    /// What was skipped, with the reason.
     pub left_out: Vec<String>,
-    /// What the data leave open or what looks wrong in them.
+    /// Limitations and irregularities of the data.
     pub notes: Vec<String>,
     /// One per block of the plan.
     pub categories: Vec<CategoryProvenance>,
-    /// How the scenarios were mined.
+    /// Mining options of the scenarios.
     pub mining: MiningOptions,
     /// Options of the parameterizations.
     pub parameterization: ParameterizationOptions,
-    /// How the counts are scored.
+    /// Options of the scores.
     pub score: ScoreOptions,
 }
 
-/// Of every block of the plan.
+/// The data of every block of the plan.
 pub(super) fn category_facts(
     collection: &Collection,
     planned: &StudyCases,
@@ -88,7 +88,7 @@ pub(super) fn category_facts(
     planned.outline().blocks.iter().zip(&planned.reductions).map(facts).collect()
 }
 
-/// Most bins of a histogram.
+/// Maximum number of bins of a histogram.
 const MAX_BINS: f64 = 40.0;
 
 /// Counts of one parameter in equal bins.
@@ -101,23 +101,23 @@ pub struct ParameterHistogram {
     pub unit: String,
     /// Lower end of the first bin, a multiple of the width.
     pub low: f64,
-    /// Width of a bin, a plain number.
+    /// Width of a bin, a round number.
     pub width: f64,
     /// Scenarios per bin.
     pub counts: Vec<u64>,
 }
 
-/// Histograms of the parameters of the kinematic parameterization that has most of them: cut-in 2, cut-out b, LVD i.
-/// Without scenarios there are none.
+/// Histograms of the parameters of the kinematic parameterization with the most parameters: cut-in 2, cut-out b, LVD i.
+/// Empty without scenarios.
 ///
 /// # Errors
-/// Of a scenario that has no such parameters.
+/// Those of a scenario that lacks these parameters.
 pub fn parameter_histograms(
     category: Category,
     scenarios: &[&Scenario],
     options: &ParameterizationOptions,
 ) -> Result<Vec<ParameterHistogram>> {
-    // Of cut-ins with a recorded start only those without a gradual lane change have a density.
+    // With recorded starts, only cut-in parameterizations without a gradual lane change have a density.
     let accelerates = |id: &Parameterization| {
         id.features().is_some_and(|features| features.speed == SpeedProfile::ConstantAcceleration)
     };
@@ -134,8 +134,8 @@ pub fn parameter_histograms(
     Ok(space.parameters().iter().enumerate().filter_map(of).collect())
 }
 
-/// Lower end, width and counts by the rule of Freedman and Diaconis (1981), the width a plain number; `None` without a
-/// finite value.
+/// Lower end, width and counts by the rule of Freedman and Diaconis (1981), with a round number as width; `None`
+/// without a finite value.
 fn bins(mut values: Vec<f64>) -> Option<(f64, f64, Vec<u64>)> {
     values.retain(|value| value.is_finite());
     values.sort_unstable_by(f64::total_cmp);
@@ -144,7 +144,7 @@ fn bins(mut values: Vec<f64>) -> Option<(f64, f64, Vec<u64>)> {
     let quartiles = values[n * 3 / 4] - values[n / 4];
     let rule = 2.0 * quartiles / libm::cbrt(n as f64);
     let least = ((last - first) / MAX_BINS).max(1e-9 * first.abs().max(last.abs())).max(1e-9);
-    // From half the rule's width on: the next plain number is up to 2.5 times as large.
+    // Starts at half the rule's width, because the next round number is up to 2.5 times as large.
     let width = plain_step((0.5 * rule).max(least));
     let (from, to) = ((first / width).floor(), (last / width).floor());
     let mut counts = vec![0_u64; (to - from) as usize + 1];

@@ -1,5 +1,5 @@
-//! Studies: scenarios and parameterizations become a plan of lanes; the plan is run whole or in shards, resumed, merged and
-//! scored. [`Study`] is the way in.
+//! Studies: scenarios and parameterizations become a plan of lanes; the plan is run whole or in shards, resumed, merged
+//! and scored. [`Study`] is the entry point.
 
 mod cases;
 mod facts;
@@ -33,7 +33,7 @@ use crate::support::run_dir::Results;
 use crate::traffic::mining::{Collection, MiningOptions, counts_text};
 use crate::{Error, Place, Result};
 
-/// Largest first line that is read: checksums of a page of scenarios, facts of the recordings.
+/// Maximum size of the first line that is read, bytes: checksums of the pages of scenarios, data of the recordings.
 const MAX_HEAD_BYTES: u64 = 1 << 30;
 
 /// The first line of the file. The scenarios follow it.
@@ -84,7 +84,7 @@ struct StudyPlanFile {
 pub struct Study {
     cases: StudyCases,
     facts: StudyProvenance,
-    /// Where it was read, with the hash of the run.
+    /// The file that it was read from, with the hash of the run.
     file: Option<(PathBuf, String)>,
 }
 
@@ -107,17 +107,17 @@ impl StudyBuilder<'_> {
         StudyBuilder { options, ..self }
     }
 
-    /// How counts are scored.
+    /// Options of the scores.
     pub fn score(self, score: ScoreOptions) -> Self {
         StudyBuilder { score, ..self }
     }
 
-    /// How the scenarios were mined, for the record.
+    /// Mining options of the scenarios, for the record.
     pub fn mining(self, mining: MiningOptions) -> Self {
         StudyBuilder { mining, ..self }
     }
 
-    /// What the scenarios are of, for the report.
+    /// Origin of the scenarios, for the report.
     pub fn data(self, data: impl Into<String>) -> Self {
         StudyBuilder { data: data.into(), ..self }
     }
@@ -127,12 +127,12 @@ impl StudyBuilder<'_> {
         StudyBuilder { scenario_file_sha256: sha256, ..self }
     }
 
-    /// Sets the paper's published numbers beside the results.
+    /// Shows the paper's published numbers with the results.
     pub fn published(self, published: bool) -> Self {
         StudyBuilder { published, ..self }
     }
 
-    /// Says that the lanes are to be run in f64, by [`CpuBackend::reference`](crate::engine::CpuBackend::reference).
+    /// Declares that the lanes run in f64, by [`CpuBackend::reference`](crate::engine::CpuBackend::reference).
     pub fn reference(self, reference: bool) -> Self {
         StudyBuilder { reference, ..self }
     }
@@ -140,8 +140,8 @@ impl StudyBuilder<'_> {
     /// Plans the study.
     ///
     /// # Errors
-    /// [`Error::Input`] where no scenario of these categories was kept, or where scenarios are too long for their
-    /// sample rate.
+    /// [`Error::Input`] if no scenario of these categories was kept, or if scenarios are too long for their sample
+    /// rate.
     pub fn plan(self) -> Result<Study> {
         let StudyBuilder { collection, profile, options, mining, score, data, .. } = self;
         score.validate()?;
@@ -176,7 +176,7 @@ impl Study {
     /// Kind of the sealed plan file.
     pub const KIND: &str = "study plan";
 
-    /// Begins a study of the scenarios that were kept.
+    /// Begins a study of the kept scenarios.
     pub fn builder(collection: &Collection, profile: Profile) -> StudyBuilder<'_> {
         StudyBuilder {
             collection,
@@ -201,7 +201,7 @@ impl Study {
         &self.cases
     }
 
-    /// What a report says beside the outcomes.
+    /// Data of a report in addition to the outcomes.
     pub fn facts(&self) -> &StudyProvenance {
         &self.facts
     }
@@ -214,13 +214,13 @@ impl Study {
         score(self.plan(), counts, &self.facts.score)
     }
 
-    /// The first line of the plan file, with the hash of the run. The line holds the checksums of all that follows.
+    /// The first line of the plan file, and the hash of the run. The line contains the checksums of the rest.
     pub(crate) fn seal(&self) -> Result<(Vec<u8>, String)> {
         seal(Study::KIND, &StudyPlanFile { facts: self.facts.clone(), plan: self.cases.head().clone() })
     }
 
-    /// Hash of the run. Parts agree on the plan file's; the counts of a run in one piece follow from plan and
-    /// arithmetic alone, so that it may be resumed under other score options.
+    /// Hash of the run. Parts use the hash of the plan file. The counts of a run in one piece depend only on plan and
+    /// arithmetic, so it may be resumed with other score options.
     fn run_sha256(&self, is_part: bool) -> Result<String> {
         match &self.file {
             Some((_, run_sha256)) => Ok(run_sha256.clone()),
@@ -229,22 +229,22 @@ impl Study {
         }
     }
 
-    /// Writes the plan file into a run's folder, or finds the same one there: many shards may do so at once.
+    /// Writes the plan file into a run's folder, or checks that the same one exists; many shards may do so at once.
     ///
     /// # Errors
-    /// [`Error::Input`] where the folder holds the plan of another run; [`Error::Io`].
+    /// [`Error::Input`] if the folder holds the plan of another run; [`Error::Io`].
     pub fn write_plan(&self, out: &Path) -> Result<()> {
         let Some((path, _)) = &self.file else {
             let line = self.seal()?.0;
             return leave_plan(out, &line, |file| self.cases.write_file(&line, file));
         };
-        // The file as it is: of a shard's scenarios alone the plan could not be written.
+        // Copies the file, because a shard holds only its own scenarios and cannot write the plan.
         let mut line = Vec::new();
         BufReader::new(input_file::open(path)?).read_until(b'\n', &mut line).map_err(|e| Error::io(path, "read", e))?;
         leave_plan(out, &line, |file| std::io::copy(&mut File::open(path)?, file).map(drop))
     }
 
-    /// Adds the plan file to the results, unless it would be larger than so many bytes; tells whether it did.
+    /// Adds the plan file to the results, unless it is larger than `max_bytes`; returns whether it did.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -257,15 +257,15 @@ impl Study {
         Ok(is_kept)
     }
 
-    /// Reads a plan file; of a shard, its scenarios only.
+    /// Reads a plan file; for a shard, only its scenarios.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Input`] for anything but a whole plan of this version and engine.
+    /// [`Error::Io`]; [`Error::Input`] for any other or incomplete file, or another version or engine.
     pub fn read(path: &Path, shard: Option<Shard>) -> Result<Study> {
         Study::read_units(path, |count| units_of(shard, count))
     }
 
-    /// The same with an interval of the scenarios, of so many: nothing else of the file is read.
+    /// The same for an interval of the scenarios that `wanted` selects by their number; reads nothing else of the file.
     fn read_units(path: &Path, wanted: impl FnOnce(u64) -> Range<u64>) -> Result<Study> {
         let (file, run_sha256, mut scenarios) = read_sealed_line(Study::KIND, path, MAX_HEAD_BYTES, HOW_TO_REMAKE)?;
         let StudyPlanFile { facts, plan } = file;

@@ -1,4 +1,4 @@
-//! Plans a study: mined scenarios and options become cases, bounded before anything is made of them.
+//! Plans a study: mined scenarios and options become cases; sizes are limited before anything is allocated.
 
 use crate::engine::plan::{Headway, LanePlan};
 use crate::model::driver::ModelId;
@@ -12,7 +12,7 @@ use crate::scenario::{Category, Scenario};
 use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
-/// What a study sweeps.
+/// Options of a study.
 #[derive(Debug, Clone)]
 pub struct StudyOptions {
     /// Categories, in order.
@@ -36,16 +36,18 @@ impl Default for StudyOptions {
     }
 }
 
-/// Entries of all series at the paper's time step: so many for any file, and more for each value in it, enough for any
-/// number of scenarios from 10 Hz on. Sparse series of long scenarios would make gigabytes of a short file.
+/// Maximum number of entries of all series at the paper's time step: this constant, plus an amount for each value in
+/// the file. Sufficient for any number of scenarios sampled at 10 Hz or more. Sparse series of long scenarios would
+/// otherwise expand a small file to gigabytes.
 const MAX_ENTRIES: f64 = (4 << 20) as f64;
 const MAX_ENTRIES_PER_VALUE: f64 = 15.0;
 const PAPER_DT_S: f64 = 0.04;
 
-/// Plans a study over mined scenarios with all of its cases: the kept ones are simulated, in the order given; a
+/// Plans a study over mined scenarios with all of its cases. The kept ones are simulated, in the order given; a
 /// decomposition may be fitted on more (see [`SvdFit`]).
 ///
 /// # Errors
+/// As [`outline_study`] and [`StudyCases::window`].
 /// As [`outline_study`] and [`StudyCases::window`].
 pub fn plan_study(scenarios: &[Scenario], profile: &Profile, options: &StudyOptions) -> Result<LanePlan> {
     let cases = outline_study(scenarios, profile, options)?;
@@ -55,7 +57,7 @@ pub fn plan_study(scenarios: &[Scenario], profile: &Profile, options: &StudyOpti
 /// Plans a study as [`plan_study`] does, without making its cases.
 ///
 /// # Errors
-/// [`Error::Usage`] for a category, model, headway or kept scenario that is there twice: each lane has a key of its own.
+/// [`Error::Usage`] for a duplicate category, model, headway or kept scenario, because lane keys must be unique.
 pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyOptions) -> Result<StudyCases> {
     refuse_repeats(|| Place::option("categories"), options.categories.iter().map(|c| (*c, c.label())))?;
     let kept = scenarios.iter().filter(|scenario| scenario.kept);
@@ -108,14 +110,14 @@ pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyO
         blocks,
         &held,
     )?;
-    // Of the decompositions, facts need more than the file holds.
+    // The report data need more of the decompositions than the file stores.
     Ok(StudyCases { reductions, left_out, ..head.with_scenarios(0, held)? })
 }
 
-/// Bounds the tables before anything of them is made.
+/// Limits the size of the tables before they are allocated.
 fn check_size(entries: f64, values: f64, dt_s: f64) -> Result<()> {
     let told = format!("the scenarios and their parameterizations have {entries:.1e} values at a step of {dt_s} s");
-    // A finer time step is the user's choice and not the file's.
+    // The user, not the file, chooses a finer time step.
     if entries > (MAX_ENTRIES + MAX_ENTRIES_PER_VALUE * values) * (PAPER_DT_S / dt_s).max(1.0) {
         let problem = format!("{told}, but only {values:.1e} were recorded");
         let help = "their sample rate is low for so many or so long ones: give more samples, or study fewer at once";

@@ -1,6 +1,6 @@
-//! A study as a file: a line of JSON, then its scenarios as in a scenario file, one a line, in pages of 64. The first line
-//! has a checksum of every page. A process that computes some of the scenarios reads their pages alone. The hash of the
-//! plan is that of head and checksums.
+//! A study as a file: a line of JSON, then its scenarios as in a scenario file, one per line, in pages of 64. The first
+//! line contains a checksum of every page. A process that computes some of the scenarios reads only their pages. The
+//! hash of the plan is that of the first line's data and checksums.
 
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
@@ -15,11 +15,11 @@ use crate::support::plain_text::hex;
 use crate::support::ranges::repeated;
 use crate::{Error, Place, Result};
 
-/// Scenarios of a page.
+/// Number of scenarios in a page.
 pub(super) const PAGE: u64 = 64;
 
-/// What the cases of a scenario follow from, and the gap that it starts from where no headway sets it. Nothing else of it
-/// is in the file or in the hash.
+/// The fields of a scenario that determine its cases, and its initial gap if no headway sets it. The file and the hash
+/// contain nothing else of it.
 pub(crate) fn stripped(scenario: &Scenario, gap_m: Option<f64>) -> Scenario {
     let mut stripped = Scenario {
         recording: String::new(),
@@ -37,7 +37,7 @@ pub(crate) fn stripped(scenario: &Scenario, gap_m: Option<f64>) -> Scenario {
         end_cause: None,
         frame_switch: None,
         tag_frames: None,
-        // The study's facts tell it.
+        // The study's provenance records this.
         synthetic: false,
         ..scenario.clone()
     };
@@ -51,7 +51,8 @@ pub(crate) fn stripped(scenario: &Scenario, gap_m: Option<f64>) -> Scenario {
     stripped
 }
 
-/// The lines of a page. Series that decide no lane take no memory, but a scenario file has them: they are 0 there.
+/// The lines of a page. Series that affect no lane take no memory, but a scenario file requires them: they are written
+/// as 0.
 pub(super) fn lines(scenarios: &[Scenario]) -> std::io::Result<Vec<u8>> {
     let mut text = Vec::new();
     for scenario in scenarios {
@@ -65,7 +66,7 @@ pub(super) fn lines(scenarios: &[Scenario]) -> std::io::Result<Vec<u8>> {
     Ok(text)
 }
 
-/// What a study is beside its scenarios, and the checksums of those.
+/// The data of a study without its scenarios, and the checksums of these.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct StudyHead {
@@ -85,12 +86,12 @@ pub struct StudyHead {
 pub(crate) struct BlockHead {
     pub(super) category: Category,
     pub(super) units: u64,
-    /// None where there were too few scenarios for a decomposition.
+    /// `None` if there were too few scenarios for a decomposition.
     pub(super) basis: Option<SvdBasis>,
 }
 
 impl BlockHead {
-    /// Of the decomposition, what cases are made with.
+    /// Keeps the part of the decomposition that cases are made with.
     pub fn new(category: Category, units: u64, reduction: Option<&Reduction>) -> BlockHead {
         let used = Parameterization::max_coefficients(category);
         let basis = reduction.map(|reduction| {
@@ -103,7 +104,7 @@ impl BlockHead {
 }
 
 impl StudyHead {
-    /// Of scenarios that are all held.
+    /// The head for scenarios that are all held.
     pub(crate) fn new(
         profile: Profile,
         models: Vec<ModelId>,
@@ -121,7 +122,7 @@ impl StudyHead {
         Ok(head)
     }
 
-    /// The head whose checksums and hash fit these lines of one page, whatever they hold.
+    /// The head with matching checksums and hash for these lines of one page, valid or not.
     #[cfg(test)]
     pub(crate) fn with_changed_lines(&self, lines: &[u8]) -> Result<StudyHead> {
         assert!(self.unit_count() <= PAGE, "the scenarios of one page");
@@ -131,7 +132,7 @@ impl StudyHead {
         Ok(head)
     }
 
-    /// Hash of the plan: everything that decides the outcomes.
+    /// Hash of the plan: everything that determines the outcomes.
     fn hash(&self) -> Result<String> {
         let StudyHead { plan_sha256: _, profile, models, headways, parameterization, blocks, pages } = self;
         let mut canonical = Canonical::new("study of lines");
@@ -143,12 +144,12 @@ impl StudyHead {
         Ok(canonical.finish())
     }
 
-    /// Scenarios of the study.
+    /// Number of scenarios of the study.
     pub(super) fn unit_count(&self) -> u64 {
         self.blocks.iter().map(|block| block.units).fold(0, u64::saturating_add)
     }
 
-    /// Whether a study can be so.
+    /// Checks whether this can be the head of a study.
     pub(super) fn check(&self, place: &Place) -> Result<()> {
         let wrong =
             |problem: &str| Err(Error::input(place.clone(), problem, "make the plan again with option `plan_only`"));
@@ -193,12 +194,12 @@ impl StudyHead {
         Ok(())
     }
 
-    /// Bytes of all scenarios.
+    /// Total size of all scenarios, bytes.
     pub(super) fn scenario_bytes(&self) -> u64 {
         self.pages.iter().map(|(bytes, _)| *bytes).fold(0, u64::saturating_add)
     }
 
-    /// The scenario of a line, if it can be simulated.
+    /// Parses the scenario of a line and checks that it can be simulated.
     pub(super) fn scenario(&self, unit: u64, line: &[u8]) -> std::result::Result<Scenario, String> {
         let mut first = 0;
         let block = self.blocks.iter().find(|block| {
@@ -214,7 +215,7 @@ impl StudyHead {
         if Headway::is_observed(&self.headways) && scenario.gap0.is_none() {
             return wrong("it has no recorded gap");
         }
-        // The copy holds no more memory than it needs.
+        // Copies the scenario without excess memory.
         problem_of(&scenario).map_or_else(|| Ok(stripped(&scenario, scenario.gap0)), |problem| wrong(&problem))
     }
 }

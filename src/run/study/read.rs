@@ -1,4 +1,4 @@
-//! Reads a study from its file: head and checksums first, then the pages of the scenarios that are wanted.
+//! Reads a study from its file: head and checksums first, then the pages of the requested scenarios.
 
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::ops::Range;
@@ -14,7 +14,7 @@ use crate::scenario::{Scenario, Tables};
 use crate::support::plain_text::hex;
 use crate::{Error, Place, Result};
 
-/// The source of a plan without cases.
+/// Case source of a plan without cases.
 struct NoCases;
 
 impl CaseSource for NoCases {
@@ -29,7 +29,7 @@ impl CaseSource for NoCases {
 }
 
 impl StudyHead {
-    /// The study with these of its scenarios; `first_held` is the unit of the first one.
+    /// The study with some of its scenarios; `first_held` is the unit of the first one.
     pub(crate) fn with_scenarios(self, first_held: u64, held: Vec<Scenario>) -> Result<StudyCases> {
         let (mut ids, end_held) = (held.iter().map(|scenario| scenario.id.clone()), first_held + held.len() as u64);
         let (mut first, mut blocks, mut reductions) = (0, Vec::new(), Vec::new());
@@ -55,11 +55,12 @@ impl StudyHead {
         Ok(StudyCases { head: self, outline, reductions, first_held, held, left_out: Vec::new() })
     }
 
-    /// The study with some of its scenarios, whose lines begin where the file stands. `wanted` says which, of so many.
+    /// Reads the study with some of its scenarios, whose lines begin at the file's present position. `wanted` selects
+    /// them by their number.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Input`] at `place` where head or scenarios contradict themselves or the hash, or where a
-    /// page that is read is damaged.
+    /// [`Error::Io`]; [`Error::Input`] at `place` if head or scenarios contradict each other or the hash, or if a page
+    /// is damaged.
     pub fn read(
         self,
         file: &mut (impl Read + Seek),
@@ -108,15 +109,16 @@ impl StudyHead {
 }
 
 impl StudyCases {
-    /// What stands before the scenarios in a file.
+    /// The data before the scenarios in a file.
     pub fn head(&self) -> &StudyHead {
         &self.head
     }
 
-    /// A plan of its own over some of the scenarios held, evenly taken from all of them, at most about so many with about
-    /// so many bytes of series, and one of each category at least: for what may be concluded from them on the whole.
+    /// A separate plan over an even selection of the held scenarios, for extrapolation to all. It has at most about
+    /// `most` scenarios and `max_bytes` bytes of series, but at least one scenario of each category.
     ///
     /// # Errors
+    /// None for types of this program.
     /// None for what this program makes.
     pub(crate) fn thinned(&self, most: u64, max_bytes: u64) -> Result<LanePlan> {
         let by_bytes = self.series_bytes(self.held_units()).div_ceil(max_bytes.max(1));
@@ -136,7 +138,7 @@ impl StudyCases {
     /// Writes the plan file: its first line, then the scenarios.
     ///
     /// # Errors
-    /// Of the file; where an interval of the study is held.
+    /// Those of the file; also if only an interval of the study is held.
     pub fn write_file(&self, line: &[u8], file: &mut dyn Write) -> std::io::Result<()> {
         if self.held_units() != (0..self.outline.unit_count()) {
             return Err(std::io::Error::other("a part of a study cannot be written as the study"));
@@ -156,7 +158,7 @@ mod tests {
     use crate::traffic::mining::{MiningOptions, mine_generated};
     use crate::traffic::trajectory::generator::GeneratorOptions;
 
-    /// Counts what is read.
+    /// Counts the bytes read.
     struct Counted(Cursor<Vec<u8>>, usize);
 
     impl Read for Counted {
@@ -175,7 +177,7 @@ mod tests {
 
     #[test]
     fn an_interval_is_read_alone_and_damage_in_it_is_found() {
-        // Enough for several pages.
+        // Enough scenarios for several pages.
         let options = GeneratorOptions { recordings: 4, ..GeneratorOptions::default() };
         let scenarios = mine_generated(&options, &MiningOptions::default(), || ()).unwrap().scenarios;
         let copies =

@@ -9,18 +9,18 @@ use crate::run::parts::{PLAN_FILE, RunDir, RunState, Shard, read_parts};
 use crate::support::run_dir::{Results, STUDY_RECORD};
 use crate::{Error, Place, Result};
 
-/// What the lanes of a whole study gave.
+/// Result of a whole study.
 #[derive(Debug, Clone)]
 pub struct StudyResult {
-    /// The counts of every unit; [`Study::score`] makes the score table of them.
+    /// The counts of every unit; [`Study::score`] computes the score table from them.
     pub counts: Partial,
-    /// How the sweep went.
+    /// Summary of the sweep.
     pub summary: SweepSummary,
-    /// Parts that were merged; 0 of a run in one piece.
+    /// Number of merged parts; 0 for a run in one piece.
     pub parts: usize,
 }
 
-/// A run of a study, or of one of its shards, in a folder. It continues what an earlier process left in the journal.
+/// A run of a study, or of one of its shards, in a folder. It continues from the journal of an earlier process.
 pub struct StudyRun<'s> {
     study: &'s Study,
     run_dir: RunDir,
@@ -44,7 +44,7 @@ impl Study {
         Ok(StudyResult { counts, summary, parts: 0 })
     }
 
-    /// Opens a run in a folder; `None` where the shard's part is there already, and whole.
+    /// Opens a run in a folder; `None` if the shard's complete part exists already.
     ///
     /// # Errors
     /// [`Error::Busy`] where another process runs it; [`Error::Input`] for a damaged or foreign file in its place;
@@ -66,7 +66,7 @@ impl Study {
         Ok(Some(StudyRun { study: self, run_dir, state, summary }))
     }
 
-    /// Runs a shard in a folder and leaves plan and part there. An interrupted one continues at the next call.
+    /// Runs a shard in a folder and writes plan and part there. An interrupted run continues at the next call.
     ///
     /// # Errors
     /// As [`Study::open`] and [`Study::run`]; [`Error::Interrupted`].
@@ -77,17 +77,17 @@ impl Study {
         run.write_part()
     }
 
-    /// The study of a folder of parts with its counts: bit for bit those of the run in one piece.
+    /// The study and the counts of a folder of parts, bit for bit equal to those of the run in one piece.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Input`] naming what is missing, doubled, foreign or damaged.
+    /// [`Error::Io`]; [`Error::Input`] with the missing, duplicate, foreign or damaged parts.
     pub fn merge(out: &Path) -> Result<(Study, StudyResult)> {
         Study::merge_or(out, &|shard| format!("run shard {shard}"))
     }
 
-    /// The same; `again` says how a shard is made.
+    /// The same; `again` returns the command that makes a shard.
     pub(crate) fn merge_or(out: &Path, again: &dyn Fn(Shard) -> String) -> Result<(Study, StudyResult)> {
-        // Only counts are joined: no scenario is needed.
+        // Merging needs only counts and no scenarios.
         let study = Study::read_units(&out.join(PLAN_FILE), |_| 0..0)?;
         let plan = study.plan();
         let found = read_parts::<Partial>(out, &study.run_sha256(true)?, plan.unit_count(), again, &|counts| {
@@ -110,23 +110,23 @@ impl Study {
 }
 
 impl StudyRun<'_> {
-    /// The units: of the shard, or all.
+    /// The units of the shard, or of the whole run.
     pub fn units(&self) -> Range<u64> {
         self.state.units.clone()
     }
 
-    /// Units that no earlier process has counted.
+    /// Number of units that no earlier process has counted.
     ///
     /// # Errors
-    /// Of the journal's counts.
+    /// Those of the journal's counts.
     pub fn missing(&mut self) -> Result<u64> {
         Ok(self.state.ledger.missing(self.units())?.iter().map(|range| range.end - range.start).sum())
     }
 
-    /// Runs the lanes that are missing.
+    /// Runs the missing lanes.
     ///
     /// # Errors
-    /// As [`Study::run`]; [`Error::Interrupted`] once an end was asked for: what is done is in the journal.
+    /// As [`Study::run`]; [`Error::Interrupted`] after cancellation: finished counts are in the journal.
     pub fn sweep(&mut self, executor: &Executor) -> Result<SweepSummary> {
         let _resumable = executor.cancel.resumable();
         let ledger = &mut self.state.ledger;
@@ -136,29 +136,29 @@ impl StudyRun<'_> {
             });
             self.summary.add(&ledger.kept(part)?);
         }
-        // What earlier processes checked is in the journal.
+        // Rechecks of earlier processes are recorded in the journal.
         [self.summary.redone_lanes, self.summary.rechecked_lanes] = ledger.redone_and_rechecked();
         Ok(self.summary)
     }
 
-    /// Writes the part of a shard and removes its journal.
+    /// Writes the part of a shard and deletes its journal.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Internal`] where lanes are missing or the run is no shard.
+    /// [`Error::Io`]; [`Error::Internal`] if lanes are missing or the run is not a shard.
     pub fn write_part(self) -> Result<()> {
         self.run_dir.finish(self.state)
     }
 
-    /// Takes the counts of a whole run.
+    /// Removes and returns the counts of a whole run.
     ///
     /// # Errors
-    /// None for what this program counts.
+    /// None for counts of this program.
     pub fn take_result(&mut self) -> Result<StudyResult> {
         let counts = self.state.ledger.take()?.unwrap_or_else(|| Partial::empty(self.study.plan()));
         Ok(StudyResult { counts, summary: self.summary, parts: 0 })
     }
 
-    /// The files that a whole run leaves in its folder.
+    /// The result files of a whole run in its folder.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -166,7 +166,7 @@ impl StudyRun<'_> {
         self.state.folder.results()
     }
 
-    /// Removes the journal of a whole run whose results are written.
+    /// Deletes the journal of a whole run after its results are written.
     ///
     /// # Errors
     /// [`Error::Io`].

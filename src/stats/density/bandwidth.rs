@@ -1,10 +1,10 @@
-//! The bandwidth h of isotropic Gaussian kernels on scaled points: the leave-one-out log-likelihood, largest
-//! inside a published interval by golden-section search.
+//! The bandwidth h of isotropic Gaussian kernels on scaled points: maximizes the leave-one-out log-likelihood in a
+//! published interval by golden-section search.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// The published interval that is searched.
+/// The published search interval.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BandwidthRule {
@@ -35,33 +35,33 @@ impl BandwidthRule {
     }
 }
 
-/// Where the search ended.
+/// Position of the maximum found.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum SearchEnd {
     /// Inside the interval.
     Inside,
-    /// At its lower end: the likelihood grows as kernels get narrower, as with points that repeat.
+    /// At its lower end: the likelihood grows as kernels become narrower, for example with duplicate points.
     Lower,
-    /// At its upper end: the likelihood asks for wider kernels than the rule allows.
+    /// At its upper end: the likelihood increases for kernels wider than the rule allows.
     Upper,
 }
 
-/// What the search found.
+/// Result of the search.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Bandwidth {
     /// h, in units of the scales.
     pub value: f64,
-    /// The rule.
+    /// The rule of the interval.
     pub rule: BandwidthRule,
     /// h_S of Silverman's rule.
     pub silverman: f64,
-    /// Where the search ended.
+    /// Position of the maximum found.
     pub end: SearchEnd,
 }
 
-/// Width of the interval at which the search ends.
+/// Width of the bracket at which the search ends.
 const TOLERANCE: f64 = 1e-5;
 
 /// h_S = (4/(d + 2))^{1/(d + 4)} N^{−1/(d + 4)}.
@@ -70,16 +70,16 @@ pub fn silverman(points: usize, dimensions: usize) -> f64 {
     libm::pow(4.0 / (d + 2.0) / points as f64, 1.0 / (d + 4.0))
 }
 
-/// Scaled points with the distance of each to its nearest other.
+/// Scaled points with the distance of each to its nearest neighbour.
 pub struct LeaveOneOut {
-    /// One per parameter, N numbers each: loops over points are then loops over neighbouring numbers.
+    /// One column of N numbers per parameter, so that loops over points read consecutive numbers.
     columns: Vec<Vec<f64>>,
     /// Squared, one per point.
     nearest: Vec<f64>,
 }
 
 impl LeaveOneOut {
-    /// Bandwidth of points that are already divided by their scales; at least 2 points.
+    /// From points that are already divided by their scales; at least 2 points.
     pub fn new(scaled: &[Vec<f64>]) -> LeaveOneOut {
         let dimensions = scaled.first().map_or(0, Vec::len);
         let columns = (0..dimensions).map(|j| scaled.iter().map(|p| p[j]).collect()).collect();
@@ -88,9 +88,9 @@ impl LeaveOneOut {
         this
     }
 
-    /// Σ_i log f̂_{−i}(x_i) at bandwidth `h`, of the density over scaled points. Distances are made again at
-    /// every call: N² of them do not fit a memory, and the exponentials cost more. Sums run over each point's
-    /// others in a fixed order, then over the points in order: the bits do not depend on the number of threads.
+    /// Σ_i log f̂_{−i}(x_i) at bandwidth `h`, of the density over scaled points. Distances are recomputed at every
+    /// call, because N² of them exceed the memory and the exponentials cost more. Sums run over the other points of
+    /// each point in a fixed order, then over the points in order, so the bits do not depend on the number of threads.
     pub fn log_likelihood(&self, h: f64) -> f64 {
         let n = self.nearest.len();
         let factor = 1.0 / (2.0 * h * h);
@@ -103,7 +103,7 @@ impl LeaveOneOut {
         rows.iter().sum::<f64>() - n as f64 * constant
     }
 
-    /// A number per point, from the squared distances to all points; that to itself is infinite.
+    /// One number per point, from the squared distances to all points; the distance to itself is infinite.
     fn each_row(&self, number: impl Fn(usize, &[f64]) -> f64 + Sync) -> Vec<f64> {
         let n = self.nearest.len();
         let of_row = |squared: &mut Vec<f64>, i: usize| {
@@ -119,7 +119,7 @@ impl LeaveOneOut {
         (0..n).into_par_iter().map_init(Vec::new, of_row).collect()
     }
 
-    /// The best bandwidth of the rule's interval.
+    /// The best bandwidth in the rule's interval.
     pub fn search(&self, rule: BandwidthRule) -> Bandwidth {
         let n = self.nearest.len();
         let [lower, upper] = rule.interval(n, self.columns.len());
@@ -148,7 +148,7 @@ impl LeaveOneOut {
     }
 }
 
-/// Partial sums of a row, so that the compiler can add several terms at once in an order that is written here.
+/// Number of partial sums of a row, so that the compiler can vectorize additions in a fixed order.
 const PARTS: usize = 8;
 
 /// Σ exp(−(s − nearest)·factor) over squared distances s.
@@ -164,14 +164,14 @@ fn sum_of_exponentials(squared: &[f64], nearest: f64, factor: f64) -> f64 {
     parts.iter().sum::<f64>() + rest
 }
 
-/// exp(−x) of x ≥ 0 to 3e-16 relative, and 0 beyond 50, where a term is less than 2e-22 of the largest. Without
-/// a branch or a call, so that a loop over it becomes vector instructions; the same bits everywhere.
+/// exp(−x) of x ≥ 0 with a relative error of 3e-16, and 0 above 50, where a term is less than 2e-22 of the largest. No
+/// branch and no call, so that loops over it are vectorized; the same bits on every machine.
 #[inline(always)]
 fn exp_minus(x: f64) -> f64 {
-    // ln 2 in two parts, the first with zeros at its end: k times it is exact.
+    // ln 2 in two parts; the first one ends in zero bits, so that its product with k is exact.
     const LN_2_HIGH: f64 = 6.931_471_803_691_238e-1;
     const LN_2_LOW: f64 = 1.908_214_929_270_587_7e-10;
-    /// Added to a number below 2⁵¹, leaves its nearest integer in the lowest bits.
+    /// Adding this to a number below 2⁵¹ leaves its nearest integer in the lowest bits.
     const ROUND: f64 = 6_755_399_441_055_744.0;
     /// 1/j! for j = 0, 1, …
     const TAYLOR: [f64; 14] = [

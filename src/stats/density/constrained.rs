@@ -9,7 +9,7 @@ use super::normal::Draws;
 use crate::stats::random::Stream;
 use crate::{Error, Place, Result};
 
-/// A pivot below this fraction of its diagonal element is rounding: the equations depend on each other.
+/// A pivot below this fraction of its diagonal element is rounding error: the equations are linearly dependent.
 const MIN_PIVOT_FRACTION: f64 = 1e-12;
 
 /// f̂(x | A x = b) as a mixture over the kernels of f̂.
@@ -19,11 +19,11 @@ pub struct ConstrainedKde<'a> {
     /// A, m × d.
     rows: DMatrix<f64>,
     right: DVector<f64>,
-    /// Of A S Aᵀ with S = diag((h s)²).
+    /// Cholesky factor of A S Aᵀ with S = diag((h s)²).
     factor: Cholesky<f64, Dyn>,
     /// Weights of the kernels, sum 1.
     probabilities: Vec<f64>,
-    /// Parameters that are given: index and value. Set exactly in every draw.
+    /// Given parameters: index and value. Set exactly in every draw.
     given: Vec<(usize, f64)>,
 }
 
@@ -31,8 +31,8 @@ impl Kde {
     /// The density on A x = b; `rows` are those of A.
     ///
     /// # Errors
-    /// [`Error::Usage`] for rows of another length than the parameters, numbers that are not finite, or equations
-    /// that depend on each other.
+    /// [`Error::Usage`] if a row's length differs from the number of parameters, a number is not finite, or the
+    /// equations are linearly dependent.
     pub fn constrained(&self, rows: &[Vec<f64>], right: &[f64]) -> Result<ConstrainedKde<'_>> {
         let d = self.dimensions();
         let wrong = |problem: String, help: &str| Err(Error::usage(Place::item("A x = b"), problem, help));
@@ -78,7 +78,7 @@ impl Kde {
     /// The density given the values of some parameters, by index.
     ///
     /// # Errors
-    /// [`Error::Usage`] for an index that is not there or comes twice, a value that is not finite, or none at all.
+    /// [`Error::Usage`] for an index that is out of range or duplicate, a value that is not finite, or an empty list.
     pub fn conditional(&self, given: &[(usize, f64)]) -> Result<ConstrainedKde<'_>> {
         let d = self.dimensions();
         let mut rows = Vec::new();
@@ -107,7 +107,7 @@ impl ConstrainedKde<'_> {
         let mut draws = Draws::new(*stream, index);
         let target = draws.uniform();
         let mut sum = 0.0;
-        // Rounding may leave the sum below the target: then it is the last kernel with a weight.
+        // If rounding leaves the sum below the target, the last kernel with a positive weight is selected.
         let mut chosen = self.probabilities.iter().rposition(|p| *p > 0.0).unwrap_or(0);
         for (k, p) in self.probabilities.iter().enumerate() {
             sum += p;

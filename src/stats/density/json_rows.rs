@@ -1,4 +1,4 @@
-//! JSON for people: objects spread over lines, a row of numbers on one line.
+//! Readable JSON: objects over several lines, a row of numbers on one line.
 
 use std::io::{self, Write};
 
@@ -7,7 +7,7 @@ use serde_json::ser::{Formatter, Serializer};
 
 use crate::{Error, Result};
 
-/// JSON with one line per field and per row, and a line end at its end.
+/// JSON with one line per field and per row, ending in a line end.
 ///
 /// # Errors
 /// [`Error::Internal`] if a value has no JSON form.
@@ -22,7 +22,7 @@ pub(super) fn to_readable_json(value: &impl Serialize) -> Result<Vec<u8>> {
 #[derive(Default)]
 struct Rows {
     depth: usize,
-    /// The value written last was an object or an array: the next one begins a line.
+    /// The last value was an object or an array, so the next one begins a line.
     after_compound: bool,
 }
 

@@ -22,8 +22,8 @@ impl Kde {
     /// Fits scale and bandwidth. `names` are the parameters' names, for messages.
     ///
     /// # Errors
-    /// [`Error::Input`] for fewer than d + 1 points (or 2), for a parameter that is the same in all of them, or
-    /// for one that is not finite.
+    /// [`Error::Input`] for fewer than d + 1 points (or 2), and for a parameter that is equal in all of them or not
+    /// finite.
     pub fn fit(points: Vec<Vec<f64>>, names: &[&str], rule: BandwidthRule) -> Result<Kde> {
         let (n, d) = (points.len(), names.len());
         let data = || Place::item("density");
@@ -54,10 +54,10 @@ impl Kde {
         Ok(Kde { points, scale, bandwidth })
     }
 
-    /// An estimate whose scale and bandwidth are known.
+    /// An estimate with known scale and bandwidth.
     ///
     /// # Errors
-    /// [`Error::Input`] where lengths differ, there is no point, or a number is not finite or a spread not above 0.
+    /// [`Error::Input`] if lengths differ, there is no point, a number is not finite, or a spread is not positive.
     pub fn from_parts(points: Vec<Vec<f64>>, scale: Vec<f64>, bandwidth: Bandwidth) -> Result<Kde> {
         let wrong = |problem: String| Err(Error::input(Place::item("density"), problem, "fit it again"));
         if points.is_empty() || scale.is_empty() {
@@ -107,7 +107,7 @@ impl Kde {
         Mixture::of_kernels(self.points.clone(), &self.spread())
     }
 
-    /// The draw of an index: a kernel at random, then normal noise. Not checked for validity.
+    /// Draw of an index: a random kernel, then normal noise. Not checked for validity.
     pub fn draw(&self, stream: &Stream, index: u64) -> Vec<f64> {
         let mut draws = Draws::new(*stream, index);
         let point = &self.points[draws.below(self.points.len())];

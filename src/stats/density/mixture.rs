@@ -1,4 +1,4 @@
-//! A mixture of Gaussians: kernel density estimates, importance proposals and defensive mixtures all are one.
+//! A mixture of Gaussians, used for kernel density estimates, importance proposals and defensive mixtures.
 
 use std::ops::Range;
 
@@ -8,13 +8,13 @@ use super::normal::{normal, uniform};
 use crate::stats::random::Stream;
 use crate::{Error, Place, Result};
 
-/// Blocks of four words that one attempt at a draw may use.
+/// Maximum number of blocks of four words per attempt at a draw.
 const BLOCKS_PER_ATTEMPT: u32 = 8;
 
-/// The most parameters a mixture can have: one attempt uses 32 words, the first chooses the component.
+/// Maximum number of parameters of a mixture: one attempt uses 32 words, the first of which selects the component.
 pub const MAX_DIMENSIONS: usize = 4 * BLOCKS_PER_ATTEMPT as usize - 1;
 
-/// Components further than this below the largest, in ln, are left out of a sum: 3e-20 of it each.
+/// Sums skip components further than this below the largest, in ln: each is less than 3e-20 of it.
 const NEGLIGIBLE: f64 = 45.0;
 
 /// Σ_k w_k N(μ_k, L_k L_kᵀ) over vectors of parameters, each in its own unit.
@@ -27,24 +27,24 @@ pub struct Mixture {
     means: Vec<Vec<f64>>,
     /// Lower-triangular L with zeros above the diagonal; the diagonal is > 0.
     factors: Vec<DMatrix<f64>>,
-    /// Index into `factors`, one per component: kernels share one.
+    /// Index into `factors`, one per component; kernels share one factor.
     factor_of: Vec<usize>,
-    /// Σ of the weights up to and including each component; the last is 1.
+    /// Cumulative weights up to and including each component; the last is 1.
     cumulative: Vec<f64>,
-    /// L⁻¹ μ of all components, parameter by parameter: the loop over thousands of kernels is the inner one.
+    /// L⁻¹ μ of all components, parameter by parameter, so that the inner loop runs over thousands of kernels.
     whitened_means: Vec<f64>,
     /// ln of each component's weighted height, w (2π)^{−d/2} / det L.
     log_heights: Vec<f64>,
-    /// Neighbouring components with one factor: a point is whitened once for each.
+    /// Ranges of consecutive components with the same factor: a point is whitened once for each.
     runs: Vec<Range<usize>>,
 }
 
 impl Mixture {
-    /// Checks shapes and scales the weights to sum 1; weights that do so up to rounding are kept.
+    /// Checks shapes and scales the weights to sum 1, unless they do so up to rounding.
     ///
     /// # Errors
-    /// [`Error::Usage`] where there is no component, shapes differ, there are more than [`MAX_DIMENSIONS`]
-    /// parameters, a weight is negative or not finite, or a diagonal is not positive.
+    /// [`Error::Usage`] if there is no component, shapes differ, there are more than [`MAX_DIMENSIONS`] parameters, a
+    /// weight is negative or not finite, or a diagonal element is not positive.
     pub fn new(
         weights: Vec<f64>,
         means: Vec<Vec<f64>>,
@@ -82,13 +82,13 @@ impl Mixture {
         if factor_of.iter().any(|&f| f >= factors.len()) {
             return wrong("a component has no spread".to_owned());
         }
-        // What has been scaled once sums to 1 up to rounding and stays as it is: a mixture read back is the same one.
+        // Scaled weights sum to 1 up to rounding and are kept, so that a mixture read from a file is unchanged.
         let is_scaled = (total - 1.0).abs() <= 2.0 * weights.len() as f64 * f64::EPSILON;
         let weights = if is_scaled { weights } else { weights.iter().map(|w| w / total).collect() };
         Ok(Mixture::prepared(dimensions, weights, means, factors, factor_of))
     }
 
-    /// Works out what drawing and evaluating need.
+    /// Computes the data for drawing and evaluating.
     fn prepared(
         dimensions: usize,
         weights: Vec<f64>,
@@ -103,7 +103,7 @@ impl Mixture {
             sum += weight;
             cumulative.push(sum);
         }
-        // No draw may fall behind the last component that has any weight.
+        // No draw may select a component after the last one with a positive weight.
         if let Some(last) = weights.iter().rposition(|w| *w > 0.0) {
             cumulative[last..].fill(1.0);
         }
@@ -129,9 +129,9 @@ impl Mixture {
         Mixture { dimensions, weights, means, factors, factor_of, cumulative, whitened_means, log_heights, runs }
     }
 
-    /// Several mixtures as one: Σ share · mixture, the shares scaled to sum 1. With shares 1 − δ and δ the
-    /// defensive mixture of a proposal and the density it stands for (Hesterberg, "Weighted average importance
-    /// sampling and defensive mixture distributions", Technometrics 37, 1995). Parts without a share are left out.
+    /// Combines several mixtures: Σ weight · mixture, with the weights scaled to sum 1; mixtures of weight 0 are
+    /// skipped. With weights 1 − δ and δ it is the defensive mixture of a proposal and its density (Hesterberg,
+    /// "Weighted average importance sampling and defensive mixture distributions", Technometrics 37, 1995).
     ///
     /// # Errors
     /// As [`Mixture::new`].
@@ -146,7 +146,7 @@ impl Mixture {
         Mixture::new(weights, means, factors, factor_of)
     }
 
-    /// Equally weighted kernels with one diagonal spread.
+    /// Kernels of equal weight with a common diagonal spread.
     ///
     /// # Errors
     /// As [`Mixture::new`].
@@ -176,11 +176,11 @@ impl Mixture {
         &self.factors[self.factor_of[component]]
     }
 
-    /// The same mixture with `covariance` times `share` added to every component's: a copy that reaches
-    /// further wherever the component is narrower than that covariance.
+    /// The same mixture with `covariance` times `share` added to every component's covariance. It is wider wherever the
+    /// component is narrower than that covariance.
     ///
     /// # Errors
-    /// [`Error::Usage`] where the sum has no triangular factor.
+    /// [`Error::Usage`] if the sum has no triangular factor.
     pub fn widened(&self, covariance: &DMatrix<f64>, share: f64) -> Result<Mixture> {
         let widen = |factor: &DMatrix<f64>| {
             Cholesky::new(covariance * share + factor * factor.transpose()).map(Cholesky::unpack)
@@ -209,7 +209,7 @@ impl Mixture {
         top + libm::log(near.map(libm::exp).sum::<f64>())
     }
 
-    /// The share of each component in the density at a point, summing to 1; all 0 where the density is 0.
+    /// The fraction of each component in the density at a point, sum 1; all 0 if the density is 0.
     pub(crate) fn responsibilities(&self, point: &[f64]) -> Vec<f64> {
         let mut parts = Vec::new();
         let top = self.log_parts(point, &mut parts);
@@ -222,7 +222,7 @@ impl Mixture {
         parts
     }
 
-    /// ln of each component's weighted density at a point, into `parts`; gives the largest.
+    /// Writes ln of each component's weighted density at a point into `parts`; returns the maximum.
     pub(super) fn log_parts(&self, point: &[f64], parts: &mut Vec<f64>) -> f64 {
         let (d, n) = (self.dimensions, self.weights.len());
         parts.clear();
@@ -252,9 +252,9 @@ impl Mixture {
         top
     }
 
-    /// The point of an index: a pure function of (stream, index, attempt). Attempts are independent draws at one
-    /// index, for densities that reject some. Word 0 of the attempt's 32 chooses the component, word 1 + j is the
-    /// normal number of parameter j; the words are blocks 8·attempt … 8·attempt + 7 of the index.
+    /// The point of an index: a pure function of (stream, index, attempt). Attempts are independent draws at one index,
+    /// for densities that reject some. Word 0 of the attempt's 32 words selects the component, word 1 + j gives the
+    /// normal number of parameter j. The words are blocks 8·attempt … 8·attempt + 7 of the index.
     pub fn draw(&self, stream: &Stream, index: u64, attempt: u32) -> Vec<f64> {
         let words: Vec<u32> = (0..self.dimensions.div_ceil(4) as u32 + 1)
             .take(BLOCKS_PER_ATTEMPT as usize)
@@ -348,7 +348,7 @@ mod tests {
         let mean = |f: &dyn Fn(&[f64]) -> f64| points.iter().map(|p| f(p)).sum::<f64>() / n as f64;
         assert!((mean(&|p| p[0]) - 1.25).abs() < 0.02);
         assert!((mean(&|p| p[1]) - 0.25).abs() < 0.02);
-        // Σ w (μ₀μ₁ + cov), the second component having none.
+        // Σ w (μ₀μ₁ + cov); the second component has no covariance.
         assert!((mean(&|p| p[0] * p[1]) - (0.75 * 0.5 - 0.25 * 10.0)).abs() < 0.05);
         assert_ne!(mixture.draw(&STREAM, 0, 0), mixture.draw(&STREAM, 0, 1));
         assert_eq!(mixture.draw(&STREAM, 5, 2), mixture.draw(&STREAM, 5, 2));

@@ -1,5 +1,5 @@
-//! Weighted maximum likelihood of a Gaussian mixture by expectation and maximisation (Dempster, Laird and Rubin
-//! 1977), for cross-entropy and for modelling points: few components, full covariances.
+//! Weighted maximum likelihood of a Gaussian mixture by expectation maximisation (Dempster, Laird and Rubin 1977), for
+//! cross-entropy and for modelling points: few components, full covariances.
 
 use nalgebra::DMatrix;
 
@@ -9,14 +9,14 @@ use super::normal::uniform;
 use crate::stats::random::Stream;
 use crate::{Error, Place, Result};
 
-/// Purpose of the words that choose first centres.
+/// Purpose of the random words that select the initial centres.
 const PURPOSE: u32 = 0x464D_0001;
-/// A component below this weight is dropped.
+/// Components below this weight are dropped.
 const MIN_WEIGHT: f64 = 1e-3;
-/// Added to every variance, as a share of the points' variance of that parameter.
+/// Added to every variance, as a fraction of the points' variance of that parameter.
 const JITTER: f64 = 1e-6;
 
-/// How a mixture is fitted.
+/// Options of a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FitOptions {
     /// Most components, ≥ 1; fewer where the points do not carry them.
@@ -39,12 +39,12 @@ impl Default for FitOptions {
 }
 
 impl Mixture {
-    /// The mixture of largest weighted likelihood Σ w ln q(x). Covariances are regularised: each is drawn towards
-    /// the covariance of all points by (d + 1)/(d + 1 + its effective sample size), so that few points never give
-    /// a needle.
+    /// The mixture that maximizes the weighted log-likelihood Σ w ln q(x). Covariances are regularised: each is shrunk
+    /// towards the covariance of all points by (d + 1)/(d + 1 + its effective sample size), so that few points never
+    /// give a degenerate covariance.
     ///
     /// # Errors
-    /// [`Error::Usage`] where there is no point, shapes differ, weights are negative, not finite or all zero.
+    /// [`Error::Usage`] if there is no point, shapes differ, or weights are negative, not finite or all zero.
     pub fn fit(points: &[Vec<f64>], weights: &[f64], options: &FitOptions) -> Result<Mixture> {
         let total: f64 = weights.iter().sum();
         let d = points.first().map_or(0, Vec::len);
@@ -61,7 +61,7 @@ impl Mixture {
                 "give finite points of one length, weights that are not all zero, and at least one component",
             ));
         }
-        // Points without weight carry nothing.
+        // Points of weight 0 have no effect.
         let kept: Vec<(&[f64], f64)> =
             points.iter().zip(weights).filter(|(_, w)| **w > 0.0).map(|(p, w)| (p.as_slice(), w / total)).collect();
         let sample = Weighted::of(kept, d);
@@ -80,7 +80,7 @@ impl Mixture {
     }
 }
 
-/// Points with weights of sum 1 and what all components share.
+/// Points with weights of sum 1, and the data common to all components.
 struct Weighted<'a> {
     points: Vec<(&'a [f64], f64)>,
     d: usize,
@@ -92,7 +92,7 @@ impl<'a> Weighted<'a> {
     fn of(points: Vec<(&'a [f64], f64)>, d: usize) -> Self {
         let (mean, mut covariance) = moments(points.iter().copied(), d);
         for j in 0..d {
-            // A parameter that does not vary keeps a spread that is small beside its size.
+            // A constant parameter gets a spread that is small relative to its value.
             let least = (1e-9 * (1.0 + mean[j].abs())).powi(2);
             covariance[(j, j)] = covariance[(j, j)] * (1.0 + JITTER) + least;
         }
@@ -110,8 +110,8 @@ impl<'a> Weighted<'a> {
         factor_or_diagonal(matrix)
     }
 
-    /// First responsibilities: each point belongs to the nearest of centres chosen as k-means++ does (Arthur and
-    /// Vassilvitskii 2007), in units of the parameters' spreads, after a few rounds of k-means.
+    /// Initial responsibilities: each point belongs to the nearest centre. Centres are selected as in k-means++ (Arthur
+    /// and Vassilvitskii 2007), in units of the parameters' spreads, then improved by a few iterations of k-means.
     fn first_assignment(&self, components: usize, seed: u64) -> Vec<usize> {
         let d = self.d;
         let scale: Vec<f64> = self.covariance.diagonal().iter().map(|variance| variance.sqrt()).collect();

@@ -1,9 +1,9 @@
 //! Densities over scenario parameters.
 //!
-//! Here live the spaces that points of scenarios lie in, kernel density estimation and the Gaussian mixture that
-//! every density and every proposal is with its fit, the share of a density that is physically valid, exposure,
-//! representativeness, and the density file. Here lives nothing about lanes. Scenarios come from
-//! [`crate::traffic::mining`] or a scenario file; points go to cases through [`crate::scenario::parameterization`].
+//! This module contains the parameter spaces of scenarios, kernel density estimation, and Gaussian mixtures with their
+//! fit, which represent every density and proposal. It also contains the physically valid fraction of a density,
+//! exposure, representativeness, and the density file. It contains nothing about lanes. Scenarios come from
+//! [`crate::traffic::mining`] or a scenario file; points become cases through [`crate::scenario::parameterization`].
 
 mod bandwidth;
 mod constrained;

@@ -1,10 +1,10 @@
-//! The density of one category under one parameterization, with everything that sampling needs from it: valid
-//! region, P_valid, sizes, exposure, and where it comes from.
+//! The density of one category under one parameterization, with everything that sampling needs: valid region, P_valid,
+//! sizes, exposure, and provenance.
 //!
-//! Exposure is how often scenarios occur: events per driven hour and kilometre, with the Poisson interval.
+//! Exposure is the frequency of scenarios: events per driven hour and kilometre, with the Poisson interval.
 //!
-//! Driven are the egos' data sets: every vehicle is an ego once, from its first sample to the end of its data
-//! set. Events are the kept scenarios of the category.
+//! The driven time and distance are those of all egos: every vehicle is an ego once, from its first sample to the end
+//! of its data set. Events are the kept scenarios of the category.
 
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, Gamma};
@@ -20,27 +20,27 @@ use crate::scenario::{Category, Scenario};
 use crate::traffic::{DataProvenance, Driven};
 use crate::{Error, Place, Result};
 
-/// Where a density comes from.
+/// Provenance of a density.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Provenance {
     /// Program and version that fitted it.
     pub program: String,
-    /// The data in one line; synthetic data say so.
+    /// The data in one line; states if the data is synthetic.
     pub data: String,
-    /// Nothing here was measured on real traffic.
+    /// No part of the data was measured on real traffic.
     pub synthetic: bool,
     /// SHA-256 of the scenarios as a scenario file, in hexadecimal.
     pub scenarios_sha256: String,
-    /// Scenarios of the category that were found.
+    /// Number of scenarios of the category that were found.
     pub found: u64,
-    /// Those that the filters kept.
+    /// Number that the filters kept.
     pub kept: u64,
-    /// Kept ones that were left out, because they are no point of the parameter space.
+    /// Number of kept scenarios that were skipped because they are not points of the parameter space.
     pub left_out: u64,
 }
 
-/// How a density is fitted.
+/// Options of a fit.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FitOptions {
     /// Options of the parameterization.
@@ -49,11 +49,11 @@ pub struct FitOptions {
     pub with_thw: bool,
     /// Interval of the bandwidth.
     pub rule: BandwidthRule,
-    /// Draws of P_valid.
+    /// Number of draws for P_valid.
     pub valid_draws: u64,
     /// Seed of P_valid and of the splits.
     pub seed: u64,
-    /// Split, fit and compare; costs five more fits.
+    /// Computes representativeness by split, fit and comparison; costs five more fits.
     pub representativeness: bool,
 }
 
@@ -75,19 +75,19 @@ impl Default for FitOptions {
 pub struct DensityModel {
     /// Parameters, valid region, point → case.
     pub space: ParameterSpace,
-    /// f̂, before it is cut off at the valid region.
+    /// f̂, before truncation to the valid region.
     pub kde: Kde,
-    /// Share of f̂ inside the valid region.
+    /// Fraction of f̂ inside the valid region.
     pub valid: ValidShare,
-    /// Mean sizes of the scenarios it was fitted on: sizes are no parameters.
+    /// Mean sizes of the scenarios that it was fitted on, because sizes are not parameters.
     pub sizes: Sizes,
-    /// Events per hour and kilometre, where time or distance is known.
+    /// Events per hour and kilometre, if time or distance is known.
     pub exposure: Option<Exposure>,
     /// Representativeness for unseen scenarios, if requested and computable.
     pub representativeness: Option<Representativeness>,
     /// Where it comes from.
     pub provenance: Provenance,
-    /// The scenarios in the order of the kernels; empty where the density does not hold them.
+    /// The scenarios in the order of the kernels; empty if the density does not contain them.
     pub scenarios: Vec<Scenario>,
 }
 
@@ -95,9 +95,9 @@ pub struct DensityModel {
 pub struct Fitted {
     /// The density.
     pub model: DensityModel,
-    /// One error per kept scenario that is no point of the space.
+    /// One error per kept scenario that is not a point of the space.
     pub left_out: Vec<Error>,
-    /// Why there is no representativeness, where it was asked for.
+    /// Why representativeness is missing although it was requested.
     pub not_compared: Option<Error>,
 }
 
@@ -105,8 +105,8 @@ impl DensityModel {
     /// Fits on the kept scenarios of the parameterization's category among `scenarios`.
     ///
     /// # Errors
-    /// [`Error::Input`] where there is no kept scenario, fewer than parameters + 1, one parameter is the same in
-    /// all, or no draw is valid; [`Error::Usage`] for options that make no parameter space.
+    /// [`Error::Input`] if there are fewer than parameters + 1 kept scenarios, one parameter is equal in all of them,
+    /// or no draw is valid; [`Error::Usage`] for options that give no parameter space.
     pub fn fit(
         id: Parameterization,
         scenarios: &[Scenario],
@@ -117,7 +117,7 @@ impl DensityModel {
         let kept: Vec<&Scenario> = of_category().filter(|s| s.kept).collect();
         let name = || id.name();
         if kept.is_empty() {
-            // The same for every parameterization of the category, so that a user reads it once.
+            // The same message for every parameterization of the category, so that it is reported once.
             let found = match of_category().count() {
                 0 => "there is no such scenario".to_owned(),
                 count => format!("none of {count} scenarios passed the filters"),
@@ -188,7 +188,7 @@ impl DensityModel {
         self.space.id().category
     }
 
-    /// f̂ as a mixture, not cut off.
+    /// f̂ as a mixture, not truncated.
     ///
     /// # Errors
     /// None for a model that this type made or read.
@@ -197,7 +197,7 @@ impl DensityModel {
     }
 }
 
-/// The decomposition, where the parameterization needs one.
+/// The decomposition, if the parameterization needs one.
 fn reduction(
     id: &Parameterization,
     scenarios: &[Scenario],
@@ -260,7 +260,7 @@ pub struct Exposure {
 }
 
 impl Exposure {
-    /// From a count and what was driven.
+    /// Exposure from a count, and the driven time and distance.
     pub fn new(events: u64, driven: Driven) -> Exposure {
         let rate = |units: Option<f64>| units.map(|units| Rate::new(events, units));
         Exposure { events, driven, per_hour: rate(driven.hours), per_kilometre: rate(driven.kilometres) }
@@ -268,7 +268,7 @@ impl Exposure {
 }
 
 impl Rate {
-    /// `events` in `units` hours or kilometres, > 0.
+    /// Rate of `events` in `units` hours or kilometres, > 0.
     pub fn new(events: u64, units: f64) -> Rate {
         let [low, high] = garwood(events, 0.95);
         let n = events as f64;

@@ -26,16 +26,16 @@ use crate::support::input_file;
 use crate::support::plain_text::hex;
 use crate::{Error, Place, Result};
 
-/// The version that this program writes and reads.
+/// Version of the file format that this program writes and reads.
 const VERSION: u64 = 2;
 
-/// Largest file that is read: 10⁶ kernels of ten parameters fit.
+/// Maximum file size that is read, bytes: 10⁶ kernels of ten parameters fit.
 pub const MAX_FILE_BYTES: u64 = 256 << 20;
 
-/// Bandwidths of kernels whose scales are those of the parameters.
+/// Valid bandwidths, in units of the parameters' scales.
 const BANDWIDTHS: RangeInclusive<f64> = 1e-9..=1e3;
 
-/// Lengths and widths of vehicles, m.
+/// Valid lengths and widths of vehicles, m.
 const SIZES_M: RangeInclusive<f64> = 0.1..=100.0;
 
 const REFIT: &str = "make the file again with `lanesweep fit`";
@@ -56,14 +56,14 @@ struct File {
     p_valid: ValidShare,
     exposure: Option<Exposure>,
     representativeness: Option<Representativeness>,
-    /// Means over the scenarios: sizes are no parameters.
+    /// Means over the scenarios, because sizes are not parameters.
     sizes: Sizes,
     options: ParameterizationOptions,
     /// The decomposition of a parameterization by SVD.
     basis: Option<Basis>,
     /// One row per scenario, in the order of the parameters.
     kernels: Vec<Vec<f64>>,
-    /// One per kernel, with its recorded series; or none.
+    /// One scenario per kernel, with its recorded series; or an empty list.
     scenarios: Vec<Scenario>,
 }
 
@@ -73,7 +73,7 @@ struct File {
 struct Basis {
     /// Scenarios it was fitted on.
     rows: usize,
-    /// All of them.
+    /// All singular values.
     singular_values: Vec<f64>,
     /// p numbers: instants of the series one after the other, then extras.
     weights: Vec<f64>,
@@ -130,7 +130,7 @@ impl File {
             return wrong("parameterization", problem);
         };
         let below = |error: Error| inside(place, error);
-        // Before anything is made of them: lengths follow from these numbers.
+        // Checked first, because lengths follow from these numbers.
         self.options.validate().map_err(below)?;
         let reduction = self.basis.map(|b| {
             let basis = SvdBasis {
@@ -218,7 +218,7 @@ impl File {
     }
 }
 
-/// An error about a part of the file, as one about the file.
+/// Converts an error about a part of the file to one about the file.
 fn inside(place: &Place, error: Error) -> Error {
     match error {
         Error::Input { place: part, problem, .. } | Error::Usage { place: part, problem, .. } => {
@@ -232,7 +232,7 @@ fn inside(place: &Place, error: Error) -> Error {
 }
 
 impl DensityModel {
-    /// SHA-256 over everything in the density file, in hexadecimal: names a density in results made from it.
+    /// SHA-256 over everything in the density file, in hexadecimal; identifies a density in its results.
     ///
     /// # Errors
     /// None for a model that this crate made or read.
@@ -251,7 +251,7 @@ impl DensityModel {
     /// Reads a density file's content; `place` names it in errors.
     ///
     /// # Errors
-    /// [`Error::Input`] for anything but a whole, unchanged density file of this version: see [`read_density`].
+    /// [`Error::Input`] unless it is a complete, unchanged density file of this version: see [`read_density`].
     pub fn from_json(text: &[u8], place: &Place) -> Result<DensityModel> {
         check_version(text, place)?;
         let file: File = serde_json::from_slice(text).map_err(|e| broken(place, &e))?;
@@ -267,7 +267,7 @@ impl DensityModel {
     }
 }
 
-/// The version before anything else, so that a file of another version is not called broken.
+/// Checks the version first, so that a file of another version is not reported as broken.
 fn check_version(text: &[u8], place: &Place) -> Result<()> {
     #[derive(Deserialize)]
     struct Version {
@@ -314,7 +314,7 @@ pub fn read_density(path: &Path) -> Result<DensityModel> {
     DensityModel::from_json(&text, &Place::file(path))
 }
 
-/// Writes a density file: whole or not at all.
+/// Writes a density file atomically.
 ///
 /// # Errors
 /// [`Error::Io`] if the folder cannot be written to.

@@ -6,8 +6,8 @@
 
 use nalgebra::{Cholesky, DMatrix, DVector, DVectorView};
 
-/// Mean and covariance (d × d) of weighted points; the weights need not sum to 1. A covariance of the population: divided
-/// by the sum of the weights.
+/// Mean and covariance (d × d) of weighted points; the weights need not sum to 1. The covariance is divided by the sum
+/// of the weights (population covariance).
 pub(crate) fn moments<'a>(
     points: impl Iterator<Item = (&'a [f64], f64)> + Clone,
     d: usize,
@@ -24,13 +24,13 @@ pub(crate) fn moments<'a>(
         covariance.ger(weight, &from_mean, &from_mean, 1.0);
     }
     covariance /= total;
-    // Rounding depends on the order of a product's factors.
+    // Makes the covariance exactly symmetric, because rounding depends on the order of a product's factors.
     covariance.fill_lower_triangle_with_upper_triangle();
     (mean, covariance)
 }
 
-/// L, lower triangular, with L Lᵀ = `covariance`; the root of its diagonal where it is not positive definite in this
-/// arithmetic.
+/// L, lower triangular, with L Lᵀ = `covariance`. If the covariance is not numerically positive definite, the square
+/// root of its diagonal.
 pub(crate) fn factor_or_diagonal(covariance: DMatrix<f64>) -> DMatrix<f64> {
     let diagonal = covariance.diagonal();
     Cholesky::new(covariance).map_or_else(|| DMatrix::from_diagonal(&diagonal.map(f64::sqrt)), Cholesky::unpack)
@@ -39,8 +39,8 @@ pub(crate) fn factor_or_diagonal(covariance: DMatrix<f64>) -> DMatrix<f64> {
 /// Interquartile range of the standard normal distribution, as the published program rounds it.
 const NORMAL_IQR: f64 = 1.349;
 
-/// Scale of one parameter; 0 where all values are equal. Where the middle half of the values is one value, the
-/// IQR says nothing and σ is taken.
+/// Scale of one parameter; 0 if all values are equal. If the middle half of the values is constant, the IQR is 0 and σ
+/// is used.
 pub(super) fn scale_of(values: &[f64]) -> f64 {
     let sigma = standard_deviation(values);
     let mut sorted = values.to_vec();

@@ -1,8 +1,8 @@
-//! The standard normal distribution in f64 through `libm` alone, so that draws have the same bits everywhere.
+//! The standard normal distribution in f64, through `libm` only, so that draws have the same bits on every machine.
 
 use crate::stats::random::Stream;
 
-/// Cumulative probability at `x`, also far in the tails.
+/// Cumulative probability at `x`, accurate also far in the tails.
 pub fn normal_cdf(x: f64) -> f64 {
     0.5 * libm::erfc(-x / std::f64::consts::SQRT_2)
 }
@@ -24,12 +24,12 @@ pub fn normal_quantile(p: f64) -> f64 {
     z.copysign(from_middle)
 }
 
-/// A standard normal number from a random word: the quantile of the middle of the word's cell of 2⁻³².
+/// A standard normal number from a random word: the quantile of the midpoint of the word's interval of length 2⁻³².
 pub(crate) fn normal(word: u32) -> f64 {
     normal_quantile(uniform(word))
 }
 
-/// The middle of a word's cell of (0, 1).
+/// The midpoint of a word's interval in (0, 1).
 pub(crate) fn uniform(word: u32) -> f64 {
     (f64::from(word) + 0.5) / 4_294_967_296.0
 }
@@ -59,12 +59,12 @@ impl Draws {
         word
     }
 
-    /// In the open interval (0, 1).
+    /// Uniform in the open interval (0, 1).
     pub fn uniform(&mut self) -> f64 {
         ((self.word64() >> 12) as f64 + 0.5) / (1u64 << 52) as f64
     }
 
-    /// An integer in 0..n, each equally likely up to n/2⁶⁴.
+    /// An integer in 0..n; probabilities are equal up to n/2⁶⁴.
     pub fn below(&mut self, n: usize) -> usize {
         ((u128::from(self.word64()) * n as u128) >> 64) as usize
     }
@@ -157,7 +157,7 @@ mod tests {
         for k in 1..4000 {
             let x = -8.0 + 0.002 * f64::from(k);
             let p = normal_cdf(x);
-            // The slope of the quantile magnifies the rounding of p.
+            // The slope of the quantile function amplifies the rounding error of p.
             let density = libm::exp(-0.5 * x * x) / (2.0 * std::f64::consts::PI).sqrt();
             let rounding = 4.0 * f64::EPSILON * p / density;
             assert!((normal_quantile(p) - x).abs() < 1e-14 * (1.0 + x.abs()) + rounding, "{x}");
@@ -173,7 +173,7 @@ mod tests {
     fn the_quantile_is_exact_far_in_the_tail() {
         for k in -360..=360 {
             let z = f64::from(k) / 10.0;
-            // The lower half only: near p = 1 the distribution function has no digits left.
+            // The lower half only, because near p = 1 the distribution function has no digits left.
             let p = 0.5 * libm::erfc(z.abs() / std::f64::consts::SQRT_2);
             let error = normal_quantile(p) + z.abs();
             assert!(error.abs() <= 1e-13 * z.abs().max(1.0), "z = {z}: {error}");

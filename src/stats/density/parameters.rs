@@ -1,22 +1,23 @@
-//! The space a density lives in: ordered parameters of one parameterization, scenario → point, point → case.
+//! The space of a density: ordered parameters of one parameterization, scenario → point, point → case.
 //!
-//! The numbers are those of [`Parameterization::parameters`]. A last dimension `thw_s` can hold the observed headway.
-//! Sizes are no parameters.
+//! The numbers are those of [`Parameterization::parameters`]. An optional last dimension `thw_s` holds the observed
+//! headway. Sizes are not parameters.
 //!
-//! **Sides.** Lateral parameters of kinematic parameterizations are sizes. Under the reduction with
-//! `svd_lateral = mirrored` the lateral series is positive on the target's side. With `signed` it is left-positive, so
-//! a point belongs to a side; lanes judge |y| alone, so the case keeps the series as it is, and a scenario on the right
-//! gives the mirror image of the case that a study makes of it.
+//! **Sides.** Lateral parameters of kinematic parameterizations are absolute values. Under the reduction with
+//! `svd_lateral = mirrored` the lateral series is positive on the target's side. With `signed` it is positive on the
+//! left, so a point belongs to a side. Lanes evaluate |y| only, so the case keeps the series as it is. A scenario on
+//! the right gives the mirror image of its case in a study.
 //!
-//! **Bounds.** A point has a case if it keeps the bounds in [`Parameter`]; besides, LVD needs v1 < v0 and
-//! T = (v0 − v1)/ā in [0.1 s, 600 s], and a reconstruction by SVD needs T in the same range and no negative ego speed
-//! (LVD: first speed of the leader) or gap D.
+//! **Bounds.** A point has a case if it satisfies the bounds in [`Parameter`]. In addition, LVD requires v1 < v0 and T
+//! = (v0 − v1)/ā in [0.1 s, 600 s]. A reconstruction by SVD requires T in the same range, and no negative ego speed
+//! (LVD: initial speed of the leader) or gap D.
 //!
-//! **Valid region.** Outside of it the density is cut off (f/P_valid). A draw must also be a scenario of its category:
-//! numbers within physics, and a reconstructed target that starts (cut-in) or ends (cut-out) in the lane beside the
-//! ego's and ends or starts in the ego's. Recorded scenarios need not: their kernels stay. Speeds inside reconstructed
-//! series are no reason to refuse a draw: below 0 they are set to 0, as in a study. The filters of mining (a slower
-//! cutter, a hard deceleration) are no part of the valid region: kernels spill over them.
+//! **Valid region.** The density is truncated to this region (f/P_valid). A draw must also be a scenario of its
+//! category: its numbers are physically possible, and a reconstructed target starts (cut-in) or ends (cut-out) in the
+//! lane beside the ego's and ends or starts in the ego's lane. Recorded scenarios may violate this; their kernels
+//! remain. Speeds inside reconstructed series do not make a draw invalid: negative ones are set to 0, as in a study.
+//! The filters of mining (a slower cutter, a hard deceleration) are not part of the valid region: kernels extend beyond
+//! them.
 
 use crate::scenario::parameterization::{
     Family, LateralStart, MAX_DURATION_S, MIN_DURATION_S, Parameter, Parameterization, ParameterizationOptions,
@@ -35,9 +36,9 @@ pub struct ParameterSpace {
     variables: Vec<Variable>,
     parameters: Vec<Parameter>,
     has_thw: bool,
-    /// Bounded values that follow from several parameters: a column of the decomposition, or T of a deceleration.
+    /// Bounded values that depend on several parameters: a column of the decomposition, or T of a deceleration.
     derived: Vec<(Option<usize>, Parameter)>,
-    /// The parameters with the bounds of a draw: none is beyond physics.
+    /// The parameters with the bounds of a draw, which are within physical limits.
     drawn: Vec<Parameter>,
     /// Bounds of a draw's reconstruction.
     columns: Vec<BoundedColumn>,
@@ -48,7 +49,7 @@ pub struct ParameterSpace {
 pub struct BoundedColumn {
     /// The column.
     pub column: usize,
-    /// Its size is bounded, on either side of the lane.
+    /// The bounds apply to its absolute value, on either side of the lane.
     pub is_distance: bool,
     /// Name, unit and bounds.
     pub parameter: Parameter,
@@ -81,7 +82,7 @@ impl From<Invalid> for Error {
     }
 }
 
-/// Refuses NaN as well.
+/// Checks bounds; refuses NaN as well.
 fn in_bounds(parameter: &Parameter, value: f64) -> std::result::Result<(), Invalid> {
     if parameter.holds(value) {
         return Ok(());
@@ -93,11 +94,11 @@ impl ParameterSpace {
     /// Range of a valid T, s.
     pub const DURATION_RANGE_S: [f64; 2] = [MIN_DURATION_S, MAX_DURATION_S];
 
-    /// The space of a parameterization; `reduction` is needed for one by SVD and ignored else.
+    /// The space of a parameterization; `reduction` is needed for one by SVD and otherwise ignored.
     ///
     /// # Errors
-    /// [`Error::Usage`] for `lateral_start = recorded` with 1 or 2 (the start would be one more parameter), or
-    /// without the decomposition that the parameterization needs.
+    /// [`Error::Usage`] for `lateral_start = recorded` with 1 or 2 (the start would be an additional parameter), or if
+    /// the required decomposition is missing.
     pub fn new(
         id: Parameterization,
         options: &ParameterizationOptions,
@@ -154,7 +155,7 @@ impl ParameterSpace {
         &self.options
     }
 
-    /// The decomposition, of a parameterization by SVD.
+    /// The decomposition of a parameterization by SVD; else `None`.
     pub fn reduction(&self) -> Option<&Reduction> {
         self.reduction.as_ref()
     }
@@ -164,7 +165,7 @@ impl ParameterSpace {
         &self.parameters
     }
 
-    /// The dimension that gives a variable.
+    /// Index of the dimension that gives a variable.
     pub fn dimension_of(&self, variable: Variable) -> Option<usize> {
         if variable == Variable::TimeHeadway {
             return self.has_thw.then(|| self.dimensions() - 1);
@@ -177,12 +178,12 @@ impl ParameterSpace {
         self.parameters.len()
     }
 
-    /// The last dimension is the headway.
+    /// Whether the last dimension is the headway.
     pub fn has_thw(&self) -> bool {
         self.has_thw
     }
 
-    /// The headway of a point, s, where it has one.
+    /// The headway of a point, s; `None` without a headway dimension.
     pub fn thw_s(&self, point: &[f64]) -> Option<f64> {
         self.has_thw.then(|| point[point.len() - 1])
     }
@@ -190,7 +191,7 @@ impl ParameterSpace {
     /// Index of the parameter with this name.
     ///
     /// # Errors
-    /// [`Error::Usage`] that lists the names and the one that was probably meant.
+    /// [`Error::Usage`] with the valid names and the most similar one.
     pub fn index_of(&self, name: &str) -> Result<usize> {
         if let Some(index) = self.parameters.iter().position(|p| p.name == name) {
             return Ok(index);
@@ -205,20 +206,20 @@ impl ParameterSpace {
         ))
     }
 
-    /// The same with the bounds that a draw must keep.
+    /// The parameters with the bounds of a draw.
     pub fn drawn_parameters(&self) -> &[Parameter] {
         &self.drawn
     }
 
-    /// What a draw's reconstruction must keep; empty for kinematic parameterizations.
+    /// Bounds of a draw's reconstruction; empty for kinematic parameterizations.
     pub fn bounded_columns(&self) -> &[BoundedColumn] {
         &self.columns
     }
 
-    /// A mined scenario as a point. It may be out of bounds: see [`ParameterSpace::check`].
+    /// A mined scenario as a point. It may be out of range: see [`ParameterSpace::check`].
     ///
     /// # Errors
-    /// [`Error::Input`] for a scenario without what a dimension needs: the vehicle ahead, the observed headway;
+    /// [`Error::Input`] for a scenario that lacks the data of a dimension: the vehicle ahead, the observed headway;
     /// [`Error::Internal`] for one of another category.
     pub fn point(&self, scenario: &Scenario) -> Result<Vec<f64>> {
         let mut point = self.id.encode(scenario, &self.options, self.reduction())?;
@@ -228,12 +229,12 @@ impl ParameterSpace {
         Ok(point)
     }
 
-    /// A draw of the point is inside the valid region.
+    /// Whether a draw of this point is inside the valid region.
     pub fn is_valid(&self, point: &[f64]) -> bool {
         self.check_draw(point).is_ok()
     }
 
-    /// Tells which bound of the valid region a draw breaks first.
+    /// Returns the first bound of the valid region that a draw violates.
     pub fn check_draw(&self, point: &[f64]) -> std::result::Result<(), Invalid> {
         self.check(point)?;
         self.drawn.iter().zip(point).try_for_each(|(parameter, value)| in_bounds(parameter, *value))?;
@@ -244,7 +245,7 @@ impl ParameterSpace {
         })
     }
 
-    /// Tells which bound a point breaks first: one that breaks none has a case.
+    /// Returns the first bound that a point violates; a point without violation has a case.
     pub fn check(&self, point: &[f64]) -> std::result::Result<(), Invalid> {
         if point.len() != self.dimensions() {
             return Err(Invalid {
@@ -280,13 +281,14 @@ impl ParameterSpace {
         &point[..point.len() - usize::from(self.has_thw)]
     }
 
-    /// The rebuilt scenario of a point under the reduction, left-positive; `None` for kinematic ones.
+    /// The reconstructed scenario of a point under the reduction, left-positive; `None` for kinematic
+    /// parameterizations.
     pub fn reduced(&self, point: &[f64]) -> Option<ReducedScenario> {
         Some(self.reduction()?.rebuild(self.without_thw(point), 1.0))
     }
 
-    /// The case of a point, with sizes that the caller chooses, on a time grid of step `dt_s`. The headway
-    /// dimension is not part of it: see [`ParameterSpace::thw_s`].
+    /// The case of a point with sizes of the caller, on a time grid of step `dt_s`. It does not include the headway
+    /// dimension: see [`ParameterSpace::thw_s`].
     ///
     /// # Errors
     /// [`Error::Usage`] for a point that [`ParameterSpace::check`] refuses; [`Error::Input`] for a cut-out without the
@@ -297,8 +299,8 @@ impl ParameterSpace {
     }
 }
 
-/// What makes a reconstruction a scenario of its category. The parameterization's lane change spans one lane, so lane
-/// markings are half of it away from the lane's centre.
+/// Bounds that make a reconstruction a scenario of its category. The parameterization's lane change spans one lane, so
+/// lane markings are half of it away from the lane's centre.
 fn bounded_columns(reduction: &Reduction, options: &ParameterizationOptions) -> Vec<BoundedColumn> {
     let category = reduction.category;
     let number = |variable: Variable, column: Option<usize>| {

@@ -1,12 +1,12 @@
-//! How well a density stands for scenarios that it has not seen: M = W(gen, test) + 0.25 (W(gen, test) −
-//! W(gen, train)), the smaller the better (arXiv 2202.12025). The first term is fidelity, the second punishes
-//! generated scenarios that only repeat the training ones.
+//! How well a density represents unseen scenarios: M = W(gen, test) + 0.25 (W(gen, test) − W(gen, train)), smaller is
+//! better (arXiv 2202.12025). The first term is fidelity; the second penalizes generated scenarios that only repeat the
+//! training scenarios.
 //!
-//! Scenarios are split at random, several times; each time the density (and the decomposition of a
-//! parameterization by SVD) is fitted on the training part and as many valid scenarios are drawn from it. Under
-//! the reduction, distances are those of the whole weighted vectors w∘z, so numbers of coefficients can be
-//! compared; kinematic parameterizations are compared as points divided by their scales, so their M say
-//! something among runs of the same parameterization only.
+//! Scenarios are split at random, several times. Each time the density (and the decomposition of a parameterization by
+//! SVD) is fitted on the training part, and the same number of valid scenarios is drawn from it. Under the reduction,
+//! distances are those of the whole weighted vectors w∘z, so different numbers of coefficients can be compared.
+//! Kinematic parameterizations are compared as points divided by their scales, so their M can be compared only between
+//! runs of the same parameterization.
 //!
 //! W is exact. Sets larger than [`MAX_SET`] are replaced by random subsets of that size, on both
 //! sides: W of small sets is larger, for all terms of one table alike.
@@ -27,11 +27,11 @@ use crate::{Error, Place, Result};
 
 /// β of the metric.
 pub const BETA: f64 = 0.25;
-/// Points of a set beyond which a random part is taken.
+/// Maximum number of points of a set; larger sets are subsampled.
 pub const MAX_SET: usize = 256;
 /// Random splits.
 pub const REPETITIONS: usize = 5;
-/// Draws after which a split gives up on finding as many valid scenarios as it needs, per scenario.
+/// Maximum number of draws per required valid scenario before a split fails.
 const MAX_TRIES: u64 = 1000;
 /// [`Stream::purpose`] of splits and draws; the repetition is added.
 const PURPOSE: u32 = 0x7265_7000;
@@ -48,7 +48,7 @@ pub struct Representativeness {
     pub generated_test: f64,
     /// W(gen, train).
     pub generated_train: f64,
-    /// W(train, test): what as many real scenarios reach.
+    /// W(train, test): the value that the same number of recorded scenarios reaches.
     pub train_test: f64,
     /// Splits.
     pub repetitions: u64,
@@ -60,7 +60,7 @@ pub struct Representativeness {
     pub seed: u64,
 }
 
-/// M from its three sets, exactly.
+/// M from its three sets; exact.
 pub fn metric(generated: &[Vec<f64>], train: &[Vec<f64>], test: &[Vec<f64>]) -> f64 {
     combine(wasserstein(generated, test), wasserstein(generated, train))
 }
@@ -70,11 +70,11 @@ fn combine(generated_test: f64, generated_train: f64) -> f64 {
 }
 
 impl Representativeness {
-    /// Splits, fits, draws and compares. `scenarios` are those the density of `space` is fitted on, all valid.
+    /// Splits, fits, draws and compares. `scenarios` are those that the density of `space` is fitted on, all valid.
     ///
     /// # Errors
-    /// [`Error::Input`] where a training part is too small or too uniform to be fitted, or its density hardly
-    /// ever gives a valid scenario.
+    /// [`Error::Input`] if a training part is too small or too uniform to be fitted, or its density hardly ever gives a
+    /// valid scenario.
     pub fn estimate(
         space: &ParameterSpace,
         scenarios: &[&Scenario],
@@ -110,7 +110,7 @@ fn one_split(
     repetition: u32,
 ) -> Result<[f64; 3]> {
     let stream = Stream { seed, purpose: PURPOSE + repetition };
-    // Index 0 shuffles, the others draw.
+    // Index 0 of the stream shuffles, the others draw.
     let mut shuffled = scenarios.to_vec();
     let mut draws = Draws::new(stream, 0);
     for last in (1..shuffled.len()).rev() {
@@ -135,7 +135,7 @@ fn one_split(
         ));
     }
     let (generated, train, test) = match space.reduction() {
-        // One metric for all splits: the weights of the fit on all scenarios.
+        // The same metric for all splits: the weights of the fit on all scenarios.
         Some(all) => {
             let coefficients = fitted.dimensions() - usize::from(fitted.has_thw());
             let thw = |p: &[f64], z: &mut Vec<f64>, scale: Option<f64>| {

@@ -1,11 +1,11 @@
 //! W: the exact optimal transport between two sets of points with equal weights and Euclidean distance
 //! (Wasserstein distance of order 1).
 //!
-//! Masses are whole numbers (every point of one set carries the size of the other over their greatest common
-//! divisor), so flows are exact and only costs are rounded. Solved by successive shortest paths with potentials
-//! on the dense bipartite graph (Edmonds and Karp 1972; Jonker and Volgenant 1987 for equal sizes).
+//! Masses are integers (each point of one set has the size of the other set over their greatest common divisor), so
+//! flows are exact and only costs are rounded. Solved by successive shortest paths with potentials on the dense
+//! bipartite graph (Edmonds and Karp 1972; Jonker and Volgenant 1987 for equal sizes).
 
-/// W between sets of points, each of d numbers. 0 where both are empty; infinite where one is.
+/// W between sets of points, each of d numbers. 0 if both sets are empty; infinite if one is.
 pub fn wasserstein(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
     match (a.is_empty(), b.is_empty()) {
         (true, true) => return 0.0,
@@ -29,7 +29,7 @@ struct Transport {
     /// rows × columns.
     cost: Vec<f64>,
     flow: Vec<u64>,
-    /// Mass of a row that is not sent yet, and of a column that is not filled.
+    /// Remaining mass of a row to send, and of a column to fill.
     supply: Vec<u64>,
     demand: Vec<u64>,
     row_potential: Vec<f64>,
@@ -42,7 +42,7 @@ struct Tree {
     column_distance: Vec<f64>,
     row_done: Vec<bool>,
     column_done: Vec<bool>,
-    /// Column before a row, row before a column.
+    /// Predecessor: the column before a row, the row before a column.
     before_row: Vec<usize>,
     before_column: Vec<usize>,
 }
@@ -50,7 +50,7 @@ struct Tree {
 impl Transport {
     fn new(cost: Vec<f64>, rows: usize, columns: usize) -> Transport {
         let divisor = greatest_common_divisor(rows, columns);
-        // Column reduction: every column has an arc of reduced cost 0, none is negative.
+        // Column reduction: every column has an arc of reduced cost 0, and none is negative.
         let column_potential =
             (0..columns).map(|j| (0..rows).map(|i| cost[i * columns + j]).fold(f64::INFINITY, f64::min)).collect();
         Transport {
@@ -66,7 +66,7 @@ impl Transport {
     }
 
     fn reduced(&self, row: usize, column: usize) -> f64 {
-        // Rounding may leave a hair below 0, which a shortest path must not see.
+        // Rounding may give a slightly negative cost, which a shortest path must not use.
         (self.cost[row * self.columns + column] - self.row_potential[row] - self.column_potential[column]).max(0.0)
     }
 
@@ -101,7 +101,7 @@ impl Transport {
                     }
                 }
             }
-            // There is demand as long as there is supply, and every column can be reached.
+            // Demand exists as long as supply does, and every column is reachable.
             let open = (0..self.columns).filter(|j| !tree.column_done[*j]);
             let Some(column) = open.min_by(|i, j| tree.column_distance[*i].total_cmp(&tree.column_distance[*j])) else {
                 self.supply[source] = 0;

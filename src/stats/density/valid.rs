@@ -1,5 +1,4 @@
-//! P_valid: the share of a density inside the valid region, by counting draws. The truncated density is
-//! f/P_valid.
+//! P_valid: the fraction of a density inside the valid region, by counting draws. The truncated density is f/P_valid.
 
 use std::collections::BTreeMap;
 
@@ -15,16 +14,16 @@ use crate::{Error, Place, Result};
 /// [`Stream::purpose`] of these draws.
 pub const VALID_SHARE_PURPOSE: u32 = 0x7661_6c64;
 
-/// Draws of an estimate that nobody chose another number for: the standard error is at most 0.0016.
+/// Default number of draws: the standard error is at most 0.0016.
 pub const VALID_SHARE_DRAWS: u64 = 100_000;
 
-/// Draws that one bound refuses.
+/// Number of draws that violate one bound first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Refused {
-    /// The parameter, or the value that follows from several, whose bound they break first.
+    /// The parameter, or the value that depends on several, whose bound they violate first.
     pub parameter: String,
-    /// What it must be.
+    /// The violated condition.
     pub bound: String,
     /// How many draws.
     pub draws: u64,
@@ -42,19 +41,19 @@ pub struct ValidShare {
     pub high: f64,
     /// Draws.
     pub draws: u64,
-    /// Those inside the valid region.
+    /// Number of valid draws.
     pub valid: u64,
-    /// The others by the bound that they break first, the most first.
+    /// The other draws by the bound that they violate first, most frequent first.
     pub refused: Vec<Refused>,
     /// Seed of the draws.
     pub seed: u64,
 }
 
 impl ValidShare {
-    /// Counts. The count does not depend on the number of threads.
+    /// Counts valid draws. The count does not depend on the number of threads.
     ///
     /// # Errors
-    /// [`Error::Input`] where no draw is valid; [`Error::Usage`] for 0 draws.
+    /// [`Error::Input`] if no draw is valid; [`Error::Usage`] for 0 draws.
     pub fn count(kde: &Kde, space: &ParameterSpace, draws: u64, seed: u64) -> Result<ValidShare> {
         if draws == 0 {
             return Err(Error::usage(Place::item("draws"), "0 draws count nothing", "give at least 1, like 100000"));
@@ -65,7 +64,7 @@ impl ValidShare {
             *counts.entry(by).or_default() += draws;
             counts
         };
-        // A bound that moves with the draw (v1 < v0) is told by its parameter alone.
+        // A bound that depends on the draw (v1 < v0) is reported by its parameter only.
         let by =
             |invalid: Invalid| (invalid.parameter, invalid.bound.split(" = ").next().unwrap_or_default().to_owned());
         let counts = (0..draws).into_par_iter().filter_map(broken).map(|invalid| (by(invalid), 1));
@@ -81,7 +80,7 @@ impl ValidShare {
         let [low, high] = wilson(valid, draws);
         let refused = counts.into_iter().map(|((parameter, bound), draws)| Refused { parameter, bound, draws });
         let mut refused: Vec<Refused> = refused.collect();
-        // The sort is stable: equal numbers stay in the order of their names.
+        // The sort is stable: equal counts stay in the order of their names.
         refused.sort_by_key(|refused| std::cmp::Reverse(refused.draws));
         Ok(ValidShare { estimate: valid as f64 / draws as f64, low, high, draws, valid, refused, seed })
     }

@@ -12,15 +12,15 @@ use super::{blocks::Join, problem::Draw};
 use crate::stats::random::Stream;
 use crate::{Error, Place, Result};
 
-/// One proposal and how many draws it gives.
+/// One proposal and its number of draws.
 pub struct Technique<'a> {
-    /// The proposal, with a validity share that is known: it enters the weights of the others' draws.
+    /// The proposal, with a known validity fraction, because it enters the weights of the others' draws.
     pub proposal: &'a dyn Density,
     /// Draws, ≥ 2.
     pub draws: u64,
 }
 
-/// Σ α_i g_i / P_i, each part cut off by itself.
+/// Σ α_i g_i / P_i, each part truncated separately.
 struct Together<'a, 'b> {
     parts: &'b [(f64, &'a dyn Density)],
 }
@@ -49,11 +49,11 @@ impl Density for Together<'_, '_> {
     }
 }
 
-/// Draws every technique and combines them. The variance is that of a stratified sample, Σ α_i² s_i²/n_i: each
-/// technique gives a fixed number of draws.
+/// Draws from every technique and combines them. The variance is that of a stratified sample, Σ α_i² s_i²/n_i, because
+/// each technique has a fixed number of draws.
 ///
 /// # Errors
-/// The limit state's; [`Error::Usage`] where there is no technique, one has fewer than two draws, or the numbers of
+/// Those of the limit state; [`Error::Usage`] if there is no technique, one has fewer than two draws, or the numbers of
 /// parameters differ.
 pub fn balance_heuristic(
     nominal: &dyn Density,
@@ -79,7 +79,7 @@ pub fn balance_heuristic(
     for (i, technique) in techniques.iter().enumerate() {
         let stream = Stream { seed, purpose: purpose::TECHNIQUE + i as u32 };
         let sums = sums_of_stream(nominal, technique.proposal, limit_state, stream, 0..technique.draws, &together)?;
-        // Validity shares are in the weights already: valid draws are the draws.
+        // The weights include the validity fractions: here each valid draw counts as one attempt.
         let own = sums.total().map(|s: WeightSums| WeightSums { tries: s.draws, ..s }).unwrap_or_default();
         if own.draws < 2 {
             return Err(super::importance::no_valid_point("technique of the balance heuristic"));

@@ -1,11 +1,10 @@
-//! Sums over indices that come out the same, bit for bit, however the indices were divided among calls, threads and
-//! machines.
+//! Sums over indices with the same bits for any division of the indices among calls, threads and machines.
 //!
-//! Floating-point addition is not associative, so the order of all additions is fixed: they follow the binary tree
-//! over the indices, in which a node of level l covers the 2^l indices from a multiple of 2^l on. Any range of
-//! indices is held as the largest nodes that fill it, at most two per level; two ranges join wherever they complete
-//! a node. A block of [`BLOCK`] indices is a node of level 12. Memory grows with the logarithm of the range and with
-//! the number of gaps in it.
+//! Floating-point addition is not associative, so the order of all additions is fixed. They follow the binary tree over
+//! the indices, in which a node of level l covers 2^l indices from a multiple of 2^l on. Any range of indices is stored
+//! as the largest nodes that fill it, at most two per level; ranges join wherever they complete a node. A block of
+//! [`BLOCK`] indices is a node of level 12. Memory grows with the logarithm of the range and with the number of its
+//! gaps.
 
 use std::collections::BTreeMap;
 use std::ops::Range;
@@ -37,7 +36,7 @@ impl<S> Default for BlockSums<S> {
 }
 
 impl<S> BlockSums<S> {
-    /// Whether nodes that were read from a file are nodes: aligned to their size, disjoint, below 2⁶³.
+    /// Checks nodes read from a file: aligned to their size, disjoint, below 2⁶³.
     pub(crate) fn check(&self) -> std::result::Result<(), String> {
         let mut free_from = 0;
         for (&start, &(level, _)) in &self.nodes {
@@ -68,7 +67,7 @@ impl<S: Join + Clone> BlockSums<S> {
         sums
     }
 
-    /// Adds a node and joins it with its sibling as long as there is one.
+    /// Adds a node and joins it with its sibling, repeatedly.
     fn place(&mut self, mut start: u64, mut level: u32, mut sums: S) {
         while level < 63 {
             let sibling = start ^ (1 << level);
@@ -107,7 +106,7 @@ impl<S: Join + Clone> BlockSums<S> {
         Ok(())
     }
 
-    /// The ranges of indices that are in, in order, neighbours joined.
+    /// The ranges of covered indices, ascending, adjacent ones joined.
     pub fn ranges(&self) -> Vec<Range<u64>> {
         let mut ranges: Vec<Range<u64>> = Vec::new();
         for (start, (level, _)) in &self.nodes {
@@ -120,7 +119,7 @@ impl<S: Join + Clone> BlockSums<S> {
         ranges
     }
 
-    /// The sums of everything that is in, nodes joined in index order; `None` where nothing is.
+    /// The sum of all covered indices, nodes joined in index order; `None` if there are none.
     pub fn total(&self) -> Option<S> {
         let mut nodes = self.nodes.values().map(|(_, sums)| sums);
         let first = nodes.next()?.clone();
@@ -128,7 +127,7 @@ impl<S: Join + Clone> BlockSums<S> {
     }
 }
 
-/// The sums of a node from its leaves, a power of two of them.
+/// The sums of a node from its leaves, whose number is a power of two.
 fn pairwise<S: Join + Clone>(leaves: &[S]) -> S {
     if leaves.len() == 1 {
         return leaves[0].clone();

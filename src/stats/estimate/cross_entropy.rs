@@ -1,7 +1,7 @@
 //! Cross-entropy (Rubinstein and Kroese, "The Cross-Entropy Method", 2004; Kurtz and Song, "Cross-entropy-based
-//! adaptive importance sampling using Gaussian mixture", Structural Safety 42, 2013): a Gaussian mixture is moved
-//! towards the failures level by level, each level's goal being a quantile of the limit state; importance sampling
-//! with the last mixture and a defensive share gives the estimate.
+//! adaptive importance sampling using Gaussian mixture", Structural Safety 42, 2013). A Gaussian mixture moves towards
+//! the failures level by level; the goal of each level is a quantile of the limit state. Importance sampling with the
+//! last mixture and a defensive mixture weight gives the estimate.
 
 use nalgebra::DMatrix;
 use serde::{Deserialize, Serialize};
@@ -16,16 +16,16 @@ use crate::stats::density::moments::moments;
 use crate::stats::density::{Mixture, MixtureFitOptions as FitOptions};
 use crate::stats::random::Stream;
 
-/// Share of the density's covariance added to the widened copies of a fit's components, and their share of the
-/// mixture. Beyond the limit the failures thin out exponentially, a Gaussian fitted to them faster: without wider
-/// copies the weights have no variance, and intervals do not hold.
+/// Fraction of the density's covariance added to the widened copies of a fit's components, and the weight of these
+/// copies in the mixture. Beyond the limit, failures decrease exponentially, but a Gaussian fitted to them decreases
+/// faster: without wider copies the variance of the weights is underestimated, and intervals are too short.
 const WIDENING: f64 = 0.25;
 const WIDENED_SHARE: f64 = 0.5;
 
 /// Components whose weight in the smoothed mixture falls below this are dropped.
 const MIN_WEIGHT: f64 = 0.02;
 
-/// How to find a proposal and sample it.
+/// Options for finding a proposal and sampling it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct CrossEntropy {
     /// Seed.
@@ -38,19 +38,19 @@ pub struct CrossEntropy {
     pub quantile: f64,
     /// Maximum number of components of a level's fit; the number is chosen by the Bayesian information criterion.
     pub components: usize,
-    /// Share of the new fit in the next mixture; the rest is the previous one.
+    /// Weight of the new fit in the next mixture; the rest is the previous mixture.
     pub smoothing: f64,
     /// Maximum number of levels.
     pub levels: usize,
-    /// Share of the density in the final proposal.
+    /// Defensive mixture weight of the final proposal.
     pub defence: f64,
     /// When the final sample ends.
     pub stop: StopRule,
 }
 
 impl CrossEntropy {
-    /// ρ = 0.1, up to four components, smoothing 0.7, a defensive share of 0.1; the runs are those of the final
-    /// sample.
+    /// ρ = 0.1, up to four components, smoothing 0.7, defensive mixture weight 0.1. `final_samples` excludes the runs
+    /// of the levels.
     pub fn new(seed: u64, samples_per_level: u64, final_samples: u64) -> CrossEntropy {
         CrossEntropy {
             seed,
@@ -69,9 +69,9 @@ impl CrossEntropy {
 /// One level.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct CrossEntropyStep {
-    /// Limit state that the fitted draws reach.
+    /// Limit state at or below which draws are fitted.
     pub threshold: f64,
-    /// Draws that reach it.
+    /// Number of draws at or below it.
     pub elite: usize,
     /// Failures among the level's draws.
     pub failures: usize,
@@ -79,21 +79,21 @@ pub struct CrossEntropyStep {
     pub components: usize,
 }
 
-/// The estimate, the way to it, and the proposal, which other seeds or parts of a sample can use again.
+/// The estimate, its levels, and the proposal, which can be reused with other seeds or in parts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CrossEntropyRun {
     /// The estimate; its runs include those of the levels.
     pub estimate: Estimate,
     /// The levels.
     pub steps: Vec<CrossEntropyStep>,
-    /// The last mixture, without the defensive share.
+    /// The last mixture, without the defensive part.
     pub proposal: Mixture,
 }
 
 /// Finds a proposal and samples it.
 ///
 /// # Errors
-/// The limit state's; [`crate::Error::Usage`] where the density has no valid point.
+/// Those of the limit state; [`crate::Error::Usage`] if the density has no valid point.
 pub fn cross_entropy(
     nominal: &dyn Density,
     limit_state: &dyn LimitState,
@@ -162,8 +162,8 @@ pub fn cross_entropy(
     Ok(CrossEntropyRun { estimate, steps, proposal: sampled.proposal().clone() })
 }
 
-/// `share` of the new mixture and the rest of the old one, without what has become negligible. Mixing the densities
-/// stands for smoothing the parameters, which has no meaning where the numbers of components differ.
+/// Mixes the new mixture with weight `share` and the old one; drops negligible components. Mixing the densities
+/// replaces smoothing of the parameters, which is undefined for different numbers of components.
 fn smoothed(new: &Mixture, old: &Mixture, share: f64) -> Result<Mixture> {
     let both = Mixture::join(&[(share, new), (1.0 - share, old)])?;
     let kept: Vec<usize> = (0..both.weights().len()).filter(|k| both.weights()[*k] >= MIN_WEIGHT).collect();
