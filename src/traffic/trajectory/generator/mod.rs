@@ -30,13 +30,13 @@
 //! have another seed than the default ones. Some shares are not reached: `docs/src/validation.md` lists them.
 //!
 //! # The rate factor
-//! At [`event_rate_factor`](GeneratorOptions::event_rate_factor) 1 scenarios are about as rare as published, but kept LVDs
-//! twice as frequent. The default
-//! of 3 multiplies the *rate* of lane changes and hard braking in view, so that the default recordings have as many
-//! kept cut-outs as the paper, a third more cut-ins and three times as many LVDs, in a third of the time. Rates rise slightly less than the factor, because lane changes
-//! obstruct each other. Gentle decelerations are not raised, so a larger fraction of LVDs is kept.
-//! The numbers are fitted at this factor; 1 and 8 fit the published failures worse. With 8, so many lane changes disturb
-//! the traffic that closing speeds and brakings become those of congestion.
+//! At [`event_rate_factor`](GeneratorOptions::event_rate_factor) 1 scenarios are about as rare as published, but kept
+//! LVDs twice as frequent. The default of 3 multiplies the *rate* of lane changes and hard braking in view. In a third
+//! of the time, the default recordings then have as many kept cut-outs as the paper, a third more cut-ins and three
+//! times as many LVDs. Rates increase slightly less than the factor, because lane changes obstruct each other. Gentle
+//! decelerations are not raised, so a larger fraction of LVDs is kept. The numbers are fitted at this factor; 1 and 8
+//! fit the published failures worse. At 8, lane changes disturb the traffic so much that closing speeds and brakings
+//! become those of congestion.
 //!
 //! # Limits
 //! The data contains no row of highD and was fitted to published figures only. It says nothing about real
