@@ -1,9 +1,8 @@
-//! Where failures are: the share of failed samples per cell of two scenario parameters, as a heat map.
+//! Where failures occur: the fraction of failed samples per cell of two scenario parameters, as a heat map.
 //!
-//! The colours run from pale yellow to dark blue, each darker than the one before: they can be told apart by
-//! colour-blind readers and in grey print. Three things are never only a colour: a cell without samples is hatched,
-//! a cell with few samples is a smaller square, and a cell without failures has its own grey, so that "none seen" and
-//! "few" differ.
+//! The colours go from pale yellow to dark blue and darken with each step, so that colour-blind readers and grey prints
+//! can distinguish them. Three states are not shown by colour alone: a cell without samples is hatched, a cell with few
+//! samples is a smaller square, and a cell without failures has its own grey.
 
 use super::convergence::sampled;
 use super::plot::{Cells, ColourBar, Figure, Fill, FilledCell, Hatch, Height, Plot, PlotAxis};
@@ -14,12 +13,12 @@ use crate::run::sampling::{self, MapCounts};
 use crate::stats::density::DensityModel;
 use crate::support::table::Table;
 
-/// One parameter, cut into cells.
+/// One parameter, divided into cells.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MapAxis {
     /// Name, such as `initial gap`.
     pub name: String,
-    /// Unit, such as `m`; empty for a number without one.
+    /// Unit, such as `m`; empty for a dimensionless number.
     pub unit: String,
     /// Edges of the cells in that unit: finite, increasing, one more than cells.
     pub edges: Vec<f64>,
@@ -32,9 +31,9 @@ pub struct FailureMap {
     pub title: String,
     /// Line below the heading (which model and criterion, what was sampled); wrapped when long.
     pub subtitle: Option<String>,
-    /// The parameter across.
+    /// Horizontal parameter.
     pub x: MapAxis,
-    /// The parameter upwards.
+    /// Vertical parameter.
     pub y: MapAxis,
     /// Samples per cell, row by row: the cell of `x` cell i and `y` cell j is at `j * (x cells) + i`.
     pub samples: Vec<u64>,

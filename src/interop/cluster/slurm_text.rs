@@ -1,6 +1,6 @@
-//! The text of the scripts: commands with their flags. Messages are made elsewhere, for they name options.
+//! The text of the scripts: commands with their flags.
 //!
-//! Words are quoted so that the shell, or `sbatch` in its `#SBATCH` lines, reads back what was meant.
+//! Words are quoted so that the shell, or `sbatch` in its `#SBATCH` lines, reads back the same text.
 
 use std::fmt::Write;
 
@@ -16,7 +16,7 @@ impl SlurmArray {
         if gpu {
             directive(&mut text, "gres", "gpu:1");
         }
-        // To the batch shell alone: lanesweep is no job step, and processes of the shell's own get nothing.
+        // Only to the batch shell: lanesweep is not a job step, and the shell's own processes get no signal.
         directive(&mut text, "signal", &format!("B:USR1@{signal_before_s}"));
         let plan = shell_quoted(Place::option("out"), &format!("{}/plan.json", self.out))?;
         let words = [
@@ -77,7 +77,7 @@ impl SlurmArray {
         ))
     }
 
-    /// First lines of both jobs: what they ask for alike.
+    /// First lines of both jobs: their common resources.
     fn head(&self, name: &str, log: &str) -> Result<String> {
         let resources = &self.resources;
         let mut text = String::from("#!/usr/bin/env bash\n");
@@ -105,7 +105,7 @@ fn directive(text: &mut String, option: &str, value: &str) {
     let _ = writeln!(text, "#SBATCH --{option}={value}");
 }
 
-/// Before the program starts. The traps are set first: a signal in between is not lost.
+/// Before the program starts. The traps are set first, so that no signal in between is lost.
 const ARRAY_HEAD: &str = r#"
 # One task is one shard of the run. It may end at any time: the same command continues it.
 set -u
@@ -161,13 +161,14 @@ fi
 exit "$status"
 "#;
 
-/// Characters that neither the shell nor `sbatch` gives a meaning, wherever they stand in a word. `=` is not among
-/// them: before a command it makes an assignment.
+/// Characters without a special meaning for the shell or `sbatch` anywhere in a word. `=` is excluded, because before a
+/// command it is an assignment.
 fn is_plain(c: char) -> bool {
     c.is_ascii_alphanumeric() || "_-./:,+@%".contains(c)
 }
 
-/// One word of a POSIX shell: as it is where nothing in it is special, else in single quotes. For commands in messages.
+/// Quotes a word for a POSIX shell: unchanged if nothing in it is special, else in single quotes. For commands in
+/// messages.
 pub fn quoted_word(word: &str) -> String {
     match !word.is_empty() && word.chars().all(is_plain) {
         true => word.to_owned(),
@@ -175,18 +176,18 @@ pub fn quoted_word(word: &str) -> String {
     }
 }
 
-/// The same for a word of a script.
+/// Like [`quoted_word`], for a word of a script.
 ///
 /// # Errors
-/// [`Error::Usage`] naming `place` for control characters (line breaks among them), which could be quoted but not read
-/// in a script by a person.
+/// [`Error::Usage`] naming `place` for control characters (including line breaks), which people could not read in a
+/// script.
 pub fn shell_quoted(place: Place, word: &str) -> Result<String> {
     refuse_control(place, word)?;
     Ok(quoted_word(word))
 }
 
-/// The value of an option in an `#SBATCH` line, by the rules of `sbatch`: double quotes around, a backslash before
-/// quotes and backslashes; `$` and `` ` `` mean nothing there.
+/// Quotes the value of an option in an `#SBATCH` line by the rules of `sbatch`: in double quotes, with a backslash
+/// before quotes and backslashes; `$` and `` ` `` have no meaning there.
 ///
 /// # Errors
 /// [`Error::Usage`] naming `place` for control characters.
@@ -198,11 +199,11 @@ pub(super) fn directive_quoted(place: Place, value: &str) -> Result<String> {
     Ok(format!("\"{}\"", value.replace('\\', r"\\").replace('"', "\\\"")))
 }
 
-/// A file name pattern of `sbatch` in a folder: `name` keeps its `%` (`%A`, `%a`, `%j`), those of the folder are taken
-/// literally.
+/// A file name pattern of `sbatch` in a folder: `name` keeps its `%` (`%A`, `%a`, `%j`); those of the folder are
+/// escaped.
 ///
 /// # Errors
-/// [`Error::Usage`] for a folder with a backslash, after which Slurm takes no pattern, or with control characters.
+/// [`Error::Usage`] for a folder with control characters, or with a backslash, which disables Slurm's patterns.
 fn log_pattern(place: Place, folder: &str, name: &str) -> Result<String> {
     if folder.contains('\\') {
         let problem =
