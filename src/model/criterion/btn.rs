@@ -1,8 +1,8 @@
 //! Brake Threat Number: required over maximum available deceleration; above 1 braking cannot avoid the collision. The
 //! deceleration ramps up from 0 with jerk j; the other vehicle keeps its speed.
 //!
-//! D(a, v) is the distance closed while deceleration a reduces the closing speed v to 0: `v²/(2a) + v a/(2j) − a³/(24
-//! j²)` for `v ≥ a²/(2j)`, else `(2/3) v sqrt(2v/j)` (the ramp is not finished).
+//! D(a, v) is the distance closed while deceleration a reduces the closing speed v to 0:
+//! `v²/(2a) + v a/(2j) − a³/(24 j²)` for `v ≥ a²/(2j)`, else `(2/3) v sqrt(2v/j)` (the ramp is not finished).
 
 use serde::{Deserialize, Serialize};
 

@@ -44,8 +44,9 @@ pub fn overlaps_along<R: Real>(gap: R, half_lengths: R) -> Flag {
 
 /// Gap after a step, m, for vehicles that overlap laterally at its end, from the gaps before and after the step.
 ///
-/// Where the step moves one centre past the other, the contact is kept: the result has the centres side by side if the
-/// other vehicle was wholly ahead before, and half of that behind if it was wholly behind. Otherwise it is `after`.
+/// Where the step moves one centre past the other, the contact is kept. If the other vehicle was wholly ahead before,
+/// the result has the centres side by side. If it was wholly behind, the result is half of that. Otherwise it is
+/// `after`.
 #[inline(always)]
 pub fn held_in_contact<R: Real>(before: R, after: R, half_lengths: R) -> R {
     let was_behind = !(before + half_lengths + half_lengths).is_positive();
