@@ -45,8 +45,8 @@ pub fn overlaps_along<R: Real>(gap: R, half_lengths: R) -> Flag {
 /// Gap after a step, m, for vehicles that overlap laterally at its end, from the gaps before and after the step.
 ///
 /// Where the step moves one centre past the other, the contact is kept. If the other vehicle was wholly ahead before,
-/// the result has the centres side by side. If it was wholly behind, the result is half of that. Otherwise it is
-/// `after`.
+/// the result has the centres side by side. If it was wholly behind, the result has its centre `half_lengths/2` behind
+/// the ego's. Otherwise it is `after`.
 #[inline(always)]
 pub fn held_in_contact<R: Real>(before: R, after: R, half_lengths: R) -> R {
     let was_behind = !(before + half_lengths + half_lengths).is_positive();
