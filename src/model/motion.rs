@@ -50,7 +50,7 @@ pub enum Lateral {
     },
 }
 
-/// Series that lanes share.
+/// Series used by many lanes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tables<R> {
     /// Speeds, m/s, one per step.

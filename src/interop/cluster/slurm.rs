@@ -2,11 +2,11 @@
 //!
 //! Nothing is lost if a task ends early, because a shard keeps a journal and the same command resumes it:
 //! - the time limit: Slurm sends USR1 to the batch shell before it, the shell sends TERM to lanesweep, lanesweep
-//! finishes its chunk and ends with 75, and the task is requeued;
+//!   finishes its chunk and ends with 75, and the task is requeued;
 //! - a crash (out of memory, a killed process): the task is requeued, at most [`MAX_RESTARTS`] times;
 //! - a lost node or preemption: Slurm itself requeues the task (`--requeue`);
 //! - `scancel`: the task gets TERM, ends its chunk and is not requeued. The time limit therefore uses USR1: TERM alone
-//! would not say whether to requeue.
+//!   would not say whether to requeue.
 //!
 //! [`SplitRun`] is the run of all tasks: its verb and arguments, without those that the scripts add.
 

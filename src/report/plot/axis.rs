@@ -169,7 +169,7 @@ impl Axis {
 /// The values that a logarithmic axis must include, from estimates and their intervals (estimate, lower, upper).
 ///
 /// The axis starts at most one decade below the smallest estimate or, where that is zero, below the upper end. Without
-/// this limit a lower end close to zero would compress everything else. An upper end that stands for a zero estimate
+/// this limit a lower end close to zero would compress everything else. An upper end that represents a zero estimate
 /// has room for an arrow below it.
 pub(in crate::report) fn logarithmic_reach(intervals: &[(f64, f64, f64)]) -> Vec<f64> {
     let shown = |v: &f64| AxisScale::Logarithmic.shows(*v);
