@@ -1,10 +1,10 @@
 //! lanesweep: a massively parallel sweeper for the scenario-based assessment of automated driving systems.
 //!
-//! Rooms, each importing only those before it: [`support`] (errors, files, tables), [`model`] (drivers, criteria, profile,
-//! case), [`scenario`] (what was found, and its parameterizations), [`traffic`] (recordings, mining), [`stats`] (random
-//! numbers, densities, estimators), [`engine`] (lanes on CPUs and GPUs), [`run`] (studies, samples, maps, scores),
-//! [`report`] (tables, figures, pages), [`interop`] (other programs) and `cli` (feature `cli`). [`prelude`] has the names
-//! that most users need; `examples/library.rs` uses nothing else.
+//! Modules, each importing only those before it: [`support`] (errors, files, tables), [`model`] (drivers, criteria,
+//! profile, case), [`scenario`] (recorded scenarios and their parameterizations), [`traffic`] (recordings, mining),
+//! [`stats`] (random numbers, densities, estimators), [`engine`] (lanes on CPUs and GPUs), [`run`] (studies, samples,
+//! maps, scores), [`report`] (tables, figures, pages), [`interop`] (other programs) and `cli` (feature `cli`).
+//! [`prelude`] has the names that most users need; `examples/library.rs` uses nothing else.
 //!
 //! A cut-in against one driver, in binary64:
 //!
@@ -59,7 +59,7 @@
 //! # }
 //! ```
 
-// The rooms have crate-wide items that only the command line uses.
+// Some crate-wide items are used only by the command line.
 #![cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))]
 
 #[macro_use]

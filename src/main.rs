@@ -1,5 +1,5 @@
-//! The program: everything is in the library's [`lanesweep::cli`], but for what changes the whole process. A program
-//! that uses the library keeps its own environment, panic hook and allocator.
+//! The program. [`lanesweep::cli`] does the work; this file only sets what affects the whole process. A program that
+//! uses the library keeps its own environment, panic hook and allocator.
 
 use std::process::ExitCode;
 
@@ -8,7 +8,7 @@ use lanesweep::cli::Exit;
 #[cfg(unix)]
 mod out_of_memory;
 
-/// Stack that the program needs at most, with room to spare.
+/// Stack size that the program needs, with a margin.
 const STACK_BYTES: usize = 8 << 20;
 
 fn main() -> ExitCode {
@@ -31,25 +31,25 @@ fn main() -> ExitCode {
     }
 }
 
-/// Does this thread have the usual stack? A shell may allow less (`ulimit -s`). Its own thread is used where it may: the
-/// allocator reserves address space for every other one.
+/// Whether this thread has the usual stack; a shell may allow less (`ulimit -s`). Where it is large enough, the main
+/// thread is used, because the allocator reserves address space for every further thread.
 fn is_stack_large() -> bool {
     let limits = std::fs::read_to_string("/proc/self/limits").unwrap_or_default();
     let limit = limits.lines().find_map(|line| line.strip_prefix("Max stack size")?.split_whitespace().next());
     limit.is_some_and(|limit| limit == "unlimited" || limit.parse().is_ok_and(|bytes: usize| bytes >= STACK_BYTES))
 }
 
-/// Mesa's device-select layer complains on stderr of a missing `XDG_RUNTIME_DIR`, as if something had failed, and
-/// reorders devices that lanesweep orders itself.
+/// Mesa's device-select layer reports a missing `XDG_RUNTIME_DIR` on stderr, which reads like a failure. It also
+/// reorders devices, whose order lanesweep defines itself.
 #[allow(unsafe_code)] // changing the environment is unsafe where other threads may read it
 fn quiet_drivers() {
     if std::env::var_os("NODEVICE_SELECT").is_none() {
-        // SAFETY: the first thing that the program does; there is no other thread.
+        // SAFETY: this runs first, before any other thread exists.
         unsafe { std::env::set_var("NODEVICE_SELECT", "1") };
     }
 }
 
-/// What the library makes an error of is not told as a panic as well.
+/// Suppresses the panic message where the library turns the panic into an error.
 fn quiet_caught_panics() {
     let others = std::panic::take_hook();
     std::panic::set_hook(Box::new(move |info| {

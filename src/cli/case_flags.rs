@@ -1,4 +1,4 @@
-//! A concrete case in words: from flags, a TOML file or a row of a table.
+//! A concrete case from flags, a TOML file or a row of a table.
 
 use std::path::Path;
 
@@ -61,19 +61,19 @@ pub(super) struct CaseFlags {
     /// Width of every vehicle [default: the profile's]
     #[arg(long, value_name = "m", value_parser = length_m, help_heading = "Scenario", hide_short_help = true)]
     width: Option<f64>,
-    /// Of files: then the other vehicles keep their speed and lateral position, s.
+    /// Only in files: time after which the other vehicles keep their speed and lateral position, s.
     #[arg(skip)]
     duration: Option<f64>,
-    /// Where the values of a table stand.
+    /// The place of a table's values.
     #[arg(skip)]
     #[serde(skip)]
     row: Option<RowPlace>,
 }
 
 impl CaseFlags {
-    /// `self` where it says something, else `other`.
+    /// Values of `self` where given, otherwise those of `other`.
     pub(super) fn over(&self, other: CaseFlags) -> CaseFlags {
-        // A gap typed here replaces a headway of the file, and the other way round.
+        // A gap on the command line replaces a headway of the file, and vice versa.
         let (gap, thw) = match (self.gap, self.thw) {
             (None, None) => (other.gap, other.thw),
             typed => typed,
@@ -98,7 +98,7 @@ impl CaseFlags {
         }
     }
 
-    /// An error about a value of a table says where it stands.
+    /// Adds the place of a table's value to its error.
     fn located<T>(&self, result: Result<T>) -> Result<T> {
         result.map_err(|error| match &self.row {
             Some(row) => row.locate(error),
@@ -106,27 +106,27 @@ impl CaseFlags {
         })
     }
 
-    /// Does it say anything of the case itself?
+    /// Whether it gives any value of the case.
     pub(super) fn says_a_case(&self) -> bool {
         CaseFlags { models: None, row: None, ..self.clone() } != CaseFlags::default()
     }
 
-    /// Does it say where the ego starts?
+    /// Whether it gives the ego's start.
     pub(super) fn says_a_start(&self) -> bool {
         self.gap.is_some() || self.thw.is_some()
     }
 
-    /// Does it say anything of the case beside that?
+    /// Whether it gives a value of the case other than the ego's start.
     pub(super) fn says_more_than_a_start(&self) -> bool {
         CaseFlags { gap: None, thw: None, ..self.clone() }.says_a_case()
     }
 
-    /// The models that are named; `None` where none is.
+    /// The named models; `None` if none is named.
     pub(super) fn named_models(&self) -> Result<Option<Vec<ModelId>>> {
         self.models.as_ref().map(|_| self.models()).transpose()
     }
 
-    /// The models, in the order given; all where none is named.
+    /// The named models in the given order; all if none is named.
     fn models(&self) -> Result<Vec<ModelId>> {
         let names = self.models.iter().flat_map(|list| list.split(','));
         self.located(super::lists::models(names, "models"))
@@ -144,13 +144,13 @@ impl CaseFlags {
         })
     }
 
-    /// Runs the case with each of its models; what is doubtful of it is told.
+    /// Runs the case with each of its models; warns about doubtful values.
     pub(super) fn traced(&self, profile: &Profile, implausible: Implausible) -> Result<TracedCase> {
         let case = self.located(self.plain_case(profile, implausible)?.case(profile.frame.time_cap_s))?;
         TracedCase::run(&case, self.headway()?, profile, &self.models()?)
     }
 
-    /// Its numbers; what is doubtful of them is told.
+    /// The numbers of the case; warns about doubtful values.
     pub(super) fn plain_case(&self, profile: &Profile, implausible: Implausible) -> Result<PlainCase> {
         self.located(self.checked(profile, implausible))
     }
@@ -162,7 +162,7 @@ impl CaseFlags {
         let plain = parameters.plain_case(frame.default_length_m, frame.default_width_m)?;
         self.headway()?;
         parameters.check_plausible(&mut doubts)?;
-        // An acceleration without an end leads far within the time cap.
+        // An acceleration without an end can reach extreme speeds within the time cap.
         let last_mps = plain.last_speed_mps(frame.time_cap_s)?;
         let judged =
             doubts.check(Quantity::Speed, last_mps, || "the speed that results from the acceleration".to_owned());
@@ -195,7 +195,7 @@ impl CaseFlags {
     }
 }
 
-/// A unit, and how many of it are one of the SI.
+/// A unit, and its number per SI unit.
 type Unit = (&'static str, f64);
 
 /// Units of a speed.
@@ -204,10 +204,10 @@ const SPEEDS: [Unit; 6] =
 /// Units of an acceleration.
 const ACCELERATIONS: [Unit; 4] = [("m/s2", 1.0), ("m/s²", 1.0), ("m/s^2", 1.0), ("mps2", 1.0)];
 
-/// A speed above this needs a unit, m/s: 162 km/h, or 45 km/h that lost theirs.
+/// A speed above this needs a unit, m/s: it is 162 km/h, or 45 km/h without its unit.
 const UNITLESS_MPS: f64 = 45.0;
 
-/// A number in SI units, and whether a unit stands behind it.
+/// A number in SI units, and whether it has a unit.
 fn si(text: &str, units: &[Unit]) -> Option<(f64, bool)> {
     let text = text.trim();
     let with_unit = units.iter().find_map(|(unit, per_si)| Some((text.strip_suffix(unit)?, *per_si)));
@@ -219,7 +219,7 @@ fn si(text: &str, units: &[Unit]) -> Option<(f64, bool)> {
 /// A speed in m/s, from a number (m/s) or a number with its unit: `16.7`, `60km/h`, `37 mph`.
 ///
 /// # Errors
-/// What to write, for a text that is none, and for a number without a unit that no car on a road reaches in m/s.
+/// What to write, if the text is not a speed, or if a number without a unit is too high for a car in m/s.
 fn speed_mps(text: &str) -> std::result::Result<f64, String> {
     match si(text, &SPEEDS) {
         Some((speed, false)) if speed > UNITLESS_MPS => Err(format!(
@@ -253,12 +253,12 @@ fn acceleration_mps2(text: &str) -> std::result::Result<f64, String> {
     found.ok_or_else(|| "write an acceleration in m/s², such as -5 or -5m/s2".to_owned())
 }
 
-/// The flags that a TOML file holds.
+/// Reads the flags from a TOML file.
 pub(super) fn from_toml(path: &Path) -> Result<CaseFlags> {
     input_file::read_toml(path, "the keys are the flags of `simulate --help` with `_`")
 }
 
-/// The flags that a row of a table holds, of CSV or Parquet; rows count from 1 after the header.
+/// Reads the flags from a row of a CSV or Parquet table; rows count from 1 after the header.
 pub(super) fn from_table(path: &Path, row: usize) -> Result<CaseFlags> {
     let format = TableFormat::of(path, &[TableFormat::Csv, TableFormat::Parquet], "--table")?;
     let mut rows = ParameterRows::new(TableReader::open(path, format)?)?;
@@ -269,7 +269,7 @@ pub(super) fn from_table(path: &Path, row: usize) -> Result<CaseFlags> {
     }
     let (line, found) = if row == 0 { None } else { rows.next_row()? }.ok_or_else(missing)?;
     let mut found = found?;
-    // Of tables of scenarios: a single run has no key and no samples.
+    // Only tables of scenarios use these: a single run has no key and no samples.
     ["id", "rate"].iter().for_each(|key| drop(found.remove(*key)));
     let flags: CaseFlags = serde_json::from_value(serde_json::Value::Object(found))
         .map_err(|e| Error::Internal(format!("{}, row {row}: {e}", path.display())))?;

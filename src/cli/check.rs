@@ -19,7 +19,7 @@ use crate::scenario::{Category, Scenario};
 use crate::support::files::{make_folder_of, write_atomically};
 use crate::{Error, Place, Result};
 
-/// Profiles unless told otherwise; the first one decides.
+/// Default profiles; the first one decides.
 const PROFILES: [&str; 6] = ["un-r157", "eu-2022-1426", "eu-2022-1426-standing", "jrc-2021", "paper", "paper-fit"];
 
 /// Judge one concrete case: would the reference drivers of UN R157 avoid the collision?
@@ -67,7 +67,7 @@ pub struct Check {
     format: FormatFlag,
 }
 
-/// What is checked, and what a reader should know of it.
+/// The checked case, with facts for the reader.
 struct CheckRequest {
     subject: Subject,
     origin: String,
@@ -81,7 +81,7 @@ impl Check {
         let names = if self.profiles.is_empty() { PROFILES.map(str::to_owned).to_vec() } else { self.profiles.clone() };
         let mut profiles = names.iter().map(|name| Profile::load(name.trim())).collect::<Result<Vec<_>>>()?;
         let asked = self.asked(&profiles[0])?;
-        // A profile that has only a clause of cut-ins of its own says nothing of other cases.
+        // A profile that only adds its own cut-in clause does not apply to other cases.
         if self.profiles.is_empty() && asked.subject.category() != Category::CutIn {
             let first = profiles[0].clone();
             let is_first = |p: &Profile| {
@@ -109,7 +109,7 @@ impl Check {
         }
         self.format.print(|| sheet.text(), || sheet.json())?;
         Ok(match judgements[0].verdict() {
-            // Of input that was left out nothing is known, whatever the answer.
+            // If input was skipped the answer is incomplete.
             _ if asked.incomplete => Exit::Incomplete,
             Verdict::Undecided => Exit::Undecided,
             Verdict::OutsideAnnex => Exit::OutsideAnnex,
@@ -176,7 +176,7 @@ impl Check {
         Ok(CheckRequest { subject: Subject::recorded(scenario, headway)?, origin, is_synthetic, incomplete })
     }
 
-    /// Outputs must have their kind's name and replace no input.
+    /// Outputs must have the right file ending and must not replace an input.
     fn guard_outputs(&self) -> Result<()> {
         let inputs: Vec<PathBuf> = self.file.iter().cloned().collect();
         for (path, ending, flag) in [(&self.sheet, "html", "--sheet"), (&self.series, "csv", "--series")] {

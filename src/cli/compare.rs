@@ -1,4 +1,4 @@
-//! `lanesweep compare`: scenarios in, rates of failure of S, S' and densities beside one another out.
+//! `lanesweep compare`: compares failure rates of S, S' and densities.
 
 use std::path::PathBuf;
 use std::time::Instant;

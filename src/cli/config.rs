@@ -1,4 +1,4 @@
-//! `lanesweep config`: the configuration file, its schema, its check, and what is in force.
+//! `lanesweep config`: the configuration file, its schema, its check, and the effective values.
 
 use std::path::{Path, PathBuf};
 
@@ -134,7 +134,7 @@ impl Init {
 
 impl Show {
     fn run(&self, configured: &Configured) -> Result<Exit> {
-        // What only a profile can tell of its own time step.
+        // Only the profile can check its own time step.
         configured.profile()?;
         configured.backend()?;
         let shown: Vec<Setting> = match self.changed {

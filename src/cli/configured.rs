@@ -1,5 +1,5 @@
-//! From the command line to a configuration: which flag sets which key. Verbs have these flags' values from the settings.
-//! `--backend` and `--device` become the backend that is open.
+//! From the command line to a configuration: which flag sets which key. Verbs read the values of these flags from the
+//! settings. `--backend` and `--device` determine the opened backend.
 
 use std::path::PathBuf;
 
@@ -16,17 +16,17 @@ use crate::model::profile::Profile;
 use crate::report::run_record::SettingRecord;
 use crate::{Error, Place, Result};
 
-/// What a run is configured with.
+/// The configuration of a run.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Configured {
-    /// As values.
+    /// Values.
     pub settings: Settings,
-    /// With their sources.
+    /// Values with their sources.
     pub layers: Layers,
 }
 
-/// A flag that sets a key: the key, the flag, what its value is called where the key does not say it, its heading,
-/// whether only `--help` tells it, and the verbs that have it. Range, default and help are the key's.
+/// A flag that sets a key: the key, the flag, the value's name unless the key defines it, its heading, whether only
+/// `--help` shows it, and its verbs. Range, default and help are the key's.
 type KeyFlag = (&'static str, &'static str, &'static str, &'static str, bool, &'static [&'static str]);
 
 const SWEEPING: &[&str] = &["study", "sample", "compare", "justify", "map", "verify", "show"];
@@ -59,7 +59,7 @@ pub(super) const FLAGS: [KeyFlag; 22] = [
     ("compare.seed", "seed", "", RUN, false, &["compare"]),
 ];
 
-/// Tables and keys that decide what the lanes of a plan are: with a plan file they are decided.
+/// Tables and keys that determine a plan's lanes; a plan file already contains them.
 const OF_THE_PLAN: [&str; 7] =
     ["generator.", "mining.", "parameterization.", "score.", "sample.", "run.profile", "run.dt_s"];
 
@@ -93,8 +93,8 @@ fn with_flags(mut command: Command, keys: &[Key]) -> Command {
     command
 }
 
-/// A flag as its key says. The first sentence of a description is the short help; `Without it: X.` is the default where
-/// there is no value.
+/// Builds the flag of a key. The first sentence of the description is the short help; `Without it: X.` is the default
+/// if there is no default value.
 fn flag(key: &Key, id: &'static str, value_name: &'static str) -> Arg {
     let (text, unset) = match key.description.split_once(" Without it: ") {
         Some((text, unset)) => (text, format!(" [default: {}]", unset.trim_end_matches('.'))),
@@ -136,7 +136,7 @@ fn flag(key: &Key, id: &'static str, value_name: &'static str) -> Arg {
     }
 }
 
-/// A value as a flag takes it.
+/// A value in the syntax of a flag.
 fn word(value: &serde_json::Value) -> String {
     value.as_str().map_or_else(|| value.to_string(), str::to_owned)
 }
@@ -145,7 +145,8 @@ fn is_of_plan(key: &str) -> bool {
     OF_THE_PLAN.iter().any(|part| key.starts_with(part))
 }
 
-/// A flag of each level's own: of a global one, what stands before the verb is lost where it stands after it too.
+/// Adds `--config` at each level separately: clap drops a global flag's values before the verb if it also occurs after
+/// the verb.
 fn with_config(mut command: Command) -> Command {
     let names: Vec<String> = command.get_subcommands().map(|verb| verb.get_name().to_owned()).collect();
     for name in names {
@@ -159,7 +160,7 @@ fn with_config(mut command: Command) -> Command {
 }
 
 impl Configured {
-    /// Puts the layers together, beside the rest of the command line.
+    /// Combines the layers, and parses the rest of the command line.
     ///
     /// # Errors
     /// As [`Layers::read`] and [`Layers::flag`].
@@ -184,14 +185,14 @@ impl Configured {
             }
         }
         let mut settings = layers.settings()?;
-        // A flag that leaves one backend only wins over what a file says of it, as every flag does.
+        // Like every flag, a flag that allows only one backend overrides a file's backend.
         let is_reference = last.try_contains_id("reference").is_ok_and(|known| known) && last.get_flag("reference");
         let layer = |key: &str| layers.get(key).map_or(0, |setting| setting.origin.layer());
         let flags = Origin::Flag(String::new()).layer();
         if is_reference && layer("run.backend") < flags {
             settings.run.backend = BackendChoice::default();
         }
-        // So does a backend without devices over a device of an earlier source.
+        // A backend without devices also overrides a device of an earlier source.
         let is_cpu = settings.run.backend == BackendChoice::Cpu && layer("run.backend") > layer("run.device");
         if is_cpu || (is_reference && layer("run.device") < flags) {
             settings.run.device = None;
@@ -210,7 +211,7 @@ impl Configured {
         self.profile_of(&self.settings.run.profile).map_err(|error| self.at_origin("run.profile", "profile", error))
     }
 
-    /// The same of a profile by another name.
+    /// The same for a profile of another name.
     ///
     /// # Errors
     /// As [`Configured::profile`].
@@ -220,7 +221,7 @@ impl Configured {
         profile.with_dt(dt_s).map_err(|error| self.at_origin("run.dt_s", "dt", error))
     }
 
-    /// An error about an option, at the file or variable that sets its key.
+    /// Adds the file or variable that sets the key to an error about an option.
     pub fn at_origin(&self, key: &str, option: &'static str, error: Error) -> Error {
         let origin = self.layers.get(key).map(|setting| setting.origin);
         match (error, origin) {
@@ -232,17 +233,17 @@ impl Configured {
         }
     }
 
-    /// Whether somebody set a key.
+    /// Whether a key was set.
     pub fn is_set(&self, key: &str) -> bool {
         self.layers.given().any(|setting| setting.key.name == key)
     }
 
-    /// The configuration files, which no result may overwrite.
+    /// The configuration files; no result may overwrite them.
     pub fn files(&self) -> &[PathBuf] {
         self.layers.files()
     }
 
-    /// What somebody set, for the record of a run.
+    /// The settings that were set, for the record of a run.
     pub fn record(&self) -> Vec<SettingRecord> {
         let record = |setting: Setting| SettingRecord {
             key: setting.key.name.clone(),
@@ -252,8 +253,8 @@ impl Configured {
         self.layers.given().map(record).collect()
     }
 
-    /// With a plan file, what was typed about its lanes would not be heeded. (The environment may hold what the plan was
-    /// made with.)
+    /// Refuses flags about lanes together with a plan file, which would ignore them. Variables are allowed, because the
+    /// plan may have been made with them.
     ///
     /// # Errors
     /// [`Error::Usage`].
@@ -277,12 +278,12 @@ impl Configured {
     }
 }
 
-/// Verbs that neither take settings nor need the environment to be in order.
+/// Whether a verb reads the configuration and the environment.
 fn reads_configuration(path: &[&str]) -> bool {
     !matches!(path, ["cluster", "slurm"] | ["config", "init" | "schema" | "check" | "completions" | "man"])
 }
 
-/// The verb, and the verb below it, with what `--config` was given before and after them, and the last one's matches.
+/// The verb and its subverb, the values of `--config` before and after them, and the matches of the last one.
 fn verb_of(matches: &ArgMatches) -> (Vec<&str>, Vec<Assignment>, &ArgMatches) {
     let (mut path, mut typed, mut last) = (Vec::new(), Vec::new(), matches);
     loop {
@@ -294,17 +295,17 @@ fn verb_of(matches: &ArgMatches) -> (Vec<&str>, Vec<Assignment>, &ArgMatches) {
 }
 
 impl Configured {
-    /// The backend and the device that are asked for.
+    /// The requested backend and device.
     ///
     /// # Errors
-    /// [`Error::Usage`] for what names no device.
+    /// [`Error::Usage`] for a text that is not a device name.
     pub fn backend(&self) -> Result<(BackendChoice, Option<DeviceName>)> {
         let run = &self.settings.run;
         let device = run.device.as_deref().map(str::parse).transpose();
         Ok((run.backend, device.map_err(|error| self.at_origin("run.device", "device", error))?))
     }
 
-    /// Opens what flags, files and the environment say.
+    /// Opens the backend that flags, files and the environment select.
     ///
     /// # Errors
     /// As [`Configured::backend`] and [`OpenBackend::open`].
@@ -313,7 +314,7 @@ impl Configured {
         Ok(OpenBackend::open(backend, device.as_ref())?.with_cancel(CANCEL.clone()))
     }
 
-    /// Opens what is to be verified.
+    /// Opens the backend to be verified.
     ///
     /// # Errors
     /// As [`Configured::backend`] and [`OpenBackend::open_to_verify`].
@@ -322,10 +323,10 @@ impl Configured {
         OpenBackend::open_to_verify(backend, device.as_ref())
     }
 
-    /// The processor in binary64, for `--reference`, which leaves no choice.
+    /// The CPU in binary64, for `--reference`, which allows no other backend.
     ///
     /// # Errors
-    /// [`Error::Usage`] where another backend or a device is asked for.
+    /// [`Error::Usage`] if another backend or a device is requested.
     pub fn open_reference(&self) -> Result<OpenBackend> {
         let run = &self.settings.run;
         if run.backend == BackendChoice::Gpu || run.device.is_some() {

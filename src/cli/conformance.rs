@@ -1,4 +1,4 @@
-//! `lanesweep verify conformance`: other simulators' tables against our lanes.
+//! `lanesweep verify conformance`: compares other simulators' tables with our lanes.
 
 use std::fmt::Write;
 use std::path::PathBuf;
@@ -94,7 +94,7 @@ impl Conformance {
     }
 }
 
-/// What [`render`] tells, as JSON.
+/// The content of [`render`] as JSON.
 fn document(tallies: &[Tally], compared: Option<&LaneComparison>) -> Result<String> {
     let groups = tallies.iter().map(|t| {
         let deviations = t.deviations.iter().map(|d| {
@@ -130,7 +130,7 @@ fn document(tallies: &[Tally], compared: Option<&LaneComparison>) -> Result<Stri
 }
 
 fn render(tallies: &[Tally]) -> String {
-    // Without a number's type: every column of this table stands to the left.
+    // Without number types, so that every column is aligned left.
     let table = SummaryTable::of(tallies)
         .column("what", |t| t.label.as_str())
         .column("model", |t| t.model.map_or("-", ModelId::name))

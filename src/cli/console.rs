@@ -1,5 +1,5 @@
-//! Data on stdout, everything else on stderr; a reader that goes away is no error. All of it passes here, so that no
-//! foreign text (an id, a file's name) reaches a terminal with characters that act on it.
+//! Data on stdout, everything else on stderr; a closed pipe is not an error. All output goes through this file, so that
+//! no foreign text (an id, a file name) sends control characters to a terminal.
 
 use std::borrow::Cow;
 use std::io::{self, IsTerminal, Write};
@@ -15,21 +15,21 @@ use crate::report::tables::WIDTH;
 use crate::support::plain_text::{cut, cut_names, shown, shown_in_line, shown_json};
 use crate::{Error, Result};
 
-/// What errors call it.
+/// Name of standard output in errors.
 const STDOUT: &str = "standard output";
 
-/// How much is said on stderr.
+/// Verbosity on stderr.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verbosity {
     /// Errors only.
     Quiet,
-    /// What is being done.
+    /// Progress and warnings.
     Normal,
     /// Everything.
     Verbose,
 }
 
-/// Sets up the log. Colours only on a terminal and without `NO_COLOR`.
+/// Starts the log. Colours only on a terminal and without `NO_COLOR`.
 pub fn start_log(verbosity: Verbosity) {
     let level = match verbosity {
         Verbosity::Quiet => Level::ERROR,
@@ -39,9 +39,9 @@ pub fn start_log(verbosity: Verbosity) {
     // A second start (a test in the same process) keeps the first log.
     let _ = tracing_subscriber::fmt()
         .with_writer(io::stderr)
-        // Where stderr is gone or full there is nobody to tell, and telling it there would panic.
+        // If stderr is closed or full, no message can be shown, and writing one would panic.
         .log_internal_errors(false)
-        // One message is one line, whatever a file is called.
+        // A message is one line, whatever characters a file name has.
         .fmt_fields(debug_fn(|out, field, value| match field.name() {
             "message" => write!(out, "{}", shown_in_line(&with_flags(&cut_names(&format!("{value:?}"))))),
             name => write!(out, "{name}={}", shown_in_line(&format!("{value:?}"))),
@@ -53,7 +53,7 @@ pub fn start_log(verbosity: Verbosity) {
         .try_init();
 }
 
-/// Columns for tables on stdout: `COLUMNS` where it is set, the terminal's, or 120 where there is none.
+/// Width of tables on stdout, in columns: `COLUMNS` if set, else the terminal's, else 120.
 pub fn width() -> usize {
     let set = std::env::var("COLUMNS").ok().and_then(|columns| columns.parse().ok());
     let terminal = || Some(usize::from(terminal_size::terminal_size_of(io::stdout())?.0.0));
@@ -65,7 +65,7 @@ pub fn print(text: &str) -> Result<()> {
     write_out(&shown(text))
 }
 
-/// Writes JSON, or lines of it, to stdout.
+/// Writes JSON or JSON Lines to stdout.
 pub fn print_json(json: &str) -> Result<()> {
     write_out(&shown_json(json))
 }
@@ -78,19 +78,19 @@ fn write_out(text: &str) -> Result<()> {
     }
 }
 
-/// Writes a text to stderr, as it is: what a result says beside the data.
+/// Writes a text to stderr verbatim: messages of a result besides its data.
 pub fn say(text: &str) {
-    // Where stderr is gone there is nobody to tell.
+    // Ignore a closed stderr: no message can be shown.
     let _ = write!(io::stderr().lock(), "{}", shown(text));
 }
 
-/// What was typed, for whoever wants to repeat it.
+/// The command line as typed, for repeating the run.
 pub fn command_line() -> String {
     let words = std::env::args_os().skip(1).map(|word| quoted_word(&word.to_string_lossy()));
     format!("lanesweep {}", words.collect::<Vec<_>>().join(" "))
 }
 
-/// What moves a bar with the units of a run.
+/// Returns a callback that advances a bar.
 pub fn inc(bar: &ProgressBar) -> impl Fn(u64) + Send + Sync + 'static {
     let bar = bar.clone();
     move |units| bar.inc(units)
@@ -109,16 +109,16 @@ pub fn progress(verbosity: Verbosity, length: u64, what: &str) -> ProgressBar {
     bar
 }
 
-/// Fields of the library's options whose flag has another name. Every other one has its field's, with dashes.
+/// Option fields whose flag has another name. All others use the field's name with dashes.
 const OTHER_FLAGS: [(&str, &str); 2] = [("headways", "thw"), ("model", "models")];
 
-/// The flag of a field, without its dashes.
+/// The flag of a field, without its leading dashes.
 fn flag_of(field: &str) -> String {
     let other = OTHER_FLAGS.iter().find(|(name, _)| *name == field);
     other.map_or_else(|| field.replace('_', "-"), |(_, flag)| (*flag).to_owned())
 }
 
-/// A text of the library, which marks fields, with their flags: `--dt` for option `dt`, `--backend cpu` for option
+/// Replaces marked fields in a text of the library by their flags: `--dt` for option `dt`, `--backend cpu` for option
 /// `backend = cpu`.
 pub fn with_flags(text: &str) -> String {
     let (mut out, mut rest) = (String::with_capacity(text.len()), text);
@@ -140,24 +140,24 @@ pub fn with_flags(text: &str) -> String {
     out + rest
 }
 
-/// Tells what was left out, with what to do about it.
+/// Warns about skipped input, with help.
 pub fn warn<'a>(errors: impl IntoIterator<Item = &'a Error>) {
     errors.into_iter().for_each(|error| tracing::warn!("{error}; {}", error.help().unwrap_or_default()));
 }
 
-/// Draws an error with its help on stderr.
+/// Prints an error with its help on stderr.
 pub fn complain(error: &Error) {
     let help = error.help().map(|help| shown(&with_flags(&help)).into_owned());
     let report = miette::Report::new(Diagnostic { text: shown(&with_flags(&error.to_string())).into_owned(), help });
     let mut stderr = io::stderr().lock();
-    // Where stderr is gone there is nobody to tell.
+    // Ignore a closed stderr: no message can be shown.
     let _ = writeln!(stderr, "{report:?}");
 }
 
-/// Tells what is wrong with the command line, or prints the help that was asked for.
+/// Reports an error of the command line, or prints the requested help.
 ///
 /// # Errors
-/// [`Error::Io`] where standard output does not take the help.
+/// [`Error::Io`] if the help cannot be written to standard output.
 pub fn refuse(error: &clap::Error) -> Result<Exit> {
     if !error.use_stderr() {
         return match error.print().and_then(|()| io::stdout().flush()) {
@@ -174,12 +174,12 @@ pub fn refuse(error: &clap::Error) -> Result<Exit> {
             safe = safe.replace(&*shown(value), &short);
         }
     }
-    // Where stderr is gone there is nobody to tell.
+    // Ignore a closed stderr: no message can be shown.
     let _ = if safe == text { error.print() } else { write!(io::stderr().lock(), "{safe}") };
     Ok(Exit::Usage)
 }
 
-/// A library error as miette draws it.
+/// Adapts a library error for miette.
 #[derive(Debug, thiserror::Error)]
 #[error("{text}")]
 struct Diagnostic {
@@ -209,7 +209,7 @@ mod tests {
         }
     }
 
-    /// Fields that a source text marks.
+    /// The fields that a source text marks.
     fn fields(text: &str) -> impl Iterator<Item = &str> {
         let marks = ["option `", "Place::option(\""].into_iter().flat_map(|mark| text.split(mark).skip(1));
         marks.filter_map(move |rest| rest.get(..rest.find(|c: char| !c.is_ascii_lowercase() && c != '_')?))

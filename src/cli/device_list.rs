@@ -1,4 +1,4 @@
-//! The list of `lanesweep verify devices`: every card, and which one is taken.
+//! The list of `lanesweep verify devices`: every card, and the selected one.
 
 use std::fmt::Write;
 
@@ -15,17 +15,17 @@ use crate::{Error, Result};
 /// Prints the list.
 ///
 /// # Errors
-/// Where the environment cannot be understood.
+/// If the environment cannot be parsed.
 pub fn print(format: &FormatFlag, no_self_check: bool) -> Result<Exit> {
     let adapters = Adapters::enumerate();
     let seen = Seen::new(adapters.cards(), visible_here());
     let self_check = |index: usize| if no_self_check { "-".to_owned() } else { check(&adapters, index) };
     format.print(|| seen.text(&self_check), || seen.json(&self_check))?;
-    // The list helps to correct the environment, so it comes first.
+    // The list helps to correct the environment, so it is printed first.
     seen.visible.map(|_| Exit::Ok)
 }
 
-/// Some thousand lanes on the device and on the CPU, in a word.
+/// Checks some thousand lanes on the device against the CPU; returns the result in a word.
 fn check(adapters: &Adapters, index: usize) -> String {
     let opened = GpuBackend::open(adapters, index, GpuOptions::default());
     match opened.and_then(|gpu| self_check(&gpu)) {
@@ -35,19 +35,19 @@ fn check(adapters: &Adapters, index: usize) -> String {
     }
 }
 
-/// The devices in the light of the environment.
+/// The devices, with the environment's restrictions.
 struct Seen<'a> {
     cards: &'a [AdapterCard],
-    /// PCI bus ids that the environment allows; `None` where it says nothing.
+    /// PCI bus ids that the environment allows; `None` if it sets no restriction.
     visible: Result<Option<Vec<String>>>,
-    /// What `--backend auto` takes; `None` is the processor.
+    /// The device that `--backend auto` selects; `None` is the CPU.
     auto: Option<usize>,
 }
 
 impl<'a> Seen<'a> {
     fn new(cards: &'a [AdapterCard], visible: Result<Option<Vec<String>>>) -> Self {
         let auto = match &visible {
-            // Without a device named there is nothing that `auto` could refuse.
+            // `auto` can only fail if a device is named.
             Ok(visible) => choose(cards, BackendChoice::Auto, None, visible.as_deref()).unwrap_or(None),
             Err(_) => None,
         };
@@ -104,7 +104,7 @@ impl<'a> Seen<'a> {
                 self_check(card.index),
             ]);
         }
-        // Names and drivers break; a bus id that is to be copied does not.
+        // Names and drivers may wrap; a bus id must stay whole for copying.
         for at in [0, 2, 3, 5, 6, 7, 8] {
             if let Some(column) = table.column_mut(at) {
                 column.set_constraint(ColumnConstraint::ContentWidth);
@@ -116,7 +116,7 @@ impl<'a> Seen<'a> {
         format!("{table}\n")
     }
 
-    /// Which device `--backend auto` takes, and why; what the environment hides.
+    /// Which device `--backend auto` selects, and why; which devices the environment hides.
     fn verdict(&self) -> String {
         let visible = match &self.visible {
             Ok(visible) => visible.as_deref(),
@@ -204,8 +204,8 @@ fn limits(card: &AdapterCard) -> String {
     )
 }
 
-/// A size in the largest binary unit that leaves at least 1; drivers name sizes just below a power of two, so whole
-/// numbers are rounded.
+/// A size in the largest binary unit in which it is at least 1, rounded to integers: drivers report sizes just below a
+/// power of two.
 fn bytes(size: u64) -> String {
     const UNITS: [&str; 7] = ["B", "KiB", "MiB", "GiB", "TiB", "PiB", "EiB"];
     let mut unit = 0;

@@ -1,4 +1,4 @@
-//! `lanesweep verify devices`: what this machine can compute on.
+//! `lanesweep verify devices`: the compute devices of this machine.
 
 use clap::Args;
 

@@ -1,4 +1,4 @@
-//! `--dry-run`: how many lanes, how much memory, how long; nothing is written.
+//! `--dry-run`: number of lanes, memory and time; nothing is written.
 
 use super::Exit;
 use super::console::with_flags;
@@ -8,19 +8,19 @@ use crate::report::records::document;
 use crate::run::forecast::{ForecastPart, RunForecast};
 use crate::support::readable::{count, value};
 
-/// What a run would be.
+/// Forecast of a run.
 pub(super) struct DryRun {
     pub run: RunForecast,
     pub backend: String,
-    /// Seconds of reading, mining and planning, which this dry run took and the run takes again.
+    /// Duration of reading, mining and planning, s; the run repeats them.
     pub before_s: Option<f64>,
 }
 
 impl DryRun {
-    /// Prints it.
+    /// Prints the forecast.
     ///
     /// # Errors
-    /// [`crate::Error::Io`] where standard output cannot be written.
+    /// [`crate::Error::Io`] if standard output cannot be written to.
     pub fn print(&self, format: FormatFlag) -> Result<Exit> {
         format.print(|| self.text(peak_bytes()), || self.json(peak_bytes()))?;
         Ok(Exit::Ok)
@@ -107,7 +107,7 @@ fn time(seconds: f64) -> String {
     }
 }
 
-/// Most memory that this process had resident so far, bytes, where the system tells (Linux).
+/// Peak resident memory of this process, bytes, if the system reports it (Linux).
 fn peak_bytes() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find_map(|line| line.strip_prefix("VmHWM:"))?;

@@ -1,4 +1,4 @@
-//! How the program ends: one documented exit code per kind of ending.
+//! Exit codes: one documented code per kind of ending.
 
 use std::process::ExitCode;
 
@@ -8,36 +8,36 @@ use crate::Error;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Exit {
-    /// Everything was done; of `check`: the case is preventable, and the answer is robust.
+    /// Complete. `check`: the case is preventable, and the answer is robust.
     Ok = 0,
-    /// The case that was checked is not preventable; the sheet was written.
+    /// The checked case is not preventable; the sheet was written.
     NotPreventable = 1,
-    /// A flag, a key or a profile cannot be used; nothing was done.
+    /// A flag, a key or a profile is invalid; nothing was done.
     Usage = 2,
-    /// The data cannot be used; nothing was written.
+    /// The data are invalid; nothing was written.
     BadInput = 3,
-    /// A result was written, but parts of the input were left out; each is named on stderr.
+    /// A result was written, but parts of the input were skipped; stderr names each.
     Incomplete = 4,
-    /// A check that was asked for did not pass (conformance).
+    /// A requested check failed (conformance).
     VerificationFailed = 5,
-    /// The system refused to read or write, to start a thread or to give memory.
+    /// The system refused to read or write, to start a thread or to allocate memory.
     Io = 6,
     /// No usable compute device, or the device failed.
     NoDevice = 7,
-    /// The answer on the checked case changes with a small change of the case or of the time step; the sheet was written.
+    /// A small change of the checked case or of the time step changes the answer; the sheet was written.
     Undecided = 8,
-    /// Nothing collides in the checked case even where the ego never reacts; the sheet was written.
+    /// Nothing collides in the checked case even if the ego never reacts; the sheet was written.
     NoConflict = 9,
     /// Annex 3 does not describe the checked case, so its drivers give no answer; the sheet was written.
     OutsideAnnex = 10,
     /// A defect of the program.
     Internal = 70,
-    /// A signal or `--stop-after` ended the run early; what is done is kept, and the same command continues.
+    /// A signal or `--stop-after` ended the run early; progress is kept, and the same command resumes.
     Interrupted = crate::cli::signals::EXIT_STATUS,
 }
 
 impl Exit {
-    /// All, for documentation.
+    /// All codes, for documentation.
     pub const ALL: [Exit; 13] = [
         Exit::Ok,
         Exit::NotPreventable,
@@ -54,12 +54,12 @@ impl Exit {
         Exit::Interrupted,
     ];
 
-    /// The number.
+    /// The numeric code.
     pub fn code(self) -> u8 {
         self as u8
     }
 
-    /// What it means, in a few words.
+    /// Its meaning in a few words.
     pub fn meaning(self) -> &'static str {
         match self {
             Exit::Ok => "done; the checked case is preventable (check)",
@@ -78,7 +78,7 @@ impl Exit {
         }
     }
 
-    /// Statuses of a process that a signal ended, 128 + the signal's number, with what they mean.
+    /// Exit statuses after a signal, 128 + the signal's number, with their meanings.
     pub const BY_SIGNAL: [(u8, &str); 3] = [
         (129, "ended at once by SIGHUP; a run with a journal ends with 75 instead, and can resume"),
         (130, "the same by SIGINT (Ctrl-C)"),

@@ -145,7 +145,7 @@ impl Xosc {
         Ok(if incomplete { Exit::Incomplete } else { Exit::Ok })
     }
 
-    /// The scenarios, and whether others of the file were left out.
+    /// The scenarios, and whether others of the file were skipped.
     fn scenarios(&self, configured: &Configured, options: &PlayOptions) -> Result<(Vec<Concrete>, bool)> {
         let wrong = |flag: &str, problem: &str, help: &str| Err(Error::usage(Place::item(flag), problem, help));
         let is_lane = self.from.is_some() || self.scenarios.is_some();
@@ -207,7 +207,7 @@ impl Xosc {
         Ok((scenarios, incomplete))
     }
 
-    /// Refuses flags that only a study has.
+    /// Refuses flags that only apply to a study.
     fn refuse_for(&self, reopened: &Reopened) -> Result<()> {
         let wrong = |flag: &str, problem: &str, help: &str| Err(Error::usage(Place::item(flag), problem, help));
         let (has_scenarios, has_variants) = (self.scenarios.is_some(), !self.variant.is_empty());

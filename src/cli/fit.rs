@@ -1,4 +1,4 @@
-//! `lanesweep fit`: scenarios in, densities of their parameters out.
+//! `lanesweep fit`: fits densities to the parameters of scenarios.
 
 use std::path::PathBuf;
 
@@ -85,7 +85,7 @@ impl Fit {
             );
         }
 
-        // One file needs no folder of its own.
+        // A single file needs no folder.
         let folder = (!self.is_single()).then(|| OutputDir::open_without_record(&self.out)).transpose()?;
         let bar = console::progress(verbosity, ids.len() as u64, "fitting");
         let mut fitted: Vec<(PathBuf, DensityModel)> = Vec::new();
@@ -119,12 +119,12 @@ impl Fit {
         Ok(if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete })
     }
 
-    /// What is fitted, in the registry's order.
+    /// The parameterizations to fit, in the registry's order.
     fn ids(&self) -> Result<Vec<Parameterization>> {
         self.parameterizations.list(&self.categories.list()?)
     }
 
-    /// One file per density, none of them an input.
+    /// One file per density; none of them may be an input.
     fn files(&self, ids: &[Parameterization], configured: &Configured) -> Result<Vec<PathBuf>> {
         let single = self.is_single();
         if single && ids.len() != 1 {
@@ -153,7 +153,7 @@ impl Fit {
     }
 }
 
-/// All densities at once. Each is a result by itself, with its checksum: those of other runs stay beside them.
+/// Publishes all densities together. Each is an independent result with its checksum, so those of other runs are kept.
 fn write(fitted: &[(PathBuf, DensityModel)], folder: Option<&OutputDir>) -> Result<()> {
     let Some(folder) = folder else {
         return fitted.iter().try_for_each(|(path, model)| {

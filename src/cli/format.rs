@@ -1,4 +1,4 @@
-//! `--format` and `--tables`: what a verb prints, for people or for programs.
+//! `--format` and `--tables`: output for people or for programs.
 
 use clap::{Args, ValueEnum};
 
@@ -33,7 +33,7 @@ impl FormatFlag {
         self.format == Format::Json
     }
 
-    /// Prints one or the other; what is not asked for is not made.
+    /// Prints one of the two; only that one is built.
     pub fn print(self, text: impl FnOnce() -> String, json: impl FnOnce() -> Result<String>) -> Result<()> {
         match self.format {
             Format::Text => console::print(&text()),
@@ -41,7 +41,7 @@ impl FormatFlag {
         }
     }
 
-    /// The same of results that are in a folder.
+    /// Like [`FormatFlag::print`], for results in a folder.
     pub fn print_results(
         self,
         text: impl FnOnce() -> String,
@@ -53,7 +53,7 @@ impl FormatFlag {
         Ok(())
     }
 
-    /// Says what `--plan-only` left.
+    /// Reports the plan that `--plan-only` wrote.
     pub fn print_plan(self, lanes: u64, path: &std::path::Path) -> Result<()> {
         let text = || format!("{} lanes planned in {}\n", count(lanes), path.display());
         self.print(text, || {

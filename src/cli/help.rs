@@ -1,9 +1,9 @@
-//! How help is laid out: verbs by what people want, flags by what they are about. `-h` fits on one screen; flags that
-//! are seldom used are told by `--help` alone.
+//! The layout of help: verbs grouped by purpose, flags grouped by subject. `-h` fits on one screen; only `--help` shows
+//! rarely used flags.
 
 use clap::{Arg, ArgAction, Command};
 
-/// Verbs by what people want.
+/// Verbs by purpose.
 const VERBS: [(&str, &[&str]); 5] = [
     ("Study a data set", &["study", "mine", "compare", "justify"]),
     ("Probabilities", &["fit", "sample"]),
@@ -17,10 +17,10 @@ pub(super) const MODELS: &str = "Models and criteria";
 pub(super) const OUTPUT: &str = "Output";
 pub(super) const RUN: &str = "Run";
 
-/// Headings of flags, in order. The same flag stands below the same heading in every verb, those of `--help` alone last.
+/// Headings of flags, in order. A flag has the same heading in every verb; flags shown only by `--help` are last.
 const HEADINGS: [&str; 5] = [DATA, "Scenario", MODELS, OUTPUT, RUN];
 
-/// The command with its help laid out.
+/// Applies the layout to the command.
 pub(super) fn laid_out(command: Command) -> Command {
     let flags = root_flags();
     let command = with_groups(command);
@@ -35,7 +35,7 @@ pub(super) fn laid_out(command: Command) -> Command {
     command.help_template(format!("{text}\nFlags of every verb:\n{flags}{{after-help}}"))
 }
 
-/// The flags that every verb has, in a line each.
+/// The flags of every verb, one line each.
 fn root_flags() -> String {
     [
         ("-h, --help", "Print help; VERB -h lists the flags of a verb, VERB --help all of them"),
@@ -49,7 +49,7 @@ fn root_flags() -> String {
     .concat()
 }
 
-/// Brings the flags of a verb, and of those below it, into the order of their headings.
+/// Sorts the flags of a verb and its subverbs by their headings.
 fn with_groups(mut command: Command) -> Command {
     let names: Vec<String> = command.get_subcommands().map(|verb| verb.get_name().to_owned()).collect();
     for name in names {
@@ -64,7 +64,7 @@ fn with_groups(mut command: Command) -> Command {
         };
         let ids: Vec<clap::Id> = ids(false).chain(ids(true)).collect();
         for (at, id) in ids.into_iter().enumerate() {
-            // Those of `--help` alone stand below the flags that a verb has from the program too.
+            // Flags shown only by `--help` also follow the global flags.
             let order = |arg: &Arg| if arg.is_hide_short_help_set() { 100 + at } else { at };
             command = command.mut_arg(id, |arg| {
                 let order = order(&arg);

@@ -126,7 +126,7 @@ impl Justify {
     }
 }
 
-/// A parameterization by its key; the keys of the categories differ.
+/// Finds a parameterization by its key; keys are unique over the categories.
 fn parameterization(key: &str) -> Result<Parameterization> {
     let found = Category::ALL.into_iter().find_map(|category| Parameterization::find(category, key.trim()));
     found.ok_or_else(|| {
@@ -136,7 +136,7 @@ fn parameterization(key: &str) -> Result<Parameterization> {
     })
 }
 
-/// A day, as ISO 8601 writes it.
+/// A date in ISO 8601.
 fn date(text: &str) -> std::result::Result<String, String> {
     let parts: Vec<Option<u32>> = text.split('-').map(|part| part.parse().ok()).collect();
     let is_day = matches!(parts[..], [Some(_), Some(1..=12), Some(1..=31)]) && text.len() == 10;

@@ -1,5 +1,5 @@
-//! Flags that several verbs take, each with one definition: lists of categories, models, headways and
-//! parameterizations, the criterion, the exposure. A plural takes a list and is everything where it is left out.
+//! Flags used by several verbs, each with one definition: lists of categories, models, headways and parameterizations,
+//! the criterion, the exposure. A plural flag takes a list; without it all values are used.
 
 use clap::Args;
 
@@ -13,14 +13,14 @@ use crate::support::ranges::refuse_repeats;
 use crate::traffic::Driven;
 use crate::{Error, Place, Result};
 
-/// A whole number as the configuration writes it too: `10000`, `10_000` or `1e4`.
+/// Parses an integer as in the configuration: `10000`, `10_000` or `1e4`.
 ///
 /// # Errors
-/// What to write, for a text that is none or does not fit.
+/// What to write, if the text is not an integer or is out of range.
 pub fn whole<T: TryFrom<u64>>(text: &str) -> std::result::Result<T, String> {
     let plain = text.replace('_', "");
     let of_power = || {
-        // Beyond 2^53 a floating-point number does not tell which whole one is meant.
+        // Above 2^53 a floating-point number no longer identifies one integer.
         let value = plain.parse::<f64>().ok().filter(|value| value.fract() == 0.0 && (0.0..9e15).contains(value));
         value.map(|value| value as u64)
     };
@@ -40,7 +40,7 @@ impl CategoriesFlag {
     /// In the order of every table.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a category that there is not.
+    /// [`Error::Usage`] for an unknown category.
     pub fn list(&self) -> Result<Vec<Category>> {
         source::categories(&self.categories, "--categories")
     }
@@ -57,7 +57,7 @@ pub struct ParameterizationsFlag {
 }
 
 impl ParameterizationsFlag {
-    /// Those of the categories, in the registry's order.
+    /// The parameterizations of the categories, in the registry's order.
     ///
     /// # Errors
     /// As [`parameterizations`].
@@ -74,17 +74,17 @@ pub struct ModelsFlag {
 }
 
 impl ModelsFlag {
-    /// In the order of every table; all where none is named.
+    /// The models in the order of every table; all if none is named.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a model that there is not.
+    /// [`Error::Usage`] for an unknown model.
     pub fn list(&self) -> Result<Vec<ModelId>> {
         let mut list = models(self.models.iter().map(String::as_str), "--models")?;
         list.sort();
         Ok(list)
     }
 
-    /// Those that are named; `None` where none is.
+    /// The named models; `None` if none is named.
     ///
     /// # Errors
     /// As [`ModelsFlag::list`].
@@ -106,7 +106,7 @@ pub struct HeadwaysFlag {
 }
 
 impl HeadwaysFlag {
-    /// In the order given.
+    /// The headways in the given order.
     ///
     /// # Errors
     /// As [`headways`].
@@ -119,7 +119,7 @@ impl HeadwaysFlag {
     }
 }
 
-/// What `--models` takes.
+/// Help of `--models`.
 pub fn models_help() -> String {
     format!("Driver models: {} [default: all]", ModelId::names())
 }
@@ -138,7 +138,7 @@ impl CriterionFlag {
     /// The criterion.
     ///
     /// # Errors
-    /// [`Error::Usage`] for one that there is not.
+    /// [`Error::Usage`] for an unknown criterion.
     pub fn get(&self) -> Result<Criterion> {
         criterion(&self.criterion)
     }
@@ -147,7 +147,7 @@ impl CriterionFlag {
 /// The criterion of `--criterion`.
 ///
 /// # Errors
-/// [`Error::Usage`] for one that there is not.
+/// [`Error::Usage`] for an unknown criterion.
 pub fn criterion(name: &str) -> Result<Criterion> {
     Criterion::ALL.into_iter().find(|c| c.key().eq_ignore_ascii_case(name.trim())).ok_or_else(|| {
         let problem = format!("there is no criterion `{name}`");
@@ -167,7 +167,7 @@ pub struct ExposureFlags {
 }
 
 impl ExposureFlags {
-    /// What was typed, checked.
+    /// The given exposure, checked.
     ///
     /// # Errors
     /// As [`Driven::validate`].
@@ -178,10 +178,10 @@ impl ExposureFlags {
     }
 }
 
-/// Models by their names, in the order given; `all`, or no name, stands for every one. `flag` names the place of an error.
+/// Parses model names, in the given order; `all` or an empty list means every model. `flag` is the place in errors.
 ///
 /// # Errors
-/// [`Error::Usage`] for a model that there is not, or that is named twice.
+/// [`Error::Usage`] for an unknown or repeated model.
 pub fn models<'a>(list: impl IntoIterator<Item = &'a str>, flag: &str) -> Result<Vec<ModelId>> {
     let mut named: Vec<(ModelId, &str)> = Vec::new();
     for text in list.into_iter().map(str::trim) {
@@ -202,10 +202,10 @@ pub fn models<'a>(list: impl IntoIterator<Item = &'a str>, flag: &str) -> Result
     Ok(if named.is_empty() { ModelId::ALL.to_vec() } else { named.into_iter().map(|(model, _)| model).collect() })
 }
 
-/// The headways of `--thw`, s. `words` are what else the flag takes, for the message.
+/// Parses the headways of `--thw`, s. `words` are the flag's other values, for the message.
 ///
 /// # Errors
-/// [`Error::Usage`] for one that is not above 0, or that is given twice.
+/// [`Error::Usage`] for a value that is not above 0, or a repeated value.
 pub fn headways(list: &str, words: &str) -> Result<Vec<Headway>> {
     let parse = |text: &str| {
         if Headway::parse(text.trim()) == Some(Headway::MinFollowing) {
@@ -228,11 +228,11 @@ pub fn headways(list: &str, words: &str) -> Result<Vec<Headway>> {
     Ok(found)
 }
 
-/// The parameterizations of `--parameterizations` among those of some categories, in the registry's order; all where
-/// none is given.
+/// Finds the parameterizations of `--parameterizations` among those of the categories, in the registry's order; all if
+/// the list is empty.
 ///
 /// # Errors
-/// [`Error::Usage`] for one that the categories do not have, or that is named twice.
+/// [`Error::Usage`] for an unknown or repeated parameterization.
 fn parameterizations(categories: &[Category], list: &[String]) -> Result<Vec<Parameterization>> {
     let of_categories = || Parameterization::ALL.into_iter().filter(|p| categories.contains(&p.category));
     let wanted: Vec<&str> = list.iter().map(|key| key.trim()).collect();

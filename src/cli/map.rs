@@ -1,4 +1,4 @@
-//! `lanesweep map`: the outcome over two parameters of a category, per panel of others and model.
+//! `lanesweep map`: maps the outcome over two parameters of a category, per model and panel of other parameters.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -23,7 +23,7 @@ use crate::support::readable::{count, value};
 use crate::support::run_dir::{MAP_RECORD, OutputDir};
 use crate::{Error, Place, Result};
 
-/// Seed of the choice of lanes of a device that the CPU computes again.
+/// Seed of the random selection of device lanes that the CPU recomputes.
 const RECHECK_SEED: u64 = 1;
 
 /// Map outcomes over two parameters, and where two models or profiles differ
@@ -169,7 +169,7 @@ impl Map {
         Ok(Exit::Ok)
     }
 
-    /// That of a preset unless one is set.
+    /// The preset's profile, unless another is set.
     fn profile(&self, configured: &Configured) -> Result<Profile> {
         match self.preset.as_deref().and_then(Presets::find) {
             Some(preset) if !configured.is_set("run.profile") => configured.profile_of(preset.profile()),
@@ -177,7 +177,7 @@ impl Map {
         }
     }
 
-    /// The grids that the flags name.
+    /// Builds the grids from the flags.
     fn grids(&self, category: Category) -> Result<MapGrids> {
         match self.preset.as_deref() {
             Some(name) => match Presets::find(name) {
@@ -210,7 +210,7 @@ impl Map {
     }
 }
 
-/// A model's name, or else a profile.
+/// Parses the name of a model or a profile.
 fn against(text: &str, configured: &Configured) -> Result<Against> {
     if let Some(model) = ModelId::parse(text) {
         return Ok(Against::Model(model));

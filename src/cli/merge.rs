@@ -1,4 +1,4 @@
-//! `lanesweep cluster merge`: the parts of a run become its result, bit for bit that of the run in one piece.
+//! `lanesweep cluster merge`: merges the parts of a run into the result of the whole run, bit for bit.
 
 use std::path::PathBuf;
 

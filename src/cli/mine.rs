@@ -1,4 +1,4 @@
-//! `lanesweep mine`: recordings in, scenarios out.
+//! `lanesweep mine`: mines scenarios from recordings.
 
 use std::path::{Path, PathBuf};
 
@@ -37,7 +37,7 @@ pub struct Mine {
     plausibility: PlausibilityFlag,
 }
 
-/// Keeps a second process from writing the same file and what stands beside it.
+/// Prevents a second process from writing the same file and its provenance file.
 fn lock_of(path: &Path) -> Result<FolderLock> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
     FolderLock::acquire(&path.with_file_name(format!(".lanesweep-{name}.lock")))
@@ -49,7 +49,7 @@ impl Mine {
             source::refuse_recording(path, &self.dir, "--out")?;
             check_scenario_file(path)?;
             source::refuse_overwriting(path, configured.files(), "--out")?;
-            // Before the work: a file that cannot be written is known at once.
+            // Check before the work that the file can be written.
             AtomicFile::create(path).map(drop)?;
         }
         let _lock = self.out.as_deref().map(lock_of).transpose()?;
@@ -60,7 +60,7 @@ impl Mine {
         }
         match &self.out {
             Some(path) => {
-                // What was driven is that of this file: the former goes first, the new one comes last.
+                // The provenance file belongs to this scenario file: remove the old one first, write the new one last.
                 DataProvenance::remove_beside(path)?;
                 write_scenarios(path, &collection.scenarios)?;
                 DataProvenance {

@@ -1,5 +1,5 @@
-//! The command line: one file per verb. What was typed is parsed here; what it means is decided in the
-//! library. Data goes to stdout, log and progress to stderr.
+//! The command line: one file per verb. It parses the arguments; the library implements their meaning. Data goes to
+//! stdout, log and progress to stderr.
 
 mod case_flags;
 mod check;
@@ -106,7 +106,7 @@ enum Verb {
     Config(config::Config),
 }
 
-/// Parses the command line, runs the verb and tells how it ended.
+/// Parses the command line, runs the verb and returns its exit code.
 pub fn main() -> ExitCode {
     let matches = match configured::command().try_get_matches() {
         Ok(matches) => matches,
@@ -125,8 +125,8 @@ pub fn main() -> ExitCode {
     .into()
 }
 
-/// Does the work and tells the user how it ended. A defect, in any thread that the work waits for, must not look like
-/// a crash of the user's making.
+/// Runs the work and reports the result. A panic in any thread of the work is reported as a defect of the program, not
+/// as a user's error.
 fn run_and_report(work: impl FnOnce() -> Result<Exit>) -> Exit {
     let error = match std::panic::catch_unwind(std::panic::AssertUnwindSafe(work)) {
         Ok(Ok(exit)) => return exit,
@@ -161,17 +161,17 @@ fn run(cli: &Cli, configured: &Configured) -> Result<Exit> {
     }
 }
 
-/// Maximum number of threads per logical core. Lanes are bound by computing, so more threads only take turns.
+/// Maximum number of threads per logical core. Lanes are compute-bound, so more threads would not be faster.
 const THREADS_PER_CORE: usize = 4;
 
-/// Address space of a thread: its stack, and its share of the allocator's arenas.
+/// Address space per thread: its stack, and its part of the allocator's arenas.
 const BYTES_PER_THREAD: usize = 4 << 20;
 
-/// Starts the workers, one per core unless told otherwise: before the work, for a pool that cannot start later panics.
-/// No more are started than are of use; results do not depend on it.
+/// Starts the worker threads before the work, because a pool that cannot start later panics. The default is one per
+/// core; the maximum is the number that is useful. Results do not depend on it.
 ///
 /// # Errors
-/// [`Error::Io`] where the system gives no more threads, or no memory for them.
+/// [`Error::Io`] if the system has no more threads, or no memory for them.
 fn start_threads(asked: Option<usize>) -> Result<()> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let useful = THREADS_PER_CORE * cores;
@@ -183,11 +183,11 @@ fn start_threads(asked: Option<usize>) -> Result<()> {
         let what = asked.map_or("the worker threads".to_owned(), |asked| format!("--threads {asked}"));
         Error::io(what, "start", std::io::Error::new(std::io::ErrorKind::WouldBlock, reason))
     };
-    // Where memory ends after some of the threads have started, an allocation of one of them ends the process.
+    // If memory ran out after some threads had started, an allocation in one of them would end the process.
     let mut room = Vec::<u8>::new();
     let bytes = count.unwrap_or(cores).saturating_mul(BYTES_PER_THREAD);
     room.try_reserve_exact(bytes).map_err(|error| refused(error.to_string()))?;
-    // Else the compiler leaves out an allocation that nobody uses.
+    // Otherwise the compiler removes the unused allocation.
     std::hint::black_box(&room);
     drop(room);
     let started = rayon::ThreadPoolBuilder::new().num_threads(count.unwrap_or(0)).build_global();

@@ -1,4 +1,4 @@
-//! Flags of `lanesweep sample`: a density in, probabilities of failure out.
+//! Flags of `lanesweep sample`: estimates failure probabilities over a density.
 
 use std::path::PathBuf;
 
@@ -106,7 +106,7 @@ pub struct Sample {
 }
 
 impl Sample {
-    /// The headways of `--thw` where nothing draws them.
+    /// The headways of `--thw`, unless they are sampled.
     pub(super) fn listed_headways(&self) -> Result<Option<Vec<Headway>>> {
         match self.thw.as_deref().map(str::trim) {
             None => Ok(None),
@@ -119,7 +119,8 @@ impl Sample {
         self.settings.estimator == EstimatorKind::Mc && self.proposal.is_empty()
     }
 
-    /// Importance sampling of one given proposal: its samples are independent, so the run can be split and continued.
+    /// Whether it is importance sampling with one given proposal: its samples are independent, so the run can be split
+    /// and resumed.
     pub(super) fn is_weighted(&self) -> bool {
         self.settings.estimator == EstimatorKind::Is && self.proposal.len() == 1
     }

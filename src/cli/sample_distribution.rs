@@ -1,4 +1,4 @@
-//! `lanesweep sample --distribution`: random parameters of an OpenSCENARIO file, sampled as lanes.
+//! `lanesweep sample --distribution`: samples random parameters of an OpenSCENARIO file as lanes.
 
 use std::fmt::Write;
 use std::path::Path;
@@ -24,7 +24,7 @@ use crate::support::readable;
 use crate::support::run_dir::{ESTIMATE_RECORD, OutputDir};
 use crate::{Error, Place, Result};
 
-/// Samples what a file says.
+/// Samples the distributions of a file.
 pub(super) fn run(
     flags: &Sample,
     configured: &Configured,
@@ -91,7 +91,7 @@ pub(super) fn run(
     };
     tracing::info!("{} samples on {}", readable::count(count), executor.backend.describe());
     let bar = console::progress(verbosity, count, "sampling");
-    // Nobody said how often such scenarios occur: no exposure.
+    // The frequency of such scenarios is unknown, so there is no exposure.
     let crude = sample_crude(&plan, 0..count, &executor, &options, None, |chunk| {
         bar.inc(chunk.units.end - chunk.units.start);
         Ok(())
@@ -121,7 +121,7 @@ pub(super) fn run(
     Ok(Exit::Ok)
 }
 
-/// Looks at the fixed values and at the quartiles of the distributions: their tails are cut off anyway.
+/// Checks the fixed values and the quartiles of the distributions; the tails are truncated anyway.
 fn check_plausible(samples: &DistributionSamples, mut doubts: Doubts) -> Result<()> {
     for (parameter, value) in &samples.fixed {
         parameter.check_plausible(*value, &mut doubts)?;

@@ -1,5 +1,4 @@
-//! What the flags of `lanesweep sample` ask for, as options of the library, and what they must fulfil whatever the density
-//! is.
+//! Converts the flags of `lanesweep sample` to options of the library, and checks what does not depend on the density.
 
 use std::path::{Path, PathBuf};
 use std::time::Duration;
@@ -17,7 +16,7 @@ use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
 impl Sample {
-    /// When to end.
+    /// The rule that ends the run.
     pub(super) fn stop(&self, samples: u64) -> StopRule {
         StopRule {
             samples,
@@ -27,7 +26,7 @@ impl Sample {
         }
     }
 
-    /// Everything that a run over a density is asked for.
+    /// All options of a run over a density.
     pub(super) fn options(&self, density: &DensityModel) -> Result<SampleOptions> {
         let samples = self.settings.samples.unwrap_or(match self.settings.estimator {
             EstimatorKind::Subset => 2000,
@@ -62,7 +61,7 @@ impl Sample {
         })
     }
 
-    /// Looks at the values of `--given`, and tells what is doubtful.
+    /// Checks the values of `--given`, and warns about doubtful ones.
     fn check_given(&self, density: &DensityModel) -> Result<()> {
         let mut doubts = Doubts::new(self.plausibility.policy());
         for (name, value) in &self.given {
@@ -95,7 +94,7 @@ impl Sample {
         })
     }
 
-    /// Kind of interval of crude Monte Carlo.
+    /// Type of the interval of crude Monte Carlo.
     pub(super) fn interval(&self) -> BinomialInterval {
         match self.settings.interval {
             IntervalKind::Wilson => BinomialInterval::Wilson,
@@ -120,17 +119,17 @@ impl Sample {
     }
 }
 
-/// Samples of a run that can be split and resumed, at most: as of `compare`.
+/// Maximum number of samples of a run that can be split and resumed; the same as for `compare`.
 const MAX_SPLIT: u64 = (1 << 48) - 1;
 
-/// The complaint about a flag that the weighing estimators do not have.
+/// The error for a flag that only crude Monte Carlo has.
 pub(super) fn only_crude(flag: &str) -> Error {
     let problem = "this belongs to crude Monte Carlo";
     Error::usage(Place::item(flag), problem, "use --estimator mc, or leave it out")
 }
 
 impl Sample {
-    /// Checks what needs no density.
+    /// Checks that need no density.
     pub(super) fn check(&self) -> Result<()> {
         let settings = &self.settings;
         let is_crude = self.is_crude();
@@ -182,7 +181,7 @@ impl Sample {
     }
 }
 
-/// The rows must replace neither an input nor another result.
+/// Checks that the rows replace neither an input nor another result.
 pub(super) fn guard<'a>(rows: &Path, out: &Path, inputs: impl Iterator<Item = &'a PathBuf>) -> Result<()> {
     let results = ["estimate.json", "estimates.csv", "worst.csv", "convergence.csv", "density.json"];
     let others: Vec<PathBuf> = results.iter().map(|name| out.join(name)).chain(inputs.cloned()).collect();

@@ -1,4 +1,4 @@
-//! `lanesweep sample`: plans what the flags ask for, runs it whole or as a shard, and writes the result.
+//! `lanesweep sample`: plans the run, executes it whole or as a shard, and writes the result.
 
 use std::time::Instant;
 
@@ -22,7 +22,7 @@ use crate::support::run_dir::{ESTIMATE_RECORD, OutputDir, Results};
 use crate::support::table::TableWriter;
 use crate::{Error, Place, Result};
 
-/// A condition that so few scenarios are near is outside the data.
+/// A condition near fewer scenarios than this is outside the data.
 const FEW_SCENARIOS: f64 = 5.0;
 
 impl Sample {
@@ -50,7 +50,7 @@ impl Sample {
         self.run_sample(sample, &opened, started, verbosity)
     }
 
-    /// Plans a run of the density, for who writes the command down too; with what the data are.
+    /// Plans a run over the density; returns the plan and a description of the data.
     ///
     /// # Errors
     /// Those that the run would end with.
@@ -76,7 +76,7 @@ impl Sample {
         Ok((sampling::Sample::plan(density, &profile, &options)?, data))
     }
 
-    /// From a plan to the estimates, or to a part of them.
+    /// Executes a plan, whole or a shard of it.
     fn run_sample(
         &self,
         sample: sampling::Sample,
@@ -112,7 +112,7 @@ impl Sample {
         self.run_split(&sample, opened, &executor, started, verbosity)
     }
 
-    /// Runs what can be split and resumed.
+    /// Executes a run that can be split and resumed.
     fn run_split(
         &self,
         sample: &sampling::Sample,
@@ -122,7 +122,7 @@ impl Sample {
         verbosity: Verbosity,
     ) -> Result<Exit> {
         warn(sample)?;
-        // Rows are written on the way: a run that writes them begins anew.
+        // Rows are written during the run, so a run with rows cannot resume.
         let Some(mut run) = sample.open(&self.out, self.shards.shard, self.rows.is_none())? else {
             tracing::info!("this part exists already and is complete");
             return Ok(Exit::Ok);
@@ -160,7 +160,7 @@ impl Sample {
     }
 }
 
-/// What limits the estimates of crude Monte Carlo.
+/// Warns about limits of the estimates of crude Monte Carlo.
 fn warn(sample: &sampling::Sample) -> Result<()> {
     let (density, options) = (&sample.density, &sample.options);
     if options.source == SampleSource::Sobol {

@@ -1,4 +1,4 @@
-//! Flags of verbs that can be split and continued.
+//! Flags of verbs that can be split and resumed.
 
 use std::path::PathBuf;
 
@@ -28,10 +28,10 @@ pub struct ShardFlags {
 }
 
 impl ShardFlags {
-    /// Starts the clock of --stop-after.
+    /// Starts the time limit of --stop-after.
     ///
     /// # Errors
-    /// [`Error::Usage`] for no time.
+    /// [`Error::Usage`] for an invalid time.
     pub fn start(&self) -> Result<()> {
         let Some(seconds) = self.stop_after else { return Ok(()) };
         if !(seconds > 0.0 && seconds < 1e9) {
@@ -42,7 +42,7 @@ impl ShardFlags {
         Ok(())
     }
 
-    /// Part of a run that others join?
+    /// Whether this is a part of a run, to be merged with others.
     pub fn is_part(&self) -> bool {
         self.shard.is_some()
     }

@@ -1,4 +1,5 @@
-//! `lanesweep config completions` and `lanesweep config man`: what a shell and `man` need to know, from the command's own definition.
+//! `lanesweep config completions` and `lanesweep config man`: shell completions and manual pages from the command
+//! definition.
 
 use std::path::PathBuf;
 
@@ -32,7 +33,7 @@ impl Completions {
     }
 }
 
-/// A command with the visible ones below it, by the names of their pages.
+/// Collects a command and its visible subcommands, by the names of their pages.
 fn collect(name: String, command: &clap::Command, pages: &mut Vec<(String, clap::Command)>) {
     pages.push((name.clone(), command.clone()));
     for verb in command.get_subcommands().filter(|verb| !verb.is_hide_set() && verb.get_name() != "help") {
@@ -55,7 +56,7 @@ impl Man {
     pub fn run(&self) -> Result<Exit> {
         make_folder(&self.dir)?;
         let mut program = command();
-        // Global flags and versions reach the verbs.
+        // Adds global flags and versions to the verbs.
         program.build();
         let mut pages = Vec::new();
         collect("lanesweep".to_owned(), &program, &mut pages);

@@ -1,28 +1,28 @@
-//! What SIGINT, SIGTERM and SIGHUP do to the program.
+//! Handling of SIGINT, SIGTERM and SIGHUP.
 //!
-//! The first signal lets a run that can be continued end by itself, within [`LONGEST_WAIT`]. Any other run, and any run at
-//! the second signal, ends at once: its unfinished files are removed and the exit status is 128 + the signal's number, as a
-//! shell expects.
+//! At the first signal a resumable run ends in good order, within [`LONGEST_WAIT`]. Any other run, and any run at the
+//! second signal, ends at once: its unfinished files are removed and the exit status is 128 + the signal's number, as
+//! shells expect.
 
 use std::sync::LazyLock;
 use std::time::Duration;
 
 use crate::support::cancel::Cancel;
 
-/// Exit status of a run that was interrupted and continues when it is run again.
+/// Exit status of an interrupted run that resumes when repeated.
 pub const EXIT_STATUS: u8 = 75;
 
-/// Longest wait for a run to end by itself after a signal. What is in the journal by then is kept; the work on the present
-/// chunk, or before the first one, is given up.
+/// Maximum wait for a run to end in good order after a signal. The journal written by then is kept; the work on the
+/// present chunk, or before the first one, is lost.
 pub const LONGEST_WAIT: Duration = Duration::from_secs(4);
 
-/// The token of this process: signals and `--stop-after` set it, and its runs hold it.
+/// The cancellation token of this process: signals and `--stop-after` set it, and runs hold it.
 pub static CANCEL: LazyLock<Cancel> = LazyLock::new(Cancel::default);
 
-/// Receives SIGINT, SIGTERM and SIGHUP from now on, on a thread of its own, and SIGXFSZ, so that what is written beyond a
-/// limit of the size of files is an error and not the end; a second call does nothing. A SIGHUP that is ignored at the
-/// start (`nohup`) stays ignored; that is known on Linux only, and elsewhere SIGHUP is left to the system. Without Unix
-/// signals it does nothing, and the system's own way to end a process stays.
+/// Starts to handle SIGINT, SIGTERM and SIGHUP on a separate thread; a second call does nothing. SIGXFSZ is handled
+/// too, so that exceeding a file size limit is an error and does not end the process. A SIGHUP that is ignored at the
+/// start (`nohup`) stays ignored. Only Linux reports this; elsewhere the system handles SIGHUP. Without Unix signals
+/// the function does nothing, and the system ends the process.
 pub fn install() {
     #[cfg(unix)]
     {
@@ -31,8 +31,8 @@ pub fn install() {
             if let Err(error) = receive() {
                 tracing::warn!("signals end the program without tidying up: {error}");
             }
-            // At a limit of the size of files (`ulimit -f`) the signal would end the process in the middle of a write;
-            // with it received, the write fails instead, and the error names the file.
+            // At a file size limit (`ulimit -f`) the signal would end the process during a write. If it is handled, the
+            // write fails instead, and the error names the file.
             let at_limit = std::sync::Arc::new(std::sync::atomic::AtomicBool::new(false));
             if let Err(error) = signal_hook::flag::register(signal_hook::consts::SIGXFSZ, at_limit) {
                 tracing::debug!("a limit of the size of files would end the program: {error}");
@@ -61,7 +61,7 @@ fn receive() -> std::io::Result<()> {
     std::thread::Builder::new().name("signals".to_owned()).spawn(receiver).map(drop)
 }
 
-/// Ends the process if the run has not ended by itself by then. A run that is not asked to end any more runs on.
+/// Ends the process if the run has not ended after the wait. If the request was withdrawn, the run continues.
 #[cfg(unix)]
 fn give_up_after(wait: Duration) {
     let give_up = move || {
@@ -71,11 +71,11 @@ fn give_up_after(wait: Duration) {
             end_with(EXIT_STATUS.into());
         }
     };
-    // Without a thread the run still ends after its chunk, and at once at the second signal.
+    // Without this thread the run still ends after its chunk, and at once at the second signal.
     let _ = std::thread::Builder::new().name("end".to_owned()).spawn(give_up);
 }
 
-/// Is a signal ignored, or is that unknown? The system's mask of ignored signals begins with signal 1.
+/// Whether a signal is ignored, or this is unknown. Bit 0 of the system's mask of ignored signals is signal 1.
 #[cfg(unix)]
 fn is_ignored(signal: i32) -> bool {
     let status = std::fs::read_to_string("/proc/self/status").unwrap_or_default();
@@ -86,7 +86,7 @@ fn is_ignored(signal: i32) -> bool {
 #[cfg(unix)]
 fn say(line: &str) {
     use std::io::Write;
-    // Where stderr is gone there is nobody to tell.
+    // Ignore a closed stderr: no message can be shown.
     let _ = writeln!(std::io::stderr(), "{line}");
 }
 
@@ -97,8 +97,8 @@ fn end_at_once(signal: i32) -> ! {
 
 #[cfg(unix)]
 fn end_with(status: i32) -> ! {
-    // Nobody begins another file until the end.
+    // While the guard lives, no file can be created.
     let _live = crate::support::atomic_file::remove_live();
-    // Without the exit handlers of libraries (a driver's, say) whose threads are at work.
+    // Skips the exit handlers of libraries (such as drivers) whose threads are running.
     signal_hook::low_level::exit(status)
 }

@@ -1,4 +1,4 @@
-//! `lanesweep simulate`: one concrete case, step by step, as an engineer checks it by hand.
+//! `lanesweep simulate`: runs one concrete case step by step, for checking by hand.
 
 use std::path::{Path, PathBuf};
 
@@ -76,7 +76,7 @@ impl Simulate {
         self.guard_plot()?;
         let (lanes, incomplete) = self.lanes(configured)?;
         if let Some(path) = &self.plot {
-            // Before the table: a reader of stdout that ends early must not cost the figure.
+            // Write the figure before the table: a closed stdout must not prevent it.
             make_folder_of(path)?;
             write_atomically(path, lanes.figure(self.plot_end).svg().as_bytes())?;
         }
@@ -87,7 +87,7 @@ impl Simulate {
         Ok(if incomplete { Exit::Incomplete } else { Exit::Ok })
     }
 
-    /// The lanes, and whether others of the file were left out.
+    /// The lanes, and whether others of the file were skipped.
     fn lanes(&self, configured: &Configured) -> Result<(TracedLanes, bool)> {
         let Some(key) = &self.lane else {
             let profile = configured.profile()?;
@@ -132,7 +132,7 @@ impl Simulate {
         Ok(flags)
     }
 
-    /// The figure must be one and must replace no input.
+    /// Checks that the figure is an SVG file and replaces no input.
     fn guard_plot(&self) -> Result<()> {
         let Some(plot) = &self.plot else { return Ok(()) };
         if let Some(until) = self.plot_end.filter(|until| !(*until > 0.0 && *until < 1e9)) {

@@ -76,7 +76,7 @@ impl Slurm {
             Some(dir) => absolute("--scripts", dir)?,
             None => format!("{}/slurm", out.trim_end_matches('/')),
         };
-        // A name without a folder is looked up by the shell of the job.
+        // The job's shell looks up a name without a folder.
         let program = match self.program.contains('/') {
             true => absolute("--program", Path::new(&self.program))?,
             false => self.program.clone(),
@@ -89,7 +89,7 @@ impl Slurm {
         if self.scripts.is_none() && folder.exists() && !folder.symlink_metadata().is_ok_and(|about| about.is_dir()) {
             refuse_link(folder)?;
         }
-        // What is run comes last: with it, all of them are of one command.
+        // submit.sh comes last: if it exists, all scripts are from the same command.
         let run_folder = OutputDir::open(folder, "submit.sh")?;
         let mut results = run_folder.results()?;
         let mut told = String::new();
@@ -110,7 +110,7 @@ impl Slurm {
         Ok(Exit::Ok)
     }
 
-    /// The run, without the flags that are the scripts' own.
+    /// The run without the flags that the scripts set.
     fn split_run(&self) -> Result<SplitRun> {
         let words = match &self.study {
             Some(config) => {
@@ -136,7 +136,7 @@ impl Slurm {
     }
 }
 
-/// Checks the command that makes the plan as its verb would: an error is told here rather than by the cluster.
+/// Checks the planning command as its verb would, so that errors appear here and not on the cluster.
 fn check_plan(array: &SlurmArray) -> Result<()> {
     let run = &array.run;
     let own = ["--plan-only", "--out", &array.out];
@@ -155,7 +155,8 @@ fn check_plan(array: &SlurmArray) -> Result<()> {
     }
 }
 
-/// A path from the root, as text: scripts run elsewhere. Links stay as they are, for nodes may resolve them otherwise.
+/// The absolute path as text, because scripts run elsewhere. Links are not resolved, because nodes may resolve them
+/// differently.
 fn absolute(flag: &str, path: &Path) -> Result<String> {
     let path = std::path::absolute(path).map_err(|e| Error::io(path, "find", e))?;
     text(flag, &path)

@@ -1,4 +1,4 @@
-//! Where a verb's scenarios come from: a folder of recordings, a scenario file, or the generator.
+//! The source of a verb's scenarios: a folder of recordings, a scenario file, or the generator.
 
 use std::path::{Path, PathBuf};
 
@@ -14,7 +14,8 @@ use crate::traffic::mining::{Collection, MiningOptions, counts_text};
 use crate::traffic::trajectory::highd;
 use crate::{Error, Place, Result};
 
-/// Reads or generates, and mines, with a progress bar; tells what was left out and what was found.
+/// Reads or generates recordings and mines them, with a progress bar; reports skipped input and the number of
+/// scenarios.
 ///
 /// # Errors
 /// As [`Source::load`].
@@ -37,10 +38,10 @@ pub fn load(
     Ok(collection)
 }
 
-/// What is told one by one of what was left out.
+/// Maximum number of skipped items listed individually.
 const TOLD: usize = 20;
 
-/// Tells what was left out and what is doubtful.
+/// Reports skipped input and doubts.
 pub fn complain_of(problems: &[Error], notes: &[String]) {
     problems.iter().take(TOLD).for_each(console::complain);
     if problems.len() > TOLD {
@@ -49,7 +50,7 @@ pub fn complain_of(problems: &[Error], notes: &[String]) {
     notes.iter().for_each(|note| tracing::warn!("{note}"));
 }
 
-/// What is done about input that no road has.
+/// Policy for implausible input.
 #[derive(Debug, Clone, Copy, Args)]
 pub struct PlausibilityFlag {
     /// Use physically impossible values (a speed of 108 m/s) with a warning
@@ -58,7 +59,7 @@ pub struct PlausibilityFlag {
 }
 
 impl PlausibilityFlag {
-    /// As readers take it.
+    /// The policy for readers.
     pub fn policy(self) -> Implausible {
         if self.accept_implausible { Implausible::Accepted } else { Implausible::Refused }
     }
@@ -78,7 +79,7 @@ pub struct SourceFlags {
 }
 
 impl SourceFlags {
-    /// What they name; the generator where they name nothing.
+    /// The named source; the generator if none is named.
     pub fn source(&self, configured: &Configured) -> Source {
         match (&self.dir, &self.scenarios) {
             (Some(dir), _) => Source::Folder(dir.clone()),
@@ -95,32 +96,32 @@ impl SourceFlags {
         self.source(configured).check(self.plausibility.policy())
     }
 
-    /// As [`load`].
+    /// Like [`load`].
     pub fn load(&self, configured: &Configured, verbosity: Verbosity) -> Result<Collection> {
         load(&self.source(configured), &configured.settings.mining, self.plausibility.policy(), verbosity)
     }
 
-    /// The same, with what is read told before.
+    /// Like [`load`], but first reports what is read.
     pub fn load_told(&self, configured: &Configured, verbosity: Verbosity) -> Result<Collection> {
         tracing::info!("{}", self.source(configured).describe(false));
         self.load(configured, verbosity)
     }
 
-    /// No result may replace an input of the run.
+    /// Refuses a result that would replace an input of the run.
     pub fn refuse_overwriting(&self, output: &Path, configured: &Configured, flag: &str) -> Result<()> {
         let inputs: Vec<PathBuf> = self.scenarios.iter().chain(configured.files()).cloned().collect();
         refuse_overwriting(output, &inputs, flag)
     }
 }
 
-/// The scenarios of a file of which one is asked for, and whether some were left out; what was wrong is told.
+/// The scenarios of a file for selecting one, and whether some were skipped; reports what was wrong.
 pub fn scenarios_of(path: &Path, implausible: Implausible) -> Result<(Vec<Scenario>, bool)> {
     let ScenarioFile { scenarios, problems, notes } = read_scenario_file(path, implausible)?;
     complain_of(&problems, &notes);
     Ok((scenarios, !problems.is_empty()))
 }
 
-/// The categories of a flag, in the order of every table; all where none is given.
+/// Parses the categories of a flag, in the order of every table; all if the list is empty.
 pub fn categories(list: &[String], flag: &str) -> Result<Vec<Category>> {
     if list.is_empty() {
         return Ok(Category::ALL.to_vec());
@@ -137,9 +138,9 @@ pub fn categories(list: &[String], flag: &str) -> Result<Vec<Category>> {
     Ok(found)
 }
 
-/// The file that a path stands for, however it is written.
+/// The canonical path of a file, however it is written.
 pub fn file_of(path: &Path) -> PathBuf {
-    // Where a file does not exist yet, its folder still tells.
+    // If the file does not exist yet, its folder is resolved.
     let of_folder = || {
         let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
         Some(parent.canonicalize().ok()?.join(path.file_name()?))
@@ -147,7 +148,7 @@ pub fn file_of(path: &Path) -> PathBuf {
     path.canonicalize().ok().or_else(of_folder).unwrap_or_else(|| path.to_path_buf())
 }
 
-/// An output must not be one of these files.
+/// Refuses an output that is one of these files.
 pub fn refuse_overwriting(output: &Path, others: &[PathBuf], flag: &str) -> Result<()> {
     match others.iter().find(|other| file_of(other) == file_of(output)) {
         Some(other) => Err(Error::usage(
@@ -159,9 +160,9 @@ pub fn refuse_overwriting(output: &Path, others: &[PathBuf], flag: &str) -> Resu
     }
 }
 
-/// An output must not be one of a folder's recordings.
+/// Refuses an output that is one of a folder's recordings.
 pub fn refuse_recording(output: &Path, dir: &Path, flag: &str) -> Result<()> {
-    // A folder that cannot be listed is the reader's complaint.
+    // The reader reports a folder that cannot be listed.
     let Ok(inventory) = highd::inventory(dir) else { return Ok(()) };
     let files: Vec<PathBuf> =
         inventory.recordings.into_iter().flat_map(|r| [r.tracks, r.tracks_meta, r.recording_meta]).collect();

@@ -1,4 +1,4 @@
-//! `lanesweep study`: trajectories in, F1 out.
+//! `lanesweep study`: scores parameterizations by F1 on trajectories.
 
 use std::path::PathBuf;
 use std::time::Instant;
@@ -95,7 +95,7 @@ enum KeepPlan {
 }
 
 impl KeepPlan {
-    /// Largest plan that is left, bytes.
+    /// Maximum size of a kept plan, bytes.
     fn max_bytes(self) -> Option<u64> {
         match self {
             KeepPlan::Auto => Some(256 << 20),
@@ -132,7 +132,7 @@ impl Study {
             self.format.print_plan(study.plan().lane_count(), &self.out.join(PLAN_FILE))?;
             return Ok(if study.facts().incomplete { Exit::Incomplete } else { Exit::Ok });
         }
-        // Before the work: a device that is not there is known at once.
+        // Open before the work, so that a missing device is reported at once.
         let opened = if self.reference { configured.open_reference()? } else { configured.open()? };
         let (study, timings) = self.prepare(configured, verbosity)?;
         if self.dry_run {
@@ -141,7 +141,7 @@ impl Study {
         self.sweep(&study, &opened, configured, timings, verbosity)
     }
 
-    /// Checks what a plan is made of, but for recordings, which are not read: for who writes the command down.
+    /// Checks the inputs of a plan except recordings, which are not read; for callers that only write the command.
     ///
     /// # Errors
     /// Those that the run would end with.
@@ -153,7 +153,7 @@ impl Study {
         self.data.check(configured)
     }
 
-    /// What is studied, with what.
+    /// The profile and the options of the study.
     fn asked(&self, configured: &Configured) -> Result<(Profile, StudyOptions)> {
         let profile = configured.profile()?;
         let options = StudyOptions {
@@ -165,13 +165,13 @@ impl Study {
         Ok((profile, options))
     }
 
-    /// From data to a plan.
+    /// Makes a plan from the data.
     fn prepare(&self, configured: &Configured, verbosity: Verbosity) -> Result<(study::Study, Timings)> {
         let config = configured.settings.clone();
         let (profile, options) = self.asked(configured)?;
         let source = self.data.source(configured);
         let has_paper_headways = options.headways == Headway::paper();
-        // What is generated is said with the answer.
+        // Generated data are described with the answer.
         if !matches!(source, Source::Generated(_)) {
             tracing::info!("{}", source.describe(false));
         }
@@ -184,7 +184,8 @@ impl Study {
             .score(config.score)
             .data(data)
             .scenario_file_sha256(self.data.scenarios.as_deref().map(input_file::sha256).transpose()?)
-            // What the synthetic recordings are calibrated to stands beside what they give, where the headways are the same.
+            // Synthetic recordings are calibrated to the published numbers, so both are shown if the headways are the
+            // same.
             .published(self.published || (collection.synthetic && has_paper_headways))
             .reference(self.reference);
         let study = timed(&mut timings.plan_s, || builder.plan())?;
@@ -192,13 +193,13 @@ impl Study {
         Ok((study, timings))
     }
 
-    /// What the run would be.
+    /// Prints the forecast of the run.
     fn forecast(&self, study: &study::Study, opened: &OpenBackend, before_s: Option<f64>) -> Result<Exit> {
         let backend = opened.backend();
         DryRun { run: study.forecast(backend)?, backend: backend.describe(), before_s }.print(self.format)
     }
 
-    /// From a plan to a report, or to a part of one.
+    /// Runs a plan; returns a report, or a part of a run.
     fn sweep(
         &self,
         study: &study::Study,
@@ -213,7 +214,7 @@ impl Study {
         if self.shards.is_part() {
             study.write_plan(&self.out)?;
         }
-        // Before the work, so that a folder that cannot be written to is known at once.
+        // Open before the work, so that an unwritable folder is reported at once.
         let Some(mut run) = study.open(&self.out, self.shards.shard)? else {
             tracing::info!("this part exists already and is complete");
             return Ok(Exit::Ok);
@@ -253,7 +254,7 @@ impl Study {
         Ok(exit)
     }
 
-    /// For `simulate --from`.
+    /// Keeps the plan for `simulate --from`.
     fn leave_plan(&self, study: &study::Study, results: &mut Results) -> Result<()> {
         let Some(max_bytes) = self.keep_plan.max_bytes() else { return Ok(()) };
         if !study.keep(results, RUN_PLAN_FILE, max_bytes)? {
@@ -267,7 +268,7 @@ impl Study {
         Ok(())
     }
 
-    /// The lane table must replace neither an input nor another result.
+    /// Checks that the lane table replaces neither an input nor another result.
     fn guard_inputs(&self, configured: &Configured) -> Result<()> {
         let Some(lanes) = &self.rows else { return Ok(()) };
         let results = ["failures.csv", "f1.csv", "claims.csv", "report.txt", "reference.csv", "run.json"];

@@ -1,4 +1,4 @@
-//! `lanesweep synth`: the embedded default's recordings as highD files.
+//! `lanesweep synth`: writes the default synthetic recordings as highD files.
 
 use std::path::{Path, PathBuf};
 
@@ -30,7 +30,7 @@ impl Synth {
         let options = &configured.settings.generator;
         check_folder(&self.dir)?;
         let folder = OutputDir::open(&self.dir, SYNTHETIC_MARKER)?;
-        // What a killed run was giving its names is written again.
+        // Files that a killed run was renaming are written anew.
         let unfinished = unfinished(&self.dir).unwrap_or_default();
         let is_unfinished = |tracks: &Path| unfinished.iter().any(|name| tracks.ends_with(name));
         let taken = |id: &str| {
@@ -55,8 +55,8 @@ impl Synth {
             bar.inc(1);
         }
         bar.finish_and_clear();
-        // Some of the recordings would be studied as if they were all, and as if they were real: all get their names at
-        // once, and last the file that says what they are.
+        // A part of the recordings could be mistaken for all of them, or for real data. All are therefore renamed
+        // together, the marker file last.
         results.publish(marker.as_bytes())?;
         tracing::info!("{} synthetic recordings written to {}", options.recordings, self.dir.display());
         Ok(Exit::Ok)

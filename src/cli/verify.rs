@@ -1,4 +1,4 @@
-//! `lanesweep verify`: does this device compute what the CPU computes?
+//! `lanesweep verify`: checks that a device computes the same as the CPU.
 
 use clap::{Args, Subcommand};
 
@@ -57,7 +57,7 @@ enum VerifyVerb {
     Conformance(Conformance),
 }
 
-/// Random lanes of a model and category at most: their units are named one by one.
+/// Maximum number of random lanes per model and category: their units have individual names.
 const MAX_LANES: u64 = 100_000_000;
 
 impl Verify {
@@ -93,7 +93,7 @@ impl Verify {
             let bar = console::progress(verbosity, plan.lane_count(), name);
             let comparison = compare(name, &plan, tested, |lanes| bar.inc(lanes))?;
             bar.finish_and_clear();
-            // Set by set: a device that fails later takes nothing back.
+            // Print set by set, so that a later failure of the device keeps earlier results.
             if is_text {
                 console::print(&format!("\n{}", verification::comparison(&comparison)))?;
             }
@@ -126,7 +126,7 @@ impl Verify {
         }
     }
 
-    /// The sets, by name.
+    /// The sets with their names.
     fn sets(
         &self,
         configured: &Configured,
@@ -175,7 +175,7 @@ impl Verify {
         tested: &dyn Backend,
         verbosity: Verbosity,
     ) -> Result<Exit> {
-        // The sets' own keys name their seed; a user's scenario may begin as it likes.
+        // The keys of the generated sets contain their seed; a user's scenario may start with the same prefix.
         let own = |prefix: &str| text.starts_with(prefix) && text.contains(&format!("-seed{}-", self.seed));
         let plan = match () {
             () if own("random-") => self.random(profile)?,

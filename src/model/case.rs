@@ -1,8 +1,8 @@
-//! A concrete case: what is simulated before headway and driver model are chosen. A recorded scenario,
-//! each of its parameterizations, a sampled point, a row of a table and a `simulate` call are all cases.
+//! A concrete case: the input of a simulation, without headway and driver model. A recorded scenario, each of its
+//! parameterizations, a sampled point, a row of a table and a `simulate` call are all cases.
 //!
-//! [`PlainCase`] is a case from a handful of numbers: constant speeds or one deceleration, a lane change at constant
-//! lateral speed; what `simulate` takes from flags and what a map's cells are.
+//! [`PlainCase`] is a case given by a few numbers: constant speeds or one deceleration, and a lane change at constant
+//! lateral speed. `simulate` reads one from flags; each cell of a map is one.
 
 use serde::{Deserialize, Serialize};
 
@@ -23,7 +23,7 @@ pub enum Category {
 }
 
 impl Category {
-    /// All, in the order of every table.
+    /// All categories, in the order of every table.
     pub const ALL: [Category; 3] = [Category::CutIn, Category::CutOut, Category::Lvd];
 
     /// Name in files and keys: `cut_in`, `cut_out`, `lvd`.
@@ -44,7 +44,7 @@ impl Category {
         }
     }
 
-    /// From either name.
+    /// Parses either name.
     pub fn parse(text: &str) -> Option<Category> {
         let folded = text.to_ascii_lowercase().replace('-', "_");
         Category::ALL.into_iter().find(|c| c.key() == folded)
@@ -79,7 +79,8 @@ pub struct Case {
     pub principal: Participant,
     /// Cut-out only: the vehicle ahead of the principal one.
     pub ahead: Option<Ahead>,
-    /// Later of the scenario's duration and its last parameter event: the run goes on at least so long.
+    /// Duration of the scenario or time of its last parameter event, whichever is later, s. The run lasts at least this
+    /// long.
     pub horizon_s: f64,
 }
 
@@ -95,7 +96,7 @@ pub struct Ahead {
 /// Default lateral distance of a lane change, m.
 pub const LATERAL_DISTANCE_M: f64 = 3.5;
 
-/// The numbers; speeds in m/s, lengths in m. Fields that a category does not have are ignored.
+/// Parameters; speeds in m/s, lengths in m. Fields that do not apply to the category are ignored.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct PlainCase {
     /// Kind of scenario.
@@ -106,9 +107,9 @@ pub struct PlainCase {
     pub speed_mps: f64,
     /// Its acceleration, m/s².
     pub acceleration_mps2: f64,
-    /// Speed at which the acceleration ends; without one, at standstill or never.
+    /// Speed at which the acceleration ends; `None`: at standstill or never.
     pub end_speed_mps: Option<f64>,
-    /// Lane changes: lateral speed, ≥ 0; at 0 there is no change.
+    /// Lane changes: lateral speed, ≥ 0; 0 means no change.
     pub lateral_speed_mps: f64,
     /// Cut-in: lateral distance at the start; cut-out: at the end; > 0.
     pub lateral_distance_m: f64,
@@ -120,16 +121,16 @@ pub struct PlainCase {
     pub length_m: f64,
     /// Width of every vehicle, > 0.
     pub width_m: f64,
-    /// Duration, s, > 0: then speed and lateral position keep their last values. Without one, all motions go on to
-    /// their ends.
+    /// Duration, s, > 0; afterwards speed and lateral position are held. `None`: all motions run to their ends.
     pub duration_s: Option<f64>,
 }
 
 impl PlainCase {
-    /// The case; no event is later than `time_cap_s`.
+    /// Returns the case; no event is later than `time_cap_s`.
     ///
     /// # Errors
-    /// [`Error::Usage`] where speed, acceleration and end speed contradict one another, or an acceleration the category.
+    /// [`Error::Usage`] if speed, acceleration and end speed contradict one another, or if the acceleration contradicts
+    /// the category.
     pub fn case(&self, time_cap_s: f64) -> Result<Case> {
         let until_s = self.acceleration_until_s(time_cap_s)?;
         let (lateral, change_s) = self.lateral();
@@ -152,7 +153,7 @@ impl PlainCase {
         })
     }
 
-    /// Its speed when its acceleration ends, m/s; no event is later than `time_cap_s`.
+    /// Speed of the other vehicle when its acceleration ends, m/s; no event is later than `time_cap_s`.
     ///
     /// # Errors
     /// As [`PlainCase::case`].
@@ -172,7 +173,8 @@ impl PlainCase {
         Ok(until_s.min(self.duration_s.unwrap_or(f64::INFINITY)))
     }
 
-    /// Does the acceleration lead from the initial to the end speed, and does the leader of an LVD not accelerate?
+    /// Checks that the acceleration leads from the initial to the end speed, and that the leader of an LVD does not
+    /// accelerate.
     fn check_speeds(&self) -> Result<()> {
         let (acceleration, from_mps) = (self.acceleration_mps2, self.speed_mps);
         let wrong = |key: &str, problem: String, help: &str| Err(Error::usage(Place::item(key), problem, help));
@@ -197,14 +199,14 @@ impl PlainCase {
         Ok(())
     }
 
-    /// The lateral motion and how long it lasts, s.
+    /// The lateral motion and its duration, s.
     fn lateral(&self) -> (Lateral, f64) {
         let (rate_mps, distance_m) = (self.lateral_speed_mps, self.lateral_distance_m);
         let covered_m = distance_m.min(rate_mps * self.duration_s.unwrap_or(f64::INFINITY));
         let change_s = if rate_mps > 0.0 { covered_m / rate_mps } else { 0.0 };
         let lateral = match self.category {
             Category::Lvd => return (Lateral::Centred, 0.0),
-            // A kinematic change without speed would be over at once.
+            // Without lateral speed a kinematic change would be over at once.
             Category::CutIn if rate_mps <= 0.0 => {
                 Lateral::Sampled { position_m: vec![distance_m], towards_mps: vec![0.0] }
             }
@@ -218,7 +220,7 @@ impl PlainCase {
     }
 }
 
-/// What a case of a category cannot do without, by the names of `simulate`'s flags: the first that is missing.
+/// The first missing parameter that the category needs, by the name of its `simulate` flag.
 pub(crate) fn missing_parameter(category: Category, has: impl Fn(&str) -> bool) -> Option<&'static str> {
     let changes_lane = category != Category::Lvd;
     let needs = [
@@ -230,7 +232,7 @@ pub(crate) fn missing_parameter(category: Category, has: impl Fn(&str) -> bool) 
     needs.into_iter().find(|(key, is_needed)| *is_needed && !has(key)).map(|(key, _)| key)
 }
 
-/// A time headway of an ego at rest is no distance.
+/// Refuses a time headway for an ego at rest, because it defines no distance.
 ///
 /// # Errors
 /// [`Error::Usage`].

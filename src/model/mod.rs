@@ -1,7 +1,7 @@
-//! What is simulated: the drivers, the criteria that judge them, the profile with every constant, the concrete case and
-//! the motion of its vehicles, and the numbers that lanes compute with.
+//! The simulated system: drivers, criteria, the profile with every constant, the concrete case, the motion of its
+//! vehicles, and the lane arithmetic.
 //!
-//! No file is read here but a profile, and nothing is run: [`engine`](crate::engine) steps what is defined here.
+//! The only file read here is a profile. Nothing is simulated here: [`engine`](crate::engine) steps these definitions.
 
 pub mod case;
 #[macro_use]

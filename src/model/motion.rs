@@ -1,5 +1,5 @@
-//! How another vehicle moves: a pure function of the step index, in a fixed-size record over shared
-//! tables. No closure, no accumulation; every backend decodes it alike.
+//! How another vehicle moves: a pure function of the step index, in a fixed-size record over shared tables. It has no
+//! closure and no accumulation; every backend decodes it alike.
 
 use crate::model::scalar::Real;
 
@@ -15,7 +15,7 @@ pub enum Speed {
         /// End of the acceleration, s.
         until_s: f64,
     },
-    /// One value per step, m/s; the last one is held.
+    /// One value per step, m/s; the last is held.
     Sampled(Vec<f64>),
 }
 
@@ -26,11 +26,11 @@ impl Speed {
     }
 }
 
-/// Lateral position and speed as the host describes them. Positions are of the vehicle's centre
-/// relative to the middle of the ego's lane; the speed is counted **towards** the ego.
+/// Lateral position and speed as the host describes them. Positions are of the vehicle's centre relative to the middle
+/// of the ego's lane; the speed is positive **towards** the ego.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Lateral {
-    /// In the middle of the ego's lane all the time.
+    /// Always in the middle of the ego's lane.
     Centred,
     /// From `start_m` to `end_m` at constant speed, then held.
     Kinematic {
@@ -41,7 +41,7 @@ pub enum Lateral {
         /// Position that ends the motion, m.
         end_m: f64,
     },
-    /// One value per step; the last position is held and the lateral speed after it is 0.
+    /// One value per step; the last position is held and the lateral speed is then 0.
     Sampled {
         /// Position, m.
         position_m: Vec<f64>,
@@ -50,7 +50,7 @@ pub enum Lateral {
     },
 }
 
-/// Series that many lanes share.
+/// Series used by many lanes.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tables<R> {
     /// Speeds, m/s, one per step.
@@ -66,7 +66,7 @@ impl<R> Default for Tables<R> {
 }
 
 impl Tables<f64> {
-    /// The host's one rounding.
+    /// Rounds the series once to the lane arithmetic.
     pub fn cast<R: Real>(&self) -> Tables<R> {
         Tables {
             speed: self.speed.iter().map(|&v| R::from_f64(v)).collect(),
@@ -80,7 +80,7 @@ pub const SPEED_SAMPLED: u32 = 1;
 /// [`Motion::kind`] bit: the lateral motion is a table.
 pub const LATERAL_SAMPLED: u32 = 2;
 
-/// The record a lane decodes. 64 bytes in f32.
+/// The motion record that a lane decodes; 64 bytes in f32.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion<R> {
@@ -207,7 +207,7 @@ impl Motion<f64> {
                 motion.lateral_per_step = rate_mps * dt_s;
                 motion.lateral_until = last_step_before(duration_s, dt_s);
                 motion.lateral_end = *end_m;
-                // Towards the ego is towards y = 0.
+                // A lateral motion towards the ego leads towards y = 0.
                 motion.lateral_towards = if start_m.abs() > end_m.abs() { rate_mps.abs() } else { -rate_mps.abs() };
                 if duration_s <= 0.0 {
                     motion.lateral_initial = *end_m;
@@ -225,7 +225,7 @@ impl Motion<f64> {
         motion
     }
 
-    /// The host's one rounding.
+    /// Rounds the record once to the lane arithmetic.
     pub fn cast<R: Real>(&self) -> Motion<R> {
         Motion {
             kind: self.kind,
@@ -247,8 +247,8 @@ impl Motion<f64> {
     }
 }
 
-/// Last step that lies strictly before a time (0 where there is none): at the end itself the end value
-/// holds, and the lateral speed is 0 because the change is over.
+/// Last step strictly before a time, 0 if there is none. At the end time itself the end value applies and the lateral
+/// speed is 0, because the change is over.
 fn last_step_before(time_s: f64, dt_s: f64) -> u32 {
     let steps = (time_s / dt_s - 1e-9).ceil() - 1.0;
     if steps < 0.0 { 0 } else { steps as u32 }

@@ -1,6 +1,6 @@
 //! Profiles: every constant and every named option of models, criteria and frame as data (TOML).
 //!
-//! A profile is resolved at a time step into plain constants; nothing below it knows strings.
+//! A profile is resolved at a time step into plain constants; the code that uses them knows no strings.
 
 use std::path::Path;
 
@@ -13,27 +13,27 @@ use crate::support::plain_text::nearest;
 use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
-/// Steps of a run at most.
+/// Maximum number of steps of a run.
 pub(crate) const MAX_STEPS: f64 = 4e6;
 
-/// Which vehicles the ego's driver heeds in a cut-out.
+/// Which vehicles the ego's driver reacts to in a cut-out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CutOutTarget {
-    /// Both vehicles are checked each step; the nearest unsafe one drives the reaction.
+    /// Both vehicles are checked at each step; the driver reacts to the nearest unsafe one.
     NearestUnsafe,
-    /// Nothing until the cutting-out centre is more than 0.375 m off, then the vehicle ahead alone; a
-    /// cutting-out vehicle that hits it freezes there and becomes the target (the JRC's simulator).
+    /// No vehicle until the centre of the cutting-out vehicle is more than 0.375 m from the lane centre, then only the
+    /// vehicle ahead. A cutting-out vehicle that hits it stops there and becomes the target (the JRC's simulator).
     Exposed,
 }
 
-/// Which vehicles the criteria judge in a cut-out.
+/// Which vehicles the criteria evaluate in a cut-out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CutOutJudged {
-    /// Every other vehicle; the worst counts (the paper's words on criteria).
+    /// Every other vehicle; the worst value counts (the paper's definition).
     Every,
-    /// The vehicle ahead only: contacts with the cutting-out one and its TTC and BTN are ignored.
+    /// Only the vehicle ahead: contacts, TTC and BTN of the cutting-out vehicle are ignored.
     Ahead,
 }
 
@@ -43,41 +43,41 @@ pub enum CutOutJudged {
 pub struct FrameProfile {
     /// Time step, s.
     pub dt_s: f64,
-    /// A run ends here at the latest, s.
+    /// Maximum duration of a run, s.
     pub time_cap_s: f64,
     /// Positions are cumulative sums: index 0 is one step after the nominal start.
     pub start_shift: bool,
-    /// Runs stop where nothing can happen any more; otherwise they go on to the cap.
+    /// Whether a run ends once it has settled; otherwise it lasts to the cap.
     pub end_when_settled: bool,
-    /// Whom the driver heeds in a cut-out.
+    /// Which vehicles the driver reacts to in a cut-out.
     pub cut_out_target: CutOutTarget,
-    /// Whom the criteria judge in a cut-out.
+    /// Which vehicles the criteria evaluate in a cut-out.
     pub cut_out_judged: CutOutJudged,
     /// Exposure threshold of `exposed`, m.
     pub exposure_m: f64,
-    /// Length of vehicles without a size, m.
+    /// Length of vehicles whose size is unknown, m.
     pub default_length_m: f64,
-    /// Width of vehicles without a size, m.
+    /// Width of vehicles whose size is unknown, m.
     pub default_width_m: f64,
 }
 
 impl FrameProfile {
-    /// Steps that a run evaluates at most: indices 0 … cap/dt − 1.
+    /// Maximum number of steps that a run evaluates: indices 0 … cap/dt − 1.
     pub fn step_cap(&self) -> u32 {
         (self.time_cap_s / self.dt_s - 1e-9).ceil() as u32
     }
 }
 
-/// Makes [`Profile`] with one table per driver model of the registry.
+/// Declares [`Profile`] with one table per driver model of the registry.
 macro_rules! declare_profile {
     ($($(#[$attribute:meta])* $file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
-        /// A profile: everything that the lanes' physics takes from outside the cases.
+        /// A profile: all parameters of the lanes' physics that are not part of a case.
         #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
         #[serde(deny_unknown_fields)]
         pub struct Profile {
             /// Name.
             pub name: String,
-            /// One sentence.
+            /// Description in one sentence.
             pub description: String,
             /// Time and geometry.
             pub frame: FrameProfile,
@@ -91,7 +91,7 @@ macro_rules! declare_profile {
         }
 
         impl Profile {
-            /// The numbers of every driver model: key, value, range.
+            /// The numeric constants of every driver model: key, value, range.
             fn driver_bounds(&self) -> Vec<(String, f64, Bound)> {
                 let mut all = Vec::new();
                 $(
@@ -101,7 +101,7 @@ macro_rules! declare_profile {
                 all
             }
 
-            /// What bounds the time step of these driver models: key, longest step, s.
+            /// Bounds of the time step for these driver models: key, maximum step, s.
             fn driver_time_step_bounds(&self, models: &[ModelId]) -> Vec<(String, f64)> {
                 let mut all = Vec::new();
                 $(
@@ -133,12 +133,12 @@ impl Profile {
         BUILT_IN.iter().map(|(name, _)| *name)
     }
 
-    /// The files of those profiles, in the same order.
+    /// The files of the shipped profiles, in the same order.
     pub(crate) fn files() -> impl Iterator<Item = &'static str> {
         BUILT_IN.iter().map(|(_, text)| *text)
     }
 
-    /// A profile by name, or from a TOML file where the text is a path.
+    /// Loads a profile by name, or from a TOML file if the text is a path.
     pub fn load(name_or_path: &str) -> Result<Profile> {
         if let Some((name, text)) = BUILT_IN.iter().find(|(name, _)| *name == name_or_path) {
             return Profile::parse(text, &Place::item(format!("built-in profile {name}")));
@@ -157,7 +157,7 @@ impl Profile {
         }
         let text = input_file::read_text(path, input_file::MAX_SETTINGS_BYTES)?;
         let mut profile = Profile::parse(&text, &Place::file(path))?;
-        // Other numbers must not pass for those of the profile that was copied.
+        // A profile with changed numbers must not keep the name of a shipped profile.
         let built_in = BUILT_IN.iter().find(|(name, _)| *name == profile.name);
         if let Some((name, text)) = built_in
             && Profile::parse(text, &Place::item(format!("built-in profile {name}")))? != profile
@@ -174,7 +174,7 @@ impl Profile {
         Ok(profile)
     }
 
-    /// Every constant that is a number: key, value, range.
+    /// Every numeric constant: key, value, range.
     pub(crate) fn bounds(&self) -> Vec<(String, f64, Bound)> {
         let (frame, criteria) = (&self.frame, &self.criteria);
         let own = [
@@ -192,7 +192,7 @@ impl Profile {
         own.chain(self.driver_bounds()).collect()
     }
 
-    /// Every constant must be finite and in its range; `place` names the profile in the error.
+    /// Checks that every constant is finite and in its range; `place` names the profile in the error.
     pub fn check(&self, place: &Place) -> Result<()> {
         let bad = self.bounds().into_iter().find(|(_, value, bound)| !bound.holds(*value));
         if let Some((key, value, expected)) = bad {
@@ -216,11 +216,11 @@ impl Profile {
         Ok(())
     }
 
-    /// Is the time step short enough for these drivers and the TTC threshold? Derivation: docs/src/methods/lane.md, time
-    /// step.
+    /// Checks that the time step is short enough for these drivers and the TTC threshold. Derivation:
+    /// docs/src/methods/lane.md, time step.
     ///
     /// # Errors
-    /// [`Error::Usage`] with the longest time step and the key that bounds it.
+    /// [`Error::Usage`] with the maximum time step and the key that bounds it.
     pub fn check_time_step(&self, models: &[ModelId]) -> Result<()> {
         let threshold_s = self.criteria.ttc_threshold_s.max(driver::SHORT_STEP_S);
         let mut bounds = self.driver_time_step_bounds(models);
@@ -249,7 +249,7 @@ impl Profile {
         Ok(self)
     }
 
-    /// Steps that a run evaluates at most.
+    /// Maximum number of steps that a run evaluates.
     pub fn step_cap(&self) -> u32 {
         self.frame.step_cap()
     }
@@ -290,7 +290,7 @@ mod tests {
         assert!(error.help().unwrap().contains("did you mean `paper`"), "{error:?}");
     }
 
-    /// The numbers below a table, with their keys.
+    /// Passes the keys of all numbers in a table to `each`.
     fn numbers(value: &Value, key: &str, each: &mut dyn FnMut(&str)) {
         match value {
             Value::Object(fields) => fields.iter().for_each(|(name, inner)| {
@@ -317,7 +317,7 @@ mod tests {
         assert!(chapter.contains(&rows.concat()), "the chapter needs these rows:\n{}", rows.concat());
     }
 
-    /// Ends of the ranges, 0 where it is allowed, and numbers between, in every mixture.
+    /// Random profiles of range limits, 0 where allowed, and numbers between.
     #[test]
     fn a_profile_that_passes_gives_finite_normal_numbers_in_binary32() {
         let paper = Profile::load("paper").unwrap();
@@ -343,7 +343,7 @@ mod tests {
             }
             let profile: Profile = serde_json::from_value(value.clone()).unwrap();
             if profile.check(&Place::item("drawn")).is_err() {
-                // Too many steps.
+                // More steps than [`MAX_STEPS`].
                 continue;
             }
             passed += 1;
@@ -360,7 +360,7 @@ mod tests {
         assert!(passed > 1000, "{passed}");
     }
 
-    /// Key, value and range of what binary32 has no normal number for.
+    /// Keys, values and ranges whose results are not normal numbers in binary32.
     #[test]
     fn constants_outside_binary32_are_refused_by_key() {
         for (key, value) in [
@@ -394,8 +394,8 @@ mod tests {
         }
     }
 
-    /// Steps up to that of the reference simulators are allowed whatever the delays; beyond it the error says which
-    /// model bounds the step, and how long it may be.
+    /// Time steps up to that of the reference simulators are allowed for every delay. Beyond it the error names the
+    /// model that bounds the step and the maximum step.
     #[test]
     fn a_time_step_too_long_for_a_driver_is_refused_with_the_longest_that_is_allowed() {
         let check = |name: &str, dt_s: f64, models: &[ModelId]| {
@@ -405,14 +405,14 @@ mod tests {
             assert!(check(name, 0.1, &ModelId::ALL).is_ok(), "{name}");
             let error = check(name, 0.101, &ModelId::ALL).unwrap_err();
             let says = format!("{error} {}", error.help().unwrap());
-            // The short reaction times of EU 2022/1426 allow no longer step themselves.
+            // The short reaction times of EU 2022/1426 bound the step themselves.
             let key = if name.starts_with("eu-") { "reg157.reaction_time_s" } else { "reg157.margin_s" };
             assert!(says.contains(key) && says.contains("at most 0.1 s"), "{name}: {says}");
             assert!(check(name, 0.25, &[ModelId::Rss, ModelId::Fsm]).is_ok(), "{name}");
             assert!(check(name, 0.251, &[ModelId::Fsm]).is_err(), "{name}");
         }
         assert!(check("paper", 0.2, &[ModelId::Cchdm]).is_ok());
-        // Reg157's 0.35 s are rounded up to 0.425 s; half a step more is beyond its margin of 0.1 s.
+        // Reg157's 0.35 s are rounded up to 0.425 s; with half a step more this exceeds its margin of 0.1 s.
         let error = check("paper", 0.085, &[ModelId::Reg157]).unwrap_err().to_string();
         assert!(error.contains("reg157.margin_s") && error.contains("0.07 s"), "{error}");
         for dt_s in [0.001, 0.01, 0.02, 0.033, 0.04, 0.05, 0.066, 0.07, 0.08, 0.0875, 0.09, 0.1] {

@@ -1,16 +1,16 @@
-//! The number a lane computes with: f64 (the reference) and f32 (the lane arithmetic of every backend).
+//! The number type of a lane: f64 (the reference) and f32 (the lane arithmetic of every backend).
 //!
-//! Lane arithmetic: IEEE binary, round to nearest even, in the written order; no fused multiply-add, no
-//! root, no transcendental, and one division, [`Real::exact_div`], which every backend rounds correctly.
+//! Lane arithmetic: IEEE binary, round to nearest even, in the written order; no fused multiply-add, no root, no
+//! transcendental function. Its only division is [`Real::exact_div`], which every backend rounds correctly.
 //!
-//! Comparisons are sign bits ([`Flag`]), for numbers that are finite and not -0. Inputs lose that sign when they are
-//! rounded, and no sum, difference or magnitude of such numbers is -0; a product or a negated number may be, and is
-//! compared only where another condition excludes it.
+//! Comparisons are sign bits ([`Flag`]) of numbers that are finite and not -0. Rounding an input turns -0 into 0, and
+//! no sum, difference or magnitude of such numbers is -0. A product or a negated number may be -0, and is compared only
+//! where another condition excludes it.
 //!
-//! [`Flag`] is the truth value of the lane arithmetic, the sign bit of a word. A step of a lane has no branches, so
-//! that it can run for many lanes side by side. Its comparisons end in sign bits and are combined by the vector units'
-//! plain word operations; as `bool`s, a compiler would keep them in AVX-512's mask registers, whose operations are a
-//! quarter to a half as fast on Zen 5.
+//! [`Flag`] is the truth value of the lane arithmetic: the sign bit of a word. A step of a lane has no branches, so
+//! that many lanes can run side by side. Flags are combined by the vector units' plain word operations. As `bool`s, a
+//! compiler would keep them in AVX-512's mask registers, whose operations have a quarter to half of the throughput on
+//! Zen 5.
 
 use std::fmt::Debug;
 use std::ops::{Add, BitAnd, BitOr, Mul, Neg, Not, Sub};
@@ -32,10 +32,10 @@ pub trait Real:
     const ZERO: Self;
     /// 1.
     const ONE: Self;
-    /// +∞: "did not happen" of a minimum, "cannot be avoided" of a Brake Threat Number.
+    /// +∞: "did not happen" for a minimum, "cannot be avoided" for a Brake Threat Number.
     const INFINITY: Self;
 
-    /// The host's one rounding of an input; -0 becomes 0.
+    /// Rounds an input once; -0 becomes 0.
     fn from_f64(value: f64) -> Self;
     /// Exact widening for reports.
     fn to_f64(self) -> f64;
@@ -43,7 +43,7 @@ pub trait Real:
     fn from_step(step: u32) -> Self;
     /// Correctly rounded quotient: the only division of the lane arithmetic.
     fn exact_div(self, divisor: Self) -> Self;
-    /// Whole steps below a number in [0, 2²⁴): exact.
+    /// Number of whole steps below a number in [0, 2²⁴): exact.
     fn floor_to_step(self) -> u32;
 
     /// x < 0.
@@ -79,13 +79,13 @@ pub trait Real:
         if self < Self::ZERO { -self } else { self }
     }
 
-    /// The larger; the second where they are equal.
+    /// The larger value; the second if they are equal.
     #[inline(always)]
     fn larger(self, other: Self) -> Self {
         if self > other { self } else { other }
     }
 
-    /// The smaller; the second where they are equal.
+    /// The smaller value; the second if they are equal.
     #[inline(always)]
     fn smaller(self, other: Self) -> Self {
         if self < other { self } else { other }
@@ -142,24 +142,25 @@ macro_rules! real_float {
 real_float!(
     f32,
     |x: f32| Flag::from_bits(x.to_bits()),
-    // The bits of numbers are in the order of the numbers: negated as whole numbers, those above 0 get a sign.
+    // The bits of positive floats compare like integers: negating them as integers sets the sign bit where the value is
+    // above 0.
     |x: f32| Flag::from_bits(0_u32.wrapping_sub(x.to_bits())),
-    // A difference has a sign exactly where the first is less.
+    // The difference is negative exactly where the first is less.
     |a: f32, b: f32| Flag::from_bits((a - b).to_bits())
 );
 real_float!(f64, |x| Flag::of(x < 0.0), |x| Flag::of(x > 0.0), |a, b| Flag::of(a < b));
 
-/// True or false. Unlike `bool`, both sides of `&` and `|` are always worked out.
+/// True or false. Unlike with `bool`, both sides of `&` and `|` are always evaluated.
 #[derive(Debug, Clone, Copy)]
 #[repr(transparent)]
 pub struct Flag(i32);
 
 impl Flag {
-    /// Holds.
+    /// True.
     pub const TRUE: Flag = Flag(-1);
-    /// Does not hold.
+    /// False.
     pub const FALSE: Flag = Flag(0);
-    /// Largest step that [`Flag::reached`] knows; beyond every lane's cap.
+    /// Largest step that [`Flag::reached`] accepts; above every lane's cap.
     pub const LATEST_STEP: u32 = i32::MAX as u32;
 
     /// From a `bool`.
@@ -168,13 +169,13 @@ impl Flag {
         Flag(-i32::from(holds))
     }
 
-    /// The sign bit of these bits.
+    /// From the sign bit of a word.
     #[inline(always)]
     pub(crate) fn from_bits(bits: u32) -> Flag {
         Flag(bits as i32)
     }
 
-    /// A word whose sign bit it is.
+    /// A word whose sign bit is the flag.
     #[inline(always)]
     pub(crate) fn to_bits(self) -> u32 {
         self.0 as u32
@@ -186,7 +187,7 @@ impl Flag {
         !Flag((index as i32).wrapping_sub(step as i32))
     }
 
-    /// As a `bool`.
+    /// Converts to `bool`.
     #[inline(always)]
     pub fn holds(self) -> bool {
         self.0 < 0
@@ -198,7 +199,7 @@ impl Flag {
         if self.holds() { where_it_holds } else { otherwise }
     }
 
-    /// 1 where it holds, else 0.
+    /// 1 if true, else 0.
     #[inline(always)]
     pub fn one(self) -> u32 {
         self.0 as u32 >> 31

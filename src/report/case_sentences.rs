@@ -1,4 +1,4 @@
-//! The sentences that lead a sheet: the case and its reading, the answer, what the clauses of cut-ins demand.
+//! The leading sentences of a sheet: the case and its reading, the answer, and the demands of the cut-in clauses.
 
 use super::case_sheet::{CaseSheet, KMH};
 use crate::model::driver::ModelId;
@@ -6,11 +6,11 @@ use crate::run::check::{Answer, Judgement, REFERENCE_DRIVERS, Verdict};
 use crate::run::grid::{MapQuantity, PARAMETERS};
 use crate::support::readable::value;
 
-/// What a robust verdict survives.
+/// Perturbations that a robust verdict survives.
 pub(super) const VARIED: &str = "a tenth of the time step, 1 cm of gap, 0.1 km/h of a speed";
 
 impl CaseSheet<'_> {
-    /// The case in one line, with the reading that decides: speeds along the road in km/h, all else in SI units.
+    /// The case in one line, with the deciding reading: speeds along the road in km/h, other values in SI units.
     pub fn case(&self) -> String {
         let point = self.subject.point();
         let kmh = |name: &str, mps: f64| format!("{name} {} km/h", value(mps * KMH));
@@ -38,7 +38,7 @@ impl CaseSheet<'_> {
         format!("{reading}: {}", parts.collect::<Vec<_>>().join(", "))
     }
 
-    /// The answer in one sentence; "robust" stands only where it holds for every verdict that is named.
+    /// The answer in one sentence; "robust" is used only if it holds for every verdict named.
     pub fn answer(&self) -> String {
         let first = self.first();
         let names = |list: &[ModelId]| list.iter().map(|m| m.name()).collect::<Vec<_>>().join(" and ");
@@ -78,7 +78,7 @@ impl CaseSheet<'_> {
         format!("{}: {drivers} ({robustness})", first.verdict().label())
     }
 
-    /// Readings where the regulation is silent, of which another one changes the answer.
+    /// Readings for which the regulation is silent and another choice changes the answer.
     pub fn silent(&self) -> Vec<String> {
         self.first()
             .silent
@@ -87,7 +87,7 @@ impl CaseSheet<'_> {
             .collect()
     }
 
-    /// What the clauses of cut-ins demand of the system, each clause once, and where that of the first profile and the
+    /// What the cut-in clauses demand of the system, each clause once, and where the first profile's clause and the
     /// drivers disagree.
     pub fn demand(&self) -> Vec<String> {
         let mut sentences = self.demand_of_first();
@@ -105,7 +105,7 @@ impl CaseSheet<'_> {
         let first = self.first();
         let (Some(is_demanded), Some(demand)) = (first.is_demanded(), demand_of(first)) else { return Vec::new() };
         let (mut sentences, clause) = (vec![demand], &first.clause);
-        // What rounding decides is no disagreement.
+        // A verdict decided by rounding is not a disagreement.
         if !first.demand_flips.is_empty() || first.verdict() == Verdict::Undecided {
             return sentences;
         }
@@ -131,7 +131,7 @@ impl CaseSheet<'_> {
     }
 }
 
-/// What the clause of a profile demands, where it says something of this kind of scenario.
+/// What the clause of a profile demands; `None` if it does not cover this kind of scenario.
 fn demand_of(judgement: &Judgement) -> Option<String> {
     let clause = &judgement.clause;
     let unmet = judgement.unmet().map(|reading| {

@@ -1,5 +1,5 @@
-//! The sheet of one case against the regulation: the answer first, then the drivers, the clauses and the distance to the
-//! boundary; as text, as JSON and as a page to print.
+//! The sheet of one case against the regulation: the answer, the drivers, the clauses and the distance to the boundary;
+//! as text, as JSON and as a page to print.
 
 use serde_json::{Value, json};
 
@@ -16,26 +16,26 @@ use crate::support::readable::value;
 use crate::support::table::{Column, NumberText, Table};
 use crate::{Error, Result};
 
-/// Metres per second in kilometres per hour.
+/// Kilometres per hour in one metre per second.
 pub(super) const KMH: f64 = 3.6;
-/// What the columns of the drivers are.
+/// What the columns of the drivers show.
 const DRIVERS: &str = "Drivers; smallest gap and TTC, largest BTN. At a contact: rear-end where the ego's front hits, side where \
                        the other vehicle hits the ego's side or rear; closing is the ego's speed minus the other's. A row that \
                        equals that of a profile above is left out";
 
-/// A checked case with what has to be said of it.
+/// A checked case with the facts that its sheet states.
 pub struct CaseSheet<'a> {
     /// The case.
     pub subject: &'a Subject,
-    /// Where it comes from, in a few words.
+    /// Its source, in a few words.
     pub origin: String,
-    /// The data are the program's own.
+    /// Whether the data are synthetic.
     pub is_synthetic: bool,
     /// The profiles, in the order of the judgements.
     pub profiles: &'a [Profile],
-    /// One per profile; the first one decides. At least one.
+    /// One judgement per profile, at least one; the first decides.
     pub judgements: &'a [Judgement],
-    /// Command that makes the sheet again.
+    /// Command that reproduces the sheet.
     pub command: String,
 }
 
@@ -112,7 +112,7 @@ impl CaseSheet<'_> {
     fn clauses(&self) -> Table {
         let mut readings: Vec<&Reading> = self.first().readings.iter().collect();
         let own = readings.len();
-        // Of another clause, the conditions that differ.
+        // For other clauses, only the conditions that differ.
         let mut clauses = vec![&self.first().clause];
         for judgement in &self.judgements[1..] {
             if !clauses.contains(&&judgement.clause) {
@@ -179,7 +179,7 @@ impl CaseSheet<'_> {
     /// The sheet as one document.
     ///
     /// # Errors
-    /// None for what this program made.
+    /// None for a sheet of this program.
     pub fn json(&self) -> Result<String> {
         let judgement = |(judgement, profile): (&Judgement, &Profile)| {
             let models = judgement.models.iter().map(|judged| {
@@ -245,7 +245,7 @@ impl CaseSheet<'_> {
         }))
     }
 
-    /// The course of the case under the first profile, as a figure.
+    /// The figure of the case under the first profile, step by step.
     pub fn figure(&self) -> String {
         let first = self.first();
         let series = first
@@ -259,7 +259,7 @@ impl CaseSheet<'_> {
     /// The sheet as a page.
     ///
     /// # Errors
-    /// [`Error::Internal`] where the template does not fit: a defect of this program.
+    /// [`Error::Internal`] if the template does not match: a defect of this program.
     pub fn html(&self) -> Result<String> {
         let first = self.first();
         let mut warnings = Vec::new();
@@ -333,8 +333,8 @@ impl CaseSheet<'_> {
     }
 }
 
-/// Leaves out rows from `first` on that people read as one above but for their first cell: profiles share most drivers,
-/// clauses most conditions.
+/// Removes rows from index `first` on that repeat an earlier row except for the first cell: profiles have most drivers
+/// in common, clauses most conditions.
 fn without_repeats(mut table: Table, first: usize) -> Table {
     let (_, shown) = table.shown();
     let is_new = |at: usize| at < first || shown[..at].iter().all(|known| known[1..] != shown[at][1..]);
@@ -356,7 +356,7 @@ fn change(change: &Change) -> String {
     }
 }
 
-/// Where the answer changes, and what it becomes.
+/// The boundary at which the answer changes, and the new answer.
 fn becomes(boundary: &Boundary) -> String {
     let ends = [boundary.answer.below, boundary.answer.above].into_iter().zip(boundary.becomes);
     let named = ends.filter_map(|(at, answer)| Some(format!("{}: {}", value(at?), answer?.label())));

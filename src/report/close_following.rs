@@ -1,4 +1,4 @@
-//! Which failures come from headways below 0.5 s, as a table that study, comparison and sampling share.
+//! Which failures come from headways below 0.5 s: a table used by study, comparison and sampling.
 
 use super::tables::wrap;
 use crate::engine::{CLOSE_HEADWAY_S, Headway};
@@ -16,9 +16,8 @@ pub(super) struct CloseRow<'a> {
     pub close: &'a CloseFollowing,
 }
 
-/// The sentence that says what was counted, then a row per category and criterion where there is such a headway; empty
-/// without counts. `of_whom` says
-/// whose failures these are.
+/// A sentence about what is counted, then a row per category and criterion with such a headway; empty without counts.
+/// `of_whom` says whose failures these are.
 pub(super) fn close_following(rows: &[CloseRow], of_whom: &str, headways: &[Headway], width: usize) -> String {
     let Some(first) = rows.first() else { return String::new() };
     let cells = rows.iter().flat_map(|row| Criterion::ALL.map(|criterion| (row, criterion)));

@@ -1,4 +1,4 @@
-//! A comparison of rates of failure as text and as files.
+//! A comparison of failure rates as text and files.
 
 use serde::Serialize;
 use std::fmt::Write;
@@ -33,11 +33,11 @@ pub struct CompareFile {
     pub program: String,
     /// The data in one line; synthetic data say so.
     pub data: String,
-    /// Nothing here was measured on real traffic.
+    /// True if the data are synthetic: no statement about real traffic.
     pub synthetic: bool,
     /// SHA-256 of the scenarios as a scenario file.
     pub scenarios_sha256: String,
-    /// What was driven, where it is known.
+    /// Driven time and distance, if known.
     pub driven: Option<Driven>,
     /// Profile.
     pub profile: String,
@@ -45,17 +45,17 @@ pub struct CompareFile {
     pub models: Vec<ModelId>,
     /// Headways.
     pub headways: Vec<String>,
-    /// Samples of each density.
+    /// Samples per density.
     pub samples: u64,
     /// Seed of the draws.
     pub seed: u64,
-    /// Level of the intervals.
+    /// Confidence level of the intervals.
     pub level: f64,
-    /// Failures that a paired ratio needs on each side.
+    /// Minimum number of failures for a paired ratio, on each side.
     pub enough: Enough,
     /// Hash of the plan of S and S'.
     pub study_plan_sha256: String,
-    /// Recordings and parameterizations that were left out, and why.
+    /// Skipped recordings and parameterizations, with reasons.
     pub left_out: Vec<String>,
     /// Per category.
     pub categories: Vec<CategoryComparison>,
@@ -66,7 +66,7 @@ pub struct CompareFile {
 }
 
 impl CompareFile {
-    /// Of a comparison and its rates.
+    /// From a comparison and its rates.
     pub fn of(
         compare: &Compare,
         categories: Vec<CategoryComparison>,
@@ -96,7 +96,7 @@ impl CompareFile {
         }
     }
 
-    /// Puts tables, figures and page into their folder, the record last.
+    /// Writes tables, figures and page to their folder, the record last.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -117,10 +117,10 @@ impl CompareFile {
         results.publish(self.json()?.as_bytes())
     }
 
-    /// As JSON. What is not finite is null.
+    /// As JSON; NaN and infinity become null.
     ///
     /// # Errors
-    /// None for what this program made.
+    /// None for a record of this program.
     pub fn json(&self) -> Result<String> {
         let text = serde_json::to_string_pretty(self);
         text.map(|text| text + "\n").map_err(|e| Error::Internal(format!("a comparison cannot be written: {e}")))
@@ -176,8 +176,8 @@ impl CompareFile {
             .csv()
     }
 
-    /// The tables for the terminal, 120 columns wide at most; only an unbroken word of the data's description (a path)
-    /// can be longer.
+    /// The tables for the terminal, at most 120 columns wide; only a long word in the data's description (a path) can
+    /// exceed this.
     pub fn text(&self) -> String {
         let mut text = format!("{}\n\n{}\n", wrap(&self.data, WIDTH), self.rule());
         for category in &self.categories {
@@ -215,10 +215,10 @@ impl CompareFile {
         text
     }
 
-    /// The comparison as one page; the figures are made already.
+    /// The comparison as one page with these figures.
     ///
     /// # Errors
-    /// None for what this program makes.
+    /// None for a page of this program.
     pub fn html(&self, figures: Vec<PageFigure>) -> Result<String> {
         let mut warnings = Vec::new();
         if self.synthetic {
@@ -261,7 +261,7 @@ impl CompareFile {
         page.html()
     }
 
-    /// Scenarios start from their recorded gaps.
+    /// Whether scenarios start from their recorded gaps.
     fn is_observed(&self) -> bool {
         self.headways.iter().any(|text| Headway::parse(text) == Some(Headway::Observed))
     }
@@ -286,7 +286,7 @@ impl CompareFile {
         wrap(&text, WIDTH)
     }
 
-    /// One criterion: a row for S, its risk, and two per parameterization; a column per model.
+    /// The table of one criterion: a row for S, its risk, and two rows per parameterization; a column per model.
     fn block(&self, category: &CategoryComparison, criterion: Criterion) -> String {
         let recorded: Vec<&RecordedCell> = category.recorded.iter().filter(|c| c.criterion == criterion).collect();
         let rate = |r: &RateRecord| {
@@ -296,7 +296,7 @@ impl CompareFile {
         let mut rows: Vec<(String, Vec<String>)> =
             vec![("S".to_owned(), recorded.iter().map(|c| rate(&c.rate)).collect())];
         let risk = |r: RiskRate| match r.estimate {
-            // No failure is no proof of none.
+            // Without an observed failure the rate may still be above 0.
             e if e > 0.0 => format!("{} ± {}", short(e), short(r.standard_deviation)),
             _ => format!("≤ {}", short(r.high)),
         };
@@ -325,7 +325,7 @@ impl CompareFile {
 fn cell(rate: &RateRecord, ratio: &Ratio) -> String {
     let mark = ratio.verdict.mark();
     let Some(value) = ratio.ratio else {
-        // S never fails: only the lower end is a number.
+        // S never fails: only the lower end is finite.
         let low = ratio.low.filter(|low| *low > 0.0).map_or(String::new(), |low| format!("{}… ", factor(low)));
         return format!("{} {low}{mark}", short(rate.rate));
     };
@@ -337,7 +337,7 @@ fn cell(rate: &RateRecord, ratio: &Ratio) -> String {
     format!("{} {} {ends} {mark}", short(rate.rate), factor(value))
 }
 
-/// Per parameterization: labels (F1) beside verdicts on the rate.
+/// Per parameterization: F1 label and verdict on the rate.
 fn summary(category: &CategoryComparison) -> String {
     let marks: String = RatioVerdict::ALL.iter().map(|v| format!(" {}", v.mark())).collect();
     type Pick = fn(&ComparedCell) -> &Ratio;
@@ -370,7 +370,7 @@ fn range(low: f64, high: f64) -> String {
     format!("{}…{}", short(low), short(high))
 }
 
-/// A rate in six characters or so.
+/// A rate in about six characters.
 fn short(value: f64) -> String {
     readable::significant(value, if value.abs() < 1e-3 { 2 } else { 3 })
 }
@@ -385,12 +385,13 @@ fn factor(value: f64) -> String {
 }
 
 fn row(name: String, rate: &RateRecord) -> ForestRow {
-    // On a logarithmic axis a rate of 0 has no place, but the bound above it has.
+    // A logarithmic axis cannot show a rate of 0, but it can show the bound above it.
     let estimate = rate.rate.is_finite().then_some(rate.rate);
     ForestRow { name, estimate, lower: rate.low, upper: rate.high, ..ForestRow::default() }
 }
 
-/// One criterion of one category: a group per driver model, a row per density, the recorded scenarios as reference.
+/// The figure of one criterion of one category: a group per driver model, a row per density, the recorded scenarios as
+/// reference.
 pub fn rates(file: &CompareFile, comparison: &CategoryComparison, criterion: Criterion) -> ForestFigure {
     let recorded = comparison.recorded.iter().filter(|cell| cell.criterion == criterion);
     let groups = recorded.map(|cell| {

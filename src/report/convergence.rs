@@ -1,37 +1,37 @@
-//! How an estimate settles: failure probability with its interval over the number of samples, one panel per driver
+//! Convergence of an estimate: failure probability with its interval over the number of samples, one panel per driver
 //! model, all panels on the same axes.
 //!
-//! Both axes are logarithmic, because probabilities span decades. An estimate of zero has no place there: its
-//! interval's upper end is drawn instead, with an arrow downwards.
+//! Both axes are logarithmic, because probabilities span decades. They cannot show an estimate of zero: its interval's
+//! upper end is drawn instead, with an arrow downwards.
 
 use super::plot::{AxisScale, logarithmic_reach, number};
 use super::plot::{Ends, Figure, HOLLOW, Mark, Plot, PlotAxis, Series, Value, is_few};
 use crate::run::sampling::Checkpoint;
 use crate::stats::density::DensityModel;
 
-/// The estimate after so many samples.
+/// The estimate after a number of samples.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct ConvergencePoint {
     /// Samples so far, at least 1.
     pub samples: u64,
     /// Estimated probability, in 0..=1. Zero is drawn as the upper limit.
     pub probability: f64,
-    /// Lower end of the interval, finite; below zero it counts as zero.
+    /// Lower end of the interval, finite; a value below 0 is treated as 0.
     pub lower: f64,
-    /// Upper end of the interval, finite, not below `lower`; above one it counts as one.
+    /// Upper end of the interval, finite, not below `lower`; a value above 1 is treated as 1.
     pub upper: f64,
-    /// Ends of the interval that covers what other scenarios would change too; where it is known.
+    /// Ends of the interval that also covers the sampling of scenarios, if known.
     pub outer: Option<(f64, f64)>,
-    /// Scenarios that failures come from, where it is known.
+    /// Number of scenarios with failures, if known.
     pub failing_scenarios: Option<f64>,
 }
 
-/// One line: the estimates of one quantity in the order of their samples (sorted for drawing).
+/// One line: the estimates of one quantity in the order of their samples (sorted before drawing).
 #[derive(Debug, Clone, PartialEq)]
 pub struct ConvergenceSeries {
-    /// Heading of the panel the line is in, such as the driver model; series with the same words share the panel.
+    /// Heading of its panel, such as the driver model; series with the same heading are in the same panel.
     pub panel: String,
-    /// Name in the legend, such as the criterion; the same name looks the same in every panel.
+    /// Name in the legend, such as the criterion; the same name has the same look in every panel.
     pub name: String,
     /// The estimates.
     pub points: Vec<ConvergencePoint>,
@@ -44,14 +44,14 @@ pub struct ConvergenceFigure {
     pub title: String,
     /// Line below the heading (what was sampled, which interval); wrapped when long.
     pub subtitle: Option<String>,
-    /// Coverage of the intervals, 0 to 1.
+    /// Confidence level of the intervals, 0 to 1.
     pub level: f64,
     /// The lines; panels and legend in the order of first appearance.
     pub series: Vec<ConvergenceSeries>,
 }
 
 impl ConvergencePoint {
-    /// Why the point cannot be drawn, if so.
+    /// Why the point cannot be drawn; `None` if it can.
     fn refusal(&self) -> Option<&'static str> {
         let numbers = [self.probability, self.lower, self.upper];
         if self.samples == 0 {
@@ -70,14 +70,14 @@ impl ConvergencePoint {
     }
 }
 
-/// What was sampled, for the line below a heading.
+/// The sampled density, for the line below a heading.
 pub(super) fn sampled(density: &DensityModel) -> String {
     let id = density.space.id();
     format!("{} {} · {}", id.category.label(), id.key, density.provenance.data)
 }
 
 impl ConvergenceFigure {
-    /// Probability over samples of a sampling run, one panel per driver model.
+    /// Failure probability over the samples of a sampling run, one panel per driver model.
     pub fn of(density: &DensityModel, checkpoints: &[Checkpoint], level: f64) -> ConvergenceFigure {
         let mut series: Vec<ConvergenceSeries> = Vec::new();
         for checkpoint in checkpoints {
@@ -105,12 +105,12 @@ impl ConvergenceFigure {
         ConvergenceFigure { title, subtitle: Some(sampled(density)), level, series }
     }
 
-    /// The figure. A point that is no estimate (not finite, no probability, no samples, interval upside down, zero
-    /// without an upper limit) is not drawn but counted in a note.
+    /// The figure. Invalid points (not finite, not a probability, no samples, swapped interval ends, zero without an
+    /// upper limit) are not drawn but counted in a note.
     pub fn figure(&self) -> Figure {
         let drawn: Vec<Vec<ConvergencePoint>> = self.series.iter().map(drawable).collect();
         let is_empty = drawn.iter().all(Vec::is_empty);
-        // The same for all, so that plots can be compared.
+        // The same axes for all panels, so that they can be compared.
         let points = || drawn.iter().flatten();
         let samples = points().map(|p| p.samples as f64).collect();
         let widest =
@@ -142,7 +142,7 @@ impl ConvergenceFigure {
         }
     }
 
-    /// What the marks mean, as far as they occur.
+    /// Explains the marks that occur.
     fn caption(&self, drawn: &[Vec<ConvergencePoint>]) -> String {
         let level = 100.0 * self.level;
         let mut words = format!(
@@ -170,7 +170,7 @@ impl ConvergenceFigure {
         words
     }
 
-    /// Per series and reason, how many points are not drawn.
+    /// Per series and reason, the number of points not drawn.
     fn refused(&self) -> Vec<String> {
         let mut lines = Vec::new();
         for series in &self.series {
@@ -199,7 +199,7 @@ impl ConvergenceSeries {
             Value { x, y, interval: Some((p.lower, p.upper)), outer: p.outer, is_few, tip, ..Value::default() }
         };
         let mut values: Vec<Value> = points.iter().map(value).collect();
-        // The number at every look would cover the line.
+        // A number at every point would cover the line.
         if let Some((value, p)) = values.last_mut().zip(points.last()).filter(|(value, _)| value.is_few) {
             value.label = p.failing_scenarios.map_or(String::new(), |n| format!("{n:.0}"));
         }

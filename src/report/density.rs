@@ -8,7 +8,7 @@ use crate::stats::density::{
 use crate::support::readable::{count, count_of, significant};
 use crate::support::table::{Column, Digits, Table};
 
-/// Everything of one density but its kernels.
+/// One density without its kernels.
 pub fn text(model: &DensityModel) -> String {
     let id = model.space.id();
     let provenance = &model.provenance;
@@ -57,7 +57,7 @@ pub fn text(model: &DensityModel) -> String {
     text
 }
 
-/// The same as [`text`], as JSON; what is not known is null.
+/// The same as [`text`], as JSON; unknown values are null.
 pub fn record(model: &DensityModel) -> serde_json::Value {
     let id = model.space.id();
     let provenance = &model.provenance;
@@ -94,7 +94,7 @@ fn parameters(model: &DensityModel) -> Table {
         .build()
 }
 
-/// Which fraction of the draws every bound refuses.
+/// Fraction of the draws that each bound rejects.
 fn refused(valid: &ValidShare) -> String {
     let of = |refused: &Refused| {
         let percent = 100.0 * refused.draws as f64 / valid.draws as f64;

@@ -1,4 +1,4 @@
-//! The dossier of a parameterization as one page: the conclusion first, then what it rests on.
+//! The dossier of a parameterization as one page: the conclusion, then the evidence.
 
 use serde_json::json;
 
@@ -16,12 +16,12 @@ use crate::support::run_dir::Results;
 use crate::support::table::{Column, NumberText, Table};
 use crate::traffic::DataProvenance;
 
-/// Hidden failures on the page at most; `hidden.csv` has all.
+/// Maximum number of hidden failures on the page; `hidden.csv` has all.
 pub(super) const SHOWN: usize = 20;
 
-/// A dossier with what has to be said of it.
+/// A dossier with the facts that its page states.
 pub struct DossierReport<'a> {
-    /// What it says.
+    /// The dossier.
     pub dossier: &'a Dossier,
     /// The rules.
     pub rules: &'a Rules,
@@ -29,24 +29,24 @@ pub struct DossierReport<'a> {
     pub margin: f64,
     /// Confidence of the intervals.
     pub confidence: f64,
-    /// What the scenarios are of.
+    /// Provenance of the scenarios.
     pub provenance: &'a DataProvenance,
     /// Profile.
     pub profile: &'a Profile,
-    /// Conformance tables of this category and profile that ship with the program: what, rows, passes.
+    /// Shipped conformance tables of this category and profile: name, rows, whether they pass.
     pub conformance: Vec<(String, u64, bool)>,
-    /// Who answers for it, where that is given.
+    /// The person responsible, if given.
     pub author: Option<String>,
-    /// Its date as given: the program writes none of its own, so that the same inputs give the same bytes.
+    /// Date as given. The program adds no date, so that the same inputs give the same bytes.
     pub date: Option<String>,
-    /// Command that makes it again.
+    /// Command that reproduces it.
     pub command: String,
-    /// What belongs to the machine.
+    /// Facts about the machine.
     pub host: HostRecord,
 }
 
 impl DossierReport<'_> {
-    /// Puts page, table and figure into their folder, the record last; returns the names of the files beside it.
+    /// Writes page, table and figure to their folder, the record last; returns the names of the other files.
     ///
     /// # Errors
     /// [`crate::Error::Io`].

@@ -10,7 +10,7 @@ impl DossierReport<'_> {
     /// The dossier as a page.
     ///
     /// # Errors
-    /// [`Error::Internal`] where the template does not fit: a defect of this program.
+    /// [`Error::Internal`] if the template does not match: a defect of this program.
     pub fn html(&self) -> Result<String> {
         let mut warnings = Vec::new();
         if self.provenance.synthetic {

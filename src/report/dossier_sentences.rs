@@ -1,4 +1,4 @@
-//! The sentences of a dossier: what somebody will quote of it, each with what it is about.
+//! The sentences of a dossier. Each names its subject, because it may be quoted alone.
 
 use super::dossier::{DossierReport, share};
 use crate::engine::{CLOSE_HEADWAY_S, Headway};
@@ -34,7 +34,7 @@ impl DossierReport<'_> {
         }
     }
 
-    /// Recall under the profile, and under that of the regulation beside it.
+    /// Recall under the profile, and under the regulation's profile for comparison.
     pub(super) fn recall(&self) -> String {
         let (profile, ours) = (&self.profile.name, self.recall_of(&self.dossier.scored.recall));
         match &self.dossier.regulation {
@@ -55,7 +55,7 @@ impl DossierReport<'_> {
         }
     }
 
-    /// How many failures come from close following; empty where that is not known or S never fails.
+    /// Number of failures from close following; empty if unknown or if S never fails.
     pub(super) fn close_following(&self) -> String {
         let Some(close) = &self.dossier.close_following else { return String::new() };
         let cell = close.failures.get(self.dossier.criterion.index());
@@ -70,7 +70,7 @@ impl DossierReport<'_> {
         )
     }
 
-    /// How much more data would decide, over all undecided rules.
+    /// How much more data would decide the undecided rules.
     pub(super) fn need(&self) -> Option<String> {
         if self.dossier.conclusion != Conclusion::Undecided {
             return None;
@@ -96,7 +96,7 @@ impl DossierReport<'_> {
         })
     }
 
-    /// What the tables of other simulators say about these lanes.
+    /// Results of other simulators' tables for these lanes.
     pub(super) fn conformance_words(&self) -> String {
         let (category, profile) = (self.dossier.parameterization.category.label(), &self.profile.name);
         let own = "`lanesweep verify conformance` takes tables of your own.";
@@ -112,7 +112,7 @@ impl DossierReport<'_> {
         )
     }
 
-    /// What the conclusion must not be used for.
+    /// Purposes that the conclusion does not support.
     pub(super) fn limits(&self) -> Vec<(String, String)> {
         let model = self.dossier.model.name();
         let headways = if Headway::is_observed(&self.dossier.headways) {
@@ -144,7 +144,7 @@ impl DossierReport<'_> {
         ]
     }
 
-    /// Who signs, and when: given, or left blank.
+    /// Signatory and date, given or blank.
     pub(super) fn signature(&self) -> Vec<(String, String)> {
         let or_blank = |text: &Option<String>| text.clone().unwrap_or_else(|| BLANK.to_owned());
         let line = |name: &str, text: String| (name.to_owned(), text);

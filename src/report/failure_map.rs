@@ -1,9 +1,8 @@
-//! Where failures are: the share of failed samples per cell of two scenario parameters, as a heat map.
+//! Where failures occur: the fraction of failed samples per cell of two scenario parameters, as a heat map.
 //!
-//! The colours run from pale yellow to dark blue, each darker than the one before: they can be told apart by
-//! colour-blind readers and in grey print. Three things are never only a colour: a cell without samples is hatched,
-//! a cell with few samples is a smaller square, and a cell without failures has its own grey, so that "none seen" and
-//! "few" differ.
+//! The colours go from pale yellow to dark blue and darken with each step, so that colour-blind readers and grey prints
+//! can distinguish them. Three states are not shown by colour alone: a cell without samples is hatched, a cell with few
+//! samples is a smaller square, and a cell without failures has its own grey.
 
 use super::convergence::sampled;
 use super::plot::{Cells, ColourBar, Figure, Fill, FilledCell, Hatch, Height, Plot, PlotAxis};
@@ -14,12 +13,12 @@ use crate::run::sampling::{self, MapCounts};
 use crate::stats::density::DensityModel;
 use crate::support::table::Table;
 
-/// One parameter, cut into cells.
+/// One parameter, divided into cells.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MapAxis {
     /// Name, such as `initial gap`.
     pub name: String,
-    /// Unit, such as `m`; empty for a number without one.
+    /// Unit, such as `m`; empty for a dimensionless number.
     pub unit: String,
     /// Edges of the cells in that unit: finite, increasing, one more than cells.
     pub edges: Vec<f64>,
@@ -32,9 +31,9 @@ pub struct FailureMap {
     pub title: String,
     /// Line below the heading (which model and criterion, what was sampled); wrapped when long.
     pub subtitle: Option<String>,
-    /// The parameter across.
+    /// Horizontal parameter.
     pub x: MapAxis,
-    /// The parameter upwards.
+    /// Vertical parameter.
     pub y: MapAxis,
     /// Samples per cell, row by row: the cell of `x` cell i and `y` cell j is at `j * (x cells) + i`.
     pub samples: Vec<u64>,
@@ -42,12 +41,12 @@ pub struct FailureMap {
     pub failures: Vec<u64>,
 }
 
-/// With fewer samples than this a cell's share says little.
+/// With fewer samples than this a cell's fraction is uncertain.
 const FEW_SAMPLES: u64 = 10;
-/// From a share of zero to the largest one. Relative luminance falls from step to step.
+/// From a fraction of zero to the maximum. Relative luminance decreases from step to step.
 const COLOURS: [(u8, u8, u8); 6] =
     [(255, 236, 150), (226, 199, 112), (176, 163, 116), (120, 124, 126), (66, 82, 122), (10, 32, 80)];
-/// A cell with samples and without failures.
+/// Colour of a cell with samples and without failures.
 const NONE_FAILED: &str = "#ececec";
 
 impl MapAxis {
@@ -65,7 +64,7 @@ impl MapAxis {
         if self.cells() == 0 {
             return Some(format!("the axis {name} has no cell"));
         }
-        // Beyond this the width of an axis would leave the range of f64.
+        // Beyond this the width of an axis would overflow f64.
         if self.edges.iter().any(|e| !e.is_finite() || e.abs() > 1e300) {
             return Some(format!("an edge of the axis {name} is not a finite number"));
         }
@@ -74,14 +73,14 @@ impl MapAxis {
     }
 }
 
-/// What is known of one cell.
+/// Content of one cell.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Share {
     /// No samples.
     Empty,
-    /// More failures than samples: a mistake in the counts.
+    /// More failures than samples: an error in the counts.
     Wrong,
-    /// Share of failures, and whether from few samples only.
+    /// Fraction of failures, and whether it is based on few samples.
     Known { share: f64, few: bool },
 }
 
@@ -103,8 +102,8 @@ impl FailureMap {
         }
     }
 
-    /// Why the map cannot be drawn, if so: an axis without cells, edges that do not increase, or counts that do not
-    /// match the cells. Then [`FailureMap::figure`] says so in words and [`FailureMap::csv`] has no rows.
+    /// Why the map cannot be drawn: an axis without cells, edges that do not increase, or counts that do not match the
+    /// cells. [`FailureMap::figure`] then shows the reason as text, and [`FailureMap::csv`] has no rows.
     pub fn problem(&self) -> Option<String> {
         let cells = self.x.cells() * self.y.cells();
         let counts = [("samples", self.samples.len()), ("failures", self.failures.len())];
@@ -124,7 +123,7 @@ impl FailureMap {
     /// The map as a figure.
     ///
     /// A cell with more failures than samples is left white, crossed out and counted in a note. A map with a
-    /// [`FailureMap::problem`] is a text that names it.
+    /// [`FailureMap::problem`] becomes a text that states it.
     pub fn figure(&self) -> Figure {
         let (title, subtitle) = (self.title.clone(), self.subtitle.clone());
         if let Some(problem) = self.problem() {
@@ -196,7 +195,8 @@ impl FailureMap {
     }
 
     /// The cells as CSV, one row each in the order of [`FailureMap::samples`]: edges in the axes' units, counts, and
-    /// the share, empty without samples or with more failures than samples. Numbers in full precision.
+    /// the fraction of failures. The fraction is empty without samples or with more failures than samples. Numbers have
+    /// full precision.
     pub fn csv(&self) -> String {
         let cells = if self.problem().is_some() { 0 } else { self.samples.len() };
         let (x, y) = (&self.x.edges, &self.y.edges);
@@ -217,7 +217,7 @@ impl FailureMap {
 }
 
 impl Share {
-    /// The look of a cell beside a largest share.
+    /// The look of a cell, relative to the maximum fraction.
     fn fill(self, largest: f64) -> Fill {
         let hatched = |hatch| Fill { hatch, ..Fill::default() };
         match self {
@@ -232,7 +232,7 @@ impl Share {
     }
 }
 
-/// The colour at `place` in 0..=1 of the scale, straight between its anchors.
+/// The colour at `place` (0 to 1) of the scale, linear between its anchors.
 fn scale_colour(place: f64) -> String {
     let along = place.clamp(0.0, 1.0) * (COLOURS.len() - 1) as f64;
     let first = (along as usize).min(COLOURS.len() - 2);

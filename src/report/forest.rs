@@ -1,4 +1,4 @@
-//! A forest plot: estimates with their intervals, one line each, in groups, each group with its reference as a band.
+//! A forest plot: estimates with their intervals, one line each, in groups, with each group's reference as a band.
 
 use super::plot::{AxisScale, logarithmic_reach, number};
 use super::plot::{
@@ -10,26 +10,26 @@ use crate::support::readable::counted;
 /// One estimate.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ForestRow {
-    /// What was estimated or how; wrapped when long.
+    /// The estimated quantity or the method; wrapped when long.
     pub name: String,
-    /// The estimate, in the axis's unit. `None` is undefined (0/0): said in words and not drawn.
+    /// The estimate, in the axis's unit. `None` is undefined (0/0): stated in words and not drawn.
     pub estimate: Option<f64>,
     /// Lower end of the interval; not drawn if it or `upper` is not finite or they are swapped.
     pub lower: f64,
     /// Upper end of the interval.
     pub upper: f64,
-    /// Ends of an interval that covers more, drawn thinner.
+    /// Ends of a wider interval, drawn thinner.
     pub outer: Option<(f64, f64)>,
-    /// Scenarios with a failure, where it is known.
+    /// Scenarios with a failure, if known.
     pub failing_scenarios: Option<u64>,
 }
 
-/// Estimates that belong together.
+/// A group of estimates.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ForestGroup {
     /// Heading of the group, such as the driver model and criterion; wrapped when long.
     pub name: String,
-    /// What the rows are compared with; its interval is a band through the group.
+    /// Reference of the rows; its interval is a band through the group.
     pub reference: Option<ForestRow>,
     /// The rows, from top to bottom.
     pub rows: Vec<ForestRow>,
@@ -42,25 +42,25 @@ pub struct ForestFigure {
     pub title: String,
     /// Line below the heading (what was sampled, which interval); wrapped when long.
     pub subtitle: Option<String>,
-    /// Words below the axis, with unit, such as `Failures per hour (1/h)`.
+    /// Label of the axis, with unit, such as `Failures per hour (1/h)`.
     pub axis: String,
-    /// How the axis places values. On a logarithmic one an estimate of zero is drawn as the interval's upper end
-    /// with an arrow to the left.
+    /// Scale of the axis. On a logarithmic axis an estimate of zero is drawn as the interval's upper end with an arrow
+    /// to the left.
     pub scale: AxisScale,
-    /// What the intervals cover, in a sentence.
+    /// What the intervals cover, in one sentence.
     pub intervals: String,
     /// The groups, from top to bottom.
     pub groups: Vec<ForestGroup>,
 }
 
-/// With more lines than this the axis stands at the top too.
+/// With more lines than this the axis is also drawn at the top.
 const LONG_ROWS: usize = 20;
-/// Colour of a reference's band; its estimate is a diamond, that of a row a disc.
+/// Colour of a reference's band. The reference estimate is a diamond, that of a row a disc.
 const REFERENCE_COLOUR: &str = "#e69f00";
 /// Space below a group.
 const GROUP_GAP_PX: f64 = 4.0;
 
-/// What of a row can be drawn on the axis.
+/// The parts of a row that can be drawn on the axis.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Drawn {
     estimate: Option<f64>,
@@ -70,7 +70,7 @@ struct Drawn {
 }
 
 impl ForestRow {
-    /// The scenarios with a failure, where they are few.
+    /// The number of scenarios with a failure, if it is small.
     fn few(&self) -> Option<u64> {
         self.failing_scenarios.filter(|n| is_few(*n as f64))
     }
@@ -84,7 +84,7 @@ impl ForestRow {
         Drawn { estimate: estimate.filter(|e| scale.shows(*e)), interval, below: zero && interval.is_some() }
     }
 
-    /// Estimate and interval as numbers, and in words why one is not drawn.
+    /// Estimate and interval as numbers, and the reason if one is not drawn.
     fn words(&self, scale: AxisScale) -> String {
         let Some(estimate) = self.estimate else { return "undefined".to_string() };
         if !AxisScale::Linear.shows(estimate) {
@@ -109,7 +109,7 @@ impl ForestRow {
 }
 
 impl ForestFigure {
-    /// The figure: every row is named and its numbers stand beside it; what cannot be drawn is said there.
+    /// The figure: every row has its name and numbers; anything that cannot be drawn is stated there.
     pub fn figure(&self) -> Figure {
         let lines = self.groups.iter().map(|g| g.rows.len() + 2).sum::<usize>();
         let (title, subtitle) = (self.title.clone(), self.subtitle.clone());
@@ -117,7 +117,7 @@ impl ForestFigure {
         Figure { title, subtitle, plots, caption: self.caption(), ..Figure::default() }
     }
 
-    /// Rows are on a vertical axis in px from the top, downwards.
+    /// Rows are on a vertical axis in px, downwards from the top.
     fn plot(&self, is_doubled: bool) -> Plot {
         let (mut names, mut bands, mut y) = (Vec::new(), Vec::new(), 0.0);
         let look = Look { line_px: 1.8, marker_px: 5.0, ..Look::of(0, 1) };
@@ -175,7 +175,7 @@ impl ForestFigure {
         self.groups.iter().flat_map(|g| g.reference.iter().chain(&g.rows))
     }
 
-    /// What the axis must have room for.
+    /// The values that the axis must include.
     fn reach(&self) -> Vec<f64> {
         let mut reach = Vec::new();
         let mut intervals = Vec::new();
@@ -191,7 +191,7 @@ impl ForestFigure {
         if self.scale == AxisScale::Linear { reach } else { logarithmic_reach(&intervals) }
     }
 
-    /// What the marks mean, as far as they occur.
+    /// Explains the marks that occur.
     fn caption(&self) -> String {
         let drawn: Vec<Drawn> = self.all_rows().map(|row| row.drawn(self.scale)).collect();
         if drawn.iter().all(|d| d.estimate.is_none() && !d.below) {

@@ -1,5 +1,5 @@
-//! One self-contained page: words, tables and figures of a run in one file, without a script, and with nothing that is
-//! fetched from elsewhere. What is on it is decided by who fills a [`Page`]; how it looks is in `templates`.
+//! One self-contained page: texts, tables and figures of a run in one file, without scripts and without external
+//! resources. The caller fills a [`Page`] with content; `templates` define its look.
 
 use minijinja::value::{Serde, Value};
 use minijinja::{Environment, escape_formatter};
@@ -12,7 +12,7 @@ use crate::{Error, Result};
 const TEMPLATE: &str = include_str!("templates/report.html");
 const STYLE: &str = include_str!("templates/style.css");
 
-/// Narrower figures, such as a column of a paper, do not fill the page.
+/// Figures narrower than this, such as a column of a paper, do not fill the page.
 const NARROW_PX: f64 = 700.0;
 
 /// A figure with the names of its files beside the page.
@@ -23,7 +23,7 @@ pub struct PageFigure {
 }
 
 impl PageFigure {
-    /// From a complete SVG document: it is drawn as wide as the page.
+    /// From a complete SVG document; it is drawn at the width of the page.
     pub fn new(svg: &str, files: &[&str]) -> PageFigure {
         PageFigure { svg: inline(svg), files: files.iter().map(|file| (*file).to_owned()).collect() }
     }
@@ -36,9 +36,9 @@ pub struct Section {
     pub id: String,
     /// Heading.
     pub title: String,
-    /// What is to be seen; may be empty.
+    /// What the chapter shows; may be empty.
     pub intro: String,
-    /// A text whose columns stand below one another; may be empty.
+    /// A monospaced text with aligned columns; may be empty.
     pub text: String,
     /// Tables, before the figures.
     pub tables: Vec<Table>,
@@ -46,7 +46,7 @@ pub struct Section {
     pub figures: Vec<PageFigure>,
     /// Names and values.
     pub facts: Vec<(String, String)>,
-    /// Names and values that belong to the machine and differ from run to run.
+    /// Names and values that depend on the machine and differ between runs.
     pub host: Vec<(String, String)>,
     /// Headings and long texts that open on a click.
     pub details: Vec<(String, String)>,
@@ -59,9 +59,9 @@ pub struct Page {
     pub title: String,
     /// Program and version.
     pub program: String,
-    /// What was run on what, in a sentence.
+    /// What was run on which data, in one sentence.
     pub lead: String,
-    /// What must not be overlooked.
+    /// Warnings at the top of the page.
     pub warnings: Vec<String>,
     /// The chapters.
     pub sections: Vec<Section>,
@@ -78,7 +78,7 @@ impl Page {
     /// The page as a complete HTML document. The same page gives the same bytes.
     ///
     /// # Errors
-    /// [`Error::Internal`] where the template does not fit: a defect of this program.
+    /// [`Error::Internal`] if the template does not match: a defect of this program.
     pub fn html(&self) -> Result<String> {
         #[derive(Serialize)]
         struct Context<'a> {
@@ -88,7 +88,8 @@ impl Page {
         }
         let broken = |e: minijinja::Error| Error::Internal(format!("the report's page cannot be made: {e:#}"));
         let mut environment = Environment::new();
-        // Beside the escapes of HTML, for which the name's ending decides: what turns or hides text is shown.
+        // In addition to HTML escapes, which follow from the template's name: characters that reverse or hide text are
+        // made visible.
         environment.set_formatter(|out, state, value| match value.as_str() {
             Some(text) if !value.is_safe() => escape_formatter(out, state, &Value::from(shown(text).as_ref())),
             _ => escape_formatter(out, state, value),
@@ -99,7 +100,7 @@ impl Page {
     }
 }
 
-/// An SVG document as an element that scales with the page: a view box in place of width and height.
+/// An SVG document as an element that scales with the page: a view box replaces width and height.
 fn inline(svg: &str) -> String {
     let start = svg.find("<svg").unwrap_or(0);
     let svg = &svg[start..];
@@ -170,7 +171,7 @@ mod tests {
         let policy = head.split_once("http-equiv=\"Content-Security-Policy\" content=\"").unwrap().1;
         let policy = policy.split_once('"').unwrap().0;
         assert!(policy.starts_with("default-src 'none';"), "{policy}");
-        // Styles are inline, the icon is empty; nothing else is let in.
+        // Styles are inline and the icon is empty; the policy allows nothing else.
         let allowed: Vec<&str> = policy.split("; ").skip(1).collect();
         let none = ["base-uri 'none'", "form-action 'none'"];
         assert_eq!(allowed, [&["style-src 'unsafe-inline'", "img-src data:"][..], &none].concat());

@@ -1,5 +1,5 @@
-//! One row per lane: verdicts, continuous values and times. The lanes of a study have the columns of the golden lanes,
-//! those of a sampling run their point; void samples have no row.
+//! One row per lane: verdicts, continuous values and times. Lanes of a study have the columns of the golden lanes;
+//! lanes of a sampling run have their point. Void samples have no row.
 
 use std::path::Path;
 
@@ -17,11 +17,11 @@ use crate::support::files::make_folder_of;
 use crate::support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter};
 use crate::{Error, Result};
 
-/// Writes one row per lane of a study, chunk by chunk, so that memory does not grow with the lanes. The table gets its
-/// name with the study's other results.
+/// Writes one row per lane of a study, chunk by chunk, so that memory does not grow with the lanes. The table is
+/// renamed to its final name together with the study's other results.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Usage`] for a name that is no table's; of the lanes.
+/// [`Error::Io`]; [`Error::Usage`] for an unknown ending of the name; errors of the lanes.
 pub(crate) fn write_study(path: &Path, study: &Study, executor: &Executor) -> Result<(SweepSummary, StagedFile)> {
     make_folder_of(path)?;
     let (plan, facts) = (study.plan(), study.facts());
@@ -36,15 +36,15 @@ pub(crate) fn write_study(path: &Path, study: &Study, executor: &Executor) -> Re
 /// A table for the lanes of a sampling run; see [`write_sampled_chunk`].
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Usage`] for a name that is no table's.
+/// [`Error::Io`]; [`Error::Usage`] for an unknown ending of the name.
 pub fn sampled_table(path: &Path, plan: &LanePlan, density: &DensityModel) -> Result<TableWriter> {
     create(path, "samples", plan, density.provenance.synthetic, sampled_columns(density))
 }
 
-/// The format of a table of lanes by its file's name.
+/// The format of a table of lanes, from its file name.
 ///
 /// # Errors
-/// [`Error::Usage`] for a name that is no table's.
+/// [`Error::Usage`] for an unknown ending of the name.
 pub fn table_format(path: &Path) -> Result<TableFormat> {
     TableFormat::of(path, &TableFormat::EVERY, "option `rows`")
 }
@@ -60,7 +60,7 @@ fn create(
     TableWriter::create(path, table_format(path)?, columns, &TableMetadata { table, profile, plan_sha256, synthetic })
 }
 
-/// Numbers in the arithmetic they were computed in: the shortest text that reads back to the same bits.
+/// Arithmetic of the numbers; they are written as the shortest text that reads back to the same bits.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Digits {
     /// The lane arithmetic.
@@ -97,8 +97,8 @@ pub fn columns(digits: Digits) -> Vec<Column> {
     ]
 }
 
-/// Writes the lanes of a chunk that has outcomes, in the plan's order. Null: did not happen. `robust` is false
-/// where verdicts or crash type of the f64 reference change when the initial gap moves by 1e-9 m.
+/// Writes the lanes of a chunk with outcomes, in the plan's order. Null: did not happen. `robust` is false if moving
+/// the initial gap by 1e-9 m changes verdicts or crash type of the f64 reference.
 ///
 /// # Errors
 /// As [`TableWriter::row`].
@@ -106,7 +106,7 @@ pub fn write_chunk(table: &mut TableWriter, plan: &LanePlan, chunk: &Chunk) -> R
     let dt = plan.profile.frame.dt_s;
     let constants: Vec<Constants<f64>> =
         plan.blocks.iter().map(|b| Constants::resolve(&plan.profile, b.category)).collect();
-    // Three more lanes for each: the only part that is worth the other threads.
+    // Three more lanes for each: the only step worth parallelizing.
     let robust: Vec<bool> = (0..chunk.outcomes.len())
         .into_par_iter()
         .map(|at| {
@@ -117,7 +117,7 @@ pub fn write_chunk(table: &mut TableWriter, plan: &LanePlan, chunk: &Chunk) -> R
         let Some(key) = plan.key(chunk.first_lane + at as u64) else { continue };
         let block = &plan.blocks[key.block];
         let thw = match plan.headways[key.headway] {
-            // 2 as `2.0`, like the golden lanes.
+            // 2 is written as `2.0`, like in the golden lanes.
             Headway::ThwS(thw) => Cell::Decimal(thw),
             Headway::GapM(_) | Headway::MinFollowing | Headway::Observed => Cell::Null,
         };
@@ -192,7 +192,7 @@ pub fn sampled_columns(density: &DensityModel) -> Vec<Column> {
     columns
 }
 
-/// Writes the lanes of a chunk that has outcomes, in the plan's order. Null: did not happen, or without bound.
+/// Writes the lanes of a chunk with outcomes, in the plan's order. Null: did not happen, or unbounded.
 ///
 /// # Errors
 /// As [`TableWriter::row`]; [`Error::Internal`] for a plan that is not sampled.

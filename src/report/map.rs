@@ -1,4 +1,4 @@
-//! A run of `map`: its files and sheets. Tables are in `map_tables.rs`, `map.json` in `map_record.rs`.
+//! The files and sheets of a `map` run. Tables are in `map_tables.rs`, `map.json` in `map_record.rs`.
 
 use serde::Serialize;
 
@@ -15,40 +15,40 @@ use crate::run::check::REFERENCE_DRIVERS;
 use crate::run::grid::{Against, Agreement, CaseStyle, CellOutcome, Grid, GridPlan, MappedGrid, Perturbation};
 use crate::support::run_dir::Results;
 
-/// A whole run.
+/// A complete run.
 pub struct MapReport {
     /// The grids.
     pub grids: Vec<MappedGrid>,
-    /// Criterion of shares, sheets and differences.
+    /// Criterion of fractions, sheets and differences.
     pub criterion: Criterion,
-    /// What they are compared with.
+    /// Reference of the comparison, if any.
     pub against: Option<Against>,
     /// Profile.
     pub profile: Profile,
-    /// Preset, where it is one.
+    /// Preset, if used.
     pub preset: Option<String>,
-    /// What computed.
+    /// Facts about the machine.
     pub host: MapHost,
 }
 
-/// What belongs to the machine and not to the result.
+/// Facts about the machine, which are not part of the result.
 #[derive(Debug, Clone, Serialize)]
 pub struct MapHost {
-    /// What computed the lanes.
+    /// Backend of the lanes.
     pub backend: String,
-    /// The device, where one did.
+    /// The device, if one computed.
     pub device: Option<DeviceRecord>,
-    /// How the sweep went.
+    /// Statistics of the sweep.
     pub sweep: SweepRecord,
-    /// Threads.
+    /// Number of threads.
     pub threads: usize,
-    /// Planning, s.
+    /// Duration of planning, s.
     pub plan_s: f64,
-    /// Lanes, s.
+    /// Duration of the lanes, s.
     pub sweep_s: f64,
 }
 
-/// A difference between two verdicts on every cell of a grid.
+/// A difference between two verdicts, for every cell of a grid.
 pub(super) struct Difference<'a> {
     plan: &'a GridPlan,
     pub(super) grid: &'a Grid,
@@ -59,7 +59,7 @@ pub(super) struct Difference<'a> {
 }
 
 impl MapReport {
-    /// Number of simulations of driver models, those of the other profile and of perturbed cases included.
+    /// Number of simulations of driver models, including those of the other profile and of perturbed cases.
     pub fn simulations(&self) -> u64 {
         let of = |mapped: &MappedGrid| {
             mapped.plan.lane_count() + mapped.other.as_ref().map_or(0, |(_, plan, _)| plan.lane_count())
@@ -69,10 +69,10 @@ impl MapReport {
         self.grids.iter().map(|mapped| of(mapped) * times(mapped)).sum()
     }
 
-    /// Puts every file into its folder; gives their names, without the record's.
+    /// Writes every file to the folder; returns their names without the record's.
     ///
     /// # Errors
-    /// [`crate::Error::Io`] where the folder cannot be written.
+    /// [`crate::Error::Io`] if the folder cannot be written to.
     pub fn write(&self, mut results: Results) -> Result<Vec<String>> {
         let mut figures = Vec::new();
         let (outcomes, agreements) = (self.shown_outcomes(), self.shown_agreements());
@@ -118,7 +118,7 @@ impl MapReport {
         self.grids.iter().any(|mapped| mapped.map.has_undecided())
     }
 
-    /// Outcomes that tables and legends count; every one that occurs is among them.
+    /// Outcomes that tables and legends count, including every one that occurs.
     pub(super) fn shown_outcomes(&self) -> Vec<CellOutcome> {
         let is_shown = |outcome: &CellOutcome| match outcome {
             CellOutcome::Pass | CellOutcome::Fail => true,
@@ -131,7 +131,7 @@ impl MapReport {
         CellOutcome::ALL.into_iter().filter(is_shown).collect()
     }
 
-    /// The same of differences.
+    /// The same for differences.
     pub(super) fn shown_agreements(&self) -> Vec<Agreement> {
         let is_shown = |kind: &Agreement| match kind {
             Agreement::NoConflict => self.criterion == Criterion::Collision,
@@ -141,8 +141,8 @@ impl MapReport {
         Agreement::ALL.into_iter().filter(is_shown).collect()
     }
 
-    /// Cells in which both drivers of Annex 3 collide, and an ego that never reacts too; where both drivers were swept,
-    /// and collisions are mapped.
+    /// Cells in which both drivers of Annex 3 and an ego that never reacts collide. `None` unless both drivers were
+    /// swept and collisions are mapped.
     fn not_preventable(&self, mapped: &MappedGrid) -> Option<Vec<bool>> {
         let MappedGrid { map, .. } = mapped;
         let at = REFERENCE_DRIVERS.map(|driver| map.models.iter().position(|model| *model == driver));
@@ -226,12 +226,12 @@ impl MapReport {
     }
 }
 
-/// Where a kind stands among those that are shown, and so in the legend.
+/// Index of a kind among those shown, and in the legend.
 fn place<T: PartialEq>(shown: &[T], kind: T) -> u8 {
     shown.iter().position(|other| *other == kind).unwrap_or(0) as u8
 }
 
-/// A name as a part of a file's name.
+/// A name as part of a file name.
 fn slug(name: &str) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() || c == '-' { c.to_ascii_lowercase() } else { '_' };
     name.chars().map(plain).collect()

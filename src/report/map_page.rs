@@ -1,4 +1,4 @@
-//! A run of `map` as one page.
+//! A `map` run as one page.
 
 use super::html::{Page, PageFigure, Section};
 use super::map::MapReport;
@@ -6,7 +6,7 @@ use crate::support::readable::count;
 use crate::{Error, Result};
 
 impl MapReport {
-    /// The run as one page.
+    /// Renders the run as one page.
     pub(super) fn html(&self, figures: Vec<PageFigure>) -> Result<String> {
         let profile = serde_json::to_string_pretty(&self.profile)
             .map_err(|e| Error::Internal(format!("a profile cannot be written: {e}")))?;

@@ -1,4 +1,4 @@
-//! `map.json`: a run of `map` with what makes it again.
+//! `map.json`: a `map` run with everything needed to reproduce it.
 
 use std::collections::BTreeMap;
 
@@ -12,10 +12,10 @@ use crate::run::grid::{Against, CaseStyle, CellOutcome, GridAxis, MappedGrid, co
 use crate::{Error, Result};
 
 impl MapReport {
-    /// `map.json`: shares, differences and what makes them again; `files` stand beside it.
+    /// `map.json`: fractions, differences and everything needed to reproduce them; `files` are in the same folder.
     ///
     /// # Errors
-    /// None for what this program made.
+    /// None for a record of this program.
     pub fn json(&self, files: Vec<String>) -> Result<String> {
         let shown = self.shown_outcomes();
         let record = MapRecord {
@@ -51,7 +51,7 @@ struct MapRecord<'a> {
     differences: Vec<DifferenceRecord>,
     profile: &'a Profile,
     other_profile: Option<&'a Profile>,
-    /// Beside this one.
+    /// Names of the other files.
     files: Vec<String>,
     host: &'a MapHost,
 }
@@ -68,7 +68,7 @@ struct GridRecord<'a> {
     cases: CaseStyle,
     native_gap: bool,
     cells: usize,
-    /// The grid was chosen so that a known share comes out.
+    /// Whether the grid was chosen to match a known fraction.
     chosen_to_match: bool,
     shares: Vec<ShareRecord>,
     plans: Vec<PlanRecord<'a>>,
@@ -85,15 +85,15 @@ struct ShareRecord {
     model: &'static str,
     failures: u64,
     share: f64,
-    /// Cells by outcome: no conflict, pass, fail, …; those that tables and legends count.
+    /// Cells by outcome (no conflict, pass, fail, …), for the outcomes that tables and legends count.
     outcomes: BTreeMap<&'static str, u64>,
-    /// Cells whose outcome a perturbation changes, where perturbed cases were swept.
+    /// Cells whose outcome a perturbation changes, if perturbed cases were swept.
     #[serde(skip_serializing_if = "Option::is_none")]
     undecided: Option<u64>,
     known_percent: Option<f64>,
 }
 
-/// Cells by how two agree.
+/// Cells by agreement of two verdicts.
 #[derive(Serialize)]
 struct DifferenceRecord {
     map: String,

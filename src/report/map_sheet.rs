@@ -1,8 +1,8 @@
-//! A sheet of `map`: small multiples of one grid. Each combination of speeds has a plot, each cell the look of its kind,
-//! and lines part the kinds.
+//! A sheet of `map`: small multiples of one grid. Each combination of speeds has a plot; each cell has the look of its
+//! kind, and lines separate the kinds.
 //!
-//! Kinds differ in lightness and, where two are equally light, in hatching: they can be told apart by colour-blind
-//! readers and in grey print. What a page of three plots in a row shows stays readable at the width of a column.
+//! Kinds differ in lightness and, where two are equally light, in hatching, so that colour-blind readers and grey
+//! prints can distinguish them. A page with three plots in a row stays readable at the width of a column.
 
 use super::plot::{Cells, Figure, Fill, FilledCell, Hatch, Height, INK, Plot, PlotAxis, Rule};
 use crate::run::check::Answer;
@@ -20,9 +20,9 @@ pub struct MapSheet<'a> {
     pub kinds: Vec<(String, Fill)>,
     /// Kind of every cell, in the grid's order.
     pub cells: Vec<u8>,
-    /// Is each cell not preventable? Its boundary is drawn where that is known.
+    /// Per cell: whether it is not preventable. Its boundary is drawn if known.
     pub not_preventable: Option<Vec<bool>>,
-    /// Lines at the foot.
+    /// Notes at the foot.
     pub notes: Vec<String>,
 }
 
@@ -41,7 +41,7 @@ pub fn outcome(outcome: CellOutcome) -> (String, Fill) {
     kind(outcome.label(), colour, hatch)
 }
 
-/// Name and look of an agreement of two.
+/// Name and look of an agreement of two verdicts.
 pub fn agreement(agreement: Agreement, first: &str, second: &str) -> (String, Fill) {
     let label = agreement.label();
     match agreement {
@@ -54,7 +54,7 @@ pub fn agreement(agreement: Agreement, first: &str, second: &str) -> (String, Fi
     }
 }
 
-/// The same in every map. In grey print the second lies midway between pass and fail.
+/// The same look in every map. In grey print the second colour is midway between pass and fail.
 const NO_CONFLICT: (&str, Hatch) = ("#ffffff", Hatch::Grey);
 const UNDECIDED: (&str, Hatch) = ("#f0b429", Hatch::Crossed);
 
@@ -142,7 +142,7 @@ impl MapSheet<'_> {
         let parts: Vec<String> = axes
             .enumerate()
             .map(|(at, (axis, value))| {
-                // A unit stands once where all are the same.
+                // If several units are the same, only the last is shown.
                 let unit = if units[at + 1..].contains(&units[at]) { "" } else { units[at] };
                 format!("{} {value} {unit}", word(axis.parameter.key)).trim_end().to_owned()
             })

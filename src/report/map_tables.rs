@@ -1,4 +1,4 @@
-//! A run of `map` as tables: cells by outcome for the terminal, every cell and difference as CSV.
+//! The tables of a `map` run: cells by outcome for the terminal, every cell and difference as CSV.
 
 use std::io::{self, Write};
 
@@ -9,7 +9,7 @@ use crate::support::readable;
 use crate::support::table::{Column, Digits, NumberText, Table, csv_field};
 
 impl MapReport {
-    /// Shares and differences as tables.
+    /// Fractions and differences as tables.
     pub fn text(&self) -> String {
         let criterion = self.criterion.label();
         let any_known = self.grids.iter().any(|mapped| mapped.known_percent.iter().any(Option::is_some));
@@ -131,7 +131,7 @@ impl MapReport {
     }
 }
 
-/// Columns of a cell's place; all grids of a run have the same parameters.
+/// The columns of a cell's position; all grids of a run have the same parameters.
 fn write_header(out: &mut dyn Write, grids: &[MappedGrid], columns: &str) -> io::Result<()> {
     let keys: Vec<&str> = match grids.first() {
         Some(mapped) => mapped.plan.grid.values(0).iter().map(|(p, _): &(&MapParameter, f64)| p.key).collect(),

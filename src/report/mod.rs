@@ -1,7 +1,8 @@
-//! Reports: what a person or another program reads of a study.
+//! Reports: the output of a run for people and for other programs.
 //!
-//! Here live the terminal tables, the CSV files, the figures (SVG, all drawn by [`plot`]), the pages and `run.json`.
-//! Here lives no arithmetic beyond formatting. Scores come from [`crate::run::score`]; text and files go to the user.
+//! This module holds the terminal tables, the CSV files, the figures (SVG, all drawn by [`plot`]), the pages and
+//! `run.json`. It computes nothing beyond formatting. Scores come from [`crate::run::score`]; text and files go to the
+//! user.
 
 mod case_sentences;
 pub mod case_sheet;

@@ -1,10 +1,10 @@
 //! The radar chart of the paper: one spoke per (driver model, criterion), one polygon per parameterization,
 //! radius = F1.
 //!
-//! An undefined F1 (0/0) drawn as a number would be a false measurement. The line of a series is *broken* at an
-//! undefined spoke, and a note below the chart names the spoke.
+//! A number for an undefined F1 (0/0) would be a false measurement. The line of a series is *broken* at an undefined
+//! spoke, and a note below the chart names the spoke.
 //!
-//! Several series often share a value (F1 = 1 above all), so lines and markers are thicker than in other figures.
+//! Several series often have the same value (usually F1 = 1), so lines and markers are thicker than in other figures.
 
 use super::plot::{Figure, HOLLOW, Look, Mark, Name, Plot, PlotAxis, Series, Value, is_few};
 
@@ -13,9 +13,9 @@ use super::plot::{Figure, HOLLOW, Look, Mark, Name, Plot, PlotAxis, Series, Valu
 pub struct RadarSeries {
     /// Name in the legend, such as `1: constant speed, constant lateral speed`.
     pub name: String,
-    /// One score per spoke, in the order of [`RadarChart::spokes`], each in 0..=1 (no unit). `None` is undefined
-    /// (0/0). A missing entry, a NaN and a number outside 0..=1 are no score either and are shown as undefined;
-    /// entries beyond the last spoke are ignored.
+    /// One score per spoke, in the order of [`RadarChart::spokes`], each in 0..=1 (no unit). `None` is undefined (0/0).
+    /// A missing entry, NaN and a number outside 0..=1 are also shown as undefined; entries beyond the last spoke are
+    /// ignored.
     pub values: Vec<Option<f64>>,
 }
 
@@ -28,15 +28,15 @@ pub struct RadarChart {
     pub subtitle: Option<String>,
     /// Names of the spokes, clockwise from the top, such as `Reg157 Collision`.
     pub spokes: Vec<String>,
-    /// Scenarios in which S fails, per spoke; unknown where missing.
+    /// Scenarios in which S fails, per spoke; missing: unknown.
     pub failing: Vec<u64>,
     /// The polygons, in the order of the legend.
     pub series: Vec<RadarSeries>,
 }
 
 impl RadarChart {
-    /// The chart as a figure: the outer ring is 1, the centre 0, rings every 0.2. A score that is `None` gets no point
-    /// and no line; all such spokes are named, series by series, below the legend.
+    /// The chart as a figure: the outer ring is 1, the centre 0, rings every 0.2. An undefined score has no point and
+    /// no line; all such spokes are listed below the legend, series by series.
     pub fn figure(&self) -> Figure {
         let scores: Vec<Vec<Option<f64>>> = self.series.iter().map(|s| scores(s, self.spokes.len())).collect();
         let is_undefined = |spoke: usize| !scores.is_empty() && scores.iter().all(|s| s[spoke].is_none());
@@ -92,12 +92,12 @@ impl RadarChart {
         }
     }
 
-    /// The failing scenarios of a spoke, where they are few.
+    /// The number of failing scenarios of a spoke, if it is small.
     fn few(&self, spoke: usize) -> Option<u64> {
         self.failing.get(spoke).copied().filter(|failing| is_few(*failing as f64))
     }
 
-    /// Which scores are undefined.
+    /// Lists the undefined scores.
     fn undefined(&self, scores: &[Vec<Option<f64>>], is_undefined: &dyn Fn(usize) -> bool) -> Vec<String> {
         let names = |is_named: &dyn Fn(usize) -> bool| {
             let named = (0..self.spokes.len()).filter(|spoke| is_named(*spoke));

@@ -6,7 +6,7 @@ use crate::engine::{NO_STEP, Outcome};
 use crate::model::criterion::Criterion;
 use crate::{Error, Result};
 
-/// How a lane ended. Times in seconds, null for what did not happen and for what is infinite.
+/// How a lane ended. Times in seconds; null for events that did not happen and for infinite values.
 pub fn outcome(outcome: &Outcome<f64>, dt_s: f64) -> Value {
     let time = |step: u32| (step != NO_STEP).then(|| (f64::from(step) * dt_s * 1e9).round() / 1e9);
     let failed = |c: Criterion| outcome.verdicts.failed(c);
@@ -28,10 +28,10 @@ pub fn outcome(outcome: &Outcome<f64>, dt_s: f64) -> Value {
     })
 }
 
-/// A document as text, with a line's end.
+/// A document as text, with a final line break.
 ///
 /// # Errors
-/// None for what this program made.
+/// None for a document of this program.
 pub fn document(value: &Value) -> Result<String> {
     let text = serde_json::to_string_pretty(value);
     text.map(|text| text + "\n").map_err(|e| Error::Internal(format!("a document cannot be written: {e}")))

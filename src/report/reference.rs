@@ -1,5 +1,5 @@
-//! The lane arithmetic against the f64 reference, lane by lane: which verdicts differ, and how near to the
-//! threshold each lies.
+//! Comparison of the lane arithmetic with the f64 reference, lane by lane: which verdicts differ, and how close each is
+//! to the threshold.
 
 use crate::Result;
 use crate::engine::{Backend, Chunk, CpuBackend, LanePlan, Outcome, Wanted, chunks};
@@ -15,20 +15,20 @@ pub struct Difference {
     pub lane: String,
     /// Criterion.
     pub criterion: Criterion,
-    /// Failed in f32; in f64 it did not, or the other way round.
+    /// Whether it failed in f32; in f64 the verdict is the opposite.
     pub failed_in_f32: bool,
-    /// Distance of the f64 value from the threshold: TTC in s, BTN, for a collision the smallest gap in m.
+    /// Distance of the f64 value from the threshold: TTC in s, BTN, for a collision the minimum gap in m.
     pub distance: f64,
 }
 
-/// What a comparison has seen.
+/// Result of a comparison.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct ReferenceComparison {
     /// Lanes compared.
     pub lanes: u64,
     /// Verdicts that differ.
     pub differences: Vec<Difference>,
-    /// Lanes in which one ran into the time cap and the other did not: no verdict, information.
+    /// Lanes in which only one arithmetic reached the time cap; information, not a verdict.
     pub cap_differs: u64,
 }
 
@@ -36,7 +36,7 @@ impl ReferenceComparison {
     /// Runs every lane of a study in f32 and in f64, chunk by chunk.
     ///
     /// # Errors
-    /// Of the lanes.
+    /// Errors of the lanes.
     pub fn of_study(study: &StudyCases) -> Result<ReferenceComparison> {
         let (narrow, wide) = (CpuBackend::lane_arithmetic(), CpuBackend::reference());
         let mut comparison = ReferenceComparison::default();
@@ -51,7 +51,7 @@ impl ReferenceComparison {
         Ok(comparison)
     }
 
-    /// Takes two chunks of the same units into account.
+    /// Adds two chunks of the same units.
     pub fn add(&mut self, plan: &LanePlan, narrow: &Chunk, wide: &Chunk) {
         let thresholds = (plan.profile.criteria.ttc_threshold_s, plan.profile.criteria.btn_threshold);
         for (at, (f32, f64)) in narrow.outcomes.iter().zip(&wide.outcomes).enumerate() {
@@ -69,7 +69,7 @@ impl ReferenceComparison {
         }
     }
 
-    /// One line for the terminal and the first differences.
+    /// One line for the terminal, and the first differences.
     pub fn text(&self) -> String {
         let mut text = format!(
             "f32 against the f64 reference: {} of {} verdicts differ ({} lanes; the cap differs in {})\n",
@@ -96,8 +96,8 @@ impl ReferenceComparison {
     }
 }
 
-/// How far the value nearest to the threshold is from it; a contact makes its side's value infinite or 0,
-/// so the other side's counts.
+/// Distance of the value nearest to the threshold. A contact makes the value of its side infinite or 0, so the other
+/// side's is used.
 fn distance(criterion: Criterion, a: &Outcome<f64>, b: &Outcome<f64>, (ttc, btn): (f64, f64)) -> f64 {
     let of = |o: &Outcome<f64>| match criterion {
         Criterion::Collision => o.min_gap.abs(),

@@ -1,4 +1,4 @@
-//! What was run, on what, with what, so that a number can be made again: `run.json` of a study.
+//! `run.json` of a study: data, program and settings, so that its numbers can be reproduced.
 
 use serde::Serialize;
 
@@ -11,7 +11,7 @@ use crate::support::readable::counted;
 use crate::traffic::mining::{MiningOptions, RecordingSummary};
 use crate::{Error, Result};
 
-/// Found and kept scenarios of a category, and what became of their lanes.
+/// Found and kept scenarios of a category, and counts of their lanes.
 #[derive(Debug, Clone, Serialize)]
 pub struct CategoryRecord {
     /// Kind of scenario.
@@ -28,44 +28,44 @@ pub struct CategoryRecord {
     pub capped_lanes: u64,
     /// Cells of the score table whose F1 is 0/0.
     pub undefined_f1: u64,
-    /// Explained variance of the decomposition by its first coefficients, where there is one.
+    /// Cumulative explained variance of the decomposition's first coefficients, if there is one.
     pub svd_explained: Vec<f64>,
 }
 
-/// Seconds of the parts of a run.
+/// Durations of the parts of a run, s.
 #[derive(Debug, Clone, Default, Serialize)]
 pub struct Timings {
-    /// Reading or generating, and mining.
+    /// Reading or generating, and mining, s.
     pub mine_s: f64,
-    /// Planning: parameterizations and tables.
+    /// Planning: parameterizations and tables, s.
     pub plan_s: f64,
-    /// Lanes.
+    /// Lanes, s.
     pub sweep_s: f64,
-    /// Scores and claims.
+    /// Scores and claims, s.
     pub score_s: f64,
 }
 
-/// How the sweep went.
+/// Statistics of the sweep.
 #[derive(Debug, Clone, Serialize)]
 pub struct SweepRecord {
-    /// Lanes that the CPU computed again with every step made, all equal.
+    /// Lanes that the CPU recomputed with every step, all equal.
     pub rechecked_lanes: u64,
-    /// Seed of their choice.
+    /// Seed of the random selection of these lanes.
     pub recheck_seed: u64,
     /// Lanes that the CPU computed because the device could not.
     pub redone_lanes: u64,
-    /// Time that the device itself computed, s, where it can tell.
+    /// Computing time of the device, s, if it reports it.
     pub device_s: Option<f64>,
 }
 
-/// An option that somebody set.
+/// An option that was set.
 #[derive(Debug, Clone, Serialize)]
 pub struct SettingRecord {
-    /// Key, as `lanesweep config show` has it.
+    /// Key, as shown by `lanesweep config show`.
     pub key: String,
     /// Value.
     pub value: serde_json::Value,
-    /// Line of a file, variable or flag.
+    /// Source: line of a file, variable or flag.
     pub source: String,
 }
 
@@ -74,31 +74,31 @@ pub struct SettingRecord {
 pub struct RunRecord {
     /// Program and version.
     pub program: String,
-    /// [`ENGINE_VERSION`] of the program: what the bits of its lanes are.
+    /// [`ENGINE_VERSION`] of the program, which identifies the bits of its lanes.
     pub engine: u64,
-    /// What was swept, in one line.
+    /// The swept data, in one line.
     pub data: String,
-    /// Nothing here was measured on real traffic.
+    /// True if the data are synthetic: no statement about real traffic.
     pub synthetic: bool,
-    /// What computed the lanes.
+    /// Backend of the lanes.
     pub backend: String,
-    /// The device, where one did.
+    /// The device, if one computed.
     pub device: Option<DeviceRecord>,
-    /// How the sweep went.
+    /// Statistics of the sweep.
     pub sweep: SweepRecord,
-    /// SHA-256 of the plan: everything that decides the outcomes.
+    /// SHA-256 of the plan, which determines all outcomes.
     pub plan_sha256: String,
-    /// SHA-256 of the scenario file, where one was read.
+    /// SHA-256 of the scenario file, if one was read.
     pub scenario_file_sha256: Option<String>,
     /// Recordings with the SHA-256 of their files.
     pub recordings: Vec<RecordingSummary>,
-    /// Recordings and parts that were left out, and why.
+    /// Skipped recordings and parts, with reasons.
     pub left_out: Vec<String>,
-    /// What the data leave open or what looks wrong in them.
+    /// Open questions about the data and suspicious values.
     pub notes: Vec<String>,
     /// Per category.
     pub categories: Vec<CategoryRecord>,
-    /// Lanes in all.
+    /// Total number of lanes.
     pub lanes: u64,
     /// Profile with every constant.
     pub profile: Profile,
@@ -106,33 +106,33 @@ pub struct RunRecord {
     pub mining: MiningOptions,
     /// Options of the parameterizations.
     pub parameterization: ParameterizationOptions,
-    /// How it was scored.
+    /// Options of the scoring.
     pub score: ScoreOptions,
-    /// Options that were set for this command, and by what. As the backend's, they are of the command and not of the
-    /// result: a merge has none, its parts had their own.
+    /// Options set for this command, with their sources. Like the backend's, they belong to the command and not to the
+    /// result: a merge has none, because its parts had their own.
     pub settings: Vec<SettingRecord>,
     /// Files beside this one.
     pub files: Vec<String>,
-    /// Seconds; they differ from run to run.
+    /// Durations, s; they differ between runs.
     pub timings: Timings,
 }
 
-/// What belongs to the machine and the command, not to the result of a study.
+/// Facts about the machine and the command, which are not part of a study's result.
 pub struct StudyHost {
-    /// What computed the lanes.
+    /// Backend of the lanes.
     pub backend: String,
-    /// The device, where one did.
+    /// The device, if one computed.
     pub device: Option<DeviceRecord>,
-    /// How the sweep went.
+    /// Statistics of the sweep.
     pub swept: SweepSummary,
-    /// Seconds of the parts of the run.
+    /// Durations of the parts of the run.
     pub timings: Timings,
-    /// What was configured.
+    /// Options that were set.
     pub settings: Vec<SettingRecord>,
 }
 
 impl StudyHost {
-    /// Of merged parts, which had machines and commands of their own.
+    /// For merged parts, which had their own machines and commands.
     pub fn of_parts(result: &StudyResult) -> StudyHost {
         StudyHost {
             backend: format!("{} merged", counted(result.parts, "part")),
@@ -145,7 +145,7 @@ impl StudyHost {
 }
 
 impl RunRecord {
-    /// Of a study and its scores.
+    /// From a study and its scores.
     pub fn of(study: &Study, scores: &ScoreTable, host: StudyHost) -> RunRecord {
         let (plan, facts) = (study.plan(), study.facts().clone());
         RunRecord {

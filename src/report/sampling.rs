@@ -23,7 +23,7 @@ use crate::{Error, Result};
 /// The density of a run.
 #[derive(Debug, Clone, Serialize)]
 pub struct DensityRecord {
-    /// Its content's SHA-256.
+    /// SHA-256 of its content.
     pub sha256: String,
     /// Category.
     pub category: &'static str,
@@ -31,14 +31,14 @@ pub struct DensityRecord {
     pub parameterization: String,
     /// Names of the parameters.
     pub parameters: Vec<String>,
-    /// Scenarios that it was fitted on; 0 of a distribution that somebody wrote.
+    /// Number of scenarios in its fit; 0 for a distribution written by hand.
     pub kernels: usize,
-    /// Where it comes from.
+    /// Provenance of its data.
     pub provenance: Provenance,
 }
 
 impl DensityRecord {
-    /// Of a density.
+    /// From a density.
     ///
     /// # Errors
     /// As [`DensityModel::content_sha256`].
@@ -57,15 +57,15 @@ impl DensityRecord {
 /// Draws of crude Monte Carlo.
 #[derive(Debug, Clone, Serialize)]
 pub struct DrawRecord {
-    /// Sample indices that were drawn: [first, one past the last].
+    /// Ranges of drawn sample indices: [first, one past the last].
     pub ranges: Vec<[u64; 2]>,
     /// Samples, void ones included.
     pub samples: u64,
-    /// Samples without a valid point, which no estimate counts.
+    /// Samples without a valid point; no estimate counts them.
     pub voids: u64,
-    /// Draws in all.
+    /// Total number of draws.
     pub tries: u64,
-    /// Invalid ones among them.
+    /// Fraction of invalid draws.
     pub rejected_share: f64,
     /// Lanes.
     pub lanes: u64,
@@ -92,14 +92,14 @@ impl DrawRecord {
     }
 }
 
-/// What belongs to the machine and not to the result.
+/// Facts about the machine, which are not part of the result.
 #[derive(Debug, Clone, Serialize)]
 pub struct HostRecord {
-    /// What computed.
+    /// Backend.
     pub backend: String,
-    /// The device, where one did.
+    /// The device, if one computed.
     pub device: Option<DeviceRecord>,
-    /// Lanes that were computed again on the CPU with every step made, all equal.
+    /// Lanes that the CPU recomputed with every step, all equal.
     pub rechecked_lanes: u64,
     /// Wall clock, s.
     pub seconds: f64,
@@ -108,7 +108,7 @@ pub struct HostRecord {
 }
 
 impl HostRecord {
-    /// Of what computed a run that began at this instant.
+    /// For a run that started at `started`.
     pub fn of(opened: &OpenBackend, rechecked_lanes: u64, started: Instant) -> Self {
         HostRecord {
             backend: opened.backend().describe(),
@@ -119,7 +119,7 @@ impl HostRecord {
         }
     }
 
-    /// Of the parts of a run that were merged.
+    /// For the merged parts of a run.
     pub fn of_parts(parts: usize, rechecked_lanes: u64) -> Self {
         let threads = rayon::current_num_threads();
         HostRecord {
@@ -139,7 +139,7 @@ pub struct EstimateFile {
     pub lanesweep_estimate: u64,
     /// Program and version.
     pub program: String,
-    /// [`ENGINE_VERSION`] of the program: what the bits of its lanes are.
+    /// [`ENGINE_VERSION`] of the program, which identifies the bits of its lanes.
     pub engine: u64,
     /// Estimator: `mc`, `is`, `ce`, `subset`.
     pub estimator: &'static str,
@@ -151,23 +151,23 @@ pub struct EstimateFile {
     pub models: Vec<ModelId>,
     /// Headways, by name.
     pub headways: Vec<String>,
-    /// The same as the plan has them.
+    /// Headways, as in the plan.
     pub plan_headways: Vec<Headway>,
     /// Kind of points: `random`, `sobol`.
     pub points: &'static str,
-    /// Samples asked for.
+    /// Requested number of samples.
     pub samples: u64,
     /// Seed.
     pub seed: u64,
-    /// Parameters that were given, with their values; the estimates are conditional on them.
+    /// Parameters with given values; the estimates are conditional on them.
     pub given: Vec<(String, f64)>,
-    /// Hash of the plan, of crude Monte Carlo.
+    /// Hash of the plan; only for crude Monte Carlo.
     pub plan_sha256: Option<String>,
-    /// Draws of crude Monte Carlo.
+    /// Draws; only for crude Monte Carlo.
     pub draws: Option<DrawRecord>,
-    /// What ended it.
+    /// Why the run ended.
     pub stopped: StopReason,
-    /// The same flags give the same numbers on every machine.
+    /// Whether the same flags give the same numbers on every machine.
     pub reproducible: bool,
     /// Estimates.
     pub estimates: Vec<EstimateRow>,
@@ -175,14 +175,14 @@ pub struct EstimateFile {
     pub levels: Vec<Levels>,
     /// Files beside this one.
     pub files: Vec<String>,
-    /// SHA-256 of `worst.csv`, where there is one.
+    /// SHA-256 of `worst.csv`, if written.
     pub worst_sha256: Option<String>,
     /// The machine.
     pub host: HostRecord,
 }
 
 impl EstimateFile {
-    /// What every run says of itself; draws, levels and replicates are added by those that have them.
+    /// The part of the record common to all runs; draws, levels and replicates are added where they exist.
     ///
     /// # Errors
     /// As [`DensityModel::content_sha256`].
@@ -191,7 +191,7 @@ impl EstimateFile {
         Ok(EstimateFile::of(density, is_sampled, (&sample.profile, &sample.options), estimates, host))
     }
 
-    /// The same of any density by its record; `is_sampled_headway` where the headway is one of its parameters.
+    /// Like [`EstimateFile::new`], from a density's record; `is_sampled_headway`: the headway is one of its parameters.
     pub fn of(
         density: DensityRecord,
         is_sampled_headway: bool,
@@ -228,16 +228,16 @@ impl EstimateFile {
         }
     }
 
-    /// As JSON. What is not finite is null.
+    /// As JSON; NaN and infinity become null.
     ///
     /// # Errors
-    /// None for what this program made.
+    /// None for a record of this program.
     pub fn json(&self) -> Result<String> {
         let text = serde_json::to_string_pretty(self);
         text.map(|text| text + "\n").map_err(|e| Error::Internal(format!("an estimate cannot be written: {e}")))
     }
 
-    /// As the terminal shows it.
+    /// The text for the terminal.
     pub fn text(&self) -> String {
         let mut text = String::new();
         let density = &self.density;
@@ -311,7 +311,7 @@ impl EstimateFile {
             self.interval_rule()
         );
         let _ = writeln!(text, "{}", wrap(&rule, WIDTH));
-        // A density of N scenarios was never seen beyond them.
+        // A density of N scenarios is based on no data below a probability of 1/N.
         let resolved = 1.0 / self.density.kernels.max(1) as f64;
         let is_fitted = self.density.kernels > 0;
         if is_fitted
@@ -330,7 +330,7 @@ impl EstimateFile {
         text
     }
 
-    /// Which failures come from close following, of crude Monte Carlo.
+    /// Failures from close following; only for crude Monte Carlo.
     fn close_following(&self) -> String {
         let Some((draws, category)) = self.draws.as_ref().zip(Category::parse(self.density.category)) else {
             return String::new();
@@ -339,7 +339,7 @@ impl EstimateFile {
         close_following(&[row], "the density", &self.plan_headways, WIDTH)
     }
 
-    /// The estimates over all headways.
+    /// The table of the estimates over all headways.
     fn table(&self) -> Table {
         let estimates = &self.estimates;
         let half_width = |row: &EstimateRow| {
@@ -373,7 +373,7 @@ impl EstimateFile {
         table.column("verdict", |row| row.estimate.trust.verdict().to_string()).build()
     }
 
-    /// What the weights of importance samples say.
+    /// What the importance weights indicate.
     fn weights_text(&self) -> String {
         let rows = self.estimates.iter().filter_map(|row| Some((row, row.estimate.weights.as_ref()?)));
         let table = Table::of(rows)
@@ -389,7 +389,7 @@ impl EstimateFile {
 }
 
 impl EstimateFile {
-    /// The rows for which crude Monte Carlo needs fewer lanes for the same interval, with a sentence that says so.
+    /// The rows for which crude Monte Carlo needs fewer lanes for the same interval, with a sentence stating it.
     pub(super) fn costlier_than_crude(&self) -> impl Iterator<Item = (&EstimateRow, String)> {
         let is_costlier = |row: &&EstimateRow| row.estimate.variance_reduction < 1.0;
         let rows = self.estimates.iter().filter(|_| self.estimator != "mc").filter(is_costlier);
@@ -401,7 +401,7 @@ impl EstimateFile {
 }
 
 impl EstimateRow {
-    /// Over all headways, where there are several.
+    /// Whether the row is over all headways, if there are several.
     pub(super) fn is_overall(&self, all: &[EstimateRow]) -> bool {
         self.headway == "all" || !all.iter().any(|row| row.headway == "all")
     }

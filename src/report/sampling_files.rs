@@ -15,7 +15,7 @@ use crate::support::run_dir::Results;
 use crate::{Error, Result};
 
 impl EstimateFile {
-    /// Of a run and its result.
+    /// From a run and its result.
     ///
     /// # Errors
     /// As [`DensityModel::content_sha256`].
@@ -29,7 +29,7 @@ impl EstimateFile {
         Ok(file)
     }
 
-    /// Puts every file of the run into its folder, the record last.
+    /// Writes every file of the run to its folder, the record last.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -39,7 +39,7 @@ impl EstimateFile {
             figures = self.crude_files(&mut results, plan, density, crude, &sample.options)?;
         }
         if matches!(sample.options.estimator, Estimator::Given { .. }) {
-            // A proposal in this folder may be one that was given.
+            // A proposal in this folder may be an input of the run.
             results.keep(|name| name.starts_with("proposal-"))?;
         }
         for (model, proposal) in &result.proposals {
@@ -49,7 +49,7 @@ impl EstimateFile {
         self.publish(results, figures)
     }
 
-    /// Convergence, worst lanes and maps; returns the figures.
+    /// Writes convergence, worst lanes and maps; returns the figures.
     fn crude_files(
         &mut self,
         results: &mut Results,
@@ -88,11 +88,11 @@ impl EstimateFile {
         Ok(figures)
     }
 
-    /// Adds the table of the worst lanes, where they were counted, and its checksum to the record. `drawn` gives the point
-    /// of a lane's sample, and its headway where that is drawn too.
+    /// Adds the table of the worst lanes, if recorded, and its checksum to the record. `drawn` returns the point of a
+    /// lane's sample, and its headway if sampled.
     ///
     /// # Errors
-    /// Of `drawn`; [`Error::Io`].
+    /// Errors of `drawn`; [`Error::Io`].
     pub fn add_worst(
         &mut self,
         results: &mut Results,
@@ -128,7 +128,7 @@ impl EstimateFile {
         results.add("worst.csv", table.as_bytes())
     }
 
-    /// Adds table and page of the estimates; then everything gets its name, with the record.
+    /// Adds table and page of the estimates, then publishes all files with the record.
     ///
     /// # Errors
     /// [`Error::Io`].

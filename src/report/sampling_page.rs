@@ -13,10 +13,10 @@ use crate::support::table::{Column, Digits, Table};
 use crate::{Error, Result};
 
 impl EstimateFile {
-    /// `report.html`; the figures are those of the run, made already.
+    /// `report.html`, with the figures of the run.
     ///
     /// # Errors
-    /// None for what this program made.
+    /// None for a page of this program.
     pub fn html(&self, figures: Vec<PageFigure>) -> Result<String> {
         let density = &self.density;
         let mut warnings = Vec::new();
@@ -130,7 +130,7 @@ impl EstimateFile {
         }
     }
 
-    /// Probability over the headway, a panel per model; `None` where there is one headway only.
+    /// Probability over the headway, a panel per model; `None` for a single headway.
     pub fn headways_figure(&self) -> Option<Figure> {
         let thw_s = |row: &EstimateRow| {
             let of = |headway: &&Headway| headway.to_string() == row.headway;

@@ -1,5 +1,5 @@
-//! The tables of a sampling run as CSV: numbers in full precision, empty where a value is undefined; and how they are
-//! to be read, in words that the terminal and the page share.
+//! The tables of a sampling run as CSV: numbers in full precision, empty where undefined. Also the sentences that
+//! explain them on the terminal and the page.
 
 use super::sampling::EstimateFile;
 use crate::engine::{NO_STEP, Outcome};
@@ -94,9 +94,9 @@ pub fn convergence_csv(checkpoints: &[Checkpoint]) -> String {
         .csv()
 }
 
-/// One of the worst lanes, with what it was.
+/// One of the worst lanes, with its facts.
 pub struct WorstRow {
-    /// Place among the model's worst, from 1.
+    /// Rank among the model's worst lanes, from 1.
     pub rank: usize,
     /// The lane and its limit state.
     pub lane: WorstSample,
@@ -106,7 +106,7 @@ pub struct WorstRow {
     pub sample: u64,
     /// Driver model.
     pub model: ModelId,
-    /// Headway, s, where it is one of the plan's or a parameter.
+    /// Headway, s, from the plan or the parameters.
     pub headway: String,
     /// Its point.
     pub point: Vec<f64>,
@@ -152,12 +152,12 @@ fn kind_name(kind: IntervalKind) -> &'static str {
 }
 
 impl EstimateFile {
-    /// The headway of a row, or of how many P is the mean.
+    /// The headway of a row, or the number of headways that P averages.
     pub(super) fn headway_cell(&self, row: &EstimateRow) -> String {
         if row.headway == "all" { format!("all {}", self.headways.len()) } else { row.headway.clone() }
     }
 
-    /// What P over all headways is a mean of; `None` where there is one headway.
+    /// What P over all headways averages; `None` for a single headway.
     pub(super) fn mean_rule(&self) -> Option<String> {
         let is_mean = self.estimates.iter().any(|row| row.headway == "all");
         is_mean.then(|| {
@@ -170,7 +170,7 @@ impl EstimateFile {
         })
     }
 
-    /// What a rate per hour assumes; `None` where no risk is known or the density draws the headway.
+    /// What a rate per hour assumes; `None` if no risk is known or the density samples the headway.
     pub(super) fn exposure_rule(&self) -> Option<String> {
         let is_known = self.estimates.iter().any(|row| row.risk.per_hour.is_some() || row.risk.per_1000_km.is_some());
         (is_known && !self.plan_headways.is_empty()).then(|| {
@@ -180,7 +180,7 @@ impl EstimateFile {
         })
     }
 
-    /// What the ratio to recorded scenarios and the verdict say; `None` where nothing is compared.
+    /// What the ratio to recorded scenarios and the verdict mean; `None` without a comparison.
     pub(super) fn recorded_rule(&self) -> Option<&'static str> {
         self.estimates.iter().any(|row| row.recorded.is_some()).then_some(
             "P/S: rate of the samples over that of the recorded scenarios (S), from the same headways; = agrees, > too \
@@ -190,7 +190,7 @@ impl EstimateFile {
         )
     }
 
-    /// What the intervals hold besides the draws.
+    /// What the intervals cover in addition to the draws.
     pub(super) fn interval_rule(&self) -> &'static str {
         if self.density.kernels == 0 {
             ""

@@ -26,22 +26,22 @@ use crate::support::run_dir::Results;
 use crate::support::table::Table;
 use serde_json::Value;
 
-/// What the figures of one category need beside the scores.
+/// Data for the figures of one category, in addition to the scores.
 #[derive(Debug, Clone)]
 pub struct CategoryPictures {
     /// Failures by headway.
     pub headways: HeadwayFailures,
     /// Distributions of the mined parameters.
     pub parameters: Vec<ParameterHistogram>,
-    /// Shapes of the decomposition, where there is one.
+    /// Shapes of the decomposition, if there is one.
     pub modes: Vec<ModeShape>,
-    /// What its first coefficients explain together.
+    /// Cumulative explained variance of its first coefficients.
     pub svd_explained: Vec<f64>,
     /// Failures of S from headways below 0.5 s; `None` where the headways are gaps in metres.
     pub close_following: Option<CloseFollowing>,
 }
 
-/// Everything a study says.
+/// A study's complete report.
 pub struct StudyReport {
     /// Scores.
     pub scores: ScoreTable,
@@ -51,16 +51,16 @@ pub struct StudyReport {
     pub pictures: Vec<CategoryPictures>,
     /// The best parameterizations for collisions.
     pub best: Vec<Best>,
-    /// What was run.
+    /// Record of the run.
     pub run: RunRecord,
-    /// Set the paper's published numbers beside.
+    /// Whether to show the paper's published numbers.
     pub published: bool,
-    /// f32 against f64, where it was asked for.
+    /// f32 against f64, if requested.
     pub comparison: Option<ReferenceComparison>,
 }
 
 impl StudyReport {
-    /// Of the counts of all lanes.
+    /// From the counts of all lanes.
     ///
     /// # Errors
     /// As [`Study::score`].
@@ -90,8 +90,7 @@ impl StudyReport {
         Ok(StudyReport { scores, claims, best, pictures, run, published: facts.published, comparison })
     }
 
-    /// All tables, so many columns wide at most; only an unbroken word of the data's description (a path) can be
-    /// longer.
+    /// All tables, at most `width` columns wide; only a long word in the data's description (a path) can exceed this.
     pub fn text(&self, width: usize) -> String {
         let data = tables::wrap(&self.run.data, width);
         let mut parts = vec![format!("{data}\n")];
@@ -109,7 +108,7 @@ impl StudyReport {
         parts.join("\n")
     }
 
-    /// What the scenarios start from, in a few words.
+    /// Start of the scenarios, in a few words.
     pub(super) fn headways_in_words(&self) -> String {
         match self.scores.headways.len() {
             _ if Headway::is_observed(&self.scores.headways) => "recorded THW".to_owned(),
@@ -118,7 +117,7 @@ impl StudyReport {
         }
     }
 
-    /// Which failures of S come from close following.
+    /// Failures of S from close following.
     pub(super) fn close_following(&self, width: usize) -> String {
         let rows = self.scores.categories.iter().zip(&self.pictures).filter_map(|(scores, pictures)| {
             Some(CloseRow {
@@ -130,7 +129,7 @@ impl StudyReport {
         close_following(&rows.collect::<Vec<_>>(), "S", &self.scores.headways, width)
     }
 
-    /// Puts CSV tables, figures, what is in `results` already and `run.json` into their folder.
+    /// Writes CSV tables, figures, the files already in `results` and `run.json` to the folder.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
@@ -176,7 +175,7 @@ impl StudyReport {
         chart.figure().svg()
     }
 
-    /// The other figures of a category, with the beginnings of their files' names; without what there is no data for.
+    /// The other figures of a category, with the prefixes of their file names; figures without data are skipped.
     pub(super) fn figures(&self, at: usize) -> Vec<(&'static str, Figure)> {
         let (scores, data) = (&self.scores.categories[at], &self.run.data);
         let mut figures = Vec::new();
@@ -222,10 +221,10 @@ pub(super) fn file_name(figure: &str, category: Category, ending: &str) -> Strin
 }
 
 impl StudyReport {
-    /// The same tables as one JSON document, undefined values null; the published numbers where they were asked for.
+    /// The same tables as one JSON document; undefined values are null. Published numbers are included if requested.
     ///
     /// # Errors
-    /// None for what this program made.
+    /// None for a document of this program.
     pub fn json(&self) -> Result<String> {
         let mut value = serde_json::json!({
             "program": self.run.program,
@@ -256,7 +255,7 @@ impl StudyReport {
     }
 }
 
-/// A best parameterization; numbers without one are null.
+/// A best parameterization; undefined numbers are null.
 fn best(best: &Best) -> Value {
     let score = best.score.as_ref();
     serde_json::json!({
@@ -269,7 +268,7 @@ fn best(best: &Best) -> Value {
     })
 }
 
-/// The paper's numbers, of highD.
+/// The paper's numbers, from highD.
 fn published(scores: &ScoreTable) -> Value {
     let cells = || ModelId::ALL.into_iter().flat_map(|model| Criterion::ALL.into_iter().map(move |c| (model, c)));
     let failures = Category::ALL.into_iter().flat_map(|category| {

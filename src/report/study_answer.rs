@@ -1,5 +1,5 @@
-//! What a study answers, on one screen of a terminal: which parameterization is best, what it hides, and what the data
-//! does not tell.
+//! The answer of a study on one terminal screen: the best parameterization, what it hides, and what the data do not
+//! show.
 
 use super::study::StudyReport;
 use super::tables::wrap;
@@ -7,22 +7,22 @@ use crate::run::score::Best;
 use crate::support::readable::{count, count_of, counted};
 use crate::support::table::{NumberText, Table};
 
-/// Columns of the screen, and of a narrower one at least.
+/// Width of the screen in columns, and minimum width of a narrower one.
 const WIDTH: usize = 80;
 const MIN_WIDTH: usize = 40;
-/// Rows of the table: with the lines around it and those on stderr the screen has 24 lines.
+/// Maximum number of rows of the table: with the lines around it and those on stderr, the screen has 24 lines.
 const MAX_ROWS: usize = 12;
-/// Characters of a list of parameterizations.
+/// Maximum characters of a list of parameterizations.
 const LIST: usize = 14;
 
 const HEADER: [&str; 7] = ["scenario", "driver", "best", "F1", "hides", "not told apart", "needs"];
-/// Column of F1, or of the reason why there is none.
+/// Index of the column with F1, or with the reason why it is missing.
 const SCORE: usize = 3;
 /// Columns of numbers.
 const NUMBERS: [usize; 2] = [4, 6];
 
 impl StudyReport {
-    /// The answer in at most 20 lines of 80 columns, or fewer columns where the terminal is narrower.
+    /// The answer in at most 20 lines of 80 columns, or fewer columns on a narrower terminal.
     pub fn answer(&self, width: usize) -> String {
         let width = width.clamp(MIN_WIDTH, WIDTH);
         let made_up = if self.run.synthetic { ". No number here is a statement about real traffic." } else { "" };
@@ -66,7 +66,7 @@ impl StudyReport {
             for (at, cell) in row.iter().enumerate() {
                 end += widths[at] + if at > 0 { 2 } else { 0 };
                 let start = end - if NUMBERS.contains(&at) { cell.chars().count() } else { widths[at] };
-                // A sentence in place of an answer runs on over the empty columns after it.
+                // A sentence in place of an answer extends over the empty columns after it.
                 let gap = start.saturating_sub(line.chars().count()).max(if at > 0 { 2 } else { 0 });
                 if !cell.is_empty() {
                     line += &" ".repeat(gap);
@@ -123,7 +123,7 @@ fn list(names: &[String]) -> String {
     if text.chars().count() <= LIST { text } else { format!("{} others", names.len()) }
 }
 
-/// `1.3x`, rounded up: so much more data, or more than anybody has.
+/// `1.3x`, rounded up: how much more data is needed, or a text if the factor is unrealistic.
 fn factor(times: f64) -> String {
     match times {
         t if t >= 100.0 || t.is_nan() => ">100x".to_owned(),

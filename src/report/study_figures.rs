@@ -1,4 +1,4 @@
-//! The figures of a study beside the radar charts: recall and precision, failures against the headway, F1 against the
+//! The figures of a study except the radar charts: recall and precision, failures against the headway, F1 against the
 //! number of parameters, the shapes of a decomposition, the distributions of parameters.
 
 use super::plot::{Figure, GREY, HOLLOW, Mark, Plot, PlotAxis, Rule, Series, Value, is_few};
@@ -18,15 +18,15 @@ pub struct HeadwayFailures {
     variants: Vec<String>,
     headways: Vec<Headway>,
     models: Vec<ModelId>,
-    /// Variant × headway × model × criterion, as many as those are.
+    /// Counts by variant × headway × model × criterion.
     failures: Vec<u64>,
 }
 
 impl HeadwayFailures {
-    /// Of a block of a plan.
+    /// From a block of a plan.
     ///
     /// # Errors
-    /// Where the counts are not those of the plan.
+    /// [`crate::Error`] if the counts do not match the plan.
     pub fn of(plan: &LanePlan, partial: &Partial, block: usize) -> Result<HeadwayFailures> {
         let failures = partial.headway_failures(plan, block)?.to_vec();
         HeadwayFailures::new(&plan.blocks[block].variants, &plan.headways, &plan.models, failures)
@@ -47,13 +47,13 @@ impl HeadwayFailures {
         Ok(HeadwayFailures { variants, headways, models, failures })
     }
 
-    /// Failed lanes of a variant at a headway; models and criteria by their places in the plan.
+    /// Failed lanes of a variant at a headway; models and criteria by their indices in the plan.
     fn count(&self, (variant, headway, model, criterion): (usize, usize, usize, Criterion)) -> u64 {
         let lane = (variant * self.headways.len() + headway) * self.models.len() + model;
         self.failures[lane * Criterion::ALL.len() + criterion.index()]
     }
 
-    /// Per variant, headway, model and criterion, in this order.
+    /// Rows ordered by variant, headway, model and criterion.
     pub(super) fn rows(&self) -> impl Iterator<Item = (&str, Headway, ModelId, Criterion, u64)> {
         let lanes = self.variants.iter().flat_map(move |variant| {
             let starts = self.headways.iter().map(move |&headway| (variant, headway));
@@ -65,12 +65,12 @@ impl HeadwayFailures {
         })
     }
 
-    /// Share of the recorded scenarios that fail, over the headway: a panel per model, a line per criterion.
+    /// Fraction of the recorded scenarios that fail, over the headway: a panel per model, a line per criterion.
     pub fn figure(&self, scores: &CategoryScores, data: &str) -> Figure {
         let thw_s = |headway: &Headway| match headway {
             Headway::ThwS(seconds) => Some(*seconds),
             Headway::GapM(metres) => Some(*metres),
-            // It is another one in every scenario.
+            // These headways differ between scenarios.
             Headway::MinFollowing | Headway::Observed => None,
         };
         let is_gap = self.headways.iter().any(|headway| matches!(headway, Headway::GapM(_)));
@@ -151,7 +151,7 @@ pub fn recall_and_precision(scores: &CategoryScores, data: &str) -> Figure {
     }
 }
 
-/// Words for a heading where scenarios are few.
+/// Text for a heading if there are few scenarios.
 fn few(failing_scenarios: u64) -> String {
     let is_few = is_few(failing_scenarios as f64);
     if is_few { format!(" ({})", counted(failing_scenarios as usize, "scenario")) } else { String::new() }
@@ -167,8 +167,8 @@ fn equal_f1(f: f64) -> Vec<(f64, f64)> {
     (0..=40).rev().map(value).collect()
 }
 
-/// F1 against the number of parameters: its mean over the cells that every parameterization defines, over all criteria
-/// and for each; the front of those that no other beats with as few parameters.
+/// F1 against the number of parameters: the mean over the cells that every parameterization defines, over all criteria
+/// and for each. Also the front of parameterizations that no other beats with at most as many parameters.
 pub fn f1_by_parameters(scores: &CategoryScores, data: &str) -> Figure {
     let panel = |heading: &str, criteria: &[Criterion]| {
         let shared = shared_cells(scores, criteria);
@@ -216,13 +216,13 @@ fn f1_of(scores: &CategoryScores, variant: usize, (model, criterion): (ModelId, 
     scores.index(variant, model, criterion).and_then(|at| f1(&scores.cells[at].counts))
 }
 
-/// The cells whose F1 every parameterization defines.
+/// The cells whose F1 is defined for every parameterization.
 fn shared_cells(scores: &CategoryScores, criteria: &[Criterion]) -> Vec<(ModelId, Criterion)> {
     let cells = scores.models.iter().flat_map(|&model| criteria.iter().map(move |&criterion| (model, criterion)));
     cells.filter(|&cell| (1..scores.variants.len()).all(|variant| f1_of(scores, variant, cell).is_some())).collect()
 }
 
-/// The mean F1 of every parameterization over these cells; none where there is no cell.
+/// The mean F1 of every parameterization over these cells; empty without cells.
 fn mean_f1(scores: &CategoryScores, cells: &[(ModelId, Criterion)]) -> Vec<(Parameterization, f64)> {
     let mean = |variant: usize| {
         let sum: f64 = cells.iter().filter_map(|&cell| f1_of(scores, variant, cell)).sum();
@@ -232,7 +232,7 @@ fn mean_f1(scores: &CategoryScores, cells: &[(ModelId, Criterion)]) -> Vec<(Para
     (1..scores.variants.len()).filter_map(mean).collect()
 }
 
-/// The points that no other reaches with as small an x, from left to right.
+/// The points that no other point with at most the same x exceeds, from left to right.
 fn pareto_front(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     let mut sorted = points.to_vec();
     sorted.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.total_cmp(&a.1)));

@@ -13,14 +13,14 @@ use crate::support::table::Table;
 use crate::traffic::mining::RecordingSummary;
 use crate::{Error, Result};
 
-/// Recordings that are listed; the rest are in `run.json`.
+/// Maximum number of recordings listed; the rest are in `run.json`.
 const MAX_RECORDINGS: usize = 200;
 
 impl StudyReport {
     /// `report.html`.
     ///
     /// # Errors
-    /// None for what this program makes.
+    /// None for a page of this program.
     pub fn html(&self) -> Result<String> {
         let run = &self.run;
         let mut warnings = Vec::new();
@@ -141,7 +141,7 @@ impl StudyReport {
         }
     }
 
-    /// `None` where no claim could be computed: of a single model, say.
+    /// `None` if no claim could be computed, for instance with a single model.
     fn claims(&self) -> Option<Section> {
         let table = tables::claim_table(&self.claims, usize::MAX);
         let level = value(100.0 * self.scores.options.confidence);
@@ -179,7 +179,7 @@ impl StudyReport {
             },
         ));
         let seconds = &run.timings;
-        // Parts that were merged have times of their own, which nobody has added up.
+        // Merged parts have their own times, which are not added up.
         if seconds.sweep_s > 0.0 {
             let Timings { mine_s, plan_s, sweep_s, score_s } = seconds;
             let text = format!("mining {mine_s:.2}, planning {plan_s:.2}, lanes {sweep_s:.2}, scores {score_s:.2}");
@@ -224,7 +224,7 @@ fn compared(comparison: &ReferenceComparison) -> Section {
     }
 }
 
-/// With a full stop at its end.
+/// The text with a full stop.
 fn sentence(text: &str) -> String {
     if text.ends_with('.') { text.to_owned() } else { format!("{text}.") }
 }

@@ -1,4 +1,4 @@
-//! The tables of a study: for people as the paper has them, for files with one row per number.
+//! The tables of a study: for people in the paper's layout, for files with one row per number.
 
 use crate::model::criterion::Criterion;
 use crate::run::score::{
@@ -18,8 +18,8 @@ pub fn failures(scores: &ScoreTable, published: bool, width: usize) -> String {
     format!("Failures of the recorded scenarios (S)\n{table}{}", misfit.unwrap_or_default())
 }
 
-/// Failures of S per category, model and criterion, as in the paper's table; where asked, the shares of collision, TTC and
-/// BTN beside the published ones.
+/// Failures of S per category, model and criterion, as in the paper's table. With `published`, the fractions of
+/// collision, TTC and BTN and the published ones.
 pub(super) fn failure_table(scores: &ScoreTable, published: bool, capped: &'static str) -> Table {
     let rows = scores.categories.iter().flat_map(|c| (0..c.models.len()).map(move |at| (c, at, c.models[at])));
     let failures =
@@ -82,7 +82,7 @@ pub(super) fn share_table(scores: &CategoryScores) -> Table {
     })
 }
 
-/// A row per model and criterion, a column per parameterization, of the cells of S.
+/// A row per model and criterion, a column per parameterization, from the cells of S.
 fn per_variant(
     scores: &CategoryScores,
     fails: Option<&'static str>,
@@ -96,7 +96,7 @@ fn per_variant(
         .build()
 }
 
-/// The cell of a variant beside one of S.
+/// The cell of a variant that corresponds to one of S.
 fn same<'a>(scores: &'a CategoryScores, s: &ScoreCell, variant: usize) -> Option<&'a ScoreCell> {
     scores.index(variant, s.model, s.criterion).map(|at| &scores.cells[at])
 }
@@ -109,13 +109,13 @@ fn value(value: Option<f64>, interval: Option<ScoreInterval>) -> String {
     }
 }
 
-/// A number in 0…1 in three characters, so that seven variants fit beside each other: `.87`, `1.0`.
+/// A number in 0…1 in three characters, so that seven variants fit side by side: `.87`, `1.0`.
 fn short(value: f64) -> String {
     let text = format!("{value:.2}");
     text.strip_prefix('0').map_or_else(|| format!("{value:.1}"), str::to_owned)
 }
 
-/// The table of claims with its heading and rule; nothing where no claim could be computed.
+/// The table of claims with its heading and rule; empty if no claim could be computed.
 pub fn claims(results: &[ClaimResult], width: usize) -> String {
     let table = claim_table(results, 34);
     if table.rows.is_empty() {
@@ -125,8 +125,8 @@ pub fn claims(results: &[ClaimResult], width: usize) -> String {
     format!("The paper's claims on this data\n{}{rule}\n", table.fitted(1, width))
 }
 
-/// The paper's claims with their numbers and verdicts, without those that could not be computed; statements in lines of
-/// so many characters.
+/// The paper's claims with their numbers and verdicts, without those that could not be computed; statements are wrapped
+/// to `width` characters.
 pub(super) fn claim_table(results: &[ClaimResult], width: usize) -> Table {
     Table::of(results.iter().filter(|result| result.verdict != ClaimVerdict::NotRun))
         .column("claim", |result| result.claim.id)
@@ -142,15 +142,15 @@ pub(super) fn claim_table(results: &[ClaimResult], width: usize) -> Table {
         .build()
 }
 
-/// Failures of S and S': one row per category, variant, model and criterion. `data` says what was swept.
+/// Failures of S and S': one row per category, variant, model and criterion. `data` describes the swept data.
 ///
 /// # Errors
-/// [`Error::Internal`] where there are fewer counts of capped lanes than cells.
+/// [`Error::Internal`] if there are fewer counts of capped lanes than cells.
 pub fn failure_records(scores: &ScoreTable, data: &str) -> Result<Table> {
     let mut rows = Vec::new();
     for category in &scores.categories {
         for (at, cell) in category.cells.iter().enumerate() {
-            // Cells are variant × model × criterion, these counts variant × model.
+            // Cells are variant × model × criterion; these counts are variant × model.
             let capped = category.capped.get(at / Criterion::ALL.len()).ok_or_else(|| {
                 let what = format!("{} of {}", cell.model.name(), category.variants[cell.variant]);
                 Error::Internal(format!("no count of lanes at the time cap for {what}"))
@@ -200,7 +200,7 @@ pub fn f1_records(scores: &ScoreTable, data: &str) -> Table {
         .build()
 }
 
-/// Why F1 has no interval; empty where it has one.
+/// Why F1 has no interval; empty if it has one.
 fn no_interval(cell: &ScoreCell) -> &'static str {
     match (f1(&cell.counts), cell.f1_interval) {
         (_, Some(_)) => "",
@@ -234,7 +234,7 @@ pub fn claim_records(results: &[ClaimResult], data: &str) -> Table {
         .build()
 }
 
-/// The text broken between words; a longer word stays whole.
+/// The text wrapped between words; a longer word stays whole.
 pub(crate) fn wrap(text: &str, width: usize) -> String {
     let mut lines = vec![String::new()];
     for word in text.split(' ') {
@@ -270,7 +270,7 @@ mod tests {
             scenarios: 1,
             simulations: 10,
             variants: vec!["S".to_owned()],
-            // One model that the cells have is not in the list.
+            // A model in the cells is missing in the list.
             models: vec![ModelId::Rss],
             cells: models.into_iter().flat_map(|m| Criterion::ALL.map(|c| cell(m, c))).collect(),
             capped,

@@ -8,7 +8,7 @@ use crate::model::criterion::Criterion;
 use crate::support::readable::{count, value};
 use crate::support::table::{NumberText, Table};
 
-/// One set of lanes: per category and model what was compared, and what differs.
+/// One set of lanes: what was compared per category and model, and the differences.
 pub fn comparison(comparison: &Comparison) -> String {
     let share = |tally: &GroupComparison, criterion: Criterion| {
         let mark = if tally.tests(criterion) { "" } else { "*" };
@@ -71,7 +71,7 @@ pub fn record(comparison: &Comparison) -> serde_json::Value {
     })
 }
 
-/// One lane's words on each backend, side by side.
+/// The outcome words of one lane on each backend, side by side.
 pub fn lane(key: &str, names: [&str; 3], outcomes: &[Outcome<f64>; 3]) -> String {
     let all = outcomes.map(|o| words(&o));
     let shown = outcomes.map(|o| shown(&o));
@@ -83,7 +83,7 @@ pub fn lane(key: &str, names: [&str; 3], outcomes: &[Outcome<f64>; 3]) -> String
     format!("{key}\n{}", rows.build().text())
 }
 
-/// The words as people read them. Numbers with every digit: a difference may be in the last one.
+/// The words for people. Numbers have all digits, because a difference may be in the last one.
 fn shown(o: &Outcome<f64>) -> [String; 12] {
     let number = |v: f64| if v.is_finite() { v.to_string() } else { value(v) };
     let step = |step: u32| if step == u32::MAX { "never".to_owned() } else { step.to_string() };

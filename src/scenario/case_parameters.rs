@@ -1,4 +1,4 @@
-//! A concrete case from the few numbers that a user gives: on the command line, in a file, in a row of a table.
+//! A concrete case from the few numbers that a user gives: on the command line, in a file, or in a row of a table.
 
 use serde::Deserialize;
 
@@ -9,7 +9,8 @@ use crate::{Error, Place, Result};
 /// Shortest and longest duration, s: the longest is the time cap of the paper's profile.
 pub(super) const DURATIONS_S: (f64, f64) = (0.1, 120.0);
 
-/// What was given; speeds in m/s, lengths in m, accelerations in m/s², times in s. The names are the flags of `simulate`.
+/// The given values; speeds in m/s, lengths in m, accelerations in m/s², times in s. The names are the flags of
+/// `simulate`.
 #[derive(Debug, Clone, Default, PartialEq, Deserialize)]
 #[serde(default)]
 #[allow(missing_docs)] // see PlainCase
@@ -34,7 +35,7 @@ impl CaseParameters {
     /// The kind of scenario.
     ///
     /// # Errors
-    /// [`Error::Usage`] where it is missing or unknown.
+    /// [`Error::Usage`] if it is missing or unknown.
     pub fn category(&self) -> Result<Category> {
         let text = self.category.as_ref().ok_or_else(|| missing("category"))?;
         Category::parse(text).ok_or_else(|| {
@@ -46,7 +47,7 @@ impl CaseParameters {
         })
     }
 
-    /// Speeds that are noise of a standing vehicle become 0, and are counted; `place` says where a key stands.
+    /// Sets speeds that are noise of a standing vehicle to 0 and counts them; `place` returns the place of a key.
     pub fn settle(&mut self, doubts: &mut Doubts, place: impl Fn(&str) -> String) {
         let speeds = [
             ("ego_speed", &mut self.ego_speed),
@@ -59,10 +60,10 @@ impl CaseParameters {
         }
     }
 
-    /// Looks at what was given.
+    /// Checks the plausibility of the given values.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a value beyond the physical range, unless such are accepted.
+    /// [`Error::Usage`] for a value outside the physical range, unless such values are accepted.
     pub fn check_plausible(&self, doubts: &mut Doubts) -> Result<()> {
         for (key, quantity, value) in self.numbers() {
             let Some(value) = value else { continue };
@@ -73,13 +74,13 @@ impl CaseParameters {
         Ok(())
     }
 
-    /// The names of what was given.
+    /// Names of the given values.
     pub fn given(&self) -> Vec<&'static str> {
         let numbers = self.numbers().into_iter().filter_map(|(key, _, value)| value.map(|_| key));
         self.category.iter().map(|_| "category").chain(numbers).collect()
     }
 
-    /// Every number with a range of plausible values.
+    /// Every number that has a range of plausible values.
     fn numbers(&self) -> [(&'static str, Quantity, Option<f64>); 12] {
         [
             ("gap", Quantity::Gap, self.gap),
@@ -97,7 +98,7 @@ impl CaseParameters {
         ]
     }
 
-    /// The case; vehicles have the size given here by default.
+    /// Returns the case; vehicles without a given size have the size of the arguments, m.
     ///
     /// # Errors
     /// [`Error::Usage`] that names what is missing or out of range.
@@ -152,10 +153,10 @@ impl CaseParameters {
         })
     }
 
-    /// Checks the initial distance, where one is given.
+    /// Checks the initial distance, if given.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a gap and a headway, for one out of range, and for a headway of an ego at rest.
+    /// [`Error::Usage`] if both gap and headway are given, if one is out of range, or for a headway of an ego at rest.
     pub fn check_start(&self) -> Result<()> {
         if self.gap.is_some() && self.thw.is_some() {
             let problem = "both gap and time headway are given";
@@ -166,7 +167,7 @@ impl CaseParameters {
         self.ego_speed.map_or(Ok(()), |ego_speed_mps| check_headway(ego_speed_mps, self.thw))
     }
 
-    /// Refuses parameters that the category does not have. 0 is accepted, as it means none.
+    /// Refuses parameters that the category does not have. 0 is accepted because it means none.
     fn refuse_of_other_categories(&self, category: Category) -> Result<()> {
         let given = [
             ("lateral_speed", self.lateral_speed, category == Category::Lvd),
@@ -184,7 +185,7 @@ impl CaseParameters {
     }
 }
 
-/// The complaint about what a user has to give.
+/// The error for a missing value.
 fn missing(key: &str) -> Error {
     let what = match key {
         "category" => "cut-in, cut-out or lvd",
@@ -196,7 +197,7 @@ fn missing(key: &str) -> Error {
     Error::usage(Place::item(key), "it is missing", help)
 }
 
-/// Beyond this no speed, length or acceleration is physical.
+/// Maximum magnitude of a physical speed, length or acceleration.
 const MAX_MAGNITUDE: f64 = 1e6;
 
 fn at_least(value: f64, least: f64, key: &str) -> Result<f64> {

@@ -1,11 +1,11 @@
-//! Checks that no type expresses: lengths, signs, what a category needs, and what is plausible on a road.
+//! Checks that types cannot express: lengths, signs, what a category needs, and what is plausible on a road.
 
 use super::{Category, Other, Scenario};
 use crate::support::error::{Error, Place, Result};
 use crate::support::plausibility::{Doubts, HELP, Quantity};
 
-/// What could not be read again: JSON has no NaN, for instance, and it would be written as null. A recording may hold
-/// speeds and accelerations that no scenario has.
+/// Refuses a scenario that could not be read back: JSON writes NaN as null, for instance. A recording may hold speeds
+/// and accelerations outside the range of scenarios.
 pub(super) fn check_written(scenario: &Scenario) -> Result<()> {
     check(scenario).map_err(|p| {
         let place = Place::item(name(&scenario.id)).column(p.field);
@@ -14,17 +14,17 @@ pub(super) fn check_written(scenario: &Scenario) -> Result<()> {
     })
 }
 
-/// What no reader of scenarios would accept, as a sentence.
+/// Why readers would refuse the scenario, as a sentence; `None` if they would not.
 pub(crate) fn problem_of(scenario: &Scenario) -> Option<String> {
     check(scenario).err().map(|p| format!("`{}` {}", p.field, p.problem))
 }
 
-/// How messages call a scenario.
+/// Name of a scenario in messages.
 pub(super) fn name(id: &str) -> String {
     format!("scenario {id}")
 }
 
-/// What is wrong with which field.
+/// A problem and its field.
 pub(super) struct Problem {
     pub field: String,
     pub problem: String,
@@ -94,13 +94,13 @@ fn check_other(role: &str, other: &Other, samples: usize) -> std::result::Result
     Ok(())
 }
 
-/// Longest name of a scenario or a recording: that of a file with some words more.
+/// Maximum length of a scenario or recording name: a file name plus some words.
 const MAX_ID_BYTES: usize = 512;
 
 /// Minimum sample rate, Hz: a lower one cannot resolve a motion.
 const MIN_RATE_HZ: f64 = 0.1;
 
-/// Beyond this no length, speed or rate is physical, and the squares of the lane arithmetic lose their meaning.
+/// Maximum magnitude of a physical length, speed or rate; beyond it, squares in the lane arithmetic lose their meaning.
 const MAX_MAGNITUDE: f64 = 1e6;
 
 fn finite(field: &str, value: f64) -> std::result::Result<(), Problem> {
@@ -131,8 +131,8 @@ fn expect(holds: bool, field: &str, value: f64, what: &str) -> std::result::Resu
     })
 }
 
-/// Takes a scenario as it was read: noise of standing vehicles is 0, what is wrong is refused, what is implausible is
-/// counted. `place` says where a field stands.
+/// Admits a scenario that was read: sets noise of standing vehicles to 0, refuses errors, and counts implausible
+/// values. `place` returns the place of a field.
 pub(super) fn admit(
     scenario: &mut Scenario,
     doubts: &mut Doubts,
@@ -174,7 +174,7 @@ pub(super) fn admit(
         worst(Quantity::LateralPosition, "y", &mut other.y.iter().copied(), &is)?;
         let jump = |text: String| format!("lateral jump: {text}");
         worst(Quantity::LateralSpeed, "y", &mut rates(&other.y, 1, s.fps), &jump)?;
-        // Over a second: single samples of recorded speeds are noisy.
+        // Changes are taken over one second, because single samples of recorded speeds are noisy.
         let second = (s.fps.round() as usize).max(1);
         let mean = |text: String| format!("mean of a second: {text}");
         worst(Quantity::Acceleration, "v", &mut rates(&other.v, second, s.fps), &mean)?;
@@ -187,7 +187,7 @@ fn rates(series: &[f64], n: usize, fps: f64) -> impl Iterator<Item = f64> {
     series.iter().zip(series.iter().skip(n)).map(move |(before, after)| (after - before) * fps / n as f64)
 }
 
-/// The value that is farthest from the plausible ones, and where it is.
+/// The value farthest outside the plausible range, and its index.
 fn farthest(quantity: Quantity, values: &mut dyn Iterator<Item = f64>) -> Option<(usize, f64)> {
     let (least, most) = quantity.limits().plausible;
     let beyond = |value: f64| (least - value).max(value - most);

@@ -1,5 +1,5 @@
-//! The fields of a scenario laid out flat, as the columns of a table (`ego_v0`, `target_v`, `lead_y`), and which of them
-//! the columns of a user's table are.
+//! The fields of a scenario as flat table columns (`ego_v0`, `target_v`, `lead_y`), and the mapping of a user's columns
+//! to them.
 
 use serde_json::{Map, Value};
 
@@ -8,19 +8,19 @@ use super::schema::{Content, FIELDS, Field, Presence};
 use crate::support::error::{Error, Result};
 use crate::support::table::{Column, ColumnKind, Named, Resolved, TableReader, nearest, resolve};
 
-/// A field that is no record.
+/// A field that is not a record.
 pub(super) struct Leaf {
     /// Name of the column.
     pub flat: String,
-    /// Record that it is in.
+    /// Record that contains it.
     pub record: Option<&'static str>,
     pub field: &'static Field,
-    /// No scenario can do without it.
+    /// Whether every scenario needs it.
     pub is_required: bool,
 }
 
-/// Other names under which columns are understood, the field each stands for, and whether it may change from instant
-/// to instant although the field is that of the start.
+/// Alternative column names, the field of each, and whether the value may change between instants although the field
+/// describes the start.
 const OTHER_NAMES: [(&str, &str, bool); 8] = [
     ("ego_speed", "ego_v0", true),
     ("target_speed", "target_v", false),
@@ -50,7 +50,7 @@ pub(super) fn leaves() -> Vec<Leaf> {
     leaves
 }
 
-/// What a column can be called: the leaves, then other names; with the leaf, and whether it may change.
+/// All column names: the leaves, then alternative names; each with its leaf and whether the value may change.
 pub(super) fn names(leaves: &[Leaf]) -> Vec<(Named, usize, bool)> {
     let own = leaves.iter().enumerate().map(|(at, leaf)| (leaf.flat.clone(), leaf.field.unit, at, false));
     let other = OTHER_NAMES.iter().filter_map(|(name, of, may_change)| {
@@ -61,7 +61,7 @@ pub(super) fn names(leaves: &[Leaf]) -> Vec<(Named, usize, bool)> {
 }
 
 impl Leaf {
-    /// The column that is written.
+    /// The column as it is written.
     pub fn column(&self) -> Column {
         let kind = match self.field.content {
             Content::Text if self.flat == "id" => ColumnKind::Text,
@@ -81,13 +81,13 @@ impl Leaf {
         Column::new(self.flat.clone(), kind, self.field.unit.to_owned(), description)
     }
 
-    /// The leaf's value in a scenario as JSON.
+    /// The leaf's value in the JSON of a scenario.
     pub fn of<'a>(&self, scenario: &'a Value) -> &'a Value {
         let object = self.record.map_or(Some(scenario), |record| scenario.get(record));
         object.and_then(|object| object.get(self.field.name)).unwrap_or(&Value::Null)
     }
 
-    /// Puts a value where it belongs in a scenario as JSON; null stays out.
+    /// Sets the leaf's value in the JSON of a scenario; null is skipped.
     pub fn put(&self, scenario: &mut Map<String, Value>, value: Value) {
         if value.is_null() {
             return;
@@ -102,17 +102,17 @@ impl Leaf {
         }
     }
 
-    /// Is there one value per sample?
+    /// Whether there is one value per sample.
     pub fn is_series(&self) -> bool {
         matches!(self.field.content, Content::Series)
     }
 
-    /// A value of a table as the JSON of a scenario has it. Texts of CSV become what the field holds; what does not
-    /// stays, so that the check of the field can show it.
+    /// Converts a table value to the JSON of a scenario. Texts of CSV are converted to the field's type; a text that
+    /// cannot be converted is kept, so that the field's check can show it.
     pub fn typed(&self, value: Value, divisor: f64) -> Value {
         match self.field.content {
             Content::Number => number(value, divisor),
-            // One value of the series, at an instant.
+            // The value of the series at one instant.
             Content::Series => match value {
                 Value::Array(values) => values.into_iter().map(|value| number(value, divisor)).collect(),
                 one => number(one, divisor),
@@ -133,7 +133,7 @@ impl Leaf {
                 other => other,
             },
             Content::Text => match value {
-                // An id that a program took for a number.
+                // Some programs write ids as numbers.
                 Value::Number(number) => Value::from(number.to_string()),
                 other => other,
             },
@@ -155,14 +155,14 @@ pub(super) fn number(value: Value, divisor: f64) -> Value {
         _ => None,
     };
     match parsed {
-        // Not divided by 1: what is written comes back as it is.
+        // No division by 1, so that written values read back unchanged.
         Some(number) if divisor == 1.0 => Value::from(number),
         Some(number) => Value::from(number / divisor),
         None => value,
     }
 }
 
-/// A whole number; programs keep columns with gaps as floating-point numbers.
+/// Converts to an integer; some programs store columns with gaps as floating-point numbers.
 fn whole(value: Value) -> Value {
     let parsed = match &value {
         Value::String(text) => text.trim().parse::<i64>().ok().or_else(|| text.trim().parse().ok().and_then(exactly)),
@@ -193,14 +193,14 @@ fn yes_or_no(value: Value) -> Value {
     known.map_or(value, Value::from)
 }
 
-/// Where users read about the columns.
+/// Where the columns are documented for users.
 pub(super) const HELP: &str = "the chapter on tables lists the columns (docs/src/tables.md)";
 
-/// Says which fields the columns of a table are, and takes only those.
+/// Maps the columns of a table to fields and selects the known ones.
 ///
 /// # Errors
-/// [`Error::Input`] for a column in a unit that cannot be used, two columns of one field, and a name so near to that of
-/// a field which is missing that it is misspelt; where `others` are not let be, for every unknown one.
+/// [`Error::Input`] for a column in an unusable unit, for two columns of one field, and for an unknown name close to
+/// that of a missing field. If `others` are not allowed, for every unknown column.
 pub(super) fn choose(
     table: &mut TableReader,
     known: &[Named],
@@ -221,12 +221,12 @@ pub(super) fn choose(
                 chosen.push(Chosen { at, column: column.clone(), known, field, divisor });
             }
             Resolved::WrongUnit(problem, help) => return refused(problem, help),
-            // The index that pandas keeps.
+            // The index column that pandas writes.
             Resolved::Unknown if column.is_empty() || column.starts_with("__") || column.starts_with("Unnamed") => {}
             Resolved::Unknown => unknown.push(column),
         }
     }
-    // A lane has a verdict per criterion; a scenario has none.
+    // A lane has a verdict per criterion; a scenario does not.
     let is_lane_table = ["collision", "ttc"].iter().all(|name| unknown.iter().any(|column| column == name));
     if is_lane_table && !others_are_let_be {
         let help = "give a scenario file, such as `lanesweep mine` writes";
@@ -247,12 +247,12 @@ pub(super) fn choose(
     Ok(chosen)
 }
 
-/// A column whose field is known.
+/// A column with a known field.
 pub(super) struct Chosen {
     pub at: usize,
-    /// As the file names it.
+    /// Name in the file.
     pub column: String,
-    /// Under which name it was understood.
+    /// Index of the name that it matched.
     pub known: usize,
     pub field: usize,
     pub divisor: f64,

@@ -1,10 +1,10 @@
-//! The file of scenarios, in the format that its name ends in.
+//! Scenario files, in the format given by the file name's ending.
 //!
-//! JSON Lines have one [`Scenario`] a line, its fields as they are named there.
+//! JSON Lines have one [`Scenario`] per line, with the same field names.
 //!
-//! Numbers are written with as many digits as they need and read to the same bits, so a study on a
-//! written file gives the result of a study on the recordings. Unknown fields are ignored, so files of
-//! other programs can be read; what a scenario cannot do without is checked line by line.
+//! Numbers are written with as many digits as needed to read back to the same bits. A study on a written file therefore
+//! gives the result of a study on the recordings. Unknown fields are ignored, so that files of other programs can be
+//! read; required fields are checked line by line.
 
 use std::borrow::Cow;
 use std::io::{BufRead, BufReader, Read, Write};
@@ -23,21 +23,20 @@ use crate::support::plausibility::Implausible;
 use crate::support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter};
 use crate::{Error, Place, Result};
 
-/// Formats that scenarios are written in, the one for names without an ending first.
+/// Formats for writing; the first is the default for names without an ending.
 const WRITTEN: [TableFormat; 2] = [TableFormat::JsonLines, TableFormat::Parquet];
-/// Formats that they are read from.
+/// Formats for reading.
 const READ: [TableFormat; 3] = [TableFormat::JsonLines, TableFormat::Parquet, TableFormat::Csv];
 
-/// Reads a file of scenarios: JSON Lines or Parquet as `lanesweep mine` writes them, or a table that a user made, with
-/// a row per scenario, per instant of one, or per concrete case. One scenario in ten may be unusable.
+/// Reads a file of scenarios: JSON Lines or Parquet as `lanesweep mine` writes them, or a user's table with one row per
+/// scenario, per instant of a scenario, or per concrete case. At most one scenario in ten may be unusable.
 ///
 /// # Errors
-/// [`Error::Io`] if the file cannot be read; [`Error::Usage`] for a name with another ending;
-/// [`Error::Input`] naming the file, the line or row, the scenario where its id can be read, and the field or
-/// column: a missing one, one of a wrong type or unit, series of unequal length or of fewer than two samples, a
-/// speed of -0.5 m/s or below, a size, lane width or sample rate that is not above 0, a value beyond the physical range
-/// unless accepted, a kept cut-out without the vehicle ahead or its gap, an id that came before, a file without
-/// scenarios, or a damaged one.
+/// [`Error::Io`] if the file cannot be read; [`Error::Usage`] for another ending. [`Error::Input`] names the file, the
+/// line or row, the scenario if its id can be read, and the field or column. Its causes are: a missing field, a wrong
+/// type or unit, series of unequal length or with fewer than two samples, a speed of -0.5 m/s or below, a size, lane
+/// width or sample rate that is not above 0, a value outside the physical range unless accepted, a kept cut-out without
+/// the vehicle ahead or its gap, a repeated id, a file without scenarios, or a damaged file.
 pub fn read_scenario_file(path: &Path, implausible: Implausible) -> Result<ScenarioFile> {
     match TableFormat::of(path, &READ, "the scenario file")? {
         TableFormat::JsonLines => read_json_lines(path, implausible),
@@ -45,20 +44,20 @@ pub fn read_scenario_file(path: &Path, implausible: Implausible) -> Result<Scena
     }
 }
 
-/// As [`read_scenario_file`], where every scenario is needed and implausible ones are accepted.
+/// Like [`read_scenario_file`], but every scenario must be usable, and implausible values are accepted.
 ///
 /// # Errors
-/// As [`read_scenario_file`], for the first scenario that cannot be used.
+/// Those of [`read_scenario_file`], for the first unusable scenario.
 pub fn read_scenarios(path: &Path) -> Result<Vec<Scenario>> {
     let mut file = read_scenario_file(path, Implausible::Accepted)?;
     if file.problems.is_empty() { Ok(file.scenarios) } else { Err(file.problems.swap_remove(0)) }
 }
 
-/// Writes a file of scenarios: whole or not at all.
+/// Writes a file of scenarios atomically.
 ///
 /// # Errors
-/// [`Error::Io`] if the folder cannot be written to; [`Error::Usage`] for a name that ends neither in
-/// `.jsonl` nor in `.parquet`; [`Error::Input`] for a scenario that [`read_scenarios`] would refuse.
+/// [`Error::Io`] if the folder cannot be written to; [`Error::Usage`] for a name that ends in neither `.jsonl` nor
+/// `.parquet`; [`Error::Input`] for a scenario that [`read_scenarios`] would refuse.
 pub fn write_scenarios<'a>(path: &Path, scenarios: impl IntoIterator<Item = &'a Scenario>) -> Result<()> {
     match check_scenario_file(path)? {
         TableFormat::JsonLines => write_json_lines(path, scenarios),
@@ -70,7 +69,7 @@ pub fn write_scenarios<'a>(path: &Path, scenarios: impl IntoIterator<Item = &'a 
     }
 }
 
-/// The format of a file of scenarios that is to be written, checked before the work starts.
+/// Returns the format of a scenario file to be written; called before the work starts.
 ///
 /// # Errors
 /// [`Error::Usage`] as [`write_scenarios`].
@@ -83,7 +82,8 @@ pub fn scenario_columns() -> Vec<Column> {
     leaves().iter().map(Leaf::column).collect()
 }
 
-/// A table with one row per scenario and series as lists. The caller has checked that the scenarios can be read again.
+/// Writes a table with one row per scenario and series as lists. The caller has checked that the scenarios can be read
+/// back.
 fn write_table(path: &Path, format: TableFormat, scenarios: &[&Scenario]) -> Result<()> {
     let synthetic = scenarios.iter().any(|scenario| scenario.synthetic);
     let facts = TableMetadata { table: "scenarios", synthetic, ..TableMetadata::default() };
@@ -99,7 +99,7 @@ fn write_table(path: &Path, format: TableFormat, scenarios: &[&Scenario]) -> Res
     table.finish()
 }
 
-/// `None` where the value is not of the column's kind.
+/// Converts a JSON value to a cell; `None` if the value does not match the column's kind.
 fn cell(value: &Value, kind: ColumnKind) -> Option<Cell<'_>> {
     let numbers = || value.as_array();
     Some(match (value, kind) {
@@ -154,14 +154,14 @@ fn read_json_lines(path: &Path, implausible: Implausible) -> Result<ScenarioFile
     found.finish(Place::file(path), "expected one JSON object per line, as `lanesweep mine` writes them")
 }
 
-/// Writes a scenario file: whole or not at all.
+/// Writes a scenario file atomically.
 fn write_json_lines<'a>(path: &Path, scenarios: impl IntoIterator<Item = &'a Scenario>) -> Result<()> {
     let mut file = AtomicFile::create(path)?;
     write_lines(&mut file, scenarios, path)?;
     file.stage()?.publish()
 }
 
-/// Writes scenarios to an open stream, one a line.
+/// Writes scenarios to an open stream, one per line.
 ///
 /// # Errors
 /// As [`super::write_scenarios`]; the path in an [`Error::Io`] is `<output>`.
@@ -186,10 +186,10 @@ fn write_lines<'a>(
     Ok(())
 }
 
-/// Longest line: hours at 1000 samples a second fit.
+/// Maximum line length, bytes: enough for hours at 1000 samples per second.
 const MAX_LINE_BYTES: u64 = 64 << 20;
 
-/// What a line was refused for, with the field where one can be named.
+/// Explains why a line was refused, with the field if it can be named.
 fn explain(place: &Place, text: &str, error: &serde_json::Error) -> Error {
     let Ok(value) = serde_json::from_str::<Value>(text) else {
         return Error::input(
@@ -212,7 +212,7 @@ fn explain(place: &Place, text: &str, error: &serde_json::Error) -> Error {
     }
 }
 
-/// The message without its position, which counts lines inside the one line.
+/// The message without its position, which refers to characters within the one line.
 fn reason(error: &serde_json::Error) -> String {
     let text = error.to_string();
     text.split(" at line ").next().unwrap_or(&text).to_owned()

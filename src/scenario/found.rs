@@ -1,4 +1,4 @@
-//! Scenarios as they are read, one by one: the good ones, what was wrong with the others, and what was doubtful.
+//! Scenarios as they are read: usable ones, errors of the others, and doubts.
 
 use std::collections::{HashMap, HashSet};
 
@@ -7,40 +7,41 @@ use super::{Category, Scenario};
 use crate::support::error::{Error, Place, Result};
 use crate::support::plausibility::{Doubts, Implausible};
 
-/// One scenario in so many may be left out; where more cannot be used, the file is not what it is taken for.
+/// At most one scenario in this many may be unusable; otherwise the file is probably not a scenario file.
 const MAX_BAD_ONE_IN: u64 = 10;
-/// Number of errors that are listed one by one.
+/// Maximum number of errors listed individually.
 const MAX_LISTED: usize = 20;
-/// Number of errors that are kept.
+/// Maximum number of errors kept.
 const MAX_KEPT: usize = 1000;
 
-/// What a file of scenarios holds.
+/// The content of a file of scenarios.
 #[derive(Debug)]
 pub struct ScenarioFile {
-    /// Those that can be used, in the file's order.
+    /// Usable scenarios, in the order of the file.
     pub scenarios: Vec<Scenario>,
-    /// Why others were left out, at most one in ten.
+    /// Errors of the unusable scenarios, at most one in ten.
     pub problems: Vec<Error>,
-    /// What is doubtful of those that are used, as sentences.
+    /// Doubts about the usable scenarios, as sentences.
     pub notes: Vec<String>,
 }
 
-/// Scenarios that have been read, with where each id came from.
+/// Scenarios read so far, with the place of each id.
 pub(super) struct ScenariosRead {
     scenarios: Vec<Scenario>,
     rows: HashMap<String, u64>,
-    /// Ids that came more than once.
+    /// Ids that occurred more than once.
     doubled: HashSet<String>,
     problems: Vec<Error>,
-    /// Scenarios left out without an error of their own: beyond those kept, and the first of two of one id.
+    /// Scenarios skipped without an error of their own: those beyond the maximum number, and the first of two with the
+    /// same id.
     more: u64,
     doubts: Doubts,
-    /// What to do about two scenarios of one id.
+    /// What to do about two scenarios with the same id.
     help: &'static str,
 }
 
 impl ScenariosRead {
-    /// `help` says what to do about two scenarios of one id.
+    /// `help` says what to do about two scenarios with the same id.
     pub fn new(implausible: Implausible, help: &'static str) -> ScenariosRead {
         let doubts = Doubts::new(implausible);
         ScenariosRead {
@@ -54,23 +55,23 @@ impl ScenariosRead {
         }
     }
 
-    /// Number of scenarios so far, good or not.
+    /// Number of scenarios so far, usable or not.
     pub fn count(&self) -> u64 {
         (self.scenarios.len() - self.doubled.len()) as u64 + self.problems.len() as u64 + self.more
     }
 
-    /// What is doubtful of one more scenario.
+    /// Starts the doubts about the next scenario.
     pub fn doubts(&self) -> Doubts {
         self.doubts.another()
     }
 
-    /// What was doubtful of a scenario before it was made.
+    /// Adds doubts found before the scenario was built.
     pub fn add_doubts(&mut self, doubts: Doubts) {
         self.doubts.add(doubts);
     }
 
-    /// Takes a scenario that can be used and whose id did not come before. `place` says where a field stands, `word`
-    /// what rows are counted as.
+    /// Adds a usable scenario whose id is new. `place` returns the place of a field, `word` is the unit of counting
+    /// rows.
     pub fn take(&mut self, mut scenario: Scenario, row: u64, word: &str, place: impl Fn(&str) -> Place) {
         let mut doubts = self.doubts();
         let admitted = admit(&mut scenario, &mut doubts, &|field| place(field).to_string());
@@ -79,13 +80,13 @@ impl ScenariosRead {
         }
         if let Some(first) = self.rows.get(&scenario.id) {
             let problem = format!("this id belongs to {word} {first} too, but every scenario needs its own id");
-            // Nobody knows which of the two is meant, or the one is a piece of the other: neither is used.
+            // It is unknown which of the two is meant, or one is a part of the other: both are skipped.
             self.more += u64::from(self.doubled.insert(scenario.id.clone()));
             return self.refuse(Error::input(place("id"), problem, self.help));
         }
         self.rows.insert(scenario.id.clone(), row);
         self.doubts.add(doubts);
-        // They grew by doubling, and thousands stay.
+        // Series grew by doubling; release the excess, because thousands are kept.
         for other in std::iter::once(&mut scenario.target).chain(&mut scenario.lead) {
             other.v.shrink_to_fit();
             other.y.shrink_to_fit();
@@ -93,16 +94,16 @@ impl ScenariosRead {
         self.scenarios.push(scenario);
     }
 
-    /// Leaves a scenario out.
+    /// Skips a scenario.
     pub fn refuse(&mut self, error: Error) {
         if self.problems.len() < MAX_KEPT { self.problems.push(error) } else { self.more += 1 }
     }
 
-    /// What was found; `help` says what a file without any scenario should hold.
+    /// Returns the scenarios; `help` says what a file without scenarios should hold.
     ///
     /// # Errors
-    /// [`Error::Input`] for such a file, and if more than one scenario in ten is unusable; it lists the problems up to
-    /// a maximum number.
+    /// [`Error::Input`] for a file without scenarios, and if more than one scenario in ten is unusable; it lists the
+    /// problems up to a maximum number.
     pub fn finish(mut self, file: Place, help: &str) -> Result<ScenarioFile> {
         self.scenarios.retain(|scenario| !self.doubled.contains(&scenario.id));
         self.doubled.clear();
@@ -134,15 +135,15 @@ impl ScenariosRead {
     }
 }
 
-/// Lateral motion below this is no contradiction, m.
+/// Maximum lateral motion that is not counted as a contradiction, m.
 const LATERAL_NOISE_M: f64 = 0.5;
 
-/// Kept lane changes whose lateral position contradicts their category or side, one sentence per kind.
+/// Finds kept lane changes whose lateral position contradicts their category or side; one sentence per kind.
 fn lateral_notes(scenarios: &[Scenario]) -> Vec<String> {
     let ends = |scenario: &Scenario| {
         let y = &scenario.target.y;
         let (first, last) = (*y.first()?, *y.last()?);
-        // A cut-in begins beside the ego's lane, a cut-out ends there.
+        // A cut-in begins beside the ego's lane; a cut-out ends there.
         match scenario.category {
             Category::CutIn => Some((first, last)),
             Category::CutOut => Some((last, first)),

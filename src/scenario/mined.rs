@@ -1,8 +1,8 @@
-//! A scenario found in a recording: what `mine` writes and every parameterization reads.
+//! A scenario found in a recording: written by `mine`, read by every parameterization.
 //!
-//! Fields, names and signs are those of the scenario files (JSON Lines): SI units, f64, series at the
-//! recording's rate over [frame0, frame1], `y > 0` on the side the principal vehicle comes from (cut-in)
-//! or leaves to (cut-out), relative to the centre of the ego's lane.
+//! Fields, names and signs are those of the scenario files (JSON Lines): SI units, f64, series at the recording's rate
+//! over [frame0, frame1]. `y` is relative to the centre of the ego's lane, and positive on the side the principal
+//! vehicle comes from (cut-in) or leaves to (cut-out).
 
 use serde::{Deserialize, Serialize};
 
@@ -20,7 +20,7 @@ pub enum Side {
 }
 
 impl Side {
-    /// +1 left, −1 right: times this, the scenario's `y` becomes left-positive.
+    /// +1 for left, −1 for right; multiplied by it, the scenario's `y` becomes left-positive.
     pub fn sign(self) -> f64 {
         match self {
             Side::Left => 1.0,
@@ -60,7 +60,7 @@ pub struct Scenario {
     pub id: String,
     /// Kind of scenario.
     pub category: Category,
-    /// Recording it was found in.
+    /// Recording that contains it.
     #[serde(default)]
     pub recording: String,
     /// Ego vehicle.
@@ -80,10 +80,10 @@ pub struct Scenario {
     pub frame1: i64,
     /// Samples per second of the series.
     pub fps: f64,
-    /// Passed the filters of its category.
+    /// Whether it passed the filters of its category.
     #[serde(default = "yes")]
     pub kept: bool,
-    /// Why it was kept or not.
+    /// Why it was kept or rejected.
     #[serde(default)]
     pub reason: String,
     /// The ego.
@@ -91,7 +91,7 @@ pub struct Scenario {
     /// Width of the ego's lane, m.
     #[serde(default = "default_lane_width")]
     pub lane_width: f64,
-    /// Where the target comes from or leaves to; LVD: the side of the lane centre it starts on.
+    /// Side that the target comes from or leaves to; LVD: side of the lane centre where it starts.
     pub side: Side,
     /// Principal other vehicle.
     pub target: Other,
@@ -110,7 +110,7 @@ pub struct Scenario {
     /// Largest recorded deceleration of the target over the scenario, m/s².
     #[serde(default)]
     pub peak_decel: Option<f64>,
-    /// The lane change began before the ego's data set.
+    /// Whether the lane change began before the ego's data set.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub truncated_start: Option<bool>,
     /// What ended the scenario: `lc_end`, `leader`, `ego_lane`, `data_end`.
@@ -119,10 +119,10 @@ pub struct Scenario {
     /// First frame of the second item (the target becomes or ceases to be leader).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub frame_switch: Option<i64>,
-    /// LVD: the untrimmed interval of the tags, half open: first frame with them, first frame without.
+    /// LVD: the untrimmed half-open interval of the tags: first frame with them, first frame without.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub tag_frames: Option<[i64; 2]>,
-    /// Made up by the program: nothing that follows from it is a statement about real traffic.
+    /// Synthetic data from the generator: results are not statements about real traffic.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub synthetic: bool,
 }
@@ -141,7 +141,7 @@ impl Scenario {
         (self.target.v.len().saturating_sub(1)) as f64 / self.fps
     }
 
-    /// Recorded gap at the start over the speed that a lane's ego starts with, s (in LVD the leader's); `None` where
+    /// Recorded gap at the start divided by the speed at which a lane's ego starts (LVD: the leader's), s. `None` if
     /// neither gap nor headway is known, or the ego stands.
     pub fn start_headway_s(&self) -> Option<f64> {
         let leader = self.target.v.first().copied().unwrap_or(0.0);
@@ -152,7 +152,7 @@ impl Scenario {
     /// Recorded gap at the start, m: `gap0`, else `thw0` times the ego's speed.
     ///
     /// # Errors
-    /// [`Error::Input`] for a scenario with neither.
+    /// [`Error::Input`] if neither is given.
     pub fn start_gap_m(&self) -> Result<f64> {
         self.gap0.or(self.thw0.map(|thw_s| thw_s * self.ego.v0)).ok_or_else(|| {
             Error::input(

@@ -1,8 +1,8 @@
 //! Scenarios as found in a recording ([`Scenario`]) and cases as simulated ([`Case`]).
 //!
-//! Here live the mined scenario, its files and tables, and the concrete case with its motions. Mining and
-//! simulation live elsewhere. Data comes from [`crate::traffic::mining`] or from a
-//! scenario file and goes to [`crate::scenario::parameterization`].
+//! This module holds the mined scenario, its files and tables, and the concrete case with its motions. Mining and
+//! simulation are elsewhere. Data comes from [`crate::traffic::mining`] or a scenario file and goes to
+//! [`crate::scenario::parameterization`].
 
 mod case_parameters;
 mod check;

@@ -1,5 +1,5 @@
-//! Concrete cases in a table, one a row, with the names of `simulate`'s flags as columns; made into scenarios by
-//! sampling their motions.
+//! Concrete cases in a table, one per row, with the names of `simulate`'s flags as columns. Their motions are sampled
+//! to obtain scenarios.
 
 use serde_json::{Map, Value};
 
@@ -33,20 +33,21 @@ const COLUMNS: [(&str, &str); 17] = [
     ("rate", "Hz"),
 ];
 
-/// Default sizes of vehicles: those of all profiles that come with the program, m.
+/// Default vehicle sizes, m: those of all shipped profiles.
 const LENGTH_M: f64 = 4.3;
 const WIDTH_M: f64 = 1.9;
 /// Default samples per second.
 const RATE_HZ: f64 = 25.0;
 /// Default minimum duration of a scenario, s.
 const MIN_DEFAULT_DURATION_S: f64 = 1.0;
-/// Fewest and most samples per second.
+/// Minimum and maximum samples per second.
 const RATES_HZ: (f64, f64) = (1.0, 1000.0);
-/// Samples of all scenarios of a table, and more for each of its rows, so that a small table cannot demand any memory.
+/// Maximum number of samples for all scenarios of a table, plus an allowance per row, so that a small table cannot
+/// demand unlimited memory.
 const MAX_SAMPLES: f64 = (2 << 20) as f64;
 const MAX_SAMPLES_PER_ROW: f64 = 128.0;
 
-/// A row's number, and its fields or what is wrong with them.
+/// A row's number, and its fields or its error.
 type NumberedRow = (u64, Result<Map<String, Value>>);
 
 /// A row of parameters: names without units as keys, numbers in the units of [`COLUMNS`].
@@ -57,14 +58,14 @@ pub(crate) struct ParameterRows {
 
 impl ParameterRows {
     /// # Errors
-    /// As [`choose`], for every column that is not known.
+    /// As [`choose`], for every unknown column.
     pub fn new(mut table: TableReader) -> Result<ParameterRows> {
         let known = COLUMNS.map(|(name, unit)| Named { name: name.to_owned(), unit });
         let chosen = choose(&mut table, &known, |at| at, false)?;
         Ok(ParameterRows { table, chosen })
     }
 
-    /// The next row, or what is wrong with it; fields that are empty are left out.
+    /// Returns the next row or its error; empty fields are skipped.
     ///
     /// # Errors
     /// As [`TableReader::next_row`].
@@ -103,7 +104,7 @@ impl ParameterRows {
         Ok(map)
     }
 
-    /// Where the values of a row stand.
+    /// The place of a row's values.
     pub fn row_place(&self, row: u64) -> RowPlace {
         let column = |column: &Chosen| (COLUMNS[column.field].0, column.column.clone());
         RowPlace {
@@ -114,37 +115,37 @@ impl ParameterRows {
     }
 }
 
-/// Where the values of a row stand: its file and line, and the columns as the file names them.
+/// The place of a row's values: file, line, and the columns as the file names them.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub(crate) struct RowPlace {
     row: Place,
     columns: Vec<(&'static str, String)>,
-    /// Columns whose values count no longer.
+    /// Columns whose values have been replaced.
     replaced: Vec<&'static str>,
 }
 
 impl RowPlace {
-    /// A value of the row.
+    /// The place of a value.
     fn of(&self, key: &str) -> Place {
         let column = self.columns.iter().find(|(known, _)| *known == key).map_or(key, |(_, column)| column);
         self.row.clone().column(column)
     }
 
-    /// The same with the scenario that the row became.
+    /// The place of a value, with the scenario that the row became.
     fn of_scenario(&self, key: &str, item: &str) -> Place {
         let place = self.of(key);
-        // Of Parquet the item has the row.
+        // For Parquet, the item names the row.
         let item = place.item.as_ref().map_or(item.to_owned(), |row| format!("{row}, {item}"));
         place.of(item)
     }
 
-    /// The same without values that something else replaces.
+    /// The same without columns whose values are replaced.
     pub fn without(mut self, keys: &[&'static str]) -> RowPlace {
         self.replaced.extend(keys);
         self
     }
 
-    /// An error about a value, with file, row and column.
+    /// Adds file, row and column to an error about a value.
     pub fn locate(&self, error: Error) -> Error {
         match error {
             Error::Usage { place, problem, help } => match &place.item {
@@ -156,12 +157,12 @@ impl RowPlace {
     }
 }
 
-/// What a row says of its case.
+/// The case parameters of a row.
 fn parameters(row: &Map<String, Value>) -> Result<CaseParameters> {
     serde_json::from_value(Value::Object(row.clone())).map_err(|e| Error::Internal(format!("a row of a table: {e}")))
 }
 
-/// Every row as a scenario.
+/// Reads every row as a scenario.
 pub(super) fn read(table: TableReader, implausible: Implausible) -> Result<ScenarioFile> {
     let header = table.header();
     let mut rows = ParameterRows::new(table)?;
@@ -273,7 +274,7 @@ fn of_row(
     })
 }
 
-/// m/s.
+/// Speed at a time, m/s.
 fn speed_at(speed: &Speed, time_s: f64) -> f64 {
     match speed {
         Speed::Kinematic { initial_mps, acceleration_mps2, until_s } => {
@@ -283,7 +284,7 @@ fn speed_at(speed: &Speed, time_s: f64) -> f64 {
     }
 }
 
-/// m, positive on the side that the vehicle comes from or leaves to.
+/// Lateral position at a time, m, positive on the side that the vehicle comes from or leaves to.
 fn lateral_at(lateral: &Lateral, time_s: f64) -> f64 {
     match lateral {
         Lateral::Centred => 0.0,

@@ -1,19 +1,19 @@
-//! The fields of a scenario and what each holds: used to name the field that a line was refused for (`serde_json` says
-//! what is wrong and at which character, but not in which field of a long line), and as the columns of tables.
+//! The fields of a scenario and their types. They name the field for which a line was refused (`serde_json` gives the
+//! character, but not the field), and they are the columns of tables.
 
 use serde_json::Value;
 
-/// Whether a field must be there.
+/// Whether a field is required.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) enum Presence {
     Required,
-    /// May be absent; if there, it has a value.
+    /// May be absent; if present, it has a value.
     Defaulted,
     /// May be absent or null.
     Optional,
 }
 
-/// What a field holds.
+/// Type of a field.
 #[derive(Clone, Copy)]
 pub(super) enum Content {
     Text,
@@ -28,7 +28,7 @@ pub(super) enum Content {
     Object(&'static [Field]),
 }
 
-/// A field, with what a user of a table has to know of it.
+/// A field, with the facts that a user of a table needs.
 pub(super) struct Field {
     pub name: &'static str,
     pub presence: Presence,
@@ -97,7 +97,7 @@ const OTHER: &[Field] = &[
     field("y", Required, Series, "m", "Lateral position from the middle of the ego's lane, > 0 on `side`."),
 ];
 
-/// The first field of a line that is not what it must be, and what is wrong with it.
+/// The first invalid field of a line, and its problem.
 pub(super) fn wrong_field(line: &Value) -> Option<(String, String)> {
     line.is_object().then(|| wrong_in(line, "", FIELDS)).flatten()
 }
@@ -149,7 +149,7 @@ mod tests {
     use super::*;
     use crate::scenario::Scenario;
 
-    /// A field added to the scenario must be added here too.
+    /// A field added to [`Scenario`](super::Scenario) must be added here too.
     #[test]
     fn every_written_field_is_known() {
         let line = r#"{"id": "a", "category": "lvd", "fps": 25.0, "side": "left", "ego": {"v0": 1.0, "length": 4.0,

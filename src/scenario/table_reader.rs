@@ -1,6 +1,6 @@
-//! Scenarios from tables that this or any other program wrote: one row per scenario with series as lists, one row per
-//! scenario and instant, or one row per concrete case ([`super::parameter_table`]). The columns tell which it is.
-//! A table of tracks is recognised and refused: recordings must be mined first.
+//! Scenarios from tables of this or any other program: one row per scenario with series as lists, one row per scenario
+//! and instant, or one row per concrete case ([`super::parameter_table`]). The columns determine which. A table of
+//! tracks is recognised and refused, because recordings must be mined first.
 
 use std::io::Read;
 use std::path::Path;
@@ -54,23 +54,23 @@ struct Reader {
     table: TableReader,
     leaves: Vec<Leaf>,
     chosen: Vec<Chosen>,
-    /// Per chosen column: may its value change within a scenario?
+    /// Per selected column: whether its value may change within a scenario.
     may_change: Vec<bool>,
     found: ScenariosRead,
     /// The scenario whose instants are being read.
     open: Option<Open>,
-    /// The scenario that is left out for one of its instants.
+    /// Id of the scenario that is skipped because one of its instants is unusable.
     refused: Option<Value>,
 }
 
-/// Instants of one scenario, so far.
+/// Instants read so far of one scenario.
 struct Open {
     /// Row of every instant.
     rows: Vec<u64>,
     id: Value,
-    /// Values of the first row, per chosen column.
+    /// Values of the first row, per selected column.
     first: Vec<Value>,
-    /// Per chosen column that is a series.
+    /// Values per selected column that is a series.
     series: Vec<Vec<Value>>,
     times_s: Vec<f64>,
 }
@@ -83,7 +83,7 @@ impl Reader {
         names: &[(Named, usize, bool)],
         implausible: Implausible,
     ) -> Result<Reader> {
-        // What comes after the names is the time.
+        // The entry after the names is the time.
         let field_of = |at: usize| names.get(at).map_or(leaves.len(), |name| name.1);
         let chosen = choose(&mut table, known, field_of, true)?;
         let has_time = chosen.iter().any(|column| column.field == leaves.len());
@@ -104,7 +104,7 @@ impl Reader {
         Ok(Reader { table, leaves, chosen, may_change, found, open: None, refused: None })
     }
 
-    /// A row that is a scenario.
+    /// Reads a row that is a scenario.
     fn scenario(&mut self, row: Row) {
         let values = self.chosen.iter().zip(row.values);
         let mut scenario = Map::new();
@@ -115,7 +115,7 @@ impl Reader {
         self.take(scenario, &[row.number]);
     }
 
-    /// A row that is an instant of a scenario.
+    /// Reads a row that is an instant of a scenario.
     fn instant(&mut self, row: Row) {
         let time = self.leaves.len();
         let typed = |(column, value): (&Chosen, Value)| match self.leaves.get(column.field) {
@@ -175,7 +175,7 @@ impl Reader {
         Ok(())
     }
 
-    /// The instants that have been read make a scenario.
+    /// Builds the scenario from its instants.
     fn end(&mut self) {
         let Some(open) = self.open.take() else { return };
         let mut scenario = Map::new();
@@ -184,7 +184,7 @@ impl Reader {
             let Some(leaf) = self.leaves.get(column.field) else { continue };
             has_rate |= leaf.flat == "fps" && !first.is_null();
             let series = &open.series[at];
-            // A vehicle that is not there has no series.
+            // An absent vehicle has no series.
             let value = match leaf.is_series() {
                 true if series.iter().all(Value::is_null) => Value::Null,
                 true => Value::from(series.clone()),
@@ -204,7 +204,7 @@ impl Reader {
         self.take(scenario, &open.rows);
     }
 
-    /// Makes the scenario of one row, or of a row per instant.
+    /// Builds the scenario from one row, or from one row per instant.
     fn take(&mut self, scenario: Map<String, Value>, rows: &[u64]) {
         let value = Value::Object(scenario);
         let item = value.get("id").and_then(Value::as_str).map(name);
@@ -241,7 +241,7 @@ fn column_of(leaves: &[Leaf], chosen: &[Chosen], field: &str) -> String {
     format!("{}{index}", chosen.iter().find(is).map_or(flat.as_str(), |column| &column.column))
 }
 
-/// Samples per second of instants at equal distances; at least one. An error says which instant is wrong.
+/// Samples per second of equidistant instants; at least one instant. An error gives the index of the deviating instant.
 fn rate_hz(times_s: &[f64]) -> std::result::Result<f64, (usize, String)> {
     let end = times_s.len() - 1;
     let (first, last) = (times_s[0], times_s[end]);
@@ -252,7 +252,7 @@ fn rate_hz(times_s: &[f64]) -> std::result::Result<f64, (usize, String)> {
     if step_s.is_nan() || step_s <= 0.0 {
         return Err((end, format!("the last instant, {last} s, is not after the first, {first} s")));
     }
-    // Times are often written with two or three digits.
+    // Times are often rounded to two or three digits.
     let is_off = |(k, time_s): (usize, &f64)| (time_s - (first + k as f64 * step_s)).abs() > 0.05 * step_s;
     if times_s.iter().enumerate().any(is_off) {
         let (at, usual_s) = odd_instant(times_s);
@@ -262,12 +262,12 @@ fn rate_hz(times_s: &[f64]) -> std::result::Result<f64, (usize, String)> {
             format!("{time_s} s after {before} s; most time steps are {usual_s:.4} s: they must be equal"),
         ));
     }
-    // 25 Hz from times with rounding errors is 25 Hz.
+    // Removes rounding errors of the times: the result is 25 Hz, not 25.0000001 Hz.
     Ok((1e6 / step_s).round() / 1e6)
 }
 
-/// The first instant whose distance from the one before is far from the usual one, and that distance: a single wrong
-/// time bends the mean distance, and with it what would be expected everywhere. At least two instants.
+/// The first instant whose distance from the previous one deviates from the typical distance, and that distance. A
+/// single wrong time also changes the mean distance. Needs at least two instants.
 fn odd_instant(times_s: &[f64]) -> (usize, f64) {
     let steps: Vec<f64> = times_s.windows(2).map(|pair| pair[1] - pair[0]).collect();
     let mut sorted = steps.clone();
@@ -278,7 +278,7 @@ fn odd_instant(times_s: &[f64]) -> (usize, f64) {
     (1 + steps.iter().position(|step| off(step) >= 0.5 * largest).unwrap_or(0), usual_s)
 }
 
-/// Column names of recordings, in lower case without punctuation: vehicle, instant, place along and across.
+/// Column names of recordings, in lower case without punctuation: vehicle, instant, longitudinal and lateral position.
 const VEHICLE: &[&str] = &["id", "trackid", "vehicleid", "carid", "objectid", "idx"];
 const INSTANT: &[&str] = &[
     "frame",
@@ -294,7 +294,7 @@ const INSTANT: &[&str] = &[
 ];
 const ALONG: &[&str] = &["x", "xm", "xcenter", "vehiclex", "localx", "posx", "xloc", "xlockf", "carcenterx"];
 const ACROSS: &[&str] = &["y", "ym", "ycenter", "vehicley", "localy", "posy", "yloc", "ylockf", "carcentery"];
-/// What a table of scenarios has and a recording has not.
+/// Columns that a table of scenarios has and a recording does not.
 const SCENARIO: &[&str] = &["category", "targetv", "targetvmps", "targety", "targetym"];
 
 const TRACKS_HELP: &str = "scenarios are mined from recordings: give the folder of the recording as data, or mine it first (`mine`) and \
@@ -306,7 +306,7 @@ const HEADER_BYTES: u64 = 1 << 16;
 /// Refuses the columns of a recording.
 ///
 /// # Errors
-/// [`Error::Input`] at `header`, naming the columns that give it away.
+/// [`Error::Input`] at `header`, naming the columns typical of recordings.
 fn refuse_tracks(columns: &[String], header: Place) -> Result<()> {
     let plain = |name: &str| name.chars().filter(char::is_ascii_alphanumeric).collect::<String>().to_ascii_lowercase();
     let find = |known: &[&str]| columns.iter().find(|column| known.contains(&plain(column).as_str()));
@@ -322,8 +322,8 @@ fn refuse_tracks(columns: &[String], header: Place) -> Result<()> {
     Err(Error::input(header, problem, TRACKS_HELP))
 }
 
-/// The error of a table that cannot be read: that it holds tracks, where its first line says so. Some simulators part their
-/// columns by semicolons.
+/// The error for a table that cannot be read. If its first line looks like a recording, the error says so; some
+/// simulators separate columns by semicolons.
 fn of_unreadable_tracks(path: &Path, error: Error) -> Error {
     let mut head = Vec::new();
     let is_read = input_file::open(path).is_ok_and(|file| file.take(HEADER_BYTES).read_to_end(&mut head).is_ok());
@@ -350,7 +350,7 @@ mod tests {
             let (found, problem) = rate_hz(&times).unwrap_err();
             assert_eq!(found, at, "{problem}");
         }
-        // 25 Hz with two digits fits; 30 Hz needs three.
+        // 25 Hz needs two digits; 30 Hz needs three.
         let rounded: Vec<f64> = (0..91).map(|k| (f64::from(k) * 1000.0 / 30.0).round() / 1000.0).collect();
         assert_eq!(rate_hz(&rounded).map(f64::round), Ok(30.0));
         assert_eq!(rate_hz(&[1.0]).unwrap_err().0, 0);

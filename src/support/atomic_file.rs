@@ -1,8 +1,7 @@
-//! Files that are there whole or not at all: written beside their place under a hidden name, brought to
-//! the disk, then renamed. Used by everything that leaves results behind.
+//! Atomic files: written beside their target under a hidden name, synced to disk, then renamed. Used for all results.
 //!
-//! A register says what a process takes away when a signal ends it: the files that it has not finished, its lock, and
-//! a folder that it made and put nothing into.
+//! A registry lists what a process removes when a signal ends it: unfinished files, its lock, and an empty folder that
+//! it created.
 
 use std::collections::BTreeSet;
 use std::ffi::OsString;
@@ -18,13 +17,13 @@ use crate::{Error, Place, Result};
 /// Hidden names are `.lanesweep-<file name>-XXXXXX.part`.
 const PREFIX: &str = ".lanesweep-";
 const SUFFIX: &str = ".part";
-/// Random letters and digits in a hidden name.
+/// Number of random letters and digits in a hidden name.
 const RANDOM: usize = 6;
-/// Longest file name, in bytes, that a hidden name repeats: file systems end at 255 for all of it.
+/// Maximum number of bytes of the file name that a hidden name repeats: file systems limit a name to 255 bytes.
 const LONGEST: usize = 200;
 
-/// Removes from `dir` the hidden files that killed processes left there, of one target or of all. A process locks the
-/// hidden files that it writes, and the lock ends with the process. What cannot be removed stays; it harms nobody.
+/// Removes from `dir` the hidden files of killed processes, of one target or of all. A process locks the hidden files
+/// that it writes, and the lock ends with the process. Files that cannot be removed are harmless and stay.
 pub(crate) fn clear_stale(dir: &Path, target: Option<&Path>) {
     let Ok(entries) = std::fs::read_dir(dir) else { return };
     let wanted = target.map(|target| target.file_name().and_then(|name| name.to_str()));
@@ -35,7 +34,7 @@ pub(crate) fn clear_stale(dir: &Path, target: Option<&Path>) {
         if !is_wanted || !entry.file_type().is_ok_and(|kind| kind.is_file()) {
             continue;
         }
-        // The registry: a staged file of this process may have given its lock back.
+        // Check the registry too: a staged file of this process may have released its lock.
         if live().iter().any(|path| path.file_name() == Some(&name)) {
             continue;
         }
@@ -49,7 +48,7 @@ pub(crate) fn clear_stale(dir: &Path, target: Option<&Path>) {
     }
 }
 
-/// Whether `path` itself, and not what a link there leads to, is the file that is open as `file`.
+/// Whether `path` itself, not the target of a link, is the file open as `file`.
 #[cfg(unix)]
 pub(crate) fn is_named(path: &Path, file: &File) -> bool {
     use std::os::unix::fs::MetadataExt;
@@ -59,14 +58,14 @@ pub(crate) fn is_named(path: &Path, file: &File) -> bool {
     }
 }
 
-/// Elsewhere std does not tell; an open file's name is not given away there before it is closed.
+/// On other systems std cannot compare the files; there the name of an open file stays in use until it is closed.
 #[cfg(not(unix))]
 pub(crate) fn is_named(_: &Path, _: &File) -> bool {
     true
 }
 
-/// Refuses a link, a folder or a device where a run writes a file of its own: a folder that somebody else made must not
-/// make a run write elsewhere.
+/// Refuses a link, a folder or a device where a run writes its own file, so that a prepared folder cannot redirect the
+/// run's output.
 ///
 /// # Errors
 /// [`Error::Input`].
@@ -81,14 +80,14 @@ pub(crate) fn refuse_link(path: &Path) -> Result<()> {
     Err(Error::input(Place::file(path), problem, "remove it, or choose another folder"))
 }
 
-/// The target's file name in a hidden name.
+/// The target's file name within a hidden name.
 fn target_of(hidden: &str) -> Option<&str> {
     let (target, random) = hidden.strip_prefix(PREFIX)?.strip_suffix(SUFFIX)?.rsplit_once('-')?;
     (!target.is_empty() && random.len() == RANDOM && random.bytes().all(|b| b.is_ascii_alphanumeric()))
         .then_some(target)
 }
 
-/// What a hidden name begins with.
+/// The prefix of a hidden name.
 fn prefix(target: &Path) -> OsString {
     let mut prefix = OsString::from(PREFIX);
     match target.file_name() {
@@ -108,7 +107,7 @@ fn folder_of(target: &Path) -> &Path {
     }
 }
 
-/// A failure to begin the file. If the folder is missing, the system's message does not name it.
+/// The error for a file that cannot be created. If the folder is missing, the system's message does not name it.
 fn not_begun(target: &Path, source: std::io::Error) -> Error {
     if source.kind() != ErrorKind::NotFound {
         return Error::io(target, "write", source);
@@ -117,8 +116,8 @@ fn not_begun(target: &Path, source: std::io::Error) -> Error {
     Error::io(target, "write", std::io::Error::new(ErrorKind::NotFound, why))
 }
 
-/// A failure after the file was begun. The system's "no such file" does not say which: the result's name is new
-/// and the hidden one is unknown to the user.
+/// The error for a failure after the file was created. The system's "no such file" does not name the file: the result's
+/// name is new, and the user does not know the hidden one.
 fn failed(target: &Path, source: std::io::Error) -> Error {
     if source.kind() != ErrorKind::NotFound {
         return Error::io(target, "write", source);
@@ -132,38 +131,37 @@ fn failed(target: &Path, source: std::io::Error) -> Error {
     Error::io(target, "write", std::io::Error::other(why))
 }
 
-/// Makes a rename in `folder` survive a loss of power, where the system can do that.
+/// Makes a rename in `folder` survive a power loss, if the system supports it.
 pub(crate) fn sync_folder(folder: &Path) {
     #[cfg(unix)]
     if let Ok(folder) = std::fs::File::open(folder) {
-        // Some file systems refuse this for folders; the file's own content is on the disk already.
+        // Some file systems refuse to sync folders; the file's content is already on disk.
         let _ = folder.sync_all();
     }
     #[cfg(not(unix))]
     let _ = folder;
 }
 
-/// A file being written; dropped before [`AtomicFile::stage`], it leaves nothing behind.
+/// A file being written; dropping it before [`AtomicFile::stage`] removes it.
 pub(crate) struct AtomicFile {
     target: PathBuf,
     writer: BufWriter<NamedTempFile>,
-    // After the file: it is in the registry for as long as it exists.
+    // Declared after the file, so that the registry entry outlives it.
     live: Live,
 }
 
-/// A complete file that waits under its hidden name; dropped before [`StagedFile::publish`], it leaves
-/// nothing behind.
+/// A complete file under its hidden name; dropping it before [`StagedFile::publish`] removes it.
 pub(crate) struct StagedFile {
     target: PathBuf,
     path: TempPath,
-    /// Open for its lock.
+    /// Kept open for its lock.
     file: Option<File>,
     live: Live,
 }
 
 impl AtomicFile {
-    /// Begins the file `target` that a user named, whose folder must exist; a link is followed. What is there under
-    /// that name stays until [`StagedFile::publish`]. What killed processes left of the same target is removed.
+    /// Creates the file `target` that a user named, whose folder must exist; a link is followed. An existing file of
+    /// that name stays until [`StagedFile::publish`]. Hidden files of killed processes for the same target are removed.
     ///
     /// # Errors
     /// If the folder cannot be written to.
@@ -173,7 +171,7 @@ impl AtomicFile {
         AtomicFile::begin(target)
     }
 
-    /// As [`AtomicFile::create`] for a file in a run's folder, where no link is followed.
+    /// Like [`AtomicFile::create`], for a file in a run directory, where links are not followed.
     ///
     /// # Errors
     /// As [`refuse_link`]; if the folder cannot be written to.
@@ -186,17 +184,18 @@ impl AtomicFile {
         let prefix = prefix(target);
         let mut builder = tempfile::Builder::new();
         builder.prefix(&prefix).suffix(SUFFIX).rand_bytes(RANDOM);
-        // A temporary file is private by default; a result is as readable as any other new file.
+        // Temporary files are private by default; a result gets the permissions of any new file.
         #[cfg(unix)]
         builder.permissions(match std::fs::metadata(target) {
             Ok(existing) => existing.permissions(),
             Err(_) => std::os::unix::fs::PermissionsExt::from_mode(0o666),
         });
-        // The registry is held until the file is in it: an interruption between the two would leave the file.
+        // Hold the registry until the file is in it; an interruption in between would leave the file behind.
         let mut registry = live();
         let file = loop {
             let file = builder.tempfile_in(folder_of(target)).map_err(|source| not_begun(target, source))?;
-            // Another process may be looking whether it is stale. A file system without locks keeps stale files.
+            // Another process may hold the lock while it checks for stale files. A file system without locks keeps
+            // stale files.
             match file.as_file().try_lock() {
                 Ok(()) if is_named(file.path(), file.as_file()) => break file,
                 Err(TryLockError::Error(_)) => break file,
@@ -209,15 +208,15 @@ impl AtomicFile {
         Ok(AtomicFile { target: target.to_path_buf(), writer: BufWriter::with_capacity(1 << 16, file), live })
     }
 
-    /// Appends.
+    /// Appends bytes.
     ///
     /// # Errors
-    /// If the system refuses, a full disk for instance.
+    /// If the system refuses, for instance because the disk is full.
     pub(crate) fn append(&mut self, bytes: &[u8]) -> Result<()> {
         self.writer.write_all(bytes).map_err(|source| failed(&self.target, source))
     }
 
-    /// Brings everything to the disk, still under the hidden name.
+    /// Syncs the file to disk under its hidden name.
     ///
     /// # Errors
     /// If the system refuses.
@@ -231,8 +230,8 @@ impl AtomicFile {
     }
 }
 
-/// Where the file really goes: a link is followed; what is neither a file nor free is refused, because the
-/// rename would put a file in its place.
+/// The actual target: a link is followed. A target that exists and is not a file is refused, because the rename would
+/// replace it.
 fn resolve(target: &Path) -> Result<PathBuf> {
     let Ok(kind) = std::fs::metadata(target) else { return Ok(target.to_path_buf()) };
     if !kind.is_file() {
@@ -257,7 +256,7 @@ impl Write for AtomicFile {
 }
 
 impl StagedFile {
-    /// Gives the file its name, in place of what was there.
+    /// Renames the file to its target and replaces an existing one.
     ///
     /// # Errors
     /// If the system refuses.
@@ -268,7 +267,7 @@ impl StagedFile {
         Ok(())
     }
 
-    /// As [`StagedFile::publish`], for one of several files whose folder is synced after the last.
+    /// Like [`StagedFile::publish`], for one of several files whose folder is synced after the last.
     ///
     /// # Errors
     /// If the system refuses.
@@ -279,31 +278,31 @@ impl StagedFile {
         Ok(())
     }
 
-    /// Closes the file, for the holder of a lock on its folder: a process can have only so many files open.
+    /// Closes the file, for a caller that holds a lock on its folder; the number of open files per process is limited.
     pub(crate) fn closed(mut self) -> Self {
         self.file = None;
         self
     }
 
-    /// The name that the file gets.
+    /// The final path.
     pub(crate) fn target(&self) -> &Path {
         &self.target
     }
 }
 
-/// The hidden files of this process that exist now, and the folders and locks that go with them.
+/// Existing hidden files of this process, and the folders and locks registered with them.
 static LIVE: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 
 fn live() -> MutexGuard<'static, BTreeSet<PathBuf>> {
     LIVE.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// An entry in the registry of hidden files, for as long as the file has that name.
+/// An entry in the registry of hidden files; dropping it removes the entry.
 #[derive(Debug)]
 pub(crate) struct Live(PathBuf);
 
 impl Live {
-    /// Enters a lock file, or a folder that goes where nothing is in it.
+    /// Registers a lock file, or a folder to be removed if it is empty.
     pub(crate) fn enter(path: PathBuf) -> Live {
         live().insert(path.clone());
         Live(path)
@@ -316,10 +315,11 @@ impl Drop for Live {
     }
 }
 
-/// Removes the hidden files of this process, which is about to end. While the answer is kept, no other begins.
+/// Removes the hidden files of this process, which is about to end. While the returned guard lives, no file can be
+/// created.
 #[cfg(unix)]
 pub(crate) fn remove_live() -> Option<MutexGuard<'static, BTreeSet<PathBuf>>> {
-    // A file system that hangs while a file is begun there must not keep the process from ending.
+    // A file system that hangs while creating a file must not prevent the process from ending.
     for _ in 0..100 {
         let paths = match LIVE.try_lock() {
             Ok(paths) => paths,
@@ -329,7 +329,8 @@ pub(crate) fn remove_live() -> Option<MutexGuard<'static, BTreeSet<PathBuf>>> {
                 continue;
             }
         };
-        // What is in a folder goes before the folder. A file that has just got its proper name is not there any more.
+        // The content of a folder precedes the folder. A file that was just renamed no longer exists under its hidden
+        // name.
         for path in paths.iter().rev() {
             let _ = std::fs::remove_file(path).or_else(|_| std::fs::remove_dir(path));
         }
@@ -393,7 +394,7 @@ mod tests {
         {
             assert_eq!(target_of(other), None, "{other}");
         }
-        // A name of the greatest length leaves no room to repeat it.
+        // A name of maximum length cannot be repeated in full.
         let long = dir.path().join("n".repeat(255));
         AtomicFile::create(&long).unwrap().stage().unwrap().publish().unwrap();
         assert!(long.exists());
@@ -407,7 +408,7 @@ mod tests {
         for name in [stale, foreign, part, "run.json"] {
             fs::write(path(name), "half").unwrap();
         }
-        // As another process would hold it.
+        // Simulates a lock held by another process.
         let held = File::open(path(foreign)).unwrap();
         held.lock().unwrap();
         let mut own = AtomicFile::create(&path("run.json")).unwrap();

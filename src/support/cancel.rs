@@ -1,11 +1,12 @@
-//! Ending a run early in good order: a token that its owner sets, or a time limit, and that the run asks between its chunks.
+//! Orderly early end of a run: a cancellation token set by its owner, or a time limit; the run polls it between its
+//! chunks.
 
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
-/// Asks the runs that hold a clone of it to end. A run that keeps a journal brings what it has to the disk first; any
-/// other one ends with nothing. Both return [`Error::Interrupted`](crate::Error::Interrupted).
+/// Cancellation token: requests the runs that hold a clone to end. A run with a journal first writes its progress to
+/// disk; other runs return no result. Both return [`Error::Interrupted`](crate::Error::Interrupted).
 #[derive(Debug, Clone, Default)]
 pub struct Cancel(Arc<State>);
 
@@ -16,42 +17,42 @@ struct State {
     resumable: AtomicUsize,
 }
 
-/// While it lives, a run with a journal asks the token often enough (every few seconds).
+/// While it lives, a run with a journal polls the token every few seconds.
 #[derive(Debug)]
 #[must_use = "the run is no longer resumable as soon as the guard is dropped"]
 pub struct ResumableGuard<'a>(&'a Cancel);
 
 impl Cancel {
-    /// Whether runs are to end after the present chunk. It stays so until [`Cancel::withdraw`].
+    /// Whether runs must end after the present chunk; true until [`Cancel::withdraw`].
     pub fn requested(&self) -> bool {
         self.0.requested.load(Ordering::SeqCst) || self.deadline().is_some_and(|deadline| Instant::now() >= deadline)
     }
 
-    /// Asks runs to end after the present chunk. Returns whether that had been asked before.
+    /// Requests runs to end after the present chunk. Returns whether that was already requested.
     pub fn request(&self) -> bool {
         self.0.requested.swap(true, Ordering::SeqCst)
     }
 
-    /// Takes a request and a time limit back.
+    /// Withdraws the request and the time limit.
     pub fn withdraw(&self) {
         self.0.requested.store(false, Ordering::SeqCst);
         self.set_deadline(None);
     }
 
-    /// From `seconds` (s, by the monotonic clock) after now, [`Cancel::requested`] is true. A later call replaces an
-    /// earlier one. Negative values and NaN mean now; what is beyond the clock's range means never.
+    /// Makes [`Cancel::requested`] true `seconds` s from now, by the monotonic clock. A later call replaces an earlier
+    /// one. Negative values and NaN mean now; values beyond the clock's range mean never.
     pub fn stop_after(&self, seconds: f64) {
         let wait = if seconds > 0.0 { Duration::try_from_secs_f64(seconds).ok() } else { Some(Duration::ZERO) };
         self.set_deadline(wait.and_then(|wait| Instant::now().checked_add(wait)));
     }
 
-    /// Declares that the work until the guard's end can be interrupted and continued. Guards may overlap.
+    /// Declares that the work can be interrupted and resumed while the guard lives. Guards may overlap.
     pub fn resumable(&self) -> ResumableGuard<'_> {
         self.0.resumable.fetch_add(1, Ordering::SeqCst);
         ResumableGuard(self)
     }
 
-    /// Whether a run that can be continued asks this token.
+    /// Whether a resumable run polls this token.
     pub fn is_resumable(&self) -> bool {
         self.0.resumable.load(Ordering::SeqCst) > 0
     }

@@ -1,6 +1,6 @@
-//! The library's one error type. Every variant says *where* (file, row, column, scenario or lane),
-//! *what* was found or expected, and *what to do about it*. Texts name an option by its field: option `dt`, or
-//! option `backend = cpu`. The command line shows these as flags.
+//! The error type of the library. Every variant says *where* (file, row, column, scenario or lane), *what* was found or
+//! expected, and *what to do about it*. Texts name an option by its field: option `dt`, or option `backend = cpu`. The
+//! command line shows these as flags.
 
 use std::borrow::Cow;
 use std::fmt;
@@ -11,23 +11,23 @@ use crate::support::plain_text::{MAX_PATH, cut, cut_names, shown_in_line};
 /// Result of everything in this library that can fail on a user's input.
 pub type Result<T> = std::result::Result<T, Error>;
 
-/// Adds an error to a list that users read, unless the list has it already.
+/// Adds an error to a list shown to users, unless the list already has it.
 pub(crate) fn push_once(list: &mut Vec<Error>, error: Error) {
     if !list.iter().any(|known| known.to_string() == error.to_string()) {
         list.push(error);
     }
 }
 
-/// Where in a user's input a problem lies. Parts that are unknown stay out of the message.
+/// The place of a problem in a user's input. The message skips unknown parts.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct Place {
     /// File or folder, as the user named it.
     pub file: Option<PathBuf>,
     /// Line of the file, counted from 1 and including the header line.
     pub row: Option<u64>,
-    /// Column name as the header has it.
+    /// Column name as in the header.
     pub column: Option<String>,
-    /// The thing inside the file, of at most 80 characters: a vehicle, a scenario key, a lane key.
+    /// The item in the file, at most 80 characters: a vehicle, a scenario key, a lane key.
     pub item: Option<String>,
     /// A field of the library's options.
     pub option: Option<&'static str>,
@@ -39,7 +39,7 @@ impl Place {
         Place { file: Some(path.as_ref().to_path_buf()), ..Place::default() }
     }
 
-    /// Something that is in no file: a scenario, a lane, a flag.
+    /// An item that is not in a file: a scenario, a lane, a flag.
     pub fn item(item: impl Into<String>) -> Self {
         Place::default().of(item)
     }
@@ -61,14 +61,14 @@ impl Place {
         self
     }
 
-    /// Adds the thing inside the file.
+    /// Adds the item in the file.
     pub fn of(mut self, item: impl Into<String>) -> Self {
         self.item = Some(name(item.into()));
         self
     }
 }
 
-/// A name of a length that a message can hold, whatever the input calls itself.
+/// Shortens a name so that it fits into a message.
 fn name(text: String) -> String {
     match cut(&text) {
         Cow::Borrowed(_) => text,
@@ -76,7 +76,7 @@ fn name(text: String) -> String {
     }
 }
 
-/// A path as a message shows it; what is longer than any path of the system is cut as a name is.
+/// A path as a message shows it; a path above the system's maximum length is shortened like a name.
 fn path_name(path: &Path) -> String {
     let text = path.display().to_string();
     if text.len() > MAX_PATH { shown_in_line(&cut(&text)) } else { shown_in_line(&text) }
@@ -104,14 +104,14 @@ impl fmt::Display for Place {
     }
 }
 
-/// What can go wrong, by whose turn it is to act.
+/// Errors, grouped by who must act.
 #[derive(Debug, thiserror::Error)]
 #[non_exhaustive]
 pub enum Error {
-    /// The data is not what it must be: missing file or column, a bad number, a broken order.
+    /// Invalid data: missing file or column, a bad number, a wrong order.
     #[error("{place}: {problem}")]
     Input {
-        /// Where. Boxed, so that results which carry no error stay small: the reader returns millions.
+        /// Where. Boxed to keep results without an error small: the reader returns millions.
         place: Box<Place>,
         /// What was found and what was expected.
         problem: String,
@@ -128,31 +128,31 @@ pub enum Error {
         /// What to write instead.
         help: String,
     },
-    /// The system refused to read or write, or to start a thread.
+    /// The system refused to read, to write or to start a thread.
     #[error("{path}: cannot {action}: {source}", path = path_name(path))]
     Io {
-        /// File or folder; for threads, whose they are.
+        /// File or folder; for threads, their owner.
         path: PathBuf,
-        /// What was tried, as a verb: `read`, `write`, `create the folder`, `start`.
+        /// The attempted action, as a verb: `read`, `write`, `create the folder`, `start`.
         action: &'static str,
-        /// The system's reason.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// There is no compute device that can be used, or the one in use failed.
+    /// No usable compute device exists, or the one in use failed.
     #[error("{device}: {problem}")]
     Device {
-        /// Which device, as a user names it: its name, index or PCI bus id; or the flag that asked for one.
-        /// Boxed, as the problem is, so that results which carry no error stay small.
+        /// The device as a user names it (name, index or PCI bus id), or the flag that requested one. Boxed like the
+        /// problem, to keep results without an error small.
         device: Box<str>,
         /// What is wrong with it.
         problem: Box<str>,
         /// What to do.
         help: String,
     },
-    /// A check that the user asked for did not pass (conformance, verification).
+    /// A check requested by the user failed (conformance, verification).
     #[error("{0}")]
     Verification(String),
-    /// Another process is at work on the same run or part: the same command can do it later.
+    /// Another process works on the same run or part; the same command can be repeated later.
     #[error("{place}: {problem}")]
     Busy {
         /// The lock.
@@ -160,15 +160,15 @@ pub enum Error {
         /// Who holds it.
         problem: String,
     },
-    /// A defect of this program, caught before it could become a wrong number.
+    /// A defect of this program, caught before it could produce a wrong number.
     #[error("internal error: {0}")]
     Internal(String),
-    /// The run was asked to end early, by its owner, a signal or a time limit.
+    /// The run was ended early by its owner, a signal or a time limit.
     #[error("interrupted: {done}")]
     Interrupted {
-        /// How far it came.
+        /// Progress at the end.
         done: String,
-        /// What is done is kept, and the same run continues from there.
+        /// Whether progress is kept, so that the same run resumes there.
         is_kept: bool,
     },
 }
@@ -190,12 +190,12 @@ impl Error {
         Error::Device { device: device.into(), problem: problem.into(), help: help.into() }
     }
 
-    /// The system's refusal, with the path and what was tried.
+    /// The system's refusal, with the path and the attempted action.
     pub fn io(path: impl AsRef<Path>, action: &'static str, source: std::io::Error) -> Self {
         Error::Io { path: path.as_ref().to_path_buf(), action, source }
     }
 
-    /// What the user can do about it, where there is something to say beyond the message.
+    /// What the user can do about it; `None` if the message says it all.
     pub fn help(&self) -> Option<String> {
         match self {
             Error::Input { help, .. } | Error::Usage { help, .. } | Error::Device { help, .. } => {
@@ -241,8 +241,8 @@ impl Error {
     }
 }
 
-/// Did the system refuse to open one more file (EMFILE, ENFILE)? By its text too: an error that was given a reason has no
-/// number.
+/// Whether the system refused to open one more file (EMFILE, ENFILE). The text is checked too, because an error wrapped
+/// with a reason has no error code.
 fn is_limit_of_open_files(source: &std::io::Error) -> bool {
     let text = source.to_string();
     cfg!(unix) && ["(os error 23)", "(os error 24)"].iter().any(|number| text.contains(number))

@@ -1,4 +1,4 @@
-//! The list of a folder's results: `lanesweep-files.json`. It tells the files that lanesweep wrote from all others.
+//! The list of a folder's results: `lanesweep-files.json`. It distinguishes lanesweep's files from all others.
 
 use std::path::Path;
 
@@ -23,7 +23,7 @@ pub(super) struct RunFiles {
     pub(super) record: Option<String>,
     /// Names of the other files.
     pub(super) files: Vec<String>,
-    /// False while they get their names. Once the record is there, all are.
+    /// False while the files are being renamed. If the record exists, all of them are complete.
     pub(super) is_complete: bool,
 }
 
@@ -33,20 +33,20 @@ pub(super) struct RunFiles {
 pub(super) struct FileList {
     lanesweep_files: u64,
     pub(super) runs: Vec<RunFiles>,
-    /// SHA-256 of the runs' text. It tells a list of this program from other files; it is no signature.
+    /// SHA-256 of the runs' text. It identifies lists of this program; it is not a signature.
     sha256: String,
 }
 
 impl FileList {
-    /// A list of these runs; its checksum is made when it is written.
+    /// A list of these runs; the checksum is computed when it is written.
     pub(super) fn of(runs: Vec<RunFiles>) -> FileList {
         FileList { lanesweep_files: VERSION, runs, sha256: String::new() }
     }
 
-    /// The list of a folder; empty where there is none.
+    /// Reads the list of a folder; empty if there is none.
     ///
     /// # Errors
-    /// [`Error::Input`] for a file that is no whole list; [`Error::Io`].
+    /// [`Error::Input`] for a damaged list; [`Error::Io`].
     pub(super) fn read(dir: &Path) -> Result<FileList> {
         let path = dir.join(LIST);
         if path.symlink_metadata().is_err() {
@@ -81,12 +81,12 @@ impl FileList {
         write_inside(&dir.join(LIST), |file| file.write_all(&text))
     }
 
-    /// Whether some run has this file.
+    /// Whether any run lists this file.
     pub(super) fn holds(&self, name: &str) -> bool {
         self.runs.iter().any(|run| run.record.as_deref() == Some(name) || run.files.iter().any(|file| file == name))
     }
 
-    /// Takes a run out of the list.
+    /// Removes a run from the list and returns it.
     pub(super) fn take(&mut self, record: Option<&str>) -> RunFiles {
         let at = self.runs.iter().position(|run| run.record.as_deref() == record);
         at.map_or_else(RunFiles::default, |at| self.runs.remove(at))

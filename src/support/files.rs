@@ -1,4 +1,4 @@
-//! Writing the files of a report: each whole or not at all.
+//! Atomic writing of report files.
 
 use std::io::{ErrorKind, Write};
 use std::path::Path;
@@ -6,10 +6,10 @@ use std::path::Path;
 use crate::support::atomic_file::AtomicFile;
 use crate::{Error, Result};
 
-/// Whether a folder is there, or could be made, judged by names only, before the work starts.
+/// Checks that a folder exists or could be created; it only inspects names, before the work starts.
 ///
 /// # Errors
-/// [`Error::Io`] naming the file that is where a folder is needed.
+/// [`Error::Io`] naming the file that blocks the folder.
 pub fn check_folder(dir: &Path) -> Result<()> {
     for above in dir.ancestors().filter(|above| !above.as_os_str().is_empty()) {
         match std::fs::metadata(above) {
@@ -26,7 +26,7 @@ pub fn check_folder(dir: &Path) -> Result<()> {
     Ok(())
 }
 
-/// The same for the folder that a file is to be written to.
+/// Like [`check_folder`], for the folder of a file to be written.
 ///
 /// # Errors
 /// As [`check_folder`].
@@ -34,7 +34,7 @@ pub fn check_folder_of(file: &Path) -> Result<()> {
     file.parent().map_or(Ok(()), check_folder)
 }
 
-/// Makes a folder and those above it, where they do not exist.
+/// Creates a folder and its parents if they do not exist.
 ///
 /// # Errors
 /// [`Error::Io`].
@@ -43,7 +43,7 @@ pub fn make_folder(dir: &Path) -> Result<()> {
     std::fs::create_dir_all(dir).map_err(|e| Error::io(dir, "create the folder", e))
 }
 
-/// The same for the folder of a file.
+/// Like [`make_folder`], for the folder of a file.
 ///
 /// # Errors
 /// As [`make_folder`].
@@ -51,20 +51,20 @@ pub fn make_folder_of(file: &Path) -> Result<()> {
     file.parent().filter(|dir| !dir.as_os_str().is_empty()).map_or(Ok(()), make_folder)
 }
 
-/// Writes a file under a temporary name beside it, syncs, and renames: a reader sees the old content or the
-/// new one, never a part.
+/// Writes a file under a temporary name beside it, syncs, and renames: a reader sees the old or the new content, never
+/// a part.
 pub fn write_atomically(path: &Path, content: &[u8]) -> Result<()> {
     write_atomically_with(path, |file| file.write_all(content))
 }
 
-/// The same for content that is produced on the way.
+/// Like [`write_atomically`], for content that is streamed.
 pub fn write_atomically_with(path: &Path, produce: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
     let mut file = AtomicFile::create(path)?;
     produce(&mut file).map_err(|e| Error::io(path, "write", e))?;
     file.stage()?.publish()
 }
 
-/// The same for a file in a folder that a run owns: a link in its place is refused, not followed.
+/// Like [`write_atomically_with`], for a file in a run directory: a link in its place is refused, not followed.
 ///
 /// # Errors
 /// [`Error::Input`] for a link; [`Error::Io`].

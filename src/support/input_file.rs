@@ -1,7 +1,7 @@
-//! Opening files that a user names: regular files only, and no larger than their kind can be.
+//! Opens files that a user names: regular files only, up to the maximum size of their kind.
 //!
-//! A pipe without a writer would be waited on for ever, and a device such as `/dev/zero` never ends.
-//! Settings in TOML have one reader, so that an error in any such file names its line.
+//! Opening a pipe without a writer would block forever, and a device such as `/dev/zero` never ends. All TOML settings
+//! use one reader, so that every error names its line.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
@@ -13,11 +13,12 @@ use sha2::{Digest, Sha256};
 use crate::support::plain_text::{cut_names, hex, nearest};
 use crate::{Error, Place, Result};
 
-/// Largest file of settings (configurations, profiles, exposures): those that the program writes have a few kilobytes.
+/// Maximum size of a settings file (configurations, profiles, exposures), bytes; those that the program writes have a
+/// few kilobytes.
 pub(crate) const MAX_SETTINGS_BYTES: u64 = 1 << 20;
-/// Largest XML file: an OpenSCENARIO file has a few kilobytes, and some more for every second of a trajectory.
+/// Maximum size of an XML file, bytes; an OpenSCENARIO file has a few kilobytes, plus some per second of a trajectory.
 pub(crate) const MAX_XML_BYTES: u64 = 4 << 20;
-/// Largest table that is held in memory as a whole: a few million rows.
+/// Maximum size of a table that is held in memory, bytes: a few million rows.
 pub(crate) const MAX_TABLE_BYTES: u64 = 256 << 20;
 
 /// Opens a regular file, or a link to one.
@@ -26,7 +27,7 @@ pub(crate) const MAX_TABLE_BYTES: u64 = 256 << 20;
 /// [`Error::Io`] if it cannot be opened; [`Error::Input`] for a folder, a pipe, a device or a socket.
 pub(crate) fn open(path: &Path) -> Result<File> {
     let io = |e| Error::io(path, "read", e);
-    // Before opening: to open a pipe is to wait for its writer.
+    // Check before opening, because opening a pipe blocks until it has a writer.
     let kind = std::fs::metadata(path).map_err(io)?.file_type();
     if kind.is_dir() {
         let problem = "this is a folder; expected a regular file";
@@ -45,11 +46,11 @@ pub(crate) fn open(path: &Path) -> Result<File> {
 /// The content of a regular file of at most `largest` bytes.
 ///
 /// # Errors
-/// As [`open`]; [`Error::Input`] for a larger one.
+/// As [`open`]; [`Error::Input`] for a larger file.
 pub(crate) fn read(path: &Path, largest: u64) -> Result<Vec<u8>> {
     let file = open(path)?;
     let mut content = Vec::new();
-    // The size in the folder may lie or change: what counts is what comes.
+    // The reported size may be wrong or change, so the bytes read are limited.
     file.take(largest + 1).read_to_end(&mut content).map_err(|e| Error::io(path, "read", e))?;
     if content.len() as u64 > largest {
         return Err(Error::input(
@@ -61,8 +62,8 @@ pub(crate) fn read(path: &Path, largest: u64) -> Result<Vec<u8>> {
     Ok(content)
 }
 
-/// As [`read`], of a JSON object. What does not begin and end as one, such as a file that was cut off, is refused by its
-/// first and last bytes, whatever its size. `kind` is what it should be: `a density file`.
+/// Like [`read`], for a JSON object. A file that does not begin and end as one, such as a truncated file, is refused by
+/// its first and last bytes before it is read. `kind` names the expected file: `a density file`.
 ///
 /// # Errors
 /// As [`read`]; [`Error::Input`] with `help` for anything but `{…}`.
@@ -75,7 +76,7 @@ pub(crate) fn read_json(path: &Path, largest: u64, kind: &str, help: &str) -> Re
     read(path, largest)
 }
 
-/// The first and the last bytes of a file, 256 at most; the file is at its beginning then.
+/// The first and last bytes of a file, at most 256 each; afterwards the file is at its beginning.
 pub(crate) fn ends(file: &mut File) -> std::io::Result<(Vec<u8>, Vec<u8>)> {
     const BYTES: u64 = 256;
     let length = file.seek(SeekFrom::End(0))?;
@@ -90,10 +91,10 @@ pub(crate) fn ends(file: &mut File) -> std::io::Result<(Vec<u8>, Vec<u8>)> {
     Ok((begin, end))
 }
 
-/// As [`read`], as text.
+/// Like [`read`], as text.
 ///
 /// # Errors
-/// As [`read`]; [`Error::Input`] for what is not UTF-8.
+/// As [`read`]; [`Error::Input`] for text that is not UTF-8.
 pub(crate) fn read_text(path: &Path, largest: u64) -> Result<String> {
     String::from_utf8(read(path, largest)?).map_err(|e| {
         let at = e.utf8_error().valid_up_to();
@@ -102,7 +103,7 @@ pub(crate) fn read_text(path: &Path, largest: u64) -> Result<String> {
     })
 }
 
-/// SHA-256 of a regular file of any size, in hexadecimal; a piece at a time is in memory.
+/// SHA-256 of a regular file of any size, in hexadecimal; read in pieces.
 ///
 /// # Errors
 /// As [`open`].
@@ -120,10 +121,10 @@ pub(crate) fn sha256(path: &Path) -> Result<String> {
     }
 }
 
-/// The settings in a text; `place` is what errors name, `help` tells where the keys are described.
+/// Parses settings from a text; errors name `place`, and `help` says where the keys are documented.
 ///
 /// # Errors
-/// [`Error::Usage`] with the line for what is not TOML, an unknown key or a value of another type.
+/// [`Error::Usage`] with the line, for invalid TOML, an unknown key or a value of another type.
 pub(crate) fn parse_toml<T: DeserializeOwned>(text: &str, place: &Place, help: &str) -> Result<T> {
     toml::from_str(text).map_err(|e| {
         let mut place = place.clone();
@@ -143,14 +144,14 @@ pub(crate) fn parse_toml<T: DeserializeOwned>(text: &str, place: &Place, help: &
     })
 }
 
-/// The key whose value begins at `at`.
+/// The key whose value begins at byte `at`.
 fn key_before(text: &str, at: usize) -> Option<String> {
     let line = text.get(..at)?.lines().next_back()?;
     let key = line.strip_suffix(['=', ' ']).and_then(|_| line.split('=').next())?.trim();
     (!key.is_empty() && !key.starts_with(['#', '['])).then(|| key.to_owned())
 }
 
-/// The reader's types in a user's words.
+/// Replaces the reader's type names by a user's words.
 fn in_words(message: &str) -> String {
     let words = [("floating point", "number"), ("f64", "a number"), ("f32", "a number"), ("usize", "a whole number")];
     let whole = ["u8", "u16", "u32", "u64"].map(|name| (name, "a whole number of at least 0"));
@@ -161,17 +162,17 @@ fn in_words(message: &str) -> String {
     text
 }
 
-/// The name that an unknown one resembles, of those that the message lists.
+/// The name, of those that the message lists, that is most similar to the unknown one.
 fn meant(message: &str) -> Option<&str> {
     let mut names = message.strip_prefix("unknown field `")?.split('`').step_by(2);
     let unknown = names.next()?;
     nearest(unknown, names, 0.75)
 }
 
-/// The settings in a regular file.
+/// Reads settings from a regular file.
 ///
 /// # Errors
-/// As [`parse_toml`]; [`Error::Io`]; [`Error::Input`] where it is not a text file, or larger than a few megabytes.
+/// As [`parse_toml`]; [`Error::Io`]; [`Error::Input`] if it is not a text file or is too large.
 pub(crate) fn read_toml<T: DeserializeOwned>(path: &Path, help: &str) -> Result<T> {
     parse_toml(&read_text(path, MAX_SETTINGS_BYTES)?, &Place::file(path), help)
 }

@@ -1,5 +1,5 @@
-//! One writer per folder or part: an advisory lock on a file, which the system releases with the process
-//! however that ends. A lock file that a killed process left behind is therefore free, and is taken over.
+//! One writer per folder or part: an advisory lock on a file. The system releases it when the process ends in any way,
+//! so the lock file of a killed process is free and is reused.
 
 use std::fs::{File, OpenOptions, TryLockError};
 use std::io::{ErrorKind, Read, Seek, Write};
@@ -8,14 +8,14 @@ use std::path::{Path, PathBuf};
 use crate::support::atomic_file::{is_named, refuse_link};
 use crate::{Error, Place, Result};
 
-/// A process id and an end of line are shorter.
+/// Maximum length of a lock file, bytes: a process id and an end of line are shorter.
 const MAX_LOCK_BYTES: u64 = 32;
 
-/// The right to write what a lock file stands for; dropping it removes the file and releases the lock.
+/// Exclusive or shared right to write what a lock file protects; dropping it removes the file and releases the lock.
 #[derive(Debug)]
 pub(crate) struct FolderLock {
     path: PathBuf,
-    /// Holds the lock as long as it is open.
+    /// Holds the lock while it is open.
     file: File,
 }
 
@@ -23,13 +23,13 @@ impl FolderLock {
     /// Takes the lock `path`, whose folder must exist, without waiting.
     ///
     /// # Errors
-    /// [`Error::Busy`] if another process holds it, named by its process id where that can be read;
-    /// [`Error::Io`] if the file cannot be made or the file system knows no locks.
+    /// [`Error::Busy`] if another process holds it, with its process id if readable; [`Error::Io`] if the file cannot
+    /// be created or the file system has no locks.
     pub(crate) fn acquire(path: &Path) -> Result<FolderLock> {
         FolderLock::take(path, File::try_lock, true)
     }
 
-    /// The same lock, shared: excludes an exclusive holder, and an exclusive holder excludes sharers.
+    /// The same lock, shared: excluded by an exclusive holder, and excludes one.
     ///
     /// # Errors
     /// As [`FolderLock::acquire`].
@@ -49,13 +49,13 @@ impl FolderLock {
                 Err(TryLockError::WouldBlock) => return Err(held(path, &mut file)),
                 Err(TryLockError::Error(source)) => return Err(Error::io(path, "lock", source)),
             }
-            // The former holder removes its file before it lets go: between opening and locking the name may
-            // have gone, and a lock on a file without a name keeps nobody out.
+            // The former holder removes its file before it releases the lock. If the name vanished between opening and
+            // locking, the lock would exclude nobody.
             if !is_named(path, &file) {
                 continue;
             }
             refuse_foreign(path, &mut file)?;
-            // Those who share it are many: no number is written.
+            // A shared lock has several holders, so no process id is written.
             if is_alone { write_pid(&mut file) } else { file.set_len(0) }
                 .map_err(|source| Error::io(path, "write", source))?;
             return Ok(FolderLock { path: path.to_path_buf(), file });
@@ -65,8 +65,8 @@ impl FolderLock {
 
 impl Drop for FolderLock {
     fn drop(&mut self) {
-        // While the lock is still held exclusively, so that nobody else's file can be under that name, unless the
-        // folder was taken away and made again. A file that stays is harmless.
+        // Remove the file only while the lock is held exclusively, so that the name cannot belong to another holder,
+        // unless the folder was removed and created anew. A remaining file is harmless.
         let is_alone = self.file.unlock().is_ok() && self.file.try_lock().is_ok();
         if is_alone && is_named(&self.path, &self.file) {
             let _ = std::fs::remove_file(&self.path);
@@ -74,7 +74,7 @@ impl Drop for FolderLock {
     }
 }
 
-/// Opens the lock file or makes it, never through a link; `None` where it was taken away meanwhile.
+/// Opens or creates the lock file, never through a link; `None` if it was removed meanwhile.
 fn open(path: &Path) -> Result<Option<File>> {
     let options = || OpenOptions::new().read(true).write(true).clone();
     let result = match options().create_new(true).open(path) {
@@ -86,7 +86,7 @@ fn open(path: &Path) -> Result<Option<File>> {
     };
     match result {
         Ok(file) => Ok(Some(file)),
-        // Between the two: the folder itself is there, or the first would have said so.
+        // The file vanished between the two calls. The folder exists, or the first call would have failed.
         Err(error) if error.kind() == ErrorKind::NotFound && path.parent().is_some_and(is_folder) => Ok(None),
         Err(error) if error.kind() == ErrorKind::NotFound => {
             let folder = path.parent().unwrap_or(Path::new(".")).display();
@@ -101,7 +101,7 @@ fn is_folder(path: &Path) -> bool {
     path.as_os_str().is_empty() || path.is_dir()
 }
 
-/// Refuses a file that no lock wrote: it would lose its content. A lock file holds a process id or nothing.
+/// Refuses a file that is not a lock, because it would lose its content. A lock file holds a process id or nothing.
 fn refuse_foreign(path: &Path, file: &mut File) -> Result<()> {
     let mut text = Vec::new();
     file.take(MAX_LOCK_BYTES + 1).read_to_end(&mut text).map_err(|source| Error::io(path, "read", source))?;
@@ -112,7 +112,7 @@ fn refuse_foreign(path: &Path, file: &mut File) -> Result<()> {
     Ok(())
 }
 
-/// For the message to those who come too late.
+/// Writes the process id for the message of other processes.
 fn write_pid(file: &mut File) -> std::io::Result<()> {
     file.set_len(0)?;
     file.rewind()?;
@@ -121,7 +121,7 @@ fn write_pid(file: &mut File) -> std::io::Result<()> {
 
 fn held(path: &Path, file: &mut File) -> Error {
     let mut text = String::new();
-    // Where locks are mandatory the holder's file cannot be read: then it stays without a number.
+    // Where locks are mandatory, the holder's file cannot be read and the message has no process id.
     let pid = file.take(MAX_LOCK_BYTES).read_to_string(&mut text).ok().and_then(|_| text.trim().parse::<u32>().ok());
     let who = pid.map_or(String::new(), |pid| format!(" (pid {pid})"));
     Error::Busy {

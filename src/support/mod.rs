@@ -1,7 +1,7 @@
-//! Support that knows nothing of traffic: errors, files, tables, locks, words and numbers for people.
+//! Support that is independent of traffic: errors, files, tables, locks, and texts and numbers for people.
 //!
-//! Here live the error type, files that are never half-written, run directories and their locks, tables in three formats,
-//! ranges of settings, and those of plausible input. Every room uses it; it uses none.
+//! This module holds the error type, atomic files, run directories and their locks, tables in three formats, ranges of
+//! settings, and plausibility of input. All other modules may use it; it uses none of them.
 
 pub(crate) mod atomic_file;
 pub mod cancel;

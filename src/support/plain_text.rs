@@ -1,32 +1,31 @@
-//! Foreign text (names of files, ids, contents) as a terminal, a page and a spreadsheet may show it: characters that
-//! would act instead of being seen are written as escapes.
-//! Also the known name that an unknown one was probably meant to be, and digests as text.
+//! Makes foreign text (file names, ids, contents) safe for a terminal, a page and a spreadsheet: characters that act
+//! instead of being shown become escapes. Also finds the known name closest to an unknown one, and formats digests.
 
 use std::borrow::Cow;
 
 use sha2::{Digest, Sha256};
 
-/// Does a terminal or a browser act on it instead of showing it? Control characters (C0, DEL, C1), marks that turn the
-/// direction of reading, line separators, and what has no width.
+/// Whether a terminal or a browser acts on the character instead of showing it: control characters (C0, DEL, C1), marks
+/// of the reading direction, line separators, and zero-width characters.
 pub(crate) fn acts(c: char) -> bool {
     c.is_control()
         || matches!(c, '\u{61c}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{2069}' | '\u{feff}')
 }
 
-/// Characters of a name in a message: an id, a key, a value.
+/// Maximum characters of a name in a message: an id, a key, a value.
 pub(crate) const MAX_NAME: usize = 80;
-/// Characters of a word in a message that may be a path, as systems bound it.
+/// Maximum characters of a word in a message that may be a path; the limit of systems.
 pub(crate) const MAX_PATH: usize = 4096;
-/// Characters of a message.
+/// Maximum characters of a message.
 const MAX_MESSAGE: usize = 16_384;
 
-/// A name of at most [`MAX_NAME`] characters: of a longer one the beginning and the end.
+/// Shortens a name to [`MAX_NAME`] characters by keeping its beginning and end.
 pub(crate) fn cut(name: &str) -> Cow<'_, str> {
     cut_to(name, MAX_NAME)
 }
 
 fn cut_to(text: &str, most: usize) -> Cow<'_, str> {
-    // A character has at least a byte.
+    // The byte length is an upper bound of the character count.
     if text.len() <= most || text.chars().count() <= most {
         return Cow::Borrowed(text);
     }
@@ -37,7 +36,7 @@ fn cut_to(text: &str, most: usize) -> Cow<'_, str> {
     Cow::Owned(format!("{}\u{2026}{}", &text[..end], &text[begin..]))
 }
 
-/// A message that repeats no text of any size: what is quoted, and every word that is no path, is cut as a name is.
+/// Limits a message: quoted text, and every word that is not a path, is shortened like a name.
 pub(crate) fn cut_names(message: &str) -> String {
     let mut out = String::with_capacity(message.len().min(MAX_MESSAGE));
     let mut rest = message;
@@ -72,7 +71,7 @@ fn escaped(text: &str, stays: &[char]) -> String {
     shown
 }
 
-/// A text of several lines: line breaks stay, all else that acts is written as `\u{1b}`.
+/// Escapes a text of several lines: line breaks stay, all other acting characters become `\u{1b}`.
 pub(crate) fn shown(text: &str) -> Cow<'_, str> {
     let stays = ['\n', '\t'];
     match text.chars().any(|c| acts(c) && !stays.contains(&c)) {
@@ -81,13 +80,13 @@ pub(crate) fn shown(text: &str) -> Cow<'_, str> {
     }
 }
 
-/// A name in a line: a line break in it begins no new line.
+/// Escapes a name within a line, line breaks included.
 pub(crate) fn shown_in_line(text: &str) -> String {
     escaped(text, &[])
 }
 
-/// A JSON document with everything that acts as `\u001b`, which reads back the same. Line breaks between its tokens
-/// stay; those in its texts are escapes already.
+/// Escapes a JSON document: acting characters become `\u001b`, which reads back unchanged. Line breaks between tokens
+/// stay; those in texts are already escapes.
 pub(crate) fn shown_json(json: &str) -> Cow<'_, str> {
     if !json.chars().any(|c| acts(c) && c != '\n') {
         return Cow::Borrowed(json);
@@ -102,8 +101,8 @@ pub(crate) fn shown_json(json: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
-/// The likeliest of some names, if its likeness, 0 to 1, is above `least`. Case and separators do not count. A text that is
-/// longer than any name resembles none.
+/// The most similar name, if its similarity (0 to 1) is above `least`. Case and separators are ignored. A text longer
+/// than any name resembles none.
 pub(crate) fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>, least: f64) -> Option<&'a str> {
     if wrong.len() > 4 * MAX_NAME {
         return None;

@@ -1,11 +1,10 @@
-//! What is plausible on a road, what is beyond physics, and which unit was probably meant: one table for every reader
-//! and every flag. `docs/src/tables.md` shows it to users; a test compares the two.
+//! Plausible ranges, physical ranges and commonly mistaken units: one table for every reader and every flag.
+//! `docs/src/tables.md` shows it to users; a test compares the two.
 //!
-//! A value outside the plausible range is used and reported. One beyond the physical range is refused, unless the user
-//! accepts implausible input; then it is reported too. What no arithmetic can hold is refused by the readers
-//! themselves.
+//! A value outside the plausible range is used and reported. One outside the physical range is refused, unless the user
+//! accepts implausible input; then it is reported too. Readers themselves refuse values that no arithmetic can hold.
 
-/// What a value is of.
+/// Quantity of a value.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[allow(missing_docs)] // the table below
 pub enum Quantity {
@@ -24,17 +23,17 @@ pub enum Quantity {
 /// A row of the table.
 #[derive(Debug, Clone, Copy)]
 pub struct Limits {
-    /// What it is of.
+    /// The quantity.
     pub quantity: Quantity,
     /// Its name in messages.
     pub name: &'static str,
     /// Unit of the ranges.
     pub unit: &'static str,
-    /// Least and largest value that needs no second look.
+    /// Minimum and maximum plausible value.
     pub plausible: (f64, f64),
-    /// Least and largest value that a vehicle or a road can have.
+    /// Minimum and maximum physical value of a vehicle or a road.
     pub physical: (f64, f64),
-    /// Units that are taken for it by mistake, and how many of them one of its own is.
+    /// Units that are often used by mistake, and their number per own unit.
     pub mistaken: &'static [(&'static str, f64)],
 }
 
@@ -68,13 +67,13 @@ pub const LIMITS: [Limits; 10] = [
     of(Quantity::Rate, "sample rate", "Hz", (2.0, 200.0), (1.0, 1e4), &[]),
 ];
 
-/// Speeds above this and below 0 are noise of a vehicle that stands, m/s.
+/// Speeds between this value and 0 are noise of a standing vehicle, m/s.
 pub const NOISE_MPS: f64 = -0.5;
 
-/// What a user can do about a value that is refused here.
+/// What a user can do about a refused value.
 pub const HELP: &str = "correct the value or its unit; option `accept_implausible` uses it as it is";
 
-/// What is done about values beyond the physical range.
+/// Policy for values outside the physical range.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Implausible {
     /// They are errors.
@@ -85,13 +84,13 @@ pub enum Implausible {
 }
 
 impl Quantity {
-    /// Its row.
+    /// The row of the table.
     #[inline]
     pub fn limits(self) -> &'static Limits {
         &LIMITS[self as usize]
     }
 
-    /// Is the value within the range that needs no second look?
+    /// Whether the value is plausible.
     #[inline]
     pub fn is_plausible(self, value: f64) -> bool {
         contains(self.limits().plausible, value)
@@ -128,7 +127,7 @@ fn contains((least, most): (f64, f64), value: f64) -> bool {
     least <= value && value <= most
 }
 
-/// How often something was found, and where first.
+/// How often a problem occurred, and its first place.
 #[derive(Debug, Clone, Default)]
 struct Finding {
     count: u64,
@@ -144,7 +143,7 @@ impl Finding {
     }
 }
 
-/// What was implausible in some input, counted.
+/// Counts of implausible values in an input.
 #[derive(Debug, Clone, Default)]
 pub struct Doubts {
     policy: Implausible,
@@ -153,20 +152,20 @@ pub struct Doubts {
 }
 
 impl Doubts {
-    /// None yet.
+    /// No doubts yet.
     pub fn new(policy: Implausible) -> Doubts {
         Doubts { policy, ..Doubts::default() }
     }
 
-    /// None yet, of the same policy.
+    /// No doubts yet, with the same policy.
     pub fn another(&self) -> Doubts {
         Doubts::new(self.policy)
     }
 
-    /// Looks at a value; `place` says where it stands.
+    /// Checks a value; `place` returns its place.
     ///
     /// # Errors
-    /// What is wrong with one beyond the physical range, unless such are accepted.
+    /// The problem of a value outside the physical range, unless such values are accepted.
     #[inline]
     pub fn check(&mut self, quantity: Quantity, value: f64, place: impl FnOnce() -> String) -> Result<(), String> {
         if quantity.is_plausible(value) { Ok(()) } else { self.doubt(quantity, value, place()) }
@@ -182,7 +181,7 @@ impl Doubts {
         Ok(())
     }
 
-    /// A speed as everything here takes it: what is noise of a standing vehicle is 0, and counted.
+    /// Returns a speed with the noise of a standing vehicle set to 0 and counted.
     #[inline]
     pub fn speed(&mut self, value_mps: f64, place: impl FnOnce() -> String) -> f64 {
         if value_mps >= 0.0 || value_mps <= NOISE_MPS || value_mps.is_nan() {
@@ -192,7 +191,7 @@ impl Doubts {
         0.0
     }
 
-    /// Takes over what was found elsewhere.
+    /// Adds the doubts of another input.
     pub fn add(&mut self, other: Doubts) {
         self.still.add(other.still);
         for (own, theirs) in self.found.iter_mut().zip(other.found) {
@@ -200,7 +199,7 @@ impl Doubts {
         }
     }
 
-    /// What a user should hear, one sentence per kind.
+    /// The doubts for users, one sentence per kind.
     pub fn sentences(&self) -> Vec<String> {
         let mut list = Vec::new();
         let times = |count: u64| if count == 1 { "once".to_owned() } else { format!("{count} times, first") };

@@ -1,8 +1,8 @@
-//! Ranges of settings. A range stands at the field that it is of (`#[schemars(range(…))]`); the schema, the configuration,
-//! the flags and the types' own checks read it there.
+//! Ranges of settings. A range is declared at its field (`#[schemars(range(…))]`); the schema, the configuration, the
+//! flags and the types' own checks read it there.
 //!
-//! Lists of settings hold every value once: a repeated headway or model would count its failures twice, and two
-//! lanes would have one key.
+//! Lists of settings hold every value once: a repeated headway or model would count its failures twice and give two
+//! lanes the same key.
 
 use std::collections::HashMap;
 use std::fmt::{self, Display};
@@ -15,19 +15,19 @@ use serde_json::Value;
 
 use crate::{Error, Place, Result};
 
-/// The numbers that a field takes.
+/// Valid numbers of a field.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Range {
-    /// Only whole ones.
+    /// Only integers.
     pub is_whole: bool,
-    /// Smallest, and whether it is itself excluded.
+    /// Minimum, and whether it is excluded.
     pub least: Option<(f64, bool)>,
-    /// Largest, and whether it is itself excluded.
+    /// Maximum, and whether it is excluded.
     pub most: Option<(f64, bool)>,
 }
 
 impl Range {
-    /// What the schema of a number says.
+    /// The range in the schema of a number.
     pub fn of(property: &Value) -> Range {
         let bound = |closed: &str, open: &str| {
             let closed = property[closed].as_f64().map(|x| (x, false));
@@ -40,7 +40,7 @@ impl Range {
         }
     }
 
-    /// Is the value one of them? NaN never is.
+    /// Whether the value is in the range; false for NaN.
     pub fn contains(&self, x: f64) -> bool {
         x.is_finite()
             && self.least.is_none_or(|(limit, open)| if open { x > limit } else { x >= limit })
@@ -90,7 +90,7 @@ fn check_value(name: &str, value: &Value, schema: &Value) -> Result<()> {
     }
     let is_number = matches!(schema["type"].as_str(), Some("number" | "integer"));
     let range = Range::of(schema);
-    // JSON writes a number that is not finite as null.
+    // JSON writes NaN and infinity as null.
     if !is_number || value.as_f64().is_some_and(|x| range.contains(x)) {
         return Ok(());
     }
@@ -98,8 +98,8 @@ fn check_value(name: &str, value: &Value, schema: &Value) -> Result<()> {
     Err(Error::usage(Place::item(name), format!("{found} cannot be used"), format!("give {range}")))
 }
 
-/// The first value that repeats an earlier one, in words. The list has pairs of what a value means and how it was
-/// written: `0.60` repeats `0.6`.
+/// The first value that repeats an earlier one, in words. The list has pairs of a value and its text: `0.60` repeats
+/// `0.6`.
 pub(crate) fn repeated<K: Eq + Hash, S: Display>(list: impl IntoIterator<Item = (K, S)>) -> Option<String> {
     let mut known: HashMap<K, S> = HashMap::new();
     for (meaning, written) in list {
@@ -118,7 +118,7 @@ pub(crate) fn repeated<K: Eq + Hash, S: Display>(list: impl IntoIterator<Item = 
 /// Checks that no value of a list repeats an earlier one.
 ///
 /// # Errors
-/// [`Error::Usage`] at `place`, as [`repeated`] says it.
+/// [`Error::Usage`] at `place`, with the text of [`repeated`].
 pub(crate) fn refuse_repeats<K: Eq + Hash, S: Display>(
     place: impl FnOnce() -> Place,
     list: impl IntoIterator<Item = (K, S)>,
@@ -127,5 +127,5 @@ pub(crate) fn refuse_repeats<K: Eq + Hash, S: Display>(
     repeated(list).map_or(Ok(()), |problem| Err(refused(problem)))
 }
 
-/// What to do about a repeated value.
+/// Help for a repeated value.
 pub(crate) const GIVE_ONCE: &str = "give every value once";

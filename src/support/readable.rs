@@ -1,30 +1,30 @@
 //! Numbers for people: thousands separators, at most four significant digits, ∞ and – instead of `inf` and `NaN`. Every
-//! text and page writes its numbers here; files have every digit. Also round steps, 1, 2 or 5 times a power of ten.
+//! text and page uses them; files have every digit. Also round steps: 1, 2 or 5 times a power of ten.
 
 /// Significant digits of a number for people.
 const DIGITS: usize = 4;
 
-/// `1,234,567`.
+/// Formats a count: `1,234,567`.
 pub(crate) fn count(count: impl Into<u64>) -> String {
     grouped(&count.into().to_string())
 }
 
-/// The same for what is counted in memory.
+/// Like [`count`], for a length in memory.
 pub(crate) fn count_of(length: usize) -> String {
     grouped(&length.to_string())
 }
 
-/// The same for a number with a sign.
+/// Like [`count`], for a signed number.
 pub(crate) fn whole(number: i64) -> String {
     grouped(&number.to_string())
 }
 
-/// `1 scenario`, `2 scenarios`.
+/// Formats a count with its noun: `1 scenario`, `2 scenarios`.
 pub(crate) fn counted(length: usize, noun: &str) -> String {
     format!("{} {noun}{}", count_of(length), if length == 1 { "" } else { "s" })
 }
 
-/// A quantity with four significant digits at most and no idle zeros: `0.45`, `36`, `1,235`, `3.2e-9`, `∞`.
+/// Formats a quantity with at most four significant digits and no trailing zeros: `0.45`, `36`, `1,235`, `3.2e-9`, `∞`.
 pub(crate) fn value(value: f64) -> String {
     let text = significant(value, DIGITS);
     let (digits, power) = text.split_at(text.find('e').unwrap_or(text.len()));
@@ -34,8 +34,8 @@ pub(crate) fn value(value: f64) -> String {
     }
 }
 
-/// A number with so many significant digits, idle zeros too, so that columns stand below one another: `0.450`, `36.0`.
-/// Powers of ten below 0.001 and from a thousand million on.
+/// Formats a number with a fixed number of significant digits, so that columns align: `0.450`, `36.0`. Below 0.001 and
+/// from 10⁹ it uses powers of ten.
 pub(crate) fn significant(value: f64, digits: usize) -> String {
     if value.is_nan() {
         return "–".to_owned();
@@ -46,7 +46,7 @@ pub(crate) fn significant(value: f64, digits: usize) -> String {
     if value == 0.0 {
         return "0".to_owned();
     }
-    // Rounded once, in decimal: 999.96 has the exponent of 1,000.
+    // Round once, in decimal: 999.96 has the exponent of 1,000.
     let rounded = format!("{value:.*e}", digits.saturating_sub(1));
     let Some((mantissa, exponent)) = rounded.split_once('e') else { return rounded };
     match exponent.parse::<i32>() {
@@ -59,7 +59,7 @@ pub(crate) fn significant(value: f64, digits: usize) -> String {
     }
 }
 
-/// Thousands separators in the whole part of a decimal number.
+/// Inserts thousands separators into the integer part of a decimal number.
 fn grouped(number: &str) -> String {
     let (sign, number) = number.split_at(usize::from(number.starts_with('-')));
     let (whole, fraction) = number.split_at(number.find('.').unwrap_or(number.len()));
@@ -72,9 +72,9 @@ fn grouped(number: &str) -> String {
 /// 1, 2 or 5 times a power of ten, as digit and exponent.
 pub(crate) type OneTwoFive = (u8, i32);
 
-/// The largest 1, 2 or 5 times a power of ten that is not above `value` (positive, finite).
+/// The largest 1, 2 or 5 times a power of ten that is at most `value` (positive, finite).
 pub(crate) fn one_two_five(value: f64) -> OneTwoFive {
-    // The shortest decimal text splits a float without rounding.
+    // The shortest decimal text gives digit and exponent without rounding.
     let written = format!("{value:e}");
     let (mantissa, exponent) = written.split_once('e').unwrap_or((&written, "0"));
     let mantissa: f64 = mantissa.parse().unwrap_or(1.0);
@@ -100,7 +100,7 @@ pub(crate) fn next((digit, exponent): OneTwoFive, way: i32) -> OneTwoFive {
     }
 }
 
-/// The smallest 1, 2 or 5 times a power of ten that is not below `step` (positive).
+/// The smallest 1, 2 or 5 times a power of ten that is at least `step` (positive).
 pub(crate) fn plain_step(step: f64) -> f64 {
     let step = step.max(f64::MIN_POSITIVE);
     let (digit, exponent) = one_two_five(step);

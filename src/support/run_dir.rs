@@ -1,12 +1,12 @@
-//! A run's folder: one run at a time writes it, and its record stands beside the files of one run only.
+//! A run directory: one run at a time writes it, and its record belongs to the files of exactly one run.
 //!
-//! `lanesweep-files.json` lists the files of every run in the folder, with a checksum. Nothing that it does not list is
-//! removed or replaced. Results are written under hidden names. Once all are on the disk, the list holds the former and the
-//! new files as incomplete, the former record goes, the results get their names in quick succession, the new record gets
-//! its own, and the list is complete. After a kill in between, the next run removes what it does not write itself, and
-//! readers of files that stand for themselves (recordings) refuse the folder.
+//! `lanesweep-files.json` lists the files of every run in the folder, with a checksum. Files that it does not list are
+//! neither removed nor replaced. Results are written under hidden names. Once all are on disk, the list holds the
+//! former and the new files as incomplete, and the former record is removed. Then the results are renamed, the new
+//! record is renamed last, and the list is complete. After a kill in between, the next run removes the listed files
+//! that it does not write itself. Readers of independent files (recordings) refuse an incomplete folder.
 //!
-//! Parts of a run share the folder with one another and keep whole runs out: [`parts`](crate::run::parts).
+//! Parts of a run use the folder together and exclude whole runs: [`parts`](crate::run::parts).
 
 use std::collections::BTreeSet;
 use std::io::{ErrorKind, Write};
@@ -30,13 +30,13 @@ pub const COMPARE_RECORD: &str = "compare.json";
 /// Record of a dossier.
 pub const DOSSIER_RECORD: &str = "dossier.json";
 
-/// Records of runs that write files of the same names, such as `report.html`: a folder holds one of them.
+/// Records of runs that write files with the same names, such as `report.html`: a folder holds one of them.
 const RECORDS: [&str; 5] = [STUDY_RECORD, ESTIMATE_RECORD, MAP_RECORD, COMPARE_RECORD, DOSSIER_RECORD];
 
 /// The lock of the whole folder.
 const LOCK: &str = "run.lock";
 
-/// Files that every run of a record writes. A file of the user's with such a name is found before the work starts.
+/// Files that every run with this record writes. A user's file of such a name is detected before the work starts.
 fn usual_files(record: &str) -> &'static [&'static str] {
     match record {
         STUDY_RECORD => &["failures.csv", "f1.csv", "claims.csv", "headways.csv", "report.txt", "report.html"],
@@ -48,25 +48,25 @@ fn usual_files(record: &str) -> &'static [&'static str] {
     }
 }
 
-/// The right to write a run's folder, until it is dropped.
+/// The right to write a run directory, until it is dropped.
 #[derive(Debug)]
 pub struct OutputDir {
     dir: PathBuf,
     record: Option<&'static str>,
     is_new: bool,
     lock: Option<FolderLock>,
-    /// What a signal takes away: the lock, and the folder if it is new and empty.
+    /// What a signal removes: the lock, and the folder if it is new and empty.
     live: Vec<Live>,
 }
 
 impl OutputDir {
-    /// Takes a folder for a run that leaves this record; makes it where it is not there. What killed runs left under
-    /// hidden names is removed.
+    /// Opens a folder for a run that leaves this record, and creates it if needed. Hidden files of killed runs are
+    /// removed.
     ///
     /// # Errors
-    /// [`Error::Busy`] where another process writes it; [`Error::Usage`] where it holds another verb's run, or files that
-    /// no run listed under the names of this run's; [`Error::Input`] for a link in the place of lock or record, or a damaged
-    /// list; [`Error::Io`].
+    /// [`Error::Busy`] if another process writes it; [`Error::Usage`] if it holds another verb's run, or unlisted files
+    /// with the names of this run's; [`Error::Input`] for a link in the place of lock or record, or a damaged list;
+    /// [`Error::Io`].
     pub fn open(dir: &Path, record: &'static str) -> Result<OutputDir> {
         let mut folder = OutputDir::take(dir, Some(record), FolderLock::acquire)?;
         folder.enter_lock();
@@ -75,7 +75,7 @@ impl OutputDir {
         Ok(folder)
     }
 
-    /// The same for files that each are a result by themselves, without a record.
+    /// Like [`OutputDir::open`], for files that are independent results, without a record.
     ///
     /// # Errors
     /// As [`OutputDir::open`].
@@ -85,10 +85,10 @@ impl OutputDir {
         Ok(folder)
     }
 
-    /// The same for a part of a run, together with other parts.
+    /// Like [`OutputDir::open`], for a part of a run, together with other parts.
     ///
     /// # Errors
-    /// As [`OutputDir::open`]; [`Error::Busy`] only where a whole run or a merge is at work.
+    /// As [`OutputDir::open`]; [`Error::Busy`] only if a whole run or a merge is active.
     pub fn share(dir: &Path) -> Result<OutputDir> {
         OutputDir::take(dir, None, FolderLock::share)
     }
@@ -104,22 +104,22 @@ impl OutputDir {
         Ok(folder)
     }
 
-    /// A lock that nobody shares is this process's to take away.
+    /// Registers an exclusive lock for removal by a signal.
     fn enter_lock(&mut self) {
         self.live.push(Live::enter(self.dir.join(LOCK)));
     }
 
-    /// Where it is.
+    /// Path of the folder.
     pub fn dir(&self) -> &Path {
         &self.dir
     }
 
-    /// Begins its results.
+    /// Starts the results of the run.
     ///
     /// # Errors
     /// [`Error::Io`].
     pub fn results(&self) -> Result<Results<'_>> {
-        // It was there before the work; where it vanished meanwhile, the result is worth another one.
+        // It existed before the work. If it vanished meanwhile, create it anew to save the result.
         make_folder(&self.dir)?;
         let (kept, named) = (BTreeSet::new(), BTreeSet::new());
         Ok(Results { folder: self, staged: Vec::new(), elsewhere: Vec::new(), kept, named })
@@ -150,12 +150,12 @@ impl OutputDir {
         Err(Error::usage(Place::file(self.dir.join(name)), problem, help))
     }
 
-    /// What the former run left: its files, and those of a run that ended while they got their names.
+    /// The files that the former run left, including those of a run that ended during renaming.
     fn former(&self) -> Result<BTreeSet<String>> {
         Ok(FileList::read(&self.dir)?.take(self.record).files.into_iter().collect())
     }
 
-    /// Lists the files of this folder's run.
+    /// Writes the list of this folder's run.
     fn list(&self, files: BTreeSet<String>, is_complete: bool) -> Result<()> {
         let mut list = FileList::read(&self.dir)?;
         list.take(self.record);
@@ -170,24 +170,24 @@ impl Drop for OutputDir {
         self.live.clear();
         self.lock = None;
         if self.is_new {
-            // A run that failed leaves no folder of its own: only an empty one goes.
+            // A failed run leaves no new folder: this removes only an empty one.
             let _ = std::fs::remove_dir(&self.dir);
         }
     }
 }
 
-/// Results of a run that wait under hidden names; dropped before [`Results::publish`], they leave nothing behind.
+/// Results of a run under hidden names; dropping them before [`Results::publish`] removes them.
 pub struct Results<'a> {
     folder: &'a OutputDir,
     staged: Vec<(String, StagedFile)>,
     elsewhere: Vec<StagedFile>,
     kept: BTreeSet<String>,
-    /// Files in this folder whose paths the user gave: they may replace any.
+    /// Files in this folder whose paths the user gave; they may replace any file.
     named: BTreeSet<String>,
 }
 
 impl Results<'_> {
-    /// Their folder.
+    /// Path of the folder.
     pub fn dir(&self) -> &Path {
         &self.folder.dir
     }
@@ -200,7 +200,7 @@ impl Results<'_> {
         self.add_with(name, |file| file.write_all(content))
     }
 
-    /// Adds a file whose content is produced on the way.
+    /// Adds a file whose content is streamed.
     ///
     /// # Errors
     /// As [`Results::add`].
@@ -212,7 +212,7 @@ impl Results<'_> {
         Ok(())
     }
 
-    /// Adds a complete file that a user named: in this folder or elsewhere.
+    /// Adds a complete file that a user named, in this folder or elsewhere.
     pub(crate) fn join(&mut self, file: StagedFile) {
         let folder_of = |path: &Path| match path.parent() {
             Some(folder) if !folder.as_os_str().is_empty() => folder.canonicalize().ok(),
@@ -228,7 +228,7 @@ impl Results<'_> {
         }
     }
 
-    /// Keeps the former run's files of these names, as files of this one.
+    /// Keeps the former run's files of these names as files of this run.
     ///
     /// # Errors
     /// [`Error::Input`] for a damaged list of files.
@@ -238,16 +238,16 @@ impl Results<'_> {
         Ok(())
     }
 
-    /// The names of all files in the folder, sorted: what the record lists.
+    /// The sorted names of all files in the folder, for the record.
     pub fn names(&self) -> Vec<String> {
         let names = self.staged.iter().map(|(name, _)| name);
         names.chain(&self.kept).cloned().collect::<BTreeSet<String>>().into_iter().collect()
     }
 
-    /// Puts the results, and the record as the last of them, in the place of the former run's.
+    /// Replaces the former run's results by these; the record is renamed last.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Usage`] for two files of one name, or a file in the way that no run listed.
+    /// [`Error::Io`]; [`Error::Usage`] for two files of one name, or an unlisted file in the way.
     pub fn publish(mut self, record: &[u8]) -> Result<()> {
         let names: BTreeSet<String> = self.names().into_iter().collect();
         let (folder, dir) = (self.folder, &self.folder.dir);
@@ -275,10 +275,10 @@ impl Results<'_> {
         folder.list(names, true)
     }
 
-    /// Gives the files their names beside those of earlier runs, without a record.
+    /// Renames the files beside those of earlier runs, without a record.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Usage`] for a file in the way that no run listed.
+    /// [`Error::Io`]; [`Error::Usage`] for an unlisted file in the way.
     pub fn publish_each(self) -> Result<()> {
         self.refuse_foreign([])?;
         let folder = self.folder;
@@ -303,12 +303,12 @@ fn remove(path: &Path) -> Result<()> {
     }
 }
 
-/// Is this a result of a run in the folder, or its record?
+/// Whether this is a result of a run in the folder, or its record.
 pub fn is_listed(dir: &Path, name: &str) -> bool {
     FileList::read(dir).is_ok_and(|list| list.holds(name))
 }
 
-/// The files of runs that ended while their files got their names; `None` where all are whole.
+/// The files of runs that ended during renaming; `None` if all runs are complete.
 pub fn unfinished(dir: &Path) -> Option<Vec<String>> {
     let is_cut = |run: &RunFiles| !run.is_complete && run.record.as_ref().is_some_and(|name| !dir.join(name).exists());
     let cut: Vec<RunFiles> = FileList::read(dir).ok()?.runs.into_iter().filter(is_cut).collect();
@@ -405,7 +405,7 @@ mod tests {
     fn a_run_that_ended_while_its_files_got_their_names_leaves_nothing_beside_the_next() {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path();
-        // As left by one that had begun to replace another: no record, files of both.
+        // A run that ended while it replaced another: no record, files of both.
         let cut = || {
             let files = vec!["a.csv".to_owned(), "b.csv".to_owned()];
             let run = RunFiles { record: Some("map.json".to_owned()), files, is_complete: false };
@@ -418,7 +418,7 @@ mod tests {
         assert_eq!(unfinished(out).unwrap(), ["a.csv", "b.csv"]);
         publish(&folder(out), &["c.csv"], "third");
         assert_eq!(names(out), ["c.csv", LIST, "map.json", "other.csv"]);
-        // One that had its record already is whole.
+        // A run that already has its record is complete.
         cut();
         assert!(unfinished(out).is_none());
     }

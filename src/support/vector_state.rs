@@ -1,13 +1,13 @@
-//! The upper halves of the vector registers, as scalar code wants them.
+//! Clears the upper halves of the vector registers for scalar code.
 //!
-//! Kernels written in assembly, such as those below faer, may end without `vzeroupper`. The upper halves of the
-//! registers are then in use, and on Zen 5 every scalar operation has to keep them: single lanes ran at a third of
-//! their speed for the rest of the thread's life.
+//! Assembly kernels, such as those used by faer, may end without `vzeroupper`. The upper halves of the registers then
+//! stay in use, and on Zen 5 every scalar operation must preserve them. Single lanes then ran at a third of their speed
+//! for the rest of the thread's life.
 
-// One instruction, after the machine was asked for it.
+// One instruction, after checking that the CPU has it.
 #![allow(unsafe_code)]
 
-/// Clears them, on machines that have them.
+/// Clears the upper halves, on CPUs that have them.
 pub(crate) fn clear_upper_halves() {
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx") {
@@ -15,7 +15,7 @@ pub(crate) fn clear_upper_halves() {
         fn clear() {
             std::arch::x86_64::_mm256_zeroupper();
         }
-        // SAFETY: the machine has AVX.
+        // SAFETY: the CPU has AVX.
         unsafe { clear() }
     }
 }
@@ -24,7 +24,8 @@ pub(crate) fn clear_upper_halves() {
 pub(crate) mod tests {
     use std::arch::x86_64::{__cpuid_count, _xgetbv};
 
-    /// Are upper halves of the 256-bit registers in use? `None` where the machine does not say, or says so always.
+    /// Whether upper halves of the 256-bit registers are in use. `None` if the CPU does not report it, or always
+    /// reports true.
     pub(crate) fn upper_halves_in_use() -> Option<bool> {
         let in_use = what_the_machine_says()?;
         super::clear_upper_halves();
@@ -36,10 +37,10 @@ pub(crate) mod tests {
         let says = is_x86_feature_detected!("xsave") && __cpuid_count(13, 1).eax & 4 != 0;
         #[target_feature(enable = "xsave")]
         fn in_use() -> u64 {
-            // SAFETY: the machine says what is in use.
+            // SAFETY: the CPU reports that XGETBV with 1 is available.
             unsafe { _xgetbv(1) }
         }
-        // SAFETY: the machine has XSAVE.
+        // SAFETY: the CPU has XSAVE.
         says.then(|| unsafe { in_use() } & 0b100 != 0)
     }
 
@@ -50,7 +51,7 @@ pub(crate) mod tests {
             return;
         }
         let values = [1.5_f32; 8];
-        // SAFETY: the machine has AVX; reads eight values into a register and leaves them there.
+        // SAFETY: the CPU has AVX; the instruction reads eight values into a register and leaves them there.
         unsafe { std::arch::asm!("vmovups ymm5, [{p}]", out("xmm5") _, p = in(reg) &values) };
         assert_eq!(what_the_machine_says(), Some(true));
         super::clear_upper_halves();

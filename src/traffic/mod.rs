@@ -1,7 +1,8 @@
 //! Traffic: recordings as read, and the scenarios found in them.
 //!
-//! [`trajectory`] reads recordings (highD's format) and makes synthetic ones; [`mining`] finds cut-ins, cut-outs and leader
-//! decelerations. A [`Source`] loads and mines either, or reads a scenario file. Scenarios go to [`scenario`](crate::scenario).
+//! [`trajectory`] reads recordings (highD's format) and generates synthetic ones; [`mining`] finds cut-ins, cut-outs
+//! and leader decelerations. A [`Source`] loads and mines either, or reads a scenario file. Scenarios go to
+//! [`scenario`](crate::scenario).
 
 pub mod mining;
 mod provenance;

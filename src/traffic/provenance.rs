@@ -1,4 +1,4 @@
-//! Where scenarios come from, and how long and how far was driven for them.
+//! The source of scenarios, and the time and distance driven to record them.
 
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -16,7 +16,7 @@ use crate::support::plain_text::hex;
 use crate::support::plausibility::Implausible;
 use crate::{Error, Place, Result};
 
-/// Where scenarios come from.
+/// Source of scenarios.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Source {
     /// A folder of highD-format recordings.
@@ -28,7 +28,7 @@ pub enum Source {
 }
 
 impl Source {
-    /// In one line, which says so where the data are made up.
+    /// Description in one line; it says so if the data are synthetic.
     pub fn describe(&self, synthetic: bool) -> String {
         let text = match self {
             Source::Folder(dir) => made_up(dir).unwrap_or_else(|| format!("recordings in {}", dir.display())),
@@ -41,7 +41,7 @@ impl Source {
         if synthetic && !text.starts_with("SYNTHETIC DATA") { format!("SYNTHETIC DATA: {text}") } else { text }
     }
 
-    /// Checks that the data can be read: all of a scenario file, the names of a folder's recordings.
+    /// Checks that the data can be read: the whole scenario file, or the file names of a folder's recordings.
     ///
     /// # Errors
     /// As [`Source::load`].
@@ -62,10 +62,10 @@ impl Source {
         }
     }
 
-    /// Reads or generates, and mines. `done` is called after each recording, from any thread.
+    /// Reads or generates recordings, and mines them. `done` is called after each recording, from any thread.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Input`] where nothing can be read; [`Error::Usage`] for options out of range.
+    /// [`Error::Io`]; [`Error::Input`] if nothing can be read; [`Error::Usage`] for options out of range.
     pub fn load(&self, mining: &MiningOptions, implausible: Implausible, done: impl Fn() + Sync) -> Result<Collection> {
         match self {
             Source::Scenarios(path) => {
@@ -79,7 +79,7 @@ impl Source {
     }
 }
 
-/// Driving time and distance in which scenarios were looked for.
+/// Driven time and distance of the recordings that were searched for scenarios.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Driven {
@@ -90,7 +90,7 @@ pub struct Driven {
 }
 
 impl Driven {
-    /// Over all ego data sets of the recordings that were used; `None` for scenarios without recordings.
+    /// Sum over all ego data sets of the recordings used; `None` for scenarios without recordings.
     pub fn of(collection: &Collection) -> Option<Driven> {
         let hours = collection.recordings.iter().map(|r| r.driven_s).sum::<f64>() / 3600.0;
         let kilometres = collection.recordings.iter().map(|r| r.driven_m).sum::<f64>() / 1000.0;
@@ -98,7 +98,7 @@ impl Driven {
         Driven { hours: positive(hours), kilometres: positive(kilometres) }.known()
     }
 
-    /// `None` where neither is known.
+    /// `None` if neither is known.
     fn known(self) -> Option<Driven> {
         (self.hours.is_some() || self.kilometres.is_some()).then_some(self)
     }
@@ -118,23 +118,23 @@ impl Driven {
     }
 }
 
-/// What scenarios are of. A scenario file holds one scenario a line and has no place for it: `mine` writes it beside the
-/// file.
+/// Provenance of scenarios. A scenario file holds one scenario per line and cannot store it, so `mine` writes it to a
+/// second file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DataProvenance {
     /// The data in one line; synthetic data say so.
     pub data: String,
-    /// Nothing was measured on real traffic.
+    /// True if the data are synthetic: no statement about real traffic.
     pub synthetic: bool,
     /// SHA-256 of the scenario file, in hexadecimal.
     pub scenarios_sha256: String,
-    /// Time and distance of all ego data sets, where they are known.
+    /// Time and distance of all ego data sets, if known.
     pub driven: Option<Driven>,
 }
 
 const VERSION: u64 = 1;
 
-/// The file beside a scenario file.
+/// The provenance file of a scenario file.
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ProvenanceFile {
@@ -146,8 +146,8 @@ struct ProvenanceFile {
 }
 
 impl DataProvenance {
-    /// Of scenarios and their source. What is `told` of the driving counts before what is known: hours of one set do not
-    /// mix with kilometres of another.
+    /// From scenarios and their source. If the user gives `told`, it replaces the known values entirely: hours of one
+    /// data set must not mix with kilometres of another.
     ///
     /// # Errors
     /// [`Error::Io`]; as [`DataProvenance::read_beside`].
@@ -169,7 +169,7 @@ impl DataProvenance {
                 }
             }
             Source::Folder(_) | Source::Generated(_) => {
-                // That of the file that `mine` would write: the same scenarios have the same checksum.
+                // The checksum of the file that `mine` would write: the same scenarios have the same checksum.
                 let mut hash = Hashing(Sha256::new());
                 write_scenarios_to(&mut hash, &collection.scenarios)?;
                 provenance.scenarios_sha256 = hex(&hash.0.finalize());
@@ -179,8 +179,9 @@ impl DataProvenance {
         Ok(provenance)
     }
 
-    /// Where it stands: `scenarios.jsonl` → `scenarios.exposure.json`; of another format with its ending, so that the
-    /// same scenarios in two formats have one each: `scenarios.parquet` → `scenarios.parquet.exposure.json`.
+    /// Path of the provenance file: `scenarios.jsonl` → `scenarios.exposure.json`. Other formats keep their ending, so
+    /// that the same scenarios in two formats have one file each: `scenarios.parquet` →
+    /// `scenarios.parquet.exposure.json`.
     pub fn path_of(scenarios: &Path) -> PathBuf {
         match scenarios.extension().and_then(|ending| ending.to_str()) {
             Some(ending @ ("parquet" | "csv")) => scenarios.with_extension(format!("{ending}.exposure.json")),
@@ -188,7 +189,7 @@ impl DataProvenance {
         }
     }
 
-    /// Takes away the one beside a scenario file that is about to be replaced.
+    /// Removes the provenance file of a scenario file that will be replaced.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -200,7 +201,7 @@ impl DataProvenance {
         }
     }
 
-    /// Writes it beside a scenario file, whole or not at all; nothing where it is not known what was driven.
+    /// Writes the provenance file of a scenario file atomically; nothing if time and distance are unknown.
     ///
     /// # Errors
     /// [`Error::Io`] if the folder cannot be written to.
@@ -218,11 +219,11 @@ impl DataProvenance {
         write_atomically(&Self::path_of(scenarios), format!("{text}\n").as_bytes())
     }
 
-    /// Reads the one beside a scenario file; `None` where there is none.
+    /// Reads the provenance file of a scenario file; `None` if there is none.
     ///
     /// # Errors
-    /// [`Error::Io`] if it is there and cannot be read; [`Error::Input`] if it is broken, of another version, or
-    /// belongs to other scenarios than those with `scenarios_sha256`.
+    /// [`Error::Io`] if it exists and cannot be read; [`Error::Input`] if it is damaged, of another version, or belongs
+    /// to scenarios with another checksum than `scenarios_sha256`.
     pub fn read_beside(scenarios: &Path, scenarios_sha256: &str) -> Result<Option<DataProvenance>> {
         let path = Self::path_of(scenarios);
         let text = match input_file::read(&path, input_file::MAX_SETTINGS_BYTES) {
@@ -258,7 +259,7 @@ impl DataProvenance {
     }
 }
 
-/// A writer that keeps nothing but a checksum.
+/// A writer that computes only a checksum.
 struct Hashing(Sha256);
 
 impl Write for Hashing {

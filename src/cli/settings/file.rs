@@ -1,5 +1,5 @@
-//! A configuration file, every value with its line, and the environment's variables: `LANESWEEP_` and a key's name in
-//! capitals.
+//! Reads a configuration file, each value with its line, and the environment variables: `LANESWEEP_` and a key's name
+//! in capitals.
 
 use std::ffi::{OsStr, OsString};
 use std::path::Path;
@@ -13,7 +13,7 @@ use crate::support::input_file;
 use crate::support::plain_text::cut;
 use crate::{Error, Place, Result};
 
-/// No key is longer, its tables included.
+/// Maximum length of a key with its tables, bytes.
 const MAX_KEY_BYTES: usize = 200;
 
 /// A value of a file.
@@ -24,16 +24,16 @@ pub(super) struct Line {
     pub row: u64,
 }
 
-/// The values of a file.
+/// Reads the values of a file.
 ///
 /// # Errors
-/// [`Error::Usage`] with the line: what is not TOML, an unknown table or key, a value that the key does not take.
-/// [`Error::Io`]; [`Error::Input`] where it is not a text file, or larger than a few megabytes.
+/// [`Error::Usage`] with the line: invalid TOML, an unknown table or key, or an invalid value. [`Error::Io`];
+/// [`Error::Input`] if it is not a text file or is too large.
 pub(super) fn read(path: &Path, keys: &[Key]) -> Result<Vec<Line>> {
     parse(&input_file::read_text(path, input_file::MAX_SETTINGS_BYTES)?, &Place::file(path), keys)
 }
 
-/// The values in a text; errors name `place`.
+/// Parses the values in a text; errors name `place`.
 pub(super) fn parse(text: &str, place: &Place, keys: &[Key]) -> Result<Vec<Line>> {
     let reader = Reader { text, place, keys };
     let table = DeTable::parse(text).map_err(|e| {
@@ -96,7 +96,7 @@ impl Reader<'_> {
     }
 }
 
-/// The complaint about a key or a table that does not exist.
+/// The error for an unknown key or table.
 pub(super) fn unknown(place: Place, name: &str, is_table: bool, keys: &[Key]) -> Error {
     let table_of = |name: &str| name.rsplit_once('.').map_or(String::new(), |(table, _)| table.to_owned());
     let what = if is_table { "table" } else { "key" };
@@ -106,7 +106,7 @@ pub(super) fn unknown(place: Place, name: &str, is_table: bool, keys: &[Key]) ->
     };
     names.sort();
     names.dedup();
-    // In the same table first: another one's key of a similar name is seldom meant.
+    // Prefer the same table: a similar name in another table is rarely meant.
     let last = |name: &str| name.rsplit('.').next().unwrap_or_default().to_owned();
     let siblings: Vec<&String> = names.iter().filter(|known| table_of(known) == table_of(name)).collect();
     let near_last: Vec<(String, &String)> = siblings.into_iter().map(|known| (last(known), known)).collect();
@@ -122,10 +122,10 @@ pub(super) fn unknown(place: Place, name: &str, is_table: bool, keys: &[Key]) ->
     Error::usage(place, format!("there is no such {what}"), help)
 }
 
-/// Names the configuration file, where `--config` names none.
+/// Variable that names the configuration file if `--config` names none.
 pub const FILE_VARIABLE: &str = "LANESWEEP_CONFIG";
 
-/// Variables of the program's own tests; the program does not read them.
+/// Variables of the program's tests; the program ignores them.
 pub const TEST_VARIABLES: [&str; 9] = [
     "LANESWEEP_DLR_HT",
     "LANESWEEP_KILLS",
@@ -145,10 +145,10 @@ pub fn variable_of(key: &str) -> String {
     format!("{PREFIX}{}", key.replace('.', "_").to_ascii_uppercase())
 }
 
-/// The variables that set keys: key, name, word. An empty variable is one that is not set.
+/// The variables that set keys: key, name, text. An empty variable counts as not set.
 ///
 /// # Errors
-/// [`Error::Usage`] for a variable of the program's that it does not know, with the nearest one.
+/// [`Error::Usage`] for an unknown variable with the program's prefix, with the most similar name.
 pub(super) fn read_variables<'k>(
     variables: &[(OsString, OsString)],
     keys: &'k [Key],

@@ -1,7 +1,7 @@
-//! The keys of a configuration, as the types' own schema tells them.
+//! The keys of a configuration, from the schema of the settings types.
 //!
-//! Values come from TOML, from a word of the environment or the command line, and are checked against what the key takes.
-//! The commented configuration that ships with the program tells the order of the keys.
+//! Values come from TOML, from an environment variable or from the command line, and are checked against the key's type
+//! and range. The commented default configuration defines the order of the keys.
 
 use serde_json::{Number, Value};
 use toml::de::DeValue;
@@ -11,43 +11,43 @@ use crate::support::plain_text;
 use crate::support::ranges::Range;
 use crate::{Error, Place, Result};
 
-/// One key with what it takes.
+/// One key with its type, range and default.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Key {
     /// Tables and name, joined by dots: `mining.cut_in.max_thw_s`.
     pub name: String,
-    /// What it means.
+    /// Meaning.
     pub description: String,
-    /// What it takes.
+    /// Valid values.
     pub kind: KeyKind,
-    /// Its default; `None` where it is not set unless somebody sets it.
+    /// Default; `None` if the key has none.
     pub default: Option<Value>,
 }
 
-/// What a key takes.
+/// Valid values of a key.
 #[derive(Debug, Clone, PartialEq)]
 pub enum KeyKind {
-    /// A number.
+    /// A number in a range.
     Number(Range),
     /// True or false.
     Boolean,
-    /// One of some words.
+    /// One of several words.
     Choice(Vec<Choice>),
     /// Any text.
     Text,
 }
 
-/// A word that a key takes.
+/// A valid word of a key.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Choice {
     /// The word.
     pub word: String,
-    /// What it means; empty where the word says it.
+    /// Meaning; empty if the word is clear.
     pub description: String,
 }
 
 impl Key {
-    /// All keys, in no order that means anything.
+    /// All keys, unordered.
     pub fn all() -> Vec<Key> {
         let mut keys = Vec::new();
         collect(&settings_schema(), "", &mut keys);
@@ -59,7 +59,7 @@ impl Key {
         keys.iter().find(|key| key.name == name)
     }
 
-    /// What it expects, in words: `a number above 0 and at most 1000000`.
+    /// The valid values in words: `a number above 0 and at most 1000000`.
     pub fn expected(&self) -> String {
         match &self.kind {
             KeyKind::Boolean => "true or false".to_owned(),
@@ -73,7 +73,7 @@ impl Key {
     }
 }
 
-/// The name nearest to a wrong one, where one is near.
+/// The name most similar to a wrong one, if any is similar.
 pub(super) fn nearest<'a>(wrong: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     plain_text::nearest(wrong, names, 0.7)
 }
@@ -104,7 +104,7 @@ fn kind_of(property: &Value) -> KeyKind {
         return KeyKind::Choice(words.iter().map(|w| word(&Value::Null, w)).collect());
     }
     if let Some(choices) = property["oneOf"].as_array() {
-        // Words without a description share one branch.
+        // In the schema, words without a description are in one common branch.
         let of_branch = |choice: &Value| match choice["enum"].as_array() {
             Some(words) => words.iter().map(|w| word(&Value::Null, w)).collect(),
             None => vec![word(choice, &choice["const"])],
@@ -118,7 +118,7 @@ fn kind_of(property: &Value) -> KeyKind {
     }
 }
 
-/// The complaint about a value, with what to write instead.
+/// The error for an invalid value, with what to write instead.
 fn refused(key: &Key, found: &str, place: Place) -> Error {
     let near = match &key.kind {
         KeyKind::Choice(choices) => nearest(found.trim_matches(['"', '`']), choices.iter().map(|c| c.word.as_str())),
@@ -129,10 +129,10 @@ fn refused(key: &Key, found: &str, place: Place) -> Error {
     Error::usage(place, problem, near + &key.description)
 }
 
-/// What stands in a file, as a value for a key.
+/// Converts a TOML value to a value of a key.
 ///
 /// # Errors
-/// [`Error::Usage`] at `place` for a value that the key does not take.
+/// [`Error::Usage`] at `place` for an invalid value.
 pub(super) fn from_toml(key: &Key, found: &DeValue, place: Place) -> Result<Value> {
     let value = match found {
         DeValue::Boolean(b) => Some(Value::Bool(*b)),
@@ -144,7 +144,7 @@ pub(super) fn from_toml(key: &Key, found: &DeValue, place: Place) -> Result<Valu
     value.and_then(|value| fitted(key, value)).ok_or_else(|| refused(key, &shown(found), place))
 }
 
-/// A word of the environment or the command line, as a value for a key; quotes around it may be there.
+/// Converts a text of the environment or the command line to a value of a key; it may be in quotes.
 ///
 /// # Errors
 /// As [`from_toml`].
@@ -163,7 +163,7 @@ pub(super) fn from_word(key: &Key, word: &str, place: Place) -> Result<Value> {
     value.and_then(|value| fitted(key, value)).ok_or_else(|| refused(key, &format!("`{word}`"), place))
 }
 
-/// A value as TOML writes it.
+/// Formats a value as TOML.
 pub fn text_of(value: &Value) -> String {
     match value {
         Value::String(text) => toml::Value::String(text.clone()).to_string(),
@@ -179,13 +179,13 @@ fn whole(i: i128) -> Option<Value> {
     u64::try_from(i).map(Value::from).or_else(|_| i64::try_from(i).map(Value::from)).ok()
 }
 
-/// A value of the key's type and in its range: whole numbers stand for others, and 1e6 for a whole one.
+/// Converts a value to the key's type and checks its range: integers are valid for floats, and 1e6 for an integer.
 fn fitted(key: &Key, value: Value) -> Option<Value> {
     match (&key.kind, value) {
         (KeyKind::Number(range), Value::Number(n)) => {
             let value = match n.as_f64().filter(|_| n.is_f64()) {
                 _ if !range.is_whole => n.as_f64().map(Value::from),
-                // Beyond 2^53 a floating-point number does not tell which whole one is meant.
+                // Above 2^53 a floating-point number no longer identifies one integer.
                 Some(x) => (x.fract() == 0.0 && x.abs() < 9e15).then(|| whole(x as i128)).flatten(),
                 None => Some(Value::Number(n)),
             };
@@ -199,7 +199,7 @@ fn fitted(key: &Key, value: Value) -> Option<Value> {
     }
 }
 
-/// What was found, as a message shows it.
+/// The found value as a message shows it.
 fn shown(value: &DeValue) -> String {
     match value {
         DeValue::Boolean(b) => b.to_string(),
@@ -212,13 +212,13 @@ fn shown(value: &DeValue) -> String {
     }
 }
 
-/// Its text: every key with its default; those that are not set unless somebody sets them stand in comments.
+/// The default configuration: every key with its default; keys without a default are in comments.
 pub const DEFAULT_FILE: &str = include_str!("../../../configs/default.toml");
 
-/// The name that `lanesweep config init` gives it.
+/// Default file name of `lanesweep config init`.
 pub const DEFAULT_FILE_NAME: &str = "lanesweep.toml";
 
-/// All keys in the order of the file, which is the order in which they are read best.
+/// All keys in the order of the default file, which is chosen for readers.
 pub(super) fn keys_in_order() -> Vec<Key> {
     let names: Vec<String> = names(DEFAULT_FILE);
     let mut keys = Key::all();
@@ -226,7 +226,7 @@ pub(super) fn keys_in_order() -> Vec<Key> {
     keys
 }
 
-/// The keys that a text mentions, also in comments (`# threads = 8`).
+/// The keys in a text, including those in comments (`# threads = 8`).
 fn names(text: &str) -> Vec<String> {
     let (mut table, mut names) = (String::new(), Vec::new());
     for line in text.lines() {

@@ -1,4 +1,4 @@
-//! Defaults, files, environment, flags: one over the other, key by key.
+//! The layers of a configuration (defaults, files, environment, flags), combined key by key.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -11,28 +11,28 @@ use super::keys::{Key, KeyKind, from_word, keys_in_order};
 use super::{FILE_VARIABLE, Settings, file};
 use crate::{Error, Place, Result};
 
-/// Where a value comes from; a later one wins.
+/// Source of a value; a later one overrides an earlier one.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Origin {
-    /// The program.
+    /// Built-in default.
     Default,
     /// A line of a file.
     File {
-        /// The file, as it was named.
+        /// The file, as named by the user.
         path: PathBuf,
-        /// Its line, from 1.
+        /// Line, from 1.
         row: u64,
     },
     /// A variable of the environment.
     Environment(String),
     /// `--config KEY=VALUE`.
     Assignment(String),
-    /// A flag of its own, by its name with the dashes.
+    /// The key's own flag, with its dashes.
     Flag(String),
 }
 
 impl Origin {
-    /// As errors name it.
+    /// The place in errors.
     pub fn place(&self, key: &str) -> Place {
         match self {
             Origin::File { path, row } => Place::file(path).row(*row).of(format!("`{key}`")),
@@ -67,7 +67,7 @@ impl fmt::Display for Origin {
     }
 }
 
-/// What `--config` takes: a file or a value.
+/// Value of `--config`: a file or an assignment.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum Assignment {
     /// A file to read.
@@ -77,7 +77,7 @@ pub enum Assignment {
 }
 
 impl Assignment {
-    /// A text with `=` that names no file is a value.
+    /// A text with `=` that is not the name of a file is an assignment.
     pub fn of(text: &str) -> Assignment {
         match text.contains('=') && !Path::new(text).exists() {
             true => Assignment::Value(text.to_owned()),
@@ -86,18 +86,18 @@ impl Assignment {
     }
 }
 
-/// A key with its value and where that comes from.
+/// A key with its value and source.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Setting<'a> {
     /// The key.
     pub key: &'a Key,
     /// Its value; `None` where it is not set.
     pub value: Option<&'a Value>,
-    /// Where the value comes from.
+    /// Source of the value.
     pub origin: &'a Origin,
 }
 
-/// The layers of a configuration, put together.
+/// The combined layers of a configuration.
 #[derive(Debug, Clone)]
 pub struct Layers {
     keys: Vec<Key>,
@@ -119,12 +119,12 @@ impl Layers {
         Layers { keys, values, files: Vec::new() }
     }
 
-    /// Files, environment and `--config`, in their order. A file that `--config` names takes the place of the one that
-    /// the environment names.
+    /// Reads files, environment and `--config`, in their order. A file named by `--config` replaces the one named by
+    /// the environment.
     ///
     /// # Errors
-    /// [`Error::Usage`] naming file and line, variable or flag: unknown keys, with the nearest known one; values that
-    /// the key does not take. [`Error::Io`], [`Error::Input`] of the files.
+    /// [`Error::Usage`] naming file and line, variable or flag: unknown keys, with the most similar known one, and
+    /// invalid values. [`Error::Io`] and [`Error::Input`] of the files.
     pub fn read(typed: &[Assignment], variables: &[(OsString, OsString)]) -> Result<Layers> {
         let mut layers = Layers::defaults();
         let named = typed.iter().filter_map(|one| match one {
@@ -154,10 +154,10 @@ impl Layers {
         Ok(layers)
     }
 
-    /// `KEY=VALUE`; nothing after the `=` is the default again.
+    /// Applies `KEY=VALUE`; an empty value restores the default.
     ///
     /// # Errors
-    /// [`Error::Usage`] for an unknown key and a value that it does not take.
+    /// [`Error::Usage`] for an unknown key or an invalid value.
     pub fn assign(&mut self, text: &str) -> Result<()> {
         let (name, word) = text.split_once('=').unwrap_or((text, ""));
         let name = name.trim();
@@ -173,10 +173,10 @@ impl Layers {
         self.set_word(&key, word, origin)
     }
 
-    /// What a flag of its own was given. Words are taken in any case.
+    /// Applies the value of a key's own flag, ignoring case.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a value that the key does not take.
+    /// [`Error::Usage`] for an invalid value.
     pub fn flag(&mut self, name: &str, flag: &str, word: &str) -> Result<()> {
         let Some(key) = Key::find(&self.keys, name).cloned() else { return Ok(()) };
         let word = if matches!(key.kind, KeyKind::Choice(_)) { word.to_ascii_lowercase() } else { word.to_owned() };
@@ -201,7 +201,7 @@ impl Layers {
         })
     }
 
-    /// The values that somebody set, equal to the default or not.
+    /// The values that were set, including those equal to the default.
     pub fn given(&self) -> impl Iterator<Item = Setting<'_>> {
         self.list().filter(|setting| *setting.origin != Origin::Default)
     }
@@ -216,7 +216,7 @@ impl Layers {
         &self.files
     }
 
-    /// As a tree of tables.
+    /// The values as a tree of tables.
     pub fn tree(&self) -> Value {
         let mut root = Map::new();
         for Setting { key, value, .. } in self.list() {
@@ -227,10 +227,10 @@ impl Layers {
         Value::Object(root)
     }
 
-    /// As the program takes them.
+    /// The values as typed settings.
     ///
     /// # Errors
-    /// [`Error::Internal`] where the checks let pass what the types refuse.
+    /// [`Error::Internal`] if the types refuse what the checks accepted.
     pub fn settings(&self) -> Result<Settings> {
         let refused = |e: serde_json::Error| Error::Internal(format!("a checked configuration is refused: {e}"));
         serde_json::from_value(self.tree()).map_err(refused)

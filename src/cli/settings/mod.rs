@@ -1,8 +1,9 @@
-//! Everything that may be set in a configuration: one tree of tables, from which the file's format, its JSON Schema,
-//! the environment's variables and the checks follow.
+//! All settings of a configuration: one tree of tables, from which the file format, its JSON Schema, the environment
+//! variables and the checks follow.
 //!
-//! A value is the default, or comes from a file, the environment or a flag, the later winning ([`Layers`]); each keeps
-//! its [`Origin`]. No file is read but one that is named: a run must not depend on what lies about in a folder.
+//! A value is the default, or comes from a file, the environment or a flag; the later source wins ([`Layers`]), and
+//! each value keeps its [`Origin`]. Only named files are read, because a run must not depend on other files in a
+//! folder.
 
 mod file;
 mod keys;

@@ -1,5 +1,5 @@
-//! The JSON Schemas of a configuration, from the types, and of a profile, from the profiles that ship: every key is there
-//! in each of them.
+//! The JSON Schemas of a configuration, from the settings types, and of a profile, from the shipped profiles, each of
+//! which has every key.
 
 use serde_json::{Map, Value, json};
 
@@ -13,14 +13,14 @@ use crate::{Error, Result};
 pub fn settings_schema() -> Value {
     let mut schema = ranges::schema_of::<Settings>();
     for_toml(&mut schema);
-    // The tables' defaults are those of their keys.
+    // The defaults of the tables are those of their keys.
     if let Some(tables) = schema["properties"].as_object_mut() {
         tables.values_mut().for_each(without_table_defaults);
     }
     schema
 }
 
-/// What TOML has no word for, and what only a reader of the source can follow, goes.
+/// Removes what TOML cannot express, and what only readers of the source understand.
 fn for_toml(schema: &mut Value) {
     match schema {
         Value::Object(object) => {
@@ -32,7 +32,7 @@ fn for_toml(schema: &mut Value) {
             if object.get("default").is_some_and(Value::is_null) {
                 object.remove("default");
             }
-            // Sizes of the program's own integers say nothing to whoever writes a file.
+            // The integer sizes of the program are of no use to authors of files.
             object.remove("format");
             if let Some(Value::String(text)) = object.get_mut("description") {
                 *text = plain(text);
@@ -44,7 +44,7 @@ fn for_toml(schema: &mut Value) {
     }
 }
 
-/// Without the links of the documentation, in one line.
+/// The text in one line, without the links of the documentation.
 fn plain(text: &str) -> String {
     text.replace("[`", "`").replace("`]", "`").split_whitespace().collect::<Vec<_>>().join(" ")
 }
@@ -58,10 +58,10 @@ fn without_table_defaults(table: &mut Value) {
     inner.for_each(without_table_defaults);
 }
 
-/// JSON Schema (draft 2020-12) of a profile file. Names of options have the values of the profiles that ship as examples.
+/// JSON Schema (draft 2020-12) of a profile file. The values of options in the shipped profiles are its examples.
 ///
 /// # Errors
-/// None for what this program is built with.
+/// None for the shipped profiles.
 pub fn profile_schema() -> Result<Value> {
     let profiles = Profile::names().map(Profile::load).collect::<Result<Vec<_>>>()?;
     let bounds: Vec<(String, Bound)> =
@@ -77,8 +77,8 @@ pub fn profile_schema() -> Result<Value> {
     Ok(schema)
 }
 
-/// `values` are a key's values in the profiles that ship; `files` the same as their files have them: a key that they leave
-/// out (of a model with defaults) is not required.
+/// `values` are a key's values in the shipped profiles, `files` those that their files contain. A key missing in a file
+/// (of a model with defaults) is not required.
 fn profile_part(values: &[&Value], files: &[&Value], name: &str, bounds: &[(String, Bound)]) -> Value {
     match values {
         [Value::Object(first), ..] => {

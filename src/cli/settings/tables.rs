@@ -36,7 +36,7 @@ pub struct Settings {
 }
 
 impl Settings {
-    /// Options of the parameterizations of densities, and of replays that stand beside them.
+    /// Options of the parameterizations of densities, and of the replays compared with them.
     pub fn of_densities(&self) -> ParameterizationOptions {
         ParameterizationOptions { svd_lateral: self.fit.svd_lateral, ..self.parameterization.clone() }
     }
@@ -197,7 +197,7 @@ pub enum EstimatorKind {
 }
 
 impl EstimatorKind {
-    /// As flags and files name it.
+    /// Name in flags and files.
     pub fn key(self) -> &'static str {
         match self {
             EstimatorKind::Mc => "mc",

@@ -1,7 +1,7 @@
-//! Runs on the machines of a cluster: the scripts that its workload manager takes.
+//! Runs on a cluster: the scripts for its workload manager.
 //!
-//! Here live text and the quoting that keeps it safe. Nothing here starts a process or knows a lane: a shard, its
-//! part file and the merge belong to the verbs that the scripts call.
+//! This module builds text and quotes it safely. It starts no process and knows no lanes: the verbs that the scripts
+//! call handle shards, part files and the merge.
 
 mod shell;
 mod slurm;

@@ -1,43 +1,43 @@
 //! A run as a Slurm job array: one task per shard, a merge once all are done, and the command that submits both.
 //!
-//! What ends a task early loses nothing, for a shard keeps a journal and the same command continues it:
-//! - the time limit: Slurm sends the batch shell USR1 some time before, the shell sends lanesweep TERM, lanesweep
-//!   finishes its chunk and ends with 75, the task goes back to the queue;
-//! - a crash (out of memory, a killed process): back to the queue, at most [`MAX_RESTARTS`] times;
-//! - a lost node or preemption: Slurm itself puts the task back to the queue (`--requeue`);
-//! - `scancel`: the task gets TERM, ends its chunk and stays out of the queue. That is why the time limit is told by
-//!   USR1: TERM alone would not say whether the task is to come back.
+//! Nothing is lost if a task ends early, because a shard keeps a journal and the same command resumes it:
+//! - the time limit: Slurm sends USR1 to the batch shell before it, the shell sends TERM to lanesweep, lanesweep
+//!   finishes its chunk and ends with 75, and the task is requeued;
+//! - a crash (out of memory, a killed process): the task is requeued, at most [`MAX_RESTARTS`] times;
+//! - a lost node or preemption: Slurm itself requeues the task (`--requeue`);
+//! - `scancel`: the task gets TERM, ends its chunk and is not requeued. The time limit therefore uses USR1: TERM alone
+//!   would not say whether to requeue.
 //!
-//! [`SplitRun`] is the run that the tasks share: its verb and arguments, without what the scripts add themselves.
+//! [`SplitRun`] is the run of all tasks: its verb and arguments, without those that the scripts add.
 
 use super::shell::directive_quoted;
 use crate::{Error, Place, Result};
 
-/// Exit status of a run that was told to stop: complete so far, to be continued by the same command.
+/// Exit status of an interrupted run: its progress is saved, and the same command resumes it.
 pub const STATUS_INTERRUPTED: u8 = 75;
-/// Restarts of a task, for whatever reason, after which a crash ends it for good.
+/// Maximum number of restarts of a task for any reason; after them a crash is final.
 pub const MAX_RESTARTS: u32 = 10;
-/// Shards at most: their numbers have five digits.
+/// Maximum number of shards: their numbers have five digits.
 pub const MAX_SHARDS: u32 = 99_999;
 
-/// What each task asks Slurm for.
+/// Resources of each task.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Resources {
-    /// Time limit as Slurm writes it, such as `02:00:00` or `1-12`.
+    /// Time limit in Slurm's format, such as `02:00:00` or `1-12`.
     pub time: String,
     /// Whether each task gets a GPU and computes on it.
     pub gpu: bool,
     /// Processors per task, at least 1.
     pub cpus: u32,
-    /// Memory per task as Slurm writes it, such as `4G`; else the cluster's default.
+    /// Memory per task in Slurm's format, such as `4G`; `None`: the cluster's default.
     pub memory: Option<String>,
-    /// Partition; else the cluster's default.
+    /// Partition; `None`: the cluster's default.
     pub partition: Option<String>,
-    /// Account; else the user's default.
+    /// Account; `None`: the user's default.
     pub account: Option<String>,
-    /// Quality of service; else the account's default.
+    /// Quality of service; `None`: the account's default.
     pub qos: Option<String>,
-    /// How long before the time limit a task is told to stop, s.
+    /// Time before the time limit at which a task gets the stop signal, s.
     pub signal_before_s: u32,
 }
 
@@ -48,15 +48,15 @@ pub struct SlurmArray {
     pub run: SplitRun,
     /// Tasks of the array, 1 to 99,999.
     pub shards: u32,
-    /// Folder of the run, absolute: nodes share it.
+    /// Folder of the run, absolute; all nodes access it.
     pub out: String,
     /// Folder of scripts and logs, absolute.
     pub scripts: String,
-    /// Folder that relative paths of the run's arguments start from, absolute.
+    /// Base folder of relative paths in the run's arguments, absolute.
     pub start: String,
-    /// The program, as a job finds it.
+    /// Path of the program in a job.
     pub program: String,
-    /// What each task asks for.
+    /// Resources of each task.
     pub resources: Resources,
 }
 
@@ -72,10 +72,10 @@ pub struct Scripts {
 }
 
 impl SlurmArray {
-    /// The scripts.
+    /// Builds the scripts.
     ///
     /// # Errors
-    /// [`Error::Usage`] naming the flag for a value that Slurm would not take or that cannot be quoted.
+    /// [`Error::Usage`] naming the flag, for a value that Slurm would refuse or that cannot be quoted.
     pub fn scripts(&self) -> Result<Scripts> {
         if self.shards == 0 || self.shards > MAX_SHARDS {
             let problem = format!("{} tasks cannot be numbered", self.shards);
@@ -87,7 +87,7 @@ impl SlurmArray {
 }
 
 impl Resources {
-    /// Options with the names that Slurm and we give them, and their values.
+    /// Optional values, with Slurm's names and ours.
     pub(super) fn optional(&self) -> [(&'static str, Option<&str>); 4] {
         [
             ("mem", self.memory.as_deref()),
@@ -122,7 +122,7 @@ impl Resources {
         if self.cpus == 0 {
             return wrong("cpus", "a task needs a processor".to_owned(), "use at least 1");
         }
-        // Slurm's own bound.
+        // Slurm's own limit.
         if self.signal_before_s == 0 || self.signal_before_s > 65_535 {
             let help = "use 1 to 65535; more than one chunk of lanes takes, some seconds, serves nothing";
             return wrong("signal_before", format!("{} s cannot be used", self.signal_before_s), help);
@@ -131,7 +131,7 @@ impl Resources {
     }
 }
 
-/// `minutes[:seconds]`, `hours:minutes:seconds`, `days-hours[:minutes[:seconds]]`, and not nothing at all.
+/// Whether a text is `minutes[:seconds]`, `hours:minutes:seconds` or `days-hours[:minutes[:seconds]]`, and above zero.
 fn is_time_limit(text: &str) -> bool {
     let (days, rest) = text.split_once('-').map_or((None, text), |(days, rest)| (Some(days), rest));
     let parts: Vec<&str> = days.into_iter().chain(rest.split(':')).collect();
@@ -142,7 +142,7 @@ fn is_time_limit(text: &str) -> bool {
 /// Verbs whose lanes can be split over tasks.
 const VERBS: [&str; 2] = ["study", "sample"];
 
-/// Options that the scripts give the run, each with what to write instead.
+/// Options that the scripts set for the run, each with what to write instead.
 const TAKEN: [(&str, &str); 8] = [
     ("shard", "leave it out: option `array` says into how many shards the run is split"),
     ("out", "give option `out = DIR` before the `--`: the folder belongs to all tasks"),
@@ -165,7 +165,7 @@ impl SplitRun {
     /// From verb and arguments as typed.
     ///
     /// # Errors
-    /// [`Error::Usage`] where the verb is missing or cannot be split, or where a flag is the scripts' own.
+    /// [`Error::Usage`] if the verb is missing or cannot be split, or if a flag is set by the scripts.
     pub fn new(words: &[String]) -> Result<SplitRun> {
         let verbs = "study and sample are the verbs that can be split; example: -- sample cut-in-2.json";
         let Some((verb, arguments)) = words.split_first() else {
@@ -190,7 +190,7 @@ impl SplitRun {
         &self.verb
     }
 
-    /// What follows the verb.
+    /// The arguments after the verb.
     pub fn arguments(&self) -> &[String] {
         &self.arguments
     }

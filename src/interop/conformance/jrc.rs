@@ -1,6 +1,6 @@
-//! The JRC's tables. Simulated cases: every row becomes a case, runs in f64 under `jrc-2021`, and is compared.
-//! Functions: surrogates, distances and thresholds as plain values. Tables of both ship with the program: a build checks
-//! itself.
+//! The JRC's tables. Simulated cases: every row becomes a case, is run in f64 under `jrc-2021`, and is compared.
+//! Functions: surrogates, distances and thresholds as plain values. Tables of both are shipped, so that a build can
+//! check itself.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ use crate::run::grid::jrc_case::{
 use crate::scenario::{Case, Category, Tables};
 use crate::{Error, Result};
 
-/// Instants at which the tables hold the ego's speed and position, s.
+/// Instants at which the tables contain the ego's speed and position, s.
 const SPEED_INSTANTS_S: [(&str, f64); 12] = [
     ("v@0.5", 0.5),
     ("v@1", 1.0),
@@ -33,17 +33,17 @@ const SPEED_INSTANTS_S: [(&str, f64); 12] = [
 ];
 const POSITION_INSTANTS_S: [(&str, f64); 5] = [("x@1", 1.0), ("x@2", 2.0), ("x@3", 3.0), ("x@5", 5.0), ("x@10", 10.0)];
 
-/// One row as something to simulate.
+/// One row to be simulated.
 struct Replay {
     model: ModelId,
     profile: Profile,
     case: Case,
     gap_m: f64,
-    /// Steps that the run-up puts before the nominal start.
+    /// Number of run-up steps before the nominal start.
     run_up: u32,
 }
 
-/// What a replay gave.
+/// Result of a replay.
 struct Replayed {
     outcome: Outcome<f64>,
     /// Ego speed at each evaluated index, m/s.
@@ -156,7 +156,7 @@ impl Replay {
     }
 }
 
-/// 0 or a speed at which the change ends in a number of samples that can be held.
+/// A lateral speed: 0, or one at which the lane change has a manageable number of samples.
 fn lateral_speed(row: &Row) -> Result<f64> {
     let value = row.not_negative("vlat")?;
     if value == 0.0 || value >= MIN_LATERAL_MPS {
@@ -165,7 +165,8 @@ fn lateral_speed(row: &Row) -> Result<f64> {
     Err(Error::input(row.place("vlat"), format!("{value}"), "expected 0 or at least 0.001 m/s"))
 }
 
-/// Cut-out: the table's minima are those of the last target over the whole run, also before it was one.
+/// Cut-out: the table's minima are those of the last target over the whole run, including the time before it was the
+/// target.
 fn last_target_minima(
     profile: &Profile,
     lane: &LaneCase<f64>,
@@ -179,7 +180,7 @@ fn last_target_minima(
     for step in steps {
         let mut view = step.seen[target].view;
         if target == 0 && step.index < freeze {
-            // The frozen vehicle's offset holds the step it moved before it froze; before that it moved.
+            // The stored offset of the frozen vehicle includes its step before the freeze; here that step is removed.
             view.gap -= lane.others[0].motion.speed(tables, freeze - 1) * profile.frame.dt_s;
         }
         if view.lateral_gap < 0.0 && !view.is_behind().holds() {
@@ -230,7 +231,7 @@ fn compare(tally: &mut Tally, row: &Row, replay: &Replay, ours: &Replayed) -> Re
     for (quantity, column, value) in values {
         agrees &= tally.value(quantity, robust, value, row.optional(column)?, &|| place(column));
     }
-    // After a contact or an abort the tables are blank, and so are we.
+    // After a contact or an abort the tables are blank, and our values are skipped.
     let index = |t: f64| (t / dt).round() as usize;
     for (column, t) in SPEED_INSTANTS_S {
         let value = ours.speed.get(index(t)).copied();
@@ -298,11 +299,11 @@ pub fn compare_functions(table: &Table, profile: &Profile) -> Result<Vec<Tally>>
     Ok(tallies)
 }
 
-/// Compares this build with the tables that were made for this category under this profile: those of leader decelerations
-/// and of model functions under `jrc-2021`. There are no others.
+/// Compares this build with the shipped tables for this category and profile: leader decelerations and model functions
+/// under `jrc-2021`. There are no others.
 ///
 /// # Errors
-/// None for tables that fit: they are part of the program.
+/// None for shipped tables.
 pub fn check_shipped_tables(category: Category, profile: &Profile) -> Result<Vec<Tally>> {
     let table = |name: &str, text| Table::parse(text, Path::new(name));
     let jrc = Profile::load("jrc-2021")?;

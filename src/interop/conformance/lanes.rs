@@ -1,5 +1,5 @@
-//! Lanes of the `paper` profile: every lane of a golden table (`--scenarios S.jsonl --golden-lanes L.csv`) is run
-//! in f64 and in f32 and compared.
+//! Lanes of the `paper` profile: runs every lane of a golden table (`--scenarios S.jsonl --golden-lanes L.csv`) in f64
+//! and in f32, and compares.
 
 use std::collections::HashMap;
 
@@ -13,18 +13,18 @@ use crate::scenario::parameterization::{Parameterization, ParameterizationOption
 use crate::scenario::{Category, Scenario, Tables};
 use crate::{Error, Place, Result};
 
-/// f64 against the table, and how often f32 differs from f64.
+/// Comparison of f64 with the table, and of f32 with f64.
 #[derive(Debug, Clone)]
 pub struct LaneComparison {
     /// f64 against the table, per category and model.
     pub tallies: Vec<Tally>,
     /// Lanes whose verdicts differ between f32 and f64, as text.
     pub f32_different: Vec<String>,
-    /// Robust lanes in which rounding decides after all: they agree once the gap moves by 1e-9 m.
+    /// Robust lanes that rounding nevertheless decides: they agree if the gap changes by 1e-9 m.
     pub ties: Vec<String>,
     /// Lanes compared.
     pub lanes: u64,
-    /// Lanes in which the end time differs (information: the table's depends on how the end rule is read).
+    /// Lanes whose end time differs; information only, because the end rule of the table can be read in several ways.
     pub end_differs: u64,
 }
 
@@ -38,7 +38,7 @@ struct Encoded {
 /// Compares every lane of a table.
 pub fn compare_lanes(scenarios: &[Scenario], lanes: &Table, profile: &Profile) -> Result<LaneComparison> {
     let by_id: HashMap<&str, &Scenario> = scenarios.iter().map(|s| (s.id.as_str(), s)).collect();
-    // The golden lanes join 201 points of the sinusoid; everything else is the default.
+    // The golden lanes approximate the sinusoid by 201 points; all other options are the defaults.
     let options = ParameterizationOptions { sinusoid_intervals: 200, ..ParameterizationOptions::default() };
     let dt_s = profile.frame.dt_s;
     let constants64: HashMap<Category, Constants<f64>> =
@@ -57,7 +57,7 @@ pub fn compare_lanes(scenarios: &[Scenario], lanes: &Table, profile: &Profile) -
         if !encoded.contains_key(&key) {
             let case = match param {
                 "S" => recorded_case(scenario, dt_s)?,
-                // One by SVD needs the fit of the study that the table came from.
+                // An SVD parameterization needs the fit of the table's study.
                 _ => Parameterization::find(scenario.category, param)
                     .filter(|id| id.features().is_some())
                     .ok_or_else(|| {
@@ -98,8 +98,8 @@ pub fn compare_lanes(scenarios: &[Scenario], lanes: &Table, profile: &Profile) -
         };
         let mut judged = reference;
         if row.flag("robust")? && !agreement(&row, &reference, dt_s)? {
-            // A tie: the table's flag moves the gap but looks at verdicts only. Where a billionth of a metre
-            // gives the table's values, rounding decides between the two.
+            // A tie: the table's robustness flag moves the gap but compares verdicts only. If a change of 1e-9 m gives
+            // the table's values, rounding decides.
             for nudge_m in [1e-9, -1e-9] {
                 let start = Start::Gap(thw * lane.case64.ego_speed + nudge_m);
                 let constants = &constants64[&scenario.category];
@@ -132,7 +132,7 @@ fn run<R: Real>(
     constants.run(model, case, tables, Start::Headway(R::from_f64(thw)), &mut Silent).widen()
 }
 
-/// Does a lane agree with its row in verdicts, type and every value?
+/// Whether a lane agrees with its row in verdicts, type and every value.
 fn agreement(row: &Row, ours: &Outcome<f64>, dt: f64) -> Result<bool> {
     let mut scratch = Tally::new("", None);
     compare(&mut scratch, row, ours, dt)?;
@@ -170,7 +170,7 @@ fn compare(tally: &mut Tally, row: &Row, ours: &Outcome<f64>, dt: f64) -> Result
         ("impact speed [m/s]", "impact_speed", collided.then_some(ours.impact_speed)),
     ] {
         let theirs = row.optional(column)?;
-        // The table rounds to nine digits: a large value has fewer decimals.
+        // The table rounds to nine digits, so large values have fewer decimals.
         let scale = theirs.filter(|t| t.is_finite()).map_or(1.0, |t| t.abs().max(1.0));
         let scaled = |x: Option<f64>| x.map(|x| if x.is_finite() { x / scale } else { x });
         agrees &= tally.value(quantity, robust, scaled(value), scaled(theirs), &|| place(column));

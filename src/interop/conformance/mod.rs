@@ -1,8 +1,8 @@
-//! Conformance: tables of other people's simulators, replayed lane by lane.
+//! Conformance: tables of other simulators, replayed lane by lane.
 //!
-//! Here live the readers of golden tables (the JRC's cases and functions, the lanes of the `paper`
-//! profile) and the comparison. Here lives no physics: every row becomes an ordinary case and an ordinary
-//! lane. Tables come from files; the comparison goes to the command line.
+//! This module reads golden tables (the JRC's cases and functions, the lanes of the `paper` profile) and compares them.
+//! It has no physics: every row becomes an ordinary case and lane. Tables come from files; the comparison goes to the
+//! command line.
 
 mod jrc;
 mod lanes;

@@ -7,12 +7,12 @@ use crate::support::input_file;
 use crate::support::table::text_of_cell;
 use crate::{Error, Place, Result};
 
-/// What a table holds, told by its columns.
+/// Kind of a table, determined by its columns.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum TableKind {
-    /// Simulated cases of the JRC: the column `scenario` tells the category.
+    /// Simulated cases of the JRC; the column `scenario` is the category.
     JrcCases,
-    /// Function values: the column `fn` tells the function.
+    /// Function values; the column `fn` is the function.
     Functions,
 }
 
@@ -37,7 +37,7 @@ impl Table {
         Table::parse(&input_file::read_text(path, input_file::MAX_TABLE_BYTES)?, path)
     }
 
-    /// The same from its text; `path` is for messages.
+    /// Parses a table from text; `path` is for messages.
     ///
     /// # Errors
     /// As [`Table::read`].
@@ -90,7 +90,7 @@ impl Table {
 }
 
 impl<'a> Row<'a> {
-    /// Where this row's column stands, for errors; lines count from 1, the header's.
+    /// The place of a column in this row, for errors; lines count from 1 with the header.
     pub fn place(&self, column: &str) -> Place {
         Place::file(&self.table.path).row(self.index as u64 + 2).column(column)
     }
@@ -107,7 +107,7 @@ impl<'a> Row<'a> {
         Ok(text_of_cell(self.table.rows[self.index].get(*index).unwrap_or("")))
     }
 
-    /// A finite number that must be there.
+    /// A required finite number.
     pub fn number(&self, column: &str) -> Result<f64> {
         match self.optional(column)? {
             Some(value) if value.is_finite() => Ok(value),
@@ -125,7 +125,7 @@ impl<'a> Row<'a> {
         Err(Error::input(self.place(column), format!("{value}"), "expected a number of at least 0 and at most 1e6"))
     }
 
-    /// A number, `None` where the field is empty (the event did not happen).
+    /// A number; `None` if the field is empty (the event did not happen).
     pub fn optional(&self, column: &str) -> Result<Option<f64>> {
         let text = self.text(column)?;
         if text.is_empty() {

@@ -1,8 +1,8 @@
-//! What a comparison has seen: rows, agreements and the largest deviations, per model.
+//! Counts of a comparison: rows, agreements and the largest deviations, per model.
 
 use crate::model::driver::ModelId;
 
-/// Largest deviation of one quantity, with the row it stands in.
+/// Largest deviation of one quantity, with its row.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Deviation {
     /// Quantity, with its unit.
@@ -18,13 +18,13 @@ pub struct Deviation {
 /// Agreement of one model (and table) with a golden table.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Tally {
-    /// Table or category, as shown.
+    /// Table or category, for output.
     pub label: String,
     /// Model; `None` for functions.
     pub model: Option<ModelId>,
     /// Rows.
     pub rows: u64,
-    /// Rows whose outcome rounding does not decide.
+    /// Rows whose outcome does not depend on rounding.
     pub robust: u64,
     /// Rows in which our model reacted.
     pub reacted: u64,
@@ -42,11 +42,11 @@ pub struct Tally {
     pub complaints: Vec<String>,
 }
 
-/// Values on robust rows must agree within this.
+/// Maximum difference of values on robust rows.
 pub const TOLERANCE: f64 = 1e-6;
 
 impl Tally {
-    /// Nothing seen yet.
+    /// Starts an empty tally.
     pub fn new(label: impl Into<String>, model: Option<ModelId>) -> Self {
         Tally {
             label: label.into(),
@@ -63,15 +63,15 @@ impl Tally {
         }
     }
 
-    /// Does everything agree that must: every label, and types and values on robust rows?
+    /// Whether every label agrees, and on robust rows every type and value.
     pub fn passes(&self) -> bool {
         self.labels_equal == self.rows
             && self.types_equal == self.robust
             && self.deviations.iter().all(|d| d.largest <= TOLERANCE)
     }
 
-    /// One compared value: equal, both absent, or different by some amount (infinite where only one is
-    /// there). Returns whether it agrees within the tolerance.
+    /// Adds one compared value: equal, both absent, or different by some amount (infinite if one is absent). Returns
+    /// whether it agrees within the tolerance.
     pub fn value(
         &mut self,
         quantity: &'static str,

@@ -1,6 +1,6 @@
-//! A concrete scenario as it is played: vehicles with their paths, the road they need, and what is said about them.
+//! A concrete scenario for export: vehicles with their paths, the road they need, and properties.
 //!
-//! A path says where a vehicle is, step by step: the trace, and beyond its end the others' own motion.
+//! A path gives a vehicle's position step by step: from the trace, and after its end from the vehicle's own motion.
 
 use crate::engine::{LaneCase, Trace};
 use crate::model::scalar::Real;
@@ -29,17 +29,18 @@ pub struct PlayedVehicle {
     pub path: Vec<Vertex>,
 }
 
-/// The rear axle lies this share of the length behind the centre: OpenSCENARIO places a vehicle by its rear axle.
+/// Distance of the rear axle behind the centre, as a fraction of the length: OpenSCENARIO positions a vehicle by its
+/// rear axle.
 const REAR_AXLE_SHARE: f64 = 0.3;
 
 impl PlayedVehicle {
-    /// From the centre of the rear axle, the reference point of OpenSCENARIO, forward to the centre of the box, m, in
-    /// whole millimetres.
+    /// Distance from the centre of the rear axle, the reference point of OpenSCENARIO, forward to the centre of the
+    /// box, m, rounded to millimetres.
     pub fn centre_offset_m(&self) -> f64 {
         (REAR_AXLE_SHARE * self.length_m * 1e3).round() / 1e3
     }
 
-    /// Distance of the axles, m: they lie symmetrically about the centre.
+    /// Distance of the axles, m; they are symmetric about the centre.
     pub fn wheelbase_m(&self) -> f64 {
         2.0 * self.centre_offset_m()
     }
@@ -48,13 +49,13 @@ impl PlayedVehicle {
 /// One concrete scenario.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Concrete {
-    /// Lane key, or what stands for one.
+    /// Lane key, or a substitute.
     pub key: String,
     /// Kind of scenario.
     pub category: Category,
     /// Who drives the ego.
     pub ego: EgoMotion,
-    /// On which side the others are at positive lateral positions.
+    /// Side of the other vehicles at positive lateral positions.
     pub side: Side,
     /// Width of every lane of the road, m.
     pub lane_width_m: f64,
@@ -62,13 +63,13 @@ pub struct Concrete {
     pub vehicles: Vec<PlayedVehicle>,
     /// The concrete parameters: names with units, values.
     pub parameters: Vec<(String, f64)>,
-    /// What is said of the lane and its outcome, in order.
+    /// Properties of the lane and its outcome, in order.
     pub properties: Vec<(String, String)>,
-    /// The data are the program's own.
+    /// Whether the data are synthetic.
     pub is_synthetic: bool,
 }
 
-/// Vertices of one vehicle at most: a file of some 200 MB.
+/// Maximum number of vertices of a vehicle: a file of about 200 MB.
 pub const MAX_VERTICES: usize = 1_000_000;
 
 impl Concrete {
@@ -77,7 +78,7 @@ impl Concrete {
         self.vehicles.iter().filter_map(|vehicle| vehicle.path.last()).map(|v| v.time_s).fold(0.0, f64::max)
     }
 
-    /// When the boxes of two vehicles that are not the ego's first overlap, s. In a cut-out the vehicle that cuts out may
+    /// Time of the first overlap between two vehicles other than the ego, s. In a cut-out the cutting-out vehicle may
     /// drive through the one ahead of it.
     pub fn others_overlap_s(&self) -> Option<f64> {
         let [_, other, ahead] = &self.vehicles[..] else { return None };
@@ -86,16 +87,16 @@ impl Concrete {
         other.path.iter().zip(&ahead.path).find(overlap).map(|(at, _)| at.time_s)
     }
 
-    /// A position across the road as the world has it: left is positive.
+    /// A lateral position in world coordinates, m: left is positive.
     pub fn world_y_m(&self, y_m: f64) -> f64 {
-        // No negative zero.
+        // + 0.0 avoids a negative zero.
         self.side.sign() * y_m + 0.0
     }
 
-    /// Checks what no type says.
+    /// Checks what types cannot express.
     ///
     /// # Errors
-    /// [`Error::Input`] naming the lane, for numbers that are not finite and paths that are no trajectory or too long.
+    /// [`Error::Input`] naming the lane, for numbers that are not finite, and for paths that are too short or too long.
     pub fn check(&self) -> Result<()> {
         let place = || Place::item(format!("lane {}", self.key));
         for vehicle in &self.vehicles {
@@ -130,11 +131,10 @@ pub struct Vertex {
     pub v_mps: f64,
 }
 
-/// The ego's path, then those of the others, each with one vertex per step from 0 to `last_step`.
+/// The ego's path, then those of the other vehicles, each with one vertex per step from 0 to `last_step`.
 ///
-/// Up to the trace's last step they are the trace, bit for bit. Beyond it the others follow the motion of the case
-/// (which holds its last speed and lateral position for ever), as the lane would have moved them; the ego keeps its
-/// last speed.
+/// Up to the trace's last step they equal the trace, bit for bit. After it the others follow the motion of the case, as
+/// the lane would have moved them (the last speed and lateral position are held). The ego keeps its last speed.
 pub fn paths<R: Real>(trace: &Trace, case: &LaneCase<R>, tables: &Tables<R>, last_step: u32) -> Vec<Vec<Vertex>> {
     let dt_s = trace.dt_s;
     let traced = trace.steps.iter().take(last_step as usize + 1);

@@ -1,14 +1,14 @@
-//! Distributions of one parameter, drawn by the inverse of their cumulative probability: one uniform number in, one
-//! value out. Transcendental functions are those of `libm`, so that draws have the same bits on every machine.
+//! Distributions of one parameter, sampled by inverse transform: one uniform number gives one value. Transcendental
+//! functions come from `libm`, so that draws have the same bits on every machine.
 
 use crate::stats::density::{normal_cdf, normal_quantile};
 
-/// An interval of numbers, ends included.
+/// A closed interval.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Range {
-    /// Smallest.
+    /// Minimum.
     pub low: f64,
-    /// Largest, ≥ `low`.
+    /// Maximum, ≥ `low`.
     pub high: f64,
 }
 
@@ -16,13 +16,13 @@ impl Range {
     /// All numbers.
     pub const ALL: Range = Range { low: f64::NEG_INFINITY, high: f64::INFINITY };
 
-    /// What is in both; `None` where nothing is.
+    /// The intersection; `None` if it is empty.
     pub fn and(self, other: Range) -> Option<Range> {
         let both = Range { low: self.low.max(other.low), high: self.high.min(other.high) };
         (both.low <= both.high).then_some(both)
     }
 
-    /// Is a number inside?
+    /// Whether a number is inside.
     pub fn holds(self, value: f64) -> bool {
         self.low <= value && value <= self.high
     }
@@ -31,64 +31,65 @@ impl Range {
 /// A distribution as OpenSCENARIO describes it.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Distribution {
-    /// Every value of a range alike.
+    /// Uniform over a range.
     Uniform(Range),
-    /// Normal, cut off at a range.
+    /// Normal, truncated to a range.
     Normal {
-        /// Expected value of the whole distribution.
+        /// Mean before truncation.
         mean: f64,
-        /// Standard deviation of the whole distribution, ≥ 0.
+        /// Standard deviation before truncation, ≥ 0.
         deviation: f64,
-        /// Where it is cut off.
+        /// Range of the truncation.
         range: Range,
     },
-    /// Poisson, cut off at a range.
+    /// Poisson, truncated to a range.
     Poisson {
-        /// Expected value of the whole distribution, 0 … [`MAX_POISSON`].
+        /// Mean before truncation, 0 … [`MAX_POISSON`].
         mean: f64,
-        /// Where it is cut off.
+        /// Range of the truncation.
         range: Range,
     },
-    /// Intervals with weights, each uniform inside; in rising order, none overlaps another.
+    /// Intervals with weights, each uniform inside; ascending, without overlap.
     Histogram(Vec<(Range, f64)>),
     /// Values with weights.
     Set(Vec<(f64, f64)>),
 }
 
-/// Largest expected value of a Poisson distribution: its probabilities are tabulated.
+/// Maximum mean of a Poisson distribution, whose probabilities are tabulated.
 pub const MAX_POISSON: f64 = 1e6;
 
-/// A distribution ready to be drawn from, cut off at a range.
+/// A distribution truncated to a range, ready for sampling.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Draw {
-    /// Of a range.
+    /// Uniform over a range.
     Uniform(Range),
-    /// `mean + deviation · quantile`; of probabilities `from` to `to`, counted from above where `is_mirrored`.
+    /// `mean + deviation · quantile`, for probabilities `from` to `to`, counted from above if `is_mirrored`.
     Normal {
-        /// Expected value before cutting.
+        /// Mean before truncation.
         mean: f64,
-        /// Standard deviation before cutting.
+        /// Standard deviation before truncation.
         deviation: f64,
-        /// Where it is cut off.
+        /// Range of the truncation.
         range: Range,
         /// Cumulative probability at the nearer end.
         from: f64,
         /// Cumulative probability at the other end.
         to: f64,
-        /// Probabilities are counted from above, where they are small: nothing is lost in the tail.
+        /// Whether probabilities are counted from above, where they are small; this keeps precision in the tail.
         is_mirrored: bool,
     },
-    /// Intervals with the cumulative share at the end of each; a single value is an interval without width.
+    /// Intervals with the cumulative probability at the end of each; a single value is an interval of zero width.
     Steps {
         /// Intervals.
         steps: Vec<Range>,
-        /// Cumulative shares; the last is 1.
+        /// Cumulative probabilities; the last is 1.
         until: Vec<f64>,
     },
 }
 
 impl Distribution {
-    /// The distribution cut off at `within`, and the share of it that is left; `None` where none is.
+    /// The distribution truncated to `within`, and the fraction of its probability that remains; `None` if none
+    /// remains.
     pub fn within(&self, within: Range) -> Option<(Draw, f64)> {
         match self {
             Distribution::Uniform(range) => {
@@ -146,7 +147,7 @@ fn normal(mean: f64, deviation: f64, range: Range, own: Range) -> Option<(Draw, 
         return range.holds(mean).then_some((Draw::Uniform(Range { low: mean, high: mean }), 1.0));
     }
     let z = |x: f64| (x - mean) / deviation;
-    // In the upper tail everything is counted from above: there probabilities are small, and not near 1.
+    // In the upper tail probabilities are counted from above, where they are small and not close to 1.
     let is_mirrored = z(range.low) > 0.0;
     let mass = |range: Range| {
         let (a, b) = if is_mirrored { (-z(range.high), -z(range.low)) } else { (z(range.low), z(range.high)) };
@@ -159,9 +160,10 @@ fn normal(mean: f64, deviation: f64, range: Range, own: Range) -> Option<(Draw, 
     is_there.then(|| (draw, ((to - from) / (own_to - own_from)).min(1.0)))
 }
 
-/// Probabilities of the whole numbers of a range, as far as they matter in f64.
+/// Probabilities of the integers of a range, as far as they are significant in f64.
 fn poisson(mean: f64, range: Range) -> Vec<(f64, f64)> {
-    // Beyond 40 standard deviations (and some for small means) nothing is left of 2⁻⁵², and nothing comes of u.
+    // Beyond 40 standard deviations (plus an offset for small means) probabilities are far below 2⁻⁵² and are never
+    // drawn.
     let reach = 40.0 * mean.sqrt() + 40.0;
     let first = (mean - reach).max(range.low).max(0.0).ceil();
     let last = (mean + reach).min(range.high).floor();
@@ -178,7 +180,7 @@ fn poisson(mean: f64, range: Range) -> Vec<(f64, f64)> {
     (0..=count).map(|at| first + at as f64).map(|k| (k, probability(k))).filter(|(_, p)| *p > 0.0).collect()
 }
 
-/// Weighted intervals cut off at a range. A weight is spread evenly over its interval. `all` is the sum before cutting.
+/// Weighted intervals truncated to a range. A weight is uniform over its interval. `all` is the sum before truncation.
 fn steps(all_steps: impl Iterator<Item = (Range, f64)>, within: Range, all: f64) -> Option<(Draw, f64)> {
     let (mut steps, mut until, mut sum) = (Vec::new(), Vec::new(), 0.0);
     for (range, weight) in all_steps {
@@ -213,7 +215,7 @@ mod tests {
         (0..N).map(|index| draw.value(Draws::new(stream, index).uniform())).collect()
     }
 
-    /// Largest distance of the empirical from the cumulative probability, in units of its 0.1 % quantile.
+    /// Maximum distance between the empirical and the exact cumulative probability, in units of its 0.1 % quantile.
     fn distance(mut values: Vec<f64>, cdf: impl Fn(f64) -> f64) -> f64 {
         values.sort_by(f64::total_cmp);
         let n = values.len() as f64;
@@ -250,7 +252,7 @@ mod tests {
         let distribution = Distribution::Normal { mean: 0.0, deviation: 1.0, range };
         let (draw, share) = distribution.within(Range::ALL).unwrap();
         assert_eq!(share, 1.0);
-        // Half of what lies beyond 8 lies beyond 8.0857.
+        // Half of the probability beyond 8 is beyond 8.0857.
         let median = draw.value(0.5);
         assert!((normal_cdf(-median) / normal_cdf(-8.0) - 0.5).abs() < 1e-9, "{median}");
         assert!(
@@ -290,7 +292,7 @@ mod tests {
             x => 0.7 + 0.3 * (x - 5.0),
         };
         assert!(distance(drawn(&bins, Range::ALL), cdf) < 1.0);
-        // Cut at 2.5: half of the second bin is left.
+        // Truncated at 2.5, half of the second bin remains.
         let (_, share) = bins.within(range(0.0, 2.5)).unwrap();
         assert!((share - 0.4).abs() < 1e-15);
         assert!(distance(drawn(&bins, range(0.0, 2.5)), |x| cdf(x) / 0.4) < 1.0);

@@ -1,7 +1,7 @@
 //! The reader of `ParameterValueDistribution` files, ASAM OpenSCENARIO XML 1.1 to 1.3.
 //!
-//! Every element and attribute is one that the standard has there, or the file is refused with its line: what is not
-//! understood must not be left out in silence. The scenario that the file names is not read.
+//! Only elements and attributes that the standard allows are accepted; any other one is an error with its line, so that
+//! nothing is ignored silently. The scenario that the file names is not read.
 
 use std::path::{Path, PathBuf};
 
@@ -11,16 +11,16 @@ use super::xml_tree::{Node, parse_tree, read_tree};
 use crate::run::grid::{GridAxis, MAX_VALUES};
 use crate::{Error, Place, Result};
 
-/// A file that was read.
+/// The content of a file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DistributionFile {
     /// The file, for messages.
     pub path: PathBuf,
-    /// What it holds.
+    /// The distributions.
     pub distributions: Distributions,
 }
 
-/// The two kinds of content.
+/// The two kinds of distributions.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Distributions {
     /// Every combination of listed values.
@@ -34,20 +34,20 @@ pub enum Distributions {
 pub enum Deterministic {
     /// Values of one parameter: a set, or the steps of a range.
     Values {
-        /// Parameter as the file names it.
+        /// Name in the file.
         name: String,
         /// Line.
         line: u64,
-        /// At least one.
+        /// Values, at least one.
         values: Vec<f64>,
     },
-    /// Values of several parameters that belong together.
+    /// Combined values of several parameters.
     Sets {
-        /// Parameters as the file names them.
+        /// Names in the file.
         names: Vec<String>,
         /// Line.
         line: u64,
-        /// Rows of as many values; at least one.
+        /// Rows with one value per parameter; at least one row.
         rows: Vec<Vec<f64>>,
     },
 }
@@ -57,7 +57,7 @@ pub enum Deterministic {
 pub struct Stochastic {
     /// `numberOfTestRuns`, ≥ 1.
     pub runs: u64,
-    /// `randomSeed`, where the file has one.
+    /// `randomSeed`, if given.
     pub seed: Option<u64>,
     /// Name, line and distribution of each parameter, in order.
     pub parameters: Vec<(String, u64, Distribution)>,
@@ -66,12 +66,13 @@ pub struct Stochastic {
 /// Reads a file.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Input`] with line and element for what is not such a file, is not known or contradicts itself.
+/// [`Error::Io`]; [`Error::Input`] with line and element for another kind of file, an unknown element, or contradictory
+/// values.
 pub fn read_distribution(path: &Path) -> Result<DistributionFile> {
     of_tree(read_tree(path)?, path)
 }
 
-/// The same of a text; `path` is for messages.
+/// Parses a file's text; `path` is for messages.
 ///
 /// # Errors
 /// As [`read_distribution`].
@@ -220,7 +221,7 @@ fn multi(at: At) -> Result<Deterministic> {
 fn stochastic(at: At) -> Result<Stochastic> {
     at.attributes(&["numberOfTestRuns", "randomSeed"])?;
     at.children(&["StochasticDistribution"])?;
-    // Seeds are doubles in the standard; below 2^53 every whole number is one.
+    // Seeds are doubles in the standard; below 2^53 a double represents every integer.
     let whole = |name: &str, least: f64| {
         let value = at.number(name)?;
         if value.fract() == 0.0 && (least..9_007_199_254_740_992.0).contains(&value) {

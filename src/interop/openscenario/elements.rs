@@ -1,4 +1,4 @@
-//! Elements of XML, one line each, indented; text is escaped by `quick-xml`.
+//! XML elements, one per line, indented; `quick-xml` escapes the text.
 
 use std::borrow::Cow;
 
@@ -13,14 +13,14 @@ pub(super) type Attribute<'a> = (&'a str, String);
 /// An element with its attributes.
 pub(super) type Element<'a> = (&'a str, Vec<Attribute<'a>>);
 
-/// A document on the way.
+/// A document under construction.
 pub(super) struct Elements {
     writer: Writer<Vec<u8>>,
     open: Vec<&'static str>,
 }
 
 impl Elements {
-    /// Begins a document.
+    /// Starts a document.
     pub fn new() -> Result<Elements> {
         let mut elements = Elements { writer: Writer::new(Vec::new()), open: Vec::new() };
         elements.event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
@@ -28,7 +28,7 @@ impl Elements {
         Ok(elements)
     }
 
-    /// Opens an element; what follows stands inside it.
+    /// Opens an element; the following elements are inside it.
     pub fn open(&mut self, name: &'static str, attributes: Vec<Attribute>) -> Result<()> {
         self.indent()?;
         self.event(Event::Start(start(name, &attributes)))?;
@@ -44,12 +44,12 @@ impl Elements {
         self.line_end()
     }
 
-    /// An element without content.
+    /// Adds an element without content.
     pub fn empty(&mut self, name: &str, attributes: Vec<Attribute>) -> Result<()> {
         self.nested(&[(name, attributes)])
     }
 
-    /// Elements, each inside the one before, on one line; the last is empty.
+    /// Adds elements on one line, each inside the previous one; the last is empty.
     pub fn nested(&mut self, chain: &[Element]) -> Result<()> {
         self.indent()?;
         let Some(((last, attributes), outer)) = chain.split_last() else { return Ok(()) };
@@ -63,7 +63,7 @@ impl Elements {
         self.line_end()
     }
 
-    /// The document.
+    /// Returns the document.
     pub fn finish(mut self) -> Result<Vec<u8>> {
         while !self.open.is_empty() {
             self.close()?;
@@ -89,12 +89,12 @@ fn start<'a>(name: &'a str, attributes: &'a [Attribute]) -> BytesStart<'a> {
     BytesStart::new(name).with_attributes(attributes.iter().map(|(key, value)| (*key, value.as_str())))
 }
 
-/// A number: the shortest text that reads back to the same bits. No negative zero.
+/// Formats a number as the shortest text that reads back to the same bits, without negative zero.
 pub(super) fn number(value: f64) -> String {
     (value + 0.0).to_string()
 }
 
-/// Text as XML 1.0 can hold it, and as OpenSCENARIO reads it: a leading `$` would be a parameter.
+/// Makes text valid for XML 1.0 and OpenSCENARIO, where a leading `$` would be a parameter.
 pub(super) fn plain(text: &str) -> Cow<'_, str> {
     let is_allowed = |c: char| matches!(c, '\t' | '\n' | '\r') || (c >= ' ' && !matches!(c, '\u{fffe}' | '\u{ffff}'));
     let text: Cow<str> = if text.chars().all(is_allowed) {

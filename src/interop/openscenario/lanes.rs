@@ -1,7 +1,8 @@
-//! Lanes become concrete scenarios: run again in their own arithmetic, with the sizes, paths and numbers of their case.
+//! Converts lanes to concrete scenarios: runs them in their own arithmetic, with the sizes, paths and numbers of their
+//! case.
 //!
-//! A lane knows the ego's width and half the sums of two lengths: where the lengths themselves are not told, they are
-//! chosen so that the sums, and with them every gap and contact, stay.
+//! A lane stores the ego's width and half the sums of two lengths. Unknown lengths are chosen so that the sums, and
+//! therefore every gap and contact, stay the same.
 
 use super::{Concrete, EgoMotion, PlayedVehicle, paths};
 use crate::engine::{EndReason, LaneCase, LaneKey, LaneOther, LanePlan, LaneRunner, NO_STEP, Trace};
@@ -14,26 +15,26 @@ use crate::scenario::parameterization::{Sizes, VehicleSize};
 use crate::scenario::{Category, LATERAL_SAMPLED, Motion, SPEED_SAMPLED, Scenario, Side, Tables};
 use crate::{Error, Place, Result};
 
-/// How lanes are written.
+/// Options of the export.
 #[derive(Debug, Clone, Copy)]
 pub struct PlayOptions {
     /// Who drives the ego.
     pub ego: EgoMotion,
-    /// End of a scenario whose ego is the user's, s.
+    /// Duration of a scenario with an external ego, s.
     pub duration_s: Option<f64>,
-    /// Side of the others in place of the scenario's.
+    /// Side of the other vehicles; overrides the scenario's.
     pub side: Option<Side>,
-    /// Width of the road's lanes in place of the scenario's, m.
+    /// Width of the road's lanes, m; overrides the scenario's.
     pub lane_width_m: Option<f64>,
 }
 
-/// Width of a lane where nothing tells it, m.
+/// Default width of a lane, m.
 const LANE_WIDTH_M: f64 = 3.5;
 
-/// How long a scenario continues after the last event where the ego is the user's, s.
+/// Time after the last event for which a scenario with an external ego continues, s.
 const AFTERWARDS_S: f64 = 10.0;
 
-/// What is known of a lane beside its case.
+/// Facts about a lane in addition to its case.
 struct LaneFacts<'a> {
     key: String,
     profile: &'a Profile,
@@ -46,10 +47,11 @@ struct LaneFacts<'a> {
     drawn: Vec<(String, f64)>,
 }
 
-/// These lanes; `scenarios` tell sizes, side and lane width. Also whether the lengths of all vehicles are known.
+/// Converts lanes; `scenarios` give sizes, side and lane width. Also returns whether the lengths of all vehicles are
+/// known.
 ///
 /// # Errors
-/// [`Error::Input`] for a lane that cannot be played, and for scenarios that are not the run's.
+/// [`Error::Input`] for a lane that cannot be exported, and for scenarios that do not belong to the run.
 pub fn concrete_lanes(
     reopened: &Reopened,
     keys: &[LaneKey],
@@ -62,7 +64,7 @@ pub fn concrete_lanes(
     })
 }
 
-/// One case with each of its models, in f64.
+/// Converts one case with each of its models, in f64.
 ///
 /// # Errors
 /// As [`concrete_lanes`].
@@ -130,7 +132,7 @@ fn lanes<R: Real>(
     Ok((found, are_lengths_known))
 }
 
-/// The same numbers in f64.
+/// The same case in f64.
 fn widened<R: Real>(case: &LaneCase<R>) -> LaneCase<f64> {
     LaneCase {
         others: case.others.map(|o| LaneOther {
@@ -176,7 +178,7 @@ fn concrete<R: Real>(
             options.duration_s.map_or_else(otherwise, steps)
         }
     };
-    // A trajectory has two vertices at least.
+    // A trajectory has at least two vertices.
     let mut all = paths(trace, case, tables, last.max(1)).into_iter();
     let mut vehicle = |name, size: VehicleSize| PlayedVehicle {
         name,
@@ -202,9 +204,10 @@ fn concrete<R: Real>(
     })
 }
 
-/// The case's numbers by name; those of a sampled point as its density names them.
+/// The case's parameters by name; those of a sampled point by the names of its density.
 fn parameters(trace: &Trace, case: &LaneCase<f64>, facts: &LaneFacts) -> Vec<(String, f64)> {
-    // A product with the time step is a decimal again where that is the same product; else every digit counts.
+    // Remove the rounding error of a product with the time step if the decimal gives the same product; else keep every
+    // digit.
     let decimal = |value: f64| {
         let short = (value * 1e9).round() / 1e9;
         if short * trace.dt_s == value * trace.dt_s { short } else { value }
@@ -235,7 +238,7 @@ fn parameters(trace: &Trace, case: &LaneCase<f64>, facts: &LaneFacts) -> Vec<(St
     list
 }
 
-/// What the lane is and how it ended. Times in s; what did not happen is empty.
+/// Facts about the lane and its end. Times in s; empty if the event did not happen.
 fn properties(
     trace: &Trace,
     facts: &LaneFacts,
@@ -284,30 +287,30 @@ fn properties(
     list.into_iter().map(|(name, value)| (format!("lanesweep.{name}"), value)).collect()
 }
 
-/// Sizes of a lane's vehicles and where they come from.
+/// Sizes of a lane's vehicles, and their source.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct KnownSizes {
     /// The sizes.
     sizes: Sizes,
-    /// The lengths are of the scenario; otherwise only their sums are.
+    /// Whether the lengths are those of the scenario; otherwise only their sums are correct.
     are_lengths_known: bool,
 }
 
-/// Most that told sizes may differ from the lane's, m: the rounding of binary32.
+/// Maximum difference between given sizes and the lane's, m: the rounding of binary32.
 const TOLERANCE_M: f64 = 1e-3;
 
-/// The sizes of a case's vehicles: those told, where they are the lane's; otherwise an ego of `ego_length_m`, or
-/// shorter where the sums leave no more.
+/// The sizes of a case's vehicles: the given ones if they match the lane; otherwise an ego of `ego_length_m`, or
+/// shorter if the sums require it.
 ///
 /// # Errors
-/// [`Error::Input`] where the sizes told are not those of the lane.
+/// [`Error::Input`] if the given sizes do not match the lane.
 fn sizes_of_case(lane: &str, case: &LaneCase<f64>, told: Option<&Sizes>, ego_length_m: f64) -> Result<KnownSizes> {
     let is_pair = case.pair != 0;
     let sums = |of: fn(&crate::engine::LaneOther<f64>) -> f64| case.others.each_ref().map(|o| 2.0 * of(o));
     let (lengths, widths) = (sums(|o| o.half_lengths), sums(|o| o.half_widths));
     let Some(told) = told else {
         let shortest = if is_pair { lengths[0].min(lengths[1]) } else { lengths[0] };
-        // Every vehicle has a length.
+        // Every vehicle has a length above 0.
         let ego = ego_length_m.min(shortest / 2.0);
         let size = |at: usize| VehicleSize { length_m: lengths[at] - ego, width_m: widths[at] - case.ego_width };
         let sizes = Sizes {

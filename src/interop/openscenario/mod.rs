@@ -1,8 +1,8 @@
-//! OpenSCENARIO: concrete scenarios out, distributions of parameters in.
+//! OpenSCENARIO: export of concrete scenarios, import of parameter distributions.
 //!
-//! Here live what a played scenario holds ([`Concrete`]), its two files (ASAM OpenSCENARIO XML 1.2 and ASAM OpenDRIVE
-//! 1.7), how lanes become one, and the readers of such a scenario and of `ParameterValueDistribution` files. Lanes come
-//! from [`crate::run::reopen`]; what is read goes to [`crate::run::grid`] and [`crate::engine`].
+//! This module holds exported scenarios ([`Concrete`]), their two files (ASAM OpenSCENARIO XML 1.2 and ASAM OpenDRIVE
+//! 1.7), the conversion of lanes, and the readers of exported scenarios and of `ParameterValueDistribution` files.
+//! Lanes come from [`crate::run::reopen`]; imported data go to [`crate::run::grid`] and [`crate::engine`].
 
 mod concrete;
 mod distribution;
@@ -34,5 +34,5 @@ pub use scenario_reader::read_scenario;
 /// Author of every file.
 pub(crate) const AUTHOR: &str = concat!("lanesweep ", env!("CARGO_PKG_VERSION"));
 
-/// Date of every file: the same input gives the same bytes.
+/// Date of every file; it is constant, so that the same input gives the same bytes.
 pub(crate) const DATE: &str = "1970-01-01T00:00:00";

@@ -1,5 +1,5 @@
-//! From the names of a file to the parameters of a category, by the same name or as a user says, and deterministic
-//! distributions as the axes of a grid.
+//! Maps the names of a file to the parameters of a category, by equal names or by the user's renames, and converts
+//! deterministic distributions to the axes of a grid.
 
 use std::path::Path;
 
@@ -16,7 +16,7 @@ pub struct Rename {
     pub theirs: String,
     /// Name of one of our parameters.
     pub ours: String,
-    /// So many of our units are one of theirs, > 0.
+    /// Number of our units in one of theirs, > 0.
     pub factor: f64,
 }
 
@@ -40,22 +40,22 @@ impl std::str::FromStr for Rename {
     }
 }
 
-/// The names of a file in a category.
+/// Names of a file in a category.
 pub struct Names<'a> {
     /// Kind of scenario.
     pub category: Category,
-    /// What the user says of names.
+    /// The user's renames.
     pub renames: &'a [Rename],
     /// The file, for messages.
     pub path: &'a Path,
 }
 
 impl Names<'_> {
-    /// The parameter of a name, and the factor to its unit.
+    /// Finds the parameter of a name, and the factor to its unit.
     ///
     /// # Errors
-    /// [`Error::Input`] for a name that is none of ours and has no `--rename`; [`Error::Usage`] for a `--rename` to what
-    /// is none.
+    /// [`Error::Input`] for an unknown name without `--rename`; [`Error::Usage`] for a `--rename` to an unknown
+    /// parameter.
     pub fn find(&self, name: &str, line: u64) -> Result<(&'static MapParameter, f64)> {
         if let Some(rename) = self.renames.iter().find(|rename| rename.theirs == name) {
             return Ok((MapParameter::find(self.category, &rename.ours, "option `rename`")?, rename.factor));
@@ -68,7 +68,7 @@ impl Names<'_> {
         })
     }
 
-    /// A value in the parameter's own unit, a decimal again, within its range.
+    /// Converts a value to the parameter's unit, without rounding errors, and checks its range.
     ///
     /// # Errors
     /// [`Error::Input`] with the range.
@@ -80,7 +80,7 @@ impl Names<'_> {
         })
     }
 
-    /// Every `--rename` must be of a name that the file has, once.
+    /// Checks that every `--rename` names a parameter of the file, once.
     ///
     /// # Errors
     /// [`Error::Usage`].
@@ -103,8 +103,8 @@ impl Names<'_> {
 /// The variations of a file.
 ///
 /// # Errors
-/// [`Error::Usage`] for a stochastic file; as [`Names::find`] and [`Names::value`]; [`Error::Input`] for a value that is
-/// there twice, and for too many combinations of sets.
+/// [`Error::Usage`] for a stochastic file; as [`Names::find`] and [`Names::value`]; [`Error::Input`] for a repeated
+/// value, and for too many combinations of sets.
 pub fn variations(file: &DistributionFile, names: &Names) -> Result<Variations> {
     names.check_renames(&file.names())?;
     let Distributions::Deterministic(list) = &file.distributions else {
@@ -156,7 +156,7 @@ pub fn variations(file: &DistributionFile, names: &Names) -> Result<Variations> 
     Ok(all)
 }
 
-/// Every value once, in rising order.
+/// The distinct values in ascending order.
 fn rising(values: &[f64]) -> Vec<f64> {
     let mut sorted = values.to_vec();
     sorted.sort_by(f64::total_cmp);

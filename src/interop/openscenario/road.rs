@@ -1,4 +1,4 @@
-//! The road of a scenario as ASAM OpenDRIVE 1.7: straight, level, as many equal lanes as the vehicles need, all of them
+//! The road of a scenario as ASAM OpenDRIVE 1.7: straight and level, with as many equal lanes as the vehicles need, all
 //! in the ego's direction.
 
 use super::concrete::Concrete;
@@ -9,9 +9,9 @@ use crate::Result;
 /// A straight road along x. The middle of the ego's lane is y = 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Road {
-    /// Where it begins, m.
+    /// Start, m.
     pub start_m: f64,
-    /// Its length, m.
+    /// Length, m.
     pub length_m: f64,
     /// Width of every lane, m.
     pub lane_width_m: f64,
@@ -24,14 +24,14 @@ pub struct Road {
 /// Road before the first vehicle and after the last, m.
 const MARGIN_M: f64 = 100.0;
 
-/// An ego of the user's own may go on: room for it, m.
+/// Additional road for an external ego that continues, m.
 const BEYOND_M: f64 = 500.0;
 
-/// Lanes to one side at most: who leaves them is beside the road.
+/// Maximum number of lanes on one side; vehicles farther out are beside the road.
 const MAX_LANES: u32 = 20;
 
 impl Road {
-    /// The road that holds every vertex of every vehicle.
+    /// The road that contains every vertex of every vehicle.
     pub fn around(scenario: &Concrete) -> Road {
         let (mut first, mut last, mut left, mut right) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
         for vehicle in &scenario.vehicles {
@@ -45,7 +45,7 @@ impl Road {
         }
         let start_m = (first - MARGIN_M).floor();
         let width = scenario.lane_width_m;
-        // At least one lane to each side: there the others come from and leave to.
+        // At least one lane on each side, for vehicles that cut in or out.
         let lanes = |reach_m: f64| ((reach_m / width - 0.5).ceil().max(1.0) as u32).min(MAX_LANES);
         Road {
             start_m,
@@ -56,13 +56,13 @@ impl Road {
         }
     }
 
-    /// The reference line's place across the road, m: the left edge.
+    /// Lateral position of the reference line, m: the left edge.
     pub fn reference_y_m(&self) -> f64 {
         (f64::from(self.left_lanes) + 0.5) * self.lane_width_m
     }
 }
 
-/// The road's file.
+/// Builds the road's file.
 ///
 /// # Errors
 /// None for finite numbers.
@@ -119,7 +119,7 @@ pub fn road_file(road: &Road) -> Result<Vec<u8>> {
     xml.finish()
 }
 
-/// A lane with the line at its right (that of the centre: at the road's left edge).
+/// A lane with the line at its right; for the centre lane, at the road's left edge.
 fn lane(xml: &mut Elements, at: u32, width_m: Option<f64>, line: &str) -> Result<()> {
     let text = |text: &str| text.to_owned();
     let kind = if width_m.is_some() { "driving" } else { "none" };

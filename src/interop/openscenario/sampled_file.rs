@@ -1,4 +1,4 @@
-//! What a sampling run of a distribution file leaves of its input, so that its lanes can be made again.
+//! The input that a sampling run of a distribution file keeps, so that its lanes can be reproduced.
 
 use std::path::Path;
 
@@ -15,7 +15,7 @@ use crate::{Error, Place, Result};
 
 const VERSION: u64 = 1;
 
-/// A distribution file with what its parameters mean.
+/// A distribution file with the mapping of its parameters.
 #[derive(Debug, Clone, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SampledFile {
@@ -26,13 +26,13 @@ pub struct SampledFile {
     pub text: String,
     /// Kind of scenario.
     pub category: Category,
-    /// Their name, ours, factor.
+    /// Their name, our name, factor.
     renames: Vec<(String, String, f64)>,
     set: Vec<(String, f64)>,
 }
 
 impl SampledFile {
-    /// Reads a file; parameters that it leaves out are `set`.
+    /// Reads a file; parameters missing in it are `set`.
     ///
     /// # Errors
     /// [`Error::Io`], [`Error::Input`].
@@ -47,7 +47,7 @@ impl SampledFile {
         })
     }
 
-    /// Its random parameters.
+    /// The random parameters of the file.
     ///
     /// # Errors
     /// As [`DistributionSamples::of`].
@@ -68,22 +68,22 @@ impl SampledFile {
         DistributionSamples::of(&file, &Names { category: self.category, renames: &renames, path }, fixed)
     }
 
-    /// What the lanes are of.
+    /// Description of the data.
     pub fn data(&self) -> String {
         format!("distributions of {}", Path::new(&self.file).file_name().unwrap_or_default().to_string_lossy())
     }
 
-    /// As [`DISTRIBUTION_FILE`] has it.
+    /// The content of [`DISTRIBUTION_FILE`].
     ///
     /// # Errors
-    /// None for what this program reads.
+    /// None for a file that this program has read.
     pub fn to_json(&self) -> Result<Vec<u8>> {
         let unwritten = |e: serde_json::Error| Error::Internal(format!("a distribution cannot be kept: {e}"));
         serde_json::to_vec_pretty(self).map_err(unwritten)
     }
 }
 
-/// The finished run of a folder, of distributions too; see [`Reopened::run`].
+/// Opens the finished run of a folder, including runs of distributions; see [`Reopened::run`].
 ///
 /// # Errors
 /// As [`Reopened::run`].
@@ -91,7 +91,7 @@ pub fn reopen(dir: &Path, key: &str) -> Result<Reopened> {
     Reopened::run(dir, key, plan_of)
 }
 
-/// The plan of a run of distributions, and what it is of.
+/// The plan of a run of distributions, and a description of its data.
 fn plan_of(dir: &Path, record: &SampleRecord) -> Result<(LanePlan, String)> {
     let path = dir.join(DISTRIBUTION_FILE);
     let wrong = |problem: String| {

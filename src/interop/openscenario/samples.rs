@@ -1,8 +1,8 @@
-//! Random parameters as sampled lanes: sample `i` is a pure function of (seed, i), made on the host, in f64.
+//! Sampled lanes from random parameters: sample `i` is a pure function of (seed, i), computed on the host in f64.
 //!
-//! Every parameter takes one uniform number of the sample's own words, in the file's order; its distribution is cut off at
-//! its own range and at the physical range of the parameter. A point without a case (a deceleration that should end above
-//! the initial speed) is drawn again from the sample's next words.
+//! Every parameter uses one uniform number of the sample, in the file's order; its distribution is truncated to its own
+//! range and to the parameter's physical range. A point without a valid case (such as a deceleration that ends above
+//! the initial speed) is redrawn from the sample's next numbers.
 
 use super::distribution::{Draw, Range};
 use super::distribution_file::{DistributionFile, Distributions, Stochastic};
@@ -16,13 +16,13 @@ use crate::stats::density::Draws;
 use crate::stats::random::Stream;
 use crate::{Error, Place, Result};
 
-/// Purpose of the stream of these draws.
+/// Purpose of this random stream.
 pub const DISTRIBUTION_PURPOSE: u32 = 0x4f53_4344;
 
-/// Samples at most: their cases are a table in memory, some 400 bytes each.
+/// Maximum number of samples: their cases are a table in memory, about 400 bytes each.
 pub const MAX_SAMPLES: u64 = 1_000_000;
 
-/// Points drawn for one sample at most.
+/// Maximum number of points drawn for one sample.
 pub const ATTEMPTS: u32 = 64;
 
 /// Name of the only variant.
@@ -35,20 +35,20 @@ pub struct SampledParameter {
     pub parameter: &'static MapParameter,
     /// Its distribution, in the file's unit.
     pub draw: Draw,
-    /// To the parameter's unit.
+    /// Factor to the parameter's unit.
     pub factor: f64,
-    /// The share of the distribution that the parameter's physical range leaves.
+    /// Fraction of the distribution within the parameter's physical range.
     pub kept_share: f64,
 }
 
-/// Random parameters of a category, with values that are the same in every sample.
+/// Random parameters of a category, and constant values.
 #[derive(Debug, Clone, PartialEq)]
 pub struct DistributionSamples {
     /// Kind of scenario.
     pub category: Category,
     /// The random parameters, in the file's order.
     pub parameters: Vec<SampledParameter>,
-    /// The others.
+    /// Parameters with a constant value.
     pub fixed: Vec<(&'static MapParameter, f64)>,
     /// `numberOfTestRuns` of the file.
     pub runs: u64,
@@ -56,12 +56,12 @@ pub struct DistributionSamples {
     pub seed: Option<u64>,
 }
 
-/// A sample's point: values in the units of the parameters, and the draws that it took.
+/// A sample's point: values in the units of the parameters, and the number of draws.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Sampled {
     /// One per parameter.
     pub values: Vec<f64>,
-    /// From 1.
+    /// Number of draws, from 1.
     pub tries: u32,
 }
 
@@ -84,8 +84,8 @@ impl DistributionSamples {
     /// The random parameters of a file.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a deterministic file, for parameters that are missing or there twice; as [`Names::find`];
-    /// [`Error::Input`] where a parameter's range holds nothing of its distribution.
+    /// [`Error::Usage`] for a deterministic file, and for missing or repeated parameters; as [`Names::find`];
+    /// [`Error::Input`] if a parameter's range contains nothing of its distribution.
     pub fn of(
         file: &DistributionFile,
         names: &Names,
@@ -117,7 +117,7 @@ impl DistributionSamples {
                 return Err(Error::usage(Place::item(parameter.key), problem, "keep one of them"));
             }
         }
-        // The headway is a flag's where it is no parameter.
+        // If the headway is not a parameter, a flag gives it.
         let has = |quantity| {
             let is_given = given.iter().any(|p| p.quantity == quantity);
             is_given || (quantity == MapQuantity::Thw && !given.iter().any(|p| p.quantity == MapQuantity::Gap))
@@ -131,16 +131,16 @@ impl DistributionSamples {
         Ok(DistributionSamples { category: names.category, parameters, fixed, runs: *runs, seed: *seed })
     }
 
-    /// Is the initial distance one of the parameters?
+    /// Whether the initial distance is one of the parameters.
     pub fn has_distance(&self) -> bool {
         let given = self.parameters.iter().map(|p| p.parameter).chain(self.fixed.iter().map(|(p, _)| *p));
         given.into_iter().any(|p| matches!(p.quantity, MapQuantity::Gap | MapQuantity::Thw))
     }
 
-    /// The point of a sample: the first of its draws that is a case.
+    /// The point of a sample: the first draw that is a valid case.
     ///
     /// # Errors
-    /// [`Error::Usage`] where none of [`ATTEMPTS`] is one.
+    /// [`Error::Usage`] if none of [`ATTEMPTS`] draws is valid.
     pub fn draw(&self, seed: u64, index: u64, profile: &Profile) -> Result<Sampled> {
         self.drawn(seed, index, profile).map(|(sampled, _, _)| sampled)
     }
@@ -169,11 +169,12 @@ impl DistributionSamples {
         ))
     }
 
-    /// The plan whose unit `i` is sample `i`, and the draws in all. Headways are those given, or the parameter's own.
+    /// The plan whose unit `i` is sample `i`, and the total number of draws. Headways are the given ones, or the
+    /// parameter.
     ///
     /// # Errors
     /// As [`DistributionSamples::draw`]; [`Error::Usage`] for no samples or more than [`MAX_SAMPLES`], and for headways
-    /// beside a parameter.
+    /// together with a distance parameter.
     pub fn plan(
         &self,
         (samples, seed): (u64, u64),

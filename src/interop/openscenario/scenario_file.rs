@@ -1,10 +1,10 @@
-//! The scenario's file: ASAM OpenSCENARIO XML 1.2, the first revision whose header carries properties.
+//! The scenario file: ASAM OpenSCENARIO XML 1.2, the first revision whose header has properties.
 //!
-//! Every vehicle that is not the user's follows a polyline with one vertex per time step, timed in simulation time. The
-//! heading is 0 throughout: the boxes of a lane stay parallel to the road, and so do these, so that vehicles touch when
-//! and where they touch in the lane.
+//! Every vehicle except an external ego follows a polyline with one vertex per time step, in simulation time. The
+//! heading is always 0: the boxes of a lane are parallel to the road, so vehicles touch at the same time and place as
+//! in the lane.
 //!
-//! A folder of exported scenarios has a scenario and its road per lane, and an index of them.
+//! A folder of exported scenarios has a scenario file and a road file per lane, and an index.
 
 use std::path::Path;
 
@@ -16,16 +16,16 @@ use crate::Result;
 use crate::support::run_dir::OutputDir;
 use crate::support::table::Table;
 
-/// Name of the parameter that an ego of the user's own starts with.
+/// Name of the parameter for the initial speed of an external ego.
 const EGO_SPEED: &str = "ego_speed_mps";
 
-/// Property of a file in which two vehicles overlap that are not the ego's: the time, s.
+/// Property for an overlap of two vehicles other than the ego: its time, s.
 const OTHERS_OVERLAP: &str = "lanesweep.others_overlap_s";
 
-/// Height of every vehicle, m: no lane knows it.
+/// Height of every vehicle, m; lanes have no height.
 const HEIGHT_M: f64 = 1.5;
 
-/// The scenario's file; `road` is the name of the road's file beside it.
+/// Builds the scenario file; `road` is the name of the road file in the same folder.
 ///
 /// # Errors
 /// As [`Concrete::check`].
@@ -119,7 +119,7 @@ fn entity(xml: &mut Elements, vehicle: &PlayedVehicle) -> Result<()> {
     xml.close()
 }
 
-/// Where everybody starts, and how fast.
+/// Writes the initial positions and speeds.
 fn init(xml: &mut Elements, scenario: &Concrete) -> Result<()> {
     xml.open("Init", vec![])?;
     xml.open("Actions", vec![])?;
@@ -151,7 +151,7 @@ fn init(xml: &mut Elements, scenario: &Concrete) -> Result<()> {
     xml.close()
 }
 
-/// Everybody's path, from the beginning on.
+/// Writes the paths of the vehicles.
 fn story(xml: &mut Elements, scenario: &Concrete) -> Result<()> {
     xml.open("Story", vec![text("name", "story")])?;
     xml.open("Act", vec![text("name", "act")])?;
@@ -210,7 +210,7 @@ fn at_time(xml: &mut Elements, name: &str, time_s: f64) -> Result<()> {
     xml.close()
 }
 
-/// A position of a vehicle's centre as the position of its reference point.
+/// Converts a position of a vehicle's centre to that of its reference point.
 fn world<'a>(scenario: &Concrete, vehicle: &PlayedVehicle, x_m: f64, y_m: f64) -> Element<'a> {
     let x_m = x_m - vehicle.centre_offset_m();
     let place = vec![float("x", x_m), float("y", scenario.world_y_m(y_m)), float("z", 0.0), float("h", 0.0)];
@@ -225,13 +225,13 @@ fn float(name: &str, value: f64) -> Attribute<'_> {
     (name, number(value))
 }
 
-/// A name that can be referred to: letters, digits and `_`, no digit first.
+/// A valid identifier: letters, digits and `_`, not starting with a digit.
 fn identifier(name: &str) -> String {
     let plain: String = name.chars().map(|c| if c.is_ascii_alphanumeric() { c } else { '_' }).collect();
     if plain.starts_with(|c: char| c.is_ascii_digit()) { format!("_{plain}") } else { plain }
 }
 
-/// Name of the index.
+/// File name of the index.
 pub const INDEX: &str = "index.csv";
 
 /// One line of the index.
@@ -245,12 +245,12 @@ pub struct IndexRow {
     pub lane: String,
 }
 
-/// Puts every scenario with its road and the index into a folder, in the place of an earlier export's.
+/// Writes every scenario with its road, and the index, to a folder; replaces an earlier export.
 ///
 /// # Errors
 /// As [`scenario_file`]; [`crate::Error::Io`].
 pub fn export_folder(dir: &Path, scenarios: &[Concrete]) -> Result<Vec<IndexRow>> {
-    // Everything is made before anything is written: a lane that cannot be leaves the folder as it was.
+    // Everything is built before the first file is written, so that an error leaves the folder unchanged.
     let mut made = Vec::new();
     for (at, scenario) in scenarios.iter().enumerate() {
         let stem = format!("{:03}-{}", at + 1, safe(&scenario.key));
@@ -259,7 +259,7 @@ pub fn export_folder(dir: &Path, scenarios: &[Concrete]) -> Result<Vec<IndexRow>
     }
     let folder = OutputDir::open(dir, INDEX)?;
     let mut results = folder.results()?;
-    // The lane has a column of its own already.
+    // The lane already has its own column.
     let names: Vec<String> = scenarios.first().map_or(Vec::new(), |s| {
         s.properties.iter().map(|(name, _)| name.clone()).filter(|name| name != "lanesweep.lane").collect()
     });
@@ -283,12 +283,12 @@ pub fn export_folder(dir: &Path, scenarios: &[Concrete]) -> Result<Vec<IndexRow>
     Ok(rows)
 }
 
-/// The name of a property as that of a column.
+/// The column name of a property.
 fn property_text(property: &str) -> String {
     property.strip_prefix("lanesweep.").unwrap_or(property).to_owned()
 }
 
-/// A lane key as a part of a file name that every system takes.
+/// A lane key as part of a file name that is valid on every system.
 fn safe(key: &str) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() || matches!(c, '.' | '_' | '-') { c } else { '_' };
     let name: String = key.chars().map(plain).take(100).collect();

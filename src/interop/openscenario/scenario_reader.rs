@@ -1,5 +1,5 @@
-//! The reader of scenarios that `export xosc` wrote: the paths of the other vehicles become series again, and the ego
-//! its initial speed. Scenarios of other tools are refused: their actions would have to be played.
+//! Reads scenarios written by `export xosc`: the paths of the other vehicles become series, and the ego gets its
+//! initial speed. Scenarios of other tools are refused, because their actions would have to be simulated.
 
 use std::path::Path;
 
@@ -10,19 +10,19 @@ use crate::{Error, Place, Result};
 
 const OURS: &str = "give a file that `lanesweep export xosc` wrote; scenarios of other tools are not read";
 
-/// One vehicle as its file has it.
+/// One vehicle of a file.
 struct Read {
     length_m: f64,
     width_m: f64,
     speed_mps: f64,
-    /// Centre along and across the road, m, world coordinates; the start first.
+    /// Longitudinal and lateral position of the centre, m, world coordinates; the start first.
     path: Vec<(f64, f64)>,
 }
 
-/// The scenario of a file, as if it had been recorded: samples at the lane's time step, initial gap and speeds.
+/// Reads a scenario as if it had been recorded: samples at the lane's time step, initial gap and speeds.
 ///
 /// # Errors
-/// [`Error::Io`]; [`Error::Input`] with file, line and element for a file that is not ours.
+/// [`Error::Io`]; [`Error::Input`] with file, line and element for a file that this program did not write.
 pub fn read_scenario(path: &Path) -> Result<Scenario> {
     let root = read_tree(path)?;
     let root = At { node: &root, path };
@@ -46,7 +46,7 @@ pub fn read_scenario(path: &Path) -> Result<Scenario> {
     let ahead = if category == Category::CutOut { Some(vehicles("Ahead")?) } else { None };
     let gap =
         |behind: &Read, front: &Read| front.path[0].0 - behind.path[0].0 - (behind.length_m + front.length_m) / 2.0;
-    // The scenario's own positions are positive where the vehicle comes from, or leaves to.
+    // The scenario's positions are positive on the side the vehicle comes from or leaves to.
     let first_y = target.path.iter().find(|(_, y)| *y != 0.0).map_or(0.0, |(_, y)| *y);
     let side = if first_y < 0.0 { Side::Right } else { Side::Left };
     let other = |read: &Read| {
@@ -124,7 +124,7 @@ fn vehicle(root: At, name: &str, dt_s: f64) -> Result<Read> {
     let speed = speed.first().ok_or_else(|| start.wrong(format!("`{name}` has no speed"), OURS))?;
     let speed_mps = match speed.text("value") {
         Ok(_) => speed.number("value")?,
-        // The free ego's: a parameter of the file.
+        // For an external ego: a parameter of the file.
         Err(_) => declared(root, "ego_speed_mps")?,
     };
     let finite = |value: f64| value.is_finite().then_some(value).ok_or_else(|| entity.wrong("not finite", OURS));
@@ -136,14 +136,14 @@ fn vehicle(root: At, name: &str, dt_s: f64) -> Result<Read> {
     })
 }
 
-/// Value of a declared parameter.
+/// The value of a declared parameter.
 fn declared(root: At, name: &str) -> Result<f64> {
     let list = root.only("ParameterDeclarations")?;
     let found = list.all().find(|child| child.text("name").is_ok_and(|n| n == name));
     found.ok_or_else(|| list.wrong(format!("the parameter `{name}` is missing"), OURS))?.number("value")
 }
 
-/// All elements of a name below another, in the file's order.
+/// All descendants of this name, in the file's order.
 fn below<'a>(at: At<'a>, name: &str) -> Vec<At<'a>> {
     fn collect<'a>(node: &'a Node, path: &'a Path, name: &str, found: &mut Vec<At<'a>>) {
         for child in &node.children {

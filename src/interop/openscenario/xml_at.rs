@@ -1,4 +1,4 @@
-//! An element of an XML file with its place: what is read from it, and errors that name file, line and element.
+//! An XML element with its place: typed access, and errors that name file, line and element.
 
 use std::path::Path;
 
@@ -7,7 +7,7 @@ use super::xml_tree::Node;
 use crate::support::plain_text;
 use crate::{Error, Place, Result};
 
-/// An element and where it is.
+/// An element and its place.
 #[derive(Clone, Copy)]
 pub(super) struct At<'a> {
     pub node: &'a Node,
@@ -20,7 +20,7 @@ impl<'a> At<'a> {
         Error::input(place, problem, help)
     }
 
-    /// What another check found, here.
+    /// Adds this place to another check's error.
     pub fn because(&self, error: &Error) -> Error {
         self.wrong(error.to_string(), error.help().unwrap_or_default())
     }
@@ -29,7 +29,7 @@ impl<'a> At<'a> {
         self.node.children.iter().map(move |node| At { node, path: self.path })
     }
 
-    /// Only these attributes may be there, besides those of namespaces; and no text.
+    /// Checks that there are only these attributes (except namespaces), and no text.
     pub fn attributes(&self, known: &[&str]) -> Result<()> {
         let is_foreign = |key: &str| key == "xmlns" || key.starts_with("xmlns:") || key.starts_with("xsi:");
         for (key, _) in self.node.attributes.iter().filter(|(key, _)| !is_foreign(key)) {
@@ -47,7 +47,7 @@ impl<'a> At<'a> {
         Ok(())
     }
 
-    /// Only these elements may be inside.
+    /// Checks that there are only these child elements.
     pub fn children(&self, known: &[&str]) -> Result<()> {
         match self.node.children.iter().find(|child| !known.contains(&child.name.as_str())) {
             None => Ok(()),
@@ -62,7 +62,7 @@ impl<'a> At<'a> {
         }
     }
 
-    /// The only element of this name.
+    /// The only child of this name.
     pub fn only(self, name: &str) -> Result<At<'a>> {
         let found: Vec<At> = self.all().filter(|child| child.node.name == name).collect();
         match found[..] {
@@ -71,7 +71,7 @@ impl<'a> At<'a> {
         }
     }
 
-    /// The elements of this name, and no others; at least one.
+    /// The children, all of this name; at least one.
     pub fn some(self, name: &str) -> Result<Vec<At<'a>>> {
         self.children(&[name])?;
         let found: Vec<At> = self.all().collect();
@@ -81,7 +81,7 @@ impl<'a> At<'a> {
         Ok(found)
     }
 
-    /// The only element, of one of these names.
+    /// The only child, with one of these names.
     pub fn choice(self, names: &[&str]) -> Result<At<'a>> {
         if let Some(child) =
             self.all().find(|c| matches!(c.node.name.as_str(), "UserDefinedDistribution" | "LogNormalDistribution"))
@@ -121,7 +121,7 @@ impl<'a> At<'a> {
         })
     }
 
-    /// `lowerLimit` to `upperLimit`.
+    /// Range from `lowerLimit` to `upperLimit`.
     pub fn range(&self) -> Result<Range> {
         self.attributes(&["lowerLimit", "upperLimit"])?;
         self.children(&[])?;
@@ -134,7 +134,7 @@ impl<'a> At<'a> {
     }
 }
 
-/// `; did you mean …?` where a name is near one of a list.
+/// `; did you mean …?` if a name of the list is similar.
 fn nearest(name: &str, list: &[&str]) -> String {
     plain_text::nearest(name, list.iter().copied(), 0.8)
         .map_or(String::new(), |near| format!("; did you mean `{near}`?"))

@@ -1,5 +1,5 @@
-//! A small document of XML as a tree of elements with their lines: bounded in size and depth, without text, entities of
-//! its own or anything else that the files read here do not have.
+//! A small XML document as a tree of elements with their lines. Size and depth are limited. It has no custom entities
+//! and nothing else that the files read here do not need.
 
 use std::path::Path;
 
@@ -16,16 +16,16 @@ pub(super) struct Node {
     pub name: String,
     /// Line of its start, from 1.
     pub line: u64,
-    /// Names and values, in order; every name once.
+    /// Names and values, in order; names are unique.
     pub attributes: Vec<(String, String)>,
     pub children: Vec<Node>,
-    /// Characters directly inside it, without space around them.
+    /// Text directly inside it, trimmed.
     pub text: String,
 }
 
-/// Elements within elements at most.
+/// Maximum nesting of elements.
 const DEEPEST: usize = 32;
-/// Elements at most.
+/// Maximum number of elements.
 const MAX_ELEMENTS: usize = 500_000;
 
 const NOT_XML: &str =
@@ -34,14 +34,14 @@ const NOT_XML: &str =
 /// The root element of a file.
 ///
 /// # Errors
-/// As [`input_file::read_text`]; [`Error::Input`] with the line for what is not well-formed, too deep, too large, or has
-/// a document type.
+/// As [`input_file::read_text`]; [`Error::Input`] with the line for XML that is not well-formed, too deep, too large,
+/// or has a document type.
 pub(super) fn read_tree(path: &Path) -> Result<Node> {
     let text = input_file::read_text(path, input_file::MAX_XML_BYTES)?;
     parse_tree(&text, path)
 }
 
-/// The same of a text; `path` is for messages.
+/// Parses a text; `path` is for messages.
 pub(super) fn parse_tree(text: &str, path: &Path) -> Result<Node> {
     let text = text.trim_start_matches('\u{feff}');
     let wrong = |line: u64, problem: String, help: &str| Error::input(Place::file(path).row(line), problem, help);
@@ -109,7 +109,7 @@ pub(super) fn parse_tree(text: &str, path: &Path) -> Result<Node> {
     root.ok_or_else(|| wrong(1, "there is no element".to_owned(), NOT_XML))
 }
 
-/// Puts a finished element where it belongs.
+/// Adds a finished element to its parent.
 fn close(node: Node, open: &mut [Node], root: &mut Option<Node>) -> std::result::Result<(), String> {
     match open.last_mut() {
         Some(parent) => parent.children.push(node),
@@ -125,7 +125,7 @@ fn element(start: &BytesStart, line: u64) -> std::result::Result<Node, String> {
     for attribute in start.attributes() {
         let attribute = attribute.map_err(|e| format!("the attributes of `{name}` are broken: {e}"))?;
         let key = attribute.key.as_ref().to_owned();
-        // Only the five entities that XML itself knows are replaced, once.
+        // Only the five predefined entities of XML are replaced, once.
         let value = attribute
             .normalized_value(XmlVersion::Implicit1_0)
             .map_err(|e| format!("the attribute `{key}` of `{name}` is broken: {e}"))?;
@@ -134,7 +134,7 @@ fn element(start: &BytesStart, line: u64) -> std::result::Result<Node, String> {
     Ok(Node { name, line, attributes, children: Vec::new(), text: String::new() })
 }
 
-/// From byte positions, which only grow, to lines.
+/// Converts ascending byte positions to lines.
 struct Lines<'a> {
     text: &'a [u8],
     at: usize,

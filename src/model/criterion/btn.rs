@@ -1,7 +1,7 @@
-//! Brake Threat Number: required over largest available deceleration; above 1 braking cannot avoid the
-//! collision. The deceleration ramps up from 0 with a jerk j, the other vehicle keeps its speed.
+//! Brake Threat Number: required over maximum available deceleration; above 1 braking cannot avoid the collision. The
+//! deceleration ramps up from 0 with jerk j; the other vehicle keeps its speed.
 //!
-//! D(a, v) is the distance closed before the closing speed v is braked away with deceleration a:
+//! D(a, v) is the distance closed while deceleration a reduces the closing speed v to 0:
 //! `v²/(2a) + v a/(2j) − a³/(24 j²)` for `v ≥ a²/(2j)`, else `(2/3) v sqrt(2v/j)` (the ramp is not finished).
 
 use serde::{Deserialize, Serialize};
@@ -12,25 +12,25 @@ use crate::model::scalar::{Flag, Real};
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BtnForm {
-    /// `v²/(2 (g − v·a_max/(2j)))/a_max`: the ramp costs half its time as a delay. Closed form.
+    /// `v²/(2 (g − v·a_max/(2j)))/a_max`: the ramp counts as a delay of half its duration. Closed form.
     EquivalentDelay,
-    /// The a that solves `D(a, v) = g`, over a_max. The reference to test the others with.
+    /// The a that solves `D(a, v) = g`, over a_max. The reference for tests of the other forms.
     Exact,
     /// `D(a_max, v)/g`. Closed form.
     DistanceRatio,
 }
 
-/// Whether a contact that the gate does not see fails the criterion.
+/// Whether a contact outside the gate fails the criterion.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BtnContact {
     /// Every collision, side contacts included, fails BTN.
     Any,
-    /// Only what the gate sees.
+    /// Only contacts inside the gate.
     Gated,
 }
 
-/// Constants of the number in a lane.
+/// Constants of the criterion in a lane.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BrakeThreat<R> {
     form: BtnForm,
@@ -40,7 +40,7 @@ pub struct BrakeThreat<R> {
     two_a_max: R,
     /// 2·threshold·a_max.
     two_a_limit: R,
-    /// a_max/(2j): the delay that the ramp is worth, s.
+    /// a_max/(2j): the delay equivalent to the ramp, s.
     ramp_delay: R,
     /// Deceleration at the threshold, m/s².
     a_limit: R,
@@ -48,37 +48,37 @@ pub struct BrakeThreat<R> {
     inverse_jerk: R,
     /// 1/(12 j²).
     quartic: R,
-    /// 8/(9j): the square of the short ramp's distance is this times v³.
+    /// 8/(9j): the squared distance of the unfinished ramp is this factor times v³.
     short_ramp: R,
     /// 2j: v ≥ a²/(2j) is `2j·v ≥ a²`.
     two_jerk: R,
 }
 
-/// Largest number so far: a quotient (closed forms; of squares for the distance ratio) or a deceleration
-/// (exact form), so that a step never divides.
+/// Maximum so far, kept as a quotient (closed forms; of squares for the distance ratio) or a deceleration (exact form),
+/// so that a step never divides.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct BrakeThreatMaximum<R> {
     /// Numerator of the quotient.
     pub numerator: R,
-    /// Denominator of the quotient; 0 where no braking helps.
+    /// Denominator of the quotient; 0 where braking cannot avoid the collision.
     pub denominator: R,
     /// The predicate was true at some step.
     pub failed: Flag,
 }
 
 impl<R: Real> BrakeThreatMaximum<R> {
-    /// Nothing seen yet: 0.
+    /// Initial value: 0.
     #[inline(always)]
     pub fn new() -> Self {
         BrakeThreatMaximum { numerator: R::ZERO, denominator: R::ONE, failed: Flag::FALSE }
     }
 
-    /// As a device gives it back: numerator and denominator.
+    /// From the numerator and denominator that a device returns.
     pub fn from_quotient(numerator: R, denominator: R, failed: Flag) -> Self {
         BrakeThreatMaximum { numerator, denominator, failed }
     }
 
-    /// A collision that counts: infinite.
+    /// Infinite: a collision that counts.
     #[inline(always)]
     pub fn fail(self) -> Self {
         BrakeThreatMaximum { numerator: R::ONE, denominator: R::ZERO, failed: Flag::TRUE }
@@ -107,7 +107,7 @@ impl<R: Real> Default for BrakeThreatMaximum<R> {
 }
 
 impl<R: Real> BrakeThreat<R> {
-    /// Constants from threshold, a_max (m/s²) and jerk (m/s³).
+    /// From threshold, a_max (m/s²) and jerk (m/s³).
     pub fn new(form: BtnForm, threshold: f64, a_max: f64, jerk: f64) -> Self {
         BrakeThreat {
             form,
@@ -124,18 +124,19 @@ impl<R: Real> BrakeThreat<R> {
         }
     }
 
-    /// Its form.
+    /// Form of the number.
     pub fn form(&self) -> BtnForm {
         self.form
     }
 
-    /// The same with its form written as a constant, so that a compiler leaves the others out.
+    /// The same constants with `form` as a compile-time constant, so that the compiler removes the code of the other
+    /// forms.
     #[inline(always)]
     pub(crate) fn known_as(self, form: BtnForm) -> Self {
         BrakeThreat { form, ..self }
     }
 
-    /// The constants by the names that the shaders give them; the form counts from 0.
+    /// The constants by their names in the shaders; the form is numbered from 0.
     pub fn shader_constants(&self) -> Vec<(&'static str, f64)> {
         vec![
             ("btn_form", f64::from(self.form as u32)),
@@ -152,8 +153,8 @@ impl<R: Real> BrakeThreat<R> {
         ]
     }
 
-    /// No larger gap fails at this closing speed, m/s > 0, but for rounding; m. Infinite for forms of which it is not
-    /// known.
+    /// Gap, m, above which the criterion never fails at this closing speed (m/s, > 0), except for rounding. Infinite
+    /// for forms without a known bound.
     pub fn safe_gap(&self, closing: R) -> R {
         match self.form {
             BtnForm::EquivalentDelay => closing * self.ramp_delay + (closing * closing).exact_div(self.two_a_limit),
@@ -161,8 +162,8 @@ impl<R: Real> BrakeThreat<R> {
         }
     }
 
-    /// Takes one step of a vehicle that is `seen` into account: gap g, m, and closing speed v, m/s. Without
-    /// `keeps_value` the largest value stays as it is.
+    /// Updates the maximum with one step of a vehicle that is `seen`: gap g, m, closing speed v, m/s. Without
+    /// `keeps_value` only the verdict is updated.
     #[inline(always)]
     pub fn update(
         &self,
@@ -187,7 +188,7 @@ impl<R: Real> BrakeThreat<R> {
                 maximum.raise(counts, hopeless.choose(R::ONE, squared), hopeless.choose(R::ZERO, denominator))
             }
             BtnForm::DistanceRatio => {
-                // The quotient of squares: no root in the lane.
+                // The quotient of squares needs no root in the lane.
                 let squared = if self.ramp_ends(self.a_max, closing) {
                     let twice = self.twice_distance_times_a(self.a_max, closing);
                     let distance = twice.exact_div(self.two_a_max);
@@ -208,7 +209,7 @@ impl<R: Real> BrakeThreat<R> {
                 if !keeps_value {
                     return maximum;
                 }
-                // What the largest deceleration so far still avoids needs no new solution.
+                // Skip the solver if the maximum so far already avoids this collision.
                 let known = maximum.denominator == R::ZERO || !self.needs_more(maximum.numerator, gap, closing);
                 let hopeless = touches | (gap * gap).is_below(self.short_ramp * closing * closing * closing);
                 let solves = (counts & !hopeless).holds() && !known;
@@ -219,8 +220,8 @@ impl<R: Real> BrakeThreat<R> {
         }
     }
 
-    /// The number itself, ≥ 0, infinite where no braking helps. Run on the host: the distance ratio takes
-    /// a root here.
+    /// The number itself, ≥ 0; infinite where braking cannot avoid the collision. Host only: the distance ratio needs a
+    /// root.
     pub fn value(&self, maximum: &BrakeThreatMaximum<R>) -> f64 {
         let (numerator, denominator) = (maximum.numerator.to_f64(), maximum.denominator.to_f64());
         if denominator == 0.0 {
@@ -234,25 +235,25 @@ impl<R: Real> BrakeThreat<R> {
         }
     }
 
-    /// The number of one instant: gap, m, closing speed, m/s. For traces and tests.
+    /// The number at one instant: gap, m, closing speed, m/s. For traces and tests.
     pub fn at(&self, gap: R, closing: R) -> f64 {
         self.value(&self.update(BrakeThreatMaximum::new(), Flag::TRUE, gap, closing, true))
     }
 
-    /// v ≥ a²/(2j): the ramp ends before the closing speed is gone.
+    /// v ≥ a²/(2j): the ramp ends before the closing speed reaches 0.
     #[inline(always)]
     fn ramp_ends(&self, a: R, v: R) -> bool {
         self.two_jerk * v >= a * a
     }
 
-    /// 2a·D(a, v) of the long branch: v² + v a²/j − a⁴/(12 j²).
+    /// 2a·D(a, v) with a finished ramp: v² + v a²/j − a⁴/(12 j²).
     #[inline(always)]
     fn twice_distance_times_a(&self, a: R, v: R) -> R {
         let a2 = a * a;
         v * v + v * a2 * self.inverse_jerk - a2 * a2 * self.quartic
     }
 
-    /// D(a, v) > g: this deceleration does not avoid the collision. `a = 0` never does.
+    /// D(a, v) > g: deceleration `a` does not avoid the collision. `a = 0` never does.
     #[inline(always)]
     fn needs_more(&self, a: R, gap: R, v: R) -> bool {
         if self.ramp_ends(a, v) {
@@ -262,7 +263,7 @@ impl<R: Real> BrakeThreat<R> {
         }
     }
 
-    /// Bisection on (0, 1 + 2jv], which holds (0, sqrt(2jv)]; D falls with a there, so it always converges.
+    /// Bisection on (0, 1 + 2jv], which contains (0, sqrt(2jv)]. It always converges because D decreases with a.
     fn solve(&self, gap: R, v: R) -> R {
         let half = R::from_f64(0.5);
         let mut low = R::ZERO;

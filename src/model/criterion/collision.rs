@@ -14,12 +14,13 @@ pub enum Contact {
 }
 
 impl Contact {
-    /// 0, 1 or 2, as the tables have it.
+    /// Code in the tables: 0, 1 or 2.
     pub fn code(self) -> u32 {
         self as u32
     }
 
-    /// In words: the ego drives into the other one's rear end, or the other one comes from the side or behind.
+    /// Description: the ego drives into the rear of the other vehicle, or the other vehicle comes from the side or
+    /// behind.
     pub fn label(self) -> &'static str {
         match self {
             Contact::None => "no contact",
@@ -29,22 +30,23 @@ impl Contact {
     }
 }
 
-/// Do the boxes overlap at one step? Strict: h < 0 and |x_o − x_e| < (L_e + L_o)/2, with the signed gap `gap`.
+/// Whether the boxes overlap at one step. Strict: h < 0 and |x_o − x_e| < (L_e + L_o)/2, with the signed gap `gap`.
 #[inline(always)]
 pub fn overlaps<R: Real>(gap: R, half_lengths: R, lateral_gap: R) -> Flag {
     lateral_gap.is_negative() & overlaps_along(gap, half_lengths)
 }
 
-/// The part of [`overlaps`] along the road.
+/// The longitudinal part of [`overlaps`].
 #[inline(always)]
 pub fn overlaps_along<R: Real>(gap: R, half_lengths: R) -> Flag {
     gap.is_negative() & (gap + half_lengths + half_lengths).is_positive()
 }
 
-/// The gap after a step between vehicles that overlap across the road at its end, given the gaps before and after it.
+/// Gap after a step, m, for vehicles that overlap laterally at its end, from the gaps before and after the step.
 ///
-/// Where the step leads their centres past each other, the vehicles are held in the contact: with the centres side by
-/// side if the other was wholly ahead before, half of that behind if it was wholly behind. Otherwise `after`.
+/// Where the step moves one centre past the other, the contact is kept. If the other vehicle was wholly ahead before,
+/// the result has the centres side by side. If it was wholly behind, the result has its centre `half_lengths/2` behind
+/// the ego's. Otherwise it is `after`.
 #[inline(always)]
 pub fn held_in_contact<R: Real>(before: R, after: R, half_lengths: R) -> R {
     let was_behind = !(before + half_lengths + half_lengths).is_positive();

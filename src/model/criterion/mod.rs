@@ -1,11 +1,10 @@
-//! The criteria that judge a lane: collision, time to collision, Brake Threat Number.
+//! The criteria evaluated in a lane: collision, time to collision, Brake Threat Number.
 //!
-//! Each keeps the continuous value beside the verdict; a verdict comes from its own predicate, never from
-//! comparing a printed value. Here lives no time loop. Constants come from a profile; verdicts go to the
-//! lane's outcome.
+//! Each keeps a continuous value and a verdict; the verdict comes from its own predicate, never from comparing a
+//! printed value. This module has no time loop. Constants come from a profile; verdicts go to the lane's outcome.
 //!
-//! To add a criterion: one file here, its twin in `shaders/`, one line in [`Criterion`], and what counts verdicts; the
-//! chapter `docs/src/extend/criterion.md` names every place.
+//! To add a criterion: one file here, its twin in `shaders/`, one line in [`Criterion`], and the code that counts
+//! verdicts. The chapter `docs/src/extend/criterion.md` lists every place.
 
 mod btn;
 mod collision;
@@ -33,7 +32,7 @@ pub enum Criterion {
 }
 
 impl Criterion {
-    /// All, in the order of every table.
+    /// All criteria, in the order of every table.
     pub const ALL: [Criterion; 3] = [Criterion::Collision, Criterion::Ttc, Criterion::Btn];
 
     /// Name in files and keys.
@@ -60,7 +59,7 @@ impl Criterion {
     }
 }
 
-/// Which vehicles TTC and BTN look at.
+/// Which vehicles TTC and BTN evaluate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum LateralGate {
@@ -78,7 +77,7 @@ pub struct CriteriaProfile {
     pub ttc_threshold_s: f64,
     /// BTN above this fails (0.8).
     pub btn_threshold: f64,
-    /// Which vehicles TTC and BTN look at.
+    /// Which vehicles TTC and BTN evaluate.
     pub gate: LateralGate,
     /// Form of the Brake Threat Number.
     pub btn: BtnForm,
@@ -90,7 +89,7 @@ pub struct CriteriaProfile {
     pub jerk_mps3: f64,
 }
 
-/// The criteria at work in a lane.
+/// The criteria of a lane, in its arithmetic.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Criteria<R> {
     /// Gate of TTC and BTN.
@@ -101,14 +100,14 @@ pub struct Criteria<R> {
     pub ttc: TimeToCollision<R>,
     /// Brake Threat Number.
     pub btn: BrakeThreat<R>,
-    /// Smallest and largest values are gathered beside the verdicts, which do not need them.
+    /// Whether minimum TTC and maximum BTN are computed; verdicts do not need them.
     pub keeps_values: bool,
-    /// Verdicts mark contacts at this closing speed, m/s, or a greater one; infinite: none.
+    /// Verdicts mark contacts at or above this closing speed, m/s; infinite: none.
     pub marks_contacts_from: R,
 }
 
 impl CriteriaProfile {
-    /// Plain constants.
+    /// Resolves the constants into the lane arithmetic.
     pub fn resolve<R: Real>(&self) -> Criteria<R> {
         Criteria {
             gate: self.gate,
@@ -122,7 +121,7 @@ impl CriteriaProfile {
 }
 
 impl<R: Real> Criteria<R> {
-    /// The constants by the names that the shaders give them; flags are 0 or 1, alternatives count from 0.
+    /// The constants by their names in the shaders; flags are 0 or 1, alternatives are numbered from 0.
     pub fn shader_constants(&self) -> Vec<(&'static str, f64)> {
         let mut all = vec![
             ("criteria_gate", f64::from(self.gate as u32)),
@@ -132,7 +131,7 @@ impl<R: Real> Criteria<R> {
         all
     }
 
-    /// Do TTC and BTN look at a vehicle here? In front by its centre, and near enough across the road.
+    /// Whether TTC and BTN evaluate a vehicle at this position: its centre is in front, and the lateral gate holds.
     #[inline(always)]
     pub fn sees(&self, gap: R, half_lengths: R, lateral_gap: R, lateral_position: R, ego_width: R) -> Flag {
         let near = match self.gate {

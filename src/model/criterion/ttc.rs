@@ -9,19 +9,19 @@ pub struct TimeToCollision<R> {
     pub threshold: R,
 }
 
-/// Smallest TTC so far, kept as a quotient so that a step never divides.
+/// Minimum TTC so far, kept as a quotient so that a step never divides.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TtcMinimum<R> {
     /// Gap of the quotient, m, ≥ 0.
     pub gap: R,
-    /// Closing speed of the quotient, m/s; 0 where nothing was seen.
+    /// Closing speed of the quotient, m/s; 0 before the first value.
     pub closing: R,
     /// The predicate was true at some step.
     pub failed: Flag,
 }
 
 impl<R: Real> TtcMinimum<R> {
-    /// Nothing seen yet: infinite.
+    /// Initial value: infinite.
     #[inline(always)]
     pub fn new() -> Self {
         TtcMinimum { gap: R::ONE, closing: R::ZERO, failed: Flag::FALSE }
@@ -41,13 +41,13 @@ impl<R: Real> Default for TtcMinimum<R> {
 }
 
 impl<R: Real> TimeToCollision<R> {
-    /// No larger gap fails at this closing speed, m/s > 0, but for rounding; m.
+    /// Gap, m, above which the criterion never fails at this closing speed (m/s, > 0), except for rounding.
     pub fn safe_gap(&self, closing: R) -> R {
         self.threshold * closing
     }
 
-    /// Takes one step of a vehicle that is `seen` into account: fails iff max(g, 0) < threshold·dv, dv > 0. Without
-    /// `keeps_value` the smallest value stays as it is.
+    /// Updates the minimum with one step of a vehicle that is `seen`: fails iff max(g, 0) < threshold·dv, dv > 0.
+    /// Without `keeps_value` only the verdict is updated.
     #[inline(always)]
     pub fn update(&self, minimum: TtcMinimum<R>, seen: Flag, gap: R, closing: R, keeps_value: bool) -> TtcMinimum<R> {
         let gap = gap.larger(R::ZERO);

@@ -1,6 +1,6 @@
-//! When a driver may react to a vehicle at all, as far as that depends on the vehicle's own motion only:
-//! visibility and perception rules of UN R157. Worked out once per case, before its lanes, so a lane holds one
-//! step index per model instead of perception state. Twin: `shaders/shared/attention.wgsl`.
+//! The step from which a driver may react to a vehicle, as far as it depends only on that vehicle's motion: visibility
+//! and perception rules of UN R157. It is computed once per case, so a lane holds one step index per model instead of
+//! perception state. Twin: `shaders/shared/attention.wgsl`.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,25 +14,26 @@ pub const NEVER: u32 = u32::MAX;
 
 /// [`AttentionRule::kind`]: from the first step on.
 pub const ALWAYS: u32 = 0;
-/// [`AttentionRule::kind`]: once lateral movement has been visible for some time.
+/// [`AttentionRule::kind`]: once lateral movement has been visible for the required time.
 pub const VISIBLE_MOVEMENT: u32 = 1;
-/// [`AttentionRule::kind`]: once a vehicle beside the ego's path has been seen to deviate from its lane centre.
+/// [`AttentionRule::kind`]: once a vehicle beside the ego's path has deviated from its lane centre for the required
+/// time.
 pub const CUTTING_IN: u32 = 2;
-/// [`AttentionRule::kind`]: once the vehicle in the ego's path has been seen to deviate from its lane centre; the vehicle
-/// ahead of it is seen as late.
+/// [`AttentionRule::kind`]: once the vehicle in the ego's path has deviated from its lane centre for the required time;
+/// the vehicle ahead of it becomes visible at the same step.
 pub const CUTTING_OUT: u32 = 3;
-/// [`AttentionRule::kind`]: once it decelerates; the vehicle ahead of it is seen as late.
+/// [`AttentionRule::kind`]: once the vehicle decelerates; the vehicle ahead of it becomes visible at the same step.
 pub const DECELERATION: u32 = 4;
 
-/// Lateral movement per step from which on a vehicle moves, m: more than rounding.
+/// Minimum lateral movement per step that counts as movement, m: larger than rounding.
 const MOVEMENT_M: f64 = 1e-9;
 
-/// Share by which a loss of speed exceeds the trigger: more than the rounding of speeds, so that a lead at the trigger does
-/// not exceed it.
+/// Relative tolerance by which a loss of speed must exceed the trigger. It is larger than the rounding of speeds, so
+/// that a lead exactly at the trigger does not exceed it.
 const ROUNDING: f64 = 1e-9;
 
-/// What the driver does where the lead never decelerates more than the trigger: the text of Annex 3 is silent, its charts
-/// contain such leads.
+/// What the driver does if the lead never decelerates more than the trigger. The text of Annex 3 does not say; its
+/// charts contain such leads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BelowTrigger {
@@ -44,7 +45,7 @@ pub enum BelowTrigger {
     AtOnce,
 }
 
-/// What has to be seen of the principal vehicle before a driver may react.
+/// What the driver must perceive of the principal vehicle before it may react.
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AttentionRule<R> {
@@ -52,9 +53,9 @@ pub struct AttentionRule<R> {
     pub kind: u32,
     /// Steps from the event to the reaction.
     pub delay_steps: u32,
-    /// Deceleration: what holds where there is no event, a [`BelowTrigger`].
+    /// Deceleration: the behaviour below the trigger, a [`BelowTrigger`].
     pub below_trigger: u32,
-    /// Movement: the lateral gate, m. Deviation: the normal wandering, m. Deceleration: loss of speed in a step, m/s.
+    /// Movement: lateral gate, m. Deviation: normal wandering, m. Deceleration: loss of speed per step, m/s.
     pub threshold: R,
 }
 
@@ -64,8 +65,8 @@ impl AttentionRule<f64> {
         AttentionRule { kind: ALWAYS, delay_steps: 0, below_trigger: 0, threshold: 0.0 }
     }
 
-    /// Once lateral movement has been visible for `visible_s`; at once for a vehicle that starts inside the gate and
-    /// in LVD, where there is nothing to see.
+    /// Once lateral movement has been visible for `visible_s`. At once for a vehicle that starts inside the gate, and
+    /// in LVD, which has no lateral movement.
     pub fn after_visible_movement(visible_s: f64, lateral_gate_m: f64, dt_s: f64, category: Category) -> Self {
         if visible_s <= 0.0 || category == Category::Lvd {
             return Self::always();
@@ -75,12 +76,12 @@ impl AttentionRule<f64> {
     }
 
     /// Once a vehicle that cuts in has deviated from its lane centre by more than `wandering_m` for the perception time
-    /// (Annex 3). A vehicle that is in the ego's path from the start has nothing left to show: it is seen at once.
+    /// (Annex 3). A vehicle that starts in the ego's path is perceived at once.
     pub fn cutting_in(wandering_m: f64, perception_s: f64, dt_s: f64) -> Self {
         Self::deviation(CUTTING_IN, wandering_m, perception_s, dt_s)
     }
 
-    /// The same of a vehicle that cuts out; one that is out of the ego's path from the start has shown what is ahead.
+    /// The same for a vehicle that cuts out. If it starts outside the ego's path, the vehicle ahead is visible at once.
     pub fn cutting_out(wandering_m: f64, perception_s: f64, dt_s: f64) -> Self {
         Self::deviation(CUTTING_OUT, wandering_m, perception_s, dt_s)
     }
@@ -93,7 +94,7 @@ impl AttentionRule<f64> {
         AttentionRule { kind, delay_steps, threshold: wandering_m, ..Self::always() }
     }
 
-    /// Once the vehicle has been seen for the perception time after it decelerated more than the trigger.
+    /// Once the perception time has passed after the vehicle decelerated more than the trigger.
     pub fn after_deceleration(trigger_mps2: f64, perception_s: f64, below: BelowTrigger, dt_s: f64) -> Self {
         if trigger_mps2 <= 0.0 {
             return Self::always();
@@ -106,7 +107,7 @@ impl AttentionRule<f64> {
         }
     }
 
-    /// The host's one rounding.
+    /// Rounds the constants once to the lane arithmetic.
     pub fn cast<R: Real>(&self) -> AttentionRule<R> {
         let AttentionRule { kind, delay_steps, below_trigger, threshold } = *self;
         AttentionRule { kind, delay_steps, below_trigger, threshold: R::from_f64(threshold) }
@@ -114,7 +115,7 @@ impl AttentionRule<f64> {
 }
 
 impl AttentionRule<f32> {
-    /// In the arithmetic of a lane, exactly.
+    /// Converts the constants exactly to the lane arithmetic.
     pub fn widen<R: Real>(&self) -> AttentionRule<R> {
         let AttentionRule { kind, delay_steps, below_trigger, threshold } = *self;
         AttentionRule { kind, delay_steps, below_trigger, threshold: R::from_f64(threshold.into()) }
@@ -122,9 +123,9 @@ impl AttentionRule<f32> {
 }
 
 impl<R: Real> AttentionRule<R> {
-    /// First step at which the driver may react to the principal vehicle and to the one ahead of it; [`NEVER`] where
-    /// there is none. `lateral` (m) and `speed` (m/s) give the principal vehicle's motion at steps below `steps`;
-    /// `half_widths` is (W_e + W_o)/2, m.
+    /// First steps at which the driver may react to the principal vehicle and to the one ahead of it, or [`NEVER`].
+    /// `lateral` (m) and `speed` (m/s) give the principal vehicle's motion at steps below `steps`; `half_widths` is
+    /// (W_e + W_o)/2, m.
     #[inline]
     pub fn attend_from(
         &self,
@@ -161,7 +162,7 @@ impl<R: Real> AttentionRule<R> {
                 slows = step;
             }
             if happens {
-                // Movement is seen at the step that it begins from.
+                // Movement becomes visible at the step where it begins.
                 let from = if self.kind == VISIBLE_MOVEMENT { step.saturating_sub(1) } else { step };
                 event = from + self.delay_steps;
                 break;
@@ -192,13 +193,13 @@ mod tests {
     #[test]
     fn a_deviation_is_perceived_after_its_time() {
         let rule = AttentionRule::cutting_in(0.375, 0.4, 0.1);
-        // 0.375 m are exceeded at step 4 with 1 m/s.
+        // At 1 m/s the deviation exceeds 0.375 m at step 4.
         assert_eq!(first(rule, |i| 3.5 - 0.1 * f64::from(i)), 4 + 4);
         assert_eq!(first(rule, |i| 3.5 - f64::from(i)), 1 + 4);
         assert_eq!(first(rule, |_| 3.5), NEVER);
     }
 
-    /// Parameterizations 3, 4, c and d have the other vehicle in its final place from the start.
+    /// Parameterizations 3, 4, c and d place the other vehicle at its final position from the start.
     #[test]
     fn a_lane_change_that_is_over_at_the_start_is_seen_at_once() {
         let [cuts_in, cuts_out] = [AttentionRule::cutting_in, AttentionRule::cutting_out].map(|of| of(0.375, 0.4, 0.1));
@@ -225,7 +226,7 @@ mod tests {
         }
         let soft = |below| rule(below).attend_from(50, 1.8, |_| 0.0, braking(0.4));
         assert_eq!(soft(BelowTrigger::Never), [NEVER; 2]);
-        // Exactly the trigger, whatever the rounding of the speeds.
+        // A lead exactly at the trigger, at time steps with different rounding of the speeds.
         for dt_s in [0.1, 0.04, 0.01, 0.001] {
             let rule = AttentionRule::after_deceleration(5.0, 0.4, BelowTrigger::Never, dt_s);
             for v in [60.0 / 3.6, 20.0, 130.0 / 3.6] {

@@ -1,5 +1,5 @@
-//! CCHDM: the careful and competent human driver of UN R157, Annex 3. Perceives a cut-in, coasts for the
-//! delay, then ramps up to 0.774 g.
+//! CCHDM: the careful and competent human driver of UN R157, Annex 3. It perceives a cut-in, coasts during the delay,
+//! then ramps up to 0.774 g.
 
 use serde::{Deserialize, Serialize};
 
@@ -14,34 +14,34 @@ use crate::model::scalar::{Flag, Real};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct CchdmProfile {
-    /// The check opens below this lateral gap, m; 0 means that the vehicles overlap across the road.
+    /// The check is active below this lateral gap, m; 0 means that the vehicles overlap laterally.
     pub lateral_gate_m: f64,
     /// Absolute time to collision at which the driver reacts, s (Annex 3: 2.0 s).
     pub ttc_s: f64,
     /// Delay between perception and braking, s (the paper 0.6 s; Annex 3 and the JRC 0.75 s).
     pub delay_s: f64,
-    /// Deceleration while the delay runs: the foot is off the accelerator, m/s² (0.4).
+    /// Deceleration during the delay, with the foot off the accelerator, m/s² (0.4).
     pub coasting_mps2: f64,
     /// Jerk of the ramp, m/s³ (12.65).
     pub jerk_mps3: f64,
-    /// Largest deceleration, m/s² (0.774 g).
+    /// Maximum deceleration, m/s² (0.774 g).
     pub max_deceleration_mps2: f64,
-    /// Categories in which the driver brakes from the first moment of attention on, without a TTC check.
+    /// Categories in which the driver brakes from the first moment of attention, without a TTC check.
     pub always_unsafe: Vec<Category>,
-    /// Lateral wandering that counts as normal: risk perception begins beyond it, m (Annex 3: 0.375 m);
-    /// 0 switches the perception rule off.
+    /// Lateral wandering that counts as normal, m: risk perception begins beyond it (Annex 3: 0.375 m). 0 disables the
+    /// perception rule.
     pub wandering_m: f64,
-    /// Risk perception time after the wandering or the trigger below was exceeded, s (Annex 3: 0.4 s).
+    /// Risk perception time after the wandering or the deceleration trigger is exceeded, s (Annex 3: 0.4 s).
     pub perception_time_s: f64,
-    /// Cut-out: the danger is a time headway of at most this, s, in place of the TTC (Annex 3: 2.0 s), and the braking
-    /// goes on to standstill; 0 keeps the TTC check.
+    /// Cut-out: danger is a time headway of at most this value, s, instead of the TTC (Annex 3: 2.0 s), and the driver
+    /// then brakes to standstill. 0 keeps the TTC check.
     pub cut_out_headway_s: f64,
-    /// Added to the gap of that headway, m: a gap that was typed to the centimetre counts as the headway that it means.
+    /// Tolerance added to the gap of that headway, m, so that a gap rounded to centimetres still counts as the intended
+    /// headway.
     pub cut_out_headway_tolerance_m: f64,
-    /// Cut-in: when braking that has begun ends.
+    /// Cut-in: when braking ends.
     pub cut_in_braking: CutInBraking,
-    /// LVD: perception begins once the leader decelerates more than this, m/s² (Annex 3: 5 m/s²);
-    /// 0 switches the rule off.
+    /// LVD: perception begins once the leader decelerates more than this, m/s² (Annex 3: 5 m/s²); 0 disables the rule.
     pub lead_deceleration_trigger_mps2: f64,
     /// LVD: what the driver does where the leader never exceeds the trigger.
     pub lvd_below_threshold: BelowTrigger,
@@ -49,12 +49,12 @@ pub struct CchdmProfile {
     pub abort_on_large_ttc: bool,
 }
 
-/// When braking for a vehicle that cuts in ends. The tables of Annex 3 do not say it.
+/// When braking for a vehicle that cuts in ends. The tables of Annex 3 do not specify it.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CutInBraking {
-    /// At each step at which the TTC exceeds `ttc_s` (the JRC's simulator). Braking then begins anew and ends again, and
-    /// the gap creeps shut.
+    /// At each step at which the TTC exceeds `ttc_s` (the JRC's simulator). Braking can then restart and end
+    /// repeatedly, while the gap closes slowly.
     WhileUnsafe,
     /// Once the ego is no faster than the vehicle ahead.
     UntilEqualSpeeds,
@@ -67,7 +67,7 @@ pub struct Cchdm<R> {
     until_equal_speeds: bool,
     lateral_gate: R,
     ttc: R,
-    /// The danger is a headway of at most this, s; 0 where it is a TTC.
+    /// Danger is a headway of at most this value, s; 0: danger is a TTC.
     headway: R,
     headway_tolerance: R,
     coasting: R,
@@ -134,7 +134,8 @@ impl DriverProfile for CchdmProfile {
 }
 
 impl<R: Real> Cchdm<R> {
-    /// The gap that is a danger, m, at the ego's speed and a closing speed `dv`: a headway, or a TTC of either sign.
+    /// Gap below which the driver sees danger, m, at the ego's speed and a closing speed `dv`: from a headway, or from
+    /// a TTC of either sign.
     #[inline(always)]
     pub fn danger_gap(&self, v_ego: R, dv: R) -> R {
         if self.headway > R::ZERO { self.headway * v_ego + self.headway_tolerance } else { self.ttc * dv.abs() }
@@ -155,14 +156,14 @@ impl<R: Real> DriverModel<R> for Cchdm<R> {
         !Flag::of(self.always_unsafe) & !lateral_gap.is_at_most(self.lateral_gate)
     }
 
-    /// The ramp starts from the coasting deceleration: the first braking step is 0.4 + jerk·dt.
+    /// The ramp starts at the coasting deceleration: the first braking step is 0.4 + jerk·dt.
     #[inline(always)]
     fn initial(&self) -> DriverState<R> {
         DriverState { deceleration: self.coasting, delay_steps: self.delay_steps }
     }
 
-    /// Unsafe iff h ≤ 0 and |g/dv| ≤ 2.0 s. Because of |TTC| the driver goes on braking below the other's
-    /// speed until the opening gap exceeds 2 s of |dv|. With a headway: unsafe iff h ≤ 0 and g ≤ 2.0 s · v_e.
+    /// Unsafe iff h ≤ 0 and |g/dv| ≤ 2.0 s. Because of |TTC| the driver keeps braking below the other vehicle's speed
+    /// until the opening gap exceeds 2 s of |dv|. With a headway: unsafe iff h ≤ 0 and g ≤ 2.0 s · v_e.
     #[inline(always)]
     fn check(&self, view: &View<R>) -> Hazard<R> {
         let dv = view.closing();

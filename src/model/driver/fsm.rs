@@ -1,5 +1,5 @@
-//! FSM: the Fuzzy Safety Model (Mattas et al. 2020; UN R157, Annex 3). Two fuzzy surrogates — proactive
-//! (PFS) and critical (CFS) — tell how hard to brake.
+//! FSM: the Fuzzy Safety Model (Mattas et al. 2020; UN R157, Annex 3). Two fuzzy surrogates, proactive (PFS) and
+//! critical (CFS), determine how hard the driver brakes.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,7 +9,7 @@ use super::{
 use crate::model::case::Category;
 use crate::model::scalar::{Flag, Real};
 
-/// Which acceleration the CFS step divides by when the ego would be slower than the other vehicle after τ.
+/// Which acceleration the CFS step divides by if the ego would be slower than the other vehicle after τ.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CfsStep {
@@ -27,13 +27,13 @@ pub struct FsmProfile {
     pub reaction_time_s: f64,
     /// b_comf: comfortable deceleration, m/s² (4).
     pub comfortable_deceleration_mps2: f64,
-    /// b_max: largest deceleration the surrogates count on, m/s² (6).
+    /// b_max: maximum deceleration that the surrogates assume, m/s² (6).
     pub max_surrogate_deceleration_mps2: f64,
     /// b_lead: deceleration the leader may reach, m/s² (7).
     pub lead_deceleration_mps2: f64,
     /// d1: safety margin, m (2), used twice.
     pub margin_m: f64,
-    /// Added to the time to reach the other vehicle in the lateral gate, s (0.1).
+    /// Added to the ego's time to pass the other vehicle in the lateral gate, s (0.1).
     pub lateral_gate_margin_s: f64,
     /// Jerk of the ramp, m/s³ (12.65).
     pub jerk_mps3: f64,
@@ -106,7 +106,7 @@ impl DriverProfile for FsmProfile {
 /// 0 beyond the safe distance, 1 below the unsafe one, linear between.
 #[inline(always)]
 fn fuzzy<R: Real>(distance: R, safe: R, dangerous: R) -> R {
-    // Before the choice, so that batches of lanes choose without a branch; what is not chosen may be NaN.
+    // Computed before the selection, so that batches of lanes select without a branch; an unselected value may be NaN.
     let between = (distance - safe).exact_div(dangerous - safe);
     let is_safe = distance.is_at_least(safe);
     let is_dangerous = distance.is_at_most(dangerous);
@@ -114,7 +114,7 @@ fn fuzzy<R: Real>(distance: R, safe: R, dangerous: R) -> R {
 }
 
 impl<R: Real> Fsm<R> {
-    /// Proactive fuzzy surrogate of the leader's possible braking, 0…1.
+    /// Proactive fuzzy surrogate: the leader may brake; 0 to 1.
     #[inline(always)]
     pub fn pfs(&self, v_ego: R, v_other: R, gap: R) -> R {
         let reaction = v_ego * self.tau;
@@ -124,7 +124,7 @@ impl<R: Real> Fsm<R> {
         fuzzy(gap - self.margin, d_safe, d_unsafe)
     }
 
-    /// Critical fuzzy surrogate of the present closing, 0…1.
+    /// Critical fuzzy surrogate: the present closing speed; 0 to 1.
     #[inline(always)]
     pub fn cfs(&self, v_ego: R, v_other: R, gap: R, a_ego: R) -> R {
         let a_limited = a_ego.larger(-self.b_comf);
@@ -135,7 +135,7 @@ impl<R: Real> Fsm<R> {
         let d_new = (v_ego + a_limited * self.half_tau - v_other) * self.tau;
         let d_safe = d_new + dv_new * dv_new * self.half_inverse_comf;
         let d_unsafe = d_new + dv_new * dv_new * self.half_inverse_max;
-        // g < dv²/(2|a|), multiplied out.
+        // g < dv²/(2|a|), without a division.
         let is_short = ((gap + gap) * a_step.abs()).is_below(dv * dv);
         let slower_then = is_short.choose(R::ONE, R::ZERO);
         let faster_then = fuzzy(gap, d_safe, d_unsafe);
@@ -143,8 +143,8 @@ impl<R: Real> Fsm<R> {
         closes.choose(v_new.is_below(v_other).choose(slower_then, faster_then), R::ZERO)
     }
 
-    /// Lateral gate, only for h > 0: closed while the other vehicle moves away, while it is faster, or
-    /// while it needs longer to come in than the ego needs to pass it: h/w > (D + (L_e+L_o)/2)/dv + 0.1.
+    /// Lateral gate, only for h > 0. It is closed while the other vehicle moves away, while it is faster, or while it
+    /// needs longer to come in than the ego needs to pass it: h/w > (D + (L_e+L_o)/2)/dv + 0.1.
     #[inline(always)]
     fn gate_is_open(&self, view: &View<R>) -> Flag {
         let dv = view.closing();
@@ -157,7 +157,7 @@ impl<R: Real> Fsm<R> {
 }
 
 impl<R: Real> DriverModel<R> for Fsm<R> {
-    /// The larger of the distances at which PFS and, without acceleration, CFS become 0.
+    /// The larger of the distances beyond which PFS and, without ego acceleration, CFS are 0.
     #[inline(always)]
     fn safe_gap(&self, v_ego: R, v_other: R) -> R {
         let own_stop = v_ego * self.tau + v_ego * v_ego * self.half_inverse_comf;
@@ -165,7 +165,7 @@ impl<R: Real> DriverModel<R> for Fsm<R> {
         proactive.larger(self.steady_gap(v_ego, v_other))
     }
 
-    /// The gate is closed to what is outside and does not come in.
+    /// The gate is closed for a vehicle outside the lane that does not come in.
     #[inline(always)]
     fn ignores(&self, lateral_gap: R, lateral_towards: R) -> Flag {
         lateral_gap.is_positive() & !lateral_towards.is_positive()
@@ -173,15 +173,15 @@ impl<R: Real> DriverModel<R> for Fsm<R> {
 
     const KNOWS_STEADY_FOLLOWING: bool = true;
 
-    /// CFS is 0 beyond it at every deceleration of the ego. Without one this is its safe distance, and one after which
-    /// v_new is above v_o makes that shorter; a larger one, above dv/τ, stops the closing within half of dv·τ.
+    /// Distance beyond which CFS is 0 at every deceleration of the ego. Without deceleration it is the safe distance. A
+    /// deceleration that leaves v_new above v_o shortens it; one above dv/τ stops the closing within half of dv·τ.
     #[inline(always)]
     fn steady_gap(&self, v_ego: R, v_other: R) -> R {
         let dv = (v_ego - v_other).larger(R::ZERO);
         dv * self.tau + dv * dv * self.half_inverse_comf
     }
 
-    /// PFS only: demand PFS·b_comf.
+    /// Unsafe iff PFS ≠ 0; demand PFS·b_comf.
     #[inline(always)]
     fn check_steady(&self, view: &View<R>) -> Hazard<R> {
         let pfs = self.pfs(view.v_ego, view.v_other, view.gap);
@@ -222,7 +222,7 @@ impl<R: Real> DriverModel<R> for Fsm<R> {
         ]
     }
 
-    /// Hold the speed for τ, then the demand: reached with 12.65 m/s³ upwards, at once downwards.
+    /// Holds the speed for τ, then follows the demand: increases at 12.65 m/s³, decreases at once.
     #[inline(always)]
     fn react(&self, state: DriverState<R>, hazard: &Hazard<R>, v_ego: R) -> (DriverState<R>, R) {
         let ramp = (state.deceleration + self.jerk_per_step).smaller(self.max_deceleration);
@@ -234,7 +234,7 @@ impl<R: Real> DriverModel<R> for Fsm<R> {
 mod tests {
     use super::*;
 
-    /// Where CFS brakes, it decides, whatever PFS says; without it PFS does; and where both are 0 all is safe.
+    /// CFS alone sets the demand where it is above 0; otherwise PFS does; where both are 0 the situation is safe.
     #[test]
     fn the_critical_surrogate_decides_before_the_proactive_one() {
         let profile = crate::model::profile::Profile::load("paper").unwrap().fsm;

@@ -1,12 +1,11 @@
 //! The reference drivers of UN R157 and its companions: one file per model, each with its constants
 //! (unit, clause), its check and its reaction, written once over [`Real`].
 //!
-//! Here lives what a driver sees ([`View`]), what it decides ([`Hazard`]) and how it brakes. Here lives
-//! no time loop: the latched step stands once, in [`crate::engine`]. Parameters come from a profile;
-//! decisions go to the lane's frame.
+//! This module defines what a driver sees ([`View`]), what it decides ([`Hazard`]) and how it brakes. It has no time
+//! loop: [`crate::engine`] has the only one. Parameters come from a profile; decisions go to the lane's frame.
 //!
-//! To add a model: one file here, its twin in `shaders/`, one line in the registry (`registry.rs`). A worked
-//! example, which a test builds and runs, stands in `examples/adding-a-driver-model`.
+//! To add a model: one file here, its twin in `shaders/`, one line in the registry (`registry.rs`). A test builds and
+//! runs the worked example in `examples/adding-a-driver-model`.
 
 #[macro_use]
 mod registry;
@@ -21,7 +20,7 @@ pub use profile::{Bound, DriverProfile, SHORT_STEP_S, delay_bound_s};
 
 use crate::model::scalar::{Flag, Real};
 
-/// Makes the modules, their public names and [`ModelId`] from the registry.
+/// Declares the modules, their public names and [`ModelId`] from the registry.
 macro_rules! declare_models {
     ($($(#[$attribute:meta])* $file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
         $(
@@ -40,7 +39,7 @@ macro_rules! declare_models {
         }
 
         impl ModelId {
-            /// All, in the order of every table.
+            /// All models, in the order of every table.
             pub const ALL: [ModelId; MODELS] = [$(ModelId::$model),+];
 
             /// Name in tables, files and lane keys.
@@ -61,7 +60,7 @@ pub use cchdm::CutInBraking;
 pub use fsm::CfsStep;
 
 impl ModelId {
-    /// From its name, whatever the case; `CC` and `CC_human_driver` are the JRC's names of CCHDM.
+    /// Parses a name, ignoring case; `CC` and `CC_human_driver` are the JRC's names for CCHDM.
     pub fn parse(text: &str) -> Option<ModelId> {
         let folded = text.to_ascii_lowercase();
         match folded.as_str() {
@@ -70,7 +69,7 @@ impl ModelId {
         }
     }
 
-    /// The names of all, as messages list them: `Reg157, CCHDM, RSS, FSM`.
+    /// All names as messages list them: `Reg157, CCHDM, RSS, FSM`.
     pub fn names() -> String {
         ModelId::ALL.map(ModelId::name).join(", ")
     }
@@ -81,7 +80,7 @@ impl ModelId {
     }
 }
 
-/// What the ego's driver sees of one other vehicle at one step. The ego is in the middle of its lane.
+/// What the ego's driver sees of one other vehicle at one step. The ego stays in the middle of its lane.
 #[derive(Debug, Clone, Copy)]
 pub struct View<R> {
     /// v_e, m/s.
@@ -92,7 +91,7 @@ pub struct View<R> {
     pub v_other: R,
     /// g: signed gap, bumper to bumper, m; negative when the vehicles overlap along the road.
     pub gap: R,
-    /// h: gap across the road, m; negative when they overlap across it.
+    /// h: lateral gap, m; negative when the vehicles overlap laterally.
     pub lateral_gap: R,
     /// w: lateral speed of the other vehicle towards the ego, m/s.
     pub lateral_towards: R,
@@ -107,7 +106,7 @@ impl<R: Real> View<R> {
         self.v_ego - self.v_other
     }
 
-    /// x_e > x_o: the other vehicle's centre is behind the ego's.
+    /// x_e > x_o: the centre of the other vehicle is behind that of the ego.
     #[inline(always)]
     pub fn is_behind(&self) -> Flag {
         (self.gap + self.half_lengths).is_negative()
@@ -119,7 +118,7 @@ impl<R: Real> View<R> {
 pub struct Hazard<R> {
     /// The situation is unsafe: the driver reacts.
     pub is_unsafe: Flag,
-    /// Deceleration that the driver asks for, m/s²; models without a demand ask for their largest.
+    /// Deceleration demanded by the driver, m/s²; models without a graded demand return their maximum.
     pub demand: R,
 }
 
@@ -128,44 +127,46 @@ pub struct Hazard<R> {
 pub struct DriverState<R> {
     /// Deceleration reached so far, m/s².
     pub deceleration: R,
-    /// Steps of the reaction time that are left; counted down on unsafe steps only.
+    /// Remaining steps of the reaction time; decremented on unsafe steps only.
     pub delay_steps: u32,
 }
 
-/// A driver model in the lane arithmetic: pure functions of what it sees and its latched state.
+/// A driver model in the lane arithmetic: pure functions of the view and the latched state.
 pub trait DriverModel<R: Real>: Copy + Send + Sync {
-    // What follows is what a model promises, and saves batches of lanes trouble; without a word from a model they
-    // assume nothing. What it says has to be tested: verdicts would differ from those of single lanes.
+    // The following items are guarantees of a model that let batches of lanes skip work; the defaults guarantee
+    // nothing. Tests must check each guarantee: a false one changes verdicts.
 
-    /// Its check looks at [`View::lateral_towards`].
+    /// The check reads [`View::lateral_towards`].
     const SEES_LATERAL_SPEED: bool = true;
 
-    /// Its check looks at [`View::a_ego`].
+    /// The check reads [`View::a_ego`].
     const SEES_OWN_ACCELERATION: bool = true;
-    /// Its reaction looks at [`DriverState::deceleration`].
+    /// The reaction reads [`DriverState::deceleration`].
     const KEEPS_DECELERATION: bool = true;
 
-    /// Safe distance, m ≥ 0: while both keep their speeds, m/s, a vehicle that overlaps with the ego across the road is
-    /// safe at every larger gap. The caller may add a margin for rounding; infinite without a promise.
+    /// Safe distance, m ≥ 0. While both vehicles keep their speeds, m/s, a vehicle that overlaps the ego laterally is
+    /// safe at every larger gap. The caller may add a margin for rounding; infinite: no guarantee.
     #[inline(always)]
     fn safe_gap(&self, _v_ego: R, _v_other: R) -> R {
         R::INFINITY
     }
 
-    /// Whether a vehicle beside the ego, at this lateral gap h ≥ 0, m, and lateral speed towards it, m/s, is safe at
-    /// every gap, every speed and every acceleration of the ego. Uses the comparisons of the check itself, without the
-    /// lateral speed if the check does not see it.
+    /// Whether a vehicle beside the ego is safe at every gap, speed and acceleration of the ego, at this lateral gap h
+    /// ≥ 0, m, and lateral speed towards the ego, m/s. It uses the comparisons of the check itself, without the lateral
+    /// speed if the check does not read it.
     #[inline(always)]
     fn ignores(&self, _lateral_gap: R, _lateral_towards: R) -> Flag {
         Flag::FALSE
     }
 
-    /// The two following functions are implemented, and the reaction neither accelerates the ego nor waits again.
+    /// Whether the two following functions are implemented, and the reaction neither accelerates the ego nor restarts
+    /// its reaction time.
     const KNOWS_STEADY_FOLLOWING: bool = false;
 
-    /// Distance, m ≥ 0, beyond which the driver follows steadily a vehicle that overlaps with the ego across the road
-    /// and keeps its speed: [`DriverModel::check_steady`] agrees with the check, whatever the ego's deceleration.
-    /// Not larger at a smaller speed of the ego, m/s. Rounding may make it too small by a thousandth and a millimetre.
+    /// Distance, m ≥ 0, beyond which the driver is in steady following of a vehicle that overlaps laterally and keeps
+    /// its speed. [`DriverModel::check_steady`] then agrees with the check at every deceleration of the ego. It does
+    /// not increase as the ego's speed, m/s, decreases. Rounding may make it too small by a thousandth and a
+    /// millimetre.
     #[inline(always)]
     fn steady_gap(&self, _v_ego: R, _v_other: R) -> R {
         R::INFINITY
@@ -180,22 +181,22 @@ pub trait DriverModel<R: Real>: Copy + Send + Sync {
 
     /// State at the start of a lane.
     fn initial(&self) -> DriverState<R>;
-    /// Is the situation with this vehicle unsafe, and how hard should the ego brake?
+    /// Checks whether this vehicle makes the situation unsafe, and how hard the ego should brake.
     fn check(&self, view: &View<R>) -> Hazard<R>;
-    /// Whether a reaction that has begun goes on, whatever the check says. `view` is the principal vehicle's; while both
-    /// keep their speeds the answer does not become true.
+    /// Whether a reaction that has begun continues regardless of the check. `view` is the principal vehicle's. While
+    /// both vehicles keep their speeds the result never changes to true.
     #[inline(always)]
     fn keeps_braking(&self, _state: &DriverState<R>, _view: &View<R>) -> Flag {
         Flag::FALSE
     }
-    /// Its constants by the names that its shader gives them (`override driver_…`); flags are 0 or 1.
+    /// The model's constants by their names in its shader (`override driver_…`); flags are 0 or 1.
     fn shader_constants(&self) -> Vec<(&'static str, f64)>;
-    /// One unsafe step: the new state and the ego's next speed, m/s, ≥ 0 and not above `v_ego`.
+    /// Reacts to one unsafe step: returns the new state and the ego's next speed, m/s, between 0 and `v_ego`.
     fn react(&self, state: DriverState<R>, hazard: &Hazard<R>, v_ego: R) -> (DriverState<R>, R);
 }
 
-/// One unsafe step of any model: the reaction time is paid once, coasting; then the deceleration
-/// follows `braking`, and the speed stops at 0.
+/// One unsafe step of any model: the ego coasts once for the reaction time, then the deceleration follows `braking`;
+/// the speed stops at 0.
 #[inline(always)]
 fn latched_braking<R: Real>(state: DriverState<R>, coasting: R, braking: R, v_ego: R, dt: R) -> (DriverState<R>, R) {
     let is_delayed = Flag::reached(state.delay_steps, 1);
@@ -206,7 +207,7 @@ fn latched_braking<R: Real>(state: DriverState<R>, coasting: R, braking: R, v_eg
     (DriverState { deceleration, delay_steps }, v_next)
 }
 
-/// Whole steps of a delay. Resolved in f64: in f32, 0.6 s / 0.04 s would come out as 16 steps.
+/// Delay in whole steps. Computed in f64: in f32, 0.6 s / 0.04 s would give 16 steps.
 fn delay_steps(delay_s: f64, dt_s: f64) -> u32 {
     ((delay_s / dt_s - 1e-9).ceil().max(0.0) as u32).min(Flag::LATEST_STEP)
 }
@@ -224,12 +225,12 @@ mod tests {
         assert_eq!(delay_steps(0.35, 0.1), 4);
         assert_eq!(delay_steps(0.6, 0.04), 15);
         assert_eq!(delay_steps(0.0, 0.04), 0);
-        // Never, as a step that lanes can count down from.
+        // Never, as a step index that lanes can count down from.
         assert_eq!(delay_steps(f64::MAX, 0.04), Flag::LATEST_STEP);
     }
 
-    /// What a model promises about gaps and vehicles beside the lane, on random vehicles: it keeps the promise, and
-    /// promises as much as it can.
+    /// Checks on random vehicles that a model keeps its guarantees about gaps and vehicles beside the lane, and that
+    /// the guarantees are not weaker than necessary.
     fn keeps_its_promises<M: DriverModel<f32>>(name: &str, model: M) {
         let mut drawn = 0;
         let mut between = |least: f32, most: f32| {
@@ -272,7 +273,7 @@ mod tests {
             let said =
                 |hazard: Hazard<f32>| (hazard.is_unsafe.holds(), hazard.is_unsafe.holds().then_some(hazard.demand));
             let hazard = model.check(&slowing);
-            // All else is not the lane's in batches.
+            // Batches of lanes leave all other fields undefined.
             let seen = View { a_ego: 0.0, lateral_gap: -1.9, lateral_towards: 0.0, ..slowing };
             let is_same = said(hazard) == said(model.check_steady(&seen));
             if view.gap > 1.001 * steady_gap + 0.001 {
@@ -298,7 +299,7 @@ mod tests {
         assert!(unsafe_below > 100, "{name}: the safe distance could be smaller");
     }
 
-    /// Of the models that come with the crate.
+    /// Covers the models that come with the crate.
     #[test]
     fn models_keep_their_promises_under_every_profile() {
         for name in Profile::names() {

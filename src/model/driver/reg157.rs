@@ -15,25 +15,26 @@ use crate::model::scalar::{Flag, Real};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Reg157Profile {
-    /// The clause whose numbers these are, as sheets name it.
+    /// The clause that defines these numbers, as sheets name it.
     pub clause: String,
-    /// The check opens at this lateral gap, m (0.5 m is 0.3 m beyond the marking for 3.5 m lanes and
-    /// 1.9 m cars: R157, 5.2.5.2).
+    /// The check is active below this lateral gap, m (0.5 m is 0.3 m beyond the marking for 3.5 m lanes and 1.9 m cars:
+    /// R157, 5.2.5.2).
     pub lateral_gate_m: f64,
     /// Reaction time, s (R157: 0.35 s).
     pub reaction_time_s: f64,
-    /// Deceleration, m/s², at once (R157: 6 m/s²).
+    /// Deceleration, m/s², reached at once (R157: 6 m/s²).
     pub deceleration_mps2: f64,
-    /// Added to the threshold, s. Not in the regulation; the public simulators have 0.1 s, and without
-    /// it the model collides in 80–100 % of LVD runs, which the paper's table rules out.
+    /// Margin added to the threshold, s. It is not in the regulation: the public simulators use 0.1 s. Without it the
+    /// model collides in 80–100 % of LVD runs, which contradicts the paper's table.
     pub margin_s: f64,
-    /// Added as well, time steps; the reaction time then counts as rounded up to whole steps, as the driver makes
-    /// it. The regulation's threshold is exactly what the braking needs: without a step more, rounding decides contacts.
+    /// Further margin, in time steps; with it the reaction time is rounded up to whole steps, as the driver applies it.
+    /// The regulation's threshold is exactly the time that braking needs, so without an extra step rounding decides
+    /// contacts.
     pub margin_steps: f64,
-    /// Time for which the lateral movement must have been visible before the model may react to a
-    /// vehicle that starts outside the gate, s (R157: 0.72 s; 0 switches the rule off).
+    /// Time for which lateral movement must have been visible before the model may react to a vehicle that starts
+    /// outside the gate, s (R157: 0.72 s; 0 disables the rule).
     pub visible_lateral_movement_s: f64,
-    /// Categories in which the model brakes from the first moment on, without a check.
+    /// Categories in which the model brakes from the first step, without a check.
     pub always_unsafe: Vec<Category>,
 }
 
@@ -42,7 +43,7 @@ pub struct Reg157Profile {
 pub struct Reg157<R> {
     always_unsafe: bool,
     lateral_gate: R,
-    /// 1/(2·deceleration), s²/m, folded so that a lane never divides.
+    /// 1/(2·deceleration), s²/m, precomputed so that a lane never divides.
     half_inverse_deceleration: R,
     /// reaction time + margin, s.
     constant: R,
@@ -77,12 +78,12 @@ impl DriverProfile for Reg157Profile {
         ]
     }
 
-    /// The margin has to make up for what whole steps add: half a step and what the reaction time is rounded up by.
+    /// The margin must cover the delay that whole steps add: half a step and the rounding up of the reaction time.
     fn time_step_bounds(&self, dt_s: f64) -> Vec<(&'static str, f64)> {
         let steps = f64::from(delay_steps(self.reaction_time_s, dt_s));
         let late_s = steps * dt_s - self.reaction_time_s + dt_s / 2.0;
         let longest_s = self.margin_s.max(SHORT_STEP_S);
-        // A margin below half a step is for something else, such as 0 for the regulation's text; whole steps suffice.
+        // A margin below half a step has another purpose (0 is the regulation's text) and does not bound the step.
         let is_late = dt_s <= longest_s && self.margin_s >= dt_s / 2.0 && late_s > self.margin_s + 1e-9;
         let margin_bound_s = if is_late { rounded_down_s(self.reaction_time_s / steps) } else { longest_s };
         vec![
@@ -98,7 +99,7 @@ impl DriverProfile for Reg157Profile {
 }
 
 impl Reg157Profile {
-    /// What the threshold adds to the time of braking, s: reaction time and margins.
+    /// Time that reaction and margins add to the braking time in the threshold, s.
     pub fn reaction_and_margin_s(&self, dt_s: f64) -> f64 {
         if self.margin_steps == 0.0 {
             return self.reaction_time_s + self.margin_s;
@@ -136,7 +137,7 @@ impl<R: Real> DriverModel<R> for Reg157<R> {
         DriverState { deceleration: R::ZERO, delay_steps: self.delay_steps }
     }
 
-    /// Unsafe iff h ≤ gate and |g/dv| ≤ dv/(2·6) + 0.35 + margin: absolute TTC, signed dv on the right.
+    /// Unsafe iff h ≤ gate and |g/dv| ≤ dv/(2·6) + 0.35 + margin: absolute TTC on the left, signed dv on the right.
     #[inline(always)]
     fn check(&self, view: &View<R>) -> Hazard<R> {
         let dv = view.closing();
@@ -158,7 +159,7 @@ impl<R: Real> DriverModel<R> for Reg157<R> {
         ]
     }
 
-    /// Hold the speed for 0.35 s, then 6 m/s² at once, no jerk limit.
+    /// Holds the speed for 0.35 s, then brakes at 6 m/s² at once, without a jerk limit.
     #[inline(always)]
     fn react(&self, state: DriverState<R>, hazard: &Hazard<R>, v_ego: R) -> (DriverState<R>, R) {
         latched_braking(state, R::ZERO, hazard.demand, v_ego, self.dt)

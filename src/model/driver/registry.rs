@@ -1,11 +1,11 @@
 //! The registry of driver models: one line each.
 
-/// Calls a macro with a line per driver model, in the order of every table: its file (here and, as `.wgsl`,
-/// in `shaders/`; also its table in a profile), its type, the type of its constants in a profile, its name.
+/// Calls a macro with one line per driver model, in the order of every table. A line has the file (here, as `.wgsl` in
+/// `shaders/`, and as the table in a profile), the type, the type of its constants in a profile, and the name.
 ///
-/// Attributes before a line go on the model's field in [`Profile`](crate::model::profile::Profile) and nowhere else:
-/// with `#[serde(default)]` a profile may leave the model's table out, where the constants have defaults. The
-/// models below have none, so that no profile forgets one of their constants.
+/// Attributes before a line apply only to the model's field in [`Profile`](crate::model::profile::Profile). With
+/// `#[serde(default)]` a profile may omit the model's table if the constants have defaults. The models below have none,
+/// so that a profile must give all their constants.
 macro_rules! for_every_driver_model {
     ($callback:ident) => {
         $callback! {

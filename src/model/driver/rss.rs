@@ -15,7 +15,7 @@ use crate::model::scalar::{Flag, Real};
 pub struct RssProfile {
     /// ρ: response time, s (0.75).
     pub response_time_s: f64,
-    /// a_acc: largest acceleration of the ego during the response time, m/s² (3).
+    /// a_acc: maximum acceleration of the ego during the response time, m/s² (3).
     pub max_acceleration_mps2: f64,
     /// b_ego: deceleration that the ego will reach, m/s² (6).
     pub ego_deceleration_mps2: f64,
@@ -27,7 +27,7 @@ pub struct RssProfile {
     pub lateral_margin_m: f64,
     /// Jerk of the ramp, m/s³ (12.65).
     pub jerk_mps3: f64,
-    /// Largest deceleration, m/s² (0.774 g).
+    /// Maximum deceleration, m/s² (0.774 g).
     pub max_deceleration_mps2: f64,
 }
 
@@ -105,7 +105,7 @@ impl<R: Real> Rss<R> {
             - v_other * v_other * self.half_inverse_other
     }
 
-    /// d_lat = μ + (2|v_y| + a_lat ρ) ρ/2 + (|v_y| + a_lat ρ)²/(2 a_lat), m; direction ignored.
+    /// d_lat = μ + (2|v_y| + a_lat ρ) ρ/2 + (|v_y| + a_lat ρ)²/(2 a_lat), m; the direction of v_y is ignored.
     #[inline(always)]
     pub fn lateral_distance(&self, lateral_speed: R) -> R {
         let v_y = lateral_speed.abs();
@@ -159,7 +159,7 @@ impl<R: Real> DriverModel<R> for Rss<R> {
         ]
     }
 
-    /// Hold the speed for ρ, then ramp from 0 at 12.65 m/s³ up to 0.774 g.
+    /// Holds the speed for ρ, then ramps from 0 at 12.65 m/s³ up to 0.774 g.
     #[inline(always)]
     fn react(&self, state: DriverState<R>, hazard: &Hazard<R>, v_ego: R) -> (DriverState<R>, R) {
         let braking = (state.deceleration + self.jerk_per_step).smaller(hazard.demand);

@@ -1,20 +1,20 @@
-//! Axes of the figures: linear or logarithmic, with ticks at plain numbers.
+//! Axes of the figures: linear or logarithmic, with ticks at round numbers.
 
 use super::svg::Position;
 use crate::support::readable::{OneTwoFive, next, one_two_five, plain_step};
 
-/// How an axis places its values.
+/// Scale of an axis.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum AxisScale {
-    /// Equal differences are equally far apart.
+    /// Linear.
     #[default]
     Linear,
-    /// Equal ratios are equally far apart; zero and what lies below it have no place.
+    /// Logarithmic; zero and negative values cannot be shown.
     Logarithmic,
 }
 
 impl AxisScale {
-    /// Whether the axis has a place for `value`. Beyond 1e±300 widths and ratios would leave the range of `f64`.
+    /// Whether the axis can show `value`. Beyond 1e±300 widths and ratios would overflow `f64`.
     pub(in crate::report) fn shows(self, value: f64) -> bool {
         match self {
             Self::Linear => value.abs() <= 1e300,
@@ -22,7 +22,7 @@ impl AxisScale {
         }
     }
 
-    /// The value in the units in which the axis is even.
+    /// The value in the units in which the axis is linear.
     fn place(self, value: f64) -> f64 {
         match self {
             Self::Linear => value,
@@ -31,18 +31,18 @@ impl AxisScale {
     }
 }
 
-/// An axis between two ends, both at a plain number.
+/// An axis between two round ends.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::report) struct Axis {
     scale: AxisScale,
-    /// Ends, as [`AxisScale::place`] gives them.
+    /// Ends, as returned by [`AxisScale::place`].
     low: f64,
     high: f64,
     from_px: f64,
     to_px: f64,
 }
 
-/// A place on the axis that is marked, and the number beside it, if there is room for one.
+/// A tick of the axis, with its number if there is room for it.
 #[derive(Debug, Clone, PartialEq)]
 pub(in crate::report) struct Tick {
     pub at_px: f64,
@@ -50,14 +50,15 @@ pub(in crate::report) struct Tick {
 }
 
 impl Axis {
-    /// The axis that has a place for all `values` it can show, its ends rounded outwards. `None` without any such
-    /// value. If all are equal, the axis reaches a little to both sides.
+    /// The axis for all `values` that it can show, its ends rounded outwards. `None` without such a value. If all are
+    /// equal, the axis extends a little to both sides.
     pub fn around(scale: AxisScale, values: &[f64], (from_px, to_px): (f64, f64)) -> Option<Self> {
         let shown = || values.iter().copied().filter(|v| scale.shows(*v));
         let (min, max) = (shown().reduce(f64::min)?, shown().reduce(f64::max)?);
         let (low, high) = match scale {
             AxisScale::Linear => {
-                // Equal but for rounding counts as equal: a step between such ends would be lost in the values.
+                // Values equal except for rounding count as equal, because a step between such ends would be below the
+                // resolution of f64.
                 let size = min.abs().max(max.abs());
                 let margin = if max - min > 1e-9 * size { 0.0 } else { 0.1 * if size == 0.0 { 1.0 } else { size } };
                 let (min, max) = (min - margin, max + margin);
@@ -78,7 +79,7 @@ impl Axis {
         Some(Self { scale, low, high, from_px, to_px })
     }
 
-    /// The axis that ends exactly at `low` and `high` (finite, `low < high`), linear.
+    /// The linear axis that ends exactly at `low` and `high` (finite, `low < high`).
     pub fn exactly((low, high): (f64, f64), (from_px, to_px): (f64, f64)) -> Self {
         Self { scale: AxisScale::Linear, low, high, from_px, to_px }
     }
@@ -92,18 +93,18 @@ impl Axis {
         (self.to_px - self.from_px).abs()
     }
 
-    /// How many numbers stand above one another without crowding.
+    /// How many numbers fit above one another without crowding.
     pub fn vertical_numbers(&self) -> usize {
         let most = if self.scale == AxisScale::Linear { 6.0 } else { 8.0 };
         (self.length_px() / 18.0).clamp(2.0, most) as usize
     }
 
-    /// Whether the axis has a place for `value`.
+    /// Whether the axis can show `value`.
     pub fn shows(&self, value: f64) -> bool {
         self.scale.shows(value)
     }
 
-    /// Where `value` is; at the nearer end if the axis has no place for it.
+    /// Position of `value`, px; the nearer end if the axis cannot show it.
     pub fn at(&self, value: f64) -> f64 {
         let place = match self.scale {
             AxisScale::Logarithmic if value <= 0.0 => self.low,
@@ -113,7 +114,7 @@ impl Axis {
         self.from_px + share * (self.to_px - self.from_px)
     }
 
-    /// The ticks, with about `most` numbers at most.
+    /// The ticks, with at most about `most` numbers.
     pub fn ticks(&self, most: usize) -> Vec<Tick> {
         match self.scale {
             AxisScale::Linear => self.linear_ticks(most),
@@ -129,7 +130,7 @@ impl Axis {
     fn linear_ticks(&self, most: usize) -> Vec<Tick> {
         let step = plain_step((self.high - self.low) / most.max(1) as f64);
         let (first, last) = ((self.low / step - 1e-9).ceil(), (self.high / step + 1e-9).floor());
-        // Neighbours must differ in their numbers, however far from zero they are.
+        // Neighbouring numbers must differ, at any distance from zero.
         let largest = self.low.abs().max(self.high.abs()) / step;
         let digits = 2 + libm::log10(largest.max(1.0)).ceil() as usize;
         let count = (last - first).max(0.0) as u32;
@@ -140,7 +141,8 @@ impl Axis {
         (0..=count.min(100)).map(tick).collect()
     }
 
-    /// Within two decades 1, 2 and 5 are named, else the decades, and only every other or fewer if they are many.
+    /// Up to two decades 1, 2 and 5 have numbers, otherwise the decades, and every other decade or fewer if there are
+    /// many.
     fn decade_ticks(&self, most: usize) -> Vec<Tick> {
         let decades = self.high - self.low;
         let every = (decades / most.max(1) as f64).ceil().max(1.0) as i32;
@@ -164,11 +166,11 @@ impl Axis {
     }
 }
 
-/// The values a logarithmic axis must have room for, of estimates and their intervals (estimate, lower, upper).
+/// The values that a logarithmic axis must include, from estimates and their intervals (estimate, lower, upper).
 ///
-/// A lower end of almost nothing would squeeze all else into a corner: the axis starts no more than one decade
-/// below the smallest estimate or, where that is zero, upper end. Below an upper end that stands for a zero estimate
-/// there is room for an arrow.
+/// The axis starts at most one decade below the smallest estimate or, where that is zero, below the upper end. Without
+/// this limit a lower end close to zero would compress everything else. An upper end that represents a zero estimate
+/// has room for an arrow below it.
 pub(in crate::report) fn logarithmic_reach(intervals: &[(f64, f64, f64)]) -> Vec<f64> {
     let shown = |v: &f64| AxisScale::Logarithmic.shows(*v);
     let middles: Vec<f64> = intervals.iter().map(|(e, _, u)| if *e > 0.0 { *e } else { *u / 3.0 }).collect();
@@ -177,12 +179,12 @@ pub(in crate::report) fn logarithmic_reach(intervals: &[(f64, f64, f64)]) -> Vec
     middles.iter().copied().chain(intervals.iter().map(|(_, _, u)| *u)).chain(lows).filter(shown).collect()
 }
 
-/// A number with three digits in plain short form: `0.012`, `250`, `1.5e-6`; not finite in words.
+/// A number with three digits in short form: `0.012`, `250`, `1.5e-6`; NaN and infinity in words.
 pub(in crate::report) fn number(value: f64) -> String {
     digits_text(value, 3)
 }
 
-/// A number with so many significant digits, without zeros at the end; from 1e5 on and below 0.001 as a power.
+/// A number with this many significant digits, without trailing zeros; from 1e5 and below 0.001 as a power of ten.
 fn digits_text(value: f64, digits: usize) -> String {
     if !value.is_finite() {
         return if value.is_nan() { "not a number" } else { "infinite" }.to_string();
@@ -196,7 +198,7 @@ fn digits_text(value: f64, digits: usize) -> String {
     power_text(mantissa, exponent, digits as i32 - 1)
 }
 
-/// `mantissa` · 10^`exponent` with at most so many decimals of the mantissa.
+/// `mantissa` · 10^`exponent` with at most this many decimals of the mantissa.
 fn power_text(mantissa: f64, exponent: i32, decimals: i32) -> String {
     let trimmed = |text: String| match text.contains('.') {
         true => text.trim_end_matches('0').trim_end_matches('.').to_string(),
@@ -205,7 +207,7 @@ fn power_text(mantissa: f64, exponent: i32, decimals: i32) -> String {
     if !(-3..5).contains(&exponent) {
         return format!("{}e{exponent}", trimmed(format!("{mantissa:.*}", decimals.max(0) as usize)));
     }
-    // Divided, not multiplied by a negative power: 2/10 is 0.2.
+    // Division instead of multiplication by a negative power: 2/10 is exactly 0.2.
     let power = f64::from(10_u32.pow(exponent.unsigned_abs()));
     let value = if exponent < 0 { mantissa / power } else { mantissa * power };
     trimmed(format!("{value:.*}", (decimals - exponent).max(0) as usize))
@@ -216,13 +218,13 @@ fn place((digit, exponent): OneTwoFive) -> f64 {
     f64::from(exponent) + libm::log10(f64::from(digit))
 }
 
-/// A plain number not much above `value` (positive), at which an axis from zero can end.
+/// A round number slightly above `value` (positive), at which an axis from zero can end.
 pub(in crate::report) fn plain_end(value: f64) -> f64 {
     let step = plain_step(value / 8.0);
     (value / step - 1e-9).ceil() * step
 }
 
-/// Where values are: on two axes, or at a turn (x) and radius (y) around a centre.
+/// Positions of values: on two axes, or at an angle (x) and radius (y) around a centre.
 pub(super) struct Axes {
     pub x: Axis,
     pub y: Axis,
@@ -240,7 +242,7 @@ impl Axes {
     }
 }
 
-/// The point at `turn` (radians, clockwise from the top) on a circle.
+/// The point at angle `turn` (radians, clockwise from the top) on a circle.
 pub(super) fn on_circle((x, y): Position, radius: f64, turn: f64) -> Position {
     (x + radius * libm::sin(turn), y - radius * libm::cos(turn))
 }

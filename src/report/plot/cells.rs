@@ -1,13 +1,13 @@
-//! Cells: rectangles whose colour or hatching says what is in them.
+//! Cells: rectangles whose colour or hatching shows their content.
 
 use super::axis::Axes;
 use super::svg::{Canvas, GRID, Paint, Position, WHITE};
 
 const HATCH_GREY: &str = "#9a9a9a";
-/// Overlap of neighbouring rows of cells, so that no white seam parts them.
+/// Overlap of neighbouring rows of cells, to avoid white seams.
 const SEAM_PX: f64 = 0.6;
 
-/// Slanted lines over a cell.
+/// Hatching of a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Hatch {
     /// None.
@@ -23,12 +23,12 @@ pub enum Hatch {
     Crossed,
 }
 
-/// What a cell looks like.
+/// Look of a cell.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Fill {
-    /// `#rrggbb`; not painted where empty.
+    /// `#rrggbb`; empty: not painted.
     pub colour: String,
-    /// 0 to 1; 1 where absent.
+    /// 0 to 1; `None` is 1.
     pub opacity: Option<f64>,
     /// Lines over it.
     pub hatch: Hatch,
@@ -43,41 +43,41 @@ pub struct FilledCell {
     pub corners: [(f64, f64); 2],
     /// Its look.
     pub fill: Fill,
-    /// What a browser shows over it.
+    /// Tooltip in a browser.
     pub tip: String,
 }
 
-/// A scale of colours from zero to a largest value, at the right of the plot.
+/// A colour scale from zero to a maximum, at the right of the plot.
 #[derive(Debug, Clone, Copy)]
 pub struct ColourBar {
-    /// What the colours say.
+    /// Quantity of the colours.
     pub label: &'static str,
-    /// The largest value.
+    /// The maximum.
     pub largest: f64,
-    /// Colour of a value by its place in 0 to 1.
+    /// Colour of a position between 0 and 1.
     pub colour: fn(f64) -> String,
 }
 
-/// Rectangles, behind everything else.
+/// Rectangles behind everything else.
 #[derive(Debug, Clone, Default)]
 pub struct Cells {
     /// The rectangles.
     pub cells: Vec<FilledCell>,
-    /// Legend: names and the looks they explain.
+    /// Legend: names and their looks.
     pub key: Vec<(String, Fill)>,
-    /// Legend of colours that stand for numbers.
+    /// Legend for colours that represent numbers.
     pub bar: Option<ColourBar>,
 }
 
 impl Fill {
-    /// The whole rectangle or its middle, and the lines over it.
+    /// Draws the whole rectangle or its middle, and the hatching.
     pub(super) fn draw(&self, canvas: &mut Canvas, (x1, y1): Position, (x2, y2): Position) {
         if !self.colour.is_empty() {
             let paint = Paint { opacity: self.opacity, ..Paint::fill(&self.colour) };
             if self.is_inset {
                 let inner = |from: f64, to: f64| (from + 0.22 * (to - from), to - 0.22 * (to - from));
                 let ((x1, x2), (y1, y2)) = (inner(x1, x2), inner(y1, y2));
-                // In small cells the rim must not outweigh the colour.
+                // In small cells the rim must not dominate the colour.
                 let rim_px = (0.08 * (x2 - x1).abs().min((y2 - y1).abs())).min(0.8);
                 canvas.rect((x1, y1), (x2, y2), Paint { stroke: Some((HATCH_GREY, rim_px)), ..paint });
             } else {
@@ -86,7 +86,7 @@ impl Fill {
         }
     }
 
-    /// On one pattern for the whole page.
+    /// The hatching lines, aligned to one pattern for the whole page.
     fn strokes(&self, (x1, y1): Position, (x2, y2): Position) -> Vec<Vec<Position>> {
         let ((x1, x2), (y1, y2)) = ((x1.min(x2), x1.max(x2)), (y1.min(y2), y1.max(y2)));
         let pitch_px = if self.hatch == Hatch::Grey { 12.0 } else { 7.0 };
@@ -111,7 +111,7 @@ impl Fill {
         }
     }
 
-    /// A sample for the legend.
+    /// Draws a sample for the legend.
     pub(super) fn sample(&self, canvas: &mut Canvas, from: Position, to: Position) {
         self.draw(canvas, from, to);
         hatch(canvas, std::iter::once((self, from, to)));
@@ -119,7 +119,7 @@ impl Fill {
     }
 }
 
-/// The lines over cells, one path per colour.
+/// Draws the hatching of cells, one path per colour.
 fn hatch<'a>(canvas: &mut Canvas, cells: impl Iterator<Item = (&'a Fill, Position, Position)> + Clone) {
     for (is_grey, paint) in [(false, Paint::line(WHITE, 1.4)), (true, Paint::line(HATCH_GREY, 0.8))] {
         let own = cells.clone().filter(|cell| matches!(cell.0.hatch, Hatch::Grey | Hatch::Crossed) == is_grey);
@@ -133,7 +133,7 @@ fn hatch<'a>(canvas: &mut Canvas, cells: impl Iterator<Item = (&'a Fill, Positio
 impl Cells {
     pub(super) fn draw(&self, canvas: &mut Canvas, axes: &Axes) {
         let places = |cell: &FilledCell| (axes.at(cell.corners[0]), axes.at(cell.corners[1]));
-        // Whole cells without smoothing, so that no white seams part neighbours; the rims of small squares need it.
+        // Whole cells are drawn without anti-aliasing, to avoid white seams; the rims of small squares need it.
         for is_inset in [false, true] {
             let attributes = if is_inset { "class=\"inset\"" } else { "shape-rendering=\"crispEdges\"" };
             let mut own = self.cells.iter().filter(|cell| cell.fill.is_inset == is_inset).peekable();

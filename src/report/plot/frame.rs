@@ -1,4 +1,4 @@
-//! What stands around a plot: ticks with their numbers, names, the scale of colours.
+//! The surroundings of a plot: ticks with their numbers, names, the colour scale.
 
 use super::axis::Axis;
 use super::axis::on_circle;
@@ -7,7 +7,7 @@ use super::{
     ColourBar, HEADING, INDENT_PX, NAME_GAP_PX, NAME_PX, NOTE_PX, Name, Plot, RADIUS_PX, SPOKE_PX, TEXT, TICK,
 };
 
-/// Of a name beside a plot.
+/// Type of a name beside a plot.
 pub(in crate::report) const ROW: Type = set(14, false, INK);
 
 impl Name {
@@ -22,7 +22,7 @@ impl Name {
 }
 
 impl Plot {
-    /// The horizontal axis: grid, ticks, numbers.
+    /// Draws the horizontal axis: grid, ticks, numbers.
     pub(super) fn numbers_below(
         &self,
         canvas: &mut Canvas,
@@ -51,7 +51,7 @@ impl Plot {
         }
     }
 
-    /// The names of a vertical axis at the left, their notes at the right.
+    /// Draws the names of a vertical axis at the left and their notes at the right.
     pub(super) fn names_beside(&self, canvas: &mut Canvas, (left, right): (f64, f64), (top, _): (f64, f64)) {
         for name in &self.y.names {
             let (x, y) = (left - NAME_PX - 16.0, top - name.at);
@@ -65,7 +65,7 @@ impl Plot {
     }
 }
 
-/// The vertical axis: grid, ticks, numbers.
+/// Draws the vertical axis: grid, ticks, numbers.
 pub(super) fn numbers_left(canvas: &mut Canvas, axis: &Axis, (left, right): (f64, f64), has_grid: bool) {
     for tick in axis.ticks(axis.vertical_numbers()) {
         let y = tick.at_px;
@@ -81,7 +81,7 @@ pub(super) fn numbers_left(canvas: &mut Canvas, axis: &Axis, (left, right): (f64
     }
 }
 
-/// A spoke's name outside the outer ring: upward at the top, downward at the bottom, centred beside it.
+/// Draws a spoke's name outside the outer ring: upward at the top, downward at the bottom, centred at the sides.
 pub(super) fn spoke_name(canvas: &mut Canvas, name: &Name, centre: Position, turn: f64) {
     let (x, y) = on_circle(centre, RADIUS_PX + NAME_GAP_PX, turn);
     let anchor = match libm::sin(turn) {
@@ -90,12 +90,12 @@ pub(super) fn spoke_name(canvas: &mut Canvas, name: &Name, centre: Position, tur
         _ => Anchor::Middle,
     };
     let set = if name.is_empty { Type { colour: GREY, ..TEXT } } else { TEXT };
-    // The cosine runs from 1 (the block ends at y) over 0 (centred on y) to -1 (it starts at y).
+    // The cosine goes from 1 (the block ends at y) through 0 (centred on y) to -1 (it starts at y).
     let top = y - set.height_px(&name.words, SPOKE_PX) * (1.0 + libm::cos(turn)) / 2.0;
     canvas.block((x, top), &name.words, set, SPOKE_PX, anchor);
 }
 
-/// From zero to the largest value, a plain number at or above every value.
+/// Draws the scale from zero to a round number at or above the maximum.
 pub(super) fn colour_bar(canvas: &mut Canvas, bar: &ColourBar, (left, right): (f64, f64), (top, bottom): (f64, f64)) {
     const BANDS: u32 = 100;
     canvas.text((left, top + 12.0), bar.label, TICK, Anchor::Start);

@@ -7,54 +7,54 @@ use super::svg::{Anchor, Canvas, GREY, Paint, Position, Type, WHITE, set};
 
 pub(in crate::report) const TICK: Type = set(13, false, GREY);
 
-/// With more values than this a line has no markers: they would hide it.
+/// A line with more values than this has no markers, because they would hide it.
 const MAX_MARKERS: usize = 40;
-/// With more labelled values than this none is written out.
+/// Labels are not drawn if there are more than this.
 const MAX_WORDS: usize = 8;
 
-/// Below so many failing scenarios a value is drawn hollow.
+/// A value with fewer failing scenarios than this is drawn hollow.
 const MIN_SCENARIOS: f64 = 10.0;
 
-/// What a hollow marker means, for captions.
+/// Caption of hollow markers.
 pub(in crate::report) const HOLLOW: &str = "Hollow: fewer than ten failing scenarios, with their number.";
 
-/// Whether a value rests on few failing scenarios; their number may be an effective one.
+/// Whether a value is based on few failing scenarios; their number may be an effective one.
 pub(in crate::report) fn is_few(failing_scenarios: f64) -> bool {
     failing_scenarios < MIN_SCENARIOS
 }
 
-/// How the values of a series are drawn.
+/// Marks of a series.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Mark {
-    /// A line through the values in their order, broken where one cannot be shown.
+    /// A line through the values in order, broken at values that cannot be shown.
     Line,
     /// A marker per value.
     Points,
-    /// The intervals of neighbouring values as an area, that of a single one as a line.
+    /// The intervals of neighbouring values as an area; the interval of a single value as a line.
     Band,
-    /// The interval of each value as a line with a bar at both ends; that of a zero on a logarithmic axis as an upper
-    /// limit with an arrow.
+    /// The interval of each value as a line with a bar at both ends; for a zero on a logarithmic axis an upper limit
+    /// with an arrow.
     Intervals,
-    /// A bar from zero per value, so wide in the unit of x.
+    /// A bar from zero per value, with this width in the unit of x.
     Bars(f64),
 }
 
 /// One value of a series.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Value {
-    /// Across.
+    /// Horizontal value.
     pub x: f64,
-    /// Upwards.
+    /// Vertical value.
     pub y: f64,
     /// Ends of its interval.
     pub interval: Option<(f64, f64)>,
-    /// Ends of an interval that covers more, drawn paler and thinner.
+    /// Ends of a wider interval, drawn paler and thinner.
     pub outer: Option<(f64, f64)>,
-    /// It rests on few failing scenarios: its marker is hollow.
+    /// Based on few failing scenarios: its marker is hollow.
     pub is_few: bool,
-    /// A word beside it.
+    /// Label beside it.
     pub label: String,
-    /// What a browser shows over its marker; name and numbers where empty.
+    /// Tooltip of its marker in a browser; empty: name and numbers.
     pub tip: String,
 }
 
@@ -70,35 +70,35 @@ impl Value {
     }
 }
 
-/// Values that belong together.
+/// A series of values.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Series {
-    /// Name in the legend; the same name looks the same in every plot. An empty one is not in the legend.
+    /// Name in the legend; the same name has the same look in every plot. Empty: not in the legend.
     pub name: String,
-    /// How the values are drawn.
+    /// Marks of the values.
     pub marks: Vec<Mark>,
-    /// The values. One that an axis cannot show is left out of the picture.
+    /// The values. Those that an axis cannot show are not drawn.
     pub values: Vec<Value>,
-    /// A look of its own; otherwise that of its place in the legend.
+    /// Own look; `None`: the look of its index in the legend.
     pub look: Option<Look>,
     /// Intervals are along x instead of y.
     pub is_sideways: bool,
-    /// Attributes of each value's group; `class="value"` where empty.
+    /// SVG attributes of each value's group; empty: `class="value"`.
     pub attributes: String,
 }
 
-/// Lines to compare with, behind the series.
+/// Reference lines behind the series.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Rule {
     /// The lines, inside the plot's ranges.
     pub runs: Vec<Vec<(f64, f64)>>,
-    /// Name in the legend, which an empty one is not in.
+    /// Name in the legend; empty: not in the legend.
     pub name: String,
     /// `#rrggbb`.
     pub colour: &'static str,
     /// Width.
     pub width_px: f64,
-    /// Lengths of dashes and gaps, px; solid where empty.
+    /// Lengths of dashes and gaps, px; empty: solid.
     pub dash: &'static str,
     /// Attributes of the lines' group.
     pub attributes: String,
@@ -109,7 +109,7 @@ pub struct Rule {
 pub enum Layer {
     /// Values with marks.
     Series(Series),
-    /// Lines to compare with.
+    /// Reference lines.
     Rule(Rule),
     /// Rectangles.
     Cells(Cells),
@@ -141,7 +141,7 @@ impl Rule {
         canvas.group(&self.attributes, "", |canvas| canvas.path(&runs, false, paint));
     }
 
-    /// A sample for the legend.
+    /// Draws a sample for the legend.
     pub(super) fn sample(&self, canvas: &mut Canvas, (x, y): Position, width_px: f64) {
         let paint = Paint { dash: self.dash, ..Paint::line(self.colour, self.width_px) };
         canvas.path(&[vec![(x, y), (x + width_px, y)]], false, paint);
@@ -159,8 +159,8 @@ impl Series {
         self.marks.contains(&mark)
     }
 
-    /// Runs of values without one between them that cannot be shown, and whether the run closes. Around a centre the
-    /// last value has the first as its neighbour.
+    /// Runs of consecutive values that can be shown, and whether each run closes. Around a centre the last value is a
+    /// neighbour of the first.
     fn runs<'a>(&'a self, axes: &Axes) -> Vec<(Vec<&'a Value>, bool)> {
         let shown: Vec<Option<&Value>> =
             self.values.iter().map(|value| Some(value).filter(|value| axes.shows(value.place()))).collect();
@@ -172,7 +172,7 @@ impl Series {
         runs.map(|run| (run.iter().copied().flatten().collect(), closes)).collect()
     }
 
-    /// The ends of an interval of a value.
+    /// The ends of a value's interval on the page.
     fn ends(&self, value: &Value, interval: Option<(f64, f64)>, axes: &Axes) -> Option<(Position, Position)> {
         let (lower, upper) = interval?;
         let end = |v: f64| axes.at(if self.is_sideways { (v, value.y) } else { (value.x, v) });
@@ -211,7 +211,7 @@ impl Series {
         if !self.has(Mark::Line) || runs.is_empty() {
             return;
         }
-        // Round joins: a mitred corner of a thin spike would reach beyond its value.
+        // Round joins: a mitred corner of a thin spike would extend beyond its value.
         canvas.group("class=\"series\" stroke-linejoin=\"round\"", "", |canvas| {
             for (run, is_closed) in runs {
                 let places: Vec<Position> = run.iter().map(|value| axes.at((value.x, value.y))).collect();
@@ -224,7 +224,7 @@ impl Series {
         });
     }
 
-    /// Intervals and markers. `taken`: where labels stand already, as left end, width and base line.
+    /// Draws intervals and markers. `taken`: existing labels, as left end, width and base line.
     pub(super) fn markers(
         &self,
         canvas: &mut Canvas,
@@ -263,7 +263,7 @@ impl Series {
                 }
                 Look { is_hollow: value.is_few, ..*look }.marker(canvas, place);
             });
-            // A word per value of a few; with many they would cover one another.
+            // A label per value if there are few; many would cover one another.
             if !value.label.is_empty() && (self.values.len() <= MAX_WORDS || value.is_few) {
                 label(canvas, place, &value.label, taken);
             }
@@ -279,7 +279,7 @@ impl Series {
         words.into_iter().filter(|word| !word.is_empty()).cloned().collect::<Vec<_>>().join("; ")
     }
 
-    /// Without a bar at a lower end that is beyond the axis.
+    /// Draws an interval, without a bar at a lower end beyond the axis.
     fn interval(&self, canvas: &mut Canvas, (lower, upper): (Position, Position), has_lower: bool, look: &Look) {
         let bar = |(x, y): Position| match self.is_sideways {
             true => vec![(x, y - 4.0), (x, y + 4.0)],
@@ -289,18 +289,18 @@ impl Series {
         canvas.path(&[vec![lower, upper], bar(upper), lower_bar], false, Paint::line(look.colour, look.line_px));
     }
 
-    /// A short bar with an arrow towards lower values: the value is somewhere there.
+    /// Draws an upper limit: a short bar with an arrow towards lower values.
     fn limit(&self, canvas: &mut Canvas, (x, y): Position, look: &Look) {
-        // From the bar's middle so far towards lower values and so far beside it.
+        // Offset from the bar's middle: along the value axis downwards, and across it.
         let at = |on: f64, beside: f64| if self.is_sideways { (x - on, y + beside) } else { (x + beside, y + on) };
-        // The lines drawn first are the wider ones: where limits coincide, as they do early on, each can be seen.
+        // Earlier limits are wider, so that each stays visible where limits coincide.
         let half = 1.3 * look.marker_px;
         let strokes = [vec![at(0.0, -half), at(0.0, half)], vec![at(0.0, 0.0), at(9.0, 0.0)]];
         canvas.path(&strokes, false, Paint::line(look.colour, 1.6));
         canvas.path(&[vec![at(8.0, -3.5), at(8.0, 3.5), at(15.0, 0.0)]], true, Paint::fill(look.colour));
     }
 
-    /// A sample for the legend, of what the series draws.
+    /// Draws a sample of the series for the legend.
     pub(super) fn sample(&self, canvas: &mut Canvas, (x, y): Position, width_px: f64, look: &Look) {
         if self.marks.iter().any(|mark| matches!(mark, Mark::Band | Mark::Bars(_))) {
             let opacity = if self.has(Mark::Band) { Some(0.16) } else { None };
@@ -315,7 +315,7 @@ impl Series {
     }
 }
 
-/// A word beside a place, where no other stands.
+/// Draws a label beside a point, unless another one is there.
 fn label(canvas: &mut Canvas, place: Position, words: &str, taken: &mut Vec<(f64, f64, f64)>) {
     let width = TICK.text_px(words);
     let places = [(9.0, -7.0), (-9.0 - width, -7.0), (9.0, 14.0), (-9.0 - width, 14.0), (9.0, -21.0)];
@@ -326,7 +326,7 @@ fn label(canvas: &mut Canvas, place: Position, words: &str, taken: &mut Vec<(f64
     canvas.text((x, y), words, TICK, Anchor::Start);
 }
 
-/// Without points between neighbours on whose line they lie: a lane has thousands of steps.
+/// Removes points that lie on the line between their neighbours: a lane has thousands of steps.
 fn without_inner_points(places: &[Position]) -> Vec<Position> {
     let mut kept: Vec<Position> = Vec::new();
     for (k, &(x, y)) in places.iter().enumerate() {

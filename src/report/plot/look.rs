@@ -1,11 +1,11 @@
-//! What a series looks like: colour, dash, marker.
+//! The look of a series: colour, dash, marker.
 
 use std::f64::consts::TAU;
 
 use super::axis::on_circle;
 use super::svg::{Canvas, Paint, Position, WHITE};
 
-/// Okabe & Ito (2008), chosen for colour-blind readers; without the yellow, too pale as a line on white.
+/// Okabe & Ito (2008), chosen for colour-blind readers; without the yellow, which is too pale as a line on white.
 const COLOURS: [&str; 7] = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#000000", "#e69f00", "#56b4e9"];
 /// Line styles (SVG dash arrays); the empty one is solid.
 const DASHES: [&str; 7] = ["", "10,4", "3,3", "12,3,3,3", "18,5", "7,3,2,3,2,3", "5,6"];
@@ -27,7 +27,7 @@ pub enum Symbol {
     Ring,
     /// Two strokes.
     Cross,
-    /// So many corners; the first so many steps clockwise from the top.
+    /// A polygon: its number of corners, and the position of the first in steps clockwise from the top.
     Polygon(u32, f64),
 }
 
@@ -36,7 +36,7 @@ pub enum Symbol {
 pub struct Look {
     /// `#rrggbb`.
     pub colour: &'static str,
-    /// Lengths of dashes and gaps, px; solid where empty.
+    /// Lengths of dashes and gaps, px; empty: solid.
     pub dash: &'static str,
     /// Width of the line.
     pub line_px: f64,
@@ -49,8 +49,9 @@ pub struct Look {
 }
 
 impl Look {
-    /// Colour, dash and marker cycle together; from the eighth series on the dash is shifted, so no pair repeats
-    /// before 49 series. Lines run from thick to thin and markers from large to small: what lies below stays visible.
+    /// Colour, dash and marker cycle together; from the eighth series on the dash is shifted, so that no pair repeats
+    /// before 49 series. Lines go from thick to thin and markers from large to small, so that earlier ones stay
+    /// visible.
     pub fn of(index: usize, count: usize) -> Self {
         let depth = if count > 1 { index as f64 / (count - 1) as f64 } else { 0.5 };
         Self {
@@ -67,7 +68,7 @@ impl Look {
         Paint { dash: self.dash, ..Paint::line(self.colour, self.line_px) }
     }
 
-    /// The marker around a point, with a white rim that parts it from the markers below.
+    /// Draws the marker at a point, with a white rim that separates it from markers below.
     pub(in crate::report) fn marker(&self, canvas: &mut Canvas, (x, y): Position) {
         let (r, colour) = (self.marker_px, self.colour);
         let rimmed = match self.is_hollow {

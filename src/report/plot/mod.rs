@@ -1,8 +1,7 @@
-//! Every figure is one type: plots with axes, their layers, and a legend that the layers make themselves.
+//! The one type of all figures: plots with axes, their layers, and a legend built from the layers.
 //!
-//! What differs between figures (which numbers, which words) is with who makes them; here is how they look, as a
-//! picture and as numbers. A new kind of picture is a layer or a scale of an axis. A page is 1000 px wide and as high
-//! as its texts need, so no text is cut.
+//! The caller gives numbers and words; this module defines their look, as a picture and as CSV. A new kind of picture
+//! is a new layer or axis scale. A page is 1000 px wide and as high as its texts need, so no text is cut.
 
 mod axis;
 mod cells;
@@ -34,14 +33,14 @@ const BORDER_PX: f64 = 36.0;
 const TEXT_WIDTH_PX: f64 = WIDTH_PX - 2.0 * BORDER_PX;
 /// Space between plots.
 const GAP_PX: f64 = 22.0;
-/// Length of a sample in the legend, and where the text behind it starts.
+/// Length of a sample in the legend, and offset of the text after it.
 const SAMPLE_PX: f64 = 56.0;
 const SAMPLE_TEXT_PX: f64 = 68.0;
-/// Widths of the words left and right of a plot whose vertical axis has named ticks, and how far rows stand in.
+/// Widths of the texts left and right of a plot whose vertical axis has named ticks, and the indent of rows.
 const NAME_PX: f64 = 280.0;
 const NOTE_PX: f64 = 226.0;
 const INDENT_PX: f64 = 14.0;
-/// Radius of the outer ring of a plot around a centre, the distance of names from it, and their width.
+/// Radius of the outer ring of a polar plot, distance of the names from it, and their width.
 const RADIUS_PX: f64 = 285.0;
 const NAME_GAP_PX: f64 = 20.0;
 const SPOKE_PX: f64 = WIDTH_PX / 2.0 - RADIUS_PX - NAME_GAP_PX - 8.0;
@@ -51,7 +50,7 @@ const TEXT: Type = set(16, false, INK);
 const HEADING: Type = set(16, true, INK);
 const NOTE: Type = set(14, false, INK);
 
-/// A page of plots with their words.
+/// A page of plots with its texts.
 #[derive(Debug, Clone, Default)]
 pub struct Figure {
     /// Heading; wrapped when long.
@@ -60,9 +59,9 @@ pub struct Figure {
     pub subtitle: Option<String>,
     /// The plots, row by row.
     pub plots: Vec<Plot>,
-    /// What the marks mean; wrapped when long.
+    /// Explains the marks; wrapped when long.
     pub caption: String,
-    /// Lines at the foot, below a bold head; nothing without lines.
+    /// A bold heading and lines at the foot; omitted without lines.
     pub notes: (&'static str, Vec<String>),
 }
 
@@ -71,42 +70,42 @@ pub struct Figure {
 pub struct Plot {
     /// Heading.
     pub heading: String,
-    /// Horizontal axis; around a centre the turn, a whole one from end to end.
+    /// Horizontal axis; in a polar plot the angle, one full turn from end to end.
     pub x: PlotAxis,
-    /// Vertical axis; around a centre the radius.
+    /// Vertical axis; in a polar plot the radius.
     pub y: PlotAxis,
-    /// What is drawn: cells behind rules behind series.
+    /// The layers: cells behind rules behind series.
     pub layers: Vec<Layer>,
     /// Height of the frame.
     pub height: Height,
-    /// The axes are turn and radius.
+    /// Polar plot: the axes are angle and radius.
     pub is_polar: bool,
 }
 
 /// Height of a plot's frame.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Height {
-    /// As the number of plots on the page allows.
+    /// Depends on the number of plots on the page.
     #[default]
     Usual,
-    /// So many px.
+    /// Height, px.
     Px(f64),
-    /// So many times the width.
+    /// Multiple of the width.
     OfWidth(f64),
 }
 
-/// An axis before it has a place on a page.
+/// An axis without a position on a page.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct PlotAxis {
     /// Quantity and unit; wrapped when long.
     pub label: String,
-    /// How values are placed.
+    /// Scale.
     pub scale: AxisScale,
-    /// Where it ends.
+    /// Ends.
     pub ends: Ends,
     /// Names instead of numbers.
     pub names: Vec<Name>,
-    /// Numbers stand at the top too.
+    /// Whether the numbers are repeated at the top.
     pub is_doubled: bool,
 }
 
@@ -118,22 +117,22 @@ pub enum Ends {
     Layers,
     /// Around these values.
     Around(Vec<f64>),
-    /// At these two, on a linear axis.
+    /// Exactly these two, on a linear axis.
     Exactly(f64, f64),
 }
 
-/// A named place of an axis.
+/// A named position on an axis.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct Name {
-    /// Where; on a vertical axis the top of its lines.
+    /// Position; on a vertical axis the top of its lines.
     pub at: f64,
     /// The name; wrapped when long.
     pub words: String,
-    /// Words at the other side of the plot; wrapped when long.
+    /// Text at the other side of the plot; wrapped when long.
     pub note: String,
-    /// It heads the names below it.
+    /// Whether it is the heading of the names below it.
     pub is_heading: bool,
-    /// Nothing is drawn there.
+    /// Whether the row has no values.
     pub is_empty: bool,
 }
 
@@ -159,7 +158,7 @@ impl PlotAxis {
 
 impl Figure {
     /// The figure as a complete SVG document. Texts are XML-escaped; control characters become U+FFFD. The same figure
-    /// gives the same bytes. Nothing fails: a plot without a value says so, and without plots only the texts remain.
+    /// gives the same bytes. It never fails: a plot without a value says so, and without plots only the texts remain.
     pub fn svg(&self) -> String {
         let mut canvas = Canvas::new(WIDTH_PX);
         let mut y = canvas.paragraph((BORDER_PX, 24.0), &self.title, TITLE, TEXT_WIDTH_PX);
@@ -205,7 +204,7 @@ impl Figure {
         names
     }
 
-    /// All plots below `top`, side by side as their number allows; returns the y below.
+    /// Draws all plots below `top`, in rows that depend on their number; returns the y below.
     fn rows(&self, canvas: &mut Canvas, top: f64) -> f64 {
         let (columns, height_px) = match self.plots.len() {
             0 | 1 => (1, 420.0),
@@ -255,7 +254,7 @@ impl Figure {
         y
     }
 
-    /// Sample and name of what the layers draw, in two columns read downwards (one, if a name is too long for half the
+    /// Draws samples and names of the layers, in two columns read downwards (one if a name is too long for half the
     /// width); returns the y below.
     fn legend(&self, canvas: &mut Canvas, top: f64) -> f64 {
         let names = self.names();
@@ -298,7 +297,7 @@ impl Figure {
     }
 }
 
-/// What the legend explains.
+/// An entry of the legend.
 enum Entry<'a> {
     Series(&'a Series, Look),
     Fill(&'a Fill),
@@ -318,7 +317,7 @@ impl Plot {
         self.layers.iter().filter_map(|layer| if let Layer::Cells(cells) = layer { Some(cells) } else { None })
     }
 
-    /// Room left and right of the frame.
+    /// Space left and right of the frame, px.
     fn room_px(&self) -> (f64, f64) {
         if !self.y.names.is_empty() {
             return (NAME_PX + 16.0, NOTE_PX + 18.0);
@@ -326,7 +325,7 @@ impl Plot {
         (60.0, if self.cells().any(|cells| cells.bar.is_some()) { 120.0 } else { 16.0 })
     }
 
-    /// The axes within these ends; `None` where there is nothing to show.
+    /// The axes within these ends; `None` if there is nothing to show.
     fn axes(&self, across: (f64, f64), down: (f64, f64), centre: Option<Position>) -> Option<Axes> {
         let width =
             |series: &Series| series.marks.iter().find_map(|m| if let Mark::Bars(w) = m { Some(*w) } else { None });
@@ -345,7 +344,7 @@ impl Plot {
         Some(Axes { x, y, centre })
     }
 
-    /// The plot in a frame: axes with their numbers, layers.
+    /// Draws the plot in a frame: axes with their numbers, layers.
     pub(super) fn draw(
         &self,
         canvas: &mut Canvas,
@@ -377,11 +376,11 @@ impl Plot {
         }
     }
 
-    /// All layers but the markers, which are above the frame.
+    /// Draws all layers except markers, which are above the frame.
     fn behind(&self, canvas: &mut Canvas, axes: &Axes, look: &dyn Fn(&Series) -> Look) {
         self.cells().for_each(|cells| cells.draw(canvas, axes));
         self.rules().for_each(|rule| rule.draw(canvas, axes));
-        // All bands below all lines below all markers: a band never hides a value.
+        // All bands, then all lines, then all markers: a band never hides a value.
         self.series().for_each(|series| series.bands(canvas, axes, &look(series)));
         self.series().for_each(|series| series.bars_and_line(canvas, axes, &look(series)));
     }
@@ -393,7 +392,7 @@ impl Plot {
         }
     }
 
-    /// Rings, spokes with their names, layers; returns the y below. Values are around the middle of the page.
+    /// Draws rings, spokes with their names, and layers around the middle of the page; returns the y below.
     fn draw_polar(&self, canvas: &mut Canvas, look: &dyn Fn(&Series) -> Look, top: f64) -> f64 {
         let name_px = |name: &Name| TEXT.height_px(&name.words, SPOKE_PX);
         let reach = self.x.names.iter().map(name_px).fold(0.0, f64::max) + NAME_GAP_PX + RADIUS_PX;

@@ -1,6 +1,7 @@
-//! SVG documents: shapes, groups and wrapped text. Layout belongs to the plots.
+//! SVG documents: shapes, groups and wrapped text. The plots define the layout.
 //!
-//! Coordinates are in user units (px) with at most two decimals, so equal figures are equal bytes on every machine.
+//! Coordinates are in user units (px) with at most two decimals, so that equal figures have equal bytes on every
+//! machine.
 
 use std::fmt::{Display, Write};
 
@@ -12,18 +13,18 @@ pub(in crate::report) const GRID: &str = "#bdbdbd";
 pub(in crate::report) const WHITE: &str = "#ffffff";
 const FONTS: &str = "DejaVu Sans, Verdana, Arial, Helvetica, sans-serif";
 
-/// A place on the page, px.
+/// A position on the page, px.
 pub(in crate::report) type Position = (f64, f64);
 
-/// How a shape is painted. Colours are `#rrggbb`.
+/// Paint of a shape. Colours are `#rrggbb`.
 #[derive(Debug, Clone, Copy, Default)]
 pub(in crate::report) struct Paint<'a> {
     pub fill: Option<&'a str>,
-    /// Of the fill, 0 to 1; 1 where absent.
+    /// Opacity of the fill, 0 to 1; `None` is 1.
     pub opacity: Option<f64>,
     /// Colour and width (px).
     pub stroke: Option<(&'a str, f64)>,
-    /// Lengths of dashes and gaps, px; solid where empty.
+    /// Lengths of dashes and gaps, px; empty: solid.
     pub dash: &'a str,
 }
 
@@ -37,7 +38,7 @@ impl<'a> Paint<'a> {
     }
 }
 
-/// How a text is set.
+/// Type of a text: size, weight, colour.
 #[derive(Debug, Clone, Copy)]
 pub(in crate::report) struct Type {
     pub size_px: u32,
@@ -54,7 +55,7 @@ impl Type {
         f64::from(self.size_px) * 1.3
     }
 
-    /// Upper estimate of a character's width. The reader's font is unknown, so this is the wide DejaVu Sans.
+    /// Upper estimate of a character's width, px. The reader's font is unknown, so it is that of the wide DejaVu Sans.
     fn char_px(self, c: char) -> f64 {
         let em = match c {
             ' ' | '.' | ',' | ':' | ';' | '\'' | '|' | 'i' | 'l' | 'j' | 'I' | '!' => 0.35,
@@ -70,11 +71,11 @@ impl Type {
         text.chars().map(|c| self.char_px(c)).sum()
     }
 
-    /// `text` in lines no wider than `width_px`: broken at blanks, and inside a word only if it alone is too wide.
+    /// Wraps `text` to `width_px`: at blanks, and inside a word only if the word alone is too wide.
     pub fn wrap(self, text: &str, width_px: f64) -> Vec<String> {
         let mut lines = Vec::new();
         let mut line = String::new();
-        // A no-break space holds an interval together.
+        // A no-break space keeps an interval together.
         for word in text.split(|c: char| c.is_whitespace() && c != '\u{a0}').filter(|word| !word.is_empty()) {
             if !line.is_empty() && self.text_px(&line) + self.char_px(' ') + self.text_px(word) > width_px {
                 lines.push(std::mem::take(&mut line));
@@ -95,13 +96,13 @@ impl Type {
         lines
     }
 
-    /// Height of `text` in lines no wider than `width_px`.
+    /// Height of `text` wrapped to `width_px`.
     pub fn height_px(self, text: &str, width_px: f64) -> f64 {
         self.wrap(text, width_px).len() as f64 * self.line_px()
     }
 }
 
-/// Which end of a text its position is.
+/// Alignment of a text at its position.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(in crate::report) enum Anchor {
     Start,
@@ -109,7 +110,7 @@ pub(in crate::report) enum Anchor {
     End,
 }
 
-/// A document that is being drawn.
+/// A document under construction.
 #[derive(Debug)]
 pub(in crate::report) struct Canvas {
     width_px: f64,
@@ -122,7 +123,7 @@ impl Canvas {
         Canvas { width_px, body: String::new(), depth: 1 }
     }
 
-    /// The document, ending a little below `bottom`.
+    /// The finished document, ending a little below `bottom`.
     pub fn document(self, bottom: f64) -> String {
         format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\" font-family=\"{FONTS}\" \
@@ -148,7 +149,7 @@ impl Canvas {
         self.element(&(text + " />"));
     }
 
-    /// A rectangle from corner to corner, in either order.
+    /// Draws a rectangle between two corners, in either order.
     pub fn rect(&mut self, (x1, y1): Position, (x2, y2): Position, paint: Paint) {
         let (x, y, width, height) =
             (Number(x1.min(x2)), Number(y1.min(y2)), Number((x2 - x1).abs()), Number((y2 - y1).abs()));
@@ -159,7 +160,7 @@ impl Canvas {
         self.shape(format!("<circle cx=\"{}\" cy=\"{}\" r=\"{}\"", Number(x), Number(y), Number(radius_px)), paint);
     }
 
-    /// Runs of straight lines, as one path.
+    /// Draws polylines as one path.
     pub fn path(&mut self, runs: &[Vec<Position>], is_closed: bool, paint: Paint) {
         let run = |points: &Vec<Position>| {
             let corners: Vec<String> = points.iter().map(|(x, y)| format!("{x:.2},{y:.2}")).collect();
@@ -175,7 +176,7 @@ impl Canvas {
         self.path(&[vec![from, to]], false, Paint::line(colour, width_px));
     }
 
-    /// One line of text on its base line.
+    /// Draws one line of text on its base line.
     pub fn text(&mut self, (x, y): Position, line: &str, set: Type, anchor: Anchor) {
         let anchor = match anchor {
             Anchor::Start => "start",
@@ -193,7 +194,7 @@ impl Canvas {
         ));
     }
 
-    /// A wrapped text with its top at `y`; returns the y below it.
+    /// Draws a wrapped text with its top at `y`; returns the y below it.
     pub fn block(&mut self, (x, y): Position, words: &str, set: Type, width_px: f64, anchor: Anchor) -> f64 {
         let lines = set.wrap(words, width_px);
         for (k, line) in lines.iter().enumerate() {
@@ -206,7 +207,7 @@ impl Canvas {
         self.block(at, words, set, width_px, Anchor::Start)
     }
 
-    /// Groups what `draw` draws. `attributes` are written as they are; browsers show `tip` over the group.
+    /// Groups what `draw` draws. `attributes` are written verbatim; `tip` is the group's tooltip in browsers.
     pub fn group(&mut self, attributes: &str, tip: &str, draw: impl FnOnce(&mut Self)) {
         self.element(&format!("<g {attributes}>"));
         self.depth += 1;
@@ -237,8 +238,8 @@ impl Display for Number {
     }
 }
 
-/// Text as XML content holds it, without the characters that XML 1.0 allows in no form, not even escaped, and those
-/// that turn or hide others.
+/// Text escaped for XML content, without the characters that XML 1.0 never allows, and without those that reverse or
+/// hide text.
 fn escaped(text: &str) -> String {
     let mut out = String::with_capacity(text.len());
     for c in text.chars() {
@@ -260,7 +261,7 @@ fn escaped(text: &str) -> String {
 pub(super) mod tests {
     use super::*;
 
-    /// The words of the document's texts, lines joined, and a check that its tags nest.
+    /// The words of the document's texts, lines joined; also checks that its tags nest.
     pub fn words(svg: &str) -> String {
         let (mut open, mut words) = (Vec::new(), Vec::new());
         for part in svg.split('<').skip(1).filter(|part| !part.starts_with("!--")) {

@@ -1,4 +1,4 @@
-//! Lanes step by step, as `simulate` shows them: figure, table, document and a summary of each.
+//! Lanes step by step, as `simulate` shows them: figure, table, document and summaries.
 
 use super::{TraceFigure, TraceSeries, table};
 use crate::Result;
@@ -9,7 +9,7 @@ use crate::run::reopen::{TracedLane, TracedLanes};
 use crate::support::readable::value;
 
 impl TracedLanes {
-    /// The lanes on one sheet, to a time, s, or 2 s after the last change.
+    /// The lanes on one sheet, up to a time, s, or 2 s after the last change.
     pub fn figure(&self, until_s: Option<f64>) -> TraceFigure<'_> {
         let first = &self.lanes[0];
         let category = first.trace.category.label();
@@ -34,7 +34,7 @@ impl TracedLanes {
     /// Outcomes and series as one document.
     ///
     /// # Errors
-    /// None for what this program made.
+    /// None for a document of this program.
     pub fn json(&self) -> Result<String> {
         let outcomes = self.lanes.iter().map(|lane| {
             let reference = lane.reference.as_ref().map(|reference| records::outcome(reference, lane.trace.dt_s));
@@ -117,7 +117,7 @@ fn end(outcome: &Outcome<f64>) -> String {
     }
 }
 
-/// What of the reference is another than in the lane arithmetic; values differ in their last digits and are not looked at.
+/// Differences of the reference from the lane arithmetic. Values differ in their last digits and are not compared.
 fn differences(ours: &Outcome<f64>, reference: &Outcome<f64>, time: &dyn Fn(u32) -> String) -> Vec<String> {
     let mut list = Vec::new();
     if ours.verdicts != reference.verdicts {

@@ -1,8 +1,8 @@
-//! One case step by step: the figure of everything that its driver models see and do, over one time axis, and every
-//! number of it as CSV.
+//! One case step by step: the figure of all that its driver models see and do, over one time axis, and every number as
+//! CSV.
 //!
-//! The sheet has the width of a column of a paper (two for a cut-out, whose vehicles stand side by side) and type that
-//! stays readable at that width. Series differ in colour, dashes and line width, marks in their shapes.
+//! The sheet has the width of a column of a paper (two for a cut-out, one per vehicle) and a type size that is readable
+//! at that width. Series differ in colour, dashes and line width; marks differ in shape.
 
 mod lanes;
 mod panels;
@@ -14,7 +14,7 @@ use crate::support::table::Table;
 pub use panels::TraceSeries;
 use panels::{Column, Panel, Shown, mark_dash, mark_look};
 
-/// Lanes of one case, or of variants of one, on one sheet.
+/// Lanes of one case, or of variants of a case, on one sheet.
 #[derive(Debug, Clone)]
 pub struct TraceFigure<'a> {
     /// Heading; wrapped when long.
@@ -23,14 +23,14 @@ pub struct TraceFigure<'a> {
     pub subtitle: Option<String>,
     /// The lanes.
     pub series: Vec<TraceSeries<'a>>,
-    /// Where time ends, s; otherwise 2 s after the last change.
+    /// Last time shown, s; `None`: 2 s after the last change.
     pub until_s: Option<f64>,
 }
 
 /// Width of a column of the sheet, px: type of 13 px becomes 6 pt at the 252 pt of a paper's column.
 const COLUMN_PX: f64 = 540.0;
 const MARGIN_PX: f64 = 14.0;
-/// From the column's edge to the plot: room for numbers.
+/// Distance from the column's edge to the plot: room for numbers.
 const LEFT_PX: f64 = 58.0;
 const TITLE: Type = set(17, true, INK);
 const NAME: Type = set(14, true, INK);
@@ -44,9 +44,9 @@ const MARK_PX: f64 = 5.0;
 impl TraceFigure<'_> {
     /// The figure as a complete SVG document, 540 px wide (1080 px for a cut-out) and as high as its panels need.
     ///
-    /// A note says so where the lanes go on after the last time that is shown. TTC is shown up to ten times
-    /// its threshold, BTN up to 2.5 times. Texts are XML-escaped; control characters become U+FFFD. The same figure
-    /// gives the same bytes. Nothing fails: without lanes only the texts remain.
+    /// A note says if lanes continue after the last time shown. TTC is shown up to ten times its threshold, BTN up to
+    /// 2.5 times. Texts are XML-escaped; control characters become U+FFFD. The same figure gives the same bytes. It
+    /// never fails: without lanes only the texts remain.
     pub fn svg(&self) -> String {
         let shown = Shown::of(&self.series, self.until_s);
         let columns = shown.columns();
@@ -74,7 +74,7 @@ impl TraceFigure<'_> {
         canvas.document(y)
     }
 
-    /// Names, marks and worst values of the series; returns the y below.
+    /// Draws names, marks and worst values of the series; returns the y below.
     fn table(&self, canvas: &mut Canvas, looks: &[Look], width_px: f64, top: f64) -> f64 {
         let columns =
             [StepMark::Reaction.label(), StepMark::Braking.label(), StepMark::Contact.label(), "min TTC", "max BTN"];
@@ -130,7 +130,7 @@ impl TraceFigure<'_> {
     }
 }
 
-/// One column of panels over one time axis; returns the y below.
+/// Draws one column of panels over one time axis; returns the y below.
 fn column(canvas: &mut Canvas, panels: &[Panel], across: (f64, f64), top: f64, lines: &[(StepMark, f64)]) -> f64 {
     let look = |series: &Series| series.look.unwrap_or_else(|| Look::of(0, 1));
     let mut y = top;
@@ -140,7 +140,7 @@ fn column(canvas: &mut Canvas, panels: &[Panel], across: (f64, f64), top: f64, l
         canvas.text((across.1, title_bottom - 6.0), hint, HINT, Anchor::End);
         let mut frame_top = title_bottom;
         if let (0, Ends::Exactly(low, high)) = (k, &plot.x.ends) {
-            // The labels of the lines through all panels stand above the first plot, each in a row of its own.
+            // The labels of the lines through all panels are above the first plot, each in its own row.
             frame_top += lines.len() as f64 * CELL.line_px();
             let time = Axis::exactly((*low, *high), across);
             lines.iter().enumerate().for_each(|(row, line)| {
@@ -157,8 +157,8 @@ fn column(canvas: &mut Canvas, panels: &[Panel], across: (f64, f64), top: f64, l
     y + 35.0
 }
 
-/// The label of a line, and the line from there down to the first plot; on the side that has room. Later lines pass
-/// behind: the label is on white.
+/// Draws the label of a line and the line down to the first plot, on the side with room. The label has a white
+/// background, because later lines pass behind it.
 fn mark_label(canvas: &mut Canvas, (mark, at_s): (StepMark, f64), x: f64, (top, bottom): (f64, f64), right: f64) {
     let words = format!("{} {} s", mark.label(), thousandths(at_s));
     let width = CELL.text_px(&words);
@@ -182,9 +182,9 @@ fn worst(value: f64, unit: &str) -> String {
 
 const VEHICLES: [&str; 2] = ["other", "ahead"];
 
-/// The traces, one row per step. Several traces stand one below the other, named by a first column `lane`; a single one
-/// does without. The last column names the marks of a step (`reaction`, `braking`, `contact`, joined by `+`). Infinite
-/// is `inf`; a vehicle that there is not leaves its columns empty.
+/// The traces, one row per step. Several traces follow one another, named by a first column `lane`; a single trace has
+/// no such column. The last column names the marks of a step (`reaction`, `braking`, `contact`, joined by `+`).
+/// Infinity is `inf`; the columns of an absent vehicle are empty.
 pub fn table(traces: &[(String, &Trace)]) -> Table {
     let vehicles = traces.iter().map(|(_, trace)| trace.vehicles).max().unwrap_or(1);
     let rows = traces.iter().flat_map(|(name, trace)| trace.steps.iter().map(move |step| (name, *trace, step)));

@@ -1,4 +1,4 @@
-//! What the figure of a case shows: its panels as plots. Where they stand on the sheet is the figure's business.
+//! The panels of a case's figure as plots. The figure arranges them on the sheet.
 
 use super::super::plot::plain_end;
 use super::super::plot::{GREY, Height, INK, Layer, Look, Mark, Plot, PlotAxis, Rule, Series, Symbol, Value};
@@ -7,24 +7,24 @@ use crate::engine::{StepMark, Trace, TracedStep, TracedVehicle};
 /// One lane on the sheet.
 #[derive(Debug, Clone)]
 pub struct TraceSeries<'a> {
-    /// What tells it from the others: driver model, variant.
+    /// Its distinguishing name: driver model, variant.
     pub name: String,
     /// The lane.
     pub trace: &'a Trace,
 }
 
-/// Half the width of the lane that is drawn, m: that of the paper's cut-ins and cut-outs, which start or end 3.5 m off.
+/// Half the width of the drawn lane, m: that of the paper's cut-ins and cut-outs, which start or end at 3.5 m.
 const HALF_LANE_M: f64 = 1.75;
-/// Seconds that are shown after the last change.
+/// Time shown after the last change, s.
 const REST_S: f64 = 2.0;
-/// TTC and BTN are shown up to so many times their thresholds.
+/// TTC and BTN are shown up to these multiples of their thresholds.
 const TTC_SHOWN: f64 = 10.0;
 const BTN_SHOWN: f64 = 2.5;
 
 /// A run of points, (time in s, value), without a gap.
 #[derive(Debug, Clone, PartialEq)]
 struct Curve {
-    /// Of another vehicle in a panel of the ego, or ignored by the criteria.
+    /// Whether it is drawn thin: of another vehicle in a panel of the ego, or ignored by the criteria.
     is_thin: bool,
     look: Look,
     points: Vec<(f64, f64)>,
@@ -43,14 +43,14 @@ impl From<Curve> for Layer {
 pub(super) struct Panel {
     /// How to read it, in a few words.
     pub hint: String,
-    /// The heading says what it shows, with unit.
+    /// The plot; its heading names the quantity with unit.
     pub plot: Plot,
 }
 
-/// The panels of one other vehicle or of the ego, from top to bottom.
+/// The panels of the ego or of one other vehicle, from top to bottom.
 pub(super) type Column = Vec<Panel>;
 
-/// A mark in the colour of its series; told apart by shape.
+/// A mark in the colour of its series; shapes distinguish marks.
 pub(super) fn mark_look(mark: StepMark, look: &Look) -> Look {
     let symbol = match mark {
         StepMark::Reaction => Symbol::Ring,
@@ -81,17 +81,17 @@ fn rule(ends: [(f64, f64); 2], colour: &'static str, width_px: f64, dash: &'stat
     }
 }
 
-/// What all panels show: the series up to a time.
+/// Data common to all panels: the series up to a time.
 pub(super) struct Shown<'a> {
     pub series: &'a [TraceSeries<'a>],
-    /// How they look.
+    /// Looks of the series.
     pub looks: Vec<Look>,
-    /// Last time that is shown, s.
+    /// Last time shown, s.
     pub until_s: f64,
 }
 
 impl<'a> Shown<'a> {
-    /// Up to a time, or all that changes: lanes may go on for long after their last event.
+    /// Up to a given time, or to the last change: lanes may continue long after their last event.
     pub fn of(series: &'a [TraceSeries<'a>], until_s: Option<f64>) -> Self {
         let end_s = series.iter().filter_map(|s| Some(s.trace.steps.last()?.time_s)).fold(0.0, f64::max);
         let last_s = series.iter().map(|s| last_change_s(s.trace)).fold(0.0, f64::max) + REST_S;
@@ -123,7 +123,7 @@ impl<'a> Shown<'a> {
         vec![std::iter::once(speed).chain(of(0)).collect(), std::iter::once(acceleration).chain(of(1)).collect()]
     }
 
-    /// Some step at which the criteria do not look at a vehicle that is there is shown.
+    /// Whether a step is shown at which the criteria ignore a vehicle that is present.
     pub fn has_unjudged(&self) -> bool {
         let unjudged = |trace: &Trace, step: &TracedStep| {
             step.others[..trace.vehicles].iter().any(|other| other.is_present && !other.is_judged)
@@ -135,7 +135,7 @@ impl<'a> Shown<'a> {
         &trace.steps[..trace.steps.partition_point(|step| step.time_s <= self.until_s)]
     }
 
-    /// A panel with axes and layers; where lanes have marks, a single lane's run through as lines.
+    /// A panel with axes and layers; the marks of a single lane become lines through all panels.
     fn panel(
         &self,
         title: &str,
@@ -144,7 +144,7 @@ impl<'a> Shown<'a> {
         ends: (f64, f64),
         layers: Vec<Layer>,
     ) -> Panel {
-        // A lane of one step has an axis too.
+        // A lane of one step needs an axis too.
         let end_s = if self.until_s > 0.0 { self.until_s } else { 1.0 };
         let through = self.mark_lines().into_iter().map(|(mark, time_s)| {
             let attributes = format!("class=\"mark-line {}\"", mark.label());
@@ -165,7 +165,7 @@ impl<'a> Shown<'a> {
         rule([(0.0, value), (self.until_s.max(1.0), value)], colour, width_px, dash).into()
     }
 
-    /// Where lines run through all panels: for a single lane only, more would be a thicket.
+    /// Times of the lines through all panels; only for a single lane, because more would be confusing.
     pub fn mark_lines(&self) -> Vec<(StepMark, f64)> {
         let [series] = self.series else { return Vec::new() };
         let time = |mark: StepMark| Some((mark, series.trace.time_s(series.trace.step_of(mark)?)));
@@ -240,7 +240,7 @@ impl<'a> Shown<'a> {
             let other = &step.others[vehicle];
             other.is_present.then(|| (value(other), false))
         };
-        // A little beyond 0 and 1, where most of the curves are.
+        // The axis extends a little beyond 0 and 1, where most of the curves are.
         self.panel(title, hint, 58.0, (-0.1, 1.1), layers(self.curves(&present), Vec::new()))
     }
 
@@ -270,12 +270,13 @@ impl<'a> Shown<'a> {
         self.panel("Lateral position (m)", "grey lines: sides of the ego", 110.0, ends, layers.collect())
     }
 
-    /// A value of the first series; the same for all of one sheet.
+    /// A value of the first series; equal for all of a sheet.
     fn first(&self, value: impl Fn(&Trace) -> f64) -> f64 {
         self.series.first().map_or(1.0, |s| value(s.trace))
     }
 
-    /// The different courses of a value of a vehicle, grey where all lanes have one; where lanes share one, that of the longest.
+    /// The distinct courses of a vehicle's value, grey if all lanes have the same one; the longest stands for equal
+    /// ones.
     fn courses(&self, vehicle: usize, value: &dyn Fn(&TracedVehicle) -> f64) -> Vec<(Look, &'a Trace)> {
         let at = |step: &TracedStep| {
             let other = &step.others[vehicle];
@@ -310,7 +311,7 @@ impl<'a> Shown<'a> {
         })
     }
 
-    /// Marks of the lanes, as layers; contacts with one vehicle only where it is given.
+    /// Marks of the lanes as layers; with a vehicle, only contacts with it.
     fn marks(
         &self,
         which: &[StepMark],
@@ -334,7 +335,7 @@ impl<'a> Shown<'a> {
     }
 }
 
-/// The last time at which anything but positions changes or the worst value is seen, s.
+/// The last time at which anything except positions changes or the worst value occurs, s.
 fn last_change_s(trace: &Trace) -> f64 {
     let state = |step: &TracedStep| {
         let of = |other: &TracedVehicle| (other.v_mps, other.y_m, other.is_present, other.is_judged);
@@ -355,7 +356,8 @@ fn last_change_s(trace: &Trace) -> f64 {
     changes.next_back().into_iter().chain(worst.into_iter().chain(marks).flatten()).fold(0.0, f64::max)
 }
 
-/// A value over time as runs without a gap, cut also where thin begins or ends; such neighbours share a point.
+/// A value over time as runs without a gap, also split where thin drawing begins or ends; such neighbours have a common
+/// point.
 fn runs(look: Look, steps: &[TracedStep], value: &dyn Fn(&TracedStep) -> Option<(f64, bool)>) -> Vec<Curve> {
     let mut runs: Vec<Curve> = Vec::new();
     let mut open = false;
@@ -386,11 +388,11 @@ fn layers(curves: impl IntoIterator<Item = Curve>, marks: Vec<Layer>) -> Vec<Lay
     curves.into_iter().map(Layer::from).chain(marks).collect()
 }
 
-/// Ends around values with a little room, different and finite.
+/// Distinct, finite ends around values, with a little room.
 fn around(values: impl Iterator<Item = f64>) -> (f64, f64) {
     let shown = values.filter(|v| v.abs() <= 1e300);
     let (low, high) = shown.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), v| (low.min(v), high.max(v)));
-    // Equal but for rounding counts as equal.
+    // Values equal except for rounding count as equal.
     let room = (0.06 * (high - low)).max(1e-3 * low.abs().max(high.abs())).max(0.05);
     let (low, high) = (low - room, high + room);
     if low < high && low.is_finite() && high.is_finite() { (low, high) } else { (0.0, 1.0) }
@@ -401,7 +403,7 @@ fn below(curve: Curve, top: f64) -> Vec<Curve> {
     let Curve { look, is_thin, points } = curve;
     let mut pieces: Vec<Vec<(f64, f64)>> = vec![Vec::new()];
     let crossing = |(t1, v1): (f64, f64), (t2, v2): (f64, f64)| {
-        // Towards infinity it is the step's end that crosses.
+        // Towards infinity the curve crosses at the end of the step.
         let share =
             if v2.is_finite() && v1.is_finite() { (top - v1) / (v2 - v1) } else { f64::from(u8::from(v1 <= top)) };
         (t1 + share * (t2 - t1), top)

@@ -1,4 +1,4 @@
-//! What must hold for every figure and table of a case, the strangest ones too.
+//! Properties of every figure and table of a case, including unusual ones.
 
 use super::super::plot::words;
 use super::{TraceFigure, TraceSeries, table};
@@ -31,7 +31,7 @@ fn figure(traces: &[Trace]) -> TraceFigure<'_> {
     TraceFigure { title: "A case".to_owned(), subtitle: Some("SYNTHETIC DATA".to_owned()), series, until_s: None }
 }
 
-/// Frames as (left, top, right, bottom), each with the points of the series before it and the marks after it.
+/// Frames as (left, top, right, bottom), each with the points of its series and its marks.
 type Panels = Vec<([f64; 4], Vec<(f64, f64)>, Vec<(String, f64)>)>;
 
 fn number(tag: &str, key: &str) -> f64 {
@@ -74,7 +74,7 @@ fn panels(svg: &str) -> Panels {
     panels
 }
 
-/// What holds for every figure; gives its panels.
+/// Checks the properties of every figure; returns its panels.
 fn check(traces: &[Trace]) -> Panels {
     let svg = figure(traces).svg();
     assert_eq!(svg, figure(traces).svg(), "the same figure gives the same bytes");
@@ -97,7 +97,7 @@ fn check(traces: &[Trace]) -> Panels {
             assert!(inside, "({x}, {y}) is outside of {frame:?}");
         }
     }
-    // The marks of the speed panel stand where the traces say.
+    // The marks of the speed panel are at the times of the traces.
     let end_s = traces.iter().map(|t| t.steps.last().unwrap().time_s).fold(0.0, f64::max);
     let until_s = super::panels::Shown::of(&figure(traces).series, None).until_s;
     assert!(until_s <= end_s);
@@ -171,7 +171,7 @@ fn a_contact_at_once_a_gap_of_nothing_and_a_ttc_that_is_never_finite_are_drawn()
 fn a_vehicle_that_is_not_in_view_has_no_curves() {
     let leaving = Lateral::Kinematic { start_m: 0.0, rate_mps: 0.7, end_m: 3.5 };
     let out = case(Category::CutOut, 25.0, vehicle(25.0, leaving));
-    // This profile's ego sees the vehicle ahead from the exposure on, and the cutting-out one never.
+    // In this profile the ego sees the vehicle ahead from the exposure on, and never the cutting-out one.
     let traces = ModelId::ALL.map(|model| trace("jrc-2021", &out, 40.0, model));
     assert!(traces.iter().all(|t| t.steps.iter().all(|step| !step.others[0].is_present)));
     let panels = check(&traces);

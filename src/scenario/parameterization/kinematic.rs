@@ -1,4 +1,4 @@
-//! Kinematic parameterizations: features as data, and the variables, names and cases that follow from them.
+//! Kinematic parameterizations: features as data, and the variables, names and cases derived from them.
 
 use super::options::{AfterDuration, LateralStart, ParameterizationOptions};
 use super::parameter::Variable;
@@ -10,7 +10,7 @@ use crate::scenario::{Case, Category, Lateral, Scenario, Speed};
 /// How the speeds of the vehicles other than the ego change over [0, T].
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum SpeedProfile {
-    /// They do not.
+    /// Constant.
     Constant,
     /// With constant acceleration; LVD: from v0 to v1, then constant.
     ConstantAcceleration,
@@ -38,12 +38,12 @@ pub struct Kinematic {
     pub lane_change: LaneChange,
 }
 
-/// One value per [`Variable`], by its code; 0 for those that a parameterization lacks.
+/// One value per [`Variable`], indexed by its code; 0 for those that a parameterization lacks.
 #[derive(Default)]
 pub(super) struct Values([f64; Variable::ALL.len()]);
 
 impl Values {
-    /// Those of a point. T follows where speeds and a mean deceleration are given.
+    /// The values of a point. T is derived where speeds and a mean deceleration are given.
     fn of_point(variables: &[Variable], point: &[f64]) -> Values {
         let mut values = Values::default();
         for (variable, value) in variables.iter().zip(point) {
@@ -96,7 +96,7 @@ impl Kinematic {
         all.into_iter().filter_map(|(variable, is_given)| is_given.then_some(variable)).collect()
     }
 
-    /// What is kept, in words.
+    /// Describes the kept features in words.
     pub(super) fn description(self, category: Category) -> String {
         let speed = match (self.speed, category) {
             (SpeedProfile::Constant, _) => "constant speed",
@@ -113,7 +113,7 @@ impl Kinematic {
         format!("{speed}{plural}{lane_change}")
     }
 
-    /// The case of a mined scenario: T, and with the option the lateral start, stay as recorded.
+    /// The case of a mined scenario. T stays as recorded, and with the option also the lateral start.
     pub(super) fn replay(self, scenario: &Scenario, grid: TimeGrid, options: &ParameterizationOptions) -> Result<Case> {
         let variables = self.variables(scenario.category);
         let point = variables.iter().map(|v| v.of(scenario, options)).collect::<Result<Vec<f64>>>()?;
@@ -139,7 +139,7 @@ impl Kinematic {
         self.case(category, &values, options.lane_change_m, sizes, grid, options)
     }
 
-    /// `start_m`: lateral distance from which a cut-in comes.
+    /// `start_m`: lateral distance at which a cut-in starts.
     fn case(
         self,
         category: Category,
@@ -189,7 +189,7 @@ impl Kinematic {
     }
 }
 
-/// The sinusoid at every step, or `intervals` lines between points of it where that is above 0.
+/// The sinusoid at every step; if `intervals` is above 0, that many line segments between points of it.
 fn sinusoidal_series(v0: f64, v1: f64, duration_s: f64, grid: TimeGrid, intervals: usize) -> Speed {
     let n = intervals;
     let points: Vec<f64> =
@@ -227,7 +227,7 @@ mod tests {
             for row in profile["rows"].as_array().unwrap() {
                 let (t, v) = (row[0].as_f64().unwrap(), row[2].as_f64().unwrap());
                 let elapsed = (t - number("t_const")).max(0.0);
-                // The golden's times and values are rounded to six and ten decimals.
+                // The times and values of the golden file are rounded to six and ten decimals.
                 let ours = sinusoidal_speed(v0, v1, duration_s, elapsed);
                 assert!((ours - v).abs() < 1e-5, "v0 {v0}, t {t}: {ours} instead of {v}");
                 compared += 1;

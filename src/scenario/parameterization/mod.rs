@@ -1,11 +1,11 @@
-//! Parameterizations: from a mined scenario to a point, and from a scenario or a point to the case that is simulated.
+//! Parameterizations: from a mined scenario to a point, and from a scenario or a point to the simulated case.
 //!
-//! Here live S (the scenario as recorded), the kinematic parameterizations and the reduction by singular
-//! value decomposition. Here lives nothing about headways, models or verdicts. Scenarios come from
-//! [`crate::scenario`]; cases go to [`crate::engine`].
+//! This module holds S (the scenario as recorded), the kinematic parameterizations and the reduction by singular value
+//! decomposition. It knows nothing about headways, models or verdicts. Scenarios come from [`crate::scenario`]; cases
+//! go to [`crate::engine`].
 //!
-//! A [`Parameterization`] is data: all that others ask of it (parameters, description, encoding, decoding) follows
-//! from its category and its [`Family`]. To add one of a known family: a line in [`Parameterization::ALL`].
+//! A [`Parameterization`] is data: its parameters, description, encoding and decoding follow from its category and its
+//! [`Family`]. To add one of an existing family: a line in [`Parameterization::ALL`].
 
 mod kinematic;
 mod options;
@@ -32,7 +32,7 @@ pub use svd::{SvdBasis, fit_svd};
 use crate::scenario::{Case, Category, Scenario};
 use crate::{Error, Place, Result};
 
-/// How a parameterization describes a scenario.
+/// How a parameterization represents a scenario.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Family {
     /// By physical variables.
@@ -58,7 +58,7 @@ pub struct Parameterization {
     pub category: Category,
     /// Name, unique in its category; in the paper `1`…`7`, `a`…`g`, `i`…`v`.
     pub key: Cow<'static, str>,
-    /// How it describes a scenario.
+    /// How it represents a scenario.
     pub family: Family,
 }
 
@@ -77,7 +77,7 @@ const fn svd(category: Category, key: &'static str, coefficients: usize) -> Para
 }
 
 impl Parameterization {
-    /// The paper's 19, in the order of every table.
+    /// The paper's 19 parameterizations, in the order of every table.
     pub const ALL: [Parameterization; 19] = {
         use Category::{CutIn, CutOut, Lvd};
         use LaneChange::{Gradual, Instantaneous, None};
@@ -105,17 +105,17 @@ impl Parameterization {
         ]
     };
 
-    /// Those of one category, in order.
+    /// The parameterizations of one category, in order.
     pub fn of(category: Category) -> impl Iterator<Item = Parameterization> {
         Self::ALL.into_iter().filter(move |p| p.category == category)
     }
 
-    /// By category and name.
+    /// Finds one by category and name.
     pub fn find(category: Category, key: &str) -> Option<Parameterization> {
         Self::of(category).find(|p| p.key == key)
     }
 
-    /// Largest number of SVD coefficients in a category.
+    /// Maximum number of SVD coefficients in a category.
     pub fn max_coefficients(category: Category) -> usize {
         Self::of(category).filter_map(|id| id.coefficients()).max().unwrap_or(0)
     }
@@ -125,7 +125,7 @@ impl Parameterization {
         format!("{} {}", self.category.label(), self.key)
     }
 
-    /// One line: what is kept.
+    /// The kept features in one line.
     pub fn description(&self) -> String {
         match self.family {
             Family::Kinematic(features) => features.description(self.category),
@@ -141,7 +141,7 @@ impl Parameterization {
         }
     }
 
-    /// Features; `None` for one by SVD.
+    /// Features; `None` for SVD.
     pub fn features(&self) -> Option<Kinematic> {
         match self.family {
             Family::Kinematic(features) => Some(features),
@@ -149,7 +149,7 @@ impl Parameterization {
         }
     }
 
-    /// What each number of a point stands for; empty for coefficients, which stand for no single variable.
+    /// What each number of a point stands for; empty for SVD coefficients, which have no single variable.
     pub fn variables(&self) -> Vec<Variable> {
         self.features().map_or(Vec::new(), |features| features.variables(self.category))
     }
@@ -168,7 +168,7 @@ impl Parameterization {
         self.coefficients().unwrap_or_else(|| variables.iter().filter(|v| **v != Variable::Duration).count())
     }
 
-    /// Whether the cases hold a series per time step, not a formula.
+    /// Whether the cases hold a series per time step rather than a formula.
     pub fn has_series(&self) -> bool {
         self.features().is_none_or(|features| features.speed == SpeedProfile::Sinusoidal)
     }
@@ -188,11 +188,11 @@ impl Parameterization {
         ))
     }
 
-    /// A mined scenario as a point; one by SVD needs its decomposition.
+    /// Encodes a mined scenario as a point; an SVD parameterization needs its decomposition.
     ///
     /// # Errors
-    /// [`Error::Input`] for a cut-out without the vehicle ahead; [`Error::Internal`] for a scenario of another
-    /// category or a missing decomposition.
+    /// [`Error::Input`] for a cut-out without the vehicle ahead; [`Error::Internal`] for a scenario of another category
+    /// or a missing decomposition.
     pub fn encode(
         &self,
         scenario: &Scenario,
@@ -206,11 +206,11 @@ impl Parameterization {
         }
     }
 
-    /// The case of a valid point, with sizes that the caller chooses.
+    /// Decodes a valid point into a case; the caller gives the sizes.
     ///
     /// # Errors
-    /// [`Error::Input`] for a cut-out without the size of the vehicle ahead; [`Error::Internal`] for a point of
-    /// another length or a missing decomposition.
+    /// [`Error::Input`] for a cut-out without the size of the vehicle ahead; [`Error::Internal`] for a point of another
+    /// length or a missing decomposition.
     pub fn decode(
         &self,
         point: &[f64],
@@ -226,7 +226,7 @@ impl Parameterization {
         }
         match self.family {
             Family::Kinematic(features) => features.decode(self.category, point, sizes, grid.into(), options),
-            // A point has no side: its lateral series stays as it is.
+            // A point has no side, so its lateral series is not mirrored.
             Family::Svd(_) => {
                 let reduction = self.fitted(reduction)?;
                 reduction.case_of(&reduction.rebuild(point, 1.0), sizes, grid)
@@ -234,7 +234,7 @@ impl Parameterization {
         }
     }
 
-    /// The case that replays a mined scenario. Beside its point it keeps the recorded T, sizes and side.
+    /// The case that replays a mined scenario from its point, with the recorded T, sizes and side.
     ///
     /// # Errors
     /// As [`encode`](Self::encode).

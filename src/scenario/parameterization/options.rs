@@ -117,13 +117,13 @@ impl Default for ParameterizationOptions {
 }
 
 impl ParameterizationOptions {
-    /// The defaults of densities: `svd_lateral` is [`SvdLateral::Mirrored`], because kernels around left-positive series
-    /// of left and right scenarios spill into the ego's lane between them.
+    /// Defaults for densities: `svd_lateral` is [`SvdLateral::Mirrored`]. With left-positive series, kernels around
+    /// left and right scenarios would reach into the ego's lane between them.
     pub fn of_densities() -> ParameterizationOptions {
         ParameterizationOptions { svd_lateral: SvdLateral::Mirrored, ..ParameterizationOptions::default() }
     }
 
-    /// Checks the ranges; the error names the option.
+    /// Checks the ranges.
     pub fn validate(&self) -> Result<()> {
         ranges::check("parameterization", self)
     }

@@ -1,5 +1,5 @@
-//! What the numbers of a point stand for: variables of a case with name, unit and valid range, and how each is read
-//! from a mined scenario.
+//! The numbers of a point: variables of a case with name, unit and valid range, and how each is read from a mined
+//! scenario.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,26 +10,26 @@ use crate::scenario::{Category, Scenario};
 use crate::support::plausibility::Quantity;
 use crate::{Error, Place, Result};
 
-/// Shortest duration T of a valid point and of a reconstruction, s.
+/// Minimum duration T of a valid point and of a reconstruction, s.
 pub const MIN_DURATION_S: f64 = 0.1;
 
-/// Longest duration T of a valid point, s: five times the longest run, which ends after 120 s. It keeps sampled
-/// series short where a deceleration comes out near 0.
+/// Maximum duration T of a valid point, s: five times the longest run, which ends after 120 s. It limits sampled series
+/// where a deceleration is near 0.
 pub const MAX_DURATION_S: f64 = 600.0;
 
-/// Physical ranges of a density's numbers: unit, smallest scale of a parameter, largest size of a value or scale. Beyond,
-/// nothing drives, and the lane arithmetic (binary32) has no normal number.
+/// Physical ranges of a density's numbers: unit, minimum scale of a parameter, maximum magnitude of a value or scale.
+/// Beyond them no vehicle exists, and values are not normal numbers of the lane arithmetic (binary32).
 const PHYSICAL_RANGES: [(&str, f64, f64); 5] =
     [("m/s", 1e-9, 200.0), ("m/s²", 1e-9, 100.0), ("m", 1e-9, 10_000.0), ("s", 1e-9, 1000.0), ("1", 1e-9, 1e6)];
 
-/// A number that a kinematic case is made of. Its code is its slot in the
-/// [recipe](crate::engine::generated::Recipe) of a case generator.
+/// A number that defines a kinematic case. Its code is its slot in the [recipe](crate::engine::generated::Recipe) of a
+/// case generator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(u32)]
 pub enum Variable {
     /// Speed of cutter or cutting-out vehicle at t = 0, m/s; LVD: of leader and ego before the deceleration.
     TargetSpeed,
-    /// Size of the target's lateral speed, m/s.
+    /// Magnitude of the target's lateral speed, m/s.
     LateralSpeed,
     /// Speed of the ego, m/s; LVD: that of the leader.
     EgoSpeed,
@@ -51,24 +51,24 @@ pub enum Variable {
     TimeHeadway,
 }
 
-/// A dimension as files and tables show it.
+/// A dimension of a point as files and tables show it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Parameter {
     /// Name with its unit, `v_target_mps`.
     pub name: String,
-    /// Unit: `m/s`, `m/s²`, `m`, `s`; `1` for coefficients, which have none.
+    /// Unit: `m/s`, `m/s²`, `m`, `s`; `1` for dimensionless coefficients.
     pub unit: String,
-    /// Least valid value; `None` is unbounded.
+    /// Minimum valid value; `None` is unbounded.
     pub lower: Option<f64>,
-    /// The least value itself is not valid.
+    /// Whether the minimum itself is excluded.
     pub lower_excluded: bool,
-    /// Largest valid value; `None` is unbounded.
+    /// Maximum valid value; `None` is unbounded.
     pub upper: Option<f64>,
 }
 
 impl Variable {
-    /// All, in the order of their codes.
+    /// All variables, in the order of their codes.
     pub const ALL: [Variable; 11] = [
         Variable::TargetSpeed,
         Variable::LateralSpeed,
@@ -102,10 +102,10 @@ impl Variable {
         Parameter { name: name.to_owned(), unit: unit.to_owned(), lower, lower_excluded, upper }
     }
 
-    /// The value in a mined scenario.
+    /// Returns the value in a mined scenario.
     ///
     /// # Errors
-    /// [`Error::Input`] for a scenario without it: no vehicle ahead, no observed headway.
+    /// [`Error::Input`] for a scenario without the value: no vehicle ahead, or no observed headway.
     pub fn of(self, scenario: &Scenario, options: &ParameterizationOptions) -> Result<f64> {
         let (target, duration_s) = (&scenario.target, scenario.duration_s());
         let before = if scenario.category == Category::Lvd { target.v[0].max(0.0) } else { target.v[0] };
@@ -122,7 +122,7 @@ impl Variable {
             Variable::Duration => duration_s,
             Variable::FinalSpeed => after(),
             Variable::MeanDeceleration => (before - after()) / duration_s,
-            // A drawn ego of an LVD starts at the leader's speed, from the recorded gap like that of S.
+            // In LVD the ego starts at the leader's speed, with the recorded gap, like the ego of S.
             Variable::TimeHeadway if scenario.category == Category::Lvd && scenario.thw0.is_some() && before > 0.0 => {
                 scenario.start_headway_s().unwrap_or_default()
             }
@@ -138,7 +138,7 @@ impl Variable {
 }
 
 impl Parameter {
-    /// Whose plausible and physical range its values have; `None` where there is no such range.
+    /// The quantity that defines its plausible and physical range; `None` if there is none.
     pub(crate) fn quantity(&self) -> Option<Quantity> {
         match (&*self.name, &*self.unit) {
             ("lateral_speed_mps", _) => Some(Quantity::LateralSpeed),
@@ -150,12 +150,12 @@ impl Parameter {
         }
     }
 
-    /// Coefficient `j` of a decomposition, counted from 0: unbounded and without a unit.
+    /// Coefficient `j` of a decomposition, counted from 0: unbounded, dimensionless.
     pub(super) fn coefficient(j: usize) -> Parameter {
         Parameter { name: format!("c{}", j + 1), unit: "1".to_owned(), lower: None, lower_excluded: false, upper: None }
     }
 
-    /// Within the bounds; false for NaN.
+    /// Whether a value is within the bounds; false for NaN.
     pub fn holds(&self, value: f64) -> bool {
         let above = match self.lower {
             Some(lower) if self.lower_excluded => value > lower,
@@ -165,13 +165,13 @@ impl Parameter {
         value.is_finite() && above && self.upper.is_none_or(|upper| value <= upper)
     }
 
-    /// Smallest scale and largest size of a value or scale, in its unit.
+    /// Minimum scale and maximum magnitude of a value or scale, in its unit.
     pub fn physical_range(&self) -> [f64; 2] {
         let of_unit = PHYSICAL_RANGES.iter().find(|(unit, ..)| *unit == self.unit);
         of_unit.map_or([f64::MIN_POSITIVE, f64::MAX], |&(_, smallest, largest)| [smallest, largest])
     }
 
-    /// The same with bounds that lie within the physical range of its quantity.
+    /// The same parameter with its bounds limited to the physical range of its quantity.
     pub fn within_physics(&self) -> Parameter {
         let Some(quantity) = self.quantity() else { return self.clone() };
         let (least, largest) = quantity.limits().physical;

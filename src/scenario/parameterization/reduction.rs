@@ -1,5 +1,5 @@
-//! Scenarios as vectors and back: cut-in 5–7 (y, v; v^e_0, T), cut-out e–g (y, v^c, v^l; v^e_0, D, T),
-//! LVD iii–v (v; T). What the directions of a decomposition mean is shown by its mode shapes.
+//! Conversion of scenarios to vectors and back: cut-in 5–7 (y, v; v^e_0, T), cut-out e–g (y, v^c, v^l; v^e_0, D, T),
+//! LVD iii–v (v; T). Mode shapes show the meaning of the directions of a decomposition.
 
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +12,7 @@ use super::svd::{SvdBasis, fit_svd};
 use crate::scenario::{Case, Category, Scenario, Side};
 use crate::{Error, Result};
 
-/// Directions whose mode shapes are shown.
+/// Number of directions whose mode shapes are shown.
 const SHOWN: usize = 3;
 
 /// A series in the vector of a decomposition.
@@ -26,7 +26,7 @@ pub enum ReducedSeries {
     LeadSpeed,
 }
 
-/// The vector of a category: its series one behind the other, then single numbers, T last.
+/// The layout of a category's vector: its series one after another, then single numbers, T last.
 fn layout(category: Category) -> (&'static [ReducedSeries], &'static [Variable]) {
     use Variable::{Duration, EgoSpeed, LeadGap};
     match category {
@@ -49,7 +49,7 @@ pub struct Reduction {
     options: ParameterizationOptions,
 }
 
-/// A scenario rebuilt from few coefficients; within its physical range.
+/// A scenario reconstructed from few coefficients; within its physical range.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ReducedScenario {
     /// Lateral position of the target, m, > 0 on its side; empty in LVD.
@@ -67,7 +67,8 @@ pub struct ReducedScenario {
 }
 
 impl Reduction {
-    /// Fits on scenarios of one category. Needs more scenarios than the largest number of coefficients.
+    /// Fits the decomposition to scenarios of one category. Their number must exceed the maximum number of
+    /// coefficients.
     pub fn fit(category: Category, scenarios: &[&Scenario], options: &ParameterizationOptions) -> Result<Reduction> {
         let rows = scenarios.iter().map(|s| vector(s, options)).collect::<Result<Vec<_>>>()?;
         let needed = Parameterization::max_coefficients(category);
@@ -79,11 +80,11 @@ impl Reduction {
         Ok(Reduction { category, basis, options: options.clone() })
     }
 
-    /// A decomposition that was fitted before, as a density file holds it.
+    /// A previously fitted decomposition, as a density file holds it.
     ///
     /// # Errors
-    /// [`Error::Input`] where lengths do not fit the category and the number of instants, or a number is not
-    /// finite or a weight not above 0.
+    /// [`Error::Input`] if lengths do not match the category and the number of instants, a number is not finite, or a
+    /// weight is not above 0.
     pub fn from_parts(category: Category, basis: SvdBasis, options: &ParameterizationOptions) -> Result<Reduction> {
         let (series, extras) = layout(category);
         let p = series.len() * options.svd_instants + extras.len();
@@ -109,19 +110,19 @@ impl Reduction {
         Ok(self.basis.coefficients(&vector(scenario, &self.options)?, d))
     }
 
-    /// The scenario rebuilt from its first `d` coefficients.
+    /// The scenario reconstructed from its first `d` coefficients.
     pub fn reduce(&self, scenario: &Scenario, d: usize) -> Result<ReducedScenario> {
         Ok(self.rebuild(&self.coefficients(scenario, d)?, scenario.side.sign()))
     }
 
-    /// The scenario that belongs to coefficients. `side` is 1 for the left and −1 for the right: with
-    /// [`SvdLateral::Signed`] the lateral series is left-positive and is multiplied by it.
+    /// The scenario reconstructed from coefficients. `side` is 1 for left and −1 for right: with [`SvdLateral::Signed`]
+    /// the lateral series is left-positive and is multiplied by it.
     pub fn rebuild(&self, coefficients: &[f64], side: f64) -> ReducedScenario {
         self.scenario_of(&self.basis.reconstruct(coefficients), side)
     }
 
-    /// One column of the reconstruction from coefficients, in its unit and before any clamping; the same bits
-    /// as [`SvdBasis::reconstruct`] gives.
+    /// One column of the reconstruction from coefficients, in its unit, before clamping; bit-identical to
+    /// [`SvdBasis::reconstruct`].
     pub fn rebuilt_column(&self, coefficients: &[f64], column: usize) -> f64 {
         let mut weighted = self.basis.mean[column];
         for (c, direction) in coefficients.iter().zip(&self.basis.directions) {
@@ -130,13 +131,13 @@ impl Reduction {
         weighted / self.basis.weights[column]
     }
 
-    /// First column of a series, where the category has it.
+    /// First column of a series; `None` if the category lacks it.
     pub fn series_column(&self, series: ReducedSeries) -> Option<usize> {
         let at = layout(self.category).0.iter().position(|s| *s == series)?;
         Some(at * self.options.svd_instants)
     }
 
-    /// Column of a variable, where the vector has it; in LVD the ego starts at the leader's speed.
+    /// Column of a variable; `None` if the vector lacks it. In LVD the ego starts at the leader's speed.
     pub fn column(&self, variable: Variable) -> Option<usize> {
         let (series, extras) = layout(self.category);
         match extras.iter().position(|v| *v == variable) {
@@ -146,7 +147,7 @@ impl Reduction {
         }
     }
 
-    /// Vector → scenario: mirrored back and brought into the physical range.
+    /// Converts a vector to a scenario: mirrors it back and limits it to the physical range.
     fn scenario_of(&self, z: &[f64], side: f64) -> ReducedScenario {
         let mirror = match self.options.svd_lateral {
             SvdLateral::Signed => side,
@@ -166,15 +167,15 @@ impl Reduction {
         }
     }
 
-    /// The case of a scenario under `d` coefficients. Sizes stay those of the scenario.
+    /// The case of a scenario reduced to `d` coefficients, with the scenario's sizes.
     pub fn case(&self, scenario: &Scenario, d: usize, grid: impl Into<TimeGrid>) -> Result<Case> {
         self.case_of(&self.reduce(scenario, d)?, &Sizes::of(scenario), grid)
     }
 
-    /// The case of a rebuilt scenario on a time grid.
+    /// The case of a reconstructed scenario on a time grid.
     ///
     /// # Errors
-    /// For a cut-out without the size of the vehicle ahead.
+    /// [`Error::Input`] for a cut-out without the size of the vehicle ahead.
     pub fn case_of(&self, reduced: &ReducedScenario, sizes: &Sizes, grid: impl Into<TimeGrid>) -> Result<Case> {
         SeriesCase {
             category: self.category,
@@ -188,11 +189,11 @@ impl Reduction {
         .on(grid.into(), sizes)
     }
 
-    /// The series of the decomposition with their shapes over some of its scenarios. Left-positive series are those of
-    /// one side, the one with more scenarios: the mean of both sides drives in the middle, where nobody drove.
+    /// The series of the decomposition with their shapes over the given scenarios. Left-positive series use only the
+    /// side with more scenarios: the mean of both sides would drive in the middle, where no vehicle drove.
     ///
     /// # Errors
-    /// [`Error::Input`] for a scenario that has no vector.
+    /// [`Error::Input`] for a scenario that cannot be converted to a vector.
     pub fn mode_shapes(&self, scenarios: &[&Scenario]) -> Result<Vec<ModeShape>> {
         let target = match self.category {
             Category::CutIn => "cutter",
@@ -247,11 +248,11 @@ fn means(rows: &[Vec<f64>]) -> Vec<f64> {
     (0..columns).map(|c| rows.iter().map(|row| row[c]).sum::<f64>() / rows.len() as f64).collect()
 }
 
-/// One series of the mean scenario and of those along the first directions, in the units of the recording.
+/// One series of the mean scenario and its variation along the first directions, in the units of the recording.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ModeShape {
-    /// What it is: `lateral position of the cutter`.
+    /// Name, such as `lateral position of the cutter`.
     pub quantity: String,
     /// Unit.
     pub unit: String,
@@ -261,7 +262,7 @@ pub struct ModeShape {
     pub along: Vec<Vec<f64>>,
 }
 
-/// Scenario → vector: series at n_t equidistant points over [0, T], then the extras.
+/// Converts a scenario to a vector: series at n_t equidistant points over [0, T], then the extras.
 fn vector(scenario: &Scenario, options: &ParameterizationOptions) -> Result<Vec<f64>> {
     let n = options.svd_instants;
     if n < 2 {

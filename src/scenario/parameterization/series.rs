@@ -1,5 +1,5 @@
-//! Series on other time grids, the cases that consist of series, and the numbers that kinematic parameterizations take
-//! from them.
+//! Resampling of series on other time grids, cases that consist of series, and the numbers that kinematic
+//! parameterizations derive from them.
 
 use super::options::{AfterDuration, LateralSpeed, ParameterizationOptions};
 use super::sizes::{Sizes, vehicle_ahead};
@@ -7,12 +7,12 @@ use crate::Result;
 use crate::model::profile::Profile;
 use crate::scenario::{Case, Category, Lateral, Other, Scenario, Speed};
 
-/// Value of a series of rate `fps` at time `t_s`, linear between samples, the last one held.
+/// Value of a series of rate `fps`, Hz, at time `t_s`, s: linear between samples; the last sample is held.
 pub fn at(series: &[f64], fps: f64, t_s: f64) -> f64 {
     let last = series.len() - 1;
     let position = t_s * fps;
     let nearest = position.round();
-    // A grid point is the sample itself: t·fps comes out a rounding error beside it.
+    // At a grid point return the sample itself: t·fps may differ from it by a rounding error.
     if (position - nearest).abs() < 1e-9 {
         return series[(nearest.max(0.0) as usize).min(last)];
     }
@@ -22,23 +22,23 @@ pub fn at(series: &[f64], fps: f64, t_s: f64) -> f64 {
     series[below] + (series[above] - series[below]) * share
 }
 
-/// Instants that motions are sampled at.
+/// Instants at which motions are sampled.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct TimeGrid {
-    /// Time between two, s.
+    /// Interval between instants, s.
     pub dt_s: f64,
-    /// Maximum number: no lane reads more.
+    /// Maximum number of instants; no lane reads more.
     pub max_steps: usize,
 }
 
 impl TimeGrid {
-    /// That of a profile's lanes, which end at its time cap.
+    /// The grid of a profile's lanes, which end at its time cap.
     pub fn of(profile: &Profile) -> TimeGrid {
         TimeGrid { dt_s: profile.frame.dt_s, max_steps: profile.step_cap() as usize + 2 }
     }
 }
 
-/// Without an end.
+/// A grid without an end.
 impl From<f64> for TimeGrid {
     fn from(dt_s: f64) -> TimeGrid {
         TimeGrid { dt_s, max_steps: usize::MAX }
@@ -74,7 +74,7 @@ pub fn lateral_on_grid(series: &[f64], fps: f64, duration_s: f64, grid: TimeGrid
     (position, towards)
 }
 
-/// A scenario whose vehicles follow series; after T the last values hold.
+/// A scenario whose vehicles follow series; after T the last values are held.
 pub(super) struct SeriesCase<'a> {
     pub category: Category,
     /// Lateral position of the target, m; unused in LVD.
@@ -108,7 +108,7 @@ impl SeriesCase<'_> {
     }
 }
 
-/// S: the case of the recorded scenario on a time grid. Fails for a cut-out without a vehicle ahead.
+/// S: the case of the recorded scenario on a time grid. Fails for a cut-out without the vehicle ahead.
 pub fn recorded_case(scenario: &Scenario, grid: impl Into<TimeGrid>) -> Result<Case> {
     let target = &scenario.target;
     let lead = match scenario.category {
@@ -128,8 +128,8 @@ pub fn recorded_case(scenario: &Scenario, grid: impl Into<TimeGrid>) -> Result<C
     .on(grid.into(), &Sizes::of(scenario))
 }
 
-/// Size of the constant lateral speed, m/s: the displacement over the time. (|y(0)| − |y(T)|)/T, as one may
-/// also read the specification, would shorten the path of a target that ends beyond the lane's middle.
+/// Magnitude of the constant lateral speed, m/s: displacement over time. The alternative reading of the specification,
+/// (|y(0)| − |y(T)|)/T, would shorten the path of a target that ends beyond the lane's middle.
 pub fn lateral_speed(scenario: &Scenario, options: &ParameterizationOptions) -> f64 {
     let y = &scenario.target.y;
     let duration = scenario.duration_s();
@@ -152,7 +152,7 @@ pub fn mean_acceleration(other: &Other, duration_s: f64) -> f64 {
 pub fn accelerated(initial_mps: f64, acceleration_mps2: f64, duration_s: f64, after: AfterDuration) -> Speed {
     let until_s = match after {
         AfterDuration::Hold => duration_s,
-        // Longer than any run.
+        // A time beyond every run, s.
         AfterDuration::Unlimited => 1e6,
     };
     Speed::Kinematic { initial_mps, acceleration_mps2, until_s }

@@ -1,5 +1,5 @@
-//! Sizes of the vehicles of a case, and the case that follows from sizes and motions. Sizes are no parameters: S and
-//! S' share them, and points drawn from a density take the means of its scenarios.
+//! Sizes of the vehicles of a case, and the case built from sizes and motions. Sizes are not parameters: S and S' use
+//! the same ones, and points drawn from a density use the means of its scenarios.
 
 use serde::{Deserialize, Serialize};
 
@@ -29,7 +29,7 @@ pub struct Sizes {
 }
 
 impl Sizes {
-    /// Those of a mined scenario.
+    /// The sizes in a mined scenario.
     pub fn of(scenario: &Scenario) -> Sizes {
         let size = |length_m: f64, width_m: f64| VehicleSize { length_m, width_m };
         Sizes {
@@ -39,8 +39,7 @@ impl Sizes {
         }
     }
 
-    /// Means over scenarios, in their order; of the vehicle ahead over those that have one. `None` without
-    /// scenarios.
+    /// Means over scenarios, in their order; for the vehicle ahead over those that have one. `None` without scenarios.
     pub fn mean<'a>(scenarios: impl IntoIterator<Item = &'a Scenario>) -> Option<Sizes> {
         let all: Vec<Sizes> = scenarios.into_iter().map(Sizes::of).collect();
         let mean = |sizes: Vec<VehicleSize>| {
@@ -57,7 +56,7 @@ impl Sizes {
         })
     }
 
-    /// The case of vehicles of these sizes; `lead` is the speed of the vehicle ahead and the gap to it, m.
+    /// The case of vehicles with these sizes; `lead` is the speed of the vehicle ahead and the gap to it, m.
     ///
     /// # Errors
     /// [`Error::Input`] for a vehicle ahead without a size.
@@ -98,7 +97,7 @@ impl Sizes {
     }
 }
 
-/// The vehicle ahead of a cut-out and its gap, m; a scenario without them cannot be simulated.
+/// The vehicle ahead of a cut-out and its gap, m; fails for a scenario without them.
 pub(crate) fn vehicle_ahead(scenario: &Scenario) -> Result<(&Other, f64)> {
     match (&scenario.lead, scenario.lead_gap) {
         (Some(lead), Some(gap)) => Ok((lead, gap)),

@@ -1,8 +1,8 @@
-//! Reduction of vectors by singular value decomposition: weights, fit, reconstruction. Knows columns, not
-//! scenarios.
+//! Reduction of vectors by singular value decomposition: weights, fit, reconstruction. It works on columns and knows
+//! nothing about scenarios.
 //!
-//! Rows of X are weight ∘ z − mean; an economy SVD X = U Σ Vᵀ; the first d coefficients are kept. Computed
-//! by faer without parallelism: its bits must not depend on the number of threads.
+//! Rows of X are weight ∘ z − mean; an economy SVD X = U Σ Vᵀ; the first d coefficients are kept. faer computes it
+//! without parallelism, so that its bits do not depend on the number of threads.
 
 use faer::Mat;
 
@@ -18,16 +18,16 @@ pub struct SvdBasis {
     pub weights: Vec<f64>,
     /// Mean of the weighted vectors.
     pub mean: Vec<f64>,
-    /// Singular values, falling.
+    /// Singular values, in descending order.
     pub singular_values: Vec<f64>,
     /// Right singular vectors, one per singular value, each as long as z.
     pub directions: Vec<Vec<f64>>,
-    /// Rows it was fitted on.
+    /// Number of rows in the fit.
     pub rows: usize,
 }
 
-/// Fits on `rows`, each a vector of `series` × `instants` values followed by extras. `lateral` is the sign of the
-/// first series, where that is a lateral one. `name` says in errors what the rows are.
+/// Fits on `rows`, each a vector of `series` × `instants` values followed by extras. `lateral` is the sign of the first
+/// series if it is lateral. `name` says in errors what the rows are.
 pub fn fit_svd(
     rows: &[Vec<f64>],
     (series, lateral): (usize, Option<SvdLateral>),
@@ -51,7 +51,7 @@ pub fn fit_svd(
         (rows.iter().map(|r| (r[column] - mean) * (r[column] - mean)).sum::<f64>() / n as f64).sqrt()
     };
     let mut weights = Vec::with_capacity(p);
-    // Positions on one side spread little. Their own spread as unit would give the lateral series ten times the
+    // Positions on one side vary little. With their own spread as unit, the lateral series would have ten times the
     // variance, and its directions would displace those of the speeds: docs/src/methods/parameterizations.md.
     let distance = |column: usize| (rows.iter().map(|r| r[column] * r[column]).sum::<f64>() / n as f64).sqrt();
     for j in 0..series {
@@ -91,7 +91,7 @@ impl SvdBasis {
         self.directions[..d].iter().map(|v| v.iter().zip(&centred).map(|(v, x)| v * x).sum()).collect()
     }
 
-    /// The vector that belongs to coefficients: (μ + Σ c_j V_j) / weights.
+    /// Reconstructs the vector of coefficients: (μ + Σ c_j V_j) / weights.
     pub fn reconstruct(&self, coefficients: &[f64]) -> Vec<f64> {
         let mut weighted = self.mean.clone();
         for (c, direction) in coefficients.iter().zip(&self.directions) {
@@ -121,7 +121,7 @@ mod tests {
     use super::*;
     use crate::support::vector_state::tests::upper_halves_in_use;
 
-    /// What runs after a fit runs as fast as before.
+    /// A fit does not slow down the code that runs after it.
     #[test]
     fn a_fit_leaves_the_registers_as_scalar_code_wants_them() {
         let rows: Vec<Vec<f64>> =

@@ -1,4 +1,4 @@
-//! What a column is and what a field of it holds.
+//! Columns and the types of their fields.
 
 use std::borrow::Cow;
 
@@ -6,24 +6,24 @@ use serde_json::Value;
 
 use crate::support::readable;
 
-/// How the values of a column are kept.
+/// Type of a column's values.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum ColumnKind {
-    /// Text that mostly differs between rows.
+    /// Text that usually differs between rows.
     Text,
-    /// One of few texts: Parquet keeps each once.
+    /// One of few texts: Parquet stores each once.
     Name,
-    /// Yes or no; in CSV 1 and 0.
+    /// A boolean; in CSV 1 and 0.
     Flag,
-    /// A whole number of 64 bits.
+    /// A 64-bit integer.
     Whole,
-    /// A number of the lane arithmetic, binary32.
+    /// A number of the lane arithmetic (binary32).
     Binary32,
-    /// A number in binary64.
+    /// A binary64 number.
     Binary64,
-    /// Numbers over the instants of a scenario, binary64.
+    /// Binary64 numbers over the instants of a scenario.
     Series,
-    /// Whole numbers in a row.
+    /// A list of integers.
     Wholes,
 }
 
@@ -43,7 +43,7 @@ impl ColumnKind {
     }
 }
 
-/// A column of a table that is written.
+/// A column of a table to be written.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Column {
     /// Name.
@@ -52,30 +52,30 @@ pub struct Column {
     pub kind: ColumnKind,
     /// Unit: `m`, `m/s`, `s`, …; `1` for numbers without one; empty for columns that are not numbers.
     pub unit: Cow<'static, str>,
-    /// One sentence, with when a field is empty.
+    /// One sentence, including when a field is empty.
     pub description: Cow<'static, str>,
-    /// How people read its numbers; files have every digit.
+    /// Number format for people; files have every digit.
     pub digits: Digits,
-    /// What people read where there is none.
+    /// Text for people if there is no value.
     pub null: &'static str,
 }
 
-/// How many digits of a number people read.
+/// Number of digits shown to people.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
 pub enum Digits {
-    /// Four significant ones at most, without idle zeros.
+    /// At most four significant digits, without trailing zeros.
     #[default]
     Readable,
-    /// So many significant ones, with idle zeros.
+    /// This many significant digits, with trailing zeros.
     Significant(usize),
-    /// So many after the point.
+    /// This many decimals.
     Fixed(usize),
-    /// The same with a sign, of a difference.
+    /// This many decimals, with a sign, for a difference.
     Signed(usize),
 }
 
 impl Digits {
-    /// A number as people read it.
+    /// Formats a number for people.
     pub fn text(self, number: f64) -> String {
         match self {
             Digits::Readable => readable::value(number),
@@ -87,17 +87,17 @@ impl Digits {
 }
 
 impl Column {
-    /// A column of a table that is written to files.
+    /// A column of a table in files.
     pub fn new<T: Into<Cow<'static, str>>>(name: T, kind: ColumnKind, unit: T, description: T) -> Column {
         Column { kind, unit: unit.into(), description: description.into(), ..Column::from(name) }
     }
 
-    /// The same column with numbers of so many digits.
+    /// Sets the number of digits shown.
     pub fn digits(self, digits: Digits) -> Column {
         Column { digits, ..self }
     }
 
-    /// The same column with a mark for what there is not.
+    /// Sets the text for null.
     pub fn null(self, null: &'static str) -> Column {
         Column { null, ..self }
     }
@@ -114,26 +114,26 @@ impl<N: Into<Cow<'static, str>>> From<N> for Column {
 /// A field of a row.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Cell<'a> {
-    /// Did not happen, or does not exist: null in Parquet and JSON Lines, empty in CSV.
+    /// Absent or not applicable: null in Parquet and JSON Lines, empty in CSV.
     Null,
-    /// Of [`ColumnKind::Text`] and [`ColumnKind::Name`].
+    /// For [`ColumnKind::Text`] and [`ColumnKind::Name`].
     Text(Cow<'a, str>),
-    /// Of [`ColumnKind::Flag`].
+    /// For [`ColumnKind::Flag`].
     Flag(bool),
-    /// Of [`ColumnKind::Whole`].
+    /// For [`ColumnKind::Whole`].
     Whole(i64),
-    /// Of [`ColumnKind::Binary32`] (which it has to fit) and [`ColumnKind::Binary64`].
+    /// For [`ColumnKind::Binary32`] (the value must fit) and [`ColumnKind::Binary64`].
     Number(f64),
-    /// As `Number`, but 2 is `2.0` in CSV.
+    /// As `Number`, but CSV writes 2 as `2.0`.
     Decimal(f64),
-    /// Of [`ColumnKind::Series`].
+    /// For [`ColumnKind::Series`].
     Series(Cow<'a, [f64]>),
-    /// Of [`ColumnKind::Wholes`].
+    /// For [`ColumnKind::Wholes`].
     Wholes(Cow<'a, [i64]>),
 }
 
 impl<'a> Cell<'a> {
-    /// A text that is there.
+    /// A text cell.
     pub fn text(text: impl Into<Cow<'a, str>>) -> Cell<'a> {
         Cell::Text(text.into())
     }
@@ -144,20 +144,20 @@ impl<'a> Cell<'a> {
     }
 }
 
-/// What a file says of its table; only Parquet has a place for it.
+/// Metadata of a table in a file; only Parquet stores them.
 #[derive(Debug, Clone, Default, PartialEq, Eq)]
 pub struct TableMetadata {
     /// Kind of rows: `lanes`, `samples`, `scenarios`.
     pub table: &'static str,
-    /// Name of the profile, where lanes were run.
+    /// Name of the profile, if lanes were run.
     pub profile: Option<String>,
-    /// SHA-256 of the plan of lanes, where there is one.
+    /// SHA-256 of the plan of lanes, if there is one.
     pub plan_sha256: Option<String>,
-    /// Known to be made up by the program: no statement about real traffic.
+    /// Known to be synthetic: not a statement about real traffic.
     pub synthetic: bool,
 }
 
-/// A row; one value per column that was asked for. CSV has texts only; a field that is empty is null.
+/// A row with one value per requested column. CSV values are texts; an empty field is null.
 pub(crate) struct Row {
     /// CSV: line of the file, counted from 1 with the header; Parquet: row, counted from 1.
     pub number: u64,

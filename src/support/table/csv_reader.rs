@@ -13,7 +13,7 @@ use super::writer::text_of_cell;
 use crate::support::input_file;
 use crate::{Error, Place, Result};
 
-/// Longest row: no table here has any near it, and a quote that is never closed makes the rest of a file one row.
+/// Maximum row length, bytes. A quote that is never closed makes the rest of the file one row.
 const MAX_ROW_BYTES: u64 = 16 << 20;
 
 pub(super) struct CsvRows {
@@ -24,7 +24,7 @@ pub(super) struct CsvRows {
     wanted: Vec<usize>,
 }
 
-/// A file that gives so many bytes and then an error.
+/// A file that returns an error after a budget of bytes.
 struct BudgetedFile {
     file: BufReader<File>,
     left: Rc<Cell<u64>>,

@@ -1,4 +1,4 @@
-//! A table in memory: text for the terminal, CSV, JSON, a page and files of every format are renderings of it.
+//! A table in memory, rendered as terminal text, CSV, JSON, a page or a file of any format.
 
 use std::path::Path;
 
@@ -14,7 +14,7 @@ use crate::support::readable;
 /// Columns and rows; every row has one cell per column.
 #[derive(Debug, Clone, Default, PartialEq)]
 pub struct Table {
-    /// What it shows; only pages have a place for it.
+    /// Caption; only pages show it.
     pub caption: String,
     /// The columns.
     pub columns: Vec<Column>,
@@ -22,7 +22,7 @@ pub struct Table {
     pub rows: Vec<Vec<Cell<'static>>>,
 }
 
-/// A table whose columns are being added, each with the value that it has of an item.
+/// A table under construction: each added column has a value per item.
 pub struct TableOf<T> {
     items: Vec<T>,
     table: Table,
@@ -41,7 +41,7 @@ impl Table {
         Table { caption: caption.into(), ..self }
     }
 
-    /// The table as CSV: numbers in full precision, nothing for null.
+    /// The table as CSV: numbers in full precision, null as an empty field.
     pub fn csv(&self) -> String {
         let names: Vec<String> = self.columns.iter().map(|column| csv_field(&column.name)).collect();
         let mut text = names.join(",") + "\n";
@@ -49,8 +49,8 @@ impl Table {
         text
     }
 
-    /// The rows as a list of objects. A number that JSON does not have (infinite) is null. The column `data` is left
-    /// out: a document says once what it is about.
+    /// The rows as a list of objects. Infinity and NaN become null, because JSON lacks them. The column `data` is
+    /// skipped: a document names its data once.
     pub fn records(&self) -> Value {
         let record = |row: &Vec<Cell>| {
             let fields = self.columns.iter().zip(row).filter(|(column, _)| column.name != "data");
@@ -60,7 +60,7 @@ impl Table {
         Value::Array(self.rows.iter().map(record).collect())
     }
 
-    /// Writes the table to a file whose format its name's ending chooses.
+    /// Writes the table to a file in the format of the file name's ending.
     ///
     /// # Errors
     /// As [`TableFormat::of`] and [`TableWriter::row`].
@@ -71,12 +71,12 @@ impl Table {
         file.finish()
     }
 
-    /// The leading columns of words: they stand to the left, what follows to the right.
+    /// Number of leading text columns; they are aligned left, the others right.
     pub(super) fn words(&self) -> usize {
         self.columns.iter().take_while(|c| matches!(c.kind, ColumnKind::Text | ColumnKind::Name)).count()
     }
 
-    /// Names of the columns and the rows as people read them.
+    /// Column names and rows as people read them.
     pub(crate) fn shown(&self) -> (Vec<String>, Vec<Vec<String>>) {
         let row = |row: &Vec<Cell>| self.columns.iter().zip(row).map(|(column, cell)| shown(column, cell)).collect();
         (self.columns.iter().map(|column| column.name.to_string()).collect(), self.rows.iter().map(row).collect())
@@ -84,7 +84,7 @@ impl Table {
 }
 
 impl<T: Copy> TableOf<T> {
-    /// Adds a column with a value per item; the value's type is the column's.
+    /// Adds a column with a value per item; the value's type determines the column's.
     pub fn column<V: CellValue>(mut self, column: impl Into<Column>, value: impl Fn(T) -> V) -> TableOf<T> {
         self.table.columns.push(Column { kind: V::KIND, ..column.into() });
         for (row, item) in self.table.rows.iter_mut().zip(&self.items) {
@@ -93,7 +93,7 @@ impl<T: Copy> TableOf<T> {
         self
     }
 
-    /// Adds columns of the same type, as many as there are keys.
+    /// Adds one column of the same type per key.
     pub fn columns<K: Copy, C: Into<Column>, V: CellValue>(
         self,
         keys: impl IntoIterator<Item = K>,
@@ -103,7 +103,7 @@ impl<T: Copy> TableOf<T> {
         keys.into_iter().fold(self, |table, key| table.column(name(key), |item| value(item, key)))
     }
 
-    /// The table.
+    /// Builds the table.
     pub fn build(self) -> Table {
         self.table
     }
@@ -118,7 +118,7 @@ pub trait CellValue {
     fn cell(self) -> Cell<'static>;
 }
 
-/// Numbers that are text already, such as an interval or a part of a whole.
+/// Formatted numbers, such as an interval or a part of a whole.
 pub struct NumberText(pub String);
 
 impl CellValue for NumberText {
@@ -154,7 +154,7 @@ impl CellValue for f64 {
     }
 }
 
-/// Counts; null beyond 63 bits.
+/// Counts; null above 63 bits.
 macro_rules! whole {
     ($($kind:ty),*) => {$(
         impl CellValue for $kind {
@@ -189,7 +189,7 @@ fn shown(column: &Column, cell: &Cell) -> String {
     }
 }
 
-/// As the template of pages reads it.
+/// As page templates read it.
 impl Serialize for Table {
     fn serialize<S: Serializer>(&self, serializer: S) -> std::result::Result<S::Ok, S::Error> {
         let (header, rows) = self.shown();
@@ -223,7 +223,7 @@ mod tests {
 
     #[test]
     fn a_field_has_its_type_whatever_it_looks_like() {
-        // `is_f64`: 1 as a number is 1.0 in every row, 3 as a count is 3.
+        // `is_f64` depends on the column, not the value: the number 1 is 1.0 in every row, the count 3 is 3.
         let rows = table().records();
         assert!(rows[0]["f1"].is_f64() && rows[0]["fn"].is_i64() && rows[0]["parameterization"].is_string());
         assert_eq!(

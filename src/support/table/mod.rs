@@ -1,10 +1,10 @@
-//! Tables: rows of named, typed columns with units, in files whose format their name's ending chooses.
+//! Tables: rows of named, typed columns with units, in files whose format follows from the file name's ending.
 //!
-//! Here live the formats (CSV, JSON Lines, Apache Parquet), the columns, the [`Table`] in memory with its renderings for
-//! terminals, pages and documents, the writer that streams rows to a file which
-//! is there whole or not at all, and the reader of tables that other programs made. Here lives nothing about what the
-//! rows mean: lanes and samples are [`crate::report`]'s, scenarios [`crate::scenario`]'s. `docs/src/tables.md` tells
-//! users the columns; a test compares it with what is written.
+//! This module holds the formats (CSV, JSON Lines, Apache Parquet), the columns, and the [`Table`] in memory with its
+//! renderings for terminals, pages and documents. It also holds the writer, which streams rows to an atomic file, and
+//! the reader of other programs' tables. The meaning of rows is defined elsewhere: lanes and samples in
+//! [`crate::report`], scenarios in [`crate::scenario`]. `docs/src/tables.md` documents the columns; a test compares it
+//! with the written files.
 
 mod column;
 mod csv_reader;
@@ -35,7 +35,7 @@ use std::path::Path;
 
 use crate::{Error, Place, Result};
 
-/// No reader here panics without Parquet; see the function of this name with it.
+/// Always false: without Parquet no reader here panics. See the function of this name with the feature.
 #[cfg(not(feature = "parquet"))]
 pub fn is_panic_caught() -> bool {
     false
@@ -53,10 +53,10 @@ pub enum TableFormat {
 }
 
 impl TableFormat {
-    /// All, for tables of lanes and samples; CSV is what names without an ending have.
+    /// All formats, for tables of lanes and samples; CSV is the default for names without an ending.
     pub const EVERY: [TableFormat; 3] = [TableFormat::Csv, TableFormat::JsonLines, TableFormat::Parquet];
 
-    /// Endings of names, the customary one first.
+    /// Endings of names, the usual one first.
     fn endings(self) -> &'static [&'static str] {
         match self {
             TableFormat::Csv => &["csv"],
@@ -65,11 +65,11 @@ impl TableFormat {
         }
     }
 
-    /// The format of a file among those that can be used there. A name without an ending has the first of them; another
-    /// ending is refused, so that no table hides under the name of another format.
+    /// The format of a file, among the usable ones. A name without an ending has the first of them. Another ending is
+    /// refused, so that no table has the name of another format.
     ///
     /// # Errors
-    /// [`Error::Usage`] that names `what` (a flag), the file and the known endings; or says that the program was built
+    /// [`Error::Usage`] that names `what` (a flag), the file and the known endings, or says that the program was built
     /// without Parquet.
     pub fn of(path: &Path, usable: &[TableFormat], what: &str) -> Result<TableFormat> {
         let Some(ending) = path.extension().map(|ending| ending.to_string_lossy().to_ascii_lowercase()) else {

@@ -1,20 +1,20 @@
-//! Which field a column of a user's table is: by its name, with or without its unit at the end.
+//! Maps a column of a user's table to a field by its name, with or without the unit at the end.
 
 use crate::support::plain_text;
 
 /// A field that a table can have.
 #[derive(Debug, Clone)]
 pub(crate) struct Named {
-    /// Its name, without a unit.
+    /// Name without a unit.
     pub name: String,
-    /// Its unit; empty for fields that are not numbers, `1` for a number without one.
+    /// Unit; empty for fields that are not numbers, `1` for a dimensionless number.
     pub unit: &'static str,
 }
 
-/// What a column's values are divided by to be in the field's unit.
+/// Divisor that converts a column's values to the field's unit.
 pub(crate) type Divisor = f64;
 
-/// Units as names end in them.
+/// Unit suffixes of names.
 const SUFFIXES: [(&str, &str); 17] = [
     ("mps", "m/s"),
     ("kmh", "km/h"),
@@ -35,18 +35,18 @@ const SUFFIXES: [(&str, &str); 17] = [
     ("rad", "radians"),
 ];
 
-/// Where a column belongs.
+/// The field of a column.
 #[derive(Debug, PartialEq)]
 pub(crate) enum Resolved {
-    /// To the field of this index.
+    /// Index of the field, and the divisor of the values.
     Field(usize, Divisor),
-    /// To a field, but in a unit that cannot be used: the problem and what to do.
+    /// A field, but in an unusable unit: the problem and what to do.
     WrongUnit(String, String),
-    /// To none.
+    /// No field.
     Unknown,
 }
 
-/// The field of a column. Dots count as underscores, so that the names of JSON (`ego.v0`) are understood.
+/// Finds the field of a column. Dots count as underscores, so that JSON names (`ego.v0`) are accepted.
 pub(crate) fn resolve(column: &str, fields: &[Named]) -> Resolved {
     let folded = column.trim().replace('.', "_").to_ascii_lowercase();
     let is = |field: &Named| field.name.eq_ignore_ascii_case(&folded);
@@ -76,7 +76,7 @@ pub(crate) fn resolve(column: &str, fields: &[Named]) -> Resolved {
     Resolved::Unknown
 }
 
-/// The name that is most like one that is not known, if one is.
+/// The known name most similar to an unknown one, if any.
 pub(crate) fn nearest<'a>(column: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     plain_text::nearest(column, names, 0.8)
 }

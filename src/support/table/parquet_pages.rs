@@ -1,33 +1,33 @@
-//! What a Parquet file claims of itself, looked at before it is believed: how deep its schema is nested, and how much
-//! its pages would take. The decoder reserves what page headers name, and runs of one value can name any number of
-//! them in a few bytes. Everything here is read from headers; nothing is decompressed.
+//! Checks a Parquet file's claims before decoding: the nesting of its schema and the size of its pages. The decoder
+//! reserves the memory that page headers name, and a run of one value can name any number of values in a few bytes.
+//! Only headers are read here; nothing is decompressed.
 
 use std::fs::File;
 use std::io::{Read, Seek, SeekFrom};
 
 use parquet::file::metadata::ColumnChunkMetaData;
 
-/// Deepest nesting of groups: a list in a record in the root has four.
+/// Maximum nesting of groups: a list in a record in the root has four.
 const DEEPEST: usize = 8;
-/// Largest footer, bytes.
+/// Maximum footer size, bytes.
 const MAX_FOOTER: u64 = 64 << 20;
-/// Longest page header, bytes.
+/// Maximum page header size, bytes.
 const MAX_HEADER: u64 = 1 << 20;
-/// Largest page, bytes.
+/// Maximum page size, bytes.
 const MAX_PAGE: i64 = 256 << 20;
-/// Bytes that may come of a file of any size, and more for each of its bytes.
+/// Decompressed bytes allowed for a file of any size, plus an allowance per byte of the file.
 const BYTES: u64 = 16 << 20;
 const BYTES_PER_BYTE: u64 = 256;
-/// Values that may come of a file of any size, and more for each of its bytes.
+/// Values allowed for a file of any size, plus an allowance per byte of the file.
 const VALUES: u64 = 1 << 20;
 const VALUES_PER_BYTE: u64 = 64;
 
-/// What is wrong with a file; `None` for what the system did not give.
+/// Why a file is refused.
 pub(super) type Refusal = &'static str;
 
 const DAMAGED: Refusal = "its footer or a page header is damaged";
 
-/// Looks at the footer.
+/// Checks the footer.
 pub(super) fn check_footer(file: &mut File, size: u64) -> Result<(), Refusal> {
     let mut tail = [0_u8; 8];
     if size < 12 {
@@ -81,7 +81,7 @@ pub(super) fn check_footer(file: &mut File, size: u64) -> Result<(), Refusal> {
         .ok_or(if is_flat { DAMAGED } else { "its columns are nested too deeply" })
 }
 
-/// Looks at the pages of the columns that will be read; the size of the largest, bytes.
+/// Checks the pages of the columns to be read; returns the size of the largest, bytes.
 pub(super) fn check_pages<'a>(
     file: &mut File,
     size: u64,
@@ -109,14 +109,14 @@ pub(super) fn check_pages<'a>(
 }
 
 struct Page {
-    /// With its header, bytes, > 0.
+    /// Including its header, bytes, > 0.
     length: u64,
     uncompressed: u64,
     values: u64,
 }
 
 fn page(file: &mut File, at: u64, most: u64) -> Result<Page, Refusal> {
-    // Headers have some tens of bytes; statistics can make them long.
+    // Headers have some tens of bytes; statistics can make them longer.
     let mut tried = most.min(256);
     loop {
         let mut bytes = vec![0; tried as usize];
@@ -135,7 +135,7 @@ fn header(bytes: &[u8]) -> Option<Page> {
     compact.fields(&mut |compact, id, kind| match (id, kind) {
         (2, I32) => compact.zigzag().map(|size| uncompressed = size).map(|()| true),
         (3, I32) => compact.zigzag().map(|size| compressed = size).map(|()| true),
-        // The headers of data, dictionary and second data pages begin with the number of values.
+        // Headers of data, dictionary and second-version data pages begin with the number of values.
         (5 | 7 | 8, STRUCT) => {
             compact.fields(&mut |compact, id, kind| {
                 let is_count = id == 1 && kind == I32;
@@ -164,16 +164,16 @@ fn read_at(file: &mut File, at: u64, bytes: &mut [u8]) -> Result<(), Refusal> {
 const I32: u8 = 5;
 const LIST: u8 = 9;
 const STRUCT: u8 = 12;
-/// Deepest nesting of what is skipped.
+/// Maximum nesting of skipped fields.
 const DEEPEST_SKIPPED: usize = 32;
 
-/// Thrift's compact protocol, as far as headers have it; `None` where the bytes end or make no sense.
+/// Reader of Thrift's compact protocol, limited to page headers; `None` if bytes are missing or invalid.
 struct Compact<'a> {
     bytes: &'a [u8],
     at: usize,
 }
 
-/// What to do with a field: true if its value has been read.
+/// Callback for a field: returns true if it read the value.
 type Visit<'v, 'a> = &'v mut dyn FnMut(&mut Compact<'a>, i64, u8) -> Option<bool>;
 
 impl<'a> Compact<'a> {
@@ -200,14 +200,14 @@ impl<'a> Compact<'a> {
         Some((value >> 1) as i64 ^ -((value & 1) as i64))
     }
 
-    /// Number of elements and their type.
+    /// Reads a list's number of elements and their type.
     fn list(&mut self) -> Option<(u64, u8)> {
         let byte = self.byte()?;
         let count = if byte >> 4 == 15 { self.varint()? } else { u64::from(byte >> 4) };
         Some((count, byte & 15))
     }
 
-    /// Goes through the fields of a structure.
+    /// Visits the fields of a structure.
     fn fields(&mut self, visit: Visit<'_, 'a>) -> Option<()> {
         self.fields_at(visit, 0)
     }
@@ -258,7 +258,7 @@ impl<'a> Compact<'a> {
         }
     }
 
-    /// In a list a truth value is a byte.
+    /// In a list a boolean takes a byte.
     fn skip_element(&mut self, kind: u8, depth: usize) -> Option<()> {
         if kind == 1 || kind == 2 { self.byte().map(drop) } else { self.skip(kind, depth + 1) }
     }

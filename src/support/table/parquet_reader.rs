@@ -1,7 +1,7 @@
-//! Rows of a Parquet file that any program may have written, or spoilt.
+//! Rows of a Parquet file that any program may have written or damaged.
 //!
-//! A few rows at a time are in memory. What the decoder would believe is checked before ([`super::parquet_pages`]); its
-//! panics on what is damaged end here, as an error about the file.
+//! A few rows at a time are in memory. [`super::parquet_pages`] checks the sizes before the decoder relies on them;
+//! panics of the decoder on damaged files become errors about the file.
 
 use std::cell::Cell;
 use std::fs::File;
@@ -27,12 +27,12 @@ use super::parquet_pages::{check_footer, check_pages};
 use crate::support::input_file;
 use crate::{Error, Place, Result};
 
-/// Rows that are decoded together, and fewer where pages are large: each row may repeat the longest text of a page.
+/// Rows decoded together; fewer if pages are large, because each row may repeat the longest text of a page.
 const BATCH_ROWS: u64 = 64;
 const BATCH_BYTES: u64 = 8 << 20;
-/// Longest series: eleven hours at 25 Hz.
+/// Maximum length of a series: eleven hours at 25 Hz.
 const MAX_SERIES: usize = 1 << 20;
-/// Longest text, bytes: every row may repeat it.
+/// Maximum length of a text, bytes: every row may repeat it.
 const MAX_TEXT: usize = 1 << 16;
 
 pub(super) struct ParquetRows {
@@ -40,7 +40,7 @@ pub(super) struct ParquetRows {
     file: File,
     size: u64,
     metadata: ArrowReaderMetadata,
-    /// Where each column is: field of the root, and field of the record there.
+    /// Position of each column: field of the root, and field of the record there.
     leaves: Vec<(usize, Option<usize>)>,
     /// Names as in the file's header, for messages.
     names: Vec<String>,
@@ -52,24 +52,24 @@ pub(super) struct ParquetRows {
     number: u64,
 }
 
-/// A column of a batch; a value is null too where its record is.
+/// A column of a batch; a value is also null if its record is.
 struct Leaf {
     record: Option<ArrayRef>,
     values: ArrayRef,
 }
 
 thread_local! {
-    /// A panic of this thread is going to be caught here.
+    /// Whether a panic of this thread will be caught here.
     static IS_CAUGHT: Cell<bool> = const { Cell::new(false) };
 }
 
-/// Whether a panic of this thread, which works on a damaged Parquet file, is going to be an error about that file: a
-/// program's panic hook (`std::panic::set_hook`) need not tell it. The library sets no hook.
+/// Whether a panic of this thread, which decodes a damaged Parquet file, becomes an error about that file. A program's
+/// panic hook (`std::panic::set_hook`) can then suppress its message. The library sets no hook.
 pub fn is_panic_caught() -> bool {
     IS_CAUGHT.get()
 }
 
-/// The decoder's work. Damage that makes it panic is an error about the file.
+/// Runs the decoder. Damage that makes it panic becomes an error about the file.
 fn guarded<T>(path: &Path, work: impl FnOnce() -> std::result::Result<T, String>) -> Result<T> {
     IS_CAUGHT.set(true);
     let result = catch_unwind(AssertUnwindSafe(work));
@@ -90,7 +90,7 @@ impl ParquetRows {
         let mut file = input_file::open(path)?;
         let size = file.metadata().map_err(|e| Error::io(path, "read", e))?.len();
         check_footer(&mut file, size).map_err(|problem| damaged(path, problem))?;
-        // The types are Parquet's own: what another program's Arrow made of them is of no interest.
+        // Use only Parquet's own types and ignore the Arrow schema of another program.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
         let metadata = guarded(path, || ArrowReaderMetadata::load(&file, options).map_err(|e| e.to_string()))?;
         let (mut names, mut leaves) = (Vec::new(), Vec::new());
@@ -185,11 +185,11 @@ impl ParquetRows {
         Ok(Some(Row { number: self.number, values }))
     }
 
-    /// The wanted columns of a batch.
+    /// The requested columns of a batch.
     fn leaves_of(&self, batch: &RecordBatch) -> std::result::Result<Vec<Leaf>, String> {
         let leaf = |&column: &usize| {
             let (root, inner) = self.leaves[column];
-            // The batch has the wanted fields of the root, in their order in the file.
+            // The batch has the requested fields of the root, in the order of the file.
             let before = |&&other: &&usize| self.leaves[other].0 < root;
             let mut roots: Vec<usize> = self.wanted.iter().filter(before).map(|&other| self.leaves[other].0).collect();
             roots.sort_unstable();
@@ -215,8 +215,8 @@ fn is_number(of: &DataType) -> bool {
     of.is_integer() || of.is_floating() || matches!(of, DataType::Decimal128(..) | DataType::Decimal256(..))
 }
 
-/// Whether a table here can have values of this type. Arrow's own types (dictionaries, large lists) do not occur: its
-/// metadata is skipped.
+/// Whether values of this type can be read. Arrow's own types (dictionaries, large lists) do not occur, because the
+/// Arrow metadata is skipped.
 fn is_readable(of: &DataType) -> bool {
     match of {
         DataType::Utf8 | DataType::Boolean | DataType::Null => true,
@@ -225,7 +225,7 @@ fn is_readable(of: &DataType) -> bool {
     }
 }
 
-/// A value of a leaf; NaN and infinity, which JSON has not, are null.
+/// A value of a leaf; NaN and infinity become null, because JSON lacks them.
 fn value(leaf: &Leaf, at: usize) -> std::result::Result<Value, String> {
     let array = &leaf.values;
     if leaf.record.as_ref().is_some_and(|record| record.is_null(at)) || array.is_null(at) {

@@ -1,7 +1,7 @@
 //! Rows as Apache Parquet: zstd, row groups of a fixed number of rows, units and descriptions with every column.
 //!
-//! The same rows give the same bytes, whoever computed them in whatever pieces: rows are gathered in batches of a fixed
-//! number, and no time and no machine is named.
+//! The same rows give the same bytes, independent of how they were computed: batches have a fixed number of rows, and
+//! no time or machine is recorded.
 
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -23,15 +23,15 @@ use super::{Cell, Column, ColumnKind, TableMetadata};
 use crate::support::atomic_file::AtomicFile;
 use crate::{Error, Result};
 
-/// Rows that are encoded together.
+/// Number of rows encoded together.
 const BATCH_ROWS: usize = 8 << 10;
-/// Rows of a row group; what the writer holds in memory is one of them, encoded.
+/// Number of rows in a row group; the writer holds one encoded group in memory.
 const GROUP_ROWS: usize = 128 << 10;
-/// The same where rows have series, of some kilobytes each.
+/// Number of rows encoded together if they have series of some kilobytes each.
 const SERIES_BATCH_ROWS: usize = 64;
 const SERIES_GROUP_ROWS: usize = 512;
 
-/// A Parquet file that is being written.
+/// A Parquet file being written.
 pub(super) struct ParquetFile {
     path: PathBuf,
     schema: Arc<Schema>,
@@ -46,7 +46,7 @@ impl ParquetFile {
         let has_series = columns.iter().any(|column| column.kind == ColumnKind::Series);
         let (batch_rows, group_rows) =
             if has_series { (SERIES_BATCH_ROWS, SERIES_GROUP_ROWS) } else { (BATCH_ROWS, GROUP_ROWS) };
-        // Arrow's readers show what stands with its schema, the others what stands in the footer.
+        // Arrow's readers show the metadata in its schema; other readers show those in the footer.
         let words = key_values(columns, facts);
         let pairs = words.iter().map(|word| (word.key.clone(), word.value.clone().unwrap_or_default()));
         let pairs: HashMap<String, String> = pairs.collect();
@@ -66,7 +66,7 @@ impl ParquetFile {
         Ok(ParquetFile { path: path.to_path_buf(), schema, builders, batch_rows, gathered: 0, writer })
     }
 
-    /// The caller has checked that the cells fit.
+    /// Appends a row. The caller has checked that the cells match the columns.
     pub(super) fn row(&mut self, row: &[Cell]) -> Result<()> {
         for (builder, cell) in self.builders.iter_mut().zip(row) {
             builder.append(cell).map_err(|e| Error::Internal(format!("Parquet: {e}")))?;
@@ -83,7 +83,7 @@ impl ParquetFile {
         self.writer.write(&batch).map_err(|e| failed(&self.path, e))
     }
 
-    /// Everything but the file's proper name.
+    /// Completes the file under its hidden name.
     pub(super) fn finish(mut self) -> Result<AtomicFile> {
         if self.gathered > 0 {
             self.flush()?;
@@ -92,7 +92,7 @@ impl ParquetFile {
     }
 }
 
-/// The system's refusal where it is one.
+/// Returns the system's error if there is one.
 fn failed(path: &Path, error: ParquetError) -> Error {
     match error {
         ParquetError::External(source) => match source.downcast::<std::io::Error>() {
@@ -120,8 +120,8 @@ fn field(column: &Column) -> Field {
     Field::new(column.name.as_ref(), data_type, true).with_metadata(words)
 }
 
-/// What stands in the footer. The columns' words are there once more as JSON: not every reader shows those that Arrow
-/// keeps with a column.
+/// Metadata for the footer. The descriptions of the columns are repeated there as JSON, because not every reader shows
+/// those that Arrow stores with a column.
 fn key_values(columns: &[Column], facts: &TableMetadata) -> Vec<KeyValue> {
     let words: Vec<serde_json::Value> = columns
         .iter()
@@ -141,7 +141,7 @@ fn key_values(columns: &[Column], facts: &TableMetadata) -> Vec<KeyValue> {
     list
 }
 
-/// The values of a column that are gathered.
+/// Collects the values of a column.
 enum Builder {
     Text(StringBuilder),
     Name(StringDictionaryBuilder<Int32Type>),
@@ -167,7 +167,7 @@ impl Builder {
         }
     }
 
-    /// What does not fit the column is null; the caller lets nothing such through.
+    /// Appends a cell. A cell of another type becomes null; the caller prevents it.
     fn append(&mut self, cell: &Cell) -> std::result::Result<(), ArrowError> {
         let number = match cell {
             Cell::Number(number) | Cell::Decimal(number) => Some(*number),

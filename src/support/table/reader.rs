@@ -1,4 +1,4 @@
-//! Reading tables that other programs made, row by row.
+//! Reads other programs' tables row by row.
 
 use std::path::{Path, PathBuf};
 
@@ -10,7 +10,7 @@ use super::csv_reader::CsvRows;
 use super::parquet_reader::ParquetRows;
 use crate::{Error, Place, Result};
 
-/// A table that is being read.
+/// A table being read.
 pub(crate) struct TableReader {
     path: PathBuf,
     columns: Vec<String>,
@@ -24,10 +24,10 @@ enum Rows {
 }
 
 impl TableReader {
-    /// Opens a table and reads the names of its columns; fields of records count as columns `record_field`.
+    /// Opens a table and reads its column names; fields of records become columns named `record_field`.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Input`] for anything but a regular file with a table, and for a damaged header or footer.
+    /// [`Error::Io`]; [`Error::Input`] if it is not a regular file with a table, or its header or footer is damaged.
     pub fn open(path: &Path, format: TableFormat) -> Result<TableReader> {
         let (columns, rows) = match format {
             TableFormat::Csv => {
@@ -44,16 +44,15 @@ impl TableReader {
         Ok(TableReader { path: path.to_path_buf(), columns, rows })
     }
 
-    /// Names of the columns, as they are in the file.
+    /// Column names as in the file.
     pub fn columns(&self) -> &[String] {
         &self.columns
     }
 
-    /// Says which columns are wanted, in the order in which rows shall have them. Before the first row.
+    /// Selects the columns, in the order in which rows have them. Call it before the first row.
     ///
     /// # Errors
-    /// [`Error::Input`] where a wanted column holds what no table here has, or its pages claim more than the file can
-    /// hold.
+    /// [`Error::Input`] if a selected column has an unsupported type, or its pages claim more than the file can hold.
     pub fn want(&mut self, columns: &[usize]) -> Result<()> {
         match &mut self.rows {
             Rows::Csv(rows) => {
@@ -65,10 +64,10 @@ impl TableReader {
         }
     }
 
-    /// The next row; `None` after the last one.
+    /// Returns the next row; `None` after the last.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Input`] for what is damaged.
+    /// [`Error::Io`]; [`Error::Input`] for damaged data.
     pub fn next_row(&mut self) -> Result<Option<Row>> {
         match &mut self.rows {
             Rows::Csv(rows) => rows.next_row(),
@@ -77,12 +76,12 @@ impl TableReader {
         }
     }
 
-    /// The file.
+    /// The place of the file.
     pub fn file(&self) -> Place {
         Place::file(&self.path)
     }
 
-    /// The header: where a column is told to be wrong.
+    /// The place of the header, for errors about columns.
     pub fn header(&self) -> Place {
         match &self.rows {
             Rows::Csv(_) => self.file().row(1),
@@ -91,7 +90,7 @@ impl TableReader {
         }
     }
 
-    /// What rows are counted as.
+    /// The word for counting rows.
     pub fn word(&self) -> &'static str {
         match &self.rows {
             Rows::Csv(_) => "line",
@@ -100,7 +99,7 @@ impl TableReader {
         }
     }
 
-    /// A row and what it is of, where that is known.
+    /// The place of a row, with its item if known.
     pub fn place(&self, number: u64, item: Option<String>) -> Place {
         match &self.rows {
             Rows::Csv(_) => item.map_or(self.file().row(number), |item| self.file().row(number).of(item)),

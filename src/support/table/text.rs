@@ -1,34 +1,34 @@
-//! A table for the terminal, as plain text.
+//! Renders a table as plain text for the terminal.
 
 use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Width, presets};
 
 use super::Table;
 
-/// Columns that every table fits in where no terminal says how wide it is.
+/// Default width of tables, in characters, if the terminal's width is unknown.
 pub(crate) const WIDTH: usize = 120;
 
-/// A blank at which no line is broken.
+/// A non-breaking space.
 const NO_BREAK: char = '\u{a0}';
 
 impl Table {
-    /// The table in 120 columns: numbers to the right, the leading columns of words to the left. Cells are broken
-    /// between words; where a word or number does not fit, the table is wider.
+    /// The table in 120 characters: numbers aligned right, leading text columns left. Cells break between words; if a
+    /// word or number does not fit, the table is wider.
     pub fn text(&self) -> String {
         let (header, rows) = self.shown();
         drawn(header, rows, self.words(), WIDTH)
     }
 
-    /// The table within so many columns of the terminal. Where it is too wide it becomes several, each with the first
-    /// `keys` columns, so that no number and no interval is broken.
+    /// The table within a width in characters. If it is too wide it becomes several tables, each with the first `keys`
+    /// columns, so that no number and no interval breaks.
     pub fn fitted(&self, keys: usize, width: usize) -> String {
         let (header, rows) = self.shown();
-        // Nothing is broken within brackets, and no table is narrower than its words.
+        // Brackets do not break, and no table is narrower than its words.
         let [header, rows @ ..] = &[vec![header], rows].concat().iter().map(|row| held(row)).collect::<Vec<_>>()[..]
         else {
             return String::new();
         };
         let cells = |at: usize| std::iter::once(header).chain(rows).filter_map(move |row| row.get(at));
-        // With the bars and spaces of the style.
+        // Including the bars and spaces of the style.
         let longest = |at: usize, breaks: &[char]| {
             let parts = cells(at).flat_map(|cell| cell.split(breaks)).map(|part| part.chars().count());
             parts.max().unwrap_or(0) + 3
@@ -55,7 +55,7 @@ impl Table {
     }
 }
 
-/// A row in which nothing is broken within brackets.
+/// Replaces the spaces in brackets by non-breaking ones.
 fn held(row: &[String]) -> Vec<String> {
     let held = |cell: &String| {
         let mut depth = 0;
@@ -68,7 +68,7 @@ fn held(row: &[String]) -> Vec<String> {
     row.iter().map(held).collect()
 }
 
-/// Draws a table that breaks its cells rather than the terminal's lines, the first `words` columns to the left.
+/// Draws a table whose cells break, with the first `words` columns aligned left.
 fn drawn(header: Vec<String>, rows: Vec<Vec<String>>, words: usize, width: usize) -> String {
     let mut table = comfy_table::Table::new();
     table.load_style(presets::ASCII_MARKDOWN);
@@ -76,15 +76,14 @@ fn drawn(header: Vec<String>, rows: Vec<Vec<String>>, words: usize, width: usize
     let widths = column_widths(&header, &rows, width);
     table.set_header(header).add_rows(rows);
     for ((at, column), width) in table.column_iter_mut().enumerate().zip(widths) {
-        // With a space on either side.
+        // Plus a space on either side.
         column.set_constraint(ColumnConstraint::Absolute(Width::Fixed(width as u16 + 2)));
         column.set_cell_alignment(if at < words { CellAlignment::Left } else { CellAlignment::Right });
     }
     format!("{table}\n")
 }
 
-/// Widths of the columns' texts: each holds its longest word, and columns with longer lines share what is left of the
-/// table's width.
+/// Widths of the columns' texts: each fits its longest word, and columns with longer lines divide the remaining width.
 fn column_widths(header: &[String], rows: &[Vec<String>], width: usize) -> Vec<usize> {
     let longest = |at: usize, of: fn(&str) -> usize| {
         let cells = std::iter::once(&header[at]).chain(rows.iter().filter_map(|row| row.get(at)));

@@ -1,9 +1,9 @@
-//! Writing a table row by row to a file that is there whole or not at all.
+//! Writes a table row by row to an atomic file.
 //!
-//! **CSV.** A spreadsheet takes a field that begins with `=`, `+`, `-` or `@` for a formula, and an id
-//! may come from anybody: such a text gets an apostrophe in front, which our readers take away again. Numbers stay.
+//! **CSV.** A spreadsheet treats a field that begins with `=`, `+`, `-` or `@` as a formula, and ids may come from
+//! anybody. Such a text gets a leading apostrophe, which our readers remove. Numbers are unchanged.
 //!
-//! **JSON Lines.** JSON has neither NaN nor infinity: both become null.
+//! **JSON Lines.** NaN and infinity become null, because JSON lacks them.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
@@ -17,8 +17,8 @@ use super::{Cell, Column, ColumnKind, TableFormat, TableMetadata};
 use crate::support::atomic_file::{AtomicFile, StagedFile};
 use crate::{Error, Result};
 
-/// A table that is being written. Memory does not grow with its rows. Dropped before [`TableWriter::finish`], it leaves
-/// nothing behind.
+/// A table being written. Memory does not grow with the number of rows. Dropping it before [`TableWriter::finish`]
+/// removes the file.
 pub struct TableWriter {
     columns: Vec<Column>,
     out: Out,
@@ -33,7 +33,7 @@ enum Out {
 }
 
 impl TableWriter {
-    /// Begins a table; what is there under that name stays until [`TableWriter::finish`].
+    /// Creates a table; an existing file of that name stays until [`TableWriter::finish`].
     ///
     /// # Errors
     /// [`Error::Io`] if the folder cannot be written to; as [`TableFormat::of`] without the feature `parquet`.
@@ -64,10 +64,10 @@ impl TableWriter {
         Ok(TableWriter { columns, out })
     }
 
-    /// Appends a row: one field per column, each of the column's kind.
+    /// Appends a row: one field per column, each of the column's type.
     ///
     /// # Errors
-    /// [`Error::Io`], a full disk for instance; [`Error::Internal`] for fields that do not fit the columns.
+    /// [`Error::Io`], for instance if the disk is full; [`Error::Internal`] for fields that do not match the columns.
     pub fn row(&mut self, row: &[Cell]) -> Result<()> {
         if row.len() != self.columns.len() || !self.columns.iter().zip(row).all(|(c, cell)| fits(c.kind, cell)) {
             return Err(Error::Internal(format!("a row does not fit its table: {row:?}")));
@@ -88,7 +88,7 @@ impl TableWriter {
         }
     }
 
-    /// Brings the table to the disk and gives it its name.
+    /// Syncs the table to disk and renames it to its final name.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -96,7 +96,7 @@ impl TableWriter {
         self.stage()?.publish()
     }
 
-    /// Brings the table to the disk, still without its name.
+    /// Syncs the table to disk under its hidden name.
     ///
     /// # Errors
     /// [`Error::Io`].
@@ -122,7 +122,7 @@ fn fits(kind: ColumnKind, cell: &Cell) -> bool {
     }
 }
 
-/// A row as CSV. Numbers have as many digits as they need in their arithmetic.
+/// Appends a row as CSV. Numbers have as many digits as needed to read back unchanged in their arithmetic.
 pub(super) fn append_csv(text: &mut String, columns: &[Column], row: &[Cell]) {
     for (at, (column, cell)) in columns.iter().zip(row).enumerate() {
         if at > 0 {
@@ -148,15 +148,16 @@ fn joined<T: ToString>(values: &[T]) -> String {
     values.iter().map(T::to_string).collect::<Vec<_>>().join(" ")
 }
 
-/// What makes a formula of a field, directly or (tab, carriage return) once the blank before it is skipped.
+/// Characters that begin a formula, directly or (tab, carriage return) after a skipped blank.
 const BEGINS_FORMULA: [char; 6] = ['=', '+', '-', '@', '\t', '\r'];
 
-/// Does a text begin as a formula does, after apostrophes that are there already?
+/// Whether a text begins like a formula, after leading apostrophes.
 fn begins_formula(text: &str) -> bool {
     text.trim_start_matches('\'').starts_with(BEGINS_FORMULA)
 }
 
-/// The text as a spreadsheet shows it and computes nothing: `=1+1` is `'=1+1`. What is a number stays.
+/// Protects a text so that a spreadsheet shows it and does not compute it: `=1+1` becomes `'=1+1`. Numbers are
+/// unchanged.
 pub(crate) fn cell_text(text: &str) -> Cow<'_, str> {
     match begins_formula(text) && text.parse::<f64>().is_err() {
         true => Cow::Owned(format!("'{text}")),
@@ -164,12 +165,12 @@ pub(crate) fn cell_text(text: &str) -> Cow<'_, str> {
     }
 }
 
-/// The text that [`cell_text`] made a field of.
+/// Inverse of [`cell_text`].
 pub(crate) fn text_of_cell(field: &str) -> &str {
     field.strip_prefix('\'').filter(|text| begins_formula(text)).unwrap_or(field)
 }
 
-/// A text as a field of CSV, in quotes where it needs them.
+/// A text as a CSV field, quoted if needed.
 pub(crate) fn csv_field(text: &str) -> String {
     let field = cell_text(text);
     match field.contains([',', '"', '\n', '\r']) {
@@ -178,7 +179,7 @@ pub(crate) fn csv_field(text: &str) -> String {
     }
 }
 
-/// Appends a row to a text; fields are in the order of the columns.
+/// Appends a row as JSON; fields are in the order of the columns.
 fn append_json(line: &mut String, columns: &[Column], row: &[Cell]) {
     let separator = |at: usize| if at == 0 { '{' } else { ',' };
     for (at, (column, cell)) in columns.iter().zip(row).enumerate() {
@@ -190,7 +191,7 @@ fn append_json(line: &mut String, columns: &[Column], row: &[Cell]) {
     line.push_str("}\n");
 }
 
-/// A cell as JSON.
+/// Converts a cell to JSON.
 pub(super) fn json_value(kind: ColumnKind, cell: &Cell) -> Value {
     match cell {
         Cell::Null => Value::Null,

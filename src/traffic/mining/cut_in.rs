@@ -72,7 +72,7 @@ pub(super) fn lane_change_of<'a>(
     set.recording_tags.activities[target_index].lane_change(set.ego.lane[found.start], j)
 }
 
-/// Sets the origin fields that cut-in and cut-out share.
+/// Sets the origin fields common to cut-in and cut-out.
 pub(super) fn describe(
     scenario: &mut Scenario,
     found: &FoundScenario,

@@ -118,7 +118,7 @@ impl<'a> LineDistance<'a> {
         }
     }
 
-    /// Progress over the window that ends at `k` is small. False for an incomplete window.
+    /// Whether progress over the window that ends at `k` is small. False for an incomplete window.
     fn is_calm(&self, k: usize) -> bool {
         k >= self.window && k < self.s.len() && self.s[k] - self.least[k] < self.quiescent_gap_m - TOLERANCE
     }

@@ -106,9 +106,9 @@ mod tests {
     #[test]
     fn the_search_pauses_after_a_match_but_not_after_a_discarded_one() {
         assert_eq!(starts("..ll.ll..ll", 100, 0, 1), [2, 5, 9]);
-        // Ends at 4; goes on at 8 with what begins there or later.
+        // The match ends at 4; the search resumes at 8 with matches that begin there or later.
         assert_eq!(starts("..ll.ll..ll", 100, 4, 1), [2, 9]);
-        // Runs on when the pause is over: begins there.
+        // The item still holds after the pause, so the match begins there.
         assert_eq!(starts("..ll.lllll.", 100, 4, 1), [2, 8]);
         assert_eq!(starts("..l.lll", 100, 4, 2), [4]);
     }

@@ -14,7 +14,7 @@ pub(super) struct DriverParameters {
     pub time_headway_s: f64,
     /// Standstill gap s0, m.
     pub standstill_gap_m: f64,
-    /// Largest acceleration a, m/s².
+    /// Maximum acceleration a, m/s².
     pub acceleration_mps2: f64,
     /// Comfortable deceleration b, m/s².
     pub comfortable_mps2: f64,
@@ -37,9 +37,10 @@ pub(super) struct LeaderView {
 /// Maximum braking of any driver, m/s².
 pub(super) const HARDEST_BRAKING_MPS2: f64 = 8.0;
 
-/// Braking that drivers exceed only where they must, m/s²: 2.4 % of the published decelerations of leaders exceed 2 m/s².
+/// Braking that drivers exceed only if necessary, m/s²: 2.4 % of the published decelerations of leaders exceed 2 m/s².
 const GENTLE_MPS2: f64 = 1.8;
-/// They must where more than this fraction of it is needed to avoid contact, or where the leader brakes more than this.
+/// It is necessary if avoiding contact needs more than this fraction of it, or if the leader brakes harder than this
+/// fraction.
 const URGENT: f64 = 0.8;
 const BRAKING_LEADER_MPS2: f64 = -0.5;
 

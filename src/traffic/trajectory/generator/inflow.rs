@@ -10,8 +10,8 @@ use crate::traffic::trajectory::VehicleClass;
 const FOLLOWERS: f64 = 0.8;
 /// The published flow per direction, vehicles per hour.
 const PUBLISHED_FLOW_VEHPH: f64 = 3350.0;
-/// Largest braking with which an arrival approaches the vehicle ahead, m/s². Vehicles have driven behind each other before
-/// they arrive, so their speeds are much alike.
+/// Maximum braking with which an arrival approaches the vehicle ahead, m/s². Vehicles have followed each other before
+/// they arrive, so their speeds are similar.
 const APPROACH_MPS2: f64 = 0.025;
 /// Mean number of lanes per direction in the default mix of roads: the published flow refers to it; other roads scale
 /// with their lanes.
@@ -29,7 +29,7 @@ pub(super) struct LaneDemand {
     truck_fraction: f64,
     /// Mean desired speed of cars in this lane, m/s.
     car_speed_mps: f64,
-    /// Of its drivers.
+    /// Overreaction of its drivers.
     overreaction: f64,
 }
 
@@ -42,8 +42,8 @@ pub(super) fn demand(
     truck_level: f64,
     speed_level: f64,
 ) -> Vec<LaneDemand> {
-    // Shares of the flow and of the trucks, and desired car speeds (above the published peak of 33 m/s,
-    // since most drive behind others), from the leftmost lane.
+    // Fractions of the flow and of the trucks, and desired car speeds, from the leftmost lane. The speeds are above the
+    // published peak of 33 m/s, because most cars drive behind others.
     let (flow, trucks, speeds): (&[f64], &[f64], &[f64]) = match lanes {
         2 => (&[0.57, 0.43], &[0.02, 0.98], &[40.0, 34.0]),
         _ => (&[0.37, 0.38, 0.25], &[0.0, 0.06, 0.94], &[41.0, 38.0, 34.0]),
@@ -76,7 +76,7 @@ pub(super) struct Inflow {
 }
 
 impl Inflow {
-    /// An empty lane's first vehicle.
+    /// The queue of an empty lane.
     pub fn new(
         demand: LaneDemand,
         lane: usize,

@@ -26,7 +26,7 @@ const NO_HURRY: f64 = 0.35;
 const MIN_TTC_S: f64 = 2.0;
 /// Minimum gap to the new neighbours at the start, m.
 const MIN_GAP_M: f64 = 4.0;
-/// Braking that nobody asks of the new follower, m/s².
+/// Maximum braking that a lane change may require of the new follower, m/s².
 const MAX_FOLLOWER_BRAKING_MPS2: f64 = 4.0;
 /// Headway to the new leader at which half of the drivers accept, s.
 const LEAD_HALF_S: f64 = 0.55;
@@ -48,7 +48,7 @@ const PRESSING_S: f64 = 1.5;
 pub(super) struct Neighbour {
     /// Bumper to bumper, m; negative beside.
     pub gap_m: f64,
-    /// Its speed, m/s.
+    /// Speed of the vehicle, m/s.
     pub speed_mps: f64,
 }
 
@@ -80,7 +80,7 @@ pub(super) enum Manner {
 }
 
 impl Manner {
-    /// That of one decision.
+    /// Draws the manner of one decision.
     pub fn draw(behaviour: &Behaviour, stream: &mut TrafficRandom) -> Manner {
         if stream.chance(behaviour.accelerating_fraction) { Manner::Accelerating } else { Manner::Considerate }
     }
@@ -98,7 +98,8 @@ fn promised_speed(speed_mps: f64, driver: &DriverParameters, ahead: Option<Neigh
     leader.speed_mps + (desired - leader.speed_mps) * freedom
 }
 
-/// The motive, 0 to a little above 1: times the rate of lane changes, their hazard before the gaps are looked at.
+/// The motive, from 0 to slightly above 1; multiplied by the rate of lane changes it is their hazard before the check
+/// of the gaps.
 pub(super) fn motive(
     way: Way,
     speed_mps: f64,

@@ -1,6 +1,6 @@
 //! Generator of synthetic motorway recordings, the default data of the program.
 //!
-//! This room simulates traffic and records the view of a camera above the road. It has no scenarios: it schedules
+//! This module simulates traffic and records the view of a camera above the road. It has no scenarios: it schedules
 //! lane changes and braking, and mining finds scenarios as in any recording. Input is [`GeneratorOptions`] with
 //! random numbers; output is [`Recording`]s.
 //!
@@ -16,27 +16,27 @@
 //! | `traffic` | correlated (Ornstein–Uhlenbeck) acceleration noise, lag, opening of the gap after a cut-in | noise sd 0.20–0.24 m/s², correlation 1.5 s |
 //! | `lane_change` | motives (a faster lane, keeping right, letting a close follower pass) and gap acceptance; some drivers let a follower brake and accelerate | 0.24 line crossings per vehicle and km; cut-in THW mode 0.8–1.0 s, bulk 0.5–2.5 s, 4 % below 0.5 s; 362 of 2,992 cut-ins kept, 819 of 3,069 cut-outs |
 //! | `lateral` | quintic lane changes with a mild asymmetry, wander in the lane | duration 2.9–7.3 s, profile close to a quintic |
-//! | `braking` | scheduled hard brakings of one or two phases with an exponential tail | 482 of 20,351 leader decelerations above 2 m/s²; the paper's shares of failures of LVD |
-//! | `options` | the numbers on which failures depend most, fitted by `examples/calibrate_generator.rs` | the paper's 36 shares of failures of S |
+//! | `braking` | scheduled hard brakings of one or two phases with an exponential tail | 482 of 20,351 leader decelerations above 2 m/s²; the paper's failure fractions of LVD |
+//! | `options` | the numbers on which failures depend most, fitted by `examples/calibrate_generator.rs` | the paper's 36 failure fractions of S |
 //! | `events` | the hazards of lane changes and brakings, and the rate factor | 2,992 cut-ins, 3,069 cut-outs, 482 LVD above 2 m/s² in 109,986 data sets |
 //!
 //! `tests/traffic/generator_calibration.rs` prints these figures beside ours and fails if the difference exceeds its
 //! limit. It names the figures that are outside.
 //!
 //! # What is fitted
-//! The numbers of [`Behaviour`] are fitted, all others are set by hand to published traffic figures. The fit sees the
-//! paper's 36 shares of failures of S, the numbers of scenarios found and kept, the density, the speeds of cars and
-//! trucks, and overlapping vehicles. It never sees an F1 or a claim of the paper: those are predictions. Its recordings
-//! have another seed than the default ones. Some shares are not reached: `docs/src/validation.md` lists them.
+//! The numbers of [`Behaviour`] are fitted, all others are set by hand to published traffic figures. The fit uses the
+//! paper's 36 failure fractions of S, the numbers of scenarios found and kept, the density, the speeds of cars and
+//! trucks, and overlapping vehicles. It never uses an F1 or a claim of the paper: those are predictions. Its recordings
+//! have another seed than the default ones. Some fractions are not reached: `docs/src/validation.md` lists them.
 //!
 //! # The rate factor
-//! At [`event_rate_factor`](GeneratorOptions::event_rate_factor) 1 scenarios are about as rare as published, but kept LVDs
-//! twice as frequent. The default
-//! of 3 multiplies the *rate* of lane changes and hard braking in view, so that the default recordings have as many
-//! kept cut-outs as the paper, a third more cut-ins and three times as many LVDs, in a third of the time. Rates rise slightly less than the factor, because lane changes
-//! obstruct each other. Gentle decelerations are not raised, so a larger fraction of LVDs is kept.
-//! The numbers are fitted at this factor; 1 and 8 fit the published failures worse. With 8, so many lane changes disturb
-//! the traffic that closing speeds and brakings become those of congestion.
+//! At [`event_rate_factor`](GeneratorOptions::event_rate_factor) 1 scenarios are about as rare as published, but kept
+//! LVDs twice as frequent. The default of 3 multiplies the *rate* of lane changes and hard braking in view. In a third
+//! of the time, the default recordings then have as many kept cut-outs as the paper, a third more cut-ins and three
+//! times as many LVDs. Rates increase slightly less than the factor, because lane changes obstruct each other. Gentle
+//! decelerations are not raised, so a larger fraction of LVDs is kept. The numbers are fitted at this factor; 1 and 8
+//! fit the published failures worse. At 8, lane changes disturb the traffic so much that closing speeds and brakings
+//! become those of congestion.
 //!
 //! # Limits
 //! The data contains no row of highD and was fitted to published figures only. It says nothing about real

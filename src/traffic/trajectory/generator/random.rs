@@ -1,12 +1,12 @@
 //! Random numbers of the generator: counter-based streams keyed by the purpose of the draw. No recording depends on
 //! another, on the number of threads or on the machine.
 //!
-//! Transcendentals come from `libm`: the system's own differ in their last bits between platforms.
+//! Transcendental functions come from `libm`, because system libraries differ in the last bits between platforms.
 
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 
-/// Purpose of a stream; streams of different purposes never share a number.
+/// Purpose of a stream; streams of different purposes have no common numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Purpose {
     /// Lane counts, flows and truck share of a recording.

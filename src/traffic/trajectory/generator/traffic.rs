@@ -36,7 +36,7 @@ const FILLING_MPS: f64 = 21.0;
 /// Speed up to which drivers of cars accelerate during a lane change, as a factor on their desired speed. Trucks have
 /// limiters.
 const EXCEEDING: f64 = 1.5;
-/// Room ahead in which they do: length, time headway and time to collision.
+/// Free space ahead that they need: length, time headway and time to collision.
 const ROOM_M: f64 = 3.0;
 const ROOM_HEADWAY_S: f64 = 0.3;
 const ROOM_TTC_S: f64 = 4.0;
@@ -44,17 +44,17 @@ const ROOM_TTC_S: f64 = 4.0;
 /// Dimensions of a simulation.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct RoadSetup {
-    /// m.
+    /// Lane width, m.
     pub lane_width_m: f64,
-    /// m.
+    /// Length of road in view, m.
     pub window_m: f64,
-    /// s.
+    /// Time step, s.
     pub step_s: f64,
     /// Steps from one sample to the next.
     pub steps_per_sample: usize,
     /// Multiplies the rates of lane changes and hard brakings in the camera's view.
     pub event_rate_factor: f64,
-    /// Of drivers and traffic where scenarios arise.
+    /// Behaviour of drivers and traffic that determines the scenarios.
     pub behaviour: Behaviour,
 }
 
@@ -146,8 +146,8 @@ impl Traffic {
         }
     }
 
-    /// Front first. The order hardly changes between steps, where insertion sort is linear; ties keep
-    /// the order of arrival.
+    /// Sorts vehicles front first. The order hardly changes between steps, so insertion sort is linear; ties keep the
+    /// order of arrival.
     fn sort(&mut self) {
         for k in 1..self.order.len() {
             let moving = self.order[k];
@@ -204,7 +204,7 @@ impl Traffic {
                 perceived += (leader_now - perceived) * self.perception;
             }
 
-            // During a lane change the driver keeps less.
+            // During a lane change the driver keeps a smaller headway.
             let kept_s = if own.change.is_some() {
                 self.setting.behaviour.change_headway_fraction * headway_s
             } else {

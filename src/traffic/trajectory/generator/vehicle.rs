@@ -16,11 +16,11 @@ pub(super) struct Samples {
     pub first: usize,
     /// Along the road from the start of the camera's view, m.
     pub s_m: Vec<f64>,
-    /// Across the road, to the left of the leftmost line, m (negative on the road).
+    /// Lateral position to the left of the leftmost line, m (negative on the road).
     pub d_m: Vec<f64>,
     /// Speed along the road, m/s.
     pub v_s_mps: Vec<f64>,
-    /// Speed across the road, m/s, to the left.
+    /// Lateral speed to the left, m/s.
     pub v_d_mps: Vec<f64>,
     /// Acceleration along the road, m/s².
     pub a_s_mps2: Vec<f64>,
@@ -31,15 +31,15 @@ pub(super) struct Samples {
 pub(super) struct Vehicle {
     /// Car or truck.
     pub class: VehicleClass,
-    /// m.
+    /// Length, m.
     pub length_m: f64,
-    /// m.
+    /// Width, m.
     pub width_m: f64,
     /// The driver's car-following.
     pub driver: DriverParameters,
     /// Centre along the road, m; 0 where the camera's view begins.
     pub s_m: f64,
-    /// m/s, ≥ 0.
+    /// Speed, m/s, ≥ 0.
     pub speed_mps: f64,
     /// Actual acceleration, m/s².
     pub acceleration_mps2: f64,

@@ -275,7 +275,7 @@ impl CsvTable {
         }
     }
 
-    /// Does the last record end with the file instead of a line end?
+    /// Whether the last record ends with the file instead of a line end.
     fn ends_open(&self) -> bool {
         let hashing = self.reader.get_ref();
         hashing.at_end && self.reader.position().byte() == hashing.bytes

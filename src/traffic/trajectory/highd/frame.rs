@@ -1,5 +1,5 @@
-//! Transformations between highD's image (corner of the box, y down, `laneId` ascending with y) and the internal
-//! frame (centre, forward and left, lane 0 leftmost). Reader and writer share them.
+//! Transformations between highD's image (corner of the box, y down, `laneId` ascending with y) and the internal frame
+//! (centre, forward and left, lane 0 leftmost). The reader and the writer use them.
 
 use crate::traffic::trajectory::NO_LANE;
 

@@ -1,5 +1,5 @@
-//! Are the vehicles where lanes and boxes say? After a mirrored axis or with another reference point every number is
-//! plausible by itself, but not beside the others. One frame a second is looked at.
+//! Checks vehicle positions against lanes and boxes. A mirrored axis or another reference point leaves every number
+//! plausible by itself, but not in combination. One frame per second is checked.
 
 use super::frame::Direction;
 use crate::support::plausibility::Implausible;
@@ -62,7 +62,7 @@ struct Finding {
     is_general: bool,
 }
 
-/// Samples of a track that are looked at.
+/// Samples of a track that are checked.
 fn looked_at(track: &Track, stride: i64) -> impl Iterator<Item = usize> + use<> {
     let first = (-track.first_frame).rem_euclid(stride) as usize;
     (first..track.len()).step_by(stride as usize)
@@ -77,7 +77,7 @@ fn direction(recording: &Recording, track: &Track) -> Direction {
     if *name == Direction::Upper.name() { Direction::Upper } else { Direction::Lower }
 }
 
-/// How far a lateral position lies beyond the vehicle's lane, or beyond its carriageway where it has no lane, m.
+/// Distance of a lateral position beyond the vehicle's lane, or beyond its carriageway if it has no lane, m.
 fn beyond_m(recording: &Recording, track: &Track, sample: usize, d_m: f64) -> f64 {
     let carriageway = &recording.carriageways[track.carriageway];
     let lines = &carriageway.lane_lines_m;

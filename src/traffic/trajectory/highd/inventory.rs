@@ -1,4 +1,4 @@
-//! Which recordings a folder holds: three files of the same prefix are one recording.
+//! Recordings of a folder: three files with the same prefix are one recording.
 
 use std::collections::BTreeMap;
 use std::fs;

@@ -1,9 +1,8 @@
 //! The highD format: a recording is three comma-separated files, `NN_tracks.csv`, `NN_tracksMeta.csv`
 //! and `NN_recordingMeta.csv`.
 //!
-//! This room has the inventory of a folder, the reader, the writer, and the coordinate transformation that both
-//! share. It converts between paths and [`Recording`](super::Recording)s. No other room uses a column name of the
-//! format.
+//! This module has the inventory of a folder, the reader, the writer, and their common coordinate transformation. It
+//! converts between paths and [`Recording`](super::Recording)s. No other module uses a column name of the format.
 
 mod columns;
 mod format;

@@ -1,4 +1,4 @@
-//! Numbers of the files: parsed from bytes, and written with so many decimals.
+//! Numbers of the files: parsed from bytes, and written with a given number of decimals.
 //!
 //! Most of the reading time is spent here, so plain decimals have a fast path; the
 //! standard library parses all others. Both round correctly, so the values are equal.

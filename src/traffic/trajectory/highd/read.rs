@@ -26,10 +26,10 @@ pub struct Loaded {
     pub notes: Vec<String>,
 }
 
-/// As [`read_judged`], but accepts implausible values.
+/// Like [`read_judged`], but accepts implausible values.
 ///
 /// # Errors
-/// As [`read_judged`].
+/// Those of [`read_judged`].
 pub fn read(files: &HighdFiles) -> Result<Loaded> {
     read_judged(files, Implausible::Accepted)
 }
@@ -223,16 +223,16 @@ fn add_sample(
     Ok(())
 }
 
-/// Judges the last sample of a track against the plausible ranges.
+/// Checks the last sample of a track against the plausible ranges.
 struct SampleJudge {
     rate_hz: f64,
-    /// Samples of a second.
+    /// Samples per second.
     window: usize,
     /// One over that number.
     inverse_window: f64,
 }
 
-/// The judged quantities of one sample; 0 if not yet defined.
+/// The checked quantities of one sample; 0 if not yet defined.
 struct JudgedSample {
     speed_mps: f64,
     lateral_speed_mps: f64,
