@@ -58,11 +58,11 @@ pub struct BoundedColumn {
 /// Why a point is outside the valid region.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Invalid {
-    /// Which parameter, or which value that follows from several: `duration_s`, `v_ego_mps`, `gap_lead_m`.
+    /// The parameter, or the value that depends on several: `duration_s`, `v_ego_mps`, `gap_lead_m`.
     pub parameter: String,
     /// Its value.
     pub value: f64,
-    /// What it must be: `≥ 0`.
+    /// The violated condition: `≥ 0`.
     pub bound: String,
 }
 

@@ -1,7 +1,7 @@
-//! Several proposals at once, combined by the balance heuristic (Veach and Guibas, "Optimally combining sampling
-//! techniques for Monte Carlo rendering", SIGGRAPH 1995; Owen and Zhou 2000): every draw counts f/Σ α_i g_i, α_i the
-//! share of the draws from g_i, whichever of them it came from. Where one proposal is good the sum is, and a weight
-//! is never larger than 1/α_i times that of any single one.
+//! Several proposals, combined by the balance heuristic (Veach and Guibas, "Optimally combining sampling techniques for
+//! Monte Carlo rendering", SIGGRAPH 1995; Owen and Zhou 2000). Every draw has the weight f/Σ α_i g_i, whichever
+//! proposal it came from; α_i is the fraction of the draws from g_i. The combination is good wherever one proposal is
+//! good. A weight is at most 1/α_i times that of proposal i alone.
 
 use super::importance::{sums_of_stream, weighted_interval};
 use super::problem::{Density, LimitState, purpose};

@@ -1,7 +1,7 @@
-//! Importance sampling: draws of a proposal g, each counting f/g.
+//! Importance sampling: draws of a proposal g with weights f/g.
 //!
-//! The author's form fits the proposal to the worst points of a pilot drawn from f. The defensive mixture keeps a
-//! share δ of f in it, which bounds the weights by 1/δ and lets ways to fail that g misses be seen at all.
+//! The author's form fits the proposal to the worst points of a pilot drawn from f. The defensive mixture gives f the
+//! weight δ in the proposal. This bounds the weights by 1/δ, and makes failure modes visible that g misses.
 
 use std::ops::Range;
 use std::time::Instant;
@@ -22,12 +22,11 @@ use crate::stats::density::{Mixture, MixtureFitOptions as FitOptions};
 use crate::stats::random::Stream;
 use crate::{Error, Place, Result};
 
-/// A density fitted to points: a kernel density estimate, say.
+/// Fits a density to points, for example a kernel density estimate.
 pub trait FitProposal {
     /// The density of the points.
-    ///
     /// # Errors
-    /// Where the points do not determine one.
+    /// If the points do not determine a density.
     fn fit(&self, points: &[Vec<f64>]) -> Result<Mixture>;
 }
 
@@ -37,7 +36,7 @@ impl<F: Fn(&[Vec<f64>]) -> Result<Mixture>> FitProposal for F {
     }
 }
 
-/// (1 − δ) g + δ f, cut off where f is. Attempts choose g or f anew, so the mixture is cut off as a whole.
+/// (1 − δ) g + δ f, truncated like f. Every attempt selects g or f anew, so the mixture is truncated as a whole.
 pub struct Defended<'a> {
     nominal: &'a dyn Density,
     proposal: Mixture,
@@ -45,10 +44,10 @@ pub struct Defended<'a> {
     validity: f64,
 }
 
-/// Mixes a share δ in [0, 1] of the density into a proposal; with 0 it only inherits what is valid.
+/// Mixes the density into a proposal with weight δ in [0, 1]; with 0 only the validity rule is adopted.
 ///
 /// # Errors
-/// [`Error::Usage`] where the share is outside [0, 1] or the numbers of parameters differ.
+/// [`Error::Usage`] if the weight is outside [0, 1] or the numbers of parameters differ.
 pub fn defended(proposal: Mixture, nominal: &dyn Density, share: f64) -> Result<Defended<'_>> {
     if !(0.0..=1.0).contains(&share) || proposal.dimensions() != nominal.dimensions() {
         return Err(Error::usage(
@@ -65,13 +64,13 @@ pub fn defended(proposal: Mixture, nominal: &dyn Density, share: f64) -> Result<
 }
 
 impl Defended<'_> {
-    /// The same with its valid share counted over `draws` draws: what the balance heuristic needs where points can be
-    /// invalid. Its relative error √((1 − P)/(P·draws)) is in no interval.
+    /// The same with its valid fraction counted over `draws` draws. The balance heuristic needs this if points can be
+    /// invalid. No interval includes its relative error √((1 − P)/(P·draws)).
     pub fn with_counted_validity(mut self, seed: u64, draws: u64) -> Self {
         let stream = Stream { seed, purpose: purpose::VALIDITY };
         let is_valid = |index: &u64| self.is_valid(&self.attempt(&stream, *index, 0));
         let valid = (0..draws).into_par_iter().filter(is_valid).count();
-        // A proposal without a valid draw is found out when it is sampled.
+        // A proposal without a valid draw is detected when it is sampled.
         self.validity = (valid as f64 / draws.max(1) as f64).max(f64::MIN_POSITIVE);
         self
     }
@@ -118,35 +117,35 @@ impl Density for Defended<'_> {
     }
 }
 
-/// Failures of a sample of the density itself, to compare an estimate with.
+/// Failures of a sample of the density itself, for comparison with an estimate.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PilotCheck {
-    /// Runs of the pilot.
+    /// Number of runs of the pilot.
     pub runs: u64,
-    /// Its failures.
+    /// Number of its failures.
     pub failures: u64,
 }
 
 impl PilotCheck {
-    /// Adds the pilot to an estimate that follows it: its runs, and the warning where the two disagree.
+    /// Adds the pilot's runs to a later estimate, and a warning if the two disagree.
     pub fn add_to(&self, estimate: &mut Estimate) {
         estimate.set_runs(estimate.runs + self.runs);
         self.check(estimate);
     }
 
-    /// The warning where the pilot's failures are too unlikely under an estimate.
+    /// Adds a warning if the pilot's number of failures is too unlikely under an estimate.
     pub(crate) fn check(&self, estimate: &mut Estimate) {
         let p = estimate.probability;
         let interval = super::clopper_pearson(self.failures, self.runs, 1.0 - Warning::PILOT_LIKELIHOOD);
-        // The estimate is uncertain too: no disagreement where the intervals overlap.
+        // The estimate is uncertain too: overlapping intervals are no disagreement.
         let apart = estimate.interval.high < interval.low || estimate.interval.low > interval.high;
         let (failures, expected) = (self.failures, p * self.runs as f64);
         estimate.trust.warn_if(apart && !interval.holds(p), Warning::DisagreesWithPilot { failures, expected });
     }
 }
 
-/// How to sample a proposal.
+/// Options for sampling a proposal.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Importance {
     /// Seed.
@@ -155,19 +154,19 @@ pub struct Importance {
     pub level: f64,
     /// When to end.
     pub stop: StopRule,
-    /// Divide by the sum of the weights instead of the number of draws: biased by 1/n, and better only where many
-    /// draws fail; needed where a density is known up to a constant.
+    /// Divides by the sum of the weights instead of the number of draws. The bias is of order 1/n, and the variance is
+    /// lower only if many draws fail. Required if a density is known only up to a constant.
     pub self_normalised: bool,
 }
 
 impl Importance {
-    /// So many samples, unbiased, 95 %.
+    /// `samples` samples, unbiased, level 95 %.
     pub fn new(seed: u64, samples: u64) -> Importance {
         Importance { seed, level: 0.95, stop: StopRule::samples(samples), self_normalised: false }
     }
 }
 
-/// The leaf of one judged draw.
+/// The leaf of one evaluated draw.
 pub(crate) fn weigh(nominal: &dyn Density, proposal: &dyn Density, drawn: &Draw, response: f64) -> WeightedDraw {
     let ratio = libm::exp(nominal.log_density(&drawn.point) - proposal.log_density(&drawn.point));
     WeightedDraw {
@@ -179,10 +178,10 @@ pub(crate) fn weigh(nominal: &dyn Density, proposal: &dyn Density, drawn: &Draw,
     }
 }
 
-/// Draws, judges and weighs a range of indices. Sums of disjoint ranges merge to those of their union, bit for bit.
+/// Draws, evaluates and weights a range of indices. Sums of disjoint ranges merge to those of their union, bit for bit.
 ///
 /// # Errors
-/// The limit state's.
+/// Those of the limit state.
 pub fn importance_sums(
     nominal: &dyn Density,
     proposal: &dyn Density,
@@ -193,7 +192,7 @@ pub fn importance_sums(
     sums_of_stream(nominal, proposal, limit_state, Stream { seed, purpose: purpose::PROPOSAL }, indices, proposal)
 }
 
-/// The same for draws of one density weighed against another (the mixture of several techniques).
+/// The same for draws of one density weighted relative to another (the mixture of several techniques).
 pub(crate) fn sums_of_stream(
     nominal: &dyn Density,
     drawn_from: &dyn Density,
@@ -230,7 +229,7 @@ pub(crate) fn sums_of_stream(
     Ok(sums)
 }
 
-/// Student's interval on the scale of ln P, the effective number of failures less one being the degrees of freedom.
+/// Student's interval on the scale of ln P; the degrees of freedom are the effective number of failures minus one.
 pub(crate) fn weighted_interval(probability: f64, variance: f64, effective_failures: f64, level: f64) -> Interval {
     if probability <= 0.0 || variance <= 0.0 {
         return Interval::nothing(level);
@@ -238,7 +237,7 @@ pub(crate) fn weighted_interval(probability: f64, variance: f64, effective_failu
     log_normal(probability, variance.sqrt() / probability, effective_failures - 1.0, level)
 }
 
-/// The estimate of sums.
+/// The estimate from sums.
 pub fn from_weight_sums(sums: &WeightSums, self_normalised: bool, level: f64, stopped: StopReason) -> Estimate {
     let figures = sums.figures();
     let (method, probability, variance) = if self_normalised {
@@ -256,11 +255,11 @@ pub fn from_weight_sums(sums: &WeightSums, self_normalised: bool, level: f64, st
     estimate
 }
 
-/// Samples the proposal until a rule ends it. The proposal must be valid where the density is; g > 0 wherever f > 0
-/// and failure is possible, or the estimate is too small and nothing shows it.
+/// Samples the proposal until a rule ends it. The proposal must be valid wherever the density is. If g = 0 where f > 0
+/// and failure is possible, the estimate is too small without any warning.
 ///
 /// # Errors
-/// The limit state's.
+/// Those of the limit state.
 pub fn importance(
     nominal: &dyn Density,
     proposal: &dyn Density,
@@ -290,34 +289,35 @@ pub fn worst_share(points: &[Vec<f64>], values: &[f64], share: f64) -> Vec<Vec<f
     order.into_iter().take(count).map(|i| points[i].clone()).collect()
 }
 
-/// How a pilot makes a proposal.
+/// Options of a pilot.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Pilot {
-    /// Draws of the density.
+    /// Number of draws of the density.
     pub runs: u64,
-    /// Share of them, the worst, that the proposal is fitted to.
+    /// Fraction of the draws, the worst ones, that the proposal is fitted to.
     pub worst: f64,
-    /// Share of one broad Gaussian in the proposal: the worst points' covariance plus a quarter of the pilot's.
-    /// Kernels are narrow across the limit, where the failures thin out more slowly than a kernel does; without it
-    /// rare large weights make intervals too short.
+    /// Weight of one broad Gaussian in the proposal: its covariance is that of the worst points plus a quarter of the
+    /// pilot's. Kernels are narrow across the limit, where failures decrease more slowly than a kernel does. Without
+    /// it, rare large weights make intervals too short.
     pub broad: f64,
-    /// Share δ of the density itself in the proposal.
+    /// Defensive mixture weight δ of the density in the proposal.
     pub defence: f64,
 }
 
 impl Pilot {
-    /// The worst 2 %, a broad share of 0.2, a defensive share of 0.1.
+    /// The worst 2 %, a broad weight of 0.2, a defensive mixture weight of 0.1.
     pub fn guarded(runs: u64) -> Pilot {
         Pilot { runs, worst: 0.02, broad: 0.2, defence: 0.1 }
     }
 }
 
-/// The author's form: a pilot drawn from the density, its worst share fitted, then importance sampling. The estimate
-/// is checked against the pilot. Gives the proposal too, without its defensive share, so that others can sample it again.
+/// The author's form: a pilot drawn from the density, a fit to its worst fraction, then importance sampling. The
+/// estimate is checked against the pilot. Also returns the proposal without its defensive part, for reuse.
 ///
 /// # Errors
-/// The limit state's and the fit's; [`Error::Usage`] where the pilot has no valid point or a share is outside [0, 1].
+/// Those of the limit state and of the fit; [`Error::Usage`] if the pilot has no valid point or a fraction is outside
+/// [0, 1].
 pub fn from_pilot(
     nominal: &dyn Density,
     limit_state: &dyn LimitState,
@@ -332,8 +332,8 @@ pub fn from_pilot(
     Ok((estimate, proposal.proposal().clone()))
 }
 
-/// The proposal that a pilot finds, without its defensive share, and what the pilot counted. Estimates of the draws of
-/// both are checked with [`PilotCheck::add_to`].
+/// The proposal of a pilot, without its defensive part, and the pilot's counts. Estimates from draws of both are
+/// checked with [`PilotCheck::add_to`].
 ///
 /// # Errors
 /// As [`from_pilot`].
@@ -363,7 +363,7 @@ pub fn pilot_proposal(
     Ok((fitted, PilotCheck { runs, failures }))
 }
 
-/// The error where no draw is valid.
+/// The error if no draw is valid.
 pub(crate) fn no_valid_point(of: &str) -> Error {
     Error::usage(
         Place::item(of),

@@ -6,7 +6,7 @@ use statrs::function::beta::beta_reg;
 
 use crate::stats::density::normal_quantile;
 
-/// How an interval was made.
+/// Method of an interval.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum IntervalKind {
@@ -18,22 +18,22 @@ pub enum IntervalKind {
     RuleOfThree,
     /// Student's t on ln P.
     LogStudent,
-    /// Wilson's with the effective number of runs of clusters.
+    /// Wilson's, with the effective number of runs of clusters.
     Clusters,
-    /// Nothing was found and nothing bounds the probability from above but 1.
+    /// No failures were found, and the only upper bound is 1.
     Nothing,
 }
 
-/// An interval that is to hold the probability.
+/// An interval for a probability.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct Interval {
     /// Lower end, ≥ 0.
     pub low: f64,
     /// Upper end, ≤ 1.
     pub high: f64,
-    /// Nominal share of repeats whose interval holds the truth, in (0, 1).
+    /// Nominal coverage in (0, 1): the fraction of repeats whose interval contains the true value.
     pub level: f64,
-    /// How it was made.
+    /// Method of the interval.
     pub kind: IntervalKind,
 }
 
@@ -48,7 +48,7 @@ impl Interval {
         self.low <= probability && probability <= self.high
     }
 
-    /// [0, 1].
+    /// The trivial interval [0, 1].
     pub(crate) fn nothing(level: f64) -> Interval {
         Interval { low: 0.0, high: 1.0, level, kind: IntervalKind::Nothing }
     }
@@ -57,7 +57,7 @@ impl Interval {
 /// Wilson's score interval ("Probable inference", JASA 22, 1927). `failures` and `runs` may be effective numbers.
 ///
 /// ```
-/// // Nothing failed in 1,000 runs: that bounds the probability, it does not make it 0.
+/// With no failure in 1,000 runs the probability is bounded, but not 0.
 /// let interval = lanesweep::stats::estimate::wilson(0.0, 1000.0, 0.95);
 /// assert!(interval.low == 0.0 && (0.003..0.004).contains(&interval.high));
 /// ```
@@ -70,14 +70,14 @@ pub fn wilson(failures: f64, runs: f64, level: f64) -> Interval {
     let z2 = z * z / runs;
     let middle = (p + 0.5 * z2) / (1.0 + z2);
     let half = z / (1.0 + z2) * (p * (1.0 - p) / runs + 0.25 * z2 / runs).sqrt();
-    // At 0 and at all failures the ends are 0 and 1 exactly; the difference of equals is not.
+    // With no failures or only failures, the end is exactly 0 or 1; rounding of the difference would change it.
     let low = if failures <= 0.0 { 0.0 } else { (middle - half).max(0.0) };
     let high = if failures >= runs { 1.0 } else { (middle + half).min(1.0) };
     Interval { low, high, level, kind: IntervalKind::Wilson }
 }
 
-/// The exact interval of Clopper and Pearson (Biometrika 26, 1934): it holds the truth in at least `level` of
-/// repeats, whatever the truth.
+/// The exact interval of Clopper and Pearson (Biometrika 26, 1934): its coverage is at least `level` for every true
+/// value.
 pub fn clopper_pearson(failures: u64, runs: u64, level: f64) -> Interval {
     if runs == 0 {
         return Interval::nothing(level);
@@ -88,8 +88,8 @@ pub fn clopper_pearson(failures: u64, runs: u64, level: f64) -> Interval {
     Interval { low, high, level, kind: IntervalKind::ClopperPearson }
 }
 
-/// The upper limit after `runs` runs without a failure, 1 − (1 − level)^{1/runs}: about 3/runs at 95 %. One-sided,
-/// so below Clopper and Pearson's.
+/// The upper limit after `runs` runs without a failure, 1 − (1 − level)^{1/runs}: about 3/runs at 95 %. One-sided, so
+/// it is lower than Clopper and Pearson's limit.
 pub fn rule_of_three(runs: u64, level: f64) -> Interval {
     if runs == 0 {
         return Interval::nothing(level);
@@ -98,9 +98,9 @@ pub fn rule_of_three(runs: u64, level: f64) -> Interval {
     Interval { low: 0.0, high, level, kind: IntervalKind::RuleOfThree }
 }
 
-/// P·exp(∓ t·c) for an estimate with the coefficient of variation c: an interval on the scale of ln P, which stays
-/// above 0 and is as lopsided as estimates of small probabilities are. t is Student's for the given degrees of
-/// freedom (≥ 1; ∞ gives the normal one). On the log scale the standard deviation is √ln(1 + c²).
+/// P·exp(∓ t·c) for an estimate with the coefficient of variation c: an interval on the scale of ln P. It stays above 0
+/// and is as asymmetric as estimates of small probabilities. t is Student's quantile for the given degrees of freedom
+/// (≥ 1; ∞ gives the normal quantile). On the log scale the standard deviation is √ln(1 + c²).
 pub fn log_normal(probability: f64, coefficient_of_variation: f64, degrees_of_freedom: f64, level: f64) -> Interval {
     if probability.is_nan() || probability <= 0.0 || !coefficient_of_variation.is_finite() {
         return Interval::nothing(level);
@@ -111,7 +111,7 @@ pub fn log_normal(probability: f64, coefficient_of_variation: f64, degrees_of_fr
     Interval { low: probability / ratio, high: (probability * ratio).min(1.0), level, kind: IntervalKind::LogStudent }
 }
 
-/// Quantile of Student's t. Above 1,000 degrees of freedom it is the normal one to 0.2 %.
+/// Quantile of Student's t. Above 1,000 degrees of freedom the normal quantile is used, with a relative error of 0.2 %.
 pub(super) fn student_quantile(p: f64, degrees_of_freedom: f64) -> f64 {
     if degrees_of_freedom > 1000.0 {
         return normal_quantile(p);
@@ -119,14 +119,15 @@ pub(super) fn student_quantile(p: f64, degrees_of_freedom: f64) -> f64 {
     StudentsT::new(0.0, 1.0, degrees_of_freedom.max(1.0)).map_or_else(|_| normal_quantile(p), |t| t.inverse_cdf(p))
 }
 
-/// The normal quantile over Student's at a level: at most 1.
+/// Ratio of the normal quantile to Student's at a level: at most 1.
 pub(super) fn student_factor(degrees_of_freedom: f64, level: f64) -> f64 {
     let p = 0.5 + 0.5 * level;
     normal_quantile(p) / student_quantile(p, degrees_of_freedom)
 }
 
-/// x with I_x(a, b) = p, to the last digits that the regularised incomplete beta function has. Bisection of ln x:
-/// quantiles of rare events lie many decades below 1, and the library's own inversion does not end for some of them.
+/// x with I_x(a, b) = p, to the accuracy of the regularised incomplete beta function. Bisection of ln x, because
+/// quantiles of rare events are many decades below 1, and the library's own inversion does not terminate for some of
+/// them.
 fn beta_quantile(a: f64, b: f64, p: f64) -> f64 {
     let (mut low, mut high) = (-745.0, 0.0);
     for _ in 0..70 {

@@ -1,5 +1,5 @@
-//! How far an estimate over kernels would change with other kernels: the data's share of its uncertainty, for estimators
-//! whose draws do not come from the kernels themselves.
+//! Variation of an estimate with other kernels: the contribution of the data to its uncertainty, for estimators whose
+//! draws do not come from the kernels themselves.
 
 use rayon::prelude::*;
 
@@ -11,27 +11,27 @@ use crate::Result;
 use crate::stats::density::Mixture;
 use crate::stats::random::Stream;
 
-/// Draws of the proposal that shares are counted on.
+/// Number of draws of the proposal for counting the fractions.
 const DRAWS: u64 = 4096;
-/// Points whose kernels are held at once.
+/// Number of points whose kernels are held at once.
 const AT_ONCE: usize = 256;
 
-/// What kernels of equal weight have to do with the probability of failure.
+/// Contributions of kernels of equal weight to the probability of failure.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct KernelShares {
-    /// Variance of the probability over repeats of the sampling of kernels, over its square: N/(N − 1)·Σ(s_j − 1/N)²,
-    /// s_j being the share of failure that is kernel j's.
+    /// Relative variance of the probability over repeated sampling of the kernels: N/(N − 1)·Σ(s_j − 1/N)², where s_j
+    /// is the fraction of failures from kernel j.
     pub relative_variance: f64,
     /// Effective number of kernels that failures come from, 1/Σ s_j².
     pub effective_failing: f64,
 }
 
-/// Counts the shares over draws of a proposal: each failing draw weighs f/g and is its kernels' as they explain it.
-/// Σ s_j² is estimated without the bias that the draws' own noise gives it. `None` where no draw fails or there is
-/// one kernel.
+/// Counts the fractions over draws of a proposal. Each failing draw has the weight f/g, divided among the kernels by
+/// their responsibilities. Σ s_j² is corrected for the bias from the draws' noise. `None` if no draw fails or there is
+/// only one kernel.
 ///
 /// # Errors
-/// The limit state's.
+/// Those of the limit state.
 pub fn kernel_shares(
     kernels: &Mixture,
     nominal: &dyn Density,
@@ -51,7 +51,7 @@ pub fn kernel_shares(
             (ratio, kernels.responsibilities(point))
         };
         let all: Vec<(f64, Vec<f64>)> = points.par_iter().map(explained).collect();
-        // In the order of the indices: the same bits on any number of threads.
+        // In the order of the indices, so that the bits do not depend on the number of threads.
         for (w, shares) in all {
             weight += w;
             weight_squared += w * w;
@@ -72,8 +72,8 @@ pub fn kernel_shares(
 }
 
 impl Estimate {
-    /// The same estimate with the uncertainty of the data in it, which is independent of that of the draws. The variance
-    /// reduction stays that of the draws.
+    /// Adds the uncertainty of the data, which is independent of that of the draws. The variance reduction remains that
+    /// of the draws.
     pub(crate) fn over_kernels(mut self, shares: &KernelShares) -> Estimate {
         let (p, own) = (self.probability, self.interval);
         let scenarios = shares.effective_failing;

@@ -1,9 +1,9 @@
 //! Probabilities of rare failures from samples: estimators, their intervals, and warnings about them.
 //!
-//! Here lives nothing about vehicles: a [`Density`] draws points as pure functions of an index, a [`LimitState`]
-//! gives each point a value that is ≤ 0 where it fails, and every estimator gives one [`Estimate`]. Points go to the
-//! limit state in batches, as it runs on vector hardware. The same seed gives the same bits on any number of
-//! threads and in any division of the indices.
+//! This module contains nothing about vehicles. A [`Density`] draws points as pure functions of an index. A
+//! [`LimitState`] gives each point a value that is ≤ 0 if it fails. Every estimator returns one [`Estimate`]. Points
+//! are passed to the limit state in batches, because it runs on vector hardware. The same seed gives the same bits for
+//! any number of threads and any division of the indices.
 
 mod balance;
 mod blocks;

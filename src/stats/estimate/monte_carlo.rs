@@ -1,7 +1,7 @@
-//! Crude Monte Carlo: the share of failures among draws of the density itself. Counts are integers and exact.
+//! Crude Monte Carlo: the fraction of failures among draws of the density itself. Counts are exact integers.
 //!
-//! Where one draw serves several runs (headways, say), the draws are independent, the runs of a
-//! draw are not.
+//! If one draw is used in several runs (for example headways), the draws are independent, but the runs of a draw are
+//! not.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,26 +9,26 @@ use super::interval::{Interval, clopper_pearson, rule_of_three, wilson};
 use super::stop::StopReason;
 use super::summary::Estimate;
 
-/// Which interval goes with a count of failures. With none, it is the rule of three in both cases.
+/// Interval for a count of failures. Without failures, it is the rule of three in both cases.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum BinomialInterval {
-    /// Holds the truth at the nominal level on average.
+    /// Has the nominal coverage on average.
     Wilson,
-    /// Holds it at least at the nominal level.
+    /// Has at least the nominal coverage.
     ClopperPearson,
 }
 
-/// What was counted.
+/// Counts of a sample.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Counts {
-    /// Valid draws, all of them judged.
+    /// Number of valid draws; all of them are evaluated.
     pub runs: u64,
-    /// Those that failed.
+    /// Number of failed draws.
     pub failures: u64,
-    /// Indices without a valid point.
+    /// Number of indices without a valid point.
     pub voids: u64,
-    /// Attempts at valid points.
+    /// Number of attempts at valid points.
     pub tries: u64,
 }
 
@@ -45,7 +45,7 @@ impl std::ops::Add for Counts {
     }
 }
 
-/// The estimate of counts.
+/// The estimate from counts.
 pub fn from_counts(counts: &Counts, interval: BinomialInterval, level: f64, stopped: StopReason) -> Estimate {
     let Counts { runs, failures, voids, .. } = *counts;
     let probability = if runs > 0 { failures as f64 / runs as f64 } else { 0.0 };
@@ -60,12 +60,12 @@ pub fn from_counts(counts: &Counts, interval: BinomialInterval, level: f64, stop
     estimate
 }
 
-/// The mean share of failed runs over `draws` draws of `size` runs each, from Σ k and Σ k², k being the failed runs of
-/// a draw. Exact integers in; the variance is that of a mean of independent draws,
-/// (Σk²/size² − n·P²)/(n(n − 1)) (Cochran, "Sampling Techniques", 9A: clusters of equal size).
+/// The mean fraction of failed runs over `draws` draws of `size` runs each, from Σ k and Σ k², where k is the number of
+/// failed runs of a draw. The sums are exact integers. The variance is that of a mean of independent draws, (Σk²/size²
+/// − n·P²)/(n(n − 1)) (Cochran, "Sampling Techniques", 9A: clusters of equal size).
 ///
-/// The interval is Wilson's with the effective number of runs P(1 − P)/variance, at least the number of draws
-/// where the variance vanishes; without failures it is the rule of three over the draws.
+/// The interval is Wilson's with the effective number of runs P(1 − P)/variance, or the number of draws if the variance
+/// is 0. Without failures it is the rule of three over the draws.
 pub fn from_clusters(draws: u64, size: u64, failed: u64, squares: u64, level: f64, stopped: StopReason) -> Estimate {
     let (n, m) = (draws as f64, size as f64);
     let probability = if draws > 0 { failed as f64 / (n * m) } else { 0.0 };

@@ -1,6 +1,6 @@
-//! What an estimator is given: a density that draws points, and a limit state that judges them.
+//! Input of an estimator: a density that draws points, and a limit state that evaluates them.
 //!
-//! Points come in bulk: drawn in parallel, judged in one batch.
+//! Points are processed in bulk: drawn in parallel, evaluated in one batch.
 
 use std::ops::Range;
 
@@ -11,11 +11,11 @@ use crate::stats::density::normal::normal;
 use crate::stats::random::Stream;
 use crate::{Error, Place, Result};
 
-/// Attempts at a valid point before an index is given up as void. With a validity share of one half, one index in
-/// 2⁶⁴ is void; with 5 %, one in 27.
+/// Maximum number of attempts at a valid point; after these the index is void. With a valid fraction of one half, one
+/// index in 2⁶⁴ is void; with 5 %, one in 27.
 pub const ATTEMPTS: u32 = 64;
 
-/// Purposes of the estimators' words. The same draws serve no two of them.
+/// Purposes of the estimators' random words; no two estimators use the same draws.
 pub(crate) mod purpose {
     /// Draws of the density itself: crude Monte Carlo, pilots, the first level of subset simulation.
     pub const NOMINAL: u32 = 0x4553_0001;
@@ -29,13 +29,13 @@ pub(crate) mod purpose {
     pub const CHAIN: u32 = 0x4553_2000;
     /// Draws of one of several techniques: its number is added.
     pub const TECHNIQUE: u32 = 0x4553_3000;
-    /// Draws that tell which kernels failures come from.
+    /// Draws that determine which kernels failures come from.
     pub const SHARES: u32 = 0x4553_0004;
-    /// The estimate of a validity share.
+    /// The estimate of a valid fraction.
     pub const VALIDITY: u32 = 0x4553_0003;
 }
 
-/// A valid point and what it cost.
+/// A valid point and the number of attempts.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Draw {
     /// The point, one number per parameter, each in its own unit.
@@ -44,8 +44,8 @@ pub struct Draw {
     pub tries: u32,
 }
 
-/// A density over parameters that may be cut off where parameters are invalid (a negative speed): the density drawn
-/// from is then f / P_valid inside and 0 outside.
+/// A density over parameters that may be truncated to a valid region (for example without negative speeds). The density
+/// of the draws is then f / P_valid inside and 0 outside.
 pub trait Density: Sync {
     /// Number of parameters.
     fn dimensions(&self) -> usize;
@@ -53,11 +53,10 @@ pub trait Density: Sync {
     /// ln of f, **not** divided by P_valid [1 / product of the units]; −∞ at invalid points.
     fn log_density(&self, point: &[f64]) -> f64;
 
-    /// One attempt at the point of an index: a draw of f before anything is cut off. A pure function of its
-    /// arguments.
+    /// One attempt at the point of an index: a draw of f before truncation. A pure function of its arguments.
     fn attempt(&self, stream: &Stream, index: u64, attempt: u32) -> Vec<f64>;
 
-    /// Whether a point lies inside.
+    /// Whether a point is inside the valid region.
     fn is_valid(&self, _point: &[f64]) -> bool {
         true
     }
@@ -72,7 +71,7 @@ pub trait Density: Sync {
         false
     }
 
-    /// The point of an index, or `None` where [`ATTEMPTS`] attempts gave no valid one: a void index.
+    /// The point of an index, or `None` for a void index: [`ATTEMPTS`] attempts gave no valid point.
     fn draw(&self, stream: &Stream, index: u64) -> Option<Draw> {
         (0..ATTEMPTS).find_map(|attempt| {
             let point = self.attempt(stream, index, attempt);
@@ -121,13 +120,13 @@ impl Density for StandardNormal {
     }
 }
 
-/// Standard normal numbers of an index, from a block on.
+/// Standard normal numbers of an index, starting at a block.
 pub(crate) fn normals(stream: &Stream, index: u64, first_block: u32, count: usize) -> Vec<f64> {
     let blocks = 0..count.div_ceil(4) as u32;
     blocks.flat_map(|b| stream.words(index, first_block + b)).take(count).map(normal).collect()
 }
 
-/// A mixture cut off where a rule says so.
+/// A mixture truncated by a validity rule.
 pub struct Truncated<V> {
     mixture: Mixture,
     is_valid: V,
@@ -135,11 +134,11 @@ pub struct Truncated<V> {
 }
 
 impl<V: Fn(&[f64]) -> bool + Sync> Truncated<V> {
-    /// Cuts the mixture off and estimates P_valid from `draws` draws; its relative error is
-    /// √((1 − P_valid) / (P_valid · draws)) and is not in any interval: choose `draws` so that it is negligible.
+    /// Truncates the mixture and estimates P_valid from `draws` draws. No interval includes its relative error √((1 −
+    /// P_valid) / (P_valid · draws)): choose `draws` so that it is negligible.
     ///
     /// # Errors
-    /// [`Error::Usage`] where no draw is valid.
+    /// [`Error::Usage`] if no draw is valid.
     pub fn new(mixture: Mixture, is_valid: V, seed: u64, draws: u64) -> Result<Self> {
         let stream = Stream { seed, purpose: purpose::VALIDITY };
         let valid =
@@ -147,10 +146,10 @@ impl<V: Fn(&[f64]) -> bool + Sync> Truncated<V> {
         Self::with_share(mixture, is_valid, valid as f64 / draws as f64)
     }
 
-    /// Cuts the mixture off, P_valid being known.
+    /// Truncates the mixture with a known P_valid.
     ///
     /// # Errors
-    /// [`Error::Usage`] where the share is not in (0, 1].
+    /// [`Error::Usage`] if the fraction is not in (0, 1].
     pub fn with_share(mixture: Mixture, is_valid: V, share: f64) -> Result<Self> {
         if share > 0.0 && share <= 1.0 {
             return Ok(Truncated { mixture, is_valid, share });
@@ -162,7 +161,7 @@ impl<V: Fn(&[f64]) -> bool + Sync> Truncated<V> {
         ))
     }
 
-    /// The mixture before it is cut off.
+    /// The mixture before truncation.
     pub fn mixture(&self) -> &Mixture {
         &self.mixture
     }
@@ -190,14 +189,14 @@ impl<V: Fn(&[f64]) -> bool + Sync> Density for Truncated<V> {
     }
 }
 
-/// What decides between failure and no failure.
+/// Decides whether a point fails.
 pub trait LimitState: Sync {
-    /// One value per point, in order: ≤ 0 fails. Continuous through the limit where possible: cross-entropy and
-    /// subset simulation follow the values down to 0, the others use the sign only. +∞ may stand for "far from any
+    /// One value per point, in order: ≤ 0 fails. Continuous at the limit if possible: cross-entropy and subset
+    /// simulation follow the values down to 0; the other estimators use only the sign. +∞ may stand for "far from any
     /// failure".
     ///
     /// # Errors
-    /// Whatever keeps the points from being judged.
+    /// Any error that prevents the evaluation.
     fn evaluate(&self, points: &[Vec<f64>]) -> Result<Vec<f64>>;
 }
 
@@ -222,7 +221,7 @@ pub(crate) fn evaluate_checked(limit_state: &dyn LimitState, points: &[Vec<f64>]
     }
 }
 
-/// Maximum number of points drawn and judged at a time: bounds the memory of any sample.
+/// Maximum number of points drawn and evaluated at a time: bounds the memory of any sample.
 pub(crate) const BATCH: u64 = 1 << 16;
 
 /// The draws of a range of indices, in order.
@@ -237,7 +236,7 @@ pub(crate) struct Evaluated {
     pub voids: u64,
 }
 
-/// Draws and judges a range of indices, however long, keeping the points.
+/// Draws and evaluates a range of indices of any length, keeping the points.
 pub(crate) fn evaluated(
     density: &dyn Density,
     limit_state: &dyn LimitState,
@@ -254,7 +253,7 @@ pub(crate) fn evaluated(
     Ok(Evaluated { points, values, voids })
 }
 
-/// A range in batches.
+/// Splits a range into batches.
 pub(crate) fn batches(indices: Range<u64>) -> impl Iterator<Item = Range<u64>> {
     let mut at = indices.start;
     std::iter::from_fn(move || {

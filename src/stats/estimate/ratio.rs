@@ -1,26 +1,26 @@
-//! The ratio of two rates that are measured on the same clusters: the recorded runs of a scenario and the draws around
-//! it, say. Clusters are independent of one another, the two measurements on one cluster are not.
+//! The ratio of two rates measured on the same clusters, for example the recorded runs of a scenario and the draws
+//! around it. Clusters are independent; the two measurements on one cluster are not.
 
 use serde::Serialize;
 
 use super::interval::{Interval, IntervalKind, rule_of_three, student_factor, student_quantile, wilson};
 
-/// Runs and failures, one number per cluster; both slices are equally long.
+/// Runs and failures, one number per cluster; both slices have the same length.
 #[derive(Debug, Clone, Copy)]
 pub struct Clusters<'a> {
     /// Runs; a cluster may have none.
     pub runs: &'a [u64],
-    /// Those that failed.
+    /// Number of failed runs.
     pub failures: &'a [u64],
 }
 
 impl Clusters<'_> {
-    /// Failed runs.
+    /// Total number of failed runs.
     pub fn failed(&self) -> u64 {
         self.failures.iter().sum()
     }
 
-    /// Clusters with a failed run.
+    /// Number of clusters with a failed run.
     pub fn failing(&self) -> u64 {
         self.failures.iter().filter(|k| **k > 0).count() as u64
     }
@@ -31,7 +31,7 @@ impl Clusters<'_> {
         if runs > 0 { self.failed() as f64 / runs as f64 } else { 0.0 }
     }
 
-    /// What each cluster adds to rate − expected rate: (k_i − R·m_i)/Σm (the linearized ratio of totals).
+    /// Contribution of each cluster to rate − expected rate: (k_i − R·m_i)/Σm (the linearized ratio of totals).
     fn influences(&self) -> impl Iterator<Item = f64> + '_ {
         let total = self.runs.iter().sum::<u64>().max(1) as f64;
         let rate = self.rate();
@@ -44,7 +44,7 @@ impl Clusters<'_> {
 pub struct ClusterRate {
     /// Failed runs over runs.
     pub rate: f64,
-    /// Its variance over repeats of the whole sampling of clusters.
+    /// Its variance over repeated sampling of clusters.
     pub variance: f64,
     /// Its interval.
     pub interval: Interval,
@@ -52,19 +52,19 @@ pub struct ClusterRate {
     pub effective_failing: f64,
 }
 
-/// (Σx)²/Σx² (Kish): how many equal numbers these count as; 0 where all are 0.
+/// (Σx)²/Σx² (Kish): the equivalent number of equal values; 0 if all are 0.
 fn effective_number(values: impl Iterator<Item = u64>) -> f64 {
     let (sum, squares) = values.fold((0.0, 0.0), |(sum, squares), x| (sum + x as f64, squares + x as f64 * x as f64));
     if squares > 0.0 { sum * sum / squares } else { 0.0 }
 }
 
-/// The rate with the variance between clusters, N/(N − 1)·Σ((k_i − R·m_i)/Σm)² (the ultimate-cluster estimator: it
-/// holds what happens within clusters too; Cochran, "Sampling Techniques", 11.9).
+/// The rate with the variance between clusters, N/(N − 1)·Σ((k_i − R·m_i)/Σm)². This ultimate-cluster estimator
+/// includes the variance within clusters (Cochran, "Sampling Techniques", 11.9).
 ///
 /// The interval is Wilson's with the effective number of runs R(1 − R)/variance·(z/t)² (Korn and Graubard, Survey
-/// Methodology 24, 1998). It lies between the effective number of clusters, (Σm)²/Σm², which one fully correlated
-/// cluster of runs each would give, and the number of runs. t has one degree of freedom less than the smaller of the
-/// effective numbers of failing and of passing clusters: the variance is known from few clusters only.
+/// Methodology 24, 1998). This number lies between the effective number of clusters, (Σm)²/Σm², which fully correlated
+/// runs within clusters would give, and the number of runs. The degrees of freedom of t are the smaller of the
+/// effective numbers of failing and of passing clusters minus one, because few clusters determine the variance.
 pub fn cluster_rate(clusters: Clusters, level: f64) -> ClusterRate {
     let n = clusters.runs.len() as f64;
     let (rate, total) = (clusters.rate(), clusters.runs.iter().sum::<u64>());
@@ -79,24 +79,24 @@ pub fn cluster_rate(clusters: Clusters, level: f64) -> ClusterRate {
         let freedom = effective_failing.min(effective_number(passed)) - 1.0;
         let factor = student_factor(freedom, level);
         let effective = rate * (1.0 - rate) / variance * factor * factor;
-        // Without any variance only the number of clusters bounds the rate.
+        // With variance 0, only the number of clusters bounds the rate.
         let effective = if variance > 0.0 { effective.clamp(least, (total as f64).max(least)) } else { least };
         Interval { kind: IntervalKind::Clusters, ..wilson(rate * effective, effective, level) }
     };
     ClusterRate { rate, variance, interval, effective_failing }
 }
 
-/// Verdict of a ratio about its numerator.
+/// Verdict on the numerator of a ratio.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RatioVerdict {
     /// The interval of the ratio lies within [1/margin, margin].
     Agrees,
-    /// The interval lies above 1, and reaches beyond the margin.
+    /// The interval is above 1 and extends beyond the margin.
     TooHigh,
-    /// The interval lies below 1, and reaches beyond the margin.
+    /// The interval is below 1 and extends beyond the margin.
     TooLow,
-    /// The interval holds 1 and reaches beyond the margin, or too few clusters fail.
+    /// The interval contains 1 and extends beyond the margin, or too few clusters fail.
     Undecided,
 }
 
@@ -105,7 +105,7 @@ impl RatioVerdict {
     pub const ALL: [RatioVerdict; 4] =
         [RatioVerdict::Agrees, RatioVerdict::TooHigh, RatioVerdict::TooLow, RatioVerdict::Undecided];
 
-    /// In words.
+    /// Text for reports.
     pub fn text(self) -> &'static str {
         match self {
             RatioVerdict::Agrees => "agrees",
@@ -115,7 +115,7 @@ impl RatioVerdict {
         }
     }
 
-    /// In one character.
+    /// One-character symbol.
     pub fn mark(self) -> char {
         match self {
             RatioVerdict::Agrees => '=',
@@ -127,26 +127,26 @@ impl RatioVerdict {
 }
 
 impl Ratio {
-    /// The rates are equal up to the margin.
+    /// Whether the rates are equal within the margin.
     pub fn agrees(&self) -> bool {
         self.verdict == RatioVerdict::Agrees
     }
 }
 
-/// How the interval of a ratio was made.
+/// Method of a ratio's interval.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RatioMethod {
     /// Student's t on the logarithm, differences cluster by cluster.
     Paired,
-    /// One rate's interval over the other's: too few failing clusters for the logarithm.
+    /// The interval of one rate divided by that of the other: too few failing clusters for the logarithm.
     Separate,
 }
 
-/// What a verdict needs: failing clusters on each side for the paired interval, and a margin for agreement.
+/// Requirements of a verdict: failing clusters on each side for the paired interval, and a margin for agreement.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct Enough {
-    /// Clusters with a failed run.
+    /// Required number of clusters with a failed run.
     pub clusters: u64,
     /// Ratio up to which rates count as equal, above 1.
     pub margin: f64,
@@ -154,8 +154,7 @@ pub struct Enough {
 
 impl Default for Enough {
     fn default() -> Self {
-        // 0.8 … 1.25: the limits that two drugs must keep to be called equivalent (European Medicines Agency,
-        // CPMP/EWP/QWP/1401/98).
+        // 0.8 … 1.25: the limits of bioequivalence of two drugs (European Medicines Agency, CPMP/EWP/QWP/1401/98).
         Enough { clusters: 10, margin: 1.25 }
     }
 }
@@ -169,14 +168,14 @@ pub struct Ratio {
     pub low: Option<f64>,
     /// Upper end.
     pub high: Option<f64>,
-    /// How the interval was made.
+    /// Method of the interval.
     pub method: RatioMethod,
     /// Its verdict.
     pub verdict: RatioVerdict,
 }
 
 impl Ratio {
-    /// Both ends; the upper one is ∞ where the denominator never fails and the numerator does.
+    /// Both ends; the upper end is ∞ if the denominator never fails and the numerator does.
     pub fn interval(&self) -> Option<(f64, f64)> {
         let open = self.low.filter(|low| self.ratio.is_none() && *low > 0.0);
         self.low.zip(self.high).or(open.map(|low| (low, f64::INFINITY)))
@@ -185,15 +184,15 @@ impl Ratio {
 
 /// The ratio of two rates over the same clusters, in the same order.
 ///
-/// With enough failing clusters on both sides the interval is R·exp(∓t·σ) with
-/// σ² = N/(N − 1)·Σ(z_i/P − y_i/S)², z and y being the clusters' influences on numerator and denominator: the delta
-/// method on the logarithm, which takes the covariance of the two with it. What varies within clusters (draws of a
-/// Monte Carlo sample) is in σ² as well. t has one degree of freedom less than the side with fewer failing clusters
-/// has of them. A numerator that equals the denominator cluster by cluster has the interval [1, 1]. Rates agree where
-/// the interval lies within the margin; an interval that holds 1 and is wider decides nothing.
+/// With enough failing clusters on both sides the interval is R·exp(∓t·σ) with σ² = N/(N − 1)·Σ(z_i/P − y_i/S)². z and
+/// y are the clusters' influences on numerator and denominator. This is the delta method on the logarithm, which
+/// includes the covariance of the two rates. σ² also includes the variation within clusters (draws of a Monte Carlo
+/// sample). The degrees of freedom of t are the smaller number of failing clusters minus one. A numerator that equals
+/// the denominator cluster by cluster has the interval [1, 1]. Rates agree if the interval lies within the margin; a
+/// wider interval that contains 1 is undecided.
 ///
-/// With too few the interval is [P_low/S_high, P_high/S_low] of [`cluster_rate`]: 1 outside still decides,
-/// 1 inside is undecided, not agreement.
+/// With too few failing clusters the interval is [P_low/S_high, P_high/S_low] of [`cluster_rate`]. If it excludes 1, it
+/// still decides; otherwise the verdict is undecided, not agreement.
 pub fn paired_ratio(numerator: Clusters, denominator: Clusters, enough: Enough, level: f64) -> Ratio {
     let finite = |v: f64| v.is_finite().then_some(v);
     let (p, s) = (numerator.rate(), denominator.rate());

@@ -1,5 +1,5 @@
-//! When a sample is large enough. Rules are looked at after fixed numbers of samples only, so that how fast a machine
-//! is, and how many threads it has, cannot move the end.
+//! Rules that end a sample. They are evaluated only after fixed numbers of samples, so that neither the speed of a
+//! machine nor its number of threads changes the end.
 
 use std::time::{Duration, Instant};
 
@@ -7,10 +7,10 @@ use serde::{Deserialize, Serialize};
 
 use super::blocks::BLOCK;
 
-/// Sample sizes at which the rules are looked at.
+/// Sample sizes at which the rules are evaluated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
 pub enum Checkpoints {
-    /// 4,096 · 2^k: few looks, so the interval suffers little from being looked at repeatedly.
+    /// 4,096 · 2^k: few evaluations, so repeated testing affects the interval little.
     #[default]
     Doubling,
     /// Every so many samples, rounded up to blocks of 4,096.
@@ -36,57 +36,57 @@ impl Checkpoints {
     }
 }
 
-/// When to end. A plan file holds the number of samples alone: what is drawn does not depend on the other rules.
+/// When to end. A plan file stores only the number of samples, because the draws do not depend on the other rules.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct StopRule {
     /// Maximum number of samples, ≥ 1. Always a limit.
     pub samples: u64,
-    /// End at the first checkpoint at which half the interval's width over the estimate is at most this, there
-    /// being at least [`StopRule::MIN_FAILURES`] failures.
+    /// End at the first checkpoint at which half the interval's width over the estimate is at most this, with at least
+    /// [`StopRule::MIN_FAILURES`] failures.
     #[serde(skip)]
     pub relative_half_width: Option<f64>,
     /// End at the first checkpoint after this time. The result then depends on the machine and says so.
     #[serde(skip)]
     pub time_limit: Option<Duration>,
-    /// Where the rules are looked at.
+    /// When the rules are evaluated.
     #[serde(skip)]
     pub checkpoints: Checkpoints,
 }
 
-/// What ended a sample.
+/// Reason for the end of a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StopReason {
-    /// The number of samples asked for.
+    /// The requested number of samples was reached.
     Samples,
     /// The interval was narrow enough.
     RelativeHalfWidth,
-    /// Time ran out: another machine would have ended elsewhere.
+    /// The time limit was reached; another machine would end elsewhere.
     TimeLimit,
 }
 
 impl StopReason {
-    /// Whether the same call ends at the same sample everywhere.
+    /// Whether the same call ends at the same sample on every machine.
     pub fn is_reproducible(self) -> bool {
         self != StopReason::TimeLimit
     }
 }
 
 impl StopRule {
-    /// Failures before a narrow interval is believed: fewer can make intervals narrow by chance.
+    /// Minimum number of failures for this rule: with fewer, intervals can be narrow by chance.
     pub const MIN_FAILURES: u64 = 10;
 
-    /// Whether nothing but the number of samples ends it.
+    /// Whether only the number of samples ends it.
     pub fn is_fixed(&self) -> bool {
         self.relative_half_width.is_none() && self.time_limit.is_none()
     }
 
-    /// So many samples and no other rule.
+    /// `samples` samples and no other rule.
     pub fn samples(samples: u64) -> StopRule {
         StopRule { samples, relative_half_width: None, time_limit: None, checkpoints: Checkpoints::Doubling }
     }
 
-    /// The sample size at which to look next.
+    /// The next sample size at which to evaluate the rules.
     pub(crate) fn next(&self, samples: u64) -> u64 {
         if self.relative_half_width.is_none() && self.time_limit.is_none() {
             return self.samples;

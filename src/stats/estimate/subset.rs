@@ -1,7 +1,7 @@
-//! Subset simulation (Au and Beck, "Estimation of small failure probabilities in high dimensions by subset
-//! simulation", Probabilistic Engineering Mechanics 16, 2001): the probability as a product of shares of about p0,
-//! each the share of one level's samples that reach the next. From the second level on the samples are states of
-//! Markov chains that started at the samples which reached the level.
+//! Subset simulation (Au and Beck, "Estimation of small failure probabilities in high dimensions by subset simulation",
+//! Probabilistic Engineering Mechanics 16, 2001). The probability is a product of fractions of about p0; each is the
+//! fraction of one level's samples that reach the next level. From the second level on, the samples are states of
+//! Markov chains that start at the samples that reached the level.
 
 use std::collections::BTreeMap;
 
@@ -20,10 +20,10 @@ use crate::stats::density::moments::{factor_or_diagonal, moments};
 use crate::stats::density::normal::uniform;
 use crate::stats::random::Stream;
 
-/// Acceptance that the step size is steered towards between levels.
+/// Target acceptance rate for adapting the step size between levels.
 const GOAL_ACCEPTANCE: f64 = 0.4;
 
-/// How to go down.
+/// Options of a subset simulation.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Subset {
     /// Seed.
@@ -32,7 +32,7 @@ pub struct Subset {
     pub level: f64,
     /// Samples of each level, ≥ 20.
     pub samples_per_level: u64,
-    /// p0: share of a level that starts the next, in (0, 1).
+    /// p0: fraction of a level that starts the next, in (0, 1).
     pub share: f64,
     /// Maximum number of levels.
     pub levels: usize,
@@ -48,24 +48,24 @@ impl Subset {
 /// One level.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct SubsetLevel {
-    /// Limit state that starts the next level; 0 at the last.
+    /// Limit state at which the next level starts; 0 at the last level.
     pub threshold: f64,
-    /// Share of the level's samples that reach it.
+    /// Fraction of the level's samples that reach it.
     pub share: f64,
-    /// Share of the chains' steps that moved; 1 at the first level, which has no chains.
+    /// Fraction of the chains' steps that moved; 1 at the first level, which has no chains.
     pub acceptance: f64,
-    /// Coefficient of variation of the share.
+    /// Coefficient of variation of this fraction.
     pub coefficient_of_variation: f64,
 }
 
-/// The estimate and the way to it.
+/// The estimate and its levels.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SubsetRun {
     /// The estimate.
     pub estimate: Estimate,
     /// The levels.
     pub levels: Vec<SubsetLevel>,
-    /// Points of the last level that fail: where failures lie.
+    /// Points of the last level that fail.
     pub failures: Vec<Vec<f64>>,
 }
 
@@ -77,14 +77,14 @@ struct State {
     value: f64,
     /// Chain within the level.
     chain: u32,
-    /// The first level's sample that it descends from.
+    /// Index of the first level's sample that it descends from.
     root: u32,
 }
 
-/// Goes down level by level until enough of a level fails.
+/// Runs level by level until enough samples of a level fail.
 ///
 /// # Errors
-/// The limit state's; [`crate::Error::Usage`] where the density has no valid point.
+/// Those of the limit state; [`crate::Error::Usage`] if the density has no valid point.
 pub fn subset(density: &dyn Density, limit_state: &dyn LimitState, options: &Subset) -> Result<SubsetRun> {
     let stream = Stream { seed: options.seed, purpose: purpose::NOMINAL };
     let first = evaluated(density, limit_state, stream, 0..options.samples_per_level.max(20))?;
@@ -144,8 +144,8 @@ fn conclude(
     states: &[State],
     voids: u64,
 ) -> Estimate {
-    // ln P = Σ ln p_l; a root's influence is the sum of its descendants' deviations in all levels, so correlations
-    // within chains, between chains of one ancestor and between levels are all in the sum of squares.
+    // ln P = Σ ln p_l. A root's influence is the sum of its descendants' deviations in all levels. So the sum of
+    // squares includes correlations within chains, between chains of one ancestor and between levels.
     let squares = influence.values().map(|d| d * d).sum::<f64>();
     let fourths = influence.values().map(|d| d.powi(4)).sum::<f64>();
     let by_levels: f64 = levels.iter().map(|l| l.coefficient_of_variation.powi(2)).sum();
@@ -161,7 +161,7 @@ fn conclude(
     let (estimated, variance, interval) = if reached {
         (probability, (probability * coefficient_of_variation).powi(2), interval)
     } else {
-        // Chains that do not come nearer to failure say nothing of what lies beyond: no bound but 1.
+        // Chains that do not approach failure give no information beyond: the only bound is 1.
         (0.0, 0.0, Interval::nothing(options.level))
     };
     let mut estimate =
@@ -177,8 +177,8 @@ fn conclude(
     estimate
 }
 
-/// The value that about `share` of the states reach, 0 at the lowest. On a plateau, where many share one value, the
-/// next lower value; `None` where all states have one value above 0.
+/// The value that about a fraction `share` of the states reach, at least 0. On a plateau, where many states have the
+/// same value, the next lower value; `None` if all states have one value above 0.
 fn threshold_of(states: &[State], share: f64) -> Option<f64> {
     let mut values: Vec<f64> = states.iter().map(|s| s.value).collect();
     values.sort_by(f64::total_cmp);
@@ -195,8 +195,8 @@ fn threshold_of(states: &[State], share: f64) -> Option<f64> {
     (reaching < values.len()).then_some(threshold)
 }
 
-/// Coefficient of variation of a level's share from the correlation within its chains: √(Σ over chains of the
-/// squared sum of deviations)/(n p), which is Au and Beck's √((1 − p)/(p n) (1 + γ)) with all lags of γ.
+/// Coefficient of variation of a level's fraction from the correlation within its chains: √(Σ over chains of the
+/// squared sum of deviations)/(n p). This is Au and Beck's √((1 − p)/(p n) (1 + γ)) with all lags of γ.
 fn chain_variation(states: &[State], threshold: f64, share: f64) -> f64 {
     let mut chains: BTreeMap<u32, f64> = BTreeMap::new();
     for state in states {
@@ -205,12 +205,12 @@ fn chain_variation(states: &[State], threshold: f64, share: f64) -> f64 {
     chains.values().map(|d| d * d).sum::<f64>().sqrt() / (states.len() as f64 * share)
 }
 
-/// The moves of the chains. Two kinds take turns, each exact by itself: two steps of the autoregressive move
-/// x' = m + √(1 − s²)(x − m) + s L z, reversible for the Gaussian with the density's own mean and covariance and
-/// corrected by Metropolis and Hastings to the density (preconditioned Crank-Nicolson with a reference), which crosses
-/// a level in few steps however many parameters there are; then one random walk with the seeds' spread, which does
-/// not stick where the density is far from that Gaussian. For the standard normal density the first kind needs no
-/// correction and is used alone.
+/// The moves of the chains. Two kinds alternate; each alone leaves the density invariant. First, two steps of the
+/// autoregressive move x' = m + √(1 − s²)(x − m) + s L z. It is reversible for the Gaussian with the density's mean and
+/// covariance, and corrected by Metropolis-Hastings to the density (preconditioned Crank-Nicolson with a reference). It
+/// crosses a level in few steps for any number of parameters. Second, one random walk step with the seeds' spread,
+/// which does not get stuck where the density is far from that Gaussian. For the standard normal density the first kind
+/// needs no correction and is used alone.
 struct Walk<'a> {
     density: &'a dyn Density,
     seed: u64,
@@ -218,7 +218,7 @@ struct Walk<'a> {
     mean: DVector<f64>,
     /// L of the reference.
     factor: DMatrix<f64>,
-    /// Share s of the new direction in an autoregressive move.
+    /// Weight s of the new direction in an autoregressive move.
     turn: f64,
     /// Step of the random walk in units of the seeds' spread.
     stride: f64,
@@ -228,7 +228,7 @@ struct Walk<'a> {
 const KINDS: u64 = 3;
 
 impl<'a> Walk<'a> {
-    /// The reference is taken from draws of the density.
+    /// Estimates the reference from draws of the density.
     fn new(density: &'a dyn Density, seed: u64, draws: &[State]) -> Self {
         let d = density.dimensions();
         let stride = 2.0 / (d as f64).sqrt();
@@ -236,12 +236,12 @@ impl<'a> Walk<'a> {
         Walk { density, seed, mean, factor, turn: 0.6, stride }
     }
 
-    /// The next level: chains from the states at or below the threshold, as many states as before, the seeds being
-    /// the first of each chain. All chains take a step together, one batch per step. Gives also the runs and the
-    /// share of steps that moved.
+    /// Makes the next level: chains from the states at or below the threshold, with the same total number of states;
+    /// the seeds are the first states of the chains. All chains step together, one batch per step. Also returns the
+    /// number of runs and the fraction of steps that moved.
     ///
-    /// A move is accepted by the density ratio first and then by the limit state, both of which keep the density
-    /// restricted to the level invariant. The step size is one for the whole level.
+    /// A move is accepted first by the density ratio, then by the limit state; both keep the density restricted to the
+    /// level invariant. The whole level has one step size.
     fn level(
         &mut self,
         limit_state: &dyn LimitState,
@@ -291,7 +291,7 @@ impl<'a> Walk<'a> {
         Ok((next, runs, share(moves[0] + moves[1], steps[0] + steps[1])))
     }
 
-    /// An autoregressive move, or `None` where the density refuses it: no run is spent on it.
+    /// An autoregressive move, or `None` if the density rejects it, which costs no run.
     fn turned(&self, state: &State, stream: &Stream, index: u64) -> Option<(Vec<f64>, f64)> {
         let d = self.density.dimensions();
         let z = normals(stream, index, 1, d);
@@ -304,12 +304,12 @@ impl<'a> Walk<'a> {
         let step = &self.factor * DVector::from_vec(z);
         let point: Vec<f64> =
             (0..d).map(|j| self.mean[j] + keep * (state.point[j] - self.mean[j]) + self.turn * step[j]).collect();
-        // The correction: ln reference, up to its constant, at the point left and at the point proposed.
+        // The correction: ln of the reference density, up to its constant, at the old and at the proposed point.
         let gain = self.log_reference(&state.point) - self.log_reference(&point);
         self.evaluated_by_density(state, point, gain, stream, index)
     }
 
-    /// A step of a random walk, or `None` where the density refuses it.
+    /// A step of a random walk, or `None` if the density rejects it.
     fn walked(&self, state: &State, seeds: &DMatrix<f64>, stream: &Stream, index: u64) -> Option<(Vec<f64>, f64)> {
         let step = seeds * DVector::from_vec(normals(stream, index, 1, self.density.dimensions()));
         let point: Vec<f64> = state.point.iter().zip(&step).map(|(x, s)| x + self.stride * s).collect();
@@ -339,7 +339,7 @@ impl<'a> Walk<'a> {
     }
 }
 
-/// Mean of states and L of their covariance, drawn a little towards its diagonal.
+/// Mean of states and L of their covariance, shrunk a little towards its diagonal.
 fn spread(states: &[State], d: usize) -> (DVector<f64>, DMatrix<f64>) {
     let (mean, mut covariance) = moments(states.iter().map(|s| (s.point.as_slice(), 1.0)), d);
     let keep = states.len() as f64 / (states.len() as f64 + d as f64 + 1.0);

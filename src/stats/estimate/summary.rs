@@ -1,4 +1,4 @@
-//! The one result that every estimator gives.
+//! The result of every estimator.
 
 use serde::{Deserialize, Serialize};
 
@@ -7,7 +7,7 @@ use super::ratio::ClusterRate;
 use super::stop::StopReason;
 use super::trust::{Trust, Warning};
 
-/// A probability of failure with all that is known of its accuracy.
+/// A probability of failure with measures of its accuracy.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// Estimator: `monte_carlo`, `importance`, `importance_self_normalised`, `cross_entropy`,
@@ -23,41 +23,40 @@ pub struct Estimate {
     pub variance: f64,
     /// √variance over the probability; ∞ at zero.
     pub coefficient_of_variation: f64,
-    /// Evaluations of the limit state, pilots and levels included.
+    /// Number of evaluations of the limit state, including pilots and levels.
     pub runs: u64,
-    /// Failures in the sample that the estimate rests on (the last level's, the final sample's).
+    /// Number of failures in the sample of the estimate (the last level's, the final sample's).
     pub failures: u64,
-    /// Indices without a valid point.
+    /// Number of indices without a valid point.
     pub voids: u64,
     /// Variance of crude Monte Carlo with as many runs over this variance: P(1 − P)/(runs · variance).
     pub variance_reduction: f64,
-    /// For weighted samples.
+    /// Figures of weighted samples.
     pub weights: Option<WeightFigures>,
-    /// What ended the sample.
+    /// Reason for the end of the sample.
     pub stopped: StopReason,
-    /// What speaks against believing it.
+    /// Warnings about the estimate.
     pub trust: Trust,
 }
 
-/// What the weights of a sample say about it.
+/// Figures about the weights of a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct WeightFigures {
     /// Effective sample size (Σw)²/Σw².
     pub effective_size: f64,
-    /// The same over the failures.
+    /// The same for the failures.
     pub effective_size_failures: f64,
-    /// Largest weight over the sum of all.
+    /// Maximum weight over the sum of all weights.
     pub largest_share: f64,
-    /// Largest failure's share of the estimate.
+    /// Fraction of the estimate from the failure with the largest weight.
     pub largest_share_failures: f64,
-    /// Mean weight, 1 in expectation.
+    /// Mean weight; its expectation is 1.
     pub mean_weight: f64,
     /// Standard error of the mean weight.
     pub mean_weight_error: f64,
-    /// Share of the estimate carried by failures where density over proposal exceeds
-    /// [`super::Warning::THIN_RATIO`].
+    /// Fraction of the estimate from failures where density over proposal exceeds [`super::Warning::THIN_RATIO`].
     pub thin_share: f64,
-    /// How many those failures are.
+    /// Number of these failures.
     pub thin_failures: u64,
     /// Σ over failures w / Σ w.
     pub self_normalised: f64,
@@ -66,7 +65,7 @@ pub struct WeightFigures {
 }
 
 impl Estimate {
-    /// Fills in what follows from the rest.
+    /// Computes the derived figures.
     #[allow(clippy::too_many_arguments)]
     pub(crate) fn new(
         method: &str,
@@ -100,8 +99,8 @@ impl Estimate {
         estimate
     }
 
-    /// The same estimate with the uncertainty of the data in it: `clusters` are the draws around each scenario. Neither
-    /// variance nor interval gets smaller; the variance reduction stays that of the draws.
+    /// Adds the uncertainty of the data: `clusters` are the draws around each scenario. Neither variance nor interval
+    /// becomes smaller; the variance reduction remains that of the draws.
     pub(crate) fn over_scenarios(mut self, clusters: &ClusterRate) -> Estimate {
         let (own, with_data) = (self.interval, clusters.interval);
         self.interval.low = own.low.min(with_data.low);
@@ -118,7 +117,7 @@ impl Estimate {
         self
     }
 
-    /// Counts runs that were spent before the final sample too.
+    /// Sets the number of runs, including those before the final sample.
     pub(crate) fn set_runs(&mut self, runs: u64) {
         self.runs = runs;
         let crude = self.probability * (1.0 - self.probability) / runs as f64;

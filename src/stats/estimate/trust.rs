@@ -1,4 +1,4 @@
-//! What speaks against believing an estimate. Each warning has one threshold, documented where it stands.
+//! Warnings about an estimate. Each warning has one documented threshold.
 
 use std::fmt;
 
@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::support::readable::significant;
 
-/// One thing that is wrong, with the figure that shows it.
+/// One warning, with the figure that causes it.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "warning", rename_all = "snake_case")]
 pub enum Warning {
@@ -23,9 +23,9 @@ pub enum Warning {
         /// (Σk)²/Σk² over the failures around each scenario.
         scenarios: f64,
     },
-    /// The interval is that of the draws alone, but the density rests on data.
+    /// The interval covers the draws alone, but the density is fitted to data.
     DataLeftOut,
-    /// The rate was not compared with that of recorded scenarios: what the parameterization changes is not known.
+    /// The rate was not compared with that of recorded scenarios: the error of the parameterization is unknown.
     NotCompared,
     /// The rate differs from that of the recorded scenarios (S) beyond the margin, or too few failures tell whether it does.
     AgainstRecorded {
@@ -48,7 +48,7 @@ pub enum Warning {
     },
     /// One failure carries more than [`Warning::MAX_FRACTION`] of the estimate.
     OneWeightDominates {
-        /// Its share.
+        /// Its fraction of the estimate.
         share: f64,
     },
     /// The mean weight, 1 in expectation, is off by more than [`Warning::MEAN_WEIGHT_ERRORS`] standard errors, or by
@@ -62,9 +62,9 @@ pub enum Warning {
     /// Failures where the proposal is thin (below a fifth of the density) carry more than
     /// [`Warning::THIN_SHARE`] of the estimate: the proposal misses a way to fail.
     ModeMissed {
-        /// Their share of the estimate.
+        /// Their fraction of the estimate.
         share: f64,
-        /// How many they are.
+        /// Number of these failures.
         failures: u64,
     },
     /// The pilot, drawn from the density itself, has a number of failures that is less likely than
@@ -72,14 +72,14 @@ pub enum Warning {
     DisagreesWithPilot {
         /// Failures of the pilot.
         failures: u64,
-        /// Failures that the estimate lets expect.
+        /// Failures expected under the estimate.
         expected: f64,
     },
     /// Markov chains moved in less than [`Warning::MIN_ACCEPTANCE`] of their steps.
     ChainsStuck {
         /// Level, counted from 1.
         level: usize,
-        /// Share of steps that moved.
+        /// Fraction of steps that moved.
         acceptance: f64,
     },
     /// The surviving samples descend from effectively fewer than [`Warning::MIN_LINEAGES`] independent ones.
@@ -97,7 +97,7 @@ pub enum Warning {
     },
     /// More than [`Warning::VOID_SHARE`] of the indices gave no valid point.
     VoidDraws {
-        /// Their share.
+        /// Fraction of void indices.
         share: f64,
     },
     /// The time limit ended the sample: the result depends on the machine.
@@ -111,16 +111,16 @@ impl Warning {
     pub const MIN_SCENARIOS: f64 = 10.0;
     /// Effective sample size over failures below which [`Warning::LowEffectiveSize`] is raised.
     pub const MIN_EFFECTIVE_SIZE: f64 = 30.0;
-    /// Share of the estimate above which [`Warning::OneWeightDominates`] is raised.
+    /// Fraction of the estimate above which [`Warning::OneWeightDominates`] is raised.
     pub const MAX_FRACTION: f64 = 0.1;
     /// Standard errors above which [`Warning::MeanWeightOff`] is raised.
     pub const MEAN_WEIGHT_ERRORS: f64 = 4.0;
     /// Distance from 1 above which [`Warning::MeanWeightOff`] is raised.
     pub const MEAN_WEIGHT_OFF: f64 = 0.2;
-    /// Density over proposal above which a point counts as thinly covered. With a defensive share of 0.1 the
-    /// defensive part is then likelier than the rest to have drawn it.
+    /// Density over proposal above which a point counts as thinly covered. With a defensive mixture weight of 0.1, such
+    /// a point was more likely drawn from the defensive part.
     pub const THIN_RATIO: f64 = 5.0;
-    /// Share of the estimate above which [`Warning::ModeMissed`] is raised.
+    /// Fraction of the estimate above which [`Warning::ModeMissed`] is raised.
     pub const THIN_SHARE: f64 = 0.1;
     /// Two-sided likelihood below which [`Warning::DisagreesWithPilot`] is raised.
     pub const PILOT_LIKELIHOOD: f64 = 0.001;
@@ -128,7 +128,7 @@ impl Warning {
     pub const MIN_ACCEPTANCE: f64 = 0.1;
     /// Lineages below which [`Warning::FewLineages`] is raised.
     pub const MIN_LINEAGES: f64 = 10.0;
-    /// Share of void indices above which [`Warning::VoidDraws`] is raised.
+    /// Fraction of void indices above which [`Warning::VoidDraws`] is raised.
     pub const VOID_SHARE: f64 = 0.001;
 
     /// Whether the estimate must not be used at all.
@@ -234,7 +234,7 @@ impl fmt::Display for Verdict {
     }
 }
 
-/// All warnings of an estimate. An empty list is no proof: a way to fail that no draw has met leaves no trace.
+/// All warnings of an estimate. An empty list is no proof: a failure mode without a draw causes no warning.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Trust {
     /// Warnings, in the order of their discovery.
@@ -253,7 +253,7 @@ impl Trust {
         }
     }
 
-    /// Adds a warning where its condition holds.
+    /// Adds a warning if its condition holds.
     pub(crate) fn warn_if(&mut self, condition: bool, warning: Warning) {
         if condition {
             self.warnings.push(warning);

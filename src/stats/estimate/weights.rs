@@ -1,4 +1,4 @@
-//! Sums over weighted draws: everything that importance sampling needs, in constant memory.
+//! Sums over weighted draws for importance sampling, in constant memory.
 
 use serde::{Deserialize, Serialize};
 
@@ -10,9 +10,9 @@ use super::trust::{Trust, Warning};
 /// One index of a weighted sample.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct WeightedDraw {
-    /// f/(P_valid g), f over g both without the truncation of g; 0 where void.
+    /// f/(P_valid g), with g before truncation; 0 if void.
     pub weight: f64,
-    /// Response: 1 where it fails, 0 where not; any number in between, such as a probability of injury.
+    /// Response: 1 if it fails, else 0; or any number in between, such as a probability of injury.
     pub response: f64,
     /// Attempts at a valid point.
     pub tries: u32,
@@ -29,8 +29,8 @@ impl WeightedDraw {
     }
 }
 
-/// Sums over weighted draws. Weights here lack the factor valid draws / tries, which stands for the proposal's
-/// P_valid: with it the estimate is Σ w r / tries, as if invalid attempts had been draws of weight 0.
+/// Sums over weighted draws. The weights lack the factor valid draws / tries, which estimates the proposal's P_valid.
+/// With it the estimate is Σ w r / tries, as if invalid attempts were draws of weight 0.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct WeightSums {
     /// Valid draws.
@@ -41,7 +41,7 @@ pub struct WeightSums {
     pub tries: u64,
     /// Draws with a response above 0.
     pub failures: u64,
-    /// Those of them that are thin.
+    /// Number of these draws that are thin.
     pub thin_failures: u64,
     /// Σ w.
     pub weight: f64,
@@ -109,8 +109,8 @@ impl WeightSums {
         ratio(self.failing, self.tries as f64)
     }
 
-    /// Variance of the unbiased estimate, every attempt being a draw: the uncertainty of the proposal's validity
-    /// share is in it.
+    /// Variance of the unbiased estimate, with every attempt as a draw; it includes the uncertainty of the proposal's
+    /// valid fraction.
     pub fn unbiased_variance(&self) -> f64 {
         let p = self.unbiased();
         (ratio(self.failing_squared, (self.tries as f64).powi(2)) - ratio(p * p, self.tries as f64)).max(0.0)
@@ -145,7 +145,7 @@ fn ratio(above: f64, below: f64) -> f64 {
 }
 
 impl Trust {
-    /// The warnings that weights give rise to.
+    /// Adds the warnings about the weights.
     pub(crate) fn about_weights(&mut self, figures: &WeightFigures, failures: u64) {
         let off = (figures.mean_weight - 1.0).abs();
         let standard_errors = if figures.mean_weight_error > 0.0 {

@@ -15,11 +15,11 @@ use super::directions::POLYNOMIALS;
 use super::philox::Stream;
 use crate::{Error, Place, Result};
 
-/// Dimensions there are.
+/// Number of available dimensions.
 pub const SOBOL_DIMENSIONS: u32 = 32;
-/// Points there are: indices are smaller.
+/// Number of available points; indices are smaller.
 pub const SOBOL_POINTS: u64 = 1 << 32;
-/// Words of a dimension in the table that a device gets.
+/// Number of words of a dimension in the device's table.
 pub const SOBOL_ROW: usize = DIGITS + 2;
 
 /// Binary digits of a coordinate.
@@ -58,7 +58,7 @@ impl Sobol {
         Ok(Sobol { rows: rows.collect() })
     }
 
-    /// What a device gets. A row for each dimension: the direction words of the index's bits from the lowest to the
+    /// The table for a device. One row per dimension: the direction words of the index's bits from the lowest to the
     /// highest, then two words that seed the scrambling.
     pub fn table(&self) -> &[[u32; SOBOL_ROW]] {
         &self.rows
@@ -94,7 +94,7 @@ fn sobol_point(row: &[u32; SOBOL_ROW], index: u32) -> u32 {
 fn owen_scramble(word: u32, seed: [u32; 2]) -> u32 {
     let mut scrambled = 0;
     for chunk in 0..DIGITS as u32 / LEVELS {
-        // Two shifts: one by 32 is none.
+        // Two shifts, because a shift by 32 bits is not possible.
         let above = (word >> 1) >> (31 - LEVELS * chunk);
         let coins =
             avalanche(avalanche(above.wrapping_add(seed[0])) ^ seed[1].wrapping_add(chunk.wrapping_mul(0x9E37_79B9)));
@@ -148,7 +148,7 @@ mod tests {
     use super::*;
     use sha2::{Digest, Sha256};
 
-    /// Without scrambling.
+    /// The coordinate without scrambling.
     fn plain(index: u32, dimension: usize) -> u32 {
         let mut row = [0; SOBOL_ROW];
         row[..DIGITS].copy_from_slice(&directions()[dimension]);

@@ -1,4 +1,4 @@
-//! From a random word to a uniform number, one of several things, or one of several weighted things.
+//! Converts random words to a uniform number, a uniform choice, or a weighted choice.
 
 use super::philox::wide_product;
 use crate::{Error, Place, Result};
@@ -27,7 +27,7 @@ pub struct AliasTable {
 
 /// The whole of a column, in units of 2⁻³².
 const WHOLE: u64 = 1 << 32;
-/// So that sums of quotas stay exact in f64.
+/// Limit for exact sums of quotas in f64.
 const MAX_WEIGHTS: usize = 1 << 20;
 
 impl AliasTable {
@@ -59,13 +59,13 @@ impl AliasTable {
         let all = n as u64 * WHOLE;
         let mut quotas: Vec<u64> = weights.iter().map(|w| (w / total * all as f64) as u64).collect();
         let largest = (0..n).rev().max_by(|&a, &b| weights[a].total_cmp(&weights[b])).unwrap_or(0);
-        // Rounding in f64 may put the sum a little above, too.
+        // Rounding in f64 may also put the sum slightly above.
         quotas[largest] = (quotas[largest] + all).saturating_sub(quotas.iter().sum());
         Ok(AliasTable { columns: columns(quotas) })
     }
 
-    /// What a device gets: for every column its threshold, below which the second word means the column itself, and
-    /// its alias.
+    /// The table for a device: for every column its threshold, below which the second word selects the column itself,
+    /// and its alias.
     pub fn table(&self) -> &[[u32; 2]] {
         &self.columns
     }
@@ -75,7 +75,7 @@ impl AliasTable {
         self.columns.len() as u32
     }
 
-    /// The component that two independent words pick.
+    /// The component that two independent words select.
     #[inline]
     pub fn pick(&self, word_a: u32, word_b: u32) -> u32 {
         let column = choose(word_a, self.count());
