@@ -82,7 +82,7 @@ pub struct ParameterizationOptions {
     pub lane_change_m: f64,
     /// Least lateral speed, m/s (1e-3).
     #[schemars(extend("exclusiveMinimum" = 0.0))]
-    #[serde(alias = "min_lateral_speed_mps")] // in density files of earlier builds
+    #[serde(alias = "least_lateral_speed_mps")] // in density files of earlier builds
     pub min_lateral_speed_mps: f64,
     /// LVD ii: 0 samples the sinusoid itself at every step; n > 0 joins n + 1 points of it by lines, as an
     /// independent implementation does with 200 (largest effect on a speed: Δ·π²/(16 n²)).
@@ -126,5 +126,16 @@ impl ParameterizationOptions {
     /// Checks the ranges.
     pub fn validate(&self) -> Result<()> {
         ranges::check("parameterization", self)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn density_files_of_earlier_builds_keep_their_least_lateral_speed() {
+        let options: ParameterizationOptions = serde_json::from_str(r#"{"least_lateral_speed_mps": 0.25}"#).unwrap();
+        assert_eq!(options.min_lateral_speed_mps, 0.25);
     }
 }
