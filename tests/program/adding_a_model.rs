@@ -85,6 +85,7 @@ fn build(copy: &Path) {
     let build_dir = Path::new(env!("CARGO_TARGET_TMPDIR")).parent().unwrap();
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.current_dir(copy).args(["build", "--release", "--offline", "--locked", "--bin", "lanesweep"]);
+    command.arg("--all-features"); // as CI has built the dependencies
     command.args(["--config", "profile.release.package.lanesweep.debug=false"]);
     command.env("CARGO_BUILD_BUILD_DIR", build_dir).env("CARGO_TARGET_DIR", target_dir());
     let output = command.output().unwrap();
