@@ -11,7 +11,7 @@ use crate::model::profile::Profile;
 use crate::run::reopen::TracedCase;
 use crate::scenario::{CaseParameters, ParameterRows, PlainCase, RowPlace};
 use crate::support::input_file;
-use crate::support::plausibility::{Doubts, Implausible, Quantity};
+use crate::support::plausibility::{Doubts, Implausible};
 use crate::support::readable::value;
 use crate::support::table::{TableFormat, TableReader};
 use crate::{Error, Place, Result};
@@ -156,21 +156,9 @@ impl CaseFlags {
     }
 
     fn checked(&self, profile: &Profile, implausible: Implausible) -> Result<PlainCase> {
-        let (frame, mut doubts) = (&profile.frame, Doubts::new(implausible));
-        let mut parameters = self.parameters();
-        parameters.settle(&mut doubts, str::to_owned);
-        let plain = parameters.plain_case(frame.default_length_m, frame.default_width_m)?;
+        let mut doubts = Doubts::new(implausible);
+        let plain = self.parameters().checked_case(&profile.frame, &mut doubts)?;
         self.headway()?;
-        parameters.check_plausible(&mut doubts)?;
-        // An acceleration without an end can reach extreme speeds within the time cap.
-        let last_mps = plain.last_speed_mps(frame.time_cap_s)?;
-        let judged =
-            doubts.check(Quantity::Speed, last_mps, || "the speed that results from the acceleration".to_owned());
-        judged.map_err(|text| {
-            let problem = format!("it results in a speed that no vehicle has: {text}");
-            let help = "a deceleration is negative; an acceleration needs an end: option `end_speed`";
-            Error::usage(Place::item("acceleration"), problem, help)
-        })?;
         doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
         Ok(plain)
     }

@@ -76,6 +76,7 @@ macro_rules! declare_constants {
                         let simulation = Simulation { frame, criteria, model, model_index, scene };
                         run_lane(&simulation, case, tables, start, observer)
                     })+
+                    ModelId::Foreign(_) => unreachable!("drivers outside the registry run side by side"),
                 }
             }
 
@@ -83,6 +84,7 @@ macro_rules! declare_constants {
             pub fn driver_shader_constants(&self, id: ModelId) -> Vec<(&'static str, f64)> {
                 match id {
                     $(ModelId::$model => self.$file.shader_constants(),)+
+                    ModelId::Foreign(_) => Vec::new(),
                 }
             }
         }
@@ -114,6 +116,7 @@ macro_rules! declare_constants {
                         let simulation = Simulation { frame, criteria, model: &self.$file, model_index, scene };
                         run_stream(&simulation, instructions, stream, entries, each);
                     })+
+                    ModelId::Foreign(_) => unreachable!("drivers outside the registry run side by side"),
                 }
             }
         }

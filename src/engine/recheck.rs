@@ -83,6 +83,8 @@ impl<'p> Recheck<'p> {
         let end = chunk.first_lane + chunk.verdicts.len() as u64;
         let mut keys: Vec<LaneKey> =
             self.chosen(chunk.first_lane..end).filter_map(|lane| self.plan.key(lane)).collect();
+        // There is no second implementation of a driver outside the registry.
+        keys.retain(|key| self.plan.models[key.model].foreign().is_none());
         keys.sort_by_key(|key| (key.block, key.model));
         let groups = keys.chunk_by(|a, b| (a.block, a.model) == (b.block, b.model));
         let tasks: Vec<&[LaneKey]> = groups.flat_map(|group| group.chunks(TASK)).collect();

@@ -162,16 +162,11 @@ fn time(step: u32, dt: f64) -> f64 {
     (f64::from_step(step) * dt * 1e9).round() / 1e9
 }
 
-/// The columns, in their order: units are in the names, parameters come last.
+/// How a lane ended: units are in the names.
 #[rustfmt::skip] // a table: one line per column
-pub fn sampled_columns(density: &DensityModel) -> Vec<Column> {
+fn outcome_columns() -> Vec<Column> {
     let c = Column::new;
-    let mut columns = vec![
-        c("sample", ColumnKind::Whole, "1", "Index of the sample: with the seed it decides the point."),
-        c("category", ColumnKind::Name, "", "Kind of scenario: cut_in, cut_out or lvd (leader decelerates)."),
-        c("parameterization", ColumnKind::Name, "", "Key of the parameterization whose parameters were drawn."),
-        c("headway", ColumnKind::Name, "", "Initial time headway or gap with its unit; `sampled` where it is a parameter."),
-        c("model", ColumnKind::Name, "", "Driver model."),
+    vec![
         c("collision", ColumnKind::Flag, "", "Failed the criterion collision."),
         c("ttc", ColumnKind::Flag, "", "Failed the criterion TTC."),
         c("btn", ColumnKind::Flag, "", "Failed the criterion BTN."),
@@ -184,7 +179,63 @@ pub fn sampled_columns(density: &DensityModel) -> Vec<Column> {
         c("end_s", ColumnKind::Binary64, "s", "When the run ended."),
         c("impact_speed_mps", ColumnKind::Binary32, "m/s", "Speed of the ego at contact; null without one."),
         c("impact_closing_speed_mps", ColumnKind::Binary32, "m/s", "Closing speed at contact; null without one."),
+    ]
+}
+
+/// The values of [`outcome_columns`]. Null: did not happen, or unbounded.
+fn outcome_cells(outcome: &Outcome<f64>, dt_s: f64) -> [Cell<'static>; 12] {
+    let value = |v: f64| Cell::number(v.is_finite().then_some(v));
+    let at_contact = |v: f64| Cell::number((outcome.contact_step != NO_STEP).then_some(v));
+    let time = |step: u32| Cell::number((step != NO_STEP).then(|| time(step, dt_s)));
+    let [collision, ttc, btn] = Criterion::ALL.map(|c| Cell::Flag(outcome.verdicts.failed(c)));
+    [
+        collision,
+        ttc,
+        btn,
+        Cell::Flag(outcome.verdicts.capped()),
+        value(outcome.min_ttc),
+        value(outcome.max_btn),
+        value(outcome.min_gap),
+        Cell::Whole(i64::from(outcome.contact.code())),
+        time(outcome.reaction_step),
+        time(outcome.end_step),
+        at_contact(outcome.impact_speed),
+        at_contact(outcome.impact_closing_speed),
+    ]
+}
+
+/// The columns of [concrete cases](crate::run::cases), in their order.
+#[rustfmt::skip] // a table: one line per column
+pub fn case_columns() -> Vec<Column> {
+    let c = Column::new;
+    let mut columns = vec![
+        c("case", ColumnKind::Whole, "1", "Row of the case, from 0."),
+        c("headway", ColumnKind::Name, "", "Initial time headway or gap with its unit; `observed` where the case has its own gap."),
+        c("model", ColumnKind::Name, "", "Driver model."),
     ];
+    columns.extend(outcome_columns());
+    columns
+}
+
+/// A row of [`case_columns`].
+pub fn case_row<'a>(case: u64, headway: Headway, model: &'a str, outcome: &Outcome<f64>, dt_s: f64) -> Vec<Cell<'a>> {
+    let mut row = vec![Cell::Whole(case as i64), Cell::text(headway.to_string()), Cell::text(model)];
+    row.extend(outcome_cells(outcome, dt_s));
+    row
+}
+
+/// The columns, in their order: units are in the names, parameters come last.
+#[rustfmt::skip] // a table: one line per column
+pub fn sampled_columns(density: &DensityModel) -> Vec<Column> {
+    let c = Column::new;
+    let mut columns = vec![
+        c("sample", ColumnKind::Whole, "1", "Index of the sample: with the seed it decides the point."),
+        c("category", ColumnKind::Name, "", "Kind of scenario: cut_in, cut_out or lvd (leader decelerates)."),
+        c("parameterization", ColumnKind::Name, "", "Key of the parameterization whose parameters were drawn."),
+        c("headway", ColumnKind::Name, "", "Initial time headway or gap with its unit; `sampled` where it is a parameter."),
+        c("model", ColumnKind::Name, "", "Driver model."),
+    ];
+    columns.extend(outcome_columns());
     columns.extend(density.space.parameters().iter().map(|parameter| {
         let (name, unit) = (parameter.name.clone(), parameter.unit.clone());
         Column::new(name, ColumnKind::Binary32, unit, "Parameter that was drawn.".to_owned())
@@ -207,9 +258,6 @@ pub fn write_sampled_chunk(
     };
     let dt = plan.profile.frame.dt_s;
     let dimensions = density.space.dimensions();
-    let value = |v: f64| Cell::number(v.is_finite().then_some(v));
-    let at_contact = |outcome: &Outcome<f64>, v: f64| Cell::number((outcome.contact_step != NO_STEP).then_some(v));
-    let time = |step: u32| Cell::number((step != NO_STEP).then(|| (f64::from(step) * dt * 1e9).round() / 1e9));
     let (headways, models) = (plan.headways.len(), plan.models.len());
     for (unit, lanes) in chunk.units.clone().zip(chunk.outcomes.chunks(headways * models)) {
         let drawn = generator.draw(unit);
@@ -222,26 +270,14 @@ pub fn write_sampled_chunk(
                 Some(_) => "sampled".to_owned(),
                 None => plan.headways[at / models].to_string(),
             };
-            let [collision, ttc, btn] = Criterion::ALL.map(|c| Cell::Flag(outcome.verdicts.failed(c)));
             let mut row = vec![
                 Cell::Whole(unit as i64),
                 Cell::text(density.category().key()),
                 Cell::text(density.space.id().key.as_ref()),
                 Cell::text(headway),
                 Cell::text(plan.models[at % models].name()),
-                collision,
-                ttc,
-                btn,
-                Cell::Flag(outcome.verdicts.capped()),
-                value(outcome.min_ttc),
-                value(outcome.max_btn),
-                value(outcome.min_gap),
-                Cell::Whole(i64::from(outcome.contact.code())),
-                time(outcome.reaction_step),
-                time(outcome.end_step),
-                at_contact(outcome, outcome.impact_speed),
-                at_contact(outcome, outcome.impact_closing_speed),
             ];
+            row.extend(outcome_cells(outcome, dt));
             row.extend(point.iter().map(|&v| Cell::Number(v)));
             table.row(&row)?;
         }

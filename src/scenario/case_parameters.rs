@@ -3,6 +3,7 @@
 use serde::Deserialize;
 
 use super::{Category, LATERAL_DISTANCE_M, PlainCase, check_headway, missing_parameter};
+use crate::model::profile::FrameProfile;
 use crate::support::plausibility::{Doubts, HELP, Quantity};
 use crate::{Error, Place, Result};
 
@@ -72,6 +73,27 @@ impl CaseParameters {
                 .map_err(|problem| Error::usage(Place::item(key), problem, HELP))?;
         }
         Ok(())
+    }
+
+    /// Returns the case after all checks: vehicles without a given size have that of the frame. Speeds that are noise
+    /// are set to 0.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] that names what is missing or out of range.
+    pub fn checked_case(&mut self, frame: &FrameProfile, doubts: &mut Doubts) -> Result<PlainCase> {
+        self.settle(doubts, str::to_owned);
+        let plain = self.plain_case(frame.default_length_m, frame.default_width_m)?;
+        self.check_plausible(doubts)?;
+        // An acceleration without an end can reach extreme speeds within the time cap.
+        let last_mps = plain.last_speed_mps(frame.time_cap_s)?;
+        let is_plausible =
+            doubts.check(Quantity::Speed, last_mps, || "the speed that results from the acceleration".to_owned());
+        is_plausible.map_err(|text| {
+            let problem = format!("it results in a speed that no vehicle has: {text}");
+            let help = "a deceleration is negative; an acceleration needs an end: option `end_speed`";
+            Error::usage(Place::item("acceleration"), problem, help)
+        })?;
+        Ok(plain)
     }
 
     /// Names of the given values.

@@ -8,11 +8,13 @@ use rayon::prelude::*;
 
 use crate::Result;
 use crate::engine::backend::{Backend, Chunk, RecheckBy, Session, Wanted, Watch};
+use crate::engine::cpu::foreign::{self, BATCH_LANES};
 use crate::engine::cpu::runner::LaneRunner;
 use crate::engine::cpu::series::max_entries;
 use crate::engine::cpu::simd::Instructions;
 use crate::engine::outcome::{Outcome, Verdicts};
 use crate::engine::plan::LanePlan;
+use crate::model::driver::ModelId;
 use crate::model::scalar::Real;
 use crate::scenario::Category;
 
@@ -129,6 +131,7 @@ impl Backend for CpuBackend<f64> {
     }
 
     fn prepare<'p>(&self, plan: &'p LanePlan) -> Result<Box<dyn Session + 'p>> {
+        ModelId::refuse_foreign(&plan.models, "the reference in binary64")?;
         Ok(Box::new(lane_by_lane(plan, LaneRunner::<f64>::new(plan))))
     }
 }
@@ -202,6 +205,10 @@ impl<F: RunUnits<R>, R: Real> CpuSession<'_, F, R> {
         units.div_ceil(TASKS_PER_THREAD * threads).clamp(least, most).min(units.div_ceil(threads)).max(1)
     }
 
+    fn has_foreign(&self) -> bool {
+        self.plan.models.iter().any(|model| model.foreign().is_some())
+    }
+
     /// Units of a task, counted within the block.
     fn task(inside: &Range<u64>, task_units: u64, k: usize) -> Range<u64> {
         let from = inside.start + k as u64 * task_units;
@@ -212,12 +219,14 @@ impl<F: RunUnits<R>, R: Real> CpuSession<'_, F, R> {
 impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
     fn chunk_lanes(&self, _wanted: Wanted) -> u64 {
         let steps = if self.in_batches { CHUNK_STEPS } else { CHUNK_STEPS_OF_SINGLE_LANES };
-        lanes_of_steps(steps, self.plan.profile.step_cap())
+        let lanes = lanes_of_steps(steps, self.plan.profile.step_cap());
+        if self.has_foreign() { lanes.min(BATCH_LANES * self.plan.models.len() as u64) } else { lanes }
     }
 
     fn run(&mut self, units: Range<u64>, wanted: Wanted) -> Result<Chunk> {
         // Single lanes compute the values anyway.
-        let wanted = if self.in_batches || wanted.watch().is_none() { wanted } else { Wanted::Outcomes };
+        let has_marks = self.in_batches && !self.has_foreign();
+        let wanted = if has_marks || wanted.watch().is_none() { wanted } else { Wanted::Outcomes };
         let plan = self.plan;
         let run = &self.run;
         let first_lane = plan.first_lane_of(units.start);
@@ -248,6 +257,17 @@ impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
                             verdicts[at] = outcome.verdicts;
                         });
                     });
+                }
+            }
+            for (at_model, &model) in plan.models.iter().enumerate() {
+                let Some(driver) = model.foreign() else { continue };
+                let found = foreign::run_block(plan, block, inside.clone(), model, &*driver)?;
+                for (at, outcome) in found.into_iter().enumerate() {
+                    let lane = from + at * plan.models.len() + at_model;
+                    verdicts[lane] = outcome.verdicts;
+                    if let Some(to) = outcomes.get_mut(lane) {
+                        *to = outcome;
+                    }
                 }
             }
         }

@@ -155,6 +155,7 @@ mod tests {
                             ModelId::Cchdm => run!(cchdm),
                             ModelId::Rss => run!(rss),
                             ModelId::Fsm => run!(fsm),
+                            ModelId::Foreign(_) => continue,
                         };
                         (saved, lead_only, all) = (saved + steps, lead_only + u32::from(steps > 0), all + 1);
                     }

@@ -1,10 +1,11 @@
 //! Lanes on the CPU: single lanes, batches on vector instructions, and the work that verdict-only batches
-//! skip ([`fast_forward`], [`steady_following`], [`lead_only`]). The step itself is [`lane_step`](super::lane_step)'s.
+//! skip ([`fast_forward`], [`steady_following`], [`lead_only`]), and lanes of drivers outside the registry ([`foreign`]). The step itself is [`lane_step`](super::lane_step)'s.
 
 pub(crate) mod backend;
 mod batch;
 mod batch_arrays;
 mod fast_forward;
+mod foreign;
 pub(in crate::engine) mod lane_result;
 mod lead_only;
 pub(in crate::engine) mod pending;

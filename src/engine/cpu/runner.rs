@@ -114,7 +114,8 @@ impl<'p, R: Real> LaneRunner<'p, R> {
         }
     }
 
-    /// Runs all lanes of one unit in the plan's order; passes position within the unit and outcome.
+    /// Runs all lanes of one unit in the plan's order, except those of drivers outside the registry; passes position
+    /// within the unit and outcome.
     pub fn run_unit(&self, block: usize, unit: u64, mut each: impl FnMut(usize, Outcome<R>)) {
         let mut at = 0;
         for variant in 0..self.plan.blocks[block].variants.len() {
@@ -122,7 +123,9 @@ impl<'p, R: Real> LaneRunner<'p, R> {
             let may_cross = may_cross(&case, &tables, self.dt());
             for &start in &self.starts {
                 for &model in &self.plan.models {
-                    each(at, self.run_case(block, &case, &tables, may_cross, start, model));
+                    if model.foreign().is_none() {
+                        each(at, self.run_case(block, &case, &tables, may_cross, start, model));
+                    }
                     at += 1;
                 }
             }
@@ -148,7 +151,7 @@ impl<'p, R: Real> LaneRunner<'p, R> {
 }
 
 impl LaneRunner<'_, f32> {
-    /// Runs all lanes of some units of a block in batches; passes the position, counted from the first unit, and the
+    /// Runs all lanes of some units of a block in batches, except those of drivers outside the registry; passes the position, counted from the first unit, and the
     /// result. The order is unspecified. Verdicts show the marks of a watch.
     pub fn run_units<E: Ending>(
         &self,
@@ -179,7 +182,7 @@ impl LaneRunner<'_, f32> {
         let (starts, every_step) = (&self.starts[..], self.every_step);
         let stream = Lanes { cases: &cases, tracks: &tracks, starts, one_start_each: false, every_step, may_cross };
         let models = self.plan.models.len();
-        for (at_model, &model) in self.plan.models.iter().enumerate() {
+        for (at_model, &model) in self.plan.models.iter().enumerate().filter(|(_, model)| model.foreign().is_none()) {
             let each = |lane: usize, end: E| each(lane * models + at_model, end);
             if in_batches {
                 let watched = watch.map(|watch| watch.criteria(&self.plan.profile, model, constants.criteria));

@@ -16,6 +16,7 @@ use super::records::StartRecord;
 use super::ring::{Answer, Job, RING};
 use super::shader::{self, Specialization};
 use crate::engine::{Backend, Chunk, Constants, DeviceRecord, LaneCase, LanePlan, Outcome, Session, Verdicts, Wanted};
+use crate::model::driver::ModelId;
 use crate::scenario::{Category, Tables};
 use crate::{Error, Result};
 
@@ -52,6 +53,7 @@ struct Piece {
 
 impl<'p> GpuSession<'p> {
     pub fn new(plan: &'p LanePlan, device: String, commands: Sender<Command>, options: &GpuOptions) -> Result<Self> {
+        ModelId::refuse_foreign(&plan.models, "a device")?;
         let queue = options.lanes_per_invocation != Some(1);
         let constants: Vec<Constants<f32>> =
             plan.blocks.iter().map(|b| Constants::resolve(&plan.profile, b.category)).collect();

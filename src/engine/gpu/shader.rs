@@ -59,6 +59,8 @@ macro_rules! declare_shaders {
                     concat!(stringify!($file), ".wgsl"),
                     include_str!(concat!("../../../shaders/", stringify!($file), ".wgsl")),
                 ),)+
+                // The session refuses it.
+                ModelId::Foreign(_) => ("", ""),
             }
         }
     };

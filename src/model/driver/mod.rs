@@ -1,6 +1,8 @@
 //! The reference drivers of UN R157 and its companions: one file per model, each with its constants
 //! (unit, clause), its check and its reaction, written once over [`Real`].
 //!
+//! A driver that is a function of the calling program is registered at run time ([`ModelId::register`]).
+//!
 //! This module defines what a driver sees ([`View`]), what it decides ([`Hazard`]) and how it brakes. It has no time
 //! loop: [`crate::engine`] has the only one. Parameters come from a profile; decisions go to the lane's frame.
 //!
@@ -11,11 +13,13 @@
 mod registry;
 
 mod attention;
+mod foreign;
 mod profile;
 
 pub use attention::{
     ALWAYS, AttentionRule, BelowTrigger, CUTTING_IN, CUTTING_OUT, DECELERATION, NEVER, VISIBLE_MOVEMENT,
 };
+pub use foreign::{Accelerations, ForeignId, LaneColumns, MAX_ACCELERATION_MPS2, VectorDriver, VehicleColumns};
 pub use profile::{Bound, DriverProfile, SHORT_STEP_S, delay_bound_s};
 
 use crate::model::scalar::{Flag, Real};
@@ -30,27 +34,38 @@ macro_rules! declare_models {
 
         /// A driver model, in the order of every table.
         #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, serde::Serialize, serde::Deserialize)]
+        #[serde(try_from = "String", into = "String")]
         pub enum ModelId {
             $(
                 #[doc = concat!("See [`", stringify!($model), "`].")]
-                #[serde(rename = $name)]
                 $model,
             )+
+            /// A driver of this process.
+            Foreign(ForeignId),
         }
 
         impl ModelId {
-            /// All models, in the order of every table.
+            /// All built-in models, in the order of every table.
             pub const ALL: [ModelId; MODELS] = [$(ModelId::$model),+];
 
             /// Name in tables, files and lane keys.
             pub fn name(self) -> &'static str {
                 match self {
                     $(ModelId::$model => $name,)+
+                    ModelId::Foreign(id) => id.name(),
+                }
+            }
+
+            /// Position in [`ModelId::ALL`]; for another driver, that of the model for which it stands.
+            pub fn index(self) -> usize {
+                match self {
+                    ModelId::Foreign(id) => id.index(),
+                    built_in => ModelId::ALL.iter().position(|model| *model == built_in).unwrap_or(0),
                 }
             }
         }
 
-        /// Number of driver models.
+        /// Number of built-in models.
         pub const MODELS: usize = [$($name),+].len();
     };
 }
@@ -60,8 +75,13 @@ pub use cchdm::CutInBraking;
 pub use fsm::CfsStep;
 
 impl ModelId {
-    /// Parses a name, ignoring case; `CC` and `CC_human_driver` are the JRC's names for CCHDM.
+    /// Parses the name of a built-in model or a registered driver, ignoring case; `CC` and `CC_human_driver` are the
+    /// JRC's names for CCHDM.
     pub fn parse(text: &str) -> Option<ModelId> {
+        ModelId::built_in(text).or_else(|| ModelId::registered(text))
+    }
+
+    fn built_in(text: &str) -> Option<ModelId> {
         let folded = text.to_ascii_lowercase();
         match folded.as_str() {
             "cc" | "cc_human_driver" => Some(ModelId::Cchdm),
@@ -73,10 +93,27 @@ impl ModelId {
     pub fn names() -> String {
         ModelId::ALL.map(ModelId::name).join(", ")
     }
+}
 
-    /// Position in [`ModelId::ALL`].
-    pub fn index(self) -> usize {
-        self as usize
+impl From<ModelId> for String {
+    fn from(model: ModelId) -> String {
+        match model {
+            ModelId::Foreign(id) => id.identity().to_owned(),
+            built_in => built_in.name().to_owned(),
+        }
+    }
+}
+
+impl TryFrom<String> for ModelId {
+    type Error = String;
+
+    fn try_from(text: String) -> Result<ModelId, String> {
+        let built_in = ModelId::ALL.into_iter().find(|model| model.name() == text);
+        // A plan names its driver with the fingerprint: another driver of that name is not the plan's.
+        let registered = || ModelId::registered(&text).filter(|_| text.contains('@'));
+        built_in
+            .or_else(registered)
+            .ok_or_else(|| format!("there is no driver `{text}` in this process; expected one of {}", ModelId::names()))
     }
 }
 

@@ -1,11 +1,13 @@
 //! Tables: rows of named, typed columns with units, in files whose format follows from the file name's ending.
 //!
-//! This module holds the formats (CSV, JSON Lines, Apache Parquet), the columns, and the [`Table`] in memory with its
+//! This module holds the formats (CSV, JSON Lines, Apache Parquet, Arrow in memory), the columns, and the [`Table`] in memory with its
 //! renderings for terminals, pages and documents. It also holds the writer, which streams rows to an atomic file, and
 //! the reader of other programs' tables. The meaning of rows is defined elsewhere: lanes and samples in
 //! [`crate::report`], scenarios in [`crate::scenario`]. `docs/src/tables.md` documents the columns; a test compares it
 //! with the written files.
 
+#[cfg(feature = "arrow")]
+mod arrow;
 mod column;
 mod csv_reader;
 mod memory;
@@ -20,6 +22,8 @@ mod reader;
 mod text;
 mod writer;
 
+#[cfg(feature = "arrow")]
+pub use arrow::ArrowRows;
 pub(crate) use column::Row;
 pub use column::{Cell, Column, ColumnKind, Digits, TableMetadata};
 pub use memory::{CellValue, NumberText, Table, TableOf};

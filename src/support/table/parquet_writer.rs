@@ -3,22 +3,15 @@
 //! The same rows give the same bytes, independent of how they were computed: batches have a fixed number of rows, and
 //! no time or machine is recorded.
 
-use std::collections::HashMap;
-use std::path::{Path, PathBuf};
-use std::sync::Arc;
-
-use arrow_array::builder::{
-    BooleanBuilder, Float32Builder, Float64Builder, Int64Builder, ListBuilder, StringBuilder, StringDictionaryBuilder,
-};
-use arrow_array::types::Int32Type;
-use arrow_array::{ArrayRef, RecordBatch};
-use arrow_schema::{ArrowError, DataType, Field, Schema};
 use parquet::arrow::ArrowWriter;
 use parquet::basic::{Compression, ZstdLevel};
 use parquet::errors::ParquetError;
 use parquet::file::metadata::KeyValue;
 use parquet::file::properties::{EnabledStatistics, WriterProperties};
+use std::collections::HashMap;
+use std::path::{Path, PathBuf};
 
+use super::arrow::ArrowRows;
 use super::{Cell, Column, ColumnKind, TableMetadata};
 use crate::support::atomic_file::AtomicFile;
 use crate::{Error, Result};
@@ -34,10 +27,8 @@ const SERIES_GROUP_ROWS: usize = 512;
 /// A Parquet file being written.
 pub(super) struct ParquetFile {
     path: PathBuf,
-    schema: Arc<Schema>,
-    builders: Vec<Builder>,
+    rows: ArrowRows,
     batch_rows: usize,
-    gathered: usize,
     writer: ArrowWriter<AtomicFile>,
 }
 
@@ -50,8 +41,7 @@ impl ParquetFile {
         let words = key_values(columns, facts);
         let pairs = words.iter().map(|word| (word.key.clone(), word.value.clone().unwrap_or_default()));
         let pairs: HashMap<String, String> = pairs.collect();
-        let fields: Vec<Field> = columns.iter().map(field).collect();
-        let schema = Arc::new(Schema::new_with_metadata(fields, pairs));
+        let rows = ArrowRows::new(columns, pairs);
         let level = ZstdLevel::try_new(3).map_err(|e| Error::Internal(format!("Parquet: {e}")))?;
         let properties = WriterProperties::builder()
             .set_compression(Compression::ZSTD(level))
@@ -61,31 +51,23 @@ impl ParquetFile {
             .set_key_value_metadata(Some(words))
             .build();
         let file = AtomicFile::create(path)?;
-        let writer = ArrowWriter::try_new(file, schema.clone(), Some(properties)).map_err(|e| failed(path, e))?;
-        let builders = columns.iter().map(|column| Builder::new(column.kind)).collect();
-        Ok(ParquetFile { path: path.to_path_buf(), schema, builders, batch_rows, gathered: 0, writer })
+        let writer = ArrowWriter::try_new(file, rows.schema(), Some(properties)).map_err(|e| failed(path, e))?;
+        Ok(ParquetFile { path: path.to_path_buf(), rows, batch_rows, writer })
     }
 
     /// Appends a row. The caller has checked that the cells match the columns.
     pub(super) fn row(&mut self, row: &[Cell]) -> Result<()> {
-        for (builder, cell) in self.builders.iter_mut().zip(row) {
-            builder.append(cell).map_err(|e| Error::Internal(format!("Parquet: {e}")))?;
-        }
-        self.gathered += 1;
-        if self.gathered == self.batch_rows { self.flush() } else { Ok(()) }
+        self.rows.row(row)?;
+        if self.rows.count() == self.batch_rows { self.flush() } else { Ok(()) }
     }
 
     fn flush(&mut self) -> Result<()> {
-        self.gathered = 0;
-        let arrays = self.builders.iter_mut().map(Builder::finish).collect();
-        let batch =
-            RecordBatch::try_new(self.schema.clone(), arrays).map_err(|e| Error::Internal(format!("Parquet: {e}")))?;
-        self.writer.write(&batch).map_err(|e| failed(&self.path, e))
+        self.writer.write(&self.rows.batch()?).map_err(|e| failed(&self.path, e))
     }
 
     /// Completes the file under its hidden name.
     pub(super) fn finish(mut self) -> Result<AtomicFile> {
-        if self.gathered > 0 {
+        if self.rows.count() > 0 {
             self.flush()?;
         }
         self.writer.into_inner().map_err(|e| failed(&self.path, e))
@@ -101,23 +83,6 @@ fn failed(path: &Path, error: ParquetError) -> Error {
         },
         other => Error::Internal(format!("Parquet: {other}")),
     }
-}
-
-fn field(column: &Column) -> Field {
-    let data_type = match column.kind {
-        ColumnKind::Text => DataType::Utf8,
-        ColumnKind::Name => DataType::Dictionary(Box::new(DataType::Int32), Box::new(DataType::Utf8)),
-        ColumnKind::Flag => DataType::Boolean,
-        ColumnKind::Whole => DataType::Int64,
-        ColumnKind::Binary32 => DataType::Float32,
-        ColumnKind::Binary64 => DataType::Float64,
-        ColumnKind::Series => DataType::List(Arc::new(Field::new_list_field(DataType::Float64, true))),
-        ColumnKind::Wholes => DataType::List(Arc::new(Field::new_list_field(DataType::Int64, true))),
-    };
-    let words = [("unit", &column.unit), ("description", &column.description)];
-    let words: HashMap<String, String> =
-        words.into_iter().map(|(key, value)| (key.to_owned(), value.to_string())).collect();
-    Field::new(column.name.as_ref(), data_type, true).with_metadata(words)
 }
 
 /// Metadata for the footer. The descriptions of the columns are repeated there as JSON, because not every reader shows
@@ -139,75 +104,4 @@ fn key_values(columns: &[Column], facts: &TableMetadata) -> Vec<KeyValue> {
     add("synthetic", facts.synthetic.then(|| "true".to_owned()));
     add("columns", Some(serde_json::Value::from(words).to_string()));
     list
-}
-
-/// Collects the values of a column.
-enum Builder {
-    Text(StringBuilder),
-    Name(StringDictionaryBuilder<Int32Type>),
-    Flag(BooleanBuilder),
-    Whole(Int64Builder),
-    Binary32(Float32Builder),
-    Binary64(Float64Builder),
-    Series(ListBuilder<Float64Builder>),
-    Wholes(ListBuilder<Int64Builder>),
-}
-
-impl Builder {
-    fn new(kind: ColumnKind) -> Builder {
-        match kind {
-            ColumnKind::Text => Builder::Text(StringBuilder::new()),
-            ColumnKind::Name => Builder::Name(StringDictionaryBuilder::new()),
-            ColumnKind::Flag => Builder::Flag(BooleanBuilder::new()),
-            ColumnKind::Whole => Builder::Whole(Int64Builder::new()),
-            ColumnKind::Binary32 => Builder::Binary32(Float32Builder::new()),
-            ColumnKind::Binary64 => Builder::Binary64(Float64Builder::new()),
-            ColumnKind::Series => Builder::Series(ListBuilder::new(Float64Builder::new())),
-            ColumnKind::Wholes => Builder::Wholes(ListBuilder::new(Int64Builder::new())),
-        }
-    }
-
-    /// Appends a cell. A cell of another type becomes null; the caller prevents it.
-    fn append(&mut self, cell: &Cell) -> std::result::Result<(), ArrowError> {
-        let number = match cell {
-            Cell::Number(number) | Cell::Decimal(number) => Some(*number),
-            _ => None,
-        };
-        match (self, cell) {
-            (Builder::Text(builder), Cell::Text(text)) => builder.append_value(text),
-            (Builder::Text(builder), _) => builder.append_null(),
-            (Builder::Name(builder), Cell::Text(text)) => drop(builder.append(text)?),
-            (Builder::Name(builder), _) => builder.append_null(),
-            (Builder::Flag(builder), Cell::Flag(flag)) => builder.append_value(*flag),
-            (Builder::Flag(builder), _) => builder.append_null(),
-            (Builder::Whole(builder), Cell::Whole(number)) => builder.append_value(*number),
-            (Builder::Whole(builder), _) => builder.append_null(),
-            (Builder::Binary32(builder), _) => builder.append_option(number.map(|number| number as f32)),
-            (Builder::Binary64(builder), _) => builder.append_option(number),
-            (Builder::Series(builder), Cell::Series(series)) => {
-                builder.values().append_slice(series);
-                builder.append(true);
-            }
-            (Builder::Series(builder), _) => builder.append(false),
-            (Builder::Wholes(builder), Cell::Wholes(numbers)) => {
-                builder.values().append_slice(numbers);
-                builder.append(true);
-            }
-            (Builder::Wholes(builder), _) => builder.append(false),
-        }
-        Ok(())
-    }
-
-    fn finish(&mut self) -> ArrayRef {
-        match self {
-            Builder::Text(builder) => Arc::new(builder.finish()),
-            Builder::Name(builder) => Arc::new(builder.finish()),
-            Builder::Flag(builder) => Arc::new(builder.finish()),
-            Builder::Whole(builder) => Arc::new(builder.finish()),
-            Builder::Binary32(builder) => Arc::new(builder.finish()),
-            Builder::Binary64(builder) => Arc::new(builder.finish()),
-            Builder::Series(builder) => Arc::new(builder.finish()),
-            Builder::Wholes(builder) => Arc::new(builder.finish()),
-        }
-    }
 }

@@ -1,0 +1,333 @@
+//! Lanes of a [`VectorDriver`]: they run side by side, so that the driver is called once per step. Frame, criteria and
+//! order are those of the built-in drivers' lanes, in binary32.
+
+use std::ops::Range;
+
+use rayon::prelude::*;
+
+use crate::engine::cpu::lane_result::conclude;
+use crate::engine::cpu::runner::LaneRunner;
+use crate::engine::drivers::Constants;
+use crate::engine::frame::{Frame, Simulation};
+use crate::engine::lane_case::LaneCase;
+use crate::engine::lane_step::{LaneConstants, LaneState, Moved, OtherState, Seen, advance};
+use crate::engine::outcome::{NO_STEP, Outcome};
+use crate::engine::plan::LanePlan;
+use crate::engine::scene::Scene;
+use crate::model::driver::{
+    DriverModel, DriverState, Hazard, LaneColumns, MAX_ACCELERATION_MPS2, ModelId, VectorDriver, VehicleColumns, View,
+};
+use crate::model::scalar::{Flag, Real};
+use crate::scenario::Tables;
+use crate::{Error, Place, Result};
+
+/// Lanes that run side by side: enough for whole-array arithmetic, few enough that a run is cancelled within seconds.
+pub(in crate::engine) const BATCH_LANES: u64 = 1 << 15;
+
+/// The place of the driver's model in a step that the engine makes without it: it never reacts. The caller changes the
+/// speed afterwards.
+#[derive(Debug, Clone, Copy)]
+struct Unreacting;
+
+impl DriverModel<f32> for Unreacting {
+    fn initial(&self) -> DriverState<f32> {
+        DriverState { deceleration: 0.0, delay_steps: 0 }
+    }
+
+    fn check(&self, _view: &View<f32>) -> Hazard<f32> {
+        Hazard { is_unsafe: Flag::FALSE, demand: 0.0 }
+    }
+
+    fn shader_constants(&self) -> Vec<(&'static str, f64)> {
+        Vec::new()
+    }
+
+    fn react(&self, state: DriverState<f32>, _hazard: &Hazard<f32>, v_ego: f32) -> (DriverState<f32>, f32) {
+        (state, v_ego)
+    }
+}
+
+/// A lane of a batch.
+struct BatchLane {
+    /// Index of its case in the batch.
+    case: usize,
+    constants: LaneConstants<f32>,
+    state: LaneState<f32>,
+}
+
+/// Outcomes of the lanes of some units of a block under one model of the plan, by unit, variant and headway.
+///
+/// # Errors
+/// Those of the driver; [`Error::Input`] for accelerations that are missing, NaN or above the maximum.
+pub(in crate::engine) fn run_block(
+    plan: &LanePlan,
+    block: usize,
+    units: Range<u64>,
+    model: ModelId,
+    driver: &dyn VectorDriver,
+) -> Result<Vec<Outcome<f64>>> {
+    let (runner, first_unit) = (LaneRunner::<f32>::of_few(plan), units.start);
+    let of_block = &plan.blocks[block];
+    let variants = of_block.variants.len();
+    let resolved = Constants::<f32>::resolve(&plan.profile, of_block.category);
+    let model_index = model.index();
+    let settles = resolved.frames[model_index].end_when_settled && !driver.may_accelerate();
+    let frame = Frame { end_when_settled: settles, ..resolved.frames[model_index] };
+    let scene = |case: &LaneCase<f32>| Scene::unknown(case.pair != 0);
+    let simulation =
+        |scene| Simulation { frame: &frame, criteria: &resolved.criteria, model: &Unreacting, model_index, scene };
+    let keys = units.flat_map(|unit| (0..variants).map(move |variant| (unit, variant)));
+    let cases: Vec<_> = keys.map(|(unit, variant)| runner.case(block, unit, variant)).collect();
+    let starts: Vec<_> = plan.headways.iter().map(|headway| headway.start::<f32>()).collect();
+    let lane = |(at, start): (usize, _)| {
+        let case = &cases[at].0;
+        let simulation = simulation(scene(case));
+        BatchLane {
+            case: at,
+            constants: LaneConstants::new(&simulation, case),
+            state: LaneState::new(&simulation, case, start),
+        }
+    };
+    let mut lanes: Vec<BatchLane> =
+        (0..cases.len()).flat_map(|at| starts.iter().map(move |start| (at, *start))).map(lane).collect();
+    let mut outcomes = vec![Outcome::NONE; lanes.len()];
+    let mut running: Vec<usize> = (0..lanes.len()).collect();
+    let mut accelerations = driver.start(lanes.len(), plan.profile.frame.dt_s)?;
+    let mut step = 0;
+    while !running.is_empty() {
+        let moved: Vec<(Moved<f32>, [OtherState<f32>; 2])> = running
+            .par_iter()
+            .map(|&at| {
+                let lane = &lanes[at];
+                let (case, tables) = &cases[lane.case];
+                let places = places(case, tables, lane.state.index);
+                (advance(&simulation(scene(case)), &lane.constants, &lane.state, &places), places)
+            })
+            .collect();
+        let seen = running.iter().map(|&at| (at, &lanes[at], &cases[lanes[at].case].0));
+        let columns = columns_of(step, plan.profile.frame.dt_s, seen, &moved);
+        let found = accelerations(&columns)?;
+        check(plan, model, &found, &columns, block, first_unit)?;
+        for ((&at, (moved, places)), acceleration) in running.iter().zip(&moved).zip(found) {
+            let lane = &mut lanes[at];
+            let before = lane.state.v_ego;
+            let reaction_step = lane.state.reaction_step;
+            lane.state = moved.state;
+            if acceleration < 0.0 && reaction_step == NO_STEP {
+                lane.state.reaction_step = step;
+            }
+            let is_over = lane.state.over.holds();
+            if !is_over {
+                lane.state.v_ego = (before + acceleration * frame.dt).larger(0.0);
+            }
+            if is_over || lane.state.index >= frame.step_cap {
+                let simulation = simulation(scene(&cases[lane.case].0));
+                outcomes[at] = conclude(&simulation, &lane.constants, &lane.state, places).widen();
+            }
+        }
+        running.retain(|&at| !lanes[at].state.over.holds() && lanes[at].state.index < frame.step_cap);
+        step += 1;
+    }
+    Ok(outcomes)
+}
+
+/// Checks what the driver returned.
+fn check(
+    plan: &LanePlan,
+    model: ModelId,
+    found: &[f32],
+    columns: &LaneColumns,
+    block: usize,
+    first_unit: u64,
+) -> Result<()> {
+    let expected = columns.lane.len();
+    let driver = || Place::item(format!("driver {}, step {}", model.name(), columns.step));
+    if found.len() != expected {
+        let problem = format!("it returned {} accelerations for {expected} lanes", found.len());
+        return Err(Error::input(driver(), problem, "return one number per lane, in m/s²"));
+    }
+    let is_wrong = |acceleration: &f32| !(acceleration.abs() <= MAX_ACCELERATION_MPS2);
+    let Some(at) = found.iter().position(is_wrong) else { return Ok(()) };
+    let headways = plan.headways.len();
+    let (case, headway) = (columns.lane[at] as usize / headways, columns.lane[at] as usize % headways);
+    let of_block = &plan.blocks[block];
+    let unit = first_unit + (case / of_block.variants.len()) as u64;
+    let (unit, variant) = (of_block.units.name(unit), &of_block.variants[case % of_block.variants.len()]);
+    let key = format!("{unit}/{variant}/{}/{}", plan.headways[headway], model.name());
+    let problem = format!("its acceleration is {} m/s² in lane {key}", found[at]);
+    let help = format!("return finite numbers of at most {MAX_ACCELERATION_MPS2} m/s²");
+    Err(Error::input(driver(), problem, help))
+}
+
+/// The other vehicles of a case at a step.
+fn places(case: &LaneCase<f32>, tables: &Tables<f32>, step: u32) -> [OtherState<f32>; 2] {
+    let first = OtherState::of(&case.others[0].motion, tables, step);
+    [first, if case.pair != 0 { OtherState::of(&case.others[1].motion, tables, step) } else { first }]
+}
+
+/// What the drivers of the running lanes see after these moved to a step.
+fn columns_of<'a>(
+    step: u32,
+    dt_s: f64,
+    lanes: impl Iterator<Item = (usize, &'a BatchLane, &'a LaneCase<f32>)>,
+    moved: &[(Moved<f32>, [OtherState<f32>; 2])],
+) -> LaneColumns {
+    let mut columns = LaneColumns { step, time_s: f64::from(step) * dt_s, ..LaneColumns::default() };
+    for ((at, lane, case), (moved, _)) in lanes.zip(moved) {
+        columns.lane.push(at as i64);
+        columns.ego_speed.push(moved.seen[0].view.v_ego);
+        columns.ego_acceleration.push(moved.seen[0].view.a_ego);
+        for (k, vehicle) in columns.vehicles.iter_mut().enumerate() {
+            let exists = k == 0 || case.pair != 0;
+            push(vehicle, &moved.seen[k], exists, lane.constants.others[k].attend_from <= step);
+        }
+    }
+    columns
+}
+
+fn push(vehicle: &mut VehicleColumns, seen: &Seen<f32>, exists: bool, may_attend: bool) {
+    let present = exists && seen.present.holds();
+    vehicle.present.push(present);
+    vehicle.attended.push(present && may_attend);
+    vehicle.speed.push(seen.view.v_other);
+    vehicle.gap.push(seen.view.gap);
+    vehicle.lateral_gap.push(seen.view.lateral_gap);
+    vehicle.lateral_speed.push(seen.view.lateral_towards);
+    vehicle.half_lengths.push(seen.view.half_lengths);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::sync::Arc;
+
+    use crate::engine::verify::{RandomOptions, random_plan};
+    use crate::engine::{Backend, Chunk, CpuBackend, Executor, Wanted};
+    use crate::model::driver::{Accelerations, DriverProfile};
+    use crate::model::profile::Profile;
+    use crate::scenario::Category;
+
+    /// A built-in driver behind the interface of foreign ones.
+    struct Wrapped {
+        profile: Profile,
+        wrong: Option<f32>,
+    }
+
+    impl VectorDriver for Wrapped {
+        fn stands_for(&self) -> ModelId {
+            ModelId::Rss
+        }
+
+        fn may_accelerate(&self) -> bool {
+            false
+        }
+
+        fn start(&self, lanes: usize, dt_s: f64) -> Result<Accelerations<'_>> {
+            // The constants of RSS do not depend on the category.
+            let rss = self.profile.rss.resolve::<f32>(dt_s, Category::CutIn);
+            let mut states = vec![DriverModel::<f32>::initial(&rss); lanes];
+            Ok(Box::new(move |columns| {
+                let one = |row: usize| {
+                    let state = &mut states[columns.lane[row] as usize];
+                    let v_ego = columns.ego_speed[row];
+                    let mut nearest: Option<(f32, Hazard<f32>)> = None;
+                    for vehicle in &columns.vehicles {
+                        let view = View {
+                            v_ego,
+                            a_ego: columns.ego_acceleration[row],
+                            v_other: vehicle.speed[row],
+                            gap: vehicle.gap[row],
+                            lateral_gap: vehicle.lateral_gap[row],
+                            lateral_towards: vehicle.lateral_speed[row],
+                            half_lengths: vehicle.half_lengths[row],
+                        };
+                        let hazard = rss.check(&view);
+                        let reacts = vehicle.attended[row] && hazard.is_unsafe.holds();
+                        if reacts && nearest.is_none_or(|(gap, _)| view.gap < gap) {
+                            nearest = Some((view.gap, hazard));
+                        }
+                    }
+                    let Some((_, hazard)) = nearest else { return 0.0 };
+                    let (next, _) = rss.react(*state, &hazard, v_ego);
+                    let delayed = state.delay_steps > 0;
+                    *state = next;
+                    // Coasts at its present speed for the reaction time, or brakes.
+                    if delayed { 0.0 } else { -next.deceleration }
+                };
+                let mut found: Vec<f32> = (0..columns.lane.len()).map(one).collect();
+                if let Some(wrong) = self.wrong.filter(|_| columns.step == 3) {
+                    found[0] = wrong;
+                }
+                Ok(found)
+            }))
+        }
+    }
+
+    fn plan(models: Vec<ModelId>) -> LanePlan {
+        let options = RandomOptions { lanes_per_model_and_category: 2000, models, ..Default::default() };
+        random_plan(&Profile::load("paper").unwrap(), &options).unwrap()
+    }
+
+    fn outcomes(plan: &LanePlan, backend: impl Backend) -> Result<Vec<Outcome<f64>>> {
+        let mut all = Vec::new();
+        let executor = Executor::new(backend);
+        executor.sweep(plan, 0..plan.unit_count(), Wanted::Outcomes, |chunk| {
+            all.extend(chunk.outcomes);
+            Ok(())
+        })?;
+        Ok(all)
+    }
+
+    fn wrapped(name: &str, wrong: Option<f32>) -> ModelId {
+        let driver = Wrapped { profile: Profile::load("paper").unwrap(), wrong };
+        ModelId::register(name, "1", Arc::new(driver)).unwrap()
+    }
+
+    /// Beside a built-in model in one plan, with verdicts and outcomes.
+    #[test]
+    fn a_built_in_driver_behind_the_interface_gives_its_own_lanes() {
+        let plan = plan(vec![ModelId::Rss, wrapped("wrapped", None)]);
+        for backend in [CpuBackend::lane_arithmetic(), CpuBackend::scalar()] {
+            let all = outcomes(&plan, &backend).unwrap();
+            assert!(all.len() > 10_000 && all.iter().any(|outcome| outcome.verdicts.0 != 0));
+            for (lane, pair) in all.chunks(2).enumerate() {
+                // The step of the first reaction differs: the interface has no word for coasting.
+                let wrapped = Outcome { reaction_step: pair[0].reaction_step, ..pair[1] };
+                assert_eq!(wrapped, pair[0], "lane {lane}");
+            }
+            let executor = Executor::new(&backend).with_recheck(1);
+            let verdicts = |chunk: Chunk| {
+                assert!(chunk.verdicts.chunks(2).all(|pair| pair[0] == pair[1]));
+                Ok(())
+            };
+            executor.sweep(&plan, 0..plan.unit_count(), Wanted::Verdicts, verdicts).unwrap();
+        }
+        let error = outcomes(&plan, CpuBackend::reference()).unwrap_err().to_string();
+        assert!(error.contains("driver wrapped"), "{error}");
+    }
+
+    #[test]
+    fn a_wrong_acceleration_names_driver_step_and_lane() {
+        for wrong in [f32::NAN, f32::NEG_INFINITY, 101.0] {
+            let plan = plan(vec![wrapped("wrong", Some(wrong))]);
+            let error = outcomes(&plan, CpuBackend::lane_arithmetic()).unwrap_err().to_string();
+            assert!(error.starts_with("driver wrong, step 3: its acceleration is "), "{error}");
+        }
+    }
+
+    #[test]
+    fn a_name_is_a_word_that_no_built_in_model_has_and_a_plan_knows_its_fingerprint() {
+        let driver = || Arc::new(Wrapped { profile: Profile::load("paper").unwrap(), wrong: None });
+        for name in ["", "rss", "CC", "all", "a b", "a/b"] {
+            assert!(ModelId::register(name, "1", driver()).is_err(), "{name}");
+        }
+        let first = ModelId::register("named", "1", driver()).unwrap();
+        let text = serde_json::to_string(&first).unwrap();
+        assert_eq!((text.as_str(), first.name()), ("\"named@1\"", "named"));
+        assert_eq!(serde_json::from_str::<ModelId>(&text).unwrap(), first);
+        let second = ModelId::register("named", "2", driver()).unwrap();
+        assert_eq!((ModelId::parse("NAMED"), serde_json::from_str(&text).ok()), (Some(second), Some(first)));
+        assert!(serde_json::from_str::<ModelId>("\"named@3\"").is_err());
+        assert!(serde_json::from_str::<ModelId>("\"named\"").is_err());
+    }
+}

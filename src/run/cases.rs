@@ -1,0 +1,215 @@
+//! Concrete cases in bulk: a row of numbers each, run with every headway and model. The columns are those of `simulate`
+//! for a single case; the outcomes are those of its lanes.
+
+use crate::engine::{Block, CaseSource, Executor, Headway, LaneCase, LanePlan, Outcome, Start, Units, Wanted};
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
+use crate::scenario::{CaseParameters, Category, Tables};
+use crate::support::plausibility::{Doubts, Implausible};
+use crate::{Error, Place, Result};
+
+/// Name of the only variant.
+const VARIANT: &str = "case";
+
+/// Cases that are planned together.
+pub struct Cases {
+    plan: LanePlan,
+    /// Row of every unit.
+    rows: Vec<usize>,
+    /// What was doubtful about the values, a sentence per kind.
+    pub notes: Vec<String>,
+}
+
+/// The cases of every block, and their series.
+#[derive(Default)]
+struct EncodedCases {
+    blocks: Vec<Vec<LaneCase<f64>>>,
+    tables: Tables<f64>,
+}
+
+impl CaseSource for EncodedCases {
+    fn case(&self, block: usize, unit: u64, _variant: usize) -> LaneCase<f64> {
+        self.blocks[block][unit as usize]
+    }
+
+    fn tables(&self) -> &Tables<f64> {
+        &self.tables
+    }
+}
+
+impl Cases {
+    /// Plans rows of parameters. Without headways every row has its own `gap` or `thw`; with headways none has.
+    ///
+    /// # Errors
+    /// [`Error::Input`] that names row (from `first_row`) and column; [`Error::Usage`] without rows, and as
+    /// [`LanePlan::new`].
+    pub fn plan(
+        rows: Vec<CaseParameters>,
+        first_row: u64,
+        profile: &Profile,
+        models: &[ModelId],
+        headways: &[Headway],
+        implausible: Implausible,
+    ) -> Result<Cases> {
+        let mut doubts = Doubts::new(implausible);
+        let mut source = EncodedCases::default();
+        let mut by_category: Vec<(Category, Vec<usize>)> = Vec::new();
+        for (row, parameters) in rows.into_iter().enumerate() {
+            let at = first_row + row as u64;
+            let (category, case) = encode(parameters, profile, headways, &mut source.tables, &mut doubts)
+                .map_err(|error| of_row(at, error))?;
+            let block = match by_category.iter().position(|(known, _)| *known == category) {
+                Some(block) => block,
+                None => {
+                    by_category.push((category, Vec::new()));
+                    source.blocks.push(Vec::new());
+                    by_category.len() - 1
+                }
+            };
+            by_category[block].1.push(row);
+            source.blocks[block].push(case);
+        }
+        if by_category.is_empty() {
+            return Err(Error::usage(Place::item("cases"), "there are no rows", "give at least one case"));
+        }
+        let block = |(category, rows): &(Category, Vec<usize>)| Block {
+            category: *category,
+            units: Units::Numbered(rows.len() as u64),
+            variants: vec![VARIANT.to_owned()],
+            first_unit: 0,
+            first_lane: 0,
+        };
+        let blocks = by_category.iter().map(block).collect();
+        let headways = if headways.is_empty() { vec![Headway::Observed] } else { headways.to_vec() };
+        let plan = LanePlan::new(profile.clone(), models.to_vec(), headways, blocks, Box::new(source))?;
+        let rows = by_category.into_iter().flat_map(|(_, rows)| rows).collect();
+        Ok(Cases { plan, rows, notes: doubts.sentences() })
+    }
+
+    /// The lanes.
+    pub fn lane_plan(&self) -> &LanePlan {
+        &self.plan
+    }
+
+    /// Runs the lanes. Returns an outcome per row, headway and model, the last varying fastest.
+    ///
+    /// # Errors
+    /// Those of the backend; [`Error::Interrupted`].
+    pub fn run(&self, executor: &Executor) -> Result<Vec<Outcome<f64>>> {
+        let per_row = self.plan.headways.len() * self.plan.models.len();
+        let mut outcomes: Vec<Option<Outcome<f64>>> = vec![None; self.rows.len() * per_row];
+        executor.sweep(&self.plan, 0..self.plan.unit_count(), Wanted::Outcomes, |chunk| {
+            let rows = &self.rows[chunk.units.start as usize..chunk.units.end as usize];
+            for (row, lanes) in rows.iter().zip(chunk.outcomes.chunks(per_row)) {
+                for (to, outcome) in outcomes[row * per_row..].iter_mut().zip(lanes) {
+                    *to = Some(*outcome);
+                }
+            }
+            Ok(())
+        })?;
+        let all: Option<Vec<_>> = outcomes.into_iter().collect();
+        all.ok_or_else(|| Error::Internal("a case has no outcome".to_owned()))
+    }
+}
+
+/// The lane case of a row.
+fn encode(
+    mut parameters: CaseParameters,
+    profile: &Profile,
+    headways: &[Headway],
+    tables: &mut Tables<f64>,
+    doubts: &mut Doubts,
+) -> Result<(Category, LaneCase<f64>)> {
+    let plain = parameters.checked_case(&profile.frame, doubts)?;
+    let start = match (parameters.gap, parameters.thw) {
+        (Some(gap_m), _) => Some(Start::Gap(gap_m)),
+        (None, thw_s) => thw_s.map(Start::Headway),
+    };
+    let mut case = LaneCase::encode(&plain.case(profile.frame.time_cap_s)?, profile, tables);
+    match (start, headways.is_empty()) {
+        (Some(start), true) => case = case.ahead_by(start.gap(plain.ego_speed_mps)),
+        (None, false) => {}
+        (Some(_), false) => {
+            let key = if parameters.gap.is_some() { "gap" } else { "thw" };
+            let problem = "the case has its own start, and headways are given for all cases";
+            return Err(Error::usage(Place::item(key), problem, "leave out the column or option `thw`"));
+        }
+        (None, true) => {
+            let help = "give a column `gap` (m) or `thw` (s), or option `thw` for all cases";
+            return Err(Error::usage(Place::item("gap"), "the initial distance is missing", help));
+        }
+    }
+    Ok((plain.category, case))
+}
+
+/// Adds the row to an error about a value.
+fn of_row(row: u64, error: Error) -> Error {
+    match error {
+        Error::Usage { place, problem, help } => {
+            let key = place.item.unwrap_or_default();
+            Error::input(Place::item(format!("row {row}")).column(key), problem, help)
+        }
+        other => other,
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::engine::{CpuBackend, Trace};
+    use crate::model::criterion::Criterion;
+
+    fn row(category: &str, ego_speed: f64, gap: Option<f64>) -> CaseParameters {
+        CaseParameters {
+            category: Some(category.to_owned()),
+            ego_speed: Some(ego_speed),
+            speed: Some(20.0),
+            gap,
+            lateral_speed: (category == "cut-in").then_some(1.0),
+            acceleration: (category == "lvd").then_some(-6.0),
+            ..CaseParameters::default()
+        }
+    }
+
+    fn plan(rows: Vec<CaseParameters>, headways: &[Headway]) -> Result<Cases> {
+        let profile = Profile::load("paper").unwrap();
+        Cases::plan(rows, 0, &profile, &ModelId::ALL, headways, Implausible::Refused)
+    }
+
+    /// Rows of several categories keep their order, and each is the lane that a single run of it is.
+    #[test]
+    fn every_row_is_the_lane_of_its_numbers() {
+        let profile = Profile::load("paper").unwrap();
+        let rows: Vec<_> = (0..60)
+            .map(|k| row(["cut-in", "lvd"][k % 2], 20.0 + k as f64 / 4.0, Some(5.0 + (k * 7 % 40) as f64)))
+            .collect();
+        let cases = plan(rows.clone(), &[]).unwrap();
+        let outcomes = cases.run(&Executor::new(CpuBackend::lane_arithmetic())).unwrap();
+        let mut collisions = 0;
+        for (at, outcome) in outcomes.iter().enumerate() {
+            let (row, model) = (&rows[at / ModelId::ALL.len()], ModelId::ALL[at % ModelId::ALL.len()]);
+            let frame = &profile.frame;
+            let plain = row.plain_case(frame.default_length_m, frame.default_width_m).unwrap();
+            let mut tables = Tables::default();
+            let case = LaneCase::encode(&plain.case(frame.time_cap_s).unwrap(), &profile, &mut tables).cast::<f32>();
+            let headway = Headway::GapM(row.gap.unwrap());
+            let trace = Trace::record(&profile, plain.category, &case, &tables.cast(), headway, model);
+            assert_eq!(trace.outcome, *outcome, "{row:?} {model:?}");
+            collisions += u32::from(outcome.verdicts.failed(Criterion::Collision));
+        }
+        assert!((10..200).contains(&collisions), "{collisions}");
+    }
+
+    #[test]
+    fn a_wrong_row_is_named_with_its_column() {
+        let said = |rows: Vec<CaseParameters>, headways: &[Headway]| plan(rows, headways).err().unwrap().to_string();
+        let good = row("cut-in", 30.0, Some(10.0));
+        let fast = row("cut-in", 300.0, Some(10.0));
+        assert!(said(vec![good.clone(), fast], &[]).starts_with("column `ego_speed`, row 1"));
+        let nan = row("cut-in", f64::NAN, Some(10.0));
+        assert!(said(vec![nan], &[]).starts_with("column `ego_speed`, row 0"));
+        assert!(said(vec![row("lvd", 30.0, None)], &[]).contains("the initial distance is missing"));
+        assert!(said(vec![good], &[Headway::ThwS(1.0)]).contains("has its own start"));
+        assert!(said(Vec::new(), &[]).contains("there are no rows"));
+    }
+}
