@@ -2,11 +2,14 @@
 //! no foreign text (an id, a file name) sends control characters to a terminal.
 
 use std::borrow::Cow;
+use std::ffi::OsString;
 use std::io::{self, IsTerminal, Write};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use clap::error::ContextValue;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
-use tracing::Level;
+use tracing::{Level, Metadata};
+use tracing_subscriber::fmt::MakeWriter;
 use tracing_subscriber::fmt::format::debug_fn;
 
 use super::Exit;
@@ -29,6 +32,60 @@ pub enum Verbosity {
     Verbose,
 }
 
+/// What a run inside another program says, until its owner takes it.
+#[derive(Debug, Default)]
+pub(super) struct Captured {
+    /// What the program would print on stdout.
+    pub text: String,
+    /// Lines of the log and of stderr.
+    pub messages: Vec<(Level, String)>,
+    /// The bar of the present work.
+    pub bar: Option<ProgressBar>,
+}
+
+static CAPTURED: Mutex<Option<Captured>> = Mutex::new(None);
+static COMMAND_LINE: Mutex<Vec<OsString>> = Mutex::new(Vec::new());
+
+/// What is captured now; `None` if the program prints.
+pub(super) fn captured() -> MutexGuard<'static, Option<Captured>> {
+    CAPTURED.lock().unwrap_or_else(PoisonError::into_inner)
+}
+
+/// Adds a line to what is captured; false if the program prints.
+fn capture(level: Level, line: &str) -> bool {
+    let mut captured = captured();
+    let Some(captured) = captured.as_mut() else { return false };
+    captured.messages.push((level, line.trim_end().to_owned()));
+    true
+}
+
+/// Writes lines of the log to stderr, or to what is captured.
+struct LogLine(Level);
+
+impl Write for LogLine {
+    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+        if capture(self.0, &String::from_utf8_lossy(bytes)) { Ok(bytes.len()) } else { io::stderr().write(bytes) }
+    }
+
+    fn flush(&mut self) -> io::Result<()> {
+        io::stderr().flush()
+    }
+}
+
+struct Log;
+
+impl MakeWriter<'_> for Log {
+    type Writer = LogLine;
+
+    fn make_writer(&self) -> LogLine {
+        LogLine(Level::INFO)
+    }
+
+    fn make_writer_for(&self, meta: &Metadata<'_>) -> LogLine {
+        LogLine(*meta.level())
+    }
+}
+
 /// Starts the log. Colours only on a terminal and without `NO_COLOR`.
 pub fn start_log(verbosity: Verbosity) {
     let level = match verbosity {
@@ -38,7 +95,9 @@ pub fn start_log(verbosity: Verbosity) {
     };
     // A second start (a test in the same process) keeps the first log.
     let _ = tracing_subscriber::fmt()
-        .with_writer(io::stderr)
+        .with_writer(Log)
+        // The owner of what is captured gets the level beside the line.
+        .with_level(captured().is_none())
         // If stderr is closed or full, no message can be shown, and writing one would panic.
         .log_internal_errors(false)
         // A message is one line, whatever characters a file name has.
@@ -71,6 +130,10 @@ pub fn print_json(json: &str) -> Result<()> {
 }
 
 fn write_out(text: &str) -> Result<()> {
+    if let Some(captured) = captured().as_mut() {
+        captured.text += text;
+        return Ok(());
+    }
     let mut stdout = io::stdout().lock();
     match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
@@ -80,13 +143,22 @@ fn write_out(text: &str) -> Result<()> {
 
 /// Writes a text to stderr verbatim: messages of a result besides its data.
 pub fn say(text: &str) {
+    if capture(Level::INFO, text) {
+        return;
+    }
     // Ignore a closed stderr: no message can be shown.
     let _ = write!(io::stderr().lock(), "{}", shown(text));
 }
 
+/// Sets the words after the program's name.
+pub(super) fn set_command_line(words: &[OsString]) {
+    *COMMAND_LINE.lock().unwrap_or_else(PoisonError::into_inner) = words.to_vec();
+}
+
 /// The command line as typed, for repeating the run.
 pub fn command_line() -> String {
-    let words = std::env::args_os().skip(1).map(|word| quoted_word(&word.to_string_lossy()));
+    let words = COMMAND_LINE.lock().unwrap_or_else(PoisonError::into_inner);
+    let words = words.iter().map(|word| quoted_word(&word.to_string_lossy()));
     format!("lanesweep {}", words.collect::<Vec<_>>().join(" "))
 }
 
@@ -106,6 +178,10 @@ pub fn progress(verbosity: Verbosity, length: u64, what: &str) -> ProgressBar {
         bar.set_style(style);
     }
     bar.set_message(what.to_owned());
+    if let Some(captured) = captured().as_mut() {
+        bar.set_draw_target(ProgressDrawTarget::hidden());
+        captured.bar = Some(bar.clone());
+    }
     bar
 }
 

@@ -13,6 +13,7 @@ mod console;
 mod device_list;
 mod devices;
 mod dry_run;
+pub mod embedded;
 mod exit;
 mod export;
 mod fit;
@@ -40,6 +41,7 @@ mod verify;
 
 pub use exit::Exit;
 
+use std::ffi::OsString;
 use std::process::ExitCode;
 
 use clap::{Args, FromArgMatches, Parser, Subcommand};
@@ -106,12 +108,19 @@ enum Verb {
     Config(config::Config),
 }
 
-/// Parses the command line, runs the verb and returns its exit code.
+/// Parses the command line of the process, runs the verb and returns its exit code.
 pub fn main() -> ExitCode {
-    let matches = match configured::command().try_get_matches() {
+    main_with(&std::env::args_os().skip(1).collect::<Vec<_>>()).into()
+}
+
+/// Like [`main`], with the words after the program's name. For a process that does nothing else: it handles signals and
+/// starts the global thread pool.
+pub fn main_with(words: &[OsString]) -> Exit {
+    console::set_command_line(words);
+    let matches = match configured::command().try_get_matches_from(with_program_name(words)) {
         Ok(matches) => matches,
         Err(error) => {
-            return run_and_report(|| console::refuse(&error)).into();
+            return run_and_report(|| console::refuse(&error));
         }
     };
     if let Ok(common) = Common::from_arg_matches(&matches) {
@@ -120,29 +129,36 @@ pub fn main() -> ExitCode {
     signals::install();
     run_and_report(|| {
         let (cli, configured) = Configured::of(&matches)?;
+        let asked = configured.settings.run.threads;
+        pool_of(asked)?.build_global().map_err(|error| not_started(asked, &error))?;
         run(&cli, &configured)
     })
-    .into()
 }
 
-/// Runs the work and reports the result. A panic in any thread of the work is reported as a defect of the program, not
-/// as a user's error.
+fn with_program_name(words: &[OsString]) -> impl Iterator<Item = OsString> + '_ {
+    std::iter::once(OsString::from("lanesweep")).chain(words.iter().cloned())
+}
+
+/// Runs the work and reports the result.
 fn run_and_report(work: impl FnOnce() -> Result<Exit>) -> Exit {
-    let error = match std::panic::catch_unwind(std::panic::AssertUnwindSafe(work)) {
-        Ok(Ok(exit)) => return exit,
-        Ok(Err(error)) => error,
-        Err(_) => Error::Internal(
+    without_panic(work).unwrap_or_else(|error| {
+        console::complain(&error);
+        Exit::from(&error)
+    })
+}
+
+/// Runs the work. A panic in any thread of the work is a defect of the program, not a user's error.
+fn without_panic(work: impl FnOnce() -> Result<Exit>) -> Result<Exit> {
+    std::panic::catch_unwind(std::panic::AssertUnwindSafe(work)).unwrap_or_else(|_| {
+        Err(Error::Internal(
             "the program panicked; see the message above. Existing files are complete; \
                          the same command resumes a run from its journal"
                 .to_owned(),
-        ),
-    };
-    console::complain(&error);
-    Exit::from(&error)
+        ))
+    })
 }
 
 fn run(cli: &Cli, configured: &Configured) -> Result<Exit> {
-    start_threads(configured.settings.run.threads)?;
     match &cli.verb {
         Verb::Study(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Mine(verb) => verb.run(configured, cli.common.verbosity()),
@@ -167,34 +183,39 @@ const THREADS_PER_CORE: usize = 4;
 /// Address space per thread: its stack, and its part of the allocator's arenas.
 const BYTES_PER_THREAD: usize = 4 << 20;
 
-/// Starts the worker threads before the work, because a pool that cannot start later panics. The default is one per
-/// core; the maximum is the number that is useful. Results do not depend on it.
+/// The worker threads, which start before the work, because a pool that cannot start later panics. The default is one
+/// per core; the maximum is the number that is useful. Results do not depend on it.
 ///
 /// # Errors
-/// [`Error::Io`] if the system has no more threads, or no memory for them.
-fn start_threads(asked: Option<usize>) -> Result<()> {
+/// [`Error::Io`] if there is no memory for them.
+fn pool_of(asked: Option<usize>) -> Result<rayon::ThreadPoolBuilder> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let useful = THREADS_PER_CORE * cores;
     if let Some(asked) = asked.filter(|asked| *asked > useful) {
         tracing::info!("--threads {asked}: {useful} are started, {THREADS_PER_CORE} per logical core");
     }
     let count = asked.map(|asked| asked.min(useful));
-    let refused = |reason: String| {
-        let what = asked.map_or("the worker threads".to_owned(), |asked| format!("--threads {asked}"));
-        Error::io(what, "start", std::io::Error::new(std::io::ErrorKind::WouldBlock, reason))
-    };
     // If memory ran out after some threads had started, an allocation in one of them would end the process.
     let mut room = Vec::<u8>::new();
     let bytes = count.unwrap_or(cores).saturating_mul(BYTES_PER_THREAD);
-    room.try_reserve_exact(bytes).map_err(|error| refused(error.to_string()))?;
+    room.try_reserve_exact(bytes).map_err(|error| refused(asked, error.to_string()))?;
     // Otherwise the compiler removes the unused allocation.
     std::hint::black_box(&room);
     drop(room);
-    let started = rayon::ThreadPoolBuilder::new().num_threads(count.unwrap_or(0)).build_global();
-    started.map_err(|error| match std::error::Error::source(&error).and_then(|e| e.downcast_ref::<std::io::Error>()) {
-        Some(source) => refused(source.to_string()),
+    Ok(rayon::ThreadPoolBuilder::new().num_threads(count.unwrap_or(0)))
+}
+
+/// The error of a system that has no more threads.
+fn not_started(asked: Option<usize>, error: &rayon::ThreadPoolBuildError) -> Error {
+    match std::error::Error::source(error).and_then(|e| e.downcast_ref::<std::io::Error>()) {
+        Some(source) => refused(asked, source.to_string()),
         None => Error::Internal(format!("the thread pool did not start: {error}")),
-    })
+    }
+}
+
+fn refused(asked: Option<usize>, reason: String) -> Error {
+    let what = asked.map_or("the worker threads".to_owned(), |asked| format!("--threads {asked}"));
+    Error::io(what, "start", std::io::Error::new(std::io::ErrorKind::WouldBlock, reason))
 }
 
 #[cfg(test)]
