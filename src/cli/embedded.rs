@@ -2,12 +2,15 @@
 //! what it would print. It handles no signals; its owner can watch it and end it from another thread.
 
 use std::ffi::OsString;
-use std::sync::Mutex;
+use std::sync::{Mutex, TryLockError};
+
+use serde_json::Value;
 
 use super::configured::{self, Configured};
-use super::console::{self, Captured, Verbosity};
+use super::console::{self, Verbosity};
 use super::signals::CANCEL;
 use super::{Exit, not_started, pool_of, run as run_verb, with_program_name, without_panic};
+use crate::support::cancel::Cancel;
 use crate::{Error, Place, Result};
 
 /// How a verb ended, and what it printed on standard output.
@@ -27,23 +30,38 @@ pub const STACK_BYTES: usize = 8 << 20;
 /// # Errors
 /// [`Error::Usage`] for a wrong command line; [`Error::Busy`] while another verb runs; those of the verb.
 pub fn run(words: &[OsString]) -> Result<Answer> {
-    static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
-    let Ok(_one) = ONE_AT_A_TIME.try_lock() else {
-        return Err(Error::Busy {
-            place: Box::new(Place::item("this process")),
-            problem: "another run of lanesweep is in progress here".to_owned(),
+    exclusively(|| {
+        console::set_command_line(words);
+        let result = without_panic(|| parse_and_run(words));
+        let text = console::captured().as_mut().map(|captured| {
+            captured.bar = None;
+            std::mem::take(&mut captured.text)
         });
+        Ok(Answer { exit: result?, text: text.unwrap_or_default() })
+    })
+}
+
+/// Does other work of the library as [`run`] does a verb: alone in this process, with its own cancellation, and with
+/// its messages captured.
+///
+/// # Errors
+/// [`Error::Busy`] while other work is in progress; those of the work.
+pub fn exclusively<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
+    static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
+    let _one = match ONE_AT_A_TIME.try_lock() {
+        Ok(one) => one,
+        Err(TryLockError::Poisoned(one)) => one.into_inner(),
+        Err(TryLockError::WouldBlock) => {
+            return Err(Error::Busy {
+                place: Box::new(Place::item("this process")),
+                problem: "another run of lanesweep is in progress here".to_owned(),
+            });
+        }
     };
     CANCEL.withdraw();
-    *console::captured() = Some(Captured::default());
-    console::set_command_line(words);
+    console::captured().get_or_insert_default();
     console::start_log(Verbosity::Normal);
-    let result = without_panic(|| parse_and_run(words));
-    let text = console::captured().as_mut().map(|captured| {
-        captured.bar = None;
-        std::mem::take(&mut captured.text)
-    });
-    Ok(Answer { exit: result?, text: text.unwrap_or_default() })
+    work()
 }
 
 fn parse_and_run(words: &[OsString]) -> Result<Exit> {
@@ -69,14 +87,56 @@ fn wrong_words(error: &clap::Error) -> Error {
     Error::usage(Place::item("arguments"), problem.trim_start_matches("error: ").trim(), tip)
 }
 
+/// The command line as data, for programs that make an interface of it: a list of verbs with their arguments, in the
+/// order of their help.
+pub fn definition() -> Value {
+    let mut program = configured::command();
+    program.build();
+    let verbs = program.get_subcommands().filter(|verb| verb.get_name() != "help");
+    Value::Array(verbs.flat_map(|verb| verb_definitions("", verb)).collect())
+}
+
+fn verb_definitions(before: &str, verb: &clap::Command) -> Vec<Value> {
+    let name = format!("{before}{}", verb.get_name());
+    if verb.has_subcommands() {
+        let within = verb.get_subcommands().filter(|verb| verb.get_name() != "help");
+        return within.flat_map(|verb| verb_definitions(&format!("{name} "), verb)).collect();
+    }
+    let text = |styled: Option<&clap::builder::StyledStr>| styled.map(ToString::to_string).unwrap_or_default();
+    let argument = |arg: &clap::Arg| {
+        let defaults = arg.get_default_values().iter().map(|value| value.to_string_lossy());
+        let choices = arg.get_possible_values().into_iter().map(|value| value.get_name().to_owned());
+        let count = arg.get_num_args().map_or(1, |range| range.max_values());
+        serde_json::json!({
+            "id": arg.get_id().as_str(),
+            "flag": arg.get_long(),
+            "takes_value": arg.get_action().takes_values(),
+            "repeats": count > 1 || matches!(arg.get_action(), clap::ArgAction::Append),
+            "is_list": arg.get_value_delimiter().is_some(),
+            "is_required": arg.is_required_set(),
+            "value_name": arg.get_value_names().unwrap_or_default().first().map(ToString::to_string),
+            "default": defaults.collect::<Vec<_>>().join(","),
+            "choices": choices.collect::<Vec<_>>(),
+            "help": text(arg.get_long_help().or(arg.get_help())),
+            "heading": arg.get_help_heading(),
+        })
+    };
+    let arguments = verb.get_arguments().filter(|arg| !["help", "version"].contains(&arg.get_id().as_str()));
+    vec![serde_json::json!({
+        "verb": name,
+        "help": text(verb.get_long_about().or(verb.get_about())),
+        "arguments": arguments.map(argument).collect::<Vec<_>>(),
+    })]
+}
+
 /// Requests the running verb to end in good order: after the present chunk, with its journal on disk.
 pub fn cancel() {
     CANCEL.request();
 }
 
-/// Whether the running verb was requested to end.
-pub fn is_cancelled() -> bool {
-    CANCEL.requested()
+/// The token that [`cancel`] sets.
+pub fn token() -> Cancel {
+    CANCEL.clone()
 }
 
 /// The present work of the running verb: what it is, the units done, and all units.

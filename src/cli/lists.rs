@@ -149,7 +149,7 @@ impl CriterionFlag {
 /// # Errors
 /// [`Error::Usage`] for an unknown criterion.
 pub fn criterion(name: &str) -> Result<Criterion> {
-    Criterion::ALL.into_iter().find(|c| c.key().eq_ignore_ascii_case(name.trim())).ok_or_else(|| {
+    Criterion::parse(name.trim()).ok_or_else(|| {
         let problem = format!("there is no criterion `{name}`");
         Error::usage(Place::item("--criterion"), problem, "use collision, ttc or btn")
     })

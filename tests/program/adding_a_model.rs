@@ -12,7 +12,8 @@ use std::process::{Command, Output};
 use crate::common::device::software_device;
 
 /// What a copy needs to be built.
-const SOURCES: [&str; 8] = ["Cargo.toml", "Cargo.lock", "README.md", "src", "shaders", "configs", "benches", "tests"];
+const SOURCES: [&str; 9] =
+    ["Cargo.toml", "Cargo.lock", "README.md", "src", "shaders", "configs", "benches", "tests", "python"];
 
 /// The three touches: two new files and, in the third, one new line.
 const RUST: &str = "src/model/driver/aeb.rs";

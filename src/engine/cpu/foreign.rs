@@ -106,8 +106,8 @@ pub(in crate::engine) fn run_block(
             .collect();
         let seen = running.iter().map(|&at| (at, &lanes[at], &cases[lanes[at].case].0));
         let columns = columns_of(step, plan.profile.frame.dt_s, seen, &moved);
-        let found = accelerations(&columns)?;
-        check(plan, model, &found, &columns, block, first_unit)?;
+        let found = accelerations(columns)?;
+        check(plan, model, &found, &running, step, block, first_unit)?;
         for ((&at, (moved, places)), acceleration) in running.iter().zip(&moved).zip(found) {
             let lane = &mut lanes[at];
             let before = lane.state.v_ego;
@@ -131,28 +131,29 @@ pub(in crate::engine) fn run_block(
     Ok(outcomes)
 }
 
-/// Checks what the driver returned.
+/// Checks what the driver returned for the running lanes.
 fn check(
     plan: &LanePlan,
     model: ModelId,
     found: &[f32],
-    columns: &LaneColumns,
+    running: &[usize],
+    step: u32,
     block: usize,
     first_unit: u64,
 ) -> Result<()> {
-    let expected = columns.lane.len();
-    let driver = || Place::item(format!("driver {}, step {}", model.name(), columns.step));
-    if found.len() != expected {
-        let problem = format!("it returned {} accelerations for {expected} lanes", found.len());
+    let driver = || Place::item(format!("driver {}, step {step}", model.name()));
+    if found.len() != running.len() {
+        let problem = format!("it returned {} accelerations for {} lanes", found.len(), running.len());
         return Err(Error::input(driver(), problem, "return one number per lane, in m/s²"));
     }
-    let is_wrong = |acceleration: &f32| !(acceleration.abs() <= MAX_ACCELERATION_MPS2);
-    let Some(at) = found.iter().position(is_wrong) else { return Ok(()) };
+    // A NaN is wrong too.
+    let is_right = |acceleration: &f32| acceleration.abs() <= MAX_ACCELERATION_MPS2;
+    let Some(at) = found.iter().position(|acceleration| !is_right(acceleration)) else { return Ok(()) };
     let headways = plan.headways.len();
-    let (case, headway) = (columns.lane[at] as usize / headways, columns.lane[at] as usize % headways);
+    let (case, headway) = (running[at] / headways, running[at] % headways);
     let of_block = &plan.blocks[block];
-    let unit = first_unit + (case / of_block.variants.len()) as u64;
-    let (unit, variant) = (of_block.units.name(unit), &of_block.variants[case % of_block.variants.len()]);
+    let unit = of_block.units.name(first_unit + (case / of_block.variants.len()) as u64);
+    let variant = &of_block.variants[case % of_block.variants.len()];
     let key = format!("{unit}/{variant}/{}/{}", plan.headways[headway], model.name());
     let problem = format!("its acceleration is {} m/s² in lane {key}", found[at]);
     let help = format!("return finite numbers of at most {MAX_ACCELERATION_MPS2} m/s²");

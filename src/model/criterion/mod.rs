@@ -44,6 +44,11 @@ impl Criterion {
         }
     }
 
+    /// Parses a name, ignoring case.
+    pub fn parse(text: &str) -> Option<Criterion> {
+        Criterion::ALL.into_iter().find(|criterion| criterion.key().eq_ignore_ascii_case(text))
+    }
+
     /// Name in tables and figures.
     pub fn label(self) -> &'static str {
         match self {

@@ -46,7 +46,7 @@ pub struct LaneColumns {
 }
 
 /// Returns an acceleration, m/s², for every lane of the columns.
-pub type Accelerations<'a> = Box<dyn FnMut(&LaneColumns) -> Result<Vec<f32>> + 'a>;
+pub type Accelerations<'a> = Box<dyn FnMut(LaneColumns) -> Result<Vec<f32>> + 'a>;
 
 /// A driver of many lanes at once.
 pub trait VectorDriver: Send + Sync {

@@ -1,0 +1,258 @@
+//! `simulate`: a table of concrete cases becomes a table of outcomes.
+
+use std::collections::HashMap;
+
+use arrow_array::cast::AsArray;
+use arrow_array::types::{
+    Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type, UInt32Type, UInt64Type,
+};
+use arrow_array::{Array, RecordBatch};
+use arrow_schema::DataType;
+use lanesweep::cli::embedded;
+use lanesweep::engine::{Headway, OpenBackend};
+use lanesweep::model::driver::ModelId;
+use lanesweep::model::profile::Profile;
+use lanesweep::report::lanes::{case_columns, case_row};
+use lanesweep::run::cases::Cases;
+use lanesweep::scenario::CaseParameters;
+use lanesweep::support::plausibility::Implausible;
+use lanesweep::support::table::ArrowRows;
+use lanesweep::{Error, Place, Result};
+use pyo3::prelude::*;
+
+use crate::error::InputError;
+use crate::frame::{Frame, stream_of};
+use crate::verb::watched;
+
+/// Cases that are planned and run together: memory does not grow with the table beyond its result.
+const CASES: usize = 1 << 16;
+
+/// Columns of numbers, with their unit as an optional ending.
+const NUMBERS: [(&str, &str); 13] = [
+    ("ego_speed", "_mps"),
+    ("speed", "_mps"),
+    ("gap", "_m"),
+    ("thw", "_s"),
+    ("lateral_speed", "_mps"),
+    ("lateral_distance", "_m"),
+    ("acceleration", "_mps2"),
+    ("end_speed", "_mps"),
+    ("ahead_speed", "_mps"),
+    ("ahead_gap", "_m"),
+    ("length", "_m"),
+    ("width", "_m"),
+    ("duration", "_s"),
+];
+
+/// A column of a batch as numbers; null and NaN are missing values.
+fn numbers(array: &dyn Array) -> Option<Vec<Option<f64>>> {
+    macro_rules! of {
+        ($($type:ident => $arrow:ident),+) => {
+            match array.data_type() {
+                $(DataType::$type => array.as_primitive::<$arrow>().iter().map(|v| v.map(|v| v as f64)).collect(),)+
+                DataType::Null => vec![None; array.len()],
+                _ => return None,
+            }
+        };
+    }
+    Some(of!(
+        Float64 => Float64Type, Float32 => Float32Type, Int64 => Int64Type, Int32 => Int32Type, Int16 => Int16Type,
+        Int8 => Int8Type, UInt64 => UInt64Type, UInt32 => UInt32Type, UInt16 => UInt16Type, UInt8 => UInt8Type
+    ))
+}
+
+/// A column of a batch as texts.
+fn texts(array: &dyn Array) -> Option<Vec<Option<String>>> {
+    let owned = |text: Option<&str>| text.map(str::to_owned);
+    Some(match array.data_type() {
+        DataType::Utf8 => array.as_string::<i32>().iter().map(owned).collect(),
+        DataType::LargeUtf8 => array.as_string::<i64>().iter().map(owned).collect(),
+        DataType::Utf8View => array.as_string_view().iter().map(owned).collect(),
+        DataType::Dictionary(..) => {
+            let names = array.as_any_dictionary_opt()?;
+            let values = texts(names.values().as_ref())?;
+            let keys = names.normalized_keys();
+            (0..array.len()).map(|row| if array.is_null(row) { None } else { values[keys[row]].clone() }).collect()
+        }
+        _ => return None,
+    })
+}
+
+fn of_column(name: &str, problem: String, help: &str) -> Error {
+    Error::input(Place::default().column(name), problem, help)
+}
+
+/// The cases of a batch.
+fn rows_of(batch: &RecordBatch, category: Option<&str>, first_row: u64) -> Result<Vec<CaseParameters>> {
+    let blank = CaseParameters { category: category.map(str::to_owned), ..CaseParameters::default() };
+    let mut rows = vec![blank; batch.num_rows()];
+    let mut seen: HashMap<&str, &str> = HashMap::new();
+    for (field, array) in batch.schema_ref().fields().iter().zip(batch.columns()) {
+        let name = field.name().as_str();
+        let is = |(key, unit): &&(&str, &str)| name == *key || name.strip_prefix(key) == Some(unit);
+        if name == "category" && category.is_some() {
+            return Err(of_column(name, "the argument `category` is given too".to_owned(), "leave out one of the two"));
+        }
+        if name == "category" {
+            let found = texts(array.as_ref()).ok_or_else(|| {
+                of_column(
+                    name,
+                    format!("holds values of the type {}", array.data_type()),
+                    "expected texts: cut-in, cut-out or lvd",
+                )
+            })?;
+            rows.iter_mut().zip(found).for_each(|(row, text)| row.category = text);
+            continue;
+        }
+        let Some((key, _)) = NUMBERS.iter().find(is) else {
+            let known = NUMBERS.map(|(key, unit)| format!("{key}{unit}")).join(", ");
+            let help = format!("leave it out, or use one of category, {known}; units may be left out");
+            return Err(of_column(name, "there is no such column".to_owned(), &help));
+        };
+        if let Some(other) = seen.insert(key, name) {
+            return Err(of_column(name, format!("column `{other}` says the same"), "leave out one of the two"));
+        }
+        let values = numbers(array.as_ref()).ok_or_else(|| {
+            of_column(name, format!("holds values of the type {}", array.data_type()), "expected numbers")
+        })?;
+        for (at, (row, value)) in rows.iter_mut().zip(values).enumerate() {
+            if value.is_some_and(|value| !value.is_finite()) {
+                let place = Place::item(format!("row {}", first_row + at as u64)).column(name);
+                let problem = format!("{} is no number", value.unwrap_or(f64::NAN));
+                return Err(Error::input(
+                    place,
+                    problem,
+                    "give a finite number, or null for a value that is not given",
+                ));
+            }
+            *match *key {
+                "ego_speed" => &mut row.ego_speed,
+                "speed" => &mut row.speed,
+                "gap" => &mut row.gap,
+                "thw" => &mut row.thw,
+                "lateral_speed" => &mut row.lateral_speed,
+                "lateral_distance" => &mut row.lateral_distance,
+                "acceleration" => &mut row.acceleration,
+                "end_speed" => &mut row.end_speed,
+                "ahead_speed" => &mut row.ahead_speed,
+                "ahead_gap" => &mut row.ahead_gap,
+                "length" => &mut row.length,
+                "width" => &mut row.width,
+                _ => &mut row.duration,
+            } = value;
+        }
+    }
+    Ok(rows)
+}
+
+/// What all cases share.
+struct Options {
+    category: Option<String>,
+    models: Vec<ModelId>,
+    headways: Vec<Headway>,
+    profile: Profile,
+    backend: OpenBackend,
+    implausible: Implausible,
+}
+
+fn options(
+    category: Option<String>,
+    models: &[String],
+    thw: &[String],
+    profile: &str,
+    dt: Option<f64>,
+    backend: &str,
+    device: Option<&str>,
+    accept_implausible: bool,
+) -> Result<Options> {
+    let mut profile = Profile::load(profile)?;
+    if let Some(dt_s) = dt {
+        profile = profile.with_dt(dt_s)?;
+    }
+    let model = |name: &String| {
+        ModelId::parse(name).ok_or_else(|| {
+            let problem = format!("there is no driver model `{name}`");
+            Error::usage(Place::option("models"), problem, format!("use one of {}, or a Driver", ModelId::names()))
+        })
+    };
+    let headway = |text: &String| {
+        let parsed = text.parse().ok().map(Headway::ThwS).or_else(|| Headway::parse(text));
+        parsed.filter(|headway| *headway != Headway::Observed).ok_or_else(|| {
+            Error::usage(
+                Place::option("thw"),
+                format!("`{text}` is no headway"),
+                "give seconds, or texts such as 1.2s, 30m, r157",
+            )
+        })
+    };
+    let models: Vec<ModelId> = models.iter().map(model).collect::<Result<_>>()?;
+    Ok(Options {
+        category,
+        models: if models.is_empty() { ModelId::ALL.to_vec() } else { models },
+        headways: thw.iter().map(headway).collect::<Result<_>>()?,
+        profile,
+        backend: OpenBackend::open(backend.parse()?, device.map(str::parse).transpose()?.as_ref())?
+            .with_cancel(embedded::token()),
+        implausible: if accept_implausible { Implausible::Accepted } else { Implausible::Refused },
+    })
+}
+
+/// Appends the outcomes of some cases; returns notes about their values.
+fn run(rows: Vec<CaseParameters>, first_row: u64, options: &Options, to: &mut ArrowRows) -> Result<Vec<String>> {
+    let Options { models, headways, profile, implausible, .. } = options;
+    let cases = Cases::plan(rows, first_row, profile, models, headways, *implausible)?;
+    let outcomes = cases.run(&options.backend.executor())?;
+    let plan = cases.lane_plan();
+    let per_row = plan.headways.len() * models.len();
+    for (at, outcome) in outcomes.iter().enumerate() {
+        let (row, headway, model) = (at / per_row, at / models.len() % plan.headways.len(), at % models.len());
+        let row = first_row + row as u64;
+        to.row(&case_row(row, plan.headways[headway], models[model].name(), outcome, profile.frame.dt_s))?;
+    }
+    Ok(cases.notes)
+}
+
+/// Runs a table of concrete cases. See `lanesweep.simulate`.
+#[pyfunction]
+#[pyo3(signature = (cases, *, category, models, thw, profile, dt, backend, device, accept_implausible, on_message=None))]
+#[allow(clippy::too_many_arguments)] // keyword arguments of the Python function
+pub fn simulate(
+    py: Python<'_>,
+    cases: &Bound<'_, PyAny>,
+    category: Option<String>,
+    models: Vec<String>,
+    thw: Vec<String>,
+    profile: String,
+    dt: Option<f64>,
+    backend: String,
+    device: Option<String>,
+    accept_implausible: bool,
+    on_message: Option<&Bound<'_, PyAny>>,
+) -> PyResult<(Frame, Vec<String>)> {
+    let stream = stream_of(cases)?;
+    let batches: Vec<RecordBatch> = stream
+        .collect::<std::result::Result<_, _>>()
+        .map_err(|error| InputError::new_err(format!("the table cannot be read: {error}")))?;
+    watched(py, None, on_message, move || {
+        embedded::exclusively(|| {
+            let options =
+                options(category, &models, &thw, &profile, dt, &backend, device.as_deref(), accept_implausible)?;
+            let mut rows = ArrowRows::new(&case_columns(), HashMap::new());
+            let (mut frames, mut notes, mut first_row) = (Vec::new(), Vec::new(), 0);
+            let pieces = batches.iter().flat_map(|batch| {
+                (0..batch.num_rows().div_ceil(CASES))
+                    .map(|k| batch.slice(k * CASES, CASES.min(batch.num_rows() - k * CASES)))
+            });
+            for piece in pieces {
+                let of_piece = rows_of(&piece, options.category.as_deref(), first_row)?;
+                notes.extend(run(of_piece, first_row, &options, &mut rows)?);
+                first_row += piece.num_rows() as u64;
+                frames.push(rows.batch()?);
+            }
+            if first_row == 0 {
+                return Err(Error::input(Place::item("cases"), "the table has no rows", "give at least one case"));
+            }
+            Ok((Frame::new(rows.schema(), frames), notes))
+        })
+    })
+}

@@ -1,0 +1,231 @@
+//! Tables in and out: Arrow record batches behind the Arrow PyCapsule interface, which pandas, Polars, pyarrow and DuckDB
+//! read and write without a copy.
+
+use std::collections::HashMap;
+use std::sync::Arc;
+
+use arrow_array::cast::AsArray;
+use arrow_array::ffi_stream::{FFI_ArrowArrayStream, RecordBatchStreamReader};
+use arrow_array::types::{Float32Type, Float64Type, Int32Type, Int64Type};
+use arrow_array::{Array, RecordBatch, RecordBatchIterator, RecordBatchReader};
+use arrow_schema::{DataType, SchemaRef};
+use lanesweep::support::table::{ArrowRows, Cell, Column, ColumnKind};
+use numpy::PyArray1;
+use pyo3::exceptions::{PyKeyError, PyTypeError};
+use pyo3::prelude::*;
+use pyo3::types::{PyCapsule, PyDict, PyList};
+use serde_json::Value;
+
+use crate::error::{InputError, InternalError, exception};
+
+const STREAM: &std::ffi::CStr = c"arrow_array_stream";
+
+/// A table: typed columns with units. Libraries of data frames take it as it is: `polars.DataFrame(frame)`,
+/// `pyarrow.table(frame)`, `pandas.DataFrame.from_arrow(frame)`, and `to_pandas()`.
+#[pyclass(frozen, module = "lanesweep")]
+pub struct Frame {
+    schema: SchemaRef,
+    batches: Vec<RecordBatch>,
+}
+
+impl Frame {
+    pub fn new(schema: SchemaRef, batches: Vec<RecordBatch>) -> Frame {
+        Frame { schema, batches }
+    }
+}
+
+#[pymethods]
+impl Frame {
+    fn __len__(&self) -> usize {
+        self.batches.iter().map(RecordBatch::num_rows).sum()
+    }
+
+    /// Names of the columns.
+    #[getter]
+    fn columns(&self) -> Vec<String> {
+        self.schema.fields().iter().map(|field| field.name().clone()).collect()
+    }
+
+    /// Unit of every column that has one.
+    #[getter]
+    fn units(&self) -> HashMap<String, String> {
+        self.metadata("unit")
+    }
+
+    /// One sentence per column that has one.
+    #[getter]
+    fn descriptions(&self) -> HashMap<String, String> {
+        self.metadata("description")
+    }
+
+    /// The Arrow C stream of the table.
+    #[pyo3(signature = (requested_schema=None))]
+    fn __arrow_c_stream__<'py>(
+        &self,
+        py: Python<'py>,
+        requested_schema: Option<Bound<'py, PyAny>>,
+    ) -> PyResult<Bound<'py, PyCapsule>> {
+        // The protocol allows to return the own schema.
+        let _ = requested_schema;
+        let batches = self.batches.clone().into_iter().map(Ok);
+        let reader: Box<dyn RecordBatchReader + Send> =
+            Box::new(RecordBatchIterator::new(batches, self.schema.clone()));
+        PyCapsule::new_with_value(py, FFI_ArrowArrayStream::new(reader), STREAM)
+    }
+
+    /// A column as a NumPy array; texts as a list. Null is NaN in columns of numbers and None in others.
+    fn __getitem__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+        let at = self.schema.index_of(name).map_err(|_| {
+            PyKeyError::new_err(format!("there is no column `{name}`; there are {}", self.columns().join(", ")))
+        })?;
+        let arrays: Vec<&dyn Array> = self.batches.iter().map(|batch| batch.column(at).as_ref()).collect();
+        let has_null = arrays.iter().any(|array| array.null_count() > 0);
+        match self.schema.field(at).data_type() {
+            DataType::Float64 => {
+                let values = arrays.iter().flat_map(|array| array.as_primitive::<Float64Type>().iter());
+                Ok(PyArray1::from_iter(py, values.map(|value| value.unwrap_or(f64::NAN))).into_any())
+            }
+            DataType::Float32 => {
+                let values = arrays.iter().flat_map(|array| array.as_primitive::<Float32Type>().iter());
+                Ok(PyArray1::from_iter(py, values.map(|value| value.unwrap_or(f32::NAN))).into_any())
+            }
+            DataType::Int64 if !has_null => {
+                let values = arrays.iter().flat_map(|array| array.as_primitive::<Int64Type>().iter().flatten());
+                Ok(PyArray1::from_iter(py, values).into_any())
+            }
+            DataType::Boolean if !has_null => {
+                let values = arrays.iter().flat_map(|array| array.as_boolean().iter().flatten());
+                Ok(PyArray1::from_iter(py, values).into_any())
+            }
+            _ => {
+                let list = PyList::empty(py);
+                for array in arrays {
+                    (0..array.len()).try_for_each(|row| list.append(value(py, array, row)?))?;
+                }
+                Ok(list.into_any())
+            }
+        }
+    }
+
+    /// The first rows as dictionaries.
+    #[pyo3(signature = (n=None))]
+    fn rows<'py>(&self, py: Python<'py>, n: Option<usize>) -> PyResult<Bound<'py, PyList>> {
+        let list = PyList::empty(py);
+        let mut left = n.unwrap_or(usize::MAX);
+        for batch in &self.batches {
+            for row in 0..batch.num_rows().min(left) {
+                let dict = PyDict::new(py);
+                for (field, array) in self.schema.fields().iter().zip(batch.columns()) {
+                    dict.set_item(field.name(), value(py, array.as_ref(), row)?)?;
+                }
+                list.append(dict)?;
+            }
+            left = left.saturating_sub(batch.num_rows());
+        }
+        Ok(list)
+    }
+}
+
+impl Frame {
+    fn metadata(&self, key: &str) -> HashMap<String, String> {
+        let of = |field: &Arc<arrow_schema::Field>| {
+            let text = field.metadata().get(key).filter(|text| !text.is_empty())?;
+            Some((field.name().clone(), text.clone()))
+        };
+        self.schema.fields().iter().filter_map(of).collect()
+    }
+}
+
+/// A value of an array of one of our types.
+fn value<'py>(py: Python<'py>, array: &dyn Array, row: usize) -> PyResult<Bound<'py, PyAny>> {
+    if array.is_null(row) {
+        return Ok(py.None().into_bound(py));
+    }
+    Ok(match array.data_type() {
+        DataType::Utf8 => array.as_string::<i32>().value(row).into_pyobject(py)?.into_any(),
+        DataType::Boolean => array.as_boolean().value(row).into_pyobject(py)?.to_owned().into_any(),
+        DataType::Int64 => array.as_primitive::<Int64Type>().value(row).into_pyobject(py)?.into_any(),
+        DataType::Float32 => array.as_primitive::<Float32Type>().value(row).into_pyobject(py)?.into_any(),
+        DataType::Float64 => array.as_primitive::<Float64Type>().value(row).into_pyobject(py)?.into_any(),
+        DataType::Dictionary(..) => {
+            let names = array.as_dictionary::<Int32Type>();
+            let key = names.keys().value(row) as usize;
+            names.values().as_string::<i32>().value(key).into_pyobject(py)?.into_any()
+        }
+        DataType::List(_) => {
+            let items = array.as_list::<i32>().value(row);
+            let list = PyList::empty(py);
+            (0..items.len()).try_for_each(|at| list.append(value(py, items.as_ref(), at)?))?;
+            list.into_any()
+        }
+        other => return Err(InternalError::new_err(format!("a column has the type {other}"))),
+    })
+}
+
+/// The stream of a table of another library.
+pub fn stream_of(table: &Bound<'_, PyAny>) -> PyResult<RecordBatchStreamReader> {
+    let method = table.getattr("__arrow_c_stream__").map_err(|_| {
+        let of = table.get_type().name().map_or_else(|_| "an object".to_owned(), |name| name.to_string());
+        PyTypeError::new_err(format!(
+            "{of} is no table: expected one with the Arrow interface (`__arrow_c_stream__`), such as a DataFrame of \
+             pandas 2.2 or Polars, or pyarrow.table({{...}})"
+        ))
+    })?;
+    let capsule = method.call0()?.cast_into::<PyCapsule>()?;
+    let pointer = capsule.pointer_checked(Some(STREAM))?.cast::<FFI_ArrowArrayStream>();
+    // SAFETY: a capsule of this name holds a valid stream, and the reader moves it out.
+    #[allow(unsafe_code)] // the C interface has no safe form
+    let reader = unsafe { RecordBatchStreamReader::from_raw(pointer.as_ptr()) };
+    reader.map_err(|error| InputError::new_err(format!("the table cannot be read: {error}")))
+}
+
+/// A table of records: a list of objects with equal keys, as JSON. A column has the type of its values; whole numbers
+/// beside others become numbers.
+#[pyfunction]
+pub fn frame_of_records(py: Python<'_>, json: &str) -> PyResult<Frame> {
+    let records: Vec<serde_json::Map<String, Value>> =
+        serde_json::from_str(json).map_err(|error| InternalError::new_err(format!("a table: {error}")))?;
+    let mut names: Vec<&String> = Vec::new();
+    for name in records.iter().flat_map(|record| record.keys()) {
+        if !names.contains(&name) {
+            names.push(name);
+        }
+    }
+    let kind = |name: &str| {
+        let mut values =
+            records.iter().filter_map(|record| record.get(name)).filter(|value| !value.is_null()).peekable();
+        let has_values = values.peek().is_some();
+        let mut kinds = values.map(|value| match value {
+            Value::Bool(_) => ColumnKind::Flag,
+            Value::Number(number) if number.is_i64() => ColumnKind::Whole,
+            Value::Number(_) => ColumnKind::Binary64,
+            _ => ColumnKind::Text,
+        });
+        let first = kinds.next().unwrap_or(ColumnKind::Binary64);
+        let joined = kinds.fold(first, |joined, kind| match (joined, kind) {
+            (a, b) if a == b => a,
+            (ColumnKind::Whole | ColumnKind::Binary64, ColumnKind::Whole | ColumnKind::Binary64) => {
+                ColumnKind::Binary64
+            }
+            _ => ColumnKind::Text,
+        });
+        if has_values { joined } else { ColumnKind::Binary64 }
+    };
+    let columns: Vec<Column> =
+        names.iter().map(|name| Column::new((*name).clone(), kind(name), String::new(), String::new())).collect();
+    let mut rows = ArrowRows::new(&columns, HashMap::new());
+    for record in &records {
+        let cell = |column: &Column| match (column.kind, record.get(column.name.as_ref())) {
+            (_, None | Some(Value::Null)) => Cell::Null,
+            (ColumnKind::Text, Some(Value::String(text))) => Cell::text(text.clone()),
+            (ColumnKind::Text, Some(other)) => Cell::text(other.to_string()),
+            (_, Some(Value::Bool(flag))) => Cell::Flag(*flag),
+            (ColumnKind::Whole, Some(number)) => number.as_i64().map_or(Cell::Null, Cell::Whole),
+            (_, Some(number)) => Cell::number(number.as_f64()),
+        };
+        let row: Vec<Cell> = columns.iter().map(cell).collect();
+        rows.row(&row).map_err(|error| exception(py, &error))?;
+    }
+    let batch = rows.batch().map_err(|error| exception(py, &error))?;
+    Ok(Frame::new(rows.schema(), vec![batch]))
+}

@@ -1,0 +1,27 @@
+//! The compiled half of the Python package `lanesweep`: verbs of the program, tables as Arrow data, drivers and limit
+//! states. `lanesweep/_core.pyi` documents the functions for Python.
+
+mod cases;
+mod driver;
+mod error;
+mod frame;
+mod limit_state;
+mod verb;
+
+use pyo3::prelude::*;
+
+#[pymodule]
+fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    error::add_to(module)?;
+    module.add_class::<frame::Frame>()?;
+    module.add_class::<limit_state::LimitState>()?;
+    module.add_class::<driver::View>()?;
+    module.add_class::<driver::Vehicle>()?;
+    module.add_function(wrap_pyfunction!(verb::run, module)?)?;
+    module.add_function(wrap_pyfunction!(verb::main, module)?)?;
+    module.add_function(wrap_pyfunction!(verb::definition, module)?)?;
+    module.add_function(wrap_pyfunction!(frame::frame_of_records, module)?)?;
+    module.add_function(wrap_pyfunction!(cases::simulate, module)?)?;
+    module.add_function(wrap_pyfunction!(driver::register, module)?)
+}

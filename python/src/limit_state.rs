@@ -1,0 +1,183 @@
+//! A density with one driver and criterion as a function of points: what OpenTURNS, UQpy and SciPy call.
+
+use std::path::PathBuf;
+use std::sync::Arc;
+
+use lanesweep::cli::embedded;
+use lanesweep::engine::{Headway, OpenBackend};
+use lanesweep::model::criterion::Criterion;
+use lanesweep::model::driver::ModelId;
+use lanesweep::model::profile::Profile;
+use lanesweep::run::sampling::{LaneLimitState, SampleHeadways, truncated};
+use lanesweep::stats::density::{DensityModel, read_density};
+use lanesweep::stats::estimate::{Density as _, LimitState as _};
+use lanesweep::{Error, Place, Result};
+use numpy::{PyArray1, PyReadonlyArray2};
+use pyo3::prelude::*;
+
+use crate::error::exception;
+use crate::verb::watched;
+
+struct Opened {
+    density: DensityModel,
+    profile: Profile,
+    model: ModelId,
+    criterion: Criterion,
+    headway: SampleHeadways,
+    backend: OpenBackend,
+}
+
+/// See `lanesweep.LimitState`.
+#[pyclass(frozen, subclass, module = "lanesweep._core")]
+pub struct LimitState(Arc<Opened>);
+
+fn open(
+    density: PathBuf,
+    model: &str,
+    criterion: &str,
+    thw: Option<String>,
+    profile: &str,
+    backend: &str,
+    device: Option<&str>,
+) -> Result<Opened> {
+    let density = read_density(&density)?;
+    let model = ModelId::parse(model).ok_or_else(|| {
+        let problem = format!("there is no driver model `{model}`");
+        Error::usage(Place::option("models"), problem, format!("use one of {}, or a Driver", ModelId::names()))
+    })?;
+    let criterion = Criterion::parse(criterion).ok_or_else(|| {
+        let problem = format!("there is no criterion `{criterion}`");
+        Error::usage(Place::option("criterion"), problem, "use collision, ttc or btn")
+    })?;
+    let headway = match thw {
+        None => SampleHeadways::Sampled,
+        Some(text) => {
+            let parsed = text.parse().ok().map(Headway::ThwS).or_else(|| Headway::parse(&text));
+            let help = "give seconds, or a text such as 1.2s, 30m, r157";
+            SampleHeadways::Each(vec![
+                parsed.ok_or_else(|| Error::usage(Place::option("thw"), format!("`{text}` is no headway"), help))?,
+            ])
+        }
+    };
+    let backend = OpenBackend::open(backend.parse()?, device.map(str::parse).transpose()?.as_ref())?;
+    let opened = Opened {
+        density,
+        profile: Profile::load(profile)?,
+        model,
+        criterion,
+        headway,
+        backend: backend.with_cancel(embedded::token()),
+    };
+    // A wrong headway is an error of the construction, not of the first call.
+    opened.values(&[opened.density.kde.points()[0].clone()])?;
+    Ok(opened)
+}
+
+impl Opened {
+    fn values(&self, points: &[Vec<f64>]) -> Result<Vec<f64>> {
+        LaneLimitState {
+            density: &self.density,
+            profile: &self.profile,
+            model: self.model,
+            criterion: self.criterion,
+            headway: self.headway.clone(),
+            executor: self.backend.executor(),
+        }
+        .evaluate(points)
+    }
+}
+
+#[pymethods]
+impl LimitState {
+    #[new]
+    #[pyo3(signature = (density, *, model, criterion, thw, profile, backend, device))]
+    fn new(
+        py: Python<'_>,
+        density: PathBuf,
+        model: String,
+        criterion: String,
+        thw: Option<String>,
+        profile: String,
+        backend: String,
+        device: Option<String>,
+    ) -> PyResult<LimitState> {
+        let work = move || {
+            embedded::exclusively(|| open(density, &model, &criterion, thw, &profile, &backend, device.as_deref()))
+        };
+        Ok(LimitState(Arc::new(watched(py, None, None, work)?)))
+    }
+
+    /// Names of the parameters, with units.
+    #[getter]
+    fn parameters(&self) -> Vec<String> {
+        self.0.density.space.parameters().iter().map(|parameter| parameter.name.clone()).collect()
+    }
+
+    /// The recorded scenarios as points, a row each.
+    #[getter]
+    fn points(&self) -> Vec<Vec<f64>> {
+        self.0.density.kde.points().to_vec()
+    }
+
+    /// Bandwidth of every parameter: the standard deviation of the kernels around the points.
+    #[getter]
+    fn kernel_deviations(&self) -> Vec<f64> {
+        self.0.density.kde.spread()
+    }
+
+    /// Whether each point is valid: the density is 0 elsewhere.
+    fn is_valid<'py>(
+        &self,
+        py: Python<'py>,
+        points: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<bool>>> {
+        let points = self.rows(py, &points)?;
+        Ok(PyArray1::from_iter(py, points.iter().map(|point| self.0.density.space.is_valid(point))))
+    }
+
+    /// log f̂ of each point; −inf outside the valid region.
+    fn log_density<'py>(
+        &self,
+        py: Python<'py>,
+        points: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let points = self.rows(py, &points)?;
+        let opened = self.0.clone();
+        let work = move || {
+            let truncated = truncated(&opened.density)?;
+            let log_share = truncated.validity_share().ln();
+            Ok(points.iter().map(|point| truncated.log_density(point) - log_share).collect::<Vec<f64>>())
+        };
+        Ok(PyArray1::from_vec(py, watched(py, None, None, work)?))
+    }
+
+    /// The limit state of each point.
+    fn __call__<'py>(
+        &self,
+        py: Python<'py>,
+        points: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let points = self.rows(py, &points)?;
+        let opened = self.0.clone();
+        let values = watched(py, None, None, move || embedded::exclusively(|| opened.values(&points)))?;
+        Ok(PyArray1::from_vec(py, values))
+    }
+}
+
+impl LimitState {
+    /// Checks the points and copies them into rows.
+    fn rows(&self, py: Python<'_>, points: &PyReadonlyArray2<'_, f64>) -> PyResult<Vec<Vec<f64>>> {
+        let points = points.as_array();
+        let dimensions = self.0.density.space.dimensions();
+        let refuse = |problem: String, help: String| exception(py, &Error::input(Place::item("points"), problem, help));
+        if points.ncols() != dimensions {
+            let problem = format!("they have {} columns", points.ncols());
+            return Err(refuse(problem, format!("give {dimensions} columns: {}", self.parameters().join(", "))));
+        }
+        if let Some(((row, column), value)) = points.indexed_iter().find(|(_, value)| !value.is_finite()) {
+            let problem = format!("row {row} has {value} in column {column}");
+            return Err(refuse(problem, "give finite numbers".to_owned()));
+        }
+        Ok(points.rows().into_iter().map(|row| row.to_vec()).collect())
+    }
+}

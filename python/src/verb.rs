@@ -1,0 +1,115 @@
+//! Verbs of the program inside the interpreter. The work runs on its own thread without the GIL; the calling thread looks
+//! for signals and passes on progress and messages.
+
+use std::ffi::OsString;
+use std::sync::Mutex;
+use std::sync::mpsc::{self, RecvTimeoutError};
+use std::time::Duration;
+
+use lanesweep::cli::embedded;
+use lanesweep::{Error, Result};
+use pyo3::prelude::*;
+
+use crate::driver;
+use crate::error::exception;
+
+/// How often the calling thread looks for signals.
+const LOOK: Duration = Duration::from_millis(20);
+
+/// Runs work on a thread with the program's stack and waits for it. A signal (Ctrl-C) requests the end of the work and is
+/// raised after it.
+pub fn watched<T: Send + 'static>(
+    py: Python<'_>,
+    on_progress: Option<&Bound<'_, PyAny>>,
+    on_message: Option<&Bound<'_, PyAny>>,
+    work: impl FnOnce() -> Result<T> + Send + 'static,
+) -> PyResult<T> {
+    let (send, done) = mpsc::channel();
+    let done = Mutex::new(done);
+    let thread = std::thread::Builder::new().name("lanesweep".to_owned()).stack_size(embedded::STACK_BYTES);
+    let started = thread.spawn(move || drop(send.send(work())));
+    started.map_err(|error| exception(py, &Error::io("a thread", "start", error)))?;
+    let mut signal = None;
+    let mut failed = None;
+    let result = loop {
+        let result = py.detach(|| match done.lock() {
+            Ok(done) => done.recv_timeout(LOOK),
+            Err(_) => Err(RecvTimeoutError::Disconnected),
+        });
+        if let Err(error) = pass_on(py, on_progress, on_message) {
+            embedded::cancel();
+            failed = failed.or(Some(error));
+        }
+        match result {
+            Ok(result) => break result,
+            Err(RecvTimeoutError::Disconnected) => break Err(Error::Internal("the work panicked".to_owned())),
+            Err(RecvTimeoutError::Timeout) => {
+                if let Err(error) = py.check_signals() {
+                    embedded::cancel();
+                    signal = signal.or(Some(error));
+                }
+            }
+        }
+    };
+    // The exception of a driver says more than the error that it caused.
+    let raised = driver::take_exception();
+    if let Some(error) = signal.or(failed) {
+        return Err(error);
+    }
+    result.map_err(|error| match raised {
+        Some(cause) => {
+            let made = exception(py, &error);
+            made.set_cause(py, Some(cause));
+            made
+        }
+        None => exception(py, &error),
+    })
+}
+
+fn pass_on(
+    py: Python<'_>,
+    on_progress: Option<&Bound<'_, PyAny>>,
+    on_message: Option<&Bound<'_, PyAny>>,
+) -> PyResult<()> {
+    for (level, line) in embedded::take_messages() {
+        if let Some(on_message) = on_message {
+            on_message.call1((level.as_str(), line))?;
+        }
+    }
+    if let Some(on_progress) = on_progress
+        && let Some(progress) = embedded::progress()
+    {
+        on_progress.call1(progress)?;
+    }
+    py.check_signals()
+}
+
+/// Runs a verb: the words that follow the program's name on a command line.
+#[pyfunction]
+#[pyo3(signature = (words, on_progress=None, on_message=None))]
+pub fn run(
+    py: Python<'_>,
+    words: Vec<OsString>,
+    on_progress: Option<&Bound<'_, PyAny>>,
+    on_message: Option<&Bound<'_, PyAny>>,
+) -> PyResult<(u8, String)> {
+    let answer = watched(py, on_progress, on_message, move || embedded::run(&words))?;
+    Ok((answer.exit.code(), answer.text))
+}
+
+/// The command line itself, with its own handling of signals. For a process that does nothing else.
+#[pyfunction]
+pub fn main(py: Python<'_>, words: Vec<OsString>) -> u8 {
+    py.detach(|| {
+        let thread = std::thread::Builder::new().stack_size(embedded::STACK_BYTES);
+        let program = thread.spawn(move || lanesweep::cli::main_with(&words));
+        program.map_or(lanesweep::cli::Exit::Io, |program| program.join().unwrap_or(lanesweep::cli::Exit::Internal))
+    })
+    .code()
+}
+
+/// The verbs and their arguments, as JSON.
+#[pyfunction]
+pub fn definition() -> String {
+    embedded::definition().to_string()
+}
