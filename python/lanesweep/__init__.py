@@ -1,0 +1,58 @@
+"""lanesweep: scenario-based assessment of automated driving systems.
+
+Recordings or tables of cases become lanes: a scenario, a parameterization, a headway and a driver model each. Speeds are in
+m/s, lengths in m, times in s, accelerations in m/s².
+
+>>> import lanesweep
+>>> result = lanesweep.study(synth_recordings=2)  # without data: on generated recordings
+>>> result.table("f1").to_pandas()                # doctest: +SKIP
+"""
+
+from __future__ import annotations
+
+from . import _core, drivers
+from ._core import (
+    BusyError,
+    DeviceError,
+    Frame,
+    InputError,
+    InternalError,
+    LanesweepError,
+    SystemRefusal,
+    UsageError,
+    Vehicle,
+    VerificationError,
+    View,
+    __version__,
+    profile,
+)
+from ._driver import Driver
+from ._result import Figure, Result
+from ._run import command
+from ._simulate import LimitState, simulate
+from ._verbs import *  # noqa: F403
+from ._verbs import __all__ as _verbs
+
+__all__ = [
+    "BusyError",
+    "DeviceError",
+    "Driver",
+    "Figure",
+    "Frame",
+    "InputError",
+    "InternalError",
+    "LanesweepError",
+    "LimitState",
+    "Result",
+    "SystemRefusal",
+    "UsageError",
+    "Vehicle",
+    "VerificationError",
+    "View",
+    "__version__",
+    "command",
+    "drivers",
+    "profile",
+    "simulate",
+    *_verbs,
+]

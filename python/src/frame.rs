@@ -7,10 +7,12 @@ use std::sync::Arc;
 use arrow_array::cast::AsArray;
 use arrow_array::ffi_stream::{FFI_ArrowArrayStream, RecordBatchStreamReader};
 use arrow_array::types::{Float32Type, Float64Type, Int32Type, Int64Type};
-use arrow_array::{Array, RecordBatch, RecordBatchIterator, RecordBatchReader};
-use arrow_schema::{DataType, SchemaRef};
+use arrow_array::{
+    Array, ArrayRef, Float64Array, RecordBatch, RecordBatchIterator, RecordBatchReader, StringArray,
+};
+use arrow_schema::{DataType, Field, Schema, SchemaRef};
 use lanesweep::support::table::{ArrowRows, Cell, Column, ColumnKind};
-use numpy::PyArray1;
+use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::{PyKeyError, PyTypeError};
 use pyo3::prelude::*;
 use pyo3::types::{PyCapsule, PyDict, PyList};
@@ -107,6 +109,53 @@ impl Frame {
         }
     }
 
+    /// The table as a pandas data frame (a copy).
+    fn to_pandas<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        let py = slf.py();
+        let columns = PyDict::new(py);
+        for name in slf.get().columns() {
+            columns.set_item(&name, slf.get().__getitem__(py, &name)?)?;
+        }
+        py.import("pandas")?.call_method1("DataFrame", (columns,))
+    }
+
+    /// The table as a Polars data frame.
+    fn to_polars<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("polars")?.call_method1("DataFrame", (slf,))
+    }
+
+    /// The table as a pyarrow table.
+    fn to_arrow<'py>(slf: &Bound<'py, Self>) -> PyResult<Bound<'py, PyAny>> {
+        slf.py().import("pyarrow")?.call_method1("table", (slf,))
+    }
+
+    fn __repr__(&self) -> String {
+        format!("<lanesweep.Frame: {} rows of {}>", self.__len__(), self.columns().join(", "))
+    }
+
+    fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {
+        const SHOWN: usize = 20;
+        let escape = |text: &str| text.replace('&', "&amp;").replace('<', "&lt;");
+        let mut html = String::from("<table><thead><tr>");
+        let units = self.units();
+        for name in self.columns() {
+            let unit = units.get(&name).filter(|unit| *unit != "1").map(|unit| format!("<br>{unit}")).unwrap_or_default();
+            html += &format!("<th>{}{unit}</th>", escape(&name));
+        }
+        html += "</tr></thead><tbody>";
+        for row in self.rows(py, Some(SHOWN))?.iter() {
+            html += "<tr>";
+            for cell in row.cast::<PyDict>()?.values().iter() {
+                let text = if cell.is_none() { String::new() } else { cell.str()?.to_string() };
+                html += &format!("<td>{}</td>", escape(&text));
+            }
+            html += "</tr>";
+        }
+        let rows = self.__len__();
+        let more = if rows > SHOWN { format!("<p>{SHOWN} of {rows} rows</p>") } else { String::new() };
+        Ok(html + "</tbody></table>" + &more)
+    }
+
     /// The first rows as dictionaries.
     #[pyo3(signature = (n=None))]
     fn rows<'py>(&self, py: Python<'py>, n: Option<usize>) -> PyResult<Bound<'py, PyList>> {
@@ -177,6 +226,23 @@ pub fn stream_of(table: &Bound<'_, PyAny>) -> PyResult<RecordBatchStreamReader> 
     #[allow(unsafe_code)] // the C interface has no safe form
     let reader = unsafe { RecordBatchStreamReader::from_raw(pointer.as_ptr()) };
     reader.map_err(|error| InputError::new_err(format!("the table cannot be read: {error}")))
+}
+
+/// A table of columns: arrays of numbers, and lists of texts.
+#[pyfunction]
+pub fn frame_of_columns(columns: &Bound<'_, PyDict>) -> PyResult<Frame> {
+    let (mut fields, mut arrays): (Vec<Field>, Vec<ArrayRef>) = (Vec::new(), Vec::new());
+    for (name, values) in columns.iter() {
+        let array: ArrayRef = match values.extract::<PyReadonlyArray1<'_, f64>>() {
+            Ok(numbers) => Arc::new(Float64Array::from_iter_values(numbers.as_array().iter().copied())),
+            Err(_) => Arc::new(StringArray::from(values.extract::<Vec<Option<String>>>()?)),
+        };
+        fields.push(Field::new(name.extract::<String>()?, array.data_type().clone(), true));
+        arrays.push(array);
+    }
+    let schema = Arc::new(Schema::new(fields));
+    let batch = RecordBatch::try_new(schema.clone(), arrays);
+    Ok(Frame::new(schema, vec![batch.map_err(|error| InputError::new_err(format!("the columns: {error}")))?]))
 }
 
 /// A table of records: a list of objects with equal keys, as JSON. A column has the type of its values; whole numbers

@@ -108,6 +108,15 @@ pub fn main(py: Python<'_>, words: Vec<OsString>) -> u8 {
     .code()
 }
 
+/// A profile of drivers and criteria, as nested dictionaries.
+#[pyfunction]
+pub fn profile<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
+    let profile = lanesweep::model::profile::Profile::load(name).map_err(|error| exception(py, &error))?;
+    let text = serde_json::to_string(&profile);
+    let text = text.map_err(|error| exception(py, &Error::Internal(format!("a profile: {error}"))))?;
+    py.import("json")?.call_method1("loads", (text,))
+}
+
 /// The verbs and their arguments, as JSON.
 #[pyfunction]
 pub fn definition() -> String {

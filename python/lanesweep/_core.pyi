@@ -1,0 +1,163 @@
+"""Types of the compiled module."""
+
+from collections.abc import Callable, Sequence
+from typing import Any, final
+
+import numpy as np
+import numpy.typing as npt
+
+__version__: str
+
+class LanesweepError(Exception):
+    """An error of lanesweep.
+
+    Attributes
+    ----------
+    problem : str
+        Where and what.
+    help : str or None
+        What to do.
+    exit_code : int
+        The exit code of the program for it.
+    """
+
+    problem: str
+    help: str | None
+    exit_code: int
+
+class UsageError(LanesweepError): ...
+class InputError(LanesweepError): ...
+class SystemRefusal(LanesweepError): ...
+class DeviceError(LanesweepError): ...
+class VerificationError(LanesweepError): ...
+class BusyError(LanesweepError): ...
+class InternalError(LanesweepError): ...
+
+@final
+class Frame:
+    def __len__(self) -> int: ...
+    @property
+    def columns(self) -> list[str]: ...
+    @property
+    def units(self) -> dict[str, str]: ...
+    @property
+    def descriptions(self) -> dict[str, str]: ...
+    def __arrow_c_stream__(self, requested_schema: Any | None = None) -> Any: ...
+    def __getitem__(self, name: str, /) -> Any: ...
+    def to_pandas(self) -> Any: ...
+    def to_polars(self) -> Any: ...
+    def to_arrow(self) -> Any: ...
+    def rows(self, n: int | None = None) -> list[dict[str, Any]]: ...
+    def _repr_html_(self) -> str: ...
+
+class LimitState:
+    def __new__(
+        cls,
+        density: Any,
+        *,
+        model: str,
+        criterion: str,
+        thw: str | None,
+        profile: str,
+        backend: str,
+        device: str | None,
+    ) -> LimitState: ...
+    @property
+    def parameters(self) -> list[str]: ...
+    @property
+    def points(self) -> list[list[float]]: ...
+    @property
+    def kernel_deviations(self) -> list[float]: ...
+    def is_valid(self, points: npt.NDArray[np.float64]) -> npt.NDArray[np.bool_]: ...
+    def log_density(self, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]: ...
+    def __call__(self, points: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]: ...
+
+@final
+class Vehicle:
+    """Another vehicle as the drivers of all running lanes see it: an entry per lane.
+
+    Attributes
+    ----------
+    present : ndarray of bool
+        The vehicle is there for the ego; where it is not, the other entries have no meaning.
+    attended : ndarray of bool
+        It is there, and the attention rule lets the driver react to it.
+    speed, gap, lateral_gap, lateral_speed, half_lengths : ndarray of float32
+        m/s; m, bumper to bumper; m, negative where the vehicles overlap; m/s towards the ego; m.
+    """
+
+    @property
+    def present(self) -> npt.NDArray[np.bool_]: ...
+    @property
+    def attended(self) -> npt.NDArray[np.bool_]: ...
+    @property
+    def speed(self) -> npt.NDArray[np.float32]: ...
+    @property
+    def gap(self) -> npt.NDArray[np.float32]: ...
+    @property
+    def lateral_gap(self) -> npt.NDArray[np.float32]: ...
+    @property
+    def lateral_speed(self) -> npt.NDArray[np.float32]: ...
+    @property
+    def half_lengths(self) -> npt.NDArray[np.float32]: ...
+
+@final
+class View:
+    """All running lanes at one step: an entry per lane.
+
+    Attributes
+    ----------
+    step : int
+        Index of the step.
+    time_s : float
+        Time since the start, s.
+    lane : ndarray of int64
+        Position of each lane in its batch, ascending: the index of its entry in arrays of states.
+    ego_speed, ego_acceleration : ndarray of float32
+        m/s; m/s² over the last step, 0 at the start.
+    other : Vehicle
+        The principal vehicle: it cuts in, cuts out, or leads.
+    ahead : Vehicle
+        In a cut-out, the vehicle ahead of the one that cuts out; elsewhere it is not present.
+    """
+
+    @property
+    def step(self) -> int: ...
+    @property
+    def time_s(self) -> float: ...
+    @property
+    def lane(self) -> npt.NDArray[np.int64]: ...
+    @property
+    def ego_speed(self) -> npt.NDArray[np.float32]: ...
+    @property
+    def ego_acceleration(self) -> npt.NDArray[np.float32]: ...
+    @property
+    def other(self) -> Vehicle: ...
+    @property
+    def ahead(self) -> Vehicle: ...
+    def __len__(self) -> int: ...
+
+def run(
+    words: Sequence[str],
+    on_progress: Callable[[str, int, int], None] | None = None,
+    on_message: Callable[[str, str], None] | None = None,
+) -> tuple[int, str]: ...
+def main(words: Sequence[str]) -> int: ...
+def definition() -> str: ...
+def profile(name: str) -> dict[str, Any]: ...
+def frame_of_records(json: str) -> Frame: ...
+def frame_of_columns(columns: dict[str, Any]) -> Frame: ...
+def simulate(
+    cases: Any,
+    *,
+    category: str | None,
+    models: list[str],
+    thw: list[str],
+    profile: str,
+    dt: float | None,
+    backend: str,
+    device: str | None,
+    accept_implausible: bool,
+    on_message: Callable[[str, str], None] | None = None,
+) -> tuple[Frame, list[str]]: ...
+def register(name: str, fingerprint: str, driver: Any, may_accelerate: bool, attention: str) -> None: ...

@@ -1,0 +1,194 @@
+"""Results of verbs: a folder of tables, figures and records."""
+
+from __future__ import annotations
+
+import csv
+import html
+import json
+import os
+import tempfile
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+from ._core import Frame, frame_of_records
+
+#: What the exit code of a result means; other codes are exceptions.
+STATUS = {
+    0: "ok",
+    1: "not preventable",
+    4: "incomplete",
+    8: "undecided",
+    9: "no conflict",
+    10: "outside Annex 3",
+}
+
+#: Columns whose values are names, even where all of them look like numbers.
+_NAMES = {"id", "scenario", "param", "parameterization", "variant", "headway", "category", "model", "criterion", "lane", "claim"}
+
+
+#: Written for values without a number: null in a frame.
+_NO_NUMBER = {"inf", "-inf", "NaN"}
+
+
+class Figure:
+    """A figure in SVG; notebooks show it."""
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+
+    @property
+    def svg(self) -> str:
+        return self.path.read_text(encoding="utf-8")
+
+    def _repr_svg_(self) -> str:
+        return self.svg
+
+    def __repr__(self) -> str:
+        return f"Figure({self.path.name!r})"
+
+
+class Result:
+    """What a verb leaves: status, text, a document, and a folder with tables, figures and a page.
+
+    A result without `out` lives in a temporary folder, which goes with the object; `save` keeps a copy. Where a function
+    takes a file or folder, a result can be given: it stands for its own.
+
+    Attributes
+    ----------
+    status : str
+        ``"ok"``, ``"incomplete"`` if parts of the input were left out, or the answer of `check`.
+    document : dict
+        The numbers as one document, as ``--format json`` prints it.
+    folder : Path or None
+        Folder of the files.
+    """
+
+    def __init__(self, verb: str, code: int, text: str, path: Path | None, keep: Any) -> None:
+        self.verb = verb
+        self.status = STATUS.get(code, str(code))
+        self._text = text
+        self.path = path
+        self._keep = keep
+        self._document: dict[str, Any] | None = None
+
+    @property
+    def folder(self) -> Path | None:
+        return self.path if self.path is not None and self.path.is_dir() else None
+
+    @property
+    def document(self) -> dict[str, Any]:
+        if self._document is None:
+            try:
+                found = json.loads(self._text) if self._text.strip() else {}
+            except ValueError:
+                found = {}
+            self._document = found if isinstance(found, dict) else {"rows": found}
+        return self._document
+
+    @property
+    def text(self) -> str:
+        """The result for people."""
+        for name in ("report.txt", "compare.txt"):
+            path = self.path / name if self.path is not None else None
+            if path is not None and path.is_file():
+                return path.read_text(encoding="utf-8")
+        return self._text
+
+    @property
+    def tables(self) -> list[str]:
+        """Names of the tables: of the document, and of the folder's CSV files."""
+        in_document = [key for key, value in self.document.items() if _is_table(value)]
+        in_folder = sorted(path.stem for path in self._files("*.csv"))
+        return in_document + [name for name in in_folder if name not in in_document]
+
+    def table(self, name: str) -> Frame:
+        """Return a table as a frame."""
+        value = self.document.get(name)
+        if _is_table(value):
+            return frame_of_records(json.dumps(value))
+        path = self.path / f"{name}.csv" if self.path is not None else None
+        if path is None or not path.is_file():
+            raise KeyError(f"there is no table `{name}`; there are {', '.join(self.tables)}")
+        return read_csv(path)
+
+    @property
+    def figures(self) -> list[str]:
+        """Names of the figures."""
+        return sorted(path.stem for path in self._files("*.svg"))
+
+    def figure(self, name: str) -> Figure:
+        """Return a figure."""
+        path = self.path / f"{name}.svg" if self.path is not None else None
+        if path is None or not path.is_file():
+            raise KeyError(f"there is no figure `{name}`; there are {', '.join(self.figures)}")
+        return Figure(path)
+
+    def save(self, folder: str | os.PathLike[str]) -> Path:
+        """Copy the files into a new folder."""
+        import shutil
+
+        if self.path is None:
+            raise ValueError(f"{self.verb} leaves no files")
+        target = Path(folder)
+        if self.path.is_dir():
+            shutil.copytree(self.path, target)
+        else:
+            shutil.copy2(self.path, target)
+        return target
+
+    def _files(self, pattern: str) -> Iterator[Path]:
+        return self.folder.glob(pattern) if self.folder is not None else iter(())
+
+    def __fspath__(self) -> str:
+        if self.path is None:
+            raise TypeError(f"the result of {self.verb} has no file")
+        return str(self.path)
+
+    def __repr__(self) -> str:
+        at = f", {str(self.path)!r}" if self.path is not None else ""
+        return f"<lanesweep {self.verb}: {self.status}{at}>"
+
+    def __str__(self) -> str:
+        return self.text
+
+    def _repr_html_(self) -> str:
+        page = self.path / "report.html" if self.path is not None else None
+        if page is not None and page.is_file():
+            source = html.escape(page.read_text(encoding="utf-8"), quote=True)
+            return f'<iframe srcdoc="{source}" style="width:100%;height:40em;border:0" sandbox="allow-scripts"></iframe>'
+        return f"<pre>{html.escape(self.text)}</pre>"
+
+
+def _is_table(value: Any) -> bool:
+    return isinstance(value, list) and bool(value) and all(isinstance(row, dict) for row in value)
+
+
+def _typed(values: list[str]) -> list[Any]:
+    """Read a column of texts as whole numbers or numbers, if all of them are."""
+    for read in (int, float):
+        try:
+            return [None if value == "" or value in _NO_NUMBER else read(value) for value in values]
+        except ValueError:
+            continue
+    return [value or None for value in values]
+
+
+def read_csv(path: str | os.PathLike[str]) -> Frame:
+    """Read a CSV table that lanesweep wrote."""
+    with open(path, encoding="utf-8", newline="") as file:
+        header, *rows = csv.reader(file)
+    columns = {}
+    for at, name in enumerate(header):
+        texts = [row[at] for row in rows]
+        # Our files protect texts that a spreadsheet would take for a formula.
+        texts = [text[1:] if text[:1] == "'" and text[1:2] in "'=+-@\t\r" else text for text in texts]
+        columns[name] = [text or None for text in texts] if name in _NAMES else _typed(texts)
+    records = [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
+    if not records:
+        return frame_of_records(json.dumps([{name: None for name in header}]))
+    return frame_of_records(json.dumps(records))
+
+
+def temporary() -> tempfile.TemporaryDirectory[str]:
+    return tempfile.TemporaryDirectory(prefix="lanesweep-", ignore_cleanup_errors=True)

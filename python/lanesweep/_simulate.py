@@ -1,0 +1,206 @@
+"""Tables of concrete cases, and limit states."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import numpy.typing as npt
+
+from . import _core
+from ._core import Frame
+from ._driver import Driver, names_of
+from ._run import on_message, words_of
+
+if TYPE_CHECKING:
+    from ._verbs import Models, Path, Values
+
+
+def _frame_of(columns: Mapping[str, Any]) -> Frame:
+    """Make a table of columns; a scalar holds for all rows."""
+    arrays = {name: np.asarray(values) for name, values in columns.items()}
+    lengths = {array.size for array in arrays.values() if array.ndim == 1}
+    if len(lengths) > 1 or any(array.ndim > 1 for array in arrays.values()):
+        raise _core.InputError(f"the columns differ in length ({sorted(lengths)}): give one value per case, or one for all")
+    count = lengths.pop() if lengths else 1
+    table: dict[str, Any] = {}
+    for name, array in arrays.items():
+        full = np.broadcast_to(array, (count,))
+        if full.dtype.kind in "biuf":
+            table[name] = np.ascontiguousarray(full, dtype=np.float64)
+        elif all(value is None or isinstance(value, str) for value in full.tolist()):
+            table[name] = full.tolist()
+        else:
+            try:
+                table[name] = np.ascontiguousarray(full, dtype=np.float64)
+            except (TypeError, ValueError) as error:
+                raise _core.InputError(f"column `{name}`: {error}; expected numbers, or texts for `category`") from None
+    return _core.frame_of_columns(table)
+
+
+def simulate(
+    cases: Any,
+    *,
+    category: str | None = None,
+    models: Models | None = None,
+    thw: Values | None = None,
+    profile: Path = "paper",
+    dt: float | None = None,
+    backend: str = "auto",
+    device: str | None = None,
+    accept_implausible: bool = False,
+) -> Frame:
+    """Run concrete cases against driver models.
+
+    Parameters
+    ----------
+    cases : table
+        One case per row: a DataFrame of pandas or Polars, a pyarrow table, anything with the Arrow interface, or a mapping
+        of columns. Columns, with or without their unit: `category` (cut-in, cut-out, lvd), `ego_speed_mps`, `speed_mps`,
+        `gap_m` or `thw_s`, `lateral_speed_mps`, `lateral_distance_m`, `acceleration_mps2`, `end_speed_mps`,
+        `ahead_speed_mps`, `ahead_gap_m`, `length_m`, `width_m`, `duration_s`. They mean what the arguments of `trace` mean;
+        a null is a value that is not given.
+    category : str, optional
+        Kind of all cases, in place of the column.
+    models : str, Driver or list of these, optional
+        Driver models; by default the four that are built in.
+    thw : float, str or list of these, optional
+        Initial time headways, s, which every case starts from (or gaps: ``"30m"``); without it each row has its own.
+    profile : str or path
+        Name or file of a profile.
+    dt : float, optional
+        Time step, s; by default the profile's.
+    backend, device : str
+        ``"auto"``, ``"cpu"`` or ``"gpu"``, and the name of a device. Results do not depend on them.
+    accept_implausible : bool
+        Use physically impossible values with a warning.
+
+    Returns
+    -------
+    Frame
+        A row per case, headway and model, the last varying fastest: verdicts, minima and maxima, times in s, speeds in m/s.
+
+    Raises
+    ------
+    InputError
+        With row (from 0) and column of a wrong value.
+    """
+    if isinstance(cases, Mapping):
+        cases = _frame_of(cases)
+    elif type(cases).__module__.split(".")[0] == "pandas" and not _has_arrow(cases):
+        cases = _frame_of({str(name): cases[name].to_numpy() for name in cases.columns})
+    frame, notes = _core.simulate(
+        cases,
+        category=category,
+        models=names_of(models),
+        thw=[] if thw is None else words_of(thw, is_list=False),
+        profile=os.fspath(profile),
+        dt=dt,
+        backend=backend,
+        device=device,
+        accept_implausible=accept_implausible,
+        on_message=on_message,
+    )
+    for note in notes:
+        warnings.warn(note, stacklevel=2)
+    return frame
+
+
+class LimitState(_core.LimitState):
+    """A density with one driver model and criterion, as a function of points: at most 0 where the criterion fails.
+
+    `LimitState(density, ...)(points)` takes an array of shape (n, d) and returns n values, so that libraries of reliability
+    analysis (OpenTURNS, UQpy, SciPy) can call it. Values are continuous at the limit wherever that is possible: TTC minus its
+    threshold, threshold minus BTN; for collisions the smallest TTC, or minus the closing speed of the contact.
+
+    Parameters
+    ----------
+    density : path or Result
+        Density file of `fit`.
+    model : str or Driver
+        Driver model.
+    criterion : str
+        ``"collision"``, ``"ttc"`` or ``"btn"``.
+    thw : float or str, optional
+        Initial headway, s; without it the density must draw it.
+    profile, backend, device : str
+        As in `simulate`.
+
+    Attributes
+    ----------
+    parameters : list of str
+        Names of the columns of points, with units.
+    points : list of list of float
+        The recorded scenarios, and `kernel_deviations` of the kernels around them: together they are the density, which
+        `log_density(points)` evaluates within its valid region (`is_valid(points)`).
+    """
+
+    def __new__(
+        cls,
+        density: Path,
+        *,
+        model: str | Driver = "FSM",
+        criterion: str = "collision",
+        thw: float | str | None = None,
+        profile: Path = "paper",
+        backend: str = "cpu",
+        device: str | None = None,
+    ) -> LimitState:
+        return super().__new__(
+            cls,
+            os.fspath(density),
+            model=names_of(model)[0],
+            criterion=criterion,
+            thw=None if thw is None else str(thw),
+            profile=os.fspath(profile),
+            backend=backend,
+            device=device,
+        )
+
+    def __call__(self, points: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        return super().__call__(_two_dimensional(points))
+
+    def is_valid(self, points: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+        return super().is_valid(_two_dimensional(points))
+
+    def log_density(self, points: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        return super().log_density(_two_dimensional(points))
+
+    def draw(self, count: int, rng: np.random.Generator | None = None) -> npt.NDArray[np.float64]:
+        """Draw valid points of the density, by rejection; with the random numbers of NumPy, not of `sample`."""
+        rng = np.random.default_rng() if rng is None else rng
+        centres, deviations = np.asarray(self.points), np.asarray(self.kernel_deviations)
+        found: list[npt.NDArray[np.float64]] = []
+        missing = count
+        while missing > 0:
+            drawn = centres[rng.integers(len(centres), size=2 * missing + 16)]
+            drawn = drawn + deviations * rng.standard_normal(drawn.shape)
+            drawn = drawn[self.is_valid(drawn)][:missing]
+            found.append(drawn)
+            missing -= len(drawn)
+        return np.concatenate(found) if found else np.empty((0, centres.shape[1]))
+
+
+def _has_arrow(table: Any) -> bool:
+    """Whether pandas can hand out Arrow data: from 2.2 on, if pyarrow is installed."""
+    if not hasattr(table, "__arrow_c_stream__"):
+        return False
+    try:
+        import pyarrow  # noqa: F401
+    except ImportError:
+        return False
+    return True
+
+
+def _two_dimensional(points: npt.ArrayLike) -> npt.NDArray[np.float64]:
+    array = np.ascontiguousarray(points, dtype=np.float64)
+    if array.ndim == 1:
+        array = array[np.newaxis, :]
+    if array.ndim != 2:
+        raise _core.InputError(f"points have {array.ndim} dimensions; give an array of shape (n, d)")
+    return array
+
+

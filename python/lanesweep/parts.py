@@ -1,0 +1,119 @@
+"""Runs in parts, for any executor: plan once, run the parts anywhere, join them. The result has the bytes of the whole run.
+
+    plan = parts.plan(lanesweep.sample, "cut-in-2.json", samples=10**8, thw=1.2)
+    done = [parts.run(plan, shard) for shard in range(plan.shards)]  # joblib, Dask, Ray, …
+    result = parts.join(plan, done)
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+from ._driver import Driver, register
+from ._result import Result, temporary
+from ._run import command
+from ._verbs import merge
+
+__all__ = ["Plan", "join", "plan", "run"]
+
+#: A part: names and contents of its files.
+Part = dict[str, bytes]
+
+
+@dataclass(frozen=True)
+class Plan:
+    """A run that is made once, and the number of its parts; it can be pickled.
+
+    Attributes
+    ----------
+    verb : str
+        ``"study"`` or ``"sample"``.
+    content : bytes
+        The plan file.
+    shards : int
+        Number of parts.
+    drivers : tuple of Driver
+        Drivers in Python that the plan names.
+    """
+
+    verb: str
+    content: bytes = field(repr=False)
+    shards: int
+    drivers: tuple[Driver, ...] = ()
+
+
+def plan(function: Callable[..., Result], *args: Any, shards: int = 8, **arguments: Any) -> Plan:
+    """Plan a run of `lanesweep.study` or `lanesweep.sample`, with its arguments.
+
+    Parameters
+    ----------
+    function : callable
+        `lanesweep.study` or `lanesweep.sample`.
+    shards : int
+        Number of parts, of equal size.
+
+    Returns
+    -------
+    Plan
+    """
+    if function.__name__ not in ("study", "sample"):
+        raise ValueError(f"{function.__name__} cannot be split; study and sample can")
+    if shards < 1:
+        raise ValueError(f"{shards} parts; give at least 1")
+    models = arguments.get("models")
+    several = models if isinstance(models, (list, tuple)) else [models]
+    drivers = tuple(model for model in several if isinstance(model, Driver))
+    with temporary() as folder:
+        function(*args, **arguments, plan_only=True, out=folder)
+        content = (Path(folder) / "plan.json").read_bytes()
+    return Plan(function.__name__, content, shards, drivers)
+
+
+def run(plan: Plan, shard: int, *, backend: str = "cpu", threads: int | None = None) -> Part:
+    """Run a part of a plan, counted from 0.
+
+    Returns
+    -------
+    dict of str to bytes
+        The files of the part.
+    """
+    for driver in plan.drivers:
+        register(driver)
+    with temporary() as folder:
+        path = Path(folder) / "plan.json"
+        path.write_bytes(plan.content)
+        words = [plan.verb, f"--plan={path}", f"--shard={shard}/{plan.shards}", f"--out={folder}", f"--backend={backend}"]
+        command(words + ([] if threads is None else [f"--threads={threads}"]))
+        return {part.name: part.read_bytes() for part in Path(folder).glob("part-*")}
+
+
+def join(plan: Plan, parts: Iterable[Part], *, out: str | os.PathLike[str] | None = None) -> Result:
+    """Join the parts of a run; missing, double and foreign parts are errors.
+
+    Parameters
+    ----------
+    parts : iterable of dict
+        What `run` returned, in any order.
+    out : path, optional
+        Folder of the result; without it the files go with the result.
+
+    Returns
+    -------
+    Result
+    """
+    for driver in plan.drivers:
+        register(driver)
+    keep = temporary() if out is None else None
+    folder = Path(keep.name) / "run" if keep is not None else Path(os.fspath(out or ""))
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "plan.json").write_bytes(plan.content)
+    for part in parts:
+        for name, content in part.items():
+            (folder / name).write_bytes(content)
+    result = merge(folder)
+    result.path, result._keep = folder, keep
+    return result

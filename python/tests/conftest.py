@@ -1,0 +1,36 @@
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import lanesweep
+import pytest
+
+
+@pytest.fixture(scope="session")
+def program() -> Callable[..., subprocess.CompletedProcess[str]]:
+    """The command line in a process of its own."""
+
+    def run(*words: object) -> subprocess.CompletedProcess[str]:
+        command = [sys.executable, "-m", "lanesweep", *map(str, words)]
+        return subprocess.run(command, capture_output=True, text=True, check=False)
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def scenarios(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Mined scenarios of two generated recordings."""
+    folder = tmp_path_factory.mktemp("data")
+    lanesweep.synth(folder / "recordings", synth_recordings=2)
+    return Path(lanesweep.mine(folder / "recordings", out=folder / "scenarios.jsonl"))
+
+
+@pytest.fixture(scope="session")
+def density(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A density of cut-ins."""
+    folder = tmp_path_factory.mktemp("density")
+    lanesweep.fit(synth_recordings=6, categories="cut-in", parameterizations=2, no_comparison=True, out=folder)
+    return folder / "cut-in-2.json"

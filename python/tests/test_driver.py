@@ -1,0 +1,111 @@
+"""Drivers in Python."""
+
+from __future__ import annotations
+
+import os
+import signal
+import threading
+from typing import Any
+
+import lanesweep
+import numpy as np
+import pytest
+from lanesweep.drivers import IDM, Reg157
+
+CASES = {
+    "ego_speed": np.linspace(15, 40, 200),
+    "speed": np.linspace(10, 30, 200),
+    "gap": np.tile([5.0, 15.0, 30.0, 60.0], 50),
+    "lateral_speed": np.tile([0.5, 1.0, 1.5, 2.0, 2.5], 40),
+}
+
+
+def test_reg157_in_numpy_is_the_built_in_model_to_the_bit(scenarios) -> None:
+    models = [Reg157(), "Reg157"]
+    frame = lanesweep.simulate(CASES, category="cut-in", models=models).to_pandas()
+    ours, theirs = (frame[frame["model"] == name].reset_index(drop=True) for name in ("Reg157-numpy", "Reg157"))
+    columns = ["collision", "ttc", "btn", "min_ttc_s", "max_btn", "min_gap_m", "end_s", "impact_speed_mps"]
+    assert len(ours) == 200 and ours["collision"].nunique() == 2
+    assert ours[columns].equals(theirs[columns])
+    # All lanes of a study: cut-ins, cut-outs and leaders, recorded and parameterized.
+    study = lanesweep.study(scenarios=scenarios, models=models).table("failures").to_pandas()
+    by_model = {name: group.drop(columns="model").reset_index(drop=True) for name, group in study.groupby("model")}
+    assert by_model["Reg157-numpy"].equals(by_model["Reg157"])
+
+
+def test_a_driver_is_scored_sampled_and_mapped_like_the_built_in_ones(scenarios, density) -> None:
+    idm = IDM(headway_s=1.2)
+    study = lanesweep.study(scenarios=scenarios, models=["FSM", idm], thw="1.2,0.4")
+    assert {row["model"] for row in study.table("f1").rows()} == {"FSM", "IDM"}
+    assert "IDM" in str(study)
+    sample = lanesweep.sample(density, models=[idm], samples=500, thw=1.2)
+    assert [row["model"] for row in sample.table("estimates").rows()].count("IDM") == 1
+    grid = lanesweep.map("cut-in", models=[idm], x="gap=5..25/5", y="speed_kmh=40..80/5", fixed="ego_speed_kmh=90")
+    assert grid.status == "ok"
+
+
+class Wrong(lanesweep.Driver):
+    may_accelerate = False
+
+    def __init__(self, answer: Any) -> None:
+        self.answer = answer
+
+    def acceleration(self, view: lanesweep.View, state: Any) -> Any:
+        return self.answer(view) if callable(self.answer) else self.answer
+
+
+def fail(view: lanesweep.View) -> None:
+    raise ZeroDivisionError("the driver fell asleep")
+
+
+@pytest.mark.parametrize(
+    ("answer", "message"),
+    [
+        (fail, "step 0.*ZeroDivisionError"),
+        (lambda view: np.zeros(len(view) + 1), "201 numbers for 200 lanes"),
+        (lambda view: np.zeros((len(view), 2)), "2 dimensions"),
+        (lambda view: np.full(len(view), np.nan), "NaN"),
+        (lambda view: np.full(len(view), -1000.0), "-1000"),
+        (lambda view: ["hard"] * len(view), "ValueError"),
+        (None, "step 0"),
+    ],
+)
+def test_a_wrong_driver_is_an_error_with_its_cause(answer, message) -> None:
+    with pytest.raises(lanesweep.InputError, match=message) as raised:
+        lanesweep.simulate(CASES, category="cut-in", models=[Wrong(answer)])
+    if answer is fail:
+        assert isinstance(raised.value.__cause__, ZeroDivisionError)
+    assert len(lanesweep.simulate(CASES, category="cut-in", models="FSM")) == 200
+
+
+def test_a_number_for_all_lanes_and_lists_are_accelerations_too() -> None:
+    constant = lanesweep.simulate(CASES, category="cut-in", models=[Wrong(-3.0)]).to_pandas()
+    listed = lanesweep.simulate(CASES, category="cut-in", models=[Wrong(lambda view: [-3] * len(view))]).to_pandas()
+    assert constant.equals(listed) and (constant["reaction_s"] == 0).all()
+
+
+def test_a_driver_that_brakes_harder_collides_less() -> None:
+    counts = [
+        lanesweep.simulate(CASES, category="cut-in", models=[Wrong(a)])["collision"].sum() for a in (0.0, -1.0, -4.0, -9.0)
+    ]
+    assert counts == sorted(counts, reverse=True) and counts[0] > counts[-1]
+
+
+def test_names_that_cannot_be_are_refused() -> None:
+    for name in ("FSM", "two words", "a/b"):
+        driver = Wrong(0.0)
+        driver.name = name
+        with pytest.raises(lanesweep.UsageError):
+            lanesweep.simulate(CASES, category="cut-in", models=[driver])
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals")
+def test_an_interrupt_stops_a_slow_driver() -> None:
+    def slow(view: lanesweep.View) -> float:
+        threading.Event().wait(0.05)
+        return 0.0
+
+    threading.Timer(0.5, lambda: signal.raise_signal(signal.SIGINT)).start()
+    with pytest.raises(KeyboardInterrupt):
+        lanesweep.simulate(CASES, category="cut-in", models=[Wrong(slow)])
+    assert len(lanesweep.simulate(CASES, category="cut-in", models="FSM")) == 200

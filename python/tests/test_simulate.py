@@ -1,0 +1,100 @@
+"""Tables of concrete cases."""
+
+from __future__ import annotations
+
+import lanesweep
+import numpy as np
+import pandas as pd
+import polars as pl
+import pyarrow as pa
+import pytest
+
+CASES = {
+    "ego_speed_mps": [30.0, 25.0, 33.0],
+    "speed_mps": [20.0, 20.0, 15.0],
+    "gap_m": [12.0, 40.0, 20.0],
+    "lateral_speed_mps": [1.0, 1.5, 2.0],
+}
+
+
+def test_every_library_of_tables_gives_the_same_outcomes() -> None:
+    tables = [CASES, pd.DataFrame(CASES), pl.DataFrame(CASES), pa.table(CASES), {k: np.array(v) for k, v in CASES.items()}]
+    frames = [lanesweep.simulate(table, category="cut-in").to_pandas() for table in tables]
+    assert len(frames[0]) == 12 and list(frames[0]["case"]) == [0] * 4 + [1] * 4 + [2] * 4
+    for frame in frames[1:]:
+        pd.testing.assert_frame_equal(frame, frames[0])
+
+
+def test_a_row_is_the_case_that_trace_runs() -> None:
+    frame = lanesweep.simulate(CASES, category="cut-in", models="FSM")
+    for row in frame.rows():
+        at = row["case"]
+        case = {key.rsplit("_", 1)[0]: values[at] for key, values in CASES.items()}
+        traced = lanesweep.trace(category="cut-in", models="FSM", **case).document["lanes"][0]
+        outcome = traced.get("outcome", traced)
+        assert outcome["collision"] == row["collision"]
+        # A trace is in binary64.
+        assert row["min_ttc_s"] == pytest.approx(outcome["min_ttc_s"], rel=1e-4)
+
+
+def test_headways_for_all_cases_and_mixed_categories_keep_the_order() -> None:
+    table = {
+        "category": ["lvd", "cut-in", "lvd"],
+        "ego_speed": [30, 30, 20],
+        "speed": [30, 20, 20],
+        "lateral_speed": [None, 1.0, None],
+        "acceleration": [-6.0, None, -6.0],
+    }
+    frame = lanesweep.simulate(pd.DataFrame(table), thw=[1.2, "0.4"], models=["RSS", "FSM"])
+    rows = [(row["case"], row["headway"], row["model"]) for row in frame.rows()]
+    assert rows == [(case, thw, model) for case in range(3) for thw in ("1.2s", "0.4s") for model in ("RSS", "FSM")]
+    assert frame.units["min_ttc_s"] == "s" and "collision" in frame.descriptions["collision"]
+
+
+def test_cases_of_any_number_are_those_of_their_parts() -> None:
+    rng = np.random.default_rng(1)
+    n = 70_000
+    table = {
+        "ego_speed": rng.uniform(10, 40, n),
+        "speed": rng.uniform(5, 35, n),
+        "gap": rng.uniform(2, 60, n),
+        "lateral_speed": rng.uniform(0.3, 2.5, n),
+    }
+    whole = lanesweep.simulate(table, category="cut-in", models="FSM", backend="cpu")
+    part = lanesweep.simulate({k: v[66_000:] for k, v in table.items()}, category="cut-in", models="FSM", backend="cpu")
+    assert np.array_equal(whole["case"], np.arange(n))
+    for column in ("collision", "ttc", "btn", "min_gap_m"):
+        assert np.array_equal(whole[column][66_000:], part[column], equal_nan=column == "min_gap_m"), column
+    assert 0 < whole["collision"].sum() < n
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"ego_speed_mps": [30.0, float("nan"), 33.0]}, "row 1.*ego_speed|ego_speed.*row 1"),
+        ({"ego_speed_mps": [30.0, 300.0, 33.0]}, "ego_speed.*row 1|row 1.*ego_speed"),
+        ({"ego_speed_mps": ["fast", "slow", "30"]}, "ego_speed"),
+        ({"colour": ["red"] * 3}, "colour.*no such column"),
+        ({"gap": [1.0, 2.0, 3.0]}, "gap.*says the same"),
+        ({"thw_s": [1.0, 1.0, 1.0]}, "both gap and time headway"),
+        ({"gap_m": []}, "differ in length"),
+        ({"category": ["cut-in"] * 3}, "argument `category` is given too"),
+        ({"gap_m": np.zeros((3, 2))}, "differ in length"),
+    ],
+)
+def test_wrong_cases_are_named(change, message) -> None:
+    with pytest.raises(lanesweep.InputError, match=message):
+        lanesweep.simulate({**CASES, **change}, category="cut-in")
+
+
+def test_what_is_no_table_is_refused() -> None:
+    with pytest.raises(TypeError, match="no table"):
+        lanesweep.simulate([1, 2, 3])
+    with pytest.raises(lanesweep.InputError, match="no rows"):
+        lanesweep.simulate(pd.DataFrame({"ego_speed": pd.Series([], dtype=float)}), category="cut-in", thw=1)
+    with pytest.raises(lanesweep.InputError, match="initial distance is missing"):
+        lanesweep.simulate({"ego_speed": 30, "speed": 20, "lateral_speed": 1}, category="cut-in")
+    with pytest.raises(lanesweep.UsageError, match="no headway"):
+        lanesweep.simulate({"ego_speed": 30, "lateral_speed": 1}, category="cut-in", thw="soon")
+    with pytest.raises(lanesweep.UsageError, match="no profile|profile"):
+        lanesweep.simulate({"ego_speed": 30, "lateral_speed": 1}, category="cut-in", thw=1, profile="none-such")

@@ -1,0 +1,118 @@
+"""Verbs as functions: the program's own files, and its errors as exceptions."""
+
+from __future__ import annotations
+
+import logging
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import lanesweep
+import pytest
+
+ROOT = Path(__file__).parents[1]
+
+
+def test_the_functions_are_those_of_the_program() -> None:
+    subprocess.run([sys.executable, ROOT / "generate.py", "--check"], check=True)
+
+
+def test_a_study_has_the_bytes_of_the_command_line(program, scenarios, tmp_path) -> None:
+    ours = lanesweep.study(scenarios=scenarios, backend="cpu", out=tmp_path / "ours")
+    theirs = program("-q", "study", "--scenarios", scenarios, "--backend", "cpu", "--out", tmp_path / "theirs")
+    assert theirs.returncode == 0, theirs.stderr
+    names = {path.name for path in (tmp_path / "ours").iterdir()}
+    assert names == {path.name for path in (tmp_path / "theirs").iterdir()} and len(names) > 20
+    # Times and paths are in the record, in the page, and in the list with their checksums.
+    for name in names - {"run.json", "report.html", "lanesweep-files.json", "report.txt"}:
+        assert (tmp_path / "ours" / name).read_bytes() == (tmp_path / "theirs" / name).read_bytes(), name
+    assert ours.status == "ok" and ours.folder == tmp_path / "ours"
+
+
+def test_a_sample_has_the_bytes_of_the_command_line(program, density, tmp_path) -> None:
+    options = {"samples": 3000, "thw": [1.2, 0.4], "models": ["FSM", "RSS"]}
+    lanesweep.sample(density, **options, backend="cpu", out=tmp_path / "ours")
+    words = ["--samples=3000", "--thw=1.2,0.4", "--models=FSM,RSS", "--backend=cpu", f"--out={tmp_path / 'theirs'}"]
+    theirs = program("-q", "sample", density, *words)
+    assert theirs.returncode == 0, theirs.stderr
+    for name in ["estimates.csv", "worst.csv", "convergence.csv", "convergence.svg", "density.json", "map-FSM.svg"]:
+        assert (tmp_path / "ours" / name).read_bytes() == (tmp_path / "theirs" / name).read_bytes(), name
+
+
+def test_a_result_has_tables_figures_and_a_page(scenarios) -> None:
+    result = lanesweep.study(scenarios=scenarios, thw="1.2,0.6", backend="cpu")
+    frame = result.table("f1").to_pandas()
+    assert set(frame["model"]) == {"Reg157", "CCHDM", "RSS", "FSM"}
+    assert frame["parameterization"].map(type).eq(str).all() and frame["tp"].dtype.kind == "i"
+    assert frame["f1"].dropna().between(0, 1).all()
+    assert len(result.table("failures")) == len(result.table("failures").to_polars())
+    headways = result.table("headways").to_arrow()
+    assert headways.num_rows == len(result.table("headways"))
+    assert "<svg" in result.figure("radar-cut-in").svg
+    assert "<iframe" in result._repr_html_() and "SYNTHETIC" in str(result)
+    with pytest.raises(KeyError, match="there are .*f1"):
+        result.table("f2")
+    folder = Path(result)
+    assert folder.is_dir()
+    del result
+    assert not folder.exists()
+
+
+def test_a_check_has_its_answer_as_status() -> None:
+    safe = lanesweep.check(category="cut-in", ego_speed="60km/h", speed="40km/h", gap=30, lateral_speed=1)
+    assert safe.status == "ok" and "preventable" in str(safe.document).lower()
+    close = lanesweep.check(category="cut-in", ego_speed=30.0, speed=10.0, gap=3, lateral_speed=2)
+    assert close.status == "not preventable"
+
+
+def test_errors_are_exceptions_with_place_and_help(tmp_path) -> None:
+    with pytest.raises(lanesweep.UsageError, match="no driver model `FSN`") as raised:
+        lanesweep.study(synth_recordings=1, models="FSN")
+    assert raised.value.exit_code == 2 and "use one of" in raised.value.help
+    with pytest.raises(lanesweep.LanesweepError, match="nothing-here"):
+        lanesweep.study(tmp_path / "nothing-here")
+    bad = tmp_path / "bad.jsonl"
+    bad.write_text("{}\n")
+    with pytest.raises(lanesweep.InputError, match=r"bad\.jsonl, line 1"):
+        lanesweep.study(scenarios=bad)
+    with pytest.raises(lanesweep.UsageError, match="synth-recordings|synth_recordings"):
+        lanesweep.study(synth_recordings="many")
+    assert not list(tmp_path.glob("**/.*"))
+
+
+def test_messages_go_to_logging(caplog, scenarios) -> None:
+    with caplog.at_level(logging.INFO, "lanesweep"):
+        lanesweep.study(scenarios=scenarios, thw=1.2, models="FSM", backend="cpu")
+    assert any("lanes on" in record.message for record in caplog.records)
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals")
+def test_an_interrupt_ends_a_run_and_a_next_one_works(density) -> None:
+    threading.Timer(1.0, lambda: signal.raise_signal(signal.SIGINT)).start()
+    start = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        lanesweep.sample(density, samples=10**10, thw=1.2, backend="cpu")
+    assert time.monotonic() - start < 15
+    assert lanesweep.sample(density, samples=100, thw=1.2, backend="cpu").status == "ok"
+
+
+def test_a_second_run_of_the_process_is_refused_and_harms_nothing(density) -> None:
+    done: list[object] = []
+    thread = threading.Thread(target=lambda: done.append(lanesweep.sample(density, samples=3 * 10**6, thw=1.2, backend="cpu")))
+    thread.start()
+    time.sleep(0.5)
+    if thread.is_alive():
+        with pytest.raises(lanesweep.BusyError):
+            lanesweep.sample(density, samples=100, thw=1.2, backend="cpu")
+    thread.join()
+    assert done[0].status == "ok"  # type: ignore[attr-defined]
+
+
+def test_the_command_line_is_complete(program) -> None:
+    assert program("--version").stdout.startswith("lanesweep ")
+    refused = program("study", "--no-such-flag")
+    assert refused.returncode == 2 and "no-such-flag" in refused.stderr
