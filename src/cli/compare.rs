@@ -71,7 +71,7 @@ impl Compare {
         self.guard_inputs(configured)?;
         check_folder(&self.out)?;
         let opened = configured.open()?;
-        let collection = self.data.load_told(configured, verbosity)?;
+        let collection = self.data.report_and_load(configured, verbosity)?;
         let facts = DataProvenance::of(&self.data.source(configured), &collection, typed)?;
         if facts.driven.is_none() {
             tracing::warn!(

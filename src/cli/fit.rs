@@ -77,7 +77,7 @@ impl Fit {
             representativeness: !self.no_comparison,
         };
         let files = self.files(&ids, configured)?;
-        let collection = self.data.load_told(configured, verbosity)?;
+        let collection = self.data.report_and_load(configured, verbosity)?;
         let facts = DataProvenance::of(&self.data.source(configured), &collection, typed)?;
         if facts.driven.is_none() {
             tracing::warn!(

@@ -80,7 +80,7 @@ impl Justify {
         }
         check_folder(&self.out)?;
         let opened = configured.open()?;
-        let collection = self.data.load_told(configured, verbosity)?;
+        let collection = self.data.report_and_load(configured, verbosity)?;
         let facts =
             DataProvenance::of(&self.data.source(configured), &collection, Driven { hours: None, kilometres: None })?;
         let options = JustifyOptions {

@@ -92,7 +92,7 @@ impl Slurm {
         // submit.sh comes last: if it exists, all scripts are from the same command.
         let run_folder = OutputDir::open(folder, "submit.sh")?;
         let mut results = run_folder.results()?;
-        let mut told = String::new();
+        let mut written = String::new();
         for (name, text, what) in [
             ("array.sbatch", &texts.array, format!("{} tasks, one shard each", array.shards)),
             ("merge.sbatch", &texts.merge, "the result of the whole run".to_owned()),
@@ -102,11 +102,11 @@ impl Slurm {
             if name != "submit.sh" {
                 results.add(name, text.as_bytes())?;
             }
-            told += &format!("{}: {what}\n", path.display());
+            written += &format!("{}: {what}\n", path.display());
         }
         results.publish(texts.submit.as_bytes())?;
         let submit = shell_quoted(Place::option("scripts"), &format!("{}/submit.sh", array.scripts))?;
-        console::print(&format!("{told}\nSubmit with:\n  bash {submit}\n"))?;
+        console::print(&format!("{written}\nSubmit with:\n  bash {submit}\n"))?;
         Ok(Exit::Ok)
     }
 

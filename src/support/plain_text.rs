@@ -159,8 +159,8 @@ mod tests {
             format!("`{long}` of `{}` b`", long.replace('a', "a b`c ")),
             format!("{long}/{long}"),
         ] {
-            let told = cut_names(&hostile);
-            assert!(told.chars().count() <= MAX_MESSAGE, "{} characters of {told:.200}", told.len());
+            let message = cut_names(&hostile);
+            assert!(message.chars().count() <= MAX_MESSAGE, "{} characters of {message:.200}", message.len());
         }
         assert_eq!(cut_names(&format!("no `{long}` here")).chars().count(), MAX_NAME + 10);
         assert_eq!(cut_names(&format!("no {long} here")), format!("no {short} here"));

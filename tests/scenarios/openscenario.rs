@@ -271,8 +271,8 @@ fn lanes_of_a_study_and_of_a_sampling_run_are_those_of_simulate_in_binary32() {
     assert_eq!(check(&["--from", "study", "--worst", "3", "--models", "FSM,RSS", "--side", "left"], "study"), 6);
     let listed = good(root, &["export", "xosc", "--from", "study", "--worst", "1", "--models", "RSS", "--out", "y"]);
     let lane = listed.lines().next().unwrap().split_once("  ").unwrap().1;
-    let told = ["--from", "study", "--scenarios", "s.jsonl", "--side", "left", "--lane", lane];
-    assert_eq!(check(&told, "study"), 1);
+    let flags = ["--from", "study", "--scenarios", "s.jsonl", "--side", "left", "--lane", lane];
+    assert_eq!(check(&flags, "study"), 1);
     // What an earlier export left does not stand beside the new files.
     assert_eq!(std::fs::read_dir(root.join("x")).unwrap().count(), 4);
 

@@ -602,8 +602,8 @@ fn white_space_may_change_but_lengths_must_fit() {
     ] {
         let mut file = good.clone();
         *file.pointer_mut(pointer).unwrap() = value;
-        let told = DensityModel::from_json(&serde_json::to_vec(&file).unwrap(), &place).unwrap_err().to_string();
-        let hash = told.split("the content has ").nth(1).unwrap()[..64].to_owned();
+        let message = DensityModel::from_json(&serde_json::to_vec(&file).unwrap(), &place).unwrap_err().to_string();
+        let hash = message.split("the content has ").nth(1).unwrap()[..64].to_owned();
         file["content_sha256"] = Value::String(hash);
         let error = DensityModel::from_json(&serde_json::to_vec(&file).unwrap(), &place).unwrap_err().to_string();
         assert!(error.contains("density.json") && error.contains(expected), "{pointer}: {error}");

@@ -75,9 +75,9 @@ impl StudyHead {
         let wanted = wanted(count);
         let begin = file.stream_position().map_err(io)?;
         let end = file.seek(SeekFrom::End(0)).map_err(io)?;
-        let told = self.scenario_bytes();
-        if end - begin != told {
-            let problem = format!("it holds {} bytes of scenarios, where its head tells of {told}", end - begin);
+        let expected = self.scenario_bytes();
+        if end - begin != expected {
+            let problem = format!("it holds {} bytes of scenarios, where its head tells of {expected}", end - begin);
             return Err(wrong(format!("{problem}: it was cut off or added to")));
         }
         let (mut held, mut at) = (Vec::new(), begin);
