@@ -80,9 +80,9 @@ impl Check {
         self.guard_outputs()?;
         let names = if self.profiles.is_empty() { PROFILES.map(str::to_owned).to_vec() } else { self.profiles.clone() };
         let mut profiles = names.iter().map(|name| Profile::load(name.trim())).collect::<Result<Vec<_>>>()?;
-        let asked = self.asked(&profiles[0])?;
+        let request = self.request(&profiles[0])?;
         // A profile that only adds its own cut-in clause does not apply to other cases.
-        if self.profiles.is_empty() && asked.subject.category() != Category::CutIn {
+        if self.profiles.is_empty() && request.subject.category() != Category::CutIn {
             let first = profiles[0].clone();
             let is_first = |p: &Profile| {
                 (&p.frame, &p.cchdm, &p.rss, &p.fsm) == (&first.frame, &first.cchdm, &first.rss, &first.fsm)
@@ -90,12 +90,12 @@ impl Check {
             profiles.retain(|profile| profile.name == first.name || !is_first(profile));
         }
         let models = self.case.named_models()?.unwrap_or_else(|| ModelId::ALL.to_vec());
-        let check = Checked { subject: asked.subject, profiles, models };
+        let check = Checked { subject: request.subject, profiles, models };
         let judgements = check.run()?;
         let sheet = CaseSheet {
             subject: &check.subject,
-            origin: asked.origin,
-            is_synthetic: asked.is_synthetic,
+            origin: request.origin,
+            is_synthetic: request.is_synthetic,
             profiles: &check.profiles,
             judgements: &judgements,
             command: console::command_line(),
@@ -110,7 +110,7 @@ impl Check {
         self.format.print(|| sheet.text(), || sheet.json())?;
         Ok(match judgements[0].verdict() {
             // If input was skipped the answer is incomplete.
-            _ if asked.incomplete => Exit::Incomplete,
+            _ if request.incomplete => Exit::Incomplete,
             Verdict::Undecided => Exit::Undecided,
             Verdict::OutsideAnnex => Exit::OutsideAnnex,
             Verdict::Answer(Answer::Preventable) => Exit::Ok,
@@ -119,7 +119,7 @@ impl Check {
         })
     }
 
-    fn asked(&self, profile: &Profile) -> Result<CheckRequest> {
+    fn request(&self, profile: &Profile) -> Result<CheckRequest> {
         let Some(path) = &self.file else {
             return self.of_flags(CaseFlags::default(), profile, "a case of flags".to_owned());
         };

@@ -172,15 +172,15 @@ const BYTES_PER_THREAD: usize = 4 << 20;
 ///
 /// # Errors
 /// [`Error::Io`] if the system has no more threads, or no memory for them.
-fn start_threads(asked: Option<usize>) -> Result<()> {
+fn start_threads(requested: Option<usize>) -> Result<()> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let useful = THREADS_PER_CORE * cores;
-    if let Some(asked) = asked.filter(|asked| *asked > useful) {
-        tracing::info!("--threads {asked}: {useful} are started, {THREADS_PER_CORE} per logical core");
+    if let Some(requested) = requested.filter(|requested| *requested > useful) {
+        tracing::info!("--threads {requested}: {useful} are started, {THREADS_PER_CORE} per logical core");
     }
-    let count = asked.map(|asked| asked.min(useful));
+    let count = requested.map(|requested| requested.min(useful));
     let refused = |reason: String| {
-        let what = asked.map_or("the worker threads".to_owned(), |asked| format!("--threads {asked}"));
+        let what = requested.map_or("the worker threads".to_owned(), |requested| format!("--threads {requested}"));
         Error::io(what, "start", std::io::Error::new(std::io::ErrorKind::WouldBlock, reason))
     };
     // If memory ran out after some threads had started, an allocation in one of them would end the process.

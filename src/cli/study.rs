@@ -148,13 +148,13 @@ impl Study {
     pub(super) fn check(&self, configured: &Configured) -> Result<()> {
         self.guard_inputs(configured)?;
         check_folder(&self.out)?;
-        let (profile, options) = self.asked(configured)?;
+        let (profile, options) = self.profile_and_options(configured)?;
         profile.check_time_step(&options.models)?;
         self.data.check(configured)
     }
 
     /// The profile and the options of the study.
-    fn asked(&self, configured: &Configured) -> Result<(Profile, StudyOptions)> {
+    fn profile_and_options(&self, configured: &Configured) -> Result<(Profile, StudyOptions)> {
         let profile = configured.profile()?;
         let options = StudyOptions {
             categories: self.categories.list()?,
@@ -168,7 +168,7 @@ impl Study {
     /// Makes a plan from the data.
     fn prepare(&self, configured: &Configured, verbosity: Verbosity) -> Result<(study::Study, Timings)> {
         let config = configured.settings.clone();
-        let (profile, options) = self.asked(configured)?;
+        let (profile, options) = self.profile_and_options(configured)?;
         let source = self.data.source(configured);
         let has_paper_headways = options.headways == Headway::paper();
         // Generated data are described with the answer.

@@ -206,7 +206,7 @@ impl<'a> Executor<'a> {
 /// Computes a chunk and checks that it holds what was requested.
 fn compute(plan: &LanePlan, session: &mut dyn Session, units: &Range<u64>, wanted: Wanted) -> Result<Chunk> {
     let chunk = session.run(units.clone(), wanted)?;
-    chunk.check_asked(plan, units, wanted)?;
+    chunk.check_requested(plan, units, wanted)?;
     Ok(chunk)
 }
 

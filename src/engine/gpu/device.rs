@@ -86,7 +86,7 @@ impl Device {
         let mut features = wgpu::Features::empty();
         features.set(wgpu::Features::TIMESTAMP_QUERY, card.timestamps);
         features.set(wgpu::Features::PASSTHROUGH_SHADERS, exact);
-        let asked = adapter.request_device(&wgpu::DeviceDescriptor {
+        let request = adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("lanesweep"),
             required_features: features,
             // The device's own limits, not the portable 128 MiB.
@@ -95,7 +95,7 @@ impl Device {
             memory_hints: wgpu::MemoryHints::Performance,
             trace: wgpu::Trace::Off,
         });
-        let (device, queue) = pollster::block_on(asked).map_err(|e| {
+        let (device, queue) = pollster::block_on(request).map_err(|e| {
             Error::device(
                 &card.name,
                 format!("it cannot be opened: {e}"),

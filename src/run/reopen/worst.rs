@@ -88,9 +88,10 @@ impl Reopened {
         for (at, record) in reader.records().enumerate() {
             let record = record.map_err(|e| wrong(at as u64 + 2, e.to_string()))?;
             let ranked_by = by.and_then(|by| record.get(by)).unwrap_or_default();
-            if let Some(asked) = options.criterion.filter(|asked| asked.key() != ranked_by) {
-                let problem = format!("worst.csv ranks its lanes by {ranked_by}, not by {}", asked.key());
-                let help = format!("leave it out, or run `lanesweep sample` with option `criterion = {}`", asked.key());
+            if let Some(requested) = options.criterion.filter(|requested| requested.key() != ranked_by) {
+                let problem = format!("worst.csv ranks its lanes by {ranked_by}, not by {}", requested.key());
+                let help =
+                    format!("leave it out, or run `lanesweep sample` with option `criterion = {}`", requested.key());
                 return Err(Error::usage(Place::option("criterion"), problem, help));
             }
             let key = self.find(text_of_cell(record.get(column).unwrap_or("")))?;
