@@ -167,11 +167,11 @@ impl Outcome {
             let kept_raised = our_kept / sets as f64 / (kept / PUBLISHED_SETS);
             let name = category.label();
             // Gentle decelerations are not raised by the rate factor, and hard ones more.
-            let (raise, most) = if category == Category::Lvd { (1.0, 2.0) } else { (self.rate_factor, 1.2) };
-            figures.push((format!("{name} found per data set, factor"), raised / raise, 0.6, most));
+            let (raise, max) = if category == Category::Lvd { (1.0, 2.0) } else { (self.rate_factor, 1.2) };
+            figures.push((format!("{name} found per data set, factor"), raised / raise, 0.6, max));
             // The published failures of LVD ask for more hard brakings than were published.
-            let most = if category == Category::Lvd { 2.2 } else { 1.5 };
-            figures.push((format!("{name} kept per data set, factor"), kept_raised / self.rate_factor, 0.8, most));
+            let max = if category == Category::Lvd { 2.2 } else { 1.5 };
+            figures.push((format!("{name} kept per data set, factor"), kept_raised / self.rate_factor, 0.8, max));
         }
         let traffic = &self.traffic;
         figures.push(("density, veh/km and lane".to_owned(), traffic.density / traffic.looks as f64, 12.0, 16.5));

@@ -57,8 +57,8 @@ pub(super) fn run(
             "{:.3} % of the distribution of {} are outside {} … {} {} and are not drawn",
             100.0 * (1.0 - p.kept_share),
             p.parameter.key,
-            readable::value(p.parameter.least),
-            readable::value(p.parameter.most),
+            readable::value(p.parameter.min),
+            readable::value(p.parameter.max),
             p.parameter.unit
         );
     }

@@ -67,12 +67,12 @@ impl Verify {
             Some(VerifyVerb::Conformance(verb)) => return verb.run(),
             None => (),
         }
-        for (flag, value, most) in [
+        for (flag, value, max) in [
             ("--random-lanes", self.random_lanes, MAX_LANES),
             ("--threshold-units", self.threshold_units, MAX_LANES / 1000),
         ] {
-            if value == 0 || value > most {
-                let problem = format!("{value} is not usable; expected 1 to {most}");
+            if value == 0 || value > max {
+                let problem = format!("{value} is not usable; expected 1 to {max}");
                 return Err(Error::usage(Place::item(flag), problem, "choose a number in this range"));
             }
         }

@@ -245,16 +245,16 @@ impl Slot {
             return;
         }
         let limits = device.device.limits();
-        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let max_bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
         // Doubling makes growth rare; the device's maximum is the limit.
-        let room = |bytes: u64, most: u64| bytes.next_power_of_two().min(most).max(bytes);
+        let room = |bytes: u64, max_bytes: u64| bytes.next_power_of_two().min(max_bytes).max(bytes);
         let results = Use::STORAGE | Use::COPY_SRC | Use::COPY_DST;
         let stride = u64::from(launch_stride(device));
         self.buffers = Some(Buffers {
             launches: device.buffer("launches", stride * models as u64, Use::UNIFORM | Use::COPY_DST),
-            verdicts: device.buffer("verdicts", room(parts.verdicts, most), results),
-            outcomes: device.buffer("outcomes", room(parts.outcomes, most), results),
-            finished: device.buffer("finished", room(parts.finished, most), results),
+            verdicts: device.buffer("verdicts", room(parts.verdicts, max_bytes), results),
+            outcomes: device.buffer("outcomes", room(parts.outcomes, max_bytes), results),
+            finished: device.buffer("finished", room(parts.finished, max_bytes), results),
             readback: device.buffer(
                 "results",
                 room(parts.total(), limits.max_buffer_size),

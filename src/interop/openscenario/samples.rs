@@ -100,11 +100,11 @@ impl DistributionSamples {
         let mut parameters: Vec<SampledParameter> = Vec::new();
         for (name, line, distribution) in of_file {
             let (parameter, factor) = names.find(name, *line)?;
-            let within = Range { low: parameter.least / factor, high: parameter.most / factor };
+            let within = Range { low: parameter.min / factor, high: parameter.max / factor };
             let (draw, kept_share) = distribution.within(within).ok_or_else(|| {
                 let place = Place::file(names.path).row(*line).of(format!("parameter `{name}`"));
                 let problem =
-                    format!("none of its values lies in {} … {} {}", parameter.least, parameter.most, parameter.unit);
+                    format!("none of its values lies in {} … {} {}", parameter.min, parameter.max, parameter.unit);
                 Error::input(place, problem, "correct the distribution, or its unit with option `rename`")
             })?;
             parameters.push(SampledParameter { parameter, draw, factor, kept_share });
@@ -213,6 +213,6 @@ impl DistributionSamples {
 impl SampledParameter {
     /// The value of a uniform number, in the parameter's unit.
     fn value(&self, uniform: f64) -> f64 {
-        (self.draw.value(uniform) * self.factor).clamp(self.parameter.least, self.parameter.most)
+        (self.draw.value(uniform) * self.factor).clamp(self.parameter.min, self.parameter.max)
     }
 }

@@ -101,15 +101,15 @@ impl Conclusion {
 impl Rules {
     /// Findings on recall and precision.
     pub(super) fn of_labels(&self, scored: &Scored, options: &ScoreOptions) -> Vec<Finding> {
-        let least = u64::from(options.min_failures.max(1));
+        let min_failures = u64::from(options.min_failures.max(1));
         let failing = scored.failing_scenarios;
         let share = |quantity, share: Share, limit: f64| {
             // Few scenarios give little evidence, independent of the number of headways that fail in each.
             let (conclusion, need) = match share.value.zip(share.interval) {
-                Some((value, interval)) if failing >= least => conclude(value, interval, limit),
+                Some((value, interval)) if failing >= min_failures => conclude(value, interval, limit),
                 _ => {
                     // Without any failure the required number of scenarios is unknown.
-                    let times = least as f64 / failing as f64;
+                    let times = min_failures as f64 / failing as f64;
                     (Conclusion::Undecided, (failing > 0).then_some(Need { times: times.max(1.1) }))
                 }
             };

@@ -186,8 +186,8 @@ fn slot(place: Option<usize>) -> u32 {
 fn at_least(bound: f64, excluded: bool) -> f32 {
     let rounded = bound as f32;
     let kept = |v: f32| if excluded { f64::from(v) > bound } else { f64::from(v) >= bound };
-    let least = if kept(rounded) { rounded } else { rounded.next_up() };
-    if least.is_subnormal() { f32::MIN_POSITIVE } else { least }
+    let min = if kept(rounded) { rounded } else { rounded.next_up() };
+    if min.is_subnormal() { f32::MIN_POSITIVE } else { min }
 }
 
 /// The largest number of the lane arithmetic that satisfies an upper bound.

@@ -152,8 +152,8 @@ impl fmt::Display for Warning {
             Warning::FewFailures { failures: 1 } => write!(f, "only 1 failure was found"),
             Warning::FewFailures { failures } => write!(f, "only {failures} failures were found"),
             Warning::FewScenarios { scenarios } => {
-                let least = Warning::MIN_SCENARIOS;
-                write!(f, "the failures come from effectively {scenarios:.1} scenarios; at least {least} are needed")
+                let min = Warning::MIN_SCENARIOS;
+                write!(f, "the failures come from effectively {scenarios:.1} scenarios; at least {min} are needed")
             }
             Warning::DataLeftOut => write!(f, "the interval is that of the draws: other scenarios would change more"),
             Warning::NotCompared => write!(
