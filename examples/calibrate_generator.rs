@@ -307,8 +307,8 @@ fn show(seeds: &[u64], behaviour: Behaviour, profile: &Profile) -> Result<(), Bo
         row(claim.claim.id, "", outcomes.iter().map(|of| of.claims[at].verdict.text().to_owned()));
     }
     let misfit = |outcome: &Outcome| Misfit::of(&outcome.scores).expect("all models are published");
-    row("shares within the limits", "", each(&|of| format!("{} of {}", misfit(of).near, misfit(of).shares)));
-    row("root mean square of the shares, points", "", each(&|of| format!("{:.2}", misfit(of).share_rms_points)));
+    row("shares within the limits", "", each(&|of| format!("{} of {}", misfit(of).near, misfit(of).rates)));
+    row("root mean square of the shares, points", "", each(&|of| format!("{:.2}", misfit(of).rate_rms_points)));
     row("mean difference of the LVD F1", "", each(&|of| format!("{:.3}", misfit(of).f1_mean)));
     row("largest", "", each(&|of| format!("{:.3}", misfit(of).f1_largest)));
     Ok(())

@@ -261,7 +261,7 @@ fn row(base: &Scored, scores: &Scored) -> String {
         kept.join(" "),
         largest(&shares),
         largest(&f1s),
-        misfit.share_rms_points,
+        misfit.rate_rms_points,
         misfit.f1_mean,
         other_verdicts(&base.claims, &scores.claims)
     )

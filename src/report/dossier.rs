@@ -212,7 +212,7 @@ impl DossierReport<'_> {
         let coverage = dossier.coverage.as_ref().map(|coverage| {
             json!({
                 "found": coverage.found, "kept": coverage.kept, "points": coverage.points,
-                "valid_share": coverage.valid_share,
+                "valid_share": coverage.valid_fraction,
                 "representativeness": coverage.representativeness.map(|(metric, train_test)| {
                     json!({"metric": metric, "train_test": train_test})
                 }),

@@ -167,8 +167,8 @@ impl<'a> Weighted<'a> {
                 let top = mixture.log_parts(point, &mut parts);
                 let sum: f64 = parts.iter().map(|p| libm::exp(p - top)).sum();
                 log_likelihood += weight * (top + libm::log(sum));
-                for (share, part) in responsibilities.iter_mut().zip(&parts) {
-                    share[i] = libm::exp(part - top) / sum;
+                for (responsibility, part) in responsibilities.iter_mut().zip(&parts) {
+                    responsibility[i] = libm::exp(part - top) / sum;
                 }
             }
             if log_likelihood - last < options.tolerance {
@@ -183,8 +183,8 @@ impl<'a> Weighted<'a> {
     /// Weights, means and factors for given responsibilities.
     fn maximise(&self, responsibilities: &[Vec<f64>]) -> Result<Mixture> {
         let (mut weights, mut means, mut factors) = (Vec::new(), Vec::new(), Vec::new());
-        for share in responsibilities {
-            let own = self.points.iter().zip(share).map(|(p, s)| (p.0, p.1 * s)).filter(|p| p.1 > 0.0);
+        for responsibility in responsibilities {
+            let own = self.points.iter().zip(responsibility).map(|(p, s)| (p.0, p.1 * s)).filter(|p| p.1 > 0.0);
             let weight: f64 = own.clone().map(|p| p.1).sum();
             if weight < MIN_WEIGHT {
                 continue;
