@@ -22,15 +22,16 @@ use crate::{Error, Place, Result};
 /// Default profiles; the first one decides.
 const PROFILES: [&str; 6] = ["un-r157", "eu-2022-1426", "eu-2022-1426-standing", "jrc-2021", "paper", "paper-fit"];
 
-/// Judge one concrete case: would the reference drivers of UN R157 avoid the collision?
+/// Check one concrete case: do the reference drivers of UN R157 avoid the collision?
 ///
-/// The case comes from flags, from a TOML file or a row of a table (the flags' names with `_` as keys or columns; flags
-/// win), from a scenario of a file, or from an OpenSCENARIO file of `export xosc`. Every model runs under every profile.
-/// The case is preventable where CCHDM or FSM, the drivers of Annex 3, avoid the collision under the first profile. It
-/// has no conflict where nothing collides even if the ego never reacts. It is undecided where a tenth of the time step, 1 cm
-/// of gap or 0.1 km/h changes the answer, and outside Annex 3 where the annex describes no such case. Then follow the
-/// margins, the clauses, and the distance from the boundary along each number. Exit status: 0 preventable, 1 not
-/// preventable, 8 undecided, 9 no conflict, 10 outside Annex 3, 4 input was left out.
+/// The case comes from flags, from a TOML file or a row of a table (keys and columns are the flags' names with `_`;
+/// flags override them), from a scenario of a file, or from an OpenSCENARIO file of `export xosc`. Every model runs
+/// under every profile. The case is preventable if CCHDM or FSM, the drivers of Annex 3, avoids the collision under the
+/// first profile. It has no conflict if nothing collides even when the ego never reacts. It is undecided if one of
+/// these changes the answer: a tenth of the time step, 1 cm of gap, 0.1 km/h of speed. It is outside Annex 3 if the
+/// annex does not describe such a case. The output also has the margins, the clauses, and the distance to another
+/// answer along each parameter. Exit status: 0 preventable, 1 not preventable, 8 undecided, 9 no conflict, 10 outside
+/// Annex 3, 4 parts of the input were skipped.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  \
@@ -52,10 +53,10 @@ pub struct Check {
     scenario: Option<String>,
     #[command(flatten)]
     case: CaseFlags,
-    /// Profiles; the first decides [default: un-r157, the two of EU 2022/1426, jrc-2021, paper, paper-fit]
+    /// Profiles; the first one decides [default: un-r157, the two of EU 2022/1426, jrc-2021, paper, paper-fit]
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Models and criteria")]
     profiles: Vec<String>,
-    /// Also write the sheet as a page to print
+    /// Also write the case sheet as an HTML page for printing
     #[arg(long, value_name = "FILE.html", help_heading = "Output")]
     sheet: Option<PathBuf>,
     /// Also write every step of every model under the first profile

@@ -36,7 +36,7 @@ pub struct Slurm {
     /// Folder of the run: plan, parts and the result
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     out: PathBuf,
-    /// Time limit of a task, as Slurm writes it
+    /// Time limit of a task, in Slurm's format
     #[arg(long, value_name = "TIME", default_value = "02:00:00", help_heading = "Run")]
     time: String,
     /// GPUs per task: 1, or none to compute on the CPU

@@ -13,13 +13,15 @@ use crate::stats::estimate::{Ratio, RatioVerdict};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Rules {
-    /// Least recall: failures of S that S' has too (0.9). A hidden failure is the error that an assessment must not make.
+    /// Minimum recall: the fraction of the failures of S that S' also has (0.9). A hidden failure is the error that an
+    /// assessment must not make.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub min_recall: f64,
-    /// Least precision: failures of S' that S has too (0.8). False alarms cost effort, not safety.
+    /// Minimum precision: the fraction of the failures of S' that S also has (0.8). False alarms cost effort, not
+    /// safety.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub min_precision: f64,
-    /// Least share of kept scenarios that are points of the parameter space (0.95).
+    /// Minimum fraction of kept scenarios that are points of the parameter space (0.95).
     #[schemars(range(min = 0.0, max = 1.0))]
     pub min_coverage: f64,
 }

@@ -242,7 +242,7 @@ pub struct ScoreOptions {
     /// Coverage of the intervals (0.95).
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub confidence: f64,
-    /// Below so many failures in S F1 has no interval; below so many scenarios with one a claim is not judged (10).
+    /// Below so many failures in S F1 has no interval; below so many scenarios with one a claim is not evaluated (10).
     #[schemars(range(min = 0, max = 4_294_967_295_u32))]
     pub min_failures: u32,
 }

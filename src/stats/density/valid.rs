@@ -86,7 +86,7 @@ impl ValidFraction {
     }
 }
 
-/// Wilson interval of 95 % of a share.
+/// 95 % Wilson interval of a fraction.
 fn wilson(hits: u64, n: u64) -> [f64; 2] {
     let z = normal_quantile(0.975);
     let (n, p) = (n as f64, hits as f64 / n as f64);
