@@ -16,10 +16,12 @@ use crate::stats::density::moments::moments;
 use crate::stats::density::{Mixture, MixtureFitOptions as FitOptions};
 use crate::stats::random::Stream;
 
-/// Fraction of the density's covariance added to the widened copies of a fit's components, and the weight of these
-/// copies in the mixture. Beyond the limit, failures decrease exponentially, but a Gaussian fitted to them decreases
-/// faster: without wider copies the variance of the weights is underestimated, and intervals are too short.
+/// Every component of a fit has a widened copy, with this fraction of the density's covariance added to its own.
+///
+/// Beyond the limit, the density of failures decreases exponentially, but a Gaussian fitted to them decreases faster.
+/// Without the copies, the variance of the weights is underestimated and the intervals are too short.
 const WIDENING: f64 = 0.25;
+/// Total weight of the widened copies in the mixture.
 const WIDENED_WEIGHT: f64 = 0.5;
 
 /// Components whose weight in the smoothed mixture falls below this are dropped.
