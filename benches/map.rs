@@ -48,8 +48,8 @@ fn time(part: &str, simulations: u64, work: impl Fn() -> usize) {
     all.sort_by(f64::total_cmp);
     let cpu = cpu_before.zip(cpu_s()).map(|(before, after)| (after - before) / f64::from(REPETITIONS));
     let cpu = cpu.map_or(String::new(), |s| format!(", {s:.3} s of CPU time each"));
-    let (least, median) = (all[0], all[all.len() / 2]);
-    eprintln!("{part:>6}: {simulations} simulations, median {median:.3} s, least {least:.3} s{cpu}");
+    let (min, median) = (all[0], all[all.len() / 2]);
+    eprintln!("{part:>6}: {simulations} simulations, median {median:.3} s, least {min:.3} s{cpu}");
 }
 
 /// Linux: user and system time of the process so far, s; the kernel counts in hundredths of a second.

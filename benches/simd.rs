@@ -200,10 +200,10 @@ fn print_ratios(what: &str, one: &[f64], two: &[f64]) {
     ratios.sort_by(f64::total_cmp);
     let quartile = |k: usize| ratios[(k * (ratios.len() - 1) + 2) / 4];
     let (low, middle, high) = (quartile(1), quartile(2), quartile(3));
-    let least = |times: &[f64]| times.iter().fold(f64::INFINITY, |least, &time| least.min(time));
-    let of_least = least(two) / least(one);
+    let min_of = |times: &[f64]| times.iter().fold(f64::INFINITY, |min, &time| min.min(time));
+    let min_ratio = min_of(two) / min_of(one);
     eprintln!(
-        "    CPU time on {what}: median {middle:.3}, quartiles {low:.3} and {high:.3}; least over least {of_least:.3}"
+        "    CPU time on {what}: median {middle:.3}, quartiles {low:.3} and {high:.3}; least over least {min_ratio:.3}"
     );
 }
 

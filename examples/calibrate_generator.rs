@@ -167,11 +167,11 @@ impl Outcome {
             let kept_raised = our_kept / sets as f64 / (kept / PUBLISHED_SETS);
             let name = category.label();
             // Gentle decelerations are not raised by the rate factor, and hard ones more.
-            let (raise, most) = if category == Category::Lvd { (1.0, 2.0) } else { (self.rate_factor, 1.2) };
-            figures.push((format!("{name} found per data set, factor"), raised / raise, 0.6, most));
+            let (raise, max) = if category == Category::Lvd { (1.0, 2.0) } else { (self.rate_factor, 1.2) };
+            figures.push((format!("{name} found per data set, factor"), raised / raise, 0.6, max));
             // The published failures of LVD ask for more hard brakings than were published.
-            let most = if category == Category::Lvd { 2.2 } else { 1.5 };
-            figures.push((format!("{name} kept per data set, factor"), kept_raised / self.rate_factor, 0.8, most));
+            let max = if category == Category::Lvd { 2.2 } else { 1.5 };
+            figures.push((format!("{name} kept per data set, factor"), kept_raised / self.rate_factor, 0.8, max));
         }
         let traffic = &self.traffic;
         figures.push(("density, veh/km and lane".to_owned(), traffic.density / traffic.looks as f64, 12.0, 16.5));
@@ -307,8 +307,8 @@ fn show(seeds: &[u64], behaviour: Behaviour, profile: &Profile) -> Result<(), Bo
         row(claim.claim.id, "", outcomes.iter().map(|of| of.claims[at].verdict.text().to_owned()));
     }
     let misfit = |outcome: &Outcome| Misfit::of(&outcome.scores).expect("all models are published");
-    row("shares within the limits", "", each(&|of| format!("{} of {}", misfit(of).near, misfit(of).shares)));
-    row("root mean square of the shares, points", "", each(&|of| format!("{:.2}", misfit(of).share_rms_points)));
+    row("shares within the limits", "", each(&|of| format!("{} of {}", misfit(of).near, misfit(of).rates)));
+    row("root mean square of the shares, points", "", each(&|of| format!("{:.2}", misfit(of).rate_rms_points)));
     row("mean difference of the LVD F1", "", each(&|of| format!("{:.3}", misfit(of).f1_mean)));
     row("largest", "", each(&|of| format!("{:.3}", misfit(of).f1_largest)));
     Ok(())

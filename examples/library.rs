@@ -46,10 +46,10 @@ fn main() -> Result<()> {
     let columns = columns.into_inner().expect("nobody else holds it");
     assert_eq!(columns.key.len() as u64, swept.lanes);
     let collisions = columns.collision.iter().filter(|hit| **hit).count();
-    let least_ttc_s = columns.min_ttc_s.iter().copied().fold(f64::INFINITY, f64::min);
+    let min_ttc_s = columns.min_ttc_s.iter().copied().fold(f64::INFINITY, f64::min);
     let largest_btn = columns.max_btn.iter().copied().filter(|btn| btn.is_finite()).fold(0.0, f64::max);
     println!("{} scenarios, {} lanes, {collisions} collisions", done.load(Ordering::Relaxed), swept.lanes);
-    println!("smallest TTC {least_ttc_s:.2} s, largest finite BTN {largest_btn:.2}");
+    println!("smallest TTC {min_ttc_s:.2} s, largest finite BTN {largest_btn:.2}");
 
     let scores = study.score(&study.run(&executor)?.counts)?;
     for category in &scores.categories {

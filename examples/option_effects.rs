@@ -248,8 +248,8 @@ fn row(base: &Scored, scores: &Scored) -> String {
     let ((old_shares, old_f1), (shares, f1s)) = (numbers(&base.table), numbers(&scores.table));
     let (shares, f1s) = (changes(&old_shares, &shares), changes(&old_f1, &f1s));
     let largest = |changes: &[(&str, f64)]| {
-        let most = changes.iter().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
-        most.map_or_else(String::new, |(name, change)| format!("{name} {change:+.2}"))
+        let largest_change = changes.iter().max_by(|a, b| a.1.abs().total_cmp(&b.1.abs()));
+        largest_change.map_or_else(String::new, |(name, change)| format!("{name} {change:+.2}"))
     };
     let n = |changes: &[(&str, f64)]| changes.len().max(1) as f64;
     let s_points = (shares.iter().map(|(_, d)| d * d).sum::<f64>() / n(&shares)).sqrt();
@@ -261,7 +261,7 @@ fn row(base: &Scored, scores: &Scored) -> String {
         kept.join(" "),
         largest(&shares),
         largest(&f1s),
-        misfit.share_rms_points,
+        misfit.rate_rms_points,
         misfit.f1_mean,
         other_verdicts(&base.claims, &scores.claims)
     )

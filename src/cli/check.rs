@@ -22,15 +22,16 @@ use crate::{Error, Place, Result};
 /// Default profiles; the first one decides.
 const PROFILES: [&str; 6] = ["un-r157", "eu-2022-1426", "eu-2022-1426-standing", "jrc-2021", "paper", "paper-fit"];
 
-/// Judge one concrete case: would the reference drivers of UN R157 avoid the collision?
+/// Check one concrete case: do the reference drivers of UN R157 avoid the collision?
 ///
-/// The case comes from flags, from a TOML file or a row of a table (the flags' names with `_` as keys or columns; flags
-/// win), from a scenario of a file, or from an OpenSCENARIO file of `export xosc`. Every model runs under every profile.
-/// The case is preventable where CCHDM or FSM, the drivers of Annex 3, avoid the collision under the first profile. It
-/// has no conflict where nothing collides even if the ego never reacts. It is undecided where a tenth of the time step, 1 cm
-/// of gap or 0.1 km/h changes the answer, and outside Annex 3 where the annex describes no such case. Then follow the
-/// margins, the clauses, and the distance from the boundary along each number. Exit status: 0 preventable, 1 not
-/// preventable, 8 undecided, 9 no conflict, 10 outside Annex 3, 4 input was left out.
+/// The case comes from flags, from a TOML file or a row of a table (keys and columns are the flags' names with `_`;
+/// flags override them), from a scenario of a file, or from an OpenSCENARIO file of `export xosc`. Every model runs
+/// under every profile. The case is preventable if CCHDM or FSM, the drivers of Annex 3, avoids the collision under the
+/// first profile. It has no conflict if nothing collides even when the ego never reacts. It is undecided if one of
+/// these changes the answer: a tenth of the time step, 1 cm of gap, 0.1 km/h of speed. It is outside Annex 3 if the
+/// annex does not describe such a case. The output also has the margins, the clauses, and the distance to another
+/// answer along each parameter. Exit status: 0 preventable, 1 not preventable, 8 undecided, 9 no conflict, 10 outside
+/// Annex 3, 4 parts of the input were skipped.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  \
@@ -52,10 +53,10 @@ pub struct Check {
     scenario: Option<String>,
     #[command(flatten)]
     case: CaseFlags,
-    /// Profiles; the first decides [default: un-r157, the two of EU 2022/1426, jrc-2021, paper, paper-fit]
+    /// Profiles; the first one decides [default: un-r157, the two of EU 2022/1426, jrc-2021, paper, paper-fit]
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Models and criteria")]
     profiles: Vec<String>,
-    /// Also write the sheet as a page to print
+    /// Also write the case sheet as an HTML page for printing
     #[arg(long, value_name = "FILE.html", help_heading = "Output")]
     sheet: Option<PathBuf>,
     /// Also write every step of every model under the first profile
@@ -80,9 +81,9 @@ impl Check {
         self.guard_outputs()?;
         let names = if self.profiles.is_empty() { PROFILES.map(str::to_owned).to_vec() } else { self.profiles.clone() };
         let mut profiles = names.iter().map(|name| Profile::load(name.trim())).collect::<Result<Vec<_>>>()?;
-        let asked = self.asked(&profiles[0])?;
+        let request = self.request(&profiles[0])?;
         // A profile that only adds its own cut-in clause does not apply to other cases.
-        if self.profiles.is_empty() && asked.subject.category() != Category::CutIn {
+        if self.profiles.is_empty() && request.subject.category() != Category::CutIn {
             let first = profiles[0].clone();
             let is_first = |p: &Profile| {
                 (&p.frame, &p.cchdm, &p.rss, &p.fsm) == (&first.frame, &first.cchdm, &first.rss, &first.fsm)
@@ -90,12 +91,12 @@ impl Check {
             profiles.retain(|profile| profile.name == first.name || !is_first(profile));
         }
         let models = self.case.named_models()?.unwrap_or_else(|| ModelId::ALL.to_vec());
-        let check = Checked { subject: asked.subject, profiles, models };
+        let check = Checked { subject: request.subject, profiles, models };
         let judgements = check.run()?;
         let sheet = CaseSheet {
             subject: &check.subject,
-            origin: asked.origin,
-            is_synthetic: asked.is_synthetic,
+            origin: request.origin,
+            is_synthetic: request.is_synthetic,
             profiles: &check.profiles,
             judgements: &judgements,
             command: console::command_line(),
@@ -110,7 +111,7 @@ impl Check {
         self.format.print(|| sheet.text(), || sheet.json())?;
         Ok(match judgements[0].verdict() {
             // If input was skipped the answer is incomplete.
-            _ if asked.incomplete => Exit::Incomplete,
+            _ if request.incomplete => Exit::Incomplete,
             Verdict::Undecided => Exit::Undecided,
             Verdict::OutsideAnnex => Exit::OutsideAnnex,
             Verdict::Answer(Answer::Preventable) => Exit::Ok,
@@ -119,7 +120,7 @@ impl Check {
         })
     }
 
-    fn asked(&self, profile: &Profile) -> Result<CheckRequest> {
+    fn request(&self, profile: &Profile) -> Result<CheckRequest> {
         let Some(path) = &self.file else {
             return self.of_flags(CaseFlags::default(), profile, "a case of flags".to_owned());
         };

@@ -7,10 +7,10 @@ use super::merge::Merge;
 use super::slurm::Slurm;
 use crate::Result;
 
-/// Split a run over several machines and join its parts
+/// Split a run over several machines and merge its parts
 ///
-/// `--shard I/N` of `study` and `sample` computes a part; `cluster merge` makes the result of all parts, `cluster slurm`
-/// writes the scripts of a Slurm job array.
+/// `--shard I/N` of `study` and `sample` computes one part. `cluster merge` merges all parts into the result.
+/// `cluster slurm` writes the scripts of a Slurm job array.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  lanesweep study --shard 0/2 --out result\n  lanesweep study --shard 1/2 --out \
                         result\n  lanesweep cluster merge result\n  lanesweep cluster slurm study.toml --array 20 \

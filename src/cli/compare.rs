@@ -27,7 +27,7 @@ use crate::{Error, Result};
 /// Simulates the recorded scenarios (S) and their parameterized replays (S'), fits a density per parameterization on
 /// the same scenarios, draws --samples scenarios from each, and compares the rates of failure per category, driver
 /// model and criterion, with the ratio to S and its interval. A ratio agrees if its interval lies within the margin.
-/// Without data it runs on generated recordings. Tables go to stdout, files to --out.
+/// Without data it uses generated recordings. Tables go to stdout, files to --out.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  \
@@ -71,7 +71,7 @@ impl Compare {
         self.guard_inputs(configured)?;
         check_folder(&self.out)?;
         let opened = configured.open()?;
-        let collection = self.data.load_told(configured, verbosity)?;
+        let collection = self.data.report_and_load(configured, verbosity)?;
         let facts = DataProvenance::of(&self.data.source(configured), &collection, typed)?;
         if facts.driven.is_none() {
             tracing::warn!(

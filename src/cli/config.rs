@@ -17,8 +17,9 @@ use crate::{Error, Place, Result};
 
 /// Configurations, completions for your shell, manual pages
 ///
-/// Every option has a default; a file (--config FILE), the environment (LANESWEEP_RUN_BACKEND, …), --config KEY=VALUE and
-/// a flag of its own (--backend) set it, the later winning. No file is read that is not named.
+/// Every option has a default. A file (--config FILE), the environment (LANESWEEP_RUN_BACKEND, …), --config KEY=VALUE
+/// and the option's own flag (--backend) override it; the last of these that sets an option wins. Only a named file is
+/// read.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  lanesweep config init\n  lanesweep config show --config lanesweep.toml\n  lanesweep \
@@ -87,7 +88,7 @@ struct Check {
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  lanesweep config schema > lanesweep.schema.json")]
 struct Schema {
-    /// Of what
+    /// Kind of file
     #[arg(value_enum, default_value_t, help_heading = "Data")]
     of: SchemaOf,
 }

@@ -44,8 +44,8 @@ impl DryRun {
     fn text(&self, now: Option<u64>) -> String {
         let mut text = format!("Dry run: nothing is written.\nData    {}\n", self.run.data);
         let lanes: u64 = self.run.parts.iter().map(|part| part.lanes).fold(0, u64::saturating_add);
-        let most = if self.run.is_at_most { "at most " } else { "" };
-        text += &format!("Lanes   {most}{}\n", count(lanes));
+        let at_most = if self.run.is_at_most { "at most " } else { "" };
+        text += &format!("Lanes   {at_most}{}\n", count(lanes));
         let wide = |of: &dyn Fn(&ForecastPart) -> usize| self.run.parts.iter().map(of).max().unwrap_or(0);
         let (a, b) = (wide(&|part| part.of.chars().count()), wide(&|part| part.what.chars().count()));
         let c = wide(&|part| count(part.units).len());
@@ -66,7 +66,7 @@ impl DryRun {
         };
         text += &match &self.run.lanes {
             Some(forecast) => format!(
-                "Time    {most}{} for the lanes, from {} of them run just now ({:.3} \u{b5}s each): an estimate, on this \
+                "Time    {at_most}{} for the lanes, from {} of them run just now ({:.3} \u{b5}s each): an estimate, on this \
                  machine as it is loaded now\n        on {}\n",
                 time(forecast.seconds),
                 count(forecast.measured_lanes),

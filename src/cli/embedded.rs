@@ -74,8 +74,8 @@ fn parse_and_run(words: &[OsString]) -> Result<Exit> {
         }
     };
     let (cli, configured) = Configured::of(&matches)?;
-    let asked = configured.settings.run.threads;
-    let pool = pool_of(asked)?.stack_size(STACK_BYTES).build().map_err(|error| not_started(asked, &error))?;
+    let requested = configured.settings.run.threads;
+    let pool = pool_of(requested)?.stack_size(STACK_BYTES).build().map_err(|error| not_started(requested, &error))?;
     pool.install(|| run_verb(&cli, &configured))
 }
 

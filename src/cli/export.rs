@@ -45,9 +45,10 @@ impl Export {
 
 /// Write lanes as ASAM OpenSCENARIO XML 1.2 with an OpenDRIVE road
 ///
-/// The lanes are those named of a study, a sampling run or a scenario file, the worst of a run, or one case of flags.
-/// Every lane becomes NNN-KEY.xosc and NNN-KEY.xodr; index.csv lists them with their outcomes. The others follow their
-/// own motion, step by step; the ego what the driver model drove, or with --ego external only its start is written.
+/// Exports named lanes of a study, a sampling run or a scenario file, the worst lanes of a run, or one case from flags.
+/// Every lane becomes NNN-KEY.xosc and NNN-KEY.xodr; index.csv lists them with their outcomes. The other vehicles
+/// follow their own motion, step by step. The ego follows the path that the driver model drove; with --ego external
+/// only its position and speed at the start are written.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  \
@@ -76,13 +77,13 @@ pub struct Xosc {
     lane: Vec<String>,
     /// The N worst lanes of the run per model
     ///
-    /// Of a sampling run: those of worst.csv. Of a study: the scenarios with the smallest margin of --criterion, each with
-    /// its worst lane.
+    /// For a sampling run: the lanes of worst.csv. For a study: the scenarios with the smallest margin of --criterion,
+    /// each with its worst lane.
     #[arg(long, value_name = "N", requires = "from", conflicts_with = "lane", help_heading = "Output")]
     worst: Option<usize>,
     /// Criterion of --worst [default: collision]
     ///
-    /// Of a sampling run it is that of its worst.csv.
+    /// For a sampling run it must be the criterion of worst.csv.
     #[arg(long, value_name = "collision|ttc|btn", requires = "worst", help_heading = "Models and criteria")]
     criterion: Option<String>,
     /// Variants of --worst: S, keys of parameterizations [default: all]
@@ -95,10 +96,10 @@ pub struct Xosc {
         hide_short_help = true
     )]
     variant: Vec<String>,
-    /// Who drives the ego
+    /// Driver of the ego
     #[arg(long, value_enum, default_value_t, help_heading = "Scenario")]
     ego: EgoFlag,
-    /// End with --ego external [default: 10 s after the lane's last event and end]
+    /// End of the scenario with --ego external [default: 10 s after the lane's last event and end]
     #[arg(long, value_name = "s", help_heading = "Scenario", hide_short_help = true)]
     duration: Option<f64>,
     /// Side that the other vehicle comes from or leaves to [default: the scenario's, else left]
@@ -116,10 +117,10 @@ pub struct Xosc {
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
 enum EgoFlag {
-    /// Follows the path that the driver model drove
+    /// The ego follows the path that the driver model drove
     #[default]
     Model,
-    /// Your own controller: only position and speed at the start are written
+    /// Your own controller drives the ego: only its position and speed at the start are written
     External,
 }
 

@@ -24,9 +24,9 @@ use crate::{Error, Place, Result};
 
 /// How are the parameters of scenarios distributed?
 ///
-/// Fits a kernel density to the kept scenarios of each category under each parameterization, computes which fraction
-/// of it is physically possible, how often such scenarios occur, and how well drawn scenarios represent unseen real
-/// ones. One density file per parameterization is written. Without data it runs on generated recordings. Tables go to
+/// Fits a kernel density to the kept scenarios of each category under each parameterization. Computes the physically
+/// possible fraction of each density, how often such scenarios occur, and how well drawn scenarios represent unseen
+/// real ones. Writes one density file per parameterization. Without data it uses generated recordings. Tables go to
 /// stdout, files to --out.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
@@ -46,12 +46,13 @@ pub struct Fit {
     /// Add the observed time headway as a parameter (thw_s)
     #[arg(long, help_heading = "Scenario")]
     with_thw: bool,
-    /// Do not compare drawn with unseen scenarios
+    /// Skip the comparison of drawn with unseen scenarios
     #[arg(long, help_heading = "Models and criteria", hide_short_help = true)]
     no_comparison: bool,
     /// Leave the recorded series out of the density files
     ///
-    /// `sample` then cannot compare its rates with those of the recorded scenarios. For a file that is passed on.
+    /// `sample` then cannot compare its rates with those of the recorded scenarios. Use it if you share the file but
+    /// not the recordings.
     #[arg(long, help_heading = "Models and criteria", hide_short_help = true)]
     without_scenarios: bool,
     #[command(flatten)]
@@ -77,7 +78,7 @@ impl Fit {
             representativeness: !self.no_comparison,
         };
         let files = self.files(&ids, configured)?;
-        let collection = self.data.load_told(configured, verbosity)?;
+        let collection = self.data.report_and_load(configured, verbosity)?;
         let facts = DataProvenance::of(&self.data.source(configured), &collection, typed)?;
         if facts.driven.is_none() {
             tracing::warn!(

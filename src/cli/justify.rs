@@ -27,10 +27,10 @@ use crate::{Error, Place, Result};
 
 /// Is a parameterization appropriate for this driver model, scenario type and criterion?
 ///
-/// Replays the recorded scenarios (S) as recorded and as parameterized (S'), fits a density, and concludes by the rules of
-/// [justify] in the configuration: appropriate, not appropriate, or undecided and how much more data would decide. The
-/// dossier (report.html) names the failures that are hidden, shows the worst of them, gives the risk ratio, the coverage
-/// and the alternatives. Without data it runs on generated recordings.
+/// Replays the recorded scenarios as recorded (S) and parameterized (S'), fits a density, and applies the rules of
+/// [justify] in the configuration: appropriate, not appropriate, or undecided, with the amount of data that would
+/// decide. The dossier (report.html) lists the failures that S' hides, shows the worst of them, and gives the risk
+/// ratio, the coverage and the alternatives. Without data it uses generated recordings.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  \
@@ -50,7 +50,7 @@ pub struct Justify {
     criterion: lists::CriterionFlag,
     #[command(flatten)]
     headways: lists::HeadwaysFlag,
-    /// Who answers for the dossier [default: a line to fill in]
+    /// Person responsible for the dossier [default: a line to fill in]
     #[arg(long, value_name = "NAME", help_heading = "Output", hide_short_help = true)]
     author: Option<String>,
     /// Date of the dossier [default: a line to fill in]
@@ -80,7 +80,7 @@ impl Justify {
         }
         check_folder(&self.out)?;
         let opened = configured.open()?;
-        let collection = self.data.load_told(configured, verbosity)?;
+        let collection = self.data.report_and_load(configured, verbosity)?;
         let facts =
             DataProvenance::of(&self.data.source(configured), &collection, Driven { hours: None, kilometres: None })?;
         let options = JustifyOptions {

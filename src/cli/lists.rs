@@ -98,9 +98,9 @@ impl ModelsFlag {
 pub struct HeadwaysFlag {
     /// Time headways, s; paper: 2.0, 1.8, … 0.2; r157; observed: the recorded gaps
     ///
-    /// The paper's claims need all of its headways. r157: the minimum following distance of UN R157, 5.2.3.3, by the
-    /// ego's speed; may stand in a list. observed: each scenario starts from its recorded gap, and a density draws the
-    /// headway as one more parameter; stands alone.
+    /// The paper's claims need all of its headways. r157: the minimum following distance of UN R157, 5.2.3.3, for the
+    /// ego's speed; a list may contain it. observed: each scenario starts from its recorded gap, and a density draws
+    /// the headway as one more parameter; it cannot be combined with other headways.
     #[arg(long, value_name = "LIST", default_value = "paper", help_heading = "Scenario")]
     thw: String,
 }
@@ -219,7 +219,8 @@ pub fn headways(list: &str, words: &str) -> Result<Vec<Headway>> {
         })
     };
     if list.split(',').any(|text| Headway::parse(text.trim()) == Some(Headway::Observed)) {
-        let problem = "`observed` starts each scenario from its recorded gap and stands alone";
+        let problem =
+            "`observed` starts each scenario from its recorded gap and cannot be combined with other headways";
         return Err(Error::usage(Place::item("--thw"), problem, "give `observed`, or a list of headways without it"));
     }
     let found = list.split(',').map(parse).collect::<Result<Vec<_>>>()?;

@@ -29,8 +29,8 @@ const RECHECK_SEED: u64 = 1;
 /// Map outcomes over two parameters, and where two models or profiles differ
 ///
 /// Every cell is one concrete case. --preset takes the grids of the JRC's evidence (jrc) or of the regulation's Annex 3
-/// (r157, to 60 and to 130 km/h); --x, --y, --panel and --set make any other. Writes a sheet per grid and model (SVG), cells.csv, differences.csv and map.json; the shares go to
-/// stdout.
+/// (r157, to 60 and to 130 km/h); --x, --y, --panel and --set define any other grid. Writes a sheet per grid and model
+/// (SVG), cells.csv, differences.csv and map.json. The percentages of cells with a failure go to stdout.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES, after_long_help = after_long_help())]
 pub struct Map {
@@ -46,7 +46,7 @@ pub struct Map {
     /// the panels.
     #[arg(long, value_name = "FILE", conflicts_with = "preset", help_heading = "Data")]
     distribution: Option<PathBuf>,
-    /// With --distribution: parameter of the file = our parameter, times a factor; repeatable
+    /// With --distribution: map a parameter of the file to one of lanesweep, times a factor; repeatable
     #[arg(long, value_name = "THEIRS=OURS[*FACTOR]", requires = "distribution", help_heading = "Scenario")]
     rename: Vec<Rename>,
     /// Parameter of the x axis: NAME=FROM..TO/STEP or NAME=A,B,C
@@ -59,10 +59,10 @@ pub struct Map {
     y: Option<String>,
     /// Parameter of the panels; repeatable
     ///
-    /// Several make a panel of every combination.
+    /// Several of them give one panel per combination.
     #[arg(long, value_name = "NAME=RANGE", help_heading = "Scenario")]
     panel: Vec<String>,
-    /// Value that is the same in every cell; repeatable
+    /// Constant parameter; repeatable
     #[arg(long, value_name = "NAME=VALUE", help_heading = "Scenario")]
     set: Vec<String>,
     /// Only panels in which the ego is faster than the other vehicle
@@ -75,12 +75,12 @@ pub struct Map {
     models: lists::ModelsFlag,
     #[command(flatten)]
     criterion: lists::CriterionFlag,
-    /// Model or profile; maps where it and the models differ
+    /// Model or profile to compare with; maps the differences
     #[arg(long, value_name = "MODEL|PROFILE", help_heading = "Models and criteria")]
     against: Option<String>,
-    /// Mark cells whose outcome changes with a tenth of the time step, 1 cm, 0.1 km/h
+    /// Mark cells whose outcome changes with a tenth of the time step, 1 cm or 0.1 km/h
     ///
-    /// They are undecided: each cell is simulated eight times, and sheets show them in their own colour.
+    /// They are undecided. Each cell is simulated eight times; sheets show undecided cells in their own colour.
     #[arg(long, help_heading = "Models and criteria")]
     robust: bool,
     #[command(flatten)]

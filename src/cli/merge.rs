@@ -16,9 +16,9 @@ use crate::run::{Merged, merge};
 
 /// Merge the parts of a run into its result
 ///
-/// Checks that the parts in DIR (left there by `--shard`) belong to the plan beside them, cover every lane exactly
-/// once and are whole; names what is missing, doubled, foreign or damaged, with the command that makes it. The result
-/// goes into DIR and is, bit for bit, that of the run in one piece.
+/// Checks that the parts in DIR (written by `--shard`) belong to the plan in DIR, are complete, and cover every lane
+/// exactly once. Names each missing, duplicate, foreign or damaged part, with the command that recomputes it. The
+/// result is written to DIR; it equals, bit for bit, the result of the unsplit run.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  lanesweep study --shard 0/2 --out result\n  lanesweep study --shard 1/2 --out \
                         result\n  lanesweep cluster merge result")]

@@ -129,8 +129,8 @@ pub fn main_with(words: &[OsString]) -> Exit {
     signals::install();
     run_and_report(|| {
         let (cli, configured) = Configured::of(&matches)?;
-        let asked = configured.settings.run.threads;
-        pool_of(asked)?.build_global().map_err(|error| not_started(asked, &error))?;
+        let requested = configured.settings.run.threads;
+        pool_of(requested)?.build_global().map_err(|error| not_started(requested, &error))?;
         run(&cli, &configured)
     })
 }
@@ -188,17 +188,17 @@ const BYTES_PER_THREAD: usize = 4 << 20;
 ///
 /// # Errors
 /// [`Error::Io`] if there is no memory for them.
-fn pool_of(asked: Option<usize>) -> Result<rayon::ThreadPoolBuilder> {
+fn pool_of(requested: Option<usize>) -> Result<rayon::ThreadPoolBuilder> {
     let cores = std::thread::available_parallelism().map_or(1, usize::from);
     let useful = THREADS_PER_CORE * cores;
-    if let Some(asked) = asked.filter(|asked| *asked > useful) {
-        tracing::info!("--threads {asked}: {useful} are started, {THREADS_PER_CORE} per logical core");
+    if let Some(requested) = requested.filter(|requested| *requested > useful) {
+        tracing::info!("--threads {requested}: {useful} are started, {THREADS_PER_CORE} per logical core");
     }
-    let count = asked.map(|asked| asked.min(useful));
+    let count = requested.map(|requested| requested.min(useful));
     // If memory ran out after some threads had started, an allocation in one of them would end the process.
     let mut room = Vec::<u8>::new();
     let bytes = count.unwrap_or(cores).saturating_mul(BYTES_PER_THREAD);
-    room.try_reserve_exact(bytes).map_err(|error| refused(asked, error.to_string()))?;
+    room.try_reserve_exact(bytes).map_err(|error| refused(requested, error.to_string()))?;
     // Otherwise the compiler removes the unused allocation.
     std::hint::black_box(&room);
     drop(room);
@@ -206,15 +206,15 @@ fn pool_of(asked: Option<usize>) -> Result<rayon::ThreadPoolBuilder> {
 }
 
 /// The error of a system that has no more threads.
-fn not_started(asked: Option<usize>, error: &rayon::ThreadPoolBuildError) -> Error {
+fn not_started(requested: Option<usize>, error: &rayon::ThreadPoolBuildError) -> Error {
     match std::error::Error::source(error).and_then(|e| e.downcast_ref::<std::io::Error>()) {
-        Some(source) => refused(asked, source.to_string()),
+        Some(source) => refused(requested, source.to_string()),
         None => Error::Internal(format!("the thread pool did not start: {error}")),
     }
 }
 
-fn refused(asked: Option<usize>, reason: String) -> Error {
-    let what = asked.map_or("the worker threads".to_owned(), |asked| format!("--threads {asked}"));
+fn refused(requested: Option<usize>, reason: String) -> Error {
+    let what = requested.map_or("the worker threads".to_owned(), |requested| format!("--threads {requested}"));
     Error::io(what, "start", std::io::Error::new(std::io::ErrorKind::WouldBlock, reason))
 }
 

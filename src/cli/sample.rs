@@ -19,7 +19,7 @@ use crate::stats::density::DensityModel;
 /// How likely does a driver fail?
 ///
 /// Draws concrete scenarios from a density (see `lanesweep fit`), runs each against the driver models and estimates
-/// the probability of failure with its interval: by crude Monte Carlo, importance sampling, cross-entropy or subset
+/// the probability of failure with its interval, by crude Monte Carlo, importance sampling, cross-entropy or subset
 /// simulation. Each estimate has a verdict on whether to trust it. A table goes to stdout, files to --out.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
@@ -54,7 +54,7 @@ pub struct Sample {
     /// With --distribution: kind of scenario: cut-in, cut-out, lvd
     #[arg(long, value_name = "NAME", requires = "distribution", help_heading = "Scenario", hide_short_help = true)]
     pub(super) category: Option<String>,
-    /// With --distribution: parameter of the file = our parameter, times a factor; repeatable
+    /// With --distribution: map a parameter of the file to one of lanesweep, times a factor; repeatable
     #[arg(
         long,
         value_name = "THEIRS=OURS[*FACTOR]",
@@ -63,7 +63,7 @@ pub struct Sample {
         hide_short_help = true
     )]
     pub(super) rename: Vec<Rename>,
-    /// With --distribution: value that is the same in every sample; repeatable
+    /// With --distribution: constant parameter; repeatable
     #[arg(long, value_name = "NAME=VALUE", requires = "distribution", value_parser = given, help_heading = "Scenario", hide_short_help = true)]
     pub(super) set: Vec<(String, f64)>,
     #[command(flatten)]
@@ -80,7 +80,7 @@ pub struct Sample {
     /// Also write one row per lane: .csv, .jsonl or .parquet
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub(super) rows: Option<PathBuf>,
-    /// Draw given this value of a parameter (mc); repeatable
+    /// Draw from the density conditional on this value (mc); repeatable
     #[arg(long, value_name = "NAME=VALUE", value_parser = given, help_heading = "Scenario")]
     pub(super) given: Vec<(String, f64)>,
     /// Proposal file to sample, with --estimator is; repeatable

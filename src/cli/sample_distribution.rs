@@ -52,13 +52,13 @@ pub(super) fn run(
     let sampled = SampledFile::read(path, category, &flags.rename, &flags.set)?;
     let samples = sampled.samples()?;
     check_plausible(&samples, Doubts::new(flags.plausibility.policy()))?;
-    for p in samples.parameters.iter().filter(|p| p.kept_share < 1.0) {
+    for p in samples.parameters.iter().filter(|p| p.kept_fraction < 1.0) {
         tracing::warn!(
             "{:.3} % of the distribution of {} are outside {} … {} {} and are not drawn",
-            100.0 * (1.0 - p.kept_share),
+            100.0 * (1.0 - p.kept_fraction),
             p.parameter.key,
-            readable::value(p.parameter.least),
-            readable::value(p.parameter.most),
+            readable::value(p.parameter.min),
+            readable::value(p.parameter.max),
             p.parameter.unit
         );
     }

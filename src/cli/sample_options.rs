@@ -142,20 +142,20 @@ impl Sample {
         if let Some((flag, _)) = belongs_to_crude.iter().find(|(_, given)| *given && !is_crude) {
             return Err(only_crude(flag));
         }
-        let least = |flag: &str, value: u64, least: u64, most: u64| {
-            if (least..=most).contains(&value) {
+        let check_range = |flag: &str, value: u64, min: u64, max: u64| {
+            if (min..=max).contains(&value) {
                 return Ok(());
             }
-            let help = format!("give at least {least} and at most {most}");
+            let help = format!("give at least {min} and at most {max}");
             Err(Error::usage(Place::item(flag), format!("{value} is out of range"), help))
         };
         match settings.estimator {
             EstimatorKind::Is if self.is_weighted() => {
-                least("--samples", settings.samples.unwrap_or(100_000), 1, MAX_SPLIT)?
+                check_range("--samples", settings.samples.unwrap_or(100_000), 1, MAX_SPLIT)?
             }
-            EstimatorKind::Subset => least("--samples", settings.samples.unwrap_or(2000), 100, MAX_HELD)?,
+            EstimatorKind::Subset => check_range("--samples", settings.samples.unwrap_or(2000), 100, MAX_HELD)?,
             EstimatorKind::Is | EstimatorKind::Ce => {
-                least("--samples", settings.samples.unwrap_or(100_000), 100, 10 * MAX_HELD)?
+                check_range("--samples", settings.samples.unwrap_or(100_000), 100, 10 * MAX_HELD)?
             }
             _ => (),
         }

@@ -11,18 +11,18 @@ use crate::{Error, Place, Result};
 /// Flags of every verb that can be split.
 #[derive(Debug, Clone, Args)]
 pub struct ShardFlags {
-    /// Compute shard I of N (from 0); `cluster merge` joins them
+    /// Compute shard I of N (from 0); `cluster merge` merges them
     ///
     /// The part is written to --out. `auto/N` takes I from a Kubernetes Indexed Job or a Slurm array.
     #[arg(long, value_name = "I/N", help_heading = "Run")]
     pub shard: Option<Shard>,
-    /// Run a plan that --plan-only wrote, instead of making one
+    /// Run a plan that --plan-only wrote
     #[arg(long, value_name = "FILE", conflicts_with = "plan_only", help_heading = "Run", hide_short_help = true)]
     pub plan: Option<PathBuf>,
     /// Write the plan, plan.json in --out, and stop
     #[arg(long, conflicts_with = "shard", help_heading = "Run", hide_short_help = true)]
     pub plan_only: bool,
-    /// Stop after the chunk in progress at that time, as Ctrl-C does; the same command resumes
+    /// After this time, finish the current chunk and stop, as after Ctrl-C; the same command resumes
     #[arg(long, value_name = "s", help_heading = "Run", hide_short_help = true)]
     pub stop_after: Option<f64>,
 }

@@ -18,10 +18,10 @@ use crate::{Error, Place, Result};
 
 /// Run one concrete scenario and print or draw its time series
 ///
-/// The case comes from flags, from a TOML file, from a row of a table (the flags' names with `_` as keys or columns;
-/// flags win), or from a finished run or a scenario file with a lane key. The series goes to stdout as CSV, the
-/// outcome to stderr, the figure to --plot. Several models (--models FSM,RSS) or variants (--compare) follow one
-/// another in the CSV and share the figure.
+/// The case comes from flags, from a TOML file, from a row of a table (keys and columns are the flags' names with `_`;
+/// flags override them), or from a finished run or a scenario file with a lane key. The series goes to stdout as CSV,
+/// the outcome to stderr, the figure to --plot. Several models (--models FSM,RSS) or variants (--compare) follow one
+/// another in the CSV and share one figure.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  \
@@ -46,15 +46,16 @@ pub struct Simulate {
     scenarios: Option<PathBuf>,
     /// Folder (--out) of a study or sample, for --lane
     ///
-    /// Repeats that lane with the run's profile and options, bit for bit, and says whether f64 gives another outcome.
+    /// Repeats that lane with the run's profile and options, bit for bit, and reports whether f64 gives another
+    /// outcome.
     #[arg(long, value_name = "DIR", requires = "lane", conflicts_with_all = ["scenarios", "case_file", "table", "profile", "dt"], help_heading = "Data")]
     from: Option<PathBuf>,
     /// Lane key: scenario/variant/headway/model
     #[arg(long, value_name = "KEY", help_heading = "Data")]
     lane: Option<String>,
-    /// Also other variants of the lane's scenario
+    /// Also simulate other variants of the lane's scenario
     ///
-    /// S (recorded; also without a value), keys of parameterizations, or all.
+    /// S (the recorded scenario; the default without a value), keys of parameterizations, or all.
     #[arg(long, value_name = "VARIANTS", requires = "lane", value_delimiter = ',', num_args = 0..=1, default_missing_value = "S", help_heading = "Scenario")]
     compare: Vec<String>,
     /// Also draw the time series

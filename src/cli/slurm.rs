@@ -36,7 +36,7 @@ pub struct Slurm {
     /// Folder of the run: plan, parts and the result
     #[arg(long, value_name = "DIR", help_heading = "Output")]
     out: PathBuf,
-    /// Time limit of a task, as Slurm writes it
+    /// Time limit of a task, in Slurm's format
     #[arg(long, value_name = "TIME", default_value = "02:00:00", help_heading = "Run")]
     time: String,
     /// GPUs per task: 1, or none to compute on the CPU
@@ -92,7 +92,7 @@ impl Slurm {
         // submit.sh comes last: if it exists, all scripts are from the same command.
         let run_folder = OutputDir::open(folder, "submit.sh")?;
         let mut results = run_folder.results()?;
-        let mut told = String::new();
+        let mut written = String::new();
         for (name, text, what) in [
             ("array.sbatch", &texts.array, format!("{} tasks, one shard each", array.shards)),
             ("merge.sbatch", &texts.merge, "the result of the whole run".to_owned()),
@@ -102,11 +102,11 @@ impl Slurm {
             if name != "submit.sh" {
                 results.add(name, text.as_bytes())?;
             }
-            told += &format!("{}: {what}\n", path.display());
+            written += &format!("{}: {what}\n", path.display());
         }
         results.publish(texts.submit.as_bytes())?;
         let submit = shell_quoted(Place::option("scripts"), &format!("{}/submit.sh", array.scripts))?;
-        console::print(&format!("{told}\nSubmit with:\n  bash {submit}\n"))?;
+        console::print(&format!("{written}\nSubmit with:\n  bash {submit}\n"))?;
         Ok(Exit::Ok)
     }
 

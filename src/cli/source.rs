@@ -39,13 +39,13 @@ pub fn load(
 }
 
 /// Maximum number of skipped items listed individually.
-const TOLD: usize = 20;
+const MAX_LISTED: usize = 20;
 
 /// Reports skipped input and doubts.
 pub fn complain_of(problems: &[Error], notes: &[String]) {
-    problems.iter().take(TOLD).for_each(console::complain);
-    if problems.len() > TOLD {
-        tracing::error!("{} more are left out", problems.len() - TOLD);
+    problems.iter().take(MAX_LISTED).for_each(console::complain);
+    if problems.len() > MAX_LISTED {
+        tracing::error!("{} more are left out", problems.len() - MAX_LISTED);
     }
     notes.iter().for_each(|note| tracing::warn!("{note}"));
 }
@@ -101,8 +101,8 @@ impl SourceFlags {
         load(&self.source(configured), &configured.settings.mining, self.plausibility.policy(), verbosity)
     }
 
-    /// Like [`load`], but first reports what is read.
-    pub fn load_told(&self, configured: &Configured, verbosity: Verbosity) -> Result<Collection> {
+    /// Like [`load`], but first reports the source of the data.
+    pub fn report_and_load(&self, configured: &Configured, verbosity: Verbosity) -> Result<Collection> {
         tracing::info!("{}", self.source(configured).describe(false));
         self.load(configured, verbosity)
     }

@@ -29,9 +29,9 @@ use crate::traffic::Source;
 
 /// How far do parameterized scenarios agree with recorded ones?
 ///
-/// Mines cut-ins, cut-outs and leader decelerations, replays each as recorded (S) and parameterized (S') from ten
-/// time headways against every driver model, judges collision, TTC and BTN, and scores S' against S. Without data it
-/// runs on generated recordings. The answer goes to stdout, tables and figures to --out.
+/// Mines cut-ins, cut-outs and leader decelerations. Replays each as recorded (S) and parameterized (S') from ten time
+/// headways with every driver model, evaluates collision, TTC and BTN, and scores S' against S. Without data it uses
+/// generated recordings. The answer goes to stdout, tables and figures to --out.
 #[derive(Debug, Args)]
 #[command(mut_args(|arg| match arg.get_id().as_str() {
     "dir" | "scenarios" | "accept_implausible" | "categories" | "models" | "thw" | "published" | "reference" => {
@@ -51,7 +51,7 @@ pub struct Study {
     /// Also write one row per lane: .csv, .jsonl or .parquet
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     rows: Option<PathBuf>,
-    /// Tables and page have the paper's published numbers (of highD) too
+    /// Add the paper's published numbers (of highD) to tables and page
     #[arg(long, help_heading = "Models and criteria")]
     published: bool,
     /// Compute in binary64 on the CPU, not in the f32 lane arithmetic
@@ -148,13 +148,13 @@ impl Study {
     pub(super) fn check(&self, configured: &Configured) -> Result<()> {
         self.guard_inputs(configured)?;
         check_folder(&self.out)?;
-        let (profile, options) = self.asked(configured)?;
+        let (profile, options) = self.profile_and_options(configured)?;
         profile.check_time_step(&options.models)?;
         self.data.check(configured)
     }
 
     /// The profile and the options of the study.
-    fn asked(&self, configured: &Configured) -> Result<(Profile, StudyOptions)> {
+    fn profile_and_options(&self, configured: &Configured) -> Result<(Profile, StudyOptions)> {
         let profile = configured.profile()?;
         let options = StudyOptions {
             categories: self.categories.list()?,
@@ -168,7 +168,7 @@ impl Study {
     /// Makes a plan from the data.
     fn prepare(&self, configured: &Configured, verbosity: Verbosity) -> Result<(study::Study, Timings)> {
         let config = configured.settings.clone();
-        let (profile, options) = self.asked(configured)?;
+        let (profile, options) = self.profile_and_options(configured)?;
         let source = self.data.source(configured);
         let has_paper_headways = options.headways == Headway::paper();
         // Generated data are described with the answer.

@@ -16,7 +16,7 @@ use crate::{Error, Place, Result};
 
 /// Write the synthetic recordings that `study` uses without data
 ///
-/// The files are highD's; `study DIR` on them gives the same result as `study` alone.
+/// The files have the format of highD; `study DIR` on them gives the same result as `study` without data.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  lanesweep synth recordings")]
 pub struct Synth {

@@ -21,7 +21,7 @@ use crate::{Error, Place, Result};
 
 /// Check that a device computes every lane as the CPU does
 ///
-/// Runs the same lanes on the f64 reference, the CPU and the device: random ones, ones on the thresholds of every
+/// Runs the same lanes on the f64 reference, the CPU and the device: random lanes, lanes on the thresholds of every
 /// rule, and a study. Every output word of the device must equal the CPU's; otherwise the exit code is 5. Without a
 /// GPU, use a software device (--device llvmpipe), or verify the CPU backend itself (--backend cpu).
 #[derive(Debug, Args)]
@@ -67,12 +67,12 @@ impl Verify {
             Some(VerifyVerb::Conformance(verb)) => return verb.run(),
             None => (),
         }
-        for (flag, value, most) in [
+        for (flag, value, max) in [
             ("--random-lanes", self.random_lanes, MAX_LANES),
             ("--threshold-units", self.threshold_units, MAX_LANES / 1000),
         ] {
-            if value == 0 || value > most {
-                let problem = format!("{value} is not usable; expected 1 to {most}");
+            if value == 0 || value > max {
+                let problem = format!("{value} is not usable; expected 1 to {max}");
                 return Err(Error::usage(Place::item(flag), problem, "choose a number in this range"));
             }
         }

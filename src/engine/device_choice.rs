@@ -116,9 +116,9 @@ pub fn pci_bus_id(text: &str) -> Option<String> {
         Some(prefix) if prefix.eq_ignore_ascii_case("pci:") => &text[4..],
         _ => text,
     };
-    let hex = |digits: &str, most: u32| {
+    let hex = |digits: &str, max: u32| {
         let plain = !digits.is_empty() && digits.bytes().all(|b| b.is_ascii_hexdigit());
-        plain.then(|| u32::from_str_radix(digits, 16).ok()).flatten().filter(|&n| n <= most)
+        plain.then(|| u32::from_str_radix(digits, 16).ok()).flatten().filter(|&n| n <= max)
     };
     let parts: Vec<&str> = text.split(':').collect();
     let (domain, bus, rest) = match parts[..] {

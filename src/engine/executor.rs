@@ -133,7 +133,7 @@ impl<'a> Executor<'a> {
     ) -> Result<SweepSummary> {
         let Executor { backend, fallback, chunk_lanes, .. } = self;
         let fallback = fallback.as_deref();
-        let most = chunk_lanes.unwrap_or(u64::MAX);
+        let max_lanes = chunk_lanes.unwrap_or(u64::MAX);
         let mut summary = SweepSummary::default();
         let mut redo: Option<Box<dyn Session + '_>> = None;
         let mut session = match (backend.prepare(plan), fallback) {
@@ -170,7 +170,7 @@ impl<'a> Executor<'a> {
         let mut redo_until = if session.is_some() { units.start } else { units.end };
         while from < units.end {
             if let Some(session) = session.as_mut().filter(|_| from >= redo_until) {
-                let range = from..next_cut(plan, from, units.end, session.chunk_lanes(wanted).min(most));
+                let range = from..next_cut(plan, from, units.end, session.chunk_lanes(wanted).min(max_lanes));
                 match (compute(plan, session.as_mut(), &range, wanted), fallback) {
                     (Ok(chunk), _) => {
                         deliver(chunk, &**backend, 0)?;
@@ -194,7 +194,7 @@ impl<'a> Executor<'a> {
                 Some(session) => session,
                 none => none.insert(fallback.prepare(plan)?),
             };
-            let range = from..next_cut(plan, from, redo_until, session.chunk_lanes(wanted).min(most));
+            let range = from..next_cut(plan, from, redo_until, session.chunk_lanes(wanted).min(max_lanes));
             deliver(compute(plan, session.as_mut(), &range, wanted)?, fallback, 1)?;
             from = range.end;
         }
@@ -206,7 +206,7 @@ impl<'a> Executor<'a> {
 /// Computes a chunk and checks that it holds what was requested.
 fn compute(plan: &LanePlan, session: &mut dyn Session, units: &Range<u64>, wanted: Wanted) -> Result<Chunk> {
     let chunk = session.run(units.clone(), wanted)?;
-    chunk.check_asked(plan, units, wanted)?;
+    chunk.check_requested(plan, units, wanted)?;
     Ok(chunk)
 }
 
@@ -247,6 +247,6 @@ pub fn chunks(plan: &LanePlan, units: Range<u64>) -> Vec<Range<u64>> {
 
 /// End of a chunk that begins at a unit and holds about `lanes` lanes, at least one unit.
 fn next_cut(plan: &LanePlan, from: u64, end: u64, lanes: u64) -> u64 {
-    let most = plan.blocks.iter().map(|b| plan.lanes_per_unit(b)).max().unwrap_or(1).max(1);
-    end.min(from + (lanes / most).max(1))
+    let max_per_unit = plan.blocks.iter().map(|b| plan.lanes_per_unit(b)).max().unwrap_or(1).max(1);
+    end.min(from + (lanes / max_per_unit).max(1))
 }

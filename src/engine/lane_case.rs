@@ -7,7 +7,7 @@
 
 pub use crate::model::driver::NEVER;
 use crate::model::driver::{AttentionRule, DriverProfile, MODELS};
-use crate::model::profile::{CutOutJudged, CutOutTarget, Profile};
+use crate::model::profile::{CutOutEvaluated, CutOutTarget, Profile};
 use crate::model::scalar::Real;
 use crate::scenario::{Case, Category, LATERAL_SAMPLED, Lateral, Motion, Participant, SPEED_SAMPLED, Speed, Tables};
 use crate::{Error, Place, Result};
@@ -64,7 +64,7 @@ impl LaneCase<f64> {
             let offset = case.principal.length_m + ahead.gap_m;
             others[1] = encode_other(case, &ahead.vehicle, offset, dt_s, tables);
         }
-        if case.category == Category::CutOut && profile.frame.cut_out_judged == CutOutJudged::Ahead {
+        if case.category == Category::CutOut && profile.frame.cut_out_evaluated == CutOutEvaluated::Ahead {
             others[0].judged = 0;
         }
         let series = Series::of(&others[0].motion, tables, profile.step_cap());

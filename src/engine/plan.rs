@@ -84,7 +84,9 @@ impl Headway {
     /// [`Error::Usage`].
     pub(crate) fn refuse_mixture(list: &[Headway]) -> Result<()> {
         if list.len() > 1 && Headway::is_observed(list) {
-            let problem = format!("`{OBSERVED}` starts each scenario from its recorded gap and stands alone");
+            let problem = format!(
+                "`{OBSERVED}` starts each scenario from its recorded gap and cannot be combined with other headways"
+            );
             return Err(Error::usage(Place::option("thw"), problem, "run the other headways by themselves"));
         }
         Ok(())

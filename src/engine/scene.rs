@@ -61,7 +61,7 @@ pub(super) fn may_cross<R: Real>(case: &LaneCase<R>, tables: &Tables<R>, dt: R) 
         let fastest = if motion.kind & SPEED_SAMPLED != 0 {
             let from = motion.speed_offset as usize;
             let series = &tables.speed[from..from + motion.speed_len as usize];
-            series.iter().fold(R::ZERO, |most, &speed| speed.larger(most))
+            series.iter().fold(R::ZERO, |max, &speed| speed.larger(max))
         } else {
             motion.speed_initial.larger(motion.speed_end)
         };

@@ -30,7 +30,7 @@ pub enum CutOutTarget {
 /// Which vehicles the criteria evaluate in a cut-out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
-pub enum CutOutJudged {
+pub enum CutOutEvaluated {
     /// Every other vehicle; the worst value counts (the paper's definition).
     Every,
     /// Only the vehicle ahead: contacts, TTC and BTN of the cutting-out vehicle are ignored.
@@ -52,7 +52,8 @@ pub struct FrameProfile {
     /// Which vehicles the driver reacts to in a cut-out.
     pub cut_out_target: CutOutTarget,
     /// Which vehicles the criteria evaluate in a cut-out.
-    pub cut_out_judged: CutOutJudged,
+    #[serde(rename = "cut_out_judged")]
+    pub cut_out_evaluated: CutOutEvaluated,
     /// Exposure threshold of `exposed`, m.
     pub exposure_m: f64,
     /// Length of vehicles whose size is unknown, m.

@@ -3,7 +3,7 @@
 use std::fmt::Write;
 
 use crate::stats::density::{
-    DensityModel, Exposure, Rate, Refused, Representativeness, SearchEnd, ValidShare, standard_deviation,
+    DensityModel, Exposure, Rate, Refused, Representativeness, SearchEnd, ValidFraction, standard_deviation,
 };
 use crate::support::readable::{count, count_of, significant};
 use crate::support::table::{Column, Digits, Table};
@@ -95,7 +95,7 @@ fn parameters(model: &DensityModel) -> Table {
 }
 
 /// Fraction of the draws that each bound rejects.
-fn refused(valid: &ValidShare) -> String {
+fn refused(valid: &ValidFraction) -> String {
     let of = |refused: &Refused| {
         let percent = 100.0 * refused.draws as f64 / valid.draws as f64;
         format!("{} % of the draws by {} (valid is {})", significant(percent, 2), refused.parameter, refused.bound)

@@ -96,8 +96,8 @@ impl DossierReport<'_> {
             .build()
     }
 
-    pub(super) fn hidden(&self, most: usize) -> Table {
-        Table::of(self.dossier.hidden.iter().take(most))
+    pub(super) fn hidden(&self, max_rows: usize) -> Table {
+        Table::of(self.dossier.hidden.iter().take(max_rows))
             .column("lane of S'", |hidden| hidden.key.as_str())
             .column("S: impact km/h", |hidden| hidden.recorded.impact_closing_speed * 3.6)
             .column("S: TTC s", |hidden| hidden.recorded.min_ttc)
@@ -212,7 +212,7 @@ impl DossierReport<'_> {
         let coverage = dossier.coverage.as_ref().map(|coverage| {
             json!({
                 "found": coverage.found, "kept": coverage.kept, "points": coverage.points,
-                "valid_share": coverage.valid_share,
+                "valid_share": coverage.valid_fraction,
                 "representativeness": coverage.representativeness.map(|(metric, train_test)| {
                     json!({"metric": metric, "train_test": train_test})
                 }),

@@ -145,7 +145,7 @@ impl DossierReport<'_> {
                     count(coverage.points)
                 ),
             ));
-            let percent = value(100.0 * coverage.valid_share);
+            let percent = value(100.0 * coverage.valid_fraction);
             facts.push(("share of the density inside its valid region".to_owned(), format!("{percent} %")));
             facts.push((
                 "representativeness".to_owned(),

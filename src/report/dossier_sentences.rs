@@ -82,7 +82,7 @@ impl DossierReport<'_> {
             );
         }
         let times = self.dossier.findings.iter().filter_map(|finding| finding.need).map(|Need { times }| times);
-        let times = times.fold(None, |most: Option<f64>, times| Some(most.map_or(times, |most| most.max(times))))?;
+        let times = times.fold(None, |max: Option<f64>, times| Some(max.map_or(times, |max| max.max(times))))?;
         let more = (times * self.dossier.scenarios as f64).ceil();
         Some(if times < 1000.0 {
             format!(

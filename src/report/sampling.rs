@@ -427,8 +427,8 @@ pub(super) fn interval_text(low: f64, high: f64, kind: IntervalKind) -> String {
 /// `2.16 (1.5…3.1)`.
 pub(super) fn ratio_text(ratio: Option<Ratio>) -> String {
     let end = |value: Option<f64>| value.map_or("∞".to_owned(), short);
-    let told = |r: Ratio| Some(format!("{} ({}…{}) {}", short(r.ratio?), end(r.low), end(r.high), r.verdict.mark()));
-    ratio.and_then(told).unwrap_or_else(|| "–".to_owned())
+    let text = |r: Ratio| Some(format!("{} ({}…{}) {}", short(r.ratio?), end(r.low), end(r.high), r.verdict.mark()));
+    ratio.and_then(text).unwrap_or_else(|| "–".to_owned())
 }
 
 pub(super) fn rate_text(rate: Option<RiskRate>) -> String {

@@ -292,7 +292,7 @@ fn published(scores: &ScoreTable) -> Value {
     });
     let misfit = Misfit::of(scores).map(|misfit| {
         serde_json::json!({
-            "shares": misfit.shares, "near": misfit.near, "share_rms_points": misfit.share_rms_points,
+            "shares": misfit.rates, "near": misfit.near, "share_rms_points": misfit.rate_rms_points,
             "f1_values": misfit.f1_values, "f1_mean": misfit.f1_mean, "f1_largest": misfit.f1_largest,
         })
     });

@@ -92,15 +92,15 @@ impl StudyReport {
     }
 
     fn row(&self, best: &Best) -> [String; 7] {
-        let least = u64::from(self.scores.options.min_failures.max(1));
+        let min_scenarios = u64::from(self.scores.options.min_failures.max(1));
         let name = [best.category.label(), best.model.name()].map(str::to_owned);
         let Some(score) = &best.score else {
             let scenarios = best.failing_scenarios;
-            let times = least as f64 / scenarios as f64;
+            let times = min_scenarios as f64 / scenarios as f64;
             let text = match scenarios {
                 0 => "S never collides: nothing to compare".to_owned(),
-                1 => format!("too few: 1 colliding scenario, {least} needed"),
-                _ => format!("too few: {} colliding scenarios, {least} needed", count(scenarios)),
+                1 => format!("too few: 1 colliding scenario, {min_scenarios} needed"),
+                _ => format!("too few: {} colliding scenarios, {min_scenarios} needed", count(scenarios)),
             };
             let needs = if scenarios == 0 { "-".to_owned() } else { factor(times) };
             let [category, model] = name;

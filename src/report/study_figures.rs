@@ -159,9 +159,9 @@ fn few(failing_scenarios: u64) -> String {
 
 /// All pairs of recall and precision with this F1: P = F·R/(2R − F).
 fn equal_f1(f: f64) -> Vec<(f64, f64)> {
-    let least = f / (2.0 - f);
+    let min_recall = f / (2.0 - f);
     let value = |k: u32| {
-        let r = 1.0 + (least - 1.0) * f64::from(k) / 40.0;
+        let r = 1.0 + (min_recall - 1.0) * f64::from(k) / 40.0;
         (r, (f * r / (2.0 * r - f)).min(1.0))
     };
     (0..=40).rev().map(value).collect()

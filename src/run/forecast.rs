@@ -262,21 +262,21 @@ fn lanes_at_most(options: &SampleOptions) -> u64 {
 /// Measures drawing and weighting as well, because they cost more than the lanes.
 fn weighed(sample: &Sample, proposals: &Proposals, executor: &Executor) -> Result<Forecast> {
     let all = sample.samples();
-    let most = all.min(sample.chunk_samples());
-    let (mut samples, mut took) = (most.min(256), 0.0);
+    let max_samples = all.min(sample.chunk_samples());
+    let (mut samples, mut took) = (max_samples.min(256), 0.0);
     loop {
         let started = Instant::now();
         sample.sample_weighted(proposals, &mut Ledger::new(0..samples, &[]), executor, |_| ())?;
         let last = std::mem::replace(&mut took, started.elapsed().as_secs_f64());
-        if samples >= most || took + last >= BUDGET.as_secs_f64() / 2.0 {
+        if samples >= max_samples || took + last >= BUDGET.as_secs_f64() / 2.0 {
             break;
         }
-        samples = (2 * samples).min(most);
+        samples = (2 * samples).min(max_samples);
     }
     Ok(Forecast {
         lanes: sample.lane_count(),
         seconds: took / samples as f64 * all as f64,
         measured_lanes: samples * sample.options.models.len() as u64,
-        lanes_at_once: most,
+        lanes_at_once: max_samples,
     })
 }

@@ -222,12 +222,12 @@ fn missing(key: &str) -> Error {
 /// Maximum magnitude of a physical speed, length or acceleration.
 const MAX_MAGNITUDE: f64 = 1e6;
 
-fn at_least(value: f64, least: f64, key: &str) -> Result<f64> {
-    if value.abs() <= MAX_MAGNITUDE && value >= least {
+fn at_least(value: f64, min: f64, key: &str) -> Result<f64> {
+    if value.abs() <= MAX_MAGNITUDE && value >= min {
         return Ok(value);
     }
-    let expected = if least.is_finite() {
-        format!("a number of at least {least} and at most 1e6")
+    let expected = if min.is_finite() {
+        format!("a number of at least {min} and at most 1e6")
     } else {
         "a number between -1e6 and 1e6".into()
     };

@@ -189,7 +189,7 @@ fn rates(series: &[f64], n: usize, fps: f64) -> impl Iterator<Item = f64> {
 
 /// The value farthest outside the plausible range, and its index.
 fn farthest(quantity: Quantity, values: &mut dyn Iterator<Item = f64>) -> Option<(usize, f64)> {
-    let (least, most) = quantity.limits().plausible;
-    let beyond = |value: f64| (least - value).max(value - most);
+    let (min, max) = quantity.limits().plausible;
+    let beyond = |value: f64| (min - value).max(value - max);
     values.enumerate().max_by(|(_, a), (_, b)| beyond(*a).total_cmp(&beyond(*b)))
 }

@@ -90,9 +90,9 @@ impl ParameterRows {
                 let problem = format!("is {value}; expected {expected}");
                 return Err(Error::input(self.table.place(row, None).column(&column.column), problem, HELP));
             }
-            let (least, most) = RATES_HZ;
-            if key == "rate" && !value.as_f64().is_some_and(|rate_hz| (least..=most).contains(&rate_hz)) {
-                let help = format!("give a number of at least {least} and at most {most}");
+            let (min, max) = RATES_HZ;
+            if key == "rate" && !value.as_f64().is_some_and(|rate_hz| (min..=max).contains(&rate_hz)) {
+                let help = format!("give a number of at least {min} and at most {max}");
                 return Err(Error::input(
                     self.table.place(row, None).column(&column.column),
                     format!("{value} cannot be used"),

@@ -24,14 +24,14 @@ pub(crate) fn cut(name: &str) -> Cow<'_, str> {
     cut_to(name, MAX_NAME)
 }
 
-fn cut_to(text: &str, most: usize) -> Cow<'_, str> {
+fn cut_to(text: &str, max_chars: usize) -> Cow<'_, str> {
     // The byte length is an upper bound of the character count.
-    if text.len() <= most || text.chars().count() <= most {
+    if text.len() <= max_chars || text.chars().count() <= max_chars {
         return Cow::Borrowed(text);
     }
-    let tail = most / 3;
+    let tail = max_chars / 3;
     let at = |(at, _): (usize, char)| at;
-    let end = text.char_indices().nth(most - tail - 1).map_or(text.len(), at);
+    let end = text.char_indices().nth(max_chars - tail - 1).map_or(text.len(), at);
     let begin = text.char_indices().nth_back(tail - 1).map_or(0, at);
     Cow::Owned(format!("{}\u{2026}{}", &text[..end], &text[begin..]))
 }
@@ -52,10 +52,10 @@ pub(crate) fn cut_names(message: &str) -> String {
 }
 
 fn cut_words(text: &str) -> String {
-    let most = |word: &str| if word.contains(['/', '\\']) { MAX_PATH } else { MAX_NAME };
+    let max_chars = |word: &str| if word.contains(['/', '\\']) { MAX_PATH } else { MAX_NAME };
     let cut = |word| {
         let name = str::trim_end(word);
-        [cut_to(name, most(name)), Cow::Borrowed(&word[name.len()..])]
+        [cut_to(name, max_chars(name)), Cow::Borrowed(&word[name.len()..])]
     };
     text.split_inclusive(char::is_whitespace).flat_map(cut).collect()
 }
@@ -101,16 +101,16 @@ pub(crate) fn shown_json(json: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
-/// The most similar name, if its similarity (0 to 1) is above `least`. Case and separators are ignored. A text longer
-/// than any name resembles none.
-pub(crate) fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>, least: f64) -> Option<&'a str> {
+/// The most similar name, if its similarity (0 to 1) is above `min_likeness`. Case and separators are ignored. A text
+/// longer than any name resembles none.
+pub(crate) fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>, min_likeness: f64) -> Option<&'a str> {
     if wrong.len() > 4 * MAX_NAME {
         return None;
     }
     let plain = |text: &str| text.trim().to_ascii_lowercase().replace(['_', '-', ' ', '.'], "");
     let wrong = plain(wrong);
     let likeness = |name: &str| strsim::jaro_winkler(&wrong, &plain(name));
-    let scored = names.into_iter().map(|name| (likeness(name), name)).filter(|&(likeness, _)| likeness > least);
+    let scored = names.into_iter().map(|name| (likeness(name), name)).filter(|&(likeness, _)| likeness > min_likeness);
     scored.max_by(|a, b| a.0.total_cmp(&b.0)).map(|(_, name)| name)
 }
 
@@ -159,8 +159,8 @@ mod tests {
             format!("`{long}` of `{}` b`", long.replace('a', "a b`c ")),
             format!("{long}/{long}"),
         ] {
-            let told = cut_names(&hostile);
-            assert!(told.chars().count() <= MAX_MESSAGE, "{} characters of {told:.200}", told.len());
+            let message = cut_names(&hostile);
+            assert!(message.chars().count() <= MAX_MESSAGE, "{} characters of {message:.200}", message.len());
         }
         assert_eq!(cut_names(&format!("no `{long}` here")).chars().count(), MAX_NAME + 10);
         assert_eq!(cut_names(&format!("no {long} here")), format!("no {short} here"));

@@ -98,7 +98,7 @@ impl Quantity {
 
     fn describe(self, value: f64) -> String {
         let of = self.limits();
-        let ((least, most), words) = match contains(of.physical, value) {
+        let ((min, max), words) = match contains(of.physical, value) {
             true => (of.plausible, "is not plausible"),
             false => (of.physical, "is beyond what is physical"),
         };
@@ -113,7 +113,7 @@ impl Quantity {
             )
         });
         format!(
-            "{} {} {words} for {article} {} ({least} to {most} {}){hint}",
+            "{} {} {words} for {article} {} ({min} to {max} {}){hint}",
             crate::support::readable::value(value),
             of.unit,
             of.name,
@@ -123,8 +123,8 @@ impl Quantity {
 }
 
 #[inline]
-fn contains((least, most): (f64, f64), value: f64) -> bool {
-    least <= value && value <= most
+fn contains((min, max): (f64, f64), value: f64) -> bool {
+    min <= value && value <= max
 }
 
 /// How often a problem occurred, and its first place.

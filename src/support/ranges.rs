@@ -21,9 +21,9 @@ pub struct Range {
     /// Only integers.
     pub is_whole: bool,
     /// Minimum, and whether it is excluded.
-    pub least: Option<(f64, bool)>,
+    pub min: Option<(f64, bool)>,
     /// Maximum, and whether it is excluded.
-    pub most: Option<(f64, bool)>,
+    pub max: Option<(f64, bool)>,
 }
 
 impl Range {
@@ -35,16 +35,16 @@ impl Range {
         };
         Range {
             is_whole: property["type"] == "integer",
-            least: bound("minimum", "exclusiveMinimum"),
-            most: bound("maximum", "exclusiveMaximum"),
+            min: bound("minimum", "exclusiveMinimum"),
+            max: bound("maximum", "exclusiveMaximum"),
         }
     }
 
     /// Whether the value is in the range; false for NaN.
     pub fn contains(&self, x: f64) -> bool {
         x.is_finite()
-            && self.least.is_none_or(|(limit, open)| if open { x > limit } else { x >= limit })
-            && self.most.is_none_or(|(limit, open)| if open { x < limit } else { x <= limit })
+            && self.min.is_none_or(|(limit, open)| if open { x > limit } else { x >= limit })
+            && self.max.is_none_or(|(limit, open)| if open { x < limit } else { x <= limit })
     }
 }
 
@@ -52,14 +52,14 @@ impl Range {
 impl fmt::Display for Range {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(if self.is_whole { "a whole number" } else { "a number" })?;
-        if let (Some((low, false)), Some((high, false))) = (self.least, self.most) {
+        if let (Some((low, false)), Some((high, false))) = (self.min, self.max) {
             return write!(f, " from {low} to {high}");
         }
-        if let Some((low, open)) = self.least {
+        if let Some((low, open)) = self.min {
             write!(f, " {} {low}", if open { "above" } else { "of at least" })?;
         }
-        if let Some((high, open)) = self.most {
-            let and = if self.least.is_some() { " and" } else { "" };
+        if let Some((high, open)) = self.max {
+            let and = if self.min.is_some() { " and" } else { "" };
             write!(f, "{and} {} {high}", if open { "below" } else { "at most" })?;
         }
         Ok(())

@@ -146,12 +146,12 @@ struct ProvenanceFile {
 }
 
 impl DataProvenance {
-    /// From scenarios and their source. If the user gives `told`, it replaces the known values entirely: hours of one
-    /// data set must not mix with kilometres of another.
+    /// From scenarios and their source. If the user gives hours or kilometres (`given`), they replace all known
+    /// values: hours of one data set must not mix with kilometres of another.
     ///
     /// # Errors
     /// [`Error::Io`]; as [`DataProvenance::read_beside`].
-    pub fn of(source: &Source, collection: &Collection, told: Driven) -> Result<DataProvenance> {
+    pub fn of(source: &Source, collection: &Collection, given: Driven) -> Result<DataProvenance> {
         let mut provenance = DataProvenance {
             data: source.describe(collection.synthetic),
             synthetic: collection.synthetic,
@@ -175,7 +175,7 @@ impl DataProvenance {
                 provenance.scenarios_sha256 = hex(&hash.0.finalize());
             }
         }
-        provenance.driven = told.known().or(provenance.driven);
+        provenance.driven = given.known().or(provenance.driven);
         Ok(provenance)
     }
 

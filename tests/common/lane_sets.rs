@@ -4,7 +4,7 @@
 use lanesweep::engine::LanePlan;
 use lanesweep::engine::verify::{RandomOptions, ThresholdOptions, random_plan, threshold_plan};
 use lanesweep::model::criterion::{BtnContact, BtnForm, LateralGate};
-use lanesweep::model::profile::{CutOutJudged, CutOutTarget, Profile};
+use lanesweep::model::profile::{CutOutEvaluated, CutOutTarget, Profile};
 use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
@@ -26,7 +26,7 @@ pub fn forms() -> Vec<Profile> {
         }
     }
     let mut ahead_only = paper.clone();
-    ahead_only.frame.cut_out_judged = CutOutJudged::Ahead;
+    ahead_only.frame.cut_out_evaluated = CutOutEvaluated::Ahead;
     profiles.push(ahead_only);
     let mut exposed = paper.clone();
     exposed.frame.cut_out_target = CutOutTarget::Exposed;

@@ -199,14 +199,14 @@ fn every_table_has_the_stride_of_its_rust_twin() {
 fn every_override_gets_a_value_of_its_type_and_no_value_is_left_over() {
     for model in ModelId::ALL {
         let (module, _) = parse(&shader::assemble(model));
-        let asked: BTreeSet<&str> = module.overrides.iter().map(|(_, o)| o.name.as_deref().unwrap()).collect();
+        let declared: BTreeSet<&str> = module.overrides.iter().map(|(_, o)| o.name.as_deref().unwrap()).collect();
         for (place, constants) in resolved() {
             for paired in [false, true] {
                 let given =
                     shader::constants(&constants, model, Specialization { paired, values: paired, queue: !paired });
                 let names: BTreeSet<&str> = given.iter().map(|(name, _)| *name).collect();
                 assert_eq!(names.len(), given.len(), "{model:?}: a constant is given twice");
-                assert_eq!(names, asked, "{model:?}, {place}");
+                assert_eq!(names, declared, "{model:?}, {place}");
                 for (_, wanted) in module.overrides.iter() {
                     let name = wanted.name.as_deref().unwrap();
                     // A default would hide a constant that the host forgets.
@@ -355,7 +355,10 @@ fn every_model_has_a_shader_with_the_functions_of_its_rust_file_in_their_order()
         let mut names = function_names(text.split("#[cfg(test)]").next().unwrap());
         names.retain(|name| !no_twin.contains(&name.as_str()));
         assert_eq!(names, function_names(shader), "{file} and its twin");
-        assert!(["initial", "check", "react"].iter().all(|&asked| names.iter().any(|name| name == asked)), "{file}");
+        assert!(
+            ["initial", "check", "react"].iter().all(|&required| names.iter().any(|name| name == required)),
+            "{file}"
+        );
     }
 }
 

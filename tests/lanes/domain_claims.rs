@@ -348,7 +348,7 @@ fn where_f32_and_f64_differ_a_tenth_of_a_millimetre_decides() {
 fn a_step_takes_no_more_operations_than_it_should() {
     let profile = paper();
     let case = lvd(30.0, 10.0, 4.0);
-    for (model, most) in [(ModelId::Reg157, 80), (ModelId::Cchdm, 80), (ModelId::Rss, 95), (ModelId::Fsm, 130)] {
+    for (model, max) in [(ModelId::Reg157, 80), (ModelId::Cchdm, 80), (ModelId::Rss, 95), (ModelId::Fsm, 130)] {
         let mut tables = Tables::default();
         let lane = LaneCase::encode(&case, &profile, &mut tables).cast::<Counting>();
         let (tables, constants) = (tables.cast(), Constants::<Counting>::resolve(&profile, case.category));
@@ -356,7 +356,7 @@ fn a_step_takes_no_more_operations_than_it_should() {
             constants.run(model, &lane, &tables, Start::Headway(Counting::from_f64(1.0)), &mut Silent)
         });
         let per_step = count.total() / u64::from(outcome.end_step + 1);
-        assert!(per_step > 10 && per_step <= most, "{model:?}: {per_step} operations per step ({count:?})");
+        assert!(per_step > 10 && per_step <= max, "{model:?}: {per_step} operations per step ({count:?})");
     }
 }
 
@@ -518,7 +518,7 @@ fn fraction(number: u32, word: u32) -> f64 {
 fn a_collision_with_a_margin_is_the_same_collision_at_every_time_step() {
     let (mut collided, mut passed) = (0, 0);
     for number in 0..1500 {
-        let between = |word: u32, least: f64, most: f64| least + (most - least) * fraction(number, word);
+        let between = |word: u32, min: f64, max: f64| min + (max - min) * fraction(number, word);
         let (v_ego, rate_mps) = (between(0, 10.0, 65.0), between(1, 0.3, 3.0));
         let v_other = between(2, 0.0, 0.8 * v_ego);
         let (start_m, closing) = (between(3, 1.9, 4.0), v_ego - v_other);

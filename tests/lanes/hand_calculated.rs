@@ -462,10 +462,10 @@ fn robust_verdicts_of_random_cases(cases: u32) {
     let profile = Profile::load("un-r157").unwrap();
     let finer = [0.001, 0.0007, 0.0023].map(|dt_s| profile.clone().with_dt(dt_s).unwrap());
     let mut drawn = 0;
-    let mut between = |least: f64, most: f64| {
+    let mut between = |min: f64, max: f64| {
         drawn += 1;
         let uniform = f64::from(philox4x32_10([drawn, 0, 0, 0], [157, 0])[0]) / 2_f64.powi(32);
-        least + (most - least) * uniform
+        min + (max - min) * uniform
     };
     let (mut decided, mut undecided, mut differing) = (0, 0, [0; 3]);
     for number in 0..cases {

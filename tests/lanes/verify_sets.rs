@@ -220,8 +220,8 @@ fn every_criterion_fails_and_passes_often_for_every_model_in_every_category() {
         // Without `end_when_settled` every lane without a contact runs to the cap.
         let frame = &plan.profile.frame;
         let ends = frame.end_when_settled;
-        let (mean_s, most_s) = (steps / lanes * frame.dt_s, if ends { 16.0 } else { frame.time_cap_s });
-        assert!(mean_s < most_s, "{name}: {mean_s} s");
+        let (mean_s, max_s) = (steps / lanes * frame.dt_s, if ends { 16.0 } else { frame.time_cap_s });
+        assert!(mean_s < max_s, "{name}: {mean_s} s");
         assert!(!ends || (capped as f64) < 0.1 * lanes, "{name}: {capped} of {lanes} at the cap");
     }
 }
@@ -283,8 +283,8 @@ fn sides(
     let f = |x: f64| x as f32;
     let square = |x: f32| x * x;
     let tau = f(fsm.reaction_time_s);
-    let comf = f(1.0 / (2.0 * fsm.comfortable_deceleration_mps2));
-    let most = f(1.0 / (2.0 * fsm.max_surrogate_deceleration_mps2));
+    let comfortable = f(1.0 / (2.0 * fsm.comfortable_deceleration_mps2));
+    let full = f(1.0 / (2.0 * fsm.max_surrogate_deceleration_mps2));
     let lead = vo * vo * f(1.0 / (2.0 * fsm.lead_deceleration_mps2));
     let room = g - dv * f(c.max_deceleration_mps2 / (2.0 * c.jerk_mps3));
     Some(match threshold {
@@ -311,10 +311,10 @@ fn sides(
             let brake = after * after * f(1.0 / (2.0 * rss.lateral_acceleration_mps2));
             (h, f(rss.lateral_margin_m) + (w.abs() + after) * f(rho / 2.0) + brake)
         }
-        Threshold::PfsSafe => (g - f(fsm.margin_m), v * tau + v * v * comf - lead + f(fsm.margin_m)),
-        Threshold::PfsUnsafe => (g - f(fsm.margin_m), v * tau + v * v * most - lead),
-        Threshold::CfsSafe => (g, dv * tau + dv * dv * comf),
-        Threshold::CfsUnsafe => (g, dv * tau + dv * dv * most),
+        Threshold::PfsSafe => (g - f(fsm.margin_m), v * tau + v * v * comfortable - lead + f(fsm.margin_m)),
+        Threshold::PfsUnsafe => (g - f(fsm.margin_m), v * tau + v * v * full - lead),
+        Threshold::CfsSafe => (g, dv * tau + dv * dv * comfortable),
+        Threshold::CfsUnsafe => (g, dv * tau + dv * dv * full),
         Threshold::FsmGate => (h * dv, w * (g + half + half + f(fsm.lateral_gate_margin_s) * dv)),
         Threshold::LateralSpeed => (w, 0.0),
         Threshold::LateralGap => (h, 0.0),

@@ -314,12 +314,12 @@ fn the_code_of_the_chapter_on_driver_models_is_that_of_the_example_which_a_test_
 
 #[test]
 fn the_time_of_a_study_of_the_papers_size_stands_in_one_place_with_its_command() {
-    let mut told = Vec::new();
+    let mut found = Vec::new();
     for path in markdown_below("docs/src").into_iter().chain(["README.md".to_owned()]) {
         let text = fs::read_to_string(root().join(&path)).unwrap();
-        told.extend(text.split("\n\n").filter(|p| p.contains("493,600 lanes")).map(|p| (path.clone(), p.to_owned())));
+        found.extend(text.split("\n\n").filter(|p| p.contains("493,600 lanes")).map(|p| (path.clone(), p.to_owned())));
     }
-    let [(path, paragraph)] = &told[..] else { panic!("{told:?}") };
+    let [(path, paragraph)] = &found[..] else { panic!("{found:?}") };
     assert_eq!(path, "docs/src/validation.md");
     assert!(paragraph.contains("cargo bench --bench paper_size") && paragraph.contains("benches/runs/"), "{paragraph}");
 }

@@ -381,8 +381,8 @@ fn a_contact_is_told_by_its_kind_and_its_closing_speed() {
     assert!((ego - closing - 20.0).abs() < 1e-9, "the other one drives 20 m/s: {outcome}");
     let (_, said) = simulated("--thw 0.4");
     assert!(said.contains("(rear-end contact, closing at ") && said.contains(" m/s, the ego at "), "{said}");
-    let told = said.split("closing at ").nth(1).unwrap().split(' ').next().unwrap().parse::<f64>().unwrap();
-    assert!((told - closing).abs() < 0.01, "{said}");
+    let printed = said.split("closing at ").nth(1).unwrap().split(' ').next().unwrap().parse::<f64>().unwrap();
+    assert!((printed - closing).abs() < 0.01, "{said}");
 }
 
 #[test]
@@ -407,8 +407,8 @@ fn the_initial_gap_is_that_of_the_first_row_whatever_the_profile() {
         let mut lines = csv.lines();
         let column = lines.next().unwrap().split(',').position(|name| name == "other_gap_m").unwrap();
         let first: f64 = lines.next().unwrap().split(',').nth(column).unwrap().parse().unwrap();
-        let told = said.split("initial gap ").nth(1).unwrap().split(' ').next().unwrap().parse::<f64>().unwrap();
-        assert!((told - first).abs() < 0.005, "{profile}: {said} but the series starts at {first}");
+        let printed = said.split("initial gap ").nth(1).unwrap().split(' ').next().unwrap().parse::<f64>().unwrap();
+        assert!((printed - first).abs() < 0.005, "{profile}: {said} but the series starts at {first}");
     }
 }
 

@@ -274,8 +274,8 @@ fn fits(value: &Value, schema: &Value, at: &str) {
         (Some("string"), Value::String(_)) | (Some("boolean"), Value::Bool(_)) => {}
         (Some("number" | "integer"), Value::Number(number)) => {
             let number = number.as_f64().unwrap();
-            assert!(schema["minimum"].as_f64().is_none_or(|least| number >= least), "{at}: {number}");
-            assert!(schema["maximum"].as_f64().is_none_or(|most| number <= most), "{at}: {number}");
+            assert!(schema["minimum"].as_f64().is_none_or(|min| number >= min), "{at}: {number}");
+            assert!(schema["maximum"].as_f64().is_none_or(|max| number <= max), "{at}: {number}");
         }
         (kind, value) => panic!("{at} is {value}, the schema says {kind:?}"),
     }

@@ -18,7 +18,7 @@ fn run(dir: &Path, line: &str) -> Output {
         .unwrap()
 }
 
-fn told(output: &Output) -> String {
+fn message_of(output: &Output) -> String {
     format!("{}{}", String::from_utf8_lossy(&output.stdout), String::from_utf8_lossy(&output.stderr))
 }
 
@@ -115,7 +115,7 @@ fn every_example_of_the_help_runs() {
             if is_without_device {
                 skipped(&format!("{example}: no such device here"));
             }
-            assert!(output.status.success() || is_without_device, "{example}: {}", told(&output));
+            assert!(output.status.success() || is_without_device, "{example}: {}", message_of(&output));
             ran.insert(example);
         }
     }

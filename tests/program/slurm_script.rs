@@ -134,11 +134,11 @@ fn task(program: &str, restarts: u32, signal: Option<&str>) -> (Option<i32>, Str
     let dir = tempfile::tempdir().unwrap();
     let bin = dir.path().join("bin");
     std::fs::create_dir(&bin).unwrap();
-    let asked = dir.path().join("asked");
+    let requested = dir.path().join("asked");
     let ready = dir.path().join("ready");
     for (name, text) in [
         ("lanesweep", format!("#!/usr/bin/env bash\nready() {{ : >'{}'; }}\n{program}\n", ready.display())),
-        ("scontrol", format!("#!/bin/sh\necho \"$@\" >>'{}'\n", asked.display())),
+        ("scontrol", format!("#!/bin/sh\necho \"$@\" >>'{}'\n", requested.display())),
     ] {
         std::fs::write(bin.join(name), text).unwrap();
         std::fs::set_permissions(bin.join(name), std::os::unix::fs::PermissionsExt::from_mode(0o755)).unwrap();
@@ -155,7 +155,7 @@ fn task(program: &str, restarts: u32, signal: Option<&str>) -> (Option<i32>, Str
         assert!(Command::new("kill").args([signal, &child.id().to_string()]).status().unwrap().success());
     }
     let status = child.wait().unwrap().code();
-    (status, std::fs::read_to_string(asked).unwrap_or_default())
+    (status, std::fs::read_to_string(requested).unwrap_or_default())
 }
 
 /// As lanesweep: told to stop, it needs a moment, then ends with 75.
@@ -182,7 +182,7 @@ fn a_task_goes_back_to_the_queue_when_it_can_continue_and_only_then() {
 fn what_cannot_work_is_refused_and_nothing_is_written() {
     let dir = tempfile::tempdir().unwrap();
     let start = ["cluster", "slurm", "--array", "3", "--out", "o"];
-    for (flags, told) in [
+    for (flags, message) in [
         (&["--", "sample", "a.json", "--shard", "0/3"][..], "--shard cannot be given after the `--`"),
         (&["--", "study", "--out=x"], "--out cannot be given"),
         (&["--", "study", "--plan", "p.json"], "--plan cannot be given"),
@@ -206,7 +206,7 @@ fn what_cannot_work_is_refused_and_nothing_is_written() {
         let refused = lanesweep(dir.path(), &[&start[..], flags].concat());
         assert_eq!(refused.status.code(), Some(2), "{flags:?}");
         let stderr = said(&refused.stderr);
-        assert!(stderr.contains(told), "{flags:?}: {stderr}");
+        assert!(stderr.contains(message), "{flags:?}: {stderr}");
     }
     // A study file that is not there would be found missing by the cluster, after the queue.
     let missing = lanesweep(dir.path(), &[&start[..], &["s.toml"]].concat());
@@ -236,7 +236,7 @@ fn a_command_that_its_verb_refuses_is_refused_before_anything_is_written() {
     }
     let before = std::fs::read_dir(dir.path()).unwrap().count();
     let start = ["cluster", "slurm", "--array", "3", "--out", "o"];
-    for (run, told) in [
+    for (run, message) in [
         ("-- study --profile papr", "did you mean `paper`"),
         ("-- study --models XYZ", "--models: there is no driver model `XYZ`"),
         ("-- study --thw nonsense", "--thw: `nonsense` is not a time headway"),
@@ -263,7 +263,7 @@ fn a_command_that_its_verb_refuses_is_refused_before_anything_is_written() {
         let refused = lanesweep(dir.path(), &start.into_iter().chain(run.split(' ')).collect::<Vec<_>>());
         let stderr = said(&refused.stderr);
         assert!(refused.status.code().is_some_and(|code| [2, 3, 6].contains(&code)), "{run}: {stderr}");
-        assert!(stderr.contains(told), "{run}: {stderr}");
+        assert!(stderr.contains(message), "{run}: {stderr}");
         assert_eq!(std::fs::read_dir(dir.path()).unwrap().count(), before, "{run} wrote something");
     }
     let good = lanesweep(dir.path(), &start.into_iter().chain("-- sample d.json".split(' ')).collect::<Vec<_>>());

@@ -49,7 +49,7 @@ fn overall(rows: &[EstimateRow]) -> Vec<&EstimateRow> {
 }
 
 /// The warning about recorded scenarios says something.
-fn is_told(row: &EstimateRow) -> bool {
+fn is_flagged(row: &EstimateRow) -> bool {
     row.estimate.trust.warnings.iter().any(|w| matches!(w, Warning::AgainstRecorded { .. }))
 }
 
@@ -61,7 +61,7 @@ fn rates_that_are_sound_do_not_exclude_each_other() {
         for row in overall(&rows) {
             let ratios = row.recorded.unwrap();
             let agrees = ratios.replayed.agrees() && ratios.sampled.unwrap().agrees();
-            assert_eq!(is_told(row), !agrees, "{key}: {row:?}");
+            assert_eq!(is_flagged(row), !agrees, "{key}: {row:?}");
             eprintln!("{key} {:?}: {:?} {}", row.model, row.estimate.interval, row.estimate.trust.verdict());
             if row.estimate.trust.verdict() == Verdict::Sound {
                 assert!(agrees);
@@ -97,7 +97,7 @@ fn a_rate_that_nothing_is_compared_with_is_not_sound() {
 fn estimators_that_search_for_failures_stand_beside_the_replayed_scenarios_too() {
     for row in rows(&sample(density("3"), Estimator::CrossEntropy { defence: 0.1 }, vec![Headway::ThwS(0.6)])) {
         let ratios = row.recorded.unwrap();
-        assert!(ratios.sampled.is_none() && (ratios.replayed.agrees() || is_told(&row)), "{row:?}");
+        assert!(ratios.sampled.is_none() && (ratios.replayed.agrees() || is_flagged(&row)), "{row:?}");
     }
 }
 

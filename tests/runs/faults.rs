@@ -130,7 +130,7 @@ fn a_folder_that_vanishes_in_mid_run_is_told_or_made_again_and_nothing_is_claime
     let long = [SAMPLE, &["--stop-after", "100000"]].concat();
     let whole = shared().join("sample");
     let out = bench.path().join("out");
-    let (mut told, mut made_again) = (0, 0);
+    let (mut reported, mut made_again) = (0, 0);
     for round in 0..2 {
         let mut run = start(bench.path(), &[&long[..], &["--out", "out"]].concat());
         // Before its journal is begun, and after.
@@ -146,7 +146,7 @@ fn a_folder_that_vanishes_in_mid_run_is_told_or_made_again_and_nothing_is_claime
                 assert!(said.contains("out vanished") && said.contains("begins anew"), "{said}");
                 assert!(!said.contains("are done and kept"), "{said}");
                 assert!(!out.exists(), "a folder that is taken away is not made again by a journal");
-                told += 1;
+                reported += 1;
                 done(bench.path(), &[SAMPLE, &["--out", "out"]].concat());
             }
             other => panic!("{other:?}: {said}"),
@@ -154,7 +154,7 @@ fn a_folder_that_vanishes_in_mid_run_is_told_or_made_again_and_nothing_is_claime
         same(&out, &whole, &format!("round {round}"));
         std::fs::remove_dir_all(&out).unwrap();
     }
-    println!("{told} runs told of it, {made_again} made the folder again");
+    println!("{reported} runs told of it, {made_again} made the folder again");
 }
 
 #[test]

@@ -136,11 +136,11 @@ fn a_dry_run_makes_the_series_of_few_of_many_long_scenarios() {
     // All series have 1.7 GB at this time step, those of one scenario 0.2 GB.
     let run = "-q --threads 1 study --dry-run --backend cpu --dt 0.0001 --scenarios";
     let run = [&run.split(' ').collect::<Vec<_>>()[..], &[scenarios.to_str().unwrap()]].concat();
-    let (code, told, said) = limited(dir.path(), "ulimit -v 700000", &run);
+    let (code, log, said) = limited(dir.path(), "ulimit -v 700000", &run);
     assert_eq!(code, 0, "{said}");
     // What the run itself will hold is told all the same.
-    let peak = told.split("Memory  about ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap().replace(',', "");
-    assert!(peak.parse::<f64>().unwrap() > 1000.0, "{told}");
+    let peak = log.split("Memory  about ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap().replace(',', "");
+    assert!(peak.parse::<f64>().unwrap() > 1000.0, "{log}");
 }
 
 #[test]

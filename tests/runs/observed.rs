@@ -87,7 +87,7 @@ fn a_scenario_without_a_recorded_gap_is_named_and_a_mixture_of_headways_is_refus
     assert!(error.to_string().contains("gap0"), "{error}");
     let mixed = StudyOptions { headways: vec![Headway::Observed, Headway::ThwS(1.0)], ..StudyOptions::default() };
     let error = plan_study(&recordings(1).scenarios, &paper, &mixed).err().unwrap().to_string();
-    assert!(error.contains("stands alone"), "{error}");
+    assert!(error.contains("cannot be combined"), "{error}");
 }
 
 /// Every lane of S of a plan, by (block, unit, headway, model).

@@ -359,10 +359,10 @@ fn two_processes_do_not_compute_the_same_part() {
     let lock = dir.join("run/run.lock");
     wait_for_run(&mut first, "the lock is taken", || std::fs::read(&lock).is_ok_and(|pid| !pid.is_empty()));
     let (code, out, err) = lanesweep(dir, &long);
-    let told = format!("another lanesweep process is writing this part or run (pid {})", first.id());
+    let message = format!("another lanesweep process is writing this part or run (pid {})", first.id());
     kill(first);
     assert_eq!(code, 75, "{err}");
-    assert!(flat(&err).contains(&told) && out.is_empty(), "{err}");
+    assert!(flat(&err).contains(&message) && out.is_empty(), "{err}");
 }
 
 #[test]

@@ -44,13 +44,13 @@ fn folder() -> (tempfile::TempDir, PathBuf) {
     (dir, path)
 }
 
-fn asked(samples: u64) -> SampleOptions {
+fn options_of(samples: u64) -> SampleOptions {
     let headways = SampleHeadways::Each(vec![Headway::ThwS(1.0), Headway::ThwS(0.4)]);
     SampleOptions { seed: 5, ..SampleOptions::new(Estimator::CRUDE, samples, headways) }
 }
 
 fn plan(density: &DensityModel, samples: u64, profile: &Profile) -> LanePlan {
-    plan_samples(density, &density.mixture().unwrap(), profile, &asked(samples)).unwrap()
+    plan_samples(density, &density.mixture().unwrap(), profile, &options_of(samples)).unwrap()
 }
 
 /// Counts in chunks that end at these samples, joined in the order given.
@@ -71,7 +71,7 @@ fn counts_and_worst_lanes_are_the_same_however_a_run_is_cut_up() {
         let plan = plan(&density, n, &profile);
         let names: Vec<&str> = density.space.parameters().iter().map(|p| p.name.as_str()).collect();
         let map = Some(MapAxes::of(&density, names[0], names[1]).unwrap());
-        let options = SampleOptions { worst: 12, map, ..asked(n) };
+        let options = SampleOptions { worst: 12, map, ..options_of(n) };
         let cpu = CpuBackend::lane_arithmetic();
         let whole = tally(&plan, &cpu, &[(0, n)], &options);
         assert!(whole.failures.iter().sum::<u64>() > 0 && whole.worst.iter().all(|w| w.len() == 12));
@@ -99,7 +99,7 @@ fn a_list_of_worst_lanes_is_the_same_where_only_lanes_that_may_enter_it_are_valu
     for (category, key) in [(Category::CutIn, "2"), (Category::CutOut, "b"), (Category::Lvd, "ii")] {
         let plan = plan(&density(category, key), 30_000, &profile);
         for criterion in Criterion::ALL {
-            let counting = SampleOptions { worst: 7, criterion, ..asked(30_000) };
+            let counting = SampleOptions { worst: 7, criterion, ..options_of(30_000) };
             let every_value = tally(&plan, &cpu, &[(0, 30_000)], &counting);
             let valued = std::cell::Cell::new(0);
             let sampled = |backend: &dyn Backend, range: std::ops::Range<u64>| {
@@ -131,7 +131,7 @@ fn parts_of_different_runs_and_doubled_parts_do_not_join() {
     let profile = Profile::load("paper").unwrap();
     let density = density(Category::CutIn, "2");
     let (one, other) = (plan(&density, 500, &profile), plan(&density, 501, &profile));
-    let options = SampleOptions { worst: 2, criterion: Criterion::Ttc, ..asked(500) };
+    let options = SampleOptions { worst: 2, criterion: Criterion::Ttc, ..options_of(500) };
     let cpu = CpuBackend::lane_arithmetic();
     let part = |plan: &LanePlan, from, to| tally(plan, &cpu, &[(from, to)], &options);
     assert!(part(&one, 0, 100).merge(part(&other, 100, 200)).is_err(), "two runs");
@@ -196,8 +196,8 @@ fn rows_hold_every_lane_of_a_reduced_density_with_its_point() {
     assert!(rows.iter().all(|row| row["c5"].parse::<f32>().is_ok() && row["headway"] == "0.6s"));
     let failed = rows.iter().filter(|row| row["collision"] == "1" && row["model"] == "FSM").count();
     let table = std::fs::read_to_string(dir.path().join("lanesweep-sample/estimates.csv")).unwrap();
-    let told = table.lines().find(|line| line.contains("mc,FSM,collision,0.6s")).unwrap();
-    assert_eq!(told.split(',').nth(7).unwrap(), failed.to_string());
+    let row = table.lines().find(|line| line.contains("mc,FSM,collision,0.6s")).unwrap();
+    assert_eq!(row.split(',').nth(7).unwrap(), failed.to_string());
 }
 
 #[test]

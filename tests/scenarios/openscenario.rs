@@ -271,8 +271,8 @@ fn lanes_of_a_study_and_of_a_sampling_run_are_those_of_simulate_in_binary32() {
     assert_eq!(check(&["--from", "study", "--worst", "3", "--models", "FSM,RSS", "--side", "left"], "study"), 6);
     let listed = good(root, &["export", "xosc", "--from", "study", "--worst", "1", "--models", "RSS", "--out", "y"]);
     let lane = listed.lines().next().unwrap().split_once("  ").unwrap().1;
-    let told = ["--from", "study", "--scenarios", "s.jsonl", "--side", "left", "--lane", lane];
-    assert_eq!(check(&told, "study"), 1);
+    let flags = ["--from", "study", "--scenarios", "s.jsonl", "--side", "left", "--lane", lane];
+    assert_eq!(check(&flags, "study"), 1);
     // What an earlier export left does not stand beside the new files.
     assert_eq!(std::fs::read_dir(root.join("x")).unwrap().count(), 4);
 
@@ -317,16 +317,16 @@ fn the_worst_lanes_of_a_study_are_those_with_the_smallest_margin() {
     let rows: Vec<HashMap<String, String>> = reader.deserialize().map(Result::unwrap).collect();
     let of_model = rows.iter().filter(|r| r["model"] == "CCHDM" && r["param"] == "S");
     // Per scenario whether any of its lanes ends in a contact, else its smallest TTC.
-    let mut least: HashMap<&str, (bool, f64)> = HashMap::new();
+    let mut min_by_id: HashMap<&str, (bool, f64)> = HashMap::new();
     for row in of_model {
         let (collides, ttc) = (row["collision"] == "1", row["min_ttc"].parse::<f64>().unwrap_or(f64::INFINITY));
-        let known = least.entry(&row["id"]).or_insert((false, f64::INFINITY));
+        let known = min_by_id.entry(&row["id"]).or_insert((false, f64::INFINITY));
         *known = (known.0 || collides, known.1.min(ttc));
     }
     let index = std::fs::read_to_string(root.join("x/index.csv")).unwrap();
     let chosen = series(&index);
     assert_eq!(chosen.len(), 4);
-    let collisions = least.values().filter(|(collides, _)| *collides).count();
+    let collisions = min_by_id.values().filter(|(collides, _)| *collides).count();
     assert_eq!(chosen.iter().filter(|r| r["collision"] == "fail").count(), collisions.min(4));
     for row in &chosen {
         let speeds = ["impact_speed_mps", "impact_closing_speed_mps"].map(|name| row[name].is_empty());
@@ -354,13 +354,13 @@ fn an_ego_of_the_users_own_has_a_start_and_no_path_and_the_others_go_on() {
     let csv = good(dir.path(), &[&["simulate"], &CUT_IN[..]].concat());
     let rows = series(&csv);
     let end: f64 = rows.last().unwrap()["t_s"].parse().unwrap();
-    for (flags, least) in [(&[][..], end + 9.9), (&["--duration", "30"], 30.0)] {
+    for (flags, min_s) in [(&[][..], end + 9.9), (&["--duration", "30"], 30.0)] {
         good(dir.path(), &[&["export", "xosc", "--ego", "external", "--out", "x"], &CUT_IN[..], flags].concat());
         let text = only_scenario(&dir.path().join("x"));
         let (vehicles, all) = played(&text);
         assert!(vehicles["Ego"].path.is_empty());
         let path = &vehicles["Other"].path;
-        assert!(path.last().unwrap().0 >= least, "{:?}", path.last());
+        assert!(path.last().unwrap().0 >= min_s, "{:?}", path.last());
         for (at, row) in rows.iter().enumerate() {
             assert_eq!(path[at].2, row["other_y_m"].parse::<f64>().unwrap());
         }

@@ -64,8 +64,8 @@ fn a_sample_is_a_function_of_seed_and_index_and_parts_count_what_the_whole_count
     assert_ne!(draw(157, 7), draw(158, 7));
     let (plan, tries) = samples.plan((600, 157), &profile, &ModelId::ALL, &[]).unwrap();
     assert_eq!(tries, 600);
-    let asked = SampleOptions::new(Estimator::CRUDE, 600, SampleHeadways::Sampled);
-    let counting = SampleOptions { worst: 5, ..asked };
+    let defaults = SampleOptions::new(Estimator::CRUDE, 600, SampleHeadways::Sampled);
+    let counting = SampleOptions { worst: 5, ..defaults };
     let tally = |units: std::ops::Range<u64>, backend: &dyn Backend| {
         let mut tally = SampleTally::empty(&plan, &counting);
         Executor::new(backend)

@@ -249,7 +249,7 @@ fn the_chapter_has_the_ranges_that_readers_apply() {
     let rows: Vec<&str> = section.lines().filter(|line| line.starts_with("| ")).skip(1).collect();
     assert_eq!(rows.len(), LIMITS.len());
     for (row, of) in rows.iter().zip(&LIMITS) {
-        let range = |(least, most): (f64, f64)| format!("{least} … {most}");
+        let range = |(min, max): (f64, f64)| format!("{min} … {max}");
         let (plausible, physical) = (range(of.plausible), range(of.physical));
         let expected = format!("| {} | {} | {plausible} | {physical} |", of.name, of.unit);
         assert!(row.starts_with(&expected), "{row} should begin with {expected}");

@@ -269,7 +269,7 @@ fn numbers(values: &[f64]) -> ArrayRef {
 }
 
 /// The least that a table of series has.
-fn least() -> Vec<(&'static str, ArrayRef)> {
+fn required_columns() -> Vec<(&'static str, ArrayRef)> {
     vec![
         ("id", texts(&["a", "b"])),
         ("category", texts(&["cut_in", "lvd"])),
@@ -298,7 +298,7 @@ fn through(columns: Vec<(&str, ArrayRef)>, compression: Compression) -> laneswee
 #[test]
 fn a_table_of_series_with_the_required_columns_is_read_whatever_program_wrote_it() {
     for compression in [Compression::UNCOMPRESSED, Compression::SNAPPY] {
-        let read = through(least(), compression).unwrap();
+        let read = through(required_columns(), compression).unwrap();
         let [a, b] = &read[..] else { panic!("two scenarios") };
         assert_eq!((a.ego.v0, a.fps, &a.target.y[..], a.lead_id), (30.0, 25.0, &[3.5, 3.4, 3.3][..], None));
         assert_eq!(
@@ -313,15 +313,18 @@ fn a_table_of_series_with_the_required_columns_is_read_whatever_program_wrote_it
         (number("length"), numbers(&[4.5, 4.5])),
         (number("width"), numbers(&[1.8, 1.8])),
     ]);
-    let mut columns: Vec<_> = least().into_iter().filter(|(name, _)| !name.starts_with("ego_")).collect();
+    let mut columns: Vec<_> = required_columns().into_iter().filter(|(name, _)| !name.starts_with("ego_")).collect();
     columns.push(("ego", Arc::new(ego)));
-    assert_eq!(through(columns, Compression::SNAPPY).unwrap(), through(least(), Compression::SNAPPY).unwrap());
+    assert_eq!(
+        through(columns, Compression::SNAPPY).unwrap(),
+        through(required_columns(), Compression::SNAPPY).unwrap()
+    );
 }
 
 #[test]
 fn what_is_wrong_with_a_table_of_series_is_told_with_row_scenario_and_column() {
     let with = |name: &'static str, array: ArrayRef| {
-        let mut columns = least();
+        let mut columns = required_columns();
         match columns.iter_mut().find(|(known, _)| *known == name) {
             Some(column) => column.1 = array,
             None => columns.push((name, array)),
@@ -363,7 +366,7 @@ fn simulate_takes_a_row_of_a_parquet_table() {
 fn a_damaged_parquet_file_is_told_as_one_and_no_panic_is_printed() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("s.parquet");
-    made::write(&path, least(), Compression::SNAPPY);
+    made::write(&path, required_columns(), Compression::SNAPPY);
     let good = std::fs::read(&path).unwrap();
     let mut refused = 0;
     for at in (0..good.len()).step_by(7) {
@@ -386,7 +389,7 @@ fn a_damaged_parquet_file_is_told_as_one_and_no_panic_is_printed() {
 fn a_small_file_that_claims_many_values_is_refused_before_they_are_made() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("s.parquet");
-    let mut columns = least();
+    let mut columns = required_columns();
     for (name, array) in &mut columns {
         if name.starts_with("target_v") || name.starts_with("target_y") {
             *array = made::series(&[vec![1.0; 6 << 20], vec![1.0; 6 << 20]]);
@@ -498,7 +501,7 @@ fn small_negative_speeds_are_0_in_every_table_and_flag_and_larger_ones_an_error(
     is_still("s.jsonl", &line(-0.01));
     assert!(of("s.jsonl", &line(-0.5)).unwrap_err().to_string().contains("`target.v[1]`"));
     let of_parquet = |speed: f64| {
-        let mut columns = least();
+        let mut columns = required_columns();
         columns.retain(|(name, _)| *name != "target_v");
         columns.push(("target_v", made::series(&[vec![20.0, 20.0, 25.0], vec![1.0, speed]])));
         through(columns, Compression::UNCOMPRESSED)

@@ -13,7 +13,7 @@ use rayon::prelude::*;
 
 const REPEATS: u64 = 1000;
 /// As the claims and the answer of a study have it.
-const LEAST_FAILING: usize = 10;
+const MIN_FAILING: usize = 10;
 
 /// Scenarios from which parameterizations are scored.
 #[derive(Clone)]
@@ -140,7 +140,7 @@ fn intervals_of_differences_hold() {
                 let of = |repeat: u64| {
                     let scenarios = population.scenarios(n, 1000 + repeat);
                     let failing = scenarios.iter().filter(|scenario| fails(scenario)).count();
-                    (failing >= LEAST_FAILING)
+                    (failing >= MIN_FAILING)
                         .then(|| [population.resampled(&[&scenarios], repeat), population.ours(&scenarios)])
                 };
                 let all: Vec<[ScoreInterval; 2]> = (0..REPEATS).into_par_iter().filter_map(of).collect();
@@ -184,7 +184,7 @@ fn claim(population: &Population, n: usize, seed: u64) -> [ClaimVerdict; 2] {
         cell
     };
     let cells: Vec<_> = (0..12).map(&mut cell).collect();
-    let is_enough = |cell: &[Vec<Confusion<u32>>]| cell.iter().filter(|s| fails(s)).count() >= LEAST_FAILING;
+    let is_enough = |cell: &[Vec<Confusion<u32>>]| cell.iter().filter(|s| fails(s)).count() >= MIN_FAILING;
     let verdict = |cell: &Vec<Vec<Confusion<u32>>>| match is_enough(cell) {
         true => ClaimVerdict::of_sign(population.ours(cell)),
         false => ClaimVerdict::TooFew,

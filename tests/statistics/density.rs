@@ -11,7 +11,7 @@ use lanesweep::scenario::parameterization::{
 };
 use lanesweep::scenario::{Case, Category, Lateral, Scenario, Side, Speed};
 use lanesweep::stats::density::{
-    Bandwidth, BandwidthRule, DensityModel, FitOptions, Kde, LeaveOneOut, ParameterSpace, SearchEnd, ValidShare,
+    Bandwidth, BandwidthRule, DensityModel, FitOptions, Kde, LeaveOneOut, ParameterSpace, SearchEnd, ValidFraction,
     metric, normal_cdf, read_density, wasserstein, write_density,
 };
 use lanesweep::stats::random::Stream;
@@ -504,11 +504,11 @@ fn the_valid_share_counts_what_the_density_says() {
     let kde = with_bandwidth(vec![vec![1.0, 0.5], vec![2.0, 3.0]], vec![1.0, 1.0], 1.0);
     let expected = 0.5 * (normal_cdf(1.0) * normal_cdf(0.5) + normal_cdf(2.0) * normal_cdf(3.0));
     assert!((probability(&kde, &[0.0; 2], &[f64::INFINITY; 2]) - expected).abs() < 1e-14);
-    let share = ValidShare::count(&kde, &space, 100_000, 1).unwrap();
+    let share = ValidFraction::count(&kde, &space, 100_000, 1).unwrap();
     assert!((share.estimate - expected).abs() < 0.006, "{} {expected}", share.estimate);
     assert!(share.low < expected && expected < share.high, "{share:?} {expected}");
     let nowhere = with_bandwidth(vec![vec![-100.0, -100.0]], vec![1.0, 1.0], 1.0);
-    assert!(ValidShare::count(&nowhere, &space, 1000, 1).is_err());
+    assert!(ValidFraction::count(&nowhere, &space, 1000, 1).is_err());
 }
 
 #[test]
@@ -602,8 +602,8 @@ fn white_space_may_change_but_lengths_must_fit() {
     ] {
         let mut file = good.clone();
         *file.pointer_mut(pointer).unwrap() = value;
-        let told = DensityModel::from_json(&serde_json::to_vec(&file).unwrap(), &place).unwrap_err().to_string();
-        let hash = told.split("the content has ").nth(1).unwrap()[..64].to_owned();
+        let message = DensityModel::from_json(&serde_json::to_vec(&file).unwrap(), &place).unwrap_err().to_string();
+        let hash = message.split("the content has ").nth(1).unwrap()[..64].to_owned();
         file["content_sha256"] = Value::String(hash);
         let error = DensityModel::from_json(&serde_json::to_vec(&file).unwrap(), &place).unwrap_err().to_string();
         assert!(error.contains("density.json") && error.contains(expected), "{pointer}: {error}");

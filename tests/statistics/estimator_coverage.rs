@@ -141,7 +141,7 @@ fn importance_sampling_intervals_hold() {
     let truth = four_branch_probability(3.0, 3.5);
     of("pilot KDE, four branches", truth, &StandardNormal { dimensions: 2 }, &four_branch(3.0, 3.5));
     // Half of the plane cut off: the first parameter is a speed.
-    let half = Truncated::with_share(unit_mixture(2), |x: &[f64]| x[0] > 0.0, 0.5).expect("a share");
+    let half = Truncated::with_validity(unit_mixture(2), |x: &[f64]| x[0] > 0.0, 0.5).expect("a share");
     let slow = |points: &[Vec<f64>]| Ok(points.iter().map(|x| 3.0 - x[0]).collect());
     of("pilot KDE, half cut off", 2.0 * tail(3.0), &half, &slow);
 }

@@ -86,13 +86,13 @@ fn estimates(density: &DensityModel, profile: &Profile, model: ModelId, thw_s: f
 }
 
 /// A model and a headway at which the probability is between these.
-fn rare(density: &DensityModel, profile: &Profile, least: f64, most: f64) -> Option<(ModelId, f64)> {
+fn rare(density: &DensityModel, profile: &Profile, min: f64, max: f64) -> Option<(ModelId, f64)> {
     let models = [ModelId::Fsm, ModelId::Rss, ModelId::Cchdm, ModelId::Reg157];
     let headways = || (1..=20).rev().map(|k| f64::from(k) / 10.0);
     models
         .into_iter()
         .flat_map(|model| headways().map(move |thw_s| (model, thw_s)))
-        .find(|&(model, thw_s)| (least..most).contains(&crude(density, profile, model, thw_s, 20_000).probability))
+        .find(|&(model, thw_s)| (min..max).contains(&crude(density, profile, model, thw_s, 20_000).probability))
 }
 
 fn compare(name: &str, scenarios: &[Scenario], category: Category, key: &str, samples: u64, n: u64) {

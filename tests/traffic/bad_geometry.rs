@@ -31,7 +31,7 @@ fn read(texts: &Texts, implausible: Implausible) -> Result<Loaded> {
     std::fs::write(&files.tracks, &texts.tracks).unwrap();
     std::fs::write(&files.tracks_meta, &texts.tracks_meta).unwrap();
     std::fs::write(&files.recording_meta, &texts.recording_meta).unwrap();
-    highd::read_judged(&files, implausible)
+    highd::read_checked(&files, implausible)
 }
 
 /// The recording with a column of `tracks` made anew from its value and the height of the box.

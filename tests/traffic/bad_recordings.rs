@@ -255,10 +255,10 @@ fn what_no_road_has_is_refused_unless_accepted_and_then_told() {
         ] {
             fs::write(path, text).unwrap();
         }
-        let error = highd::read_judged(&files, Implausible::Refused).expect_err(what);
+        let error = highd::read_checked(&files, Implausible::Refused).expect_err(what);
         assert_says(&error, says);
         assert!(error.help().unwrap().contains("option `accept_implausible`"), "{what}");
-        let loaded = highd::read_judged(&files, Implausible::Accepted).unwrap();
+        let loaded = highd::read_checked(&files, Implausible::Accepted).unwrap();
         assert!(
             loaded.notes.iter().any(|note| says.iter().all(|said| note.contains(said))),
             "{what}: {:?}",

@@ -189,9 +189,9 @@ fn the_default_recordings_hold_enough_scenarios_at_the_stated_factor() {
         let rate = published_kept / PUBLISHED_SETS;
         table.ratio_row(&format!("{name}: kept per data set"), rate, kept / counted.sets / factor, 0.5, 1.5);
         // For the same reason more of the found LVDs are kept, at most `factor` times as many.
-        let most = if category == Category::Lvd { factor } else { 1.8 };
+        let max = if category == Category::Lvd { factor } else { 1.8 };
         let ratio = published_kept / published_found;
-        table.ratio_row(&format!("{name}: kept among found"), ratio, kept / found, 0.6, most);
+        table.ratio_row(&format!("{name}: kept among found"), ratio, kept / found, 0.6, max);
     }
 
     let excess: Vec<f64> = counted.kept(Category::Lvd).filter_map(|s| s.peak_decel).map(|p| p - 2.0).collect();

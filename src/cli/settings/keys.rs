@@ -279,14 +279,14 @@ mod tests {
     #[test]
     fn what_the_schema_lets_pass_at_its_bounds_the_types_take_too() {
         for key in Key::all() {
-            let KeyKind::Number(Range { least, most, .. }) = key.kind else { continue };
-            let closed = [least, most].into_iter().flatten().filter(|(_, open)| !open);
+            let KeyKind::Number(Range { min, max, .. }) = key.kind else { continue };
+            let closed = [min, max].into_iter().flatten().filter(|(_, open)| !open);
             for (bound, _) in closed {
                 let mut layers = Layers::defaults();
                 layers.assign(&format!("{}={bound}", key.name)).unwrap();
                 layers.settings().unwrap();
             }
-            let beyond = [least.map(|(x, _)| x - 1.0), most.map(|(x, _)| x + 1.0)];
+            let beyond = [min.map(|(x, _)| x - 1.0), max.map(|(x, _)| x + 1.0)];
             for bound in beyond.into_iter().flatten() {
                 let error = Layers::defaults().assign(&format!("{}={bound}", key.name)).unwrap_err();
                 assert!(error.to_string().contains("expected"), "{error}");

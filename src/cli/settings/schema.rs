@@ -103,8 +103,8 @@ fn profile_part(values: &[&Value], files: &[&Value], name: &str, bounds: &[(Stri
                 _ => "string",
             }});
             if let Some((_, bound)) = bounds.iter().find(|(key, _)| key == name) {
-                let [least, most] = bound.ends();
-                (schema["minimum"], schema["maximum"]) = (json!(least), json!(most));
+                let [min, max] = bound.ends();
+                (schema["minimum"], schema["maximum"]) = (json!(min), json!(max));
                 schema["description"] = json!(bound.to_string());
             }
             let mut examples: Vec<&Value> = Vec::new();

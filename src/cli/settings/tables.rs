@@ -15,7 +15,7 @@ use crate::traffic::trajectory::generator::GeneratorOptions;
 #[serde(deny_unknown_fields, default)]
 #[schemars(title = "lanesweep configuration")]
 pub struct Settings {
-    /// What every verb shares: threads, what computes, profile.
+    /// Options of every verb: threads, backend, profile.
     pub run: RunSettings,
     /// The synthetic recordings that verbs run on without data.
     pub generator: GeneratorOptions,
@@ -42,7 +42,7 @@ impl Settings {
     }
 }
 
-/// What every verb shares.
+/// Options of every verb.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RunSettings {
@@ -52,11 +52,12 @@ pub struct RunSettings {
     pub threads: Option<usize>,
     /// Backend; auto: a GPU if there is one.
     pub backend: BackendChoice,
-    /// Device, by part of its name, PCI bus id or index. `lanesweep verify devices` lists the devices. The default is the
-    /// first GPU.
+    /// Device, by part of its name, PCI bus id or index. `lanesweep verify devices` lists the devices. The default is
+    /// the first GPU.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub device: Option<String>,
-    /// paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc` takes jrc-2021 unless it is set.
+    /// paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc` takes
+    /// jrc-2021 unless it is set.
     pub profile: String,
     /// Time step, s. Without it: the profile's.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -82,11 +83,11 @@ impl Default for RunSettings {
 pub struct FitSettings {
     /// Search interval of the bandwidth.
     pub bandwidth_rule: BandwidthInterval,
-    /// Sign of the lateral series of densities and of what `compare` and `justify` set beside them.
+    /// Sign of the lateral series of densities and of the replays that `compare` and `justify` compare with them.
     pub svd_lateral: SvdLateral,
     /// Seed of P_valid and of the splits for M.
     pub seed: u64,
-    /// Number of draws for P_valid; 10^9 tell it to 0.01 % where it is 0.1.
+    /// Number of draws for P_valid; with 10^9 its relative standard error is 0.01 % if it is 0.1.
     #[schemars(range(min = 1, max = 1_000_000_000))]
     pub valid_draws: u64,
 }
@@ -107,10 +108,10 @@ impl Default for FitSettings {
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum BandwidthInterval {
-    /// From 0.2 times Silverman's to Silverman's, as with the reduction of scenarios
+    /// From 0.2 times Silverman's bandwidth to Silverman's, as for the reduction of scenarios
     #[default]
     Reduction,
-    /// From 0.2 to 5 times Silverman's, up to 1 at least
+    /// From 0.2 to 5 times Silverman's bandwidth; the upper end is at least 1
     Wide,
 }
 
@@ -120,21 +121,22 @@ pub enum BandwidthInterval {
 pub struct SampleSettings {
     /// Crude, importance, cross-entropy, subset. Importance sampling draws around the worst points of a pilot.
     pub estimator: EstimatorKind,
-    /// Samples at most. With ce: of the final sample. Without it: 100000; subset: 2000 per level.
+    /// Number of samples. A stop rule may end the run earlier. With ce: the number in the final sample.
+    /// Without it: 100000; subset: 2000 per level.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1))]
     pub samples: Option<u64>,
     /// Criterion to map, rank or estimate.
     pub criterion: Criterion,
-    /// Kind of points of mc.
+    /// Kind of points of `mc`.
     pub points: PointKind,
-    /// Kind of interval of mc.
+    /// Kind of interval of `mc`.
     pub interval: IntervalKind,
     /// Level of the intervals.
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub level: f64,
-    /// Stop when half-width over estimate is at most this. The interval is checked after 4096·2^k samples. The default is
-    /// to draw all samples.
+    /// Stop when half-width over estimate is at most this. The interval is checked after 4096·2^k samples. The default
+    /// is to draw all samples.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub half_width: Option<f64>,
@@ -144,16 +146,16 @@ pub struct SampleSettings {
     pub time_limit_s: Option<f64>,
     /// Worst lanes to list per model; 0 runs faster.
     pub worst: usize,
-    /// Runs of the pilot of is.
+    /// Number of runs of the pilot of `is`.
     #[schemars(range(min = 500, max = 10_000_000))]
     pub pilot: u64,
-    /// Elite fraction: of the pilot's points, the worst that the proposal of is is fitted to.
+    /// Elite fraction: the worst fraction of the pilot's points, to which the proposal of `is` is fitted.
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub elite_fraction: f64,
-    /// Mixture weight of one broad Gaussian over the worst points in the proposal of is; 0 is the published form.
+    /// Mixture weight of one broad Gaussian over the worst points in the proposal of `is`; 0 is the published form.
     #[schemars(extend("minimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub broad_weight: f64,
-    /// Defensive mixture weight: of the density in the proposals of is and ce; 0 is the published form.
+    /// Defensive mixture weight: the weight of the density in the proposals of `is` and `ce`; 0 is the published form.
     #[schemars(extend("minimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub defensive_weight: f64,
     /// Seed of the draws.
@@ -239,7 +241,7 @@ pub struct CompareSettings {
     pub samples: u64,
     /// Seed of the draws.
     pub seed: u64,
-    /// Rates agree where the interval of their ratio lies from 1/margin to margin (1.25).
+    /// Rates agree if the interval of their ratio lies between 1/margin and margin (1.25).
     #[schemars(extend("exclusiveMinimum" = 1.0, "maximum" = 100.0))]
     pub margin: f64,
 }

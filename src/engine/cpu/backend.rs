@@ -200,9 +200,9 @@ impl<F: RunUnits<R>, R: Real> CpuSession<'_, F, R> {
         let threads = rayon::current_num_threads() as u64;
         let vehicles = if block.category == Category::CutOut { 2 } else { 1 };
         let entries = variants * vehicles * max_entries(self.plan.profile.step_cap());
-        let most = FULL_TASK.div_ceil(per_unit_and_model).min(TASK_ENTRIES / entries).max(1);
-        let least = SMALL_TASK.div_ceil(per_unit_and_model).min(most);
-        units.div_ceil(TASKS_PER_THREAD * threads).clamp(least, most).min(units.div_ceil(threads)).max(1)
+        let max_units = FULL_TASK.div_ceil(per_unit_and_model).min(TASK_ENTRIES / entries).max(1);
+        let min_units = SMALL_TASK.div_ceil(per_unit_and_model).min(max_units);
+        units.div_ceil(TASKS_PER_THREAD * threads).clamp(min_units, max_units).min(units.div_ceil(threads)).max(1)
     }
 
     fn has_foreign(&self) -> bool {

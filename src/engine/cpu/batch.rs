@@ -25,7 +25,7 @@ pub(in crate::engine) const BATCHES: usize = 3;
 /// Minimum number of steps before a lane that did not qualify is examined again. For quiescent steps the wait also
 /// grows with the number of steps already made.
 const LOOK_AGAIN: u32 = 4 * ROWS as u32;
-const LOOK_AGAIN_SHARE: u32 = 4;
+const LOOK_AGAIN_DIVISOR: u32 = 4;
 
 /// Fewer steady-following steps are cheaper without moving the lane to another stage.
 const MIN_STEADY_STEPS: u32 = 6 * ROWS as u32;
@@ -161,7 +161,7 @@ impl Batch {
                 // A lane at standstill was examined only because it stands still; its regular examination may be due
                 // later.
                 if state.index > *eventful_until {
-                    *eventful_until = state.index + LOOK_AGAIN.max(state.index / LOOK_AGAIN_SHARE);
+                    *eventful_until = state.index + LOOK_AGAIN.max(state.index / LOOK_AGAIN_DIVISOR);
                 }
                 fixed.ego.still_from[k] = state.index + LOOK_AGAIN;
             }

@@ -40,7 +40,7 @@ pub(in crate::engine) fn quiescent_steps<M: DriverModel<f32>>(
 ) -> Option<Quiescent> {
     let index = state.index;
     // One burst of steps remains, so that the lane ends in the regular way.
-    let mut most = simulation.frame.step_cap.saturating_sub(index + ROWS as u32);
+    let mut max_steps = simulation.frame.step_cap.saturating_sub(index + ROWS as u32);
     let vehicles = if simulation.scene.is_pair { 2 } else { 1 };
     for other in &lane.others[..vehicles] {
         if index < other.present_from {
@@ -48,12 +48,12 @@ pub(in crate::engine) fn quiescent_steps<M: DriverModel<f32>>(
         }
         for event in [other.present_until, other.attend_from] {
             if event > index {
-                most = most.min(event - index);
+                max_steps = max_steps.min(event - index);
             }
         }
     }
     if is_still(simulation, lane, state, places) {
-        let steps = if lane.horizon > index { most.min(lane.horizon - index) } else { most };
+        let steps = if lane.horizon > index { max_steps.min(lane.horizon - index) } else { max_steps };
         return (steps >= MIN_STEPS).then_some(Quiescent { steps, gaps: state.gaps });
     }
     let ego = Ego { v: state.v_ego, a: 0.0, width: lane.ego_width };
@@ -80,10 +80,10 @@ pub(in crate::engine) fn quiescent_steps<M: DriverModel<f32>>(
     }
     if settled || state.v_ego <= 0.0 {
         // The step at the horizon ends the lane.
-        most = most.min(lane.horizon.saturating_sub(index));
+        max_steps = max_steps.min(lane.horizon.saturating_sub(index));
     }
     let mut gaps = state.gaps;
-    let mut steps = most;
+    let mut steps = max_steps;
     for vehicle in 0..vehicles {
         // The gap of a vehicle outside the ego's lane is never read again.
         let Some(lowest) = lowest[vehicle] else { continue };
@@ -91,9 +91,9 @@ pub(in crate::engine) fn quiescent_steps<M: DriverModel<f32>>(
         if steps < MIN_STEPS || gaps[vehicle] + by(vehicle) * (MIN_STEPS as f32) < lowest {
             return None;
         }
-        let most = steps;
-        (steps, gaps[vehicle]) = carried(gaps[vehicle], by(vehicle), most, lowest);
-        if steps < most && vehicle == 1 && gaps[0] != state.gaps[0] {
+        let max_steps = steps;
+        (steps, gaps[vehicle]) = carried(gaps[vehicle], by(vehicle), max_steps, lowest);
+        if steps < max_steps && vehicle == 1 && gaps[0] != state.gaps[0] {
             gaps[0] = carried(state.gaps[0], by(0), steps, 0.0).1;
         }
     }
@@ -180,10 +180,10 @@ fn quiescent_gap<M: DriverModel<f32>>(
 /// Between two powers of two, binary32 numbers are equally spaced, so every addition advances by the same whole number
 /// of spacings. A tie rounds to even, so ties end after one addition. Hence only a few additions per power of two are
 /// computed.
-fn carried(gap: f32, change: f32, most: u32, lowest: f32) -> (u32, f32) {
+fn carried(gap: f32, change: f32, max_steps: u32, lowest: f32) -> (u32, f32) {
     const BINADE: u32 = 1 << f32::MANTISSA_DIGITS >> 1;
     let (mut gap, mut made) = (gap, 0);
-    while made < most {
+    while made < max_steps {
         let next = gap + change;
         if next < lowest || next <= 0.0 {
             break;
@@ -192,7 +192,7 @@ fn carried(gap: f32, change: f32, most: u32, lowest: f32) -> (u32, f32) {
         let (before, bits, after) = (gap.to_bits(), next.to_bits(), (next + change).to_bits());
         if bits == before || bits == after {
             // Rounding absorbs the change from here on.
-            return (most, next);
+            return (max_steps, next);
         }
         (gap, made) = (next, made + 1);
         let binade = bits / BINADE;
@@ -206,7 +206,7 @@ fn carried(gap: f32, change: f32, most: u32, lowest: f32) -> (u32, f32) {
             bits - (binade * BINADE + 1).max(lowest.to_bits()).min(bits)
         };
         let by = after.abs_diff(bits);
-        let times = (way / by).min(most - made);
+        let times = (way / by).min(max_steps - made);
         gap = f32::from_bits(if after > bits { bits + times * by } else { bits - times * by });
         made += times;
     }
@@ -225,16 +225,16 @@ mod tests {
     use crate::scenario::Category;
 
     /// Reference: the same by repeated addition.
-    fn added(gap: f32, change: f32, most: u32, lowest: f32) -> (u32, f32) {
+    fn added(gap: f32, change: f32, max_steps: u32, lowest: f32) -> (u32, f32) {
         let mut gap = gap;
-        for made in 0..most {
+        for made in 0..max_steps {
             let next = gap + change;
             if next < lowest || next <= 0.0 {
                 return (made, gap);
             }
             gap = next;
         }
-        (most, gap)
+        (max_steps, gap)
     }
 
     /// A pseudorandom word for each number.
@@ -254,11 +254,11 @@ mod tests {
             let size = 2f32.powf(unit(16) * 30.0 - 26.0);
             let change = if word >> 63 == 0 { size } else { -size };
             let lowest = if number % 3 == 0 { 0.0 } else { gap * unit(32) };
-            let most = (word >> 48) as u32 % 3000;
+            let max_steps = (word >> 48) as u32 % 3000;
             assert_eq!(
-                carried(gap, change, most, lowest),
-                added(gap, change, most, lowest),
-                "{gap:e} {change:e} {most}"
+                carried(gap, change, max_steps, lowest),
+                added(gap, change, max_steps, lowest),
+                "{gap:e} {change:e} {max_steps}"
             );
         }
     }
@@ -271,8 +271,12 @@ mod tests {
                 for sign in [1.0, -1.0] {
                     let gap = f32::from_bits(8f32.to_bits() + 200 + odd);
                     let change = sign * (whole as f32 + 0.5) * (f32::from_bits(8f32.to_bits() + 1) - 8.0);
-                    for most in [0, 1, 2, 3, 7, 100, 1000] {
-                        assert_eq!(carried(gap, change, most, 0.0), added(gap, change, most, 0.0), "{odd} {change:e}");
+                    for max_steps in [0, 1, 2, 3, 7, 100, 1000] {
+                        assert_eq!(
+                            carried(gap, change, max_steps, 0.0),
+                            added(gap, change, max_steps, 0.0),
+                            "{odd} {change:e}"
+                        );
                     }
                 }
             }
@@ -282,9 +286,9 @@ mod tests {
     /// A lane with vehicles that keep speed and lateral position, at some step of its run.
     fn lane(number: u64) -> (LaneConstants<f32>, LaneState<f32>, [OtherState<f32>; 2]) {
         let mut drawn = 0;
-        let mut between = |least: f32, most: f32| {
+        let mut between = |min: f32, max: f32| {
             drawn += 1;
-            least + (most - least) * f32::from(mixed(64 * number + drawn) as u16) / 65536.0
+            min + (max - min) * f32::from(mixed(64 * number + drawn) as u16) / 65536.0
         };
         let v_ego = between(0.0, 40.0);
         let place = |between: &mut dyn FnMut(f32, f32) -> f32| OtherState {
@@ -293,8 +297,7 @@ mod tests {
             towards: if between(0.0, 1.0) < 0.8 { 0.0 } else { between(-1.0, 1.0) },
         };
         let places = [place(&mut between), place(&mut between)];
-        let mut step =
-            |never: f32, most: f32| if between(0.0, 1.0) < never { NEVER } else { between(0.0, most) as u32 };
+        let mut step = |never: f32, max: f32| if between(0.0, 1.0) < never { NEVER } else { between(0.0, max) as u32 };
         let mut other = || OtherConstants {
             half_lengths: 4.5,
             half_widths: 1.9,

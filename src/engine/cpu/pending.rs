@@ -102,12 +102,12 @@ impl Pending {
     #[inline]
     pub fn have<M: DriverModel<f32>>(
         &mut self,
-        least: usize,
+        min_count: usize,
         simulation: &Simulation<f32, M>,
         stream: &Lanes<'_>,
         sets_apart: Option<&[f32]>,
     ) {
-        if self.count() >= least || self.case == stream.cases.len() {
+        if self.count() >= min_count || self.case == stream.cases.len() {
             return;
         }
         self.close_up(simulation.scene.is_pair);

@@ -63,9 +63,9 @@ mod tests {
     /// A lane behind a vehicle that keeps its speed, at some step of its run: the ego brakes or has braked.
     fn lane(number: u32) -> (LaneConstants<f32>, LaneState<f32>, OtherState<f32>) {
         let mut drawn = 0;
-        let mut between = |least: f32, most: f32| {
+        let mut between = |min: f32, max: f32| {
             drawn += 1;
-            least + (most - least) * unit_uniform(philox4x32_10([drawn, number, 0, 0], [11, 0])[0])
+            min + (max - min) * unit_uniform(philox4x32_10([drawn, number, 0, 0], [11, 0])[0])
         };
         let speed = between(0.0, 40.0);
         let place = OtherState { speed, position: between(-2.2, 2.2), towards: 0.0 };

@@ -86,7 +86,7 @@ impl Device {
         let mut features = wgpu::Features::empty();
         features.set(wgpu::Features::TIMESTAMP_QUERY, card.timestamps);
         features.set(wgpu::Features::PASSTHROUGH_SHADERS, exact);
-        let asked = adapter.request_device(&wgpu::DeviceDescriptor {
+        let request = adapter.request_device(&wgpu::DeviceDescriptor {
             label: Some("lanesweep"),
             required_features: features,
             // The device's own limits, not the portable 128 MiB.
@@ -95,7 +95,7 @@ impl Device {
             memory_hints: wgpu::MemoryHints::Performance,
             trace: wgpu::Trace::Off,
         });
-        let (device, queue) = pollster::block_on(asked).map_err(|e| {
+        let (device, queue) = pollster::block_on(request).map_err(|e| {
             Error::device(
                 &card.name,
                 format!("it cannot be opened: {e}"),
@@ -242,9 +242,9 @@ impl Device {
     pub fn upload<T: bytemuck::Pod>(&self, label: &str, content: &[T]) -> Result<wgpu::Buffer> {
         let bytes: &[u8] = bytemuck::cast_slice(content);
         let limits = self.device.limits();
-        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        if bytes.len() as u64 > most {
-            let problem = format!("the {label} take {} bytes, but the device holds at most {most}", bytes.len());
+        let max_bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        if bytes.len() as u64 > max_bytes {
+            let problem = format!("the {label} take {} bytes, but the device holds at most {max_bytes}", bytes.len());
             return Err(Error::device(&self.name, problem, "use option `backend = cpu`, or split the data"));
         }
         let usage = wgpu::BufferUsages::STORAGE | wgpu::BufferUsages::COPY_DST;
@@ -259,15 +259,15 @@ impl Device {
         let limits = self.device.limits();
         // The read-back buffer also holds counts and times.
         let room = limits.max_buffer_size.saturating_sub(SMALL_RESULT_BYTES);
-        let most = limits.max_storage_buffer_binding_size.min(room).min(MAX_RESULT_BYTES);
-        ((most as f64 / (models as f64 * bytes_per_lane)) as u64).min(MAX_LANES)
+        let max_bytes = limits.max_storage_buffer_binding_size.min(room).min(MAX_RESULT_BYTES);
+        ((max_bytes as f64 / (models as f64 * bytes_per_lane)) as u64).min(MAX_LANES)
     }
 
     /// Workgroups of a dispatch in two dimensions, because one dimension is limited to 65,535.
     pub fn grid(&self, groups: u32) -> (u32, u32) {
         let groups = groups.max(1);
-        let most = self.device.limits().max_compute_workgroups_per_dimension.max(1);
-        let rows = groups.div_ceil(most);
+        let max_groups = self.device.limits().max_compute_workgroups_per_dimension.max(1);
+        let rows = groups.div_ceil(max_groups);
         (groups.div_ceil(rows), rows)
     }
 

@@ -192,9 +192,9 @@ impl DeviceOwner {
         let record = size_of::<super::records::OutcomeRecord>() as f64;
         let max_lanes = [0.5, record + 0.5].map(|bytes| self.device.max_lanes(models, bytes));
         let limits = self.device.device.limits();
-        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let most = most.min(if setup.generator.is_some() { MAX_MADE_BYTES } else { MAX_CASE_BYTES });
-        Ok(Prepared { session, max_lanes, max_cases: (most / sample_bytes).max(1) })
+        let max_bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        let max_bytes = max_bytes.min(if setup.generator.is_some() { MAX_MADE_BYTES } else { MAX_CASE_BYTES });
+        Ok(Prepared { session, max_lanes, max_cases: (max_bytes / sample_bytes).max(1) })
     }
 
     fn submit(&mut self, session: u64, cases: Option<Cases>, job: Job) -> Result<(Slot, Flight)> {

@@ -15,24 +15,25 @@ use crate::{Error, Result};
 /// Maximum number of jobs in flight.
 pub(super) const RING: usize = 3;
 
-/// The lanes of consecutive units of one block, all models.
+/// One job of the device: the lanes of consecutive units of one block, for every model.
 #[derive(Debug, Clone)]
 pub(super) struct Job {
-    /// One per model of the plan.
+    /// One pipeline per model of the plan.
     pub pipelines: Vec<PipelineSpec>,
-    /// First case in the buffer of cases.
+    /// Index of the first case in the buffer of cases.
     pub first_case: u32,
-    /// Units × variants.
+    /// Number of cases: units × variants.
     pub cases: u32,
+    /// Number of headways of each case.
     pub headways: u32,
-    /// Whether its pipelines write outcomes.
+    /// Whether the pipelines write outcomes.
     pub has_outcomes: bool,
     /// The criteria of each model.
     pub criteria: Vec<Criteria<f32>>,
 }
 
 impl Job {
-    /// Lanes per model.
+    /// Number of lanes per model.
     pub fn lanes(&self) -> u32 {
         self.cases * self.headways
     }
@@ -59,7 +60,7 @@ pub(super) struct Answer {
     pub device_s: f64,
 }
 
-/// The buffers of one job; they are reused and only grow.
+/// The buffers of one job in flight. Later jobs reuse them unless they need more room.
 #[derive(Default)]
 pub(super) struct Slot {
     buffers: Option<Buffers>,
@@ -75,18 +76,18 @@ struct Buffers {
     models: usize,
 }
 
-/// Offset of each part of the results in the read-back buffer, bytes.
+/// Size of each part of a job's results, bytes. The parts are consecutive in the read-back buffer.
 #[derive(Clone, Copy)]
-struct ResultOffsets {
+struct ResultSizes {
     verdicts: u64,
     outcomes: u64,
     finished: u64,
     times: u64,
 }
 
-impl ResultOffsets {
-    fn of(job: &Job, models: usize) -> ResultOffsets {
-        ResultOffsets {
+impl ResultSizes {
+    fn of(job: &Job, models: usize) -> ResultSizes {
+        ResultSizes {
             verdicts: (models * job.words() * 4) as u64,
             outcomes: (models * job.records() * size_of::<OutcomeRecord>()) as u64,
             finished: (models * 4) as u64,
@@ -95,7 +96,7 @@ impl ResultOffsets {
     }
 
     fn total(&self) -> u64 {
-        // Times are resolved to multiples of 8 bytes.
+        // Times are 64-bit words, so they start at a multiple of 8 bytes.
         (self.verdicts + self.outcomes + self.finished).next_multiple_of(8) + self.times
     }
 }
@@ -103,7 +104,7 @@ impl ResultOffsets {
 /// A job in flight.
 pub(super) struct Flight {
     job: Job,
-    parts: ResultOffsets,
+    parts: ResultSizes,
     submission: wgpu::SubmissionIndex,
     mapped: mpsc::Receiver<std::result::Result<(), wgpu::BufferAsyncError>>,
     since: Instant,
@@ -113,7 +114,7 @@ impl Slot {
     /// Submits a job to the device.
     pub fn submit(&mut self, device: &mut Device, inputs: &Inputs, job: Job) -> Result<Flight> {
         let models = job.pipelines.len();
-        let parts = ResultOffsets::of(&job, models);
+        let parts = ResultSizes::of(&job, models);
         self.grow(device, &parts, models);
         let buffers = self.buffers.as_ref().ok_or_else(|| device.failed("it has no buffers"))?;
         let stride = launch_stride(device);
@@ -129,7 +130,7 @@ impl Slot {
                 finished_word: model as u32,
                 lanes_per_group,
                 ttc_threshold_s: job.criteria[model].ttc.threshold,
-                // f32::MAX stands for ∞: no closing speed exceeds it.
+                // f32::MAX replaces ∞: no closing speed reaches it.
                 marks_contacts_from: job.criteria[model].marks_contacts_from.min(f32::MAX),
             };
             let at = stride as usize * model;
@@ -159,7 +160,7 @@ impl Slot {
         let (x, y) = device.grid(job.lanes().div_ceil(lanes_per_group));
         let pipelines = job.pipelines.iter().map(|spec| device.pipeline(spec)).collect::<Result<Vec<_>>>()?;
         let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("job") });
-        // Words that no lane writes must be zero.
+        // The kernels add bits and counts to these words, so the words must start at zero.
         let results = [
             (&buffers.verdicts, parts.verdicts),
             (&buffers.outcomes, parts.outcomes),
@@ -200,9 +201,10 @@ impl Slot {
         Ok(Flight { job, parts, submission, mapped, since })
     }
 
-    /// Waits for a job and reads its results. `previous` is the end of the previous job.
+    /// Waits for a job and reads its results. `previous` is the time at which the previous job ended.
     ///
-    /// The outer error means that the device's state is unknown; the inner one that this job failed.
+    /// # Errors
+    /// The outer error means that the state of the device is unknown; the inner error means that only this job failed.
     pub fn finish(&mut self, device: &Device, flight: Flight, previous: Option<Instant>) -> Result<Result<Answer>> {
         let wait = wgpu::PollType::Wait {
             submission_index: Some(flight.submission.clone()),
@@ -215,7 +217,7 @@ impl Slot {
             error => device.failed(error.to_string()),
         })?;
         device.untroubled()?;
-        // Excludes the time in the queue behind the previous job.
+        // The time of this job excludes its time in the queue behind the previous job.
         let began = previous.map_or(flight.since, |done| done.max(flight.since));
         let wall_s = began.elapsed().as_secs_f64();
         let mapped = flight.mapped.recv_timeout(device.options.timeout);
@@ -232,7 +234,7 @@ impl Slot {
         Ok(answer)
     }
 
-    fn grow(&mut self, device: &Device, parts: &ResultOffsets, models: usize) {
+    fn grow(&mut self, device: &Device, parts: &ResultSizes, models: usize) {
         use wgpu::BufferUsages as Use;
         let enough = self.buffers.as_ref().is_some_and(|b| {
             b.models == models
@@ -245,16 +247,16 @@ impl Slot {
             return;
         }
         let limits = device.device.limits();
-        let most = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        // Doubling makes growth rare; the device's maximum is the limit.
-        let room = |bytes: u64, most: u64| bytes.next_power_of_two().min(most).max(bytes);
+        let max_bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
+        // Sizes are powers of two, so that buffers are rarely replaced; the device's limit is the maximum.
+        let room = |bytes: u64, max_bytes: u64| bytes.next_power_of_two().min(max_bytes).max(bytes);
         let results = Use::STORAGE | Use::COPY_SRC | Use::COPY_DST;
         let stride = u64::from(launch_stride(device));
         self.buffers = Some(Buffers {
             launches: device.buffer("launches", stride * models as u64, Use::UNIFORM | Use::COPY_DST),
-            verdicts: device.buffer("verdicts", room(parts.verdicts, most), results),
-            outcomes: device.buffer("outcomes", room(parts.outcomes, most), results),
-            finished: device.buffer("finished", room(parts.finished, most), results),
+            verdicts: device.buffer("verdicts", room(parts.verdicts, max_bytes), results),
+            outcomes: device.buffer("outcomes", room(parts.outcomes, max_bytes), results),
+            finished: device.buffer("finished", room(parts.finished, max_bytes), results),
             readback: device.buffer(
                 "results",
                 room(parts.total(), limits.max_buffer_size),
@@ -278,7 +280,10 @@ fn launch_stride(device: &Device) -> u32 {
     (size_of::<Launch>() as u32).next_multiple_of(device.device.limits().min_uniform_buffer_offset_alignment)
 }
 
-/// Converts bytes to results; every lane must have been computed.
+/// Converts the bytes of the read-back buffer to results.
+///
+/// # Errors
+/// [`Error::Device`] if the device did not complete every lane.
 fn read(device: &Device, flight: &Flight, bytes: &[u8], wall_s: f64) -> Result<Answer> {
     let Flight { job, parts, .. } = flight;
     let models = job.pipelines.len();
@@ -303,7 +308,7 @@ fn read(device: &Device, flight: &Flight, bytes: &[u8], wall_s: f64) -> Result<A
     let measured: Vec<f64> = if device.timestamps { dispatches.collect() } else { Vec::new() };
     let device_s: f64 = measured.iter().sum();
     let slowest_s = measured.iter().fold(0.0, |a: f64, b| a.max(*b));
-    // Without working timestamps, the wall-clock time is an upper bound.
+    // If the timestamps do not work, the wall-clock time is used; it is an upper bound.
     let timed = slowest_s > 0.0;
     Ok(Answer {
         words: (0..models).map(|m| bytemuck::pod_collect_to_vec(&per_model(verdicts, m))).collect(),

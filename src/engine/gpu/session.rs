@@ -90,9 +90,10 @@ impl<'p> GpuSession<'p> {
         let plan = self.plan;
         let variants = plan.blocks[block].variants.len() as u64;
         let per_unit = variants * plan.headways.len() as u64;
-        let most = self.max_lanes(wanted);
-        if per_unit > most || variants > self.prepared.max_cases {
-            let problem = format!("one scenario has {per_unit} lanes per model, but the device holds at most {most}");
+        let max_lanes = self.max_lanes(wanted);
+        if per_unit > max_lanes || variants > self.prepared.max_cases {
+            let problem =
+                format!("one scenario has {per_unit} lanes per model, but the device holds at most {max_lanes}");
             return Err(Error::device(&self.device, problem, "use option `backend = cpu`, or fewer headways"));
         }
         let inside = matches!(&self.window, Some((at, held, _)) if *at == block && held.contains(&units.start));
@@ -117,7 +118,7 @@ impl<'p> GpuSession<'p> {
         let Some((_, held, paired)) = &self.window else {
             return Err(Error::Internal("no cases are on the device".to_owned()));
         };
-        let count = self.pacer.units(per_unit, most);
+        let count = self.pacer.units(per_unit, max_lanes);
         let end = units.end.min(units.start + count).min(held.end);
         let has_outcomes = wanted == Wanted::Outcomes;
         let specialization = Specialization { paired: *paired, values: has_outcomes, queue: self.queue };
@@ -211,9 +212,9 @@ impl Session for GpuSession<'_> {
     }
 
     fn chunk_lanes(&self, wanted: Wanted) -> u64 {
-        let most = if wanted == Wanted::Outcomes { 1 << 20 } else { 1 << 27 };
+        let max_lanes = if wanted == Wanted::Outcomes { 1 << 20 } else { 1 << 27 };
         let jobs = if self.device_s > 0.0 { JOBS_PER_CHUNK } else { 1 };
-        (self.pacer.lanes() * self.plan.models.len() as u64 * jobs).clamp(1, most)
+        (self.pacer.lanes() * self.plan.models.len() as u64 * jobs).clamp(1, max_lanes)
     }
 
     fn device_seconds(&self) -> Option<f64> {

@@ -337,13 +337,13 @@ fn kinematic_lateral(draw: &mut CaseRandom, across: LateralRole) -> Lateral {
 
 /// A horizon: none, short or long.
 fn horizon_steps(draw: &mut CaseRandom) -> f64 {
-    let most = match draw.uniform() {
+    let max = match draw.uniform() {
         x if x < 0.15 => 0,
         x if x < 0.80 => 150,
         x if x < 0.98 => 400,
         _ => 1500,
     };
-    draw.below(most + 1) as f64
+    draw.below(max + 1) as f64
 }
 
 /// Cases with numbers at the ends of their ranges.

@@ -31,13 +31,13 @@ pub struct PlayedVehicle {
 
 /// Distance of the rear axle behind the centre, as a fraction of the length: OpenSCENARIO positions a vehicle by its
 /// rear axle.
-const REAR_AXLE_SHARE: f64 = 0.3;
+const REAR_AXLE_FRACTION: f64 = 0.3;
 
 impl PlayedVehicle {
     /// Distance from the centre of the rear axle, the reference point of OpenSCENARIO, forward to the centre of the
     /// box, m, rounded to millimetres.
     pub fn centre_offset_m(&self) -> f64 {
-        (REAR_AXLE_SHARE * self.length_m * 1e3).round() / 1e3
+        (REAR_AXLE_FRACTION * self.length_m * 1e3).round() / 1e3
     }
 
     /// Distance of the axles, m; they are symmetric about the centre.

@@ -222,13 +222,13 @@ fn stochastic(at: At) -> Result<Stochastic> {
     at.attributes(&["numberOfTestRuns", "randomSeed"])?;
     at.children(&["StochasticDistribution"])?;
     // Seeds are doubles in the standard; below 2^53 a double represents every integer.
-    let whole = |name: &str, least: f64| {
+    let whole = |name: &str, min: f64| {
         let value = at.number(name)?;
-        if value.fract() == 0.0 && (least..9_007_199_254_740_992.0).contains(&value) {
+        if value.fract() == 0.0 && (min..9_007_199_254_740_992.0).contains(&value) {
             return Ok(value as u64);
         }
         let problem = format!("the attribute `{name}` is {value}");
-        Err(at.wrong(problem, format!("write a whole number of at least {least} and below 2^53")))
+        Err(at.wrong(problem, format!("write a whole number of at least {min} and below 2^53")))
     };
     let seed = at.has("randomSeed").then(|| whole("randomSeed", 0.0)).transpose()?;
     let mut parameters = Vec::new();

@@ -114,8 +114,8 @@ fn lanes<R: Real>(
         };
         let size = VehicleSize { length_m: wide.others[0].half_lengths, width_m: wide.ego_width };
         let alike = || Sizes { ego: size, target: size, lead: (wide.pair != 0).then_some(size) };
-        let told = reopened.density().map(|d| d.sizes).or_else(|| scenario.map(Sizes::of));
-        let sizes = told.or_else(|| reopened.has_one_size().then(alike));
+        let known = reopened.density().map(|d| d.sizes).or_else(|| scenario.map(Sizes::of));
+        let sizes = known.or_else(|| reopened.has_one_size().then(alike));
         are_lengths_known &= sizes.is_some();
         let facts = LaneFacts {
             key: plan.key_text(key),
@@ -304,11 +304,11 @@ const TOLERANCE_M: f64 = 1e-3;
 ///
 /// # Errors
 /// [`Error::Input`] if the given sizes do not match the lane.
-fn sizes_of_case(lane: &str, case: &LaneCase<f64>, told: Option<&Sizes>, ego_length_m: f64) -> Result<KnownSizes> {
+fn sizes_of_case(lane: &str, case: &LaneCase<f64>, known: Option<&Sizes>, ego_length_m: f64) -> Result<KnownSizes> {
     let is_pair = case.pair != 0;
     let sums = |of: fn(&crate::engine::LaneOther<f64>) -> f64| case.others.each_ref().map(|o| 2.0 * of(o));
     let (lengths, widths) = (sums(|o| o.half_lengths), sums(|o| o.half_widths));
-    let Some(told) = told else {
+    let Some(known) = known else {
         let shortest = if is_pair { lengths[0].min(lengths[1]) } else { lengths[0] };
         // Every vehicle has a length above 0.
         let ego = ego_length_m.min(shortest / 2.0);
@@ -320,21 +320,21 @@ fn sizes_of_case(lane: &str, case: &LaneCase<f64>, told: Option<&Sizes>, ego_len
         };
         return Ok(KnownSizes { sizes, are_lengths_known: false });
     };
-    let others = [Some(told.target), told.lead.filter(|_| is_pair)];
-    let mut pairs = vec![("width of the ego", told.ego.width_m, case.ego_width)];
+    let others = [Some(known.target), known.lead.filter(|_| is_pair)];
+    let mut pairs = vec![("width of the ego", known.ego.width_m, case.ego_width)];
     for (at, other) in others.iter().enumerate().filter_map(|(at, other)| Some((at, other.as_ref()?))) {
-        pairs.push(("sum of two lengths", told.ego.length_m + other.length_m, lengths[at]));
-        pairs.push(("sum of two widths", told.ego.width_m + other.width_m, widths[at]));
+        pairs.push(("sum of two lengths", known.ego.length_m + other.length_m, lengths[at]));
+        pairs.push(("sum of two widths", known.ego.width_m + other.width_m, widths[at]));
     }
-    if let Some((what, told, lane_has)) = pairs.iter().find(|(_, a, b)| (a - b).abs() > TOLERANCE_M) {
-        let problem = format!("the {what} is {told} m by the scenarios and {lane_has} m in the run");
+    if let Some((what, expected, lane_has)) = pairs.iter().find(|(_, a, b)| (a - b).abs() > TOLERANCE_M) {
+        let problem = format!("the {what} is {expected} m by the scenarios and {lane_has} m in the run");
         let help =
             "give the scenario file of the run (option `scenarios`), or leave it out: every gap and contact stays";
         return Err(Error::input(Place::item(format!("lane {lane}")), problem, help));
     }
-    if is_pair && told.lead.is_none() {
+    if is_pair && known.lead.is_none() {
         let help = "give the scenario file of the run (option `scenarios`), or leave it out";
         return Err(Error::input(Place::item(format!("lane {lane}")), "the vehicle ahead has no size", help));
     }
-    Ok(KnownSizes { sizes: *told, are_lengths_known: true })
+    Ok(KnownSizes { sizes: *known, are_lengths_known: true })
 }

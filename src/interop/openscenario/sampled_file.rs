@@ -107,8 +107,8 @@ fn plan_of(dir: &Path, record: &SampleRecord) -> Result<(LanePlan, String)> {
     }
     let profile = &record.profile;
     profile.check(&Place::file(dir.join(ESTIMATE_RECORD)))?;
-    let asked = (record.samples, record.seed);
-    let (plan, _) = sampled.samples()?.plan(asked, profile, &record.models, &record.plan_headways)?;
+    let requested = (record.samples, record.seed);
+    let (plan, _) = sampled.samples()?.plan(requested, profile, &record.models, &record.plan_headways)?;
     if record.plan_sha256.as_deref() != Some(plan.hash()) {
         return Err(wrong("its plan does not match the distributions and the profile beside it".to_owned()));
     }

@@ -38,7 +38,7 @@ pub struct SampledParameter {
     /// Factor to the parameter's unit.
     pub factor: f64,
     /// Fraction of the distribution within the parameter's physical range.
-    pub kept_share: f64,
+    pub kept_fraction: f64,
 }
 
 /// Random parameters of a category, and constant values.
@@ -100,14 +100,14 @@ impl DistributionSamples {
         let mut parameters: Vec<SampledParameter> = Vec::new();
         for (name, line, distribution) in of_file {
             let (parameter, factor) = names.find(name, *line)?;
-            let within = Range { low: parameter.least / factor, high: parameter.most / factor };
-            let (draw, kept_share) = distribution.within(within).ok_or_else(|| {
+            let within = Range { low: parameter.min / factor, high: parameter.max / factor };
+            let (draw, kept_fraction) = distribution.within(within).ok_or_else(|| {
                 let place = Place::file(names.path).row(*line).of(format!("parameter `{name}`"));
                 let problem =
-                    format!("none of its values lies in {} … {} {}", parameter.least, parameter.most, parameter.unit);
+                    format!("none of its values lies in {} … {} {}", parameter.min, parameter.max, parameter.unit);
                 Error::input(place, problem, "correct the distribution, or its unit with option `rename`")
             })?;
-            parameters.push(SampledParameter { parameter, draw, factor, kept_share });
+            parameters.push(SampledParameter { parameter, draw, factor, kept_fraction });
         }
         let given: Vec<&MapParameter> =
             parameters.iter().map(|p| p.parameter).chain(fixed.iter().map(|(p, _)| *p)).collect();
@@ -213,6 +213,6 @@ impl DistributionSamples {
 impl SampledParameter {
     /// The value of a uniform number, in the parameter's unit.
     fn value(&self, uniform: f64) -> f64 {
-        (self.draw.value(uniform) * self.factor).clamp(self.parameter.least, self.parameter.most)
+        (self.draw.value(uniform) * self.factor).clamp(self.parameter.min, self.parameter.max)
     }
 }

@@ -270,9 +270,9 @@ mod tests {
     /// the guarantees are not weaker than necessary.
     fn keeps_its_promises<M: DriverModel<f32>>(name: &str, model: M) {
         let mut drawn = 0;
-        let mut between = |least: f32, most: f32| {
+        let mut between = |min: f32, max: f32| {
             drawn += 1;
-            least + (most - least) * unit_uniform(philox4x32_10([drawn, 0, 0, 0], [7, 0])[0])
+            min + (max - min) * unit_uniform(philox4x32_10([drawn, 0, 0, 0], [7, 0])[0])
         };
         let (mut unsafe_below, mut safe, mut ignored) = (0, 0, 0);
         let (mut is_steady, mut unsteady_below) = (0, 0);

@@ -63,8 +63,8 @@ impl Bound {
 
     /// Minimum and maximum value.
     pub fn ends(self) -> [f64; 2] {
-        let least = if self.has_zero { 0.0 } else { self.smallest };
-        [if self.has_negative { -self.largest } else { least }, self.largest]
+        let min = if self.has_zero { 0.0 } else { self.smallest };
+        [if self.has_negative { -self.largest } else { min }, self.largest]
     }
 }
 

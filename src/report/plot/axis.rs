@@ -95,8 +95,8 @@ impl Axis {
 
     /// How many numbers fit above one another without crowding.
     pub fn vertical_numbers(&self) -> usize {
-        let most = if self.scale == AxisScale::Linear { 6.0 } else { 8.0 };
-        (self.length_px() / 18.0).clamp(2.0, most) as usize
+        let max = if self.scale == AxisScale::Linear { 6.0 } else { 8.0 };
+        (self.length_px() / 18.0).clamp(2.0, max) as usize
     }
 
     /// Whether the axis can show `value`.
@@ -114,11 +114,11 @@ impl Axis {
         self.from_px + share * (self.to_px - self.from_px)
     }
 
-    /// The ticks, with at most about `most` numbers.
-    pub fn ticks(&self, most: usize) -> Vec<Tick> {
+    /// The ticks, with at most about `max_ticks` numbers.
+    pub fn ticks(&self, max_ticks: usize) -> Vec<Tick> {
         match self.scale {
-            AxisScale::Linear => self.linear_ticks(most),
-            AxisScale::Logarithmic => self.decade_ticks(most),
+            AxisScale::Linear => self.linear_ticks(max_ticks),
+            AxisScale::Logarithmic => self.decade_ticks(max_ticks),
         }
     }
 
@@ -127,8 +127,8 @@ impl Axis {
         Tick { at_px: self.from_px + share * (self.to_px - self.from_px), label }
     }
 
-    fn linear_ticks(&self, most: usize) -> Vec<Tick> {
-        let step = plain_step((self.high - self.low) / most.max(1) as f64);
+    fn linear_ticks(&self, max_ticks: usize) -> Vec<Tick> {
+        let step = plain_step((self.high - self.low) / max_ticks.max(1) as f64);
         let (first, last) = ((self.low / step - 1e-9).ceil(), (self.high / step + 1e-9).floor());
         // Neighbouring numbers must differ, at any distance from zero.
         let largest = self.low.abs().max(self.high.abs()) / step;
@@ -143,9 +143,9 @@ impl Axis {
 
     /// Up to two decades 1, 2 and 5 have numbers, otherwise the decades, and every other decade or fewer if there are
     /// many.
-    fn decade_ticks(&self, most: usize) -> Vec<Tick> {
+    fn decade_ticks(&self, max_ticks: usize) -> Vec<Tick> {
         let decades = self.high - self.low;
-        let every = (decades / most.max(1) as f64).ceil().max(1.0) as i32;
+        let every = (decades / max_ticks.max(1) as f64).ceil().max(1.0) as i32;
         let mut ticks = Vec::new();
         for exponent in self.low.floor() as i32..=self.high.ceil() as i32 {
             for digit in 1..=9_u8 {
@@ -155,7 +155,7 @@ impl Axis {
                 }
                 let named = match digit {
                     1 => exponent.rem_euclid(every) == 0,
-                    2 | 5 => decades <= 2.0 && 3.0 * decades <= most as f64,
+                    2 | 5 => decades <= 2.0 && 3.0 * decades <= max_ticks as f64,
                     _ => false,
                 } || (decades <= 1.0 && matches!(digit, 2 | 5));
                 let label = named.then(|| power_text(f64::from(digit), exponent, 0));
@@ -252,9 +252,9 @@ mod tests {
     use super::*;
     use AxisScale::{Linear, Logarithmic};
 
-    fn labels(scale: AxisScale, values: &[f64], most: usize) -> Vec<String> {
+    fn labels(scale: AxisScale, values: &[f64], max_ticks: usize) -> Vec<String> {
         let axis = Axis::around(scale, values, (0.0, 100.0)).unwrap();
-        axis.ticks(most).into_iter().filter_map(|t| t.label).collect()
+        axis.ticks(max_ticks).into_iter().filter_map(|t| t.label).collect()
     }
 
     #[test]

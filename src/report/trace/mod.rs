@@ -80,8 +80,8 @@ impl TraceFigure<'_> {
             [StepMark::Reaction.label(), StepMark::Braking.label(), StepMark::Contact.label(), "min TTC", "max BTN"];
         let name_left = MARGIN_PX + SAMPLE_PX + 8.0;
         let longest_px = self.series.iter().map(|s| CELL.text_px(&s.name)).fold(0.0, f64::max);
-        let most = width_px - MARGIN_PX - CELL_PX * columns.len() as f64;
-        let at = |column: usize| most.min(name_left + longest_px + 16.0) + CELL_PX * column as f64;
+        let max_px = width_px - MARGIN_PX - CELL_PX * columns.len() as f64;
+        let at = |column: usize| max_px.min(name_left + longest_px + 16.0) + CELL_PX * column as f64;
         let mut y = top + CELL.line_px();
         for (column, head) in columns.iter().enumerate() {
             canvas.text((at(column), top + f64::from(CELL.size_px)), head, HINT, Anchor::Start);

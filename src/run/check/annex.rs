@@ -1,6 +1,6 @@
-//! What Annex 3 of UN R157 describes: the danger that a profile's CCHDM detects, cases outside the annex, and our
-//! interpretations where the annex is silent. All follow from the profile; a profile without the annex's rules has
-//! none.
+//! Annex 3 of UN R157 and a profile: the danger that the profile's CCHDM detects, the cases that the annex does not
+//! describe, and our interpretations where the annex is silent. The last two exist only for a profile with the annex's
+//! rules.
 
 use super::subject::Lane;
 use crate::model::driver::{BelowTrigger, CutInBraking};
@@ -9,7 +9,7 @@ use crate::run::grid::{MapQuantity, Point, SPEED_MPS};
 use crate::scenario::Category;
 use crate::support::readable::value;
 
-/// The danger of a category, in a few words.
+/// Returns the condition under which CCHDM detects a danger, in a few words.
 pub(super) fn danger(profile: &Profile, category: Category) -> String {
     let cchdm = &profile.cchdm;
     let trigger_mps2 = cchdm.lead_deceleration_trigger_mps2;
@@ -28,8 +28,8 @@ pub(super) fn danger(profile: &Profile, category: Category) -> String {
     }
 }
 
-/// Why Annex 3 does not describe a case. Evaluates only the initial speeds of a deceleration and the headway of a
-/// cut-out.
+/// Returns why Annex 3 does not describe the case; `None` if it does. Only the initial speeds of an LVD and the headway
+/// of a cut-out are checked.
 pub(super) fn outside(profile: &Profile, category: Category, point: &Point) -> Option<String> {
     let cchdm = &profile.cchdm;
     let ego_mps = point.get(MapQuantity::EgoSpeed)?;
@@ -58,7 +58,7 @@ pub(super) fn outside(profile: &Profile, category: Category, point: &Point) -> O
     }
 }
 
-/// Interpretations where the annex is silent, each with a profile that interprets it otherwise.
+/// Returns our interpretations where the annex is silent, each with a profile that has another interpretation.
 pub(super) fn readings_where_silent(profile: &Profile, category: Category) -> Vec<(String, Profile)> {
     let mut all = Vec::new();
     let (coasting_mps2, ttc_s) = (value(profile.cchdm.coasting_mps2), value(profile.cchdm.ttc_s));
@@ -69,7 +69,8 @@ pub(super) fn readings_where_silent(profile: &Profile, category: Category) -> Ve
             all.push((sentence, other));
         }
     };
-    // A profile without the annex's wandering zone has no such interpretation.
+    // `wandering_m` is the lateral deviation that the annex regards as normal. A profile without it does not follow the
+    // annex, so it has no interpretations of the annex.
     if profile.cchdm.wandering_m <= 0.0 {
         return all;
     }
@@ -91,11 +92,11 @@ pub(super) fn readings_where_silent(profile: &Profile, category: Category) -> Ve
     all
 }
 
-/// A cutter that overlaps the ego's path at the start shows no deviation. That it is perceived at once is our
-/// interpretation.
+/// Returns a sentence on a vehicle that cuts in and overlaps the ego's path at the start. The annex perceives a cut-in
+/// by the deviation from the lane centre and does not say when this vehicle is perceived. We interpret: at once.
 pub(super) fn attends_at_once(profile: &Profile, category: Category, lane: &Lane) -> Option<&'static str> {
-    let cutter = &lane.case.others[0];
-    let overlaps = cutter.motion.lateral(&lane.tables, 0).position.abs() <= cutter.half_widths;
+    let other = &lane.case.others[0];
+    let overlaps = other.motion.lateral(&lane.tables, 0).position.abs() <= other.half_widths;
     let applies = category == Category::CutIn && profile.cchdm.wandering_m > 0.0 && overlaps;
     applies.then_some("CCHDM attends at once to a vehicle that overlaps the ego's path at the start (ours)")
 }

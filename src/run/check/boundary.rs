@@ -53,7 +53,7 @@ pub struct Boundary {
 /// The boundaries along all numbers of a case.
 pub(super) fn boundaries(subject: &Subject, profile: &Profile, budget: &StepBudget) -> Result<Vec<Boundary>> {
     let mut found = Vec::new();
-    for (key, least, most, resolution) in VARIED {
+    for (key, min, max, resolution) in VARIED {
         let Some(parameter) = PARAMETERS.iter().find(|parameter| parameter.key == key) else { continue };
         let Some(si) = subject.point().get(parameter.quantity) else { continue };
         // An acceleration is outside the axis of decelerations.
@@ -68,7 +68,7 @@ pub(super) fn boundaries(subject: &Subject, profile: &Profile, budget: &StepBudg
             let values = (0..=SCANNED).map(|k| value + step * f64::from(k));
             values.map_while(|value| Some((value, verdicts(value)?))).collect()
         };
-        let (below, above) = (side(least.min(value)), side(most.max(value)));
+        let (below, above) = (side(min.min(value)), side(max.max(value)));
         let answers = nearest(&below, &above, resolution, &verdicts, &|verdicts| verdicts.verdict());
         let change = |model: &ModelId| {
             let found = nearest(&below, &above, resolution, &verdicts, &|verdicts| verdicts.collides(*model));
@@ -77,7 +77,7 @@ pub(super) fn boundaries(subject: &Subject, profile: &Profile, budget: &StepBudg
         found.push(Boundary {
             parameter,
             value,
-            range: (least.min(value), most.max(value)),
+            range: (min.min(value), max.max(value)),
             answer: change_of(&answers),
             becomes: answers.map(|found| found.map(|(_, answer)| answer)),
             models: ModelId::ALL.iter().map(change).collect(),

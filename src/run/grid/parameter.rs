@@ -54,9 +54,9 @@ pub struct MapParameter {
     /// Number of its units in one SI unit.
     pub per_si: f64,
     /// Minimum value, in its unit.
-    pub least: f64,
+    pub min: f64,
     /// Maximum value, in its unit.
-    pub most: f64,
+    pub max: f64,
     /// Categories that have it.
     pub categories: &'static [Category],
 }
@@ -72,10 +72,10 @@ const fn parameter(
     unit: &'static str,
     quantity: MapQuantity,
     per_si: f64,
-    (least, most): (f64, f64),
+    (min, max): (f64, f64),
     categories: &'static [Category],
 ) -> MapParameter {
-    MapParameter { key, label, unit, quantity, per_si, least, most, categories }
+    MapParameter { key, label, unit, quantity, per_si, min, max, categories }
 }
 
 /// All, in the order of help texts.
@@ -228,11 +228,11 @@ impl MapParameter {
             && doubts.speed(self.si(value), || format!("{} = {value}", self.key)) != self.si(value);
         doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
         let value = if is_still { 0.0 } else { value };
-        if (self.least..=self.most).contains(&value) {
+        if (self.min..=self.max).contains(&value) {
             return Ok(value);
         }
         let problem = format!("{} = {value} cannot be used", self.key);
-        let help = format!("give a number of at least {} and at most {} {}", self.least, self.most, self.unit);
+        let help = format!("give a number of at least {} and at most {} {}", self.min, self.max, self.unit);
         Err(Error::usage(Place::item(flag), problem, help))
     }
 }

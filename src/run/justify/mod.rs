@@ -69,7 +69,7 @@ pub struct Coverage {
     /// Number of kept scenarios that are points of the parameter space.
     pub points: u64,
     /// Fraction of the fitted density inside its valid region.
-    pub valid_share: f64,
+    pub valid_fraction: f64,
     /// Representativeness metric M of the density, and the value for the same number of recorded scenarios; `None` with
     /// too few.
     pub representativeness: Option<(f64, f64)>,
@@ -266,7 +266,7 @@ impl Coverage {
             found: model.provenance.found,
             kept: model.provenance.kept,
             points: model.provenance.kept - left_out.len() as u64,
-            valid_share: model.valid.estimate,
+            valid_fraction: model.valid.estimate,
             representativeness: model.representativeness.map(|r| (r.metric, r.train_test)),
         }
     }

@@ -13,13 +13,15 @@ use crate::stats::estimate::{Ratio, RatioVerdict};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Rules {
-    /// Least recall: failures of S that S' has too (0.9). A hidden failure is the error that an assessment must not make.
+    /// Minimum recall: the fraction of the failures of S that S' also has (0.9). A hidden failure is the error that an
+    /// assessment must not make.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub min_recall: f64,
-    /// Least precision: failures of S' that S has too (0.8). False alarms cost effort, not safety.
+    /// Minimum precision: the fraction of the failures of S' that S also has (0.8). False alarms cost effort, not
+    /// safety.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub min_precision: f64,
-    /// Least share of kept scenarios that are points of the parameter space (0.95).
+    /// Minimum fraction of kept scenarios that are points of the parameter space (0.95).
     #[schemars(range(min = 0.0, max = 1.0))]
     pub min_coverage: f64,
 }
@@ -101,15 +103,15 @@ impl Conclusion {
 impl Rules {
     /// Findings on recall and precision.
     pub(super) fn of_labels(&self, scored: &Scored, options: &ScoreOptions) -> Vec<Finding> {
-        let least = u64::from(options.min_failures.max(1));
+        let min_failures = u64::from(options.min_failures.max(1));
         let failing = scored.failing_scenarios;
         let share = |quantity, share: Share, limit: f64| {
             // Few scenarios give little evidence, independent of the number of headways that fail in each.
             let (conclusion, need) = match share.value.zip(share.interval) {
-                Some((value, interval)) if failing >= least => conclude(value, interval, limit),
+                Some((value, interval)) if failing >= min_failures => conclude(value, interval, limit),
                 _ => {
                     // Without any failure the required number of scenarios is unknown.
-                    let times = least as f64 / failing as f64;
+                    let times = min_failures as f64 / failing as f64;
                     (Conclusion::Undecided, (failing > 0).then_some(Need { times: times.max(1.1) }))
                 }
             };

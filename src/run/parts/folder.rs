@@ -208,7 +208,7 @@ mod tests {
         dir
     }
 
-    fn told(names: &[&str], units: u64) -> String {
+    fn problem_of(names: &[&str], units: u64) -> String {
         let dir = folder(names);
         let error = collect(dir.path(), units, |shard| format!("make {shard}")).unwrap_err();
         format!("{error} {}", error.help().unwrap_or_default())
@@ -216,13 +216,13 @@ mod tests {
 
     #[test]
     fn missing_doubled_and_misnamed_parts_are_told_with_what_to_do() {
-        let missing = told(&["part-00000-of-00003.json"], 9);
+        let missing = problem_of(&["part-00000-of-00003.json"], 9);
         assert!(missing.contains("6 of 9 units are missing") && missing.contains("make 1/3\nmake 2/3"), "{missing}");
-        let doubled = told(&["part-00000-of-00003.json", "part-00000-of-00001.json"], 9);
+        let doubled = problem_of(&["part-00000-of-00003.json", "part-00000-of-00001.json"], 9);
         assert!(doubled.contains("units 0 to 2 are doubled"), "{doubled}");
-        assert!(told(&["part-3.json"], 9).contains("no part"));
-        assert!(told(&["estimate.json"], 9).contains("there is no part here"));
-        let mixed = told(&["part-00000-of-00003.json", "part-00002-of-00004.json"], 12);
+        assert!(problem_of(&["part-3.json"], 9).contains("no part"));
+        assert!(problem_of(&["estimate.json"], 9).contains("there is no part here"));
+        let mixed = problem_of(&["part-00000-of-00003.json", "part-00002-of-00004.json"], 12);
         assert!(mixed.contains("units 4..6, 9..12"), "{mixed}");
     }
 

@@ -289,7 +289,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path().join("out");
         let path = out.join("journal");
-        let told = |what: &str, journal: &mut Journal<Vec<u32>>| {
+        let append_fails = |what: &str, journal: &mut Journal<Vec<u32>>| {
             let error = journal.append(&[vec![2]]).unwrap_err();
             assert!(matches!(error, Error::Io { .. }), "{error}");
             assert!(error.to_string().contains(what) && error.to_string().contains("begins anew"), "{error}");
@@ -301,12 +301,12 @@ mod tests {
             if has_begun {
                 journal.append(&[vec![1]]).unwrap();
                 std::fs::remove_file(&path).unwrap();
-                told("removed or replaced", &mut journal);
+                append_fails("removed or replaced", &mut journal);
                 std::fs::write(&path, "another one").unwrap();
-                told("removed or replaced", &mut journal);
+                append_fails("removed or replaced", &mut journal);
             }
             std::fs::remove_dir_all(&out).unwrap();
-            told("out vanished", &mut journal);
+            append_fails("out vanished", &mut journal);
             assert!(!out.exists());
         }
     }

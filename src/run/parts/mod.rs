@@ -84,10 +84,10 @@ fn from_environment(environment: impl Fn(&str) -> Option<String>) -> Result<u64,
     if let Some(index) = value(KUBERNETES)? {
         return Ok(index);
     }
-    let [id, least] = SLURM;
+    let [id, first] = SLURM;
     let index = value(id)?.ok_or_else(|| format!("auto needs {KUBERNETES} or {id} in the environment"))?;
-    let least = value(least)?.unwrap_or(0);
-    index.checked_sub(least).ok_or_else(|| format!("{id} is {index}, below the array's first index {least}"))
+    let first = value(first)?.unwrap_or(0);
+    index.checked_sub(first).ok_or_else(|| format!("{id} is {index}, below the array's first index {first}"))
 }
 
 impl FromStr for Shard {

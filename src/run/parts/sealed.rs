@@ -201,18 +201,18 @@ mod tests {
     fn a_file_of_another_engine_or_version_is_refused_by_its_number() {
         let (text, sha256) = seal("part", &vec![1.5_f64]).unwrap();
         let text = String::from_utf8(text).unwrap();
-        let told = |from: &str, to: &str| {
+        let problem_of = |from: &str, to: &str| {
             assert!(text.contains(from), "{text}");
             let changed = text.replace(from, to);
             unseal::<Vec<f64>>("part", changed.as_bytes(), &Place::item("here"), "").unwrap_err().to_string()
         };
         let engine = format!("\"engine\":{ENGINE_VERSION}");
-        let other = told(&engine, "\"engine\":999");
+        let other = problem_of(&engine, "\"engine\":999");
         assert!(other.contains(&format!("of engine 999, this program has engine {ENGINE_VERSION}")), "{other}");
-        assert!(told(&format!("\"version\":{VERSION},{engine}"), "\"version\":1").contains("its version is 1"));
+        assert!(problem_of(&format!("\"version\":{VERSION},{engine}"), "\"version\":1").contains("its version is 1"));
         // Changing only the version number is detected, because the checksum includes it.
         let of_other = hex(&Sha256::digest(format!("part {VERSION} {}\n[1.5]", ENGINE_VERSION + 1)));
-        assert!(told(&sha256, &of_other).contains("checksum"));
+        assert!(problem_of(&sha256, &of_other).contains("checksum"));
     }
 
     #[test]

@@ -1,4 +1,5 @@
-//! The worst lanes of a reopened run: for a study, of its lanes; for a sampling run, of its table.
+//! The worst lanes of a reopened run. For a study they are computed from its lanes; for a sampling run they are read
+//! from its table `worst.csv`.
 
 use std::path::Path;
 
@@ -19,7 +20,7 @@ use crate::{Error, Place, Result};
 /// Maximum number of returned lanes.
 const MAX_LANES: usize = 10_000;
 
-/// Values of all lanes of the first scenarios are computed.
+/// Number of scenarios in the first piece of a study, for whose lanes all values are computed.
 const FIRST_UNITS: u64 = 64;
 
 /// Which of the worst lanes are requested.
@@ -34,17 +35,19 @@ pub struct WorstOptions<'a> {
     pub models: Option<&'a [ModelId]>,
 }
 
-/// A lane by its [limit state](limit_state).
+/// The [limit state](limit_state) of a lane, and the lane.
 type Ranked = (f64, u64);
 
 impl Reopened {
-    /// For a study: per model, the scenarios with the smallest [limit state](limit_state) of the criterion. Each
-    /// contributes its worst lane over variants and headways; ascending, equal ones in the plan's order. For a sampling
-    /// run: the first lanes of each model in the table `worst.csv` of its folder.
+    /// Returns the worst lanes of each model.
+    ///
+    /// For a study: each scenario has one worst lane over variants and headways, that with the smallest
+    /// [limit state](limit_state) of the criterion. The result is the first `count` of these lanes, in ascending order;
+    /// equal values are in the plan's order. For a sampling run: the first `count` lanes of the model in `worst.csv`.
     ///
     /// # Errors
-    /// [`Error::Usage`] for variants, models or a criterion that the run does not have, and for too many lanes;
-    /// [`Error::Io`]; [`Error::Input`] for a sampling run without such a table.
+    /// [`Error::Usage`] for variants, models or a criterion that the run does not have, and for no or too many lanes;
+    /// [`Error::Io`]; [`Error::Input`] for a sampling run whose table is missing or damaged.
     pub fn worst(&self, dir: &Path, options: &WorstOptions) -> Result<Vec<LaneKey>> {
         if options.count == 0 {
             return Err(Error::usage(Place::option("worst"), "0 is out of range", "give 1 or more"));
@@ -88,9 +91,10 @@ impl Reopened {
         for (at, record) in reader.records().enumerate() {
             let record = record.map_err(|e| wrong(at as u64 + 2, e.to_string()))?;
             let ranked_by = by.and_then(|by| record.get(by)).unwrap_or_default();
-            if let Some(asked) = options.criterion.filter(|asked| asked.key() != ranked_by) {
-                let problem = format!("worst.csv ranks its lanes by {ranked_by}, not by {}", asked.key());
-                let help = format!("leave it out, or run `lanesweep sample` with option `criterion = {}`", asked.key());
+            if let Some(requested) = options.criterion.filter(|requested| requested.key() != ranked_by) {
+                let problem = format!("worst.csv ranks its lanes by {ranked_by}, not by {}", requested.key());
+                let help =
+                    format!("leave it out, or run `lanesweep sample` with option `criterion = {}`", requested.key());
                 return Err(Error::usage(Place::option("criterion"), problem, help));
             }
             let key = self.find(text_of_cell(record.get(column).unwrap_or("")))?;
@@ -107,7 +111,7 @@ impl Reopened {
     }
 }
 
-/// Reruns the lanes on the CPU. Once the lists are full, values are computed only for lanes that may enter one.
+/// Reruns the lanes on the CPU. Once every list is full, values are computed only for lanes that can enter a list.
 fn worst_of_study(study: &Study, options: &WorstOptions, models: &[usize]) -> Result<Vec<LaneKey>> {
     let &WorstOptions { count, variants, .. } = options;
     let (plan, criterion) = (study.plan(), options.criterion.unwrap_or(Criterion::Collision));
@@ -132,7 +136,8 @@ fn worst_of_study(study: &Study, options: &WorstOptions, models: &[usize]) -> Re
     study.cases().in_windows(0..plan.unit_count(), WINDOW, |plan, units| {
         let mut from = units.start;
         while from < units.end {
-            // The number of scenarios doubles: a list then finds as many new lanes in each piece.
+            // A piece is as large as all pieces before it, so that about equally many new lanes of each piece enter a
+            // list.
             let to = units.end.min(FIRST_UNITS.max(2 * from));
             let wanted = wanted(plan, &worst, options, criterion, models);
             executor.sweep(plan, from..to, wanted, |chunk| {
@@ -147,7 +152,7 @@ fn worst_of_study(study: &Study, options: &WorstOptions, models: &[usize]) -> Re
     Ok(lanes.filter_map(|(_, lane)| plan.key(*lane)).collect())
 }
 
-/// Results that further lanes must return, so that the lists equal those from all values.
+/// Results that the next lanes must return, so that the lists are the same as with the values of all lanes.
 fn wanted(
     plan: &LanePlan,
     worst: &[Vec<Ranked>],
@@ -158,8 +163,8 @@ fn wanted(
     let mut watch = Watch::NOTHING;
     for &model in models {
         let last = worst[model].get(options.count - 1).map(|(value, _)| *value);
-        // Failures are so frequent in a study that marking all failures of the criterion would mark too many lanes;
-        // then all values are computed.
+        // `Some` criterion means that all its failures are marked. A study has too many failures for that, so all
+        // values are computed.
         match last.and_then(|last| marks_of(&plan.profile, criterion, last)) {
             Some((marks, None)) => watch.0[plan.models[model].index()] = marks,
             _ => return Wanted::Outcomes,
@@ -168,7 +173,7 @@ fn wanted(
     Wanted::Watched(watch)
 }
 
-/// Inserts the worst lane of each unit of a chunk into the lists.
+/// Inserts the worst lane of each scenario of a chunk into the lists.
 fn add(
     plan: &LanePlan,
     chunk: &Chunk,
@@ -178,7 +183,7 @@ fn add(
     count: usize,
 ) {
     let valued = chunk.valued.iter().flatten().map(|(lane, outcome)| (*lane, outcome));
-    // The current unit, and its worst lane so far, per model.
+    // The current scenario, and per model its worst lane so far.
     let (mut unit, mut of_unit) = (None, vec![None; worst.len()]);
     for (lane, outcome) in (chunk.first_lane..).zip(&chunk.outcomes).chain(valued) {
         let Some(key) = plan.key(lane).filter(is_wanted) else { continue };

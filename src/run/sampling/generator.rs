@@ -7,7 +7,7 @@ use crate::engine::generated::{
     CasePath, ColumnBound, Generator, LateralPath, MAX_BOUNDS, MAX_PARAMETERS, NO_SLOT, PointSource, Points, Recipe,
     ReducedColumns,
 };
-use crate::model::profile::{CutOutJudged, CutOutTarget, Profile};
+use crate::model::profile::{CutOutEvaluated, CutOutTarget, Profile};
 use crate::model::scalar::Real;
 use crate::scenario::Category;
 use crate::scenario::parameterization::{AfterDuration, ReducedSeries, Sizes, Variable};
@@ -156,7 +156,7 @@ fn recipe(space: &ParameterSpace, sizes: &Sizes, profile: &Profile) -> Result<Re
         pair: u32::from(pair),
         decelerates: u32::from(space.dimension_of(Variable::MeanDeceleration).is_some()),
         unlimited: u32::from(unlimited),
-        judged: u32::from(!(pair && frame.cut_out_judged == CutOutJudged::Ahead)),
+        judged: u32::from(!(pair && frame.cut_out_evaluated == CutOutEvaluated::Ahead)),
         step_cap: profile.step_cap(),
         slots: Variable::ALL.map(|variable| slot(space.dimension_of(variable))),
         columns: columns(space),
@@ -186,8 +186,8 @@ fn slot(place: Option<usize>) -> u32 {
 fn at_least(bound: f64, excluded: bool) -> f32 {
     let rounded = bound as f32;
     let kept = |v: f32| if excluded { f64::from(v) > bound } else { f64::from(v) >= bound };
-    let least = if kept(rounded) { rounded } else { rounded.next_up() };
-    if least.is_subnormal() { f32::MIN_POSITIVE } else { least }
+    let min = if kept(rounded) { rounded } else { rounded.next_up() };
+    if min.is_subnormal() { f32::MIN_POSITIVE } else { min }
 }
 
 /// The largest number of the lane arithmetic that satisfies an upper bound.

@@ -75,9 +75,9 @@ impl LimitState for LaneLimitState<'_> {
 /// The density of a density file, truncated to its valid region.
 ///
 /// # Errors
-/// As [`Truncated::with_share`].
+/// As [`Truncated::with_validity`].
 pub fn truncated(density: &DensityModel) -> Result<Truncated<impl Fn(&[f64]) -> bool + Sync + '_>> {
-    Truncated::with_share(density.mixture()?, |point: &[f64]| density.space.is_valid(point), density.valid.estimate)
+    Truncated::with_validity(density.mixture()?, |point: &[f64]| density.space.is_valid(point), density.valid.estimate)
 }
 
 /// Determines which scenarios failures come from, by draws of a proposal with the defensive mixture weight `defence`.

@@ -1,5 +1,5 @@
-//! Importance sampling over given proposals, or those of a pilot: draws, evaluates and weights the samples that a
-//! ledger does not hold.
+//! Importance sampling with given proposals or with those of a pilot. It draws, evaluates and weights the samples that
+//! the ledger does not hold.
 
 use std::ops::Range;
 
@@ -24,19 +24,22 @@ use crate::{Error, Place, Result};
 /// Maximum number of samples evaluated between two journal updates.
 const CHUNK: u64 = 1 << 16;
 
-/// Maximum number of kernels for which weighting `CHUNK` samples takes about one second.
+/// Number of kernels in the density for which weighting `CHUNK` samples takes about one second. The time is
+/// proportional to the number of kernels, so a density with more kernels has smaller chunks.
 const KERNELS: u64 = 1 << 10;
 
-/// Number of samples between two checks of the journal and of cancellation: small enough to take seconds for any lane
-/// duration. A power of two, to fit the tree of sums.
+/// Returns the number of samples between two updates of the journal and checks for cancellation.
+///
+/// It is small enough that a chunk takes seconds, however long the lanes last. It is a power of two, because the sums
+/// follow a binary tree over the sample indices.
 fn chunk_samples(step_cap: u32, models: u64, kernels: u64) -> u64 {
-    let judged = lanes_within_seconds(step_cap) / models.max(1);
-    let weighed = CHUNK / (kernels / KERNELS).max(1);
-    1 << judged.min(weighed).clamp(1, CHUNK).ilog2()
+    let evaluated = lanes_within_seconds(step_cap) / models.max(1);
+    let weighted = CHUNK / (kernels / KERNELS).max(1);
+    1 << evaluated.min(weighted).clamp(1, CHUNK).ilog2()
 }
 
 impl Sample {
-    /// Number of samples between two checks of the journal.
+    /// Number of samples between two updates of the journal.
     pub(crate) fn chunk_samples(&self) -> u64 {
         let (models, kernels) = (self.options.models.len(), self.density.kde.points().len());
         chunk_samples(self.profile.step_cap(), models as u64, kernels as u64)

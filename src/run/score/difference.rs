@@ -116,12 +116,12 @@ pub fn min_contrast(rates: &[ScenarioRate], contrasts: &[Contrast], level: f64) 
     };
     let value =
         |contrast: &Contrast| contrast.constant + contrast.terms.iter().map(|(c, at)| c * values[*at]).sum::<f64>();
-    let least = |of: &dyn Fn(&Contrast) -> f64| contrasts.iter().map(of).fold(f64::INFINITY, f64::min);
+    let min_over = |of: &dyn Fn(&Contrast) -> f64| contrasts.iter().map(of).fold(f64::INFINITY, f64::min);
     let interval = ScoreInterval {
-        low: least(&|contrast| value(contrast) - reach(contrast, &own, -1.0)),
-        high: least(&|contrast| value(contrast) + reach(contrast, &shared, 1.0)),
+        low: min_over(&|contrast| value(contrast) - reach(contrast, &own, -1.0)),
+        high: min_over(&|contrast| value(contrast) + reach(contrast, &shared, 1.0)),
     };
-    (!contrasts.is_empty()).then(|| (least(&value), interval))
+    (!contrasts.is_empty()).then(|| (min_over(&value), interval))
 }
 
 #[cfg(test)]

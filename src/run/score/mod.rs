@@ -242,7 +242,7 @@ pub struct ScoreOptions {
     /// Coverage of the intervals (0.95).
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub confidence: f64,
-    /// Below so many failures in S F1 has no interval; below so many scenarios with one a claim is not judged (10).
+    /// Below so many failures in S F1 has no interval; below so many scenarios with one a claim is not evaluated (10).
     #[schemars(range(min = 0, max = 4_294_967_295_u32))]
     pub min_failures: u32,
 }
@@ -276,8 +276,8 @@ mod tests {
     fn counts_past_2_to_the_32_score_as_their_shares_do() {
         let c = Confusion { tp: 6 << 40, fn_: 2 << 40, fp: 4 << 40, tn: 88 << 40 };
         assert_eq!((recall(&c), precision(&c), f1(&c)), (Some(0.75), Some(0.6), Some(12.0 / 18.0)));
-        let most = Confusion { tp: u64::MAX, ..Confusion::default() };
-        assert_eq!(f1(&most), Some(1.0));
+        let max = Confusion { tp: u64::MAX, ..Confusion::default() };
+        assert_eq!(f1(&max), Some(1.0));
     }
 
     #[test]

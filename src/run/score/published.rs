@@ -75,12 +75,12 @@ pub fn published_lvd_f1(variant: &str, model: ModelId, criterion: Criterion) -> 
 /// Misfit between a study and the published numbers.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Misfit {
-    /// Number of these rates that are near the published ones; see [`Misfit::beyond_points`].
-    pub shares: usize,
+    /// Number of failure rates of S that are published for cells of the study, at most 36.
+    pub rates: usize,
     /// How many of them are near the published ones; see [`Misfit::beyond_points`].
     pub near: usize,
     /// Root mean square difference of these rates, percentage points.
-    pub share_rms_points: f64,
+    pub rate_rms_points: f64,
     /// Number of F1 values of LVD parameterizations that are published and defined here, at most 60.
     pub f1_values: usize,
     /// Mean absolute difference of these F1; 0 without any.
@@ -110,9 +110,9 @@ impl Misfit {
         }
         let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len().max(1) as f64;
         (!squares.is_empty()).then(|| Misfit {
-            shares: squares.len(),
+            rates: squares.len(),
             near,
-            share_rms_points: mean(&squares).sqrt(),
+            rate_rms_points: mean(&squares).sqrt(),
             f1_values: differences.len(),
             f1_mean: mean(&differences),
             f1_largest: differences.iter().copied().fold(0.0, f64::max),
@@ -139,7 +139,7 @@ impl Misfit {
         format!(
             "Difference to the published numbers of highD: {} shares of failures, root mean square {:.1} percentage \
              points, {} within 3 points or a factor 1.5{f1}.",
-            self.shares, self.share_rms_points, self.near
+            self.rates, self.rate_rms_points, self.near
         )
     }
 }

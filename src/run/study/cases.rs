@@ -130,12 +130,12 @@ impl StudyCases {
     pub fn in_windows(
         &self,
         units: Range<u64>,
-        most: u64,
+        max_units: u64,
         mut each: impl FnMut(&LanePlan, Range<u64>) -> Result<()>,
     ) -> Result<()> {
         let mut from = units.start;
         while from < units.end {
-            let mut to = units.end.min(from.saturating_add(most.max(1)));
+            let mut to = units.end.min(from.saturating_add(max_units.max(1)));
             while to - from > 1 && self.entries(from..to) > MAX_ENTRIES_AT_ONCE {
                 to = from + (to - from) / 2;
             }

@@ -143,9 +143,9 @@ fn bins(mut values: Vec<f64>) -> Option<(f64, f64, Vec<u64>)> {
     let n = values.len();
     let quartiles = values[n * 3 / 4] - values[n / 4];
     let rule = 2.0 * quartiles / libm::cbrt(n as f64);
-    let least = ((last - first) / MAX_BINS).max(1e-9 * first.abs().max(last.abs())).max(1e-9);
+    let min_width = ((last - first) / MAX_BINS).max(1e-9 * first.abs().max(last.abs())).max(1e-9);
     // Starts at half the rule's width, because the next round number is up to 2.5 times as large.
-    let width = plain_step((0.5 * rule).max(least));
+    let width = plain_step((0.5 * rule).max(min_width));
     let (from, to) = ((first / width).floor(), (last / width).floor());
     let mut counts = vec![0_u64; (to - from) as usize + 1];
     for value in values {

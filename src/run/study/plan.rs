@@ -116,10 +116,10 @@ pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyO
 
 /// Limits the size of the tables before they are allocated.
 fn check_size(entries: f64, values: f64, dt_s: f64) -> Result<()> {
-    let told = format!("the scenarios and their parameterizations have {entries:.1e} values at a step of {dt_s} s");
+    let size = format!("the scenarios and their parameterizations have {entries:.1e} values at a step of {dt_s} s");
     // The user, not the file, chooses a finer time step.
     if entries > (MAX_ENTRIES + MAX_ENTRIES_PER_VALUE * values) * (PAPER_DT_S / dt_s).max(1.0) {
-        let problem = format!("{told}, but only {values:.1e} were recorded");
+        let problem = format!("{size}, but only {values:.1e} were recorded");
         let help = "their sample rate is low for so many or so long ones: give more samples, or study fewer at once";
         return Err(Error::input(Place::item("scenarios"), problem, help));
     }

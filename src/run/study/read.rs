@@ -75,9 +75,9 @@ impl StudyHead {
         let wanted = wanted(count);
         let begin = file.stream_position().map_err(io)?;
         let end = file.seek(SeekFrom::End(0)).map_err(io)?;
-        let told = self.scenario_bytes();
-        if end - begin != told {
-            let problem = format!("it holds {} bytes of scenarios, where its head tells of {told}", end - begin);
+        let expected = self.scenario_bytes();
+        if end - begin != expected {
+            let problem = format!("it holds {} bytes of scenarios, where its head tells of {expected}", end - begin);
             return Err(wrong(format!("{problem}: it was cut off or added to")));
         }
         let (mut held, mut at) = (Vec::new(), begin);
@@ -115,14 +115,14 @@ impl StudyCases {
     }
 
     /// A separate plan over an even selection of the held scenarios, for extrapolation to all. It has at most about
-    /// `most` scenarios and `max_bytes` bytes of series, but at least one scenario of each category.
+    /// `max_scenarios` scenarios and `max_bytes` bytes of series, but at least one scenario of each category.
     ///
     /// # Errors
     /// None for types of this program.
     /// None for what this program makes.
-    pub(crate) fn thinned(&self, most: u64, max_bytes: u64) -> Result<LanePlan> {
+    pub(crate) fn thinned(&self, max_scenarios: u64, max_bytes: u64) -> Result<LanePlan> {
         let by_bytes = self.series_bytes(self.held_units()).div_ceil(max_bytes.max(1));
-        let step = (self.held.len() as u64).div_ceil(most.max(1)).max(by_bytes).max(1);
+        let step = (self.held.len() as u64).div_ceil(max_scenarios.max(1)).max(by_bytes).max(1);
         let (mut held, mut blocks) = (Vec::new(), Vec::new());
         for (head, block) in self.head.blocks.iter().zip(&self.outline.blocks) {
             let units = block.units.held().map(|unit| block.first_unit + unit).step_by(step as usize);

@@ -271,7 +271,7 @@ mod tests {
 
     #[test]
     fn counts_names_and_descriptions_follow_from_the_features() {
-        let told = |category, key| {
+        let summary = |category, key| {
             let id = Parameterization::find(category, key).unwrap();
             let parameters = id.parameters(&ParameterizationOptions::default());
             let names: Vec<String> = parameters.into_iter().map(|p| p.name).collect();
@@ -298,7 +298,7 @@ mod tests {
             (Category::Lvd, "i", "3: constant deceleration: v0_mps v1_mps mean_deceleration_mps2"),
             (Category::Lvd, "ii", "3: sinusoidal deceleration: v0_mps v1_mps mean_deceleration_mps2"),
         ] {
-            assert_eq!(told(category, key), expected);
+            assert_eq!(summary(category, key), expected);
         }
     }
 }

@@ -80,7 +80,7 @@ pub struct ParameterizationOptions {
     /// Lateral distance of a lane change, m (3.5).
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub lane_change_m: f64,
-    /// Least lateral speed, m/s (1e-3).
+    /// Minimum lateral speed, m/s (1e-3).
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     #[serde(alias = "least_lateral_speed_mps")] // in density files of earlier builds
     pub min_lateral_speed_mps: f64,

@@ -174,10 +174,10 @@ impl Parameter {
     /// The same parameter with its bounds limited to the physical range of its quantity.
     pub fn within_physics(&self) -> Parameter {
         let Some(quantity) = self.quantity() else { return self.clone() };
-        let (least, largest) = quantity.limits().physical;
+        let (min, max) = quantity.limits().physical;
         Parameter {
-            lower: Some(self.lower.map_or(least, |lower| lower.max(least))),
-            upper: Some(self.upper.map_or(largest, |upper| upper.min(largest))),
+            lower: Some(self.lower.map_or(min, |lower| lower.max(min))),
+            upper: Some(self.upper.map_or(max, |upper| upper.min(max))),
             ..self.clone()
         }
     }

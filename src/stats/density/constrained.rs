@@ -68,8 +68,8 @@ impl Kde {
             0.5 * whitened.norm_squared()
         };
         let exponents: Vec<f64> = self.points().iter().map(exponent).collect();
-        let least = exponents.iter().copied().fold(f64::INFINITY, f64::min);
-        let weights: Vec<f64> = exponents.iter().map(|e| libm::exp(least - e)).collect();
+        let min = exponents.iter().copied().fold(f64::INFINITY, f64::min);
+        let weights: Vec<f64> = exponents.iter().map(|e| libm::exp(min - e)).collect();
         let total: f64 = weights.iter().sum();
         this.probabilities = weights.iter().map(|w| w / total).collect();
         Ok(this)

@@ -176,14 +176,14 @@ impl Mixture {
         &self.factors[self.factor_of[component]]
     }
 
-    /// The same mixture with `covariance` times `share` added to every component's covariance. It is wider wherever the
-    /// component is narrower than that covariance.
+    /// The same mixture with `covariance` times `fraction` added to every component's covariance. It is wider wherever
+    /// the component is narrower than that covariance.
     ///
     /// # Errors
     /// [`Error::Usage`] if the sum has no triangular factor.
-    pub fn widened(&self, covariance: &DMatrix<f64>, share: f64) -> Result<Mixture> {
+    pub fn widened(&self, covariance: &DMatrix<f64>, fraction: f64) -> Result<Mixture> {
         let widen = |factor: &DMatrix<f64>| {
-            Cholesky::new(covariance * share + factor * factor.transpose()).map(Cholesky::unpack)
+            Cholesky::new(covariance * fraction + factor * factor.transpose()).map(Cholesky::unpack)
         };
         let factors =
             self.factors.iter().map(widen).collect::<Option<Vec<_>>>().ok_or_else(|| {

@@ -65,9 +65,9 @@ impl Mixture {
         let kept: Vec<(&[f64], f64)> =
             points.iter().zip(weights).filter(|(_, w)| **w > 0.0).map(|(p, w)| (p.as_slice(), w / total)).collect();
         let sample = Weighted::of(kept, d);
-        let least = if options.choose { 1 } else { options.components };
+        let min_components = if options.choose { 1 } else { options.components };
         let mut best: Option<(f64, Mixture)> = None;
-        for components in least..=options.components {
+        for components in min_components..=options.components {
             let (mixture, log_likelihood) = sample.expectation_maximisation(components, options)?;
             let parameters = mixture.weights().len() * (1 + d + d * (d + 1) / 2) - 1;
             let bic = parameters as f64 * libm::log(sample.effective) - 2.0 * sample.effective * log_likelihood;
@@ -93,8 +93,8 @@ impl<'a> Weighted<'a> {
         let (mean, mut covariance) = moments(points.iter().copied(), d);
         for j in 0..d {
             // A constant parameter gets a spread that is small relative to its value.
-            let least = (1e-9 * (1.0 + mean[j].abs())).powi(2);
-            covariance[(j, j)] = covariance[(j, j)] * (1.0 + JITTER) + least;
+            let min_variance = (1e-9 * (1.0 + mean[j].abs())).powi(2);
+            covariance[(j, j)] = covariance[(j, j)] * (1.0 + JITTER) + min_variance;
         }
         let effective = 1.0 / points.iter().map(|(_, w)| w * w).sum::<f64>();
         Weighted { points, d, covariance, effective }
@@ -117,20 +117,20 @@ impl<'a> Weighted<'a> {
         let scale: Vec<f64> = self.covariance.diagonal().iter().map(|variance| variance.sqrt()).collect();
         let distance = |a: &[f64], b: &[f64]| -> f64 { (0..d).map(|j| ((a[j] - b[j]) / scale[j]).powi(2)).sum() };
         let stream = Stream { seed, purpose: PURPOSE };
-        let choose = |shares: &[f64], k: usize| {
-            let goal = uniform(stream.words(k as u64, 0)[0]) * shares.iter().sum::<f64>();
+        let choose = |weights: &[f64], k: usize| {
+            let goal = uniform(stream.words(k as u64, 0)[0]) * weights.iter().sum::<f64>();
             let mut sum = 0.0;
-            shares.iter().position(|s| {
+            weights.iter().position(|s| {
                 sum += s;
                 sum >= goal
             })
         };
-        let shares: Vec<f64> = self.points.iter().map(|p| p.1).collect();
-        let mut centres = vec![self.points[choose(&shares, 0).unwrap_or(0)].0.to_vec()];
+        let weights: Vec<f64> = self.points.iter().map(|p| p.1).collect();
+        let mut centres = vec![self.points[choose(&weights, 0).unwrap_or(0)].0.to_vec()];
         let mut nearest: Vec<f64> = self.points.iter().map(|p| distance(p.0, &centres[0])).collect();
         for k in 1..components {
-            let shares: Vec<f64> = self.points.iter().zip(&nearest).map(|(p, n)| p.1 * n).collect();
-            let centre = self.points[choose(&shares, k).unwrap_or(0)].0.to_vec();
+            let weights: Vec<f64> = self.points.iter().zip(&nearest).map(|(p, n)| p.1 * n).collect();
+            let centre = self.points[choose(&weights, k).unwrap_or(0)].0.to_vec();
             nearest.iter_mut().zip(&self.points).for_each(|(n, p)| *n = n.min(distance(p.0, &centre)));
             centres.push(centre);
         }
@@ -153,38 +153,38 @@ impl<'a> Weighted<'a> {
     /// The fitted mixture and its mean log-likelihood.
     fn expectation_maximisation(&self, components: usize, options: &FitOptions) -> Result<(Mixture, f64)> {
         let n = self.points.len();
-        let mut shares = vec![vec![0.0; n]; components];
+        let mut responsibilities = vec![vec![0.0; n]; components];
         for (i, own) in self.first_assignment(components, options.seed).into_iter().enumerate() {
-            shares[own][i] = 1.0;
+            responsibilities[own][i] = 1.0;
         }
-        let mut mixture = self.maximise(&shares)?;
+        let mut mixture = self.maximise(&responsibilities)?;
         let mut last = f64::NEG_INFINITY;
         let mut parts = Vec::new();
         for _ in 0..options.iterations {
-            shares = vec![vec![0.0; n]; mixture.weights().len()];
+            responsibilities = vec![vec![0.0; n]; mixture.weights().len()];
             let mut log_likelihood = 0.0;
             for (i, (point, weight)) in self.points.iter().enumerate() {
                 let top = mixture.log_parts(point, &mut parts);
                 let sum: f64 = parts.iter().map(|p| libm::exp(p - top)).sum();
                 log_likelihood += weight * (top + libm::log(sum));
-                for (share, part) in shares.iter_mut().zip(&parts) {
-                    share[i] = libm::exp(part - top) / sum;
+                for (responsibility, part) in responsibilities.iter_mut().zip(&parts) {
+                    responsibility[i] = libm::exp(part - top) / sum;
                 }
             }
             if log_likelihood - last < options.tolerance {
                 return Ok((mixture, log_likelihood));
             }
             last = log_likelihood;
-            mixture = self.maximise(&shares)?;
+            mixture = self.maximise(&responsibilities)?;
         }
         Ok((mixture, last))
     }
 
     /// Weights, means and factors for given responsibilities.
-    fn maximise(&self, shares: &[Vec<f64>]) -> Result<Mixture> {
+    fn maximise(&self, responsibilities: &[Vec<f64>]) -> Result<Mixture> {
         let (mut weights, mut means, mut factors) = (Vec::new(), Vec::new(), Vec::new());
-        for share in shares {
-            let own = self.points.iter().zip(share).map(|(p, s)| (p.0, p.1 * s)).filter(|p| p.1 > 0.0);
+        for responsibility in responsibilities {
+            let own = self.points.iter().zip(responsibility).map(|(p, s)| (p.0, p.1 * s)).filter(|p| p.1 > 0.0);
             let weight: f64 = own.clone().map(|p| p.1).sum();
             if weight < MIN_WEIGHT {
                 continue;

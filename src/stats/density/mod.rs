@@ -33,4 +33,4 @@ pub use normal::{normal_cdf, normal_quantile};
 pub use parameters::{BoundedColumn, Invalid, ParameterSpace};
 pub use representativeness::{BETA, MAX_SET, REPETITIONS, Representativeness, metric};
 pub use transport::wasserstein;
-pub use valid::{Refused, VALID_SHARE_DRAWS, VALID_SHARE_PURPOSE, ValidShare};
+pub use valid::{Refused, VALID_FRACTION_DRAWS, VALID_FRACTION_PURPOSE, ValidFraction};

@@ -14,7 +14,7 @@ use super::kde::Kde;
 use super::mixture::Mixture;
 use super::parameters::ParameterSpace;
 use super::representativeness::Representativeness;
-use super::valid::{VALID_SHARE_DRAWS, ValidShare};
+use super::valid::{VALID_FRACTION_DRAWS, ValidFraction};
 use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction, Sizes, SvdFit};
 use crate::scenario::{Category, Scenario};
 use crate::traffic::{DataProvenance, Driven};
@@ -63,7 +63,7 @@ impl Default for FitOptions {
             parameterization: ParameterizationOptions::of_densities(),
             with_thw: false,
             rule: BandwidthRule::Reduction,
-            valid_draws: VALID_SHARE_DRAWS,
+            valid_draws: VALID_FRACTION_DRAWS,
             seed: 157,
             representativeness: true,
         }
@@ -78,7 +78,7 @@ pub struct DensityModel {
     /// f̂, before truncation to the valid region.
     pub kde: Kde,
     /// Fraction of f̂ inside the valid region.
-    pub valid: ValidShare,
+    pub valid: ValidFraction,
     /// Mean sizes of the scenarios that it was fitted on, because sizes are not parameters.
     pub sizes: Sizes,
     /// Events per hour and kilometre, if time or distance is known.
@@ -155,7 +155,7 @@ impl DensityModel {
         let names: Vec<&str> = space.parameters().iter().map(|p| p.name.as_str()).collect();
         let kde = Kde::fit(points, &names, options.rule).map_err(|error| named(error, &name()))?;
         let valid =
-            ValidShare::count(&kde, &space, options.valid_draws, options.seed).map_err(|e| named(e, &name()))?;
+            ValidFraction::count(&kde, &space, options.valid_draws, options.seed).map_err(|e| named(e, &name()))?;
         let Some(sizes) = Sizes::mean(used.iter().copied()) else {
             return Err(Error::Internal(format!("{}: a density without scenarios", name())));
         };

@@ -16,7 +16,7 @@ use super::kde::Kde;
 use super::model::{DensityModel, Exposure, Provenance};
 use super::parameters::ParameterSpace;
 use super::representativeness::Representativeness;
-use super::valid::ValidShare;
+use super::valid::ValidFraction;
 use crate::scenario::parameterization::{
     Parameter, Parameterization, ParameterizationOptions, Reduction, Sizes, SvdBasis,
 };
@@ -53,7 +53,7 @@ struct File {
     /// s_j, one per parameter, in its unit.
     scale: Vec<f64>,
     bandwidth: Bandwidth,
-    p_valid: ValidShare,
+    p_valid: ValidFraction,
     exposure: Option<Exposure>,
     representativeness: Option<Representativeness>,
     /// Means over the scenarios, because sizes are not parameters.

@@ -124,13 +124,13 @@ fn one_split(
     let names: Vec<&str> = space.parameters().iter().map(|p| p.name.as_str()).collect();
     let kde = Kde::fit(train_points.clone(), &names, rule)?;
     let (train, test) = (&train[..train.len().min(MAX_SET)], &test[..test.len().min(MAX_SET)]);
-    let most = MAX_TRIES * train.len() as u64;
-    let valid = (1..=most).map(|index| kde.draw(&stream, index)).filter(|x| fitted.is_valid(x)).take(train.len());
+    let max_draws = MAX_TRIES * train.len() as u64;
+    let valid = (1..=max_draws).map(|index| kde.draw(&stream, index)).filter(|x| fitted.is_valid(x)).take(train.len());
     let generated: Vec<Vec<f64>> = valid.collect();
     if generated.len() < train.len() {
         return Err(Error::input(
             Place::item("representativeness"),
-            format!("only {} of {most} draws are valid scenarios", generated.len()),
+            format!("only {} of {max_draws} draws are valid scenarios", generated.len()),
             "nearly all of the density lies outside of the bounds: look at the scenarios",
         ));
     }

@@ -12,10 +12,10 @@ use crate::stats::random::Stream;
 use crate::{Error, Place, Result};
 
 /// [`Stream::purpose`] of these draws.
-pub const VALID_SHARE_PURPOSE: u32 = 0x7661_6c64;
+pub const VALID_FRACTION_PURPOSE: u32 = 0x7661_6c64;
 
 /// Default number of draws: the standard error is at most 0.0016.
-pub const VALID_SHARE_DRAWS: u64 = 100_000;
+pub const VALID_FRACTION_DRAWS: u64 = 100_000;
 
 /// Number of draws that violate one bound first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -32,7 +32,7 @@ pub struct Refused {
 /// P̂_valid with its 95 % interval.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct ValidShare {
+pub struct ValidFraction {
     /// Valid draws over draws.
     pub estimate: f64,
     /// Lower end of the Wilson interval of 95 %.
@@ -49,16 +49,16 @@ pub struct ValidShare {
     pub seed: u64,
 }
 
-impl ValidShare {
+impl ValidFraction {
     /// Counts valid draws. The count does not depend on the number of threads.
     ///
     /// # Errors
     /// [`Error::Input`] if no draw is valid; [`Error::Usage`] for 0 draws.
-    pub fn count(kde: &Kde, space: &ParameterSpace, draws: u64, seed: u64) -> Result<ValidShare> {
+    pub fn count(kde: &Kde, space: &ParameterSpace, draws: u64, seed: u64) -> Result<ValidFraction> {
         if draws == 0 {
             return Err(Error::usage(Place::item("draws"), "0 draws count nothing", "give at least 1, like 100000"));
         }
-        let stream = Stream { seed, purpose: VALID_SHARE_PURPOSE };
+        let stream = Stream { seed, purpose: VALID_FRACTION_PURPOSE };
         let broken = |index: u64| space.check_draw(&kde.draw(&stream, index)).err();
         let count = |mut counts: BTreeMap<(String, String), u64>, (by, draws): ((String, String), u64)| {
             *counts.entry(by).or_default() += draws;
@@ -82,11 +82,11 @@ impl ValidShare {
         let mut refused: Vec<Refused> = refused.collect();
         // The sort is stable: equal counts stay in the order of their names.
         refused.sort_by_key(|refused| std::cmp::Reverse(refused.draws));
-        Ok(ValidShare { estimate: valid as f64 / draws as f64, low, high, draws, valid, refused, seed })
+        Ok(ValidFraction { estimate: valid as f64 / draws as f64, low, high, draws, valid, refused, seed })
     }
 }
 
-/// Wilson interval of 95 % of a share.
+/// 95 % Wilson interval of a fraction.
 fn wilson(hits: u64, n: u64) -> [f64; 2] {
     let z = normal_quantile(0.975);
     let (n, p) = (n as f64, hits as f64 / n as f64);

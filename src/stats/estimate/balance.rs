@@ -31,8 +31,11 @@ impl Density for Together<'_, '_> {
     }
 
     fn log_density(&self, point: &[f64]) -> f64 {
-        let logs: Vec<f64> =
-            self.parts.iter().map(|(share, g)| libm::log(share / g.validity_share()) + g.log_density(point)).collect();
+        let logs: Vec<f64> = self
+            .parts
+            .iter()
+            .map(|(weight, g)| libm::log(weight / g.validity_fraction()) + g.log_density(point))
+            .collect();
         let top = logs.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         if top == f64::NEG_INFINITY {
             return top;
@@ -84,9 +87,9 @@ pub fn balance_heuristic(
         if own.draws < 2 {
             return Err(super::importance::no_valid_point("technique of the balance heuristic"));
         }
-        let (share, n) = (parts[i].0, own.draws as f64);
-        probability += share * own.unbiased();
-        variance += share * share * own.unbiased_variance() * n / (n - 1.0);
+        let (weight, n) = (parts[i].0, own.draws as f64);
+        probability += weight * own.unbiased();
+        variance += weight * weight * own.unbiased_variance() * n / (n - 1.0);
         total = Some(total.map_or(own, |t| WeightSums::join(&t, &own)));
     }
     let total = total.unwrap_or_default();

@@ -16,11 +16,13 @@ use crate::stats::density::moments::moments;
 use crate::stats::density::{Mixture, MixtureFitOptions as FitOptions};
 use crate::stats::random::Stream;
 
-/// Fraction of the density's covariance added to the widened copies of a fit's components, and the weight of these
-/// copies in the mixture. Beyond the limit, failures decrease exponentially, but a Gaussian fitted to them decreases
-/// faster: without wider copies the variance of the weights is underestimated, and intervals are too short.
+/// Every component of a fit has a widened copy, with this fraction of the density's covariance added to its own.
+///
+/// Beyond the limit, the density of failures decreases exponentially, but a Gaussian fitted to them decreases faster.
+/// Without the copies, the variance of the weights is underestimated and the intervals are too short.
 const WIDENING: f64 = 0.25;
-const WIDENED_SHARE: f64 = 0.5;
+/// Total weight of the widened copies in the mixture.
+const WIDENED_WEIGHT: f64 = 0.5;
 
 /// Components whose weight in the smoothed mixture falls below this are dropped.
 const MIN_WEIGHT: f64 = 0.02;
@@ -135,7 +137,7 @@ pub fn cross_entropy(
         let fit = FitOptions { components: options.components, seed: options.seed, ..FitOptions::default() };
         let narrow = Mixture::fit(&points, &weights, &fit)?;
         let wide = narrow.widened(&nominal_covariance, WIDENING)?;
-        let fitted = Mixture::join(&[(1.0 - WIDENED_SHARE, &narrow), (WIDENED_SHARE, &wide)])?;
+        let fitted = Mixture::join(&[(1.0 - WIDENED_WEIGHT, &narrow), (WIDENED_WEIGHT, &wide)])?;
         let next = match &proposal {
             Some(last) => smoothed(&fitted, last, options.smoothing)?,
             None => fitted,
@@ -162,10 +164,10 @@ pub fn cross_entropy(
     Ok(CrossEntropyRun { estimate, steps, proposal: sampled.proposal().clone() })
 }
 
-/// Mixes the new mixture with weight `share` and the old one; drops negligible components. Mixing the densities
+/// Mixes the new mixture with this `weight` and the old one; drops negligible components. Mixing the densities
 /// replaces smoothing of the parameters, which is undefined for different numbers of components.
-fn smoothed(new: &Mixture, old: &Mixture, share: f64) -> Result<Mixture> {
-    let both = Mixture::join(&[(share, new), (1.0 - share, old)])?;
+fn smoothed(new: &Mixture, old: &Mixture, weight: f64) -> Result<Mixture> {
+    let both = Mixture::join(&[(weight, new), (1.0 - weight, old)])?;
     let kept: Vec<usize> = (0..both.weights().len()).filter(|k| both.weights()[*k] >= MIN_WEIGHT).collect();
     if kept.is_empty() {
         return Ok(both);

@@ -40,7 +40,7 @@ impl<F: Fn(&[Vec<f64>]) -> Result<Mixture>> FitProposal for F {
 pub struct Defended<'a> {
     nominal: &'a dyn Density,
     proposal: Mixture,
-    share: f64,
+    weight: f64,
     validity: f64,
 }
 
@@ -48,19 +48,19 @@ pub struct Defended<'a> {
 ///
 /// # Errors
 /// [`Error::Usage`] if the weight is outside [0, 1] or the numbers of parameters differ.
-pub fn defended(proposal: Mixture, nominal: &dyn Density, share: f64) -> Result<Defended<'_>> {
-    if !(0.0..=1.0).contains(&share) || proposal.dimensions() != nominal.dimensions() {
+pub fn defended(proposal: Mixture, nominal: &dyn Density, weight: f64) -> Result<Defended<'_>> {
+    if !(0.0..=1.0).contains(&weight) || proposal.dimensions() != nominal.dimensions() {
         return Err(Error::usage(
             Place::item("defensive mixture"),
             format!(
-                "a share of {share}, {} parameters of the proposal and {} of the density do not fit together",
+                "a share of {weight}, {} parameters of the proposal and {} of the density do not fit together",
                 proposal.dimensions(),
                 nominal.dimensions()
             ),
             "give a share from 0 to 1 and two densities over the same parameters",
         ));
     }
-    Ok(Defended { nominal, proposal, share, validity: 1.0 })
+    Ok(Defended { nominal, proposal, weight, validity: 1.0 })
 }
 
 impl Defended<'_> {
@@ -82,7 +82,7 @@ impl Defended<'_> {
 }
 
 impl Density for Defended<'_> {
-    fn validity_share(&self) -> f64 {
+    fn validity_fraction(&self) -> f64 {
         self.validity
     }
 
@@ -94,18 +94,18 @@ impl Density for Defended<'_> {
         if !self.nominal.is_valid(point) {
             return f64::NEG_INFINITY;
         }
-        let of = |share: f64, log: &dyn Fn() -> f64| {
-            if share > 0.0 { libm::log(share) + log() } else { f64::NEG_INFINITY }
+        let of = |weight: f64, log: &dyn Fn() -> f64| {
+            if weight > 0.0 { libm::log(weight) + log() } else { f64::NEG_INFINITY }
         };
-        let a = of(1.0 - self.share, &|| self.proposal.log_density(point));
-        let b = of(self.share, &|| self.nominal.log_density(point));
+        let a = of(1.0 - self.weight, &|| self.proposal.log_density(point));
+        let b = of(self.weight, &|| self.nominal.log_density(point));
         let top = a.max(b);
         if top == f64::NEG_INFINITY { top } else { top + libm::log(libm::exp(a - top) + libm::exp(b - top)) }
     }
 
     fn attempt(&self, stream: &Stream, index: u64, attempt: u32) -> Vec<f64> {
         let choice = Stream { purpose: stream.purpose.wrapping_add(purpose::CHOICE), ..*stream };
-        if uniform(choice.words(index, attempt)[0]) < self.share {
+        if uniform(choice.words(index, attempt)[0]) < self.weight {
             self.nominal.attempt(stream, index, attempt)
         } else {
             self.proposal.draw(stream, index, attempt)
@@ -170,7 +170,7 @@ impl Importance {
 pub(crate) fn weigh(nominal: &dyn Density, proposal: &dyn Density, drawn: &Draw, response: f64) -> WeightedDraw {
     let ratio = libm::exp(nominal.log_density(&drawn.point) - proposal.log_density(&drawn.point));
     WeightedDraw {
-        weight: ratio / nominal.validity_share(),
+        weight: ratio / nominal.validity_fraction(),
         response,
         tries: drawn.tries,
         is_void: false,
@@ -281,11 +281,11 @@ pub fn importance(
     }
 }
 
-/// The worst points: those with the smallest values, at least one; equal values in the order of the points.
-pub fn worst_share(points: &[Vec<f64>], values: &[f64], share: f64) -> Vec<Vec<f64>> {
+/// The fraction of the points with the smallest values, at least one point. Points with equal values keep their order.
+pub fn worst_points(points: &[Vec<f64>], values: &[f64], fraction: f64) -> Vec<Vec<f64>> {
     let mut order: Vec<usize> = (0..points.len().min(values.len())).collect();
     order.sort_by(|a, b| values[*a].total_cmp(&values[*b]).then(a.cmp(b)));
-    let count = ((share * order.len() as f64).round() as usize).clamp(1, order.len().max(1));
+    let count = ((fraction * order.len() as f64).round() as usize).clamp(1, order.len().max(1));
     order.into_iter().take(count).map(|i| points[i].clone()).collect()
 }
 
@@ -349,7 +349,7 @@ pub fn pilot_proposal(
     if first.points.is_empty() {
         return Err(no_valid_point("pilot"));
     }
-    let worst = worst_share(&first.points, &first.values, pilot.worst);
+    let worst = worst_points(&first.points, &first.values, pilot.worst);
     let mut fitted = fit.fit(&worst)?;
     if pilot.broad > 0.0 {
         let one = FitOptions { components: 1, choose: false, ..FitOptions::default() };

@@ -25,7 +25,7 @@ pub use blocks::{BLOCK, BlockSums, Join};
 pub use cross_entropy::{CrossEntropy, CrossEntropyRun, CrossEntropyStep, cross_entropy};
 pub use importance::{
     Defended, FitProposal, Importance, Pilot, PilotCheck, defended, from_pilot, from_weight_sums, importance,
-    importance_sums, pilot_proposal, worst_share,
+    importance_sums, pilot_proposal, worst_points,
 };
 pub use interval::{Interval, IntervalKind, clopper_pearson, log_normal, rule_of_three, wilson};
 pub use kernels::{KernelShares, kernel_shares};

@@ -62,7 +62,7 @@ pub trait Density: Sync {
     }
 
     /// P_valid = ∫ f over the valid points, in (0, 1].
-    fn validity_share(&self) -> f64 {
+    fn validity_fraction(&self) -> f64 {
         1.0
     }
 
@@ -130,7 +130,7 @@ pub(crate) fn normals(stream: &Stream, index: u64, first_block: u32, count: usiz
 pub struct Truncated<V> {
     mixture: Mixture,
     is_valid: V,
-    share: f64,
+    validity: f64,
 }
 
 impl<V: Fn(&[f64]) -> bool + Sync> Truncated<V> {
@@ -143,20 +143,20 @@ impl<V: Fn(&[f64]) -> bool + Sync> Truncated<V> {
         let stream = Stream { seed, purpose: purpose::VALIDITY };
         let valid =
             (0..draws).into_par_iter().filter(|index| is_valid(&mixture.draw(&stream, *index, 0))).count() as u64;
-        Self::with_share(mixture, is_valid, valid as f64 / draws as f64)
+        Self::with_validity(mixture, is_valid, valid as f64 / draws as f64)
     }
 
     /// Truncates the mixture with a known P_valid.
     ///
     /// # Errors
     /// [`Error::Usage`] if the fraction is not in (0, 1].
-    pub fn with_share(mixture: Mixture, is_valid: V, share: f64) -> Result<Self> {
-        if share > 0.0 && share <= 1.0 {
-            return Ok(Truncated { mixture, is_valid, share });
+    pub fn with_validity(mixture: Mixture, is_valid: V, validity: f64) -> Result<Self> {
+        if validity > 0.0 && validity <= 1.0 {
+            return Ok(Truncated { mixture, is_valid, validity });
         }
         Err(Error::usage(
             Place::item("truncated density"),
-            format!("the share of valid draws is {share}"),
+            format!("the share of valid draws is {validity}"),
             "check the bounds of the parameters: they must leave something of the density",
         ))
     }
@@ -184,8 +184,8 @@ impl<V: Fn(&[f64]) -> bool + Sync> Density for Truncated<V> {
         (self.is_valid)(point)
     }
 
-    fn validity_share(&self) -> f64 {
-        self.share
+    fn validity_fraction(&self) -> f64 {
+        self.validity
     }
 }
 
@@ -272,7 +272,7 @@ mod tests {
     fn a_truncated_density_draws_inside_only_and_knows_its_share() {
         let mixture = Mixture::of_kernels(vec![vec![0.0, 0.0]], &[1.0, 1.0]).unwrap();
         let half = Truncated::new(mixture, |x: &[f64]| x[0] > 0.0, 1, 100_000).unwrap();
-        assert!((half.validity_share() - 0.5).abs() < 0.01);
+        assert!((half.validity_fraction() - 0.5).abs() < 0.01);
         let stream = Stream { seed: 2, purpose: 3 };
         let draws: Vec<Draw> = (0..10_000).filter_map(|i| half.draw(&stream, i)).collect();
         assert!(draws.iter().all(|d| d.point[0] > 0.0));
@@ -284,7 +284,7 @@ mod tests {
     #[test]
     fn an_index_without_a_valid_point_is_void() {
         let mixture = Mixture::of_kernels(vec![vec![0.0]], &[1.0]).unwrap();
-        let never = Truncated::with_share(mixture.clone(), |_: &[f64]| false, 0.5).unwrap();
+        let never = Truncated::with_validity(mixture.clone(), |_: &[f64]| false, 0.5).unwrap();
         assert!(never.draw(&Stream { seed: 2, purpose: 3 }, 0).is_none());
         assert!(Truncated::new(mixture, |_: &[f64]| false, 1, 100).is_err());
     }

@@ -72,15 +72,19 @@ pub fn cluster_rate(clusters: Clusters, level: f64) -> ClusterRate {
     let variance = if n > 1.0 { n / (n - 1.0) * squares } else { rate * (1.0 - rate) };
     let effective_failing = effective_number(clusters.failures.iter().copied());
     let passed = clusters.runs.iter().zip(clusters.failures).map(|(runs, failures)| runs.saturating_sub(*failures));
-    let least = effective_number(clusters.runs.iter().copied()).max(1.0);
+    let min_effective = effective_number(clusters.runs.iter().copied()).max(1.0);
     let interval = if clusters.failed() == 0 {
-        rule_of_three(least as u64, level)
+        rule_of_three(min_effective as u64, level)
     } else {
         let freedom = effective_failing.min(effective_number(passed)) - 1.0;
         let factor = student_factor(freedom, level);
         let effective = rate * (1.0 - rate) / variance * factor * factor;
         // With variance 0, only the number of clusters bounds the rate.
-        let effective = if variance > 0.0 { effective.clamp(least, (total as f64).max(least)) } else { least };
+        let effective = if variance > 0.0 {
+            effective.clamp(min_effective, (total as f64).max(min_effective))
+        } else {
+            min_effective
+        };
         Interval { kind: IntervalKind::Clusters, ..wilson(rate * effective, effective, level) }
     };
     ClusterRate { rate, variance, interval, effective_failing }

@@ -60,7 +60,7 @@ pub enum Warning {
         standard_errors: f64,
     },
     /// Failures where the proposal is thin (below a fifth of the density) carry more than
-    /// [`Warning::THIN_SHARE`] of the estimate: the proposal misses a way to fail.
+    /// [`Warning::MAX_THIN_FRACTION`] of the estimate: the proposal misses a way to fail.
     ModeMissed {
         /// Their fraction of the estimate.
         share: f64,
@@ -95,7 +95,7 @@ pub enum Warning {
         /// Limit state reached, > 0.
         threshold: f64,
     },
-    /// More than [`Warning::VOID_SHARE`] of the indices gave no valid point.
+    /// More than [`Warning::MAX_VOID_FRACTION`] of the indices gave no valid point.
     VoidDraws {
         /// Fraction of void indices.
         share: f64,
@@ -121,7 +121,7 @@ impl Warning {
     /// a point was more likely drawn from the defensive part.
     pub const THIN_RATIO: f64 = 5.0;
     /// Fraction of the estimate above which [`Warning::ModeMissed`] is raised.
-    pub const THIN_SHARE: f64 = 0.1;
+    pub const MAX_THIN_FRACTION: f64 = 0.1;
     /// Two-sided likelihood below which [`Warning::DisagreesWithPilot`] is raised.
     pub const PILOT_LIKELIHOOD: f64 = 0.001;
     /// Acceptance below which [`Warning::ChainsStuck`] is raised.
@@ -129,7 +129,7 @@ impl Warning {
     /// Lineages below which [`Warning::FewLineages`] is raised.
     pub const MIN_LINEAGES: f64 = 10.0;
     /// Fraction of void indices above which [`Warning::VoidDraws`] is raised.
-    pub const VOID_SHARE: f64 = 0.001;
+    pub const MAX_VOID_FRACTION: f64 = 0.001;
 
     /// Whether the estimate must not be used at all.
     pub fn is_grave(&self) -> bool {
@@ -152,8 +152,8 @@ impl fmt::Display for Warning {
             Warning::FewFailures { failures: 1 } => write!(f, "only 1 failure was found"),
             Warning::FewFailures { failures } => write!(f, "only {failures} failures were found"),
             Warning::FewScenarios { scenarios } => {
-                let least = Warning::MIN_SCENARIOS;
-                write!(f, "the failures come from effectively {scenarios:.1} scenarios; at least {least} are needed")
+                let min = Warning::MIN_SCENARIOS;
+                write!(f, "the failures come from effectively {scenarios:.1} scenarios; at least {min} are needed")
             }
             Warning::DataLeftOut => write!(f, "the interval is that of the draws: other scenarios would change more"),
             Warning::NotCompared => write!(
@@ -269,7 +269,7 @@ impl Trust {
     /// The warning about void indices.
     pub(crate) fn about_voids(&mut self, voids: u64, draws: u64) {
         let share = voids as f64 / draws.max(1) as f64;
-        self.warn_if(share > Warning::VOID_SHARE, Warning::VoidDraws { share });
+        self.warn_if(share > Warning::MAX_VOID_FRACTION, Warning::VoidDraws { share });
     }
 }
 

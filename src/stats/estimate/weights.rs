@@ -167,6 +167,6 @@ impl Trust {
         let share = figures.largest_share_failures;
         self.warn_if(share > Warning::MAX_FRACTION, Warning::OneWeightDominates { share });
         let (share, failures) = (figures.thin_share, figures.thin_failures);
-        self.warn_if(share > Warning::THIN_SHARE, Warning::ModeMissed { share, failures });
+        self.warn_if(share > Warning::MAX_THIN_FRACTION, Warning::ModeMissed { share, failures });
     }
 }

@@ -1,46 +1,51 @@
-//! Standard normal deviates from 32-bit words: the inverse of the normal distribution function as a table of cubics
-//! that integer operations choose from, evaluated in f32.
+//! Standard normal deviates from 32-bit words. A table of cubic polynomials approximates the inverse of the normal
+//! distribution function. Integer operations select the cubic; it is evaluated in f32.
 //!
-//! A word w stands for the probability (w + ½)/2³². The lower half of the words gives the mirror image of the upper
-//! half. A tail word t < 2³¹ (0: farthest out) has the tail probability m/2³³ with m = 2t + 1; leading zeros of m give
-//! the octave, the next four bits the segment, the rest the place within it. So segments are short where the inverse
-//! is steep, out to the last word at 6.34 standard deviations.
+//! A word w represents the probability (w + ½)/2³². The lower half of the words mirrors the upper half, so the table
+//! covers only one tail. A tail word t < 2³¹ has the tail probability m/2³³ with m = 2t + 1; t = 0 is the outermost.
+//! The number of leading zeros of m selects the octave. The next four bits after the leading one select the segment,
+//! and the remaining bits give the position in the segment. So segments are short where the inverse is steep. The
+//! outermost word is at 6.34 standard deviations.
 //!
-//! Absolute error below 10⁻⁶ for every word: at most 1.6·10⁻⁸ from the cubics, the rest from rounding, where half a
-//! unit in the last place is 2.4·10⁻⁷ beyond 4. The tests below find 4.8·10⁻⁷ at most.
+//! The absolute error is below 10⁻⁶ for every word. The cubics contribute at most 1.6·10⁻⁸ and rounding the rest:
+//! beyond 4 standard deviations, half a unit in the last place is 2.4·10⁻⁷. The tests below find at most 4.8·10⁻⁷.
 
 use std::sync::LazyLock;
 
-/// Bits of a tail word that choose the segment of an octave.
+/// Number of bits that select the segment of an octave.
 const SEGMENT_BITS: u32 = 4;
 /// Octaves of tail probability: 2⁻¹ … 2⁻², 2⁻² … 2⁻³, and so on down to 2⁻³³.
 const OCTAVES: usize = 32;
 const SEGMENTS: usize = OCTAVES << SEGMENT_BITS;
 
-/// The cubics, as a device gets them: octave by octave from the centre outwards, 16 segments each, in every octave from
-/// the outer end inwards. A row is (c₀, c₁, c₂, c₃) of |z| = c₀ + x(c₁ + x(c₂ + x·c₃)), where x in (0, 1) grows
-/// outwards. Made at the first call, with the same bits on every machine.
+/// Returns the cubics, in the layout of the device's table.
+///
+/// The octaves are in order from the centre outwards. Each has 16 segments, in order from its outer end inwards. A row
+/// (c₀, c₁, c₂, c₃) gives |z| = c₀ + x(c₁ + x(c₂ + x·c₃)), where x in (0, 1) increases outwards. The table is computed
+/// at the first call and has the same bits on every machine.
 pub fn normal_table() -> &'static [[f32; 4]] {
     static TABLE: LazyLock<Vec<[f32; 4]>> = LazyLock::new(|| (0..SEGMENTS).map(segment).collect());
     &TABLE
 }
 
-/// The standard normal deviate whose distribution function is (word + ½)/2³². Error below 10⁻⁶; exactly antisymmetric:
-/// `standard_normal(!word) == -standard_normal(word)`; never zero. From a word to the next it may fall by one unit in
-/// the last place, because rounding moves the two apart, and in the middle eight words share one deviate; a thousand
-/// words farther it has risen.
+/// Returns the standard normal deviate at which the distribution function is (word + ½)/2³².
+///
+/// The error is below 10⁻⁶. The result is never zero and exactly antisymmetric:
+/// `standard_normal(!word) == -standard_normal(word)`. Rounding can make the deviate of the next word smaller by one
+/// unit in the last place. In the octave at the centre, eight successive words share one deviate. Words 1024 apart have
+/// increasing deviates wherever the tests compare them.
 #[inline]
 pub fn standard_normal(word: u32) -> f32 {
     let is_lower = word < 0x8000_0000;
     let tail = if is_lower { word } else { !word };
-    // Odd, so never zero, and at most 31 leading zeros.
+    // An odd number is not zero, so it has at most 31 leading zeros.
     let odd = 2 * tail + 1;
     let octave = odd.leading_zeros();
-    // Without its leading bit.
+    // The bits below the leading one.
     let rest = (odd << octave) << 1;
     let segment = (octave << SEGMENT_BITS) | (rest >> (32 - SEGMENT_BITS));
-    // Distance from the segment's inner end: the middle of one of 2²³ steps, an odd integer of 24 bits, so that the
-    // conversion is exact and no deviate is zero.
+    // x is the distance from the segment's inner end: the middle of one of 2²³ steps. 2·steps + 1 is odd and has at
+    // most 24 bits, so its conversion to f32 is exact, x is above 0, and no deviate is zero.
     let steps = !(rest << SEGMENT_BITS) >> 9;
     let x = (2 * steps + 1) as f32 * (1.0 / 16_777_216.0);
     let c = normal_table()[segment as usize];
@@ -48,10 +53,10 @@ pub fn standard_normal(word: u32) -> f32 {
     if is_lower { -z } else { z }
 }
 
-/// z ≥ 0 with tail probability Q(z) = `tail`, for 10⁻³⁰⁰ < `tail` ≤ ½; error below 10⁻¹⁴·(1 + z).
+/// Returns z ≥ 0 with the tail probability Q(z) = `tail`, for 10⁻³⁰⁰ < `tail` ≤ ½. The error is below 10⁻¹⁴·(1 + z).
 ///
-/// Newton's method on ln Q, which is concave and falls: it comes back to the solution from everything beyond it, and
-/// Q(z) ≤ ½·exp(−z²/2) says what is.
+/// It uses Newton's method on ln Q. This function is concave and decreasing, so the iteration converges from every
+/// start at or above the solution. The start is there, because Q(z) ≤ ½·exp(−z²/2).
 pub fn inverse_normal_tail(tail: f64) -> f64 {
     const ROOT_TAU: f64 = 2.506_628_274_631_000_7;
     let goal = libm::log(tail);
@@ -64,12 +69,12 @@ pub fn inverse_normal_tail(tail: f64) -> f64 {
     z
 }
 
-/// Interpolates the inverse in one segment, in f64, at both ends and at two points between. Neighbours meet, and of
-/// all cubics with both ends fixed this one has nearly the least error.
+/// Returns the cubic of one segment. In f64 it interpolates the inverse at both ends and at two interior points.
+/// Neighbouring segments therefore meet, and the error is near the minimum for cubics with fixed ends.
 fn segment(at: usize) -> [f32; 4] {
     let (octave, step) = (at >> SEGMENT_BITS, at & ((1 << SEGMENT_BITS) - 1));
     let steps = (1 << SEGMENT_BITS) as f64;
-    // Halving is exact.
+    // Halving a binary floating-point number is exact.
     let unit = (0..octave + 2).fold(1.0, |unit, _| unit * 0.5) / steps;
     let inner = unit * (steps + step as f64 + 1.0);
     // Expanded Chebyshev nodes: ½(1 ∓ (√2 − 1)) between 0 and 1.
@@ -98,7 +103,7 @@ mod tests {
     use super::*;
     use sha2::{Digest, Sha256};
 
-    /// The deviate in f64, by other means than the table's: Newton on Q itself, from the result to be judged.
+    /// The deviate in f64 by another method than the table's: Newton's method on Q itself, from the result under test.
     fn reference(word: u32, near: f32) -> f64 {
         let tail = if word < 0x8000_0000 { word } else { !word };
         let p = (f64::from(tail) + 0.5) / 4_294_967_296.0;
@@ -119,7 +124,7 @@ mod tests {
         (f64::from(z) - reference(word, z)).abs()
     }
 
-    /// First and last tail word of every segment, with their neighbours.
+    /// The tail words at the ends of all segments, with their neighbours.
     fn edges() -> Vec<u32> {
         let mut edges = Vec::new();
         for octave in 0..32_u32 {
@@ -148,7 +153,7 @@ mod tests {
 
     #[test]
     fn the_inverse_has_the_published_quantiles() {
-        // As tables have them, to the last digit of f64.
+        // Published quantiles, to the last digit of f64.
         for (tail, z) in [
             (0.5, 0.0),
             (0.25, 0.674_489_750_196_081_7),
@@ -187,7 +192,7 @@ mod tests {
     #[test]
     fn errors_stay_below_a_millionth_on_all_edges_and_two_million_words() {
         let spread = (0..2_000_000_u32).map(|k| k.wrapping_mul(0x9E37_79B1));
-        // The same number of words in every octave: the far tails too.
+        // The same number of words in every octave, so that the far tail is covered too.
         let octaves = (0..32_u32).flat_map(|octave| {
             (0..20_000_u32).map(move |k| ((1 << 31) | (k.wrapping_mul(0x9E37_79B1) >> 1)) >> octave >> 1)
         });
@@ -214,7 +219,7 @@ mod tests {
 
     #[test]
     fn a_larger_word_gives_no_smaller_deviate() {
-        // Neighbours: but for the last place.
+        // Neighbouring words: it falls by at most one unit in the last place.
         let fall = |a: u32, b: u32| f64::from(standard_normal(a)) - f64::from(standard_normal(b));
         let mut falls = 0;
         let starts = edges().into_iter().chain((0..20_000).map(|k: u32| k.wrapping_mul(0x9E37_79B1)));
@@ -227,7 +232,7 @@ mod tests {
             }
         }
         println!("{falls} falls by one unit in the last place");
-        // A thousand words apart: strictly.
+        // Words 1024 apart: it increases strictly.
         for word in (0..u32::MAX - 1024).step_by(1021) {
             assert!(fall(word, word + 1024) < 0.0, "{word:08x}");
         }
@@ -260,7 +265,7 @@ mod tests {
             let p = 0.5 * libm::erfc(-f64::from(*z) / std::f64::consts::SQRT_2);
             largest.max((p - k as f64 / n).abs()).max(((k + 1) as f64 / n - p).abs())
         });
-        // 1.95/√n is passed by chance once in a thousand.
+        // A correct sample exceeds 1.95/√n with probability 0.001.
         assert!(distance * n.sqrt() < 1.95, "{}", distance * n.sqrt());
     }
 }

@@ -2,18 +2,18 @@
 //! as 1, 2, 3", SC 2011). Integer operations only.
 
 const MULTIPLIERS: [u32; 2] = [0xD251_1F53, 0xCD9E_8D57];
-/// Steps of the key: the golden ratio and √3 − 1, as fractions of 2³².
+/// Increments of the two key words per round: the fractional parts of the golden ratio and of √3, times 2³².
 const KEY_STEPS: [u32; 2] = [0x9E37_79B9, 0xBB67_AE85];
 const ROUNDS: usize = 10;
 
-/// High and low word of a product.
+/// Returns the high and the low word of the 64-bit product.
 #[inline]
 pub(super) fn wide_product(a: u32, b: u32) -> [u32; 2] {
     let product = u64::from(a) * u64::from(b);
     [(product >> 32) as u32, product as u32]
 }
 
-/// Four random words of a counter under a key.
+/// Returns the four random words of a counter under a key.
 #[inline]
 pub fn philox4x32_10(counter: [u32; 4], key: [u32; 2]) -> [u32; 4] {
     let (mut c, mut k) = (counter, key);
@@ -26,18 +26,20 @@ pub fn philox4x32_10(counter: [u32; 4], key: [u32; 2]) -> [u32; 4] {
     c
 }
 
-/// A family of independent words: one seed, one purpose. The counter is
-/// (index low, index high, block within the index, purpose), the key is the seed (low, high).
+/// A stream of independent random words, identified by a seed and a purpose.
+///
+/// The Philox counter is (low word of the index, high word of the index, block, purpose). The key is the seed (low
+/// word, high word).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Stream {
     /// Seed of the whole run.
     pub seed: u64,
-    /// What the words are for: streams of different purposes are independent.
+    /// Use of the words. Streams with different purposes are independent.
     pub purpose: u32,
 }
 
 impl Stream {
-    /// Four words of an index; `block` counts the fours.
+    /// Returns four words of an index; `block` is the number of the group of four.
     #[inline]
     pub fn words(&self, index: u64, block: u32) -> [u32; 4] {
         let key = [self.seed as u32, (self.seed >> 32) as u32];
@@ -51,7 +53,7 @@ mod tests {
 
     #[test]
     fn the_known_answers_of_random123() {
-        // Its file of known answers, philox4x32 with 10 rounds.
+        // From Random123's file of known answers: philox4x32 with 10 rounds.
         let known = [
             ([0; 4], [0; 2], [0x6627_e8d5, 0xe169_c58d, 0xbc57_ac4c, 0x9b00_dbd8]),
             ([u32::MAX; 4], [u32::MAX; 2], [0x408f_276d, 0x41c8_3b0e, 0xa20b_c7c6, 0x6d54_51fd]),

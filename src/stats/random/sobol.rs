@@ -1,13 +1,16 @@
-//! Sobol's sequence with nested uniform scrambling (Owen, "Randomly permuted (t,m,s)-nets and (t,s)-sequences", 1995):
-//! points that fill the unit cube evenly; each single point is uniformly distributed. Points come by index.
+//! Sobol's sequence with nested uniform scrambling (Owen, "Randomly permuted (t,m,s)-nets and (t,s)-sequences", 1995).
+//! The points fill the unit cube evenly, and each single point is uniformly distributed. A point is computed from its
+//! index.
 //!
-//! Scrambling walks down the binary digits of a coordinate and flips each by a coin that belongs to the digits above
-//! it. Equal digits above meet the same coin, so that elementary intervals are permuted whole and every net stays one.
-//! Here the coins of four levels, a tree of 15, are bits of one hash of the digits above. Hashes that permute all 32
+//! Scrambling goes through the binary digits of a coordinate from the highest to the lowest. A random bit, the digit's
+//! coin, decides whether the digit is flipped. The coin depends only on the digits above: coordinates that agree in
+//! these use the same coin. So scrambling maps elementary intervals to elementary intervals, and a net remains a net.
+//!
+//! One hash of the digits above gives the coins of four levels, a binary tree of 15 bits. Hashes that permute all 32
 //! digits at once (Laine and Karras; Burley, JCGT 2020) are cheaper, but their coins depend on each other from the
-//! third level on; these do not, as far as the tests can tell.
+//! third level on. The tests find no such dependence in the coins here.
 //!
-//! Indices are not shuffled: points k·2^m … (k + 1)·2^m − 1 are a net for every k and m.
+//! Indices are not shuffled: points k·2^m … (k + 1)·2^m − 1 form a net for every k and m.
 
 use std::sync::LazyLock;
 
@@ -24,7 +27,7 @@ pub const SOBOL_ROW: usize = DIGITS + 2;
 
 /// Binary digits of a coordinate.
 const DIGITS: usize = 32;
-/// Levels of digits whose coins come from one hash.
+/// Number of digit levels whose coins come from one hash.
 const LEVELS: u32 = 4;
 /// Purpose of the Philox stream that gives the seeds of the dimensions.
 const SCRAMBLING: u32 = 0x534f_424c;
@@ -65,7 +68,7 @@ impl Sobol {
     }
 
     /// Coordinate `dimension` (from 0) of point `index`, as a fraction of 2³². `None` beyond [`SOBOL_POINTS`] or the
-    /// dimensions asked for.
+    /// requested dimensions.
     #[inline]
     pub fn word(&self, index: u64, dimension: u32) -> Option<u32> {
         let row = self.rows.get(dimension as usize)?;
@@ -79,7 +82,7 @@ fn sobol_word(row: &[u32; SOBOL_ROW], index: u32) -> u32 {
     owen_scramble(sobol_point(row, index), [row[DIGITS], row[DIGITS + 1]])
 }
 
-/// The coordinate before scrambling: the sum, digit by digit, of the direction words of the index's bits.
+/// Returns the coordinate before scrambling: the bitwise XOR of the direction words of the index's set bits.
 #[inline]
 fn sobol_point(row: &[u32; SOBOL_ROW], index: u32) -> u32 {
     let mut word = 0;
@@ -108,7 +111,7 @@ fn owen_scramble(word: u32, seed: [u32; 2]) -> u32 {
     scrambled
 }
 
-/// A permutation of the words in which every bit depends on every other: Wellons' `lowbias32`.
+/// A bijective hash of words in which every output bit depends on every input bit: Wellons' `lowbias32`.
 #[inline]
 fn avalanche(word: u32) -> u32 {
     let mut x = word ^ (word >> 16);

@@ -115,15 +115,15 @@ struct Page {
     values: u64,
 }
 
-fn page(file: &mut File, at: u64, most: u64) -> Result<Page, Refusal> {
+fn page(file: &mut File, at: u64, max_bytes: u64) -> Result<Page, Refusal> {
     // Headers have some tens of bytes; statistics can make them longer.
-    let mut tried = most.min(256);
+    let mut tried = max_bytes.min(256);
     loop {
         let mut bytes = vec![0; tried as usize];
         read_at(file, at, &mut bytes)?;
         match header(&bytes) {
             Some(page) => return Ok(page),
-            None if tried < most => tried = (tried * 8).min(most),
+            None if tried < max_bytes => tried = (tried * 8).min(max_bytes),
             None => return Err(DAMAGED),
         }
     }

@@ -47,9 +47,9 @@ impl Table {
         }
         let text = |columns: &Vec<usize>| {
             let of = |row: &Vec<String>| columns.iter().map(|&at| row[at].clone()).collect::<Vec<_>>();
-            let least = fixed + columns.iter().skip(keys).map(|at| longest(*at, &[' ', '\n'])).sum::<usize>();
+            let min_width = fixed + columns.iter().skip(keys).map(|at| longest(*at, &[' ', '\n'])).sum::<usize>();
             let words = columns.iter().filter(|at| **at < self.words()).count();
-            drawn(of(header), rows.iter().map(of).collect(), words, width.max(least)).replace(NO_BREAK, " ")
+            drawn(of(header), rows.iter().map(of).collect(), words, width.max(min_width)).replace(NO_BREAK, " ")
         };
         parts.iter().map(text).collect::<Vec<_>>().join("\n")
     }

@@ -103,7 +103,7 @@ pub fn mine_folder(
         .par_iter()
         .with_max_len(1)
         .map(|files| {
-            let part = highd::read_judged(files, implausible).map(|loaded| {
+            let part = highd::read_checked(files, implausible).map(|loaded| {
                 let mined = mine(&loaded.recording, options);
                 let summary = summary(&loaded.recording, &mined, options, loaded.checksum_sha256);
                 let name = |note: String| format!("recording {}: {note}", loaded.recording.id);

@@ -94,7 +94,7 @@ fn crossings(d_m: &[f64], lane: Lane) -> Vec<(usize, LaneChangeKind)> {
 /// `s` over the track, and the limits that determine begin and end of the change.
 struct LineDistance<'a> {
     s: &'a [f64],
-    least: Vec<f64>,
+    window_min: Vec<f64>,
     window: usize,
     reach: usize,
     quiescent_gap_m: f64,
@@ -108,7 +108,7 @@ impl<'a> LineDistance<'a> {
         let window = window_samples(options.window_s, frame_rate_hz);
         LineDistance {
             s,
-            least: trailing_min(s, window),
+            window_min: trailing_min(s, window),
             window,
             reach: samples(options.search_s, frame_rate_hz),
             quiescent_gap_m: options.quiescent_speed_mps * options.window_s,
@@ -120,7 +120,7 @@ impl<'a> LineDistance<'a> {
 
     /// Whether progress over the window that ends at `k` is small. False for an incomplete window.
     fn is_calm(&self, k: usize) -> bool {
-        k >= self.window && k < self.s.len() && self.s[k] - self.least[k] < self.quiescent_gap_m - TOLERANCE
+        k >= self.window && k < self.s.len() && self.s[k] - self.window_min[k] < self.quiescent_gap_m - TOLERANCE
     }
 
     /// Last sample before the crossing `k` at which the change had not begun.

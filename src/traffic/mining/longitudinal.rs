@@ -40,7 +40,7 @@ pub fn longitudinal_events(v_mps: &[f64], frame_rate_hz: f64, options: &Longitud
 struct Rise {
     x: Vec<f64>,
     /// Minimum over the trailing window.
-    least: Vec<f64>,
+    window_min: Vec<f64>,
     /// `quiescent_from[j]`: first sample ≥ j from which the next window rises by less than the threshold.
     quiescent_from: Vec<Option<usize>>,
     window: usize,
@@ -49,13 +49,13 @@ struct Rise {
 
 impl Rise {
     fn new(x: Vec<f64>, window: usize, threshold: f64) -> Self {
-        let least = trailing_min(&x, window);
+        let window_min = trailing_min(&x, window);
         let mut quiescent_from = vec![None; x.len() + 1];
         for j in (0..x.len().saturating_sub(window)).rev() {
             let end = j + window;
-            quiescent_from[j] = if x[end] - least[end] < threshold { Some(j) } else { quiescent_from[j + 1] };
+            quiescent_from[j] = if x[end] - window_min[end] < threshold { Some(j) } else { quiescent_from[j + 1] };
         }
-        Rise { x, least, quiescent_from, window, threshold }
+        Rise { x, window_min, quiescent_from, window, threshold }
     }
 
     /// If an activity starts at `k`: its end, `None` inside for the end of the track.
@@ -63,9 +63,9 @@ impl Rise {
         let ahead = k + self.window;
         let starts = k >= self.window
             && ahead < self.x.len()
-            && self.x[k] - self.least[k] >= self.threshold
-            && self.least[ahead] == self.x[k]
-            && self.x[ahead] - self.least[ahead] > 0.0;
+            && self.x[k] - self.window_min[k] >= self.threshold
+            && self.window_min[ahead] == self.x[k]
+            && self.x[ahead] - self.window_min[ahead] > 0.0;
         if !starts {
             return None;
         }
@@ -166,10 +166,10 @@ mod tests {
     fn equals_the_minimum_over_each_window() {
         let x: Vec<f64> = (0..200).map(|i| f64::from((i * 7919) % 101)).collect();
         for window in [0, 1, 2, 25, 300] {
-            let least = trailing_min(&x, window);
+            let window_min = trailing_min(&x, window);
             for k in 0..x.len() {
                 let expected = x[k.saturating_sub(window)..=k].iter().copied().fold(f64::INFINITY, f64::min);
-                assert_eq!(least[k], expected, "window {window}, sample {k}");
+                assert_eq!(window_min[k], expected, "window {window}, sample {k}");
             }
         }
     }

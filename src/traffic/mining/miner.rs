@@ -52,7 +52,7 @@ fn mine_pair(set: &DataSet, target_index: usize, scenarios: &mut Vec<Scenario>) 
     let rate = set.recording_tags.recording.frame_rate_hz;
     let stretches = set.stretches(target_index);
     if activities.changes_lane() {
-        let shorter = |least_s: f64| move |m: &Match| (m.len() as f64 / rate) < least_s - TOLERANCE;
+        let shorter = |min_s: f64| move |m: &Match| (m.len() as f64 / rate) < min_s - TOLERANCE;
         let discarded = shorter(options.cut_in.min_duration_s);
         each_match(&stretches, &cut_in::ITEMS, samples(options.cut_in.pause_s, rate), discarded, |stretch, m| {
             scenarios.extend(cut_in::scenario(set, target_index, m, stretch.first, &stretch.tags));

@@ -224,8 +224,8 @@ fn part(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
         tally.samples();
         tally.valid();
         let axes = tally.map.as_ref().map(|map| map.axes.clone());
-        let asked = SampleOptions::new(Estimator::CRUDE, 20, SampleHeadways::Sampled);
-        let options = SampleOptions { worst: tally.worst_limit(), criterion: CRITERION, map: axes, ..asked };
+        let defaults = SampleOptions::new(Estimator::CRUDE, 20, SampleHeadways::Sampled);
+        let options = SampleOptions { worst: tally.worst_limit(), criterion: CRITERION, map: axes, ..defaults };
         let plan = small_plan(density_of(seeds), &density_of(seeds).mixture()?, &seeds.profile)?;
         let joined = SampleTally::empty(&plan, &options).merge(tally.clone())?;
         let back = tally.clone().merge(SampleTally::empty(&plan, &options))?;

@@ -145,8 +145,8 @@ impl Seeds {
         let map = MapAxes::of(&density, names[0], names[1]).unwrap();
         let chunk = CpuBackend::<f64>::reference().prepare(&plan).unwrap().run(PART_UNITS, Wanted::Outcomes).unwrap();
         let parts = [None, Some(map)].map(|map| {
-            let asked = SampleOptions::new(Estimator::CRUDE, 20, SampleHeadways::Sampled);
-            let options = SampleOptions { worst: 3, criterion: CRITERION, map, ..asked };
+            let defaults = SampleOptions::new(Estimator::CRUDE, 20, SampleHeadways::Sampled);
+            let options = SampleOptions { worst: 3, criterion: CRITERION, map, ..defaults };
             let tally = SampleTally::of_chunk(&plan, &chunk, &options).unwrap();
             (
                 tally.clone(),

@@ -29,13 +29,13 @@ pub struct GeneratorOptions {
     /// three lanes (published: 3,350).
     #[schemars(range(min = 60.0, max = 4500.0))]
     pub flow_vehph: f64,
-    /// Share of trucks among all vehicles, 0 to 0.5 (published: about 0.2).
+    /// Fraction of trucks among all vehicles, 0 to 0.5 (published: about 0.2).
     #[schemars(range(min = 0.0, max = 0.5))]
     pub truck_fraction: f64,
-    /// Factor on the rates of lane changes and hard braking in the camera's view.
-    /// 1 stands for the published rates, which the traffic meets in part (`docs/src/validation.md`). The default gives as
-    /// many kept cut-outs as the paper has, more cut-ins and LVDs, in a third of highD's time. A larger one disturbs the
-    /// traffic: vehicles brake for lane changes of others.
+    /// Factor on the rates of lane changes and hard braking in the camera's view. 1 stands for the published rates,
+    /// which the traffic meets in part (`docs/src/validation.md`). The default gives as many kept cut-outs as the paper
+    /// has, more cut-ins and LVDs, in a third of highD's time. A larger one disturbs the traffic: vehicles brake for
+    /// lane changes of others.
     #[schemars(range(min = 0.0, max = 20.0))]
     pub event_rate_factor: f64,
     /// How scenarios arise.
@@ -76,11 +76,11 @@ impl GeneratorOptions {
     }
 }
 
-/// How drivers change lanes and brake. Rates and shares are those at rate factor 1.
+/// How drivers change lanes and brake. Rates and fractions are those at rate factor 1.
 ///
-/// The defaults are fitted to the paper's 36 shares of failures of S and to published traffic figures
-/// (`examples/calibrate_generator.rs`, which also prints what other numbers give); four were then moved by hand. The fit
-/// never saw an F1, a claim of the paper or the seed of the default recordings.
+/// The defaults are fitted to the paper's 36 failure rates of S and to published traffic figures
+/// (`examples/calibrate_generator.rs`, which also prints what other numbers give); four were then moved by hand. The
+/// fit never saw an F1, a claim of the paper or the seed of the default recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Behaviour {
@@ -90,14 +90,14 @@ pub struct Behaviour {
     /// Braking of the new follower that reduces the acceptance of a gap by a factor e, m/s².
     #[schemars(range(min = 0.001, max = 10.0))]
     pub follower_braking_mps2: f64,
-    /// Share of decisions by a driver who accelerates during the change and lets a faster follower brake, 0 to 1.
+    /// Fraction of decisions by a driver who accelerates during the change and lets a faster follower brake, 0 to 1.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub accelerating_fraction: f64,
     /// The same braking of the new follower, for such a driver, m/s².
     #[schemars(range(min = 0.001, max = 10.0))]
     pub accelerating_follower_braking_mps2: f64,
-    /// Mean acceleration of such a driver during the change where there is room, before values outside of 0 to 2.8 m/s² are
-    /// drawn again, m/s².
+    /// Mean acceleration of such a driver during the change where there is room, before values outside of 0 to 2.8 m/s²
+    /// are drawn again, m/s².
     #[schemars(range(min = 0.0, max = 2.8))]
     pub change_acceleration_mps2: f64,
     /// Median duration of lane changes, before those outside of the published 2.9 to 7.3 s are left out, s.

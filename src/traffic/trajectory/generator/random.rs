@@ -9,7 +9,7 @@ use rand_core::{Rng, SeedableRng};
 /// Purpose of a stream; streams of different purposes have no common numbers.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) enum Purpose {
-    /// Lane counts, flows and truck share of a recording.
+    /// Lane counts, flows and fraction of trucks of a recording.
     Site = 1,
     /// Headways, drivers and vehicles at the upstream end.
     Inflow = 2,

@@ -232,8 +232,8 @@ impl Traffic {
                     gap_m > ROOM_M + ROOM_HEADWAY_S * own.speed_mps && gap_m > ROOM_TTC_S * closing_mps
                 };
                 let old = if own.is_in(change.from_lane) { last_in[change.from_lane] } else { None };
-                let most = if own.class == VehicleClass::Truck { 1.0 } else { EXCEEDING };
-                let slow = own.speed_mps < most * own.driver.desired_speed_mps;
+                let max_fraction = if own.class == VehicleClass::Truck { 1.0 } else { EXCEEDING };
+                let slow = own.speed_mps < max_fraction * own.driver.desired_speed_mps;
                 if leader.is_none_or(room) && old.is_none_or(room) && slow {
                     command = command.max(acceleration_mps2);
                 }

@@ -169,23 +169,30 @@ fn off_centre(recording: &Recording) -> Option<Finding> {
 
 /// Lateral speeds that contradict the change of the positions.
 fn against(recording: &Recording) -> Option<Finding> {
-    let (mut both, mut moved, mut told, mut samples) = (0.0, 0.0, 0.0, 0_u32);
-    let mut most: Option<(f64, &Track, usize)> = None;
+    let (mut cross_sum, mut change_sum, mut speed_sum, mut samples) = (0.0, 0.0, 0.0, 0_u32);
+    let mut strongest: Option<(f64, &Track, usize)> = None;
     for track in &recording.tracks {
         for k in looked_at(track, stride(recording)).filter(|k| (1..track.len() - 1).contains(k)) {
             let change_mps = (track.d_m[k + 1] - track.d_m[k - 1]) * recording.frame_rate_hz / 2.0;
             let speed_mps = track.v_d_mps[k];
-            (both, moved, told) =
-                (both + change_mps * speed_mps, moved + change_mps * change_mps, told + speed_mps * speed_mps);
+            (cross_sum, change_sum, speed_sum) = (
+                cross_sum + change_mps * speed_mps,
+                change_sum + change_mps * change_mps,
+                speed_sum + speed_mps * speed_mps,
+            );
             samples += 1;
-            if most.is_none_or(|(least, ..)| change_mps * speed_mps < least) {
-                most = Some((change_mps * speed_mps, track, k));
+            if strongest.is_none_or(|(min, ..)| change_mps * speed_mps < min) {
+                strongest = Some((change_mps * speed_mps, track, k));
             }
         }
     }
-    let (_, track, k) = most?;
+    let (_, track, k) = strongest?;
     let noise = f64::from(samples) * MIN_LATERAL_MPS * MIN_LATERAL_MPS;
-    if moved < noise || told < noise || both >= -0.5 * (moved * told).sqrt() || recording.tracks.len() < MIN_VEHICLES {
+    if change_sum < noise
+        || speed_sum < noise
+        || cross_sum >= -0.5 * (change_sum * speed_sum).sqrt()
+        || recording.tracks.len() < MIN_VEHICLES
+    {
         return None;
     }
     let problem = format!(

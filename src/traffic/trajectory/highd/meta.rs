@@ -123,10 +123,10 @@ fn frames_per_second(table: &CsvTable, column: CsvColumn) -> Result<f64> {
     if FRAME_RATES_HZ.contains(&frame_rate_hz) {
         return Ok(frame_rate_hz);
     }
-    let (least, most) = (FRAME_RATES_HZ.start(), FRAME_RATES_HZ.end());
+    let (min, max) = (FRAME_RATES_HZ.start(), FRAME_RATES_HZ.end());
     Err(table.bad(
         column,
-        format!("{} is not a frame rate; expected between {least} and {most} frames per second", table.shown(column)),
+        format!("{} is not a frame rate; expected between {min} and {max} frames per second", table.shown(column)),
         "give the number of frames per second (highD: 25)",
     ))
 }

@@ -19,7 +19,7 @@ mod write;
 pub use columns::FileChecksum;
 pub use inventory::{HighdFiles, Inventory, SYNTHETIC_MARKER, inventory, made_up};
 pub use number::Precision;
-pub use read::{Loaded, read, read_judged};
+pub use read::{Loaded, read, read_checked};
 pub use writable::quantize;
 pub(crate) use write::stage;
 pub use write::{RecordingInfo, write};

@@ -26,12 +26,12 @@ pub struct Loaded {
     pub notes: Vec<String>,
 }
 
-/// Like [`read_judged`], but accepts implausible values.
+/// Like [`read_checked`], but accepts implausible values.
 ///
 /// # Errors
-/// Those of [`read_judged`].
+/// Those of [`read_checked`].
 pub fn read(files: &HighdFiles) -> Result<Loaded> {
-    read_judged(files, Implausible::Accepted)
+    read_checked(files, Implausible::Accepted)
 }
 
 /// Reads one recording. Each file is read once, from start to end.
@@ -42,7 +42,7 @@ pub fn read(files: &HighdFiles) -> Result<Loaded> {
 ///
 /// # Errors
 /// Any violation of the format, with file, line and column or vehicle.
-pub fn read_judged(files: &HighdFiles, implausible: Implausible) -> Result<Loaded> {
+pub fn read_checked(files: &HighdFiles, implausible: Implausible) -> Result<Loaded> {
     let mut doubts = Doubts::new(implausible);
     let recording_meta = meta::read_recording_meta(files, &mut doubts)?;
     let (vehicles, tracks_meta_checksum) = meta::read_tracks_meta(files, &recording_meta, &mut doubts)?;
@@ -107,14 +107,14 @@ fn read_tracks(
     mut tracks: Vec<Track>,
     doubts: &mut Doubts,
 ) -> Result<Vec<Track>> {
-    let judge = SampleJudge::new(meta.frame_rate_hz);
+    let check = SampleCheck::new(meta.frame_rate_hz);
     // Sums of the accelerations over each vehicle's last second, because single samples are noisy.
     let mut sums_mps2 = vec![0.0; vehicles.len()];
     let mut at = 0;
     while table.next_row()? {
         at = find_vehicle(table, columns.id, vehicles, at)?;
         add_sample(table, columns, meta, &vehicles[at], &mut tracks[at], doubts)?;
-        let sample = judge.sample(&tracks[at], &mut sums_mps2[at]);
+        let sample = check.sample(&tracks[at], &mut sums_mps2[at]);
         if !sample.is_plausible() {
             report(&sample, table, columns, &tracks[at], doubts)?;
         }
@@ -224,7 +224,7 @@ fn add_sample(
 }
 
 /// Checks the last sample of a track against the plausible ranges.
-struct SampleJudge {
+struct SampleCheck {
     rate_hz: f64,
     /// Samples per second.
     window: usize,
@@ -233,7 +233,7 @@ struct SampleJudge {
 }
 
 /// The checked quantities of one sample; 0 if not yet defined.
-struct JudgedSample {
+struct CheckedSample {
     speed_mps: f64,
     lateral_speed_mps: f64,
     /// Difference of the lateral positions over the time between two samples.
@@ -242,15 +242,15 @@ struct JudgedSample {
     acceleration_mps2: f64,
 }
 
-impl SampleJudge {
+impl SampleCheck {
     fn new(rate_hz: f64) -> Self {
         let window = (rate_hz.round() as usize).max(1);
-        SampleJudge { rate_hz, window, inverse_window: 1.0 / window as f64 }
+        SampleCheck { rate_hz, window, inverse_window: 1.0 / window as f64 }
     }
 
     /// `sum_mps2` is the sum of the track's accelerations over the last second so far.
     #[inline]
-    fn sample(&self, track: &Track, sum_mps2: &mut f64) -> JudgedSample {
+    fn sample(&self, track: &Track, sum_mps2: &mut f64) -> CheckedSample {
         let last = |series: &[f64]| series.last().copied().unwrap_or_default();
         *sum_mps2 += last(&track.a_s_mps2);
         let samples = track.a_s_mps2.len();
@@ -261,7 +261,7 @@ impl SampleJudge {
             [.., before, now] => now - before,
             _ => 0.0,
         };
-        JudgedSample {
+        CheckedSample {
             speed_mps: last(&track.v_s_mps),
             lateral_speed_mps: last(&track.v_d_mps),
             lateral_change_mps: lateral_change_m * self.rate_hz,
@@ -270,7 +270,7 @@ impl SampleJudge {
     }
 }
 
-impl JudgedSample {
+impl CheckedSample {
     /// One test for all quantities: nearly every sample passes it.
     #[inline]
     fn is_plausible(&self) -> bool {
@@ -287,7 +287,7 @@ impl JudgedSample {
 /// A value outside the physical range, unless such values are accepted.
 #[cold]
 fn report(
-    sample: &JudgedSample,
+    sample: &CheckedSample,
     table: &CsvTable,
     columns: &TrackColumns,
     track: &Track,

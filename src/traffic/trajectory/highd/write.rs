@@ -145,7 +145,7 @@ struct Summary {
 
 impl Summary {
     fn add(&mut self, headways: &Headways) {
-        let lower = |least: &mut Option<f64>, value: f64| *least = Some(least.map_or(value, |least| least.min(value)));
+        let lower = |min: &mut Option<f64>, value: f64| *min = Some(min.map_or(value, |min| min.min(value)));
         lower(&mut self.min_dhw_m, headways.dhw_m);
         headways.thw_s.into_iter().for_each(|thw_s| lower(&mut self.min_thw_s, thw_s));
         headways.ttc_s.into_iter().filter(|ttc_s| *ttc_s > 0.0).for_each(|ttc_s| lower(&mut self.min_ttc_s, ttc_s));
@@ -257,8 +257,8 @@ impl Writer<'_> {
             line.computed(speeds().fold(f64::INFINITY, f64::min));
             line.computed(speeds().fold(0.0, f64::max));
             line.computed(speeds().sum::<f64>() / track.len() as f64);
-            for least in [summary.min_dhw_m, summary.min_thw_s, summary.min_ttc_s] {
-                line.computed(least.unwrap_or(-1.0));
+            for min in [summary.min_dhw_m, summary.min_thw_s, summary.min_ttc_s] {
+                line.computed(min.unwrap_or(-1.0));
             }
             line.integer(track.lane.array_windows().filter(|[before, after]| before != after).count() as i64);
             file.append(line.end())?;
