@@ -7,9 +7,7 @@ use std::sync::Arc;
 use arrow_array::cast::AsArray;
 use arrow_array::ffi_stream::{FFI_ArrowArrayStream, RecordBatchStreamReader};
 use arrow_array::types::{Float32Type, Float64Type, Int32Type, Int64Type};
-use arrow_array::{
-    Array, ArrayRef, Float64Array, RecordBatch, RecordBatchIterator, RecordBatchReader, StringArray,
-};
+use arrow_array::{Array, ArrayRef, Float64Array, RecordBatch, RecordBatchIterator, RecordBatchReader, StringArray};
 use arrow_schema::{DataType, Field, Schema, SchemaRef};
 use lanesweep::support::table::{ArrowRows, Cell, Column, ColumnKind};
 use numpy::{PyArray1, PyReadonlyArray1};
@@ -139,7 +137,8 @@ impl Frame {
         let mut html = String::from("<table><thead><tr>");
         let units = self.units();
         for name in self.columns() {
-            let unit = units.get(&name).filter(|unit| *unit != "1").map(|unit| format!("<br>{unit}")).unwrap_or_default();
+            let unit =
+                units.get(&name).filter(|unit| *unit != "1").map(|unit| format!("<br>{unit}")).unwrap_or_default();
             html += &format!("<th>{}{unit}</th>", escape(&name));
         }
         html += "</tr></thead><tbody>";

@@ -145,7 +145,7 @@ impl LimitState {
         let opened = self.0.clone();
         let work = move || {
             let truncated = truncated(&opened.density)?;
-            let log_share = truncated.validity_share().ln();
+            let log_share = truncated.validity_fraction().ln();
             Ok(points.iter().map(|point| truncated.log_density(point) - log_share).collect::<Vec<f64>>())
         };
         Ok(PyArray1::from_vec(py, watched(py, None, None, work)?))

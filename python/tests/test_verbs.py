@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[1]
 
 
 def test_the_functions_are_those_of_the_program() -> None:
-    subprocess.run([sys.executable, ROOT / "generate.py", "--check"], check=True)
+    subprocess.run([sys.executable, ROOT / "tools" / "generate.py", "--check"], check=True)
 
 
 def test_a_study_has_the_bytes_of_the_command_line(program, scenarios, tmp_path) -> None:

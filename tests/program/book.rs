@@ -96,7 +96,7 @@ fn commands_print_what_the_book_says() {
     assert!(!cases.is_empty(), "no chapter has a console block");
 
     let tests = trycmd::TestCases::new();
-    tests.case(work.path().join("*.md")).timeout(Duration::from_secs(120)).env("NO_COLOR", "1");
+    tests.case(work.path().join("*.md")).timeout(Duration::from_secs(600)).env("NO_COLOR", "1");
     tests.register_bin("lanesweep", Path::new(env!("CARGO_BIN_EXE_lanesweep")));
     tests.register_bins(TOOLS.map(|tool| (tool, on_path(tool))));
     tests.run();

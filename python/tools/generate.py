@@ -1,4 +1,4 @@
-"""Writes lanesweep/_verbs.py from the definition of the command line: `python generate.py`, with the module installed."""
+"""Writes lanesweep/_verbs.py from the definition of the command line: `python tools/generate.py`, with the module installed."""
 
 from __future__ import annotations
 
@@ -59,7 +59,8 @@ def documented(verb: dict, arguments: list[dict], default_out: str | None) -> st
         default = f", default {argument['default']}" if argument["default"] and argument["takes_value"] else ""
         kind = type_of(argument).replace(" | None", "")
         lines.append(f"    {name_of(argument)} : {kind}{note}{default}")
-        lines.append(paragraph(argument["help"].replace("\\", "\\\\"), 8))
+        parts = [part.strip().rstrip(".") for part in argument["help"].split("\n\n") if part.strip()]
+        lines.append(paragraph(". ".join(parts).replace("\\", "\\\\") + ".", 8))
         if argument["choices"] and argument["takes_value"]:
             lines.append(paragraph("One of " + ", ".join(argument["choices"]) + ".", 8))
     if default_out is not None:
@@ -95,7 +96,7 @@ def function(verb: dict) -> str:
 
 def text() -> str:
     verbs = {verb["verb"]: verb for verb in json.loads(core.definition())}
-    head = '''"""Verbs of the program as functions. Written by generate.py; do not edit."""
+    head = '''"""Verbs of the program as functions. Written by tools/generate.py; do not edit."""
 
 from __future__ import annotations
 
@@ -119,7 +120,7 @@ Models: TypeAlias = str | Driver | Sequence[str | Driver]
 
 
 if __name__ == "__main__":
-    path = Path(__file__).parent / "lanesweep" / "_verbs.py"
+    path = Path(__file__).parents[1] / "lanesweep" / "_verbs.py"
     if "--check" in sys.argv:
         sys.exit(0 if path.read_text(encoding="utf-8") == text() else f"{path} is not that of this program: run generate.py")
     path.write_text(text(), encoding="utf-8")
