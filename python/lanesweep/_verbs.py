@@ -61,70 +61,70 @@ def study(
 ) -> Result:
     """How far do parameterized scenarios agree with recorded ones?
 
-    Mines cut-ins, cut-outs and leader decelerations, replays each as recorded (S) and parameterized (S') from ten
-    time headways against every driver model, judges collision, TTC and BTN, and scores S' against S. Without data
-    it runs on generated recordings. The answer goes to stdout, tables and figures to --out.
+    Mines cut-ins, cut-outs and leader decelerations. Replays each as recorded (S) and parameterized (S') from ten
+    time headways with every driver model, evaluates collision, TTC and BTN, and scores S' against S. Without data
+    it uses generated recordings. The answer goes to stdout, tables and figures to --out.
 
     Parameters
     ----------
     recordings : Value
-        Folder of highD-format recordings [default: synthetic recordings]
+        Folder of highD-format recordings [default: synthetic recordings].
     scenarios : Value
-        Scenario file (.jsonl, .parquet, .csv) instead of recordings
+        Scenario file (.jsonl, .parquet, .csv) instead of recordings.
     accept_implausible : bool
-        Use physically impossible values (a speed of 108 m/s) with a warning
+        Use physically impossible values (a speed of 108 m/s) with a warning.
     synth_recordings : Value, default 84
-        Number of generated recordings They are called `01`, `02`, ….
+        Number of generated recordings. They are called `01`, `02`, ….
     categories : Values
-        Kinds of scenario: cut-in, cut-out, lvd [default: all]
+        Kinds of scenario: cut-in, cut-out, lvd [default: all].
     thw : Values, default paper
-        Time headways, s; paper: 2.0, 1.8, … 0.2; r157; observed: the recorded gaps The paper's claims need all
-        of its headways. r157: the minimum following distance of UN R157, 5.2.3.3, by the ego's speed; may stand
-        in a list. observed: each scenario starts from its recorded gap, and a density draws the headway as one
-        more parameter; stands alone.
+        Time headways, s; paper: 2.0, 1.8, … 0.2; r157; observed: the recorded gaps. The paper's claims need all
+        of its headways. r157: the minimum following distance of UN R157, 5.2.3.3, for the ego's speed; a list
+        may contain it. observed: each scenario starts from its recorded gap, and a density draws the headway as
+        one more parameter; it cannot be combined with other headways.
     published : bool
-        Tables and page have the paper's published numbers (of highD) too
+        Add the paper's published numbers (of highD) to tables and page.
     reference : bool
-        Compute in binary64 on the CPU, not in the f32 lane arithmetic
+        Compute in binary64 on the CPU, not in the f32 lane arithmetic.
     models : Models
-        Driver models: Reg157, CCHDM, RSS, FSM [default: all]
+        Driver models: Reg157, CCHDM, RSS, FSM [default: all].
     profile : Value, default paper
-        paper, paper-fit, jrc-2021, un-r157 Name of a profile, or a TOML file of your own. `map --preset jrc`
+        paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc`
         takes jrc-2021 unless it is set.
     compare_reference : bool
-        Run both arithmetics and list every verdict that differs (reference.csv in --out)
+        Run both arithmetics and list every verdict that differs (reference.csv in --out).
     dt : Value, s
-        Time step [default: the profile's]
+        Time step [default: the profile's].
     rows : Value
-        Also write one row per lane: .csv, .jsonl or .parquet
+        Also write one row per lane: .csv, .jsonl or .parquet.
     keep_plan : Value, default auto
-        Keep the plan in --out for `simulate --from` The plan is run-plan.json; with it you can repeat each
+        Keep the plan in --out for `simulate --from`. The plan is run-plan.json; with it you can repeat each
         lane. auto keeps it up to 256 MiB, about 135,000 scenarios.
         One of auto, always, never.
     dry_run : bool
-        Print lanes, memory and estimated time; write nothing
+        Print lanes, memory and estimated time; write nothing.
     shard : Value
-        Compute shard I of N (from 0); `cluster merge` joins them The part is written to --out. `auto/N` takes I
-        from a Kubernetes Indexed Job or a Slurm array.
+        Compute shard I of N (from 0); `cluster merge` merges them. The part is written to --out. `auto/N` takes
+        I from a Kubernetes Indexed Job or a Slurm array.
     config : Values
-        Configuration file, or one key of it; repeatable `lanesweep config init` writes such a file. Without
+        Configuration file, or one key of it; repeatable. `lanesweep config init` writes such a file. Without
         --config, LANESWEEP_CONFIG names it.
     backend : Value, default auto
-        Backend; auto: a GPU if there is one
+        Backend; auto: a GPU if there is one.
         One of auto, cpu, gpu.
     device : Value
-        Device, by part of its name, PCI bus id or index `lanesweep verify devices` lists the devices. The
+        Device, by part of its name, PCI bus id or index. `lanesweep verify devices` lists the devices. The
         default is the first GPU.
     seed : Value, default 157
-        Seed that chooses the lanes to check on the CPU No score depends on it.
+        Seed that chooses the lanes to check on the CPU. No score depends on it.
     plan : Value
-        Run a plan that --plan-only wrote, instead of making one
+        Run a plan that --plan-only wrote.
     plan_only : bool
-        Write the plan, plan.json in --out, and stop
+        Write the plan, plan.json in --out, and stop.
     stop_after : Value, s
-        Stop after the chunk in progress at that time, as Ctrl-C does; the same command resumes
+        After this time, finish the current chunk and stop, as after Ctrl-C; the same command resumes.
     threads : Value
-        Threads; results do not depend on it [default: all cores]
+        Threads; results do not depend on it [default: all cores].
     out : path, optional
         Where the files stay; without it they go with the result.
 
@@ -184,16 +184,16 @@ def mine(
     Parameters
     ----------
     recordings : Value
-        Folder of highD-format recordings
+        Folder of highD-format recordings.
     kept : bool
-        Only scenarios that pass the paper's filters
+        Only scenarios that pass the paper's filters.
     accept_implausible : bool
-        Use physically impossible values (a speed of 108 m/s) with a warning
+        Use physically impossible values (a speed of 108 m/s) with a warning.
     config : Values
-        Configuration file, or one key of it; repeatable `lanesweep config init` writes such a file. Without
+        Configuration file, or one key of it; repeatable. `lanesweep config init` writes such a file. Without
         --config, LANESWEEP_CONFIG names it.
     threads : Value
-        Threads; results do not depend on it [default: all cores]
+        Threads; results do not depend on it [default: all cores].
     out : path, optional
         Where the files stay; without it they go with the result.
 
@@ -237,47 +237,47 @@ def fit(
 ) -> Result:
     """How are the parameters of scenarios distributed?
 
-    Fits a kernel density to the kept scenarios of each category under each parameterization, computes which
-    fraction of it is physically possible, how often such scenarios occur, and how well drawn scenarios represent
-    unseen real ones. One density file per parameterization is written. Without data it runs on generated
+    Fits a kernel density to the kept scenarios of each category under each parameterization. Computes the
+    physically possible fraction of each density, how often such scenarios occur, and how well drawn scenarios
+    represent unseen real ones. Writes one density file per parameterization. Without data it uses generated
     recordings. Tables go to stdout, files to --out.
 
     Parameters
     ----------
     recordings : Value
-        Folder of highD-format recordings [default: synthetic recordings]
+        Folder of highD-format recordings [default: synthetic recordings].
     scenarios : Value
-        Scenario file (.jsonl, .parquet, .csv) instead of recordings
+        Scenario file (.jsonl, .parquet, .csv) instead of recordings.
     hours : Value, h
-        Driven time of all egos [default: from the recordings]
+        Driven time of all egos [default: from the recordings].
     km : Value, km
-        Driven distance of all egos [default: from the recordings]
+        Driven distance of all egos [default: from the recordings].
     accept_implausible : bool
-        Use physically impossible values (a speed of 108 m/s) with a warning
+        Use physically impossible values (a speed of 108 m/s) with a warning.
     synth_recordings : Value, default 84
-        Number of generated recordings They are called `01`, `02`, ….
+        Number of generated recordings. They are called `01`, `02`, ….
     categories : Values
-        Kinds of scenario: cut-in, cut-out, lvd [default: all]
+        Kinds of scenario: cut-in, cut-out, lvd [default: all].
     parameterizations : Values
-        Parameterizations: 1…7, a…g, i…v [default: all] 1…7 are for cut-ins, a…g for cut-outs, i…v for leader
+        Parameterizations: 1…7, a…g, i…v [default: all]. 1…7 are for cut-ins, a…g for cut-outs, i…v for leader
         decelerations.
     with_thw : bool
-        Add the observed time headway as a parameter (thw_s)
+        Add the observed time headway as a parameter (thw_s).
     no_comparison : bool
-        Do not compare drawn with unseen scenarios
+        Skip the comparison of drawn with unseen scenarios.
     without_scenarios : bool
-        Leave the recorded series out of the density files `sample` then cannot compare its rates with those of
-        the recorded scenarios. For a file that is passed on.
+        Leave the recorded series out of the density files. `sample` then cannot compare its rates with those of
+        the recorded scenarios. Use it if you share the file but not the recordings.
     bandwidth_rule : Value, default reduction
-        Search interval of the bandwidth
+        Search interval of the bandwidth.
         One of reduction, wide.
     config : Values
-        Configuration file, or one key of it; repeatable `lanesweep config init` writes such a file. Without
+        Configuration file, or one key of it; repeatable. `lanesweep config init` writes such a file. Without
         --config, LANESWEEP_CONFIG names it.
     seed : Value, default 157
-        Seed of P_valid and of the splits for M
+        Seed of P_valid and of the splits for M.
     threads : Value
-        Threads; results do not depend on it [default: all cores]
+        Threads; results do not depend on it [default: all cores].
     out : path, optional
         Where the files stay; without it they go with the result.
 
@@ -350,90 +350,91 @@ def sample(
     """How likely does a driver fail?
 
     Draws concrete scenarios from a density (see `lanesweep fit`), runs each against the driver models and estimates
-    the probability of failure with its interval: by crude Monte Carlo, importance sampling, cross-entropy or subset
+    the probability of failure with its interval, by crude Monte Carlo, importance sampling, cross-entropy or subset
     simulation. Each estimate has a verdict on whether to trust it. A table goes to stdout, files to --out.
 
     Parameters
     ----------
     density : Value
-        Density file
+        Density file.
     distribution : Value
-        OpenSCENARIO file with stochastic distributions, not a density Its numberOfTestRuns and randomSeed are
+        OpenSCENARIO file with stochastic distributions, not a density. Its numberOfTestRuns and randomSeed are
         the defaults of --samples and --seed.
     proposal : Values
-        Proposal file to sample, with --estimator is; repeatable Several are combined by the balance heuristic.
+        Proposal file to sample, with --estimator is; repeatable. Several are combined by the balance heuristic.
     accept_implausible : bool
-        Use physically impossible values (a speed of 108 m/s) with a warning
+        Use physically impossible values (a speed of 108 m/s) with a warning.
     thw : Values
-        Time headways, s [default: the density's, else paper] paper is 2.0, 1.8, … 0.2. observed (or sampled):
+        Time headways, s [default: the density's, else paper]. paper is 2.0, 1.8, … 0.2. observed (or sampled):
         the headway is drawn from the recorded ones, as a parameter of the density, which needs `fit --with-
         thw`. The adaptive estimators take one headway.
     given : Values
-        Draw given this value of a parameter (mc); repeatable
+        Draw from the density conditional on this value (mc); repeatable.
     category : Value
-        With --distribution: kind of scenario: cut-in, cut-out, lvd
+        With --distribution: kind of scenario: cut-in, cut-out, lvd.
     rename : Values
-        With --distribution: parameter of the file = our parameter, times a factor; repeatable
+        With --distribution: map a parameter of the file to one of lanesweep, times a factor; repeatable.
     set : Values
-        With --distribution: value that is the same in every sample; repeatable
+        With --distribution: constant parameter; repeatable.
     models : Models
-        Driver models: Reg157, CCHDM, RSS, FSM [default: all]
+        Driver models: Reg157, CCHDM, RSS, FSM [default: all].
     profile : Value, default paper
-        paper, paper-fit, jrc-2021, un-r157 Name of a profile, or a TOML file of your own. `map --preset jrc`
+        paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc`
         takes jrc-2021 unless it is set.
     estimator : Value, default mc
-        Crude, importance, cross-entropy, subset Importance sampling draws around the worst points of a pilot.
+        Crude, importance, cross-entropy, subset. Importance sampling draws around the worst points of a pilot.
         One of mc, is, ce, subset.
     samples : Value
-        Samples at most [default: 100000; subset: 2000 per level] With ce: of the final sample.
+        Number of samples [default: 100000; subset: 2000 per level]. A stop rule may end the run earlier. With
+        ce: the number in the final sample.
     criterion : Value, default collision
-        Criterion to map, rank or estimate
+        Criterion to map, rank or estimate.
         One of collision, ttc, btn.
     half_width : Value
-        Stop when half-width over estimate is at most this The interval is checked after 4096·2^k samples. The
+        Stop when half-width over estimate is at most this. The interval is checked after 4096·2^k samples. The
         default is to draw all samples.
     dt : Value, s
-        Time step [default: the profile's]
+        Time step [default: the profile's].
     points : Value, default random
-        Kind of points of mc
+        Kind of points of `mc`.
         One of random, sobol.
     interval : Value, default wilson
-        Kind of interval of mc
+        Kind of interval of `mc`.
         One of wilson, clopper-pearson.
     level : Value, default 0.95
-        Level of the intervals
+        Level of the intervals.
     time_limit : Value, s
-        Stop at the first check after this time (not reproducible) [default: no limit]
+        Stop at the first check after this time (not reproducible) [default: no limit].
     map : Value
-        Failure map over two parameters, or `none` [default: the first two]
+        Failure map over two parameters, or `none` [default: the first two].
     rows : Value
-        Also write one row per lane: .csv, .jsonl or .parquet
+        Also write one row per lane: .csv, .jsonl or .parquet.
     worst : Value, default 20
-        Worst lanes to list per model; 0 runs faster
+        Worst lanes to list per model; 0 runs faster.
     dry_run : bool
-        Print lanes, memory and estimated time; write nothing
+        Print lanes, memory and estimated time; write nothing.
     shard : Value
-        Compute shard I of N (from 0); `cluster merge` joins them The part is written to --out. `auto/N` takes I
-        from a Kubernetes Indexed Job or a Slurm array.
+        Compute shard I of N (from 0); `cluster merge` merges them. The part is written to --out. `auto/N` takes
+        I from a Kubernetes Indexed Job or a Slurm array.
     config : Values
-        Configuration file, or one key of it; repeatable `lanesweep config init` writes such a file. Without
+        Configuration file, or one key of it; repeatable. `lanesweep config init` writes such a file. Without
         --config, LANESWEEP_CONFIG names it.
     backend : Value, default auto
-        Backend; auto: a GPU if there is one
+        Backend; auto: a GPU if there is one.
         One of auto, cpu, gpu.
     device : Value
-        Device, by part of its name, PCI bus id or index `lanesweep verify devices` lists the devices. The
+        Device, by part of its name, PCI bus id or index. `lanesweep verify devices` lists the devices. The
         default is the first GPU.
     seed : Value, default 157
-        Seed of the draws
+        Seed of the draws.
     plan : Value
-        Run a plan that --plan-only wrote, instead of making one
+        Run a plan that --plan-only wrote.
     plan_only : bool
-        Write the plan, plan.json in --out, and stop
+        Write the plan, plan.json in --out, and stop.
     stop_after : Value, s
-        Stop after the chunk in progress at that time, as Ctrl-C does; the same command resumes
+        After this time, finish the current chunk and stop, as after Ctrl-C; the same command resumes.
     threads : Value
-        Threads; results do not depend on it [default: all cores]
+        Threads; results do not depend on it [default: all cores].
     out : path, optional
         Where the files stay; without it they go with the result.
 
@@ -512,56 +513,56 @@ def compare(
     Simulates the recorded scenarios (S) and their parameterized replays (S'), fits a density per parameterization
     on the same scenarios, draws --samples scenarios from each, and compares the rates of failure per category,
     driver model and criterion, with the ratio to S and its interval. A ratio agrees if its interval lies within the
-    margin. Without data it runs on generated recordings. Tables go to stdout, files to --out.
+    margin. Without data it uses generated recordings. Tables go to stdout, files to --out.
 
     Parameters
     ----------
     recordings : Value
-        Folder of highD-format recordings [default: synthetic recordings]
+        Folder of highD-format recordings [default: synthetic recordings].
     scenarios : Value
-        Scenario file (.jsonl, .parquet, .csv) instead of recordings
+        Scenario file (.jsonl, .parquet, .csv) instead of recordings.
     hours : Value, h
-        Driven time of all egos [default: from the recordings]
+        Driven time of all egos [default: from the recordings].
     km : Value, km
-        Driven distance of all egos [default: from the recordings]
+        Driven distance of all egos [default: from the recordings].
     accept_implausible : bool
-        Use physically impossible values (a speed of 108 m/s) with a warning
+        Use physically impossible values (a speed of 108 m/s) with a warning.
     synth_recordings : Value, default 84
-        Number of generated recordings They are called `01`, `02`, ….
+        Number of generated recordings. They are called `01`, `02`, ….
     categories : Values
-        Kinds of scenario: cut-in, cut-out, lvd [default: all]
+        Kinds of scenario: cut-in, cut-out, lvd [default: all].
     parameterizations : Values
-        Parameterizations: 1…7, a…g, i…v [default: all] 1…7 are for cut-ins, a…g for cut-outs, i…v for leader
+        Parameterizations: 1…7, a…g, i…v [default: all]. 1…7 are for cut-ins, a…g for cut-outs, i…v for leader
         decelerations.
     thw : Values, default paper
-        Time headways, s; paper: 2.0, 1.8, … 0.2; r157; observed: the recorded gaps The paper's claims need all
-        of its headways. r157: the minimum following distance of UN R157, 5.2.3.3, by the ego's speed; may stand
-        in a list. observed: each scenario starts from its recorded gap, and a density draws the headway as one
-        more parameter; stands alone.
+        Time headways, s; paper: 2.0, 1.8, … 0.2; r157; observed: the recorded gaps. The paper's claims need all
+        of its headways. r157: the minimum following distance of UN R157, 5.2.3.3, for the ego's speed; a list
+        may contain it. observed: each scenario starts from its recorded gap, and a density draws the headway as
+        one more parameter; it cannot be combined with other headways.
     models : Models
-        Driver models: Reg157, CCHDM, RSS, FSM [default: all]
+        Driver models: Reg157, CCHDM, RSS, FSM [default: all].
     profile : Value, default paper
-        paper, paper-fit, jrc-2021, un-r157 Name of a profile, or a TOML file of your own. `map --preset jrc`
+        paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc`
         takes jrc-2021 unless it is set.
     samples : Value, default 20000
-        Samples of each density; each runs from every headway
+        Samples of each density; each runs from every headway.
     dt : Value, s
-        Time step [default: the profile's]
+        Time step [default: the profile's].
     dry_run : bool
-        Print lanes, memory and estimated time; write nothing
+        Print lanes, memory and estimated time; write nothing.
     config : Values
-        Configuration file, or one key of it; repeatable `lanesweep config init` writes such a file. Without
+        Configuration file, or one key of it; repeatable. `lanesweep config init` writes such a file. Without
         --config, LANESWEEP_CONFIG names it.
     backend : Value, default auto
-        Backend; auto: a GPU if there is one
+        Backend; auto: a GPU if there is one.
         One of auto, cpu, gpu.
     device : Value
-        Device, by part of its name, PCI bus id or index `lanesweep verify devices` lists the devices. The
+        Device, by part of its name, PCI bus id or index. `lanesweep verify devices` lists the devices. The
         default is the first GPU.
     seed : Value, default 157
-        Seed of the draws
+        Seed of the draws.
     threads : Value
-        Threads; results do not depend on it [default: all cores]
+        Threads; results do not depend on it [default: all cores].
     out : path, optional
         Where the files stay; without it they go with the result.
 
@@ -620,53 +621,53 @@ def justify(
 ) -> Result:
     """Is a parameterization appropriate for this driver model, scenario type and criterion?
 
-    Replays the recorded scenarios (S) as recorded and as parameterized (S'), fits a density, and concludes by the
-    rules of [justify] in the configuration: appropriate, not appropriate, or undecided and how much more data would
-    decide. The dossier (report.html) names the failures that are hidden, shows the worst of them, gives the risk
-    ratio, the coverage and the alternatives. Without data it runs on generated recordings.
+    Replays the recorded scenarios as recorded (S) and parameterized (S'), fits a density, and applies the rules of
+    [justify] in the configuration: appropriate, not appropriate, or undecided, with the amount of data that would
+    decide. The dossier (report.html) lists the failures that S' hides, shows the worst of them, and gives the risk
+    ratio, the coverage and the alternatives. Without data it uses generated recordings.
 
     Parameters
     ----------
     recordings : Value
-        Folder of highD-format recordings [default: synthetic recordings]
+        Folder of highD-format recordings [default: synthetic recordings].
     scenarios : Value
-        Scenario file (.jsonl, .parquet, .csv) instead of recordings
+        Scenario file (.jsonl, .parquet, .csv) instead of recordings.
     accept_implausible : bool
-        Use physically impossible values (a speed of 108 m/s) with a warning
+        Use physically impossible values (a speed of 108 m/s) with a warning.
     synth_recordings : Value, default 84
-        Number of generated recordings They are called `01`, `02`, ….
+        Number of generated recordings. They are called `01`, `02`, ….
     parameterization : Value
-        Parameterization: 1…7 (cut-in), a…g (cut-out), i…v (LVD)
+        Parameterization: 1…7 (cut-in), a…g (cut-out), i…v (LVD).
     thw : Values, default paper
-        Time headways, s; paper: 2.0, 1.8, … 0.2; r157; observed: the recorded gaps The paper's claims need all
-        of its headways. r157: the minimum following distance of UN R157, 5.2.3.3, by the ego's speed; may stand
-        in a list. observed: each scenario starts from its recorded gap, and a density draws the headway as one
-        more parameter; stands alone.
+        Time headways, s; paper: 2.0, 1.8, … 0.2; r157; observed: the recorded gaps. The paper's claims need all
+        of its headways. r157: the minimum following distance of UN R157, 5.2.3.3, for the ego's speed; a list
+        may contain it. observed: each scenario starts from its recorded gap, and a density draws the headway as
+        one more parameter; it cannot be combined with other headways.
     models : Models
-        Driver model: Reg157, CCHDM, RSS, FSM
+        Driver model: Reg157, CCHDM, RSS, FSM.
     criterion : Value, default collision
-        Criterion to map, rank or estimate For worst lanes, failure maps, fractions, stop rules and the adaptive
-        estimators.
+        Criterion to map, rank or estimate. For worst lanes, failure maps, fractions, stop rules and the
+        adaptive estimators.
     profile : Value, default paper
-        paper, paper-fit, jrc-2021, un-r157 Name of a profile, or a TOML file of your own. `map --preset jrc`
+        paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc`
         takes jrc-2021 unless it is set.
     dt : Value, s
-        Time step [default: the profile's]
+        Time step [default: the profile's].
     author : Value
-        Who answers for the dossier [default: a line to fill in]
+        Person responsible for the dossier [default: a line to fill in].
     date : Value
-        Date of the dossier [default: a line to fill in]
+        Date of the dossier [default: a line to fill in].
     config : Values
-        Configuration file, or one key of it; repeatable `lanesweep config init` writes such a file. Without
+        Configuration file, or one key of it; repeatable. `lanesweep config init` writes such a file. Without
         --config, LANESWEEP_CONFIG names it.
     backend : Value, default auto
-        Backend; auto: a GPU if there is one
+        Backend; auto: a GPU if there is one.
         One of auto, cpu, gpu.
     device : Value
-        Device, by part of its name, PCI bus id or index `lanesweep verify devices` lists the devices. The
+        Device, by part of its name, PCI bus id or index. `lanesweep verify devices` lists the devices. The
         default is the first GPU.
     threads : Value
-        Threads; results do not depend on it [default: all cores]
+        Threads; results do not depend on it [default: all cores].
     out : path, optional
         Where the files stay; without it they go with the result.
 
@@ -730,64 +731,65 @@ def map(
     """Map outcomes over two parameters, and where two models or profiles differ
 
     Every cell is one concrete case. --preset takes the grids of the JRC's evidence (jrc) or of the regulation's
-    Annex 3 (r157, to 60 and to 130 km/h); --x, --y, --panel and --set make any other. Writes a sheet per grid and
-    model (SVG), cells.csv, differences.csv and map.json; the shares go to stdout.
+    Annex 3 (r157, to 60 and to 130 km/h); --x, --y, --panel and --set define any other grid. Writes a sheet per
+    grid and model (SVG), cells.csv, differences.csv and map.json. The percentages of cells with a failure go to
+    stdout.
 
     Parameters
     ----------
     distribution : Value
-        OpenSCENARIO file with deterministic distributions The first two parameters with several values are the
+        OpenSCENARIO file with deterministic distributions. The first two parameters with several values are the
         axes, unless --x and --y name others; the others define the panels.
     accept_implausible : bool
-        Use physically impossible values (a speed of 108 m/s) with a warning
+        Use physically impossible values (a speed of 108 m/s) with a warning.
     category : Value
-        Kind of scenario: cut-in, cut-out, lvd
+        Kind of scenario: cut-in, cut-out, lvd.
     preset : Value
-        Predefined grids with their models: jrc, r157
+        Predefined grids with their models: jrc, r157.
     rename : Values
-        With --distribution: parameter of the file = our parameter, times a factor; repeatable
+        With --distribution: map a parameter of the file to one of lanesweep, times a factor; repeatable.
     x : Value
-        Parameter of the x axis: NAME=FROM..TO/STEP or NAME=A,B,C With --distribution also a NAME of the file.
+        Parameter of the x axis: NAME=FROM..TO/STEP or NAME=A,B,C. With --distribution also a NAME of the file.
     y : Value
-        Parameter of the y axis
+        Parameter of the y axis.
     panel : Values
-        Parameter of the panels; repeatable Several make a panel of every combination.
+        Parameter of the panels; repeatable. Several of them give one panel per combination.
     set : Values
-        Value that is the same in every cell; repeatable
+        Constant parameter; repeatable.
     closing : bool
-        Only panels in which the ego is faster than the other vehicle
+        Only panels in which the ego is faster than the other vehicle.
     native_gap : bool
-        Start each model at its following distance in the JRC's simulator, not gap_m or thw_s
+        Start each model at its following distance in the JRC's simulator, not gap_m or thw_s.
     models : Models
-        Driver models: Reg157, CCHDM, RSS, FSM [default: all]
+        Driver models: Reg157, CCHDM, RSS, FSM [default: all].
     criterion : Value, default collision
-        Criterion to map, rank or estimate For worst lanes, failure maps, fractions, stop rules and the adaptive
-        estimators.
+        Criterion to map, rank or estimate. For worst lanes, failure maps, fractions, stop rules and the
+        adaptive estimators.
     against : Value
-        Model or profile; maps where it and the models differ
+        Model or profile to compare with; maps the differences.
     robust : bool
-        Mark cells whose outcome changes with a tenth of the time step, 1 cm, 0.1 km/h They are undecided: each
-        cell is simulated eight times, and sheets show them in their own colour.
+        Mark cells whose outcome changes with a tenth of the time step, 1 cm or 0.1 km/h. They are undecided.
+        Each cell is simulated eight times; sheets show undecided cells in their own colour.
     profile : Value, default paper
-        paper, paper-fit, jrc-2021, un-r157 Name of a profile, or a TOML file of your own. `map --preset jrc`
+        paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc`
         takes jrc-2021 unless it is set.
     reference : bool
-        Compute in binary64 on the CPU: the reference of the lane arithmetic
+        Compute in binary64 on the CPU: the reference of the lane arithmetic.
     dt : Value, s
-        Time step [default: the profile's]
+        Time step [default: the profile's].
     dry_run : bool
-        Print lanes, memory and estimated time; write nothing
+        Print lanes, memory and estimated time; write nothing.
     config : Values
-        Configuration file, or one key of it; repeatable `lanesweep config init` writes such a file. Without
+        Configuration file, or one key of it; repeatable. `lanesweep config init` writes such a file. Without
         --config, LANESWEEP_CONFIG names it.
     backend : Value, default auto
-        Backend; auto: a GPU if there is one
+        Backend; auto: a GPU if there is one.
         One of auto, cpu, gpu.
     device : Value
-        Device, by part of its name, PCI bus id or index `lanesweep verify devices` lists the devices. The
+        Device, by part of its name, PCI bus id or index. `lanesweep verify devices` lists the devices. The
         default is the first GPU.
     threads : Value
-        Threads; results do not depend on it [default: all cores]
+        Threads; results do not depend on it [default: all cores].
     out : path, optional
         Where the files stay; without it they go with the result.
 
@@ -854,66 +856,66 @@ def check(
     config: Values | None = None,
     threads: Value | None = None,
 ) -> Result:
-    """Judge one concrete case: would the reference drivers of UN R157 avoid the collision?
+    """Check one concrete case: do the reference drivers of UN R157 avoid the collision?
 
-    The case comes from flags, from a TOML file or a row of a table (the flags' names with `_` as keys or columns;
-    flags win), from a scenario of a file, or from an OpenSCENARIO file of `export xosc`. Every model runs under
-    every profile. The case is preventable where CCHDM or FSM, the drivers of Annex 3, avoid the collision under the
-    first profile. It has no conflict where nothing collides even if the ego never reacts. It is undecided where a
-    tenth of the time step, 1 cm of gap or 0.1 km/h changes the answer, and outside Annex 3 where the annex
-    describes no such case. Then follow the margins, the clauses, and the distance from the boundary along each
-    number. Exit status: 0 preventable, 1 not preventable, 8 undecided, 9 no conflict, 10 outside Annex 3, 4 input
-    was left out.
+    The case comes from flags, from a TOML file or a row of a table (keys and columns are the flags' names with `_`;
+    flags override them), from a scenario of a file, or from an OpenSCENARIO file of `export xosc`. Every model runs
+    under every profile. The case is preventable if CCHDM or FSM, the drivers of Annex 3, avoids the collision under
+    the first profile. It has no conflict if nothing collides even when the ego never reacts. It is undecided if one
+    of these changes the answer: a tenth of the time step, 1 cm of gap, 0.1 km/h of speed. It is outside Annex 3 if
+    the annex does not describe such a case. The output also has the margins, the clauses, and the distance to
+    another answer along each parameter. Exit status: 0 preventable, 1 not preventable, 8 undecided, 9 no conflict,
+    10 outside Annex 3, 4 parts of the input were skipped.
 
     Parameters
     ----------
     file : Value
-        TOML file, table (.csv, .parquet), scenario file (.jsonl) or OpenSCENARIO file (.xosc) with the case
+        TOML file, table (.csv, .parquet), scenario file (.jsonl) or OpenSCENARIO file (.xosc) with the case.
     row : Value, default 1
-        Row of a table, from 1 after the header
+        Row of a table, from 1 after the header.
     scenario : Value
-        Scenario of a scenario file, by its id It starts with its observed gap, or with --gap or --thw.
+        Scenario of a scenario file, by its id. It starts with its observed gap, or with --gap or --thw.
     accept_implausible : bool
-        Use physically impossible values (a speed of 108 m/s) with a warning
+        Use physically impossible values (a speed of 108 m/s) with a warning.
     category : Value
-        Kind of scenario: cut-in, cut-out, lvd
+        Kind of scenario: cut-in, cut-out, lvd.
     ego_speed : Value, m/s
-        Initial speed of the ego
+        Initial speed of the ego.
     speed : Value, m/s
-        Initial speed of the other vehicle [default: the ego's]
+        Initial speed of the other vehicle [default: the ego's].
     gap : Value, m
-        Initial gap, bumper to bumper
+        Initial gap, bumper to bumper.
     thw : Value, s
-        Initial time headway instead of the gap
+        Initial time headway instead of the gap.
     lateral_speed : Value, m/s
-        Cut-in, cut-out: lateral speed
+        Cut-in, cut-out: lateral speed.
     acceleration : Value, m/s²
-        Acceleration of the other vehicle; an LVD needs one [default: 0]
+        Acceleration of the other vehicle; an LVD needs one [default: 0].
     ahead_gap : Value, m
-        Cut-out: gap between the two, bumper to bumper
+        Cut-out: gap between the two, bumper to bumper.
     lateral_distance : Value, m
-        Cut-in: lateral distance at the start; cut-out: at the end [default: 3.5]
+        Cut-in: lateral distance at the start; cut-out: at the end [default: 3.5].
     end_speed : Value, m/s
-        Speed at which the acceleration ends [default: standstill, or never]
+        Speed at which the acceleration ends [default: standstill, or never].
     ahead_speed : Value, m/s
-        Cut-out: speed of the vehicle ahead of the cutting-out one [default: 0]
+        Cut-out: speed of the vehicle ahead of the cutting-out one [default: 0].
     length : Value, m
-        Length of every vehicle [default: the profile's]
+        Length of every vehicle [default: the profile's].
     width : Value, m
-        Width of every vehicle [default: the profile's]
+        Width of every vehicle [default: the profile's].
     models : Models
-        Driver models: Reg157, CCHDM, RSS, FSM [default: all]
+        Driver models: Reg157, CCHDM, RSS, FSM [default: all].
     profiles : Values
-        Profiles; the first decides [default: un-r157, the two of EU 2022/1426, jrc-2021, paper, paper-fit]
+        Profiles; the first one decides [default: un-r157, the two of EU 2022/1426, jrc-2021, paper, paper-fit].
     sheet : Value
-        Also write the sheet as a page to print
+        Also write the case sheet as an HTML page for printing.
     series : Value
-        Also write every step of every model under the first profile
+        Also write every step of every model under the first profile.
     config : Values
-        Configuration file, or one key of it; repeatable `lanesweep config init` writes such a file. Without
+        Configuration file, or one key of it; repeatable. `lanesweep config init` writes such a file. Without
         --config, LANESWEEP_CONFIG names it.
     threads : Value
-        Threads; results do not depend on it [default: all cores]
+        Threads; results do not depend on it [default: all cores].
 
     Returns
     -------
@@ -956,7 +958,7 @@ def trace(
     table: Value | None = None,
     row: Value | None = None,
     scenarios: Value | None = None,
-    from: Value | None = None,
+    from_: Value | None = None,
     lane: Value | None = None,
     accept_implausible: bool = False,
     category: Value | None = None,
@@ -983,74 +985,74 @@ def trace(
 ) -> Result:
     """Run one concrete scenario and print or draw its time series
 
-    The case comes from flags, from a TOML file, from a row of a table (the flags' names with `_` as keys or
-    columns; flags win), or from a finished run or a scenario file with a lane key. The series goes to stdout as
-    CSV, the outcome to stderr, the figure to --plot. Several models (--models FSM,RSS) or variants (--compare)
-    follow one another in the CSV and share the figure.
+    The case comes from flags, from a TOML file, from a row of a table (keys and columns are the flags' names with
+    `_`; flags override them), or from a finished run or a scenario file with a lane key. The series goes to stdout
+    as CSV, the outcome to stderr, the figure to --plot. Several models (--models FSM,RSS) or variants (--compare)
+    follow one another in the CSV and share one figure.
 
     Parameters
     ----------
     case_file : Value
-        TOML file with the case
+        TOML file with the case.
     table : Value
-        Table (.csv, .parquet) with one case per row
+        Table (.csv, .parquet) with one case per row.
     row : Value, default 1
-        Row of the table, from 1 after the header
+        Row of the table, from 1 after the header.
     scenarios : Value
-        Scenario file (.jsonl, .parquet, .csv) for --lane
-    from : Value
-        Folder (--out) of a study or sample, for --lane Repeats that lane with the run's profile and options,
-        bit for bit, and says whether f64 gives another outcome.
+        Scenario file (.jsonl, .parquet, .csv) for --lane.
+    from_ : Value
+        Folder (--out) of a study or sample, for --lane. Repeats that lane with the run's profile and options,
+        bit for bit, and reports whether f64 gives another outcome.
     lane : Value
-        Lane key: scenario/variant/headway/model
+        Lane key: scenario/variant/headway/model.
     accept_implausible : bool
-        Use physically impossible values (a speed of 108 m/s) with a warning
+        Use physically impossible values (a speed of 108 m/s) with a warning.
     category : Value
-        Kind of scenario: cut-in, cut-out, lvd
+        Kind of scenario: cut-in, cut-out, lvd.
     ego_speed : Value, m/s
-        Initial speed of the ego
+        Initial speed of the ego.
     speed : Value, m/s
-        Initial speed of the other vehicle [default: the ego's]
+        Initial speed of the other vehicle [default: the ego's].
     gap : Value, m
-        Initial gap, bumper to bumper
+        Initial gap, bumper to bumper.
     thw : Value, s
-        Initial time headway instead of the gap
+        Initial time headway instead of the gap.
     lateral_speed : Value, m/s
-        Cut-in, cut-out: lateral speed
+        Cut-in, cut-out: lateral speed.
     acceleration : Value, m/s²
-        Acceleration of the other vehicle; an LVD needs one [default: 0]
+        Acceleration of the other vehicle; an LVD needs one [default: 0].
     ahead_gap : Value, m
-        Cut-out: gap between the two, bumper to bumper
+        Cut-out: gap between the two, bumper to bumper.
     compare : Values
-        Also other variants of the lane's scenario S (recorded; also without a value), keys of
-        parameterizations, or all.
+        Also simulate other variants of the lane's scenario. S (the recorded scenario; the default without a
+        value), keys of parameterizations, or all.
     lateral_distance : Value, m
-        Cut-in: lateral distance at the start; cut-out: at the end [default: 3.5]
+        Cut-in: lateral distance at the start; cut-out: at the end [default: 3.5].
     end_speed : Value, m/s
-        Speed at which the acceleration ends [default: standstill, or never]
+        Speed at which the acceleration ends [default: standstill, or never].
     ahead_speed : Value, m/s
-        Cut-out: speed of the vehicle ahead of the cutting-out one [default: 0]
+        Cut-out: speed of the vehicle ahead of the cutting-out one [default: 0].
     length : Value, m
-        Length of every vehicle [default: the profile's]
+        Length of every vehicle [default: the profile's].
     width : Value, m
-        Width of every vehicle [default: the profile's]
+        Width of every vehicle [default: the profile's].
     models : Models
-        Driver models: Reg157, CCHDM, RSS, FSM [default: all]
+        Driver models: Reg157, CCHDM, RSS, FSM [default: all].
     profile : Value, default paper
-        paper, paper-fit, jrc-2021, un-r157 Name of a profile, or a TOML file of your own. `map --preset jrc`
+        paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc`
         takes jrc-2021 unless it is set.
     dt : Value, s
-        Time step [default: the profile's]
+        Time step [default: the profile's].
     plot : Value
-        Also draw the time series Speed, acceleration, gap, TTC, BTN, PFS, CFS and lateral position, with
+        Also draw the time series. Speed, acceleration, gap, TTC, BTN, PFS, CFS and lateral position, with
         reaction, braking and contact.
     plot_end : Value, s
-        End of the figure's time axis [default: 2 s after the last change]
+        End of the figure's time axis [default: 2 s after the last change].
     config : Values
-        Configuration file, or one key of it; repeatable `lanesweep config init` writes such a file. Without
+        Configuration file, or one key of it; repeatable. `lanesweep config init` writes such a file. Without
         --config, LANESWEEP_CONFIG names it.
     threads : Value
-        Threads; results do not depend on it [default: all cores]
+        Threads; results do not depend on it [default: all cores].
 
     Returns
     -------
@@ -1063,7 +1065,7 @@ def trace(
             ('table', table, False),
             ('row', row, False),
             ('scenarios', scenarios, False),
-            ('from', from, False),
+            ('from', from_, False),
             ('lane', lane, False),
             ('accept-implausible', accept_implausible, False),
             ('category', category, False),
@@ -1095,7 +1097,7 @@ def trace(
 def export_xosc(
     *,
     case_file: Value | None = None,
-    from: Value | None = None,
+    from_: Value | None = None,
     scenarios: Value | None = None,
     lane: Values | None = None,
     accept_implausible: bool = False,
@@ -1128,78 +1130,78 @@ def export_xosc(
 ) -> Result:
     """Write lanes as ASAM OpenSCENARIO XML 1.2 with an OpenDRIVE road
 
-    The lanes are those named of a study, a sampling run or a scenario file, the worst of a run, or one case of
-    flags. Every lane becomes NNN-KEY.xosc and NNN-KEY.xodr; index.csv lists them with their outcomes. The others
-    follow their own motion, step by step; the ego what the driver model drove, or with --ego external only its
-    start is written.
+    Exports named lanes of a study, a sampling run or a scenario file, the worst lanes of a run, or one case from
+    flags. Every lane becomes NNN-KEY.xosc and NNN-KEY.xodr; index.csv lists them with their outcomes. The other
+    vehicles follow their own motion, step by step. The ego follows the path that the driver model drove; with --ego
+    external only its position and speed at the start are written.
 
     Parameters
     ----------
     case_file : Value
-        TOML file with the case
-    from : Value
-        Folder (--out) of a study or sample, for --lane or --worst
+        TOML file with the case.
+    from_ : Value
+        Folder (--out) of a study or sample, for --lane or --worst.
     scenarios : Value
-        Scenario file for --lane With --from a study: the study's scenarios, for sizes, side and lane width.
+        Scenario file for --lane. With --from a study: the study's scenarios, for sizes, side and lane width.
     lane : Values
-        Lane key: scenario/variant/headway/model; repeatable
+        Lane key: scenario/variant/headway/model; repeatable.
     accept_implausible : bool
-        Use physically impossible values (a speed of 108 m/s) with a warning
+        Use physically impossible values (a speed of 108 m/s) with a warning.
     category : Value
-        Kind of scenario: cut-in, cut-out, lvd
+        Kind of scenario: cut-in, cut-out, lvd.
     ego_speed : Value, m/s
-        Initial speed of the ego
+        Initial speed of the ego.
     speed : Value, m/s
-        Initial speed of the other vehicle [default: the ego's]
+        Initial speed of the other vehicle [default: the ego's].
     gap : Value, m
-        Initial gap, bumper to bumper
+        Initial gap, bumper to bumper.
     thw : Value, s
-        Initial time headway instead of the gap
+        Initial time headway instead of the gap.
     lateral_speed : Value, m/s
-        Cut-in, cut-out: lateral speed
+        Cut-in, cut-out: lateral speed.
     acceleration : Value, m/s²
-        Acceleration of the other vehicle; an LVD needs one [default: 0]
+        Acceleration of the other vehicle; an LVD needs one [default: 0].
     ahead_gap : Value, m
-        Cut-out: gap between the two, bumper to bumper
+        Cut-out: gap between the two, bumper to bumper.
     ego : Value, default model
-        Who drives the ego
+        Driver of the ego.
         One of model, external.
     lateral_distance : Value, m
-        Cut-in: lateral distance at the start; cut-out: at the end [default: 3.5]
+        Cut-in: lateral distance at the start; cut-out: at the end [default: 3.5].
     end_speed : Value, m/s
-        Speed at which the acceleration ends [default: standstill, or never]
+        Speed at which the acceleration ends [default: standstill, or never].
     ahead_speed : Value, m/s
-        Cut-out: speed of the vehicle ahead of the cutting-out one [default: 0]
+        Cut-out: speed of the vehicle ahead of the cutting-out one [default: 0].
     length : Value, m
-        Length of every vehicle [default: the profile's]
+        Length of every vehicle [default: the profile's].
     width : Value, m
-        Width of every vehicle [default: the profile's]
+        Width of every vehicle [default: the profile's].
     variant : Values
-        Variants of --worst: S, keys of parameterizations [default: all]
+        Variants of --worst: S, keys of parameterizations [default: all].
     duration : Value, s
-        End with --ego external [default: 10 s after the lane's last event and end]
+        End of the scenario with --ego external [default: 10 s after the lane's last event and end].
     side : Value
-        Side that the other vehicle comes from or leaves to [default: the scenario's, else left]
+        Side that the other vehicle comes from or leaves to [default: the scenario's, else left].
         One of left, right.
     lane_width : Value, m
-        Width of the road's lanes [default: the scenario's, else 3.5]
+        Width of the road's lanes [default: the scenario's, else 3.5].
     models : Models
-        Driver models: Reg157, CCHDM, RSS, FSM [default: all]
+        Driver models: Reg157, CCHDM, RSS, FSM [default: all].
     criterion : Value
-        Criterion of --worst [default: collision] Of a sampling run it is that of its worst.csv.
+        Criterion of --worst [default: collision]. For a sampling run it must be the criterion of worst.csv.
     profile : Value, default paper
-        paper, paper-fit, jrc-2021, un-r157 Name of a profile, or a TOML file of your own. `map --preset jrc`
+        paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc`
         takes jrc-2021 unless it is set.
     dt : Value, s
-        Time step [default: the profile's]
+        Time step [default: the profile's].
     worst : Value
-        The N worst lanes of the run per model Of a sampling run: those of worst.csv. Of a study: the scenarios
-        with the smallest margin of --criterion, each with its worst lane.
+        The N worst lanes of the run per model. For a sampling run: the lanes of worst.csv. For a study: the
+        scenarios with the smallest margin of --criterion, each with its worst lane.
     config : Values
-        Configuration file, or one key of it; repeatable `lanesweep config init` writes such a file. Without
+        Configuration file, or one key of it; repeatable. `lanesweep config init` writes such a file. Without
         --config, LANESWEEP_CONFIG names it.
     threads : Value
-        Threads; results do not depend on it [default: all cores]
+        Threads; results do not depend on it [default: all cores].
 
     Returns
     -------
@@ -1209,7 +1211,7 @@ def export_xosc(
         'export xosc',
         [
             ('case-file', case_file, False),
-            ('from', from, False),
+            ('from', from_, False),
             ('scenarios', scenarios, False),
             ('lane', lane, False),
             ('accept-implausible', accept_implausible, False),
@@ -1254,19 +1256,19 @@ def synth(
 ) -> Result:
     """Write the synthetic recordings that `study` uses without data
 
-    The files are highD's; `study DIR` on them gives the same result as `study` alone.
+    The files have the format of highD; `study DIR` on them gives the same result as `study` without data.
 
     Parameters
     ----------
     recordings : Value
-        Folder for the recordings; created if it does not exist
+        Folder for the recordings; created if it does not exist.
     synth_recordings : Value, default 84
-        Number of generated recordings They are called `01`, `02`, ….
+        Number of generated recordings. They are called `01`, `02`, ….
     config : Values
-        Configuration file, or one key of it; repeatable `lanesweep config init` writes such a file. Without
+        Configuration file, or one key of it; repeatable. `lanesweep config init` writes such a file. Without
         --config, LANESWEEP_CONFIG names it.
     threads : Value
-        Threads; results do not depend on it [default: all cores]
+        Threads; results do not depend on it [default: all cores].
 
     Returns
     -------
@@ -1292,19 +1294,19 @@ def merge(
 ) -> Result:
     """Merge the parts of a run into its result
 
-    Checks that the parts in DIR (left there by `--shard`) belong to the plan beside them, cover every lane exactly
-    once and are whole; names what is missing, doubled, foreign or damaged, with the command that makes it. The
-    result goes into DIR and is, bit for bit, that of the run in one piece.
+    Checks that the parts in DIR (written by `--shard`) belong to the plan in DIR, are complete, and cover every
+    lane exactly once. Names each missing, duplicate, foreign or damaged part, with the command that recomputes it.
+    The result is written to DIR; it equals, bit for bit, the result of the unsplit run.
 
     Parameters
     ----------
     recordings : Value
-        The run's folder
+        The run's folder.
     config : Values
-        Configuration file, or one key of it; repeatable `lanesweep config init` writes such a file. Without
+        Configuration file, or one key of it; repeatable. `lanesweep config init` writes such a file. Without
         --config, LANESWEEP_CONFIG names it.
     threads : Value
-        Threads; results do not depend on it [default: all cores]
+        Threads; results do not depend on it [default: all cores].
 
     Returns
     -------

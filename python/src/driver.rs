@@ -18,6 +18,12 @@ pub fn take_exception() -> Option<PyErr> {
     RAISED.lock().unwrap_or_else(PoisonError::into_inner).take()
 }
 
+/// The error of a driver that raised an exception.
+pub fn error_of(py: Python<'_>, raised: &PyErr) -> Error {
+    let text = raised.value(py).repr().map_or_else(|_| "an exception".to_owned(), |text| text.to_string());
+    Error::input(Place::item("a driver"), format!("it raised {text}"), "see the exception that caused this")
+}
+
 /// Another vehicle as the drivers of all running lanes see it: an entry per lane.
 #[pyclass(frozen, module = "lanesweep")]
 pub struct Vehicle {

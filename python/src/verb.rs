@@ -58,6 +58,11 @@ pub fn watched<T: Send + 'static>(
     }
     result.map_err(|error| match raised {
         Some(cause) => {
+            let error = match error {
+                // A single lane, whose run cannot fail by itself.
+                Error::Internal(_) => driver::error_of(py, &cause),
+                other => other,
+            };
             let made = exception(py, &error);
             made.set_cause(py, Some(cause));
             made

@@ -65,7 +65,7 @@ def test_a_result_has_tables_figures_and_a_page(scenarios) -> None:
 def test_a_check_has_its_answer_as_status() -> None:
     safe = lanesweep.check(category="cut-in", ego_speed="60km/h", speed="40km/h", gap=30, lateral_speed=1)
     assert safe.status == "ok" and "preventable" in str(safe.document).lower()
-    close = lanesweep.check(category="cut-in", ego_speed=30.0, speed=10.0, gap=3, lateral_speed=2)
+    close = lanesweep.check(category="cut-in", ego_speed="60km/h", speed="20km/h", gap=10, lateral_speed=1)
     assert close.status == "not preventable"
 
 

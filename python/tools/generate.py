@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import importlib.util
 import json
+import keyword
 import sys
 import textwrap
 from pathlib import Path
-
-import lanesweep._core as core
+from types import ModuleType
 
 # Verb of the program → function; what it leaves in a temporary place if no `out` is given.
 FUNCTIONS = {
@@ -30,7 +31,8 @@ WIDTH = 120
 
 
 def name_of(argument: dict) -> str:
-    return {"dir": "recordings"}.get(argument["id"], argument["id"])
+    name = {"dir": "recordings"}.get(argument["id"], argument["id"])
+    return name + "_" if keyword.iskeyword(name) else name
 
 
 def type_of(argument: dict) -> str:
@@ -94,8 +96,20 @@ def function(verb: dict) -> str:
     return "\n".join([f"def {name}(", *parameters, ") -> Result:", body, *call])
 
 
+def core() -> ModuleType:
+    """The installed compiled module, without the package, which needs what is written here."""
+    package = importlib.util.find_spec("lanesweep")
+    assert package is not None and package.submodule_search_locations, "install the module first"
+    (file,) = Path(package.submodule_search_locations[0]).glob("_core.*[od]")
+    spec = importlib.util.spec_from_file_location("lanesweep._core", file)
+    assert spec is not None and spec.loader is not None
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    return module
+
+
 def text() -> str:
-    verbs = {verb["verb"]: verb for verb in json.loads(core.definition())}
+    verbs = {verb["verb"]: verb for verb in json.loads(core().definition())}
     head = '''"""Verbs of the program as functions. Written by tools/generate.py; do not edit."""
 
 from __future__ import annotations

@@ -6,6 +6,7 @@ use crate::model::profile::Profile;
 use crate::model::scalar::Real;
 use crate::scenario::{Category, Tables};
 
+use super::cpu::foreign;
 use super::cpu::lane_result::Ending;
 use super::cpu::pending::Lanes;
 use super::cpu::rules::Rules;
@@ -23,6 +24,8 @@ macro_rules! declare_constants {
         /// Everything a lane of one category takes from the profile, as plain constants.
         #[derive(Debug, Clone, Copy)]
         pub struct Constants<R> {
+            /// Time step, s.
+            pub dt_s: f64,
             /// Criteria.
             pub criteria: Criteria<R>,
             /// Time and end rules, per model in the order of [`ModelId::ALL`].
@@ -38,6 +41,7 @@ macro_rules! declare_constants {
             pub fn resolve(profile: &Profile, category: Category) -> Self {
                 let dt_s = profile.frame.dt_s;
                 Constants {
+                    dt_s,
                     criteria: profile.criteria.resolve(),
                     frames: [$(Frame::resolve(&profile.frame, profile.$file.abort_above_ttc_s())),+],
                     $($file: profile.$file.resolve(dt_s, category),)+
@@ -76,7 +80,7 @@ macro_rules! declare_constants {
                         let simulation = Simulation { frame, criteria, model, model_index, scene };
                         run_lane(&simulation, case, tables, start, observer)
                     })+
-                    ModelId::Foreign(_) => unreachable!("drivers outside the registry run side by side"),
+                    ModelId::Foreign(_) => foreign_lane(self, id, case, tables, start, observer),
                 }
             }
 
@@ -123,3 +127,18 @@ macro_rules! declare_constants {
     };
 }
 for_every_driver_model!(declare_constants);
+
+/// A single lane of a driver outside the registry. The driver has computed this lane before, in a sweep; if it fails now,
+/// the caller has no result to return.
+fn foreign_lane<R: Real>(
+    constants: &Constants<R>,
+    model: ModelId,
+    case: &LaneCase<R>,
+    tables: &Tables<R>,
+    start: Start<R>,
+    observer: &mut impl Observer<R>,
+) -> Outcome<R> {
+    let driver = model.foreign().unwrap_or_else(|| unreachable!("the model is built in"));
+    let outcome = foreign::run_one(constants, model, &*driver, case, tables, start, observer);
+    outcome.unwrap_or_else(|error| panic!("{error}"))
+}

@@ -93,7 +93,7 @@ pub fn columns(digits: Digits) -> Vec<Column> {
         c("t_crash", ColumnKind::Binary64, "s", "When vehicles touched; null if never."),
         c("impact_speed", value, "m/s", "Speed of the ego at contact; null without one."),
         c("t_end", ColumnKind::Binary64, "s", "When the run ended."),
-        c("robust", ColumnKind::Flag, "", "Moving the initial gap by 1e-9 m changes neither verdict nor contact in binary64."),
+        c("robust", ColumnKind::Flag, "", "Moving the initial gap by 1e-9 m changes neither verdict nor contact in binary64; null for drivers outside the registry."),
     ]
 }
 
@@ -107,10 +107,13 @@ pub fn write_chunk(table: &mut TableWriter, plan: &LanePlan, chunk: &Chunk) -> R
     let constants: Vec<Constants<f64>> =
         plan.blocks.iter().map(|b| Constants::resolve(&plan.profile, b.category)).collect();
     // Three more lanes for each: the only step worth parallelizing.
-    let robust: Vec<bool> = (0..chunk.outcomes.len())
+    let robust: Vec<Option<bool>> = (0..chunk.outcomes.len())
         .into_par_iter()
         .map(|at| {
-            plan.key(chunk.first_lane + at as u64).is_some_and(|key| is_robust(&constants[key.block], plan, &key))
+            let key = plan.key(chunk.first_lane + at as u64)?;
+            // A driver outside the registry is slow lane by lane.
+            let is_built_in = plan.models[key.model].foreign().is_none();
+            is_built_in.then(|| is_robust(&constants[key.block], plan, &key))
         })
         .collect();
     for (at, outcome) in chunk.outcomes.iter().enumerate() {
@@ -140,7 +143,7 @@ pub fn write_chunk(table: &mut TableWriter, plan: &LanePlan, chunk: &Chunk) -> R
             time(outcome.contact_step),
             Cell::number((outcome.contact_step != NO_STEP).then_some(outcome.impact_speed)),
             time(outcome.end_step),
-            Cell::Flag(robust[at]),
+            robust[at].map_or(Cell::Null, Cell::Flag),
         ])?;
     }
     Ok(())

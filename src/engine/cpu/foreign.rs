@@ -8,12 +8,14 @@ use rayon::prelude::*;
 use crate::engine::cpu::lane_result::conclude;
 use crate::engine::cpu::runner::LaneRunner;
 use crate::engine::drivers::Constants;
-use crate::engine::frame::{Frame, Simulation};
+use crate::engine::frame::{Frame, Simulation, Start};
+use crate::engine::lane::{Observer, Step};
 use crate::engine::lane_case::LaneCase;
 use crate::engine::lane_step::{LaneConstants, LaneState, Moved, OtherState, Seen, advance};
 use crate::engine::outcome::{NO_STEP, Outcome};
 use crate::engine::plan::LanePlan;
 use crate::engine::scene::Scene;
+use crate::model::criterion::Criteria;
 use crate::model::driver::{
     DriverModel, DriverState, Hazard, LaneColumns, MAX_ACCELERATION_MPS2, ModelId, VectorDriver, VehicleColumns, View,
 };
@@ -29,30 +31,116 @@ pub(in crate::engine) const BATCH_LANES: u64 = 1 << 15;
 #[derive(Debug, Clone, Copy)]
 struct Unreacting;
 
-impl DriverModel<f32> for Unreacting {
-    fn initial(&self) -> DriverState<f32> {
-        DriverState { deceleration: 0.0, delay_steps: 0 }
+impl<R: Real> DriverModel<R> for Unreacting {
+    fn initial(&self) -> DriverState<R> {
+        DriverState { deceleration: R::ZERO, delay_steps: 0 }
     }
 
-    fn check(&self, _view: &View<f32>) -> Hazard<f32> {
-        Hazard { is_unsafe: Flag::FALSE, demand: 0.0 }
+    fn check(&self, _view: &View<R>) -> Hazard<R> {
+        Hazard { is_unsafe: Flag::FALSE, demand: R::ZERO }
     }
 
     fn shader_constants(&self) -> Vec<(&'static str, f64)> {
         Vec::new()
     }
 
-    fn react(&self, state: DriverState<f32>, _hazard: &Hazard<f32>, v_ego: f32) -> (DriverState<f32>, f32) {
+    fn react(&self, state: DriverState<R>, _hazard: &Hazard<R>, v_ego: R) -> (DriverState<R>, R) {
         (state, v_ego)
     }
 }
 
+/// What all lanes of a driver in one category share.
+struct Setting<R> {
+    frame: Frame<R>,
+    criteria: Criteria<R>,
+    model_index: usize,
+}
+
+impl<R: Real> Setting<R> {
+    fn new(constants: &Constants<R>, model: ModelId, driver: &dyn VectorDriver) -> Self {
+        let model_index = model.index();
+        let mut frame = constants.frames[model_index];
+        frame.end_when_settled &= !driver.may_accelerate();
+        Setting { frame, criteria: constants.criteria, model_index }
+    }
+
+    fn simulation(&self, case: &LaneCase<R>) -> Simulation<'_, R, Unreacting> {
+        let Setting { frame, criteria, model_index } = self;
+        let scene = Scene::unknown(case.pair != 0);
+        Simulation { frame, criteria, model: &Unreacting, model_index: *model_index, scene }
+    }
+}
+
 /// A lane of a batch.
-struct BatchLane {
+struct BatchLane<R> {
     /// Index of its case in the batch.
     case: usize,
-    constants: LaneConstants<f32>,
-    state: LaneState<f32>,
+    constants: LaneConstants<R>,
+    state: LaneState<R>,
+}
+
+impl<R: Real> BatchLane<R> {
+    fn new(setting: &Setting<R>, at: usize, case: &LaneCase<R>, start: Start<R>) -> Self {
+        let simulation = setting.simulation(case);
+        let constants = LaneConstants::new(&simulation, case);
+        BatchLane { case: at, constants, state: LaneState::new(&simulation, case, start) }
+    }
+
+    /// Moves the lane to its next step, without the driver.
+    fn moved(&self, setting: &Setting<R>, case: &LaneCase<R>, tables: &Tables<R>) -> (Moved<R>, [OtherState<R>; 2]) {
+        let places = places(case, tables, self.state.index);
+        (advance(&setting.simulation(case), &self.constants, &self.state, &places), places)
+    }
+
+    /// Takes the step over, with the driver's acceleration, m/s². Returns the outcome if it was the last step.
+    fn steer(
+        &mut self,
+        setting: &Setting<R>,
+        case: &LaneCase<R>,
+        (moved, places): &(Moved<R>, [OtherState<R>; 2]),
+        acceleration: f32,
+    ) -> Option<Outcome<R>> {
+        let LaneState { index, v_ego, reaction_step, .. } = self.state;
+        self.state = moved.state;
+        if acceleration < 0.0 && reaction_step == NO_STEP {
+            self.state.reaction_step = index;
+        }
+        let is_over = self.state.over.holds();
+        if !is_over {
+            self.state.v_ego = (v_ego + R::from_f64(acceleration.into()) * setting.frame.dt).larger(R::ZERO);
+        }
+        let is_last = is_over || self.state.index >= setting.frame.step_cap;
+        is_last.then(|| conclude(&setting.simulation(case), &self.constants, &self.state, places))
+    }
+}
+
+/// Runs one lane, as [`run_lane`](crate::engine::run_lane) does with a built-in driver.
+///
+/// # Errors
+/// Those of the driver; [`Error::Input`] for an acceleration that is missing, NaN or above the maximum.
+pub(in crate::engine) fn run_one<R: Real>(
+    constants: &Constants<R>,
+    model: ModelId,
+    driver: &dyn VectorDriver,
+    case: &LaneCase<R>,
+    tables: &Tables<R>,
+    start: Start<R>,
+    observer: &mut impl Observer<R>,
+) -> Result<Outcome<R>> {
+    let setting = Setting::new(constants, model, driver);
+    let mut lane = BatchLane::new(&setting, 0, case, start);
+    let mut accelerations = driver.start(1, constants.dt_s)?;
+    loop {
+        let moved = lane.moved(&setting, case, tables);
+        let LaneState { index, v_ego, .. } = lane.state;
+        observer.step(&Step { index, v_ego, seen: moved.0.seen, hazard: moved.0.hazard });
+        let seen = std::iter::once((0, &lane, case));
+        let found = accelerations(columns_of(index, constants.dt_s, seen, std::slice::from_ref(&moved)))?;
+        check(model, &found, 1, index, |_| "of a single run".to_owned())?;
+        if let Some(outcome) = lane.steer(&setting, case, &moved, found[0]) {
+            return Ok(outcome);
+        }
+    }
 }
 
 /// Outcomes of the lanes of some units of a block under one model of the plan, by unit, variant and headway.
@@ -69,115 +157,82 @@ pub(in crate::engine) fn run_block(
     let (runner, first_unit) = (LaneRunner::<f32>::of_few(plan), units.start);
     let of_block = &plan.blocks[block];
     let variants = of_block.variants.len();
-    let resolved = Constants::<f32>::resolve(&plan.profile, of_block.category);
-    let model_index = model.index();
-    let settles = resolved.frames[model_index].end_when_settled && !driver.may_accelerate();
-    let frame = Frame { end_when_settled: settles, ..resolved.frames[model_index] };
-    let scene = |case: &LaneCase<f32>| Scene::unknown(case.pair != 0);
-    let simulation =
-        |scene| Simulation { frame: &frame, criteria: &resolved.criteria, model: &Unreacting, model_index, scene };
+    let constants = Constants::<f32>::resolve(&plan.profile, of_block.category);
+    let setting = Setting::new(&constants, model, driver);
     let keys = units.flat_map(|unit| (0..variants).map(move |variant| (unit, variant)));
     let cases: Vec<_> = keys.map(|(unit, variant)| runner.case(block, unit, variant)).collect();
     let starts: Vec<_> = plan.headways.iter().map(|headway| headway.start::<f32>()).collect();
-    let lane = |(at, start): (usize, _)| {
-        let case = &cases[at].0;
-        let simulation = simulation(scene(case));
-        BatchLane {
-            case: at,
-            constants: LaneConstants::new(&simulation, case),
-            state: LaneState::new(&simulation, case, start),
-        }
-    };
-    let mut lanes: Vec<BatchLane> =
-        (0..cases.len()).flat_map(|at| starts.iter().map(move |start| (at, *start))).map(lane).collect();
+    let of_case = |at: usize| starts.iter().map(move |start| (at, *start));
+    let lanes = (0..cases.len()).flat_map(of_case);
+    let mut lanes: Vec<BatchLane<f32>> =
+        lanes.map(|(at, start)| BatchLane::new(&setting, at, &cases[at].0, start)).collect();
+    // Every lane gets its outcome below.
     let mut outcomes = vec![Outcome::NONE; lanes.len()];
     let mut running: Vec<usize> = (0..lanes.len()).collect();
-    let mut accelerations = driver.start(lanes.len(), plan.profile.frame.dt_s)?;
+    let mut accelerations = driver.start(lanes.len(), constants.dt_s)?;
+    let key = |lane: usize| {
+        let (case, headway) = (lane / starts.len(), lane % starts.len());
+        let unit = of_block.units.name(first_unit + (case / variants) as u64);
+        format!("{unit}/{}/{}/{}", of_block.variants[case % variants], plan.headways[headway], model.name())
+    };
     let mut step = 0;
     while !running.is_empty() {
-        let moved: Vec<(Moved<f32>, [OtherState<f32>; 2])> = running
-            .par_iter()
-            .map(|&at| {
-                let lane = &lanes[at];
-                let (case, tables) = &cases[lane.case];
-                let places = places(case, tables, lane.state.index);
-                (advance(&simulation(scene(case)), &lane.constants, &lane.state, &places), places)
-            })
-            .collect();
+        let moved = |&at: &usize| {
+            let lane: &BatchLane<f32> = &lanes[at];
+            let (case, tables) = &cases[lane.case];
+            lane.moved(&setting, case, tables)
+        };
+        let moved: Vec<_> = running.par_iter().map(moved).collect();
         let seen = running.iter().map(|&at| (at, &lanes[at], &cases[lanes[at].case].0));
-        let columns = columns_of(step, plan.profile.frame.dt_s, seen, &moved);
-        let found = accelerations(columns)?;
-        check(plan, model, &found, &running, step, block, first_unit)?;
-        for ((&at, (moved, places)), acceleration) in running.iter().zip(&moved).zip(found) {
+        let found = accelerations(columns_of(step, constants.dt_s, seen, &moved))?;
+        check(model, &found, running.len(), step, |at| key(running[at]))?;
+        let mut still_running = Vec::with_capacity(running.len());
+        for ((&at, moved), acceleration) in running.iter().zip(&moved).zip(found) {
             let lane = &mut lanes[at];
-            let before = lane.state.v_ego;
-            let reaction_step = lane.state.reaction_step;
-            lane.state = moved.state;
-            if acceleration < 0.0 && reaction_step == NO_STEP {
-                lane.state.reaction_step = step;
-            }
-            let is_over = lane.state.over.holds();
-            if !is_over {
-                lane.state.v_ego = (before + acceleration * frame.dt).larger(0.0);
-            }
-            if is_over || lane.state.index >= frame.step_cap {
-                let simulation = simulation(scene(&cases[lane.case].0));
-                outcomes[at] = conclude(&simulation, &lane.constants, &lane.state, places).widen();
+            match lane.steer(&setting, &cases[lane.case].0, moved, acceleration) {
+                Some(outcome) => outcomes[at] = outcome.widen(),
+                None => still_running.push(at),
             }
         }
-        running.retain(|&at| !lanes[at].state.over.holds() && lanes[at].state.index < frame.step_cap);
+        running = still_running;
         step += 1;
     }
     Ok(outcomes)
 }
 
-/// Checks what the driver returned for the running lanes.
-fn check(
-    plan: &LanePlan,
-    model: ModelId,
-    found: &[f32],
-    running: &[usize],
-    step: u32,
-    block: usize,
-    first_unit: u64,
-) -> Result<()> {
+/// Checks what the driver returned for the running lanes; `key` names one of them.
+fn check(model: ModelId, found: &[f32], lanes: usize, step: u32, key: impl Fn(usize) -> String) -> Result<()> {
     let driver = || Place::item(format!("driver {}, step {step}", model.name()));
-    if found.len() != running.len() {
-        let problem = format!("it returned {} accelerations for {} lanes", found.len(), running.len());
+    if found.len() != lanes {
+        let problem = format!("it returned {} accelerations for {lanes} lanes", found.len());
         return Err(Error::input(driver(), problem, "return one number per lane, in m/s²"));
     }
     // A NaN is wrong too.
     let is_right = |acceleration: &f32| acceleration.abs() <= MAX_ACCELERATION_MPS2;
     let Some(at) = found.iter().position(|acceleration| !is_right(acceleration)) else { return Ok(()) };
-    let headways = plan.headways.len();
-    let (case, headway) = (running[at] / headways, running[at] % headways);
-    let of_block = &plan.blocks[block];
-    let unit = of_block.units.name(first_unit + (case / of_block.variants.len()) as u64);
-    let variant = &of_block.variants[case % of_block.variants.len()];
-    let key = format!("{unit}/{variant}/{}/{}", plan.headways[headway], model.name());
-    let problem = format!("its acceleration is {} m/s² in lane {key}", found[at]);
+    let problem = format!("its acceleration is {} m/s² in lane {}", found[at], key(at));
     let help = format!("return finite numbers of at most {MAX_ACCELERATION_MPS2} m/s²");
     Err(Error::input(driver(), problem, help))
 }
 
 /// The other vehicles of a case at a step.
-fn places(case: &LaneCase<f32>, tables: &Tables<f32>, step: u32) -> [OtherState<f32>; 2] {
+fn places<R: Real>(case: &LaneCase<R>, tables: &Tables<R>, step: u32) -> [OtherState<R>; 2] {
     let first = OtherState::of(&case.others[0].motion, tables, step);
     [first, if case.pair != 0 { OtherState::of(&case.others[1].motion, tables, step) } else { first }]
 }
 
 /// What the drivers of the running lanes see after these moved to a step.
-fn columns_of<'a>(
+fn columns_of<'a, R: Real>(
     step: u32,
     dt_s: f64,
-    lanes: impl Iterator<Item = (usize, &'a BatchLane, &'a LaneCase<f32>)>,
-    moved: &[(Moved<f32>, [OtherState<f32>; 2])],
+    lanes: impl Iterator<Item = (usize, &'a BatchLane<R>, &'a LaneCase<R>)>,
+    moved: &[(Moved<R>, [OtherState<R>; 2])],
 ) -> LaneColumns {
     let mut columns = LaneColumns { step, time_s: f64::from(step) * dt_s, ..LaneColumns::default() };
     for ((at, lane, case), (moved, _)) in lanes.zip(moved) {
         columns.lane.push(at as i64);
-        columns.ego_speed.push(moved.seen[0].view.v_ego);
-        columns.ego_acceleration.push(moved.seen[0].view.a_ego);
+        columns.ego_speed.push(narrow(moved.seen[0].view.v_ego));
+        columns.ego_acceleration.push(narrow(moved.seen[0].view.a_ego));
         for (k, vehicle) in columns.vehicles.iter_mut().enumerate() {
             let exists = k == 0 || case.pair != 0;
             push(vehicle, &moved.seen[k], exists, lane.constants.others[k].attend_from <= step);
@@ -186,15 +241,20 @@ fn columns_of<'a>(
     columns
 }
 
-fn push(vehicle: &mut VehicleColumns, seen: &Seen<f32>, exists: bool, may_attend: bool) {
+/// Exact in the lane arithmetic.
+fn narrow<R: Real>(value: R) -> f32 {
+    value.to_f64() as f32
+}
+
+fn push<R: Real>(vehicle: &mut VehicleColumns, seen: &Seen<R>, exists: bool, may_attend: bool) {
     let present = exists && seen.present.holds();
     vehicle.present.push(present);
     vehicle.attended.push(present && may_attend);
-    vehicle.speed.push(seen.view.v_other);
-    vehicle.gap.push(seen.view.gap);
-    vehicle.lateral_gap.push(seen.view.lateral_gap);
-    vehicle.lateral_speed.push(seen.view.lateral_towards);
-    vehicle.half_lengths.push(seen.view.half_lengths);
+    vehicle.speed.push(narrow(seen.view.v_other));
+    vehicle.gap.push(narrow(seen.view.gap));
+    vehicle.lateral_gap.push(narrow(seen.view.lateral_gap));
+    vehicle.lateral_speed.push(narrow(seen.view.lateral_towards));
+    vehicle.half_lengths.push(narrow(seen.view.half_lengths));
 }
 
 #[cfg(test)]
@@ -302,6 +362,12 @@ mod tests {
                 Ok(())
             };
             executor.sweep(&plan, 0..plan.unit_count(), Wanted::Verdicts, verdicts).unwrap();
+        }
+        // Single lanes, as traces run them.
+        let runner = LaneRunner::<f32>::new(&plan);
+        let all = outcomes(&plan, CpuBackend::lane_arithmetic()).unwrap();
+        for lane in (1..plan.lane_count()).step_by(2 * 97) {
+            assert_eq!(runner.run(&plan.key(lane).unwrap()).widen(), all[lane as usize], "lane {lane}");
         }
         let error = outcomes(&plan, CpuBackend::reference()).unwrap_err().to_string();
         assert!(error.contains("driver wrapped"), "{error}");

@@ -5,7 +5,7 @@ pub(crate) mod backend;
 mod batch;
 mod batch_arrays;
 mod fast_forward;
-mod foreign;
+pub(in crate::engine) mod foreign;
 pub(in crate::engine) mod lane_result;
 mod lead_only;
 pub(in crate::engine) mod pending;
