@@ -105,10 +105,12 @@ class Result:
     def table(self, name: str) -> Frame:
         """Return a table as a frame."""
         value = self.document.get(name)
-        if _is_table(value):
-            return frame_of_records(json.dumps(value))
         path = self.path / f"{name}.csv" if self.path is not None else None
-        if path is None or not path.is_file():
+        has_file = path is not None and path.is_file()
+        # Types are those of the document, unless its rows hold more than values.
+        if _is_table(value) and not (has_file and any(isinstance(one, dict) for row in value for one in row.values())):
+            return frame_of_records(json.dumps(value))
+        if path is None or not has_file:
             raise KeyError(f"there is no table `{name}`; there are {', '.join(self.tables)}")
         return read_csv(path)
 

@@ -1,0 +1,274 @@
+"""Measures the Python module beside the command line and its peers: `python benches/python/measure.py WHAT`.
+
+WHAT is one of: first (install to first figure; needs a wheel: first WHEEL), cases (a million cases), driver (Reg157 in NumPy on
+the default study), openturns, uqpy (subset simulation on one problem), ray (parts on two and four workers). Prints CSV.
+"""
+
+from __future__ import annotations
+
+import math
+import os
+import subprocess
+import sys
+import tempfile
+import time
+from pathlib import Path
+
+import lanesweep
+import numpy as np
+
+
+def row(*cells: object) -> None:
+    print(",".join(str(cell) for cell in cells), flush=True)
+
+
+def program(*words: object) -> float:
+    start = time.perf_counter()
+    subprocess.run([sys.executable, "-m", "lanesweep", "-q", *map(str, words)], check=True, stdout=subprocess.DEVNULL)
+    return time.perf_counter() - start
+
+
+def first(wheel: str) -> None:
+    code = "import lanesweep; lanesweep.study(synth_recordings=12, backend='cpu').figure('radar-cut-in').svg"
+    with tempfile.TemporaryDirectory() as folder:
+        start = time.perf_counter()
+        subprocess.run([sys.executable, "-m", "venv", folder], check=True)
+        made = time.perf_counter()
+        subprocess.run([f"{folder}/bin/pip", "install", "-q", wheel], check=True)
+        installed = time.perf_counter()
+        subprocess.run([f"{folder}/bin/python", "-c", code], check=True, cwd=folder)
+        done = time.perf_counter()
+        imports = []
+        for _ in range(5):
+            begin = time.perf_counter()
+            subprocess.run([f"{folder}/bin/python", "-c", "import lanesweep"], check=True, cwd=folder)
+            middle = time.perf_counter()
+            subprocess.run([f"{folder}/bin/python", "-c", "pass"], check=True, cwd=folder)
+            imports.append(middle - begin - (time.perf_counter() - middle))
+    row("step", "seconds")
+    row("environment", round(made - start, 2))
+    row("install, with NumPy", round(installed - made, 2))
+    row("first figure", round(done - installed, 2))
+    row("import, median of 5", round(sorted(imports)[2], 3))
+    row("wheel bytes", Path(wheel).stat().st_size)
+
+
+def cases(count: int = 10**6) -> None:
+    """A million concrete cut-ins: in memory, and as a Parquet table through the command line."""
+    import pandas as pd
+
+    rng = np.random.default_rng(1)
+    table = pd.DataFrame({
+        "category": "cut-in",
+        "ego_speed": rng.uniform(15, 40, count),
+        "speed": rng.uniform(10, 35, count),
+        "gap": rng.uniform(2, 80, count),
+        "lateral_speed": rng.uniform(0.3, 2.5, count),
+        "duration": 8.0,
+    })  # fmt: skip
+    row("way", "cases", "seconds")
+    for _ in range(3):
+        start = time.perf_counter()
+        frame = lanesweep.simulate(table, models="FSM", backend="cpu")
+        row("simulate(DataFrame)", count, round(time.perf_counter() - start, 2))
+        start = time.perf_counter()
+        frame.to_polars()
+        row("frame.to_polars()", count, round(time.perf_counter() - start, 4))
+    part = table.iloc[: count // 10]
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "cases.parquet"
+        part.to_parquet(path)
+        words = ["study", "--scenarios", path, "--thw=observed", "--models=FSM", "--backend=cpu", f"--out={folder}/out"]
+        row("study --scenarios --rows", len(part), round(program(*words, f"--rows={folder}/lanes.parquet"), 2))
+
+
+def driver() -> None:
+    """Reg157 in NumPy on the default study: verdicts, and lane-steps per second."""
+    from lanesweep.drivers import Reg157
+
+    with tempfile.TemporaryDirectory() as folder:
+        results, seconds = {}, {}
+        for name, model in [("built-in", "Reg157"), ("NumPy", Reg157())]:
+            start = time.perf_counter()
+            result = lanesweep.study(models=[model], backend="cpu", out=f"{folder}/{name}", rows=f"{folder}/{name}.parquet")
+            seconds[name] = time.perf_counter() - start
+            results[name] = result
+        import polars as pl
+
+        ours, theirs = (pl.read_parquet(f"{folder}/{name}.parquet") for name in ("NumPy", "built-in"))
+        same = [column for column in ours.columns if column not in ("model", "robust", "t_react")]
+        differing = (ours.select(same).rows() != theirs.select(same).rows()) and sum(
+            a != b for a, b in zip(ours.select(same).rows(), theirs.select(same).rows(), strict=True)
+        )
+        steps = int(((theirs["t_end"] / 0.04).round() + 1).sum())
+    row("driver", "lanes", "lane-steps", "seconds of study with rows", "differing lanes")
+    row("built-in", len(theirs), steps, round(seconds["built-in"], 2), 0)
+    row("NumPy", len(ours), steps, round(seconds["NumPy"], 2), int(differing))
+
+    # The steps alone.
+    count = 200_000
+    rng = np.random.default_rng(1)
+    table = {
+        "ego_speed": rng.uniform(15, 40, count),
+        "speed": rng.uniform(10, 35, count),
+        "gap": rng.uniform(2, 80, count),
+        "lateral_speed": rng.uniform(0.3, 2.5, count),
+    }
+    row("driver", "lanes", "lane-steps", "seconds", "million lane-steps per second")
+    for name, model in [("built-in", "Reg157"), ("NumPy", Reg157())]:
+        start = time.perf_counter()
+        frame = lanesweep.simulate(table, category="cut-in", models=[model], backend="cpu")
+        elapsed = time.perf_counter() - start
+        steps = int(np.round(frame["end_s"] / 0.04 + 1).sum())
+        row(name, count, steps, round(elapsed, 2), round(steps / elapsed / 1e6, 2))
+    # A plain loop over the lanes of the same model, without an engine: a cut-in at constant speeds.
+    sample = 300
+    start = time.perf_counter()
+    steps = 0
+    for k in range(sample):
+        v, u, gap, w = (table[key][k] for key in ("ego_speed", "speed", "gap", "lateral_speed"))
+        y, delay = 3.5, 9
+        for _ in range(3000):
+            steps += 1
+            dv, h = v - u, y - 1.9
+            if h < 0 and gap <= 0 or (h < 0 and dv <= 0) or v <= 0:
+                break
+            if h <= 0.5 and dv != 0 and abs(gap) <= abs(dv) * (dv / 12 + 0.45) and gap > -4.3:
+                if delay > 0:
+                    delay -= 1
+                else:
+                    v = max(v - 6 * 0.04, 0.0)
+            gap += (u - v) * 0.04
+            y = max(y - w * 0.04, 0.0)
+    elapsed = time.perf_counter() - start
+    row("plain Python loop", sample, steps, round(elapsed, 2), round(steps / elapsed / 1e6, 2))
+
+
+def problem() -> tuple[lanesweep.LimitState, Path, tempfile.TemporaryDirectory[str]]:
+    keep = tempfile.TemporaryDirectory()
+    lanesweep.fit(categories="cut-in", parameterizations=2, no_comparison=True, out=keep.name)
+    path = Path(keep.name) / "cut-in-2.json"
+    return lanesweep.LimitState(path, model="FSM", criterion="collision", thw=1.2), path, keep
+
+
+def ours(path: Path) -> None:
+    row("method", "seed", "estimate", "low", "high", "lanes", "seconds")
+    truth = lanesweep.sample(path, models="FSM", criterion="collision", thw=1.2, samples=2 * 10**6, backend="cpu")
+    one = truth.table("estimates").rows()[0]
+    row("lanesweep crude, the truth", "", one["probability"], one["draws_low"], one["draws_high"], one["runs"], "")
+    for seed in range(3):
+        start = time.perf_counter()
+        found = lanesweep.sample(path, models="FSM", criterion="collision", thw=1.2, estimator="subset", seed=seed, backend="cpu")
+        one = found.table("estimates").rows()[0]
+        row("lanesweep subset", seed, one["probability"], one["low"], one["high"], one["runs"], round(time.perf_counter() - start, 2))
+
+
+class StandardNormal:
+    """The problem in independent standard normal numbers, as subset simulation of other libraries needs it: the first chooses
+    the kernel, the others are its deviations. Points where the density is 0 are far from failure."""
+
+    def __init__(self, limit_state: lanesweep.LimitState) -> None:
+        self.limit_state = limit_state
+        self.centres, self.deviations = np.asarray(limit_state.points), np.asarray(limit_state.kernel_deviations)
+        self.dimensions = len(self.deviations) + 1
+        self.calls = 0
+        u = np.random.default_rng(0).standard_normal((10**5, self.dimensions))
+        #: Probability of the valid region, by which estimates are divided.
+        self.share = limit_state.is_valid(self.points(u)).mean()
+
+    def points(self, u: np.ndarray) -> np.ndarray:
+        uniform = 0.5 * (1 + np.vectorize(math.erf)(u[:, 0] / math.sqrt(2)))
+        kernel = np.minimum((uniform * len(self.centres)).astype(int), len(self.centres) - 1)
+        return self.centres[kernel] + self.deviations * u[:, 1:]
+
+    def __call__(self, u: object) -> np.ndarray:
+        points = self.points(np.atleast_2d(np.asarray(u, dtype=float)))
+        self.calls += len(points)
+        values = np.full(len(points), 1e3)
+        valid = self.limit_state.is_valid(points)
+        if valid.any():
+            values[valid] = self.limit_state(points[valid])
+        return values
+
+
+def openturns() -> None:
+    import openturns as ot
+
+    limit_state, path, _keep = problem()
+    ours(path)
+    g = StandardNormal(limit_state)
+    function = ot.PythonFunction(g.dimensions, 1, func_sample=lambda sample: g(sample)[:, np.newaxis])
+    event = ot.ThresholdEvent(
+        ot.CompositeRandomVector(function, ot.RandomVector(ot.Normal(g.dimensions))), ot.LessOrEqual(), 0.0
+    )
+    for seed in range(3):
+        ot.RandomGenerator.SetSeed(seed)
+        g.calls = 0
+        start = time.perf_counter()
+        algorithm = ot.SubsetSampling(event)
+        algorithm.setMaximumOuterSampling(40)
+        algorithm.setBlockSize(100)
+        algorithm.run()
+        result = algorithm.getResult()
+        half = result.getConfidenceLength(0.95) / 2
+        p = result.getProbabilityEstimate()
+        seconds = round(time.perf_counter() - start, 2)
+        row("OpenTURNS SubsetSampling", seed, p / g.share, (p - half) / g.share, (p + half) / g.share, g.calls, seconds)
+
+
+UQPY: StandardNormal
+
+
+def uqpy() -> None:
+    """UQpy 4.2 needs NumPy 1: run it in an environment of its own."""
+    global UQPY
+    from UQpy.distributions import JointIndependent, Normal
+    from UQpy.reliability import SubsetSimulation
+    from UQpy.run_model import PythonModel, RunModel
+    from UQpy.sampling import ModifiedMetropolisHastings
+
+    limit_state, _, _keep = problem()
+    UQPY = StandardNormal(limit_state)
+    row("method", "seed", "estimate", "low", "high", "lanes", "seconds")
+    with tempfile.TemporaryDirectory() as folder:
+        Path(folder, "limit.py").write_text("import __main__\n\ndef g(u):\n    return float(__main__.UQPY(u)[0])\n")
+        os.chdir(folder)
+        for seed in range(3):
+            UQPY.calls = 0
+            start = time.perf_counter()
+            d = UQPY.dimensions
+            target = JointIndependent([Normal() for _ in range(d)])
+            first = np.random.default_rng(seed).standard_normal((2000, d))
+            chains = ModifiedMetropolisHastings(dimension=d, log_pdf_target=target.log_pdf, n_chains=200, random_state=seed)
+            model = RunModel(model=PythonModel(model_script="limit.py", model_object_name="g"))
+            found = SubsetSimulation(model, chains, samples_init=first, nsamples_per_subset=2000, max_level=10)
+            p, cov = found.failure_probability / UQPY.share, found.independent_chains_CoV
+            seconds = round(time.perf_counter() - start, 2)
+            row("UQpy SubsetSimulation", seed, p, p * (1 - 1.96 * cov), p * (1 + 1.96 * cov), UQPY.calls, seconds)
+        os.chdir("/")
+
+
+def ray() -> None:
+    import ray as cluster
+    from lanesweep import ray as on_ray
+
+    _, path, _keep = problem()
+    row("workers", "samples", "seconds")
+    samples = 4 * 10**6
+    start = time.perf_counter()
+    whole = lanesweep.sample(path, models="FSM", criterion="collision", thw=1.2, samples=samples, threads=1, backend="cpu")
+    row("none, one thread", samples, round(time.perf_counter() - start, 2))
+    for workers in (1, 2, 4):
+        cluster.init(num_cpus=workers, include_dashboard=False, _node_ip_address="127.0.0.1", log_to_driver=False)
+        on_ray.sample(path, models="FSM", thw=1.2, samples=1000, shards=workers)  # starts the workers
+        start = time.perf_counter()
+        joined = on_ray.sample(path, models="FSM", criterion="collision", thw=1.2, samples=samples, shards=8)
+        row(workers, samples, round(time.perf_counter() - start, 2))
+        same = (Path(joined) / "estimates.csv").read_bytes() == (Path(whole) / "estimates.csv").read_bytes()
+        assert same, "other bytes"
+        cluster.shutdown()
+
+
+if __name__ == "__main__":
+    what, *arguments = sys.argv[1:]
+    {"first": first, "cases": cases, "driver": driver, "openturns": openturns, "uqpy": uqpy, "ray": ray}[what](*arguments)
