@@ -110,7 +110,8 @@ enum Verb {
 pub fn main() -> ExitCode {
     let matches = match configured::command().try_get_matches() {
         Ok(matches) => matches,
-        Err(error) => {
+        Err(mut error) => {
+            configured::name_replacement(&mut error);
             return run_and_report(|| console::refuse(&error)).into();
         }
     };
@@ -153,7 +154,7 @@ fn run(cli: &Cli, configured: &Configured) -> Result<Exit> {
         Verb::Synth(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Map(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Simulate(verb) => verb.run(configured, cli.common.verbosity()),
-        Verb::Check(verb) => verb.run(cli.common.verbosity()),
+        Verb::Check(verb) => verb.run(configured),
         Verb::Export(verb) => verb.run(configured),
         Verb::Cluster(verb) => verb.run(),
         Verb::Verify(verb) => verb.run(configured, cli.common.verbosity()),

@@ -307,6 +307,19 @@ fn flags_that_would_not_be_heeded_and_absurd_numbers_of_threads_are_refused() {
     let lane = "01_cut_in_81_74_836/S/1.2s/RSS";
     refused(&["simulate", "--scenarios", text(&scenarios), "--lane", lane, "--gap", "5"], "would be ignored");
     refused(&["study", "--threads", "100000000"], "expected a whole number from 1 to");
+    let dt = ["--config", "run.dt_s=0.05"];
+    refused(&[&["simulate", "--from", "run", "--lane", lane][..], &dt].concat(), "`run.dt_s` is decided by the run");
+    refused(
+        &[&["export", "xosc", "--from", "run", "--lane", lane][..], &dt].concat(),
+        "is decided by the run (--from)",
+    );
+    let check = ["check", "--category", "lvd", "--ego-speed", "30", "--thw", "1", "--acceleration", "-6"];
+    refused(&[&check[..], &dt].concat(), "`run.dt_s` has no effect on a check");
+    for data in [&["--scenarios", text(&scenarios)][..], &["recordings"]] {
+        refused(&[&["study", "--synth-recordings", "2"], data].concat(), "cannot be used with");
+    }
+    refused(&["study", "--tables", "--format", "json"], "leave out one of the two");
+    refused(&["cluster", "merge", "run", "--tables", "--format", "json"], "leave out one of the two");
 }
 
 /// What a folder of results or a document says of its data.
