@@ -72,7 +72,9 @@ const REMOVED: [(&str, &str); 2] =
 pub(super) fn name_replacement(error: &mut clap::Error) {
     let Some(ContextValue::String(flag)) = error.get(ContextKind::InvalidArg) else { return };
     if let Some((_, key)) = REMOVED.iter().find(|(removed, _)| flag == removed) {
+        // Similar flags, and their use, are not meant.
         error.remove(ContextKind::SuggestedArg);
+        error.remove(ContextKind::Usage);
         let tip = format!("write '--config {key}' instead").into();
         error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip]));
     }
