@@ -31,7 +31,7 @@ from ._result import Figure, Result
 from ._run import command
 from ._simulate import LimitState, simulate
 from ._verbs import *  # noqa: F403
-from ._verbs import __all__ as _verbs
+from ._verbs import __all__ as _functions
 
 __all__ = [
     "BusyError",
@@ -54,5 +54,5 @@ __all__ = [
     "drivers",
     "profile",
     "simulate",
-    *_verbs,
+    *_functions,
 ]

@@ -10,7 +10,7 @@ import numpy as np
 import numpy.typing as npt
 import ray
 
-from . import parts
+from . import _verbs, parts
 from ._result import Result
 from ._simulate import LimitState
 
@@ -90,13 +90,8 @@ def _planned(function: Callable[..., Result]) -> Callable[..., Result]:
     return planned
 
 
-def _functions() -> tuple[Callable[..., Result], Callable[..., Result]]:
-    from . import _verbs
-
-    return _planned(_verbs.sample), _planned(_verbs.study)
-
-
-sample, study = _functions()
+sample = _planned(_verbs.sample)
+study = _planned(_verbs.study)
 
 
 class _Evaluator:

@@ -6,7 +6,8 @@ use clap::Args;
 
 use super::Exit;
 use super::case_flags::{CaseFlags, from_table, from_toml};
-use super::console::{self, Verbosity};
+use super::configured::Configured;
+use super::console;
 use super::format::FormatFlag;
 use super::source::{PlausibilityFlag, refuse_overwriting, scenarios_of};
 use crate::interop::openscenario::read_scenario;
@@ -77,7 +78,11 @@ struct CheckRequest {
 }
 
 impl Check {
-    pub fn run(&self, _verbosity: Verbosity) -> Result<Exit> {
+    pub fn run(&self, configured: &Configured) -> Result<Exit> {
+        configured.refuse_assigned(
+            "has no effect on a check",
+            "leave it out; --profiles names the profiles, which hold the time step",
+        )?;
         self.guard_outputs()?;
         let names = if self.profiles.is_empty() { PROFILES.map(str::to_owned).to_vec() } else { self.profiles.clone() };
         let mut profiles = names.iter().map(|name| Profile::load(name.trim())).collect::<Result<Vec<_>>>()?;

@@ -4,6 +4,7 @@
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValue, PossibleValuesParser};
+use clap::error::{ContextKind, ContextValue};
 use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, FromArgMatches};
 
@@ -63,6 +64,22 @@ pub(super) const FLAGS: [KeyFlag; 22] = [
 const OF_THE_PLAN: [&str; 7] =
     ["generator.", "mining.", "parameterization.", "score.", "sample.", "run.profile", "run.dt_s"];
 
+/// Flags of earlier versions, with the keys that replaced them.
+const REMOVED: [(&str, &str); 2] =
+    [("--synth-seed", "generator.seed=N"), ("--synth-duration", "generator.duration_s=SECONDS")];
+
+/// Adds what replaced a removed flag to the error about it.
+pub(super) fn name_replacement(error: &mut clap::Error) {
+    let Some(ContextValue::String(flag)) = error.get(ContextKind::InvalidArg) else { return };
+    if let Some((_, key)) = REMOVED.iter().find(|(removed, _)| flag == removed) {
+        // Similar flags, and their use, are not meant.
+        error.remove(ContextKind::SuggestedArg);
+        error.remove(ContextKind::Usage);
+        let tip = format!("write '--config {key}' instead").into();
+        error.insert(ContextKind::Suggested, ContextValue::StyledStrs(vec![tip]));
+    }
+}
+
 /// The command line, with `--config` for every verb and the flags that set keys.
 pub(super) fn command() -> Command {
     super::help::laid_out(with_flags(with_config(Cli::command()), &Key::all()))
@@ -79,7 +96,8 @@ fn with_flags(mut command: Command, keys: &[Key]) -> Command {
     for name in names {
         command = command.mut_subcommand(name, |command| with_flags(command, keys));
     }
-    let has_plan = command.get_arguments().any(|arg| arg.get_id() == "plan");
+    let has = |id: &str| command.get_arguments().any(|arg| arg.get_id() == id);
+    let (has_plan, has_data) = (has("plan"), has("scenarios"));
     let verb = command.get_name().to_owned();
     for (name, id, value_name, heading, is_seldom, _) in flags_of(&verb) {
         let Some(key) = Key::find(keys, name) else { continue };
@@ -87,6 +105,9 @@ fn with_flags(mut command: Command, keys: &[Key]) -> Command {
         arg = arg.global(name == "run.threads");
         if has_plan && is_of_plan(name) {
             arg = arg.conflicts_with("plan");
+        }
+        if has_data && name == "generator.recordings" {
+            arg = arg.conflicts_with_all(["dir", "scenarios"]);
         }
         command = command.arg(arg);
     }
@@ -171,6 +192,16 @@ impl Configured {
         if path.last() == Some(&"slurm") && !typed.is_empty() {
             let help = "give it to the run: lanesweep cluster slurm … -- study --config FILE";
             return Err(Error::usage(Place::item("--config"), "the scripts do not carry it", help));
+        }
+        // A missing file is named by the system's error if its name says that a file is meant.
+        let is_neither = |one: &&Assignment| match one {
+            Assignment::File(path) => !path.exists() && path.extension().is_none_or(|ending| ending != "toml"),
+            Assignment::Value(_) => false,
+        };
+        if let Some(Assignment::File(path)) = typed.iter().find(is_neither) {
+            let problem = format!("`{}` is neither KEY=VALUE nor an existing file", path.display());
+            let help = "write a key with its value, such as run.dt_s=0.05, or the path of a TOML file";
+            return Err(Error::usage(Place::item("--config"), problem, help));
         }
         let mut layers = match reads_configuration(&path) {
             true => Layers::read(&typed, &std::env::vars_os().collect::<Vec<_>>())?,
@@ -259,20 +290,29 @@ impl Configured {
     /// # Errors
     /// [`Error::Usage`].
     pub fn refuse_with_plan(&self) -> Result<()> {
-        let is_typed = |origin: &Origin| match origin {
+        let are_files_typed = std::env::var_os(crate::cli::settings::FILE_VARIABLE).is_none();
+        self.refuse_lane_keys(are_files_typed, "is decided by the plan (--plan)", "leave it out, or make another plan")
+    }
+
+    /// Refuses `--config KEY=VALUE` about lanes where `why` says that it has no effect. Files and variables are
+    /// allowed, because other commands share them.
+    ///
+    /// # Errors
+    /// [`Error::Usage`].
+    pub fn refuse_assigned(&self, why: &str, help: &str) -> Result<()> {
+        self.refuse_lane_keys(false, why, help)
+    }
+
+    fn refuse_lane_keys(&self, are_files_refused: bool, why: &str, help: &str) -> Result<()> {
+        let is_refused = |origin: &Origin| match origin {
             Origin::Assignment(_) => true,
-            Origin::File { .. } => std::env::var_os(crate::cli::settings::FILE_VARIABLE).is_none(),
+            Origin::File { .. } => are_files_refused,
             _ => false,
         };
-        match self.layers.given().find(|setting| is_typed(setting.origin) && is_of_plan(&setting.key.name)) {
+        match self.layers.given().find(|setting| is_refused(setting.origin) && is_of_plan(&setting.key.name)) {
             None => Ok(()),
-            Some(setting) => {
-                let problem = format!("`{}` is decided by the plan (--plan)", setting.key.name);
-                Err(Error::usage(
-                    setting.origin.place(&setting.key.name),
-                    problem,
-                    "leave it out, or make another plan",
-                ))
+            Some(Setting { key, origin, .. }) => {
+                Err(Error::usage(origin.place(&key.name), format!("`{}` {why}", key.name), help))
             }
         }
     }
@@ -298,11 +338,19 @@ impl Configured {
     /// The requested backend and device.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a text that is not a device name.
+    /// [`Error::Usage`] for a text that is not a device name, and for a device of the CPU, with the source of both.
     pub fn backend(&self) -> Result<(BackendChoice, Option<DeviceName>)> {
         let run = &self.settings.run;
         let device = run.device.as_deref().map(str::parse).transpose();
-        Ok((run.backend, device.map_err(|error| self.at_origin("run.device", "device", error))?))
+        let device: Option<DeviceName> = device.map_err(|error| self.at_origin("run.device", "device", error))?;
+        run.backend.check(device.as_ref()).map_err(|error| {
+            let [backend, device] = ["run.backend", "run.device"]
+                .map(|key| self.layers.get(key).map_or_else(Place::default, |setting| setting.origin.place(key)));
+            let named = run.device.as_deref().unwrap_or_default();
+            let problem = format!("`{named}` is named, but {backend} chooses the CPU, which uses no device");
+            Error::usage(device, problem, error.help().unwrap_or_default())
+        })?;
+        Ok((run.backend, device))
     }
 
     /// Opens the backend that flags, files and the environment select.

@@ -67,7 +67,10 @@ pub fn exclusively<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
 fn parse_and_run(words: &[OsString]) -> Result<Exit> {
     let matches = match configured::command().try_get_matches_from(with_program_name(words)) {
         Ok(matches) => matches,
-        Err(error) if error.use_stderr() => return Err(wrong_words(&error)),
+        Err(mut error) if error.use_stderr() => {
+            configured::name_replacement(&mut error);
+            return Err(wrong_words(&error));
+        }
         Err(error) => {
             console::print(&error.to_string())?;
             return Ok(Exit::Ok);

@@ -162,6 +162,7 @@ impl Xosc {
                 return wrong("--from", "a run has many lanes", "add --lane KEY, or --worst N");
             }
             (Some(dir), scenarios) => {
+                configured.refuse_assigned("is decided by the run (--from)", "leave it out")?;
                 let reopened = reopen(dir, self.lane.first().map_or("", String::as_str))?;
                 self.refuse_for(&reopened)?;
                 let (mined, incomplete) = scenarios.as_ref().map(read).transpose()?.unwrap_or_default();

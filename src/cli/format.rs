@@ -3,11 +3,11 @@
 use clap::{Args, ValueEnum};
 
 use super::{Exit, console};
-use crate::Result;
 use crate::report::study::StudyReport;
 use crate::report::tables;
 use crate::support::readable::count;
 use crate::support::run_dir::Results;
+use crate::{Error, Place, Result};
 
 /// How tables are printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -71,6 +71,20 @@ pub(super) struct TablesFlag {
 }
 
 impl TablesFlag {
+    /// Refuses the flag where it would have no effect.
+    ///
+    /// # Errors
+    /// [`Error::Usage`].
+    pub fn check(self, format: FormatFlag) -> Result<()> {
+        match self.tables && format.is_json() {
+            true => {
+                let problem = "--format json prints one document, which has the numbers of all tables";
+                Err(Error::usage(Place::item("--tables"), problem, "leave out one of the two"))
+            }
+            false => Ok(()),
+        }
+    }
+
     /// Writes the files and prints the answer, or all tables.
     pub fn finish(
         self,

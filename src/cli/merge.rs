@@ -34,6 +34,7 @@ pub struct Merge {
 
 impl Merge {
     pub fn run(&self) -> Result<Exit> {
+        self.tables.check(self.format)?;
         let [plan, out] = [&self.dir.join(PLAN_FILE), &self.dir].map(|path| quoted_word(&path.display().to_string()));
         let again = |verb: &str, shard| format!("lanesweep {verb} --plan {plan} --shard {shard} --out {out}");
         let (folder, merged) = merge(&self.dir, &again)?;

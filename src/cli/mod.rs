@@ -119,7 +119,8 @@ pub fn main_with(words: &[OsString]) -> Exit {
     console::set_command_line(words);
     let matches = match configured::command().try_get_matches_from(with_program_name(words)) {
         Ok(matches) => matches,
-        Err(error) => {
+        Err(mut error) => {
+            configured::name_replacement(&mut error);
             return run_and_report(|| console::refuse(&error));
         }
     };
@@ -169,7 +170,7 @@ fn run(cli: &Cli, configured: &Configured) -> Result<Exit> {
         Verb::Synth(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Map(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Simulate(verb) => verb.run(configured, cli.common.verbosity()),
-        Verb::Check(verb) => verb.run(cli.common.verbosity()),
+        Verb::Check(verb) => verb.run(configured),
         Verb::Export(verb) => verb.run(configured),
         Verb::Cluster(verb) => verb.run(),
         Verb::Verify(verb) => verb.run(configured, cli.common.verbosity()),

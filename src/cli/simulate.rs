@@ -103,7 +103,10 @@ impl Simulate {
             ));
         }
         let (reopened, incomplete) = match (&self.from, &self.scenarios) {
-            (Some(dir), _) => (reopen(dir, key)?, false),
+            (Some(dir), _) => {
+                configured.refuse_assigned("is decided by the run (--from)", "leave it out")?;
+                (reopen(dir, key)?, false)
+            }
             (None, Some(path)) => {
                 let profile = configured.profile()?;
                 let (mut scenarios, incomplete) = scenarios_of(path, self.plausibility.policy())?;

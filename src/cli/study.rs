@@ -268,8 +268,9 @@ impl Study {
         Ok(())
     }
 
-    /// Checks that the lane table replaces neither an input nor another result.
+    /// Checks that every flag has an effect, and that the lane table replaces neither an input nor another result.
     fn guard_inputs(&self, configured: &Configured) -> Result<()> {
+        self.tables.check(self.format)?;
         let Some(lanes) = &self.rows else { return Ok(()) };
         let results = ["failures.csv", "f1.csv", "claims.csv", "report.txt", "reference.csv", "run.json"];
         let results = results.into_iter().chain([PLAN_FILE, RUN_PLAN_FILE]);

@@ -23,7 +23,7 @@ pub mod study;
 
 use std::path::Path;
 
-use crate::support::files::check_folder;
+use crate::support::files::check_run_folder;
 use crate::support::run_dir::{ESTIMATE_RECORD, OutputDir, STUDY_RECORD};
 use crate::{Error, Place, Result};
 use parts::{PLAN_FILE, Shard, kind_of};
@@ -44,7 +44,7 @@ pub enum Merged {
 /// [`Error::Io`]; [`Error::Busy`] if another process writes there; [`Error::Input`] with the missing, duplicate,
 /// foreign or damaged parts.
 pub(crate) fn merge(dir: &Path, again: &dyn Fn(&str, Shard) -> String) -> Result<(OutputDir, Merged)> {
-    check_folder(dir)?;
+    check_run_folder(dir)?;
     let plan = dir.join(PLAN_FILE);
     if !plan.exists() {
         return Err(no_parts(dir));

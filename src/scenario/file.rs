@@ -151,7 +151,7 @@ fn read_json_lines(path: &Path, implausible: Implausible) -> Result<ScenarioFile
             Err(error) => found.refuse(explain(&place, text, &error)),
         }
     }
-    found.finish(Place::file(path), "expected one JSON object per line, as `lanesweep mine` writes them")
+    found.finish(Place::file(path), ONE_OBJECT)
 }
 
 /// Writes a scenario file atomically.
@@ -186,6 +186,9 @@ fn write_lines<'a>(
     Ok(())
 }
 
+/// Help for a file of something else.
+const ONE_OBJECT: &str = "expected one JSON object per line, as `lanesweep mine` writes them";
+
 /// Maximum line length, bytes: enough for hours at 1000 samples per second.
 const MAX_LINE_BYTES: u64 = 64 << 20;
 
@@ -198,6 +201,9 @@ fn explain(place: &Place, text: &str, error: &serde_json::Error) -> Error {
             "every line holds one complete scenario; NaN and Infinity are not JSON: remove such scenarios",
         );
     };
+    if !value.is_object() {
+        return Error::input(place.clone(), "not a scenario: the line is no JSON object", ONE_OBJECT);
+    }
     let id = value.get("id").and_then(Value::as_str);
     let place = id.map_or_else(|| place.clone(), |id| place.clone().of(name(id)));
     match wrong_field(&value) {

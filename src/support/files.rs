@@ -4,7 +4,7 @@ use std::io::{ErrorKind, Write};
 use std::path::Path;
 
 use crate::support::atomic_file::AtomicFile;
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 /// Checks that a folder exists or could be created; it only inspects names, before the work starts.
 ///
@@ -22,6 +22,18 @@ pub fn check_folder(dir: &Path) -> Result<()> {
             Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => {}
             Err(e) => return Err(Error::io(dir, "create the folder", e)),
         }
+    }
+    Ok(())
+}
+
+/// Checks that the folder of a run that is to be read is no file.
+///
+/// # Errors
+/// [`Error::Input`] for a file.
+pub fn check_run_folder(dir: &Path) -> Result<()> {
+    if dir.is_file() {
+        let help = "give the folder (option `out`) that the run was written to";
+        return Err(Error::input(Place::file(dir), "this is a file; expected the folder of a run", help));
     }
     Ok(())
 }

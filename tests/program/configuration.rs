@@ -190,6 +190,10 @@ fn what_is_configured_yields_to_a_flag_that_contradicts_it() {
     good(dir, &device, &["-q", "study", "--dry-run", "--backend", "cpu"]);
     good(dir, &gpu, &["-q", "study", "--dry-run", "--reference"]);
     refused(dir, &device, &["-q", "study", "--dry-run"]);
+    let both = [("LANESWEEP_RUN_BACKEND", "cpu"), ("LANESWEEP_RUN_DEVICE", "0")];
+    let said = refused(dir, &both, &["-q", "study", "--dry-run"]);
+    assert!(said.contains("variable LANESWEEP_RUN_DEVICE: `0` is named") && !said.contains("--backend"), "{said}");
+    assert!(said.contains("variable LANESWEEP_RUN_BACKEND chooses the CPU"), "{said}");
     // A plan's lanes are decided; what the environment says of them was there when it was made.
     let small = [("LANESWEEP_GENERATOR_RECORDINGS", "1"), ("LANESWEEP_RUN_BACKEND", "cpu")];
     good(dir, &small, &["-q", "study", "--plan-only", "--out", "run"]);

@@ -12,9 +12,14 @@ fn lanesweep(args: &[&str]) -> Output {
 }
 
 fn refused(args: &[&str], hint: &str) {
+    refused_with(2, args, hint);
+}
+
+fn refused_with(code: i32, args: &[&str], hint: &str) {
     let output = lanesweep(args);
-    let said = String::from_utf8_lossy(&output.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
-    assert_eq!(output.status.code(), Some(2), "{args:?}: {said}");
+    let said = String::from_utf8_lossy(&output.stderr).replace('│', " ");
+    let said = said.split_whitespace().collect::<Vec<_>>().join(" ");
+    assert_eq!(output.status.code(), Some(code), "{args:?}: {said}");
     assert!(said.contains(hint), "{args:?} should say `{hint}`: {said}");
 }
 
@@ -186,15 +191,16 @@ fn a_pilot_and_manual_pages_replace_no_file_of_the_users_and_follow_no_link() {
 }
 
 #[test]
-fn worst_lanes_of_a_changed_table_are_not_exported() {
+fn worst_lanes_of_a_changed_table_are_not_exported_and_what_is_missing_is_named() {
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| dir.path().join(name);
     let (density, out, exported) = (at("d.json"), at("out"), at("exported"));
     let fit = ["-q", "fit", "--synth-recordings", "2", "--categories", "cut-in", "--parameterizations", "2"];
     assert!(lanesweep(&[&fit[..], &["--no-comparison", "--out", text(&density)]].concat()).status.success());
     let sample =
-        ["-q", "sample", text(&density), "--samples", "500", "--thw", "0.6", "--models", "FSM", "--worst", "3"];
-    assert!(lanesweep(&[&sample[..], &["--out", text(&out)]].concat()).status.success());
+        ["-q", "sample", text(&density), "--samples", "500", "--thw", "0.6", "--models", "FSM", "--out", text(&out)];
+    let listed = |worst: &str| assert!(lanesweep(&[&sample[..], &["--worst", worst]].concat()).status.success());
+    listed("3");
     let export = ["-q", "export", "xosc", "--from", text(&out), "--worst", "1", "--out", text(&exported)];
     assert!(lanesweep(&export).status.success());
     refused(&[&export[..], &["--criterion", "ttc"]].concat(), "ranks its lanes by collision");
@@ -203,9 +209,18 @@ fn worst_lanes_of_a_changed_table_are_not_exported() {
     let mut lines: Vec<&str> = table.lines().collect();
     lines.swap(1, 2);
     std::fs::write(out.join("worst.csv"), lines.join("\n") + "\n").unwrap();
-    let output = lanesweep(&export);
-    let said = String::from_utf8_lossy(&output.stderr).split_whitespace().collect::<Vec<_>>().join(" ");
-    assert!(output.status.code() == Some(3) && said.contains("worst.csv") && said.contains("checksum"), "{said}");
+    refused_with(3, &export, "worst.csv: checksum mismatch");
+    std::fs::remove_file(out.join("worst.csv")).unwrap();
+    refused_with(3, &export, "worst.csv: the run's table of worst lanes is missing");
+    listed("0");
+    refused_with(3, &export, "the run was made without a table of worst lanes");
+    // The density of the run, damaged and missing: what makes it again is the run.
+    let simulate = ["simulate", "--from", text(&out), "--lane", "#77/2/0.6s/FSM"];
+    assert!(lanesweep(&simulate).status.success());
+    std::fs::write(out.join("density.json"), "{}").unwrap();
+    refused_with(3, &simulate, "run `lanesweep sample` into this folder again");
+    std::fs::remove_file(out.join("density.json")).unwrap();
+    refused_with(3, &simulate, "density.json: the density of the run is missing");
 }
 
 #[cfg(unix)]
@@ -292,6 +307,19 @@ fn flags_that_would_not_be_heeded_and_absurd_numbers_of_threads_are_refused() {
     let lane = "01_cut_in_81_74_836/S/1.2s/RSS";
     refused(&["simulate", "--scenarios", text(&scenarios), "--lane", lane, "--gap", "5"], "would be ignored");
     refused(&["study", "--threads", "100000000"], "expected a whole number from 1 to");
+    let dt = ["--config", "run.dt_s=0.05"];
+    refused(&[&["simulate", "--from", "run", "--lane", lane][..], &dt].concat(), "`run.dt_s` is decided by the run");
+    refused(
+        &[&["export", "xosc", "--from", "run", "--lane", lane][..], &dt].concat(),
+        "is decided by the run (--from)",
+    );
+    let check = ["check", "--category", "lvd", "--ego-speed", "30", "--thw", "1", "--acceleration", "-6"];
+    refused(&[&check[..], &dt].concat(), "`run.dt_s` has no effect on a check");
+    for data in [&["--scenarios", text(&scenarios)][..], &["recordings"]] {
+        refused(&[&["study", "--synth-recordings", "2"], data].concat(), "cannot be used with");
+    }
+    refused(&["study", "--tables", "--format", "json"], "leave out one of the two");
+    refused(&["cluster", "merge", "run", "--tables", "--format", "json"], "leave out one of the two");
 }
 
 /// What a folder of results or a document says of its data.

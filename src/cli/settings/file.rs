@@ -156,8 +156,9 @@ pub(super) fn read_variables<'k>(
     let known: Vec<(String, &Key)> = keys.iter().map(|key| (variable_of(&key.name), key)).collect();
     let mut found = Vec::new();
     for (name, word) in variables {
-        let Some(name) = name.to_str().filter(|name| name.starts_with(PREFIX)) else { continue };
-        if name == FILE_VARIABLE || TEST_VARIABLES.contains(&name) || word.is_empty() {
+        // A name that is not UTF-8 is unknown, too.
+        let name = &*name.to_string_lossy();
+        if !name.starts_with(PREFIX) || name == FILE_VARIABLE || TEST_VARIABLES.contains(&name) || word.is_empty() {
             continue;
         }
         let place = || Place::item(format!("environment variable {name}"));

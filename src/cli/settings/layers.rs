@@ -255,6 +255,16 @@ fn insert(table: &mut Map<String, Value>, name: &str, value: Value) {
 mod tests {
     use super::*;
 
+    #[cfg(unix)]
+    #[test]
+    fn a_variable_of_ours_whose_name_is_no_text_is_refused() {
+        use std::os::unix::ffi::OsStringExt;
+        let read = |name: &[u8]| Layers::read(&[], &[(OsString::from_vec(name.to_vec()), "1".into())]);
+        let error = read(b"LANESWEEP_RUN_DT\xff").unwrap_err();
+        assert!(error.to_string().contains("there is no such variable"), "{error}");
+        assert!(read(b"OTHER_\xff").is_ok());
+    }
+
     #[test]
     fn what_the_checks_let_pass_the_types_take() {
         let words = [

@@ -5,6 +5,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::engine::BackendChoice;
 use crate::model::criterion::Criterion;
+use crate::model::driver::Bound;
 use crate::run::score::ScoreOptions;
 use crate::scenario::parameterization::{ParameterizationOptions, SvdLateral};
 use crate::traffic::mining::MiningOptions;
@@ -61,7 +62,7 @@ pub struct RunSettings {
     pub profile: String,
     /// Time step, s. Without it: the profile's.
     #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0))]
+    #[schemars(extend("minimum" = Bound::TIME_STEP.smallest, "maximum" = Bound::TIME_STEP.largest))]
     pub dt_s: Option<f64>,
 }
 

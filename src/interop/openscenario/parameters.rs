@@ -61,8 +61,7 @@ impl Names<'_> {
             return Ok((MapParameter::find(self.category, &rename.ours, "option `rename`")?, rename.factor));
         }
         MapParameter::find(self.category, name, "").map(|parameter| (parameter, 1.0)).map_err(|error| {
-            let help = error.help().unwrap_or_default();
-            let problem = format!("a {} has no parameter `{name}`", self.category.label());
+            let Error::Usage { problem, help, .. } = error else { return error };
             let help = format!("name it by option `rename` {name}=OURS or option `rename` {name}=OURS*FACTOR; {help}");
             Error::input(Place::file(self.path).row(line).of(format!("parameter `{name}`")), problem, help)
         })

@@ -178,7 +178,9 @@ impl MapParameter {
             Some(near) => format!("did you mean `{near}`? There are {}", keys.join(", ")),
             None => format!("there are {}", keys.join(", ")),
         };
-        Err(Error::usage(Place::item(flag), format!("a {} has no parameter `{key}`", category.label()), help))
+        let article = if category == Category::Lvd { "an" } else { "a" };
+        let problem = format!("{article} {} has no parameter `{key}`", category.label());
+        Err(Error::usage(Place::item(flag), problem, help))
     }
 
     /// A value in SI units.

@@ -21,7 +21,7 @@ use crate::run::sampling::{Sample, SampleKind};
 use crate::run::study::{Study, StudyOptions, plan_study};
 use crate::scenario::Scenario;
 use crate::stats::density::DensityModel;
-use crate::support::files::check_folder;
+use crate::support::files::check_run_folder;
 use crate::support::ranges::refuse_repeats;
 use crate::support::run_dir::{ESTIMATE_RECORD, STUDY_RECORD};
 use crate::{Error, Place, Result};
@@ -59,7 +59,7 @@ impl Reopened {
         key: &str,
         of_distribution: impl FnOnce(&Path, &SampleRecord) -> Result<(LanePlan, String)>,
     ) -> Result<Reopened> {
-        check_folder(dir)?;
+        check_run_folder(dir)?;
         let has = |name: &str| dir.join(name).exists();
         if has(STUDY_RECORD) && !(has(ESTIMATE_RECORD) && key.starts_with('#')) {
             return Ok(Reopened::study(record::study_of(dir)?));

@@ -1,5 +1,6 @@
 //! Records of a finished run: `run.json` of a study, `estimate.json` of a sampling run.
 
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use serde::Deserialize;
@@ -71,7 +72,15 @@ impl SampleRecord {
     /// # Errors
     /// [`Error::Io`]; [`Error::Input`] if the folder does not hold a complete and unchanged run of crude Monte Carlo.
     pub(super) fn plan(&self, dir: &Path) -> Result<(LanePlan, DensityModel)> {
-        let density = read_density(&dir.join("density.json"))?;
+        let path = dir.join("density.json");
+        let again = "run `lanesweep sample` into this folder again: it writes the density that it samples";
+        let density = read_density(&path).map_err(|error| match error {
+            Error::Input { place, problem, .. } => Error::input(*place, problem, again),
+            Error::Io { source, .. } if source.kind() == ErrorKind::NotFound => {
+                Error::input(Place::file(&path), "the density of the run is missing", again)
+            }
+            other => other,
+        })?;
         let wrong = |problem: String| {
             let help =
                 "give the folder (option `out`) of a `lanesweep sample` run of crude Monte Carlo by this version";

@@ -14,6 +14,7 @@ use crate::run::study::{Study, WINDOW};
 use crate::support::input_file;
 use crate::support::plain_text::hex;
 use crate::support::ranges::refuse_repeats;
+use crate::support::run_dir::ESTIMATE_RECORD;
 use crate::support::table::text_of_cell;
 use crate::{Error, Place, Result};
 
@@ -68,15 +69,22 @@ impl Reopened {
 
     fn worst_of_table(&self, dir: &Path, options: &WorstOptions, models: &[usize]) -> Result<Vec<LaneKey>> {
         let (path, count) = (dir.join("worst.csv"), options.count);
-        if !path.exists() {
+        // A plan without results has no record.
+        let record = dir.join(ESTIMATE_RECORD).exists().then(|| SampleRecord::read(dir)).transpose()?;
+        let Some(sha256) = record.and_then(|run| run.worst_sha256) else {
             let help = "run `lanesweep sample` with option `worst` above 0, or name lanes with option `lane`";
-            return Err(Error::input(Place::file(&path), "this run listed no worst lanes", help));
+            return Err(Error::input(Place::file(dir), "the run was made without a table of worst lanes", help));
+        };
+        let wrong = |problem: &str| {
+            let help = "run `lanesweep sample` into this folder again, or name lanes with option `lane`";
+            Err(Error::input(Place::file(&path), problem, help))
+        };
+        if !path.exists() {
+            return wrong("the run's table of worst lanes is missing");
         }
         let text = input_file::read_text(&path, input_file::MAX_TABLE_BYTES)?;
-        if SampleRecord::read(dir)?.worst_sha256.is_none_or(|sha256| hex(&Sha256::digest(&text)) != sha256) {
-            let problem = "checksum mismatch with estimate.json: the table was changed or damaged";
-            let help = "run `lanesweep sample` again, or name lanes with option `lane`";
-            return Err(Error::input(Place::file(&path), problem, help));
+        if hex(&Sha256::digest(&text)) != sha256 {
+            return wrong("checksum mismatch with estimate.json: the table was changed or damaged");
         }
         let mut reader = csv::Reader::from_reader(text.as_bytes());
         let wrong = |row: u64, problem: String| {
