@@ -10,7 +10,12 @@ m/s, lengths in m, times in s, accelerations in m/s².
 
 from __future__ import annotations
 
-from . import _core, drivers
+import os as _os
+
+# Mesa's layer that chooses devices reports a missing XDG_RUNTIME_DIR on stderr, and reorders the devices, whose order is ours.
+_os.environ.setdefault("NODEVICE_SELECT", "1")
+
+from . import _core, drivers  # noqa: E402
 from ._core import (
     BusyError,
     DeviceError,

@@ -2,10 +2,34 @@
 
 from collections.abc import Callable, Sequence
 from typing import Any, final
+from typing_extensions import disjoint_base
 
 import numpy as np
 import numpy.typing as npt
 
+__all__ = [
+    "BusyError",
+    "DeviceError",
+    "Frame",
+    "InputError",
+    "InternalError",
+    "LanesweepError",
+    "LimitState",
+    "SystemRefusal",
+    "UsageError",
+    "Vehicle",
+    "VerificationError",
+    "View",
+    "__version__",
+    "definition",
+    "frame_of_columns",
+    "frame_of_records",
+    "main",
+    "profile",
+    "register",
+    "run",
+    "simulate",
+]
 __version__: str
 
 class LanesweepError(Exception):
@@ -50,6 +74,7 @@ class Frame:
     def rows(self, n: int | None = None) -> list[dict[str, Any]]: ...
     def _repr_html_(self) -> str: ...
 
+@disjoint_base
 class LimitState:
     def __new__(
         cls,

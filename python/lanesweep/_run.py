@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import importlib
 import logging
 import os
 import sys
+import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any
@@ -28,7 +30,10 @@ def progress() -> tuple[Callable[[str, int, int], None] | None, Callable[[], Non
     The bar is that of `tqdm` if it is installed; in a terminal or notebook only.
     """
     try:
-        from tqdm.auto import tqdm
+        with warnings.catch_warnings():
+            # Without ipywidgets, tqdm draws its bar as text and warns about it.
+            warnings.simplefilter("ignore")
+            tqdm: Any = importlib.import_module("tqdm.auto").tqdm
     except ImportError:
         return None, lambda: None
     if not (sys.stderr is not None and sys.stderr.isatty()) and "ipykernel" not in sys.modules:
@@ -56,7 +61,7 @@ def word(value: Any) -> str:
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, os.PathLike):
-        return os.fspath(value)
+        return str(os.fspath(value))
     return str(value)
 
 

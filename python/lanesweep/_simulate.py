@@ -149,7 +149,7 @@ class LimitState(_core.LimitState):
         backend: str = "cpu",
         device: str | None = None,
     ) -> LimitState:
-        return super().__new__(
+        made = super().__new__(
             cls,
             os.fspath(density),
             model=names_of(model)[0],
@@ -159,6 +159,8 @@ class LimitState(_core.LimitState):
             backend=backend,
             device=device,
         )
+        assert isinstance(made, cls)
+        return made
 
     def __call__(self, points: npt.ArrayLike) -> npt.NDArray[np.float64]:
         return super().__call__(_two_dimensional(points))

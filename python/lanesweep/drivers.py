@@ -106,4 +106,5 @@ class IDM(Driver):
             in_lane = vehicle.attended & (vehicle.lateral_gap < 0) & (vehicle.gap + vehicle.half_lengths > 0)
             ratio = wanted / np.maximum(vehicle.gap, 0.1)
             interaction = np.where(in_lane, np.maximum(interaction, ratio**2), interaction)
-        return np.clip(a * (free - interaction), -self.max_deceleration_mps2, a)
+        wished = np.clip(a * (free - interaction), -self.max_deceleration_mps2, a)
+        return np.asarray(wished, dtype=f32)

@@ -50,7 +50,7 @@ def run(
     -------
     Result
     """
-    task = ray.remote(num_cpus=num_cpus, max_retries=max_retries, **options)(parts.run)
+    task: Any = ray.remote(num_cpus=num_cpus, max_retries=max_retries, **options)(parts.run)
     shared = ray.put(plan)
     pending = [task.remote(shared, shard, backend=backend, threads=max(1, int(num_cpus))) for shard in range(plan.shards)]
 
@@ -124,7 +124,7 @@ def limit_state(
     callable
         Takes an array of shape (n, d), returns n values.
     """
-    actor = ray.remote(num_cpus=num_cpus, max_restarts=-1, max_task_retries=3)(_Evaluator)
+    actor: Any = ray.remote(num_cpus=num_cpus, max_restarts=-1, max_task_retries=3)(_Evaluator)
     actors = [actor.remote(arguments, options) for _ in range(workers)]
 
     def values(points: npt.ArrayLike) -> npt.NDArray[np.float64]:

@@ -12,6 +12,8 @@ import numpy as np
 import pytest
 from lanesweep.drivers import IDM, Reg157
 
+FIXED = {"set": {"ego_speed_kmh": 90, "lateral_speed_mps": 1.0}}
+
 CASES = {
     "ego_speed": np.linspace(15, 40, 200),
     "speed": np.linspace(10, 30, 200),
@@ -40,7 +42,7 @@ def test_a_driver_is_scored_sampled_and_mapped_like_the_built_in_ones(scenarios,
     assert "IDM" in str(study)
     sample = lanesweep.sample(density, models=[idm], samples=500, thw=1.2)
     assert [row["model"] for row in sample.table("estimates").rows()]== ["IDM"] * 3
-    grid = lanesweep.map("cut-in", models=[idm], x="gap=5..25/5", y="speed_kmh=40..80/5", fixed="ego_speed_kmh=90")
+    grid = lanesweep.map("cut-in", models=[idm], x="gap_m=5..25/5", y="other_speed_kmh=40..80/5", **FIXED)
     assert grid.status == "ok"
 
 
