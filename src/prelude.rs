@@ -2,8 +2,9 @@
 
 pub use crate::engine::{CpuBackend, Executor, Headway, OpenBackend, Outcome, Trace, Wanted};
 pub use crate::model::criterion::Criterion;
-pub use crate::model::driver::ModelId;
+pub use crate::model::driver::{Accelerations, LaneColumns, ModelId, VectorDriver};
 pub use crate::model::profile::Profile;
+pub use crate::run::cases::Cases;
 pub use crate::run::check::{Check, Subject};
 pub use crate::run::compare::{Compare, CompareOptions};
 pub use crate::run::grid::{Map, MapOptions};
@@ -13,7 +14,7 @@ pub use crate::run::sampling::{Sample, SampleHeadways, SampleOptions};
 pub use crate::run::score::{ScoreOptions, f1, precision, recall};
 pub use crate::run::study::{Study, StudyOptions};
 pub use crate::scenario::parameterization::Parameterization;
-pub use crate::scenario::{Category, PlainCase, Scenario, read_scenarios, write_scenarios};
+pub use crate::scenario::{CaseParameters, Category, PlainCase, Scenario, read_scenarios, write_scenarios};
 pub use crate::stats::density::{DensityModel, FitOptions, read_density, write_density};
 pub use crate::support::cancel::Cancel;
 pub use crate::traffic::mining::{Collection, MiningOptions, mine_folder, mine_generated};
