@@ -41,6 +41,12 @@ class Figure:
     def svg(self) -> str:
         return self.path.read_text(encoding="utf-8")
 
+    def save(self, path: str | os.PathLike[str]) -> Path:
+        """Write the figure to a file."""
+        target = Path(path)
+        target.write_text(self.svg, encoding="utf-8")
+        return target
+
     def _repr_svg_(self) -> str:
         return self.svg
 
@@ -58,18 +64,26 @@ class Result:
     ----------
     status : str
         ``"ok"``, ``"incomplete"`` if parts of the input were left out, or the answer of `check`.
+    text : str
+        The result for people, as the command line prints it; `print` shows it.
     document : dict
         The numbers as one document, as ``--format json`` prints it.
-    folder : Path or None
-        Folder of the files.
+    messages : list of str
+        Lines of the log: what was found, and what was left out.
+    path, folder : Path or None
+        File or folder of the result; the folder of its files.
     """
 
-    def __init__(self, verb: str, code: int, text: str, path: Path | None, keep: Any) -> None:
+    def __init__(
+        self, verb: str, code: int, text: str, document: str, messages: list[str], path: Path | None, keep: Any
+    ) -> None:
         self.verb = verb
         self.status = STATUS.get(code, str(code))
-        self._text = text
+        self.text = text or "\n".join(messages)
+        self.messages = messages
         self.path = path
         self._keep = keep
+        self._json = document
         self._document: dict[str, Any] | None = None
 
     @property
@@ -79,21 +93,15 @@ class Result:
     @property
     def document(self) -> dict[str, Any]:
         if self._document is None:
-            try:
-                found = json.loads(self._text) if self._text.strip() else {}
-            except ValueError:
-                found = {}
+            found = json.loads(self._json or "{}")
             self._document = found if isinstance(found, dict) else {"rows": found}
         return self._document
 
     @property
-    def text(self) -> str:
-        """The result for people."""
-        for name in ("report.txt", "compare.txt"):
-            path = self.path / name if self.path is not None else None
-            if path is not None and path.is_file():
-                return path.read_text(encoding="utf-8")
-        return self._text
+    def densities(self) -> dict[str, Path]:
+        """Density files of a fit, by category and parameterization: ``"cut-in-2"``."""
+        found = self._files("*.json") if self.verb == "fit" else iter(())
+        return {path.stem: path for path in sorted(found) if not path.name.startswith("lanesweep-")}
 
     @property
     def tables(self) -> list[str]:
@@ -109,10 +117,10 @@ class Result:
         has_file = path is not None and path.is_file()
         # Types are those of the document, unless its rows hold more than values.
         if _is_table(value) and not (has_file and any(isinstance(one, dict) for row in value for one in row.values())):
-            return frame_of_records(json.dumps(value))
+            return frame_of_records(json.dumps(value), _header(path) if path is not None and has_file else [])
         if path is None or not has_file:
             raise KeyError(f"there is no table `{name}`; there are {', '.join(self.tables)}")
-        return read_csv(path)
+        return _read_csv(path)
 
     @property
     def figures(self) -> list[str]:
@@ -145,6 +153,12 @@ class Result:
     def __fspath__(self) -> str:
         if self.path is None:
             raise TypeError(f"the result of {self.verb} has no file")
+        if self.densities:
+            # Where a fit is given, a density is expected.
+            if len(self.densities) > 1:
+                names = ", ".join(self.densities)
+                raise TypeError(f"the fit has several densities: give one of them, as result.densities[name]: {names}")
+            return str(next(iter(self.densities.values())))
         return str(self.path)
 
     def __repr__(self) -> str:
@@ -166,6 +180,12 @@ def _is_table(value: Any) -> TypeGuard[list[dict[str, Any]]]:
     return isinstance(value, list) and bool(value) and all(isinstance(row, dict) for row in value)
 
 
+def _header(path: Path) -> list[str]:
+    """Names of the columns of a CSV file."""
+    with path.open(encoding="utf-8", newline="") as file:
+        return next(csv.reader(file), [])
+
+
 def _typed(values: list[str]) -> list[Any]:
     """Read a column of texts as whole numbers or numbers, if all of them are."""
     for read in (int, float):
@@ -176,7 +196,7 @@ def _typed(values: list[str]) -> list[Any]:
     return [value or None for value in values]
 
 
-def read_csv(path: str | os.PathLike[str]) -> Frame:
+def _read_csv(path: str | os.PathLike[str]) -> Frame:
     """Read a CSV table that lanesweep wrote."""
     with open(path, encoding="utf-8", newline="") as file:
         header, *rows = csv.reader(file)
@@ -188,8 +208,8 @@ def read_csv(path: str | os.PathLike[str]) -> Frame:
         columns[name] = [text or None for text in texts] if name in _NAMES else _typed(texts)
     records = [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
     if not records:
-        return frame_of_records(json.dumps([{name: None for name in header}]))
-    return frame_of_records(json.dumps(records))
+        return frame_of_records(json.dumps([{name: None for name in header}]), header)
+    return frame_of_records(json.dumps(records), header)
 
 
 def temporary() -> tempfile.TemporaryDirectory[str]:

@@ -81,17 +81,37 @@ def command(words: Sequence[Any]) -> tuple[int, str]:
     tuple of int and str
         Exit code, and what the program prints. An error is an exception.
     """
+    code, text, _, _ = _run(words)
+    return code, text
+
+
+def _run(words: Sequence[Any]) -> tuple[int, str, str, list[str]]:
+    """Run a command line; return exit code, text, document, and the lines of the log."""
     move, close = progress()
+    messages: list[str] = []
+
+    def keep(level: str, line: str) -> None:
+        messages.append(line)
+        on_message(level, line)
+
     try:
-        return _core.run([word(one) for one in words], move, on_message)
+        return *_core.run([word(one) for one in words], move, keep), messages
     finally:
         close()
 
 
 def run(
-    verb: str, arguments: list[tuple[str | None, Any, bool]], *, out: Any = None, default_out: str | None = None, document: bool = False
+    verb: str,
+    arguments: list[tuple[str | None, Any, bool]],
+    *,
+    out: Any = None,
+    default_out: str | None = None,
+    path: Any = None,
 ) -> Result:
-    """Run a verb with arguments: flag (None for a position), value, whether it is a comma-separated list."""
+    """Run a verb with arguments: flag (None for a position), value, whether it is a comma-separated list.
+
+    The files of the result are in `out`, in a temporary `default_out`, or in `path`, which is an argument.
+    """
     words: list[str] = verb.split()
     positions: list[str] = []
     for flag, value, is_list in arguments:
@@ -104,17 +124,14 @@ def run(
         else:
             given = names_of(value) if flag == "models" else value
             words += [f"--{flag}={one}" for one in words_of(given, is_list=is_list)]
-    keep, path = None, None
-    if out is not None:
-        path = Path(os.fspath(out))
-    elif default_out is not None:
+    keep = None
+    if out is None and default_out is not None:
         keep = temporary()
-        path = Path(keep.name) / default_out
-    if path is not None:
-        words.append(f"--out={path}")
-    if document:
-        words.append("--format=json")
+        out = Path(keep.name) / default_out
+    if out is not None:
+        path = out
+        words.append(f"--out={os.fspath(out)}")
     if positions:
         words += ["--", *positions]
-    code, text = command(words)
-    return Result(verb, code, text, path, keep)
+    code, text, document, messages = _run(words)
+    return Result(verb, code, text, document, messages, None if path is None else Path(os.fspath(path)), keep)

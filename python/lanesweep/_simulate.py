@@ -61,7 +61,7 @@ def simulate(
         One case per row: a DataFrame of pandas or Polars, a pyarrow table, anything with the Arrow interface, or a mapping
         of columns. Columns, with or without their unit: `category` (cut-in, cut-out, lvd), `ego_speed_mps`, `speed_mps`,
         `gap_m` or `thw_s`, `lateral_speed_mps`, `lateral_distance_m`, `acceleration_mps2`, `end_speed_mps`,
-        `ahead_speed_mps`, `ahead_gap_m`, `length_m`, `width_m`, `duration_s`. They mean what the arguments of `trace` mean;
+        `ahead_speed_mps`, `ahead_gap_m`, `length_m`, `width_m`, `duration_s`; speeds also as `_kmh`. They mean what the arguments of `trace` mean;
         a null is a value that is not given.
     category : str, optional
         Kind of all cases, in place of the column.
@@ -112,8 +112,9 @@ def simulate(
 class LimitState(_core.LimitState):
     """A density with one driver model and criterion, as a function of points: at most 0 where the criterion fails.
 
-    `LimitState(density, ...)(points)` takes an array of shape (n, d) and returns n values, so that libraries of reliability
-    analysis (OpenTURNS, UQpy, SciPy) can call it. Values are continuous at the limit wherever that is possible: TTC minus its
+    `LimitState(density, ...)(points)` takes an array of shape (n, d), or a data frame with these columns, and returns n values,
+    so that libraries of reliability analysis (OpenTURNS, UQpy, SciPy) can call it. Outside the valid region, where the density
+    is 0, the value is infinite. Elsewhere values are continuous at the limit wherever that is possible: TTC minus its
     threshold, threshold minus BTN; for collisions the smallest TTC, or minus the closing speed of the contact.
 
     Parameters
@@ -160,20 +161,40 @@ class LimitState(_core.LimitState):
             device=device,
         )
         assert isinstance(made, cls)
+        made._arguments = os.fspath(density), model, criterion, thw, profile, backend, device
         return made
 
+    _arguments: tuple[Any, ...]
+
+    def __reduce__(self) -> tuple[Any, ...]:
+        return _opened, self._arguments
+
     def __call__(self, points: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        return super().__call__(_two_dimensional(points))
+        return super().__call__(self._array(points))
 
     def is_valid(self, points: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-        return super().is_valid(_two_dimensional(points))
+        return super().is_valid(self._array(points))
 
     def log_density(self, points: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        return super().log_density(_two_dimensional(points))
+        return super().log_density(self._array(points))
 
-    def draw(self, count: int, rng: np.random.Generator | None = None) -> npt.NDArray[np.float64]:
-        """Draw valid points of the density, by rejection; with the random numbers of NumPy, not of `sample`."""
-        rng = np.random.default_rng() if rng is None else rng
+    def _array(self, points: Any) -> npt.NDArray[np.float64]:
+        """Points as an array; columns of a data frame by their names."""
+        if hasattr(points, "columns") and hasattr(points, "__getitem__"):
+            missing = [name for name in self.parameters if name not in list(points.columns)]
+            if missing:
+                raise _core.InputError(f"the points have no column {', '.join(missing)}; expected {', '.join(self.parameters)}")
+            points = np.column_stack([np.asarray(points[name], dtype=np.float64) for name in self.parameters])
+        array = np.ascontiguousarray(points, dtype=np.float64)
+        if array.ndim == 1:
+            array = array[np.newaxis, :]
+        if array.ndim != 2:
+            raise _core.InputError(f"points have {array.ndim} dimensions; give an array of shape (n, d)")
+        return array
+
+    def draw(self, count: int, rng: np.random.Generator | int | None = None) -> npt.NDArray[np.float64]:
+        """Draw valid points of the density, by rejection, with a generator or seed of NumPy (not the numbers of `sample`)."""
+        rng = np.random.default_rng(rng)
         centres, deviations = np.asarray(self.points), np.asarray(self.kernel_deviations)
         found: list[npt.NDArray[np.float64]] = []
         missing = count
@@ -197,12 +218,7 @@ def _has_arrow(table: Any) -> bool:
     return True
 
 
-def _two_dimensional(points: npt.ArrayLike) -> npt.NDArray[np.float64]:
-    array = np.ascontiguousarray(points, dtype=np.float64)
-    if array.ndim == 1:
-        array = array[np.newaxis, :]
-    if array.ndim != 2:
-        raise _core.InputError(f"points have {array.ndim} dimensions; give an array of shape (n, d)")
-    return array
-
-
+def _opened(
+    density: str, model: Any, criterion: str, thw: Any, profile: Any, backend: str, device: str | None
+) -> LimitState:
+    return LimitState(density, model=model, criterion=criterion, thw=thw, profile=profile, backend=backend, device=device)

@@ -162,7 +162,6 @@ def study(
         ],
         out=out,
         default_out='study',
-        document=True,
     )
 
 
@@ -212,7 +211,6 @@ def mine(
         ],
         out=out,
         default_out='scenarios.jsonl',
-        document=False,
     )
 
 
@@ -306,7 +304,6 @@ def fit(
         ],
         out=out,
         default_out='densities',
-        document=True,
     )
 
 
@@ -481,7 +478,6 @@ def sample(
         ],
         out=out,
         default_out='sample',
-        document=True,
     )
 
 
@@ -595,7 +591,6 @@ def compare(
         ],
         out=out,
         default_out='compare',
-        document=True,
     )
 
 
@@ -697,7 +692,6 @@ def justify(
         ],
         out=out,
         default_out='dossier',
-        document=True,
     )
 
 
@@ -826,7 +820,6 @@ def map(
         ],
         out=out,
         default_out='map',
-        document=True,
     )
 
 
@@ -948,7 +941,6 @@ def check(
             ('config', config, False),
             ('threads', threads, False),
         ],
-        document=True,
     )
 
 
@@ -1090,7 +1082,6 @@ def trace(
             ('config', config, False),
             ('threads', threads, False),
         ],
-        document=True,
     )
 
 
@@ -1243,12 +1234,11 @@ def export_xosc(
         ],
         out=out,
         default_out=None,
-        document=True,
     )
 
 
 def synth(
-    recordings: Value,
+    folder: Value,
     *,
     synth_recordings: Value | None = None,
     config: Values | None = None,
@@ -1260,7 +1250,7 @@ def synth(
 
     Parameters
     ----------
-    recordings : Value
+    folder : Value
         Folder for the recordings; created if it does not exist.
     synth_recordings : Value, default 84
         Number of generated recordings. They are called `01`, `02`, ….
@@ -1277,17 +1267,17 @@ def synth(
     return run(
         'synth',
         [
-            (None, recordings, False),
+            (None, folder, False),
             ('synth-recordings', synth_recordings, False),
             ('config', config, False),
             ('threads', threads, False),
         ],
-        document=False,
+        path=folder,
     )
 
 
 def merge(
-    recordings: Value,
+    folder: Value,
     *,
     config: Values | None = None,
     threads: Value | None = None,
@@ -1300,7 +1290,7 @@ def merge(
 
     Parameters
     ----------
-    recordings : Value
+    folder : Value
         The run's folder.
     config : Values
         Configuration file, or one key of it; repeatable. `lanesweep config init` writes such a file. Without
@@ -1315,9 +1305,9 @@ def merge(
     return run(
         'cluster merge',
         [
-            (None, recordings, False),
+            (None, folder, False),
             ('config', config, False),
             ('threads', threads, False),
         ],
-        document=True,
+        path=folder,
     )

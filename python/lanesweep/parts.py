@@ -1,4 +1,5 @@
-"""Runs in parts, for any executor: plan once, run the parts anywhere, join them. The result has the bytes of the whole run.
+"""Runs in parts, for any executor: plan once, run the parts anywhere, join them. Tables, figures and estimates have the bytes of
+the whole run; only what the record says of the host (seconds, backend) differs.
 
     plan = parts.plan(lanesweep.sample, "cut-in-2.json", samples=10**8, thw=1.2)
     done = [parts.run(plan, shard) for shard in range(plan.shards)]  # joblib, Dask, Ray, …
@@ -13,6 +14,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from ._core import InputError
 from ._driver import Driver, register
 from ._result import Result, temporary
 from ._run import command
@@ -111,9 +113,15 @@ def join(plan: Plan, parts: Iterable[Part], *, out: str | os.PathLike[str] | Non
     folder = Path(keep.name) / "run" if keep is not None else Path(os.fspath(out or ""))
     folder.mkdir(parents=True, exist_ok=True)
     (folder / "plan.json").write_bytes(plan.content)
+    names: set[str] = set()
     for part in parts:
         for name, content in part.items():
+            if name in names:
+                raise InputError(f"{name} is there twice: give every part once")
+            names.add(name)
             (folder / name).write_bytes(content)
     result = merge(folder)
-    result.path, result._keep = folder, keep
+    for name in names | {"plan.json"}:
+        (folder / name).unlink(missing_ok=True)
+    result._keep = keep
     return result

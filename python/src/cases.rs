@@ -27,7 +27,10 @@ use crate::verb::watched;
 /// Cases that are planned and run together: memory does not grow with the table beyond its result.
 const CASES: usize = 1 << 16;
 
-/// Columns of numbers, with their unit as an optional ending.
+/// Kilometres per hour, for each metre per second.
+const KMH: f64 = 3.6;
+
+/// Columns of numbers, with their unit as an optional ending; speeds also have `_kmh`.
 const NUMBERS: [(&str, &str); 13] = [
     ("ego_speed", "_mps"),
     ("speed", "_mps"),
@@ -89,7 +92,9 @@ fn rows_of(batch: &RecordBatch, category: Option<&str>, first_row: u64) -> Resul
     let mut seen: HashMap<&str, &str> = HashMap::new();
     for (field, array) in batch.schema_ref().fields().iter().zip(batch.columns()) {
         let name = field.name().as_str();
-        let is = |(key, unit): &&(&str, &str)| name == *key || name.strip_prefix(key) == Some(unit);
+        let is_kmh = |key: &str, unit: &str| unit == "_mps" && name.strip_prefix(key) == Some("_kmh");
+        let is =
+            |(key, unit): &&(&str, &str)| name == *key || name.strip_prefix(key) == Some(unit) || is_kmh(key, unit);
         if name == "category" && category.is_some() {
             return Err(of_column(name, "the argument `category` is given too".to_owned(), "leave out one of the two"));
         }
@@ -104,7 +109,7 @@ fn rows_of(batch: &RecordBatch, category: Option<&str>, first_row: u64) -> Resul
             rows.iter_mut().zip(found).for_each(|(row, text)| row.category = text);
             continue;
         }
-        let Some((key, _)) = NUMBERS.iter().find(is) else {
+        let Some((key, unit)) = NUMBERS.iter().find(is) else {
             let known = NUMBERS.map(|(key, unit)| format!("{key}{unit}")).join(", ");
             let help = format!("leave it out, or use one of category, {known}; units may be left out");
             return Err(of_column(name, "there is no such column".to_owned(), &help));
@@ -139,10 +144,22 @@ fn rows_of(batch: &RecordBatch, category: Option<&str>, first_row: u64) -> Resul
                 "length" => &mut row.length,
                 "width" => &mut row.width,
                 _ => &mut row.duration,
-            } = value;
+            } = value.map(|value| if is_kmh(key, unit) { value / KMH } else { value });
         }
     }
     Ok(rows)
+}
+
+/// A note on rows without a speed in a table that has speeds: the ego's is taken.
+fn missing_speed(rows: &[CaseParameters], first_row: u64) -> Option<String> {
+    let missing = rows.iter().filter(|row| row.speed.is_none()).count();
+    let first = rows.iter().position(|row| row.speed.is_none())?;
+    (missing < rows.len()).then(|| {
+        format!(
+            "column `speed`: {missing} rows, the first of them row {}, have no value: the ego's speed is used",
+            first_row + first as u64
+        )
+    })
 }
 
 /// What all cases share.
@@ -245,6 +262,7 @@ pub fn simulate(
             });
             for piece in pieces {
                 let of_piece = rows_of(&piece, options.category.as_deref(), first_row)?;
+                notes.extend(missing_speed(&of_piece, first_row));
                 notes.extend(run(of_piece, first_row, &options, &mut rows)?);
                 first_row += piece.num_rows() as u64;
                 frames.push(rows.batch()?);

@@ -244,13 +244,15 @@ pub fn frame_of_columns(columns: &Bound<'_, PyDict>) -> PyResult<Frame> {
     Ok(Frame::new(schema, vec![batch.map_err(|error| InputError::new_err(format!("the columns: {error}")))?]))
 }
 
-/// A table of records: a list of objects with equal keys, as JSON. A column has the type of its values; whole numbers
+/// A table of records: a list of objects with equal keys, as JSON; columns in this order, then the others. A column has the type of its values; whole numbers
 /// beside others become numbers.
 #[pyfunction]
-pub fn frame_of_records(py: Python<'_>, json: &str) -> PyResult<Frame> {
+#[pyo3(signature = (json, order=vec![]))]
+pub fn frame_of_records(py: Python<'_>, json: &str, order: Vec<String>) -> PyResult<Frame> {
     let records: Vec<serde_json::Map<String, Value>> =
         serde_json::from_str(json).map_err(|error| InternalError::new_err(format!("a table: {error}")))?;
-    let mut names: Vec<&String> = Vec::new();
+    let mut names: Vec<&String> =
+        order.iter().filter(|name| records.first().is_some_and(|record| record.contains_key(*name))).collect();
     for name in records.iter().flat_map(|record| record.keys()) {
         if !names.contains(&name) {
             names.push(name);

@@ -151,7 +151,7 @@ impl LimitState {
         Ok(PyArray1::from_vec(py, watched(py, None, None, work)?))
     }
 
-    /// The limit state of each point.
+    /// The limit state of each point; infinite outside the valid region, where the density is 0.
     fn __call__<'py>(
         &self,
         py: Python<'py>,
@@ -159,7 +159,15 @@ impl LimitState {
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let points = self.rows(py, &points)?;
         let opened = self.0.clone();
-        let values = watched(py, None, None, move || embedded::exclusively(|| opened.values(&points)))?;
+        let values = watched(py, None, None, move || {
+            let is_valid: Vec<bool> = points.iter().map(|point| opened.density.space.is_valid(point)).collect();
+            let valid = points.into_iter().zip(&is_valid).filter_map(|(point, is_valid)| is_valid.then_some(point));
+            let valid: Vec<Vec<f64>> = valid.collect();
+            let found = if valid.is_empty() { Vec::new() } else { embedded::exclusively(|| opened.values(&valid))? };
+            let mut found = found.into_iter();
+            let value = |is_valid: bool| if is_valid { found.next() } else { None }.unwrap_or(f64::INFINITY);
+            Ok(is_valid.into_iter().map(value).collect())
+        })?;
         Ok(PyArray1::from_vec(py, values))
     }
 }

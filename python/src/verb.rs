@@ -97,9 +97,9 @@ pub fn run(
     words: Vec<OsString>,
     on_progress: Option<&Bound<'_, PyAny>>,
     on_message: Option<&Bound<'_, PyAny>>,
-) -> PyResult<(u8, String)> {
+) -> PyResult<(u8, String, String)> {
     let answer = watched(py, on_progress, on_message, move || embedded::run(&words))?;
-    Ok((answer.exit.code(), answer.text))
+    Ok((answer.exit.code(), answer.text, answer.document))
 }
 
 /// The command line itself, with its own handling of signals. For a process that does nothing else.

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import os
 import signal
+import sys
 import threading
+from pathlib import Path
 from typing import Any
 
 import lanesweep
@@ -70,6 +72,7 @@ def fail(view: lanesweep.View) -> None:
         (lambda view: np.full(len(view), -1000.0), "-1000"),
         (lambda view: ["hard"] * len(view), "ValueError"),
         (None, "step 0"),
+        (lambda view: np.full(len(view), 0.5), "(?s)0.5 m/s.*may accelerate"),
     ],
 )
 def test_a_wrong_driver_is_an_error_with_its_cause(answer, message) -> None:
@@ -111,3 +114,12 @@ def test_an_interrupt_stops_a_slow_driver() -> None:
     with pytest.raises(KeyboardInterrupt):
         lanesweep.simulate(CASES, category="cut-in", models=[Wrong(slow)])
     assert len(lanesweep.simulate(CASES, category="cut-in", models="FSM")) == 200
+
+
+def test_the_example_in_jax_avoids_what_it_can() -> None:
+    pytest.importorskip("jax")
+    sys.path.insert(0, str(Path(__file__).parents[1] / "examples"))
+    from driver_in_jax import JaxDriver
+
+    counts = [lanesweep.simulate(CASES, category="cut-in", models=[model])["collision"].sum() for model in (JaxDriver(), Wrong(0))]
+    assert 0 < counts[0] < counts[1]

@@ -34,6 +34,18 @@ def test_wrong_points_and_arguments_are_refused(density, tmp_path) -> None:
         limit_state(np.zeros((3, d + 1)))
     with pytest.raises(lanesweep.InputError, match="row 1 has NaN"):
         limit_state(np.array([np.zeros(d), np.full(d, np.nan)]))
+    import pickle
+
+    import pandas as pd
+
+    invalid = np.full(d, -1000.0)
+    assert limit_state(invalid) == [np.inf] and limit_state.log_density(invalid) == [-np.inf]
+    points = limit_state.draw(20, rng=3)
+    frame = pd.DataFrame(points, columns=limit_state.parameters)
+    assert np.array_equal(limit_state(frame[limit_state.parameters[::-1]]), limit_state(points))
+    assert np.array_equal(pickle.loads(pickle.dumps(limit_state))(points), limit_state(points))
+    with pytest.raises(lanesweep.InputError, match="no column"):
+        limit_state(frame.iloc[:, 1:])
     with pytest.raises(lanesweep.InputError, match="3 dimensions"):
         limit_state(np.zeros((1, 1, d)))
     with pytest.raises(lanesweep.UsageError, match="headway"):

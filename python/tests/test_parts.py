@@ -33,6 +33,8 @@ def test_missing_parts_and_verbs_that_cannot_be_split_are_errors(density) -> Non
     plan = parts.plan(lanesweep.sample, density, samples=2000, thw=1.2, shards=3)
     with pytest.raises(lanesweep.InputError, match="missing"):
         parts.join(plan, [parts.run(plan, 0)])
+    with pytest.raises(lanesweep.InputError, match="twice"):
+        parts.join(plan, [parts.run(plan, 0)] * 2)
     with pytest.raises(ValueError, match="cannot be split"):
         parts.plan(lanesweep.check)
     with pytest.raises(lanesweep.UsageError):

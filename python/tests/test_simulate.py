@@ -87,6 +87,15 @@ def test_wrong_cases_are_named(change, message) -> None:
         lanesweep.simulate({**CASES, **change}, category="cut-in")
 
 
+def test_kilometres_per_hour_and_speeds_that_are_not_given() -> None:
+    kmh = {"ego_speed_kmh": [108.0, 90.0], "speed_kmh": [72.0, 72.0], "gap": [12, 40], "lateral_speed": [1.0, 1.5]}
+    mps = {"ego_speed": [30.0, 25.0], "speed": [20.0, 20.0], "gap": [12, 40], "lateral_speed": [1.0, 1.5]}
+    ours, theirs = (lanesweep.simulate(table, category="cut-in", models="FSM").to_pandas() for table in (kmh, mps))
+    pd.testing.assert_frame_equal(ours, theirs)
+    with pytest.warns(UserWarning, match="speed.*row 1.*the ego's speed"):
+        lanesweep.simulate(pd.DataFrame(mps).assign(speed=[20.0, None]), category="cut-in", models="FSM")
+
+
 def test_what_is_no_table_is_refused() -> None:
     with pytest.raises(TypeError, match="no table"):
         lanesweep.simulate([1, 2, 3])

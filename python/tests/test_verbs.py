@@ -54,6 +54,8 @@ def test_a_result_has_tables_figures_and_a_page(scenarios) -> None:
     assert headways.num_rows == len(result.table("headways"))
     assert "<svg" in result.figure("radar-cut-in").svg
     assert "<iframe" in result._repr_html_() and "SYNTHETIC" in str(result)
+    header = (Path(result) / "f1.csv").read_text().splitlines()[0].split(",")
+    assert result.table("f1").columns == [name for name in header if name != "data"]
     with pytest.raises(KeyError, match="there are .*f1"):
         result.table("f2")
     folder = Path(result)

@@ -30,8 +30,10 @@ LEFT_OUT = {"out", "format", "quiet", "verbose", "tables"}
 WIDTH = 120
 
 
-def name_of(argument: dict) -> str:
-    name = {"dir": "recordings"}.get(argument["id"], argument["id"])
+def name_of(argument: dict, verb: str) -> str:
+    name = argument["id"]
+    if name == "dir":
+        name = "folder" if verb in ("synth", "cluster merge") else "recordings"
     return name + "_" if keyword.iskeyword(name) else name
 
 
@@ -60,7 +62,7 @@ def documented(verb: dict, arguments: list[dict], default_out: str | None) -> st
         note = f", {unit}" if unit and unit.islower() and unit not in {"auto|cpu|gpu"} and len(unit) < 8 else ""
         default = f", default {argument['default']}" if argument["default"] and argument["takes_value"] else ""
         kind = type_of(argument).replace(" | None", "")
-        lines.append(f"    {name_of(argument)} : {kind}{note}{default}")
+        lines.append(f"    {name_of(argument, verb['verb'])} : {kind}{note}{default}")
         parts = [part.strip().rstrip(".") for part in argument["help"].split("\n\n") if part.strip()]
         lines.append(paragraph(". ".join(parts).replace("\\", "\\\\") + ".", 8))
         if argument["choices"] and argument["takes_value"]:
@@ -77,21 +79,24 @@ def function(verb: dict) -> str:
     arguments = [argument for argument in verb["arguments"] if argument["id"] not in LEFT_OUT]
     positions = [argument for argument in arguments if argument["flag"] is None]
     flags = [argument for argument in arguments if argument["flag"] is not None]
-    parameters = [f"    {name_of(a)}: {type_of(a) if not a['is_required'] else 'Value'}" + ("" if a["is_required"] else " = None") for a in positions]
+    name_in = {a["id"]: name_of(a, verb["verb"]) for a in arguments}
+    parameters = [f"    {name_in[a['id']]}: " + ("Value" if a["is_required"] else f"{type_of(a)} = None") for a in positions]
     parameters.append("    *,")
-    parameters += [f"    {name_of(a)}: {type_of(a)} = {'None' if a['takes_value'] else 'False'}" for a in flags]
+    parameters += [f"    {name_in[a['id']]}: {type_of(a)} = {'None' if a['takes_value'] else 'False'}" for a in flags]
     has_out = "out" in has
     if has_out:
         is_required = any(a["id"] == "out" and a["is_required"] for a in verb["arguments"])
         parameters.append("    out: Path" if is_required else "    out: Path | None = None")
     parameters = [line if line.endswith(",") else line + "," for line in parameters]
-    given = [f"        ({a['flag']!r}, {name_of(a)}, {a['is_list'] or a['value_name'] == 'LIST'})," for a in arguments]
+    given = [f"        ({a['flag']!r}, {name_in[a['id']]}, {a['is_list'] or a['value_name'] == 'LIST'})," for a in arguments]
     call = [f"    return run(", f"        {verb['verb']!r},", "        ["]
     call += ["    " + line for line in given] + ["        ],"]
     if has_out:
         call.append("        out=out,")
         call.append(f"        default_out={default_out!r},")
-    call += [f"        document={'format' in has},", "    )"]
+    elif verb["verb"] in ("synth", "cluster merge"):
+        call.append("        path=folder,")
+    call.append("    )")
     body = documented(verb, arguments, default_out if has_out else None)
     return "\n".join([f"def {name}(", *parameters, ") -> Result:", body, *call])
 

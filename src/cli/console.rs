@@ -37,6 +37,8 @@ pub enum Verbosity {
 pub(super) struct Captured {
     /// What the program would print on stdout.
     pub text: String,
+    /// The same numbers as one JSON document, if the verb has one.
+    pub document: String,
     /// Lines of the log and of stderr.
     pub messages: Vec<(Level, String)>,
     /// The bar of the present work.

@@ -20,6 +20,8 @@ pub struct Answer {
     pub exit: Exit,
     /// Text, JSON or CSV.
     pub text: String,
+    /// The numbers of the text as one JSON document; empty if the verb has none.
+    pub document: String,
 }
 
 /// Stack of the threads that run a verb, bytes.
@@ -33,11 +35,11 @@ pub fn run(words: &[OsString]) -> Result<Answer> {
     exclusively(|| {
         console::set_command_line(words);
         let result = without_panic(|| parse_and_run(words));
-        let text = console::captured().as_mut().map(|captured| {
+        let (text, document) = console::captured().as_mut().map_or_else(Default::default, |captured| {
             captured.bar = None;
-            std::mem::take(&mut captured.text)
+            (std::mem::take(&mut captured.text), std::mem::take(&mut captured.document))
         });
-        Ok(Answer { exit: result?, text: text.unwrap_or_default() })
+        Ok(Answer { exit: result?, text, document })
     })
 }
 

@@ -35,10 +35,21 @@ impl FormatFlag {
 
     /// Prints one of the two; only that one is built.
     pub fn print(self, text: impl FnOnce() -> String, json: impl FnOnce() -> Result<String>) -> Result<()> {
-        match self.format {
-            Format::Text => console::print(&text()),
-            Format::Json => console::print_json(&json()?),
+        if console::captured().is_none() {
+            return match self.format {
+                Format::Text => console::print(&text()),
+                Format::Json => console::print_json(&json()?),
+            };
         }
+        // The owner of what is captured gets both.
+        let document = json()?;
+        if self.is_json() {
+            console::print_json(&document)?
+        } else {
+            console::print(&text())?
+        }
+        console::captured().iter_mut().for_each(|captured| captured.document.clone_from(&document));
+        Ok(())
     }
 
     /// Like [`FormatFlag::print`], for results in a folder.

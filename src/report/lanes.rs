@@ -213,7 +213,7 @@ pub fn case_columns() -> Vec<Column> {
     let c = Column::new;
     let mut columns = vec![
         c("case", ColumnKind::Whole, "1", "Row of the case, from 0."),
-        c("headway", ColumnKind::Name, "", "Initial time headway or gap with its unit; `observed` where the case has its own gap."),
+        c("headway", ColumnKind::Name, "", "Initial time headway or gap with its unit; null where each case has its own."),
         c("model", ColumnKind::Name, "", "Driver model."),
     ];
     columns.extend(outcome_columns());
@@ -222,7 +222,8 @@ pub fn case_columns() -> Vec<Column> {
 
 /// A row of [`case_columns`].
 pub fn case_row<'a>(case: u64, headway: Headway, model: &'a str, outcome: &Outcome<f64>, dt_s: f64) -> Vec<Cell<'a>> {
-    let mut row = vec![Cell::Whole(case as i64), Cell::text(headway.to_string()), Cell::text(model)];
+    let headway = (headway != Headway::Observed).then(|| headway.to_string());
+    let mut row = vec![Cell::Whole(case as i64), headway.map_or(Cell::Null, Cell::text), Cell::text(model)];
     row.extend(outcome_cells(outcome, dt_s));
     row
 }

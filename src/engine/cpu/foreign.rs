@@ -136,7 +136,7 @@ pub(in crate::engine) fn run_one<R: Real>(
         observer.step(&Step { index, v_ego, seen: moved.0.seen, hazard: moved.0.hazard });
         let seen = std::iter::once((0, &lane, case));
         let found = accelerations(columns_of(index, constants.dt_s, seen, std::slice::from_ref(&moved)))?;
-        check(model, &found, 1, index, |_| "of a single run".to_owned())?;
+        check(model, driver, &found, 1, index, |_| "of a single run".to_owned())?;
         if let Some(outcome) = lane.steer(&setting, case, &moved, found[0]) {
             return Ok(outcome);
         }
@@ -185,7 +185,7 @@ pub(in crate::engine) fn run_block(
         let moved: Vec<_> = running.par_iter().map(moved).collect();
         let seen = running.iter().map(|&at| (at, &lanes[at], &cases[lanes[at].case].0));
         let found = accelerations(columns_of(step, constants.dt_s, seen, &moved))?;
-        check(model, &found, running.len(), step, |at| key(running[at]))?;
+        check(model, driver, &found, running.len(), step, |at| key(running[at]))?;
         let mut still_running = Vec::with_capacity(running.len());
         for ((&at, moved), acceleration) in running.iter().zip(&moved).zip(found) {
             let lane = &mut lanes[at];
@@ -201,18 +201,30 @@ pub(in crate::engine) fn run_block(
 }
 
 /// Checks what the driver returned for the running lanes; `key` names one of them.
-fn check(model: ModelId, found: &[f32], lanes: usize, step: u32, key: impl Fn(usize) -> String) -> Result<()> {
-    let driver = || Place::item(format!("driver {}, step {step}", model.name()));
+fn check(
+    model: ModelId,
+    driver: &dyn VectorDriver,
+    found: &[f32],
+    lanes: usize,
+    step: u32,
+    key: impl Fn(usize) -> String,
+) -> Result<()> {
+    let place = || Place::item(format!("driver {}, step {step}", model.name()));
     if found.len() != lanes {
         let problem = format!("it returned {} accelerations for {lanes} lanes", found.len());
-        return Err(Error::input(driver(), problem, "return one number per lane, in m/s²"));
+        return Err(Error::input(place(), problem, "return one number per lane, in m/s²"));
     }
+    let most = if driver.may_accelerate() { MAX_ACCELERATION_MPS2 } else { 0.0 };
     // A NaN is wrong too.
-    let is_right = |acceleration: &f32| acceleration.abs() <= MAX_ACCELERATION_MPS2;
+    let is_right = |acceleration: &f32| (-MAX_ACCELERATION_MPS2..=most).contains(acceleration);
     let Some(at) = found.iter().position(|acceleration| !is_right(acceleration)) else { return Ok(()) };
     let problem = format!("its acceleration is {} m/s² in lane {}", found[at], key(at));
-    let help = format!("return finite numbers of at most {MAX_ACCELERATION_MPS2} m/s²");
-    Err(Error::input(driver(), problem, help))
+    let help = if found[at] > 0.0 && most == 0.0 {
+        "say that the driver may accelerate, or return at most 0".to_owned()
+    } else {
+        format!("return finite numbers of at most {MAX_ACCELERATION_MPS2} m/s²")
+    };
+    Err(Error::input(place(), problem, help))
 }
 
 /// The other vehicles of a case at a step.
@@ -375,7 +387,7 @@ mod tests {
 
     #[test]
     fn a_wrong_acceleration_names_driver_step_and_lane() {
-        for wrong in [f32::NAN, f32::NEG_INFINITY, 101.0] {
+        for wrong in [f32::NAN, f32::NEG_INFINITY, 101.0, 0.5] {
             let plan = plan(vec![wrapped("wrong", Some(wrong))]);
             let error = outcomes(&plan, CpuBackend::lane_arithmetic()).unwrap_err().to_string();
             assert!(error.starts_with("driver wrong, step 3: its acceleration is "), "{error}");
