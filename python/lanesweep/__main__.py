@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import signal
 import sys
 
 from . import _core
@@ -10,8 +11,9 @@ from . import _core
 
 def main() -> None:
     """Run the command line of this process and end it with the program's exit code."""
+    # The program handles signals itself.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
     code = _core.main(sys.argv[1:])
-    sys.stdout.flush()
     # The program has flushed its output; threads of drivers are not waited for.
     os._exit(code)
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import abc
 import hashlib
 import inspect
+import pickle
 import textwrap
 import threading
 import uuid
@@ -75,42 +76,60 @@ class Driver(abc.ABC):
         """
 
 
-_registered: dict[int, tuple[Driver, str]] = {}
+#: Drivers by what the engine knows them by: name and fingerprint.
+_registered: dict[str, Driver] = {}
+#: Fingerprints of drivers that have none of their own: never taken for another's.
+_unknown: dict[int, tuple[Driver, str]] = {}
 _lock = threading.Lock()
 
 
-def _fingerprint(driver: Driver) -> str:
-    """Distinguish drivers of one name: by the code of the class and the values of the instance."""
+def fingerprint(driver: Driver) -> str:
+    """Distinguish drivers of one name: by the code of their classes, and by their values."""
+    digest = hashlib.sha256()
     try:
-        code = textwrap.dedent(inspect.getsource(type(driver)))
-        values = repr(sorted(vars(driver).items()))
-        if " at 0x" in values or "..." in values:
-            raise ValueError("the values have no text")
-    except (OSError, TypeError, ValueError):
-        # Never taken for another: a run with this driver is not resumed by another process.
-        return uuid.uuid4().hex[:16]
-    return hashlib.sha256(f"{code}\n{values}".encode()).hexdigest()[:16]
+        for kind in type(driver).__mro__:
+            if kind in (Driver, object) or kind.__module__ == "abc":
+                continue
+            digest.update(textwrap.dedent(inspect.getsource(kind)).encode())
+            for name, value in sorted(vars(kind).items()):
+                if name.startswith("__") or name in ("_abc_impl",):
+                    continue
+                function = getattr(value, "__func__", value)
+                if inspect.isfunction(function):
+                    cells = [name for name in function.__code__.co_freevars if name != "__class__"]
+                    if cells or function.__defaults__ or function.__kwdefaults__:
+                        # Its source does not say what it computes.
+                        raise ValueError("a function holds values")
+                else:
+                    digest.update(pickle.dumps((name, value)))
+        digest.update(pickle.dumps(sorted(vars(driver).items())))
+    except Exception:
+        # No source, or values that cannot be pickled: a run with this driver is not resumed by another process.
+        with _lock:
+            return _unknown.setdefault(id(driver), (driver, uuid.uuid4().hex[:16]))[1]
+    return digest.hexdigest()[:16]
 
 
-def register(driver: Driver) -> str:
-    """Make a driver known to the engine and return its name."""
+def register(driver: Driver, known_as: str | None = None) -> str:
+    """Make a driver known to the engine; return its name and fingerprint, which is another process's if given."""
     name = driver.name or type(driver).__name__
+    identity = known_as or f"{name}@{fingerprint(driver)}"
     with _lock:
-        fingerprint = _fingerprint(driver)
-        known = _registered.get(id(driver))
-        if known is None or known[0] is not driver or known[1] != fingerprint:
-            _core.register(name, fingerprint, driver, bool(driver.may_accelerate), driver.attention)
-            _registered[id(driver)] = (driver, fingerprint)
-        elif len(_registered) > 1:
-            # The last registration of a name counts.
-            _core.register(name, fingerprint, driver, bool(driver.may_accelerate), driver.attention)
-    return name
+        if identity not in _registered:
+            _core.register(name, identity.rpartition("@")[2], driver, bool(driver.may_accelerate), driver.attention)
+            _registered[identity] = driver
+    return identity
 
 
 def names_of(models: Any) -> list[str]:
-    """Names of models; drivers are registered."""
+    """Names of models as the engine knows them; drivers are registered."""
     if models is None:
         return []
     if isinstance(models, (str, Driver)):
         models = [models]
-    return [register(model) if isinstance(model, Driver) else str(model) for model in models]
+    names = [register(model) if isinstance(model, Driver) else str(model) for model in models]
+    shown = [name.partition("@")[0] for name in names]
+    for at, name in enumerate(shown):
+        if name in shown[:at] and names[at] not in names[:at]:
+            raise _core.UsageError(f"two drivers are called {name}: give one of them another `name`")
+    return names

@@ -34,8 +34,9 @@ _NO_NUMBER = {"inf", "-inf", "NaN"}
 class Figure:
     """A figure in SVG; notebooks show it."""
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, keep: Any = None) -> None:
         self.path = path
+        self._keep = keep
 
     @property
     def svg(self) -> str:
@@ -132,7 +133,7 @@ class Result:
         path = self.path / f"{name}.svg" if self.path is not None else None
         if path is None or not path.is_file():
             raise KeyError(f"there is no figure `{name}`; there are {', '.join(self.figures)}")
-        return Figure(path)
+        return Figure(path, self._keep)
 
     def save(self, folder: str | os.PathLike[str]) -> Path:
         """Copy the files into a new folder."""

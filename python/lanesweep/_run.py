@@ -67,6 +67,8 @@ def word(value: Any) -> str:
 
 def words_of(value: Any, *, is_list: bool) -> list[str]:
     """Write a value, or several, as on the command line."""
+    if hasattr(value, "tolist"):
+        value = value.tolist()  # of NumPy
     if isinstance(value, dict):
         value = [f"{name}={word(one)}" for name, one in value.items()]
     several = [word(value)] if isinstance(value, (str, os.PathLike)) or not isinstance(value, Sequence) else [*map(word, value)]
@@ -115,6 +117,7 @@ def run(
     words: list[str] = verb.split()
     positions: list[str] = []
     for flag, value, is_list in arguments:
+        value = value.item() if hasattr(value, "item") and getattr(value, "ndim", None) == 0 else value
         if value is None or value is False or (isinstance(value, (list, tuple)) and not value):
             continue
         if flag is None:

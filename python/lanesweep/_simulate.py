@@ -19,25 +19,35 @@ if TYPE_CHECKING:
     from ._verbs import Models, Path, Values
 
 
+def _column(name: str, values: Any) -> Any:
+    """Values of a column: numbers, in which NaN stands for a value that is not given, or texts."""
+    if np.ma.isMaskedArray(values):
+        values = np.ma.filled(np.ma.asarray(values, dtype=np.float64), np.nan)
+    array = np.asarray(values)
+    if array.ndim > 1:
+        raise _core.InputError(f"column `{name}` has the shape {array.shape}: give one value per case, or one for all")
+    if array.dtype.kind in "biuf":
+        return array.astype(np.float64)
+    items = [None if value is None or type(value).__name__ == "NAType" else value for value in array.reshape(-1).tolist()]
+    if any(isinstance(value, str) for value in items) or array.dtype.kind in "cmM":
+        if not all(value is None or isinstance(value, str) for value in items):
+            raise _core.InputError(f"column `{name}` holds {array.dtype}; expected numbers, or texts for `category`")
+        return np.array(items, dtype=object).reshape(array.shape)
+    try:
+        return np.array([np.nan if value is None else float(value) for value in items]).reshape(array.shape)
+    except (TypeError, ValueError) as error:
+        raise _core.InputError(f"column `{name}`: {error}; expected numbers, or texts for `category`") from None
+
+
 def _frame_of(columns: Mapping[str, Any]) -> Frame:
     """Make a table of columns; a scalar holds for all rows."""
-    arrays = {name: np.asarray(values) for name, values in columns.items()}
+    arrays = {str(name): _column(str(name), values) for name, values in columns.items()}
     lengths = {array.size for array in arrays.values() if array.ndim == 1}
-    if len(lengths) > 1 or any(array.ndim > 1 for array in arrays.values()):
+    if len(lengths) > 1:
         raise _core.InputError(f"the columns differ in length ({sorted(lengths)}): give one value per case, or one for all")
     count = lengths.pop() if lengths else 1
-    table: dict[str, Any] = {}
-    for name, array in arrays.items():
-        full = np.broadcast_to(array, (count,))
-        if full.dtype.kind in "biuf":
-            table[name] = np.ascontiguousarray(full, dtype=np.float64)
-        elif all(value is None or isinstance(value, str) for value in full.tolist()):
-            table[name] = full.tolist()
-        else:
-            try:
-                table[name] = np.ascontiguousarray(full, dtype=np.float64)
-            except (TypeError, ValueError) as error:
-                raise _core.InputError(f"column `{name}`: {error}; expected numbers, or texts for `category`") from None
+    full = {name: np.broadcast_to(array, (count,)) for name, array in arrays.items()}
+    table = {name: array.tolist() if array.dtype == object else np.ascontiguousarray(array) for name, array in full.items()}
     return _core.frame_of_columns(table)
 
 
@@ -81,17 +91,25 @@ def simulate(
     Returns
     -------
     Frame
-        A row per case, headway and model, the last varying fastest: verdicts, minima and maxima, times in s, speeds in m/s.
+        A row per case, headway and model, the last varying fastest: verdicts, minima and maxima, times in s, speeds in m/s. Lanes
+        are in binary32, as in a study; `trace` is in binary64.
 
     Raises
     ------
     InputError
         With row (from 0) and column of a wrong value.
     """
+    library = type(cases).__module__.split(".")[0]
     if isinstance(cases, Mapping):
         cases = _frame_of(cases)
-    elif type(cases).__module__.split(".")[0] == "pandas" and not _has_arrow(cases):
-        cases = _frame_of({str(name): cases[name].to_numpy() for name in cases.columns})
+    elif library == "pandas" and hasattr(cases, "reset_index"):
+        # Rows are counted from 0, whatever the index says; it is no column.
+        cases = cases.reset_index(drop=True)
+        if not _has_arrow(cases):
+            cases = _frame_of({name: cases[name].to_numpy() for name in cases.columns})
+    elif library == "polars" and hasattr(cases, "schema"):
+        # Columns without any value have no type, and nothing to say.
+        cases = cases.select([name for name, kind in cases.schema.items() if str(kind) != "Null"])
     frame, notes = _core.simulate(
         cases,
         category=category,
@@ -150,6 +168,8 @@ class LimitState(_core.LimitState):
         backend: str = "cpu",
         device: str | None = None,
     ) -> LimitState:
+        if not isinstance(model, (str, Driver)):
+            raise _core.UsageError(f"`model` is {model!r}; give one model: a name or a Driver")
         made = super().__new__(
             cls,
             os.fspath(density),
@@ -170,7 +190,8 @@ class LimitState(_core.LimitState):
         return _opened, self._arguments
 
     def __call__(self, points: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        return super().__call__(self._array(points))
+        array = self._array(points)
+        return super().__call__(array) if len(array) else np.empty(0)
 
     def is_valid(self, points: npt.ArrayLike) -> npt.NDArray[np.bool_]:
         return super().is_valid(self._array(points))
@@ -180,6 +201,8 @@ class LimitState(_core.LimitState):
 
     def _array(self, points: Any) -> npt.NDArray[np.float64]:
         """Points as an array; columns of a data frame by their names."""
+        if np.ma.isMaskedArray(points):
+            points = np.ma.filled(points, np.nan)
         if hasattr(points, "columns") and hasattr(points, "__getitem__"):
             missing = [name for name in self.parameters if name not in list(points.columns)]
             if missing:

@@ -14,7 +14,9 @@ f32 = np.float32
 
 
 class Reg157(Driver):
-    """The performance model of UN R157, 5.2.5.2, as the built-in `Reg157` has it, to the bit.
+    """The performance model of UN R157, 5.2.5.2, with the verdicts, minima and ends of the built-in `Reg157`, to the bit.
+
+    `reaction_s` differs: here it is the first braking, there the first unsafe step, which the reaction time precedes.
 
     It brakes at 6 m/s² after 0.35 s once ``|gap / dv| <= dv / (2 * 6) + 0.35 s + margin`` for a vehicle beside or in its
     lane. Once it holds, the deceleration ends with the condition; the reaction time passes once.

@@ -38,14 +38,18 @@ class Plan:
         The plan file.
     shards : int
         Number of parts.
-    drivers : tuple of Driver
-        Drivers in Python that the plan names.
+    drivers : tuple of (Driver, str)
+        Drivers in Python that the plan names, and how.
     """
 
     verb: str
     content: bytes = field(repr=False)
     shards: int
-    drivers: tuple[Driver, ...] = ()
+    drivers: tuple[tuple[Driver, str], ...] = ()
+
+    def _register(self) -> None:
+        for driver, known_as in self.drivers:
+            register(driver, known_as)
 
 
 def plan(function: Callable[..., Result], *args: Any, shards: int = 8, **arguments: Any) -> Plan:
@@ -67,8 +71,10 @@ def plan(function: Callable[..., Result], *args: Any, shards: int = 8, **argumen
     if shards < 1:
         raise ValueError(f"{shards} parts; give at least 1")
     models = arguments.get("models")
-    several = models if isinstance(models, (list, tuple)) else [models]
-    drivers = tuple(model for model in several if isinstance(model, Driver))
+    several = [models] if models is None or isinstance(models, (str, Driver)) else list(models)
+    if models is not None:
+        arguments["models"] = several
+    drivers = tuple((model, register(model)) for model in several if isinstance(model, Driver))
     with temporary() as folder:
         function(*args, **arguments, plan_only=True, out=folder)
         content = (Path(folder) / "plan.json").read_bytes()
@@ -83,8 +89,7 @@ def run(plan: Plan, shard: int, *, backend: str = "cpu", threads: int | None = N
     dict of str to bytes
         The files of the part.
     """
-    for driver in plan.drivers:
-        register(driver)
+    plan._register()
     with temporary() as folder:
         path = Path(folder) / "plan.json"
         path.write_bytes(plan.content)
@@ -107,8 +112,7 @@ def join(plan: Plan, parts: Iterable[Part], *, out: str | os.PathLike[str] | Non
     -------
     Result
     """
-    for driver in plan.drivers:
-        register(driver)
+    plan._register()
     keep = temporary() if out is None else None
     folder = Path(keep.name) / "run" if keep is not None else Path(os.fspath(out or ""))
     folder.mkdir(parents=True, exist_ok=True)
@@ -116,6 +120,8 @@ def join(plan: Plan, parts: Iterable[Part], *, out: str | os.PathLike[str] | Non
     names: set[str] = set()
     for part in parts:
         for name, content in part.items():
+            if Path(name).name != name or not name.startswith("part-"):
+                raise InputError(f"`{name}` is no file of a part")
             if name in names:
                 raise InputError(f"{name} is there twice: give every part once")
             names.add(name)

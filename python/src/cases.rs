@@ -172,6 +172,16 @@ struct Options {
     implausible: Implausible,
 }
 
+/// A headway as Python gives it: seconds, or a text with its unit.
+pub fn headway_of(text: &str) -> Result<Headway> {
+    let parsed = Headway::parse(text).or_else(|| Headway::parse(&format!("{text}s")));
+    parsed.filter(|headway| *headway != Headway::Observed).ok_or_else(|| {
+        let help = "give seconds of at least 0, or a text such as 1.2s, 30m, r157";
+        Error::usage(Place::option("thw"), format!("`{text}` is no headway"), help)
+    })
+}
+
+#[allow(clippy::too_many_arguments)] // as `simulate`
 fn options(
     category: Option<String>,
     models: &[String],
@@ -192,21 +202,11 @@ fn options(
             Error::usage(Place::option("models"), problem, format!("use one of {}, or a Driver", ModelId::names()))
         })
     };
-    let headway = |text: &String| {
-        let parsed = text.parse().ok().map(Headway::ThwS).or_else(|| Headway::parse(text));
-        parsed.filter(|headway| *headway != Headway::Observed).ok_or_else(|| {
-            Error::usage(
-                Place::option("thw"),
-                format!("`{text}` is no headway"),
-                "give seconds, or texts such as 1.2s, 30m, r157",
-            )
-        })
-    };
     let models: Vec<ModelId> = models.iter().map(model).collect::<Result<_>>()?;
     Ok(Options {
         category,
         models: if models.is_empty() { ModelId::ALL.to_vec() } else { models },
-        headways: thw.iter().map(headway).collect::<Result<_>>()?,
+        headways: thw.iter().map(|text| headway_of(text)).collect::<Result<_>>()?,
         profile,
         backend: OpenBackend::open(backend.parse()?, device.map(str::parse).transpose()?.as_ref())?
             .with_cancel(embedded::token()),

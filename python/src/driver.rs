@@ -144,7 +144,7 @@ impl VectorDriver for PythonDriver {
     }
 
     fn start(&self, lanes: usize, dt_s: f64) -> Result<Accelerations<'_>> {
-        let state = Python::attach(|py| {
+        let state = attached(|py| {
             let state = self.driver.bind(py).call_method1("start", (lanes, dt_s));
             state.map(Bound::unbind).map_err(|raised| self.failed(py, "start", raised))
         })?;
@@ -153,12 +153,18 @@ impl VectorDriver for PythonDriver {
                 return Err(Error::Interrupted { done: "a driver was stopped".to_owned(), is_kept: false });
             }
             let (step, count) = (columns.step, columns.lane.len());
-            Python::attach(|py| {
+            attached(|py| {
                 let found = accelerations(py, self.driver.bind(py), state.bind(py), columns, count);
                 found.map_err(|raised| self.failed(py, &format!("step {step}"), raised))
             })
         }))
     }
+}
+
+/// Calls Python, unless the interpreter is ending.
+fn attached<T>(work: impl for<'py> FnOnce(Python<'py>) -> Result<T>) -> Result<T> {
+    let ending = || Error::Interrupted { done: "the interpreter ends".to_owned(), is_kept: false };
+    Python::try_attach(work).unwrap_or_else(|| Err(ending()))
 }
 
 fn accelerations(

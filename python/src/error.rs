@@ -3,7 +3,7 @@
 use lanesweep::Error;
 use lanesweep::cli::Exit;
 use pyo3::create_exception;
-use pyo3::exceptions::{PyException, PyKeyboardInterrupt};
+use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 
 create_exception!(lanesweep._core, LanesweepError, PyException, "An error of lanesweep; see `help` and `exit_code`.");
@@ -18,6 +18,7 @@ create_exception!(
 create_exception!(lanesweep._core, DeviceError, LanesweepError, "There is no usable device, or it failed.");
 create_exception!(lanesweep._core, VerificationError, LanesweepError, "A requested check failed.");
 create_exception!(lanesweep._core, BusyError, LanesweepError, "Another run uses this process or folder.");
+create_exception!(lanesweep._core, RunStopped, LanesweepError, "A time limit ended the run.");
 create_exception!(lanesweep._core, InternalError, LanesweepError, "A defect of lanesweep.");
 
 pub fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
@@ -30,6 +31,7 @@ pub fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
         py.get_type::<DeviceError>(),
         py.get_type::<VerificationError>(),
         py.get_type::<BusyError>(),
+        py.get_type::<RunStopped>(),
         py.get_type::<InternalError>(),
     ] {
         module.add(class.name()?.to_str()?, &class)?;
@@ -51,7 +53,7 @@ pub fn exception(py: Python<'_>, error: &Error) -> PyErr {
         Error::Device { .. } => DeviceError::new_err(text),
         Error::Verification(_) => VerificationError::new_err(text),
         Error::Busy { .. } => BusyError::new_err(text),
-        Error::Interrupted { .. } => return PyKeyboardInterrupt::new_err(text),
+        Error::Interrupted { .. } => RunStopped::new_err(text),
         _ => InternalError::new_err(text),
     };
     // A value that cannot be set is missing from the exception; the text has all of it.

@@ -233,7 +233,10 @@ pub fn frame_of_columns(columns: &Bound<'_, PyDict>) -> PyResult<Frame> {
     let (mut fields, mut arrays): (Vec<Field>, Vec<ArrayRef>) = (Vec::new(), Vec::new());
     for (name, values) in columns.iter() {
         let array: ArrayRef = match values.extract::<PyReadonlyArray1<'_, f64>>() {
-            Ok(numbers) => Arc::new(Float64Array::from_iter_values(numbers.as_array().iter().copied())),
+            // NumPy has no null.
+            Ok(numbers) => {
+                Arc::new(Float64Array::from_iter(numbers.as_array().iter().map(|n| (!n.is_nan()).then_some(*n))))
+            }
             Err(_) => Arc::new(StringArray::from(values.extract::<Vec<Option<String>>>()?)),
         };
         fields.push(Field::new(name.extract::<String>()?, array.data_type().clone(), true));

@@ -4,7 +4,7 @@ use std::path::PathBuf;
 use std::sync::Arc;
 
 use lanesweep::cli::embedded;
-use lanesweep::engine::{Headway, OpenBackend};
+use lanesweep::engine::OpenBackend;
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
@@ -15,6 +15,7 @@ use lanesweep::{Error, Place, Result};
 use numpy::{PyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
+use crate::cases::headway_of;
 use crate::error::exception;
 use crate::verb::watched;
 
@@ -51,13 +52,7 @@ fn open(
     })?;
     let headway = match thw {
         None => SampleHeadways::Sampled,
-        Some(text) => {
-            let parsed = text.parse().ok().map(Headway::ThwS).or_else(|| Headway::parse(&text));
-            let help = "give seconds, or a text such as 1.2s, 30m, r157";
-            SampleHeadways::Each(vec![
-                parsed.ok_or_else(|| Error::usage(Place::option("thw"), format!("`{text}` is no headway"), help))?,
-            ])
-        }
+        Some(text) => SampleHeadways::Each(vec![headway_of(&text)?]),
     };
     let backend = OpenBackend::open(backend.parse()?, device.map(str::parse).transpose()?.as_ref())?;
     let opened = Opened {
@@ -91,6 +86,7 @@ impl Opened {
 impl LimitState {
     #[new]
     #[pyo3(signature = (density, *, model, criterion, thw, profile, backend, device))]
+    #[allow(clippy::too_many_arguments)] // keyword arguments of the Python class
     fn new(
         py: Python<'_>,
         density: PathBuf,
@@ -142,13 +138,13 @@ impl LimitState {
         points: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let points = self.rows(py, &points)?;
-        let opened = self.0.clone();
-        let work = move || {
-            let truncated = truncated(&opened.density)?;
-            let log_share = truncated.validity_fraction().ln();
-            Ok(points.iter().map(|point| truncated.log_density(point) - log_share).collect::<Vec<f64>>())
-        };
-        Ok(PyArray1::from_vec(py, watched(py, None, None, work)?))
+        let density = &self.0.density;
+        let values = py.detach(|| {
+            let truncated = truncated(density)?;
+            let log_fraction = truncated.validity_fraction().ln();
+            Ok(points.iter().map(|point| truncated.log_density(point) - log_fraction).collect::<Vec<f64>>())
+        });
+        Ok(PyArray1::from_vec(py, values.map_err(|error: Error| exception(py, &error))?))
     }
 
     /// The limit state of each point; infinite outside the valid region, where the density is 0.

@@ -8,6 +8,7 @@ use std::time::Duration;
 
 use lanesweep::cli::embedded;
 use lanesweep::{Error, Result};
+use pyo3::exceptions::PyException;
 use pyo3::prelude::*;
 
 use crate::driver;
@@ -46,17 +47,23 @@ pub fn watched<T: Send + 'static>(
             Err(RecvTimeoutError::Timeout) => {
                 if let Err(error) = py.check_signals() {
                     embedded::cancel();
-                    signal = signal.or(Some(error));
+                    if signal.is_some() {
+                        // The work does not look for the request: it goes on alone, and the next call is refused until it ends.
+                        return Err(error);
+                    }
+                    signal = Some(error);
                 }
             }
         }
     };
-    // The exception of a driver says more than the error that it caused.
-    let raised = driver::take_exception();
+    // The exception of a driver says more than the error that it caused. Only work that has a driver leaves one.
+    let raised = driver::take_exception().filter(|_| result.is_err());
     if let Some(error) = signal.or(failed) {
         return Err(error);
     }
     result.map_err(|error| match raised {
+        // What ends the program is no error of the driver.
+        Some(cause) if !cause.is_instance_of::<PyException>(py) => cause,
         Some(cause) => {
             let error = match error {
                 // A single lane, whose run cannot fail by itself.

@@ -2,7 +2,7 @@
 //! what it would print. It handles no signals; its owner can watch it and end it from another thread.
 
 use std::ffi::OsString;
-use std::sync::{Mutex, TryLockError};
+use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 
 use serde_json::Value;
 
@@ -32,7 +32,7 @@ pub const STACK_BYTES: usize = 8 << 20;
 /// # Errors
 /// [`Error::Usage`] for a wrong command line; [`Error::Busy`] while another verb runs; those of the verb.
 pub fn run(words: &[OsString]) -> Result<Answer> {
-    exclusively(|| {
+    alone(|| {
         console::set_command_line(words);
         let result = without_panic(|| parse_and_run(words));
         let (text, document) = console::captured().as_mut().map_or_else(Default::default, |captured| {
@@ -48,7 +48,11 @@ pub fn run(words: &[OsString]) -> Result<Answer> {
 ///
 /// # Errors
 /// [`Error::Busy`] while other work is in progress; those of the work.
-pub fn exclusively<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
+pub fn exclusively<T: Send>(work: impl FnOnce() -> Result<T> + Send) -> Result<T> {
+    alone(|| pool()?.install(work))
+}
+
+fn alone<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
     static ONE_AT_A_TIME: Mutex<()> = Mutex::new(());
     let _one = match ONE_AT_A_TIME.try_lock() {
         Ok(one) => one,
@@ -64,6 +68,26 @@ pub fn exclusively<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
     console::captured().get_or_insert_default();
     console::start_log(Verbosity::Normal);
     work()
+}
+
+/// The worker threads of work without an option `threads`. The threads of a process do not survive its fork, so a child
+/// starts its own.
+fn pool() -> Result<Arc<rayon::ThreadPool>> {
+    static POOL: Mutex<Option<(u32, Arc<rayon::ThreadPool>)>> = Mutex::new(None);
+    let mut pool = POOL.lock().unwrap_or_else(PoisonError::into_inner);
+    match pool.take() {
+        Some((process, found)) if process == std::process::id() => {
+            *pool = Some((process, found.clone()));
+            return Ok(found);
+        }
+        // Dropping it would wait for threads that are not there.
+        Some((_, of_parent)) => std::mem::forget(of_parent),
+        None => {}
+    }
+    let made = pool_of(None)?.stack_size(STACK_BYTES).build().map_err(|error| not_started(None, &error))?;
+    let made = Arc::new(made);
+    *pool = Some((std::process::id(), made.clone()));
+    Ok(made)
 }
 
 fn parse_and_run(words: &[OsString]) -> Result<Exit> {

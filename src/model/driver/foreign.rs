@@ -66,7 +66,7 @@ pub trait VectorDriver: Send + Sync {
 
 /// A registered driver: its position in the list of this process.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord)]
-pub struct ForeignId(u16);
+pub struct ForeignId(u32);
 
 struct Registered {
     name: &'static str,
@@ -86,7 +86,7 @@ impl ModelId {
     ///
     /// # Errors
     /// [`Error::Usage`] for the name of a built-in model, a name that is not a word of letters, digits, `_`, `-` and
-    /// `.`, and for more than 65,536 drivers.
+    /// `.`, and for more than 2³² drivers.
     pub fn register(name: &str, fingerprint: &str, driver: Arc<dyn VectorDriver>) -> Result<ModelId> {
         let place = || Place::item(format!("driver `{}`", crate::support::plain_text::cut(name)));
         let is_word = |text: &str| text.bytes().all(|b| b.is_ascii_alphanumeric() || b"_-.".contains(&b));
@@ -102,7 +102,7 @@ impl ModelId {
             return Err(Error::usage(place(), "it stands for a driver that is not built in", "name a built-in model"));
         }
         let mut registered = REGISTERED.write().unwrap_or_else(std::sync::PoisonError::into_inner);
-        let id = u16::try_from(registered.len());
+        let id = u32::try_from(registered.len());
         let id = id.map_err(|_| Error::usage(place(), "too many drivers are registered", "start a new process"))?;
         let (name, identity) = (name.to_owned(), format!("{name}@{fingerprint}"));
         registered.push(Registered { name: name.leak(), identity: identity.leak(), stands_for, driver });
@@ -113,7 +113,7 @@ impl ModelId {
     pub(super) fn registered(text: &str) -> Option<ModelId> {
         let registered = REGISTERED.read().unwrap_or_else(std::sync::PoisonError::into_inner);
         let at = registered.iter().rposition(|one| one.name.eq_ignore_ascii_case(text) || one.identity == text)?;
-        u16::try_from(at).ok().map(|id| ModelId::Foreign(ForeignId(id)))
+        u32::try_from(at).ok().map(|id| ModelId::Foreign(ForeignId(id)))
     }
 
     /// The driver, if it is not built in.
@@ -142,7 +142,7 @@ impl ModelId {
 impl ForeignId {
     fn with<T>(self, of: impl FnOnce(&Registered) -> T) -> T {
         let registered = REGISTERED.read().unwrap_or_else(std::sync::PoisonError::into_inner);
-        of(&registered[usize::from(self.0)])
+        of(&registered[self.0 as usize])
     }
 
     /// Name in tables, files and lane keys.
