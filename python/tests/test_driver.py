@@ -96,6 +96,33 @@ def test_a_driver_that_brakes_harder_collides_less() -> None:
     assert counts == sorted(counts, reverse=True) and counts[0] > counts[-1]
 
 
+def test_what_ends_the_program_is_no_error_of_the_driver() -> None:
+    def leave(view: lanesweep.View) -> None:
+        raise SystemExit(3)
+
+    with pytest.raises(SystemExit):
+        lanesweep.simulate(CASES, category="cut-in", models=[Wrong(leave)])
+
+
+def test_drivers_of_one_name_are_told_apart_in_threads() -> None:
+    expected = {a: lanesweep.simulate(CASES, category="cut-in", models=[Wrong(a)])["collision"].sum() for a in (-1.0, -5.0, -9.0)}
+    found: list[tuple[float, int]] = []
+
+    def run(a: float) -> None:
+        for _ in range(10):
+            while True:
+                try:
+                    found.append((a, lanesweep.simulate(CASES, category="cut-in", models=[Wrong(a)])["collision"].sum()))
+                    break
+                except lanesweep.BusyError:
+                    continue
+
+    threads = [threading.Thread(target=run, args=(a,)) for a in expected]
+    [thread.start() for thread in threads]
+    [thread.join() for thread in threads]
+    assert len(found) == 30 and all(expected[a] == count for a, count in found)
+
+
 def test_names_that_cannot_be_are_refused() -> None:
     for name in ("FSM", "two words", "a/b"):
         driver = Wrong(0.0)

@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 import lanesweep
+import numpy as np
 import pytest
 from lanesweep import parts
 
@@ -27,6 +28,51 @@ def test_parts_in_any_order_have_the_bytes_of_the_whole(density, scenarios) -> N
     plan = parts.plan(lanesweep.study, scenarios=scenarios, models=["FSM", lanesweep.drivers.IDM()], thw=1.2, shards=2)
     joined = parts.join(plan, [parts.run(plan, 1), parts.run(plan, 0)])
     assert contents(joined, ["f1.csv", "failures.csv"]) == contents(whole, ["f1.csv", "failures.csv"])
+
+
+class OfAnArray(lanesweep.Driver):
+    """A driver whose values have no short text."""
+
+    may_accelerate = False
+
+    def __init__(self) -> None:
+        self.values = np.arange(2000.0)
+        self.lock = None
+
+    def acceleration(self, view, state):
+        return -self.values[: len(view)] % 3
+
+
+def test_parts_with_a_driver_run_in_other_processes(density) -> None:
+    from concurrent.futures import ProcessPoolExecutor
+    from multiprocessing import get_context
+
+    driver = OfAnArray()
+    plan = parts.plan(lanesweep.sample, density, samples=600, thw=1.2, shards=2, models=[driver])
+    with ProcessPoolExecutor(2, mp_context=get_context("spawn")) as pool:
+        done = list(pool.map(parts.run, [plan, plan], range(2)))
+    whole = lanesweep.sample(density, samples=600, thw=1.2, models=[driver])
+    assert contents(parts.join(plan, done), FILES) == contents(whole, FILES)
+
+
+def test_a_run_is_not_resumed_with_another_driver_of_its_name(density, tmp_path) -> None:
+    def made(value: float) -> lanesweep.Driver:
+        class Constant(lanesweep.Driver):
+            may_accelerate = False
+
+            def acceleration(self, view, state):
+                return np.full(len(view), value)
+
+        return Constant()
+
+    options = {"samples": 300_000, "thw": 1.2}
+    with pytest.raises(lanesweep.RunStopped):
+        lanesweep.sample(density, **options, models=[made(-1.0)], stop_after=0.3, out=tmp_path / "out")
+    ours = lanesweep.sample(density, **{**options, "samples": 20_000}, models=[made(-8.0)], out=tmp_path / "out")
+    fresh = lanesweep.sample(density, **{**options, "samples": 20_000}, models=[made(-8.0)])
+    assert contents(ours, ["estimates.csv"]) == contents(fresh, ["estimates.csv"])
+    with pytest.raises(lanesweep.UsageError, match="two drivers are called Constant"):
+        lanesweep.sample(density, samples=10, thw=1.2, models=[made(-1.0), made(-2.0)])
 
 
 def test_missing_parts_and_verbs_that_cannot_be_split_are_errors(density) -> None:

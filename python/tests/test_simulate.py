@@ -2,6 +2,11 @@
 
 from __future__ import annotations
 
+import os
+import signal
+import time
+import warnings
+
 import lanesweep
 import numpy as np
 import pandas as pd
@@ -72,6 +77,7 @@ def test_cases_of_any_number_are_those_of_their_parts() -> None:
     ("change", "message"),
     [
         ({"ego_speed_mps": [30.0, float("nan"), 33.0]}, "row 1.*ego_speed|ego_speed.*row 1"),
+        ({"ego_speed_mps": [30.0, float("inf"), 33.0]}, "row 1.*ego_speed|ego_speed.*row 1"),
         ({"ego_speed_mps": [30.0, 300.0, 33.0]}, "ego_speed.*row 1|row 1.*ego_speed"),
         ({"ego_speed_mps": ["fast", "slow", "30"]}, "ego_speed"),
         ({"colour": ["red"] * 3}, "colour.*no such column"),
@@ -85,6 +91,42 @@ def test_cases_of_any_number_are_those_of_their_parts() -> None:
 def test_wrong_cases_are_named(change, message) -> None:
     with pytest.raises(lanesweep.InputError, match=message):
         lanesweep.simulate({**CASES, **change}, category="cut-in")
+
+
+def test_an_index_is_no_column_and_missing_values_are_not_given() -> None:
+    frame = pd.DataFrame(CASES)
+    shuffled = frame.iloc[[2, 0, 1]]
+    ours = lanesweep.simulate(shuffled, category="cut-in", models="FSM")["min_gap_m"]
+    theirs = lanesweep.simulate(frame, category="cut-in", models="FSM")["min_gap_m"]
+    assert np.array_equal(ours, theirs[[2, 0, 1]], equal_nan=True)
+    lengths = [None, 4.0, pd.NA]
+    expected = lanesweep.simulate({**CASES, "length": [4.3, 4.0, 4.3]}, category="cut-in").to_pandas()
+    masked = np.ma.masked_invalid([np.nan, 4.0, np.nan])
+    for given in (lengths, masked, [np.nan, 4.0, np.nan]):
+        found = lanesweep.simulate({**CASES, "length": given}, category="cut-in").to_pandas()
+        pd.testing.assert_frame_equal(found, expected)
+    empty = pl.DataFrame(CASES).with_columns(pl.lit(None).alias("length"))
+    assert len(lanesweep.simulate(empty, category="cut-in")) == 12
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="no fork")
+def test_a_child_of_a_process_that_has_simulated_simulates_too() -> None:
+    table = {key: np.tile(values, 2000) for key, values in CASES.items()}
+    lanesweep.simulate(table, category="cut-in")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        child = os.fork()
+    if child == 0:
+        os._exit(0 if len(lanesweep.simulate(table, category="cut-in")) == 24_000 else 1)
+    for _ in range(600):
+        process, status = os.waitpid(child, os.WNOHANG)
+        if process:
+            break
+        time.sleep(0.1)
+    else:
+        os.kill(child, signal.SIGKILL)
+        pytest.fail("the child hangs")
+    assert os.waitstatus_to_exitcode(status) == 0
 
 
 def test_kilometres_per_hour_and_speeds_that_are_not_given() -> None:
@@ -103,7 +145,8 @@ def test_what_is_no_table_is_refused() -> None:
         lanesweep.simulate(pd.DataFrame({"ego_speed": pd.Series([], dtype=float)}), category="cut-in", thw=1)
     with pytest.raises(lanesweep.InputError, match="initial distance is missing"):
         lanesweep.simulate({"ego_speed": 30, "speed": 20, "lateral_speed": 1}, category="cut-in")
-    with pytest.raises(lanesweep.UsageError, match="no headway"):
-        lanesweep.simulate({"ego_speed": 30, "lateral_speed": 1}, category="cut-in", thw="soon")
+    for thw in ("soon", -1, float("nan"), float("inf"), "observed"):
+        with pytest.raises(lanesweep.UsageError, match="no headway"):
+            lanesweep.simulate({"ego_speed": 30, "lateral_speed": 1}, category="cut-in", thw=thw)
     with pytest.raises(lanesweep.UsageError, match="no profile|profile"):
         lanesweep.simulate({"ego_speed": 30, "lateral_speed": 1}, category="cut-in", thw=1, profile="none-such")

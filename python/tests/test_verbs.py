@@ -64,6 +64,17 @@ def test_a_result_has_tables_figures_and_a_page(scenarios) -> None:
     assert not folder.exists()
 
 
+def test_a_figure_outlives_its_result(scenarios) -> None:
+    figure = lanesweep.study(scenarios=scenarios, thw=1.2, models="FSM", backend="cpu").figure("radar-cut-in")
+    assert "<svg" in figure.svg
+
+
+def test_a_time_limit_is_no_interrupt(density, tmp_path) -> None:
+    options = {"samples": 10**8, "thw": 1.2, "models": "FSM", "backend": "cpu"}
+    with pytest.raises(lanesweep.RunStopped, match="continues"):
+        lanesweep.sample(density, **options, stop_after=0.5, out=tmp_path)
+
+
 def test_a_check_has_its_answer_as_status() -> None:
     safe = lanesweep.check(category="cut-in", ego_speed="60km/h", speed="40km/h", gap=30, lateral_speed=1)
     assert safe.status == "ok" and "preventable" in str(safe.document).lower()
