@@ -85,7 +85,7 @@ def test_cases_of_any_number_are_those_of_their_parts() -> None:
         ({"thw_s": [1.0, 1.0, 1.0]}, "both gap and time headway"),
         ({"gap_m": []}, "differ in length"),
         ({"category": ["cut-in"] * 3}, "argument `category` is given too"),
-        ({"gap_m": np.zeros((3, 2))}, "differ in length"),
+        ({"gap_m": np.zeros((3, 2))}, r"the shape \(3, 2\)"),
     ],
 )
 def test_wrong_cases_are_named(change, message) -> None:

@@ -142,10 +142,10 @@ fn unsafe_code_is_found_where_it_has_no_reason() {
 
 #[test]
 fn unsafe_code_is_denied_and_every_exception_says_why() {
-    let lint = &toml_file("Cargo.toml")["lints"]["rust"]["unsafe_code"];
+    let lint = &toml_file("Cargo.toml")["workspace"]["lints"]["rust"]["unsafe_code"];
     assert!(matches!(lint.as_str(), Some("deny" | "forbid")), "Cargo.toml: unsafe_code = \"deny\"");
     let mut files = Vec::new();
-    rust_files(&root().join("src"), &mut files);
+    ["src", "python/src"].iter().for_each(|folder| rust_files(&root().join(folder), &mut files));
     assert!(files.len() > 50, "only {} files were seen", files.len());
     let mut wrong = Vec::new();
     for file in files {
