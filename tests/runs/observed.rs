@@ -238,5 +238,5 @@ fn every_verb_takes_observed_headways_and_says_how_many_failures_come_from_close
     let (code, _, err) = lanesweep(&["-q", "study", "--thw", "observed,1.0"]);
     // The drawing breaks long lines.
     let err: String = err.split(|c: char| c.is_whitespace() || c == '│').filter(|word| !word.is_empty()).collect();
-    assert!(code != Some(0) && err.contains("standsalone"), "{err}");
+    assert!(code != Some(0) && err.contains("cannotbecombined"), "{err}");
 }
