@@ -43,6 +43,23 @@ def test_a_sample_has_the_bytes_of_the_command_line(program, density, tmp_path) 
         assert (tmp_path / "ours" / name).read_bytes() == (tmp_path / "theirs" / name).read_bytes(), name
 
 
+def test_a_device_gives_the_same_bytes(density, scenarios, tmp_path) -> None:
+    def both(device: dict[str, str]) -> dict[str, bytes]:
+        folder = tmp_path / device["backend"]
+        lanesweep.sample(density, samples=2000, thw=1.2, **device, out=folder / "sample")
+        lanesweep.study(scenarios=scenarios, thw=1.2, **device, out=folder / "study")
+        names = ["sample/estimates.csv", "sample/worst.csv", "study/f1.csv", "study/failures.csv"]
+        return {name: (folder / name).read_bytes() for name in names}
+
+    try:
+        on_device = both({"backend": "gpu", "device": "llvmpipe"})
+    except (lanesweep.DeviceError, lanesweep.UsageError) as error:
+        if os.environ.get("LANESWEEP_REQUIRE_DEVICE"):
+            raise
+        pytest.skip(f"no software device: {error}")
+    assert on_device == both({"backend": "cpu"})
+
+
 def test_a_result_has_tables_figures_and_a_page(scenarios) -> None:
     result = lanesweep.study(scenarios=scenarios, thw="1.2,0.6", backend="cpu")
     frame = result.table("f1").to_pandas()
