@@ -46,7 +46,7 @@ fn main() {
     let bytes = write_recordings(folder.path());
     for repetition in 0..3 {
         time("read and mine", repetition, bytes, "bytes", || {
-            mine_folder(folder.path(), &MiningOptions::default(), Default::default(), || ()).unwrap()
+            mine_folder(folder.path(), &MiningOptions::default(), Default::default(), || Ok(())).unwrap()
         });
     }
     if let Some(peak) = peak_memory_bytes() {

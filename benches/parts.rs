@@ -40,7 +40,7 @@ fn recordings(criterion: &mut Criterion) {
     group.bench_function("mine one", |b| b.iter(|| mine(black_box(&recording), &mining)));
     group.throughput(Throughput::Bytes(all));
     group.bench_function("read and mine a folder", |b| {
-        b.iter(|| mine_folder(folder.path(), &mining, Default::default(), || ()).unwrap())
+        b.iter(|| mine_folder(folder.path(), &mining, Default::default(), || Ok(())).unwrap())
     });
     group.finish();
 }
@@ -95,7 +95,7 @@ fn study(criterion: &mut Criterion) {
         b.iter_batched(
             GeneratorOptions::default,
             |generator| {
-                let mined = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap();
+                let mined = mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap();
                 let plan = plan_study(&mined.scenarios, &profile, &StudyOptions::default()).unwrap();
                 let partial = swept(&plan, &cpu);
                 score(&plan, &partial, &ScoreOptions::default()).unwrap()

@@ -28,7 +28,7 @@ fn main() {
     }
     println!("part,density,models,samples,lanes,worst,seconds,peak_bytes,failures");
     let generator = GeneratorOptions { recordings: 24, ..GeneratorOptions::default() };
-    let scenarios = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap().scenarios;
+    let scenarios = mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap().scenarios;
     let million = 1_000_000;
     if std::env::args().any(|arg| arg == "--worst") {
         for (category, key) in [(Category::CutIn, "2"), (Category::CutOut, "b"), (Category::Lvd, "ii")] {

@@ -17,7 +17,7 @@ struct Columns {
 
 fn main() -> Result<()> {
     let recordings = GeneratorOptions { recordings: 1, duration_s: 120.0, ..GeneratorOptions::default() };
-    let mined = mine_generated(&recordings, &MiningOptions::default(), || ())?;
+    let mined = mine_generated(&recordings, &MiningOptions::default(), || Ok(()))?;
     let study = Study::builder(&mined, Profile::load("paper")?).plan()?;
 
     let done = Arc::new(AtomicU64::new(0));

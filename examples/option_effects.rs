@@ -274,7 +274,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         parameterization: ParameterizationOptions::default(),
         profile: Profile::load("paper")?,
     };
-    let mine = |settings: &Settings| mine_generated(&settings.generator, &settings.mining, || ());
+    let mine = |settings: &Settings| mine_generated(&settings.generator, &settings.mining, || Ok(()));
     let collection = mine(&settings)?;
     let base = settings.scores(&collection)?;
     println!(

@@ -47,7 +47,7 @@
 //!
 //! # fn main() -> lanesweep::Result<()> {
 //! let recordings = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
-//! let mined = mine_generated(&recordings, &MiningOptions::default(), || ())?;
+//! let mined = mine_generated(&recordings, &MiningOptions::default(), || Ok(()))?;
 //! let study = Study::builder(&mined, Profile::load("paper")?).plan()?;
 //! let result = study.run(&Executor::new(CpuBackend::lane_arithmetic()))?;
 //! assert_eq!(result.summary.lanes, study.plan().lane_count());

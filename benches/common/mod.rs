@@ -15,7 +15,7 @@ pub const PAPER: [(Category, usize); 3] = [(Category::CutIn, 362), (Category::Cu
 /// Synthetic scenarios, repeated under new keys up to the paper's numbers.
 pub fn paper_size_scenarios() -> Vec<Scenario> {
     let generator = GeneratorOptions { recordings: 24, ..GeneratorOptions::default() };
-    let mined = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap();
+    let mined = mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap();
     let mut scenarios = Vec::new();
     for (category, count) in PAPER {
         let kept: Vec<&Scenario> = mined.scenarios.iter().filter(|s| s.category == category && s.kept).collect();

@@ -130,6 +130,25 @@ def test_an_interrupt_ends_a_run_and_a_next_one_works(density) -> None:
     assert lanesweep.sample(density, samples=100, thw=1.2, backend="cpu").status == "ok"
 
 
+@pytest.mark.skipif(os.name == "nt", reason="signals")
+def test_an_interrupt_ends_reading_and_generating_recordings(tmp_path) -> None:
+    calls = [lambda: lanesweep.synth(tmp_path / "recordings", synth_recordings=400), lambda: lanesweep.study(synth_recordings=900)]
+    for call in calls:
+        threading.Timer(0.5, lambda: signal.raise_signal(signal.SIGINT)).start()
+        start = time.monotonic()
+        with pytest.raises(KeyboardInterrupt):
+            call()
+        assert time.monotonic() - start < 8
+    assert not (tmp_path / "recordings").exists() or not any((tmp_path / "recordings").iterdir())
+
+
+def test_input_that_is_left_out_is_named_in_the_messages(tmp_path) -> None:
+    recordings = lanesweep.synth(tmp_path / "recordings", synth_recordings=2)
+    (tmp_path / "recordings" / "02_tracks.csv").write_text("frame,id\n")
+    mined = lanesweep.mine(recordings)
+    assert mined.status == "incomplete" and any("02_tracks.csv" in line for line in mined.messages)
+
+
 def test_a_second_run_of_the_process_is_refused_and_harms_nothing(density) -> None:
     done: list[object] = []
     thread = threading.Thread(target=lambda: done.append(lanesweep.sample(density, samples=3 * 10**6, thw=1.2, backend="cpu")))

@@ -225,6 +225,11 @@ pub fn warn<'a>(errors: impl IntoIterator<Item = &'a Error>) {
 
 /// Prints an error with its help on stderr.
 pub fn complain(error: &Error) {
+    if captured().is_some() {
+        // In the words of the library.
+        capture(Level::ERROR, &format!("{error}; {}", error.help().unwrap_or_default()));
+        return;
+    }
     let help = error.help().map(|help| shown(&with_flags(&help)).into_owned());
     let report = miette::Report::new(Diagnostic { text: shown(&with_flags(&error.to_string())).into_owned(), help });
     let mut stderr = io::stderr().lock();

@@ -3,9 +3,11 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use indicatif::ProgressBar;
 
 use super::configured::Configured;
 use super::console::{self, Verbosity};
+use super::signals::CANCEL;
 use crate::scenario::{Category, Scenario, ScenarioFile, read_scenario_file};
 use crate::support::plausibility::Implausible;
 use crate::support::ranges::refuse_repeats;
@@ -27,7 +29,7 @@ pub fn load(
 ) -> Result<Collection> {
     let what = if matches!(source, Source::Generated(_)) { "generating and mining" } else { "reading and mining" };
     let bar = console::progress(verbosity, source.recordings(), what);
-    let collection = source.load(mining, implausible, || bar.inc(1))?;
+    let collection = source.load(mining, implausible, || advance(&bar))?;
     bar.finish_and_clear();
     complain_of(&collection.problems, &collection.notes);
     let data = source.describe(collection.synthetic);
@@ -36,6 +38,12 @@ pub fn load(
     }
     tracing::info!("{}", counts_text(&collection.scenarios));
     Ok(collection)
+}
+
+/// Advances a bar over recordings, unless the owner of the process has asked for the end of the work.
+pub fn advance(bar: &ProgressBar) -> Result<()> {
+    bar.inc(1);
+    CANCEL.check()
 }
 
 /// Maximum number of skipped items listed individually.

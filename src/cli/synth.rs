@@ -7,6 +7,7 @@ use clap::Args;
 use super::Exit;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
+use super::source;
 use crate::support::files::check_folder;
 use crate::support::run_dir::{OutputDir, unfinished};
 use crate::traffic::Source;
@@ -52,7 +53,7 @@ impl Synth {
             let recording = generate_one(options, index)?;
             let staged = highd::stage(&self.dir, &recording, &RecordingInfo::default())?;
             staged.into_iter().for_each(|file| results.join(file.closed()));
-            bar.inc(1);
+            source::advance(&bar)?;
         }
         bar.finish_and_clear();
         // A part of the recordings could be mistaken for all of them, or for real data. All are therefore renamed

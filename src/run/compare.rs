@@ -49,7 +49,7 @@ pub struct CompareOptions {
 ///
 /// # fn main() -> lanesweep::Result<()> {
 /// # let recordings = GeneratorOptions { recordings: 2, ..GeneratorOptions::default() };
-/// # let scenarios = mine_generated(&recordings, &MiningOptions::default(), || ())?.scenarios;
+/// # let scenarios = mine_generated(&recordings, &MiningOptions::default(), || Ok(()))?.scenarios;
 /// # let facts = DataProvenance { data: "synthetic".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
 /// let options = CompareOptions {
 ///     study: StudyOptions { headways: vec![Headway::ThwS(0.6)], ..StudyOptions::default() },

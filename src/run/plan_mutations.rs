@@ -27,7 +27,7 @@ const INPUTS: u64 = 1500;
 #[test]
 fn a_changed_plan_is_an_error_or_a_plan_and_never_a_panic() {
     let generator = GeneratorOptions { recordings: 2, duration_s: 240.0, ..GeneratorOptions::default() };
-    let scenarios = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap().scenarios;
+    let scenarios = mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap().scenarios;
     let profile = Profile::load("paper").unwrap();
     let facts =
         DataProvenance { data: "synthetic".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
@@ -74,7 +74,7 @@ const FLOATS: [f64; 11] = [-0.0, 0.0, 5e-324, f64::MIN_POSITIVE, 1e-9, 0.1, -1.0
 #[test]
 fn changed_scenarios_under_checksums_that_fit_are_an_error_or_scenarios_with_plausible_cases() {
     let generator = GeneratorOptions { recordings: 2, duration_s: 240.0, ..GeneratorOptions::default() };
-    let scenarios = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap().scenarios;
+    let scenarios = mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap().scenarios;
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("plan.json");
     for category in Category::ALL {

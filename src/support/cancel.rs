@@ -5,6 +5,8 @@ use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::{Duration, Instant};
 
+use crate::{Error, Result};
+
 /// Cancellation token: requests the runs that hold a clone to end. A run with a journal first writes its progress to
 /// disk; other runs return no result. Both return [`Error::Interrupted`](crate::Error::Interrupted).
 #[derive(Debug, Clone, Default)]
@@ -26,6 +28,17 @@ impl Cancel {
     /// Whether runs must end after the present chunk; true until [`Cancel::withdraw`].
     pub fn requested(&self) -> bool {
         self.0.requested.load(Ordering::SeqCst) || self.deadline().is_some_and(|deadline| Instant::now() >= deadline)
+    }
+
+    /// Ends work that keeps nothing, if its end was requested; a time limit is for runs that resume.
+    ///
+    /// # Errors
+    /// [`Error::Interrupted`].
+    pub(crate) fn check(&self) -> Result<()> {
+        if self.0.requested.load(Ordering::SeqCst) {
+            return Err(Error::Interrupted { done: "the data were not read to the end".to_owned(), is_kept: false });
+        }
+        Ok(())
     }
 
     /// Requests runs to end after the present chunk. Returns whether that was already requested.

@@ -62,11 +62,17 @@ impl Source {
         }
     }
 
-    /// Reads or generates recordings, and mines them. `done` is called after each recording, from any thread.
+    /// Reads or generates recordings, and mines them. `done` is called after each recording, from any thread; its error
+    /// ends the work.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Input`] if nothing can be read; [`Error::Usage`] for options out of range.
-    pub fn load(&self, mining: &MiningOptions, implausible: Implausible, done: impl Fn() + Sync) -> Result<Collection> {
+    /// [`Error::Io`]; [`Error::Input`] if nothing can be read; [`Error::Usage`] for options out of range; that of `done`.
+    pub fn load(
+        &self,
+        mining: &MiningOptions,
+        implausible: Implausible,
+        done: impl Fn() -> Result<()> + Sync,
+    ) -> Result<Collection> {
         match self {
             Source::Scenarios(path) => {
                 let ScenarioFile { scenarios, problems, notes } = read_scenario_file(path, implausible)?;

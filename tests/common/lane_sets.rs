@@ -76,6 +76,6 @@ pub fn small_study() -> LanePlan {
 /// The same with other options.
 pub fn small_study_of(options: StudyOptions) -> LanePlan {
     let generator = GeneratorOptions { recordings: 2, ..GeneratorOptions::default() };
-    let collection = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap();
+    let collection = mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap();
     plan_study(&collection.scenarios, &Profile::load("paper").unwrap(), &options).unwrap()
 }

@@ -69,7 +69,7 @@ fn every_word_of_a_small_study_is_equal() {
 #[test]
 fn any_number_of_headways_gives_the_same_words() {
     let generator = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
-    let mut scenarios = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap().scenarios;
+    let mut scenarios = mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap().scenarios;
     for category in Category::ALL {
         let mut seen = 0;
         scenarios.retain(|scenario| {

@@ -236,7 +236,7 @@ fn a_pipe_in_place_of_a_recording_is_refused() {
     std::fs::write(dir.path().join("01_recordingMeta.csv"), texts.recording_meta).unwrap();
     let pipe = dir.path().join("01_tracks.csv");
     assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
-    let error = lanesweep::traffic::mining::mine_folder(dir.path(), &Default::default(), Default::default(), || ())
+    let error = lanesweep::traffic::mining::mine_folder(dir.path(), &Default::default(), Default::default(), || Ok(()))
         .unwrap_err();
     assert!(error.to_string().contains("expected a regular file"), "{error}");
     assert!(

@@ -151,7 +151,7 @@ fn failures(plan: &LanePlan) -> Vec<Vec<u64>> {
 #[test]
 fn with_the_bandwidth_a_density_tends_to_the_replays_of_its_scenarios() {
     let generator = GeneratorOptions { recordings: 8, duration_s: 200.0, ..GeneratorOptions::default() };
-    let scenarios = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap().scenarios;
+    let scenarios = mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap().scenarios;
     let profile = Profile::load("paper").unwrap();
     let headways = vec![Headway::ThwS(1.4), Headway::ThwS(0.8), Headway::ThwS(0.4)];
     let options = StudyOptions { headways: headways.clone(), ..StudyOptions::default() };

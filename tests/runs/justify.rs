@@ -19,7 +19,7 @@ use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
 fn recordings(count: usize) -> Collection {
     let options = GeneratorOptions { recordings: count, ..GeneratorOptions::default() };
-    mine_generated(&options, &MiningOptions::default(), || ()).unwrap()
+    mine_generated(&options, &MiningOptions::default(), || Ok(())).unwrap()
 }
 
 fn study_options(category: Category, model: ModelId) -> StudyOptions {

@@ -21,7 +21,7 @@ use run::{lanesweep, said};
 
 fn synthetic() -> Vec<Scenario> {
     let options = GeneratorOptions { recordings: 2, duration_s: 120.0, ..GeneratorOptions::default() };
-    mine_generated(&options, &MiningOptions::default(), || ()).unwrap().scenarios
+    mine_generated(&options, &MiningOptions::default(), || Ok(())).unwrap().scenarios
 }
 
 /// The scenarios as text, which has every bit of theirs.

@@ -290,7 +290,7 @@ fn scenarios() -> &'static [Scenario] {
     static MINED: OnceLock<Vec<Scenario>> = OnceLock::new();
     MINED.get_or_init(|| {
         let generator = GeneratorOptions { recordings: 4, ..GeneratorOptions::default() };
-        mine_generated(&generator, &MiningOptions::default(), || ()).unwrap().scenarios
+        mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap().scenarios
     })
 }
 

@@ -146,7 +146,7 @@ fn compare(name: &str, scenarios: &[Scenario], category: Category, key: &str, sa
 
 fn default_data() -> Vec<Scenario> {
     let generator = GeneratorOptions { recordings: 24, ..GeneratorOptions::default() };
-    mine_generated(&generator, &MiningOptions::default(), || ()).unwrap().scenarios
+    mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap().scenarios
 }
 
 #[test]
@@ -158,7 +158,7 @@ fn estimators_agree_with_crude_monte_carlo_on_lanes() {
 #[ignore = "10^8 lanes per data set"]
 fn every_estimator_holds_what_a_hundred_million_lanes_resolve() {
     let mined =
-        |dir: PathBuf| mine_folder(&dir, &MiningOptions::default(), Default::default(), || ()).unwrap().scenarios;
+        |dir: PathBuf| mine_folder(&dir, &MiningOptions::default(), Default::default(), || Ok(())).unwrap().scenarios;
     let samples = 100_000_000;
     compare("default data", &default_data(), Category::CutIn, "2", samples, 100_000);
     if let Some(dir) = common::sumo_recordings() {

@@ -253,7 +253,7 @@ fn recorded_motions_are_neither_straight_lines_nor_sinusoids() {
 #[test]
 fn failures_of_recorded_scenarios_are_near_the_published_ones_on_an_unseen_seed() {
     let options = GeneratorOptions { seed: 1, ..GeneratorOptions::default() };
-    let mined = mine_generated(&options, &MiningOptions::default(), || ()).unwrap();
+    let mined = mine_generated(&options, &MiningOptions::default(), || Ok(())).unwrap();
     let study = Study::builder(&mined, Profile::load("paper").unwrap()).plan().unwrap();
     let backend = CpuBackend::lane_arithmetic();
     let scores = study.score(&study.run(&Executor::new(&backend)).unwrap().counts).unwrap();

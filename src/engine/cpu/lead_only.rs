@@ -77,7 +77,7 @@ mod tests {
     /// Cut-outs of a synthetic recording, recorded and parameterized.
     fn cut_outs(profile: &Profile) -> LanePlan {
         let generator = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
-        let mined = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap();
+        let mined = mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap();
         let options = StudyOptions { categories: vec![Category::CutOut], ..StudyOptions::default() };
         plan_study(&mined.scenarios, profile, &options).unwrap()
     }

@@ -121,7 +121,7 @@ fn check(traces: &[Trace]) -> Panels {
 
 fn small_study() -> LanePlan {
     let generator = GeneratorOptions { recordings: 3, ..GeneratorOptions::default() };
-    let scenarios = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap().scenarios;
+    let scenarios = mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap().scenarios;
     plan_study(&scenarios, &Profile::load("paper").unwrap(), &StudyOptions::default()).unwrap()
 }
 

@@ -231,7 +231,7 @@ mod tests {
     #[test]
     fn the_worst_lanes_of_a_study_are_those_that_all_values_give() {
         let generated = GeneratorOptions { recordings: 10, ..GeneratorOptions::default() };
-        let mined = mine_generated(&generated, &MiningOptions::default(), || ()).unwrap();
+        let mined = mine_generated(&generated, &MiningOptions::default(), || Ok(())).unwrap();
         let study = Study::builder(&mined, Profile::load("paper").unwrap()).plan().unwrap();
         let plan = study.plan();
         assert!(plan.unit_count() > 4 * FIRST_UNITS, "{} scenarios", plan.unit_count());

@@ -67,7 +67,7 @@ use crate::{Error, Place, Result};
 ///
 /// # fn main() -> lanesweep::Result<()> {
 /// # let recordings = GeneratorOptions { recordings: 2, ..GeneratorOptions::default() };
-/// # let scenarios = mine_generated(&recordings, &MiningOptions::default(), || ())?.scenarios;
+/// # let scenarios = mine_generated(&recordings, &MiningOptions::default(), || Ok(()))?.scenarios;
 /// # let facts = DataProvenance { data: "synthetic".into(), synthetic: true, scenarios_sha256: String::new(), driven: None };
 /// # let options = FitOptions { representativeness: false, valid_draws: 100, ..FitOptions::default() };
 /// # let id = Parameterization::find(Category::CutIn, "2").unwrap();

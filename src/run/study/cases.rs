@@ -252,7 +252,7 @@ mod tests {
 
     fn scenarios() -> Vec<Scenario> {
         let options = GeneratorOptions { recordings: 4, ..GeneratorOptions::default() };
-        mine_generated(&options, &MiningOptions::default(), || ()).unwrap().scenarios
+        mine_generated(&options, &MiningOptions::default(), || Ok(())).unwrap().scenarios
     }
 
     fn outlined(scenarios: &[Scenario]) -> StudyCases {

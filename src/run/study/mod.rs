@@ -59,7 +59,7 @@ struct StudyPlanFile {
 ///
 /// # fn main() -> lanesweep::Result<()> {
 /// # let recordings = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
-/// # let mined = mine_generated(&recordings, &MiningOptions::default(), || ())?;
+/// # let mined = mine_generated(&recordings, &MiningOptions::default(), || Ok(()))?;
 /// # let folder = tempfile::tempdir().unwrap();
 /// # let folder = folder.path();
 /// let study = Study::builder(&mined, Profile::load("paper")?).plan()?;

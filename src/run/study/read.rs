@@ -179,7 +179,7 @@ mod tests {
     fn an_interval_is_read_alone_and_damage_in_it_is_found() {
         // Enough scenarios for several pages.
         let options = GeneratorOptions { recordings: 4, ..GeneratorOptions::default() };
-        let scenarios = mine_generated(&options, &MiningOptions::default(), || ()).unwrap().scenarios;
+        let scenarios = mine_generated(&options, &MiningOptions::default(), || Ok(())).unwrap().scenarios;
         let copies =
             |copy: usize| scenarios.iter().map(move |s| Scenario { id: format!("{}~{copy}", s.id), ..s.clone() });
         let many: Vec<Scenario> = (0..6).flat_map(copies).collect();

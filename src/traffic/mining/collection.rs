@@ -86,19 +86,20 @@ struct MinedPart {
     synthetic: bool,
 }
 
-/// Reads and mines every recording of a folder. `done` is called after each one, from any thread.
+/// Reads and mines every recording of a folder. `done` is called after each one, from any thread; its error ends the work.
 ///
 /// # Errors
-/// If the folder holds no recording, or none of them can be read: the first recording's error.
+/// If the folder holds no recording, or none of them can be read: the first recording's error. That of `done`.
 pub fn mine_folder(
     dir: &Path,
     options: &MiningOptions,
     implausible: Implausible,
-    done: impl Fn() + Sync,
+    done: impl Fn() -> Result<()> + Sync,
 ) -> Result<Collection> {
     options.validate()?;
     let inventory = highd::inventory(dir)?;
-    let parts: Vec<Result<MinedPart>> = inventory
+    // The outer error ends the work; an inner one leaves out a recording.
+    let parts: Result<Vec<Result<MinedPart>>> = inventory
         .recordings
         .par_iter()
         .with_max_len(1)
@@ -110,12 +111,12 @@ pub fn mine_folder(
                 let notes = loaded.notes.into_iter().map(name).collect();
                 MinedPart { mined, summary, notes, synthetic: loaded.recording.synthetic }
             });
-            done();
-            part
+            done()?;
+            Ok(part)
         })
         .collect();
     let mut collection = Collection { problems: inventory.problems, ..Collection::default() };
-    for part in parts {
+    for part in parts? {
         match part {
             Ok(part) => collection.add(part),
             Err(error) => collection.problems.push(error),
@@ -127,11 +128,14 @@ pub fn mine_folder(
     Ok(collection)
 }
 
-/// Generates and mines synthetic recordings.
+/// Generates and mines synthetic recordings. `done` is called after each one, from any thread; its error ends the work.
+///
+/// # Errors
+/// [`Error::Usage`] for options out of range; that of `done`.
 pub fn mine_generated(
     generator: &GeneratorOptions,
     options: &MiningOptions,
-    done: impl Fn() + Sync,
+    done: impl Fn() -> Result<()> + Sync,
 ) -> Result<Collection> {
     options.validate()?;
     let parts: Vec<MinedPart> = (0..generator.recordings)
@@ -141,7 +145,7 @@ pub fn mine_generated(
             let recording = generate_one(generator, index)?;
             let mined = mine(&recording, options);
             let summary = summary(&recording, &mined, options, Vec::new());
-            done();
+            done()?;
             Ok(MinedPart { mined, summary, notes: Vec::new(), synthetic: recording.synthetic })
         })
         .collect::<Result<_>>()?;

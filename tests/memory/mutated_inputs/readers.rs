@@ -97,7 +97,7 @@ fn recording(which: usize, bytes: &[u8], dir: &Path, seeds: &Seeds) -> Result<()
     for (k, name) in names.into_iter().enumerate() {
         file(if k == which { bytes } else { &seeds.recording[k] }, dir, name);
     }
-    mine_folder(dir, &MiningOptions::default(), Default::default(), || ()).map(drop)
+    mine_folder(dir, &MiningOptions::default(), Default::default(), || Ok(())).map(drop)
 }
 
 /// The first lanes of a plan, with one headway.

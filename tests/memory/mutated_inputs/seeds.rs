@@ -124,7 +124,7 @@ cut_out,plain,RSS,80,0.5,4.3,10,30,25,1,2,,,,,1.5,2.0,,,,,,,,,,,,,,,,,,0
 impl Seeds {
     pub fn make() -> Seeds {
         let generator = GeneratorOptions { recordings: 10, duration_s: 120.0, ..GeneratorOptions::default() };
-        let mined = mine_generated(&generator, &MiningOptions::default(), || ()).unwrap().scenarios;
+        let mined = mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap().scenarios;
         let few: Vec<Scenario> = Category::ALL.into_iter().flat_map(|c| first_of(&mined, c, 2)).collect();
         let profile = Profile::load("paper").unwrap();
         let fit = |category, key, n| {
