@@ -8,7 +8,7 @@ use std::time::{Duration, Instant};
 use crate::{Error, Result};
 
 /// Cancellation token: requests the runs that hold a clone to end. A run with a journal first writes its progress to
-/// disk; other runs return no result. Both return [`Error::Interrupted`](crate::Error::Interrupted).
+/// disk; other runs return no result. Both return [`Error::Interrupted`].
 #[derive(Debug, Clone, Default)]
 pub struct Cancel(Arc<State>);
 
