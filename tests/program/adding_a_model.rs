@@ -87,7 +87,7 @@ fn build(copy: &Path) {
     let mut command = Command::new(std::env::var_os("CARGO").unwrap_or_else(|| "cargo".into()));
     command.current_dir(copy).args(["build", "--release", "--offline", "--locked", "--bin", "lanesweep"]);
     // As the dependencies have been built; CI says with which further flags.
-    command.arg("--all-features").args(std::env::var_os("LANESWEEP_CARGO_FLAGS"));
+    command.arg("--all-features").args(std::env::var_os("CARGO_SELECTION"));
     command.args(["--config", "profile.release.package.lanesweep.debug=false"]);
     command.env("CARGO_BUILD_BUILD_DIR", build_dir).env("CARGO_TARGET_DIR", target_dir());
     let output = command.output().unwrap();
