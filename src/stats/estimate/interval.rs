@@ -57,7 +57,7 @@ impl Interval {
 /// Wilson's score interval ("Probable inference", JASA 22, 1927). `failures` and `runs` may be effective numbers.
 ///
 /// ```
-/// With no failure in 1,000 runs the probability is bounded, but not 0.
+/// // With no failure in 1,000 runs the probability is bounded, but not 0.
 /// let interval = lanesweep::stats::estimate::wilson(0.0, 1000.0, 0.95);
 /// assert!(interval.low == 0.0 && (0.003..0.004).contains(&interval.high));
 /// ```
