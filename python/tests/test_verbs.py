@@ -132,8 +132,8 @@ def test_an_interrupt_ends_a_run_and_a_next_one_works(density) -> None:
 
 @pytest.mark.skipif(os.name == "nt", reason="signals")
 def test_an_interrupt_ends_reading_and_generating_recordings(tmp_path) -> None:
-    calls = [lambda: lanesweep.synth(tmp_path / "recordings", synth_recordings=400), lambda: lanesweep.study(synth_recordings=900)]
-    for call in calls:
+    long = {"synth_recordings": 99, "config": "generator.duration_s=1000"}
+    for call in (lambda: lanesweep.synth(tmp_path / "recordings", **long), lambda: lanesweep.study(**long)):
         threading.Timer(0.5, lambda: signal.raise_signal(signal.SIGINT)).start()
         start = time.monotonic()
         with pytest.raises(KeyboardInterrupt):
