@@ -13,7 +13,7 @@ use lanesweep::support::table::{ArrowRows, Cell, Column, ColumnKind};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::{PyKeyError, PyTypeError};
 use pyo3::prelude::*;
-use pyo3::types::{PyCapsule, PyDict, PyList};
+use pyo3::types::{PyCapsule, PyDict, PyFloat, PyList};
 use serde_json::Value;
 
 use crate::error::{InputError, InternalError, exception};
@@ -133,19 +133,22 @@ impl Frame {
 
     fn _repr_html_(&self, py: Python<'_>) -> PyResult<String> {
         const SHOWN: usize = 20;
-        let escape = |text: &str| text.replace('&', "&amp;").replace('<', "&lt;");
+        let escape = |text: &str| text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;");
         let mut html = String::from("<table><thead><tr>");
-        let units = self.units();
+        let descriptions = self.descriptions();
         for name in self.columns() {
-            let unit =
-                units.get(&name).filter(|unit| *unit != "1").map(|unit| format!("<br>{unit}")).unwrap_or_default();
-            html += &format!("<th>{}{unit}</th>", escape(&name));
+            let title = descriptions.get(&name).map_or("", |text| text.as_str());
+            html += &format!("<th title=\"{}\">{}</th>", escape(title), escape(&name));
         }
         html += "</tr></thead><tbody>";
         for row in self.rows(py, Some(SHOWN))?.iter() {
             html += "<tr>";
             for cell in row.cast::<PyDict>()?.values().iter() {
-                let text = if cell.is_none() { String::new() } else { cell.str()?.to_string() };
+                let text = match &cell {
+                    cell if cell.is_none() => String::new(),
+                    cell if cell.is_instance_of::<PyFloat>() => cell.call_method1("__format__", (".5g",))?.to_string(),
+                    cell => cell.str()?.to_string(),
+                };
                 html += &format!("<td>{}</td>", escape(&text));
             }
             html += "</tr>";
