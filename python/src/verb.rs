@@ -8,7 +8,7 @@ use std::time::Duration;
 
 use lanesweep::cli::embedded;
 use lanesweep::{Error, Result};
-use pyo3::exceptions::PyException;
+use pyo3::exceptions::{PyException, PyKeyboardInterrupt};
 use pyo3::prelude::*;
 
 use crate::driver;
@@ -30,8 +30,7 @@ pub fn watched<T: Send + 'static>(
     let thread = std::thread::Builder::new().name("lanesweep".to_owned()).stack_size(embedded::STACK_BYTES);
     let started = thread.spawn(move || drop(send.send(work())));
     started.map_err(|error| exception(py, &Error::io("a thread", "start", error)))?;
-    let mut signal = None;
-    let mut failed = None;
+    let mut ended: Option<PyErr> = None;
     let result = loop {
         let result = py.detach(|| match done.lock() {
             Ok(done) => done.recv_timeout(LOOK),
@@ -39,26 +38,21 @@ pub fn watched<T: Send + 'static>(
         });
         if let Err(error) = pass_on(py, on_progress, on_message) {
             embedded::cancel();
-            failed = failed.or(Some(error));
+            if ended.is_some() && result.is_err() && error.is_instance_of::<PyKeyboardInterrupt>(py) {
+                // The work does not look for the request: it goes on alone, and the next call is refused until it ends.
+                return Err(error);
+            }
+            ended = ended.or(Some(error));
         }
         match result {
             Ok(result) => break result,
             Err(RecvTimeoutError::Disconnected) => break Err(Error::Internal("the work panicked".to_owned())),
-            Err(RecvTimeoutError::Timeout) => {
-                if let Err(error) = py.check_signals() {
-                    embedded::cancel();
-                    if signal.is_some() {
-                        // The work does not look for the request: it goes on alone, and the next call is refused until it ends.
-                        return Err(error);
-                    }
-                    signal = Some(error);
-                }
-            }
+            Err(RecvTimeoutError::Timeout) => {}
         }
     };
     // The exception of a driver says more than the error that it caused. Only work that has a driver leaves one.
     let raised = driver::take_exception().filter(|_| result.is_err());
-    if let Some(error) = signal.or(failed) {
+    if let Some(error) = ended {
         return Err(error);
     }
     result.map_err(|error| match raised {
@@ -78,6 +72,7 @@ pub fn watched<T: Send + 'static>(
     })
 }
 
+/// Passes on messages and progress, and raises what a signal asks for.
 fn pass_on(
     py: Python<'_>,
     on_progress: Option<&Bound<'_, PyAny>>,

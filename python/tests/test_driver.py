@@ -6,6 +6,7 @@ import os
 import signal
 import sys
 import threading
+import time
 from pathlib import Path
 from typing import Any
 
@@ -141,6 +142,33 @@ def test_an_interrupt_stops_a_slow_driver() -> None:
     with pytest.raises(KeyboardInterrupt):
         lanesweep.simulate(CASES, category="cut-in", models=[Wrong(slow)])
     assert len(lanesweep.simulate(CASES, category="cut-in", models="FSM")) == 200
+
+
+@pytest.mark.skipif(os.name == "nt", reason="signals")
+def test_a_second_interrupt_leaves_a_driver_that_blocks() -> None:
+    released = threading.Event()
+
+    def block(view: lanesweep.View) -> float:
+        released.wait(60)
+        return 0.0
+
+    for delay_s in (0.5, 1.0):
+        threading.Timer(delay_s, lambda: signal.raise_signal(signal.SIGINT)).start()
+    start = time.monotonic()
+    with pytest.raises(KeyboardInterrupt):
+        lanesweep.simulate(CASES, category="cut-in", models=[Wrong(block)])
+    assert time.monotonic() - start < 20
+    with pytest.raises(lanesweep.BusyError):
+        lanesweep.simulate(CASES, category="cut-in", models="FSM")
+    released.set()
+    for _ in range(200):
+        try:
+            assert len(lanesweep.simulate(CASES, category="cut-in", models="FSM")) == 200
+            break
+        except lanesweep.BusyError:
+            time.sleep(0.1)
+    else:
+        pytest.fail("the driver was released, and its work has not ended")
 
 
 def test_the_example_in_jax_avoids_what_it_can() -> None:
