@@ -128,8 +128,10 @@ macro_rules! declare_constants {
 }
 for_every_driver_model!(declare_constants);
 
-/// A single lane of a driver outside the registry. The driver has computed this lane before, in a sweep; if it fails now,
-/// the caller has no result to return.
+/// A single lane of a driver outside the registry.
+///
+/// # Panics
+/// If the driver fails. Callers of single lanes have no error to return; whoever runs the verb turns the panic into one.
 fn foreign_lane<R: Real>(
     constants: &Constants<R>,
     model: ModelId,
