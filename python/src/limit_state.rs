@@ -8,7 +8,7 @@ use lanesweep::engine::OpenBackend;
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
-use lanesweep::run::sampling::{LaneLimitState, SampleHeadways, truncated};
+use lanesweep::run::sampling::{LaneLimitState, Question, SampleHeadways, truncated};
 use lanesweep::stats::density::{DensityModel, read_density};
 use lanesweep::stats::estimate::{Density as _, LimitState as _};
 use lanesweep::{Error, Place, Result};
@@ -70,15 +70,11 @@ fn open(
 
 impl Opened {
     fn values(&self, points: &[Vec<f64>]) -> Result<Vec<f64>> {
-        LaneLimitState {
-            density: &self.density,
-            profile: &self.profile,
-            model: self.model,
-            criterion: self.criterion,
-            headway: self.headway.clone(),
-            executor: self.backend.executor(),
-        }
-        .evaluate(points)
+        let question = Question { model: self.model, criterion: self.criterion, headway: 0 };
+        let executor = self.backend.executor();
+        let lanes = LaneLimitState::new(&self.density, &self.profile, &self.headway, &[question], executor);
+        // The first guide of a point is the limit state.
+        Ok(lanes.evaluate(points)?.into_iter().step_by(lanes.guides()).collect())
     }
 }
 

@@ -97,7 +97,7 @@ fn size(bytes: u64) -> String {
     }
 }
 
-fn time(seconds: f64) -> String {
+pub(super) fn time(seconds: f64) -> String {
     match seconds {
         s if s < 10.0 => format!("{s:.2} s"),
         s if s < 600.0 => format!("{s:.0} s"),

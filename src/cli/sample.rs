@@ -9,7 +9,7 @@ use super::lists;
 use super::shard_flags::ShardFlags;
 use super::source::PlausibilityFlag;
 use crate::Result;
-use crate::cli::settings::{EstimatorKind, SampleSettings};
+use crate::cli::settings::{EstimatorKind, PointKind, SampleSettings};
 use crate::engine::Headway;
 use crate::interop::openscenario::Rename;
 use crate::model::driver::ModelId;
@@ -19,8 +19,9 @@ use crate::stats::density::DensityModel;
 /// How likely does a driver fail?
 ///
 /// Draws concrete scenarios from a density (see `lanesweep fit`), runs each against the driver models and estimates
-/// the probability of failure with its interval, by crude Monte Carlo, importance sampling, cross-entropy or subset
-/// simulation. Each estimate has a verdict on whether to trust it. A table goes to stdout, files to --out.
+/// the probability of failure with its interval, by crude Monte Carlo or importance sampling. With --half-width it
+/// takes the cheaper one for each question. Each estimate has a verdict on whether to trust it. A table goes to
+/// stdout, files to --out.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(mut_args(|arg| match arg.get_id().as_str() {
@@ -33,11 +34,11 @@ use crate::stats::density::DensityModel;
 #[command(
     after_help = "Examples (--help has more):\n  \
                   lanesweep sample lanesweep-densities/cut-in-2.json --samples 1e6\n  \
-                  lanesweep sample cut-in-1.json --estimator subset --models FSM --thw 0.6\n  \
+                  lanesweep sample cut-in-1.json --models FSM --thw 2 --half-width 0.1\n  \
                   lanesweep sample cut-in-1.json --samples 1e8 --shard 0/2 --out big",
     after_long_help = "Examples (the repository has the .xosc file in docs/examples):\n  \
                   lanesweep sample lanesweep-densities/cut-in-2.json --samples 1e6\n  \
-                  lanesweep sample cut-in-1.json --estimator subset --models FSM --thw 0.6\n  \
+                  lanesweep sample cut-in-1.json --models FSM --thw 2 --half-width 0.1\n  \
                   lanesweep sample cut-in-1.json --samples 1e8 --shard 0/2 --out big\n  \
                   lanesweep sample --distribution cut-in-stochastic.xosc --category cut-in \\\n      \
                   --rename Ego_Speed_kph=ego_speed_kmh --rename Other_Speed_kph=other_speed_kmh"
@@ -71,7 +72,7 @@ pub struct Sample {
     /// Time headways, s [default: the density's, else paper]
     ///
     /// paper is 2.0, 1.8, … 0.2. observed (or sampled): the headway is drawn from the recorded ones, as a parameter of
-    /// the density, which needs `fit --with-thw`. The adaptive estimators take one headway.
+    /// the density, which needs `fit --with-thw`.
     #[arg(long, value_name = "LIST", help_heading = "Scenario")]
     thw: Option<String>,
     /// Failure map over two parameters, or `none` [default: the first two]
@@ -85,7 +86,7 @@ pub struct Sample {
     pub(super) given: Vec<(String, f64)>,
     /// Proposal file to sample, with --estimator is; repeatable
     ///
-    /// Several are combined by the balance heuristic.
+    /// Several are mixed with equal weights.
     #[arg(long, value_name = "FILE", help_heading = "Data")]
     pub(super) proposal: Vec<PathBuf>,
     /// Folder for estimate.json, tables and figures
@@ -116,13 +117,20 @@ impl Sample {
     }
 
     pub(super) fn is_crude(&self) -> bool {
-        self.settings.estimator == EstimatorKind::Mc && self.proposal.is_empty()
+        self.settings.estimator != EstimatorKind::Is && self.proposal.is_empty()
     }
 
-    /// Whether it is importance sampling with one given proposal: its samples are independent, so the run can be split
-    /// and resumed.
-    pub(super) fn is_weighted(&self) -> bool {
-        self.settings.estimator == EstimatorKind::Is && self.proposal.len() == 1
+    /// Whether importance sampling answers what crude Monte Carlo would answer at a higher cost.
+    pub(super) fn is_refined(&self) -> bool {
+        let needs_crude = !self.given.is_empty()
+            || self.rows.is_some()
+            || self.distribution.is_some()
+            || self.settings.points == PointKind::Sobol
+            || self.settings.time_limit_s.is_some()
+            || self.shards.is_part()
+            || self.shards.plan_only
+            || self.shards.plan.is_some();
+        self.settings.estimator == EstimatorKind::Auto && self.settings.half_width.is_some() && !needs_crude
     }
 
     pub(super) fn models(&self) -> Result<Vec<ModelId>> {

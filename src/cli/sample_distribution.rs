@@ -33,7 +33,7 @@ pub(super) fn run(
     verbosity: Verbosity,
 ) -> Result<Exit> {
     let settings = &flags.settings;
-    if settings.estimator != EstimatorKind::Mc {
+    if settings.estimator == EstimatorKind::Is {
         return Err(only_crude("--distribution"));
     }
     if settings.points == PointKind::Sobol {

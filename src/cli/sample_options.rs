@@ -7,10 +7,9 @@ use super::sample::Sample;
 use super::source::file_of;
 use crate::cli::settings::{EstimatorKind, IntervalKind, PointKind};
 use crate::report::lanes::table_format;
-use crate::run::forecast::MAX_HELD;
-use crate::run::sampling::{Estimator, MapAxes, SampleHeadways, SampleOptions, SampleSource, read_proposal};
-use crate::stats::density::DensityModel;
-use crate::stats::estimate::{BinomialInterval, Checkpoints, Pilot, StopRule};
+use crate::run::sampling::{Estimator, MapAxes, SampleOptions, SampleSource, read_proposal};
+use crate::stats::density::{DensityModel, Mixture};
+use crate::stats::estimate::{BinomialInterval, Checkpoints, Search, StopRule};
 use crate::support::plausibility::{Doubts, HELP};
 use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
@@ -20,7 +19,14 @@ impl Sample {
     pub(super) fn stop(&self, samples: u64) -> StopRule {
         StopRule {
             samples,
-            relative_half_width: self.settings.half_width,
+            relative_half_width: match self.settings.estimator {
+                // The choice is made after a pilot.
+                EstimatorKind::Auto if self.is_refined() => None,
+                EstimatorKind::Is if self.settings.samples.is_none() => {
+                    Some(self.settings.half_width.unwrap_or(DEFAULT_HALF_WIDTH))
+                }
+                _ => self.settings.half_width,
+            },
             time_limit: self.settings.time_limit_s.map(Duration::from_secs_f64),
             checkpoints: Checkpoints::Doubling,
         }
@@ -29,21 +35,11 @@ impl Sample {
     /// All options of a run over a density.
     pub(super) fn options(&self, density: &DensityModel) -> Result<SampleOptions> {
         let samples = self.settings.samples.unwrap_or(match self.settings.estimator {
-            EstimatorKind::Subset => 2000,
-            _ => 100_000,
+            EstimatorKind::Is if self.proposal.is_empty() => MAX_DRAWS,
+            _ => DEFAULT_SAMPLES,
         });
         self.check_given(density)?;
         let headways = self.headways(density)?;
-        if let SampleHeadways::Each(list) = &headways
-            && list.len() != 1
-            && !self.is_crude()
-        {
-            return Err(Error::usage(
-                Place::item("--thw"),
-                format!("--estimator {} follows one headway at a time", self.settings.estimator.key()),
-                "give one, such as --thw 0.6, or a density fitted with --with-thw",
-            ));
-        }
         Ok(SampleOptions {
             models: self.models()?,
             criterion: self.settings.criterion,
@@ -77,20 +73,17 @@ impl Sample {
     fn estimator(&self, density: &DensityModel) -> Result<Estimator> {
         let settings = &self.settings;
         Ok(match settings.estimator {
-            EstimatorKind::Mc => Estimator::Crude { interval: self.interval() },
-            EstimatorKind::Is if self.proposal.is_empty() => Estimator::Pilot(Pilot {
-                worst: settings.elite_fraction,
-                broad: settings.broad_weight,
-                defence: settings.defensive_weight,
-                ..Pilot::guarded(settings.pilot)
-            }),
+            EstimatorKind::Auto | EstimatorKind::Mc => Estimator::Crude { interval: self.interval() },
+            EstimatorKind::Is if self.proposal.is_empty() => {
+                Estimator::Search(Search { defence: settings.defensive_weight, ..Search::default() })
+            }
             EstimatorKind::Is => {
                 let read = |path: &PathBuf| read_proposal(path, density);
-                let proposals = self.proposal.iter().map(read).collect::<Result<_>>()?;
-                Estimator::Given { proposals, defence: settings.defensive_weight }
+                let proposals: Vec<Mixture> = self.proposal.iter().map(read).collect::<Result<_>>()?;
+                let share = 1.0 / proposals.len() as f64;
+                let equal: Vec<(f64, &Mixture)> = proposals.iter().map(|proposal| (share, proposal)).collect();
+                Estimator::Given { proposal: Some(Mixture::join(&equal)?), defence: settings.defensive_weight }
             }
-            EstimatorKind::Ce => Estimator::CrossEntropy { defence: settings.defensive_weight },
-            EstimatorKind::Subset => Estimator::Subset,
         })
     }
 
@@ -118,6 +111,13 @@ impl Sample {
         }
     }
 }
+
+/// Number of samples if none is given.
+const DEFAULT_SAMPLES: u64 = 100_000;
+/// Half-width of importance sampling if neither it nor a number of samples is given.
+const DEFAULT_HALF_WIDTH: f64 = 0.1;
+/// Maximum number of draws of importance sampling after a search, if none is given.
+const MAX_DRAWS: u64 = 10_000_000;
 
 /// Maximum number of samples of a run that can be split and resumed; the same as for `compare`.
 const MAX_SPLIT: u64 = (1 << 48) - 1;
@@ -149,23 +149,14 @@ impl Sample {
             let help = format!("give at least {min} and at most {max}");
             Err(Error::usage(Place::item(flag), format!("{value} is out of range"), help))
         };
-        match settings.estimator {
-            EstimatorKind::Is if self.is_weighted() => {
-                check_range("--samples", settings.samples.unwrap_or(100_000), 1, MAX_SPLIT)?
+        if settings.estimator == EstimatorKind::Is {
+            check_range("--samples", settings.samples.unwrap_or(DEFAULT_SAMPLES), 1, MAX_SPLIT)?;
+            if settings.time_limit_s.is_some() {
+                return Err(only_crude("--time-limit"));
             }
-            EstimatorKind::Subset => check_range("--samples", settings.samples.unwrap_or(2000), 100, MAX_HELD)?,
-            EstimatorKind::Is | EstimatorKind::Ce => {
-                check_range("--samples", settings.samples.unwrap_or(100_000), 100, 10 * MAX_HELD)?
-            }
-            _ => (),
         }
         let is_split = self.shards.is_part() || self.shards.plan_only;
-        if is_split && !is_crude && !self.is_weighted() {
-            let problem = "the adaptive estimators are sequential and cannot be split";
-            let help = "use --estimator mc, or --estimator is with one given --proposal";
-            return Err(Error::usage(Place::item("--shard"), problem, help));
-        }
-        if is_split && (settings.half_width.is_some() || settings.time_limit_s.is_some()) {
+        if is_split && is_crude && (settings.half_width.is_some() || settings.time_limit_s.is_some()) {
             let problem = "a part of a run cannot evaluate a stop rule of the whole run";
             return Err(Error::usage(Place::item("--shard"), problem, "leave out the stop rules, or --shard"));
         }

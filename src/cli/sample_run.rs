@@ -4,7 +4,7 @@ use std::time::Instant;
 
 use super::configured::Configured;
 use super::console::{self, Verbosity};
-use super::dry_run::DryRun;
+use super::dry_run::{DryRun, time};
 use super::format::FormatFlag;
 use super::sample::Sample;
 use super::sample_options::{guard, only_crude};
@@ -13,11 +13,12 @@ use crate::engine::{Chunk, Executor, OpenBackend};
 use crate::report::lanes;
 use crate::report::sampling::{EstimateFile, HostRecord};
 use crate::run::parts::PLAN_FILE;
-use crate::run::sampling::{self, SampleKind, SampleResult, SampleSource, conditional};
+use crate::run::sampling::{self, SampleKind, SampleOptions, SampleResult, SampleSource, conditional};
 use crate::stats::density::read_density;
+use crate::stats::estimate::StopRule;
 use crate::support::atomic_file::StagedFile;
 use crate::support::files::check_folder;
-use crate::support::readable::count;
+use crate::support::readable::{count, counted};
 use crate::support::run_dir::{ESTIMATE_RECORD, OutputDir, Results};
 use crate::support::table::TableWriter;
 use crate::{Error, Place, Result};
@@ -47,7 +48,29 @@ impl Sample {
         let (sample, data) = self.planned(configured)?;
         let opened = configured.open()?;
         tracing::info!("{data}");
+        let sample = if self.is_refined() { self.chosen(sample, &opened)? } else { sample };
         self.run_sample(sample, &opened, started, verbosity)
+    }
+
+    /// The run of crude Monte Carlo with as many samples as are cheaper than importance sampling.
+    fn chosen(&self, sample: sampling::Sample, opened: &OpenBackend) -> Result<sampling::Sample> {
+        let choice = sample.choice(self.settings.half_width.unwrap_or_default(), &opened.executor())?;
+        let seconds = |samples: f64| time(samples * choice.seconds_per_sample);
+        let samples = self.settings.samples.unwrap_or(choice.samples).min(choice.samples);
+        let all = match choice.samples_for_all {
+            Some(all) => format!("{} samples for all, about {}", count(all as u64), seconds(all)),
+            None => format!("more than {} to find every failure", count(choice.samples)),
+        };
+        tracing::info!(
+            "{} by {} samples of crude Monte Carlo (about {}), {} by importance sampling; crude Monte Carlo alone would \
+             need {all}",
+            counted(choice.by_crude, "question"),
+            count(samples),
+            seconds(samples as f64),
+            choice.by_importance,
+        );
+        let options = SampleOptions { stop: StopRule::samples(samples), ..sample.options.clone() };
+        sampling::Sample::plan(sample.density, &sample.profile, &options)
     }
 
     /// Plans a run over the density; returns the plan and a description of the data.
@@ -88,27 +111,26 @@ impl Sample {
             let (run, backend) = (sample.forecast(&opened.executor())?, opened.backend().describe());
             return DryRun { run, backend, before_s: None }.print(self.format);
         }
-        if self.shards.plan_only || self.shards.is_part() {
+        let executor = opened.executor().with_recheck(sample.options.seed);
+        let is_split = self.shards.plan_only || self.shards.is_part();
+        let sample = if !matches!(sample.kind, SampleKind::Search(_)) {
+            sample
+        } else if is_split {
+            sample.searched(&executor, &self.out)?
+        } else {
+            // The search is kept in the folder, so it needs the folder's lock too.
+            let _folder = OutputDir::open(&self.out, ESTIMATE_RECORD)?;
+            let found = sample.searched(&executor, &self.out)?;
+            found.keep_search(&self.out)?;
+            found
+        };
+        if is_split {
             sample.write_plan(&self.out)?;
         }
         if self.shards.plan_only {
             self.format.print_plan(sample.lane_count(), &self.out.join(PLAN_FILE))?;
             return Ok(Exit::Ok);
         }
-        let executor = opened.executor().with_recheck(sample.options.seed);
-        if matches!(sample.kind, SampleKind::Sequential) {
-            let folder = OutputDir::open(&self.out, ESTIMATE_RECORD)?;
-            let results = folder.results()?;
-            let result = sample.run(&executor)?;
-            return write(&sample, &result, HostRecord::of(opened, 0, started), results, self.format);
-        }
-        let sample = if matches!(sample.kind, SampleKind::Pilot(_)) {
-            // The proposals are kept in the folder, so the search needs the folder's lock too.
-            let _folder = OutputDir::open(&self.out, ESTIMATE_RECORD)?;
-            sample.searched(&executor, Some(&self.out))?
-        } else {
-            sample
-        };
         self.run_split(&sample, opened, &executor, started, verbosity)
     }
 
@@ -150,7 +172,11 @@ impl Sample {
             run.write_part()?;
             return Ok(Exit::Ok);
         }
-        let result = run.take_result()?;
+        let mut result = run.take_result()?;
+        if let Some(half_width) = self.settings.half_width.filter(|_| self.is_refined()) {
+            tracing::info!("importance sampling of what is rare");
+            result = sample.refined(result, half_width, executor)?;
+        }
         let host = HostRecord::of(opened, result.rechecked_lanes, started);
         let mut results = run.results()?;
         rows.into_iter().for_each(|table| results.join(table));

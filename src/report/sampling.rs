@@ -12,10 +12,10 @@ use crate::engine::{DeviceRecord, ENGINE_VERSION, Headway, LanePlan, OpenBackend
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::close_following::CloseFollowing;
-use crate::run::sampling::{EstimateRow, Levels, RiskRate, Sample, SampleOptions, SampleTally};
+use crate::run::sampling::{EstimateRow, RiskRate, Sample, SampleOptions, SampleTally};
 use crate::scenario::Category;
 use crate::stats::density::{DensityModel, Provenance};
-use crate::stats::estimate::{IntervalKind, Ratio, StopReason};
+use crate::stats::estimate::{IntervalKind, Ratio, SearchRound, StopReason};
 use crate::support::readable::{count, count_of, counted, significant, value};
 use crate::support::table::{Column, Digits, NumberText, Table};
 use crate::{Error, Result};
@@ -141,7 +141,7 @@ pub struct EstimateFile {
     pub program: String,
     /// [`ENGINE_VERSION`] of the program, which identifies the bits of its lanes.
     pub engine: u64,
-    /// Estimator: `mc`, `is`, `ce`, `subset`.
+    /// Estimator: `mc`, `is`. With `mc`, rows of rare failures may be of importance sampling.
     pub estimator: &'static str,
     /// The density sampled.
     pub density: DensityRecord,
@@ -171,8 +171,8 @@ pub struct EstimateFile {
     pub reproducible: bool,
     /// Estimates.
     pub estimates: Vec<EstimateRow>,
-    /// Levels of the adaptive estimators, one per model.
-    pub levels: Vec<Levels>,
+    /// Rounds of the search of importance sampling.
+    pub search: Vec<SearchRound>,
     /// Files beside this one.
     pub files: Vec<String>,
     /// SHA-256 of `worst.csv`, if written.
@@ -182,7 +182,7 @@ pub struct EstimateFile {
 }
 
 impl EstimateFile {
-    /// The part of the record common to all runs; draws, levels and replicates are added where they exist.
+    /// The part of the record common to all runs; draws and search are added where they exist.
     ///
     /// # Errors
     /// As [`DensityModel::content_sha256`].
@@ -221,7 +221,7 @@ impl EstimateFile {
             stopped: stopped.unwrap_or(StopReason::Samples),
             reproducible: estimates.iter().all(|r| r.estimate.stopped.is_reproducible()),
             estimates,
-            levels: Vec::new(),
+            search: Vec::new(),
             files: Vec::new(),
             worst_sha256: None,
             host,
@@ -282,8 +282,13 @@ impl EstimateFile {
             let list: Vec<String> = self.given.iter().map(|(name, v)| format!("{name} = {}", value(*v))).collect();
             let _ = writeln!(text, "given {}: probabilities are conditional, risks are not known", list.join(", "));
         }
-        text.push_str(&self.table().text());
-        for row in self.estimates.iter().filter(|r| r.is_overall(&self.estimates)) {
+        text.push_str(&self.table(|row| row.is_overall(&self.estimates)).text());
+        if self.estimates.iter().any(|row| row.is_rare_beside(&self.estimates)) {
+            text.push_str("Rare failures, by importance sampling:\n");
+            text.push_str(&self.table(|row| row.is_rare_beside(&self.estimates)).text());
+        }
+        let shown = |row: &&EstimateRow| row.is_overall(&self.estimates) || row.is_rare_beside(&self.estimates);
+        for row in self.estimates.iter().filter(shown) {
             for warning in &row.estimate.trust.warnings {
                 let _ = writeln!(text, "{} {} {}: {warning}", row.model.name(), row.criterion.label(), row.headway);
             }
@@ -339,8 +344,8 @@ impl EstimateFile {
         close_following(&[row], "the density", &self.plan_headways, WIDTH)
     }
 
-    /// The table of the estimates over all headways.
-    fn table(&self) -> Table {
+    /// The table of some estimates.
+    fn table(&self, is_in: impl Fn(&EstimateRow) -> bool) -> Table {
         let estimates = &self.estimates;
         let half_width = |row: &EstimateRow| {
             NumberText(match 100.0 * row.estimate.relative_half_width {
@@ -351,7 +356,7 @@ impl EstimateFile {
         };
         let sampled = |row: &EstimateRow| row.recorded.and_then(|recorded| recorded.sampled);
         let ratio = |row| sampled(row).and_then(|r| Some(format!("{} {}", short(r.ratio?), r.verdict.mark())));
-        let mut table = Table::of(estimates.iter().filter(|row| row.is_overall(estimates)))
+        let mut table = Table::of(estimates.iter().filter(|row| is_in(row)))
             .column("model", |row| row.model.name())
             .column("criterion", |row| row.criterion.label())
             .column("THW", |row| self.headway_cell(row))
@@ -379,6 +384,7 @@ impl EstimateFile {
         let table = Table::of(rows)
             .column("model", |(row, _)| row.model.name())
             .column("criterion", |(row, _)| row.criterion.label())
+            .column("THW", |(row, _)| self.headway_cell(row))
             .column(three_digits("variance reduction"), |(row, _)| row.estimate.variance_reduction)
             .column("ESS", |(_, w)| w.effective_size)
             .column("ESS of failures", |(_, w)| w.effective_size_failures)
@@ -392,7 +398,7 @@ impl EstimateFile {
     /// The rows for which crude Monte Carlo needs fewer lanes for the same interval, with a sentence stating it.
     pub(super) fn costlier_than_crude(&self) -> impl Iterator<Item = (&EstimateRow, String)> {
         let is_costlier = |row: &&EstimateRow| row.estimate.variance_reduction < 1.0;
-        let rows = self.estimates.iter().filter(|_| self.estimator != "mc").filter(is_costlier);
+        let rows = self.estimates.iter().filter(|row| row.estimate.weights.is_some()).filter(is_costlier);
         rows.map(|row| {
             let ratio = short(1.0 / row.estimate.variance_reduction);
             (row, format!("this estimator used {ratio} times the lanes that crude Monte Carlo (`mc`) needs for the same interval"))
@@ -401,6 +407,11 @@ impl EstimateFile {
 }
 
 impl EstimateRow {
+    /// Whether the row is of importance sampling beside rows of crude Monte Carlo over all headways.
+    pub(super) fn is_rare_beside(&self, all: &[EstimateRow]) -> bool {
+        self.estimate.weights.is_some() && !self.is_overall(all)
+    }
+
     /// Whether the row is over all headways, if there are several.
     pub(super) fn is_overall(&self, all: &[EstimateRow]) -> bool {
         self.headway == "all" || !all.iter().any(|row| row.headway == "all")

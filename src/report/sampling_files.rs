@@ -25,7 +25,7 @@ impl EstimateFile {
             file.plan_sha256 = Some(plan.hash().to_owned());
             file.draws = Some(DrawRecord::of(&crude.tally, plan));
         }
-        file.levels = result.levels.clone();
+        file.search = result.search.clone();
         Ok(file)
     }
 
@@ -40,10 +40,10 @@ impl EstimateFile {
         }
         if matches!(sample.options.estimator, Estimator::Given { .. }) {
             // A proposal in this folder may be an input of the run.
-            results.keep(|name| name.starts_with("proposal-"))?;
+            results.keep(|name| name == "proposal.json")?;
         }
-        for (model, proposal) in &result.proposals {
-            results.add(&format!("proposal-{}.json", model.name()), proposal_text(density, proposal)?.as_bytes())?;
+        if let Some(proposal) = &result.proposal {
+            results.add("proposal.json", proposal_text(density, proposal)?.as_bytes())?;
         }
         results.add("density.json", &density.to_json()?)?;
         self.publish(results, figures)

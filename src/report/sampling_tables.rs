@@ -32,7 +32,7 @@ impl EstimateFile {
         Table::of(&self.estimates)
             .column("category", |_| self.density.category)
             .column("parameterization", |_| self.density.parameterization.as_str())
-            .column("estimator", |_| self.estimator)
+            .column("estimator", |row| if row.estimate.weights.is_some() { "is" } else { self.estimator })
             .column("model", |row| row.model.name())
             .column("criterion", |row| row.criterion.key())
             .column("headway", |row| row.headway.as_str())

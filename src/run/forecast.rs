@@ -5,15 +5,14 @@ use std::time::{Duration, Instant};
 use super::compare::Compare;
 use super::grid::{GridPlan, Map};
 use super::parts::Ledger;
-use super::sampling::{Estimator, Proposals, Sample, SampleKind, SampleOptions, SampleTally};
+use super::sampling::{Sample, SampleKind, SampleOptions, SampleTally, Weighted};
 use super::study::{Study, WINDOW};
 use crate::Result;
 use crate::engine::{
     Backend, Block, Confusion, Executor, Forecast, LanePlan, Outcome, Partial, Verdicts, Wanted, forecast,
 };
 use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::stats::estimate::{CrossEntropy, Subset};
+use crate::support::readable;
 
 /// Time for which lanes are run to measure their speed.
 const BUDGET: Duration = Duration::from_millis(200);
@@ -74,17 +73,6 @@ fn parts(plan: &LanePlan) -> Vec<ForecastPart> {
         block.variants.iter().map(part).collect::<Vec<_>>()
     };
     plan.blocks.iter().flat_map(of_block).collect()
-}
-
-/// Parts of the driver models, each with this number of samples.
-fn parts_of_models(models: &[ModelId], what: &str, samples: u64) -> Vec<ForecastPart> {
-    let part = |model: &ModelId| ForecastPart {
-        of: model.name().to_owned(),
-        what: what.to_owned(),
-        units: samples,
-        lanes: samples,
-    };
-    models.iter().map(part).collect()
 }
 
 fn counted(plan: &LanePlan, backend: &dyn Backend) -> Result<Forecast> {
@@ -216,57 +204,49 @@ impl Sample {
                     ..run
                 }
             }
-            SampleKind::Weighted(proposals) => {
-                let weighed = weighed(self, proposals, executor)?;
-                let what = format!("headway {}", options.headway_name());
+            SampleKind::Weighted(weighted) => {
+                let weighed = weighed(self, weighted, executor)?;
                 RunForecast {
-                    parts: parts_of_models(&options.models, &what, self.samples()),
+                    parts: vec![self.weighted_part("importance sampling", self.samples())],
                     more_bytes: weighed.lanes_at_once * BYTES_PER_SAMPLE,
                     more: "the samples that are judged at once",
                     lanes: Some(weighed),
                     ..run
                 }
             }
-            SampleKind::Pilot(_) | SampleKind::Sequential => {
-                let lanes = lanes_at_most(options);
+            SampleKind::Search(search) => {
+                let questions = options.asked().len() as u64;
+                let points = search.most_points(questions as usize).saturating_add(self.samples());
                 RunForecast {
-                    parts: parts_of_models(&options.models, &format!("estimator {}", options.estimator.key()), lanes),
+                    parts: vec![self.weighted_part("search and importance sampling", points)],
                     is_at_most: true,
-                    // The points of a level or pilot, with their limit states and the fit's responsibilities.
-                    more_bytes: lanes.min(MAX_HELD) * (self.density.space.parameters().len() as u64 + 8) * 8,
+                    // The points of the search with their values and densities.
+                    more_bytes: MAX_HELD.min(points) * (self.density.space.parameters().len() as u64 + 8 + 3 * questions) * 8,
                     more: "the points that are held at once",
                     ..run
                 }
             }
         })
     }
-}
 
-/// Maximum number of lanes of a driver model; the number of levels is known only during the run.
-fn lanes_at_most(options: &SampleOptions) -> u64 {
-    let (samples, seed) = (options.stop.samples, options.seed);
-    match &options.estimator {
-        Estimator::Subset => {
-            let subset = Subset::new(seed, samples);
-            subset.samples_per_level.saturating_mul(subset.levels as u64)
+    fn weighted_part(&self, of: &str, samples: u64) -> ForecastPart {
+        ForecastPart {
+            of: of.to_owned(),
+            what: readable::counted(self.options.asked().len(), "question"),
+            units: samples,
+            lanes: samples.saturating_mul(self.lanes_per_sample()),
         }
-        Estimator::CrossEntropy { .. } => {
-            let levels = CrossEntropy::new(seed, (samples / 10).max(2000), samples);
-            samples.saturating_add(levels.samples_per_level.saturating_mul(levels.levels as u64))
-        }
-        Estimator::Pilot(pilot) => samples.saturating_add(pilot.runs),
-        Estimator::Crude { .. } | Estimator::Given { .. } => samples,
     }
 }
 
 /// Measures drawing and weighting as well, because they cost more than the lanes.
-fn weighed(sample: &Sample, proposals: &Proposals, executor: &Executor) -> Result<Forecast> {
+fn weighed(sample: &Sample, weighted: &Weighted, executor: &Executor) -> Result<Forecast> {
     let all = sample.samples();
     let max_samples = all.min(sample.chunk_samples());
     let (mut samples, mut took) = (max_samples.min(256), 0.0);
     loop {
         let started = Instant::now();
-        sample.sample_weighted(proposals, &mut Ledger::new(0..samples, &[]), executor, |_| ())?;
+        sample.sample_weighted(weighted, &mut Ledger::new(0..samples, &[]), executor, |_| ())?;
         let last = std::mem::replace(&mut took, started.elapsed().as_secs_f64());
         if samples >= max_samples || took + last >= BUDGET.as_secs_f64() / 2.0 {
             break;
@@ -276,7 +256,7 @@ fn weighed(sample: &Sample, proposals: &Proposals, executor: &Executor) -> Resul
     Ok(Forecast {
         lanes: sample.lane_count(),
         seconds: took / samples as f64 * all as f64,
-        measured_lanes: samples * sample.options.models.len() as u64,
+        measured_lanes: samples * sample.lanes_per_sample(),
         lanes_at_once: max_samples,
     })
 }

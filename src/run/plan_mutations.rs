@@ -38,7 +38,7 @@ fn a_changed_plan_is_an_error_or_a_plan_and_never_a_panic() {
     let map = MapAxes::of(&density, "v_ego_mps", "v_target_mps").unwrap();
     let crude =
         SampleOptions { map: Some(map), worst: 3, ..SampleOptions::new(Estimator::CRUDE, 1000, headways.clone()) };
-    let given = Estimator::Given { proposals: vec![density.mixture().unwrap()], defence: 0.1 };
+    let given = Estimator::Given { proposal: Some(density.mixture().unwrap()), defence: 0.1 };
     let weighted = SampleOptions::new(given, 1000, headways);
     for options in [crude, weighted] {
         let sample = Sample::plan(density.clone(), &profile, &options).unwrap();

@@ -1,4 +1,4 @@
-//! Problems of structural reliability whose probabilities are known, and a kernel density estimate for tests.
+//! Problems of structural reliability whose probabilities are known.
 
 use lanesweep::Result;
 use lanesweep::stats::density::Mixture;
@@ -50,17 +50,4 @@ pub fn four_branch_probability(near: f64, far: f64) -> f64 {
 /// Independent standard normal parameters as a mixture of one: chains walk it as they walk any density.
 pub fn unit_mixture(dimensions: usize) -> Mixture {
     Mixture::of_kernels(vec![vec![0.0; dimensions]], &vec![1.0; dimensions]).expect("well formed")
-}
-
-/// Gaussian kernels with Silverman's bandwidth (4/(d + 2))^{1/(d + 4)} n^{−1/(d + 4)} in units of each spread.
-pub fn silverman(points: &[Vec<f64>]) -> Result<Mixture> {
-    let (n, d) = (points.len() as f64, points[0].len());
-    let bandwidth = (4.0 / (d as f64 + 2.0) / n).powf(1.0 / (d as f64 + 4.0));
-    let spread: Vec<f64> = (0..d)
-        .map(|j| {
-            let mean = points.iter().map(|p| p[j]).sum::<f64>() / n;
-            (points.iter().map(|p| (p[j] - mean).powi(2)).sum::<f64>() / n).sqrt() * bandwidth
-        })
-        .collect();
-    Mixture::of_kernels(points.to_vec(), &spread)
 }

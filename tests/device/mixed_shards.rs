@@ -47,9 +47,9 @@ fn whole_and_shards(counts: &[u64]) {
     done(dir, &[&fit[..], &["--no-comparison", "--out", "densities"]].concat());
     let density = "densities/cut-in-2.json";
     let sample = ["sample", density, "--samples", "9000", "--thw", "0.4", "--models", "FSM,RSS"];
-    let pilot = ["--estimator", "is", "--config", "sample.pilot=2000", "--backend", "cpu", "--out", "pilot"];
+    let pilot = ["--estimator", "is", "--backend", "cpu", "--out", "pilot"];
     done(dir, &[&sample[..], &pilot].concat());
-    let weighted = [&sample[..], &["--estimator", "is", "--proposal", "pilot/proposal-FSM.json"]].concat();
+    let weighted = [&sample[..], &["--estimator", "is", "--proposal", "pilot/proposal.json"]].concat();
     let study = ["study", "--synth-recordings", "2", "--config", "generator.duration_s=240"];
     for (name, run) in [("study", &study[..]), ("crude", &sample[..]), ("weighted", &weighted)] {
         let whole = done(dir, &[run, &["--backend", "cpu", "--out", name]].concat());

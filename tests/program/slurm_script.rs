@@ -254,7 +254,6 @@ fn a_command_that_its_verb_refuses_is_refused_before_anything_is_written() {
         ("profile.toml", "papr"),
         ("-- sample d.json --models XYZ", "--models: there is no driver model `XYZ`"),
         ("-- sample d.json --thw 0.6,0.6", "`0.6` is given twice"),
-        ("-- sample d.json --estimator subset", "cannot be split"),
         ("-- sample d.json --given nothing=3", "nothing"),
         ("-- sample d.json --level 2", "--level"),
         ("-- sample nothing.json", "nothing.json: cannot read"),

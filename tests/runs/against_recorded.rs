@@ -12,7 +12,7 @@ use lanesweep::run::sampling::{EstimateRow, Estimator, Sample, SampleHeadways, S
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{DensityModel, FitOptions};
-use lanesweep::stats::estimate::{Verdict, Warning};
+use lanesweep::stats::estimate::{Search, Verdict, Warning};
 use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
@@ -94,8 +94,8 @@ fn a_rate_that_nothing_is_compared_with_is_not_sound() {
 }
 
 #[test]
-fn estimators_that_search_for_failures_stand_beside_the_replayed_scenarios_too() {
-    for row in rows(&sample(density("3"), Estimator::CrossEntropy { defence: 0.1 }, vec![Headway::ThwS(0.6)])) {
+fn importance_sampling_stands_beside_the_replayed_scenarios_too() {
+    for row in rows(&sample(density("3"), Estimator::Search(Search::default()), vec![Headway::ThwS(0.6)])) {
         let ratios = row.recorded.unwrap();
         assert!(ratios.sampled.is_none() && (ratios.replayed.agrees() || is_flagged(&row)), "{row:?}");
     }

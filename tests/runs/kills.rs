@@ -36,7 +36,7 @@ const fn verb(
 
 const SAMPLE: &str = "sample d.json --thw 0.6 --models RSS --samples 3000 --worst 3 --out out";
 
-const VERBS: [Verb; 18] = [
+const VERBS: [Verb; 17] = [
     verb(
         "study",
         Some("run.json"),
@@ -80,19 +80,13 @@ const VERBS: [Verb; 18] = [
         "sample is",
         Some("estimate.json"),
         Some(SAMPLE),
-        "sample d.json --estimator is --config sample.pilot=2000 --samples 10000 --thw 0.6 --models RSS,FSM --out out",
+        "sample d.json --estimator is --samples 10000 --thw 0.6 --models RSS,FSM --out out",
     ),
     verb(
-        "sample ce",
+        "sample auto",
         Some("estimate.json"),
         Some(SAMPLE),
-        "sample d.json --estimator ce --samples 5000 --thw 0.6 --models FSM --out out",
-    ),
-    verb(
-        "sample subset",
-        Some("estimate.json"),
-        Some(SAMPLE),
-        "sample d.json --estimator subset --samples 500 --thw 0.6 --models FSM --out out",
+        "sample d.json --half-width 0.5 --thw 0.4,1.6 --models FSM --out out",
     ),
     verb(
         "sample --distribution",

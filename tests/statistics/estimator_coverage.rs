@@ -1,5 +1,4 @@
-//! How often the 95 % intervals hold the truth, over 1,000 seeded repeats of every estimator, and how far estimates of
-//! 10⁻⁶ lie off. Minutes long:
+//! How often the 95 % intervals hold the truth, over 1,000 seeded repeats of every estimator. Minutes long:
 //!
 //! ```text
 //! cargo test --release --test statistics estimator_coverage:: -- --ignored --nocapture
@@ -9,16 +8,15 @@ use lanesweep::engine::Confusion;
 use lanesweep::run::score::{ScoreOptions, f1, f1_interval};
 use lanesweep::stats::density::{Mixture, normal_quantile};
 use lanesweep::stats::estimate::{
-    BinomialInterval, Clusters, Counts, CrossEntropy, Density, Estimate, Importance, LimitState, Pilot, StandardNormal,
-    StopReason, Subset, Technique, Truncated, Verdict, balance_heuristic, cluster_rate, cross_entropy, from_counts,
-    from_pilot, subset,
+    BinomialInterval, Clusters, Counts, Density, Estimate, Goal, LimitState, Search, StandardNormal, StopReason,
+    Truncated, Verdict, adaptive, cluster_rate, from_counts,
 };
 use lanesweep::stats::random::Stream;
 use rand_chacha::ChaCha8Rng;
 use rand_core::{Rng, SeedableRng};
 use rayon::prelude::*;
 
-use crate::common::reliability::{four_branch, four_branch_probability, linear, silverman, tail, unit_mixture};
+use crate::common::reliability::{four_branch, four_branch_probability, linear, tail, unit_mixture};
 
 const REPEATS: u64 = 1000;
 
@@ -120,125 +118,51 @@ fn binomial_intervals_hold() {
     }
 }
 
-#[test]
-#[ignore = "long: cargo test --release --test statistics estimator_coverage:: -- --ignored --nocapture"]
-fn importance_sampling_intervals_hold() {
-    heading();
-    let mut misses = Misses::default();
-    let mut of = |name: &str, truth: f64, density: &dyn Density, limit: &dyn LimitState| {
-        let limit = |points: &[Vec<f64>]| limit.evaluate(points);
-        let row = repeat(name, truth, REPEATS, |seed| {
-            from_pilot(density, &limit, &silverman, &Pilot::guarded(5000), &Importance::new(seed, 5000))
-                .map(|found| found.0)
-                .expect("an estimate")
-        });
-        misses.want(row.coverage >= 0.92, &row, "92 %");
-    };
-    for (beta, d) in [(2.0, 2), (3.0, 2), (3.5, 2), (2.5, 5), (3.0, 5), (2.0, 10)] {
-        let density = StandardNormal { dimensions: d };
-        of(&format!("pilot KDE, linear {beta}, d = {d}"), tail(beta), &density, &linear(beta));
+/// Problems with known probability: name, truth, density, limit state.
+type Problem = (String, f64, Box<dyn Density>, Box<dyn LimitState>);
+
+fn problems() -> Vec<Problem> {
+    let mut all: Vec<Problem> = Vec::new();
+    for (beta, dimensions) in [(2.0, 2), (3.5, 2), (3.0, 5), (4.75, 5), (4.0, 10), (4.75, 10)] {
+        let name = format!("linear {beta}, d = {dimensions}");
+        all.push((name, tail(beta), Box::new(StandardNormal { dimensions }), Box::new(linear(beta))));
     }
-    let truth = four_branch_probability(3.0, 3.5);
-    of("pilot KDE, four branches", truth, &StandardNormal { dimensions: 2 }, &four_branch(3.0, 3.5));
+    for (near, far) in [(3.0, 3.5), (5.0, 5.2)] {
+        let truth = four_branch_probability(near, far);
+        let density = Box::new(StandardNormal { dimensions: 2 });
+        all.push((format!("four branches, {near} and {far}"), truth, density, Box::new(four_branch(near, far))));
+    }
     // Half of the plane cut off: the first parameter is a speed.
-    let half = Truncated::with_validity(unit_mixture(2), |x: &[f64]| x[0] > 0.0, 0.5).expect("a share");
+    let half = Truncated::with_validity(unit_mixture(2), |x: &[f64]| x[0] > 0.0, 0.5).expect("a fraction");
     let slow = |points: &[Vec<f64>]| Ok(points.iter().map(|x| 3.0 - x[0]).collect());
-    of("pilot KDE, half cut off", 2.0 * tail(3.0), &half, &slow);
-}
-
-#[test]
-#[ignore = "long: cargo test --release --test statistics estimator_coverage:: -- --ignored --nocapture"]
-fn balanced_proposals_hold() {
-    heading();
-    let mut misses = Misses::default();
-    let density = StandardNormal { dimensions: 2 };
-    let at = |x: f64, y: f64| Mixture::of_kernels(vec![vec![x, y]], &[1.0, 1.0]).expect("well formed");
-    // One proposal for each branch: with a branch left out the nominal draws meet it once or so, and no interval can
-    // hold (the weights then warn of few effective failures).
-    let branches = [at(2.3, 2.3), at(-2.3, -2.3), at(2.7, -2.7), at(-2.7, 2.7)];
-    let row = repeat("balance, four branches", four_branch_probability(3.0, 3.5), REPEATS, |seed| {
-        let mut techniques = vec![Technique { proposal: &density, draws: 1000 }];
-        techniques.extend(branches.iter().map(|proposal| Technique { proposal, draws: 1000 }));
-        balance_heuristic(&density, &techniques, &four_branch(3.0, 3.5), seed, 0.95).expect("an estimate")
-    });
-    misses.want(row.coverage >= 0.92, &row, "92 %");
-}
-
-#[test]
-#[ignore = "long: cargo test --release --test statistics estimator_coverage:: -- --ignored --nocapture"]
-fn cross_entropy_intervals_hold() {
-    heading();
-    let mut misses = Misses::default();
-    for (beta, d) in [(2.0, 2), (3.5, 2), (3.0, 5), (4.0, 10), (5.0, 2)] {
-        let density = StandardNormal { dimensions: d };
-        let row = repeat(&format!("cross-entropy, linear {beta}, d = {d}"), tail(beta), REPEATS, |seed| {
-            let options = CrossEntropy::new(seed, 2000, 5000);
-            cross_entropy(&density, &linear(beta), &options).expect("an estimate").estimate
-        });
-        misses.want(row.coverage >= 0.90, &row, "90 %");
-    }
-    let density = StandardNormal { dimensions: 2 };
-    let row = repeat("cross-entropy, four branches", four_branch_probability(3.0, 3.5), REPEATS, |seed| {
-        let options = CrossEntropy::new(seed, 2000, 5000);
-        cross_entropy(&density, &four_branch(3.0, 3.5), &options).expect("an estimate").estimate
-    });
-    misses.want(row.coverage >= 0.90, &row, "90 %");
-}
-
-#[test]
-#[ignore = "long: cargo test --release --test statistics estimator_coverage:: -- --ignored --nocapture"]
-fn subset_simulation_intervals_hold() {
-    heading();
-    let mut misses = Misses::default();
-    let mut of = |name: String, truth: f64, density: &dyn Density, limit: &dyn LimitState| {
-        let limit = |points: &[Vec<f64>]| limit.evaluate(points);
-        let row = repeat(&name, truth, REPEATS, |seed| {
-            subset(density, &limit, &Subset::new(seed, 2000)).expect("an estimate").estimate
-        });
-        misses.want(row.coverage >= 0.85, &row, "85 %");
-    };
-    for (beta, d) in [(2.0, 2), (3.5, 2), (3.0, 5), (4.0, 10), (5.0, 2)] {
-        let (walked, standard) = (unit_mixture(d), StandardNormal { dimensions: d });
-        of(format!("subset, mixture, linear {beta}, d = {d}"), tail(beta), &walked, &linear(beta));
-        of(format!("subset, pCN, linear {beta}, d = {d}"), tail(beta), &standard, &linear(beta));
-    }
-    // Kernels in two heaps: far from any Gaussian; the share of each kernel beyond the limit is known.
+    all.push(("half cut off".to_owned(), 2.0 * tail(3.0), Box::new(half), Box::new(slow)));
+    // Kernels in two heaps: far from any Gaussian; the fraction of each kernel beyond the limit is known.
     let points: Vec<Vec<f64>> = (0..200)
         .map(|i| vec![if i % 4 == 0 { 3.0 } else { 0.0 } + 0.005 * f64::from(i), 0.01 * f64::from(i)])
         .collect();
     let kernels = Mixture::of_kernels(points.clone(), &[0.5, 0.3]).expect("well formed");
     let truth = points.iter().map(|p| tail((6.0 - p[0]) / 0.5)).sum::<f64>() / 200.0;
     let first = |points: &[Vec<f64>]| Ok(points.iter().map(|x| 6.0 - x[0]).collect());
-    of("subset, mixture, two heaps of kernels".to_owned(), truth, &kernels, &first);
-    let truth = four_branch_probability(3.0, 3.5);
-    of("subset, mixture, four branches".to_owned(), truth, &unit_mixture(2), &four_branch(3.0, 3.5));
+    all.push(("two heaps of kernels".to_owned(), truth, Box::new(kernels), Box::new(first)));
+    all
 }
 
 #[test]
 #[ignore = "long: cargo test --release --test statistics estimator_coverage:: -- --ignored --nocapture"]
-fn one_in_a_million_is_reached_with_a_hundred_thousand_runs() {
+fn adaptive_importance_sampling_intervals_hold() {
     heading();
-    let beta = 4.753_424_308_822_899;
-    let truth = tail(beta);
-    assert!((truth / 1e-6 - 1.0).abs() < 1e-9);
-    let mut missed = Vec::new();
-    for d in [2, 5, 10] {
-        let (walked, standard) = (unit_mixture(d), StandardNormal { dimensions: d });
-        let rows = [
-            repeat(&format!("subset, mixture, 1e-6, d = {d}"), truth, 100, |seed| {
-                subset(&walked, &linear(beta), &Subset::new(seed, 15_000)).expect("an estimate").estimate
-            }),
-            repeat(&format!("subset, pCN, 1e-6, d = {d}"), truth, 100, |seed| {
-                subset(&standard, &linear(beta), &Subset::new(seed, 15_000)).expect("an estimate").estimate
-            }),
-            repeat(&format!("cross-entropy, 1e-6, d = {d}"), truth, 100, |seed| {
-                let options = CrossEntropy::new(seed, 5000, 40_000);
-                cross_entropy(&standard, &linear(beta), &options).expect("an estimate").estimate
-            }),
-        ];
-        missed.extend(rows.into_iter().filter(|r| r.runs > 1e5 || r.median_error > 0.2).map(|r| r.name));
+    let mut misses = Misses::default();
+    for (name, truth, density, limit_state) in problems() {
+        let row = repeat(&name, truth, REPEATS, |seed| {
+            let goal = Goal { half_width: 0.2, max_draws: 100_000 };
+            adaptive(&*density, &*limit_state, &Search::default(), &goal, seed, 0.95)
+                .expect("an estimate")
+                .estimates
+                .remove(0)
+        });
+        misses.want(row.coverage >= 0.92, &row, "92 %");
+        misses.want(row.runs <= 1e5 && row.median_error <= 0.1, &row, "10 % within 100,000 runs");
     }
-    assert!(missed.is_empty(), "more than 100,000 runs, or a median error above 20 %: {missed:?}");
 }
 
 /// Draws of a scenario: hardness is Φ(μ + σZ), which has the mean Φ(μ/√(1 + σ²)).

@@ -3,13 +3,17 @@
 
 use lanesweep::stats::density::Mixture;
 use lanesweep::stats::estimate::{
-    BlockSums, CrossEntropy, Importance, Pilot, StandardNormal, Subset, Technique, Verdict, Warning, WeightSums,
-    WeightedDraw, balance_heuristic, cross_entropy, defended, from_pilot, importance, importance_sums, subset,
+    AdaptiveRun, BlockSums, Density, Goal, Importance, LimitState, Search, StandardNormal, Truncated, Verdict, Warning,
+    WeightSums, WeightedDraw, adaptive, defended, importance, importance_sums,
 };
 
-use crate::common::reliability::{
-    four_branch, four_branch_probability, linear, silverman, tail, two_sided, unit_mixture,
-};
+use crate::common::reliability::{four_branch, four_branch_probability, linear, tail, two_sided, unit_mixture};
+
+/// The default search, ± 20 % at 95 %.
+fn found(density: &dyn Density, limit_state: &dyn LimitState, seed: u64) -> AdaptiveRun {
+    let goal = Goal { half_width: 0.2, max_draws: 100_000 };
+    adaptive(density, limit_state, &Search::default(), &goal, seed, 0.95).unwrap()
+}
 
 fn close(got: f64, expected: f64) -> bool {
     (got / expected - 1.0).abs() < 1e-9
@@ -62,7 +66,7 @@ fn the_author_s_estimates_are_reproduced() {
 fn sums_of_a_proposal_are_the_same_bits_in_any_division_of_the_indices() {
     let density = StandardNormal { dimensions: 2 };
     let proposal = defended(Mixture::of_kernels(vec![vec![2.0, 2.0]], &[0.7, 0.7]).unwrap(), &density, 0.1).unwrap();
-    let of = |range| importance_sums(&density, &proposal, &linear(3.0), 9, range).unwrap();
+    let of = |range| importance_sums(&density, &proposal, &linear(3.0), 9, range).unwrap().remove(0);
     let whole = of(0..20_000);
     let mut parts = of(7001..20_000);
     parts.merge(of(0..123)).unwrap();
@@ -73,61 +77,115 @@ fn sums_of_a_proposal_are_the_same_bits_in_any_division_of_the_indices() {
 }
 
 #[test]
-fn every_estimator_finds_the_linear_limit_s_probability() {
+fn a_search_finds_the_linear_limit_s_probability_in_any_dimension() {
     for (beta, dimensions) in [(2.0, 2), (3.5, 5), (5.0, 10)] {
-        let (density, truth) = (StandardNormal { dimensions }, tail(beta));
-        let options = CrossEntropy::new(3, 2000, 8000);
-        let moved = cross_entropy(&density, &linear(beta), &options).unwrap().estimate;
-        assert!((moved.probability / truth - 1.0).abs() < 0.1, "{moved:?}");
-        assert_eq!(moved.trust.verdict(), Verdict::Sound, "{moved:?}");
-        let down = subset(&density, &linear(beta), &Subset::new(3, 5000)).unwrap().estimate;
-        assert!((down.probability / truth - 1.0).abs() < 0.4, "{down:?}");
-        let walked = subset(&unit_mixture(dimensions), &linear(beta), &Subset::new(3, 5000)).unwrap().estimate;
-        assert!((walked.probability / truth).ln().abs() < 0.5, "{walked:?}");
+        let run = found(&StandardNormal { dimensions }, &linear(beta), 3);
+        let estimate = &run.estimates[0];
+        assert!((estimate.probability / tail(beta) - 1.0).abs() < 0.15, "{estimate:?}");
+        assert_eq!(estimate.trust.verdict(), Verdict::Sound, "{estimate:?}");
+        assert!(estimate.runs < 50_000, "{estimate:?}");
     }
-    let density = StandardNormal { dimensions: 2 };
-    let found = from_pilot(&density, &linear(3.0), &silverman, &Pilot::guarded(5000), &Importance::new(1, 5000));
-    assert!((found.unwrap().0.probability / tail(3.0) - 1.0).abs() < 0.15);
 }
 
 #[test]
-fn the_four_branches_are_all_found() {
-    let (density, truth) = (StandardNormal { dimensions: 2 }, four_branch_probability(3.0, 3.5));
-    let moved = cross_entropy(&density, &four_branch(3.0, 3.5), &CrossEntropy::new(1, 2000, 8000)).unwrap();
-    assert!((moved.estimate.probability / truth - 1.0).abs() < 0.08, "{:?}", moved.estimate);
-    let down = subset(&density, &four_branch(3.0, 3.5), &Subset::new(1, 5000)).unwrap();
-    assert!((down.estimate.probability / truth - 1.0).abs() < 0.3, "{:?}", down.estimate);
-    assert!(down.failures.iter().any(|x| x[0] > 0.0) && down.failures.iter().any(|x| x[0] < 0.0));
+fn a_search_finds_every_branch() {
+    for (near, far) in [(3.0, 3.5), (5.0, 5.2)] {
+        let (density, truth) = (StandardNormal { dimensions: 2 }, four_branch_probability(near, far));
+        let run = found(&density, &four_branch(near, far), 1);
+        assert!((run.estimates[0].probability / truth - 1.0).abs() < 0.15, "{:?}", run.estimates[0]);
+        let proposal = run.search.proposal.unwrap();
+        for (x, y) in [(1.0, 1.0), (-1.0, -1.0), (1.0, -1.0), (-1.0, 1.0)] {
+            let is_near = |k: &usize| proposal.mean(*k)[0] * x > 1.0 && proposal.mean(*k)[1] * y > 1.0;
+            assert!((0..proposal.weights().len()).any(|k| is_near(&k)), "nothing in the direction of {x}, {y}");
+        }
+    }
+}
+
+/// The first guide falls towards a place without failures, and 0.01 above them: levels lead away.
+#[test]
+fn a_guide_that_misleads_costs_draws_but_not_the_estimate() {
+    let away = |points: &[Vec<f64>]| {
+        let value = |x: &Vec<f64>| if x[0] > 3.0 { -1.0 } else { 0.01 + libm::exp(0.1 * x[0]) };
+        Ok(points.iter().map(value).collect())
+    };
+    let run = found(&StandardNormal { dimensions: 3 }, &away, 2);
+    let estimate = &run.estimates[0];
+    assert!(estimate.interval.holds(tail(3.0)), "{estimate:?}");
+}
+
+struct Halves;
+
+impl LimitState for Halves {
+    fn questions(&self) -> usize {
+        3
+    }
+
+    fn evaluate(&self, points: &[Vec<f64>]) -> lanesweep::Result<Vec<f64>> {
+        Ok(points.iter().flat_map(|x| [2.5 - x[0], 4.0 - x[0], 4.5 + x[1]]).collect())
+    }
+}
+
+#[test]
+fn one_search_answers_several_questions_with_the_same_draws() {
+    let run = found(&StandardNormal { dimensions: 2 }, &Halves, 5);
+    for (estimate, beta) in run.estimates.iter().zip([2.5, 4.0, 4.5]) {
+        assert!((estimate.probability / tail(beta) - 1.0).abs() < 0.25, "{beta}: {estimate:?}");
+        assert_eq!(estimate.trust.verdict(), Verdict::Sound, "{beta}: {estimate:?}");
+        assert_eq!(estimate.runs, run.estimates[0].runs);
+    }
+}
+
+#[test]
+fn a_search_has_the_same_bits_with_one_thread() {
+    let of = || found(&StandardNormal { dimensions: 4 }, &linear(4.0), 8);
+    let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
+    assert_eq!(one_thread.install(of), of());
+}
+
+#[test]
+fn a_truncated_density_is_searched_within_its_valid_region() {
+    let half = Truncated::with_validity(unit_mixture(2), |x: &[f64]| x[1] > 0.0, 0.5).unwrap();
+    let run = found(&half, &linear(4.0), 4);
+    // x₀ + x₁ > 4√2 with x₁ > 0: most of the tail, twice its density.
+    let truth = {
+        let (steps, width) = (200_000, 12.0 / 200_000.0);
+        let density = |y: f64| libm::exp(-0.5 * y * y) / (2.0 * std::f64::consts::PI).sqrt();
+        let of = |i: i32| (f64::from(i) + 0.5) * width;
+        2.0 * (0..steps).map(|i| density(of(i)) * tail(4.0 * std::f64::consts::SQRT_2 - of(i)) * width).sum::<f64>()
+    };
+    assert!((run.estimates[0].probability / truth - 1.0).abs() < 0.15, "{:?} beside {truth}", run.estimates[0]);
 }
 
 #[test]
 fn a_proposal_that_misses_a_way_to_fail_is_called_unusable() {
     let density = StandardNormal { dimensions: 2 };
     let one_side = || Mixture::of_kernels(vec![vec![2.7, 0.0]], &[0.6, 1.0]).unwrap();
+    let of = |proposal: &dyn Density| {
+        importance(&density, proposal, &two_sided(2.5), &Importance::new(4, 10_000)).unwrap().remove(0)
+    };
     // With a defensive share the other side is met, rarely, by draws that the proposal hardly covers.
-    let guarded = defended(one_side(), &density, 0.1).unwrap();
-    let estimate = importance(&density, &guarded, &two_sided(2.5), &Importance::new(4, 10_000)).unwrap();
+    let estimate = of(&defended(one_side(), &density, 0.1).unwrap());
     assert!(estimate.trust.warnings.iter().any(|w| matches!(w, Warning::ModeMissed { .. })), "{estimate:?}");
     assert_eq!(estimate.trust.verdict(), Verdict::Unusable);
     // Without it only the mean weight tells.
-    let estimate = importance(&density, &one_side(), &two_sided(2.5), &Importance::new(4, 10_000)).unwrap();
+    let estimate = of(&one_side());
     assert!(estimate.trust.warnings.iter().any(|w| matches!(w, Warning::MeanWeightOff { .. })), "{estimate:?}");
-    // Both sides as techniques: nothing to warn of.
+    // Both sides: nothing to warn of.
     let other = Mixture::of_kernels(vec![vec![-2.7, 0.0]], &[0.6, 1.0]).unwrap();
-    let (one, nominal) = (one_side(), unit_mixture(2));
-    let both = [&one, &other, &nominal].map(|proposal| Technique { proposal, draws: 4000 });
-    let estimate = balance_heuristic(&density, &both, &two_sided(2.5), 4, 0.95).unwrap();
+    let both = Mixture::join(&[(0.5, &one_side()), (0.5, &other)]).unwrap();
+    let estimate = of(&defended(both, &density, 0.3).unwrap());
     assert_eq!(estimate.trust.verdict(), Verdict::Sound, "{estimate:?}");
     assert!(estimate.interval.holds(2.0 * tail(2.5)));
 }
 
 #[test]
-fn levels_that_lead_nowhere_are_reported_and_give_no_probability() {
-    let density = StandardNormal { dimensions: 2 };
+fn a_search_without_failures_says_how_deep_it_looked_and_gives_no_probability() {
     let never = |points: &[Vec<f64>]| Ok(vec![1.0; points.len()]);
-    let down = subset(&density, &never, &Subset::new(1, 500)).unwrap().estimate;
-    assert_eq!((down.probability, down.trust.verdict()), (0.0, Verdict::Unusable));
-    assert_eq!(down.interval.high, 1.0);
-    let moved = cross_entropy(&density, &never, &CrossEntropy::new(1, 500, 500)).unwrap().estimate;
-    assert_eq!((moved.probability, moved.trust.verdict()), (0.0, Verdict::Unusable));
+    let run = found(&StandardNormal { dimensions: 2 }, &never, 1);
+    let estimate = &run.estimates[0];
+    assert_eq!((estimate.probability, estimate.trust.verdict()), (0.0, Verdict::Unusable));
+    assert_eq!(estimate.interval.high, 1.0);
+    let depth = run.search.questions[0].depth;
+    assert!(depth < 2e-6, "{depth}");
+    assert!(estimate.trust.warnings.contains(&Warning::NothingFound { depth }));
 }

@@ -120,10 +120,10 @@ pub enum BandwidthInterval {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SampleSettings {
-    /// Crude, importance, cross-entropy, subset. Importance sampling draws around the worst points of a pilot.
+    /// Crude Monte Carlo, importance sampling with a searched proposal, or for each question the cheaper of both: auto
+    /// needs a half-width and is crude Monte Carlo without.
     pub estimator: EstimatorKind,
-    /// Number of samples. A stop rule may end the run earlier. With ce: the number in the final sample.
-    /// Without it: 100000; subset: 2000 per level.
+    /// Number of samples; the maximum with a half-width. Without it: 100000 without a half-width, else no limit.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1))]
     pub samples: Option<u64>,
@@ -136,8 +136,8 @@ pub struct SampleSettings {
     /// Level of the intervals.
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub level: f64,
-    /// Stop when half-width over estimate is at most this. The interval is checked after 4096·2^k samples. The default
-    /// is to draw all samples.
+    /// Half-width of the draws' interval over the estimate to reach. mc checks it after 4096·2^k samples. Default: is 0.1
+    /// unless the number of samples is given; else none.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub half_width: Option<f64>,
@@ -147,16 +147,7 @@ pub struct SampleSettings {
     pub time_limit_s: Option<f64>,
     /// Worst lanes to list per model; 0 runs faster.
     pub worst: usize,
-    /// Number of runs of the pilot of `is`.
-    #[schemars(range(min = 500, max = 10_000_000))]
-    pub pilot: u64,
-    /// Elite fraction: the worst fraction of the pilot's points, to which the proposal of `is` is fitted.
-    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
-    pub elite_fraction: f64,
-    /// Mixture weight of one broad Gaussian over the worst points in the proposal of `is`; 0 is the published form.
-    #[schemars(extend("minimum" = 0.0, "exclusiveMaximum" = 1.0))]
-    pub broad_weight: f64,
-    /// Defensive mixture weight: the weight of the density in the proposals of `is` and `ce`; 0 is the published form.
+    /// Defensive mixture weight: the weight of the density in the proposal of `is`.
     #[schemars(extend("minimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub defensive_weight: f64,
     /// Seed of the draws.
@@ -166,7 +157,7 @@ pub struct SampleSettings {
 impl Default for SampleSettings {
     fn default() -> Self {
         SampleSettings {
-            estimator: EstimatorKind::Mc,
+            estimator: EstimatorKind::Auto,
             samples: None,
             criterion: Criterion::Collision,
             points: PointKind::Random,
@@ -175,9 +166,6 @@ impl Default for SampleSettings {
             half_width: None,
             time_limit_s: None,
             worst: 20,
-            pilot: 10_000,
-            elite_fraction: 0.02,
-            broad_weight: 0.2,
             defensive_weight: 0.1,
             seed: 157,
         }
@@ -190,23 +178,20 @@ impl Default for SampleSettings {
 pub enum EstimatorKind {
     #[default]
     #[allow(missing_docs)]
+    Auto,
+    #[allow(missing_docs)]
     Mc,
     #[allow(missing_docs)]
     Is,
-    #[allow(missing_docs)]
-    Ce,
-    #[allow(missing_docs)]
-    Subset,
 }
 
 impl EstimatorKind {
     /// Name in flags and files.
     pub fn key(self) -> &'static str {
         match self {
+            EstimatorKind::Auto => "auto",
             EstimatorKind::Mc => "mc",
             EstimatorKind::Is => "is",
-            EstimatorKind::Ce => "ce",
-            EstimatorKind::Subset => "subset",
         }
     }
 }

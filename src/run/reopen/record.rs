@@ -61,7 +61,7 @@ impl SampleRecord {
             return Err(wrong(format!("its version is {}, this program reads 1", run.lanesweep_estimate)));
         }
         check_engine(run.engine).map_err(wrong)?;
-        if !["mc", "is", "ce", "subset"].contains(&&*run.estimator) {
+        if !["mc", "is"].contains(&&*run.estimator) {
             return Err(wrong(format!("estimator `{}` is not known", run.estimator)));
         }
         Ok(run)

@@ -1,6 +1,8 @@
 //! The limit state of a lane: one number that is ≤ 0 exactly if a criterion failed, and decreases towards failure. Also
 //! evaluates points as lanes for the estimators.
 
+use serde::{Deserialize, Serialize};
+
 use super::plan::{SampleHeadways, plan_points};
 use crate::engine::{Executor, Marks, Outcome, Wanted};
 use crate::model::criterion::Criterion;
@@ -8,7 +10,7 @@ use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::stats::density::{DensityModel, Mixture};
 use crate::stats::estimate::{KernelShares, LimitState, Truncated, defended, kernel_shares};
-use crate::{Error, Result};
+use crate::Result;
 
 /// Value far from any failure: the ego never closed in.
 const FAR: f64 = 1e3;
@@ -40,32 +42,95 @@ pub fn limit_state(profile: &Profile, criterion: Criterion, outcome: &Outcome<f6
     if failed { value.min(0.0) } else { value.max(MIN_UNFAILED) }
 }
 
-/// One driver model under one criterion at one headway.
-pub struct LaneLimitState<'a> {
-    /// The density of the points.
-    pub density: &'a DensityModel,
-    /// Profile.
-    pub profile: &'a Profile,
+/// What is asked of a sample: does this driver model fail under this criterion from this headway?
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Question {
     /// Driver model.
     pub model: ModelId,
     /// Criterion.
     pub criterion: Criterion,
-    /// A single headway, or the density's own.
-    pub headway: SampleHeadways,
-    /// Computes the lanes, without rechecks.
-    pub executor: Executor<'a>,
+    /// Index into the headways of the run; 0 if the density draws the headway.
+    pub headway: usize,
+}
+
+/// Lanes as a limit state with several questions. Each has three guides: the [limit state](limit_state()), the smallest
+/// gap, and the reciprocal of the largest BTN. A creeping approach has a small TTC without danger; the others tell.
+pub struct LaneLimitState<'a> {
+    density: &'a DensityModel,
+    profile: &'a Profile,
+    models: Vec<ModelId>,
+    headways: SampleHeadways,
+    /// Lane of a point and criterion.
+    questions: Vec<(usize, Criterion)>,
+    executor: Executor<'a>,
+}
+
+impl<'a> LaneLimitState<'a> {
+    /// The lanes of some questions; `headways` are those of the run. The lanes are not rechecked.
+    pub fn new(
+        density: &'a DensityModel,
+        profile: &'a Profile,
+        headways: &SampleHeadways,
+        questions: &[Question],
+        executor: Executor<'a>,
+    ) -> LaneLimitState<'a> {
+        let mut models: Vec<ModelId> = Vec::new();
+        let mut asked: Vec<usize> = Vec::new();
+        for question in questions {
+            if !models.contains(&question.model) {
+                models.push(question.model);
+            }
+            if !asked.contains(&question.headway) {
+                asked.push(question.headway);
+            }
+        }
+        let lane = |question: &Question| {
+            let model = models.iter().position(|model| *model == question.model).unwrap_or(0);
+            let headway = asked.iter().position(|headway| *headway == question.headway).unwrap_or(0);
+            (headway * models.len() + model, question.criterion)
+        };
+        let questions = questions.iter().map(lane).collect();
+        let headways = match headways {
+            SampleHeadways::Each(list) => SampleHeadways::Each(asked.iter().map(|at| list[*at]).collect()),
+            SampleHeadways::Sampled => SampleHeadways::Sampled,
+        };
+        let executor = Executor { recheck: None, ..executor };
+        LaneLimitState { density, profile, models, headways, questions, executor }
+    }
+
+    /// Number of lanes of each point.
+    pub fn lanes_per_point(&self) -> u64 {
+        let headways = match &self.headways {
+            SampleHeadways::Each(list) => list.len(),
+            SampleHeadways::Sampled => 1,
+        };
+        (self.models.len() * headways) as u64
+    }
 }
 
 impl LimitState for LaneLimitState<'_> {
+    fn questions(&self) -> usize {
+        self.questions.len()
+    }
+
+    fn guides(&self) -> usize {
+        3
+    }
+
     fn evaluate(&self, points: &[Vec<f64>]) -> Result<Vec<f64>> {
-        let plan = plan_points(self.density, points, self.profile, &[self.model], &self.headway)?;
-        if plan.headways.len() != 1 {
-            return Err(Error::Internal("a limit state has one headway".to_owned()));
-        }
-        let executor = Executor { recheck: None, ..self.executor.clone() };
-        let mut values = Vec::with_capacity(points.len());
-        executor.sweep(&plan, 0..plan.unit_count(), Wanted::Outcomes, |chunk| {
-            values.extend(chunk.outcomes.iter().map(|o| limit_state(self.profile, self.criterion, o)));
+        let plan = plan_points(self.density, points, self.profile, &self.models, &self.headways)?;
+        let lanes = self.models.len() * plan.headways.len();
+        let mut values = Vec::with_capacity(3 * points.len() * self.questions.len());
+        self.executor.sweep(&plan, 0..plan.unit_count(), Wanted::Outcomes, |chunk| {
+            for outcomes in chunk.outcomes.chunks(lanes) {
+                for (lane, criterion) in &self.questions {
+                    let outcome = &outcomes[*lane];
+                    let value = limit_state(self.profile, *criterion, outcome);
+                    let guide = |guide: f64| if value <= 0.0 { value } else { guide.clamp(MIN_UNFAILED, FAR) };
+                    values.extend([value, guide(outcome.min_gap), guide(1.0 / outcome.max_btn)]);
+                }
+            }
             Ok(())
         })?;
         Ok(values)
@@ -81,7 +146,7 @@ pub fn truncated(density: &DensityModel) -> Result<Truncated<impl Fn(&[f64]) -> 
 }
 
 /// Determines which scenarios failures come from, by draws of a proposal with the defensive mixture weight `defence`.
-/// `None` if no draw fails.
+/// `None` for a question without failing draws.
 ///
 /// # Errors
 /// Those of the lanes.
@@ -90,10 +155,10 @@ pub fn scenario_shares(
     proposal: &Mixture,
     defence: f64,
     seed: u64,
-) -> Result<Option<KernelShares>> {
+) -> Result<Vec<Option<KernelShares>>> {
     let nominal = truncated(lanes.density)?;
     let proposal = defended(proposal.clone(), &nominal, defence)?;
-    kernel_shares(nominal.mixture(), &nominal, &proposal, lanes, seed)
+    kernel_shares(nominal.kernels(), &nominal, &proposal, lanes, seed)
 }
 
 /// The marks of lanes with a smaller [limit state](limit_state()) than the last one of a list. Also the criterion whose

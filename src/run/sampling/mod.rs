@@ -4,6 +4,7 @@
 //! Densities and estimators come from [`crate::stats`]; lanes run in [`crate::engine`].
 
 mod against_recorded;
+mod choice;
 mod compare;
 mod crude;
 mod generator;
@@ -16,11 +17,11 @@ mod proposal_file;
 mod rows;
 mod sample_options;
 mod sample_run;
-mod sequential;
 mod tally;
 mod weighted;
 
 pub use against_recorded::RecordedRatios;
+pub use choice::Choice;
 pub use compare::{
     CategoryComparison, ComparedCell, ComparedParameterization, RateRecord, RecordedCell, ReplayedCell, SampledCell,
     SampledScenarios, ScenarioCounts, compare_cells, kernel_scenarios, recorded_cells, sample_by_scenario,
@@ -29,14 +30,14 @@ pub use crude::{Checkpoint, CheckpointRow, CrudeRun, checkpoints, crude_of_segme
 pub use generator::{SAMPLE_PURPOSE, SampleSource, generator_of, generator_of_points};
 pub use kernels::KernelCounts;
 pub(crate) use limit_state::marks_of;
-pub use limit_state::{LaneLimitState, limit_state, scenario_shares, truncated};
+pub use limit_state::{LaneLimitState, Question, limit_state, scenario_shares, truncated};
 pub use map::{MAP_CELLS, MapAxes, MapAxis, MapCounts};
 pub use plan::{Conditional, SampleHeadways, conditional, mixture_of, plan_points, plan_samples};
-use plan_file::KIND;
+use plan_file::{KIND, SEARCH_FILE};
 pub use proposal_file::{proposal_from_text, proposal_text, read_proposal};
 pub use rows::{EstimateRow, Risk, RiskRate, crude_rows, headway_name};
 pub use sample_options::{Estimator, SampleOptions};
-pub use sample_run::{EachChunk, Levels, SampleResult, SampleRun};
+pub use sample_run::{EachChunk, SampleResult, SampleRun};
 pub use tally::{SampleTally, WorstSample};
 pub use weighted::WeightedTally;
 
@@ -44,10 +45,10 @@ use std::path::Path;
 
 use crate::engine::{Executor, LanePlan};
 use crate::model::profile::Profile;
-use crate::run::parts::leave_plan;
+use crate::run::parts::{PLAN_FILE, leave_plan};
 use crate::stats::density::{DensityModel, Exposure, Mixture};
-use crate::stats::estimate::{Pilot, PilotCheck};
-use crate::{Error, Place, Result};
+use crate::stats::estimate::{Search, SearchRun};
+use crate::{Error, Result};
 
 /// A planned sampling run: whole, or one shard of it if its samples are independent.
 ///
@@ -102,21 +103,21 @@ pub struct Sample {
 pub(crate) enum SampleKind {
     /// Crude Monte Carlo: its lanes.
     Crude(Box<LanePlan>),
-    /// Importance sampling with a fixed number of samples.
-    Weighted(Proposals),
-    /// The same with proposals that a pilot must find.
-    Pilot(Pilot),
-    /// Adaptive, with several proposals, or with a stop rule.
-    Sequential,
+    /// Importance sampling of a known proposal.
+    Weighted(Box<Weighted>),
+    /// The same with a proposal that a search must find.
+    Search(Search),
 }
 
-/// Proposals of importance sampling.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Proposals {
-    /// One for all driver models, or one for each.
-    pub mixtures: Vec<Mixture>,
-    /// Counts of the pilot of each driver model; empty for a given proposal.
-    pub pilots: Vec<PilotCheck>,
+/// Importance sampling of a known proposal.
+#[derive(Debug, Clone)]
+pub(crate) struct Weighted {
+    /// The proposal of all questions, without its defensive part.
+    pub proposal: Mixture,
+    /// Number of draws.
+    pub draws: u64,
+    /// The search that found it; `None` for a given proposal.
+    pub search: Option<SearchRun>,
 }
 
 impl Sample {
@@ -130,11 +131,14 @@ impl Sample {
                 let mixture = mixture_of(&density, &options.given)?;
                 SampleKind::Crude(Box::new(plan_samples(&density, &mixture, profile, options)?))
             }
-            Estimator::Pilot(pilot) if options.stop.is_fixed() => SampleKind::Pilot(*pilot),
-            Estimator::Given { proposals, .. } if options.stop.is_fixed() && proposals.len() == 1 => {
-                SampleKind::Weighted(Proposals { mixtures: proposals.clone(), pilots: Vec::new() })
+            Estimator::Search(search) => SampleKind::Search(*search),
+            Estimator::Given { proposal: Some(proposal), .. } => {
+                let (proposal, draws) = (proposal.clone(), options.stop.samples);
+                SampleKind::Weighted(Box::new(Weighted { proposal, draws, search: None }))
             }
-            _ => SampleKind::Sequential,
+            Estimator::Given { proposal: None, .. } => {
+                return Err(Error::Internal("importance sampling of a given proposal without one".to_owned()));
+            }
         };
         let sample = Sample { density, profile: profile.clone(), options: options.clone(), kind };
         sample.check_lanes()?;
@@ -147,7 +151,6 @@ impl Sample {
         if matches!(self.kind, SampleKind::Crude(_)) {
             return Ok(());
         }
-        self.options.check_headways()?;
         let first = self.density.kde.points()[0].clone();
         plan_points(&self.density, &[first], &self.profile, &self.options.models, &self.options.headways).map(drop)
     }
@@ -160,8 +163,8 @@ impl Sample {
     /// Writes the plan file into a run's folder, or checks that the same one exists; many shards may do so at once.
     ///
     /// # Errors
-    /// [`Error::Input`] if the folder holds the plan of another run; [`Error::Io`]; [`Error::Usage`] for a run that
-    /// cannot be split.
+    /// [`Error::Input`] if the folder holds the plan of another run; [`Error::Io`]; [`Error::Internal`] before the search
+    /// of importance sampling.
     pub fn write_plan(&self, out: &Path) -> Result<()> {
         let text = self.seal()?.0;
         leave_plan(out, &text, |file| file.write_all(&text))
@@ -171,11 +174,7 @@ impl Sample {
     fn seal(&self) -> Result<(Vec<u8>, String)> {
         match &self.kind {
             SampleKind::Crude(_) | SampleKind::Weighted(_) => self.plan_file(),
-            SampleKind::Pilot(_) | SampleKind::Sequential => {
-                let problem = "the adaptive estimators are sequential: they make no shards";
-                let help = "use crude Monte Carlo, or importance sampling with one given proposal";
-                Err(Error::usage(Place::item("estimator"), problem, help))
-            }
+            SampleKind::Search(_) => Err(Error::Internal("a run without a proposal has no plan".to_owned())),
         }
     }
 
@@ -192,15 +191,18 @@ impl Sample {
         }
     }
 
-    /// Maximum number of samples; for subset simulation per level.
+    /// Number of samples; before a search, and with a stop rule, the maximum.
     pub fn samples(&self) -> u64 {
-        self.options.stop.samples
+        match &self.kind {
+            SampleKind::Weighted(weighted) => weighted.draws,
+            _ => self.options.stop.samples,
+        }
     }
 
     /// Number of lanes of a run with a fixed number of samples.
     pub fn lane_count(&self) -> u64 {
-        let by_models = || self.samples().saturating_mul(self.options.models.len() as u64);
-        self.lane_plan().map_or_else(by_models, LanePlan::lane_count)
+        let weighted = || self.samples().saturating_mul(self.lanes_per_sample());
+        self.lane_plan().map_or_else(weighted, LanePlan::lane_count)
     }
 
     /// The exposure for the risks; `None` for a conditional density, because the frequency of such scenarios is
@@ -223,24 +225,24 @@ impl Sample {
     /// # Errors
     /// The difference found.
     fn check_sums(&self, tally: &WeightedTally) -> std::result::Result<(), String> {
-        let is_ours = tally.sums.iter().map(|(model, _)| model).eq(&self.options.models);
-        if is_ours { Ok(()) } else { Err("they are of other driver models".to_owned()) }
+        let is_ours = tally.sums.iter().map(|(question, _)| *question).eq(self.options.asked());
+        if is_ours { Ok(()) } else { Err("they answer other questions".to_owned()) }
     }
 
-    /// Finds the proposals if a pilot is needed, and saves them in the folder, so that an interrupted run need not
-    /// repeat the search. A repeated search gives the same bits, but takes time.
+    /// Finds the proposal if a search is needed, unless the folder has that of an interrupted run or of another shard. A
+    /// repeated search gives the same bits, but takes time.
     ///
     /// # Errors
     /// Those of the lanes; [`Error::Io`].
-    pub fn searched(self, executor: &Executor, out: Option<&Path>) -> Result<Sample> {
-        let SampleKind::Pilot(pilot) = self.kind else { return Ok(self) };
-        if let Some(kept) = out.map(|out| self.kept_pilot(out)).transpose()?.flatten() {
-            tracing::info!("the pilot is done already");
-            return Ok(kept);
+    pub fn searched(self, executor: &Executor, out: &Path) -> Result<Sample> {
+        let SampleKind::Search(search) = self.kind else { return Ok(self) };
+        for file in [PLAN_FILE, SEARCH_FILE] {
+            if let Some(kept) = self.kept_search(&out.join(file))? {
+                tracing::info!("the search is done already");
+                return Ok(kept);
+            }
         }
-        let kind = SampleKind::Weighted(self.pilots(&pilot, executor)?);
-        let found = Sample { kind, ..self };
-        out.map_or(Ok(()), |out| found.keep_pilot(out))?;
-        Ok(found)
+        let kind = SampleKind::Weighted(Box::new(self.search(&search, executor)?));
+        Ok(Sample { kind, ..self })
     }
 }

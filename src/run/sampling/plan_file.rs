@@ -1,4 +1,4 @@
-//! The plan file of a sampling run: the density, the proposals and all options, so that every shard and the merge use
+//! The plan file of a sampling run: the density, the proposal and all options, so that every shard and the merge use
 //! the same run.
 
 use std::path::Path;
@@ -8,17 +8,17 @@ use serde::{Deserialize, Serialize};
 use super::plan::{mixture_of, plan_samples};
 use super::proposal_file::{proposal_from_text, proposal_text};
 use super::sample_options::{Estimator, SampleOptions};
-use super::{Proposals, Sample, SampleKind};
+use super::{Sample, SampleKind, Weighted};
 use crate::model::profile::Profile;
 use crate::run::parts::{kind_of, read_sealed, seal};
-use crate::stats::density::{DensityModel, Mixture};
-use crate::stats::estimate::PilotCheck;
+use crate::stats::density::DensityModel;
+use crate::stats::estimate::SearchRun;
 use crate::support::atomic_file::refuse_link;
 use crate::support::files::{make_folder, write_inside};
 use crate::{Error, Place, Result};
 
-/// File of a run with its own pilot; kept until the run ends.
-pub(super) const PILOT_FILE: &str = "pilot.json";
+/// File of a run with its own search; kept until the run ends.
+pub(super) const SEARCH_FILE: &str = "search.json";
 /// Kind of the sealed file.
 pub(crate) const KIND: &str = "sampling plan";
 /// Maximum size of a plan that is read, bytes: mostly the density.
@@ -32,10 +32,12 @@ struct PlanFile {
     density: String,
     profile: Profile,
     options: SampleOptions,
-    /// Proposal files' texts: one for all driver models, or one for each.
-    proposals: Vec<String>,
-    /// Counts of the pilot of each driver model; empty for a given proposal.
-    pilots: Vec<PilotCheck>,
+    /// The proposal file's text, for importance sampling.
+    proposal: Option<String>,
+    /// Number of draws of the proposal.
+    draws: u64,
+    /// The search that found the proposal, unless it was given.
+    search: Option<SearchRun>,
     /// Hash of the lanes of crude Monte Carlo.
     plan_sha256: Option<String>,
 }
@@ -44,20 +46,20 @@ impl Sample {
     /// The run as the text of a file, with its hash.
     pub(crate) fn plan_file(&self) -> Result<(Vec<u8>, String)> {
         match &self.kind {
-            SampleKind::Weighted(proposals) => self.plan_file_over(proposals),
-            _ => self.plan_file_over(&Proposals::default()),
+            SampleKind::Weighted(weighted) => self.plan_file_over(Some(weighted)),
+            _ => self.plan_file_over(None),
         }
     }
 
-    fn plan_file_over(&self, proposals: &Proposals) -> Result<(Vec<u8>, String)> {
+    fn plan_file_over(&self, weighted: Option<&Weighted>) -> Result<(Vec<u8>, String)> {
         let unreadable = |e: std::string::FromUtf8Error| Error::Internal(format!("a density is no text: {e}"));
-        let text = |proposal| proposal_text(&self.density, proposal);
         let file = PlanFile {
             density: String::from_utf8(self.density.to_json()?).map_err(unreadable)?,
             profile: self.profile.clone(),
             options: self.options.clone(),
-            proposals: proposals.mixtures.iter().map(text).collect::<Result<_>>()?,
-            pilots: proposals.pilots.clone(),
+            proposal: weighted.map(|weighted| proposal_text(&self.density, &weighted.proposal)).transpose()?,
+            draws: weighted.map_or(0, |weighted| weighted.draws),
+            search: weighted.and_then(|weighted| weighted.search.clone()),
             plan_sha256: self.lane_plan().map(|plan| plan.hash().to_owned()),
         };
         seal(KIND, &file)
@@ -69,7 +71,7 @@ impl Sample {
     /// [`Error::Io`]; [`Error::Input`] for any other or incomplete file, or another version.
     pub fn read(path: &Path) -> Result<Sample> {
         let file: PlanFile = read_sealed(KIND, path, MAX_PLAN_BYTES, HOW_TO_REMAKE)?.0;
-        let PlanFile { profile, options, pilots, .. } = file;
+        let PlanFile { profile, options, search, draws, .. } = file;
         let place = Place::file(path);
         let wrong = |problem: &str| Error::input(place.clone(), problem, HOW_TO_REMAKE);
         profile.check(&place)?;
@@ -87,9 +89,13 @@ impl Sample {
         if options.map.as_ref().is_some_and(|map| map.x.parameter >= parameters || map.y.parameter >= parameters) {
             return Err(wrong("its map is over parameters that the density does not have"));
         }
-        let proposal = |text: &String| proposal_from_text(text.as_bytes(), &density, &place);
-        let mixtures: Vec<Mixture> = file.proposals.iter().map(proposal).collect::<Result<_>>()?;
-        let models = options.models.len();
+        let headways = options.headways().len().max(1);
+        if options.questions.iter().any(|asked| asked.headway >= headways || !options.models.contains(&asked.model)) {
+            return Err(wrong("its questions are not of its headways and driver models"));
+        }
+        let proposal = file.proposal.as_ref().map(|text| proposal_from_text(text.as_bytes(), &density, &place));
+        let proposal = proposal.transpose()?;
+        let fits = search.as_ref().is_none_or(|search| search.questions.len() == options.asked().len());
         let kind = match &options.estimator {
             Estimator::Crude { .. } => {
                 let planned = mixture_of(&density, &options.given)
@@ -103,39 +109,47 @@ impl Sample {
                 }
                 SampleKind::Crude(Box::new(plan))
             }
-            Estimator::Given { .. } if mixtures.len() == 1 && pilots.is_empty() => {
-                SampleKind::Weighted(Proposals { mixtures, pilots })
-            }
-            Estimator::Pilot(_) if mixtures.len() == models && pilots.len() == models => {
-                SampleKind::Weighted(Proposals { mixtures, pilots })
-            }
-            _ => return Err(wrong("its proposals are not one for all driver models or one for each")),
+            _ => match proposal {
+                Some(proposal)
+                    if fits
+                        && (1..1 << 63).contains(&draws)
+                        && search.is_some() == matches!(options.estimator, Estimator::Search(_)) =>
+                {
+                    SampleKind::Weighted(Box::new(Weighted { proposal, draws, search }))
+                }
+                _ => return Err(wrong("its proposal, draws and search do not fit its estimator")),
+            },
         };
         let sample = Sample { density, profile, options, kind };
         sample.check_lanes()?;
         Ok(sample)
     }
 
-    /// The same run after its pilot, if an interrupted run saved the pilot in the folder.
-    pub(super) fn kept_pilot(&self, out: &Path) -> Result<Option<Sample>> {
-        let path = out.join(PILOT_FILE);
+    /// The same run after its search, if an interrupted run or another shard saved it in this file.
+    pub(super) fn kept_search(&self, path: &Path) -> Result<Option<Sample>> {
         if path.symlink_metadata().is_err() {
             return Ok(None);
         }
-        refuse_link(&path)?;
-        if !kind_of(&path).is_ok_and(|kind| kind == KIND) {
-            let problem = "it would be overwritten, and it is not the pilot of an interrupted run";
-            return Err(Error::usage(Place::file(&path), problem, "move it away, or give another option `out`"));
+        refuse_link(path)?;
+        if !kind_of(path).is_ok_and(|kind| kind == KIND) {
+            let problem = "it would be overwritten, and it is not the search of an interrupted run";
+            return Err(Error::usage(Place::file(path), problem, "move it away, or give another option `out`"));
         }
-        let Ok(kept) = Sample::read(&path) else { return Ok(None) };
-        let is_same = kept.plan_file_over(&Proposals::default())?.1 == self.plan_file()?.1;
+        let Ok(kept) = Sample::read(path) else { return Ok(None) };
+        let SampleKind::Weighted(weighted) = &kept.kind else { return Ok(None) };
+        // The accuracy that is asked for is in the number of draws alone.
+        let draws = weighted.search.as_ref().map(|search| self.draws_after(search));
+        let is_same = kept.plan_file_over(None)?.1 == self.plan_file()?.1 && draws == Some(weighted.draws);
         Ok(is_same.then_some(kept))
     }
 
-    /// Saves the run after its pilot in the folder.
-    pub(super) fn keep_pilot(&self, out: &Path) -> Result<()> {
+    /// Saves the run after its search in the folder.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub(crate) fn keep_search(&self, out: &Path) -> Result<()> {
         make_folder(out)?;
         let text = self.plan_file()?.0;
-        write_inside(&out.join(PILOT_FILE), |file| file.write_all(&text))
+        write_inside(&out.join(SEARCH_FILE), |file| file.write_all(&text))
     }
 }

@@ -3,14 +3,14 @@
 use serde::{Deserialize, Serialize};
 
 use super::generator::SampleSource;
+use super::limit_state::Question;
 use super::map::MapAxes;
 use super::plan::SampleHeadways;
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::stats::density::Mixture;
-use crate::stats::estimate::{BinomialInterval, Pilot, StopRule};
-use crate::{Error, Place, Result};
+use crate::stats::estimate::{BinomialInterval, Goal, Search, StopRule};
 
 /// How probabilities are estimated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -21,36 +21,27 @@ pub enum Estimator {
         /// Kind of interval.
         interval: BinomialInterval,
     },
-    /// Importance sampling with a proposal that a pilot finds for each driver model.
-    Pilot(Pilot),
-    /// Importance sampling with given proposals; several are combined by the balance heuristic.
+    /// Importance sampling with a proposal that a search finds, one for all questions.
+    Search(Search),
+    /// Importance sampling with a given proposal.
     Given {
-        /// One for all driver models, or several. A plan file stores them separately.
+        /// The proposal. A plan file stores it separately.
         #[serde(skip)]
-        proposals: Vec<Mixture>,
-        /// Defensive mixture weight: the weight of the density in each proposal.
+        proposal: Option<Mixture>,
+        /// Defensive mixture weight: the weight of the density in the proposal.
         defence: f64,
     },
-    /// Cross-entropy.
-    CrossEntropy {
-        /// Defensive mixture weight.
-        defence: f64,
-    },
-    /// Subset simulation.
-    Subset,
 }
 
 impl Estimator {
     /// Crude Monte Carlo with Wilson's interval.
     pub const CRUDE: Estimator = Estimator::Crude { interval: BinomialInterval::Wilson };
 
-    /// Name in files: `mc`, `is`, `ce`, `subset`.
+    /// Name in files: `mc`, `is`.
     pub fn key(&self) -> &'static str {
         match self {
             Estimator::Crude { .. } => "mc",
-            Estimator::Pilot(_) | Estimator::Given { .. } => "is",
-            Estimator::CrossEntropy { .. } => "ce",
-            Estimator::Subset => "subset",
+            Estimator::Search(_) | Estimator::Given { .. } => "is",
         }
     }
 
@@ -62,13 +53,11 @@ impl Estimator {
         }
     }
 
-    /// Defensive mixture weight: the weight of the density in each proposal.
+    /// Defensive mixture weight: the weight of the density in the proposal.
     pub fn defence(&self) -> f64 {
         match self {
-            Estimator::Crude { .. } | Estimator::Subset => 0.0,
-            Estimator::Pilot(Pilot { defence, .. })
-            | Estimator::Given { defence, .. }
-            | Estimator::CrossEntropy { defence } => *defence,
+            Estimator::Crude { .. } => 0.0,
+            Estimator::Search(Search { defence, .. }) | Estimator::Given { defence, .. } => *defence,
         }
     }
 }
@@ -85,10 +74,12 @@ pub struct SampleOptions {
     pub source: SampleSource,
     /// Models, in order.
     pub models: Vec<ModelId>,
-    /// Headways: only crude Monte Carlo accepts several.
+    /// Headways.
     pub headways: SampleHeadways,
-    /// Criterion of the estimators other than crude Monte Carlo, of the worst lanes, of the map and of the stop rules.
+    /// Criterion of importance sampling, of the worst lanes, of the map and of the stop rules.
     pub criterion: Criterion,
+    /// What importance sampling is asked; empty: every model from every headway under the criterion.
+    pub questions: Vec<Question>,
     /// Seed of the draws.
     pub seed: u64,
     /// Level of the intervals.
@@ -111,6 +102,7 @@ impl SampleOptions {
             models: ModelId::ALL.to_vec(),
             headways,
             criterion: Criterion::Collision,
+            questions: Vec::new(),
             seed: 157,
             level: 0.95,
             given: Vec::new(),
@@ -119,16 +111,19 @@ impl SampleOptions {
         }
     }
 
-    /// Refuses several headways for a weighting estimator.
-    pub(super) fn check_headways(&self) -> Result<()> {
-        match &self.headways {
-            SampleHeadways::Each(list) if list.len() != 1 => Err(Error::usage(
-                Place::item("headways"),
-                format!("estimator {} follows one headway at a time", self.estimator.key()),
-                "give one, or a density that draws the headway",
-            )),
-            _ => Ok(()),
+    /// What importance sampling is asked.
+    pub fn asked(&self) -> Vec<Question> {
+        if !self.questions.is_empty() {
+            return self.questions.clone();
         }
+        let of = |(headway, model): (usize, &ModelId)| Question { model: *model, criterion: self.criterion, headway };
+        let headways = 0..self.headways().len().max(1);
+        self.models.iter().flat_map(|model| headways.clone().map(move |headway| (headway, model))).map(of).collect()
+    }
+
+    /// The accuracy that importance sampling aims at after its search; `None` if the number of draws is fixed.
+    pub(super) fn goal(&self) -> Option<Goal> {
+        self.stop.relative_half_width.map(|half_width| Goal { half_width, max_draws: self.stop.samples })
     }
 
     /// Headways; empty if the density draws them.
@@ -139,8 +134,8 @@ impl SampleOptions {
         }
     }
 
-    /// The one headway's name in tables.
-    pub(crate) fn headway_name(&self) -> String {
-        self.headways().first().map_or_else(|| "sampled".to_owned(), Headway::to_string)
+    /// A headway's name in tables.
+    pub(crate) fn headway_name(&self, headway: usize) -> String {
+        self.headways().get(headway).map_or_else(|| "sampled".to_owned(), Headway::to_string)
     }
 }

@@ -4,20 +4,17 @@
 use std::ops::Range;
 use std::path::Path;
 
-use serde::Serialize;
-
 use super::crude::{CrudeRun, crude_of_segments, cuts, sample_into};
-use super::plan_file::PILOT_FILE;
+use super::plan_file::SEARCH_FILE;
 use super::rows::EstimateRow;
 use super::sample_options::Estimator;
 use super::tally::SampleTally;
 use super::weighted::WeightedTally;
-use super::{Proposals, Sample, SampleKind};
+use super::{Sample, SampleKind};
 use crate::engine::{Chunk, Executor};
-use crate::model::driver::ModelId;
 use crate::run::parts::{Ledger, MergeableCounts, PLAN_FILE, RunDir, RunState, Shard, read_parts, units_of};
 use crate::stats::density::Mixture;
-use crate::stats::estimate::{CrossEntropyStep, SubsetLevel};
+use crate::stats::estimate::SearchRound;
 use crate::support::run_dir::{ESTIMATE_RECORD, Results};
 use crate::{Error, Place, Result};
 
@@ -49,11 +46,6 @@ impl Sample {
 
     fn sampled(&self, executor: &Executor) -> Result<SampleResult> {
         let units = 0..self.samples();
-        let weighted = |proposals: &Proposals| {
-            let mut ledger = Ledger::new(units.clone(), &[]);
-            self.sample_weighted(proposals, &mut ledger, executor, |_| ())?;
-            self.weighted_result(proposals, ledger.take()?, Place::item("samples"))
-        };
         match &self.kind {
             SampleKind::Crude(plan) => {
                 let mut ledger = Ledger::new(units.clone(), &cuts(units.end, &units));
@@ -61,9 +53,16 @@ impl Sample {
                 let run = sample_into(plan, &mut ledger, executor, options, exposure, false, |_| Ok(()))?;
                 Ok(SampleResult::of_crude(run))
             }
-            SampleKind::Weighted(proposals) => weighted(proposals),
-            SampleKind::Pilot(pilot) => weighted(&self.pilots(pilot, executor)?),
-            SampleKind::Sequential => self.run_sequential(executor),
+            SampleKind::Weighted(weighted) => {
+                let mut ledger = Ledger::new(units, &[]);
+                self.sample_weighted(weighted, &mut ledger, executor, |_| ())?;
+                self.weighted_result(weighted, ledger.take()?, Place::item("samples"))
+            }
+            SampleKind::Search(search) => {
+                let kind = SampleKind::Weighted(Box::new(self.search(search, executor)?));
+                let (density, profile) = (self.density.clone(), self.profile.clone());
+                Sample { density, profile, options: self.options.clone(), kind }.sampled(executor)
+            }
         }
     }
 
@@ -72,7 +71,7 @@ impl Sample {
     ///
     /// # Errors
     /// [`Error::Busy`] if another process runs it; [`Error::Input`] for a damaged or foreign file in its place;
-    /// [`Error::Io`]; [`Error::Usage`] for a run that cannot be split.
+    /// [`Error::Io`]; [`Error::Internal`] before the search of importance sampling.
     pub fn open(&self, out: &Path, shard: Option<Shard>, is_journalled: bool) -> Result<Option<SampleRun<'_>>> {
         let (run_sha256, unit_count) = (self.seal()?.1, self.samples());
         let run_dir = RunDir { out: out.to_path_buf(), record: ESTIMATE_RECORD, run_sha256, shard, unit_count };
@@ -92,8 +91,8 @@ impl Sample {
                 }
                 State::Weighted(Box::new(run_dir.begin(&[], is_journalled, &fits)?))
             }
-            SampleKind::Pilot(_) | SampleKind::Sequential => {
-                return Err(Error::Internal("a run that cannot be split was opened in a folder".to_owned()));
+            SampleKind::Search(_) => {
+                return Err(Error::Internal("a run without a proposal was opened in a folder".to_owned()));
             }
         };
         Ok(Some(SampleRun { sample: self, run_dir, state, crude: None, is_journalled }))
@@ -136,16 +135,16 @@ impl Sample {
                 }
                 SampleResult { parts: count, rechecked_lanes, ..SampleResult::of_crude(crude) }
             }
-            SampleKind::Weighted(proposals) => {
+            SampleKind::Weighted(weighted) => {
                 let parts = read_parts(out, &run_sha256, sample.samples(), again, &|tally| sample.check_sums(tally))?;
                 let count = parts.len();
                 let mut segments = parts.into_iter().flat_map(|part| part.segments);
                 let first = segments.next();
                 let tally = first.map(|first| segments.try_fold(first, WeightedTally::join)).transpose()?;
-                SampleResult { parts: count, ..sample.weighted_result(proposals, tally, Place::file(out))? }
+                SampleResult { parts: count, ..sample.weighted_result(weighted, tally, Place::file(out))? }
             }
-            SampleKind::Pilot(_) | SampleKind::Sequential => {
-                return Err(Error::Internal("a plan file of a run that cannot be split".to_owned()));
+            SampleKind::Search(_) => {
+                return Err(Error::Internal("a plan file of a run without a proposal".to_owned()));
             }
         };
         let result = sample.against_recorded(result)?;
@@ -203,8 +202,8 @@ impl SampleRun<'_> {
                 self.crude = Some(run);
                 Ok(())
             }
-            (State::Weighted(state), SampleKind::Weighted(proposals)) => {
-                self.sample.sample_weighted(proposals, &mut state.ledger, executor, progress)
+            (State::Weighted(state), SampleKind::Weighted(weighted)) => {
+                self.sample.sample_weighted(weighted, &mut state.ledger, executor, progress)
             }
             _ => Err(Error::Internal("a run has the counts of another estimator".to_owned())),
         }
@@ -227,9 +226,9 @@ impl SampleRun<'_> {
     /// [`Error::Internal`] before anything was sampled; of the lanes of recorded scenarios.
     pub fn take_result(&mut self) -> Result<SampleResult> {
         let result = match (&mut self.state, &self.sample.kind) {
-            (State::Weighted(state), SampleKind::Weighted(proposals)) => {
+            (State::Weighted(state), SampleKind::Weighted(weighted)) => {
                 let tally = state.ledger.counts(0..self.sample.samples())?;
-                self.sample.weighted_result(proposals, tally, Place::file(&self.run_dir.out))?
+                self.sample.weighted_result(weighted, tally, Place::file(&self.run_dir.out))?
             }
             _ => {
                 let nothing = || Error::Internal("nothing was sampled".to_owned());
@@ -250,15 +249,15 @@ impl SampleRun<'_> {
         }
     }
 
-    /// Deletes the journal of a whole run after its results are written, and the file of its pilot.
+    /// Deletes the journal of a whole run after its results are written, and the file of its search.
     ///
     /// # Errors
     /// [`Error::Io`].
     pub fn close(self) -> Result<()> {
-        if matches!(self.sample.options.estimator, Estimator::Pilot(_)) {
-            // The journal depends on this file and is deleted next; without the file the next run's pilot gives the
+        if matches!(self.sample.options.estimator, Estimator::Search(_)) {
+            // The journal depends on this file and is deleted next; without the file the next run's search gives the
             // same bits.
-            let path = self.run_dir.out.join(PILOT_FILE);
+            let path = self.run_dir.out.join(SEARCH_FILE);
             match std::fs::remove_file(&path) {
                 Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(Error::io(&path, "remove", e)),
                 _ => {}
@@ -271,16 +270,6 @@ impl SampleRun<'_> {
     }
 }
 
-/// Levels of an adaptive estimator.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Levels {
-    /// Cross-entropy.
-    CrossEntropy(Vec<CrossEntropyStep>),
-    /// Subset simulation.
-    Subset(Vec<SubsetLevel>),
-}
-
 /// Result of a sampling run.
 #[derive(Debug, Clone, Default)]
 pub struct SampleResult {
@@ -288,10 +277,10 @@ pub struct SampleResult {
     pub rows: Vec<EstimateRow>,
     /// Counts and convergence of crude Monte Carlo.
     pub crude: Option<CrudeRun>,
-    /// Levels of an adaptive estimator, by model.
-    pub levels: Vec<Levels>,
-    /// The proposals found, by model.
-    pub proposals: Vec<(ModelId, Mixture)>,
+    /// The rounds of the search.
+    pub search: Vec<SearchRound>,
+    /// The proposal found.
+    pub proposal: Option<Mixture>,
     /// Number of merged parts; 0 for a run in one piece.
     pub parts: usize,
     /// Lanes that were rechecked.

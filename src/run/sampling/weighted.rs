@@ -1,22 +1,18 @@
-//! Importance sampling with given proposals or with those of a pilot. It draws, evaluates and weights the samples that
-//! the ledger does not hold.
+//! Importance sampling with a given proposal or with one that a search finds. It draws, evaluates and weights the
+//! samples that the ledger does not hold; every question is asked of the same samples.
 
 use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use super::limit_state::{LaneLimitState, scenario_shares, truncated};
+use super::limit_state::{LaneLimitState, Question, scenario_shares, truncated};
 use super::rows::EstimateRow;
-use super::sample_options::SampleOptions;
 use super::sample_run::SampleResult;
-use super::{Proposals, Sample};
+use super::{Sample, Weighted};
 use crate::engine::{CpuBackend, Executor, lanes_within_seconds};
-use crate::model::driver::ModelId;
 use crate::run::parts::{Ledger, MergeableCounts};
-use crate::stats::density::{BandwidthRule, Kde, Mixture};
 use crate::stats::estimate::{
-    BlockSums, Defended, Estimate, KernelShares, Pilot, PilotCheck, StopReason, WeightSums, defended, from_weight_sums,
-    importance_sums, pilot_proposal,
+    BlockSums, Search, SearchRun, WeightSums, after_search, defended, from_weight_sums, importance_sums, search,
 };
 use crate::support::cancel::Cancel;
 use crate::{Error, Place, Result};
@@ -32,8 +28,8 @@ const KERNELS: u64 = 1 << 10;
 ///
 /// It is small enough that a chunk takes seconds, however long the lanes last. It is a power of two, because the sums
 /// follow a binary tree over the sample indices.
-fn chunk_samples(step_cap: u32, models: u64, kernels: u64) -> u64 {
-    let evaluated = lanes_within_seconds(step_cap) / models.max(1);
+fn chunk_samples(step_cap: u32, lanes: u64, kernels: u64) -> u64 {
+    let evaluated = lanes_within_seconds(step_cap) / lanes.max(1);
     let weighted = CHUNK / (kernels / KERNELS).max(1);
     1 << evaluated.min(weighted).clamp(1, CHUNK).ilog2()
 }
@@ -41,61 +37,58 @@ fn chunk_samples(step_cap: u32, models: u64, kernels: u64) -> u64 {
 impl Sample {
     /// Number of samples between two updates of the journal.
     pub(crate) fn chunk_samples(&self) -> u64 {
-        let (models, kernels) = (self.options.models.len(), self.density.kde.points().len());
-        chunk_samples(self.profile.step_cap(), models as u64, kernels as u64)
+        let kernels = self.density.kde.points().len();
+        chunk_samples(self.profile.step_cap(), self.lanes_per_sample(), kernels as u64)
     }
 
-    /// The lanes of a driver model as a limit state for estimators.
-    pub(super) fn limit_state<'a>(&'a self, model: ModelId, executor: Executor<'a>) -> LaneLimitState<'a> {
-        let (density, profile, options) = (&self.density, &self.profile, &self.options);
-        let (criterion, headway) = (options.criterion, options.headways.clone());
-        LaneLimitState { density, profile, model, criterion, headway, executor }
+    /// Number of lanes of a sample of importance sampling.
+    pub(crate) fn lanes_per_sample(&self) -> u64 {
+        let asked = self.options.asked();
+        let count = |is_first: &dyn Fn(usize) -> bool| (0..asked.len()).filter(|at| is_first(*at)).count() as u64;
+        let models = count(&|at| asked[..at].iter().all(|other| other.model != asked[at].model));
+        models * count(&|at| asked[..at].iter().all(|other| other.headway != asked[at].headway))
     }
 
-    /// The kernels over a pilot's worst points.
-    pub(super) fn kernels_over(&self, points: &[Vec<f64>]) -> Result<Mixture> {
-        let names: Vec<&str> = self.density.space.parameters().iter().map(|p| p.name.as_str()).collect();
-        Kde::fit(points.to_vec(), &names, BandwidthRule::Reduction)?.mixture()
+    /// The lanes of all questions as a limit state.
+    pub(super) fn limit_state<'a>(&'a self, executor: Executor<'a>) -> LaneLimitState<'a> {
+        let options = &self.options;
+        LaneLimitState::new(&self.density, &self.profile, &options.headways, &options.asked(), executor)
     }
 
-    /// The proposal of every driver model, with the counts of its pilot.
-    pub(super) fn pilots(&self, pilot: &Pilot, executor: &Executor) -> Result<Proposals> {
-        let (nominal, fit) = (truncated(&self.density)?, |points: &[Vec<f64>]| self.kernels_over(points));
-        let search = |&model: &ModelId| {
-            tracing::info!("pilot of {} on {}", model.name(), executor.backend.describe());
-            pilot_proposal(&nominal, &self.limit_state(model, executor.clone()), &fit, pilot, self.options.seed)
-        };
-        let found: Vec<(Mixture, PilotCheck)> = self.options.models.iter().map(search).collect::<Result<_>>()?;
-        let (mixtures, pilots) = found.into_iter().unzip();
-        Ok(Proposals { mixtures, pilots })
+    /// Finds a proposal. Without failures it is the density: its draws find none either, and the search says so.
+    pub(super) fn search(&self, options: &Search, executor: &Executor) -> Result<Weighted> {
+        tracing::info!("search on {}", executor.backend.describe());
+        let nominal = truncated(&self.density)?;
+        let run = search(&nominal, &self.limit_state(executor.clone()), options, self.options.seed)?;
+        let proposal = run.proposal.clone().map_or_else(|| self.density.mixture(), Ok)?;
+        Ok(Weighted { proposal, draws: self.draws_after(&run), search: Some(run) })
+    }
+
+    /// Number of draws after a search.
+    pub(super) fn draws_after(&self, search: &SearchRun) -> u64 {
+        self.options.goal().map_or(self.options.stop.samples, |goal| goal.draws(&search.questions, self.options.level))
     }
 
     /// Draws, evaluates and weights the samples that the ledger does not hold.
     pub(crate) fn sample_weighted(
         &self,
-        proposals: &Proposals,
+        weighted: &Weighted,
         ledger: &mut Ledger<WeightedTally>,
         executor: &Executor,
         mut progress: impl FnMut(u64),
     ) -> Result<()> {
-        let SampleOptions { estimator, models, seed, .. } = &self.options;
         let nominal = truncated(&self.density)?;
-        let prepared = |proposal: &Mixture| defended(proposal.clone(), &nominal, estimator.defence());
-        let proposals: Vec<Defended> = proposals.mixtures.iter().map(prepared).collect::<Result<_>>()?;
+        let proposal = defended(weighted.proposal.clone(), &nominal, self.options.estimator.defence())?;
         let (units, chunk) = (ledger.units(), self.chunk_samples());
         // The samples of a chunk are drawn, evaluated and weighted together, so a chunk cannot be cancelled.
         let whole = executor.clone().with_cancel(Cancel::default());
+        let lanes = self.limit_state(whole);
         for missing in ledger.missing(units.clone())? {
             let mut at = missing.start;
             while at < missing.end {
                 let next = (at / chunk + 1).saturating_mul(chunk).min(missing.end);
-                // One proposal serves all models, or each has its own.
-                let sums_of = |(&model, proposal): (&ModelId, &Defended)| {
-                    let lanes = self.limit_state(model, whole.clone());
-                    Ok((model, importance_sums(&nominal, proposal, &lanes, *seed, at..next)?))
-                };
-                let pairs = models.iter().zip(proposals.iter().cycle());
-                ledger.add(WeightedTally { sums: pairs.map(sums_of).collect::<Result<_>>()? }, [0; 2])?;
+                let sums = importance_sums(&nominal, &proposal, &lanes, self.options.seed, at..next)?;
+                ledger.add(WeightedTally { sums: self.options.asked().into_iter().zip(sums).collect() }, [0; 2])?;
                 progress(next - at);
                 at = next;
                 ledger.kept(executor.check_cancelled(at - units.start, units.end - units.start))?;
@@ -107,58 +100,53 @@ impl Sample {
     /// The estimates from the sums over all samples.
     ///
     /// # Errors
-    /// [`Error::Input`] at `place` if a sample or a driver model is missing.
+    /// [`Error::Input`] at `place` if a sample or a question is missing.
     pub(super) fn weighted_result(
         &self,
-        proposals: &Proposals,
+        weighted: &Weighted,
         tally: Option<WeightedTally>,
         place: Place,
     ) -> Result<SampleResult> {
-        let SampleOptions { estimator, models, seed, level, .. } = &self.options;
+        let (options, exposure) = (&self.options, self.exposure());
         let tally = tally.filter(|tally| {
             tally.covered().as_slice() == std::slice::from_ref(&(0..self.samples())) && self.check_sums(tally).is_ok()
         });
         let Some(tally) = tally else {
-            let problem = "the parts do not hold every sample of every driver model";
+            let problem = "the parts do not hold every sample of every question";
             return Err(Error::input(place, problem, "make them again"));
         };
+        // Some more lanes, on the CPU: a merge has no other backend, and all backends give the same bits.
         let cpu = CpuBackend::lane_arithmetic();
-        let row = |(at, (model, sums)): (usize, &(ModelId, BlockSums<WeightSums>))| {
-            let total = sums.total().unwrap_or_default();
-            let mut estimate = from_weight_sums(&total, false, *level, StopReason::Samples);
-            proposals.pilots.get(at).into_iter().for_each(|pilot| pilot.add_to(&mut estimate));
-            // Some more lanes, on the CPU: a merge has no other backend, and all backends give the same bits.
-            let lanes = self.limit_state(*model, Executor::new(&cpu));
-            let proposal = &proposals.mixtures[at % proposals.mixtures.len()];
-            let shares = scenario_shares(&lanes, proposal, estimator.defence(), *seed)?;
-            Ok(self.row(*model, estimate, shares.as_ref()))
-        };
-        let rows = tally.sums.iter().enumerate().map(row).collect::<Result<_>>()?;
-        let found = models.iter().copied().zip(proposals.mixtures.iter().cloned());
-        let proposals = found.filter(|_| !proposals.pilots.is_empty()).collect();
-        Ok(SampleResult { rows, proposals, ..SampleResult::default() })
-    }
-
-    /// A row of a weighting estimator.
-    pub(super) fn row(&self, model: ModelId, estimate: Estimate, shares: Option<&KernelShares>) -> EstimateRow {
-        let (exposure, options) = (self.exposure(), &self.options);
-        let row = EstimateRow::of_draws(model, options.criterion, options.headway_name(), estimate, exposure);
-        row.with_data(shares, exposure)
+        let lanes = self.limit_state(Executor::new(&cpu));
+        let shares = scenario_shares(&lanes, &weighted.proposal, options.estimator.defence(), options.seed)?;
+        let mut rows = Vec::new();
+        for (at, ((question, sums), shares)) in tally.sums.iter().zip(&shares).enumerate() {
+            let mut estimate = from_weight_sums(&sums.total().unwrap_or_default(), false, options.level);
+            if let Some(search) = &weighted.search {
+                estimate = after_search(estimate, &search.questions[at], search.points);
+            }
+            let headway = options.headway_name(question.headway);
+            let row = EstimateRow::of_draws(question.model, question.criterion, headway, estimate, exposure);
+            rows.push(row.with_data(shares.as_ref(), exposure));
+        }
+        let proposal = weighted.search.as_ref().and_then(|search| search.proposal.clone());
+        let search = weighted.search.as_ref().map(|search| search.rounds.clone()).unwrap_or_default();
+        Ok(SampleResult { rows, proposal, search, ..SampleResult::default() })
     }
 }
 
-/// Sums over a set of samples of one run; all models use the same samples. Tallies of disjoint sets can be merged in
+/// Sums over a set of samples of one run; all questions use the same samples. Tallies of disjoint sets can be merged in
 /// any order to the same bits, because the sums follow a binary tree over the indices.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct WeightedTally {
-    /// Model by model.
-    pub sums: Vec<(ModelId, BlockSums<WeightSums>)>,
+    /// Question by question.
+    pub sums: Vec<(Question, BlockSums<WeightSums>)>,
 }
 
 impl WeightedTally {
-    fn models(&self) -> Vec<ModelId> {
-        self.sums.iter().map(|(model, _)| *model).collect()
+    fn questions(&self) -> Vec<Question> {
+        self.sums.iter().map(|(question, _)| *question).collect()
     }
 }
 
@@ -168,9 +156,9 @@ impl MergeableCounts for WeightedTally {
     }
 
     fn join(mut self, other: Self) -> Result<Self> {
-        if self.models() != other.models() {
+        if self.questions() != other.questions() {
             let help = "join only counts of one run: same density, proposal, flags and seed";
-            return Err(Error::input(Place::item("weighted sums"), "they are of other driver models", help));
+            return Err(Error::input(Place::item("weighted sums"), "they answer other questions", help));
         }
         for ((_, ours), (_, theirs)) in self.sums.iter_mut().zip(other.sums) {
             ours.merge(theirs)?;
@@ -179,10 +167,11 @@ impl MergeableCounts for WeightedTally {
     }
 
     fn check(&self) -> std::result::Result<(), String> {
-        for (model, sums) in &self.sums {
+        for (question, sums) in &self.sums {
             sums.check()?;
             if sums.ranges() != self.covered() {
-                return Err(format!("{} holds other samples than the first model", model.name()));
+                let name = question.model.name();
+                return Err(format!("a question about {name} holds other samples than the first question"));
             }
         }
         Ok(())
@@ -192,6 +181,8 @@ impl MergeableCounts for WeightedTally {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::model::criterion::Criterion;
+    use crate::model::driver::ModelId;
     use crate::stats::estimate::WeightedDraw;
 
     /// Cancellation is checked after a bounded number of lane-steps and of weighted kernels, for every time step.
@@ -208,13 +199,14 @@ mod tests {
     }
 
     fn tally(models: &[ModelId], range: Range<u64>) -> WeightedTally {
+        let question = |model: &ModelId| Question { model: *model, criterion: Criterion::Collision, headway: 0 };
         let leaf = |i: u64| {
             let response = f64::from(u8::from(i.is_multiple_of(3)));
             let weight = libm::exp(((i * 2_654_435_761) % 97) as f64 / 9.0 - 5.0);
             WeightSums::from(WeightedDraw { weight, response, tries: 1, is_void: false, is_thin: false })
         };
         let sums = || BlockSums::of_leaves(range.start, &range.clone().map(leaf).collect::<Vec<_>>());
-        WeightedTally { sums: models.iter().map(|model| (*model, sums())).collect() }
+        WeightedTally { sums: models.iter().map(|model| (question(model), sums())).collect() }
     }
 
     #[test]

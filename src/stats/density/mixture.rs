@@ -176,6 +176,20 @@ impl Mixture {
         &self.factors[self.factor_of[component]]
     }
 
+    /// Whether all components have one covariance.
+    pub(crate) fn shares_factor(&self) -> bool {
+        self.runs.len() == 1
+    }
+
+    /// The same mixture with every covariance multiplied by `factor` > 0.
+    ///
+    /// # Errors
+    /// As [`Mixture::new`].
+    pub fn scaled(&self, factor: f64) -> Result<Mixture> {
+        let factors = self.factors.iter().map(|own| own * factor.sqrt()).collect();
+        Mixture::new(self.weights.clone(), self.means.clone(), factors, self.factor_of.clone())
+    }
+
     /// The same mixture with `covariance` times `fraction` added to every component's covariance. It is wider wherever
     /// the component is narrower than that covariance.
     ///

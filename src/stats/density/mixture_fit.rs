@@ -1,7 +1,8 @@
 //! Weighted maximum likelihood of a Gaussian mixture by expectation maximisation (Dempster, Laird and Rubin 1977), for
-//! cross-entropy and for modelling points: few components, full covariances.
+//! proposals and for densities: few components, full covariances.
 
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use super::Mixture;
 use super::moments::{factor_or_diagonal, moments};
@@ -19,12 +20,12 @@ const JITTER: f64 = 1e-6;
 /// Options of a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FitOptions {
-    /// Most components, ≥ 1; fewer where the points do not carry them.
+    /// Maximum number of components, ≥ 1; fewer where the points do not carry them.
     pub components: usize,
-    /// Try 1, 2, … `components` as long as each lowers the Bayesian information criterion, in which the
-    /// effective sample size (Σw)²/Σw² stands for the number of points. Otherwise exactly `components`.
+    /// Choose among 1, 2, 3, 4, 6, 8, 12, … up to `components` by the likelihood of held-out points: each half of the
+    /// points is fitted and predicts the other. Otherwise exactly `components`.
     pub choose: bool,
-    /// Most iterations for each number of components.
+    /// Maximum number of iterations for each number of components.
     pub iterations: usize,
     /// End when the mean log-likelihood grows by less than this in an iteration.
     pub tolerance: f64,
@@ -34,7 +35,7 @@ pub struct FitOptions {
 
 impl Default for FitOptions {
     fn default() -> Self {
-        FitOptions { components: 4, choose: true, iterations: 50, tolerance: 1e-4, seed: 0 }
+        FitOptions { components: 4, choose: true, iterations: 50, tolerance: 1e-3, seed: 0 }
     }
 }
 
@@ -65,20 +66,13 @@ impl Mixture {
         let kept: Vec<(&[f64], f64)> =
             points.iter().zip(weights).filter(|(_, w)| **w > 0.0).map(|(p, w)| (p.as_slice(), w / total)).collect();
         let sample = Weighted::of(kept, d);
-        let min_components = if options.choose { 1 } else { options.components };
-        let mut best: Option<(f64, Mixture)> = None;
-        for components in min_components..=options.components {
-            let (mixture, log_likelihood) = sample.expectation_maximisation(components, options)?;
-            let parameters = mixture.weights().len() * (1 + d + d * (d + 1) / 2) - 1;
-            let bic = parameters as f64 * libm::log(sample.effective) - 2.0 * sample.effective * log_likelihood;
-            if best.as_ref().is_some_and(|(lowest, _)| bic >= *lowest) {
-                break; // one more did not pay
-            }
-            best = Some((bic, mixture));
-        }
-        best.map(|(_, mixture)| mixture).ok_or_else(|| Error::Internal("no mixture was fitted".to_owned()))
+        let components = if options.choose { sample.chosen(options)? } else { options.components };
+        sample.expectation_maximisation(components, options).map(|fit| fit.0)
     }
 }
+
+/// Gain of the mean held-out log-likelihood that one more candidate must bring.
+const MIN_GAIN: f64 = 1e-3;
 
 /// Points with weights of sum 1, and the data common to all components.
 struct Weighted<'a> {
@@ -98,6 +92,37 @@ impl<'a> Weighted<'a> {
         }
         let effective = 1.0 / points.iter().map(|(_, w)| w * w).sum::<f64>();
         Weighted { points, d, covariance, effective }
+    }
+
+    /// The number of components with the largest held-out likelihood; the smaller one of almost equal candidates.
+    fn chosen(&self, options: &FitOptions) -> Result<usize> {
+        // A component takes its weight, mean and covariance from at least d + 1 points.
+        let max = (self.effective / (self.d as f64 + 1.0)).floor().max(1.0) as usize;
+        let powers = (0..usize::BITS - 2).flat_map(|bit| [1 << bit, 3 << bit]);
+        let mut candidates: Vec<usize> = powers.filter(|k| *k <= options.components.min(max)).collect();
+        candidates.sort_unstable();
+        if candidates.len() < 2 {
+            return Ok(1);
+        }
+        let half = |odd: usize| {
+            let own: Vec<(&[f64], f64)> = self.points.iter().copied().skip(odd).step_by(2).collect();
+            let total: f64 = own.iter().map(|(_, weight)| weight).sum();
+            Weighted::of(own.into_iter().map(|(point, weight)| (point, weight / total)).collect(), self.d)
+        };
+        let halves = [half(0), half(1)];
+        let jobs: Vec<(usize, usize)> = candidates.iter().flat_map(|k| [(*k, 0), (*k, 1)]).collect();
+        let held_out = |&(components, odd): &(usize, usize)| {
+            let mixture = halves[odd].expectation_maximisation(components, options)?.0;
+            Ok(halves[1 - odd].points.iter().map(|(point, weight)| weight * mixture.log_density(point)).sum::<f64>())
+        };
+        let scores: Vec<f64> = jobs.par_iter().map(held_out).collect::<Result<_>>()?;
+        let mut best = (f64::NEG_INFINITY, 1);
+        for (components, score) in candidates.into_iter().zip(scores.chunks(2).map(|pair| 0.5 * (pair[0] + pair[1]))) {
+            if score > best.0 + MIN_GAIN {
+                best = (score, components);
+            }
+        }
+        Ok(best.1)
     }
 
     /// L of (1 − λ) S + λ (covariance of all points).

@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 
 use super::interval::log_normal;
-use super::problem::{Density, LimitState, evaluated, purpose};
+use super::problem::{Density, LimitState, draw, evaluate_checked, purpose};
 use super::summary::Estimate;
 use super::trust::Warning;
 use crate::Result;
@@ -26,9 +26,9 @@ pub struct KernelShares {
     pub effective_failing: f64,
 }
 
-/// Counts the fractions over draws of a proposal. Each failing draw has the weight f/g, divided among the kernels by
-/// their responsibilities. Σ s_j² is corrected for the bias from the draws' noise. `None` if no draw fails or there is
-/// only one kernel.
+/// Counts the fractions of every question over draws of a proposal. Each failing draw has the weight f/g, divided among
+/// the kernels by their responsibilities. Σ s_j² is corrected for the bias from the draws' noise. `None` for a question
+/// without failing draws, or if there is only one kernel.
 ///
 /// # Errors
 /// Those of the limit state.
@@ -38,37 +38,63 @@ pub fn kernel_shares(
     proposal: &dyn Density,
     limit_state: &dyn LimitState,
     seed: u64,
-) -> Result<Option<KernelShares>> {
-    let drawn = evaluated(proposal, limit_state, Stream { seed, purpose: purpose::SHARES }, 0..DRAWS)?;
-    let failing: Vec<&Vec<f64>> =
-        drawn.points.iter().zip(&drawn.values).filter(|(_, v)| **v <= 0.0).map(|(p, _)| p).collect();
+) -> Result<Vec<Option<KernelShares>>> {
+    let drawn = draw(proposal, Stream { seed, purpose: purpose::SHARES }, 0..DRAWS);
+    let points: Vec<Vec<f64>> = drawn.into_iter().flatten().map(|drawn| drawn.point).collect();
+    let values = evaluate_checked(limit_state, &points)?;
+    let (questions, guides) = (limit_state.questions(), limit_state.guides());
     let n = kernels.weights().len();
-    let (mut sums, mut squares) = (vec![0.0; n], vec![0.0; n]);
-    let (mut weight, mut weight_squared) = (0.0, 0.0);
-    for points in failing.chunks(AT_ONCE) {
-        let explained = |point: &&Vec<f64>| {
+    let mut counts: Vec<Counts> = (0..questions).map(|_| Counts::new(n)).collect();
+    let fails = |at: usize, question: usize| values[(at * questions + question) * guides] <= 0.0;
+    let failing: Vec<usize> = (0..points.len()).filter(|at| (0..questions).any(|q| fails(*at, q))).collect();
+    for chunk in failing.chunks(AT_ONCE) {
+        let explained = |at: &usize| {
+            let point = &points[*at];
             let ratio = libm::exp(nominal.log_density(point) - proposal.log_density(point));
             (ratio, kernels.responsibilities(point))
         };
-        let all: Vec<(f64, Vec<f64>)> = points.par_iter().map(explained).collect();
+        let all: Vec<(f64, Vec<f64>)> = chunk.par_iter().map(explained).collect();
         // In the order of the indices, so that the bits do not depend on the number of threads.
-        for (w, shares) in all {
-            weight += w;
-            weight_squared += w * w;
-            for (j, share) in shares.iter().enumerate() {
-                sums[j] += w * share;
-                squares[j] += (w * share) * (w * share);
-            }
+        for (at, (weight, shares)) in chunk.iter().zip(&all) {
+            (0..questions).filter(|q| fails(*at, *q)).for_each(|q| counts[q].add(*weight, shares));
         }
     }
-    let pairs = weight * weight - weight_squared;
-    if n < 2 || pairs.is_nan() || pairs <= 0.0 {
-        return Ok(None);
+    Ok(counts.iter().map(Counts::shares).collect())
+}
+
+/// Sums over the failing draws of one question.
+struct Counts {
+    /// Kernel by kernel: Σ w s and Σ (w s)².
+    sums: Vec<[f64; 2]>,
+    weight: f64,
+    weight_squared: f64,
+}
+
+impl Counts {
+    fn new(kernels: usize) -> Counts {
+        Counts { sums: vec![[0.0; 2]; kernels], weight: 0.0, weight_squared: 0.0 }
     }
-    let between: f64 = sums.iter().zip(&squares).map(|(sum, square)| sum * sum - square).sum();
-    let of_squares = (between / pairs).clamp(1.0 / n as f64, 1.0);
-    let relative_variance = n as f64 / (n as f64 - 1.0) * (of_squares - 1.0 / n as f64);
-    Ok(Some(KernelShares { relative_variance, effective_failing: 1.0 / of_squares }))
+
+    fn add(&mut self, weight: f64, shares: &[f64]) {
+        self.weight += weight;
+        self.weight_squared += weight * weight;
+        for ([sum, square], share) in self.sums.iter_mut().zip(shares) {
+            *sum += weight * share;
+            *square += (weight * share) * (weight * share);
+        }
+    }
+
+    fn shares(&self) -> Option<KernelShares> {
+        let n = self.sums.len();
+        let pairs = self.weight * self.weight - self.weight_squared;
+        if n < 2 || pairs.is_nan() || pairs <= 0.0 {
+            return None;
+        }
+        let between: f64 = self.sums.iter().map(|[sum, square]| sum * sum - square).sum();
+        let of_squares = (between / pairs).clamp(1.0 / n as f64, 1.0);
+        let relative_variance = n as f64 / (n as f64 - 1.0) * (of_squares - 1.0 / n as f64);
+        Some(KernelShares { relative_variance, effective_failing: 1.0 / of_squares })
+    }
 }
 
 impl Estimate {
@@ -104,11 +130,11 @@ mod tests {
         let kernels = Mixture::of_kernels(points, &[0.3]).unwrap();
         let beyond = |points: &[Vec<f64>]| Ok(points.iter().map(|x| 3.0 - x[0]).collect());
         let proposal = defended(Mixture::of_kernels(vec![vec![3.2]], &[0.4]).unwrap(), &kernels, 0.1).unwrap();
-        let shares = kernel_shares(&kernels, &kernels, &proposal, &beyond, 5).unwrap().unwrap();
+        let shares = kernel_shares(&kernels, &kernels, &proposal, &beyond, 5).unwrap()[0].unwrap();
         // Ten of 40 have a share of 0.1 each: Σ s² = 0.1.
         assert!((shares.effective_failing / 10.0 - 1.0).abs() < 0.01, "{shares:?}");
         assert!((shares.relative_variance / (40.0 / 39.0 * 0.075) - 1.0).abs() < 0.01, "{shares:?}");
         let never = |points: &[Vec<f64>]| Ok(vec![1.0; points.len()]);
-        assert_eq!(kernel_shares(&kernels, &kernels, &proposal, &never, 5).unwrap(), None);
+        assert_eq!(kernel_shares(&kernels, &kernels, &proposal, &never, 5).unwrap(), [None]);
     }
 }

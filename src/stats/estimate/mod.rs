@@ -5,35 +5,33 @@
 //! are passed to the limit state in batches, because it runs on vector hardware. The same seed gives the same bits for
 //! any number of threads and any division of the indices.
 
-mod balance;
+mod adaptive;
 mod blocks;
-mod cross_entropy;
 mod importance;
 mod interval;
 mod kernels;
 mod monte_carlo;
+mod pool;
 mod problem;
 mod ratio;
+mod search;
+mod shapes;
 mod stop;
-mod subset;
 mod summary;
 mod trust;
 mod weights;
 
-pub use balance::{Technique, balance_heuristic};
+pub use adaptive::{AdaptiveRun, Goal, adaptive};
+pub(crate) use adaptive::after_search;
 pub use blocks::{BLOCK, BlockSums, Join};
-pub use cross_entropy::{CrossEntropy, CrossEntropyRun, CrossEntropyStep, cross_entropy};
-pub use importance::{
-    Defended, FitProposal, Importance, Pilot, PilotCheck, defended, from_pilot, from_weight_sums, importance,
-    importance_sums, pilot_proposal, worst_points,
-};
+pub use importance::{Defended, Importance, defended, from_weight_sums, importance, importance_sums};
 pub use interval::{Interval, IntervalKind, clopper_pearson, log_normal, rule_of_three, wilson};
 pub use kernels::{KernelShares, kernel_shares};
 pub use monte_carlo::{BinomialInterval, Counts, from_clusters, from_counts};
 pub use problem::{ATTEMPTS, Density, Draw, LimitState, StandardNormal, Truncated};
 pub use ratio::{ClusterRate, Clusters, Enough, Ratio, RatioMethod, RatioVerdict, cluster_rate, paired_ratio};
+pub use search::{Found, Search, SearchRound, SearchRun, search};
 pub use stop::{Checkpoints, StopReason, StopRule};
-pub use subset::{Subset, SubsetLevel, SubsetRun, subset};
 pub use summary::{Estimate, WeightFigures};
 pub use trust::{Trust, Verdict, Warning};
 pub use weights::{WeightSums, WeightedDraw};

@@ -17,18 +17,14 @@ pub const ATTEMPTS: u32 = 64;
 
 /// Purposes of the estimators' random words; no two estimators use the same draws.
 pub(crate) mod purpose {
-    /// Draws of the density itself: crude Monte Carlo, pilots, the first level of subset simulation.
+    /// Draws of the density itself.
     pub const NOMINAL: u32 = 0x4553_0001;
     /// The choice between the parts of a proposal: added to the purpose of its draws.
     pub const CHOICE: u32 = 0x1000_0000;
     /// Final draws of a proposal.
     pub const PROPOSAL: u32 = 0x4553_0002;
-    /// Draws of a level of cross-entropy: the level is added.
-    pub const CROSS_ENTROPY: u32 = 0x4553_1000;
-    /// Moves of Markov chains: the level is added.
-    pub const CHAIN: u32 = 0x4553_2000;
-    /// Draws of one of several techniques: its number is added.
-    pub const TECHNIQUE: u32 = 0x4553_3000;
+    /// Draws of a search: 64 times the round and the number of the mixture within the round are added.
+    pub const SEARCH: u32 = 0x4553_4000;
     /// Draws that determine which kernels failures come from.
     pub const SHARES: u32 = 0x4553_0004;
     /// The estimate of a valid fraction.
@@ -66,9 +62,9 @@ pub trait Density: Sync {
         1.0
     }
 
-    /// Whether f is the standard normal density, for which chains have better moves.
-    fn is_standard_normal(&self) -> bool {
-        false
+    /// f as a mixture of Gaussians, if it is one: a search then knows the scales of its kernels.
+    fn mixture(&self) -> Option<Mixture> {
+        None
     }
 
     /// The point of an index, or `None` for a void index: [`ATTEMPTS`] attempts gave no valid point.
@@ -91,6 +87,10 @@ impl Density for Mixture {
 
     fn attempt(&self, stream: &Stream, index: u64, attempt: u32) -> Vec<f64> {
         Mixture::draw(self, stream, index, attempt)
+    }
+
+    fn mixture(&self) -> Option<Mixture> {
+        Some(self.clone())
     }
 }
 
@@ -115,8 +115,8 @@ impl Density for StandardNormal {
         normals(stream, index, attempt.wrapping_mul(self.dimensions.div_ceil(4) as u32), self.dimensions)
     }
 
-    fn is_standard_normal(&self) -> bool {
-        true
+    fn mixture(&self) -> Option<Mixture> {
+        Mixture::of_kernels(vec![vec![0.0; self.dimensions]], &vec![1.0; self.dimensions]).ok()
     }
 }
 
@@ -162,7 +162,7 @@ impl<V: Fn(&[f64]) -> bool + Sync> Truncated<V> {
     }
 
     /// The mixture before truncation.
-    pub fn mixture(&self) -> &Mixture {
+    pub fn kernels(&self) -> &Mixture {
         &self.mixture
     }
 }
@@ -180,6 +180,10 @@ impl<V: Fn(&[f64]) -> bool + Sync> Density for Truncated<V> {
         self.mixture.draw(stream, index, attempt)
     }
 
+    fn mixture(&self) -> Option<Mixture> {
+        Some(self.mixture.clone())
+    }
+
     fn is_valid(&self, point: &[f64]) -> bool {
         (self.is_valid)(point)
     }
@@ -189,11 +193,21 @@ impl<V: Fn(&[f64]) -> bool + Sync> Density for Truncated<V> {
     }
 }
 
-/// Decides whether a point fails.
+/// Decides whether a point fails, under one question or several.
 pub trait LimitState: Sync {
-    /// One value per point, in order: ≤ 0 fails. Continuous at the limit if possible: cross-entropy and subset
-    /// simulation follow the values down to 0; the other estimators use only the sign. +∞ may stand for "far from any
-    /// failure".
+    /// Number of questions, ≥ 1.
+    fn questions(&self) -> usize {
+        1
+    }
+
+    /// Number of guides of each question, ≥ 1.
+    fn guides(&self) -> usize {
+        1
+    }
+
+    /// One value per point, question and guide, in this order, the guide innermost. Guide 0 decides: ≤ 0 fails. The
+    /// others are ≤ 0 exactly where it is, and only tell a search what is near to failure. They are continuous at the
+    /// limit if possible. +∞ may stand for "far from any failure".
     ///
     /// # Errors
     /// Any error that prevents the evaluation.
@@ -206,17 +220,18 @@ impl<F: Fn(&[Vec<f64>]) -> Result<Vec<f64>> + Sync> LimitState for F {
     }
 }
 
-/// The values of a batch, checked: one per point, none of them NaN.
+/// The values of a batch, checked: all are there, none of them NaN.
 pub(crate) fn evaluate_checked(limit_state: &dyn LimitState, points: &[Vec<f64>]) -> Result<Vec<f64>> {
     if points.is_empty() {
         return Ok(Vec::new());
     }
     let values = limit_state.evaluate(points)?;
-    if values.len() != points.len() {
+    let per_point = limit_state.questions() * limit_state.guides();
+    if values.len() != points.len() * per_point {
         return Err(Error::Internal(format!("{} points were given {} values", points.len(), values.len())));
     }
     match values.iter().position(|v| v.is_nan()) {
-        Some(at) => Err(Error::Internal(format!("the limit state of {:?} is not a number", points[at]))),
+        Some(at) => Err(Error::Internal(format!("the limit state of {:?} is not a number", points[at / per_point]))),
         None => Ok(values),
     }
 }
@@ -227,30 +242,6 @@ pub(crate) const BATCH: u64 = 1 << 16;
 /// The draws of a range of indices, in order.
 pub(crate) fn draw(density: &dyn Density, stream: Stream, indices: Range<u64>) -> Vec<Option<Draw>> {
     indices.into_par_iter().map(|index| density.draw(&stream, index)).collect()
-}
-
-/// Valid points of a range of indices with their values, in index order, and the tries of all.
-pub(crate) struct Evaluated {
-    pub points: Vec<Vec<f64>>,
-    pub values: Vec<f64>,
-    pub voids: u64,
-}
-
-/// Draws and evaluates a range of indices of any length, keeping the points.
-pub(crate) fn evaluated(
-    density: &dyn Density,
-    limit_state: &dyn LimitState,
-    stream: Stream,
-    indices: Range<u64>,
-) -> Result<Evaluated> {
-    let draws = draw(density, stream, indices.clone());
-    let points: Vec<Vec<f64>> = draws.into_iter().flatten().map(|d| d.point).collect();
-    let mut values = Vec::with_capacity(points.len());
-    for batch in points.chunks(BATCH as usize) {
-        values.extend(evaluate_checked(limit_state, batch)?);
-    }
-    let voids = indices.end - indices.start - points.len() as u64;
-    Ok(Evaluated { points, values, voids })
 }
 
 /// Splits a range into batches.

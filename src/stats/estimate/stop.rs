@@ -86,14 +86,6 @@ impl StopRule {
         StopRule { samples, relative_half_width: None, time_limit: None, checkpoints: Checkpoints::Doubling }
     }
 
-    /// The next sample size at which to evaluate the rules.
-    pub(crate) fn next(&self, samples: u64) -> u64 {
-        if self.relative_half_width.is_none() && self.time_limit.is_none() {
-            return self.samples;
-        }
-        self.checkpoints.next(samples).min(self.samples)
-    }
-
     /// Whether to end at this checkpoint.
     pub(crate) fn at(
         &self,
@@ -144,7 +136,6 @@ mod tests {
     #[test]
     fn a_time_limit_ends_at_a_checkpoint_and_is_not_reproducible() {
         let rule = StopRule { time_limit: Some(Duration::ZERO), ..StopRule::samples(100_000) };
-        assert_eq!(rule.next(0), 4096);
         let reason = rule.at(4096, 0, 9.0, Instant::now()).unwrap();
         assert!(!reason.is_reproducible());
     }

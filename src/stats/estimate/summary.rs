@@ -10,8 +10,7 @@ use super::trust::{Trust, Warning};
 /// A probability of failure with measures of its accuracy.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
-    /// Estimator: `monte_carlo`, `importance`, `importance_self_normalised`, `cross_entropy`,
-    /// `subset`, `balance`.
+    /// Estimator: `monte_carlo`, `importance`, `importance_self_normalised`.
     pub method: String,
     /// The estimate, in [0, 1].
     pub probability: f64,
@@ -23,9 +22,9 @@ pub struct Estimate {
     pub variance: f64,
     /// √variance over the probability; ∞ at zero.
     pub coefficient_of_variation: f64,
-    /// Number of evaluations of the limit state, including pilots and levels.
+    /// Number of evaluations of the limit state, including those of a search.
     pub runs: u64,
-    /// Number of failures in the sample of the estimate (the last level's, the final sample's).
+    /// Number of failures in the sample of the estimate, without those of a search.
     pub failures: u64,
     /// Number of indices without a valid point.
     pub voids: u64,

@@ -67,33 +67,25 @@ pub enum Warning {
         /// Number of these failures.
         failures: u64,
     },
-    /// The pilot, drawn from the density itself, has a number of failures that is less likely than
-    /// [`Warning::PILOT_LIKELIHOOD`] under the estimate.
-    DisagreesWithPilot {
-        /// Failures of the pilot.
-        failures: u64,
-        /// Failures expected under the estimate.
-        expected: f64,
+    /// The sample with which the search tested its proposal differs by more than [`Warning::SEARCH_ERRORS`] standard
+    /// errors.
+    DisagreesWithSearch {
+        /// Its probability.
+        search: f64,
+        /// Distance of the logarithms in standard errors.
+        errors: f64,
     },
-    /// Markov chains moved in less than [`Warning::MIN_ACCEPTANCE`] of their steps.
-    ChainsStuck {
-        /// Level, counted from 1.
-        level: usize,
-        /// Fraction of steps that moved.
-        acceptance: f64,
+    /// The search came less deep than [`Warning::DEPTH`] times the probability: as much may have escaped.
+    Shallow {
+        /// Everything more likely than this was searched.
+        depth: f64,
+        /// The estimate.
+        probability: f64,
     },
-    /// The surviving samples descend from effectively fewer than [`Warning::MIN_LINEAGES`] independent ones.
-    FewLineages {
-        /// Effective number.
-        lineages: f64,
-    },
-    /// The levels ended before any failure was reached: nothing nearer to failure was found, or the number of
-    /// levels was used up.
-    LevelsNotReached {
-        /// Levels used.
-        levels: usize,
-        /// Limit state reached, > 0.
-        threshold: f64,
+    /// The search found too few failures for a proposal: there may be none.
+    NothingFound {
+        /// Everything more likely than this was searched.
+        depth: f64,
     },
     /// More than [`Warning::MAX_VOID_FRACTION`] of the indices gave no valid point.
     VoidDraws {
@@ -122,12 +114,10 @@ impl Warning {
     pub const THIN_RATIO: f64 = 5.0;
     /// Fraction of the estimate above which [`Warning::ModeMissed`] is raised.
     pub const MAX_THIN_FRACTION: f64 = 0.1;
-    /// Two-sided likelihood below which [`Warning::DisagreesWithPilot`] is raised.
-    pub const PILOT_LIKELIHOOD: f64 = 0.001;
-    /// Acceptance below which [`Warning::ChainsStuck`] is raised.
-    pub const MIN_ACCEPTANCE: f64 = 0.1;
-    /// Lineages below which [`Warning::FewLineages`] is raised.
-    pub const MIN_LINEAGES: f64 = 10.0;
+    /// Standard errors above which [`Warning::DisagreesWithSearch`] is raised.
+    pub const SEARCH_ERRORS: f64 = 4.0;
+    /// Depth over the probability above which [`Warning::Shallow`] is raised.
+    pub const DEPTH: f64 = 3.0;
     /// Fraction of void indices above which [`Warning::VoidDraws`] is raised.
     pub const MAX_VOID_FRACTION: f64 = 0.001;
 
@@ -136,8 +126,9 @@ impl Warning {
         match self {
             Warning::MeanWeightOff { .. }
             | Warning::ModeMissed { .. }
-            | Warning::DisagreesWithPilot { .. }
-            | Warning::LevelsNotReached { .. } => true,
+            | Warning::DisagreesWithSearch { .. }
+            | Warning::NothingFound { .. } => true,
+            Warning::Shallow { depth, probability } => *depth > 10.0 * Warning::DEPTH * probability,
             Warning::OneWeightDominates { share } => *share > 0.5,
             Warning::LowEffectiveSize { effective_size } => *effective_size < 5.0,
             _ => false,
@@ -192,18 +183,21 @@ impl fmt::Display for Warning {
                 "{failures} failures where the proposal is thin carry {:.0} % of the estimate: it misses a way to fail",
                 100.0 * share
             ),
-            Warning::DisagreesWithPilot { failures, expected } => {
-                write!(f, "the pilot had {failures} failures where the estimate lets expect {expected:.1}")
-            }
-            Warning::ChainsStuck { level, acceptance } => {
-                write!(f, "the chains of level {level} moved in only {:.0} % of their steps", 100.0 * acceptance)
-            }
-            Warning::FewLineages { lineages } => {
-                write!(f, "the last samples descend from effectively {lineages:.1} independent ones")
-            }
-            Warning::LevelsNotReached { levels, threshold } => {
-                write!(f, "after {levels} levels the limit state is still at {threshold:.3e}: no failure was reached")
-            }
+            Warning::DisagreesWithSearch { search, errors } => write!(
+                f,
+                "the test sample of the search gave {}, {errors:.1} standard errors away",
+                significant(*search, 3)
+            ),
+            Warning::Shallow { depth, .. } => write!(
+                f,
+                "the search saw only what is more likely than {}: as many failures may have escaped it",
+                significant(*depth, 2)
+            ),
+            Warning::NothingFound { depth } => write!(
+                f,
+                "the search found too few failures for an estimate; it saw what is more likely than {}",
+                significant(*depth, 2)
+            ),
             Warning::VoidDraws { share } => {
                 write!(f, "{:.2} % of the draws gave no valid point", 100.0 * share)
             }

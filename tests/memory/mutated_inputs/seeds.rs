@@ -7,7 +7,7 @@ use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::{Counted, Journal, Part, seal, write_part};
 use lanesweep::run::sampling::{
-    Estimator, MapAxes, SampleHeadways, SampleOptions, SampleTally, WeightedTally, proposal_text,
+    Estimator, Question, MapAxes, SampleHeadways, SampleOptions, SampleTally, WeightedTally, proposal_text,
 };
 use lanesweep::run::score::ScoreOptions;
 use lanesweep::run::study::{StudyOptions, outline_study};
@@ -167,7 +167,8 @@ impl Seeds {
         let parts = parts.map(|(_, part)| written(|path| write_part(path, &part).unwrap()));
         let sums = |k: u64| WeightSums { draws: k, weight: 0.5, ..WeightSums::default() };
         let leaves: Vec<WeightSums> = (0..9).map(sums).collect();
-        let sums = ModelId::ALL.into_iter().map(|m| (m, BlockSums::of_leaves(5, &leaves))).collect();
+        let question = |model| Question { model, criterion: CRITERION, headway: 0 };
+        let sums = ModelId::ALL.into_iter().map(|m| (question(m), BlockSums::of_leaves(5, &leaves))).collect();
         let weighted = Part {
             run_sha256: "00".to_owned(),
             units: WEIGHTED_UNITS,

@@ -1,0 +1,199 @@
+//! Evaluated points of a search, drawn from many sources. Every point has the weight f/Σ n_s g_s over all sources, from
+//! whichever it came (the deterministic mixture weight; Owen and Zhou, "Safe and effective importance sampling", Journal
+//! of the American Statistical Association 95, 2000), so no evaluation is lost when the proposals move.
+
+use rayon::prelude::*;
+
+use super::problem::{BATCH, Density, LimitState, evaluate_checked};
+use crate::Result;
+use crate::stats::density::Mixture;
+use crate::stats::random::Stream;
+
+/// A proposal that points were drawn from.
+pub(super) struct Source {
+    pub mixture: Mixture,
+    /// Number of attempts, invalid ones included.
+    pub draws: f64,
+}
+
+/// The points with their values and densities.
+pub(super) struct Pool<'a> {
+    nominal: &'a dyn Density,
+    limit_state: &'a dyn LimitState,
+    pub points: Vec<Vec<f64>>,
+    /// Point × question × guide, the guide innermost.
+    values: Vec<f64>,
+    /// ln f.
+    pub log_f: Vec<f64>,
+    /// ln Σ n_s g_s, without the crude draws.
+    log_sources: Vec<f64>,
+    /// Whether a point is a crude draw. Of these only failures are kept.
+    is_crude: Vec<bool>,
+    pub sources: Vec<Source>,
+    /// Draws of the density whose points are all kept.
+    nominal_draws: f64,
+    /// Draws of the density of which only failures are kept.
+    pub crude_draws: f64,
+    /// Number of evaluated points.
+    pub evaluated: u64,
+}
+
+/// ln(eᵃ + eᵇ).
+fn log_add(a: f64, b: f64) -> f64 {
+    let top = a.max(b);
+    if top == f64::NEG_INFINITY { top } else { top + libm::log(libm::exp(a - top) + libm::exp(b - top)) }
+}
+
+/// (Σw)²/Σw²; 0 without weights.
+pub(super) fn effective_size(weights: impl Iterator<Item = f64>) -> f64 {
+    let (mut sum, mut squares) = (0.0, 0.0);
+    for weight in weights {
+        sum += weight;
+        squares += weight * weight;
+    }
+    if squares > 0.0 { sum * sum / squares } else { 0.0 }
+}
+
+impl<'a> Pool<'a> {
+    pub fn new(nominal: &'a dyn Density, limit_state: &'a dyn LimitState) -> Self {
+        Pool {
+            nominal,
+            limit_state,
+            points: Vec::new(),
+            values: Vec::new(),
+            log_f: Vec::new(),
+            log_sources: Vec::new(),
+            is_crude: Vec::new(),
+            sources: Vec::new(),
+            nominal_draws: 0.0,
+            crude_draws: 0.0,
+            evaluated: 0,
+        }
+    }
+
+    /// Number of draws of the density, which no guide has influenced.
+    pub fn density_draws(&self) -> f64 {
+        self.nominal_draws + self.crude_draws
+    }
+
+    /// The value of a guide; the sign of guide 0 decides failure.
+    pub fn value(&self, point: usize, question: usize, guide: usize) -> f64 {
+        let (questions, guides) = (self.limit_state.questions(), self.limit_state.guides());
+        self.values[(point * questions + question) * guides + guide]
+    }
+
+    pub fn fails(&self, point: usize, question: usize) -> bool {
+        self.value(point, question, 0) <= 0.0
+    }
+
+    /// The failures of a question.
+    pub fn failures(&self, question: usize) -> Vec<usize> {
+        (0..self.points.len()).filter(|point| self.fails(*point, question)).collect()
+    }
+
+    /// The points whose values are all kept, also those that do not fail.
+    pub fn guided(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.points.len()).filter(|point| !self.is_crude[*point])
+    }
+
+    /// The weight of a failure.
+    pub fn weight(&self, point: usize) -> f64 {
+        let crude = libm::log(self.crude_draws) + self.log_f[point];
+        libm::exp(self.log_f[point] - log_add(self.log_sources[point], crude))
+    }
+
+    /// The weight of a point among [`Pool::guided`].
+    pub fn guided_weight(&self, point: usize) -> f64 {
+        libm::exp(self.log_f[point] - self.log_sources[point])
+    }
+
+    /// Draws from the density and keeps every point.
+    pub fn add_nominal(&mut self, stream: Stream, draws: u64) -> Result<()> {
+        let more = libm::log(draws as f64);
+        self.log_sources.iter_mut().zip(&self.log_f).for_each(|(sum, log_f)| *sum = log_add(*sum, more + log_f));
+        self.nominal_draws += draws as f64;
+        let points = self.attempts(self.nominal, stream, 0..draws);
+        self.add(points, false)
+    }
+
+    /// Draws from the density and keeps only failures.
+    pub fn add_crude(&mut self, stream: Stream, draws: u64) -> Result<()> {
+        let from = self.crude_draws as u64;
+        self.crude_draws += draws as f64;
+        for start in (from..from + draws).step_by(BATCH as usize) {
+            let points = self.attempts(self.nominal, stream, start..(start + BATCH).min(from + draws));
+            self.add(points, true)?;
+        }
+        Ok(())
+    }
+
+    /// Draws from a mixture; returns the indices of the new points.
+    pub fn add_source(&mut self, mixture: Mixture, stream: Stream, draws: u64) -> Result<std::ops::Range<usize>> {
+        let from = self.points.len();
+        let points = self.attempts(&mixture, stream, 0..draws);
+        self.register(mixture, draws as f64);
+        self.add(points, false)?;
+        Ok(from..self.points.len())
+    }
+
+    /// Draws from a proposal in which the density has the weight `defence`; returns the indices of the new points.
+    pub fn add_defended(
+        &mut self,
+        mixture: Mixture,
+        defended: &dyn Density,
+        defence: f64,
+        stream: Stream,
+        draws: u64,
+    ) -> Result<std::ops::Range<usize>> {
+        let from = self.points.len();
+        let points = self.attempts(defended, stream, 0..draws);
+        self.register(mixture, (1.0 - defence) * draws as f64);
+        let nominal = defence * draws as f64;
+        self.log_sources.iter_mut().zip(&self.log_f).for_each(|(sum, f)| *sum = log_add(*sum, libm::log(nominal) + f));
+        self.nominal_draws += nominal;
+        self.add(points, false)?;
+        Ok(from..self.points.len())
+    }
+
+    /// Adds a source to the weights of all points.
+    fn register(&mut self, mixture: Mixture, draws: f64) {
+        let more = libm::log(draws);
+        let sums = self.points.par_iter().zip(&self.log_sources);
+        self.log_sources = sums.map(|(point, sum)| log_add(*sum, more + mixture.log_density(point))).collect();
+        self.sources.push(Source { mixture, draws });
+    }
+
+    /// One attempt per index; the valid points. An invalid attempt is a draw of weight 0.
+    fn attempts(&self, of: &dyn Density, stream: Stream, indices: std::ops::Range<u64>) -> Vec<Vec<f64>> {
+        let attempt = |index| Some(of.attempt(&stream, index, 0)).filter(|point| self.nominal.is_valid(point));
+        indices.into_par_iter().map(attempt).collect::<Vec<_>>().into_iter().flatten().collect()
+    }
+
+    fn add(&mut self, points: Vec<Vec<f64>>, is_crude: bool) -> Result<()> {
+        self.evaluated += points.len() as u64;
+        let per_point = self.limit_state.questions() * self.limit_state.guides();
+        for batch in points.chunks(BATCH as usize) {
+            let values = evaluate_checked(self.limit_state, batch)?;
+            let of = |at: usize| &values[at * per_point..(at + 1) * per_point];
+            let fails = |at: usize| of(at).chunks(self.limit_state.guides()).any(|guides| guides[0] <= 0.0);
+            let kept: Vec<usize> = (0..batch.len()).filter(|at| !is_crude || fails(*at)).collect();
+            let logs: Vec<[f64; 2]> = kept.par_iter().map(|at| self.logs(&batch[*at])).collect();
+            for (at, [log_f, log_sources]) in kept.into_iter().zip(logs) {
+                self.points.push(batch[at].clone());
+                self.values.extend_from_slice(of(at));
+                self.log_f.push(log_f);
+                self.log_sources.push(log_sources);
+                self.is_crude.push(is_crude);
+            }
+        }
+        Ok(())
+    }
+
+    /// ln f and ln Σ n_s g_s of a new point.
+    fn logs(&self, point: &[f64]) -> [f64; 2] {
+        let log_f = self.nominal.log_density(point);
+        let nominal = libm::log(self.nominal_draws) + log_f;
+        let of = |source: &Source| libm::log(source.draws) + source.mixture.log_density(point);
+        [log_f, self.sources.iter().fold(nominal, |sum, source| log_add(sum, of(source)))]
+    }
+}

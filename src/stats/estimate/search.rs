@@ -1,0 +1,416 @@
+//! The search for a proposal: where do the failures lie, for one question or several at once?
+//!
+//! It starts with draws of the density and of wider copies. Then every round draws from mixtures over what is known:
+//! around the failures ([`shapes`](super::shapes)), and, as long as they may hide elsewhere, around the points that a
+//! *guide* says are nearest to failure, level by level. All points of all rounds stay in one weighted pool. Guides
+//! can mislead; they decide where points are drawn, never what an estimate is. If they lead nowhere, crude draws of the
+//! density take their place. A proposal is accepted if a fresh sample of it shows no failure of large weight.
+
+use nalgebra::DMatrix;
+use serde::{Deserialize, Serialize};
+
+use super::importance::{defended, no_valid_point};
+use super::pool::{Pool, effective_size};
+use super::problem::{Density, LimitState, purpose};
+use super::shapes::{designs, fitted};
+use crate::Result;
+use crate::stats::density::Mixture;
+use crate::stats::density::moments::{factor_or_diagonal, moments};
+use crate::stats::random::Stream;
+
+/// Variances of the wider copies of the density in the first round, relative to its own.
+const WIDER: [f64; 2] = [4.0, 9.0];
+/// Maximum number of draws of the density in the first round; below it, four for each kernel.
+const MAX_FIRST: u64 = 8000;
+/// Rounds of one question after which crude draws help, if no failure was found or the guides are stuck.
+const PATIENCE: usize = 12;
+/// Crude draws of the first round that has any; each further one has twice as many.
+const CRUDE: u64 = 50_000;
+/// Questions followed in one round.
+const ACTIVE: usize = 4;
+/// Earlier mixtures in the accepted proposal: they meet failures that the last fits miss.
+const LADDER: usize = 12;
+/// Weight of these.
+const LADDER_WEIGHT: f64 = 0.1;
+/// A fresh sample of a proposal is refused if one failure carries more than this fraction of an estimate …
+const MAX_FRACTION: f64 = 0.03;
+/// … at most this many times.
+const MAX_REFUSALS: usize = 6;
+
+/// Options of a search.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Search {
+    /// Draws of a round, ≥ 100.
+    pub batch: u64,
+    /// Effective number of points below a guide's level, and of failures at the end.
+    pub elite: f64,
+    /// Maximum number of rounds for each question.
+    pub rounds: usize,
+    /// Maximum number of crude draws.
+    pub crude: u64,
+    /// Draws of the sample that tests a proposal.
+    pub test: u64,
+    /// Defensive mixture weight: the weight of the density in the proposal.
+    pub defence: f64,
+}
+
+impl Default for Search {
+    fn default() -> Self {
+        Search { batch: 2000, elite: 200.0, rounds: 50, crude: 1 << 21, test: 4000, defence: 0.1 }
+    }
+}
+
+impl Search {
+    /// Maximum number of rounds.
+    fn most_rounds(&self, questions: usize) -> usize {
+        self.rounds * (1 + questions.div_ceil(ACTIVE))
+    }
+
+    /// Maximum number of evaluated points.
+    pub(crate) fn most_points(&self, questions: usize) -> u64 {
+        let rounds = self.batch.max(self.test).saturating_mul(self.most_rounds(questions) as u64);
+        rounds.saturating_add(self.crude).saturating_add(2 * self.batch.max(MAX_FIRST))
+    }
+}
+
+/// What a search knows of one question.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Found {
+    /// The probability, from the sample that tested the proposal; 0 if no proposal was found.
+    pub probability: f64,
+    /// Variance of one weighted draw of the proposal, divided by the squared probability; `None` without a proposal.
+    pub relative_variance: Option<f64>,
+    /// Everything more likely than this was searched: the level that the best guide reached, or three over the number of
+    /// crude draws. Failures of a smaller probability may have escaped.
+    pub depth: f64,
+}
+
+/// One round.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SearchRound {
+    /// Points evaluated so far.
+    pub points: u64,
+    /// Points that fail any question so far.
+    pub failures: u64,
+    /// Questions whose failures are known well enough.
+    pub settled: usize,
+}
+
+/// Result of a search.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SearchRun {
+    /// The proposal without its defensive part; `None` if no failure was found. Files store it separately.
+    #[serde(skip)]
+    pub proposal: Option<Mixture>,
+    /// Question by question.
+    pub questions: Vec<Found>,
+    /// The rounds.
+    pub rounds: Vec<SearchRound>,
+    /// Points evaluated.
+    pub points: u64,
+}
+
+/// State of one question.
+struct Question {
+    rounds: usize,
+    /// Rounds with enough failures, but guides that have not come as deep.
+    waited: usize,
+    /// Scale of the covariances around design points while the failures are few.
+    stretch: f64,
+    /// Fraction of failures among the last draws around design points.
+    hits: Option<f64>,
+    /// Levels of the guides: value and probability; a guide that reached failure has level 0.
+    levels: Vec<(f64, f64)>,
+    depth: f64,
+    is_settled: bool,
+    is_given_up: bool,
+    refusals: usize,
+}
+
+impl Question {
+    fn is_open(&self) -> bool {
+        !self.is_settled && !self.is_given_up
+    }
+}
+
+/// Searches a proposal under which every question that can fail is estimated well.
+///
+/// # Errors
+/// Those of the limit state; [`crate::Error::Usage`] if the density has no valid point.
+pub fn search(nominal: &dyn Density, limit_state: &dyn LimitState, options: &Search, seed: u64) -> Result<SearchRun> {
+    let mut searching = Searching::start(nominal, limit_state, options, seed)?;
+    let mut rounds = Vec::new();
+    while searching.rounds < options.most_rounds(limit_state.questions()) {
+        searching.rounds += 1;
+        let goes_on = searching.round()?;
+        rounds.push(searching.record());
+        if !goes_on {
+            break;
+        }
+    }
+    Ok(searching.finish(rounds))
+}
+
+struct Searching<'a> {
+    nominal: &'a dyn Density,
+    options: &'a Search,
+    seed: u64,
+    pool: Pool<'a>,
+    kernels: Mixture,
+    questions: Vec<Question>,
+    found: Vec<Found>,
+    /// The last tested proposal, its largest relative variance.
+    proposal: Option<Mixture>,
+    rounds: usize,
+    crude: u64,
+}
+
+impl<'a> Searching<'a> {
+    fn start(
+        nominal: &'a dyn Density,
+        limit_state: &'a dyn LimitState,
+        options: &'a Search,
+        seed: u64,
+    ) -> Result<Searching<'a>> {
+        let mut pool = Pool::new(nominal, limit_state);
+        let kernels = nominal.mixture();
+        let count = kernels.as_ref().map_or(1, |kernels| kernels.weights().len()) as u64;
+        let first = options.batch.max((4 * count).min(MAX_FIRST));
+        let stream = |at: u32| Stream { seed, purpose: purpose::SEARCH + at };
+        pool.add_nominal(stream(0), first)?;
+        if pool.points.is_empty() {
+            return Err(no_valid_point("search"));
+        }
+        let kernels = match kernels {
+            Some(kernels) => kernels,
+            None => {
+                // Without kernels, one Gaussian has the density's spread.
+                let d = nominal.dimensions();
+                let (mean, covariance) = moments(pool.points.iter().map(|p| (p.as_slice(), 1.0)), d);
+                let factor: DMatrix<f64> = factor_or_diagonal(covariance);
+                Mixture::new(vec![1.0], vec![mean.as_slice().to_vec()], vec![factor], vec![0])?
+            }
+        };
+        for (at, variance) in (1..).zip(WIDER) {
+            pool.add_source(kernels.scaled(variance)?, stream(at), first / 2)?;
+        }
+        let question = || Question {
+            rounds: 0,
+            waited: 0,
+            stretch: 1.0,
+            hits: None,
+            levels: vec![(f64::INFINITY, 1.0); limit_state.guides()],
+            depth: 1.0,
+            is_settled: false,
+            is_given_up: false,
+            refusals: 0,
+        };
+        let questions = (0..limit_state.questions()).map(|_| question()).collect();
+        let found = vec![Found { probability: 0.0, relative_variance: None, depth: 1.0 }; limit_state.questions()];
+        Ok(Searching { nominal, options, seed, pool, kernels, questions, found, proposal: None, rounds: 0, crude: 0 })
+    }
+
+    /// A stream of this round.
+    fn stream(&self, at: usize) -> Stream {
+        Stream { seed: self.seed, purpose: purpose::SEARCH + 64 * self.rounds as u32 + at as u32 }
+    }
+
+    fn record(&self) -> SearchRound {
+        let questions = self.questions.len();
+        let fails = |point: &usize| (0..questions).any(|question| self.pool.fails(*point, question));
+        SearchRound {
+            points: self.pool.evaluated,
+            failures: (0..self.pool.points.len()).filter(fails).count() as u64,
+            settled: self.questions.iter().filter(|question| question.is_settled).count(),
+        }
+    }
+
+    fn finish(self, rounds: Vec<SearchRound>) -> SearchRun {
+        let depth = |question: &Question| question.depth.min(3.0 / self.pool.density_draws());
+        let of = |(found, question): (&Found, &Question)| Found { depth: depth(question), ..*found };
+        let questions = self.found.iter().zip(&self.questions).map(of).collect();
+        SearchRun { proposal: self.proposal, questions, rounds, points: self.pool.evaluated }
+    }
+
+    /// One round; `false` if nothing is left to do.
+    fn round(&mut self) -> Result<bool> {
+        let mut open: Vec<(f64, usize)> = Vec::new();
+        for (at, _) in self.questions.iter().enumerate().filter(|(_, question)| question.is_open()) {
+            let failures = self.pool.failures(at);
+            open.push((effective_size(failures.iter().map(|point| self.pool.weight(*point))), at));
+        }
+        // The failures of one question lead to those of a rarer one.
+        open.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        open.truncate(ACTIVE);
+        let (mut next, mut is_stuck) = (Vec::new(), false);
+        for (_, at) in &open {
+            is_stuck |= self.follow(*at, &mut next)?;
+        }
+        if self.questions.iter().all(|question| !question.is_open()) {
+            return self.test();
+        }
+        if is_stuck && self.crude < self.options.crude {
+            let draws = if self.crude == 0 { CRUDE } else { self.crude }.min(self.options.crude - self.crude);
+            self.crude += draws;
+            let stream = Stream { seed: self.seed, purpose: purpose::NOMINAL };
+            self.pool.add_crude(stream, draws)?;
+        }
+        let draws = (self.options.batch / next.len().max(1) as u64).max(100);
+        for (at, (mixture, around_designs)) in next.into_iter().enumerate() {
+            let stream = self.stream(at);
+            let new = self.pool.add_source(mixture, stream, draws)?;
+            if let Some(question) = around_designs {
+                let failing = new.clone().filter(|point| self.pool.fails(*point, question)).count();
+                self.questions[question].hits = Some(failing as f64 / new.len().max(1) as f64);
+            }
+        }
+        Ok(true)
+    }
+
+    /// Adds the mixtures to draw from for one question, or settles it. Returns whether the guides are stuck.
+    fn follow(&mut self, at: usize, next: &mut Vec<(Mixture, Option<usize>)>) -> Result<bool> {
+        let pool = &self.pool;
+        let (elite, seed) = (self.options.elite, self.seed + self.rounds as u64);
+        let failures = pool.failures(at);
+        let weights: Vec<f64> = failures.iter().map(|point| pool.weight(*point)).collect();
+        let effective = effective_size(weights.iter().copied());
+        let validity = self.nominal.validity_fraction();
+        let probability = weights.iter().sum::<f64>() / validity;
+        let question = &mut self.questions[at];
+        question.rounds += 1;
+        let has_some = effective >= 0.25 * elite;
+        if !failures.is_empty() {
+            match question.hits {
+                Some(hits) if !has_some && hits > 0.5 => question.stretch *= 2.0,
+                Some(hits) if hits < 0.2 => question.stretch = (question.stretch / 2.0).max(1.0),
+                _ => (),
+            }
+            let (heat, stretch) = if has_some { (0.7, 1.0) } else { (0.35, question.stretch) };
+            next.push((designs(&self.kernels, pool, &failures, heat, stretch)?, Some(at)));
+            if has_some {
+                next.push((fitted(pool, &failures, &weights, seed)?, None));
+            }
+        }
+        let mut depth = 3.0 / pool.density_draws();
+        for guide in 0..question.levels.len() {
+            let (level, of_level) = question.levels[guide];
+            if level <= 0.0 {
+                depth = depth.min(probability);
+                continue;
+            }
+            let below = level_of(pool, at, guide, level, elite);
+            let Some((level, points)) = below.or_else(|| level_of(pool, at, guide, f64::INFINITY, elite)) else {
+                continue;
+            };
+            let weights: Vec<f64> = points.iter().map(|point| pool.guided_weight(*point)).collect();
+            let of_level = (weights.iter().sum::<f64>() / validity).min(of_level);
+            question.levels[guide] = (level, of_level);
+            depth = depth.min(if level <= 0.0 { probability } else { of_level });
+            if level > 0.0 && of_level > 2.0 * probability {
+                next.push((fitted(pool, &points, &weights, seed)?, None));
+            }
+        }
+        question.depth = question.depth.min(depth);
+        let is_deep = question.depth <= 2.0 * probability;
+        let is_known = effective >= elite;
+        question.waited += usize::from(is_known && !is_deep);
+        let has_crude_left = self.crude < self.options.crude;
+        if is_known && (is_deep || (question.waited > PATIENCE && !has_crude_left)) {
+            question.is_settled = true;
+        } else if question.rounds >= self.options.rounds {
+            // What is known of its failures is better than nothing.
+            question.is_settled = has_some;
+            question.is_given_up = !has_some;
+        }
+        Ok((failures.is_empty() && question.rounds > PATIENCE) || (!is_deep && question.waited > PATIENCE))
+    }
+
+    /// Draws a fresh sample of a proposal for all settled questions. Returns whether to go on.
+    fn test(&mut self) -> Result<bool> {
+        let settled: Vec<usize> = (0..self.questions.len()).filter(|at| self.questions[*at].is_settled).collect();
+        if settled.is_empty() {
+            return Ok(false);
+        }
+        let seed = self.seed + self.rounds as u64;
+        let mut parts: Vec<(f64, Mixture)> = Vec::new();
+        let share = 0.5 * (1.0 - LADDER_WEIGHT) / settled.len() as f64;
+        for at in &settled {
+            let failures = self.pool.failures(*at);
+            let weights: Vec<f64> = failures.iter().map(|point| self.pool.weight(*point)).collect();
+            parts.push((share, fitted(&self.pool, &failures, &weights, seed)?));
+            parts.push((share, designs(&self.kernels, &self.pool, &failures, 1.0, 1.0)?));
+        }
+        let sources = &self.pool.sources;
+        let rungs = sources.len().min(LADDER);
+        let ladder = (0..rungs).map(|rung| &sources[(rung + 1) * sources.len() / rungs - 1].mixture);
+        let all: Vec<(f64, &Mixture)> = parts.iter().map(|(share, mixture)| (*share, mixture)).collect();
+        let all: Vec<(f64, &Mixture)> =
+            all.into_iter().chain(ladder.map(|mixture| (LADDER_WEIGHT / rungs as f64, mixture))).collect();
+        let candidate = Mixture::join(&all)?;
+        let defence = self.options.defence;
+        let proposal = defended(candidate.clone(), self.nominal, defence)?;
+        let draws = self.options.test;
+        let stream = self.stream(0);
+        let new = self.pool.add_defended(candidate.clone(), &proposal, defence, stream, draws)?;
+        let validity = self.nominal.validity_fraction();
+        let log_f = &self.pool.log_f;
+        let weight =
+            |point: usize| libm::exp(log_f[point] - proposal.log_density(&self.pool.points[point])) / validity;
+        let weights: Vec<f64> = new.clone().map(weight).collect();
+        let mut goes_on = false;
+        for at in settled {
+            let failing = new.clone().zip(&weights).filter(|(point, _)| self.pool.fails(*point, at));
+            let (mut sum, mut squares, mut largest) = (0.0, 0.0, 0.0_f64);
+            for (_, weight) in failing {
+                sum += weight;
+                squares += weight * weight;
+                largest = largest.max(*weight);
+            }
+            let probability = sum / draws as f64;
+            let variance = squares / draws as f64 / (probability * probability) - 1.0;
+            let question = &mut self.questions[at];
+            self.found[at] = Found {
+                probability,
+                relative_variance: Some(variance).filter(|variance| variance.is_finite()),
+                depth: question.depth,
+            };
+            let is_refused = sum <= 0.0 || largest > MAX_FRACTION * sum;
+            if is_refused && question.refusals < MAX_REFUSALS {
+                question.refusals += 1;
+                question.is_settled = false;
+                goes_on = true;
+            }
+        }
+        self.proposal = Some(candidate);
+        Ok(goes_on)
+    }
+}
+
+/// The lowest level of a guide, at most `last` and at least 0, below which the points have the effective size `elite`;
+/// and these points. `None` if there is none.
+fn level_of(pool: &Pool, question: usize, guide: usize, last: f64, elite: f64) -> Option<(f64, Vec<usize>)> {
+    let value = |point: &usize| pool.value(*point, question, guide);
+    let mut order: Vec<usize> = pool.guided().filter(|point| value(point) <= last).collect();
+    order.sort_by(|a, b| value(a).total_cmp(&value(b)).then(a.cmp(b)));
+    let (mut sum, mut squares) = (0.0, 0.0);
+    let mut end = 0;
+    while end < order.len() {
+        let level = value(&order[end]);
+        // Points of equal value, and all failures, belong together.
+        while end < order.len() && (value(&order[end]) <= level || value(&order[end]) <= 0.0) {
+            let weight = pool.guided_weight(order[end]);
+            sum += weight;
+            squares += weight * weight;
+            end += 1;
+        }
+        if sum * sum >= elite * squares && squares > 0.0 {
+            order.truncate(end);
+            return Some((level.max(0.0), order));
+        }
+    }
+    None
+}

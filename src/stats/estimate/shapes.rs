@@ -1,0 +1,116 @@
+//! Mixtures that cover the failures of a pool: a fit to the weighted failures, and Gaussians around design points.
+
+use nalgebra::{DMatrix, DVector};
+use rayon::prelude::*;
+
+use super::pool::Pool;
+use crate::Result;
+use crate::stats::density::{Mixture, MixtureFitOptions};
+
+/// A fit is widened: most of its weight in copies with this much more variance …
+const NARROW: (f64, f64) = (0.75, 1.2);
+/// … the rest in wide copies. Beyond the limit failures become rare more slowly than a Gaussian.
+const WIDE: (f64, f64) = (0.25, 4.0);
+/// A fit uses the points that carry this fraction of the weight.
+const CARRIED: f64 = 0.998;
+/// Maximum number of points of a fit.
+const FITTED: usize = 1200;
+/// Maximum number of components of a fit.
+const COMPONENTS: usize = 16;
+/// Maximum number of failures among which design points are looked for.
+const CANDIDATES: usize = 4000;
+/// Maximum number of design points.
+const DESIGNS: usize = 300;
+/// Design points whose weight is below e⁻¹⁴ of the largest are left out.
+const NEGLIGIBLE: f64 = 14.0;
+
+/// A mixture fitted to points with weights; the number of components is chosen by held-out likelihood.
+pub(super) fn fitted(pool: &Pool, points: &[usize], weights: &[f64], seed: u64) -> Result<Mixture> {
+    let mut order: Vec<usize> = (0..points.len()).collect();
+    order.sort_by(|a, b| weights[*b].total_cmp(&weights[*a]).then(a.cmp(b)));
+    let (all, mut sum) = (weights.iter().sum::<f64>(), 0.0);
+    order.retain(|at| {
+        let is_kept = sum < CARRIED * all;
+        sum += weights[*at];
+        is_kept
+    });
+    if order.len() > FITTED {
+        let step = order.len() as f64 / FITTED as f64;
+        order = (0..FITTED).map(|i| order[(i as f64 * step) as usize]).collect();
+    }
+    let kept: Vec<Vec<f64>> = order.iter().map(|at| pool.points[points[*at]].clone()).collect();
+    let weights: Vec<f64> = order.iter().map(|at| weights[*at]).collect();
+    let options = MixtureFitOptions { components: COMPONENTS, seed, ..MixtureFitOptions::default() };
+    let fit = Mixture::fit(&kept, &weights, &options)?;
+    Mixture::join(&[(NARROW.0, &fit.scaled(NARROW.1)?), (WIDE.0, &fit.scaled(WIDE.1)?)])
+}
+
+/// Gaussians of the kernels' own shape around design points: of each kernel, the failure that is nearest in units of the
+/// kernel. Where the failures of a kernel lie beyond a plane, f/g of such a Gaussian is bounded, however wide they are
+/// along the plane (Schuëller and Stix, "A critical appraisal of methods to determine failure probabilities", Structural
+/// Safety 4, 1987). A kernel has several where failures lie in several directions (Der Kiureghian and Dakessian,
+/// "Multiple design points in first and second-order reliability", Structural Safety 20, 1998).
+///
+/// `heat` in (0, 1]: weights are the kernels' times exp(−heat·β²/2), with β the distance. Below 1, distant design points
+/// are drawn from too. `stretch` scales the covariances.
+pub(super) fn designs(
+    kernels: &Mixture,
+    pool: &Pool,
+    failures: &[usize],
+    heat: f64,
+    stretch: f64,
+) -> Result<Mixture> {
+    let n = kernels.weights().len();
+    let whitened = |factor: &DMatrix<f64>, point: &[f64]| {
+        let mut z = DVector::from_column_slice(point);
+        factor.solve_lower_triangular_mut(&mut z);
+        z
+    };
+    let mut failures = failures.to_vec();
+    if failures.len() > CANDIDATES {
+        failures.sort_by(|a, b| pool.log_f[*b].total_cmp(&pool.log_f[*a]).then(a.cmp(b)));
+        failures.truncate(CANDIDATES);
+    }
+    let white = |factor| failures.iter().map(|at| whitened(factor, &pool.points[*at])).collect::<Vec<_>>();
+    let is_shared = kernels.shares_factor();
+    let all = if is_shared { white(kernels.factor(0)) } else { Vec::new() };
+    let max_points = match n {
+        0..=4 => 8,
+        5..=60 => 4,
+        _ => 2,
+    };
+    let of_kernel = |kernel: usize| -> Vec<(f64, usize, usize)> {
+        let own = if is_shared { Vec::new() } else { white(kernels.factor(kernel)) };
+        let centre = whitened(kernels.factor(kernel), kernels.mean(kernel));
+        let from: Vec<DVector<f64>> = if is_shared { &all } else { &own }.iter().map(|z| z - &centre).collect();
+        let mut order: Vec<(f64, usize)> = from.iter().map(DVector::norm_squared).zip(0..).collect();
+        order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
+        let nearest = order[0].0;
+        let mut taken: Vec<(f64, usize)> = Vec::new();
+        for (square, at) in order {
+            if taken.len() >= max_points || square > nearest + NEGLIGIBLE {
+                break;
+            }
+            // A failure in the direction of a design point is covered by it.
+            if !taken.iter().any(|(of, other)| from[*other].dot(&from[at]) >= 0.5 * of) {
+                taken.push((square, at));
+            }
+        }
+        let weight = libm::log(kernels.weights()[kernel]);
+        taken.into_iter().map(|(square, at)| (weight - 0.5 * heat * square, kernel, at)).collect()
+    };
+    let found: Vec<Vec<_>> = (0..n).into_par_iter().map(of_kernel).collect();
+    let mut list: Vec<(f64, usize, usize)> = found.into_iter().flatten().collect();
+    list.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
+    let top = list[0].0;
+    list.retain(|design| design.0 > top - NEGLIGIBLE);
+    list.truncate(DESIGNS);
+    let scale = stretch.sqrt();
+    let (factors, factor_of) = match is_shared {
+        true => (vec![kernels.factor(0) * scale], vec![0; list.len()]),
+        false => (list.iter().map(|d| kernels.factor(d.1) * scale).collect(), (0..list.len()).collect()),
+    };
+    let weights = list.iter().map(|design| libm::exp(design.0 - top)).collect();
+    let means = list.iter().map(|design| pool.points[failures[design.2]].clone()).collect();
+    Mixture::new(weights, means, factors, factor_of)
+}
