@@ -89,6 +89,9 @@ pub struct Sample {
     /// Several are mixed with equal weights.
     #[arg(long, value_name = "FILE", help_heading = "Data")]
     pub(super) proposal: Vec<PathBuf>,
+    /// Intervals of all rows hold together at --level (Bonferroni), not each on its own
+    #[arg(long, conflicts_with = "plan", help_heading = "Output", hide_short_help = true)]
+    pub(super) simultaneous: bool,
     /// Folder for estimate.json, tables and figures
     #[arg(long, value_name = "DIR", default_value = "lanesweep-sample", help_heading = "Output")]
     pub(super) out: PathBuf,

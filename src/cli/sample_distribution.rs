@@ -89,6 +89,7 @@ pub(super) fn run(
         worst: settings.worst,
         ..SampleOptions::new(Estimator::Crude { interval: flags.interval() }, count, headways)
     };
+    let options = if flags.simultaneous { options.together(settings.level) } else { options };
     tracing::info!("{} samples on {}", readable::count(count), executor.backend.describe());
     let bar = console::progress(verbosity, count, "sampling");
     // The frequency of such scenarios is unknown, so there is no exposure.

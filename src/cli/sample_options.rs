@@ -40,7 +40,7 @@ impl Sample {
         });
         self.check_given(density)?;
         let headways = self.headways(density)?;
-        Ok(SampleOptions {
+        let options = SampleOptions {
             models: self.models()?,
             criterion: self.settings.criterion,
             seed: self.settings.seed,
@@ -54,7 +54,8 @@ impl Sample {
             },
             map: if self.is_crude() { self.map_axes(density)? } else { None },
             ..SampleOptions::new(self.estimator(density)?, samples, headways)
-        })
+        };
+        Ok(if self.simultaneous { options.together(self.settings.level) } else { options })
     }
 
     /// Checks the values of `--given`, and warns about doubtful ones.

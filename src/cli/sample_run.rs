@@ -116,11 +116,11 @@ impl Sample {
         let sample = if !matches!(sample.kind, SampleKind::Search(_)) {
             sample
         } else if is_split {
-            sample.searched(&executor, &self.out)?
+            sample.searched(&executor, &self.out, true)?
         } else {
             // The search is kept in the folder, so it needs the folder's lock too.
             let _folder = OutputDir::open(&self.out, ESTIMATE_RECORD)?;
-            let found = sample.searched(&executor, &self.out)?;
+            let found = sample.searched(&executor, &self.out, false)?;
             found.keep_search(&self.out)?;
             found
         };

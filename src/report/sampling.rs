@@ -159,6 +159,8 @@ pub struct EstimateFile {
     pub samples: u64,
     /// Seed.
     pub seed: u64,
+    /// Level at which all intervals hold together; `None` if each holds on its own.
+    pub together: Option<f64>,
     /// Parameters with given values; the estimates are conditional on them.
     pub given: Vec<(String, f64)>,
     /// Hash of the plan; only for crude Monte Carlo.
@@ -215,6 +217,7 @@ impl EstimateFile {
             points: options.source.key(),
             samples: options.stop.samples,
             seed: options.seed,
+            together: options.together,
             given: options.given.clone(),
             plan_sha256: None,
             draws: None,

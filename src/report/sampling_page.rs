@@ -58,7 +58,11 @@ impl EstimateFile {
     }
 
     fn estimates_section(&self) -> Section {
-        let overall: Vec<&EstimateRow> = self.estimates.iter().filter(|r| r.is_overall(&self.estimates)).collect();
+        let overall: Vec<&EstimateRow> = self
+            .estimates
+            .iter()
+            .filter(|r| r.is_overall(&self.estimates) || r.is_rare_beside(&self.estimates))
+            .collect();
         let level = self.estimates.first().map_or(0.95, |row| row.estimate.interval.level);
         let wide = |row: &EstimateRow| Some(100.0 * row.estimate.relative_half_width).filter(|width| width.is_finite());
         let estimates = Table::of(overall.iter().copied())

@@ -7,6 +7,7 @@ use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::sampling::{Checkpoint, EstimateRow, RiskRate, WorstSample};
 use crate::stats::estimate::{IntervalKind, Ratio, WeightFigures};
+use crate::support::readable::value;
 use crate::support::table::Table;
 
 impl EstimateFile {
@@ -190,14 +191,18 @@ impl EstimateFile {
         )
     }
 
-    /// What the intervals cover in addition to the draws.
-    pub(super) fn interval_rule(&self) -> &'static str {
-        if self.density.kernels == 0 {
+    /// What the intervals cover in addition to the draws, and whether all of them hold together.
+    pub(super) fn interval_rule(&self) -> String {
+        let covered = if self.density.kernels == 0 {
             ""
         } else if self.estimates.iter().all(|row| row.failing_scenarios.is_some()) {
             " cover the draws and what other scenarios would change, at fixed bandwidth and scale"
         } else {
             " cover the draws alone, not what other scenarios would change"
-        }
+        };
+        let together = self
+            .together
+            .map(|level| format!("; all rows of estimates.csv hold together at {} %", value(100.0 * level)));
+        format!("{covered}{}", together.unwrap_or_default())
     }
 }

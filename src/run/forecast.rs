@@ -221,7 +221,9 @@ impl Sample {
                     parts: vec![self.weighted_part("search and importance sampling", points)],
                     is_at_most: true,
                     // The points of the search with their values and densities.
-                    more_bytes: MAX_HELD.min(points) * (self.density.space.parameters().len() as u64 + 8 + 3 * questions) * 8,
+                    more_bytes: MAX_HELD.min(points)
+                        * (self.density.space.parameters().len() as u64 + 8 + 3 * questions)
+                        * 8,
                     more: "the points that are held at once",
                     ..run
                 }

@@ -36,7 +36,7 @@ fn estimates(dir: &Path) -> serde_json::Value {
 }
 
 #[test]
-fn importance_sampling_that_is_killed_resumes_with_its_pilot_to_the_same_bits() {
+fn importance_sampling_that_is_killed_resumes_with_its_search_to_the_same_bits() {
     let dir = tempfile::tempdir().unwrap();
     let fit = "-q fit --synth-recordings 2 --categories cut-in --parameterizations 2 --config fit.valid_draws=1000 \
                --no-comparison --out d.json";
@@ -58,7 +58,7 @@ fn importance_sampling_that_is_killed_resumes_with_its_pilot_to_the_same_bits() 
     ];
     let run = |out| [&run[..], &["--backend", "cpu", "--out", out]].concat();
     done(dir.path(), &run("whole"));
-    let (killed, pilot) = (dir.path().join("killed"), dir.path().join("killed/pilot.json"));
+    let (killed, search) = (dir.path().join("killed"), dir.path().join("killed/search.json"));
     let journal = || {
         let names = std::fs::read_dir(&killed).into_iter().flatten().flatten().map(|entry| entry.path());
         names.into_iter().find(|path| path.extension().is_some_and(|extension| extension == "journal"))
@@ -79,13 +79,13 @@ fn importance_sampling_that_is_killed_resumes_with_its_pilot_to_the_same_bits() 
         }
         kill(child);
         kills += 1;
-        found.push(std::fs::read(&pilot).unwrap());
+        found.push(std::fs::read(&search).unwrap());
     }
     assert!(kills > 0, "the run ended before its journal was seen");
-    assert!(found.windows(2).all(|two| two[0] == two[1]), "the pilot is kept");
+    assert!(found.windows(2).all(|two| two[0] == two[1]), "the search is kept");
     assert_eq!(estimates(&killed), estimates(&dir.path().join("whole")));
-    assert!(!pilot.exists() && journal().is_none(), "nothing of the run is left");
-    let proposal = |dir: &Path| std::fs::read(dir.join("proposal-RSS.json")).unwrap();
+    assert!(!search.exists() && journal().is_none(), "nothing of the run is left");
+    let proposal = |dir: &Path| std::fs::read(dir.join("proposal.json")).unwrap();
     assert_eq!(proposal(&killed), proposal(&dir.path().join("whole")));
 }
 

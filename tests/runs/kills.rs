@@ -74,7 +74,7 @@ const VERBS: [Verb; 17] = [
         "sample of a proposal",
         Some("estimate.json"),
         Some(SAMPLE),
-        "sample d.json --threads 1 --estimator is --proposal pilot/proposal-RSS.json --thw 0.6 --models RSS,FSM --samples 100000 --out out",
+        "sample d.json --threads 1 --estimator is --proposal pilot/proposal.json --thw 0.6 --models RSS,FSM --samples 100000 --out out",
     ),
     verb(
         "sample is",
@@ -155,7 +155,7 @@ fn done(dir: &Path, line: &str) {
 /// Not a result: the plan, and what is there only while a run is at work.
 fn is_beside(name: &str) -> bool {
     let is_of_work = name.starts_with('.') || name.ends_with(".lock") || name.ends_with(".journal");
-    is_of_work || name == "pilot.json" || name == "plan.json" || name == LIST
+    is_of_work || name == "search.json" || name == "plan.json" || name == LIST
 }
 
 /// Whether files are getting their names.
@@ -190,10 +190,7 @@ fn furnish(dir: &Path) {
     done(dir, &format!("{plan} --out parts"));
     done(dir, "study --plan plan/plan.json --shard 0/2 --out parts");
     done(dir, "study --plan plan/plan.json --shard 1/2 --out parts");
-    done(
-        dir,
-        "sample d.json --estimator is --config sample.pilot=2000 --samples 100 --out pilot --thw 0.6 --models RSS",
-    );
+    done(dir, "sample d.json --estimator is --samples 100 --out pilot --thw 0.6 --models RSS");
     done(dir, "study --synth-recordings 1 --config generator.duration_s=200 --categories cut-in --out old-study");
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/examples");
     std::fs::copy(examples.join("cut-in-stochastic.xosc"), dir.join("d.xosc")).unwrap();
@@ -289,7 +286,7 @@ fn a_killed_run_of_any_verb_leaves_one_runs_files_and_ends_as_if_undisturbed() {
             done(dir, verb.run);
         }
         same(&without_times(files(&out)), expected, &what);
-        assert!(!out.join("pilot.json").exists(), "{what}: the run has ended, its pilot stays");
+        assert!(!out.join("search.json").exists(), "{what}: the run has ended, its search stays");
         if !is_whole_data {
             // Whole recordings are not written again, and a list whose replacement was cut off stays beside them.
             assert_tidy(dir, &what);

@@ -181,7 +181,7 @@ fn a_resealed_part_with_counts_of_another_run_is_refused_by_name() {
         }),
         ("belongs to plan", |part| part["segments"][0]["plan_sha256"] = "00".into()),
     ];
-    let of_is: [(&str, Change); 1] = [("other driver models", |part| {
+    let of_is: [(&str, Change); 1] = [("other questions", |part| {
         part["segments"][0]["sums"].as_array_mut().unwrap().truncate(1);
     })];
     let runs: [(&[&str], &str, Changes); 3] =

@@ -160,26 +160,25 @@ fn files_that_a_foreign_record_names_stay_and_the_record_is_refused() {
 
 #[cfg(unix)]
 #[test]
-fn a_pilot_and_manual_pages_replace_no_file_of_the_users_and_follow_no_link() {
+fn a_search_and_manual_pages_replace_no_file_of_the_users_and_follow_no_link() {
     let dir = tempfile::tempdir().unwrap();
     let at = |name: &str| dir.path().join(name);
     let fit = ["-q", "fit", "--synth-recordings", "2", "--categories", "cut-in", "--parameterizations", "2"];
     assert!(lanesweep(&[&fit[..], &["--no-comparison", "--out", text(&at("d.json"))]].concat()).status.success());
     let density = at("d.json");
-    let sample =
-        ["-q", "sample", text(&density), "--estimator", "is", "--samples", "1000", "--config", "sample.pilot=2000"];
+    let sample = ["-q", "sample", text(&density), "--estimator", "is", "--samples", "1000"];
     let out = at("out");
     let sample = [&sample[..], &["--models", "RSS", "--thw", "0.6", "--out", text(&out)]].concat();
     std::fs::create_dir(&out).unwrap();
-    std::fs::write(out.join("pilot.json"), "mine").unwrap();
-    refused(&sample, "pilot.json");
-    assert_eq!(std::fs::read_to_string(out.join("pilot.json")).unwrap(), "mine");
+    std::fs::write(out.join("search.json"), "mine").unwrap();
+    refused(&sample, "search.json");
+    assert_eq!(std::fs::read_to_string(out.join("search.json")).unwrap(), "mine");
     std::fs::write(at("precious"), "mine").unwrap();
     let link = |path: &Path| {
         let _ = std::fs::remove_file(path);
         std::os::unix::fs::symlink(at("precious"), path).unwrap();
     };
-    link(&out.join("pilot.json"));
+    link(&out.join("search.json"));
     std::fs::create_dir(at("man1")).unwrap();
     link(&at("man1/lanesweep-study.1"));
     for run in [&sample[..], &["config", "man", text(&at("man1"))]] {

@@ -22,12 +22,8 @@ pub const SAMPLE: [&str; 9] =
 
 /// Importance sampling that can be split: with a proposal of a run before.
 pub fn weighted(dir: &Path) -> Vec<&'static str> {
-    done(
-        dir,
-        &[&SAMPLE[..], &["--estimator", "is", "--config", "sample.pilot=2000", "--models", "RSS", "--out", "pilot"]]
-            .concat(),
-    );
-    [&SAMPLE[..], &["--estimator", "is", "--proposal", "pilot/proposal-RSS.json", "--models", "RSS,FSM"]].concat()
+    done(dir, &[&SAMPLE[..], &["--estimator", "is", "--models", "RSS", "--out", "pilot"]].concat());
+    [&SAMPLE[..], &["--estimator", "is", "--proposal", "pilot/proposal.json", "--models", "RSS,FSM"]].concat()
 }
 
 #[test]

@@ -120,10 +120,10 @@ pub enum BandwidthInterval {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SampleSettings {
-    /// Crude Monte Carlo, importance sampling with a searched proposal, or for each question the cheaper of both: auto
-    /// needs a half-width and is crude Monte Carlo without.
+    /// Crude, importance, or with a half-width the cheaper one. Importance sampling searches the failures, then draws
+    /// around them; `auto` chooses for each model and headway, and is `mc` without a half-width.
     pub estimator: EstimatorKind,
-    /// Number of samples; the maximum with a half-width. Without it: 100000 without a half-width, else no limit.
+    /// Number of samples. With a half-width: the maximum. Without it: 100000; auto and is: what the half-width takes.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1))]
     pub samples: Option<u64>,
@@ -136,8 +136,8 @@ pub struct SampleSettings {
     /// Level of the intervals.
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub level: f64,
-    /// Half-width of the draws' interval over the estimate to reach. mc checks it after 4096·2^k samples. Default: is 0.1
-    /// unless the number of samples is given; else none.
+    /// Reach this half-width over estimate. It is that of the draws' interval; mc checks it after 4096·2^k samples. The
+    /// default of is is 0.1 unless the number of samples is given; else none.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0))]
     pub half_width: Option<f64>,

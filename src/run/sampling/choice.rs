@@ -101,9 +101,7 @@ impl Sample {
     pub fn refined(&self, mut result: SampleResult, half_width: f64, executor: &Executor) -> Result<SampleResult> {
         let is_open = |question: &Question| {
             let row = result.rows.iter().find(|row| self.is_row_of(row, question));
-            row.is_none_or(|row| {
-                row.estimate.failures < StopRule::MIN_FAILURES || row.draws_half_width() > half_width
-            })
+            row.is_none_or(|row| row.estimate.failures < StopRule::MIN_FAILURES || row.draws_half_width() > half_width)
         };
         let questions: Vec<Question> = self.options.asked().into_iter().filter(is_open).collect();
         if questions.is_empty() {

@@ -4,13 +4,13 @@
 use serde::{Deserialize, Serialize};
 
 use super::plan::{SampleHeadways, plan_points};
+use crate::Result;
 use crate::engine::{Executor, Marks, Outcome, Wanted};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::stats::density::{DensityModel, Mixture};
 use crate::stats::estimate::{KernelShares, LimitState, Truncated, defended, kernel_shares};
-use crate::Result;
 
 /// Value far from any failure: the ego never closed in.
 const FAR: f64 = 1e3;

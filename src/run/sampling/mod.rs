@@ -234,13 +234,11 @@ impl Sample {
     ///
     /// # Errors
     /// Those of the lanes; [`Error::Io`].
-    pub fn searched(self, executor: &Executor, out: &Path) -> Result<Sample> {
+    pub fn searched(self, executor: &Executor, out: &Path, is_shard: bool) -> Result<Sample> {
         let SampleKind::Search(search) = self.kind else { return Ok(self) };
-        for file in [PLAN_FILE, SEARCH_FILE] {
-            if let Some(kept) = self.kept_search(&out.join(file))? {
-                tracing::info!("the search is done already");
-                return Ok(kept);
-            }
+        if let Some(kept) = self.kept_search(&out.join(if is_shard { PLAN_FILE } else { SEARCH_FILE }), is_shard)? {
+            tracing::info!("the search is done already");
+            return Ok(kept);
         }
         let kind = SampleKind::Weighted(Box::new(self.search(&search, executor)?));
         Ok(Sample { kind, ..self })

@@ -71,7 +71,7 @@ impl Sample {
     /// [`Error::Io`]; [`Error::Input`] for any other or incomplete file, or another version.
     pub fn read(path: &Path) -> Result<Sample> {
         let file: PlanFile = read_sealed(KIND, path, MAX_PLAN_BYTES, HOW_TO_REMAKE)?.0;
-        let PlanFile { profile, options, search, draws, .. } = file;
+        let PlanFile { profile, options, mut search, draws, .. } = file;
         let place = Place::file(path);
         let wrong = |problem: &str| Error::input(place.clone(), problem, HOW_TO_REMAKE);
         profile.check(&place)?;
@@ -95,6 +95,9 @@ impl Sample {
         }
         let proposal = file.proposal.as_ref().map(|text| proposal_from_text(text.as_bytes(), &density, &place));
         let proposal = proposal.transpose()?;
+        if let Some(search) = search.as_mut().filter(|search| search.has_found()) {
+            search.proposal.clone_from(&proposal);
+        }
         let fits = search.as_ref().is_none_or(|search| search.questions.len() == options.asked().len());
         let kind = match &options.estimator {
             Estimator::Crude { .. } => {
@@ -126,12 +129,13 @@ impl Sample {
     }
 
     /// The same run after its search, if an interrupted run or another shard saved it in this file.
-    pub(super) fn kept_search(&self, path: &Path) -> Result<Option<Sample>> {
+    pub(super) fn kept_search(&self, path: &Path, is_plan: bool) -> Result<Option<Sample>> {
         if path.symlink_metadata().is_err() {
             return Ok(None);
         }
         refuse_link(path)?;
-        if !kind_of(path).is_ok_and(|kind| kind == KIND) {
+        // Whoever writes a plan checks what it replaces.
+        if !is_plan && !kind_of(path).is_ok_and(|kind| kind == KIND) {
             let problem = "it would be overwritten, and it is not the search of an interrupted run";
             return Err(Error::usage(Place::file(path), problem, "move it away, or give another option `out`"));
         }

@@ -84,6 +84,8 @@ pub struct SampleOptions {
     pub seed: u64,
     /// Level of the intervals.
     pub level: f64,
+    /// Level at which the intervals of all rows hold together (Bonferroni); `None` if each holds on its own.
+    pub together: Option<f64>,
     /// Given parameters with their values (crude).
     pub given: Vec<(String, f64)>,
     /// Number of worst lanes listed per model (crude); with 0, only verdicts are computed.
@@ -105,10 +107,24 @@ impl SampleOptions {
             questions: Vec::new(),
             seed: 157,
             level: 0.95,
+            together: None,
             given: Vec::new(),
             worst: 0,
             map: None,
         }
+    }
+
+    /// The same with intervals that hold together at `level`: Bonferroni over the rows of the estimates.
+    pub fn together(self, level: f64) -> SampleOptions {
+        let headways = self.headways().len().max(1);
+        let rows = match &self.estimator {
+            // One more for the mean over all headways.
+            Estimator::Crude { .. } => {
+                self.models.len() * Criterion::ALL.len() * (headways + usize::from(headways > 1))
+            }
+            _ => self.asked().len(),
+        };
+        SampleOptions { level: 1.0 - (1.0 - level) / rows as f64, together: Some(level), ..self }
     }
 
     /// What importance sampling is asked.

@@ -21,8 +21,8 @@ mod summary;
 mod trust;
 mod weights;
 
-pub use adaptive::{AdaptiveRun, Goal, adaptive};
 pub(crate) use adaptive::after_search;
+pub use adaptive::{AdaptiveRun, Goal, adaptive};
 pub use blocks::{BLOCK, BlockSums, Join};
 pub use importance::{Defended, Importance, defended, from_weight_sums, importance, importance_sums};
 pub use interval::{Interval, IntervalKind, clopper_pearson, log_normal, rule_of_three, wilson};

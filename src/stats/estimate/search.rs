@@ -114,6 +114,13 @@ pub struct SearchRun {
     pub points: u64,
 }
 
+impl SearchRun {
+    /// Whether there is a proposal.
+    pub(crate) fn has_found(&self) -> bool {
+        self.questions.iter().any(|found| found.relative_variance.is_some())
+    }
+}
+
 /// State of one question.
 struct Question {
     rounds: usize,
@@ -274,7 +281,7 @@ impl<'a> Searching<'a> {
     /// Adds the mixtures to draw from for one question, or settles it. Returns whether the guides are stuck.
     fn follow(&mut self, at: usize, next: &mut Vec<(Mixture, Option<usize>)>) -> Result<bool> {
         let pool = &self.pool;
-        let (elite, seed) = (self.options.elite, self.seed + self.rounds as u64);
+        let (elite, seed) = (self.options.elite, self.seed.wrapping_add(self.rounds as u64));
         let failures = pool.failures(at);
         let weights: Vec<f64> = failures.iter().map(|point| pool.weight(*point)).collect();
         let effective = effective_size(weights.iter().copied());
@@ -314,7 +321,7 @@ impl<'a> Searching<'a> {
                 next.push((fitted(pool, &points, &weights, seed)?, None));
             }
         }
-        question.depth = question.depth.min(depth);
+        question.depth = depth;
         let is_deep = question.depth <= 2.0 * probability;
         let is_known = effective >= elite;
         question.waited += usize::from(is_known && !is_deep);
@@ -335,7 +342,7 @@ impl<'a> Searching<'a> {
         if settled.is_empty() {
             return Ok(false);
         }
-        let seed = self.seed + self.rounds as u64;
+        let seed = self.seed.wrapping_add(self.rounds as u64);
         let mut parts: Vec<(f64, Mixture)> = Vec::new();
         let share = 0.5 * (1.0 - LADDER_WEIGHT) / settled.len() as f64;
         for at in &settled {
@@ -358,8 +365,7 @@ impl<'a> Searching<'a> {
         let new = self.pool.add_defended(candidate.clone(), &proposal, defence, stream, draws)?;
         let validity = self.nominal.validity_fraction();
         let log_f = &self.pool.log_f;
-        let weight =
-            |point: usize| libm::exp(log_f[point] - proposal.log_density(&self.pool.points[point])) / validity;
+        let weight = |point: usize| libm::exp(log_f[point] - proposal.log_density(&self.pool.points[point])) / validity;
         let weights: Vec<f64> = new.clone().map(weight).collect();
         let mut goes_on = false;
         for at in settled {

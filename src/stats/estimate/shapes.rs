@@ -45,21 +45,25 @@ pub(super) fn fitted(pool: &Pool, points: &[usize], weights: &[f64], seed: u64) 
     Mixture::join(&[(NARROW.0, &fit.scaled(NARROW.1)?), (WIDE.0, &fit.scaled(WIDE.1)?)])
 }
 
-/// Gaussians of the kernels' own shape around design points: of each kernel, the failure that is nearest in units of the
-/// kernel. Where the failures of a kernel lie beyond a plane, f/g of such a Gaussian is bounded, however wide they are
+/// Maximum number of failures whose mean is a design point: their scatter along the limit averages out.
+const AVERAGED: usize = 10;
+
+/// A design point of a kernel.
+struct Design {
+    log_weight: f64,
+    kernel: usize,
+    point: Vec<f64>,
+}
+
+/// Gaussians of the kernels' own shape around design points: of each kernel, the mean of the
+/// failures that are nearest in units of the kernel. Where the failures of a kernel lie beyond a plane, f/g of such a Gaussian is bounded, however wide they are
 /// along the plane (Schuëller and Stix, "A critical appraisal of methods to determine failure probabilities", Structural
 /// Safety 4, 1987). A kernel has several where failures lie in several directions (Der Kiureghian and Dakessian,
 /// "Multiple design points in first and second-order reliability", Structural Safety 20, 1998).
 ///
 /// `heat` in (0, 1]: weights are the kernels' times exp(−heat·β²/2), with β the distance. Below 1, distant design points
 /// are drawn from too. `stretch` scales the covariances.
-pub(super) fn designs(
-    kernels: &Mixture,
-    pool: &Pool,
-    failures: &[usize],
-    heat: f64,
-    stretch: f64,
-) -> Result<Mixture> {
+pub(super) fn designs(kernels: &Mixture, pool: &Pool, failures: &[usize], heat: f64, stretch: f64) -> Result<Mixture> {
     let n = kernels.weights().len();
     let whitened = |factor: &DMatrix<f64>, point: &[f64]| {
         let mut z = DVector::from_column_slice(point);
@@ -79,38 +83,50 @@ pub(super) fn designs(
         5..=60 => 4,
         _ => 2,
     };
-    let of_kernel = |kernel: usize| -> Vec<(f64, usize, usize)> {
+    let of_kernel = |kernel: usize| -> Vec<Design> {
         let own = if is_shared { Vec::new() } else { white(kernels.factor(kernel)) };
         let centre = whitened(kernels.factor(kernel), kernels.mean(kernel));
         let from: Vec<DVector<f64>> = if is_shared { &all } else { &own }.iter().map(|z| z - &centre).collect();
         let mut order: Vec<(f64, usize)> = from.iter().map(DVector::norm_squared).zip(0..).collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let nearest = order[0].0;
-        let mut taken: Vec<(f64, usize)> = Vec::new();
+        let mut taken: Vec<(f64, Vec<usize>)> = Vec::new();
         for (square, at) in order {
-            if taken.len() >= max_points || square > nearest + NEGLIGIBLE {
+            if square > nearest + NEGLIGIBLE {
                 break;
             }
             // A failure in the direction of a design point is covered by it.
-            if !taken.iter().any(|(of, other)| from[*other].dot(&from[at]) >= 0.5 * of) {
-                taken.push((square, at));
+            let covers = |(of, members): &(f64, Vec<usize>)| from[members[0]].dot(&from[at]) >= 0.5 * of;
+            match taken.iter().position(covers) {
+                Some(design) if taken[design].1.len() < AVERAGED => taken[design].1.push(at),
+                None if taken.len() < max_points => taken.push((square, vec![at])),
+                _ => (),
             }
         }
         let weight = libm::log(kernels.weights()[kernel]);
-        taken.into_iter().map(|(square, at)| (weight - 0.5 * heat * square, kernel, at)).collect()
+        let design = |(square, members): (f64, Vec<usize>)| {
+            let mean = |j| members.iter().map(|at| pool.points[failures[*at]][j]).sum::<f64>() / members.len() as f64;
+            Design {
+                log_weight: weight - 0.5 * heat * square,
+                kernel,
+                point: (0..kernels.dimensions()).map(mean).collect(),
+            }
+        };
+        taken.into_iter().map(design).collect()
     };
-    let found: Vec<Vec<_>> = (0..n).into_par_iter().map(of_kernel).collect();
-    let mut list: Vec<(f64, usize, usize)> = found.into_iter().flatten().collect();
-    list.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)).then(a.2.cmp(&b.2)));
-    let top = list[0].0;
-    list.retain(|design| design.0 > top - NEGLIGIBLE);
+    let found: Vec<Vec<Design>> = (0..n).into_par_iter().map(of_kernel).collect();
+    let mut list: Vec<Design> = found.into_iter().flatten().collect();
+    // The sort is stable, so designs of equal weight keep the order of their kernels.
+    list.sort_by(|a, b| b.log_weight.total_cmp(&a.log_weight));
+    let top = list[0].log_weight;
+    list.retain(|design| design.log_weight > top - NEGLIGIBLE);
     list.truncate(DESIGNS);
     let scale = stretch.sqrt();
     let (factors, factor_of) = match is_shared {
         true => (vec![kernels.factor(0) * scale], vec![0; list.len()]),
-        false => (list.iter().map(|d| kernels.factor(d.1) * scale).collect(), (0..list.len()).collect()),
+        false => (list.iter().map(|design| kernels.factor(design.kernel) * scale).collect(), (0..list.len()).collect()),
     };
-    let weights = list.iter().map(|design| libm::exp(design.0 - top)).collect();
-    let means = list.iter().map(|design| pool.points[failures[design.2]].clone()).collect();
+    let weights = list.iter().map(|design| libm::exp(design.log_weight - top)).collect();
+    let means = list.into_iter().map(|design| design.point).collect();
     Mixture::new(weights, means, factors, factor_of)
 }

@@ -7,7 +7,7 @@ use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::{Counted, Journal, Part, seal, write_part};
 use lanesweep::run::sampling::{
-    Estimator, Question, MapAxes, SampleHeadways, SampleOptions, SampleTally, WeightedTally, proposal_text,
+    Estimator, MapAxes, Question, SampleHeadways, SampleOptions, SampleTally, WeightedTally, proposal_text,
 };
 use lanesweep::run::score::ScoreOptions;
 use lanesweep::run::study::{StudyOptions, outline_study};
