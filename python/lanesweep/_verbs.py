@@ -331,6 +331,7 @@ def sample(
     time_limit: Value | None = None,
     map: Value | None = None,
     rows: Value | None = None,
+    simultaneous: bool = False,
     worst: Value | None = None,
     dry_run: bool = False,
     shard: Value | None = None,
@@ -347,8 +348,9 @@ def sample(
     """How likely does a driver fail?
 
     Draws concrete scenarios from a density (see `lanesweep fit`), runs each against the driver models and estimates
-    the probability of failure with its interval, by crude Monte Carlo, importance sampling, cross-entropy or subset
-    simulation. Each estimate has a verdict on whether to trust it. A table goes to stdout, files to --out.
+    the probability of failure with its interval, by crude Monte Carlo or importance sampling. With --half-width it
+    takes the cheaper one for each question. Each estimate has a verdict on whether to trust it. A table goes to
+    stdout, files to --out.
 
     Parameters
     ----------
@@ -358,13 +360,13 @@ def sample(
         OpenSCENARIO file with stochastic distributions, not a density. Its numberOfTestRuns and randomSeed are
         the defaults of --samples and --seed.
     proposal : Values
-        Proposal file to sample, with --estimator is; repeatable. Several are combined by the balance heuristic.
+        Proposal file to sample, with --estimator is; repeatable. Several are mixed with equal weights.
     accept_implausible : bool
         Use physically impossible values (a speed of 108 m/s) with a warning.
     thw : Values
         Time headways, s [default: the density's, else paper]. paper is 2.0, 1.8, … 0.2. observed (or sampled):
         the headway is drawn from the recorded ones, as a parameter of the density, which needs `fit --with-
-        thw`. The adaptive estimators take one headway.
+        thw`.
     given : Values
         Draw from the density conditional on this value (mc); repeatable.
     category : Value
@@ -378,18 +380,18 @@ def sample(
     profile : Value, default paper
         paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc`
         takes jrc-2021 unless it is set.
-    estimator : Value, default mc
-        Crude, importance, cross-entropy, subset. Importance sampling draws around the worst points of a pilot.
-        One of mc, is, ce, subset.
+    estimator : Value, default auto
+        Crude, importance, or the cheaper one. Importance sampling searches the failures, then draws around
+        them; `auto` chooses for each model and headway, and is `mc` without a half-width.
+        One of auto, mc, is.
     samples : Value
-        Number of samples [default: 100000; subset: 2000 per level]. A stop rule may end the run earlier. With
-        ce: the number in the final sample.
+        Number of samples [default: 100000, or as needed]. With a half-width: the maximum.
     criterion : Value, default collision
         Criterion to map, rank or estimate.
         One of collision, ttc, btn.
     half_width : Value
-        Stop when half-width over estimate is at most this. The interval is checked after 4096·2^k samples. The
-        default is to draw all samples.
+        Reach this half-width over estimate. It is that of the draws' interval; mc checks it after 4096·2^k
+        samples. The default of is is 0.1 unless the number of samples is given; else none.
     dt : Value, s
         Time step [default: the profile's].
     points : Value, default random
@@ -406,6 +408,8 @@ def sample(
         Failure map over two parameters, or `none` [default: the first two].
     rows : Value
         Also write one row per lane: .csv, .jsonl or .parquet.
+    simultaneous : bool
+        Intervals of all rows hold together at --level (Bonferroni), not each on its own.
     worst : Value, default 20
         Worst lanes to list per model; 0 runs faster.
     dry_run : bool
@@ -464,6 +468,7 @@ def sample(
             ('time-limit', time_limit, False),
             ('map', map, False),
             ('rows', rows, False),
+            ('simultaneous', simultaneous, False),
             ('worst', worst, False),
             ('dry-run', dry_run, False),
             ('shard', shard, False),

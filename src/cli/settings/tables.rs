@@ -120,10 +120,10 @@ pub enum BandwidthInterval {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SampleSettings {
-    /// Crude, importance, or with a half-width the cheaper one. Importance sampling searches the failures, then draws
+    /// Crude, importance, or the cheaper one. Importance sampling searches the failures, then draws
     /// around them; `auto` chooses for each model and headway, and is `mc` without a half-width.
     pub estimator: EstimatorKind,
-    /// Number of samples. With a half-width: the maximum. Without it: 100000; auto and is: what the half-width takes.
+    /// Number of samples. With a half-width: the maximum. Without it: 100000, or as needed.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1))]
     pub samples: Option<u64>,
