@@ -4,8 +4,8 @@
     pip install "numpy<2" openturns UQpy        # UQpy needs NumPy 1; one that is not installed is left out, with a line
     python benches/python/reliability.py textbook.csv 50 > peers.csv
 
-Every method gets as many calls as lanesweep's median on that problem (by its number of samples per level; what it really
-made is in the table). Prints a row per problem and method: calls and error as medians over the repeats, the fraction of
+Every method gets as many calls as lanesweep's median on that problem: a first run, which is not counted, tells how many
+samples per level that takes. What it really made is in the table. Prints a row per problem and method: calls and error as medians over the repeats, the fraction of
 repeats with a relative error above one half, the mean over the truth, coverage of the 95 % interval where the method has
 one.
 """
@@ -83,7 +83,11 @@ class Counted:
 Estimate = tuple[float, float, float]
 
 
-def openturns(limit: Counted, dimensions: int, calls: int, level: int, seed: int) -> Iterator[tuple[str, Callable[[], Estimate]]]:
+# Samples per level → estimate.
+Run = Callable[[int], Estimate]
+
+
+def openturns(limit: Counted, dimensions: int, seed: int) -> Iterator[tuple[str, Run]]:
     import openturns as ot
 
     ot.Log.Show(ot.Log.NONE)
@@ -101,31 +105,30 @@ def openturns(limit: Counted, dimensions: int, calls: int, level: int, seed: int
         half = result.getConfidenceLength(0.95) / 2
         return p, p - half, p + half
 
-    def subset() -> Estimate:
+    def subset(level: int) -> Estimate:
         algorithm = ot.SubsetSampling(event)
         algorithm.setMaximumOuterSampling(level)
         algorithm.setBlockSize(1)
         algorithm.run()
         return of(algorithm.getResult())
 
-    def nais() -> Estimate:
+    def nais(level: int) -> Estimate:
         algorithm = ot.NAIS(event, 0.1)
         algorithm.setMaximumOuterSampling(level)
         algorithm.setBlockSize(1)
         algorithm.run()
         return of(algorithm.getResult())
 
-    def cross_entropy() -> Estimate:
+    def cross_entropy(level: int) -> Estimate:
         algorithm = ot.StandardSpaceCrossEntropyImportanceSampling(event, 0.1)
         algorithm.setMaximumOuterSampling(level)
         algorithm.setBlockSize(1)
         algorithm.run()
         return of(algorithm.getResult())
 
-    def directional() -> Estimate:
+    def directional(level: int) -> Estimate:
         algorithm = ot.AdaptiveDirectionalStratification(event, ot.RiskyAndFast(), ot.RandomDirection())
-        # A direction costs about ten calls.
-        algorithm.setMaximumOuterSampling(max(calls // 10, 100))
+        algorithm.setMaximumOuterSampling(max(level, 100))
         algorithm.run()
         return of(algorithm.getResult())
 
@@ -140,19 +143,20 @@ def openturns(limit: Counted, dimensions: int, calls: int, level: int, seed: int
 CURRENT: Counted
 
 
-def uqpy(limit: Counted, dimensions: int, _calls: int, level: int, seed: int) -> Iterator[tuple[str, Callable[[], Estimate]]]:
+def uqpy(limit: Counted, dimensions: int, seed: int) -> Iterator[tuple[str, Run]]:
     from UQpy.distributions import JointIndependent, Normal
     from UQpy.reliability import SubsetSimulation
     from UQpy.run_model import PythonModel, RunModel
     from UQpy.sampling import ModifiedMetropolisHastings
 
-    def subset() -> Estimate:
+    def subset(level: int) -> Estimate:
         global CURRENT
         CURRENT = limit
+        level = max(10 * (level // 10), 100)  # whole chains
         target = JointIndependent([Normal() for _ in range(dimensions)])
         first = np.random.default_rng(seed).standard_normal((level, dimensions))
         chains = ModifiedMetropolisHastings(
-            dimension=dimensions, log_pdf_target=target.log_pdf, n_chains=max(level // 10, 1), random_state=seed
+            dimension=dimensions, log_pdf_target=target.log_pdf, n_chains=level // 10, random_state=seed
         )
         model = RunModel(model=PythonModel(model_script="limit.py", model_object_name="g"))
         run = SubsetSimulation(model, chains, samples_init=first, nsamples_per_subset=level, max_level=12)
@@ -198,26 +202,32 @@ def main(textbook: Path, repeats: int) -> None:
         show(name, truth, "lanesweep", [float(line["runs"]) for line in lines], found)
         calls = int(statistics.median(float(line["runs"]) for line in lines))
         dimensions, limit = problem(name)
-        # Levels of a tenth each, the last one included.
-        level = round(calls / (1 + math.ceil(-math.log10(truth))))
         for library in (openturns, uqpy):
             runs: dict[str, tuple[list[float], list[Estimate]]] = defaultdict(lambda: ([], []))
+            levels: dict[str, int] = {}
             try:
-                for seed in range(1, repeats + 1):
+                for seed in range(repeats + 1):
                     counted = Counted(limit)
-                    for method, run in library(counted, dimensions, calls, level, seed):
+                    for method, run in library(counted, dimensions, seed):
                         counted.calls = 0
                         try:
-                            estimate = run()
+                            estimate = run(levels.get(method, FIRST))
                         except Exception as error:  # what a library cannot do counts as no estimate
                             print(f"{name}: {method}: {error}", file=sys.stderr)
                             estimate = (0.0, math.nan, math.nan)
+                        if method not in levels:
+                            levels[method] = max(FIRST * calls // max(counted.calls, 1), 100)
+                            continue
                         runs[method][0].append(counted.calls)
                         runs[method][1].append(estimate)
             except ImportError as error:
                 print(f"SKIPPED: {error}", file=sys.stderr)
             for method, (made, estimates) in runs.items():
                 show(name, truth, method, made, estimates)
+
+
+# Samples per level of the first run.
+FIRST = 1000
 
 
 if __name__ == "__main__":

@@ -306,7 +306,7 @@ impl EstimateFile {
         if let Some(rule) = self.mean_rule() {
             let _ = writeln!(text, "{}", wrap(&rule, WIDTH));
         }
-        if let Some(rule) = self.exposure_rule() {
+        for rule in [self.exposure_rule(), self.sources_rule()].into_iter().flatten() {
             let _ = writeln!(text, "{}", wrap(&rule, WIDTH));
         }
         if let Some(rule) = self.recorded_rule() {

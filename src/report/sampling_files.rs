@@ -6,9 +6,11 @@ use super::convergence::ConvergenceFigure;
 use super::failure_map::FailureMap;
 use super::html::PageFigure;
 use super::sampling::{DrawRecord, EstimateFile, HostRecord};
-use super::sampling_tables::{WorstRow, convergence_csv, worst_csv};
+use super::sampling_tables::{WorstRow, convergence_csv, model_ratios_csv, worst_csv};
 use crate::engine::{LaneKey, LanePlan, LaneRunner};
-use crate::run::sampling::{CrudeRun, Estimator, Sample, SampleOptions, SampleResult, SampleTally, proposal_text};
+use crate::run::sampling::{
+    CrudeRun, Estimator, Sample, SampleOptions, SampleResult, SampleTally, model_ratios, proposal_text,
+};
 use crate::stats::density::DensityModel;
 use crate::support::plain_text::hex;
 use crate::support::run_dir::Results;
@@ -65,6 +67,11 @@ impl EstimateFile {
             let svg = ConvergenceFigure::of(density, &run.convergence, level).figure().svg();
             results.add("convergence.svg", svg.as_bytes())?;
             figures.push(PageFigure::new(&svg, &["convergence.svg", "convergence.csv"]));
+        }
+        let level = self.estimates.first().map_or(0.95, |row| row.estimate.interval.level);
+        let ratios = model_ratios(plan, &run.tally, density.space.has_thw(), level);
+        if !ratios.is_empty() {
+            results.add("models.csv", model_ratios_csv(&ratios).as_bytes())?;
         }
         let Some(generator) = plan.generator() else {
             return Err(Error::Internal("the plan has no generator".to_owned()));

@@ -122,7 +122,7 @@ impl EstimateFile {
                         count_of(kernels)
                     ),
                 },
-                [self.mean_rule(), self.exposure_rule(), self.recorded_rule().map(str::to_owned)]
+                [self.mean_rule(), self.exposure_rule(), self.sources_rule(), self.recorded_rule().map(str::to_owned)]
                     .into_iter()
                     .flatten()
                     .map(|rule| rule + ". ")

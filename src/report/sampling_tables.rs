@@ -5,9 +5,9 @@ use super::sampling::EstimateFile;
 use crate::engine::{NO_STEP, Outcome};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
-use crate::run::sampling::{Checkpoint, EstimateRow, RiskRate, WorstSample};
-use crate::stats::estimate::{IntervalKind, Ratio, WeightFigures};
-use crate::support::readable::value;
+use crate::run::sampling::{Checkpoint, EstimateRow, ModelRatio, RiskRate, Uncertainty, WorstSample};
+use crate::stats::estimate::{IntervalKind, Ratio, RatioVerdict, WeightFigures};
+use crate::support::readable::{significant, value};
 use crate::support::table::Table;
 
 impl EstimateFile {
@@ -25,6 +25,14 @@ impl EstimateFile {
             [("", |r| r.estimate), ("_sd", |r| r.standard_deviation), ("_low", |r| r.low), ("_high", |r| r.high)];
         type End = fn(Ratio) -> Option<f64>;
         let ends: [(&str, End); 3] = [("", |r| r.ratio), ("_low", |r| r.low), ("_high", |r| r.high)];
+        type Source = fn(&Uncertainty) -> Option<f64>;
+        let sources: [(&str, Source); 5] = [
+            ("variance_from_draws", |u| Some(u.draws)),
+            ("variance_from_scenarios", |u| Some(u.scenarios)),
+            ("variance_from_exposure", |u| Some(u.exposure)),
+            ("hours_factor", |u| u.hours_factor),
+            ("samples_factor", |u| u.samples_factor),
+        ];
         let replayed = |row: &EstimateRow| row.recorded.map(|recorded| recorded.replayed);
         let sampled = |row: &EstimateRow| row.recorded.and_then(|recorded| recorded.sampled);
         let per_hour = |row: &EstimateRow| row.risk.per_hour;
@@ -71,6 +79,11 @@ impl EstimateFile {
                 |(end, _)| format!("sampled_ratio{end}"),
                 |row, (_, of)| sampled(row).and_then(of).and_then(finite),
             )
+            .columns(
+                sources,
+                |(name, _)| name,
+                |row, (_, of)| row.uncertainty.and_then(|uncertainty| of(&uncertainty)).and_then(finite),
+            )
             .column("verdict", |row| row.estimate.trust.verdict().to_string())
             .column("data", |_| self.density.provenance.data.as_str())
             .build()
@@ -91,6 +104,27 @@ pub fn convergence_csv(checkpoints: &[Checkpoint]) -> String {
         .column("low_with_data", |(_, row)| row.with_data.and_then(|(ends, _)| finite(ends[0])))
         .column("high_with_data", |(_, row)| row.with_data.and_then(|(ends, _)| finite(ends[1])))
         .column("failing_scenarios", |(_, row)| row.with_data.and_then(|(_, scenarios)| finite(scenarios)))
+        .build()
+        .csv()
+}
+
+/// `models.csv`: the rates of two driver models on the same samples. They are equal if the interval of their ratio lies
+/// within a quarter of 1.
+pub fn model_ratios_csv(ratios: &[ModelRatio]) -> String {
+    Table::of(ratios)
+        .column("model", |row| row.model.name())
+        .column("other", |row| row.other.name())
+        .column("criterion", |row| row.criterion.key())
+        .column("headway", |row| row.headway.as_str())
+        .column("ratio", |row| row.ratio.ratio)
+        .column("low", |row| row.ratio.low)
+        .column("high", |row| row.ratio.high)
+        .column("verdict", |row| match row.ratio.verdict {
+            RatioVerdict::Agrees => "equal",
+            RatioVerdict::TooHigh => "higher",
+            RatioVerdict::TooLow => "lower",
+            RatioVerdict::Undecided => "undecided",
+        })
         .build()
         .csv()
 }
@@ -178,6 +212,39 @@ impl EstimateFile {
             "Per hour and per 1000 km: scenarios occur as often as observed, but begin at these headways, which are \
              imposed, not observed; a density fitted with the headway as a parameter draws them"
                 .to_owned()
+        })
+    }
+
+    /// Where the width of the intervals comes from, and what would halve it; `None` if no row knows.
+    pub(super) fn sources_rule(&self) -> Option<String> {
+        let known: Vec<Uncertainty> = self.estimates.iter().filter_map(|row| row.uncertainty).collect();
+        let range = |of: &dyn Fn(&Uncertainty) -> f64| {
+            let values = known.iter().map(of);
+            let ends = [values.clone().fold(f64::INFINITY, f64::min), values.fold(0.0, f64::max)];
+            let [low, high] = ends.map(|end| significant(end, 2));
+            if low == high { low } else { format!("{low} to {high}") }
+        };
+        let percent = |of: fn(&Uncertainty) -> f64| range(&|u| 100.0 * of(u));
+        let factors = |of: fn(&Uncertainty) -> Option<f64>, what: &str| match known.iter().filter_map(of).count() {
+            0 => format!("more {what} alone do not halve any"),
+            some => {
+                let rows = if some == known.len() { "them".to_owned() } else { format!("{some} of {}", known.len()) };
+                let values = known.iter().filter_map(of);
+                let ends = [values.clone().fold(f64::INFINITY, f64::min), values.fold(0.0, f64::max)];
+                let [low, high] = ends.map(|end| significant(end, 2));
+                let times = if low == high { low } else { format!("{low} to {high}") };
+                format!("{times} times the {what} halve {rows}")
+            }
+        };
+        (!known.is_empty()).then(|| {
+            format!(
+                "Variance of the intervals: {} % from the draws, {} % from the recorded scenarios, {} % from their frequency; {}, {}",
+                percent(|u| u.draws),
+                percent(|u| u.scenarios),
+                percent(|u| u.exposure),
+                factors(|u| u.hours_factor, "recorded hours"),
+                factors(|u| u.samples_factor, "samples"),
+            )
         })
     }
 

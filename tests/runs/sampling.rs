@@ -265,6 +265,33 @@ fn auto_answers_frequent_failures_by_crude_lanes_and_rare_ones_by_importance_sam
     assert_eq!(estimators[2], "is");
 }
 
+/// Two models on the same samples differ by less noise than their own intervals suggest.
+#[test]
+fn models_are_compared_on_the_same_samples() {
+    let (dir, _) = folder();
+    let args = ["-q", "sample", "density.json", "--samples", "20000", "--thw", "0.4,1", "--models", "RSS,FSM"];
+    let more = ["--backend", "cpu", "--worst", "0", "--map", "none", "--simultaneous"];
+    let (code, text, err) = lanesweep(dir.path(), &[&args[..], &more].concat());
+    assert_eq!(code, 0, "{err}");
+    assert!(text.contains("all rows of estimates.csv hold together at 95 %"), "{text}");
+    assert!(text.contains("from the draws") && text.contains("recorded hours"), "{text}");
+    let read = |name: &str| std::fs::read_to_string(dir.path().join("lanesweep-sample").join(name)).unwrap();
+    let models = read("models.csv");
+    let row = models.lines().find(|line| line.starts_with("RSS,FSM,collision,0.4s")).unwrap();
+    let [ratio, low, high] = [4, 5, 6].map(|at| row.split(',').nth(at).unwrap().parse::<f64>().unwrap());
+    let estimates = read("estimates.csv");
+    let of = |model: &str| {
+        let row = estimates.lines().find(|line| line.contains(&format!("{model},collision,0.4s"))).unwrap();
+        [8, 9, 10].map(|at| row.split(',').nth(at).unwrap().parse::<f64>().unwrap())
+    };
+    let (rss, fsm) = (of("RSS"), of("FSM"));
+    assert!((ratio / (rss[0] / fsm[0]) - 1.0).abs() < 1e-12);
+    assert!(libm::log(high / low) < 0.7 * libm::log(rss[2] / rss[1]), "{row}");
+    // Two models, three criteria, two headways and their mean: 18 rows.
+    let level: f64 = estimates.lines().nth(1).unwrap().split(',').nth(11).unwrap().parse().unwrap();
+    assert!((level - (1.0 - 0.05 / 18.0)).abs() < 1e-12);
+}
+
 /// The density over the first scenarios only, scale and bandwidth held.
 fn of_few(density: &DensityModel, scenarios: usize) -> DensityModel {
     let kde = &density.kde;

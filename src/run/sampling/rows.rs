@@ -5,6 +5,7 @@ use serde::Serialize;
 
 use super::against_recorded::RecordedRatios;
 use super::tally::SampleTally;
+use super::uncertainty::Uncertainty;
 use crate::engine::LanePlan;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -31,6 +32,8 @@ pub struct EstimateRow {
     pub failing_scenarios: Option<f64>,
     /// Failures per hour and per 1,000 km, if the exposure is known.
     pub risk: Risk,
+    /// Sources of the uncertainty; `None` without failures, or if the interval covers the draws alone.
+    pub uncertainty: Option<Uncertainty>,
     /// Ratios to the rate of the recorded scenarios; `None` if the density does not contain them.
     pub recorded: Option<RecordedRatios>,
 }
@@ -46,7 +49,17 @@ impl EstimateRow {
     ) -> EstimateRow {
         let draws = [estimate.interval.low, estimate.interval.high];
         let risk = Risk::of(&estimate, exposure);
-        EstimateRow { model, criterion, headway, estimate, draws, failing_scenarios: None, risk, recorded: None }
+        EstimateRow {
+            model,
+            criterion,
+            headway,
+            estimate,
+            draws,
+            failing_scenarios: None,
+            risk,
+            uncertainty: None,
+            recorded: None,
+        }
     }
 
     /// Adds the uncertainty of the data, or a warning that it is missing.
@@ -55,10 +68,11 @@ impl EstimateRow {
             self.estimate.trust.warn_if(true, Warning::DataLeftOut);
             return self;
         };
+        let of_draws = self.estimate.variance;
         self.estimate = self.estimate.over_kernels(shares);
         self.failing_scenarios = Some(shares.effective_failing);
         self.risk = Risk::of(&self.estimate, exposure);
-        self
+        self.with_sources(of_draws, exposure)
     }
 
     /// Half the width of the draws' interval over the probability, which more samples reduce; ∞ at zero.
@@ -93,9 +107,11 @@ pub fn crude_rows(
                 let mut row = EstimateRow::of_draws(id, criterion, headway, estimate, exposure);
                 if let Some(counts) = &tally.by_kernel {
                     let clusters = counts.rate(cells, level);
+                    let of_draws = row.estimate.variance;
                     row.estimate = row.estimate.over_scenarios(&clusters);
                     row.failing_scenarios = Some(clusters.effective_failing);
                     row.risk = Risk::of(&row.estimate, exposure);
+                    row = row.with_sources(of_draws, exposure);
                 }
                 rows.push(row);
             };
