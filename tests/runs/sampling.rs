@@ -273,6 +273,7 @@ fn models_are_compared_on_the_same_samples() {
     let more = ["--backend", "cpu", "--worst", "0", "--map", "none", "--simultaneous"];
     let (code, text, err) = lanesweep(dir.path(), &[&args[..], &more].concat());
     assert_eq!(code, 0, "{err}");
+    let text = text.replace('\n', " ");
     assert!(text.contains("all rows of estimates.csv hold together at 95 %"), "{text}");
     assert!(text.contains("from the draws") && text.contains("recorded hours"), "{text}");
     let read = |name: &str| std::fs::read_to_string(dir.path().join("lanesweep-sample").join(name)).unwrap();
