@@ -9,7 +9,7 @@ use crate::model::driver::ModelId;
 use crate::run::sampling::EstimateRow;
 use crate::scenario::Category;
 use crate::support::readable::{count, count_of, value};
-use crate::support::table::{Column, Digits, Table};
+use crate::support::table::{Column, Digits, NumberText, Table};
 use crate::{Error, Result};
 
 impl EstimateFile {
@@ -41,7 +41,10 @@ impl EstimateFile {
                     0 => format!("distributions of {}", density.parameters.join(", ")),
                     kernels => format!("a density over {} mined scenarios", count_of(kernels)),
                 },
-                self.estimator,
+                match self.estimates.iter().any(|row| row.is_rare_beside(&self.estimates)) {
+                    true => format!("{}, rare failures by is", self.estimator),
+                    false => self.estimator.to_owned(),
+                },
                 self.profile.name,
                 density.provenance.data
             ),
@@ -64,7 +67,12 @@ impl EstimateFile {
             .filter(|r| r.is_overall(&self.estimates) || r.is_rare_beside(&self.estimates))
             .collect();
         let level = self.estimates.first().map_or(0.95, |row| row.estimate.interval.level);
-        let wide = |row: &EstimateRow| Some(100.0 * row.estimate.relative_half_width).filter(|width| width.is_finite());
+        let wide = |row: &EstimateRow| {
+            let percent = 100.0 * row.estimate.relative_half_width;
+            percent
+                .is_finite()
+                .then(|| NumberText(if percent < 1000.0 { format!("{percent:.1}") } else { "> 999".to_owned() }))
+        };
         let estimates = Table::of(overall.iter().copied())
             .column("model", |row| row.model.name())
             .column("criterion", |row| row.criterion.label())
@@ -75,7 +83,7 @@ impl EstimateFile {
             .column("interval", |EstimateRow { estimate: e, .. }| {
                 interval_text(e.interval.low, e.interval.high, e.interval.kind)
             })
-            .column(Column::from("± in %").digits(Digits::Fixed(1)).null("–"), wide)
+            .column(Column::from("± in %").null("–"), wide)
             .column("per hour", |row| rate_text(row.risk.per_hour))
             .column("per 1000 km", |row| rate_text(row.risk.per_1000_km))
             .column("P/S", |row| ratio_text(row.recorded.and_then(|recorded| recorded.sampled)))
@@ -90,6 +98,7 @@ impl EstimateFile {
         let weights = Table::of(weighted)
             .column("model", |(row, _)| row.model.name())
             .column("criterion", |(row, _)| row.criterion.label())
+            .column("THW", |(row, _)| self.headway_cell(row))
             .column(three_digits("variance reduction"), |(row, _)| row.estimate.variance_reduction)
             .column("effective sample size", |(_, w)| w.effective_size)
             .column("of the failures", |(_, w)| w.effective_size_failures)
