@@ -113,6 +113,24 @@ fn a_guide_that_misleads_costs_draws_but_not_the_estimate() {
     assert!(estimate.interval.holds(tail(3.0)), "{estimate:?}");
 }
 
+/// Two ways to fail: one is far away and easily found, since the guide falls towards it; the other is likely, behind a
+/// rise of the guide.
+#[test]
+fn failures_in_the_tails_do_not_hide_more_likely_ones() {
+    let pocket = |points: &[Vec<f64>]| {
+        let value = |x: &Vec<f64>| {
+            if x[0] < -6.0 || x[1] > 4.2 { -1.0 } else { libm::exp(0.5 * x[0]) }
+        };
+        Ok(points.iter().map(value).collect())
+    };
+    let truth = tail(4.2) + tail(6.0);
+    for seed in 0..5 {
+        let run = found(&StandardNormal { dimensions: 2 }, &pocket, seed);
+        let estimate = &run.estimates[0];
+        assert!((estimate.probability / truth - 1.0).abs() < 0.3, "{seed}: {estimate:?}");
+    }
+}
+
 struct Halves;
 
 impl LimitState for Halves {

@@ -26,6 +26,9 @@ const MAX_FIRST: u64 = 8000;
 const PATIENCE: usize = 12;
 /// Crude draws of the first round that has any; each further one has twice as many.
 const CRUDE: u64 = 50_000;
+/// A guide descends in one round to no less than this fraction of the probability of its last level. Else failures that were
+/// found far away in the tails would end its way, although more likely ones lie between.
+const DESCENT: f64 = 0.05;
 /// Questions followed in one round.
 const ACTIVE: usize = 4;
 /// Earlier mixtures in the accepted proposal: they meet failures that the last fits miss.
@@ -34,7 +37,11 @@ const LADDER: usize = 12;
 const LADDER_WEIGHT: f64 = 0.1;
 /// A fresh sample of a proposal is refused if one failure carries more than this fraction of an estimate …
 const MAX_FRACTION: f64 = 0.03;
-/// … at most this many times.
+/// … or if the relative variance of a draw is larger than this, because the sample itself makes the next fit better …
+const GOOD_VARIANCE: f64 = 10.0;
+/// … at most so many times;
+const MAX_REFINEMENTS: usize = 3;
+/// and in all at most this many times.
 const MAX_REFUSALS: usize = 6;
 
 /// Options of a search.
@@ -309,8 +316,9 @@ impl<'a> Searching<'a> {
                 depth = depth.min(probability);
                 continue;
             }
-            let below = level_of(pool, at, guide, level, elite);
-            let Some((level, points)) = below.or_else(|| level_of(pool, at, guide, f64::INFINITY, elite)) else {
+            let enough = (elite, DESCENT * of_level * validity);
+            let below = level_of(pool, at, guide, level, enough);
+            let Some((level, points)) = below.or_else(|| level_of(pool, at, guide, f64::INFINITY, enough)) else {
                 continue;
             };
             let weights: Vec<f64> = points.iter().map(|point| pool.guided_weight(*point)).collect();
@@ -384,7 +392,8 @@ impl<'a> Searching<'a> {
                 relative_variance: Some(variance).filter(|variance| variance.is_finite()),
                 depth: question.depth,
             };
-            let is_refused = sum <= 0.0 || largest > MAX_FRACTION * sum;
+            let is_coarse = variance > GOOD_VARIANCE && question.refusals < MAX_REFINEMENTS;
+            let is_refused = sum <= 0.0 || largest > MAX_FRACTION * sum || is_coarse;
             if is_refused && question.refusals < MAX_REFUSALS {
                 question.refusals += 1;
                 question.is_settled = false;
@@ -396,9 +405,15 @@ impl<'a> Searching<'a> {
     }
 }
 
-/// The lowest level of a guide, at most `last` and at least 0, below which the points have the effective size `elite`;
-/// and these points. `None` if there is none.
-fn level_of(pool: &Pool, question: usize, guide: usize, last: f64, elite: f64) -> Option<(f64, Vec<usize>)> {
+/// The lowest level of a guide, at most `last` and at least 0, below which the points have at least this effective size and
+/// weight; and these points. `None` if there is none.
+fn level_of(
+    pool: &Pool,
+    question: usize,
+    guide: usize,
+    last: f64,
+    (elite, min_weight): (f64, f64),
+) -> Option<(f64, Vec<usize>)> {
     let value = |point: &usize| pool.value(*point, question, guide);
     let mut order: Vec<usize> = pool.guided().filter(|point| value(point) <= last).collect();
     order.sort_by(|a, b| value(a).total_cmp(&value(b)).then(a.cmp(b)));
@@ -413,7 +428,7 @@ fn level_of(pool: &Pool, question: usize, guide: usize, last: f64, elite: f64) -
             squares += weight * weight;
             end += 1;
         }
-        if sum * sum >= elite * squares && squares > 0.0 {
+        if sum >= min_weight && sum * sum >= elite * squares && squares > 0.0 {
             order.truncate(end);
             return Some((level.max(0.0), order));
         }
