@@ -105,26 +105,15 @@ def openturns(limit: Counted, dimensions: int, seed: int) -> Iterator[tuple[str,
         half = result.getConfidenceLength(0.95) / 2
         return p, p - half, p + half
 
-    def subset(level: int) -> Estimate:
-        algorithm = ot.SubsetSampling(event)
-        algorithm.setMaximumOuterSampling(level)
-        algorithm.setBlockSize(1)
-        algorithm.run()
-        return of(algorithm.getResult())
+    def by_levels(make: Callable[[], object]) -> Run:
+        def run(level: int) -> Estimate:
+            algorithm = make()
+            algorithm.setMaximumOuterSampling(level)
+            algorithm.setBlockSize(1)
+            algorithm.run()
+            return of(algorithm.getResult())
 
-    def nais(level: int) -> Estimate:
-        algorithm = ot.NAIS(event, 0.1)
-        algorithm.setMaximumOuterSampling(level)
-        algorithm.setBlockSize(1)
-        algorithm.run()
-        return of(algorithm.getResult())
-
-    def cross_entropy(level: int) -> Estimate:
-        algorithm = ot.StandardSpaceCrossEntropyImportanceSampling(event, 0.1)
-        algorithm.setMaximumOuterSampling(level)
-        algorithm.setBlockSize(1)
-        algorithm.run()
-        return of(algorithm.getResult())
+        return run
 
     def directional(level: int) -> Estimate:
         algorithm = ot.AdaptiveDirectionalStratification(event, ot.RiskyAndFast(), ot.RandomDirection())
@@ -132,9 +121,9 @@ def openturns(limit: Counted, dimensions: int, seed: int) -> Iterator[tuple[str,
         algorithm.run()
         return of(algorithm.getResult())
 
-    yield "OpenTURNS subset simulation", subset
-    yield "OpenTURNS non-parametric adaptive IS", nais
-    yield "OpenTURNS cross-entropy", cross_entropy
+    yield "OpenTURNS subset simulation", by_levels(lambda: ot.SubsetSampling(event))
+    yield "OpenTURNS non-parametric adaptive IS", by_levels(lambda: ot.NAIS(event, 0.1))
+    yield "OpenTURNS cross-entropy", by_levels(lambda: ot.StandardSpaceCrossEntropyImportanceSampling(event, 0.1))
     if dimensions <= 5:
         yield "OpenTURNS adaptive directional stratification", directional
 

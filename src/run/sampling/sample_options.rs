@@ -68,7 +68,7 @@ impl Estimator {
 pub struct SampleOptions {
     /// Estimator.
     pub estimator: Estimator,
-    /// When to end. A run with a rule in addition to the number of samples cannot be split.
+    /// When to end. Crude Monte Carlo with a rule in addition to the number of samples cannot be split.
     pub stop: StopRule,
     /// Kind of points (crude).
     pub source: SampleSource,

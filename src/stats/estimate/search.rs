@@ -177,7 +177,7 @@ struct Searching<'a> {
     kernels: Mixture,
     questions: Vec<Question>,
     found: Vec<Found>,
-    /// The last tested proposal, its largest relative variance.
+    /// The last tested proposal.
     proposal: Option<Mixture>,
     rounds: usize,
     crude: u64,
