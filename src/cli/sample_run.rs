@@ -15,7 +15,7 @@ use crate::report::sampling::{EstimateFile, HostRecord};
 use crate::run::parts::PLAN_FILE;
 use crate::run::sampling::{self, SampleKind, SampleOptions, SampleResult, SampleSource, conditional};
 use crate::stats::density::read_density;
-use crate::stats::estimate::StopRule;
+use crate::stats::estimate::{Search, StopRule};
 use crate::support::atomic_file::StagedFile;
 use crate::support::files::check_folder;
 use crate::support::readable::{count, counted};
@@ -175,7 +175,8 @@ impl Sample {
         let mut result = run.take_result()?;
         if let Some(half_width) = self.settings.half_width.filter(|_| self.is_refined()) {
             tracing::info!("importance sampling of what is rare");
-            result = sample.refined(result, half_width, executor)?;
+            let search = Search { defence: self.settings.defensive_weight, ..Search::default() };
+            result = sample.refined(result, &search, half_width, executor)?;
         }
         let host = HostRecord::of(opened, result.rechecked_lanes, started);
         let mut results = run.results()?;

@@ -98,7 +98,13 @@ impl Sample {
     ///
     /// # Errors
     /// Those of the lanes.
-    pub fn refined(&self, mut result: SampleResult, half_width: f64, executor: &Executor) -> Result<SampleResult> {
+    pub fn refined(
+        &self,
+        mut result: SampleResult,
+        search: &Search,
+        half_width: f64,
+        executor: &Executor,
+    ) -> Result<SampleResult> {
         let is_open = |question: &Question| {
             let row = result.rows.iter().find(|row| self.is_row_of(row, question));
             row.is_none_or(|row| row.estimate.failures < StopRule::MIN_FAILURES || row.draws_half_width() > half_width)
@@ -108,7 +114,7 @@ impl Sample {
             return Ok(result);
         }
         let options = SampleOptions {
-            estimator: Estimator::Search(Search::default()),
+            estimator: Estimator::Search(*search),
             stop: StopRule { relative_half_width: Some(half_width), ..StopRule::samples(MAX_DRAWS) },
             questions: questions.clone(),
             worst: 0,
