@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 use super::limit_state::{LaneLimitState, Question, scenario_shares, truncated};
 use super::rows::EstimateRow;
 use super::sample_run::SampleResult;
-use super::{Sample, Weighted};
+use super::{Estimator, Sample, Weighted};
 use crate::engine::{CpuBackend, Executor, lanes_within_seconds};
 use crate::run::parts::{Ledger, MergeableCounts};
 use crate::stats::estimate::{
@@ -122,8 +122,8 @@ impl Sample {
         let mut rows = Vec::new();
         for (at, ((question, sums), shares)) in tally.sums.iter().zip(&shares).enumerate() {
             let mut estimate = from_weight_sums(&sums.total().unwrap_or_default(), false, options.level);
-            if let Some(search) = &weighted.search {
-                estimate = after_search(estimate, &search.questions[at], search.points);
+            if let (Some(run), Estimator::Search(search)) = (&weighted.search, &options.estimator) {
+                estimate = after_search(estimate, &run.questions[at], run.points, search);
             }
             let headway = options.headway_name(question.headway);
             let row = EstimateRow::of_draws(question.model, question.criterion, headway, estimate, exposure);

@@ -27,6 +27,8 @@ pub struct Mixture {
     means: Vec<Vec<f64>>,
     /// Lower-triangular L with zeros above the diagonal; the diagonal is > 0.
     factors: Vec<DMatrix<f64>>,
+    /// One per factor: the rows of L⁻¹ up to its diagonal, one after the other.
+    inverses: Vec<Vec<f64>>,
     /// Index into `factors`, one per component; kernels share one factor.
     factor_of: Vec<usize>,
     /// Cumulative weights up to and including each component; the last is 1.
@@ -37,6 +39,23 @@ pub struct Mixture {
     log_heights: Vec<f64>,
     /// Ranges of consecutive components with the same factor: a point is whitened once for each.
     runs: Vec<Range<usize>>,
+}
+
+/// The rows of L⁻¹ up to the diagonal, of a lower-triangular L with a positive diagonal.
+fn inverse(factor: &DMatrix<f64>) -> Vec<f64> {
+    let d = factor.nrows();
+    let mut columns = DMatrix::identity(d, d);
+    factor.solve_lower_triangular_mut(&mut columns);
+    (0..d).flat_map(|i| (0..=i).map(move |j| (i, j))).map(|at| columns[at]).collect()
+}
+
+/// z = L⁻¹ x, with the rows of [`inverse`].
+fn whiten(inverse: &[f64], point: &[f64], z: &mut [f64]) {
+    let mut start = 0;
+    for (i, z) in z.iter_mut().enumerate() {
+        *z = inverse[start..=start + i].iter().zip(point).map(|(l, x)| l * x).sum();
+        start += i + 1;
+    }
 }
 
 impl Mixture {
@@ -113,10 +132,10 @@ impl Mixture {
         let mut whitened_means = vec![0.0; n * dimensions];
         let mut log_heights = Vec::with_capacity(n);
         let mut runs: Vec<Range<usize>> = Vec::new();
-        let mut z = DVector::zeros(dimensions);
+        let inverses: Vec<Vec<f64>> = factors.iter().map(inverse).collect();
+        let mut z = vec![0.0; dimensions];
         for k in 0..n {
-            z.copy_from_slice(&means[k]);
-            factors[factor_of[k]].solve_lower_triangular_mut(&mut z);
+            whiten(&inverses[factor_of[k]], &means[k], &mut z);
             for (j, z) in z.iter().enumerate() {
                 whitened_means[j * n + k] = *z;
             }
@@ -126,7 +145,18 @@ impl Mixture {
                 _ => runs.push(k..k + 1),
             }
         }
-        Mixture { dimensions, weights, means, factors, factor_of, cumulative, whitened_means, log_heights, runs }
+        Mixture {
+            dimensions,
+            weights,
+            means,
+            factors,
+            inverses,
+            factor_of,
+            cumulative,
+            whitened_means,
+            log_heights,
+            runs,
+        }
     }
 
     /// Combines several mixtures: Σ weight · mixture, with the weights scaled to sum 1; mixtures of weight 0 are
@@ -174,6 +204,13 @@ impl Mixture {
     /// L of a component.
     pub fn factor(&self, component: usize) -> &DMatrix<f64> {
         &self.factors[self.factor_of[component]]
+    }
+
+    /// L⁻¹ x of a point, with the L of a component.
+    pub(crate) fn whitened(&self, component: usize, point: &[f64]) -> Vec<f64> {
+        let mut z = vec![0.0; self.dimensions];
+        whiten(&self.inverses[self.factor_of[component]], point, &mut z);
+        z
     }
 
     /// Whether all components have one covariance.
@@ -245,10 +282,10 @@ impl Mixture {
             parts.fill(f64::NEG_INFINITY);
             return f64::NEG_INFINITY;
         }
-        let mut z = DVector::zeros(d);
+        let mut z = [0.0; MAX_DIMENSIONS];
+        let z = &mut z[..d];
         for run in &self.runs {
-            z.copy_from_slice(point);
-            self.factors[self.factor_of[run.start]].solve_lower_triangular_mut(&mut z);
+            whiten(&self.inverses[self.factor_of[run.start]], point, z);
             let distances = &mut parts[run.clone()];
             for (j, z) in z.iter().enumerate() {
                 let means = &self.whitened_means[j * n + run.start..j * n + run.end];

@@ -2,7 +2,6 @@
 //! proposals and for densities: few components, full covariances.
 
 use nalgebra::DMatrix;
-use rayon::prelude::*;
 
 use super::Mixture;
 use super::moments::{factor_or_diagonal, moments};
@@ -73,6 +72,8 @@ impl Mixture {
 
 /// Gain of the mean held-out log-likelihood that one more candidate must bring.
 const MIN_GAIN: f64 = 1e-3;
+/// Candidates in a row without a gain, after which no larger one is tried.
+const MAX_WORSE: usize = 2;
 
 /// Points with weights of sum 1, and the data common to all components.
 struct Weighted<'a> {
@@ -110,16 +111,20 @@ impl<'a> Weighted<'a> {
             Weighted::of(own.into_iter().map(|(point, weight)| (point, weight / total)).collect(), self.d)
         };
         let halves = [half(0), half(1)];
-        let jobs: Vec<(usize, usize)> = candidates.iter().flat_map(|k| [(*k, 0), (*k, 1)]).collect();
-        let held_out = |&(components, odd): &(usize, usize)| {
+        let held_out = |odd: usize, components: usize| -> Result<f64> {
             let mixture = halves[odd].expectation_maximisation(components, options)?.0;
             Ok(halves[1 - odd].points.iter().map(|(point, weight)| weight * mixture.log_density(point)).sum::<f64>())
         };
-        let scores: Vec<f64> = jobs.par_iter().map(held_out).collect::<Result<_>>()?;
-        let mut best = (f64::NEG_INFINITY, 1);
-        for (components, score) in candidates.into_iter().zip(scores.chunks(2).map(|pair| 0.5 * (pair[0] + pair[1]))) {
+        let (mut best, mut worse) = ((f64::NEG_INFINITY, 1), 0);
+        for components in candidates {
+            let (one, other) = rayon::join(|| held_out(0, components), || held_out(1, components));
+            let score = 0.5 * (one? + other?);
+            worse += 1;
             if score > best.0 + MIN_GAIN {
-                best = (score, components);
+                (best, worse) = ((score, components), 0);
+            }
+            if worse == MAX_WORSE {
+                break;
             }
         }
         Ok(best.1)

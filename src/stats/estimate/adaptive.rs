@@ -67,7 +67,7 @@ pub fn adaptive(
         }
         None => run.questions.iter().map(|_| nothing_found(level)).collect(),
     };
-    let after = |(estimate, found): (Estimate, &Found)| after_search(estimate, found, run.points);
+    let after = |(estimate, found): (Estimate, &Found)| after_search(estimate, found, run.points, options);
     let estimates = estimates.into_iter().zip(&run.questions).map(after).collect();
     Ok(AdaptiveRun { estimates, search: run })
 }
@@ -78,7 +78,7 @@ fn nothing_found(level: f64) -> Estimate {
 }
 
 /// Adds the points of the search to an estimate, and what the search says against it.
-pub(crate) fn after_search(mut estimate: Estimate, found: &Found, points: u64) -> Estimate {
+pub(crate) fn after_search(mut estimate: Estimate, found: &Found, points: u64, options: &Search) -> Estimate {
     let draws = estimate.runs;
     estimate.set_runs(draws + points);
     let Some(variance) = found.relative_variance else {
@@ -89,7 +89,7 @@ pub(crate) fn after_search(mut estimate: Estimate, found: &Found, points: u64) -
     let shallow = found.depth > Warning::DEPTH * p;
     estimate.trust.warn_if(shallow, Warning::Shallow { depth: found.depth, probability: p });
     if p > 0.0 {
-        let error = (variance / MIN_DRAWS as f64 + estimate.coefficient_of_variation.powi(2)).sqrt();
+        let error = (variance / options.test as f64 + estimate.coefficient_of_variation.powi(2)).sqrt();
         let errors = libm::fabs(libm::log(p / found.probability)) / error;
         let disagrees = Warning::DisagreesWithSearch { search: found.probability, errors };
         estimate.trust.warn_if(errors > Warning::SEARCH_ERRORS, disagrees);

@@ -1,6 +1,5 @@
 //! Mixtures that cover the failures of a pool: a fit to the weighted failures, and Gaussians around design points.
 
-use nalgebra::{DMatrix, DVector};
 use rayon::prelude::*;
 
 use super::pool::Pool;
@@ -65,38 +64,35 @@ struct Design {
 /// are drawn from too. `stretch` scales the covariances.
 pub(super) fn designs(kernels: &Mixture, pool: &Pool, failures: &[usize], heat: f64, stretch: f64) -> Result<Mixture> {
     let n = kernels.weights().len();
-    let whitened = |factor: &DMatrix<f64>, point: &[f64]| {
-        let mut z = DVector::from_column_slice(point);
-        factor.solve_lower_triangular_mut(&mut z);
-        z
-    };
     let mut failures = failures.to_vec();
     if failures.len() > CANDIDATES {
         failures.sort_by(|a, b| pool.log_f[*b].total_cmp(&pool.log_f[*a]).then(a.cmp(b)));
         failures.truncate(CANDIDATES);
     }
-    let white = |factor| failures.iter().map(|at| whitened(factor, &pool.points[*at])).collect::<Vec<_>>();
+    let white = |kernel| failures.iter().map(|at| kernels.whitened(kernel, &pool.points[*at])).collect::<Vec<_>>();
     let is_shared = kernels.shares_factor();
-    let all = if is_shared { white(kernels.factor(0)) } else { Vec::new() };
+    let all = if is_shared { white(0) } else { Vec::new() };
     let max_points = match n {
         0..=4 => 8,
         5..=60 => 4,
         _ => 2,
     };
     let of_kernel = |kernel: usize| -> Vec<Design> {
-        let own = if is_shared { Vec::new() } else { white(kernels.factor(kernel)) };
-        let centre = whitened(kernels.factor(kernel), kernels.mean(kernel));
-        let from: Vec<DVector<f64>> = if is_shared { &all } else { &own }.iter().map(|z| z - &centre).collect();
-        let mut order: Vec<(f64, usize)> = from.iter().map(DVector::norm_squared).zip(0..).collect();
+        let own = if is_shared { Vec::new() } else { white(kernel) };
+        let points = if is_shared { &all } else { &own };
+        let centre = kernels.whitened(kernel, kernels.mean(kernel));
+        let away = |a: &[f64], b: &[f64]| -> f64 {
+            a.iter().zip(b).zip(&centre).map(|((a, b), centre)| (a - centre) * (b - centre)).sum()
+        };
+        let squares: Vec<f64> = points.iter().map(|z| away(z, z)).collect();
+        let nearest = squares.iter().copied().fold(f64::INFINITY, f64::min);
+        let near = |at: &(f64, usize)| at.0 <= nearest + NEGLIGIBLE;
+        let mut order: Vec<(f64, usize)> = squares.into_iter().zip(0..).filter(near).collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
-        let nearest = order[0].0;
         let mut taken: Vec<(f64, Vec<usize>)> = Vec::new();
         for (square, at) in order {
-            if square > nearest + NEGLIGIBLE {
-                break;
-            }
             // A failure in the direction of a design point is covered by it.
-            let covers = |(of, members): &(f64, Vec<usize>)| from[members[0]].dot(&from[at]) >= 0.5 * of;
+            let covers = |(of, members): &(f64, Vec<usize>)| away(&points[members[0]], &points[at]) >= 0.5 * of;
             match taken.iter().position(covers) {
                 Some(design) if taken[design].1.len() < AVERAGED => taken[design].1.push(at),
                 None if taken.len() < max_points => taken.push((square, vec![at])),
