@@ -20,6 +20,9 @@ struct Generation {
     first_mean: u32,
     first_factor: u32,
     first_factor_of: u32,
+    first_knot: u32,
+    // 1 where draws are transformed.
+    transformed: u32,
     // Entries of each sample in the tables.
     speed_stride: u32,
     lateral_stride: u32,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import os
 import warnings
 from collections.abc import Mapping
@@ -153,8 +154,8 @@ class LimitState(_core.LimitState):
     parameters : list of str
         Names of the columns of points, with units.
     points : list of list of float
-        The recorded scenarios, and `kernel_deviations` of the kernels around them: together they are the density, which
-        `log_density(points)` evaluates within its valid region (`is_valid(points)`).
+        The recorded scenarios, and `kernel_deviations` of the kernels around them: together they are a density of form
+        ``kernel``. `log_density(points)` evaluates a density of any form within its valid region (`is_valid(points)`).
     """
 
     def __new__(
@@ -217,17 +218,34 @@ class LimitState(_core.LimitState):
 
     def draw(self, count: int, rng: np.random.Generator | int | None = None) -> npt.NDArray[np.float64]:
         """Draw valid points of the density, by rejection, with a generator or seed of NumPy (not the numbers of `sample`)."""
-        rng = np.random.default_rng(rng)
-        centres, deviations = np.asarray(self.points), np.asarray(self.kernel_deviations)
-        found: list[npt.NDArray[np.float64]] = []
-        missing = count
-        while missing > 0:
-            drawn = centres[rng.integers(len(centres), size=2 * missing + 16)]
-            drawn = drawn + deviations * rng.standard_normal(drawn.shape)
-            drawn = drawn[self.is_valid(drawn)][:missing]
-            found.append(drawn)
-            missing -= len(drawn)
-        return np.concatenate(found) if found else np.empty((0, centres.shape[1]))
+        seed = int(np.random.default_rng(rng).integers(2**63))
+        return super()._draw(count, seed) if count > 0 else np.empty((0, len(self.parameters)))
+
+    def estimate(
+        self, points: npt.ArrayLike, log_density: npt.ArrayLike | None = None, *, level: float = 0.95
+    ) -> dict[str, Any]:
+        """Estimate the probability of failure from points that another model drew, such as a normalizing flow.
+
+        Parameters
+        ----------
+        points : array of shape (n, d) or data frame
+            Independent draws. Points outside the valid region cannot fail.
+        log_density : array of shape (n,), optional
+            ln of the density that each point was drawn from, over the parameters in their units. With it the points are a
+            proposal, weighted to this density; it must cover the density wherever a failure is possible. Without it the
+            points stand for themselves: the estimate is that of the other model within the valid region.
+        level : float
+            Level of the interval.
+
+        Returns
+        -------
+        dict
+            ``probability``, ``low``, ``high``, ``level``, ``points``, ``valid``, ``failures``, ``effective_size`` (of the
+            failures) and ``mean_weight`` (both None without `log_density`), ``verdict`` and ``warnings``.
+        """
+        logs = None if log_density is None else np.ascontiguousarray(log_density, dtype=np.float64).reshape(-1)
+        found: dict[str, Any] = json.loads(super()._estimate(self._array(points), logs, level))
+        return found
 
 
 def _has_arrow(table: Any) -> bool:

@@ -8,11 +8,14 @@ use lanesweep::engine::OpenBackend;
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
-use lanesweep::run::sampling::{LaneLimitState, Question, SampleHeadways, truncated};
+use lanesweep::run::sampling::{LaneLimitState, Question, SAMPLE_PURPOSE, SampleHeadways, truncated};
 use lanesweep::stats::density::{DensityModel, read_density};
-use lanesweep::stats::estimate::{Density as _, LimitState as _};
+use lanesweep::stats::estimate::{
+    BinomialInterval, Counts, Density as _, LimitState as _, StopReason, from_counts, importance_of_points,
+};
+use lanesweep::stats::random::Stream;
 use lanesweep::{Error, Place, Result};
-use numpy::{PyArray1, PyReadonlyArray2};
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
 
 use crate::cases::headway_of;
@@ -69,12 +72,35 @@ fn open(
 }
 
 impl Opened {
+    /// ln f̂ within the valid region, −∞ outside.
+    fn log_densities(&self, points: &[Vec<f64>]) -> Result<Vec<f64>> {
+        let truncated = truncated(&self.density)?;
+        let log_fraction = truncated.validity_fraction().ln();
+        let of = |point: &Vec<f64>| {
+            let latent = self.density.latent(point);
+            truncated.log_density(&latent) - self.density.log_slope(&latent) - log_fraction
+        };
+        Ok(points.iter().map(of).collect())
+    }
+
+    /// The limit state of valid points; infinite elsewhere.
+    fn values_or_infinite(&self, points: Vec<Vec<f64>>) -> Result<Vec<f64>> {
+        let is_valid: Vec<bool> = points.iter().map(|point| self.density.space.is_valid(point)).collect();
+        let valid = points.into_iter().zip(&is_valid).filter_map(|(point, is_valid)| is_valid.then_some(point));
+        let valid: Vec<Vec<f64>> = valid.collect();
+        let found = if valid.is_empty() { Vec::new() } else { embedded::exclusively(|| self.values(&valid))? };
+        let mut found = found.into_iter();
+        let value = |is_valid: bool| if is_valid { found.next() } else { None }.unwrap_or(f64::INFINITY);
+        Ok(is_valid.into_iter().map(value).collect())
+    }
+
     fn values(&self, points: &[Vec<f64>]) -> Result<Vec<f64>> {
+        let points: Vec<Vec<f64>> = points.iter().map(|point| self.density.latent(point)).collect();
         let question = Question { model: self.model, criterion: self.criterion, headway: 0 };
         let executor = self.backend.executor();
         let lanes = LaneLimitState::new(&self.density, &self.profile, &self.headway, &[question], executor);
         // The first guide of a point is the limit state.
-        Ok(lanes.evaluate(points)?.into_iter().step_by(lanes.guides()).collect())
+        Ok(lanes.evaluate(&points)?.into_iter().step_by(lanes.guides()).collect())
     }
 }
 
@@ -134,12 +160,7 @@ impl LimitState {
         points: PyReadonlyArray2<'py, f64>,
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let points = self.rows(py, &points)?;
-        let density = &self.0.density;
-        let values = py.detach(|| {
-            let truncated = truncated(density)?;
-            let log_fraction = truncated.validity_fraction().ln();
-            Ok(points.iter().map(|point| truncated.log_density(point) - log_fraction).collect::<Vec<f64>>())
-        });
+        let values = py.detach(|| self.0.log_densities(&points));
         Ok(PyArray1::from_vec(py, values.map_err(|error: Error| exception(py, &error))?))
     }
 
@@ -151,16 +172,80 @@ impl LimitState {
     ) -> PyResult<Bound<'py, PyArray1<f64>>> {
         let points = self.rows(py, &points)?;
         let opened = self.0.clone();
-        let values = watched(py, None, None, move || {
-            let is_valid: Vec<bool> = points.iter().map(|point| opened.density.space.is_valid(point)).collect();
-            let valid = points.into_iter().zip(&is_valid).filter_map(|(point, is_valid)| is_valid.then_some(point));
-            let valid: Vec<Vec<f64>> = valid.collect();
-            let found = if valid.is_empty() { Vec::new() } else { embedded::exclusively(|| opened.values(&valid))? };
-            let mut found = found.into_iter();
-            let value = |is_valid: bool| if is_valid { found.next() } else { None }.unwrap_or(f64::INFINITY);
-            Ok(is_valid.into_iter().map(value).collect())
-        })?;
+        let values = watched(py, None, None, move || opened.values_or_infinite(points))?;
         Ok(PyArray1::from_vec(py, values))
+    }
+
+    /// Valid draws of the density.
+    fn _draw<'py>(&self, py: Python<'py>, count: usize, seed: u64) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let density = &self.0.density;
+        let drawn = py.detach(|| {
+            let mixture = density.mixture()?;
+            let stream = Stream { seed, purpose: SAMPLE_PURPOSE };
+            let draws = (0_u64..).map(|index| density.values(&mixture.draw(&stream, index, 0)));
+            Ok(draws.filter(|point| density.space.is_valid(point)).take(count).collect::<Vec<_>>())
+        });
+        let drawn = drawn.map_err(|error: Error| exception(py, &error))?;
+        Ok(PyArray2::from_vec2(py, &drawn)?)
+    }
+
+    /// The estimate from points as JSON.
+    fn _estimate(
+        &self,
+        py: Python<'_>,
+        points: PyReadonlyArray2<'_, f64>,
+        log_density: Option<PyReadonlyArray1<'_, f64>>,
+        level: f64,
+    ) -> PyResult<String> {
+        let points = self.rows(py, &points)?;
+        let logs = log_density.map(|logs| logs.as_array().to_vec());
+        let refused = match &logs {
+            Some(logs) if logs.len() != points.len() => {
+                Some((format!("{} densities for {} points", logs.len(), points.len()), "give one per point"))
+            }
+            Some(logs) if logs.iter().any(|log| !log.is_finite()) => {
+                Some(("a density is not finite".to_owned(), "give ln of the density that each point was drawn from"))
+            }
+            _ if points.is_empty() => Some(("there is no point".to_owned(), "give at least one")),
+            _ if !(0.0..1.0).contains(&level) => Some((format!("level {level}"), "give one from 0 to below 1")),
+            _ => None,
+        };
+        if let Some((problem, help)) = refused {
+            return Err(exception(py, &Error::input(Place::item("points"), problem, help)));
+        }
+        let opened = self.0.clone();
+        watched(py, None, None, move || {
+            let fails: Vec<bool> =
+                opened.values_or_infinite(points.clone())?.iter().map(|value| *value <= 0.0).collect();
+            let estimate = match logs {
+                Some(logs) => {
+                    let ratios: Vec<f64> =
+                        opened.log_densities(&points)?.iter().zip(logs).map(|(f, g)| f - g).collect();
+                    importance_of_points(&ratios, &fails, level)
+                }
+                None => {
+                    let valid = points.iter().filter(|point| opened.density.space.is_valid(point)).count() as u64;
+                    let failures = fails.iter().filter(|fails| **fails).count() as u64;
+                    let counts = Counts { runs: valid, failures, voids: 0, tries: points.len() as u64 };
+                    from_counts(&counts, BinomialInterval::Wilson, level, StopReason::Samples)
+                }
+            };
+            let warnings = estimate.trust.warnings.iter().map(ToString::to_string).collect::<Vec<_>>();
+            let record = serde_json::json!({
+                "probability": estimate.probability,
+                "low": estimate.interval.low,
+                "high": estimate.interval.high,
+                "level": level,
+                "points": points.len(),
+                "valid": estimate.runs,
+                "failures": estimate.failures,
+                "effective_size": estimate.weights.map(|weights| weights.effective_size_failures),
+                "mean_weight": estimate.weights.map(|weights| weights.mean_weight),
+                "verdict": estimate.trust.verdict(),
+                "warnings": warnings,
+            });
+            Ok(record.to_string())
+        })
     }
 }
 

@@ -54,3 +54,34 @@ def test_wrong_points_and_arguments_are_refused(density, tmp_path) -> None:
         lanesweep.LimitState(density, criterion="speed", thw=1)
     with pytest.raises(lanesweep.LanesweepError):
         lanesweep.LimitState(tmp_path / "none.json", thw=1)
+
+
+def test_points_of_a_foreign_model_give_its_risk_and_with_their_density_that_of_ours(density) -> None:
+    limit_state = lanesweep.LimitState(density, model="RSS", criterion="ttc", thw=0.4)
+    centres = np.asarray(limit_state.points)
+    rng = np.random.default_rng(5)
+    mean, covariance = centres.mean(axis=0), 1.5 * np.cov(centres.T)
+    # A foreign model: one wide Gaussian.
+    drawn = rng.multivariate_normal(mean, covariance, size=20_000)
+    away = drawn - mean
+    square = np.einsum("ij,jk,ik->i", away, np.linalg.inv(covariance), away)
+    logs = -0.5 * (square + np.linalg.slogdet(2 * np.pi * covariance)[1])
+    truth = (limit_state(limit_state.draw(20_000, rng=1)) <= 0).mean()
+    ours = limit_state.estimate(drawn, logs)
+    assert ours["low"] < truth * 1.1 and ours["high"] > truth * 0.9 and ours["mean_weight"] == pytest.approx(1, abs=0.2)
+    theirs = limit_state.estimate(drawn)
+    valid = limit_state.is_valid(drawn)
+    assert theirs["valid"] == valid.sum() and theirs["probability"] == (limit_state(drawn)[valid] <= 0).mean()
+    with pytest.raises(lanesweep.InputError, match="densities for"):
+        limit_state.estimate(drawn, logs[1:])
+
+
+def test_a_mixture_is_a_density_as_kernels_are(scenarios, tmp_path) -> None:
+    for form in ("mixture", "copula"):
+        fitted = tmp_path / f"{form}.json"
+        lanesweep.fit(scenarios=scenarios, parameterizations=2, density=form, no_comparison=True, out=fitted)
+        limit_state = lanesweep.LimitState(fitted, model="RSS", criterion="ttc", thw=0.4)
+        points = limit_state.draw(4000, rng=2)
+        share = (limit_state(points) <= 0).mean()
+        itself = limit_state.estimate(points, limit_state.log_density(points))
+        assert itself["probability"] == pytest.approx(share) and itself["mean_weight"] == pytest.approx(1)

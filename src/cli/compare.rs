@@ -15,6 +15,7 @@ use crate::report::compare::CompareFile;
 use crate::report::sampling::HostRecord;
 use crate::run::compare::{self, CompareOptions, CompareResult};
 use crate::run::study::StudyOptions;
+use crate::stats::density::DensityKind;
 use crate::stats::estimate::Enough;
 use crate::support::files::check_folder;
 use crate::support::readable::count;
@@ -49,6 +50,9 @@ pub struct Compare {
     models: lists::ModelsFlag,
     #[command(flatten)]
     headways: lists::HeadwaysFlag,
+    /// Sample Gaussian mixtures and copulas too: what does the form of the density change?
+    #[arg(long, help_heading = "Models and criteria", hide_short_help = true)]
+    forms: bool,
     /// Print lanes, memory and estimated time; write nothing
     #[arg(long, help_heading = "Run")]
     dry_run: bool,
@@ -83,6 +87,7 @@ impl Compare {
             study: StudyOptions { categories, models, headways, parameterization: config.of_densities() },
             parameterizations: ids,
             samples: config.compare.samples,
+            every_form: self.forms,
             seed: config.compare.seed,
             enough: Enough { clusters: config.score.min_failures.into(), margin: config.compare.margin },
         };
@@ -101,7 +106,9 @@ impl Compare {
         bar.finish_and_clear();
         let bar = console::progress(
             verbosity,
-            compare.options().parameterizations.len() as u64 * config.compare.samples,
+            compare.options().parameterizations.len() as u64
+                * config.compare.samples
+                * if self.forms { DensityKind::ALL.len() as u64 } else { 1 },
             "fitting and sampling",
         );
         let result = compare.sample(&counts, &executor.with_progress(console::inc(&bar)));

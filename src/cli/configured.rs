@@ -35,7 +35,7 @@ const SIMULATING: &[&str] = &["study", "sample", "compare", "justify", "map", "v
 const GENERATING: &[&str] = &["study", "fit", "compare", "justify", "verify", "show"];
 
 #[rustfmt::skip] // a table: one line per flag
-pub(super) const FLAGS: [KeyFlag; 22] = [
+pub(super) const FLAGS: [KeyFlag; 23] = [
     ("run.threads", "threads", "", RUN, true, &["lanesweep"]),
     ("run.backend", "backend", "", RUN, false, SWEEPING),
     ("run.device", "device", "NAME|pci:BUS|INDEX", RUN, false, SWEEPING),
@@ -44,6 +44,7 @@ pub(super) const FLAGS: [KeyFlag; 22] = [
     ("generator.recordings", "synth_recordings", "", DATA, true, GENERATING),
     ("generator.recordings", "synth_recordings", "", DATA, false, &["synth"]),
     ("score.seed", "seed", "", RUN, false, &["study"]),
+    ("fit.density", "density", "", MODELS, false, &["fit"]),
     ("fit.bandwidth_rule", "bandwidth_rule", "", MODELS, true, &["fit"]),
     ("fit.seed", "seed", "", RUN, false, &["fit"]),
     ("sample.estimator", "estimator", "", MODELS, false, &["sample"]),

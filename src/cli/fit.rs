@@ -69,6 +69,7 @@ impl Fit {
         let options = FitOptions {
             parameterization: config.of_densities(),
             with_thw: self.with_thw,
+            kind: config.fit.density,
             rule: match config.fit.bandwidth_rule {
                 BandwidthInterval::Reduction => BandwidthRule::Reduction,
                 BandwidthInterval::Wide => BandwidthRule::Wide,

@@ -93,6 +93,7 @@ impl Justify {
                 },
                 parameterizations: vec![id],
                 samples: config.compare.samples,
+                every_form: false,
                 seed: config.compare.seed,
                 enough: Enough { clusters: config.score.min_failures.into(), margin: config.compare.margin },
             },

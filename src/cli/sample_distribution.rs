@@ -148,6 +148,7 @@ fn record(sampled: &SampledFile, samples: &DistributionSamples) -> DensityRecord
         parameterization: "distribution".to_owned(),
         parameters: samples.parameters.iter().map(|p| p.parameter.key.to_owned()).collect(),
         kernels: 0,
+        form: None,
         provenance: Provenance {
             program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
             data,

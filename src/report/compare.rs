@@ -14,9 +14,10 @@ use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::compare::Compare;
 use crate::run::sampling::{
-    CategoryComparison, ComparedCell, ComparedParameterization, RateRecord, RecordedCell, RiskRate,
+    CategoryComparison, ComparedCell, ComparedParameterization, RateRecord, RecordedCell, RiskRate, Uncertainty,
 };
 use crate::run::score::f1;
+use crate::stats::density::{DensityKind, Representativeness, normal_quantile};
 use crate::stats::estimate::{Enough, Ratio, RatioVerdict};
 use crate::support::readable;
 use crate::support::run_dir::Results;
@@ -136,6 +137,11 @@ impl CompareFile {
         });
         type Pick = fn(RiskRate) -> f64;
         let risks: [(&str, Pick); 2] = [("", |risk| risk.estimate), ("_sd", |risk| risk.standard_deviation)];
+        type End = fn(&RateRecord) -> f64;
+        let ends: [(&str, End); 3] = [("rate", |r| r.rate), ("low", |r| r.low), ("high", |r| r.high)];
+        let first =
+            self.categories.iter().flat_map(|category| &category.parameterizations).find(|of| !of.forms.is_empty());
+        let forms: Vec<DensityKind> = first.map_or(Vec::new(), |of| of.forms.iter().map(|other| other.form).collect());
         Table::of(rows)
             .column("category", |(category, ..)| category.key())
             .column("parameterization", |(_, of, ..)| of.key.as_str())
@@ -167,6 +173,14 @@ impl CompareFile {
             .column("ratio_low", |(.., sampled)| sampled.ratio.low)
             .column("ratio_high", |(.., sampled)| sampled.ratio.high)
             .column("verdict", |(.., sampled)| sampled.ratio.verdict.text())
+            .columns(
+                forms.iter().flat_map(|form| ends.map(|end| (*form, end))),
+                |(form, (name, _))| format!("{}_{name}", form.key()),
+                |(_, of, s, ..), (form, (_, end))| {
+                    let at = of.cells.iter().position(|cell| (cell.model, cell.criterion) == (s.model, s.criterion))?;
+                    of.forms.iter().find(|other| other.form == form).map(|other| end(&other.rates[at]))
+                },
+            )
             .columns(risks, |of| format!("s_per_hour{}", of.0), |(_, _, s, ..), of| s.risk.per_hour.map(of.1))
             .columns(risks, |of| format!("s_per_1000_km{}", of.0), |(_, _, s, ..), of| s.risk.per_1000_km.map(of.1))
             .columns(risks, |of| format!("density_per_hour{}", of.0), |(.., s), of| s.risk.per_hour.map(of.1))
@@ -198,6 +212,8 @@ impl CompareFile {
                 text.push_str(&self.block(category, criterion));
             }
             text.push_str(&summary(category));
+            text.push_str(&goodness(category));
+            text.push_str(&self.uncertainty(category));
         }
         let close = self.categories.iter().filter_map(|comparison| {
             let close = comparison.close_following.as_ref()?;
@@ -261,6 +277,40 @@ impl CompareFile {
         page.html()
     }
 
+    /// What the risk of a category is uncertain by, over all its parameterizations and forms.
+    fn uncertainty(&self, category: &CategoryComparison) -> String {
+        let rows: Vec<(&RecordedCell, &Uncertainty)> =
+            category.recorded.iter().zip(&category.uncertainty).filter_map(|(s, of)| Some((s, of.as_ref()?))).collect();
+        if rows.is_empty() {
+            return String::new();
+        }
+        type Pick = fn(&Uncertainty) -> Option<f64>;
+        let parts: [(&str, Pick); 5] = [
+            ("draws", |u| Some(u.draws)),
+            ("scenarios", |u| Some(u.scenarios)),
+            ("frequency", |u| Some(u.exposure)),
+            ("form", |u| u.form),
+            ("parameterization", |u| u.parameterization),
+        ];
+        let z = normal_quantile(0.5 + 0.5 * self.level);
+        let table = Table::of(rows)
+            .column("risk uncertain by", |(s, _)| s.model.name())
+            .column("criterion", |(s, _)| s.criterion.key())
+            .column(Column::from("factor").digits(Digits::Significant(3)), |(_, of)| libm::exp(z * of.deviation))
+            .columns(
+                parts,
+                |(name, _)| Column::from(format!("{name} %")).digits(Digits::Fixed(0)).null("-"),
+                |(_, of), (_, pick)| pick(of).map(|part| 100.0 * part),
+            );
+        let rule = format!(
+            "Factor: the {:.0} % interval of the risk is about from 1/factor to factor times it, if neither the form of the \
+             density nor the parameterization is given. The parts are those of the variance of its logarithm; form and \
+             parameterization are the spread of the densities' rates over them, less the draws.",
+            100.0 * self.level
+        );
+        format!("\n{}{}\n", table.build().text(), wrap(&rule, WIDTH))
+    }
+
     /// Whether scenarios start from their recorded gaps.
     fn is_observed(&self) -> bool {
         self.headways.iter().any(|text| Headway::parse(text) == Some(Headway::Observed))
@@ -311,6 +361,14 @@ impl CompareFile {
             let replayed = cells().map(|c| cell(&c.replayed.rate, &c.replayed.ratio)).collect();
             let sampled = cells().map(|c| cell(&c.sampled.rate, &c.sampled.ratio)).collect();
             rows.extend([(format!("{} S'", of.key), replayed), (format!("{} density", of.key), sampled)]);
+            for other in &of.forms {
+                let cells = of.cells.iter().zip(&other.rates).filter(|(c, _)| c.criterion == criterion);
+                let cells = cells.map(|(c, rate)| match rate.rate / c.sampled.rate.rate {
+                    of_kernel if of_kernel.is_finite() => format!("{} {} of it", short(rate.rate), factor(of_kernel)),
+                    _ => short(rate.rate),
+                });
+                rows.push((format!("{} {}", of.key, other.form.key()), cells.collect()));
+            }
         }
         let models = self.models.iter().enumerate();
         let table = Table::of(&rows).column(criterion.label(), |(name, _)| name.as_str()).columns(
@@ -320,6 +378,36 @@ impl CompareFile {
         );
         table.build().text() + "\n"
     }
+}
+
+/// Per parameterization and form: how well the density represents unseen scenarios. Empty unless forms were compared.
+fn goodness(category: &CategoryComparison) -> String {
+    type Row<'a> = (&'a str, DensityKind, usize, Option<&'a Representativeness>);
+    let rows = category.parameterizations.iter().filter(|of| !of.forms.is_empty()).flat_map(|of| {
+        let kernel = (of.key.as_str(), DensityKind::Kernel, of.kernels, of.goodness.as_ref());
+        let others = of.forms.iter().map(|form| (of.key.as_str(), form.form, form.components, form.goodness.as_ref()));
+        std::iter::once(kernel).chain(others)
+    });
+    let rows: Vec<Row> = rows.collect();
+    if rows.is_empty() {
+        return String::new();
+    }
+    type Pick = fn(&Representativeness) -> Option<f64>;
+    let figures: [(&str, Pick); 3] = [
+        ("log-likelihood", |r| r.log_likelihood),
+        ("W(gen, test)", |r| Some(r.generated_test)),
+        ("Sinkhorn", |r| r.sinkhorn),
+    ];
+    let table = Table::of(&rows)
+        .column("unseen scenarios", |(key, ..)| *key)
+        .column("form", |(_, form, ..)| form.key())
+        .column("components", |(_, _, components, _)| *components)
+        .columns(
+            figures,
+            |(name, _)| Column::from(name).digits(Digits::Significant(4)).null("-"),
+            |(.., of), (_, pick)| of.and_then(pick),
+        );
+    format!("\n{}", table.build().text())
 }
 
 fn cell(rate: &RateRecord, ratio: &Ratio) -> String {

@@ -5,7 +5,7 @@ use std::fmt::Write;
 use crate::stats::density::{
     DensityModel, Exposure, Rate, Refused, Representativeness, SearchEnd, ValidFraction, standard_deviation,
 };
-use crate::support::readable::{count, count_of, significant};
+use crate::support::readable::{count, count_of, counted, significant};
 use crate::support::table::{Column, Digits, Table};
 
 /// One density without its kernels.
@@ -23,6 +23,9 @@ pub fn text(model: &DensityModel) -> String {
         count(provenance.left_out)
     );
     text.push_str(&parameters(model).text());
+    if let Some(of) = &model.transformed {
+        let _ = writeln!(text, "form       {} of {}", of.kind.key(), counted(of.mixture.weights().len(), "component"));
+    }
     let bandwidth = model.kde.bandwidth();
     let end = match bandwidth.end {
         SearchEnd::Inside => "",
@@ -31,7 +34,8 @@ pub fn text(model: &DensityModel) -> String {
     };
     let _ = writeln!(
         text,
-        "bandwidth  {} (rule `{}`; Silverman's {}){end}",
+        "{}  {} (rule `{}`; Silverman's {}){end}",
+        if model.transformed.is_some() { "kernels  " } else { "bandwidth" },
         short(bandwidth.value),
         bandwidth.rule.key(),
         short(bandwidth.silverman)
@@ -72,6 +76,8 @@ pub fn record(model: &DensityModel) -> serde_json::Value {
         "kept": provenance.kept,
         "left_out": provenance.left_out,
         "parameters": parameters.records(),
+        "form": model.kind(),
+        "components": model.components(),
         "bandwidth": model.kde.bandwidth(),
         "valid": model.valid,
         "exposure": model.exposure,
@@ -125,7 +131,7 @@ fn exposure(exposure: &Exposure) -> String {
 }
 
 fn compared(r: &Representativeness) -> String {
-    format!(
+    let mut text = format!(
         "M          {} ± {} over {} splits of {} training and {} test scenarios, seed {}\n           W(gen, test) \
          {}, W(gen, train) {}, W(train, test) {}\n",
         short(r.metric),
@@ -137,14 +143,27 @@ fn compared(r: &Representativeness) -> String {
         short(r.generated_test),
         short(r.generated_train),
         short(r.train_test)
-    )
+    );
+    if let (Some(sinkhorn), Some(log_likelihood)) = (r.sinkhorn, r.log_likelihood) {
+        let _ = writeln!(
+            text,
+            "held out   log-likelihood {} per scenario; Sinkhorn divergence {}",
+            short(log_likelihood),
+            short(sinkhorn)
+        );
+    }
+    text
 }
 
 /// One row per density.
 pub fn summary(models: &[&DensityModel]) -> String {
     type Pick = fn(&Representativeness) -> f64;
-    let distances: [(&str, Pick); 3] =
-        [("M", |r| r.metric), ("W(gen, test)", |r| r.generated_test), ("W(train, test)", |r| r.train_test)];
+    let distances: [(&str, Pick); 4] = [
+        ("M", |r| r.metric),
+        ("W(gen, test)", |r| r.generated_test),
+        ("W(train, test)", |r| r.train_test),
+        ("log-likelihood", |r| r.log_likelihood.unwrap_or(f64::NAN)),
+    ];
     let rows = Table::of(models.iter().copied())
         .column("density", |model| format!("{} {}", model.space.id().category.label(), model.space.id().key))
         .column("parameters", |model| model.space.dimensions())

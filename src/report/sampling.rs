@@ -14,7 +14,7 @@ use crate::model::profile::Profile;
 use crate::run::close_following::CloseFollowing;
 use crate::run::sampling::{EstimateRow, RiskRate, Sample, SampleOptions, SampleTally};
 use crate::scenario::Category;
-use crate::stats::density::{DensityModel, Provenance};
+use crate::stats::density::{DensityKind, DensityModel, Provenance};
 use crate::stats::estimate::{IntervalKind, Ratio, SearchRound, StopReason};
 use crate::support::readable::{count, count_of, counted, significant, value};
 use crate::support::table::{Column, Digits, NumberText, Table};
@@ -33,6 +33,8 @@ pub struct DensityRecord {
     pub parameters: Vec<String>,
     /// Number of scenarios in its fit; 0 for a distribution written by hand.
     pub kernels: usize,
+    /// Its form; `None` for a distribution written by hand.
+    pub form: Option<DensityKind>,
     /// Provenance of its data.
     pub provenance: Provenance,
 }
@@ -49,6 +51,7 @@ impl DensityRecord {
             parameterization: density.space.id().key.to_string(),
             parameters: density.space.parameters().iter().map(|p| p.name.clone()).collect(),
             kernels: density.kde.points().len(),
+            form: Some(density.kind()),
             provenance: density.provenance.clone(),
         })
     }
@@ -251,7 +254,11 @@ impl EstimateFile {
             density.parameterization,
             match density.kernels {
                 0 => format!("distributions of {}", density.parameters.join(", ")),
-                kernels => format!("density over {} scenarios", count_of(kernels)),
+                kernels => {
+                    let form = density.form.filter(|form| *form != DensityKind::Kernel);
+                    let form = form.map_or(String::new(), |form| format!("{} ", form.key()));
+                    format!("{form}density over {} scenarios", count_of(kernels))
+                }
             },
             density.provenance.data
         );

@@ -8,9 +8,7 @@ use super::html::PageFigure;
 use super::sampling::{DrawRecord, EstimateFile, HostRecord};
 use super::sampling_tables::{WorstRow, convergence_csv, model_ratios_csv, worst_csv};
 use crate::engine::{LaneKey, LanePlan, LaneRunner};
-use crate::run::sampling::{
-    CrudeRun, Estimator, Sample, SampleOptions, SampleResult, SampleTally, model_ratios, proposal_text,
-};
+use crate::run::sampling::{CrudeRun, Estimator, Sample, SampleOptions, SampleResult, SampleTally, proposal_text};
 use crate::stats::density::DensityModel;
 use crate::support::plain_text::hex;
 use crate::support::run_dir::Results;
@@ -40,6 +38,10 @@ impl EstimateFile {
         if let (Some(crude), Some(plan)) = (&result.crude, sample.lane_plan()) {
             figures = self.crude_files(&mut results, plan, density, crude, &sample.options)?;
         }
+        let ratios = sample.model_ratios(result);
+        if !ratios.is_empty() {
+            results.add("models.csv", model_ratios_csv(&ratios).as_bytes())?;
+        }
         if matches!(sample.options.estimator, Estimator::Given { .. }) {
             // A proposal in this folder may be an input of the run.
             results.keep(|name| name == "proposal.json")?;
@@ -67,11 +69,6 @@ impl EstimateFile {
             let svg = ConvergenceFigure::of(density, &run.convergence, level).figure().svg();
             results.add("convergence.svg", svg.as_bytes())?;
             figures.push(PageFigure::new(&svg, &["convergence.svg", "convergence.csv"]));
-        }
-        let level = self.estimates.first().map_or(0.95, |row| row.estimate.interval.level);
-        let ratios = model_ratios(plan, &run.tally, density.space.has_thw(), level);
-        if !ratios.is_empty() {
-            results.add("models.csv", model_ratios_csv(&ratios).as_bytes())?;
         }
         let Some(generator) = plan.generator() else {
             return Err(Error::Internal("the plan has no generator".to_owned()));

@@ -6,7 +6,7 @@ use crate::engine::{NO_STEP, Outcome};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::sampling::{Checkpoint, EstimateRow, ModelRatio, RiskRate, Uncertainty, WorstSample};
-use crate::stats::estimate::{IntervalKind, Ratio, RatioVerdict, WeightFigures};
+use crate::stats::estimate::{IntervalKind, Ratio, RatioMethod, RatioVerdict, WeightFigures};
 use crate::support::readable::{significant, value};
 use crate::support::table::Table;
 
@@ -119,6 +119,10 @@ pub fn model_ratios_csv(ratios: &[ModelRatio]) -> String {
         .column("ratio", |row| row.ratio.ratio)
         .column("low", |row| row.ratio.low)
         .column("high", |row| row.ratio.high)
+        .column("covers", |row| match row.ratio.method {
+            RatioMethod::Draws => "draws",
+            RatioMethod::Paired | RatioMethod::Separate => "draws and scenarios",
+        })
         .column("verdict", |row| match row.ratio.verdict {
             RatioVerdict::Agrees => "equal",
             RatioVerdict::TooHigh => "higher",

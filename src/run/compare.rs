@@ -5,13 +5,14 @@ use crate::engine::{Block, Executor, Headway, LanePlan, Partial, SweepSummary, W
 use crate::model::profile::Profile;
 use crate::run::close_following::{CloseFollowing, close_units};
 use crate::run::sampling::{
-    CategoryComparison, ComparedParameterization, Estimator, SampleHeadways, SampleOptions, ScenarioCounts,
-    compare_cells, kernel_scenarios, plan_samples, recorded_cells, sample_by_scenario,
+    CategoryComparison, ComparedForm, ComparedParameterization, Estimator, SampleHeadways, SampleOptions,
+    ScenarioCounts, Uncertainty, compare_cells, kernel_scenarios, plan_samples, recorded_cells, sample_by_scenario,
+    sample_crude,
 };
 use crate::run::study::{StudyOptions, plan_study};
 use crate::scenario::Scenario;
 use crate::scenario::parameterization::Parameterization;
-use crate::stats::density::{BandwidthRule, DensityModel, Exposure, FitOptions, Fitted};
+use crate::stats::density::{BandwidthRule, DensityKind, DensityModel, Exposure, FitOptions, Fitted};
 use crate::stats::estimate::Enough;
 use crate::support::error::push_once;
 use crate::traffic::DataProvenance;
@@ -27,6 +28,8 @@ pub struct CompareOptions {
     pub parameterizations: Vec<Parameterization>,
     /// Samples of each density; every sample runs from every headway.
     pub samples: u64,
+    /// Also sample the densities of every other form: what does the choice of the density change?
+    pub every_form: bool,
     /// Seed of the draws.
     pub seed: u64,
     /// Required number of failures, and margin of agreement around 1.
@@ -55,6 +58,7 @@ pub struct CompareOptions {
 ///     study: StudyOptions { headways: vec![Headway::ThwS(0.6)], ..StudyOptions::default() },
 ///     parameterizations: Parameterization::find(Category::CutIn, "2").into_iter().collect(),
 ///     samples: 1000,
+///     every_form: false,
 ///     seed: 157,
 ///     enough: Enough::default(),
 /// };
@@ -161,8 +165,13 @@ impl<'a> Compare<'a> {
             CompareResult { categories: recorded.collect::<Result<_>>()?, summary, ..CompareResult::default() };
         for id in &self.options.parameterizations {
             let mut sampled = || -> Result<ComparedParameterization> {
-                let Fitted { model, left_out, .. } = self.fit(id, false)?;
-                let cells = self.sample_density(&model, counts, executor, &mut result.summary)?;
+                let every_form = self.options.every_form;
+                let Fitted { model, left_out, .. } = self.fit(id, DensityKind::Kernel, every_form)?;
+                let mut cells = self.sample_density(&model, counts, executor, &mut result.summary)?;
+                for form in DensityKind::ALL.into_iter().filter(|form| every_form && *form != DensityKind::Kernel) {
+                    let other = self.fit(id, form, true)?.model;
+                    cells.forms.push(self.sample_form(&other, executor, &mut result.summary)?);
+                }
                 result.left_out.extend(left_out);
                 Ok(cells)
             };
@@ -178,6 +187,10 @@ impl<'a> Compare<'a> {
                 Err(error) => return Err(error),
             }
         }
+        result
+            .categories
+            .iter_mut()
+            .for_each(|category| category.uncertainty = Uncertainty::of_category(category, Self::LEVEL));
         if result.categories.iter().all(|c| c.parameterizations.is_empty()) && !result.failed.is_empty() {
             return Err(result.failed.swap_remove(0));
         }
@@ -198,6 +211,7 @@ impl<'a> Compare<'a> {
             recorded: recorded_cells(&self.plan, &counts, exposure.as_ref(), Self::LEVEL),
             close_following,
             parameterizations: Vec::new(),
+            uncertainty: Vec::new(),
         })
     }
 
@@ -205,10 +219,11 @@ impl<'a> Compare<'a> {
     ///
     /// # Errors
     /// As [`DensityModel::fit`].
-    pub(crate) fn fit(&self, id: &Parameterization, representativeness: bool) -> Result<Fitted> {
+    pub(crate) fn fit(&self, id: &Parameterization, kind: DensityKind, representativeness: bool) -> Result<Fitted> {
         let fit = FitOptions {
             parameterization: self.options.study.parameterization.clone(),
             with_thw: Headway::is_observed(&self.options.study.headways),
+            kind,
             rule: BandwidthRule::Reduction,
             representativeness,
             ..FitOptions::default()
@@ -235,16 +250,7 @@ impl<'a> Compare<'a> {
         let Some((block, variant)) = self.plan.blocks.iter().enumerate().find_map(find) else {
             return Err(Error::Internal(format!("{} {} has a density but no lanes", id.category.label(), id.key)));
         };
-        let headways = match density.space.has_thw() {
-            true => SampleHeadways::Sampled,
-            false => SampleHeadways::Each(options.study.headways.clone()),
-        };
-        let plan_options = SampleOptions {
-            seed: options.seed,
-            models: options.study.models.clone(),
-            ..SampleOptions::new(Estimator::CRUDE, options.samples, headways)
-        };
-        let plan = plan_samples(density, &density.mixture()?, &self.profile, &plan_options)?;
+        let plan = plan_samples(density, &density.mixture()?, &self.profile, &self.sample_options(density))?;
         let kernels = kernel_scenarios(density, self.scenarios)?;
         let scenarios = self.plan.blocks[block].units.len() as usize;
         let exposure = density.exposure.as_ref();
@@ -257,7 +263,36 @@ impl<'a> Compare<'a> {
             kernels: kernels.len(),
             plan_sha256: plan.hash().to_owned(),
             voids: sampled.tally.voids,
+            goodness: density.representativeness,
+            forms: Vec::new(),
             cells: compare_cells(&self.plan, counts, block, variant, &sampled, options.enough, Self::LEVEL)?,
         })
+    }
+
+    /// Options of the samples of a density.
+    fn sample_options(&self, density: &DensityModel) -> SampleOptions {
+        let headways = match density.space.has_thw() {
+            true => SampleHeadways::Sampled,
+            false => SampleHeadways::Each(self.options.study.headways.clone()),
+        };
+        SampleOptions {
+            seed: self.options.seed,
+            models: self.options.study.models.clone(),
+            ..SampleOptions::new(Estimator::CRUDE, self.options.samples, headways)
+        }
+    }
+
+    /// Samples a density of another form.
+    fn sample_form(
+        &self,
+        density: &DensityModel,
+        executor: &Executor,
+        summary: &mut SweepSummary,
+    ) -> Result<ComparedForm> {
+        let options = self.sample_options(density);
+        let plan = plan_samples(density, &density.mixture()?, &self.profile, &options)?;
+        let run = sample_crude(&plan, 0..plan.unit_count(), executor, &options, None, |_| Ok(()))?;
+        summary.add(&run.summary);
+        ComparedForm::of(density, &run.rows)
     }
 }

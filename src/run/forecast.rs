@@ -12,6 +12,7 @@ use crate::engine::{
     Backend, Block, Confusion, Executor, Forecast, LanePlan, Outcome, Partial, Verdicts, Wanted, forecast,
 };
 use crate::model::criterion::Criterion;
+use crate::stats::density::DensityKind;
 use crate::support::readable;
 
 /// Time for which lanes are run to measure their speed.
@@ -121,7 +122,9 @@ impl Compare<'_> {
         let lanes = options.samples.saturating_mul((plan.headways.len() * plan.models.len()) as u64);
         for id in &options.parameterizations {
             let (of, what) = (id.category.label().to_owned(), format!("density {}", id.key));
-            parts.push(ForecastPart { of, what, units: options.samples, lanes });
+            let forms = if options.every_form { DensityKind::ALL.len() as u64 } else { 1 };
+            let lanes = lanes.saturating_mul(forms);
+            parts.push(ForecastPart { of, what, units: options.samples * forms, lanes });
             whole.add(&Forecast { lanes, seconds: lanes as f64 * per_lane_s, measured_lanes: 0, lanes_at_once: 0 });
         }
         Ok(RunForecast {

@@ -89,7 +89,7 @@ fn generator_records() -> Vec<Record> {
         record!("Generation", Generation, {
             index_low: u32, index_high: u32, count: u32, source: u32, seed_low: u32, seed_high: u32, purpose: u32,
             components: u32, weighted: u32, first_mean: u32, first_factor: u32, first_factor_of: u32,
-            speed_stride: u32, lateral_stride: u32,
+            first_knot: u32, transformed: u32, speed_stride: u32, lateral_stride: u32,
         }),
     ]
 }
@@ -149,6 +149,7 @@ fn the_generator_has_the_records_the_numbers_and_the_arithmetic_of_its_rust_twin
         ("MAX_PARAMETERS", MAX_PARAMETERS as u32),
         ("MAX_BOUNDS", MAX_BOUNDS as u32),
         ("ATTEMPTS", ATTEMPTS),
+        ("PIECES", lanesweep::stats::density::PIECES as u32),
         ("NO_SLOT", NO_SLOT),
         ("TARGET_SPEED", Variable::TargetSpeed as u32),
         ("LATERAL_SPEED", Variable::LateralSpeed as u32),

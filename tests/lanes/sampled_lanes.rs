@@ -17,7 +17,7 @@ use lanesweep::run::sampling::{
 use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions};
 use lanesweep::scenario::{Category, Scenario, Tables};
-use lanesweep::stats::density::{DensityModel, FitOptions, Mixture};
+use lanesweep::stats::density::{DensityKind, DensityModel, FitOptions, Mixture};
 use lanesweep::stats::random::Stream;
 use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
@@ -184,6 +184,37 @@ fn a_device_makes_the_same_lanes_of_the_same_samples() {
         }
     }
     eprintln!("{compared} sampled lanes: 0 differ");
+}
+
+#[test]
+fn transformed_mixtures_are_drawn_alike_on_every_backend() {
+    let device = common::device::software_backend();
+    let (profile, n) = (Profile::load("paper").unwrap(), 500);
+    for (category, key) in
+        [(Category::CutIn, "2"), (Category::CutIn, "6"), (Category::CutOut, "b"), (Category::Lvd, "i")]
+    {
+        for kind in [DensityKind::Mixture, DensityKind::Copula] {
+            let id = Parameterization::find(category, key).unwrap();
+            let density = density_with(id, FitOptions { kind, ..FitOptions::default() });
+            for source in [SampleSource::Random, SampleSource::Sobol] {
+                let plan = plan_samples(&density, &density.mixture().unwrap(), &profile, &options(n, source)).unwrap();
+                let whole = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
+                assert!(whole == outcomes(&plan, &CpuBackend::scalar(), &[0, 7, n]), "{key} {kind:?} {source:?}");
+                if let Some(device) = &device {
+                    assert!(whole == outcomes(&plan, &**device, &[0, n / 3, n]), "{key} {kind:?} {source:?} device");
+                }
+                // A draw of the lanes is the host's draw of the mixture, transformed.
+                let generator = plan.generator().unwrap();
+                let valid = (0..n).map(|index| generator.draw(index)).filter(|drawn| !drawn.is_void());
+                for drawn in valid {
+                    let values: Vec<f64> =
+                        drawn.values[..density.space.dimensions()].iter().map(|v| f64::from(*v)).collect();
+                    assert!(density.mixture().unwrap().log_density(&density.latent(&values)).is_finite());
+                    assert_eq!(generator.points.component(0, drawn.tries), None, "a component is no scenario");
+                }
+            }
+        }
+    }
 }
 
 #[test]

@@ -273,3 +273,34 @@ fn wrong_words_and_sets_that_tell_nothing_are_answered_with_what_to_do() {
     let help = succeeds(&["compare", "--help"]);
     assert!(help.starts_with("Which parameterizations give the right risk") && help.contains("Examples:"), "{help}");
 }
+
+#[test]
+fn every_form_of_a_density_is_sampled_and_the_parts_of_the_uncertainty_sum_to_one() {
+    let dir = tempfile::tempdir().unwrap();
+    let [out, alone, density] = ["compared", "sampled", "density.json"].map(|name| dir.path().join(name));
+    let wanted =
+        ["--parameterizations", "i,iii", "--thw", "0.6", "--models", "FSM", "--samples", "3000", "--backend", "cpu"];
+    let printed = succeeds(&[&["-q", "compare", "--forms", "--out", text(&out)], &wanted[..], &SMALL[..]].concat());
+    assert!(printed.contains("unseen scenarios") && printed.contains("risk uncertain by"), "{printed}");
+    let record: serde_json::Value = serde_json::from_slice(&std::fs::read(out.join("compare.json")).unwrap()).unwrap();
+    let category = &record["categories"][0];
+    let parts = ["draws", "scenarios", "exposure", "form", "parameterization"];
+    let known: Vec<_> = category["uncertainty"].as_array().unwrap().iter().filter(|of| !of.is_null()).collect();
+    assert!(!known.is_empty());
+    for of in known {
+        let sum: f64 = parts.iter().map(|part| of[part].as_f64().unwrap()).sum();
+        assert!((sum - 1.0).abs() < 1e-9, "{of}");
+    }
+    // The same density, fitted and sampled by the other verbs, has the same rate.
+    let fit = ["-q", "fit", "--parameterizations", "i", "--density", "copula", "--out", text(&density)];
+    succeeds(&[&fit[..], &SMALL[..]].concat());
+    let sample = ["-q", "sample", text(&density), "--models", "FSM", "--thw", "0.6", "--samples", "3000"];
+    succeeds(&[&sample[..], &["--backend", "cpu", "--out", text(&alone)]].concat());
+    let cells = rows(&out.join("compare.csv"));
+    for row in rows(&alone.join("estimates.csv")) {
+        let is_same =
+            |cell: &&HashMap<String, String>| cell["parameterization"] == "i" && cell["criterion"] == row["criterion"];
+        let cell = cells.iter().find(is_same).unwrap();
+        assert_eq!(number(cell, "copula_rate"), number(&row, "probability"), "{}", row["criterion"]);
+    }
+}

@@ -48,6 +48,7 @@ fn dossier_under(
             study: study_options(category, model),
             parameterizations: vec![Parameterization::find(category, key).unwrap()],
             samples: 500,
+            every_form: false,
             seed: 157,
             enough: Enough::default(),
         },

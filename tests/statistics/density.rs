@@ -11,8 +11,8 @@ use lanesweep::scenario::parameterization::{
 };
 use lanesweep::scenario::{Case, Category, Lateral, Scenario, Side, Speed};
 use lanesweep::stats::density::{
-    Bandwidth, BandwidthRule, DensityModel, FitOptions, Kde, LeaveOneOut, ParameterSpace, SearchEnd, ValidFraction,
-    metric, normal_cdf, read_density, wasserstein, write_density,
+    Bandwidth, BandwidthRule, DensityKind, DensityModel, FitOptions, Kde, LeaveOneOut, ParameterSpace, SearchEnd,
+    ValidFraction, metric, normal_cdf, read_density, wasserstein, write_density,
 };
 use lanesweep::stats::random::Stream;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
@@ -504,11 +504,11 @@ fn the_valid_share_counts_what_the_density_says() {
     let kde = with_bandwidth(vec![vec![1.0, 0.5], vec![2.0, 3.0]], vec![1.0, 1.0], 1.0);
     let expected = 0.5 * (normal_cdf(1.0) * normal_cdf(0.5) + normal_cdf(2.0) * normal_cdf(3.0));
     assert!((probability(&kde, &[0.0; 2], &[f64::INFINITY; 2]) - expected).abs() < 1e-14);
-    let share = ValidFraction::count(&kde, &space, 100_000, 1).unwrap();
+    let share = ValidFraction::count(|stream, index| kde.draw(stream, index), &space, 100_000, 1).unwrap();
     assert!((share.estimate - expected).abs() < 0.006, "{} {expected}", share.estimate);
     assert!(share.low < expected && expected < share.high, "{share:?} {expected}");
     let nowhere = with_bandwidth(vec![vec![-100.0, -100.0]], vec![1.0, 1.0], 1.0);
-    assert!(ValidFraction::count(&nowhere, &space, 1000, 1).is_err());
+    assert!(ValidFraction::count(|stream, index| nowhere.draw(stream, index), &space, 1000, 1).is_err());
 }
 
 #[test]
@@ -623,4 +623,35 @@ fn scenarios_without_a_headway_are_left_out_of_a_density_with_it_and_counted() {
     assert_eq!(fitted.model.provenance.left_out, 1);
     assert_eq!(fitted.model.kde.points().len(), some.len() - 1);
     assert_eq!(fitted.model.exposure.unwrap().events, some.len() as u64);
+}
+
+#[test]
+fn mixtures_come_back_from_files_and_are_judged_by_unseen_scenarios() {
+    let place = lanesweep::Place::item("density");
+    for (category, key) in [(Category::CutIn, "1"), (Category::Lvd, "i")] {
+        let id = Parameterization::find(category, key).unwrap();
+        let fit = |kind| {
+            let options = FitOptions { kind, valid_draws: 20_000, ..FitOptions::default() };
+            DensityModel::fit(id.clone(), scenarios(), &facts(), &options).unwrap().model
+        };
+        let kernels = fit(DensityKind::Kernel);
+        for kind in [DensityKind::Mixture, DensityKind::Copula] {
+            let model = fit(kind);
+            let text = model.to_json().unwrap();
+            let read = DensityModel::from_json(&text, &place).unwrap();
+            assert_eq!((read.kind(), &read.transformed), (kind, &model.transformed));
+            assert_eq!(read.content_sha256().unwrap(), model.content_sha256().unwrap());
+            assert_ne!(model.content_sha256().unwrap(), kernels.content_sha256().unwrap());
+            assert_eq!(model.kde, kernels.kde, "the scenarios stay");
+            let of = |model: &DensityModel| model.representativeness.unwrap();
+            let (ours, theirs) = (of(&model), of(&kernels));
+            let gain = ours.log_likelihood.unwrap() - theirs.log_likelihood.unwrap();
+            assert!(gain.abs() < 3.0, "{key} {kind:?}: {gain} per scenario");
+            // Sets of one distribution are nearer to one another than ε allows for sets of two.
+            assert!((0.5..2.0).contains(&(ours.sinkhorn.unwrap() / theirs.sinkhorn.unwrap())), "{ours:?} {theirs:?}");
+            assert!((0.5..2.0).contains(&(ours.generated_test / theirs.generated_test)));
+            let broken = String::from_utf8(text).unwrap().replace("\"mixture\": {", "\"mixture\": {\"more\": 1,");
+            assert!(DensityModel::from_json(broken.as_bytes(), &place).is_err());
+        }
+    }
 }

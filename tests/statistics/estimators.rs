@@ -1,10 +1,11 @@
 //! What the estimators of rare failures promise, on problems whose probability is known. Coverage over many repeats:
 //! `tests/statistics/estimator_coverage.rs`.
 
-use lanesweep::stats::density::Mixture;
+use lanesweep::stats::density::{Mixture, normal_cdf};
 use lanesweep::stats::estimate::{
-    AdaptiveRun, BlockSums, Density, Goal, Importance, LimitState, Search, StandardNormal, Truncated, Verdict, Warning,
-    WeightSums, WeightedDraw, adaptive, defended, importance, importance_sums,
+    AdaptiveRun, BlockSums, Density, Enough, Goal, Importance, LimitState, Search, StandardNormal, Truncated, Verdict,
+    Warning, WeightSums, WeightedDraw, adaptive, defended, from_weight_sums, importance, importance_sums,
+    weighted_ratio,
 };
 
 use crate::common::reliability::{four_branch, four_branch_probability, linear, tail, two_sided, unit_mixture};
@@ -66,7 +67,7 @@ fn the_author_s_estimates_are_reproduced() {
 fn sums_of_a_proposal_are_the_same_bits_in_any_division_of_the_indices() {
     let density = StandardNormal { dimensions: 2 };
     let proposal = defended(Mixture::of_kernels(vec![vec![2.0, 2.0]], &[0.7, 0.7]).unwrap(), &density, 0.1).unwrap();
-    let of = |range| importance_sums(&density, &proposal, &linear(3.0), 9, range).unwrap().remove(0);
+    let of = |range| importance_sums(&density, &proposal, &linear(3.0), 9, range, &[]).unwrap().remove(0);
     let whole = of(0..20_000);
     let mut parts = of(7001..20_000);
     parts.merge(of(0..123)).unwrap();
@@ -206,4 +207,40 @@ fn a_search_without_failures_says_how_deep_it_looked_and_gives_no_probability() 
     let depth = run.search.questions[0].depth;
     assert!(depth < 2e-6, "{depth}");
     assert!(estimate.trust.warnings.contains(&Warning::NothingFound { depth }));
+}
+
+/// Two questions about the same points: x_0 > 3 and x_0 > 3.2.
+struct TwoLevels;
+
+impl LimitState for TwoLevels {
+    fn questions(&self) -> usize {
+        2
+    }
+
+    fn evaluate(&self, points: &[Vec<f64>]) -> lanesweep::Result<Vec<f64>> {
+        Ok(points.iter().flat_map(|point| [3.0 - point[0], 3.2 - point[0]]).collect())
+    }
+}
+
+#[test]
+fn the_ratio_of_two_questions_about_the_same_draws_is_known_better_than_either() {
+    let density = StandardNormal { dimensions: 2 };
+    let proposal = Mixture::of_kernels(vec![vec![3.2, 0.0]], &[1.0, 1.0]).unwrap();
+    let proposal = defended(proposal, &density, 0.1).unwrap();
+    let truth = normal_cdf(-3.2) / normal_cdf(-3.0);
+    let (repeats, mut held, mut narrower) = (300, 0, 0);
+    for seed in 0..repeats {
+        let sums = importance_sums(&density, &proposal, &TwoLevels, seed, 0..2000, &[[1, 0]]).unwrap();
+        let [near, far, both] = [0, 1, 2].map(|at| sums[at].total().unwrap());
+        let ratio = weighted_ratio([&far, &near, &both], Enough::default(), 0.95);
+        let (low, high) = ratio.interval().unwrap();
+        held += u64::from((low..=high).contains(&truth));
+        let width = |sums: &WeightSums| {
+            let interval = from_weight_sums(sums, false, 0.95).interval;
+            (interval.high / interval.low).ln()
+        };
+        narrower += u64::from((high / low).ln() < width(&far).hypot(width(&near)));
+    }
+    assert!((276..=297).contains(&held), "{held} of {repeats} intervals hold {truth}");
+    assert_eq!(narrower, repeats, "what the draws have in common cancels");
 }

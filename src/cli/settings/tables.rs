@@ -8,6 +8,7 @@ use crate::model::criterion::Criterion;
 use crate::model::driver::Bound;
 use crate::run::score::ScoreOptions;
 use crate::scenario::parameterization::{ParameterizationOptions, SvdLateral};
+use crate::stats::density::DensityKind;
 use crate::traffic::mining::MiningOptions;
 use crate::traffic::trajectory::generator::GeneratorOptions;
 
@@ -82,6 +83,8 @@ impl Default for RunSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct FitSettings {
+    /// Form of the density.
+    pub density: DensityKind,
     /// Search interval of the bandwidth.
     pub bandwidth_rule: BandwidthInterval,
     /// Sign of the lateral series of densities and of the replays that `compare` and `justify` compare with them.
@@ -97,6 +100,7 @@ impl Default for FitSettings {
     fn default() -> Self {
         let options = crate::stats::density::FitOptions::default();
         FitSettings {
+            density: options.kind,
             bandwidth_rule: BandwidthInterval::default(),
             svd_lateral: options.parameterization.svd_lateral,
             seed: options.seed,
@@ -147,7 +151,7 @@ pub struct SampleSettings {
     pub time_limit_s: Option<f64>,
     /// Worst lanes to list per model; 0 runs faster.
     pub worst: usize,
-    /// Defensive mixture weight: the weight of the density in the proposal of `is`.
+    /// Defensive mixture weight: the weight of the density in the proposal of `is` and of the rare rows of `auto`.
     #[schemars(extend("minimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub defensive_weight: f64,
     /// Seed of the draws.

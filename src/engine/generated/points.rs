@@ -1,6 +1,7 @@
-//! Sample index → point: a Gaussian mixture drawn with counter-based random words or with scrambled Sobol points, or
-//! a table of given points. Twin: `shaders/shared/points.wgsl`.
+//! Sample index → point: a Gaussian mixture drawn with counter-based random words or with scrambled Sobol points and
+//! then transformed parameter by parameter, or a table of given points. Twin: `shaders/shared/points.wgsl`.
 
+use crate::stats::density::{KNOT_LIMIT, PIECES};
 use crate::stats::random::{AliasTable, SOBOL_POINTS, Sobol, Stream, choose, standard_normal};
 
 /// Maximum number of parameters of a point.
@@ -55,6 +56,9 @@ pub struct Points {
     pub factor_of: Vec<u32>,
     /// Factors: `dimensions`² each, row by row, zeros above the diagonal.
     pub factors: Vec<f32>,
+    /// Value at each knot of a [transformation](crate::stats::density::Transformation), `PIECES` + 1 per parameter; empty
+    /// if draws of the mixture are points.
+    pub knots: Vec<f32>,
 }
 
 impl Points {
@@ -88,8 +92,11 @@ impl Points {
         DrawnPoint { values: [0.0; MAX_PARAMETERS], tries: ATTEMPTS + 1 }
     }
 
-    /// The component of draw `tries` (from 1) of an index. `None` for given points.
+    /// The kernel of draw `tries` (from 1) of an index. `None` for given points and for components that are no kernels.
     pub fn component(&self, index: u64, tries: u32) -> Option<u32> {
+        if !self.knots.is_empty() {
+            return None;
+        }
         let [a, b] = match &self.source {
             PointSource::Random(stream) => {
                 let [a, b, ..] = stream.words(index, tries.checked_sub(1)? * BLOCKS);
@@ -149,8 +156,27 @@ impl Points {
             }
             values[j] = value;
         }
+        for (value, knots) in values.iter_mut().zip(self.knots.chunks_exact(PIECES + 1)) {
+            *value = transformed(knots, *value);
+        }
         values
     }
+}
+
+/// Number of knots per unit of z.
+const KNOTS_PER_UNIT: f32 = PIECES as f32 / (2.0 * KNOT_LIMIT as f32);
+
+/// The linear piece between two knots; the outermost pieces continue.
+#[inline]
+fn transformed(knots: &[f32], z: f32) -> f32 {
+    let position = (z + KNOT_LIMIT as f32) * KNOTS_PER_UNIT;
+    let piece = match position {
+        _ if position >= (PIECES - 1) as f32 => PIECES - 1,
+        _ if position >= 1.0 => position as usize,
+        _ => 0,
+    };
+    let (left, right) = (knots[piece], knots[piece + 1]);
+    left + (right - left) * (position - piece as f32)
 }
 
 #[cfg(test)]
@@ -159,7 +185,7 @@ mod tests {
 
     fn points(source: PointSource) -> Points {
         let (means, factor_of) = (vec![1.0, 2.0, 3.0], vec![0, 0, 0]);
-        Points { source, dimensions: 1, weights: None, means, factor_of, factors: vec![1.0] }
+        Points { source, dimensions: 1, weights: None, means, factor_of, factors: vec![1.0], knots: Vec::new() }
     }
 
     #[test]

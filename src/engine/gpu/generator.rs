@@ -49,6 +49,8 @@ impl GeneratorSetup {
         numbers.extend(bits(&points.factors));
         let first_factor_of = numbers.len() as u32;
         numbers.extend(&points.factor_of);
+        let first_knot = numbers.len() as u32;
+        numbers.extend(bits(&points.knots));
         let [speed_stride, lateral_stride] = generator.table_entries();
         let mut generation = Generation {
             components: points.components(),
@@ -56,6 +58,8 @@ impl GeneratorSetup {
             first_mean,
             first_factor,
             first_factor_of,
+            first_knot,
+            transformed: u32::from(!points.knots.is_empty()),
             speed_stride,
             lateral_stride,
             ..Generation::default()

@@ -167,6 +167,10 @@ pub struct Generation {
     pub first_factor: u32,
     /// Offset of the components' factor indices.
     pub first_factor_of: u32,
+    /// Offset of the transformation's knots.
+    pub first_knot: u32,
+    /// 1 if draws are transformed.
+    pub transformed: u32,
     /// Entries of each sample in the table of speeds.
     pub speed_stride: u32,
     /// Entries of each sample in the table of lateral states.

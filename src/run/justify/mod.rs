@@ -21,7 +21,7 @@ use crate::run::sampling::ComparedCell;
 use crate::run::score::ScoreOptions;
 use crate::scenario::Scenario;
 use crate::scenario::parameterization::Parameterization;
-use crate::stats::density::Fitted;
+use crate::stats::density::{DensityKind, Fitted};
 use crate::support::ranges;
 use crate::traffic::DataProvenance;
 use crate::{Error, Place, Result};
@@ -194,7 +194,7 @@ pub fn justify(
     let example = hidden.first().map(|h| [runner.trace(&LaneKey { variant: 0, ..h.lane }), runner.trace(&h.lane)]);
     let (mut compared, mut density_sha256, mut coverage) = (None, None, None);
     let (mut no_density, mut left_out) = (None, Vec::new());
-    match replay.compare.fit(&id, true) {
+    match replay.compare.fit(&id, DensityKind::Kernel, true) {
         Ok(fitted) => {
             coverage = Some(Coverage::of(&fitted));
             left_out = fitted.left_out;

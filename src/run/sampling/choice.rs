@@ -127,7 +127,7 @@ impl Sample {
                 *old = row;
             }
         }
-        Ok(SampleResult { search: rare.search, proposal: rare.proposal, ..result })
+        Ok(SampleResult { ratios: rare.ratios, search: rare.search, proposal: rare.proposal, ..result })
     }
 
     fn is_row_of(&self, row: &EstimateRow, question: &Question) -> bool {

@@ -18,12 +18,13 @@ use super::plan::SampleHeadways;
 use super::rows::{EstimateRow, Risk};
 use super::sample_options::{Estimator, SampleOptions};
 use super::tally::SampleTally;
+use super::uncertainty::Uncertainty;
 use crate::engine::{Chunk, Confusion, Executor, LanePlan, Partial, SweepSummary};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::close_following::CloseFollowing;
 use crate::scenario::{Category, Scenario};
-use crate::stats::density::{DensityModel, Exposure};
+use crate::stats::density::{DensityKind, DensityModel, Exposure, Representativeness};
 use crate::stats::estimate::{
     Clusters, Enough, Estimate, Ratio, StopReason, cluster_rate, from_clusters, paired_ratio,
 };
@@ -144,7 +145,6 @@ pub struct SampledScenarios {
 ///
 /// # Errors
 /// As [`sample_crude`].
-/// As [`sample_crude`].
 pub fn sample_by_scenario(
     plan: &LanePlan,
     kernels: &[usize],
@@ -255,6 +255,45 @@ pub struct ComparedParameterization {
     pub voids: u64,
     /// Model × criterion.
     pub cells: Vec<ComparedCell>,
+    /// How well the density represents unseen scenarios; `None` unless other forms are compared.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub goodness: Option<Representativeness>,
+    /// Densities of other forms over the same scenarios; empty unless asked for.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub forms: Vec<ComparedForm>,
+}
+
+/// A density of another form.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct ComparedForm {
+    /// The form.
+    pub form: DensityKind,
+    /// SHA-256 of the density.
+    pub density_sha256: String,
+    /// Components of its mixture.
+    pub components: usize,
+    /// How well it represents unseen scenarios.
+    pub goodness: Option<Representativeness>,
+    /// Model × criterion, as in the comparison's cells; intervals of the draws alone.
+    pub rates: Vec<RateRecord>,
+}
+
+impl ComparedForm {
+    /// From the rows of a sample.
+    ///
+    /// # Errors
+    /// As [`DensityModel::content_sha256`].
+    pub fn of(density: &DensityModel, rows: &[EstimateRow]) -> Result<ComparedForm> {
+        let is_single = rows.iter().all(|row| row.headway != "all");
+        let overall = rows.iter().filter(|row| is_single || row.headway == "all");
+        Ok(ComparedForm {
+            form: density.kind(),
+            density_sha256: density.content_sha256()?,
+            components: density.components(),
+            goodness: density.representativeness,
+            rates: overall.map(|row| RateRecord::of(&row.estimate)).collect(),
+        })
+    }
 }
 
 /// One category.
@@ -272,6 +311,8 @@ pub struct CategoryComparison {
     pub close_following: Option<CloseFollowing>,
     /// Parameterizations, in the registry's order.
     pub parameterizations: Vec<ComparedParameterization>,
+    /// What the risk is uncertain by: model × criterion.
+    pub uncertainty: Vec<Option<Uncertainty>>,
 }
 
 /// Model and criterion of every cell, in order.

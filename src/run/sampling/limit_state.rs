@@ -9,7 +9,7 @@ use crate::engine::{Executor, Marks, Outcome, Wanted};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::stats::density::{DensityModel, Mixture};
+use crate::stats::density::{DensityKind, DensityModel, Mixture};
 use crate::stats::estimate::{KernelShares, LimitState, Truncated, defended, kernel_shares};
 
 /// Value far from any failure: the ego never closed in.
@@ -54,7 +54,7 @@ pub struct Question {
     pub headway: usize,
 }
 
-/// Lanes as a limit state with several questions. Each has three guides: the [limit state](limit_state()), the smallest
+/// Lanes as a limit state with several questions, over the points of the density's [mixture](DensityModel::mixture). Each has three guides: the [limit state](limit_state()), the smallest
 /// gap, and the reciprocal of the largest BTN. A creeping approach has a small TTC without danger; the others tell.
 pub struct LaneLimitState<'a> {
     density: &'a DensityModel,
@@ -119,7 +119,8 @@ impl LimitState for LaneLimitState<'_> {
     }
 
     fn evaluate(&self, points: &[Vec<f64>]) -> Result<Vec<f64>> {
-        let plan = plan_points(self.density, points, self.profile, &self.models, &self.headways)?;
+        let values: Vec<Vec<f64>> = points.iter().map(|point| self.density.values(point)).collect();
+        let plan = plan_points(self.density, &values, self.profile, &self.models, &self.headways)?;
         let lanes = self.models.len() * plan.headways.len();
         let mut values = Vec::with_capacity(3 * points.len() * self.questions.len());
         self.executor.sweep(&plan, 0..plan.unit_count(), Wanted::Outcomes, |chunk| {
@@ -137,16 +138,17 @@ impl LimitState for LaneLimitState<'_> {
     }
 }
 
-/// The density of a density file, truncated to its valid region.
+/// The density of a density file, truncated to its valid region, over the points of its [mixture](DensityModel::mixture).
 ///
 /// # Errors
 /// As [`Truncated::with_validity`].
 pub fn truncated(density: &DensityModel) -> Result<Truncated<impl Fn(&[f64]) -> bool + Sync + '_>> {
-    Truncated::with_validity(density.mixture()?, |point: &[f64]| density.space.is_valid(point), density.valid.estimate)
+    let is_valid = |point: &[f64]| density.space.is_valid(&density.values(point));
+    Truncated::with_validity(density.mixture()?, is_valid, density.valid.estimate)
 }
 
 /// Determines which scenarios failures come from, by draws of a proposal with the defensive mixture weight `defence`.
-/// `None` for a question without failing draws.
+/// `None` for a question without failing draws, and if the density is not over kernels.
 ///
 /// # Errors
 /// Those of the lanes.
@@ -156,6 +158,9 @@ pub fn scenario_shares(
     defence: f64,
     seed: u64,
 ) -> Result<Vec<Option<KernelShares>>> {
+    if lanes.density.kind() != DensityKind::Kernel {
+        return Ok(vec![None; lanes.questions()]);
+    }
     let nominal = truncated(lanes.density)?;
     let proposal = defended(proposal.clone(), &nominal, defence)?;
     kernel_shares(nominal.kernels(), &nominal, &proposal, lanes, seed)

@@ -25,8 +25,8 @@ mod weighted;
 pub use against_recorded::RecordedRatios;
 pub use choice::Choice;
 pub use compare::{
-    CategoryComparison, ComparedCell, ComparedParameterization, RateRecord, RecordedCell, ReplayedCell, SampledCell,
-    SampledScenarios, ScenarioCounts, compare_cells, kernel_scenarios, recorded_cells, sample_by_scenario,
+    CategoryComparison, ComparedCell, ComparedForm, ComparedParameterization, RateRecord, RecordedCell, ReplayedCell,
+    SampledCell, SampledScenarios, ScenarioCounts, compare_cells, kernel_scenarios, recorded_cells, sample_by_scenario,
 };
 pub use crude::{Checkpoint, CheckpointRow, CrudeRun, checkpoints, crude_of_segments, cuts, sample_crude, sample_into};
 pub use generator::{SAMPLE_PURPOSE, SampleSource, generator_of, generator_of_points};
@@ -34,7 +34,7 @@ pub use kernels::KernelCounts;
 pub(crate) use limit_state::marks_of;
 pub use limit_state::{LaneLimitState, Question, limit_state, scenario_shares, truncated};
 pub use map::{MAP_CELLS, MapAxes, MapAxis, MapCounts};
-pub use model_ratios::{ModelRatio, model_ratios};
+pub use model_ratios::ModelRatio;
 pub use plan::{Conditional, SampleHeadways, conditional, mixture_of, plan_points, plan_samples};
 use plan_file::{KIND, SEARCH_FILE};
 pub use proposal_file::{proposal_from_text, proposal_text, read_proposal};
@@ -230,6 +230,7 @@ impl Sample {
     /// The difference found.
     fn check_sums(&self, tally: &WeightedTally) -> std::result::Result<(), String> {
         let is_ours = tally.sums.iter().map(|(question, _)| *question).eq(self.options.asked());
+        let is_ours = is_ours && tally.pairs.len() == self.options.pairs().len();
         if is_ours { Ok(()) } else { Err("they answer other questions".to_owned()) }
     }
 

@@ -8,8 +8,9 @@ use crate::engine::generated::Generator;
 use crate::engine::{Block, CaseSource, Headway, LaneCase, LanePlan, Units};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
+use crate::model::scalar::Real;
 use crate::scenario::Tables;
-use crate::stats::density::{DensityModel, Mixture};
+use crate::stats::density::{DensityKind, DensityModel, Mixture};
 use crate::stats::random::SOBOL_POINTS;
 use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
@@ -65,7 +66,10 @@ pub fn plan_samples(
         let problem = format!("{samples} Sobol points are asked for, {SOBOL_POINTS} there are");
         return Err(Error::usage(place(), problem, "use independent random points beyond"));
     }
-    let generator = generator_of(&density.space, proposal, &density.sizes, profile, options.source, options.seed)?;
+    let mut generator = generator_of(&density.space, proposal, &density.sizes, profile, options.source, options.seed)?;
+    if let Some(of) = &density.transformed {
+        generator.points.knots = of.transformation.table().map(f32::from_f64).collect();
+    }
     plan(density, profile, generator, samples, &options.models, &options.headways)
 }
 
@@ -143,8 +147,12 @@ pub struct Conditional {
 /// The density given the values of these parameters, by name. The weight of each kernel is its density at the values.
 ///
 /// # Errors
-/// [`Error::Usage`] for an unknown or duplicate parameter, if all are given, or for a value outside the valid range.
+/// [`Error::Usage`] for a density that is not over kernels, an unknown or duplicate parameter, if all are given, or for a value outside the valid range.
 pub fn conditional(density: &DensityModel, given: &[(String, f64)]) -> Result<Conditional> {
+    if density.kind() != DensityKind::Kernel {
+        let problem = format!("a density of kind {} cannot be conditioned on a parameter", density.kind().key());
+        return Err(Error::usage(Place::option("given"), problem, "fit one of kind kernel"));
+    }
     refuse_repeats(|| Place::option("given"), given.iter().map(|(name, _)| (name, name)))?;
     let mut places: Vec<(usize, f64)> = Vec::new();
     for (name, value) in given {

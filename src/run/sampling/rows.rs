@@ -112,6 +112,8 @@ pub fn crude_rows(
                     row.failing_scenarios = Some(clusters.effective_failing);
                     row.risk = Risk::of(&row.estimate, exposure);
                     row = row.with_sources(of_draws, exposure);
+                } else {
+                    row = row.with_data(None, exposure);
                 }
                 rows.push(row);
             };

@@ -137,6 +137,17 @@ impl SampleOptions {
         self.models.iter().flat_map(|model| headways.clone().map(move |headway| (headway, model))).map(of).collect()
     }
 
+    /// Pairs of asked questions that differ in the driver model alone.
+    pub(super) fn pairs(&self) -> Vec<[usize; 2]> {
+        let asked = self.asked();
+        let is_pair = |[a, b]: &[usize; 2]| {
+            let (a, b) = (&asked[*a], &asked[*b]);
+            a.model != b.model && (a.criterion, a.headway) == (b.criterion, b.headway)
+        };
+        let all = (0..asked.len()).flat_map(|a| (a + 1..asked.len()).map(move |b| [a, b]));
+        all.filter(is_pair).collect()
+    }
+
     /// The accuracy that importance sampling aims at after its search; `None` if the number of draws is fixed.
     pub(super) fn goal(&self) -> Option<Goal> {
         self.stop.relative_half_width.map(|half_width| Goal { half_width, max_draws: self.stop.samples })

@@ -5,6 +5,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use super::crude::{CrudeRun, crude_of_segments, cuts, sample_into};
+use super::model_ratios::ModelRatio;
 use super::plan_file::SEARCH_FILE;
 use super::rows::EstimateRow;
 use super::sample_options::Estimator;
@@ -275,6 +276,8 @@ impl SampleRun<'_> {
 pub struct SampleResult {
     /// The estimates.
     pub rows: Vec<EstimateRow>,
+    /// Ratios of the rates of two models by importance sampling.
+    pub ratios: Vec<ModelRatio>,
     /// Counts and convergence of crude Monte Carlo.
     pub crude: Option<CrudeRun>,
     /// The rounds of the search.

@@ -6,13 +6,15 @@ use std::ops::Range;
 use serde::{Deserialize, Serialize};
 
 use super::limit_state::{LaneLimitState, Question, scenario_shares, truncated};
+use super::model_ratios::ModelRatio;
 use super::rows::EstimateRow;
 use super::sample_run::SampleResult;
 use super::{Estimator, Sample, Weighted};
 use crate::engine::{CpuBackend, Executor, lanes_within_seconds};
 use crate::run::parts::{Ledger, MergeableCounts};
 use crate::stats::estimate::{
-    BlockSums, Search, SearchRun, WeightSums, after_search, defended, from_weight_sums, importance_sums, search,
+    BlockSums, Enough, Search, SearchRun, WeightSums, after_search, defended, from_weight_sums, importance_sums,
+    search, weighted_ratio,
 };
 use crate::support::cancel::Cancel;
 use crate::{Error, Place, Result};
@@ -37,7 +39,7 @@ fn chunk_samples(step_cap: u32, lanes: u64, kernels: u64) -> u64 {
 impl Sample {
     /// Number of samples between two updates of the journal.
     pub(crate) fn chunk_samples(&self) -> u64 {
-        let kernels = self.density.kde.points().len();
+        let kernels = self.density.components();
         chunk_samples(self.profile.step_cap(), self.lanes_per_sample(), kernels as u64)
     }
 
@@ -87,8 +89,10 @@ impl Sample {
             let mut at = missing.start;
             while at < missing.end {
                 let next = (at / chunk + 1).saturating_mul(chunk).min(missing.end);
-                let sums = importance_sums(&nominal, &proposal, &lanes, self.options.seed, at..next)?;
-                ledger.add(WeightedTally { sums: self.options.asked().into_iter().zip(sums).collect() }, [0; 2])?;
+                let (asked, pairs) = (self.options.asked(), self.options.pairs());
+                let mut sums = importance_sums(&nominal, &proposal, &lanes, self.options.seed, at..next, &pairs)?;
+                let pairs = sums.split_off(asked.len());
+                ledger.add(WeightedTally { sums: asked.into_iter().zip(sums).collect(), pairs }, [0; 2])?;
                 progress(next - at);
                 at = next;
                 ledger.kept(executor.check_cancelled(at - units.start, units.end - units.start))?;
@@ -129,9 +133,21 @@ impl Sample {
             let row = EstimateRow::of_draws(question.model, question.criterion, headway, estimate, exposure);
             rows.push(row.with_data(shares.as_ref(), exposure));
         }
+        let of = |sums: &BlockSums<WeightSums>| sums.total().unwrap_or_default();
+        let ratio = |([a, b], both): ([usize; 2], &BlockSums<WeightSums>)| {
+            let ((question, ours), (other, theirs)) = (&tally.sums[a], &tally.sums[b]);
+            ModelRatio {
+                model: question.model,
+                other: other.model,
+                criterion: question.criterion,
+                headway: options.headway_name(question.headway),
+                ratio: weighted_ratio([&of(ours), &of(theirs), &of(both)], Enough::default(), options.level),
+            }
+        };
+        let ratios = options.pairs().into_iter().zip(&tally.pairs).map(ratio).collect();
         let proposal = weighted.search.as_ref().and_then(|search| search.proposal.clone());
         let search = weighted.search.as_ref().map(|search| search.rounds.clone()).unwrap_or_default();
-        Ok(SampleResult { rows, proposal, search, ..SampleResult::default() })
+        Ok(SampleResult { rows, ratios, proposal, search, ..SampleResult::default() })
     }
 }
 
@@ -142,6 +158,8 @@ impl Sample {
 pub struct WeightedTally {
     /// Question by question.
     pub sums: Vec<(Question, BlockSums<WeightSums>)>,
+    /// Draws that fail two questions: those of two models, for each criterion and headway.
+    pub pairs: Vec<BlockSums<WeightSums>>,
 }
 
 impl WeightedTally {
@@ -156,11 +174,14 @@ impl MergeableCounts for WeightedTally {
     }
 
     fn join(mut self, other: Self) -> Result<Self> {
-        if self.questions() != other.questions() {
+        if self.questions() != other.questions() || self.pairs.len() != other.pairs.len() {
             let help = "join only counts of one run: same density, proposal, flags and seed";
             return Err(Error::input(Place::item("weighted sums"), "they answer other questions", help));
         }
         for ((_, ours), (_, theirs)) in self.sums.iter_mut().zip(other.sums) {
+            ours.merge(theirs)?;
+        }
+        for (ours, theirs) in self.pairs.iter_mut().zip(other.pairs) {
             ours.merge(theirs)?;
         }
         Ok(self)
@@ -172,6 +193,12 @@ impl MergeableCounts for WeightedTally {
             if sums.ranges() != self.covered() {
                 let name = question.model.name();
                 return Err(format!("a question about {name} holds other samples than the first question"));
+            }
+        }
+        for sums in &self.pairs {
+            sums.check()?;
+            if sums.ranges() != self.covered() {
+                return Err("a pair of models holds other samples than the first question".to_owned());
             }
         }
         Ok(())
@@ -206,7 +233,7 @@ mod tests {
             WeightSums::from(WeightedDraw { weight, response, tries: 1, is_void: false, is_thin: false })
         };
         let sums = || BlockSums::of_leaves(range.start, &range.clone().map(leaf).collect::<Vec<_>>());
-        WeightedTally { sums: models.iter().map(|model| (question(model), sums())).collect() }
+        WeightedTally { sums: models.iter().map(|model| (question(model), sums())).collect(), pairs: vec![sums()] }
     }
 
     #[test]

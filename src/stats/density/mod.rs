@@ -17,6 +17,7 @@ pub(crate) mod moments;
 pub(crate) mod normal;
 mod parameters;
 mod representativeness;
+mod transformed;
 mod transport;
 mod valid;
 
@@ -32,5 +33,6 @@ pub(crate) use normal::Draws;
 pub use normal::{normal_cdf, normal_quantile};
 pub use parameters::{BoundedColumn, Invalid, ParameterSpace};
 pub use representativeness::{BETA, MAX_SET, REPETITIONS, Representativeness, metric};
+pub use transformed::{DensityKind, KNOT_LIMIT, PIECES, Transformation, TransformedMixture};
 pub use transport::wasserstein;
 pub use valid::{Refused, VALID_FRACTION_DRAWS, VALID_FRACTION_PURPOSE, ValidFraction};

@@ -14,9 +14,11 @@ use super::kde::Kde;
 use super::mixture::Mixture;
 use super::parameters::ParameterSpace;
 use super::representativeness::Representativeness;
+use super::transformed::{DensityKind, TransformedMixture};
 use super::valid::{VALID_FRACTION_DRAWS, ValidFraction};
 use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction, Sizes, SvdFit};
 use crate::scenario::{Category, Scenario};
+use crate::stats::random::Stream;
 use crate::traffic::{DataProvenance, Driven};
 use crate::{Error, Place, Result};
 
@@ -47,6 +49,8 @@ pub struct FitOptions {
     pub parameterization: ParameterizationOptions,
     /// The observed headway is the last parameter.
     pub with_thw: bool,
+    /// Form of the density.
+    pub kind: DensityKind,
     /// Interval of the bandwidth.
     pub rule: BandwidthRule,
     /// Number of draws for P_valid.
@@ -62,6 +66,7 @@ impl Default for FitOptions {
         FitOptions {
             parameterization: ParameterizationOptions::of_densities(),
             with_thw: false,
+            kind: DensityKind::Kernel,
             rule: BandwidthRule::Reduction,
             valid_draws: VALID_FRACTION_DRAWS,
             seed: 157,
@@ -75,8 +80,11 @@ impl Default for FitOptions {
 pub struct DensityModel {
     /// Parameters, valid region, point → case.
     pub space: ParameterSpace,
-    /// f̂, before truncation to the valid region.
+    /// The recorded points, and the kernel density over them: f̂ before truncation to the valid region, unless there is a
+    /// mixture.
     pub kde: Kde,
+    /// f̂ as a mixture of transformed parameters.
+    pub transformed: Option<TransformedMixture>,
     /// Fraction of f̂ inside the valid region.
     pub valid: ValidFraction,
     /// Mean sizes of the scenarios that it was fitted on, because sizes are not parameters.
@@ -154,15 +162,21 @@ impl DensityModel {
         }
         let names: Vec<&str> = space.parameters().iter().map(|p| p.name.as_str()).collect();
         let kde = Kde::fit(points, &names, options.rule).map_err(|error| named(error, &name()))?;
+        let transformed = TransformedMixture::fit(options.kind, kde.points(), space.parameters(), options.seed)
+            .map_err(|e| named(e, &name()))?;
+        let draw = |stream: &Stream, index: u64| match &transformed {
+            Some(mixture) => mixture.draw(stream, index),
+            None => kde.draw(stream, index),
+        };
         let valid =
-            ValidFraction::count(&kde, &space, options.valid_draws, options.seed).map_err(|e| named(e, &name()))?;
+            ValidFraction::count(draw, &space, options.valid_draws, options.seed).map_err(|e| named(e, &name()))?;
         let Some(sizes) = Sizes::mean(used.iter().copied()) else {
             return Err(Error::Internal(format!("{}: a density without scenarios", name())));
         };
         let mut not_compared = None;
         let mut representativeness = None;
         if options.representativeness {
-            match Representativeness::estimate(&space, &used, options.rule, options.seed) {
+            match Representativeness::estimate(&space, &used, options) {
                 Ok(found) => representativeness = Some(found),
                 Err(error @ Error::Input { .. }) => not_compared = Some(named(error, &name())),
                 Err(error) => return Err(error),
@@ -179,7 +193,8 @@ impl DensityModel {
         };
         let exposure = facts.driven.map(|driven| Exposure::new(kept.len() as u64, driven));
         let scenarios = used.into_iter().cloned().collect();
-        let model = DensityModel { space, kde, valid, sizes, exposure, representativeness, provenance, scenarios };
+        let model =
+            DensityModel { space, kde, transformed, valid, sizes, exposure, representativeness, provenance, scenarios };
         Ok(Fitted { model, left_out, not_compared })
     }
 
@@ -188,12 +203,39 @@ impl DensityModel {
         self.space.id().category
     }
 
-    /// f̂ as a mixture, not truncated.
+    /// Form of the density.
+    pub fn kind(&self) -> DensityKind {
+        self.transformed.as_ref().map_or(DensityKind::Kernel, |of| of.kind)
+    }
+
+    /// f̂ as a mixture, not truncated; over [transformed parameters](DensityModel::latent) unless its kind is `kernel`.
+    /// Proposals are over the same ones.
     ///
     /// # Errors
     /// None for a model that this type made or read.
     pub fn mixture(&self) -> Result<Mixture> {
-        self.kde.mixture()
+        self.transformed.as_ref().map_or_else(|| self.kde.mixture(), |of| Ok(of.mixture.clone()))
+    }
+
+    /// Parameters in their units, of a point of the [mixture](DensityModel::mixture).
+    pub fn values(&self, latent: &[f64]) -> Vec<f64> {
+        self.transformed.as_ref().map_or_else(|| latent.to_vec(), |of| of.transformation.values(latent))
+    }
+
+    /// The point of the [mixture](DensityModel::mixture) of parameters in their units.
+    pub fn latent(&self, values: &[f64]) -> Vec<f64> {
+        self.transformed.as_ref().map_or_else(|| values.to_vec(), |of| of.transformation.inverse(values))
+    }
+
+    /// ln |dx/dz| at a point of the [mixture](DensityModel::mixture): the density of the parameters in their units is the
+    /// mixture's over this.
+    pub fn log_slope(&self, latent: &[f64]) -> f64 {
+        self.transformed.as_ref().map_or(0.0, |of| of.transformation.log_slope(latent))
+    }
+
+    /// Components of the mixture.
+    pub fn components(&self) -> usize {
+        self.transformed.as_ref().map_or(self.kde.points().len(), |of| of.mixture.weights().len())
     }
 }
 

@@ -16,6 +16,7 @@ use super::kde::Kde;
 use super::model::{DensityModel, Exposure, Provenance};
 use super::parameters::ParameterSpace;
 use super::representativeness::Representativeness;
+use super::transformed::{TransformedMixture, TransformedRecord};
 use super::valid::ValidFraction;
 use crate::scenario::parameterization::{
     Parameter, Parameterization, ParameterizationOptions, Reduction, Sizes, SvdBasis,
@@ -63,6 +64,9 @@ struct File {
     basis: Option<Basis>,
     /// One row per scenario, in the order of the parameters.
     kernels: Vec<Vec<f64>>,
+    /// f̂, if it is not over the kernels.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    mixture: Option<TransformedRecord>,
     /// One scenario per kernel, with its recorded series; or an empty list.
     scenarios: Vec<Scenario>,
 }
@@ -111,6 +115,7 @@ impl File {
             options: space.options().clone(),
             basis,
             kernels: model.kde.points().to_vec(),
+            mixture: model.transformed.as_ref().map(TransformedMixture::record),
             scenarios: model.scenarios.clone(),
         };
         file.content_sha256 = file.hash()?;
@@ -205,9 +210,16 @@ impl File {
         if self.category == Category::CutOut && self.sizes.lead.is_none() {
             return wrong("sizes", "a cut-out needs the size of the vehicle ahead (`lead`)".to_owned());
         }
+        let d = space.dimensions();
+        let transformed = self.mixture.map(|record| TransformedMixture::from_record(record, d)).transpose();
+        let transformed = transformed.map_err(|error| match inside(place, error) {
+            Error::Input { place, problem, help } => Error::input(place.column("mixture"), problem, help),
+            other => other,
+        })?;
         Ok(DensityModel {
             space,
             kde,
+            transformed,
             valid: share,
             sizes: self.sizes,
             exposure: self.exposure,

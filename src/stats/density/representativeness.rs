@@ -8,18 +8,22 @@
 //! Kinematic parameterizations are compared as points divided by their scales, so their M can be compared only between
 //! runs of the same parameterization.
 //!
+//! The held-out log-likelihood of the test scenarios, and the Sinkhorn divergence between them and the drawn ones, tell
+//! apart densities of several kinds over the same parameters.
+//!
 //! W is exact. Sets larger than [`MAX_SET`] are replaced by random subsets of that size, on both
 //! sides: W of small sets is larger, for all terms of one table alike.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::bandwidth::BandwidthRule;
 use super::kde::Kde;
+use super::model::FitOptions;
 use super::moments::{scale_of, standard_deviation};
 use super::normal::Draws;
 use super::parameters::ParameterSpace;
-use super::transport::wasserstein;
+use super::transformed::TransformedMixture;
+use super::transport::{mean_distance, sinkhorn, wasserstein};
 use crate::scenario::Scenario;
 use crate::scenario::parameterization::Reduction;
 use crate::stats::random::Stream;
@@ -29,6 +33,8 @@ use crate::{Error, Place, Result};
 pub const BETA: f64 = 0.25;
 /// Maximum number of points of a set; larger sets are subsampled.
 pub const MAX_SET: usize = 256;
+/// ε of the Sinkhorn divergence, as a fraction of the mean distance between training and test scenarios.
+const SINKHORN_EPSILON: f64 = 0.05;
 /// Random splits.
 pub const REPETITIONS: usize = 5;
 /// Maximum number of draws per required valid scenario before a split fails.
@@ -50,6 +56,14 @@ pub struct Representativeness {
     pub generated_train: f64,
     /// W(train, test): the value that the same number of recorded scenarios reaches.
     pub train_test: f64,
+    /// Sinkhorn divergence between drawn and test scenarios, with ε = 0.05 of the mean distance between training and test
+    /// scenarios; `None` in files of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub sinkhorn: Option<f64>,
+    /// Mean log-likelihood of a test scenario under the density of the training scenarios, truncated to the valid region
+    /// [ln of 1 / product of the units]; `None` in files of earlier versions.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub log_likelihood: Option<f64>,
     /// Splits.
     pub repetitions: u64,
     /// Scenarios in the training part; as many are drawn.
@@ -78,11 +92,10 @@ impl Representativeness {
     pub fn estimate(
         space: &ParameterSpace,
         scenarios: &[&Scenario],
-        rule: BandwidthRule,
-        seed: u64,
+        options: &FitOptions,
     ) -> Result<Representativeness> {
         let test = (scenarios.len() / 5).max(1);
-        let split = |repetition: usize| one_split(space, scenarios, test, rule, seed, repetition as u32);
+        let split = |repetition: usize| one_split(space, scenarios, test, options, repetition as u32);
         let distances = (0..REPETITIONS).into_par_iter().map(split).collect::<Result<Vec<_>>>()?;
         let mean = |k: usize| distances.iter().map(|d| d[k]).sum::<f64>() / REPETITIONS as f64;
         let metrics: Vec<f64> = distances.iter().map(|d| combine(d[0], d[1])).collect();
@@ -92,24 +105,25 @@ impl Representativeness {
             generated_test: mean(0),
             generated_train: mean(1),
             train_test: mean(2),
+            sinkhorn: Some(mean(3)),
+            log_likelihood: Some(mean(4)),
             repetitions: REPETITIONS as u64,
             train: (scenarios.len() - test) as u64,
             test: test as u64,
-            seed,
+            seed: options.seed,
         })
     }
 }
 
-/// W(gen, test), W(gen, train), W(train, test) of one split.
+/// W(gen, test), W(gen, train), W(train, test), the Sinkhorn divergence and the log-likelihood of one split.
 fn one_split(
     space: &ParameterSpace,
     scenarios: &[&Scenario],
     test: usize,
-    rule: BandwidthRule,
-    seed: u64,
+    options: &FitOptions,
     repetition: u32,
-) -> Result<[f64; 3]> {
-    let stream = Stream { seed, purpose: PURPOSE + repetition };
+) -> Result<[f64; 5]> {
+    let stream = Stream { seed: options.seed, purpose: PURPOSE + repetition };
     // Index 0 of the stream shuffles, the others draw.
     let mut shuffled = scenarios.to_vec();
     let mut draws = Draws::new(stream, 0);
@@ -122,11 +136,20 @@ fn one_split(
     let points = |set: &[&Scenario]| set.iter().map(|s| fitted.point(s)).collect::<Result<Vec<_>>>();
     let train_points = points(train)?;
     let names: Vec<&str> = space.parameters().iter().map(|p| p.name.as_str()).collect();
-    let kde = Kde::fit(train_points.clone(), &names, rule)?;
+    let kde = Kde::fit(train_points.clone(), &names, options.rule)?;
+    let mixture = TransformedMixture::fit(options.kind, &train_points, fitted.parameters(), options.seed)?;
+    let draw = |index: u64| mixture.as_ref().map_or_else(|| kde.draw(&stream, index), |of| of.draw(&stream, index));
+    let kernels = kde.mixture()?;
+    let log_density =
+        |point: &Vec<f64>| mixture.as_ref().map_or_else(|| kernels.log_density(point), |of| of.log_density(point));
+    let log_likelihoods: Vec<f64> = points(test)?.par_iter().map(log_density).collect();
     let (train, test) = (&train[..train.len().min(MAX_SET)], &test[..test.len().min(MAX_SET)]);
     let max_draws = MAX_TRIES * train.len() as u64;
-    let valid = (1..=max_draws).map(|index| kde.draw(&stream, index)).filter(|x| fitted.is_valid(x)).take(train.len());
-    let generated: Vec<Vec<f64>> = valid.collect();
+    let (mut generated, mut draws) = (Vec::new(), 0);
+    while generated.len() < train.len() && draws < max_draws {
+        draws += 1;
+        generated.extend(Some(draw(draws)).filter(|x| fitted.is_valid(x)));
+    }
     if generated.len() < train.len() {
         return Err(Error::input(
             Place::item("representativeness"),
@@ -134,6 +157,8 @@ fn one_split(
             "nearly all of the density lies outside of the bounds: look at the scenarios",
         ));
     }
+    let log_valid = libm::log(generated.len() as f64 / draws as f64);
+    let log_likelihood = log_likelihoods.iter().sum::<f64>() / log_likelihoods.len() as f64 - log_valid;
     let (generated, train, test) = match space.reduction() {
         // The same metric for all splits: the weights of the fit on all scenarios.
         Some(all) => {
@@ -170,5 +195,7 @@ fn one_split(
             (divide(generated), divide(points(train)?), divide(points(test)?))
         }
     };
-    Ok([wasserstein(&generated, &test), wasserstein(&generated, &train), wasserstein(&train, &test)])
+    let divergence = sinkhorn(&generated, &test, SINKHORN_EPSILON * mean_distance(&train, &test));
+    let distances = [(&generated, &test), (&generated, &train), (&train, &test)].map(|(a, b)| wasserstein(a, b));
+    Ok([distances[0], distances[1], distances[2], divergence, log_likelihood])
 }

@@ -1,4 +1,4 @@
-//! W: the exact optimal transport between two sets of points with equal weights and Euclidean distance
+//! Distances between sets of points. W: the exact optimal transport between two sets of points with equal weights and Euclidean distance
 //! (Wasserstein distance of order 1).
 //!
 //! Masses are integers (each point of one set has the size of the other set over their greatest common divisor), so
@@ -12,11 +12,60 @@ pub fn wasserstein(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
         (false, false) => {}
         _ => return f64::INFINITY,
     }
-    let distance = |p: &[f64], q: &[f64]| p.iter().zip(q).map(|(p, q)| (p - q) * (p - q)).sum::<f64>().sqrt();
     let cost: Vec<f64> = a.iter().flat_map(|p| b.iter().map(move |q| distance(p, q))).collect();
     let mut transport = Transport::new(cost, a.len(), b.len());
     transport.solve();
     transport.mean_cost()
+}
+
+fn distance(p: &[f64], q: &[f64]) -> f64 {
+    p.iter().zip(q).map(|(p, q)| (p - q) * (p - q)).sum::<f64>().sqrt()
+}
+
+/// Mean distance between the points of two sets.
+pub(super) fn mean_distance(a: &[Vec<f64>], b: &[Vec<f64>]) -> f64 {
+    a.iter().flat_map(|p| b.iter().map(|q| distance(p, q))).sum::<f64>() / (a.len() * b.len()) as f64
+}
+
+/// Maximum number of iterations of [`sinkhorn`].
+const ITERATIONS: usize = 1000;
+/// Change of the potentials, relative to ε, that ends the iterations.
+const PRECISION: f64 = 1e-6;
+
+/// Sinkhorn divergence between two sets of points with equal weights and Euclidean distance: the transport with entropic
+/// regularization ε > 0, less half of that of each set to itself. It is 0 for equal sets, and W for ε → 0 (Feydy et al.,
+/// "Interpolating between optimal transport and MMD using Sinkhorn divergences", AISTATS 2019).
+pub fn sinkhorn(a: &[Vec<f64>], b: &[Vec<f64>], epsilon: f64) -> f64 {
+    regularized(a, b, epsilon) - 0.5 * (regularized(a, a, epsilon) + regularized(b, b, epsilon))
+}
+
+/// The dual value of the regularized transport, by alternating updates of its potentials in the log domain.
+fn regularized(a: &[Vec<f64>], b: &[Vec<f64>], epsilon: f64) -> f64 {
+    let cost: Vec<Vec<f64>> = a.iter().map(|p| b.iter().map(|q| distance(p, q) / epsilon).collect()).collect();
+    let across: Vec<Vec<f64>> = (0..b.len()).map(|j| cost.iter().map(|row| row[j]).collect()).collect();
+    // −ln of the mean of exp(potential − cost), row by row.
+    let update = |cost: &[Vec<f64>], potential: &[f64]| -> Vec<f64> {
+        let of_row = |row: &Vec<f64>| {
+            let parts = || row.iter().zip(potential).map(|(cost, potential)| potential - cost);
+            let top = parts().fold(f64::NEG_INFINITY, f64::max);
+            let sum: f64 = parts().map(|part| libm::exp(part - top)).sum();
+            libm::log(row.len() as f64) - top - libm::log(sum)
+        };
+        cost.iter().map(of_row).collect()
+    };
+    let mut of_a = vec![0.0; a.len()];
+    let mut of_b = vec![0.0; b.len()];
+    for _ in 0..ITERATIONS {
+        of_b = update(&across, &of_a);
+        let next = update(&cost, &of_b);
+        let change = next.iter().zip(&of_a).map(|(new, old)| (new - old).abs()).fold(0.0, f64::max);
+        of_a = next;
+        if change < PRECISION {
+            break;
+        }
+    }
+    let mean = |of: &[f64]| of.iter().sum::<f64>() / of.len() as f64;
+    epsilon * (mean(&of_a) + mean(&of_b))
 }
 
 fn greatest_common_divisor(a: usize, b: usize) -> usize {
@@ -164,7 +213,7 @@ impl Transport {
 
 #[cfg(test)]
 mod tests {
-    use super::wasserstein;
+    use super::{sinkhorn, wasserstein};
 
     fn line(values: &[f64]) -> Vec<Vec<f64>> {
         values.iter().map(|v| vec![*v]).collect()
@@ -183,6 +232,17 @@ mod tests {
         };
         assert!((wasserstein(&a, &b) - area).abs() < 1e-14);
         assert!((wasserstein(&b, &a) - area).abs() < 1e-14);
+    }
+
+    #[test]
+    fn a_sinkhorn_divergence_is_0_for_equal_sets_and_w_for_a_small_epsilon() {
+        let a = vec![vec![1.0, 2.0], vec![-3.0, 0.5], vec![4.0, 4.0], vec![0.0, 1.0]];
+        let b = vec![vec![0.5, 2.5], vec![-2.0, 0.0], vec![6.0, 4.0]];
+        let w = wasserstein(&a, &b);
+        assert!(sinkhorn(&a, &a, 0.5).abs() < 1e-9);
+        assert!((sinkhorn(&a, &b, 0.05) / w - 1.0).abs() < 0.02);
+        let wide = sinkhorn(&a, &b, 1.0);
+        assert!(wide > 0.0 && wide < w && (wide - sinkhorn(&b, &a, 1.0)).abs() < 1e-4 * w, "{wide}");
     }
 
     #[test]

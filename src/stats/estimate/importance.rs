@@ -104,8 +104,8 @@ impl Importance {
     }
 }
 
-/// Draws, evaluates and weights a range of indices; returns the sums of every question. Sums of disjoint ranges merge to
-/// those of their union, bit for bit.
+/// Draws, evaluates and weights a range of indices; returns the sums of every question, then those of every pair of
+/// questions, over the draws that fail both. Sums of disjoint ranges merge to those of their union, bit for bit.
 ///
 /// # Errors
 /// Those of the limit state.
@@ -115,25 +115,28 @@ pub fn importance_sums(
     limit_state: &dyn LimitState,
     seed: u64,
     indices: Range<u64>,
+    pairs: &[[usize; 2]],
 ) -> Result<Vec<BlockSums<WeightSums>>> {
     let stream = Stream { seed, purpose: purpose::PROPOSAL };
     let (questions, guides) = (limit_state.questions(), limit_state.guides());
-    let mut sums: Vec<BlockSums<WeightSums>> = vec![BlockSums::default(); questions];
+    let asked: Vec<[usize; 2]> = (0..questions).map(|question| [question; 2]).chain(pairs.iter().copied()).collect();
+    let mut sums: Vec<BlockSums<WeightSums>> = vec![BlockSums::default(); asked.len()];
     for batch in batches(indices) {
         let mut draws = draw(proposal, stream, batch.clone());
         let points: Vec<Vec<f64>> = draws.iter_mut().flatten().map(|drawn| std::mem::take(&mut drawn.point)).collect();
         let values = evaluate_checked(limit_state, &points)?;
         let ratio = |point: &Vec<f64>| libm::exp(nominal.log_density(point) - proposal.log_density(point));
         let ratios: Vec<f64> = points.par_iter().map(ratio).collect();
-        for (question, sums) in sums.iter_mut().enumerate() {
+        for (of, sums) in asked.iter().zip(&mut sums) {
             let mut valid = 0;
             let leaf = |drawn: &Option<Draw>| {
                 let Some(drawn) = drawn else { return WeightedDraw::void().into() };
-                let (ratio, value) = (ratios[valid], values[(valid * questions + question) * guides]);
+                let value = |question: &usize| values[(valid * questions + question) * guides];
+                let (ratio, fails) = (ratios[valid], of.iter().all(|question| value(question) <= 0.0));
                 valid += 1;
                 WeightedDraw {
                     weight: ratio / nominal.validity_fraction(),
-                    response: f64::from(u8::from(value <= 0.0)),
+                    response: f64::from(u8::from(fails)),
                     tries: drawn.tries,
                     is_void: false,
                     is_thin: ratio > Warning::THIN_RATIO,
@@ -192,12 +195,24 @@ pub fn importance(
     limit_state: &dyn LimitState,
     options: &Importance,
 ) -> Result<Vec<Estimate>> {
-    let sums = importance_sums(nominal, proposal, limit_state, options.seed, 0..options.samples)?;
+    let sums = importance_sums(nominal, proposal, limit_state, options.seed, 0..options.samples, &[])?;
     let of = |sums: &BlockSums<WeightSums>| {
         let total = sums.total().unwrap_or_default();
         from_weight_sums(&total, options.self_normalised, options.level)
     };
     Ok(sums.iter().map(of).collect())
+}
+
+/// The estimate from points that another program drew. `log_ratios` holds ln f − ln g of each: f is the density of the
+/// question, normalized over its valid region (−∞ outside), g the density that the points were drawn from.
+pub fn importance_of_points(log_ratios: &[f64], fails: &[bool], level: f64) -> Estimate {
+    let leaf = |(log_ratio, fails): (&f64, &bool)| {
+        let weight = libm::exp(*log_ratio);
+        let (response, is_thin) = (f64::from(u8::from(*fails && weight > 0.0)), weight > Warning::THIN_RATIO);
+        WeightedDraw { weight, response, tries: 1, is_void: false, is_thin }.into()
+    };
+    let leaves: Vec<WeightSums> = log_ratios.iter().zip(fails).map(leaf).collect();
+    from_weight_sums(&BlockSums::of_leaves(0, &leaves).total().unwrap_or_default(), false, level)
 }
 
 /// The error if no draw is valid.

@@ -4,6 +4,7 @@
 use serde::Serialize;
 
 use super::interval::{Interval, IntervalKind, rule_of_three, student_factor, student_quantile, wilson};
+use super::weights::WeightSums;
 
 /// Runs and failures, one number per cluster; both slices have the same length.
 #[derive(Debug, Clone, Copy)]
@@ -145,6 +146,8 @@ pub enum RatioMethod {
     Paired,
     /// The interval of one rate divided by that of the other: too few failing clusters for the logarithm.
     Separate,
+    /// Student's t on the logarithm, over weighted draws: without the uncertainty of the data.
+    Draws,
 }
 
 /// Requirements of a verdict: failing clusters on each side for the paired interval, and a margin for agreement.
@@ -179,6 +182,20 @@ pub struct Ratio {
 }
 
 impl Ratio {
+    /// From the standard deviation of the logarithm.
+    fn of_logarithm(ratio: f64, sigma: f64, freedom: f64, method: RatioMethod, enough: Enough, level: f64) -> Ratio {
+        let finite = |v: f64| v.is_finite().then_some(v);
+        let factor = libm::exp(student_quantile(0.5 + 0.5 * level, freedom) * sigma);
+        let (low, high) = (ratio / factor, ratio * factor);
+        let verdict = match () {
+            () if low >= 1.0 / enough.margin && high <= enough.margin => RatioVerdict::Agrees,
+            () if low > 1.0 => RatioVerdict::TooHigh,
+            () if high < 1.0 => RatioVerdict::TooLow,
+            () => RatioVerdict::Undecided,
+        };
+        Ratio { ratio: Some(ratio), low: finite(low), high: finite(high), method, verdict }
+    }
+
     /// Both ends; the upper end is ∞ if the denominator never fails and the numerator does.
     pub fn interval(&self) -> Option<(f64, f64)> {
         let open = self.low.filter(|low| self.ratio.is_none() && *low > 0.0);
@@ -217,16 +234,24 @@ pub fn paired_ratio(numerator: Clusters, denominator: Clusters, enough: Enough, 
     let squares: f64 = pairs.map(|(z, y)| (z / p - y / s) * (z / p - y / s)).sum();
     let sigma = (n / (n - 1.0) * squares).sqrt();
     let freedom = numerator.failing().min(denominator.failing()) as f64 - 1.0;
-    let factor = libm::exp(student_quantile(0.5 + 0.5 * level, freedom) * sigma);
-    let ratio = p / s;
-    let (low, high) = (ratio / factor, ratio * factor);
-    let verdict = match () {
-        () if low >= 1.0 / enough.margin && high <= enough.margin => RatioVerdict::Agrees,
-        () if low > 1.0 => RatioVerdict::TooHigh,
-        () if high < 1.0 => RatioVerdict::TooLow,
-        () => RatioVerdict::Undecided,
-    };
-    Ratio { ratio: Some(ratio), low: finite(low), high: finite(high), method: RatioMethod::Paired, verdict }
+    Ratio::of_logarithm(p / s, sigma, freedom, RatioMethod::Paired, enough, level)
+}
+
+/// The ratio of two probabilities from the same weighted draws (common random numbers); `both` has the sums over the
+/// draws that fail both questions. Delta method on the logarithm.
+pub fn weighted_ratio([numerator, denominator, both]: [&WeightSums; 3], enough: Enough, level: f64) -> Ratio {
+    let (p, s, tries) = (numerator.unbiased(), denominator.unbiased(), numerator.tries as f64);
+    if p <= 0.0 || s <= 0.0 {
+        let ratio = (s > 0.0).then_some(0.0);
+        let (method, verdict) = (RatioMethod::Draws, RatioVerdict::Undecided);
+        return Ratio { ratio, low: None, high: None, method, verdict };
+    }
+    let covariance = both.failing_squared / (tries * tries) - p * s / tries;
+    let own = numerator.unbiased_variance() / (p * p) + denominator.unbiased_variance() / (s * s);
+    let sigma = (own - 2.0 * covariance / (p * s)).max(0.0).sqrt();
+    let effective = |sums: &WeightSums| sums.figures().effective_size_failures;
+    let freedom = effective(numerator).min(effective(denominator)) - 1.0;
+    Ratio::of_logarithm(p / s, sigma, freedom, RatioMethod::Draws, enough, level)
 }
 
 #[cfg(test)]

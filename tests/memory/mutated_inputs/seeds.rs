@@ -173,7 +173,7 @@ impl Seeds {
             run_sha256: "00".to_owned(),
             units: WEIGHTED_UNITS,
             lanes_redone_and_rechecked: [0; 2],
-            segments: vec![WeightedTally { sums }],
+            segments: vec![WeightedTally { sums, pairs: Vec::new() }],
         };
         let study = plans::plan(&[(Category::CutIn, 2, &["1"]), (Category::Lvd, 2, &["i"])]);
         let lane = |lane: u64| (lanesweep::engine::Verdicts((lane % 16) as u8), lane as f64 / 8.0);
