@@ -225,6 +225,7 @@ def fit(
     categories: Values | None = None,
     parameterizations: Values | None = None,
     with_thw: bool = False,
+    density: Value | None = None,
     no_comparison: bool = False,
     without_scenarios: bool = False,
     bandwidth_rule: Value | None = None,
@@ -261,6 +262,9 @@ def fit(
         decelerations.
     with_thw : bool
         Add the observed time headway as a parameter (thw_s).
+    density : Value, default kernel
+        Form of the density.
+        One of kernel, mixture, copula.
     no_comparison : bool
         Skip the comparison of drawn with unseen scenarios.
     without_scenarios : bool
@@ -295,6 +299,7 @@ def fit(
             ('categories', categories, True),
             ('parameterizations', parameterizations, True),
             ('with-thw', with_thw, False),
+            ('density', density, False),
             ('no-comparison', no_comparison, False),
             ('without-scenarios', without_scenarios, False),
             ('bandwidth-rule', bandwidth_rule, False),
@@ -500,6 +505,7 @@ def compare(
     models: Models | None = None,
     profile: Value | None = None,
     samples: Value | None = None,
+    forms: bool = False,
     dt: Value | None = None,
     dry_run: bool = False,
     config: Values | None = None,
@@ -547,6 +553,8 @@ def compare(
         takes jrc-2021 unless it is set.
     samples : Value, default 20000
         Samples of each density; each runs from every headway.
+    forms : bool
+        Sample Gaussian mixtures and copulas too, to see what the form of the density changes.
     dt : Value, s
         Time step [default: the profile's].
     dry_run : bool
@@ -586,6 +594,7 @@ def compare(
             ('models', models, True),
             ('profile', profile, False),
             ('samples', samples, False),
+            ('forms', forms, False),
             ('dt', dt, False),
             ('dry-run', dry_run, False),
             ('config', config, False),

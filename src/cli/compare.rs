@@ -50,7 +50,7 @@ pub struct Compare {
     models: lists::ModelsFlag,
     #[command(flatten)]
     headways: lists::HeadwaysFlag,
-    /// Sample Gaussian mixtures and copulas too: what does the form of the density change?
+    /// Sample Gaussian mixtures and copulas too, to see what the form of the density changes
     #[arg(long, help_heading = "Models and criteria", hide_short_help = true)]
     forms: bool,
     /// Print lanes, memory and estimated time; write nothing
