@@ -11,7 +11,7 @@ use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{LaneLimitState, Question, SAMPLE_PURPOSE, SampleHeadways, truncated};
 use lanesweep::stats::density::{DensityModel, read_density};
 use lanesweep::stats::estimate::{
-    BinomialInterval, Counts, Density as _, LimitState as _, StopReason, from_counts, importance_of_points,
+    BinomialInterval, Counts, Density as _, LimitState as _, StopReason, Warning, from_counts, importance_of_points,
 };
 use lanesweep::stats::random::Stream;
 use lanesweep::{Error, Place, Result};
@@ -217,6 +217,8 @@ impl LimitState {
         watched(py, None, None, move || {
             let fails: Vec<bool> =
                 opened.values_or_infinite(points.clone())?.iter().map(|value| *value <= 0.0).collect();
+            let is_valid = |point: &&Vec<f64>| opened.density.space.is_valid(point);
+            let valid = points.iter().filter(is_valid).count() as u64;
             let estimate = match logs {
                 Some(logs) => {
                     let ratios: Vec<f64> =
@@ -224,10 +226,11 @@ impl LimitState {
                     importance_of_points(&ratios, &fails, level)
                 }
                 None => {
-                    let valid = points.iter().filter(|point| opened.density.space.is_valid(point)).count() as u64;
                     let failures = fails.iter().filter(|fails| **fails).count() as u64;
                     let counts = Counts { runs: valid, failures, voids: 0, tries: points.len() as u64 };
-                    from_counts(&counts, BinomialInterval::Wilson, level, StopReason::Samples)
+                    let mut estimate = from_counts(&counts, BinomialInterval::Wilson, level, StopReason::Samples);
+                    estimate.trust.warnings.push(Warning::DataLeftOut);
+                    estimate
                 }
             };
             let warnings = estimate.trust.warnings.iter().map(ToString::to_string).collect::<Vec<_>>();
@@ -237,7 +240,7 @@ impl LimitState {
                 "high": estimate.interval.high,
                 "level": level,
                 "points": points.len(),
-                "valid": estimate.runs,
+                "valid": valid,
                 "failures": estimate.failures,
                 "effective_size": estimate.weights.map(|weights| weights.effective_size_failures),
                 "mean_weight": estimate.weights.map(|weights| weights.mean_weight),

@@ -24,7 +24,7 @@ use crate::{Error, Place, Result};
 
 /// How are the parameters of scenarios distributed?
 ///
-/// Fits a kernel density to the kept scenarios of each category under each parameterization. Computes the physically
+/// Fits a density to the kept scenarios of each category under each parameterization. Computes the physically
 /// possible fraction of each density, how often such scenarios occur, and how well drawn scenarios represent unseen
 /// real ones. Writes one density file per parameterization. Without data it uses generated recordings. Tables go to
 /// stdout, files to --out.

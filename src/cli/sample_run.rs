@@ -13,7 +13,7 @@ use crate::engine::{Chunk, Executor, OpenBackend};
 use crate::report::lanes;
 use crate::report::sampling::{EstimateFile, HostRecord};
 use crate::run::parts::PLAN_FILE;
-use crate::run::sampling::{self, SampleKind, SampleOptions, SampleResult, SampleSource, conditional};
+use crate::run::sampling::{self, EstimateRow, SampleKind, SampleOptions, SampleResult, SampleSource, conditional};
 use crate::stats::density::read_density;
 use crate::stats::estimate::{Search, StopRule};
 use crate::support::atomic_file::StagedFile;
@@ -177,6 +177,18 @@ impl Sample {
             tracing::info!("importance sampling of what is rare");
             let search = Search { defence: self.settings.defensive_weight, ..Search::default() };
             result = sample.refined(result, &search, half_width, executor)?;
+        }
+        if let Some(asked) = self.settings.half_width {
+            let of_criterion = |row: &&EstimateRow| row.criterion == self.settings.criterion && row.headway != "all";
+            let rows: Vec<&EstimateRow> = result.rows.iter().filter(of_criterion).collect();
+            let wider = rows.iter().filter(|row| row.draws_half_width() > asked).count();
+            if wider > 0 {
+                tracing::warn!(
+                    "{wider} of {} did not reach the half-width of {asked}: its weights vary more than the search foresaw, or \
+                     the maximum number of samples ended it",
+                    counted(rows.len(), "row")
+                );
+            }
         }
         let host = HostRecord::of(opened, result.rechecked_lanes, started);
         let mut results = run.results()?;

@@ -279,9 +279,9 @@ impl CompareFile {
 
     /// What the risk of a category is uncertain by, over all its parameterizations and forms.
     fn uncertainty(&self, category: &CategoryComparison) -> String {
-        let rows: Vec<(&RecordedCell, &Uncertainty)> =
-            category.recorded.iter().zip(&category.uncertainty).filter_map(|(s, of)| Some((s, of.as_ref()?))).collect();
-        if rows.is_empty() {
+        let rows: Vec<(&RecordedCell, Option<&Uncertainty>)> =
+            category.recorded.iter().zip(&category.uncertainty).map(|(s, of)| (s, of.as_ref())).collect();
+        if rows.iter().all(|(_, of)| of.is_none()) {
             return String::new();
         }
         type Pick = fn(&Uncertainty) -> Option<f64>;
@@ -296,16 +296,20 @@ impl CompareFile {
         let table = Table::of(rows)
             .column("risk uncertain by", |(s, _)| s.model.name())
             .column("criterion", |(s, _)| s.criterion.key())
-            .column(Column::from("factor").digits(Digits::Significant(3)), |(_, of)| libm::exp(z * of.deviation))
+            .column(Column::from("factor").digits(Digits::Significant(3)).null("-"), |(_, of)| {
+                of.map(|of| libm::exp(z * of.deviation))
+            })
             .columns(
                 parts,
                 |(name, _)| Column::from(format!("{name} %")).digits(Digits::Fixed(0)).null("-"),
-                |(_, of), (_, pick)| pick(of).map(|part| 100.0 * part),
+                |(_, of), (_, pick)| of.and_then(pick).map(|part| 100.0 * part),
             );
         let rule = format!(
-            "Factor: the {:.0} % interval of the risk is about from 1/factor to factor times it, if neither the form of the \
-             density nor the parameterization is given. The parts are those of the variance of its logarithm; form and \
-             parameterization are the spread of the densities' rates over them, less the draws.",
+            "Factor: the {:.0} % interval of the risk, whichever of the densities above it comes from, is about from 1/factor \
+             to factor times their geometric mean. The parts are those of the variance of its logarithm; form and \
+             parameterization (- where only one was sampled) are the spread of the densities' rates, less the draws: rough \
+             figures, because they rest on a few choices. A rate without failures counts as its upper bound, so it \
+             understates the spread; - in a whole row: no density fails.",
             100.0 * self.level
         );
         format!("\n{}{}\n", table.build().text(), wrap(&rule, WIDTH))
@@ -323,7 +327,7 @@ impl CompareFile {
             "A cell is: failed share of the lanes, its ratio to S, the ratio's {:.0} % interval, verdict. = agrees: the \
              interval lies within {:.2} … {margin}. > too high, < too low: it lies on one side of 1 and reaches \
              beyond. ? undecided: it contains 1 and is wider. Also undecided: one side has fewer than {clusters} \
-             failing scenarios, and the intervals of both rates overlap. S' is replayed, density is drawn. \
+             failing scenarios, and the intervals of both rates overlap. S' is replayed, density is drawn{}. \
              S /h and S /1000 km are its failures per hour and distance driven ± one standard deviation, {}. Scenarios are the clusters of every interval; S, S' and the densities rest on the same scenarios, \
              so the ratio is taken scenario by scenario, and what hard or easy scenarios do to both sides cancels. It \
              says whether these scenarios are represented, not whether they are enough. Of cells whose ratio is 1, at \
@@ -331,6 +335,11 @@ impl CompareFile {
              have the ratios of the rates: S and densities have the same exposure.",
             100.0 * self.level,
             1.0 / margin,
+            match self.categories.iter().flat_map(|of| &of.parameterizations).any(|of| !of.forms.is_empty()) {
+                true =>
+                    " (Gaussian kernels), mixture and copula are other forms of it: n of it is their rate over the density's",
+                false => "",
+            },
             if self.is_observed() { "from the recorded gaps" } else { "from headways that are imposed, not observed" }
         );
         wrap(&text, WIDTH)

@@ -26,20 +26,21 @@ pub fn text(model: &DensityModel) -> String {
     if let Some(of) = &model.transformed {
         let _ = writeln!(text, "form       {} of {}", of.kind.key(), counted(of.mixture.weights().len(), "component"));
     }
-    let bandwidth = model.kde.bandwidth();
-    let end = match bandwidth.end {
-        SearchEnd::Inside => "",
-        SearchEnd::Lower => "; the search ended at the rule's lower end",
-        SearchEnd::Upper => "; the search ended at the rule's upper end",
-    };
-    let _ = writeln!(
-        text,
-        "{}  {} (rule `{}`; Silverman's {}){end}",
-        if model.transformed.is_some() { "kernels  " } else { "bandwidth" },
-        short(bandwidth.value),
-        bandwidth.rule.key(),
-        short(bandwidth.silverman)
-    );
+    if model.transformed.is_none() {
+        let bandwidth = model.kde.bandwidth();
+        let end = match bandwidth.end {
+            SearchEnd::Inside => "",
+            SearchEnd::Lower => "; the search ended at the rule's lower end",
+            SearchEnd::Upper => "; the search ended at the rule's upper end",
+        };
+        let _ = writeln!(
+            text,
+            "bandwidth  {} (rule `{}`; Silverman's {}){end}",
+            short(bandwidth.value),
+            bandwidth.rule.key(),
+            short(bandwidth.silverman)
+        );
+    }
     let valid = &model.valid;
     let _ = writeln!(
         text,
@@ -95,7 +96,7 @@ fn parameters(model: &DensityModel) -> Table {
         .column(number("mean"), |(j, _)| mean(values(j)))
         .column(number("deviation"), |(j, _)| standard_deviation(&values(j)))
         .column(number("scale"), |(j, _)| model.kde.scale()[j])
-        .column(number("kernel"), |(j, _)| model.kde.spread()[j])
+        .column(number("kernel").null("-"), |(j, _)| model.transformed.is_none().then(|| model.kde.spread()[j]))
         .column("valid", |(_, parameter)| parameter.bounds_text())
         .build()
 }
@@ -147,8 +148,9 @@ fn compared(r: &Representativeness) -> String {
     if let (Some(sinkhorn), Some(log_likelihood)) = (r.sinkhorn, r.log_likelihood) {
         let _ = writeln!(
             text,
-            "held out   log-likelihood {} per scenario; Sinkhorn divergence {}",
+            "held out   log-likelihood {} ± {} per scenario, larger is better; Sinkhorn divergence {}, smaller is better",
             short(log_likelihood),
+            short(r.log_likelihood_deviation.unwrap_or(0.0)),
             short(sinkhorn)
         );
     }
@@ -168,7 +170,7 @@ pub fn summary(models: &[&DensityModel]) -> String {
         .column("density", |model| format!("{} {}", model.space.id().category.label(), model.space.id().key))
         .column("parameters", |model| model.space.dimensions())
         .column("scenarios", |model| model.kde.points().len())
-        .column(number("bandwidth"), |model| model.kde.bandwidth().value)
+        .column(number("bandwidth").null("-"), |model| model.transformed.is_none().then(|| model.kde.bandwidth().value))
         .column(number("P_valid").digits(Digits::Fixed(4)), |model| model.valid.estimate)
         .columns(
             distances,

@@ -334,9 +334,10 @@ impl EstimateFile {
         {
             let _ = writeln!(
                 text,
-                "Probabilities below {} (one in {} scenarios) come from the tails of the density's kernels, not from data",
+                "Probabilities below {} (one in {} scenarios) come from the tails of the density{}, not from data",
                 short(resolved),
-                count_of(self.density.kernels)
+                count_of(self.density.kernels),
+                if self.density.form == Some(DensityKind::Kernel) { "'s kernels" } else { "" }
             );
         }
         if self.density.provenance.synthetic {

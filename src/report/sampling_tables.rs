@@ -254,7 +254,7 @@ impl EstimateFile {
 
     /// What the ratio to recorded scenarios and the verdict mean; `None` without a comparison.
     pub(super) fn recorded_rule(&self) -> Option<&'static str> {
-        self.estimates.iter().any(|row| row.recorded.is_some()).then_some(
+        self.estimates.iter().any(|row| row.recorded.is_some_and(|of| of.sampled.is_some())).then_some(
             "P/S: rate of the samples over that of the recorded scenarios (S), from the same headways; = agrees, > too \
              high, < too low, ? undecided (intervals: estimates.csv). Sound: no warning, and S' (the same scenarios under this parameterization) and \
              the samples both fail as often as S to within a quarter: the intervals of S'/S and P/S lie within 0.80 to 1.25. \

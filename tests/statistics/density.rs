@@ -5,6 +5,7 @@ use crate::common;
 
 use std::sync::OnceLock;
 
+use lanesweep::run::sampling::{proposal_from_text, proposal_text};
 use lanesweep::scenario::parameterization::{
     Family, Kinematic, LaneChange, Parameterization, ParameterizationOptions, Reduction, SeriesScale, Sizes,
     SpeedProfile, SvdLateral, Variable, fit_svd,
@@ -650,6 +651,11 @@ fn mixtures_come_back_from_files_and_are_judged_by_unseen_scenarios() {
             // Sets of one distribution are nearer to one another than ε allows for sets of two.
             assert!((0.5..2.0).contains(&(ours.sinkhorn.unwrap() / theirs.sinkhorn.unwrap())), "{ours:?} {theirs:?}");
             assert!((0.5..2.0).contains(&(ours.generated_test / theirs.generated_test)));
+            // Proposals of other densities are over other coordinates.
+            let proposal = |of: &DensityModel| proposal_text(of, &of.mixture().unwrap()).unwrap();
+            let accepted = |text: String, by: &DensityModel| proposal_from_text(text.as_bytes(), by, &place).is_ok();
+            assert!(accepted(proposal(&model), &model) && accepted(proposal(&kernels), &kernels));
+            assert!(!accepted(proposal(&model), &kernels) && !accepted(proposal(&kernels), &model));
             let broken = String::from_utf8(text).unwrap().replace("\"mixture\": {", "\"mixture\": {\"more\": 1,");
             assert!(DensityModel::from_json(broken.as_bytes(), &place).is_err());
         }

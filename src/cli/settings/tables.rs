@@ -83,7 +83,8 @@ impl Default for RunSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct FitSettings {
-    /// Form of the density.
+    /// Form of the density. Intervals of a mixture or copula cover the draws alone, and they have no ratio to recorded
+    /// scenarios.
     pub density: DensityKind,
     /// Search interval of the bandwidth.
     pub bandwidth_rule: BandwidthInterval,

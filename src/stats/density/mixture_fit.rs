@@ -2,6 +2,7 @@
 //! proposals and for densities: few components, full covariances.
 
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 
 use super::Mixture;
 use super::moments::{factor_or_diagonal, moments};
@@ -21,9 +22,9 @@ const JITTER: f64 = 1e-6;
 pub struct FitOptions {
     /// Maximum number of components, ≥ 1; fewer where the points do not carry them.
     pub components: usize,
-    /// Choose among 1, 2, 3, 4, 6, 8, 12, … up to `components` by the likelihood of held-out points: each half of the
-    /// points is fitted and predicts the other. Otherwise exactly `components`.
-    pub choose: bool,
+    /// Choose among 1, 2, 3, 4, 6, 8, 12, … up to `components` by the likelihood of held-out points: so many parts of the
+    /// points are predicted by fits to the others. Below 2 there is no choice: exactly `components`.
+    pub folds: usize,
     /// Maximum number of iterations for each number of components.
     pub iterations: usize,
     /// End when the mean log-likelihood grows by less than this in an iteration.
@@ -34,7 +35,7 @@ pub struct FitOptions {
 
 impl Default for FitOptions {
     fn default() -> Self {
-        FitOptions { components: 4, choose: true, iterations: 50, tolerance: 1e-3, seed: 0 }
+        FitOptions { components: 4, folds: 2, iterations: 50, tolerance: 1e-3, seed: 0 }
     }
 }
 
@@ -65,7 +66,7 @@ impl Mixture {
         let kept: Vec<(&[f64], f64)> =
             points.iter().zip(weights).filter(|(_, w)| **w > 0.0).map(|(p, w)| (p.as_slice(), w / total)).collect();
         let sample = Weighted::of(kept, d);
-        let components = if options.choose { sample.chosen(options)? } else { options.components };
+        let components = if options.folds > 1 { sample.chosen(options)? } else { options.components };
         sample.expectation_maximisation(components, options).map(|fit| fit.0)
     }
 }
@@ -105,20 +106,21 @@ impl<'a> Weighted<'a> {
         if candidates.len() < 2 {
             return Ok(1);
         }
-        let half = |odd: usize| {
-            let own: Vec<(&[f64], f64)> = self.points.iter().copied().skip(odd).step_by(2).collect();
+        let part = |fold: usize, is_held_out: bool| {
+            let own = self.points.iter().enumerate().filter(|(at, _)| (at % options.folds == fold) == is_held_out);
+            let own: Vec<(&[f64], f64)> = own.map(|(_, point)| *point).collect();
             let total: f64 = own.iter().map(|(_, weight)| weight).sum();
             Weighted::of(own.into_iter().map(|(point, weight)| (point, weight / total)).collect(), self.d)
         };
-        let halves = [half(0), half(1)];
-        let held_out = |odd: usize, components: usize| -> Result<f64> {
-            let mixture = halves[odd].expectation_maximisation(components, options)?.0;
-            Ok(halves[1 - odd].points.iter().map(|(point, weight)| weight * mixture.log_density(point)).sum::<f64>())
+        let parts: Vec<[Weighted; 2]> = (0..options.folds).map(|fold| [part(fold, false), part(fold, true)]).collect();
+        let held_out = |[fitted, held_out]: &[Weighted; 2], components: usize| -> Result<f64> {
+            let mixture = fitted.expectation_maximisation(components, options)?.0;
+            Ok(held_out.points.iter().map(|(point, weight)| weight * mixture.log_density(point)).sum::<f64>())
         };
         let (mut best, mut worse) = ((f64::NEG_INFINITY, 1), 0);
         for components in candidates {
-            let (one, other) = rayon::join(|| held_out(0, components), || held_out(1, components));
-            let score = 0.5 * (one? + other?);
+            let scores = parts.par_iter().map(|part| held_out(part, components)).collect::<Result<Vec<f64>>>()?;
+            let score = scores.iter().sum::<f64>() / scores.len() as f64;
             worse += 1;
             if score > best.0 + MIN_GAIN {
                 (best, worse) = ((score, components), 0);
@@ -266,7 +268,7 @@ mod tests {
         let stream = Stream { seed: 4, purpose: 2 };
         let points: Vec<Vec<f64>> = (0..500).map(|i| three().draw(&stream, i, 0)).collect();
         let weights: Vec<f64> = (0..500).map(|i| f64::from(1 + i % 3)).collect();
-        let one = FitOptions { components: 1, choose: false, ..FitOptions::default() };
+        let one = FitOptions { components: 1, folds: 0, ..FitOptions::default() };
         let weighted = Mixture::fit(&points, &weights, &one).unwrap();
         let total: f64 = weights.iter().sum();
         let mean: f64 = points.iter().zip(&weights).map(|(p, w)| p[0] * w).sum::<f64>() / total;

@@ -162,8 +162,8 @@ impl DensityModel {
         }
         let names: Vec<&str> = space.parameters().iter().map(|p| p.name.as_str()).collect();
         let kde = Kde::fit(points, &names, options.rule).map_err(|error| named(error, &name()))?;
-        let transformed = TransformedMixture::fit(options.kind, kde.points(), space.parameters(), options.seed)
-            .map_err(|e| named(e, &name()))?;
+        let transformed =
+            TransformedMixture::fit(options.kind, kde.points(), space.parameters()).map_err(|e| named(e, &name()))?;
         let draw = |stream: &Stream, index: u64| match &transformed {
             Some(mixture) => mixture.draw(stream, index),
             None => kde.draw(stream, index),

@@ -64,6 +64,9 @@ pub struct Representativeness {
     /// [ln of 1 / product of the units]; `None` in files of earlier versions.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub log_likelihood: Option<f64>,
+    /// Its standard deviation over the splits, ddof 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub log_likelihood_deviation: Option<f64>,
     /// Splits.
     pub repetitions: u64,
     /// Scenarios in the training part; as many are drawn.
@@ -107,6 +110,7 @@ impl Representativeness {
             train_test: mean(2),
             sinkhorn: Some(mean(3)),
             log_likelihood: Some(mean(4)),
+            log_likelihood_deviation: Some(standard_deviation(&distances.iter().map(|d| d[4]).collect::<Vec<_>>())),
             repetitions: REPETITIONS as u64,
             train: (scenarios.len() - test) as u64,
             test: test as u64,
@@ -137,7 +141,7 @@ fn one_split(
     let train_points = points(train)?;
     let names: Vec<&str> = space.parameters().iter().map(|p| p.name.as_str()).collect();
     let kde = Kde::fit(train_points.clone(), &names, options.rule)?;
-    let mixture = TransformedMixture::fit(options.kind, &train_points, fitted.parameters(), options.seed)?;
+    let mixture = TransformedMixture::fit(options.kind, &train_points, fitted.parameters())?;
     let draw = |index: u64| mixture.as_ref().map_or_else(|| kde.draw(&stream, index), |of| of.draw(&stream, index));
     let kernels = kde.mixture()?;
     let log_density =

@@ -60,8 +60,12 @@ pub const PIECES: usize = 256;
 const CLEARANCE: f64 = 0.01;
 /// Minimum slope of a transformation, relative to the parameter's scale.
 const MIN_SLOPE: f64 = 1e-9;
+/// Tail probabilities below this tell no quantile.
+const RESOLVED: f64 = 1e-13;
 /// Maximum number of components.
 const COMPONENTS: usize = 32;
+/// Parts of the points of which each is held out once, to choose the number of components.
+const FOLDS: usize = 5;
 
 /// T: one increasing function per parameter, linear between knots.
 #[derive(Debug, Clone, PartialEq)]
@@ -163,17 +167,12 @@ pub(super) struct TransformedRecord {
 }
 
 impl TransformedMixture {
-    /// Fits to points of these parameters; the number of components is chosen by held-out likelihood. `None` for
-    /// [`DensityKind::Kernel`], which has no mixture.
+    /// Fits to points of these parameters; the number of components is chosen by the likelihood of held-out fifths. `None`
+    /// for [`DensityKind::Kernel`], which has no mixture.
     ///
     /// # Errors
     /// [`Error::Input`] for a parameter that is equal in all points, or on the wrong side of its bound.
-    pub fn fit(
-        kind: DensityKind,
-        points: &[Vec<f64>],
-        parameters: &[Parameter],
-        seed: u64,
-    ) -> Result<Option<TransformedMixture>> {
+    pub fn fit(kind: DensityKind, points: &[Vec<f64>], parameters: &[Parameter]) -> Result<Option<TransformedMixture>> {
         if kind == DensityKind::Kernel {
             return Ok(None);
         }
@@ -183,8 +182,7 @@ impl TransformedMixture {
         let first = margins.iter().map(|margin| margin.knots(kind, normal_tails)).collect();
         let first = Transformation::new(first)?;
         let z: Vec<Vec<f64>> = points.iter().map(|point| first.inverse(point)).collect();
-        let options =
-            FitOptions { components: COMPONENTS, iterations: 200, tolerance: 1e-5, seed, ..FitOptions::default() };
+        let options = FitOptions { components: COMPONENTS, folds: FOLDS, iterations: 200, tolerance: 1e-5, seed: 0 };
         let mixture = Mixture::fit(&z, &vec![1.0; z.len()], &options)?;
         let transformation = match kind {
             DensityKind::Copula => {
@@ -317,17 +315,33 @@ impl Margin {
 
     /// T at the knots, where z has these tail probabilities.
     fn knots(&self, kind: DensityKind, tails: impl Fn(f64) -> [f64; 2] + Sync) -> Vec<f64> {
-        Transformation::tabulated(self.unit, |z| match kind {
-            DensityKind::Copula => self.value(self.smoothed_quantile(tails(z))),
-            _ => self.value(z),
+        // Further out, the probabilities tell no quantile: the outermost slopes go on.
+        let is_resolved = |at: &usize| tails(knot(*at)).into_iter().all(|tail| tail > RESOLVED);
+        let resolved: Vec<usize> = (0..=PIECES).filter(is_resolved).collect();
+        let (DensityKind::Copula, Some(first), Some(last)) = (kind, resolved.first(), resolved.last()) else {
+            return Transformation::tabulated(self.unit, |z| self.value(z));
+        };
+        let quantile = |at: usize| self.smoothed_quantile(tails(knot(at)));
+        let slope = |a: usize, b: usize| (quantile(b) - quantile(a)) / (knot(b) - knot(a)).max(f64::MIN_POSITIVE);
+        let inner = (last - first).min(4);
+        let ([first, last], slopes) = ([*first, *last], [slope(*first, first + inner), slope(last - inner, *last)]);
+        let ends = [quantile(first), quantile(last)];
+        Transformation::tabulated(self.unit, |z| {
+            let standard = match z {
+                _ if z < knot(first) => ends[0] + slopes[0] * (z - knot(first)),
+                _ if z > knot(last) => ends[1] + slopes[1] * (z - knot(last)),
+                _ => self.smoothed_quantile(tails(z)),
+            };
+            self.value(standard)
         })
     }
 
     /// The quantile of the smoothed distribution; `tails` are the probabilities below and above it.
     fn smoothed_quantile(&self, [below, above]: [f64; 2]) -> f64 {
         let is_low = below < above;
+        let reach = 9.0 * self.smoothing;
         let (mut low, mut high) =
-            (self.sorted[0] - 9.0 * self.smoothing, self.sorted[self.sorted.len() - 1] + 9.0 * self.smoothing);
+            ((self.sorted[0] - reach).min(-9.0), (self.sorted[self.sorted.len() - 1] + reach).max(9.0));
         for _ in 0..50 {
             let middle = 0.5 * (low + high);
             let is_too_high = if is_low { self.tail(middle, 1.0) > below } else { self.tail(middle, -1.0) < above };
@@ -336,14 +350,15 @@ impl Margin {
         0.5 * (low + high)
     }
 
-    /// Probability below (`side` = 1) or above (−1) in the smoothed distribution.
+    /// Probability below (`side` = 1) or above (−1) in the smoothed distribution. One more normal distribution, with the
+    /// spread of all values and the weight of one of them, keeps values beyond the recorded ones possible.
     fn tail(&self, at: f64, side: f64) -> f64 {
         let reach = 9.0 * self.smoothing;
         let from = self.sorted.partition_point(|value| *value < at - reach);
         let until = self.sorted.partition_point(|value| *value <= at + reach);
         let certain = if side > 0.0 { from } else { self.sorted.len() - until };
         let near = self.sorted[from..until].iter().map(|value| normal_cdf(side * (at - value) / self.smoothing));
-        (certain as f64 + near.sum::<f64>()) / self.sorted.len() as f64
+        (certain as f64 + near.sum::<f64>() + normal_cdf(side * at)) / (self.sorted.len() + 1) as f64
     }
 }
 
@@ -372,7 +387,7 @@ mod tests {
 
     fn fitted(kind: DensityKind) -> TransformedMixture {
         let (points, parameters) = points();
-        TransformedMixture::fit(kind, &points, &parameters, 1).unwrap().unwrap()
+        TransformedMixture::fit(kind, &points, &parameters).unwrap().unwrap()
     }
 
     #[test]

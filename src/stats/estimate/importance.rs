@@ -208,11 +208,14 @@ pub fn importance(
 pub fn importance_of_points(log_ratios: &[f64], fails: &[bool], level: f64) -> Estimate {
     let leaf = |(log_ratio, fails): (&f64, &bool)| {
         let weight = libm::exp(*log_ratio);
-        let (response, is_thin) = (f64::from(u8::from(*fails && weight > 0.0)), weight > Warning::THIN_RATIO);
-        WeightedDraw { weight, response, tries: 1, is_void: false, is_thin }.into()
+        let response = f64::from(u8::from(*fails && weight > 0.0));
+        // No defensive part is known, so no weight tells where the proposal is thin.
+        WeightedDraw { weight, response, tries: 1, is_void: false, is_thin: false }.into()
     };
     let leaves: Vec<WeightSums> = log_ratios.iter().zip(fails).map(leaf).collect();
-    from_weight_sums(&BlockSums::of_leaves(0, &leaves).total().unwrap_or_default(), false, level)
+    let mut estimate = from_weight_sums(&BlockSums::of_leaves(0, &leaves).total().unwrap_or_default(), false, level);
+    estimate.trust.warn_if(true, Warning::DataLeftOut);
+    estimate
 }
 
 /// The error if no draw is valid.
