@@ -236,10 +236,10 @@ def fit(
 ) -> Result:
     """How are the parameters of scenarios distributed?
 
-    Fits a kernel density to the kept scenarios of each category under each parameterization. Computes the
-    physically possible fraction of each density, how often such scenarios occur, and how well drawn scenarios
-    represent unseen real ones. Writes one density file per parameterization. Without data it uses generated
-    recordings. Tables go to stdout, files to --out.
+    Fits a density to the kept scenarios of each category under each parameterization. Computes the physically
+    possible fraction of each density, how often such scenarios occur, and how well drawn scenarios represent unseen
+    real ones. Writes one density file per parameterization. Without data it uses generated recordings. Tables go to
+    stdout, files to --out.
 
     Parameters
     ----------
@@ -263,7 +263,8 @@ def fit(
     with_thw : bool
         Add the observed time headway as a parameter (thw_s).
     density : Value, default kernel
-        Form of the density.
+        Form of the density. Intervals of a mixture or copula cover the draws alone, and they have no ratio to
+        recorded scenarios.
         One of kernel, mixture, copula.
     no_comparison : bool
         Skip the comparison of drawn with unseen scenarios.
