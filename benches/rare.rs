@@ -6,10 +6,11 @@
 //! cargo bench --bench rare -- textbook 200             # a row per problem and seed
 //! ```
 //!
-//! A fourth argument selects the cases whose name contains it. `LANESWEEP_SUMO` and `LANESWEEP_DLR_HT` name folders of
+//! A fourth argument selects the cases whose name contains it; a fifth is the first seed of the repeats instead of 1000. `LANESWEEP_SUMO` and `LANESWEEP_DLR_HT` name folders of
 //! recordings in highD's format; without one, its cases are left out, with a line on stderr.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::PathBuf;
 use std::time::Instant;
 
@@ -48,6 +49,9 @@ const CASES: [(&str, Category, &str, ModelId, f64); 15] = [
     ("dlr", Category::Lvd, "iv", ModelId::Reg157, 2.0),
 ];
 
+/// The first seed of repeats.
+const FIRST_SEED: u64 = 1000;
+
 struct Case {
     name: String,
     density: DensityModel,
@@ -66,6 +70,7 @@ fn main() {
         }
         "repeats" => {
             let truths = truths(at(2));
+            let first = if at(4).is_empty() { FIRST_SEED } else { number(at(4)) };
             println!("{HEADING}");
             for case in cases(at(3)) {
                 let Some(truth) = truths.get(&case.name) else { continue };
@@ -74,14 +79,26 @@ fn main() {
                 let question = Question { model: case.model, criterion: Criterion::Collision, headway: 0 };
                 let executor = Executor::new(&backend);
                 let lanes = LaneLimitState::new(&case.density, &profile, &case.headways, &[question], executor);
-                repeats(&case.name, *truth, &truncated(&case.density).expect("a density"), &lanes, number(at(1)));
+                repeats(
+                    &case.name,
+                    *truth,
+                    &truncated(&case.density).expect("a density"),
+                    &lanes,
+                    first..first + number(at(1)),
+                );
             }
         }
         "textbook" => {
             println!("{HEADING}");
             for (name, truth, dimensions, limit_state) in problems() {
                 if name.contains(at(3)) {
-                    repeats(&name, truth, &StandardNormal { dimensions }, &*limit_state, number(at(1)));
+                    repeats(
+                        &name,
+                        truth,
+                        &StandardNormal { dimensions },
+                        &*limit_state,
+                        FIRST_SEED..FIRST_SEED + number(at(1)),
+                    );
                 }
             }
         }
@@ -151,10 +168,10 @@ fn truths(path: &str) -> BTreeMap<String, f64> {
 
 const HEADING: &str = "case,truth,seed,probability,low,high,coefficient_of_variation,runs,rounds,depth,verdict,seconds";
 
-fn repeats(name: &str, truth: f64, nominal: &dyn Density, limit_state: &dyn LimitState, repeats: u64) {
+fn repeats(name: &str, truth: f64, nominal: &dyn Density, limit_state: &dyn LimitState, seeds: Range<u64>) {
     let goal = Goal { half_width: 0.2, max_draws: 1_000_000 };
     let (mut held, mut errors, mut runs) = (0, Vec::new(), Vec::new());
-    for seed in 1000..1000 + repeats {
+    for seed in seeds {
         let started = Instant::now();
         let run = adaptive(nominal, limit_state, &Search::default(), &goal, seed, 0.95).expect("an estimate");
         let estimate = &run.estimates[0];
@@ -180,7 +197,7 @@ fn repeats(name: &str, truth: f64, nominal: &dyn Density, limit_state: &dyn Limi
     let middle = runs.len() / 2;
     eprintln!(
         "{name}: truth {truth:.3e}, held {:.1} %, median error {:.1} %, runs {} (max {})",
-        100.0 * held as f64 / repeats as f64,
+        100.0 * held as f64 / errors.len() as f64,
         100.0 * errors[middle],
         runs[middle],
         runs[runs.len() - 1]
