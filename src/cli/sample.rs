@@ -89,6 +89,9 @@ pub struct Sample {
     /// Several are mixed with equal weights.
     #[arg(long, value_name = "FILE", help_heading = "Data")]
     pub(super) proposal: Vec<PathBuf>,
+    /// Also run the samples under this profile and write ratios to profiles.csv (mc)
+    #[arg(long, value_name = "NAME|FILE", conflicts_with_all = ["plan", "distribution", "shard", "plan_only"], help_heading = "Models and criteria", hide_short_help = true)]
+    pub(super) other_profile: Option<String>,
     /// Intervals of all rows hold together at --level (Bonferroni), not each on its own
     #[arg(long, conflicts_with = "plan", help_heading = "Output", hide_short_help = true)]
     pub(super) simultaneous: bool,

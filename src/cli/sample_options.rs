@@ -138,6 +138,7 @@ impl Sample {
             ("--rows", self.rows.is_some()),
             ("--map", self.map.is_some()),
             ("--given", !self.given.is_empty()),
+            ("--other-profile", self.other_profile.is_some()),
             ("--points sobol", settings.points == PointKind::Sobol),
         ];
         if let Some((flag, _)) = belongs_to_crude.iter().find(|(_, given)| *given && !is_crude) {

@@ -10,6 +10,7 @@ use super::sample::Sample;
 use super::sample_options::{guard, only_crude};
 use super::{Exit, sample_distribution};
 use crate::engine::{Chunk, Executor, OpenBackend};
+use crate::model::profile::Profile;
 use crate::report::lanes;
 use crate::report::sampling::{EstimateFile, HostRecord};
 use crate::run::parts::PLAN_FILE;
@@ -40,16 +41,17 @@ impl Sample {
                 }
                 guard(rows, &self.out, std::iter::once(path))?;
             }
-            return self.run_sample(sample, &configured.open()?, started, verbosity);
+            return self.run_sample(sample, (&configured.open()?, None), started, verbosity);
         }
         if let Some(path) = &self.distribution {
             return sample_distribution::run(self, configured, path, started, verbosity);
         }
         let (sample, data) = self.planned(configured)?;
+        let other = self.other_profile.as_deref().map(|name| configured.profile_of(name)).transpose()?;
         let opened = configured.open()?;
         tracing::info!("{data}");
         let sample = if self.is_refined() { self.chosen(sample, &opened)? } else { sample };
-        self.run_sample(sample, &opened, started, verbosity)
+        self.run_sample(sample, (&opened, other.as_ref()), started, verbosity)
     }
 
     /// The run of crude Monte Carlo with as many samples as are cheaper than importance sampling.
@@ -103,7 +105,7 @@ impl Sample {
     fn run_sample(
         &self,
         sample: sampling::Sample,
-        opened: &OpenBackend,
+        (opened, other): (&OpenBackend, Option<&Profile>),
         started: Instant,
         verbosity: Verbosity,
     ) -> Result<Exit> {
@@ -131,14 +133,14 @@ impl Sample {
             self.format.print_plan(sample.lane_count(), &self.out.join(PLAN_FILE))?;
             return Ok(Exit::Ok);
         }
-        self.run_split(&sample, opened, &executor, started, verbosity)
+        self.run_split(&sample, (opened, other), &executor, started, verbosity)
     }
 
     /// Executes a run that can be split and resumed.
     fn run_split(
         &self,
         sample: &sampling::Sample,
-        opened: &OpenBackend,
+        (opened, other): (&OpenBackend, Option<&Profile>),
         executor: &Executor,
         started: Instant,
         verbosity: Verbosity,
@@ -177,6 +179,10 @@ impl Sample {
             tracing::info!("importance sampling of what is rare");
             let search = Search { defence: self.settings.defensive_weight, ..Search::default() };
             result = sample.refined(result, &search, half_width, executor)?;
+        }
+        if let Some(other) = other {
+            tracing::info!("the same samples under profile {}", other.name);
+            result.profiles = Some(sample.profile_ratios(&result, other, executor)?);
         }
         if let Some(asked) = self.settings.half_width {
             let of_criterion = |row: &&EstimateRow| row.criterion == self.settings.criterion && row.headway != "all";

@@ -6,7 +6,7 @@ use super::convergence::ConvergenceFigure;
 use super::failure_map::FailureMap;
 use super::html::PageFigure;
 use super::sampling::{DrawRecord, EstimateFile, HostRecord};
-use super::sampling_tables::{WorstRow, convergence_csv, model_ratios_csv, worst_csv};
+use super::sampling_tables::{WorstRow, convergence_csv, model_ratios_csv, profile_ratios_csv, worst_csv};
 use crate::engine::{LaneKey, LanePlan, LaneRunner};
 use crate::run::sampling::{CrudeRun, Estimator, Sample, SampleOptions, SampleResult, SampleTally, proposal_text};
 use crate::stats::density::DensityModel;
@@ -41,6 +41,9 @@ impl EstimateFile {
         let ratios = sample.model_ratios(result);
         if !ratios.is_empty() {
             results.add("models.csv", model_ratios_csv(&ratios).as_bytes())?;
+        }
+        if let Some(of) = &result.profiles {
+            results.add("profiles.csv", profile_ratios_csv(&sample.profile.name, of).as_bytes())?;
         }
         if matches!(sample.options.estimator, Estimator::Given { .. }) {
             // A proposal in this folder may be an input of the run.

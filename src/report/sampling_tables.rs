@@ -5,10 +5,10 @@ use super::sampling::EstimateFile;
 use crate::engine::{NO_STEP, Outcome};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
-use crate::run::sampling::{Checkpoint, EstimateRow, ModelRatio, RiskRate, Uncertainty, WorstSample};
+use crate::run::sampling::{Checkpoint, EstimateRow, ModelRatio, ProfileRatios, RiskRate, Uncertainty, WorstSample};
 use crate::stats::estimate::{IntervalKind, Ratio, RatioMethod, RatioVerdict, WeightFigures};
 use crate::support::readable::{significant, value};
-use crate::support::table::Table;
+use crate::support::table::{Table, TableOf};
 
 impl EstimateFile {
     /// `estimates.csv`.
@@ -111,9 +111,20 @@ pub fn convergence_csv(checkpoints: &[Checkpoint]) -> String {
 /// `models.csv`: the rates of two driver models on the same samples. They are equal if the interval of their ratio lies
 /// within a quarter of 1.
 pub fn model_ratios_csv(ratios: &[ModelRatio]) -> String {
-    Table::of(ratios)
-        .column("model", |row| row.model.name())
-        .column("other", |row| row.other.name())
+    let sides = Table::of(ratios).column("model", |row| row.model.name()).column("other", |row| row.other.name());
+    ratio_columns(sides).build().csv()
+}
+
+/// `profiles.csv`: the same for a model under the profile of the run and under another one.
+pub fn profile_ratios_csv(profile: &str, of: &ProfileRatios) -> String {
+    let sides = Table::of(&of.ratios).column("model", |row| row.model.name());
+    let sides = sides.column("profile", |_| profile).column("other", |_| of.other.as_str());
+    ratio_columns(sides).build().csv()
+}
+
+/// The columns that tables of ratios share.
+fn ratio_columns(sides: TableOf<&ModelRatio>) -> TableOf<&ModelRatio> {
+    sides
         .column("criterion", |row| row.criterion.key())
         .column("headway", |row| row.headway.as_str())
         .column("ratio", |row| row.ratio.ratio)
@@ -129,8 +140,6 @@ pub fn model_ratios_csv(ratios: &[ModelRatio]) -> String {
             RatioVerdict::TooLow => "lower",
             RatioVerdict::Undecided => "undecided",
         })
-        .build()
-        .csv()
 }
 
 /// One of the worst lanes, with its facts.

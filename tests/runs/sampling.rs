@@ -293,6 +293,36 @@ fn models_are_compared_on_the_same_samples() {
     assert!((level - (1.0 - 0.05 / 18.0)).abs() < 1e-12);
 }
 
+#[test]
+fn profiles_are_compared_on_the_same_samples() {
+    let (dir, _) = folder();
+    let run = |out: &str, more: &[&str]| {
+        let args = ["-q", "sample", "density.json", "--samples", "20000", "--thw", "0.4,1", "--models", "Reg157,FSM"];
+        let own = ["--backend", "cpu", "--worst", "0", "--map", "none", "--out", out];
+        lanesweep(dir.path(), &[&args[..], &own, more].concat())
+    };
+    let read = |path: &str| std::fs::read_to_string(dir.path().join(path)).unwrap();
+    let rate = |out: &str| {
+        let estimates = read(&format!("{out}/estimates.csv"));
+        let row = estimates.lines().find(|line| line.contains("Reg157,ttc,1s")).unwrap().to_owned();
+        row.split(',').nth(8).unwrap().parse::<f64>().unwrap()
+    };
+    let (code, _, err) = run("both", &["--other-profile", "un-r157"]);
+    assert_eq!(code, 0, "{err}");
+    assert_eq!(run("other", &["--profile", "un-r157"]).0, 0);
+    let table = read("both/profiles.csv");
+    let row = table.lines().find(|line| line.starts_with("Reg157,paper,un-r157,ttc,1s")).unwrap();
+    let ratio: f64 = row.split(',').nth(5).unwrap().parse().unwrap();
+    assert!((ratio / (rate("both") / rate("other")) - 1.0).abs() < 1e-12 && ratio != 1.0, "{row}");
+    // A profile against itself is equal, without any uncertainty.
+    assert_eq!(run("same", &["--other-profile", "paper"]).0, 0);
+    let same = read("same/profiles.csv");
+    assert!(same.lines().any(|line| line.starts_with("Reg157,paper,paper,ttc,1s,1,1,1,")), "{same}");
+    let args = ["-q", "sample", "density.json", "--other-profile", "paper", "--estimator", "is", "--backend", "cpu"];
+    let (code, _, err) = lanesweep(dir.path(), &args);
+    assert!(code == 2 && err.contains("--other-profile"), "{err}");
+}
+
 /// The density over the first scenarios only, scale and bandwidth held.
 fn of_few(density: &DensityModel, scenarios: usize) -> DensityModel {
     let kde = &density.kde;

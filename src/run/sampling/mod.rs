@@ -34,7 +34,7 @@ pub use kernels::KernelCounts;
 pub(crate) use limit_state::marks_of;
 pub use limit_state::{LaneLimitState, Question, limit_state, scenario_shares, truncated};
 pub use map::{MAP_CELLS, MapAxes, MapAxis, MapCounts};
-pub use model_ratios::ModelRatio;
+pub use model_ratios::{ModelRatio, ProfileRatios};
 pub use plan::{Conditional, SampleHeadways, conditional, mixture_of, plan_points, plan_samples};
 use plan_file::{KIND, SEARCH_FILE};
 pub use proposal_file::{proposal_from_text, proposal_text, read_proposal};

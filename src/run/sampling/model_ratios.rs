@@ -1,15 +1,20 @@
-//! Driver models against each other, on the same samples.
+//! Driver models, and profiles, against each other on the same samples.
 
 use serde::Serialize;
 
-use super::Sample;
+use super::crude::sample_crude;
+use super::kernels::KernelCounts;
+use super::plan::{mixture_of, plan_samples};
 use super::rows::headway_name;
 use super::sample_run::SampleResult;
 use super::tally::SampleTally;
-use crate::engine::LanePlan;
+use super::{Sample, SampleOptions};
+use crate::engine::{Executor, LanePlan};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
-use crate::stats::estimate::{Clusters, Enough, Ratio, paired_ratio};
+use crate::model::profile::Profile;
+use crate::stats::estimate::{Clusters, Enough, Ratio, StopRule, paired_ratio};
+use crate::{Error, Place, Result};
 
 /// The rate of one model over that of another. Both met the same samples (common random numbers), so what the samples
 /// and their scenarios have in common cancels. The interval covers the draws and the data; by importance sampling the
@@ -49,32 +54,82 @@ impl Sample {
     }
 }
 
-/// Every pair of models, criterion by criterion and headway by headway; empty if samples do not identify their
-/// scenarios.
+/// The models of a run under its profile against the same models under another one.
+#[derive(Debug, Clone)]
+pub struct ProfileRatios {
+    /// The profile of the denominators.
+    pub other: String,
+    /// Numerator and denominator are of one model.
+    pub ratios: Vec<ModelRatio>,
+}
+
+impl Sample {
+    /// The rates of a result over those that the same samples have under another profile.
+    ///
+    /// # Errors
+    /// [`crate::Error::Usage`] if the samples are not those of crude Monte Carlo, and as [`Sample::plan`] and
+    /// [`Sample::run`] under the other profile.
+    pub fn profile_ratios(&self, result: &SampleResult, other: &Profile, executor: &Executor) -> Result<ProfileRatios> {
+        let Some((crude, plan)) = result.crude.as_ref().zip(self.lane_plan()) else {
+            return Err(Error::usage(
+                Place::item(format!("profile {}", other.name)),
+                "two profiles are compared on the samples of crude Monte Carlo",
+                "estimate by crude Monte Carlo",
+            ));
+        };
+        let stop = StopRule::samples(crude.tally.covered().iter().map(|range| range.end).max().unwrap_or_default());
+        let options = SampleOptions { stop, worst: 0, map: None, ..self.options.clone() };
+        let theirs = plan_samples(&self.density, &mixture_of(&self.density, &options.given)?, other, &options)?;
+        let run = sample_crude(&theirs, 0..theirs.unit_count(), executor, &options, None, |_| Ok(()))?;
+        let level = result.rows.first().map_or(options.level, |row| row.estimate.interval.level);
+        let ratios = match (&crude.tally.by_kernel, &run.tally.by_kernel) {
+            (Some(ours), Some(theirs)) => {
+                let pairs: Vec<[usize; 2]> = (0..plan.models.len()).map(|model| [model; 2]).collect();
+                ratios_of(plan, [ours, theirs], &pairs, self.density.space.has_thw(), level)
+            }
+            _ => Vec::new(),
+        };
+        Ok(ProfileRatios { other: other.name.clone(), ratios })
+    }
+}
+
+/// Every pair of models; empty if samples do not identify their scenarios.
 fn model_ratios(plan: &LanePlan, tally: &SampleTally, is_sampled: bool, level: f64) -> Vec<ModelRatio> {
     let Some(counts) = &tally.by_kernel else { return Vec::new() };
+    let models = plan.models.len();
+    let pairs: Vec<[usize; 2]> = (0..models).flat_map(|a| (a + 1..models).map(move |b| [a, b])).collect();
+    ratios_of(plan, [counts; 2], &pairs, is_sampled, level)
+}
+
+/// The ratios of pairs of models, the first one in the first counts; criterion by criterion and headway by headway.
+fn ratios_of(
+    plan: &LanePlan,
+    counts: [&KernelCounts; 2],
+    pairs: &[[usize; 2]],
+    is_sampled: bool,
+    level: f64,
+) -> Vec<ModelRatio> {
     let (models, headways) = (&plan.models, plan.headways.len());
     let all = (headways > 1).then(|| ("all".to_owned(), (0..headways).collect::<Vec<_>>()));
     let each = (0..headways).map(|headway| (headway_name(plan, headway, is_sampled), vec![headway]));
     let groups: Vec<(String, Vec<usize>)> = all.into_iter().chain(each).collect();
     let mut ratios = Vec::new();
     for criterion in Criterion::ALL {
-        for (a, &model) in models.iter().enumerate() {
-            for (b, &other) in models.iter().enumerate().skip(a + 1) {
-                for (headway, of) in &groups {
-                    let over = |model: usize| {
-                        let cell = |at: &usize| (at * models.len() + model) * Criterion::ALL.len() + criterion.index();
-                        counts.over(&of.iter().map(cell).collect::<Vec<_>>())
-                    };
-                    let ((runs, failures), (other_runs, other_failures)) = (over(a), over(b));
-                    let ratio = paired_ratio(
-                        Clusters { runs: &runs, failures: &failures },
-                        Clusters { runs: &other_runs, failures: &other_failures },
-                        Enough::default(),
-                        level,
-                    );
-                    ratios.push(ModelRatio { model, other, criterion, headway: headway.clone(), ratio });
-                }
+        for pair in pairs {
+            for (headway, of) in &groups {
+                let over = |side: usize| {
+                    let cell = |at: &usize| (at * models.len() + pair[side]) * Criterion::ALL.len() + criterion.index();
+                    counts[side].over(&of.iter().map(cell).collect::<Vec<_>>())
+                };
+                let ((runs, failures), (other_runs, other_failures)) = (over(0), over(1));
+                let ratio = paired_ratio(
+                    Clusters { runs: &runs, failures: &failures },
+                    Clusters { runs: &other_runs, failures: &other_failures },
+                    Enough::default(),
+                    level,
+                );
+                let [model, other] = pair.map(|at| models[at]);
+                ratios.push(ModelRatio { model, other, criterion, headway: headway.clone(), ratio });
             }
         }
     }

@@ -5,7 +5,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use super::crude::{CrudeRun, crude_of_segments, cuts, sample_into};
-use super::model_ratios::ModelRatio;
+use super::model_ratios::{ModelRatio, ProfileRatios};
 use super::plan_file::SEARCH_FILE;
 use super::rows::EstimateRow;
 use super::sample_options::Estimator;
@@ -278,6 +278,8 @@ pub struct SampleResult {
     pub rows: Vec<EstimateRow>,
     /// Ratios of the rates of two models by importance sampling.
     pub ratios: Vec<ModelRatio>,
+    /// Ratios to the rates under another profile, if it was asked for.
+    pub profiles: Option<ProfileRatios>,
     /// Counts and convergence of crude Monte Carlo.
     pub crude: Option<CrudeRun>,
     /// The rounds of the search.
