@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::configured::Configured;
 use super::console::Verbosity;
-use super::source::{self, PlausibilityFlag};
+use super::source::{self, PlausibilityFlag, PresetFlag};
 use super::{Exit, console};
 use crate::Result;
 use crate::scenario::{check_scenario_file, write_scenarios, write_scenarios_to};
@@ -18,15 +18,17 @@ use crate::traffic::{DataProvenance, Driven, Source};
 
 /// Mine cut-ins, cut-outs and leader decelerations from recordings
 ///
-/// Reads a folder of highD-format recordings (three files each) and writes one JSON line per scenario with its
+/// Reads recordings in highD's format or another one (see `lanesweep tracks`) and writes one JSON line per scenario with its
 /// series, or one row if FILE ends in .parquet; `study --scenarios FILE` reads it. The driven time and distance go to
 /// FILE.exposure.json beside it, so that `fit --scenarios FILE` can compute events per hour.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  lanesweep mine recordings --out scenarios.jsonl")]
 pub struct Mine {
-    /// Folder of highD-format recordings
+    /// Folder of recordings, or a track file
     #[arg(value_name = "DIR", help_heading = "Data")]
     dir: PathBuf,
+    #[command(flatten)]
+    preset: PresetFlag,
     /// File to write, .jsonl or .parquet [default: standard output, JSON Lines]
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     out: Option<PathBuf>,
@@ -46,14 +48,14 @@ fn lock_of(path: &Path) -> Result<FolderLock> {
 impl Mine {
     pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         if let Some(path) = &self.out {
-            source::refuse_recording(path, &self.dir, "--out")?;
+            source::refuse_recording(path, &self.dir, self.preset.preset.as_deref(), "--out")?;
             check_scenario_file(path)?;
             source::refuse_overwriting(path, configured.files(), "--out")?;
             // Check before the work that the file can be written.
             AtomicFile::create(path).map(drop)?;
         }
         let _lock = self.out.as_deref().map(lock_of).transpose()?;
-        let from = Source::Folder(self.dir.clone());
+        let from = Source::Recordings { path: self.dir.clone(), preset: self.preset.preset.clone() };
         let mut collection = source::load(&from, &configured.settings.mining, self.plausibility.policy(), verbosity)?;
         if self.kept {
             collection.scenarios.retain(|s| s.kept);

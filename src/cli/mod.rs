@@ -37,6 +37,7 @@ mod slurm;
 mod source;
 mod study;
 mod synth;
+mod tracks;
 mod verify;
 
 pub use exit::Exit;
@@ -93,6 +94,7 @@ impl Common {
 #[derive(Subcommand)]
 enum Verb {
     Study(Box<study::Study>),
+    Tracks(tracks::Tracks),
     Mine(mine::Mine),
     Fit(fit::Fit),
     Sample(Box<sample::Sample>),
@@ -162,6 +164,7 @@ fn without_panic(work: impl FnOnce() -> Result<Exit>) -> Result<Exit> {
 fn run(cli: &Cli, configured: &Configured) -> Result<Exit> {
     match &cli.verb {
         Verb::Study(verb) => verb.run(configured, cli.common.verbosity()),
+        Verb::Tracks(verb) => verb.run(configured),
         Verb::Mine(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Fit(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Sample(verb) => verb.run(configured, cli.common.verbosity()),

@@ -13,7 +13,7 @@ use crate::support::plausibility::Implausible;
 use crate::support::ranges::refuse_repeats;
 use crate::traffic::Source;
 use crate::traffic::mining::{Collection, MiningOptions, counts_text};
-use crate::traffic::trajectory::highd;
+use crate::traffic::trajectory::{InputFile, Inputs};
 use crate::{Error, Place, Result};
 
 /// Reads or generates recordings and mines them, with a progress bar; reports skipped input and the number of
@@ -73,12 +73,24 @@ impl PlausibilityFlag {
     }
 }
 
+/// Format of recordings.
+#[derive(Debug, Clone, Args)]
+pub struct PresetFlag {
+    /// Format of the recordings: exid, sumo-fcd, … or a TOML file [default: detected]
+    #[arg(long, value_name = "NAME|FILE", help_heading = "Data", hide_short_help = true)]
+    pub preset: Option<String>,
+}
+
 /// Where a verb's data come from.
 #[derive(Debug, Clone, Args)]
 pub struct SourceFlags {
-    /// Folder of highD-format recordings [default: synthetic recordings]
+    /// Folder of recordings, or a track file [default: synthetic recordings]
+    ///
+    /// highD's format, or that of a preset, which the names of the columns tell; see `lanesweep tracks`.
     #[arg(value_name = "DIR", conflicts_with = "scenarios", help_heading = "Data")]
     pub dir: Option<PathBuf>,
+    #[command(flatten)]
+    pub preset: PresetFlag,
     /// Scenario file (.jsonl, .parquet, .csv) instead of recordings
     #[arg(long, value_name = "FILE", help_heading = "Data")]
     pub scenarios: Option<PathBuf>,
@@ -90,7 +102,7 @@ impl SourceFlags {
     /// The named source; the generator if none is named.
     pub fn source(&self, configured: &Configured) -> Source {
         match (&self.dir, &self.scenarios) {
-            (Some(dir), _) => Source::Folder(dir.clone()),
+            (Some(dir), _) => Source::Recordings { path: dir.clone(), preset: self.preset.preset.clone() },
             (None, Some(path)) => Source::Scenarios(path.clone()),
             (None, None) => Source::Generated(configured.settings.generator.clone()),
         }
@@ -169,10 +181,9 @@ pub fn refuse_overwriting(output: &Path, others: &[PathBuf], flag: &str) -> Resu
 }
 
 /// Refuses an output that is one of a folder's recordings.
-pub fn refuse_recording(output: &Path, dir: &Path, flag: &str) -> Result<()> {
+pub fn refuse_recording(output: &Path, dir: &Path, preset: Option<&str>, flag: &str) -> Result<()> {
     // The reader reports a folder that cannot be listed.
-    let Ok(inventory) = highd::inventory(dir) else { return Ok(()) };
-    let files: Vec<PathBuf> =
-        inventory.recordings.into_iter().flat_map(|r| [r.tracks, r.tracks_meta, r.recording_meta]).collect();
+    let Ok(inputs) = Inputs::of(dir, preset) else { return Ok(()) };
+    let files: Vec<PathBuf> = inputs.files().0.into_iter().flat_map(InputFile::paths).collect();
     refuse_overwriting(output, &files, flag)
 }

@@ -280,7 +280,10 @@ impl Study {
         others.extend(self.shards.plan.clone());
         source::refuse_overwriting(lanes, &others, "--rows")?;
         table_format(lanes)?;
-        self.data.dir.as_deref().map_or(Ok(()), |dir| source::refuse_recording(lanes, dir, "--rows"))
+        self.data
+            .dir
+            .as_deref()
+            .map_or(Ok(()), |dir| source::refuse_recording(lanes, dir, self.data.preset.preset.as_deref(), "--rows"))
     }
 }
 

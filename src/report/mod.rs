@@ -37,4 +37,5 @@ pub mod study_figures;
 mod study_page;
 pub mod tables;
 pub mod trace;
+pub mod tracks;
 pub mod verification;

@@ -6,9 +6,10 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use sha2::{Digest, Sha256};
 
-use super::mining::{Collection, MiningOptions, mine_folder, mine_generated};
+use super::mining::{Collection, MiningOptions, mine_generated, mine_inputs};
+use super::trajectory::Inputs;
 use super::trajectory::generator::GeneratorOptions;
-use super::trajectory::highd::{self, made_up};
+use super::trajectory::highd::made_up;
 use crate::scenario::{ScenarioFile, read_scenario_file, write_scenarios_to};
 use crate::support::files::write_atomically;
 use crate::support::input_file;
@@ -19,8 +20,13 @@ use crate::{Error, Place, Result};
 /// Source of scenarios.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Source {
-    /// A folder of highD-format recordings.
-    Folder(PathBuf),
+    /// A folder, or a file, of recordings.
+    Recordings {
+        /// The folder or file.
+        path: PathBuf,
+        /// Name or file of the preset; without it, the format is detected.
+        preset: Option<String>,
+    },
     /// A scenario file.
     Scenarios(PathBuf),
     /// Recordings that the program generates.
@@ -31,7 +37,9 @@ impl Source {
     /// Description in one line; it says so if the data are synthetic.
     pub fn describe(&self, synthetic: bool) -> String {
         let text = match self {
-            Source::Folder(dir) => made_up(dir).unwrap_or_else(|| format!("recordings in {}", dir.display())),
+            Source::Recordings { path, .. } => {
+                made_up(path).unwrap_or_else(|| format!("recordings in {}", path.display()))
+            }
             Source::Scenarios(path) => format!("scenarios of {}", path.display()),
             Source::Generated(options) => format!(
                 "SYNTHETIC DATA: {} generated recordings of {} s, seed {}, event rates multiplied by {}",
@@ -48,7 +56,7 @@ impl Source {
     pub fn check(&self, implausible: Implausible) -> Result<()> {
         match self {
             Source::Scenarios(path) => read_scenario_file(path, implausible).map(drop),
-            Source::Folder(dir) => highd::inventory(dir).map(drop),
+            Source::Recordings { path, preset } => Inputs::of(path, preset.as_deref()).map(drop),
             Source::Generated(options) => options.validate(),
         }
     }
@@ -57,7 +65,9 @@ impl Source {
     pub fn recordings(&self) -> u64 {
         match self {
             Source::Scenarios(_) => 0,
-            Source::Folder(dir) => highd::inventory(dir).map_or(0, |i| i.recordings.len() as u64),
+            Source::Recordings { path, preset } => {
+                Inputs::of(path, preset.as_deref()).map_or(0, |inputs| inputs.count() as u64)
+            }
             Source::Generated(options) => options.recordings as u64,
         }
     }
@@ -79,7 +89,9 @@ impl Source {
                 let synthetic = scenarios.iter().any(|scenario| scenario.synthetic);
                 Ok(Collection { scenarios, problems, notes, synthetic, ..Collection::default() })
             }
-            Source::Folder(dir) => mine_folder(dir, mining, implausible, done),
+            Source::Recordings { path, preset } => {
+                mine_inputs(Inputs::of(path, preset.as_deref())?, mining, implausible, done)
+            }
             Source::Generated(options) => mine_generated(options, mining, done),
         }
     }
@@ -174,7 +186,7 @@ impl DataProvenance {
                     }
                 }
             }
-            Source::Folder(_) | Source::Generated(_) => {
+            Source::Recordings { .. } | Source::Generated(_) => {
                 // The checksum of the file that `mine` would write: the same scenarios have the same checksum.
                 let mut hash = Hashing(Sha256::new());
                 write_scenarios_to(&mut hash, &collection.scenarios)?;

@@ -6,8 +6,9 @@ use std::fs;
 use std::path::Path;
 
 use lanesweep::Result;
-use lanesweep::traffic::trajectory::highd::{self, HighdFiles, Loaded, RecordingInfo};
+use lanesweep::traffic::trajectory::highd::{self, HighdFiles, RecordingInfo};
 use lanesweep::traffic::trajectory::{Carriageway, Recording, Track, VehicleClass};
+use lanesweep::traffic::trajectory::{Loaded, Precision};
 
 /// A vehicle at constant speed in the middle of a lane, at 25 samples per second.
 pub fn cruising(
@@ -52,7 +53,7 @@ pub fn recording() -> Recording {
     recording.tracks = tracks
         .map(|(id, carriageway, lane, from, samples)| cruising(id, carriageway, lane, from, samples, &recording))
         .into();
-    highd::quantize(&mut recording, highd::Precision::Hundredths).unwrap();
+    highd::quantize(&mut recording, Precision::Hundredths).unwrap();
     recording
 }
 

@@ -79,6 +79,21 @@ fn smaller(line: &str) -> String {
     words.join(" ")
 }
 
+/// Two lanes of vehicles in SUMO's format.
+fn fcd() -> String {
+    let mut text = String::from(
+        "timestep_time;vehicle_id;vehicle_x;vehicle_y;vehicle_angle;vehicle_type;vehicle_speed;vehicle_lane\n",
+    );
+    for vehicle in 0..8 {
+        for step in 0..120 {
+            let (time, lane) = (0.1 * f64::from(step), vehicle % 2);
+            let (x, y) = (30.0 * f64::from(vehicle) + 25.0 * time, 1.75 + 3.5 * f64::from(lane));
+            text += &format!("{time:.2};v{vehicle};{x:.2};{y:.2};90;passenger;25.00;east_{lane}\n");
+        }
+    }
+    text
+}
+
 #[test]
 fn every_example_of_the_help_runs() {
     let dir = tempfile::tempdir().unwrap();
@@ -102,6 +117,9 @@ fn every_example_of_the_help_runs() {
             }
             let case = "category,ego_speed,speed,gap,lateral_speed\n";
             std::fs::write(dir.join("cases.csv"), format!("{case}cut-in,30,20,20,1\ncut-in,30,20,40,1\n")).unwrap();
+            std::fs::write(dir.join("fcd.csv"), fcd()).unwrap();
+            let own = fcd().replace("vehicle_", "").replace("timestep_", "");
+            std::fs::write(dir.join("own.csv"), own.replace("angle;", "").replace(";90;", ";")).unwrap();
             std::fs::write(dir.join("study.toml"), "[score]\nmin_failures = 5\n").unwrap();
             if verb == "verify conformance" {
                 let Some(tables) = shared("golden/jrc") else { continue };

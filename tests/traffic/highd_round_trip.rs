@@ -5,11 +5,12 @@ use crate::common;
 use std::fs;
 
 use crate::common::small;
-use lanesweep::traffic::trajectory::highd::{self, Precision, RecordingInfo};
+use lanesweep::traffic::trajectory::highd::{self, RecordingInfo};
 use lanesweep::traffic::trajectory::{Carriageway, NO_LANE, Recording, Track, VehicleClass};
+use lanesweep::traffic::trajectory::{Loaded, Precision};
 use proptest::prelude::*;
 
-fn read_back(recording: &Recording, precision: Precision) -> highd::Loaded {
+fn read_back(recording: &Recording, precision: Precision) -> Loaded {
     let dir = tempfile::tempdir().unwrap();
     let info = RecordingInfo { precision, ..RecordingInfo::default() };
     highd::write(dir.path(), recording, &info).unwrap();

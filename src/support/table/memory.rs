@@ -166,7 +166,7 @@ macro_rules! whole {
         }
     )*};
 }
-whole!(u8, u32, u64, usize);
+whole!(u8, u32, u64, usize, i64);
 
 impl<V: CellValue> CellValue for Option<V> {
     const KIND: ColumnKind = V::KIND;

@@ -11,9 +11,8 @@ use super::options::MiningOptions;
 use crate::scenario::{Category, Scenario};
 use crate::support::plausibility::Implausible;
 use crate::support::readable;
-use crate::traffic::trajectory::Recording;
 use crate::traffic::trajectory::generator::{GeneratorOptions, generate_one};
-use crate::traffic::trajectory::highd::{self, FileChecksum};
+use crate::traffic::trajectory::{FileChecksum, Inputs, Loaded, Recording};
 use crate::{Error, Result};
 
 /// Results of one recording.
@@ -35,6 +34,9 @@ pub struct RecordingSummary {
     pub frame_rate_hz: f64,
     /// Its files with their content's SHA-256; empty for generated recordings.
     pub files: Vec<FileChecksum>,
+    /// The preset that the files were read by; none for highD's format and generated recordings.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub preset: Option<String>,
 }
 
 /// Scenarios of many recordings.
@@ -86,39 +88,55 @@ struct MinedPart {
     synthetic: bool,
 }
 
-/// Reads and mines every recording of a folder. `done` is called after each one, from any thread; its error ends the work.
+/// Reads and mines every recording of a folder, or of a file. `done` is called after each file, from any thread; its error
+/// ends the work.
 ///
 /// # Errors
-/// If the folder holds no recording, or none of them can be read: the first recording's error. That of `done`.
+/// If there is no recording, or none of them can be read: the first recording's error. That of `done`.
 pub fn mine_folder(
-    dir: &Path,
+    path: &Path,
+    options: &MiningOptions,
+    implausible: Implausible,
+    done: impl Fn() -> Result<()> + Sync,
+) -> Result<Collection> {
+    mine_inputs(Inputs::of(path, None)?, options, implausible, done)
+}
+
+/// The same for inputs whose format is known.
+///
+/// # Errors
+/// As [`mine_folder`].
+pub fn mine_inputs(
+    inputs: Inputs,
     options: &MiningOptions,
     implausible: Implausible,
     done: impl Fn() -> Result<()> + Sync,
 ) -> Result<Collection> {
     options.validate()?;
-    let inventory = highd::inventory(dir)?;
-    // The outer error ends the work; an inner one leaves out a recording.
-    let parts: Result<Vec<Result<MinedPart>>> = inventory
-        .recordings
+    let preset = inputs.preset().map(|preset| preset.name.clone());
+    let (files, problems) = inputs.files();
+    let part = |loaded: Loaded| {
+        let mined = mine(&loaded.recording, options);
+        let mut summary = summary(&loaded.recording, &mined, options, loaded.checksum_sha256);
+        summary.preset.clone_from(&preset);
+        let name = |note: String| format!("recording {}: {note}", loaded.recording.id);
+        let notes = loaded.notes.into_iter().map(name).collect();
+        MinedPart { mined, summary, notes, synthetic: loaded.recording.synthetic }
+    };
+    // The outer error ends the work; an inner one leaves out a file.
+    let parts: Result<Vec<Result<Vec<MinedPart>>>> = files
         .par_iter()
         .with_max_len(1)
-        .map(|files| {
-            let part = highd::read_checked(files, implausible).map(|loaded| {
-                let mined = mine(&loaded.recording, options);
-                let summary = summary(&loaded.recording, &mined, options, loaded.checksum_sha256);
-                let name = |note: String| format!("recording {}: {note}", loaded.recording.id);
-                let notes = loaded.notes.into_iter().map(name).collect();
-                MinedPart { mined, summary, notes, synthetic: loaded.recording.synthetic }
-            });
+        .map(|file| {
+            let parts = file.read(implausible).map(|all| all.into_iter().map(part).collect());
             done()?;
-            Ok(part)
+            Ok(parts)
         })
         .collect();
-    let mut collection = Collection { problems: inventory.problems, ..Collection::default() };
-    for part in parts? {
-        match part {
-            Ok(part) => collection.add(part),
+    let mut collection = Collection { problems, ..Collection::default() };
+    for parts in parts? {
+        match parts {
+            Ok(parts) => parts.into_iter().for_each(|part| collection.add(part)),
             Err(error) => collection.problems.push(error),
         }
     }
@@ -172,6 +190,7 @@ fn summary(
         driven_m,
         frame_rate_hz: recording.frame_rate_hz,
         files,
+        preset: None,
     }
 }
 

@@ -17,7 +17,7 @@ pub struct Mined {
 }
 
 /// Number of found and of kept scenarios of a category.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, serde::Serialize)]
 pub struct CategoryCount {
     /// Found.
     pub found: u64,

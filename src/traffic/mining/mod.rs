@@ -25,7 +25,7 @@ mod miner;
 mod options;
 pub mod tags;
 
-pub use collection::{Collection, RecordingSummary, count, counts_text, mine_folder, mine_generated};
+pub use collection::{Collection, RecordingSummary, count, counts_text, mine_folder, mine_generated, mine_inputs};
 pub use miner::{CategoryCount, Mined, mine};
 pub use options::{
     CutInOptions, CutOutOptions, LaneChangeEnd, LateralOptions, LongitudinalOptions, LvdOptions, MiningOptions,

@@ -4,8 +4,18 @@
 //! format, the ego-centric view and the generator of synthetic recordings. Here lives nothing about
 //! scenarios. Data comes from files or from the generator and goes to [`crate::traffic::mining`].
 
+mod csv_table;
 pub mod generator;
 pub mod highd;
+mod inputs;
+mod number;
+mod overlap;
 mod recording;
+pub mod tracks;
 
-pub use recording::{Carriageway, EgoViewOptions, LIMIT_TOLERANCE_M, Lane, NO_LANE, Recording, Track, VehicleClass};
+pub use csv_table::FileChecksum;
+pub use inputs::{InputFile, Inputs};
+pub use number::Precision;
+pub use recording::{
+    Carriageway, EgoViewOptions, LIMIT_TOLERANCE_M, Lane, Loaded, NO_LANE, Recording, Track, VehicleClass,
+};

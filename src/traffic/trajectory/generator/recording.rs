@@ -7,8 +7,8 @@ use super::random::{Purpose, TrafficRandom};
 use super::traffic::{RoadSetup, Traffic};
 use super::vehicle::Vehicle;
 use crate::support::error::Result;
-use crate::traffic::trajectory::highd::{self, Precision};
 use crate::traffic::trajectory::{Carriageway, NO_LANE, Recording, Track};
+use crate::traffic::trajectory::{Precision, highd};
 
 /// Upper edge of the image to the first line, and between the carriageways, m.
 const VERGE_M: f64 = 8.0;

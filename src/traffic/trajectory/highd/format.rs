@@ -1,5 +1,7 @@
 //! Column names of the three highD files in the order of the format.
 
+use crate::traffic::trajectory::csv_table::CsvFormat;
+
 /// `NN_tracks.csv`: one line per vehicle and frame.
 pub(super) const TRACKS_COLUMNS: [&str; 25] = [
     "frame",
@@ -68,6 +70,11 @@ pub(super) const RECORDING_META_COLUMNS: [&str; 16] = [
     "lowerLaneMarkings",
     "synthetic",
 ];
+
+/// How its tables are read.
+pub(super) fn csv_format<'a>(known: &'a [&'a str]) -> CsvFormat<'a> {
+    CsvFormat { name: "highD", known, delimiter: Some(b',') }
+}
 
 /// Returns the header line of a file.
 pub(super) fn header(columns: &[&str]) -> String {

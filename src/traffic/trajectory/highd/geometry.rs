@@ -3,13 +3,12 @@
 
 use super::frame::Direction;
 use crate::support::plausibility::Implausible;
+use crate::traffic::trajectory::overlap::overlaps;
 use crate::traffic::trajectory::{Recording, Track};
 use crate::{Error, Place, Result};
 
 /// So far beyond its lane a centre counts as misplaced, m: in lane changes `laneId` may change a little late.
 const MARGIN_M: f64 = 0.5;
-/// Overlap of two boxes that rounding and noise may cause, m.
-const OVERLAP_M: f64 = 0.2;
 /// Fewer vehicles prove nothing.
 const MIN_VEHICLES: usize = 5;
 /// From this median on, centres do not lie in the middle of their lanes; in parts of half a width. An edge that is taken
@@ -51,7 +50,7 @@ pub(super) fn check(recording: &Recording, place: &Place, implausible: Implausib
         }
         notes.push(problem);
     }
-    notes.extend(overlaps(recording));
+    notes.extend(overlapping(recording));
     Ok(notes)
 }
 
@@ -205,37 +204,13 @@ fn against(recording: &Recording) -> Option<Finding> {
 }
 
 /// Boxes that overlap.
-fn overlaps(recording: &Recording) -> Option<String> {
+fn overlapping(recording: &Recording) -> Option<String> {
     let stride = stride(recording);
-    let mut boxes: Vec<(usize, i64, f64, usize, usize)> = Vec::new();
-    for (index, track) in recording.tracks.iter().enumerate() {
-        let here = |k: usize| (track.carriageway, track.first_frame + k as i64, track.s_m[k], index, k);
-        boxes.extend(looked_at(track, stride).map(here));
-    }
-    boxes.sort_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.total_cmp(&b.2)).then(a.3.cmp(&b.3)));
-    let longest_m = recording.tracks.iter().map(|track| track.length_m).fold(0.0, f64::max);
-    let mut pairs = std::collections::BTreeSet::new();
-    let mut first: Option<String> = None;
-    for (at, a) in boxes.iter().enumerate() {
-        let near = |b: &&(usize, i64, f64, usize, usize)| (a.0, a.1) == (b.0, b.1) && b.2 - a.2 < longest_m;
-        for b in boxes[at + 1..].iter().take_while(near) {
-            let (behind, ahead) = (&recording.tracks[a.3], &recording.tracks[b.3]);
-            let along_m = (behind.length_m + ahead.length_m) / 2.0 - (b.2 - a.2);
-            let across_m = (behind.width_m + ahead.width_m) / 2.0 - (behind.d_m[a.4] - ahead.d_m[b.4]).abs();
-            if along_m > OVERLAP_M && across_m > OVERLAP_M && pairs.insert((a.3.min(b.3), a.3.max(b.3))) {
-                first.get_or_insert_with(|| {
-                    format!(
-                        "vehicles {} and {} at frame {}, by {along_m:.2} m along the road",
-                        behind.id, ahead.id, a.1
-                    )
-                });
-            }
-        }
-    }
-    let first = first?;
+    let found = overlaps(recording, |track| looked_at(track, stride))?;
     Some(format!(
-        "{} pair(s) of vehicles overlap, the first are {first}: check sizes and reference point (x and y are the left and \
+        "{} pair(s) of vehicles overlap, the first are {}: check sizes and reference point (x and y are the left and \
          upper edge of the box in the image)",
-        pairs.len()
+        found.pairs.len(),
+        found.first
     ))
 }

@@ -4,22 +4,18 @@
 //! This module has the inventory of a folder, the reader, the writer, and their common coordinate transformation. It
 //! converts between paths and [`Recording`](super::Recording)s. No other module uses a column name of the format.
 
-mod columns;
 mod format;
 mod frame;
 mod geometry;
 mod inventory;
 mod meta;
 mod neighbours;
-mod number;
 mod read;
 mod writable;
 mod write;
 
-pub use columns::FileChecksum;
 pub use inventory::{HighdFiles, Inventory, SYNTHETIC_MARKER, inventory, made_up};
-pub use number::Precision;
-pub use read::{Loaded, read, read_checked};
+pub use read::{read, read_checked};
 pub use writable::quantize;
 pub(crate) use write::stage;
 pub use write::{RecordingInfo, write};

@@ -2,29 +2,15 @@
 
 use std::path::Path;
 
-use super::columns::{CsvColumn, CsvTable, FileChecksum};
-use super::format::{FRAME_LIMIT, TRACKS_COLUMNS};
+use super::format::{FRAME_LIMIT, TRACKS_COLUMNS, csv_format};
 use super::geometry;
 use super::inventory::{HighdFiles, folder_of, made_up};
 use super::meta::{self, RecordingMeta, VehicleMeta};
 use crate::support::plausibility::{Doubts, HELP, Implausible, Quantity};
+use crate::traffic::trajectory::Loaded;
+use crate::traffic::trajectory::csv_table::{CsvColumn, CsvTable};
 use crate::traffic::trajectory::{NO_LANE, Recording, Track};
 use crate::{Error, Place, Result};
-
-/// A recording with the facts about its files for the run record.
-#[derive(Debug)]
-pub struct Loaded {
-    /// The recording.
-    pub recording: Recording,
-    /// Content of the three files, in the order tracks, tracksMeta, recordingMeta.
-    pub checksum_sha256: Vec<FileChecksum>,
-    /// Number of data lines in `tracks`.
-    pub rows: u64,
-    /// Size of the three files together, bytes.
-    pub bytes: u64,
-    /// Warnings about the data, as sentences.
-    pub notes: Vec<String>,
-}
 
 /// Like [`read_checked`], but accepts implausible values.
 ///
@@ -46,7 +32,7 @@ pub fn read_checked(files: &HighdFiles, implausible: Implausible) -> Result<Load
     let mut doubts = Doubts::new(implausible);
     let recording_meta = meta::read_recording_meta(files, &mut doubts)?;
     let (vehicles, tracks_meta_checksum) = meta::read_tracks_meta(files, &recording_meta, &mut doubts)?;
-    let mut table = CsvTable::open(&files.tracks, &TRACKS_COLUMNS)?;
+    let mut table = CsvTable::open(&files.tracks, &csv_format(&TRACKS_COLUMNS))?;
     let columns = TrackColumns::of(&table)?;
     let reserve = can_hold(&files.tracks, &vehicles);
     let empty = vehicles.iter().map(|vehicle| empty_track(vehicle, reserve)).collect();

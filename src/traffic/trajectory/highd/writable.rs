@@ -2,7 +2,7 @@
 
 use super::format::{FRAME_LIMIT, FRAME_RATES_HZ, LANE_LINES_LIMIT};
 use super::frame::{Direction, LaneNumbers};
-use super::number::{Precision, REAL_LIMIT};
+use crate::traffic::trajectory::number::{Precision, REAL_LIMIT};
 use crate::traffic::trajectory::{NO_LANE, Recording, Track};
 use crate::{Error, Place, Result};
 

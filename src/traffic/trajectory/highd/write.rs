@@ -8,9 +8,9 @@ use super::format::{RECORDING_META_COLUMNS, TRACKS_COLUMNS, TRACKS_META_COLUMNS,
 use super::frame::Direction;
 use super::inventory::HighdFiles;
 use super::neighbours::{Around, NOBODY, neighbours};
-use super::number::{Precision, push_integer};
 use super::writable::ImageLayout;
 use crate::support::atomic_file::{AtomicFile, StagedFile};
+use crate::traffic::trajectory::number::{Precision, push_integer};
 use crate::traffic::trajectory::{Recording, Track, VehicleClass};
 use crate::{Error, Place, Result};
 

@@ -1,4 +1,4 @@
-//! A comma-separated table with named columns: finds columns by name and returns typed fields. Errors name file, line
+//! A delimited table with named columns: finds columns by name and returns typed fields. Errors name file, line
 //! and column. Independent of traffic.
 //!
 //! Accepted, because they change no value: Windows line ends, a byte order mark, blank lines, quotes, blanks around a
@@ -6,7 +6,7 @@
 
 use crate::support::plain_text::hex;
 use std::fs::File;
-use std::io::{self, Read};
+use std::io::{self, Read, Seek};
 use std::path::{Path, PathBuf};
 
 use csv::{ByteRecord, Reader, ReaderBuilder, Terminator};
@@ -28,18 +28,26 @@ pub struct FileChecksum {
     pub sha256: String,
 }
 
-/// A column that the header has.
+/// A column that the header has, by index.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct CsvColumn {
-    index: usize,
-    name: &'static str,
+pub(super) struct CsvColumn(usize);
+
+/// What a reader expects of a table.
+pub(super) struct CsvFormat<'a> {
+    /// Name of the format in messages.
+    pub name: &'a str,
+    /// Column names of the format: they are never reported as misspelt.
+    pub known: &'a [&'a str],
+    /// The delimiter; `None`: the one that the header has most of.
+    pub delimiter: Option<u8>,
 }
 
 /// An open table, positioned on one of its lines.
 pub(super) struct CsvTable {
     path: PathBuf,
     reader: Reader<HashingReader<File>>,
-    known: &'static [&'static str],
+    format: String,
+    known: Vec<String>,
     header: Vec<String>,
     record: ByteRecord,
     line: u64,
@@ -56,16 +64,20 @@ const READ_AHEAD_BYTES: usize = 1 << 18;
 const MAX_LINE_BYTES: u64 = 1 << 20;
 
 impl CsvTable {
-    /// Opens a file and reads its header. `known` are the column names of the format: they are never reported as
-    /// misspelt.
+    /// Opens a file and reads its header.
     ///
     /// # Errors
-    /// If it cannot be read, is empty, or has no comma-separated header in UTF-8.
-    pub fn open(path: &Path, known: &'static [&'static str]) -> Result<Self> {
-        let file = input_file::open(path)?;
+    /// If it cannot be read, is empty, or has no delimited header in UTF-8.
+    pub fn open(path: &Path, format: &CsvFormat) -> Result<Self> {
+        let mut file = input_file::open(path)?;
+        let delimiter = match format.delimiter {
+            Some(delimiter) => delimiter,
+            None => delimiter_of(&mut file).map_err(|error| Error::io(path, "read", error))?,
+        };
         let reader = ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
+            .delimiter(delimiter)
             // Not CRLF, with which the line number is one too small in files with Windows line ends.
             .terminator(Terminator::Any(b'\n'))
             .buffer_capacity(READ_AHEAD_BYTES)
@@ -73,7 +85,8 @@ impl CsvTable {
         let mut table = CsvTable {
             path: path.to_path_buf(),
             reader,
-            known,
+            format: format.name.to_owned(),
+            known: format.known.iter().map(|&name| name.to_owned()).collect(),
             header: Vec::new(),
             record: ByteRecord::new(),
             line: 0,
@@ -107,6 +120,11 @@ impl CsvTable {
         Ok(true)
     }
 
+    /// The column names.
+    pub fn header(&self) -> &[String] {
+        &self.header
+    }
+
     /// Number of data lines so far.
     pub fn rows(&self) -> u64 {
         self.rows
@@ -116,12 +134,12 @@ impl CsvTable {
     ///
     /// # Errors
     /// If the header has none, or two; names the most similar column.
-    pub fn column(&self, name: &'static str) -> Result<CsvColumn> {
+    pub fn column(&self, name: &str) -> Result<CsvColumn> {
         self.optional_column(name)?.ok_or_else(|| {
             let problem = format!("the column is missing{}", self.strange_names_for_message());
             let help = match self.similar_name(name) {
                 Some(similar) => format!("rename the column `{similar}` to `{name}`, if that is what it holds"),
-                None => format!("add the column `{name}`, or export the file again in the highD format"),
+                None => format!("add the column `{name}`, or export the file again in the {} format", self.format),
             };
             Error::input(Place::file(&self.path).row(1).column(name), problem, help)
         })
@@ -131,9 +149,9 @@ impl CsvTable {
     ///
     /// # Errors
     /// If the header has it twice.
-    pub fn optional_column(&self, name: &'static str) -> Result<Option<CsvColumn>> {
+    pub fn optional_column(&self, name: &str) -> Result<Option<CsvColumn>> {
         let mut found = self.header.iter().enumerate().filter(|(_, header)| *header == name);
-        let first = found.next().map(|(index, _)| CsvColumn { index, name });
+        let first = found.next().map(|(index, _)| CsvColumn(index));
         if found.next().is_some() {
             return Err(Error::input(
                 Place::file(&self.path).row(1).column(name),
@@ -151,8 +169,13 @@ impl CsvTable {
 
     /// The bytes of a field.
     pub fn bytes(&self, column: CsvColumn) -> &[u8] {
+        self.bytes_at(column.0)
+    }
+
+    /// The bytes of the field at a position of the header.
+    pub fn bytes_at(&self, at: usize) -> &[u8] {
         // Every line has as many fields as the header, so the field exists.
-        let field = self.record.get(column.index).unwrap_or_default();
+        let field = self.record.get(at).unwrap_or_default();
         // Windows line ends leave this in the last field.
         field.strip_suffix(b"\r").unwrap_or(field)
     }
@@ -218,7 +241,7 @@ impl CsvTable {
 
     /// The place of a field of the present line.
     pub fn field(&self, column: CsvColumn) -> Place {
-        self.place().column(column.name)
+        self.place().column(&self.header[column.0])
     }
 
     /// The present line.
@@ -288,7 +311,7 @@ impl CsvTable {
 
     /// Header names that are not part of the format.
     fn strange_names(&self) -> impl Iterator<Item = &str> {
-        self.header.iter().map(String::as_str).filter(|name| !self.known.contains(name))
+        self.header.iter().map(String::as_str).filter(|name| !self.known.iter().any(|known| known == name))
     }
 
     /// A hint from the header about a misnamed column.
@@ -363,6 +386,16 @@ impl CsvTable {
         };
         self.bad(column, format!("{} is not {expected}", self.shown(column)), help)
     }
+}
+
+/// The delimiter that the first line has most of; a comma if it has none.
+fn delimiter_of(file: &mut File) -> io::Result<u8> {
+    let mut start = Vec::new();
+    file.take(MAX_LINE_BYTES).read_to_end(&mut start)?;
+    file.rewind()?;
+    let line = start.split(|&byte| byte == b'\n').next().unwrap_or_default();
+    let count = |delimiter: &u8| line.iter().filter(|&byte| byte == delimiter).count();
+    Ok([b'|', b'\t', b';', b','].into_iter().max_by_key(count).unwrap_or(b','))
 }
 
 /// A header field as a column name.

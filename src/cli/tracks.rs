@@ -1,0 +1,219 @@
+//! `lanesweep tracks`: what is in a track file? Reads it, checks it against itself, draws and converts it.
+
+use std::path::{Path, PathBuf};
+
+use clap::Args;
+
+use super::Exit;
+use super::configured::Configured;
+use super::format::FormatFlag;
+use crate::report::tracks::{TrackReport, across, counts, space_time};
+use crate::support::files::{check_folder, write_atomically};
+use crate::support::run_dir::OutputDir;
+use crate::support::table::{Table, TableMetadata};
+use crate::traffic::mining::mine;
+use crate::traffic::trajectory::highd::{self, RecordingInfo};
+use crate::traffic::trajectory::tracks::{LoadedTracks, Preset, SYNTHETIC, Understanding, draft, read_tracks};
+use crate::traffic::trajectory::{InputFile, Inputs, NO_LANE, Recording, Track, VehicleClass};
+use crate::{Error, Place, Result};
+
+/// What is in a track file? Check it, draw it, convert it
+///
+/// Finds the format by the names of the columns, reads the tracks and says what was understood: rate, vehicles, road,
+/// lanes, speeds, scenarios. Checks the file against itself: units, axes, reference point, lanes, jumps, overlaps. Verbs
+/// that take recordings read the same files. A preset is a TOML file that says what the columns mean.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:\n  \
+    lanesweep tracks fcd.csv\n  \
+    lanesweep tracks own.csv --write-preset own.toml\n  \
+    lanesweep tracks own.csv --preset own.toml --out figures --convert converted")]
+pub struct Tracks {
+    /// Track files, or folders of them
+    #[arg(value_name = "PATH", required = true, help_heading = "Data")]
+    paths: Vec<PathBuf>,
+    /// Format of the files: exid, sumo-fcd, … or a TOML file [default: detected]
+    #[arg(long, value_name = "NAME|FILE", help_heading = "Data")]
+    preset: Option<String>,
+    /// Write a first preset for a file that no preset fits
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["preset", "out", "convert"], help_heading = "Output")]
+    write_preset: Option<PathBuf>,
+    /// Folder for tracks.json and figures: positions over time and across the road
+    #[arg(long, value_name = "DIR", help_heading = "Output")]
+    out: Option<PathBuf>,
+    /// Write the tracks in highD's format into this folder, or as one table: .csv, .parquet
+    #[arg(long, value_name = "DIR|FILE", help_heading = "Output")]
+    convert: Option<PathBuf>,
+    #[command(flatten)]
+    format: FormatFlag,
+}
+
+impl Tracks {
+    pub fn run(&self, configured: &Configured) -> Result<Exit> {
+        if let Some(path) = &self.write_preset {
+            return self.write_draft(path);
+        }
+        if let Some(out) = &self.out {
+            check_folder(out)?;
+        }
+        let mut reports: Vec<TrackReport> = Vec::new();
+        let mut recordings: Vec<Recording> = Vec::new();
+        let mut is_complete = true;
+        for path in &self.paths {
+            let inputs = Inputs::of(path, self.preset.as_deref())?;
+            let (files, problems) = inputs.files();
+            is_complete &= problems.is_empty();
+            problems.iter().for_each(super::console::complain);
+            for file in files {
+                // A bad file does not hide what is in the others.
+                match self.of_file(&file, configured) {
+                    Ok(found) => {
+                        for (report, recording) in found {
+                            is_complete &= report.understanding.is_usable();
+                            reports.push(report);
+                            if self.out.is_some() || self.convert.is_some() {
+                                recordings.push(recording);
+                            }
+                        }
+                    }
+                    Err(error) => {
+                        is_complete = false;
+                        super::console::complain(&error);
+                    }
+                }
+            }
+        }
+        if reports.is_empty() {
+            return Ok(Exit::BadInput);
+        }
+        if let Some(out) = &self.out {
+            write_figures(out, &reports, &recordings)?;
+        }
+        if let Some(to) = &self.convert {
+            convert(to, &recordings)?;
+        }
+        let json = || {
+            serde_json::to_string_pretty(&reports).map_err(|error| Error::Internal(format!("tracks as JSON: {error}")))
+        };
+        let text = || reports.iter().map(TrackReport::text).collect::<Vec<_>>().join("\n");
+        self.format.print(text, json)?;
+        Ok(if is_complete { Exit::Ok } else { Exit::Incomplete })
+    }
+
+    fn write_draft(&self, path: &Path) -> Result<Exit> {
+        let [file] = &self.paths[..] else {
+            let problem = "one file is needed for a preset";
+            return Err(Error::usage(Place::item("--write-preset"), problem, "name one track file"));
+        };
+        if path.exists() {
+            let problem = "the file exists; it may hold your changes";
+            return Err(Error::usage(Place::file(path), problem, "choose another name, or remove it"));
+        }
+        let text = draft(file)?;
+        write_atomically(path, text.as_bytes())?;
+        tracing::info!(
+            "{} written: check each line, then run `tracks` with --preset {}",
+            path.display(),
+            path.display()
+        );
+        Ok(Exit::Ok)
+    }
+
+    fn of_file(&self, file: &InputFile, configured: &Configured) -> Result<Vec<(TrackReport, Recording)>> {
+        let mining = &configured.settings.mining;
+        let is_detected = self.preset.is_none();
+        match file {
+            InputFile::Highd(files) => {
+                let loaded = highd::read(files)?;
+                let (understanding, recording) = Understanding::of_recording(loaded.recording, loaded.notes);
+                let mined = counts(&mine(&recording, mining));
+                let file = files.tracks.display().to_string();
+                let preset = "highd".to_owned();
+                let report =
+                    TrackReport { file, preset, is_detected, understanding, mined, mined_without_smoothing: None };
+                Ok(vec![(report, recording)])
+            }
+            InputFile::Tracks(file, preset) => {
+                let without = preset.smoothing_s.map(|_| Preset { smoothing_s: None, ..(**preset).clone() });
+                let rough = without.map(|preset| read_tracks(file, &preset)).transpose()?;
+                let mut rough = rough.map(Vec::into_iter);
+                let found = read_tracks(file, preset)?.into_iter().map(|LoadedTracks { loaded, understanding }| {
+                    let mined_of = |recording: &Recording| counts(&mine(recording, mining));
+                    let rough = rough.as_mut().and_then(Iterator::next);
+                    let report = TrackReport {
+                        file: file.path.display().to_string(),
+                        preset: preset.name.clone(),
+                        is_detected,
+                        understanding,
+                        mined: mined_of(&loaded.recording),
+                        mined_without_smoothing: rough.map(|rough| mined_of(&rough.loaded.recording)),
+                    };
+                    (report, loaded.recording)
+                });
+                Ok(found.collect())
+            }
+        }
+    }
+}
+
+fn write_figures(out: &Path, reports: &[TrackReport], recordings: &[Recording]) -> Result<()> {
+    let folder = OutputDir::open(out, "tracks.json")?;
+    let mut results = folder.results()?;
+    for recording in recordings {
+        results.add(&format!("{}-time.svg", recording.id), space_time(recording).svg().as_bytes())?;
+        results.add(&format!("{}-lanes.svg", recording.id), across(recording).svg().as_bytes())?;
+    }
+    let record =
+        serde_json::to_vec_pretty(reports).map_err(|error| Error::Internal(format!("tracks.json: {error}")))?;
+    results.publish(&record)?;
+    tracing::info!("figures written to {}", out.display());
+    Ok(())
+}
+
+/// Writes recordings in highD's format, or as one table.
+fn convert(to: &Path, recordings: &[Recording]) -> Result<()> {
+    let is_table = to.extension().is_some();
+    if !is_table {
+        for (at, recording) in recordings.iter().enumerate() {
+            // Numbers as highD has them, unless the names are such.
+            let is_number = recording.id.parse::<u32>().is_ok();
+            let id = if is_number { recording.id.clone() } else { format!("{:02}", at + 1) };
+            highd::write(to, &Recording { id, ..recording.clone() }, &RecordingInfo::default())?;
+        }
+        tracing::info!("{} recordings written to {}", recordings.len(), to.display());
+        return Ok(());
+    }
+    // In one plane: x along the forward carriageway, y to its left.
+    let way = |recording: &Recording, track: &Track| {
+        if recording.carriageways[track.carriageway].name == "1" { -1.0 } else { 1.0 }
+    };
+    let synthetic = recordings.iter().any(|recording| recording.synthetic);
+    let samples = recordings.iter().flat_map(|recording| {
+        recording.tracks.iter().flat_map(move |track| (0..track.len()).map(move |k| (recording, track, k)))
+    });
+    Table::of(samples)
+        .column("recording", |(recording, ..)| match recording.synthetic {
+            true => format!("{SYNTHETIC}-{}", recording.id),
+            false => recording.id.clone(),
+        })
+        .column("vehicle", |(_, track, _)| u64::from(track.id))
+        .column("time", |(recording, track, k)| (track.first_frame + k as i64) as f64 / recording.frame_rate_hz)
+        .column("x", |(recording, track, k)| way(recording, track) * track.s_m[k])
+        .column("y", |(recording, track, k)| way(recording, track) * track.d_m[k])
+        .column("vx", |(recording, track, k)| way(recording, track) * track.v_s_mps[k])
+        .column("vy", |(recording, track, k)| way(recording, track) * track.v_d_mps[k])
+        .column("acceleration", |(_, track, k)| track.a_s_mps2[k])
+        .column("length", |(_, track, _)| track.length_m)
+        .column("width", |(_, track, _)| track.width_m)
+        .column("class", |(_, track, _)| match track.class {
+            VehicleClass::Car => "car",
+            VehicleClass::Truck => "truck",
+        })
+        .column("lane", |(recording, track, k)| {
+            let carriageway = &recording.carriageways[track.carriageway].name;
+            (track.lane[k] != NO_LANE).then(|| format!("{carriageway}.{}", track.lane[k]))
+        })
+        .build()
+        .save(to, &TableMetadata { table: "tracks", profile: None, plan_sha256: None, synthetic })?;
+    tracing::info!("table written to {}", to.display());
+    Ok(())
+}

@@ -1,0 +1,188 @@
+//! What a reader of tracks understood: its text, and figures of the tracks in time and across the road.
+
+use serde::Serialize;
+
+use super::plot::{Figure, Layer, Plot, PlotAxis, Rule};
+use crate::support::readable::count_of;
+use crate::support::table::WIDTH;
+use crate::traffic::mining::{CategoryCount, Mined};
+use crate::traffic::trajectory::tracks::Understanding;
+use crate::traffic::trajectory::{Recording, Track, VehicleClass};
+
+/// Maximum number of tracks of a figure; beyond it, every n-th is drawn.
+const MAX_TRACKS: usize = 400;
+/// Maximum number of points of a drawn track.
+const MAX_POINTS: usize = 60;
+const CAR: &str = "#0072b2";
+const TRUCK: &str = "#d55e00";
+const LINE: &str = "#000000";
+
+/// What is told of one recording.
+#[derive(Debug, Serialize)]
+pub struct TrackReport {
+    /// The track file.
+    pub file: String,
+    /// The preset.
+    pub preset: String,
+    /// The preset was found by the names of the columns.
+    pub is_detected: bool,
+    /// What was understood.
+    pub understanding: Understanding,
+    /// Found and kept scenarios: cut-ins, cut-outs, leader decelerations.
+    pub mined: Vec<CategoryCount>,
+    /// The same without the preset's smoothing.
+    pub mined_without_smoothing: Option<Vec<CategoryCount>>,
+}
+
+/// Found and kept scenarios by category.
+pub fn counts(mined: &Mined) -> Vec<CategoryCount> {
+    use crate::scenario::Category;
+    Category::ALL.iter().map(|category| crate::traffic::mining::count(&mined.scenarios, *category)).collect()
+}
+
+fn counts_in_words(counts: &[CategoryCount]) -> String {
+    use crate::scenario::Category;
+    let of = |(category, count): (Category, &CategoryCount)| {
+        format!("{} of {} {}s", count.kept, count.found, category.label())
+    };
+    Category::ALL.into_iter().zip(counts).map(of).collect::<Vec<_>>().join(", ")
+}
+
+impl TrackReport {
+    /// The report as text.
+    pub fn text(&self) -> String {
+        let how = if self.is_detected { "detected by its columns" } else { "as named" };
+        let mut text = format!(
+            "{}\n  {:<10} {}\n  {:<10} {} ({how})\n",
+            self.file, "recording", self.understanding.recording, "preset", self.preset
+        );
+        let mut lines = self.understanding.lines();
+        lines.push(("scenarios", format!("kept: {}", counts_in_words(&self.mined))));
+        if let Some(without) = &self.mined_without_smoothing {
+            lines.push(("", format!("without smoothing: {}", counts_in_words(without))));
+        }
+        for (name, words) in lines {
+            text += &hanging(&format!("  {name:<10} "), &words);
+        }
+        let findings = &self.understanding.findings;
+        if findings.is_empty() {
+            text += "  nothing contradicts itself\n";
+        }
+        for is_grave in [true, false] {
+            for finding in findings.iter().filter(|finding| finding.is_grave == is_grave) {
+                text += &hanging(if is_grave { "  WRONG      " } else { "  note       " }, &finding.text);
+            }
+        }
+        text
+    }
+}
+
+/// Words after a name, wrapped below one another.
+fn hanging(name: &str, words: &str) -> String {
+    let width = WIDTH.saturating_sub(name.chars().count()).max(20);
+    let mut lines: Vec<String> = vec![String::new()];
+    for word in words.split_whitespace() {
+        let line = lines.last_mut().expect("one line");
+        if !line.is_empty() && line.chars().count() + word.chars().count() + 1 > width {
+            lines.push(word.to_owned());
+        } else {
+            if !line.is_empty() {
+                line.push(' ');
+            }
+            line.push_str(word);
+        }
+    }
+    let indent = " ".repeat(name.chars().count());
+    lines.iter().enumerate().map(|(at, line)| format!("{}{line}\n", if at == 0 { name } else { &indent })).collect()
+}
+
+/// Tracks of a carriageway and class as lines.
+fn runs(
+    recording: &Recording,
+    carriageway: usize,
+    class: VehicleClass,
+    value: impl Fn(&Track, usize) -> (f64, f64),
+) -> Vec<Vec<(f64, f64)>> {
+    let of: Vec<&Track> = recording.tracks.iter().filter(|track| track.carriageway == carriageway).collect();
+    let every = of.len().div_ceil(MAX_TRACKS).max(1);
+    let points = |track: &&Track| {
+        let step = track.len().div_ceil(MAX_POINTS).max(1);
+        (0..track.len()).step_by(step).chain([track.len() - 1]).map(|k| value(track, k)).collect()
+    };
+    of.into_iter().step_by(every).filter(|track| track.class == class).map(|track| points(&track)).collect()
+}
+
+fn figure(
+    recording: &Recording,
+    title: &str,
+    labels: [&str; 2],
+    value: impl Fn(&Track, usize) -> (f64, f64) + Copy,
+    lines: impl Fn(usize) -> Vec<Vec<(f64, f64)>>,
+) -> Figure {
+    let mut plots = Vec::new();
+    for (index, carriageway) in recording.carriageways.iter().enumerate() {
+        let mut layers: Vec<Layer> = Vec::new();
+        let (mut xs, mut ys) = (Vec::new(), Vec::new());
+        for (class, name, colour) in [(VehicleClass::Car, "cars", CAR), (VehicleClass::Truck, "lorries", TRUCK)] {
+            let runs = runs(recording, index, class, value);
+            xs.extend(runs.iter().flatten().map(|point| point.0));
+            ys.extend(runs.iter().flatten().map(|point| point.1));
+            if !runs.is_empty() {
+                layers.push(Rule { runs, name: name.to_owned(), colour, width_px: 0.7, ..Rule::default() }.into());
+            }
+        }
+        let lane_lines = lines(index);
+        ys.extend(lane_lines.iter().flatten().map(|point| point.1));
+        if !lane_lines.is_empty() {
+            let name = "lane lines".to_owned();
+            layers.push(
+                Rule { runs: lane_lines, name, colour: LINE, width_px: 1.6, dash: "8,5", ..Rule::default() }.into(),
+            );
+        }
+        let ends = |values: &[f64]| {
+            let (low, high) =
+                values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
+            if low < high { (low, high) } else { (low - 1.0, low + 1.0) }
+        };
+        let axis = |label: &str, values: &[f64]| {
+            let (low, high) = ends(values);
+            PlotAxis::exactly(label, low, high)
+        };
+        let tracks = recording.tracks.iter().filter(|track| track.carriageway == index).count();
+        plots.push(Plot {
+            heading: format!("carriageway {}, {} tracks", carriageway.name, count_of(tracks)),
+            x: axis(labels[0], &xs),
+            y: axis(labels[1], &ys),
+            layers,
+            ..Plot::default()
+        });
+    }
+    let of_all = if recording.tracks.len() > MAX_TRACKS { " Of many tracks, every n-th is drawn." } else { "" };
+    Figure {
+        title: title.to_owned(),
+        subtitle: Some(format!("recording {}", recording.id)),
+        plots,
+        caption: format!("One line is one vehicle.{of_all}"),
+        ..Figure::default()
+    }
+}
+
+/// Positions along the road over time.
+pub fn space_time(recording: &Recording) -> Figure {
+    let rate_hz = recording.frame_rate_hz;
+    let value = move |track: &Track, k: usize| ((track.first_frame + k as i64) as f64 / rate_hz, track.s_m[k]);
+    figure(recording, "Positions over time", ["time, s", "position along the road, m"], value, |_| Vec::new())
+}
+
+/// Positions across the road over positions along it, with the lane lines.
+pub fn across(recording: &Recording) -> Figure {
+    let value = |track: &Track, k: usize| (track.s_m[k], track.d_m[k]);
+    let lines = |index: usize| {
+        let here = || recording.tracks.iter().filter(move |track| track.carriageway == index);
+        let low = here().flat_map(|track| track.s_m.iter().copied()).fold(f64::INFINITY, f64::min);
+        let high = here().flat_map(|track| track.s_m.iter().copied()).fold(f64::NEG_INFINITY, f64::max);
+        recording.carriageways[index].lane_lines_m.iter().map(|line| vec![(low, *line), (high, *line)]).collect()
+    };
+    let labels = ["position along the road, m", "position to the left of the road's line, m"];
+    figure(recording, "Positions across the road", labels, value, lines)
+}

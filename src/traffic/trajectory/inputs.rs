@@ -1,0 +1,165 @@
+//! The recordings that a user names: a folder or a file, in highD's format or in that of a preset.
+
+use std::path::{Path, PathBuf};
+
+use super::highd::{self, HighdFiles};
+use super::recording::Loaded;
+use super::tracks::{self, HIGHD, Preset, TrackFile};
+use crate::support::plausibility::Implausible;
+use crate::{Error, Place, Result};
+
+/// Recordings whose format is known.
+#[derive(Debug)]
+pub enum Inputs {
+    /// highD's format.
+    Highd(highd::Inventory),
+    /// The format of a preset.
+    Tracks {
+        /// The files.
+        files: Vec<TrackFile>,
+        /// The preset.
+        preset: Box<Preset>,
+    },
+}
+
+/// One file of recordings.
+#[derive(Debug)]
+pub enum InputFile {
+    /// The three files of a highD recording.
+    Highd(HighdFiles),
+    /// A track file, with its preset.
+    Tracks(TrackFile, Box<Preset>),
+}
+
+impl Inputs {
+    /// The recordings of a folder or file. Without a preset, the names of the columns decide.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Input`] if there is no recording, or if no preset fits; those of [`Preset::load`].
+    pub fn of(path: &Path, preset: Option<&str>) -> Result<Inputs> {
+        let with = |preset: Preset| {
+            Ok(Inputs::Tracks { files: tracks::track_files(path, &preset)?, preset: Box::new(preset) })
+        };
+        match preset {
+            Some(HIGHD) => return highd_inputs(path),
+            Some(name) => return with(Preset::load(name)?),
+            None => (),
+        }
+        if !path.exists() {
+            return highd_inputs(path);
+        }
+        if !path.is_dir() {
+            return match tracks::detect(path)? {
+                Some(preset) => with(preset),
+                None if is_highd_name(path) => highd_inputs(path),
+                None => Err(unknown(path)),
+            };
+        }
+        let Some(first) = first_track_file(path)? else { return highd_inputs(path) };
+        match tracks::detect(&first) {
+            Ok(Some(preset)) if !(preset.is_generic() && is_highd_name(&first)) => with(preset),
+            // Its reader says what is wrong.
+            _ if is_highd_name(&first) => highd_inputs(path),
+            Ok(Some(preset)) => with(preset),
+            Ok(None) => Err(unknown(&first)),
+            Err(error) => Err(error),
+        }
+    }
+
+    /// The preset; `None` for highD's format.
+    pub fn preset(&self) -> Option<&Preset> {
+        match self {
+            Inputs::Highd(_) => None,
+            Inputs::Tracks { preset, .. } => Some(preset),
+        }
+    }
+
+    /// Number of files of recordings.
+    pub fn count(&self) -> usize {
+        match self {
+            Inputs::Highd(inventory) => inventory.recordings.len(),
+            Inputs::Tracks { files, .. } => files.len(),
+        }
+    }
+
+    /// The files, and what is wrong with others.
+    pub fn files(self) -> (Vec<InputFile>, Vec<Error>) {
+        match self {
+            Inputs::Highd(inventory) => {
+                (inventory.recordings.into_iter().map(InputFile::Highd).collect(), inventory.problems)
+            }
+            Inputs::Tracks { files, preset } => {
+                (files.into_iter().map(|file| InputFile::Tracks(file, preset.clone())).collect(), Vec::new())
+            }
+        }
+    }
+}
+
+impl InputFile {
+    /// Reads the recordings.
+    ///
+    /// # Errors
+    /// As [`highd::read_checked`] and [`tracks::read_usable`].
+    pub fn read(&self, implausible: Implausible) -> Result<Vec<Loaded>> {
+        match self {
+            InputFile::Highd(files) => highd::read_checked(files, implausible).map(|loaded| vec![loaded]),
+            InputFile::Tracks(file, preset) => tracks::read_usable(file, preset, implausible),
+        }
+    }
+
+    /// The files that are read.
+    pub fn paths(self) -> Vec<PathBuf> {
+        match self {
+            InputFile::Highd(files) => vec![files.tracks, files.tracks_meta, files.recording_meta],
+            InputFile::Tracks(file, _) => vec![file.path],
+        }
+    }
+}
+
+/// A table with fewer columns holds no tracks: vehicle, time, x and y.
+const MIN_COLUMNS: usize = 4;
+const HIGHD_ENDING: &str = "_tracks.csv";
+
+fn is_highd_name(path: &Path) -> bool {
+    path.file_name().is_some_and(|name| name.to_string_lossy().ends_with(HIGHD_ENDING))
+}
+
+fn highd_inputs(path: &Path) -> Result<Inputs> {
+    if path.is_dir() || !is_highd_name(path) {
+        return highd::inventory(path).map(Inputs::Highd);
+    }
+    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let id = name.strip_suffix(HIGHD_ENDING).unwrap_or(&name);
+    let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let recordings = vec![HighdFiles::named(folder, id)];
+    Ok(Inputs::Highd(highd::Inventory { recordings, problems: Vec::new() }))
+}
+
+/// The first file of a folder that may hold tracks; those with highD's names come first.
+fn first_track_file(folder: &Path) -> Result<Option<PathBuf>> {
+    let listed = std::fs::read_dir(folder).map_err(|e| Error::io(folder, "list", e))?;
+    let mut files: Vec<PathBuf> = listed.flatten().map(|entry| entry.path()).filter(|path| path.is_file()).collect();
+    files.sort();
+    if let Some(first) = files.iter().find(|path| is_highd_name(path)) {
+        return Ok(Some(first.clone()));
+    }
+    // Meta files and settings fit no preset.
+    let has_columns = |path: &&PathBuf| tracks::columns_of(path).is_ok_and(|columns| columns.len() >= MIN_COLUMNS);
+    let fits = |path: &&PathBuf| tracks::detect(path).is_ok_and(|preset| preset.is_some());
+    Ok(files.iter().find(fits).or_else(|| files.iter().find(has_columns)).cloned())
+}
+
+fn unknown(path: &Path) -> Error {
+    let columns = match tracks::columns_of(path) {
+        Ok(columns) => {
+            let names: Vec<String> = columns.iter().take(30).map(|name| format!("`{name}`")).collect();
+            format!("; its columns are {}", names.join(", "))
+        }
+        Err(error) => return error,
+    };
+    Error::input(
+        Place::file(path),
+        format!("no preset fits this file{columns}"),
+        "name a preset by option `preset`; `lanesweep tracks` makes a first one (option `write_preset`)",
+    )
+}

@@ -1,0 +1,118 @@
+//! A first preset for a table that no preset knows, from the names of its columns.
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use super::preset::{Preset, Role};
+use super::rows::{Rows, is_same_name};
+use super::{FileFormat, format_of};
+use crate::{Error, Place, Result};
+
+/// Units in the names of columns.
+const UNITS: [(&str, &str); 10] = [
+    ("km/h", "km/h"),
+    ("kmh", "km/h"),
+    ("kph", "km/h"),
+    ("mph", "mph"),
+    ("ft/s", "ft/s"),
+    ("feet", "ft"),
+    ("_ft", "ft"),
+    ("[ft]", "ft"),
+    ("_ms", "ms"),
+    ("rad", "rad"),
+];
+
+/// The text of a preset with the columns that could be guessed, and the others as comments.
+///
+/// # Errors
+/// Those of the file; [`Error::Input`] for a file whose format is unknown.
+pub fn draft(path: &Path) -> Result<String> {
+    let format = format_of(path).ok_or_else(|| {
+        Error::input(Place::file(path), "the format is unknown", "name it .csv, .txt, .parquet, .xml or .json")
+    })?;
+    let generic = Preset::load("generic")?;
+    let rows = Rows::open(path, format, None, None)?;
+    let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+    let mut text = format!(
+        "# A first preset for {}. Check every line; the chapter on tracks explains the keys.\n\
+         name = {:?}\ntitle = {:?}\nformat = {:?}\n\
+         # Point that x and y describe: centre, front, rear, corner.\nreference = \"centre\"\n",
+        path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
+        stem,
+        format!("tracks like {stem}"),
+        match format {
+            FileFormat::Csv => "csv",
+            FileFormat::Parquet => "parquet",
+            FileFormat::Xml => "xml",
+            FileFormat::Json => "json",
+            FileFormat::Commonroad => "commonroad",
+        }
+    );
+    let mut used: Vec<&str> = Vec::new();
+    let mut columns = String::new();
+    let mut missing: Vec<&str> = Vec::new();
+    for role in Role::ALL {
+        let Some(column) = generic.columns.get(&role) else { continue };
+        let find = |name: &String| rows.header().iter().find(|header| is_guess(header, name));
+        match column.names().iter().find_map(find) {
+            Some(header) if !used.contains(&header.as_str()) => {
+                used.push(header);
+                let lower = header.to_lowercase();
+                let unit = UNITS.iter().find(|(sign, unit)| lower.contains(sign) && fits(role, unit));
+                let _ = match unit {
+                    Some((_, unit)) => writeln!(columns, "{} = {{ name = {header:?}, unit = {unit:?} }}", role.key()),
+                    None => writeln!(columns, "{} = {header:?}", role.key()),
+                };
+            }
+            _ => missing.push(role.key()),
+        }
+    }
+    if !columns.contains("time =") {
+        text.push_str("# Frames per second, because no column was taken for a time.\nframe_rate_hz = 25.0\n");
+    }
+    text.push_str("# Texts that stand for no value.\nnone = [\"\", \"NA\", \"-1\"]\n");
+    text.push_str("\n[axes]\n# Side of +x on which +y lies: left, or right in images.\ny = \"left\"\n");
+    let _ = write!(text, "\n[columns]\n{columns}");
+    for key in ["vehicle", "frame", "x", "y"].into_iter().filter(|key| missing.contains(key)) {
+        if key == "frame" && columns.contains("time =") {
+            continue;
+        }
+        let _ = writeln!(text, "{key} = \"?\"  # no column looks like it: fill it in");
+    }
+    let unused: Vec<String> = rows
+        .header()
+        .iter()
+        .filter(|header| !used.contains(&header.as_str()))
+        .map(|name| format!("{name:?}"))
+        .collect();
+    if !unused.is_empty() {
+        let _ = writeln!(text, "# Not used: {}", unused.join(", "));
+    }
+    let _ = writeln!(text, "# Other roles: {}", missing.join(", "));
+    Ok(text)
+}
+
+fn fits(role: Role, unit: &str) -> bool {
+    use super::preset::Dimension as D;
+    match role.dimension() {
+        D::Length => unit == "ft",
+        D::Speed => matches!(unit, "km/h" | "mph" | "ft/s"),
+        D::Time => unit == "ms",
+        D::Angle => unit == "rad",
+        _ => false,
+    }
+}
+
+/// Whether a column looks like a name: equal, or with a unit in brackets or after a mark.
+fn is_guess(header: &str, name: &str) -> bool {
+    if is_same_name(header, name) {
+        return true;
+    }
+    let bare = header.split(['[', '(']).next().unwrap_or(header).trim();
+    let without_unit = |text: &str| {
+        let lower = text.to_lowercase();
+        let units = ["_kmh", "_mps", "_kph", "_mph", "_deg", "_rad", "_ms", "_ft", "_m", "_s"];
+        units.iter().find_map(|unit| lower.strip_suffix(unit).map(str::to_owned)).unwrap_or(lower)
+    };
+    is_same_name(bare, name) || is_same_name(&without_unit(bare), name)
+}

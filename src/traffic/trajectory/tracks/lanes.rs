@@ -1,0 +1,190 @@
+//! Lane lines of a carriageway, from the lateral positions of its vehicles: by the names of lanes in the file, by bands of
+//! a known width, or by where vehicles drive.
+
+use super::raw::NO_LABEL;
+use super::road::median;
+
+/// Lanes are at least so far apart, m.
+const MIN_SPACING_M: f64 = 2.2;
+/// Width of a lane if nothing tells it, m.
+const USUAL_WIDTH_M: f64 = 3.6;
+/// A lane has at least this fraction of the samples.
+const MIN_FRACTION: f64 = 0.004;
+/// Standard deviation of the kernel over lateral positions, m.
+const KERNEL_M: f64 = 0.3;
+/// Raster of lateral positions, m.
+const RASTER_M: f64 = 0.1;
+/// A valley between two lanes is lower than this fraction of the lower peak.
+const VALLEY: f64 = 0.7;
+/// Maximum number of lanes.
+const MAX_LANES: usize = 32;
+
+/// Lateral position and name of the lane of a sample.
+pub(super) type Lateral = (f64, u32);
+
+/// How the lane lines were found.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum LaneSource {
+    /// Names of lanes in the file.
+    Names,
+    /// Bands of a known width.
+    Bands,
+    /// Positions of the vehicles.
+    Positions,
+    /// Boundaries of a map.
+    Map,
+}
+
+/// Lane lines from left to right; `None` without samples.
+pub(super) fn lane_lines(samples: &[Lateral], width_m: Option<f64>) -> Option<(Vec<f64>, LaneSource)> {
+    if samples.is_empty() {
+        return None;
+    }
+    let named = centres_by_name(samples);
+    let (centres, source) = match (named.is_empty(), width_m) {
+        (_, Some(width_m)) => return Some((bands(samples, width_m), LaneSource::Bands)),
+        (false, None) => (named, LaneSource::Names),
+        (true, None) => (centres_by_position(samples), LaneSource::Positions),
+    };
+    Some((lines_around(&centres), source))
+}
+
+/// Lines midway between the centres, and beyond the outer ones.
+fn lines_around(centres: &[f64]) -> Vec<f64> {
+    let mut spacings: Vec<f64> = centres.windows(2).map(|pair| pair[0] - pair[1]).collect();
+    let usual = if spacings.is_empty() { USUAL_WIDTH_M } else { median(&mut spacings) };
+    let half = usual.clamp(MIN_SPACING_M, 6.0) / 2.0;
+    let mut lines = vec![centres[0] + half];
+    lines.extend(centres.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])));
+    lines.push(centres[centres.len() - 1] - half);
+    lines
+}
+
+/// Bands of the width, as many as have vehicles.
+fn bands(samples: &[Lateral], width_m: f64) -> Vec<f64> {
+    let mut band: Vec<i64> = samples.iter().map(|(d, _)| (d / width_m).floor() as i64).collect();
+    band.sort_unstable();
+    let used = |at: &&i64| {
+        let from = band.partition_point(|b| b < *at);
+        let to = band.partition_point(|b| b <= *at);
+        (to - from) as f64 >= MIN_FRACTION * band.len() as f64
+    };
+    let low = *band.iter().find(used).unwrap_or(&band[0]);
+    let high = *band.iter().rev().find(used).unwrap_or(&band[0]);
+    let high = high.min(low + MAX_LANES as i64);
+    (low..=high + 1).rev().map(|line| line as f64 * width_m).collect()
+}
+
+/// Medians of the names' lateral positions, from left to right; names of one lane along the road are joined.
+fn centres_by_name(samples: &[Lateral]) -> Vec<f64> {
+    let mut sorted: Vec<Lateral> = samples.iter().copied().filter(|(_, label)| *label != NO_LABEL).collect();
+    sorted.sort_by(|a, b| a.1.cmp(&b.1).then(a.0.total_cmp(&b.0)));
+    let total = sorted.len() as f64;
+    let groups = sorted.chunk_by(|a, b| a.1 == b.1);
+    let mut centres: Vec<(f64, f64)> = groups
+        .filter(|group| group.len() as f64 >= MIN_FRACTION * total)
+        .map(|group| (group[group.len() / 2].0, group.len() as f64))
+        .collect();
+    centres.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut joined: Vec<(f64, f64)> = Vec::new();
+    for (d_m, weight) in centres {
+        match joined.last_mut() {
+            Some((of, sum)) if *of - d_m < MIN_SPACING_M => {
+                *of = (*of * *sum + d_m * weight) / (*sum + weight);
+                *sum += weight;
+            }
+            _ => joined.push((d_m, weight)),
+        }
+    }
+    joined.truncate(MAX_LANES);
+    joined.into_iter().map(|(d_m, _)| d_m).collect()
+}
+
+/// Peaks of the density of lateral positions, from left to right.
+fn centres_by_position(samples: &[Lateral]) -> Vec<f64> {
+    let mut d: Vec<f64> = samples.iter().map(|(d_m, _)| *d_m).collect();
+    d.sort_by(f64::total_cmp);
+    // Without the outermost ones, which may be anywhere.
+    let cut = d.len() / 500;
+    let d = &d[cut..d.len() - cut];
+    let (low, high) = (d[0] - 1.0, d[d.len() - 1] + 1.0);
+    let cells = (((high - low) / RASTER_M).ceil() as usize + 1).min(20_000);
+    let mut counts = vec![0.0; cells];
+    for value in d {
+        counts[(((value - low) / RASTER_M) as usize).min(cells - 1)] += 1.0;
+    }
+    let reach = (4.0 * KERNEL_M / RASTER_M) as i64;
+    let kernel = |offset: i64| libm::exp(-0.5 * (offset as f64 * RASTER_M / KERNEL_M).powi(2));
+    let smooth = |at: usize| -> f64 {
+        let near = (-reach..=reach)
+            .filter_map(|offset| Some((offset, *counts.get(usize::try_from(at as i64 + offset).ok()?)?)));
+        near.map(|(offset, count)| kernel(offset) * count).sum()
+    };
+    let density: Vec<f64> = (0..cells).map(smooth).collect();
+    let is_peak = |at: &usize| {
+        let left = if *at == 0 { 0.0 } else { density[at - 1] };
+        density[*at] > left && density[*at] >= density.get(at + 1).copied().unwrap_or(0.0)
+    };
+    let mut peaks: Vec<usize> = (0..cells).filter(is_peak).collect();
+    let highest = peaks.iter().map(|at| density[*at]).fold(0.0, f64::max);
+    peaks.retain(|at| density[*at] >= 0.01 * highest);
+    // The lower of two peaks that are too near, or without a valley between them, is none.
+    loop {
+        let valley = |a: usize, b: usize| density[a..=b].iter().copied().fold(f64::INFINITY, f64::min);
+        let bad = (1..peaks.len()).find(|&i| {
+            let (a, b) = (peaks[i - 1], peaks[i]);
+            ((b - a) as f64) * RASTER_M < MIN_SPACING_M || valley(a, b) > VALLEY * density[a].min(density[b])
+        });
+        let Some(i) = bad else { break };
+        peaks.remove(if density[peaks[i - 1]] < density[peaks[i]] { i - 1 } else { i });
+    }
+    let mut centres: Vec<f64> = peaks.into_iter().map(|at| low + (at as f64 + 0.5) * RASTER_M).collect();
+    centres.reverse();
+    centres.truncate(MAX_LANES);
+    if centres.is_empty() { vec![d[d.len() / 2]] } else { centres }
+}
+
+/// Lane lines of a map, from the lateral positions of its boundaries: those that are near one another are one.
+pub(super) fn lines_of_map(mut d: Vec<f64>) -> Vec<f64> {
+    d.sort_by(|a, b| b.total_cmp(a));
+    let mut lines: Vec<(f64, f64)> = Vec::new();
+    for value in d {
+        match lines.last_mut() {
+            Some((line, count)) if *line - value < 0.8 => {
+                *line = (*line * *count + value) / (*count + 1.0);
+                *count += 1.0;
+            }
+            _ => lines.push((value, 1.0)),
+        }
+    }
+    lines.into_iter().map(|(line, _)| line).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn driven(centres: &[f64], labels: bool) -> Vec<Lateral> {
+        let wander = |k: usize| 0.35 * libm::sin(k as f64 * 0.7) + 0.2 * libm::sin(k as f64 * 0.13);
+        let of = |lane: usize, centre: &f64| -> Vec<Lateral> {
+            let label = if labels { lane as u32 } else { NO_LABEL };
+            (0..400).map(|k| (centre + wander(k), label)).collect()
+        };
+        centres.iter().enumerate().flat_map(|(lane, centre)| of(lane, centre)).collect()
+    }
+
+    #[test]
+    fn lanes_are_found_with_and_without_names() {
+        let centres = [-1.8, -5.5, -9.1];
+        for labels in [true, false] {
+            let (lines, source) = lane_lines(&driven(&centres, labels), None).unwrap();
+            assert_eq!(source, if labels { LaneSource::Names } else { LaneSource::Positions });
+            assert_eq!(lines.len(), 4);
+            for (line, expected) in lines.iter().zip([0.03, -3.65, -7.3, -10.93]) {
+                assert!((line - expected).abs() < 0.25, "{lines:?}");
+            }
+        }
+        let (lines, source) = lane_lines(&driven(&[-1.83, -5.49], false), Some(3.6576)).unwrap();
+        assert_eq!((lines, source), (vec![0.0, -3.6576, -7.3152], LaneSource::Bands));
+    }
+}

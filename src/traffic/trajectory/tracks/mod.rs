@@ -1,0 +1,241 @@
+//! Tracks in any format: a [`Preset`] says what the columns of a file mean, this module makes [`Recording`]s of them.
+//!
+//! The stages: rows of a file (`rows`), vehicles in SI units (`raw`, `commonroad`), the line of the road (`road`), lanes
+//! (`lanes`), the recording (`assemble`), and what contradicts itself (`understanding`). highD files have their own reader.
+
+mod assemble;
+mod commonroad;
+mod draft;
+mod lanes;
+mod preset;
+mod raw;
+mod road;
+mod rows;
+mod smooth;
+mod understanding;
+
+use std::path::{Path, PathBuf};
+
+pub use draft::draft;
+pub use preset::{
+    Axes, Classes, ColumnName, FileFormat, HIGHD, HeadingOrigin, LaneBands, MetaFile, OneOrMany, Preset, Reference,
+    RoadSource, Role, Side,
+};
+pub use understanding::{Exclusion, Finding, Understanding, UnderstoodCarriageway};
+
+use rows::{Columns, Rows};
+
+use super::Loaded;
+use super::highd::made_up;
+use crate::support::plausibility::Implausible;
+use crate::{Error, Place, Result};
+
+/// Names of recordings with this word are synthetic, because tables of tracks have no other place to say so.
+pub const SYNTHETIC: &str = "SYNTHETIC";
+
+/// A track file and the name of its recording.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct TrackFile {
+    /// The file.
+    pub path: PathBuf,
+    /// Name of the recording.
+    pub id: String,
+}
+
+/// Endings of files that may hold tracks, with their formats.
+const ENDINGS: [(&str, FileFormat); 7] = [
+    ("csv", FileFormat::Csv),
+    ("txt", FileFormat::Csv),
+    ("tsv", FileFormat::Csv),
+    ("parquet", FileFormat::Parquet),
+    ("xml", FileFormat::Xml),
+    ("json", FileFormat::Json),
+    ("jsonl", FileFormat::Json),
+];
+
+fn format_of(path: &Path) -> Option<FileFormat> {
+    let ending = path.extension()?.to_str()?.to_lowercase();
+    ENDINGS.iter().find(|(known, _)| *known == ending).map(|(_, format)| *format)
+}
+
+/// The preset that fits a file, and the reason; `None` if none of the shipped ones fits.
+///
+/// # Errors
+/// Those of the file; [`Error::Input`] if several presets fit equally well.
+pub fn detect(path: &Path) -> Result<Option<Preset>> {
+    let Some(format) = format_of(path) else { return Ok(None) };
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let mut best: Vec<(usize, Preset)> = Vec::new();
+    for preset in Preset::shipped()? {
+        if preset.is_generic() || preset.recording_of(&name).is_none() {
+            continue;
+        }
+        let score = if preset.format == FileFormat::Commonroad {
+            usize::from(format == FileFormat::Xml && is_commonroad(path)?) * 100
+        } else if preset.format == format {
+            let Ok(rows) = Rows::of_preset(path, &preset) else { continue };
+            fitting(&preset, rows.header())
+        } else {
+            0
+        };
+        if score > 0 {
+            best.push((score, preset));
+        }
+    }
+    best.sort_by(|a, b| b.0.cmp(&a.0));
+    match best.as_slice() {
+        [(first, a), (second, b), ..] if first == second => {
+            let problem = format!("it fits the presets {} and {}", a.name, b.name);
+            Err(Error::input(Place::file(path), problem, "choose one by option `preset`"))
+        }
+        [] => generic(path, format),
+        _ => Ok(best.into_iter().next().map(|(_, preset)| preset)),
+    }
+}
+
+/// The preset for tables of unknown programs, if the names of the columns say enough.
+fn generic(path: &Path, format: FileFormat) -> Result<Option<Preset>> {
+    let preset = Preset { format, ..Preset::load("generic")? };
+    // A file that cannot be opened in this format fits nothing; its reader says why.
+    let rows = Rows::of_preset(path, &preset)?;
+    Ok((fitting(&preset, rows.header()) > 0).then_some(preset))
+}
+
+/// Number of columns of a preset that a header has; 0 if a needed one is missing.
+fn fitting(preset: &Preset, header: &[String]) -> usize {
+    let columns = Columns::of(&preset.columns, header, &[]);
+    let has = |role: Role| columns.has(role);
+    let is_needed = has(Role::Vehicle) && has(Role::X) && has(Role::Y) && (has(Role::Frame) || has(Role::Time));
+    // Half of the columns at least, so that two formats that share the names of positions are told apart.
+    let found = preset.columns.keys().filter(|role| has(**role)).count();
+    if is_needed && (preset.is_generic() || 3 * found >= 2 * preset.columns.len()) { found } else { 0 }
+}
+
+fn is_commonroad(path: &Path) -> Result<bool> {
+    use std::io::Read;
+    let mut start = Vec::new();
+    let file = crate::support::input_file::open(path)?;
+    file.take(4096).read_to_end(&mut start).map_err(|e| Error::io(path, "read", e))?;
+    Ok(start.windows(11).any(|window| window == b"<commonRoad"))
+}
+
+/// The track files of a folder, or the one file, for a preset; sorted by name.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Input`] if there is none.
+pub fn track_files(path: &Path, preset: &Preset) -> Result<Vec<TrackFile>> {
+    let of = |path: PathBuf| {
+        let name = path.file_name()?.to_str()?.to_owned();
+        let stem = || path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
+        let id = preset.recording_of(&name).map(str::to_owned).or_else(|| if path.is_dir() { None } else { stem() })?;
+        Some(TrackFile { id, path })
+    };
+    if !path.is_dir() {
+        return of(path.to_path_buf()).map(|file| vec![file]).ok_or_else(|| {
+            Error::input(Place::file(path), "the file has no name", "give the path of a file or folder")
+        });
+    }
+    let listed = std::fs::read_dir(path).map_err(|e| Error::io(path, "list", e))?;
+    let mut files: Vec<TrackFile> = Vec::new();
+    for entry in listed {
+        let file = entry.map_err(|e| Error::io(path, "list", e))?.path();
+        let name = file.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let is_ours = preset.recording_of(&name).is_some() && is_format(&file, preset);
+        if file.is_file() && is_ours && !name.starts_with('.') && !is_meta(&name, preset) {
+            files.extend(of(file));
+        }
+    }
+    files.sort_by(|a, b| a.path.cmp(&b.path));
+    if files.is_empty() {
+        let problem = format!("no file here is named {} as preset {} expects", preset.files, preset.name);
+        return Err(Error::input(Place::file(path), problem, "give another folder, or another preset"));
+    }
+    Ok(files)
+}
+
+fn is_format(path: &Path, preset: &Preset) -> bool {
+    let format = if preset.format == FileFormat::Commonroad { FileFormat::Xml } else { preset.format };
+    format_of(path) == Some(format)
+}
+
+/// Whether a file name is that of a preset's other files.
+fn is_meta(name: &str, preset: &Preset) -> bool {
+    let fits = |pattern: &str| {
+        let (before, after) = pattern.split_once('*').unwrap_or((pattern, ""));
+        name.starts_with(before) && name.ends_with(after) && (pattern.contains('*') || name == pattern)
+    };
+    let metas = preset.vehicles.iter().chain(&preset.recording).map(|meta| meta.file.as_str());
+    metas.chain(preset.types_file.as_deref()).any(fits)
+}
+
+/// A recording of a track file, and what was understood.
+#[derive(Debug)]
+pub struct LoadedTracks {
+    /// The recording with the facts about its file.
+    pub loaded: Loaded,
+    /// What was understood.
+    pub understanding: Understanding,
+}
+
+/// Reads a track file; returns its recordings. Contradictions are in their findings.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Input`] for a value that is none, with file, row and column, or for a file without vehicles.
+pub fn read_tracks(file: &TrackFile, preset: &Preset) -> Result<Vec<LoadedTracks>> {
+    let raw = match preset.format {
+        FileFormat::Commonroad => commonroad::read(&file.path, &file.id)?,
+        _ => raw::read_table(&file.path, &file.id, preset)?,
+    };
+    let place = Place::file(&file.path);
+    if raw.recordings.iter().all(|recording| recording.vehicles.is_empty()) {
+        return Err(raw::no_vehicle(&file.path));
+    }
+    let synthetic = made_up(file.path.parent().unwrap_or(Path::new("."))).is_some();
+    let bytes = raw.checksums.iter().map(|file| file.bytes).sum();
+    let mut all = Vec::new();
+    for mut recording in raw.recordings {
+        recording.synthetic = synthetic || recording.id.contains(SYNTHETIC);
+        let place = place.clone().of(format!("recording {}", recording.id));
+        let (recording, understanding) = assemble::assemble(recording, preset, &raw.roles, &place)?;
+        let loaded =
+            Loaded { recording, checksum_sha256: raw.checksums.clone(), rows: raw.rows, bytes, notes: Vec::new() };
+        all.push(LoadedTracks { loaded, understanding });
+    }
+    Ok(all)
+}
+
+/// Like [`read_tracks`], for runs that use the recordings: minor findings become notes.
+///
+/// # Errors
+/// As [`read_tracks`]; [`Error::Input`] for a grave finding, unless implausible input is accepted.
+pub fn read_usable(file: &TrackFile, preset: &Preset, implausible: Implausible) -> Result<Vec<Loaded>> {
+    let mut usable = Vec::new();
+    for LoadedTracks { mut loaded, understanding } in read_tracks(file, preset)? {
+        if let Some(grave) = understanding.findings.iter().find(|finding| finding.is_grave)
+            && implausible == Implausible::Refused
+        {
+            let more = understanding.findings.iter().filter(|finding| finding.is_grave).count() - 1;
+            let more = if more > 0 { format!(" ({more} more findings of this kind)") } else { String::new() };
+            return Err(Error::input(
+                Place::file(&file.path).of(format!("recording {}", loaded.recording.id)),
+                format!("{}{more}", grave.text),
+                "`lanesweep tracks` shows all; option `accept_implausible` uses the tracks as they are",
+            ));
+        }
+        loaded.notes.push(format!("read by preset {}", preset.name));
+        loaded.notes.extend(understanding.findings.into_iter().map(|finding| finding.text));
+        usable.push(loaded);
+    }
+    Ok(usable)
+}
+
+/// The names of a file's columns.
+///
+/// # Errors
+/// Those of the file; [`Error::Input`] for a file whose format is unknown.
+pub fn columns_of(path: &Path) -> Result<Vec<String>> {
+    let format = format_of(path).ok_or_else(|| {
+        Error::input(Place::file(path), "the format is unknown", "name it .csv, .txt, .parquet, .xml or .json")
+    })?;
+    Ok(Rows::open(path, format, None, None)?.header().to_vec())
+}

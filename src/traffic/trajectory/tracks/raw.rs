@@ -1,0 +1,400 @@
+//! What a track file says: vehicles with samples in SI units and right-handed axes, before any road is known.
+
+use std::collections::HashMap;
+use std::path::Path;
+
+use super::preset::{HeadingOrigin, MetaFile, Preset, Reference, Role, Side};
+use super::rows::{Columns, Rows, SampleRow};
+use crate::traffic::trajectory::csv_table::FileChecksum;
+use crate::{Error, Place, Result};
+
+/// No lane is named.
+pub(super) const NO_LABEL: u32 = u32::MAX;
+/// Maximum number of lane names of a file; more are no names of lanes.
+const MAX_LABELS: usize = 65_536;
+
+/// One sample. NaN: not in the file.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct RawSample {
+    /// Frame number, or time in s.
+    pub at: f64,
+    /// Position of the reference point, m; y to the left of x.
+    pub xy_m: [f64; 2],
+    /// Direction of the vehicle's front.
+    pub heading: [f64; 2],
+    /// Magnitude of the velocity, m/s.
+    pub speed_mps: f64,
+    /// Velocity in the axes of the file, m/s.
+    pub velocity_mps: [f64; 2],
+    /// Velocity forward and to the left along the road, m/s.
+    pub along_mps: [f64; 2],
+    /// Acceleration forward, m/s².
+    pub acceleration_mps2: f64,
+    /// Acceleration in the axes of the file, m/s².
+    pub acceleration_xy_mps2: [f64; 2],
+    /// Index of the lane's name, or [`NO_LABEL`].
+    pub lane: u32,
+}
+
+/// One vehicle.
+#[derive(Debug, Clone, Default)]
+pub(super) struct RawVehicle {
+    /// Its id in the file.
+    pub key: String,
+    pub class: Option<String>,
+    /// The lengths and widths that it has, m; each change is one more.
+    pub lengths_m: Vec<f64>,
+    pub widths_m: Vec<f64>,
+    /// Sign of the travel along the road.
+    pub direction: Option<f64>,
+    pub samples: Vec<RawSample>,
+}
+
+/// One recording.
+#[derive(Debug, Clone, Default)]
+pub(super) struct RawRecording {
+    pub id: String,
+    pub vehicles: Vec<RawVehicle>,
+    /// Names of lanes.
+    pub lanes: Vec<String>,
+    /// Whether `at` counts frames.
+    pub has_frames: bool,
+    pub frame_rate_hz: Option<f64>,
+    /// Samples without a position.
+    pub incomplete: u64,
+    /// Lines of the lanes, from a map: points in the axes of the file, by boundary.
+    pub boundaries: Vec<Vec<[f64; 2]>>,
+    pub synthetic: bool,
+}
+
+/// The recordings of a file.
+#[derive(Debug)]
+pub(super) struct RawFile {
+    pub recordings: Vec<RawRecording>,
+    pub checksums: Vec<FileChecksum>,
+    pub rows: u64,
+    /// Roles that the file has.
+    pub roles: Vec<Role>,
+}
+
+/// Reads a table of samples with its meta files.
+///
+/// # Errors
+/// Those of the files, with the place of a bad value.
+pub(super) fn read_table(path: &Path, id: &str, preset: &Preset) -> Result<RawFile> {
+    let rows = Rows::of_preset(path, preset)?;
+    let columns = Columns::of(&preset.columns, rows.header(), &preset.none);
+    check_columns(&rows, &columns, preset)?;
+    let mut file = Collecting::new(id, preset, &columns);
+    let (checksum, count) = rows.each(&columns, &mut |row| file.add(row))?;
+    let mut recordings = file.recordings;
+    let mut checksums = vec![checksum];
+    if let Some(meta) = &preset.vehicles {
+        checksums.extend(add_vehicle_facts(path, id, meta, preset, &mut recordings)?);
+    }
+    if let Some(meta) = &preset.recording {
+        checksums.extend(add_frame_rate(path, id, meta, preset, &mut recordings)?);
+    }
+    if let Some(types) = &preset.types_file {
+        add_types(path, id, types, &mut recordings)?;
+    }
+    let roles = Role::ALL.into_iter().filter(|role| columns.has(*role)).collect();
+    Ok(RawFile { recordings, checksums, rows: count, roles })
+}
+
+fn check_columns(rows: &Rows, columns: &Columns, preset: &Preset) -> Result<()> {
+    let missing: Vec<&str> = [Role::Vehicle, Role::X, Role::Y]
+        .into_iter()
+        .filter(|role| !columns.has(*role))
+        .filter_map(|role| preset.columns.get(&role)?.names().first().map(String::as_str))
+        .collect();
+    let has_time = columns.has(Role::Frame) || columns.has(Role::Time);
+    if missing.is_empty() && has_time {
+        return Ok(());
+    }
+    let what = if missing.is_empty() { "a frame or time".to_owned() } else { missing.join(", ") };
+    let header: Vec<String> = rows.header().iter().take(30).map(|name| format!("`{name}`")).collect();
+    Err(Error::input(
+        rows.header_place(),
+        format!("preset {} needs the column {what}; the header has {}", preset.name, header.join(", ")),
+        "use another preset, or write one: `lanesweep tracks` makes a start (option `write_preset`)",
+    ))
+}
+
+struct Collecting<'a> {
+    preset: &'a Preset,
+    id: &'a str,
+    recordings: Vec<RawRecording>,
+    /// By the name of the recording in the file.
+    of_name: HashMap<String, usize>,
+    vehicles: HashMap<(usize, String), usize>,
+    labels: HashMap<(usize, String), u32>,
+    last: (usize, usize),
+    has_frames: bool,
+    has_recordings: bool,
+    has_sizes: bool,
+    y_sign: f64,
+}
+
+impl<'a> Collecting<'a> {
+    fn new(id: &'a str, preset: &'a Preset, columns: &Columns) -> Self {
+        Collecting {
+            preset,
+            id,
+            recordings: Vec::new(),
+            of_name: HashMap::new(),
+            vehicles: HashMap::new(),
+            labels: HashMap::new(),
+            last: (usize::MAX, usize::MAX),
+            // Times tell the rate too.
+            has_frames: columns.has(Role::Frame)
+                && (preset.frame_rate_hz.is_some() || preset.recording.is_some() || !columns.has(Role::Time)),
+            has_recordings: columns.has(Role::Recording),
+            has_sizes: columns.has(Role::Length) || columns.has(Role::Width),
+            y_sign: if preset.axes.y == Side::Right { -1.0 } else { 1.0 },
+        }
+    }
+
+    fn add(&mut self, row: &dyn SampleRow) -> Result<()> {
+        let missing = |role: Role| Error::input(row.place(role), "there is no value", "fill it in, or remove the row");
+        let recording = self.recording(row)?;
+        let key = row.text(Role::Vehicle)?.ok_or_else(|| missing(Role::Vehicle))?;
+        let vehicle = self.vehicle(recording, &key);
+        let time = if self.has_frames { Role::Frame } else { Role::Time };
+        let at = row.number(time)?.ok_or_else(|| missing(time))?;
+        let number = |role| row.number(role).map(|value| value.unwrap_or(f64::NAN));
+        let xy_m = [number(Role::X)?, self.y_sign * number(Role::Y)?];
+        if xy_m.iter().any(|value| value.is_nan()) {
+            self.recordings[recording].incomplete += 1;
+            return Ok(());
+        }
+        let heading = match row.number(Role::Heading)? {
+            None => [f64::NAN; 2],
+            Some(angle) => {
+                let (sin, cos) = (libm::sin(angle), libm::cos(angle));
+                match self.preset.axes.heading {
+                    HeadingOrigin::FromX => [cos, self.y_sign * sin],
+                    HeadingOrigin::FromNorth => [sin, self.y_sign * cos],
+                }
+            }
+        };
+        let mut sample = RawSample {
+            at,
+            xy_m,
+            heading,
+            speed_mps: number(Role::Speed)?,
+            velocity_mps: [number(Role::XSpeed)?, self.y_sign * number(Role::YSpeed)?],
+            along_mps: [number(Role::ForwardSpeed)?, number(Role::LeftwardSpeed)?],
+            acceleration_mps2: number(Role::Acceleration)?,
+            acceleration_xy_mps2: [number(Role::XAcceleration)?, self.y_sign * number(Role::YAcceleration)?],
+            lane: NO_LABEL,
+        };
+        if let Some(lane) = row.text(Role::Lane)? {
+            sample.lane = self.label(recording, &lane);
+        }
+        let of = &mut self.recordings[recording].vehicles[vehicle];
+        if self.has_sizes {
+            for (role, sizes) in [(Role::Length, &mut of.lengths_m), (Role::Width, &mut of.widths_m)] {
+                if let Some(size) = row.number(role)?.filter(|size| *size > 0.0)
+                    && sizes.last() != Some(&size)
+                {
+                    sizes.push(size);
+                }
+            }
+        }
+        if of.samples.is_empty() {
+            of.class = row.text(Role::Class)?.map(|class| class.into_owned());
+            of.direction = row.number(Role::Direction)?;
+        }
+        of.samples.push(sample);
+        Ok(())
+    }
+
+    fn recording(&mut self, row: &dyn SampleRow) -> Result<usize> {
+        let name = if self.has_recordings { row.text(Role::Recording)?.unwrap_or_default() } else { "".into() };
+        if let Some(&at) = self.of_name.get(name.as_ref()) {
+            return Ok(at);
+        }
+        let id = if name.is_empty() { self.id.to_owned() } else { format!("{}-{name}", self.id) };
+        let id = id.replace(['/', '\\', ' '], "-");
+        self.recordings.push(RawRecording { id, has_frames: self.has_frames, ..RawRecording::default() });
+        self.of_name.insert(name.into_owned(), self.recordings.len() - 1);
+        Ok(self.recordings.len() - 1)
+    }
+
+    fn vehicle(&mut self, recording: usize, key: &str) -> usize {
+        if self.last.0 == recording && self.recordings[recording].vehicles[self.last.1].key == key {
+            return self.last.1;
+        }
+        let of = &mut self.recordings[recording];
+        let at = *self.vehicles.entry((recording, key.to_owned())).or_insert_with(|| {
+            of.vehicles.push(RawVehicle { key: key.to_owned(), ..RawVehicle::default() });
+            of.vehicles.len() - 1
+        });
+        self.last = (recording, at);
+        at
+    }
+
+    fn label(&mut self, recording: usize, lane: &str) -> u32 {
+        let of = &mut self.recordings[recording];
+        if let Some(last) = of.lanes.last().filter(|last| *last == lane) {
+            debug_assert!(!last.is_empty());
+            return of.lanes.len() as u32 - 1;
+        }
+        if let Some(&label) = self.labels.get(&(recording, lane.to_owned())) {
+            return label;
+        }
+        if of.lanes.len() >= MAX_LABELS {
+            return NO_LABEL;
+        }
+        of.lanes.push(lane.to_owned());
+        let label = of.lanes.len() as u32 - 1;
+        self.labels.insert((recording, lane.to_owned()), label);
+        label
+    }
+}
+
+/// The meta file beside a track file, if it is there.
+fn meta_rows(path: &Path, id: &str, meta: &MetaFile, preset: &Preset) -> Result<Option<(Rows, Columns)>> {
+    let beside = path.with_file_name(meta.file.replace('*', id));
+    if !beside.exists() {
+        return Ok(None);
+    }
+    let rows = Rows::open(&beside, preset.format, None, preset.delimiter)?;
+    let columns = Columns::of(&meta.columns, rows.header(), &preset.none);
+    Ok(Some((rows, columns)))
+}
+
+fn add_vehicle_facts(
+    path: &Path,
+    id: &str,
+    meta: &MetaFile,
+    preset: &Preset,
+    recordings: &mut [RawRecording],
+) -> Result<Option<FileChecksum>> {
+    let Some((rows, columns)) = meta_rows(path, id, meta, preset)? else { return Ok(None) };
+    let mut facts: HashMap<String, RawVehicle> = HashMap::new();
+    let (checksum, _) = rows.each(&columns, &mut |row| {
+        let Some(key) = row.text(Role::Vehicle)? else { return Ok(()) };
+        let sizes =
+            |role| -> Result<Vec<f64>> { Ok(row.number(role)?.filter(|size| *size > 0.0).into_iter().collect()) };
+        let vehicle = RawVehicle {
+            key: key.to_string(),
+            class: row.text(Role::Class)?.map(|class| class.into_owned()),
+            lengths_m: sizes(Role::Length)?,
+            widths_m: sizes(Role::Width)?,
+            direction: row.number(Role::Direction)?,
+            samples: Vec::new(),
+        };
+        facts.insert(vehicle.key.clone(), vehicle);
+        Ok(())
+    })?;
+    for vehicle in recordings.iter_mut().flat_map(|recording| &mut recording.vehicles) {
+        let Some(known) = facts.get(&vehicle.key) else { continue };
+        vehicle.class = vehicle.class.take().or_else(|| known.class.clone());
+        vehicle.direction = vehicle.direction.or(known.direction);
+        for (own, known) in [(&mut vehicle.lengths_m, &known.lengths_m), (&mut vehicle.widths_m, &known.widths_m)] {
+            if own.is_empty() {
+                own.clone_from(known);
+            }
+        }
+    }
+    Ok(Some(checksum))
+}
+
+fn add_frame_rate(
+    path: &Path,
+    id: &str,
+    meta: &MetaFile,
+    preset: &Preset,
+    recordings: &mut [RawRecording],
+) -> Result<Option<FileChecksum>> {
+    let Some((rows, columns)) = meta_rows(path, id, meta, preset)? else { return Ok(None) };
+    let mut rate = None;
+    let (checksum, _) = rows.each(&columns, &mut |row| {
+        if let Some(found) = row.number(Role::FrameRate)? {
+            if !(0.1..=1e4).contains(&found) {
+                let problem = format!("{found} is not a frame rate");
+                return Err(Error::input(row.place(Role::FrameRate), problem, "give the number of frames per second"));
+            }
+            rate = Some(found);
+        }
+        Ok(())
+    })?;
+    recordings.iter_mut().for_each(|recording| recording.frame_rate_hz = rate);
+    Ok(Some(checksum))
+}
+
+/// Sizes and classes of SUMO's vehicle types, from files with `vType` elements beside the tracks.
+fn add_types(path: &Path, id: &str, pattern: &str, recordings: &mut [RawRecording]) -> Result<()> {
+    let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
+    let ending = pattern.rsplit('*').next().unwrap_or(pattern);
+    let own = folder.join(pattern.replace('*', id));
+    let mut files = if own.exists() { vec![own] } else { Vec::new() };
+    if files.is_empty() {
+        let listed = std::fs::read_dir(folder).map_err(|e| Error::io(folder, "list", e))?;
+        files
+            .extend(listed.flatten().map(|entry| entry.path()).filter(|file| file.to_string_lossy().ends_with(ending)));
+        files.sort();
+    }
+    let mut types: HashMap<String, RawVehicle> = HashMap::new();
+    for file in files {
+        let rows = Rows::open(&file, super::preset::FileFormat::Xml, Some("vType"), None)?;
+        let named = [(Role::Vehicle, "id"), (Role::Length, "length"), (Role::Width, "width"), (Role::Class, "vClass")];
+        let named = named.map(|(role, name)| (role, super::preset::ColumnName::Name(name.to_owned())));
+        let columns = Columns::of(&named.into_iter().collect(), rows.header(), &[]);
+        rows.each(&columns, &mut |row| {
+            let Some(key) = row.text(Role::Vehicle)? else { return Ok(()) };
+            let vehicle = RawVehicle {
+                key: key.to_string(),
+                class: row.text(Role::Class)?.map(|class| class.into_owned()),
+                lengths_m: row.number(Role::Length)?.into_iter().collect(),
+                widths_m: row.number(Role::Width)?.into_iter().collect(),
+                ..RawVehicle::default()
+            };
+            types.insert(vehicle.key.clone(), vehicle);
+            Ok(())
+        })?;
+    }
+    for vehicle in recordings.iter_mut().flat_map(|recording| &mut recording.vehicles) {
+        // SUMO writes `type@distribution` for a type of a distribution.
+        let class = vehicle.class.as_deref().unwrap_or_default();
+        let Some(known) = types.get(class).or_else(|| types.get(class.split('@').next().unwrap_or_default())) else {
+            continue;
+        };
+        for (own, known) in [(&mut vehicle.lengths_m, &known.lengths_m), (&mut vehicle.widths_m, &known.widths_m)] {
+            if own.is_empty() {
+                own.clone_from(known);
+            }
+        }
+        vehicle.class = known.class.clone().or_else(|| vehicle.class.take());
+    }
+    Ok(())
+}
+
+/// The vector from the reference point to the centre of the box, m, of a vehicle that faces along a unit vector.
+pub(super) fn to_centre_m(
+    reference: Reference,
+    heading: [f64; 2],
+    length_m: f64,
+    width_m: f64,
+    y_sign: f64,
+) -> [f64; 2] {
+    let along = |metres: f64| heading.map(|part| metres * part);
+    match reference {
+        Reference::Centre => [0.0; 2],
+        Reference::Front => along(-length_m / 2.0),
+        Reference::Rear => along(length_m / 2.0),
+        // The box lies along the axes: its larger extent along the one that the vehicle drives along.
+        Reference::Corner => {
+            let is_along_x = heading[0].abs() >= heading[1].abs();
+            let (x_m, y_m) = if is_along_x { (length_m, width_m) } else { (width_m, length_m) };
+            [x_m / 2.0, y_sign * y_m / 2.0]
+        }
+    }
+}
+
+/// The error for a file without vehicles.
+pub(super) fn no_vehicle(path: &Path) -> Error {
+    Error::input(Place::file(path), "there is no vehicle", "check that this is the file with the tracks")
+}

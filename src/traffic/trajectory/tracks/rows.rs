@@ -1,0 +1,567 @@
+//! Rows of track files: delimited text, Parquet, XML and JSON give the same cells. A row is one sample, or one vehicle
+//! whose cells are lists.
+
+use std::borrow::Cow;
+use std::collections::BTreeMap;
+use std::io::{BufReader, Read};
+use std::path::{Path, PathBuf};
+
+use quick_xml::XmlVersion;
+use quick_xml::events::{BytesStart, Event};
+use quick_xml::reader::Reader;
+use serde_json::Value;
+
+use super::preset::{ColumnName, FileFormat, Preset, Role};
+use crate::support::input_file;
+use crate::support::table::{TableFormat, TableReader};
+use crate::traffic::trajectory::csv_table::{CsvFormat, CsvTable, FileChecksum};
+use crate::traffic::trajectory::number;
+use crate::{Error, Place, Result};
+
+/// Maximum size of a JSON file, bytes: it is held in memory.
+const MAX_JSON_BYTES: u64 = 1 << 30;
+/// Rows of an XML file whose attributes are its columns.
+const XML_HEADER_ROWS: usize = 1000;
+/// Maximum nesting of XML elements.
+const DEEPEST: usize = 64;
+
+/// Columns by role: position in the rows, and the factor to SI units.
+#[derive(Debug, Clone)]
+pub(super) struct Columns {
+    at: [Option<(usize, f64)>; Role::ALL.len()],
+    names: Vec<String>,
+    /// Times are dates.
+    has_dates: bool,
+    none: Vec<String>,
+}
+
+impl Columns {
+    /// Finds the columns in a header; absent ones are left out.
+    pub fn of(named: &BTreeMap<Role, ColumnName>, header: &[String], none: &[String]) -> Columns {
+        let mut at = [None; Role::ALL.len()];
+        let mut has_dates = false;
+        for (role, column) in named {
+            let position = |name: &String| header.iter().position(|column| is_same_name(column, name));
+            let place = column.names().iter().find_map(position);
+            at[*role as usize] = place.zip(column.factor(*role));
+            has_dates |= *role == Role::Time
+                && matches!(column, ColumnName::WithUnit { unit: Some(unit), .. } if unit == "date");
+        }
+        Columns { at, names: header.to_vec(), has_dates, none: none.to_vec() }
+    }
+
+    pub fn has(&self, role: Role) -> bool {
+        self.at[role as usize].is_some()
+    }
+
+    /// The name of a role's column.
+    pub fn name(&self, role: Role) -> &str {
+        self.at[role as usize].map_or(role.key(), |(at, _)| &self.names[at])
+    }
+
+    fn is_none(&self, text: &str) -> bool {
+        text.is_empty() || self.none.iter().any(|none| none == text)
+    }
+}
+
+/// Whether a column has this name; case, blanks, `_` and `-` do not count.
+pub(super) fn is_same_name(column: &str, name: &str) -> bool {
+    let letters = |text: &str| -> Vec<char> {
+        text.chars().filter(|c| !matches!(c, ' ' | '_' | '-')).flat_map(char::to_lowercase).collect()
+    };
+    column == name || letters(column) == letters(name)
+}
+
+/// One sample of one vehicle.
+pub(super) trait SampleRow {
+    /// The number of a column in SI units; `None` if the column or the value is absent.
+    fn number(&self, role: Role) -> Result<Option<f64>>;
+    /// The text of a column.
+    fn text(&self, role: Role) -> Result<Option<Cow<'_, str>>>;
+    /// The place of a value.
+    fn place(&self, role: Role) -> Place;
+}
+
+/// A file of rows.
+pub(super) struct Rows {
+    path: PathBuf,
+    header: Vec<String>,
+    source: RowSource,
+}
+
+enum RowSource {
+    Csv(Box<CsvTable>),
+    Parquet(Box<TableReader>),
+    Xml(String),
+    Json(Vec<serde_json::Map<String, Value>>),
+}
+
+impl Rows {
+    /// Opens a file and finds its columns.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Input`] if it is no file of this format.
+    pub fn open(path: &Path, format: FileFormat, rows: Option<&str>, delimiter: Option<char>) -> Result<Rows> {
+        let (header, source) = match format {
+            FileFormat::Csv => {
+                let delimiter = delimiter.and_then(|c| u8::try_from(c).ok());
+                let table = CsvTable::open(path, &CsvFormat { name: "expected", known: &[], delimiter })?;
+                (table.header().to_vec(), RowSource::Csv(Box::new(table)))
+            }
+            FileFormat::Parquet => {
+                let reader = TableReader::open(path, parquet(path)?)?;
+                (reader.columns().to_vec(), RowSource::Parquet(Box::new(reader)))
+            }
+            FileFormat::Xml => {
+                let row = rows.unwrap_or("vehicle").to_owned();
+                let mut header: Vec<String> = Vec::new();
+                let mut seen = 0;
+                each_element(path, &row, &mut |names, _| {
+                    for (name, _) in names {
+                        if !header.contains(name) {
+                            header.push(name.clone());
+                        }
+                    }
+                    seen += 1;
+                    Ok(seen < XML_HEADER_ROWS)
+                })?;
+                (header, RowSource::Xml(row))
+            }
+            FileFormat::Json => {
+                let list = json_rows(path, rows)?;
+                let mut header: Vec<String> = Vec::new();
+                for name in list.iter().take(100).flat_map(|row| row.keys()) {
+                    if !header.contains(name) {
+                        header.push(name.clone());
+                    }
+                }
+                (header, RowSource::Json(list))
+            }
+            FileFormat::Commonroad => {
+                return Err(Error::Internal(format!("{} is not a table of rows", path.display())));
+            }
+        };
+        Ok(Rows { path: path.to_path_buf(), header, source })
+    }
+
+    /// Opens the track file of a preset.
+    pub fn of_preset(path: &Path, preset: &Preset) -> Result<Rows> {
+        Rows::open(path, preset.format, preset.rows.as_deref(), preset.delimiter)
+    }
+
+    /// Column names.
+    pub fn header(&self) -> &[String] {
+        &self.header
+    }
+
+    /// The place of the header.
+    pub fn header_place(&self) -> Place {
+        match self.source {
+            RowSource::Csv(_) => Place::file(&self.path).row(1),
+            _ => Place::file(&self.path),
+        }
+    }
+
+    /// Gives every sample of the file to `each`. Returns the checksum and the number of rows.
+    ///
+    /// # Errors
+    /// Those of the file and of `each`.
+    pub fn each(
+        self,
+        columns: &Columns,
+        each: &mut dyn FnMut(&dyn SampleRow) -> Result<()>,
+    ) -> Result<(FileChecksum, u64)> {
+        let mut rows = 0;
+        match self.source {
+            RowSource::Csv(mut table) => {
+                while table.next_row()? {
+                    each(&CsvRow { table: &table, columns })?;
+                }
+                rows = table.rows();
+                return Ok((table.finish(), rows));
+            }
+            RowSource::Parquet(mut reader) => {
+                // Roles share no column, but two may name the same one.
+                let mut wanted: Vec<usize> = columns.at.iter().flatten().map(|(at, _)| *at).collect();
+                wanted.sort_unstable();
+                wanted.dedup();
+                reader.want(&wanted)?;
+                while let Some(row) = reader.next_row()? {
+                    rows += 1;
+                    let mut cells = vec![&Value::Null; self.header.len()];
+                    wanted.iter().zip(&row.values).for_each(|(at, value)| cells[*at] = value);
+                    each_sample(&cells, columns, &|| reader.place(row.number, None), each)?;
+                }
+            }
+            RowSource::Json(list) => {
+                for row in &list {
+                    rows += 1;
+                    let cells: Vec<&Value> =
+                        self.header.iter().map(|name| row.get(name).unwrap_or(&Value::Null)).collect();
+                    let place = || Place::file(&self.path).of(format!("vehicle {rows} of the list"));
+                    each_sample(&cells, columns, &place, each)?;
+                }
+            }
+            RowSource::Xml(row) => {
+                let index: BTreeMap<&str, usize> =
+                    self.header.iter().enumerate().map(|(at, name)| (name.as_str(), at)).collect();
+                each_element(&self.path, &row, &mut |attributes, place| {
+                    rows += 1;
+                    let mut texts: Vec<&str> = vec![""; self.header.len()];
+                    for (name, value) in attributes {
+                        if let Some(at) = index.get(name.as_str()) {
+                            texts[*at] = value;
+                        }
+                    }
+                    each(&TextRow { texts: &texts, columns, place })?;
+                    Ok(true)
+                })?;
+            }
+        }
+        let size = std::fs::metadata(&self.path).map_err(|e| Error::io(&self.path, "read", e))?.len();
+        let file = self.path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        Ok((FileChecksum { file, bytes: size, sha256: input_file::sha256(&self.path)? }, rows))
+    }
+}
+
+#[cfg(feature = "parquet")]
+fn parquet(_: &Path) -> Result<TableFormat> {
+    Ok(TableFormat::Parquet)
+}
+
+#[cfg(not(feature = "parquet"))]
+fn parquet(path: &Path) -> Result<TableFormat> {
+    Err(Error::usage(
+        Place::file(path),
+        "this build reads no Parquet",
+        "build it with the feature `parquet`, or convert the file to CSV",
+    ))
+}
+
+/// A number in SI units of a text; `;` joins several values, of which the first counts.
+fn number_of(text: &[u8], role: Role, columns: &Columns, place: &dyn Fn() -> Place) -> Result<Option<f64>> {
+    let Some((_, factor)) = columns.at[role as usize] else { return Ok(None) };
+    let first = text.split(|&byte| byte == b';').next().unwrap_or_default().trim_ascii();
+    let value = match number::real(first) {
+        Some(value) if value.is_finite() => value,
+        found => {
+            let shown = String::from_utf8_lossy(first);
+            if columns.is_none(&shown) || found.is_some_and(f64::is_nan) {
+                return Ok(None);
+            }
+            if role == Role::Time && columns.has_dates {
+                let parsed = seconds_of_date(&shown);
+                return parsed.map(Some).ok_or_else(|| bad(place(), &shown, "a date such as 2024-10-07 06:00:00.05"));
+            }
+            return Err(bad(place(), &shown, "a finite number"));
+        }
+    };
+    if !columns.none.is_empty() && columns.is_none(&String::from_utf8_lossy(first)) {
+        return Ok(None);
+    }
+    scaled(value, factor, place).map(Some)
+}
+
+/// A value times its factor, within the range in which derived values stay finite.
+fn scaled(value: f64, factor: f64, place: &dyn Fn() -> Place) -> Result<f64> {
+    let scaled = value * factor;
+    // Nanoseconds since 1970 are in this range as seconds.
+    if scaled.abs() <= number::REAL_LIMIT {
+        Ok(scaled)
+    } else {
+        Err(bad(place(), &value.to_string(), "a number of this world"))
+    }
+}
+
+fn bad(place: Place, found: &str, expected: &str) -> Error {
+    let shown: String = found.chars().take(40).flat_map(char::escape_debug).collect();
+    Error::input(place, format!("`{shown}` is not {expected}"), "correct the value, or name it in `none` of the preset")
+}
+
+struct CsvRow<'a> {
+    table: &'a CsvTable,
+    columns: &'a Columns,
+}
+
+impl CsvRow<'_> {
+    fn bytes(&self, role: Role) -> Option<&[u8]> {
+        self.columns.at[role as usize].map(|(at, _)| self.table.bytes_at(at))
+    }
+}
+
+impl SampleRow for CsvRow<'_> {
+    #[inline]
+    fn number(&self, role: Role) -> Result<Option<f64>> {
+        let Some(bytes) = self.bytes(role) else { return Ok(None) };
+        number_of(bytes, role, self.columns, &|| self.place(role))
+    }
+
+    fn text(&self, role: Role) -> Result<Option<Cow<'_, str>>> {
+        let Some(bytes) = self.bytes(role) else { return Ok(None) };
+        let text = String::from_utf8_lossy(bytes.split(|&byte| byte == b';').next().unwrap_or_default().trim_ascii());
+        Ok(Some(text).filter(|text| !self.columns.is_none(text)))
+    }
+
+    fn place(&self, role: Role) -> Place {
+        self.table.place().column(self.columns.name(role))
+    }
+}
+
+struct TextRow<'a> {
+    texts: &'a [&'a str],
+    columns: &'a Columns,
+    place: &'a dyn Fn() -> Place,
+}
+
+impl SampleRow for TextRow<'_> {
+    fn number(&self, role: Role) -> Result<Option<f64>> {
+        let Some((at, _)) = self.columns.at[role as usize] else { return Ok(None) };
+        number_of(self.texts[at].as_bytes(), role, self.columns, &|| self.place(role))
+    }
+
+    fn text(&self, role: Role) -> Result<Option<Cow<'_, str>>> {
+        let text = self.columns.at[role as usize].map(|(at, _)| Cow::Borrowed(self.texts[at].trim()));
+        Ok(text.filter(|text| !self.columns.is_none(text)))
+    }
+
+    fn place(&self, role: Role) -> Place {
+        (self.place)().column(self.columns.name(role))
+    }
+}
+
+/// A sample of a row whose cells may be lists.
+struct CellRow<'a> {
+    cells: &'a [&'a Value],
+    sample: usize,
+    columns: &'a Columns,
+    place: &'a dyn Fn() -> Place,
+}
+
+impl CellRow<'_> {
+    fn value(&self, role: Role) -> Option<(&Value, f64)> {
+        let (at, factor) = self.columns.at[role as usize]?;
+        let value = match self.cells[at] {
+            Value::Array(list) => list.get(self.sample)?,
+            value => value,
+        };
+        Some((value, factor))
+    }
+}
+
+impl SampleRow for CellRow<'_> {
+    fn number(&self, role: Role) -> Result<Option<f64>> {
+        match self.value(role) {
+            None | Some((Value::Null, _)) => Ok(None),
+            Some((Value::Number(number), factor)) => {
+                let value = number.as_f64().unwrap_or(f64::NAN);
+                let is_none = !self.columns.none.is_empty() && self.columns.is_none(&number.to_string());
+                if is_none || value.is_nan() { Ok(None) } else { scaled(value, factor, &|| self.place(role)).map(Some) }
+            }
+            Some((Value::String(text), _)) => number_of(text.as_bytes(), role, self.columns, &|| self.place(role)),
+            Some((Value::Bool(value), _)) => Ok(Some(f64::from(u8::from(*value)))),
+            Some((other, _)) => Err(bad(self.place(role), &other.to_string(), "a number")),
+        }
+    }
+
+    fn text(&self, role: Role) -> Result<Option<Cow<'_, str>>> {
+        let text = match self.value(role) {
+            None | Some((Value::Null, _)) => return Ok(None),
+            Some((Value::String(text), _)) => Cow::Borrowed(text.trim()),
+            Some((other, _)) => Cow::Owned(other.to_string()),
+        };
+        Ok(Some(text).filter(|text| !self.columns.is_none(text)))
+    }
+
+    fn place(&self, role: Role) -> Place {
+        (self.place)().column(self.columns.name(role))
+    }
+}
+
+/// The samples of one row; lists must be equally long.
+fn each_sample(
+    cells: &[&Value],
+    columns: &Columns,
+    place: &dyn Fn() -> Place,
+    each: &mut dyn FnMut(&dyn SampleRow) -> Result<()>,
+) -> Result<()> {
+    let list = |role: &Role| match columns.at[*role as usize].map(|(at, _)| cells[at]) {
+        Some(Value::Array(list)) => Some((*role, list.len())),
+        _ => None,
+    };
+    let lists: Vec<(Role, usize)> = Role::ALL.iter().filter_map(list).collect();
+    let samples = lists.iter().map(|(_, length)| *length).max();
+    if let (Some(longest), Some((role, length))) = (samples, lists.iter().find(|(_, length)| Some(*length) != samples))
+    {
+        return Err(Error::input(
+            place().column(columns.name(*role)),
+            format!("the list has {length} values, another one of this vehicle {longest}"),
+            "give lists of equal length",
+        ));
+    }
+    (0..samples.unwrap_or(1)).try_for_each(|sample| each(&CellRow { cells, sample, columns, place }))
+}
+
+/// Gives the attributes of every element with this name, and those of the elements around it as `element.attribute`, until
+/// `each` returns false.
+#[allow(clippy::type_complexity)]
+fn each_element(
+    path: &Path,
+    row: &str,
+    each: &mut dyn FnMut(&[(String, String)], &dyn Fn() -> Place) -> Result<bool>,
+) -> Result<()> {
+    let file = BufReader::with_capacity(1 << 18, LimitedLine::new(input_file::open(path)?));
+    let mut reader = Reader::from_reader(file);
+    let mut buffer = Vec::new();
+    let mut around: Vec<Vec<(String, String)>> = Vec::new();
+    let wrong = |at: u64, problem: String| {
+        let problem = format!("not well-formed XML at byte {at}: {problem}");
+        Error::input(Place::file(path), problem, "export the file again")
+    };
+    loop {
+        buffer.clear();
+        let at = reader.buffer_position();
+        let event = reader.read_event_into(&mut buffer).map_err(|error| wrong(at, error.to_string()))?;
+        let (start, is_open) = match event {
+            Event::Start(start) => (start, true),
+            Event::Empty(start) => (start, false),
+            Event::End(_) => {
+                around.pop();
+                continue;
+            }
+            Event::Eof => {
+                let problem = "it ends inside an element: the file is truncated".to_owned();
+                return if around.is_empty() { Ok(()) } else { Err(wrong(at, problem)) };
+            }
+            Event::DocType(_) => return Err(wrong(at, "a document type".to_owned())),
+            _ => continue,
+        };
+        let name = start.name().as_ref().to_owned();
+        let mut attributes = attributes(&start).map_err(|problem| wrong(at, problem))?;
+        if name == row {
+            attributes.extend(around.iter().flatten().cloned());
+            if !each(&attributes, &|| Place::file(path).of(format!("byte {at}")))? {
+                return Ok(());
+            }
+        }
+        if is_open {
+            if around.len() >= DEEPEST {
+                return Err(wrong(at, format!("more than {DEEPEST} elements within one another")));
+            }
+            let qualified = attributes.into_iter().filter(|(key, _)| name != row && !key.contains('.'));
+            around.push(qualified.map(|(key, value)| (format!("{name}.{key}"), value)).collect());
+        }
+    }
+}
+
+/// Refuses a file without an element end within this many bytes, which memory would have to hold.
+const MAX_ELEMENT_BYTES: u64 = 1 << 26;
+
+struct LimitedLine<R> {
+    inner: R,
+    since: u64,
+}
+
+impl<R> LimitedLine<R> {
+    fn new(inner: R) -> Self {
+        LimitedLine { inner, since: 0 }
+    }
+}
+
+impl<R: Read> Read for LimitedLine<R> {
+    fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
+        if self.since > MAX_ELEMENT_BYTES {
+            return Err(std::io::Error::from(std::io::ErrorKind::InvalidData));
+        }
+        let count = self.inner.read(bytes)?;
+        self.since = if bytes[..count].contains(&b'>') { 0 } else { self.since + count as u64 };
+        Ok(count)
+    }
+}
+
+fn attributes(start: &BytesStart) -> std::result::Result<Vec<(String, String)>, String> {
+    let mut found = Vec::new();
+    for attribute in start.attributes() {
+        let attribute = attribute.map_err(|error| error.to_string())?;
+        let value = attribute.normalized_value(XmlVersion::Implicit1_0).map_err(|error| error.to_string())?;
+        found.push((attribute.key.as_ref().to_owned(), value.into_owned()));
+    }
+    Ok(found)
+}
+
+/// The objects of a JSON file: of the list under a key, or of the list that the file is, or one per line.
+fn json_rows(path: &Path, key: Option<&str>) -> Result<Vec<serde_json::Map<String, Value>>> {
+    let text = input_file::read(path, MAX_JSON_BYTES)?;
+    let wrong = |problem: String| Error::input(Place::file(path), problem, "export the file again");
+    let mut values = serde_json::Deserializer::from_slice(&text).into_iter::<Value>();
+    let first = values.next().ok_or_else(|| wrong("the file is empty".to_owned()))?;
+    let first = first.map_err(|error| wrong(format!("not JSON: {error}")))?;
+    let list = match first {
+        Value::Array(list) => list,
+        Value::Object(mut object) => match key.and_then(|key| object.remove(key)) {
+            Some(Value::Array(list)) => list,
+            Some(_) => return Err(wrong(format!("`{}` is no list", key.unwrap_or_default()))),
+            None => {
+                let rest: std::result::Result<Vec<Value>, _> = values.collect();
+                let mut list = vec![Value::Object(object)];
+                list.extend(rest.map_err(|error| wrong(format!("not JSON: {error}")))?);
+                list
+            }
+        },
+        _ => return Err(wrong("expected a list of vehicles".to_owned())),
+    };
+    let object = |value| match value {
+        Value::Object(object) => Ok(object),
+        _ => Err(wrong("a vehicle is not an object".to_owned())),
+    };
+    list.into_iter().map(object).collect()
+}
+
+/// Seconds since 1970 of `2024-10-07 06:00:00.05+00:00`, with `T` or a blank, with or without an offset.
+fn seconds_of_date(text: &str) -> Option<f64> {
+    let (date, time) = text.split_once(['T', ' '])?;
+    let mut numbers = date.splitn(3, '-').map(|part| part.parse::<i64>().ok());
+    let (year, month, day) = (numbers.next()??, numbers.next()??, numbers.next()??);
+    if !(1..=12).contains(&month) || !(1..=31).contains(&day) || !(1..=9999).contains(&year) {
+        return None;
+    }
+    let (clock, offset_s) = match time.rfind(['+', '-', 'Z']) {
+        Some(at) if time[at..].starts_with('Z') => (&time[..at], 0.0),
+        Some(at) => {
+            let (hours, minutes) = time[at + 1..].split_once(':').unwrap_or((&time[at + 1..], "0"));
+            let offset_s = 3600.0 * hours.parse::<f64>().ok()? + 60.0 * minutes.parse::<f64>().ok()?;
+            (&time[..at], if time[at..].starts_with('-') { -offset_s } else { offset_s })
+        }
+        None => (time, 0.0),
+    };
+    let mut parts = clock.splitn(3, ':').map(|part| part.parse::<f64>().ok());
+    let (hours, minutes, seconds) = (parts.next()??, parts.next()??, parts.next().unwrap_or(Some(0.0))?);
+    // Days from civil dates (Hinnant, "chrono-compatible low-level date algorithms").
+    let shifted = if month <= 2 { year - 1 } else { year };
+    let era = shifted.div_euclid(400);
+    let of_era = shifted.rem_euclid(400);
+    let of_year = (153 * (month + if month > 2 { -3 } else { 9 }) + 2) / 5 + day - 1;
+    let days = era * 146_097 + of_era * 365 + of_era / 4 - of_era / 100 + of_year - 719_468;
+    let of_day = 3600.0 * hours + 60.0 * minutes + seconds - offset_s;
+    of_day.is_finite().then_some(days as f64 * 86_400.0 + of_day)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn dates_become_seconds() {
+        assert_eq!(seconds_of_date("1970-01-01T00:00:00Z"), Some(0.0));
+        assert_eq!(seconds_of_date("2024-10-07 06:00:00.5+00:00"), Some(1_728_280_800.5));
+        assert_eq!(seconds_of_date("2024-10-07 08:00:00.5+02:00"), Some(1_728_280_800.5));
+        for wrong in ["2024-10-07", "2024-13-07 06:00:00", "x", "2024-10-07 06", "2024-10-07 a:b:c", "-"] {
+            assert_eq!(seconds_of_date(wrong), None, "{wrong}");
+        }
+    }
+
+    #[test]
+    fn names_are_compared_without_case_and_marks() {
+        assert!(is_same_name("Vehicle-ID", "vehicle_id") && is_same_name("xloc_kf", "XLoc KF"));
+        assert!(!is_same_name("vehicle_idx", "vehicle_id"));
+    }
+}

@@ -1,0 +1,79 @@
+//! Derivatives of sampled series: central differences, and the Savitzky–Golay filter (a cubic fitted to a window around
+//! each sample; Savitzky and Golay, "Smoothing and differentiation of data by simplified least squares procedures",
+//! Analytical Chemistry 36, 1964).
+
+use nalgebra::{Matrix4, Vector4};
+
+/// Central differences, one-sided at the ends, per second.
+pub(super) fn central(values: &[f64], rate_hz: f64) -> Vec<f64> {
+    let last = values.len() - 1;
+    let at = |k: usize| {
+        let (from, to) = (k.saturating_sub(1), (k + 1).min(last));
+        if to > from { (values[to] - values[from]) * rate_hz / (to - from) as f64 } else { 0.0 }
+    };
+    (0..values.len()).map(at).collect()
+}
+
+/// The series, its first and its second derivative per second. The window is made odd and no longer than the series; the
+/// cubic of the outermost windows holds at the ends.
+pub(super) fn savitzky_golay(values: &[f64], window: usize, rate_hz: f64) -> [Vec<f64>; 3] {
+    let longest = if values.len() % 2 == 0 { values.len().saturating_sub(1) } else { values.len() };
+    let window = (window | 1).max(5).min(longest);
+    if window < 5 {
+        let first = central(values, rate_hz);
+        let second = central(&first, rate_hz);
+        return [values.to_vec(), first, second];
+    }
+    let half = (window / 2) as i64;
+    // Normal equations of a cubic over −half..=half, scaled to −1..=1.
+    let mut normal = Matrix4::zeros();
+    for offset in -half..=half {
+        let x = offset as f64 / half as f64;
+        let powers = Vector4::new(1.0, x, x * x, x * x * x);
+        normal += powers * powers.transpose();
+    }
+    let inverse = normal.try_inverse().unwrap_or_else(Matrix4::identity);
+    let last = values.len() as i64 - 1;
+    let mut result = [Vec::new(), Vec::new(), Vec::new()];
+    for k in 0..=last {
+        let middle = k.clamp(half, last - half);
+        let mut sums = Vector4::zeros();
+        for offset in -half..=half {
+            let x = offset as f64 / half as f64;
+            sums += values[(middle + offset) as usize] * Vector4::new(1.0, x, x * x, x * x * x);
+        }
+        let c = inverse * sums;
+        let x = (k - middle) as f64 / half as f64;
+        let per_second = rate_hz / half as f64;
+        result[0].push(c[0] + x * (c[1] + x * (c[2] + x * c[3])));
+        result[1].push((c[1] + x * (2.0 * c[2] + x * 3.0 * c[3])) * per_second);
+        result[2].push((2.0 * c[2] + x * 6.0 * c[3]) * per_second * per_second);
+    }
+    result
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_cubic_is_left_as_it_is_and_noise_is_reduced() {
+        let rate_hz = 25.0;
+        let cubic = |k: usize| {
+            let t = k as f64 / rate_hz;
+            [5.0 + 30.0 * t - t * t + 0.2 * t * t * t, 30.0 - 2.0 * t + 0.6 * t * t, -2.0 + 1.2 * t]
+        };
+        let values: Vec<f64> = (0..60).map(|k| cubic(k)[0]).collect();
+        let smooth = savitzky_golay(&values, 25, rate_hz);
+        for k in 0..60 {
+            for (series, exact) in smooth.iter().zip(cubic(k)) {
+                assert!((series[k] - exact).abs() < 1e-6, "{k}");
+            }
+        }
+        let noisy: Vec<f64> = (0..60).map(|k| 30.0 * k as f64 / rate_hz + 0.1 * libm::sin(k as f64 * 2.4)).collect();
+        let [_, speed, _] = savitzky_golay(&noisy, 25, rate_hz);
+        assert!(speed[10..50].iter().all(|v| (v - 30.0).abs() < 0.2));
+        assert!(central(&noisy, rate_hz).iter().any(|v| (v - 30.0).abs() > 1.0));
+        assert_eq!(savitzky_golay(&[1.0, 2.0, 3.0], 25, 1.0)[1], [1.0, 1.0, 1.0]);
+    }
+}
