@@ -6,6 +6,7 @@ use std::io::Write;
 use std::path::PathBuf;
 
 pub mod device;
+pub mod exid;
 pub mod lane_sets;
 pub mod page;
 pub mod plans;

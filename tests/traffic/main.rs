@@ -12,3 +12,4 @@ mod highd_turned;
 mod mining_activities;
 mod mining_claims;
 mod mining_recordings;
+mod tracks;

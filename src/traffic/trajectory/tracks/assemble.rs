@@ -12,8 +12,8 @@ use crate::{Error, Place, Result};
 
 /// A sample this far off the raster of times, in frames, is interpolated.
 const OFF_RASTER: f64 = 0.02;
-/// Pieces of a track that are shorter tell nothing, s.
-const MIN_PIECE_S: f64 = 0.4;
+/// Pieces of a track with fewer samples tell nothing.
+const MIN_PIECE: usize = 3;
 /// Maximum number of paths that the road is fitted to.
 const FITTED_PATHS: usize = 400;
 /// Time between positions that the road is fitted to, s.
@@ -86,6 +86,7 @@ pub(super) fn assemble(
     let mut index = [usize::MAX; 2];
     for (side, name) in [(0, "1"), (1, "2")] {
         let here = || placed.iter().filter(|of| usize::from(of.is_forward) == side);
+        let tracks = here().count();
         let stride = rate_hz.round().max(1.0) as usize;
         let laterals: Vec<Lateral> = here()
             .flat_map(|of| {
@@ -98,8 +99,12 @@ pub(super) fn assemble(
             _ => lane_lines(&laterals, preset.lanes.width_m),
         };
         let Some((lane_lines_m, source)) = found else { continue };
+        if source == LaneSource::Names {
+            about.lane_offset_error_m =
+                place_by_offset(&mut placed, side == 1, &lane_lines_m).or(about.lane_offset_error_m);
+        }
         index[side] = carriageways.len();
-        about.carriageways.push(UnderstoodCarriageway::of(name, &lane_lines_m, source, here().count()));
+        about.carriageways.push(UnderstoodCarriageway::of(name, &lane_lines_m, source, tracks));
         carriageways.push(Carriageway { name: name.to_owned(), lane_lines_m });
     }
     order_sideways(&mut carriageways, &mut placed);
@@ -240,7 +245,7 @@ fn pieces(
                 return Err(bad("the tracks are too long", "check the unit of `time`"));
             }
             let (at_frames, first_frame) = at_frames(piece, &frames, about);
-            if at_frames.len() as f64 >= (MIN_PIECE_S * rate_hz).max(3.0) {
+            if at_frames.len() >= MIN_PIECE {
                 pieces.push(Piece { vehicle, first_frame, samples: at_frames });
             } else {
                 about.short_pieces += 1;
@@ -248,10 +253,7 @@ fn pieces(
         }
     }
     if pieces.is_empty() {
-        return Err(bad(
-            "no vehicle is in view for longer than half a second",
-            "check the columns for vehicle and time",
-        ));
+        return Err(bad("no vehicle is in view for three samples", "check the columns for vehicle and time"));
     }
     Ok((rate_hz, pieces))
 }
@@ -316,6 +318,7 @@ fn mix(a: &RawSample, b: &RawSample, part: f64) -> RawSample {
         acceleration_mps2: one(a.acceleration_mps2, b.acceleration_mps2),
         acceleration_xy_mps2: two(a.acceleration_xy_mps2, b.acceleration_xy_mps2),
         lane: if part < 0.5 { a.lane } else { b.lane },
+        lane_offset_m: if part < 0.5 { a.lane_offset_m } else { b.lane_offset_m },
     }
 }
 
@@ -469,6 +472,57 @@ fn map_lines(line: &RoadLine, boundaries: &[Vec<[f64; 2]>]) -> Vec<f64> {
     };
     let lines = lines_of_map(boundaries.iter().filter_map(middle).collect());
     lines
+}
+
+/// Where the file gives the distance from the middle of the lane, it is more exact than the line of the road: d becomes the
+/// middle of the named lane plus that distance. Returns the median difference to d from the line.
+fn place_by_offset(placed: &mut [Placed], is_forward: bool, lines_m: &[f64]) -> Option<f64> {
+    let lanes = Carriageway { name: String::new(), lane_lines_m: lines_m.to_vec() };
+    // The lane that a name usually is.
+    let mut laterals: Vec<Lateral> = placed
+        .iter()
+        .filter(|of| of.is_forward == is_forward)
+        .flat_map(|of| of.on.iter().zip(&of.piece.samples).map(|(on, sample)| (on.d_m, sample.lane)))
+        .filter(|(_, label)| *label != NO_LABEL)
+        .collect();
+    laterals.sort_by(|a, b| a.1.cmp(&b.1).then(a.0.total_cmp(&b.0)));
+    let middles: std::collections::HashMap<u32, f64> = laterals
+        .chunk_by(|a, b| a.1 == b.1)
+        .filter_map(|group| {
+            let lane = lanes.lane(lanes.lane_at(group[group.len() / 2].0)?)?;
+            Some((group[0].1, lane.centre_m()))
+        })
+        .collect();
+    let offset = |on: &OnRoad, sample: &RawSample| {
+        let middle = middles.get(&sample.lane).filter(|_| sample.lane_offset_m.is_finite())?;
+        Some((middle, on.d_m - middle))
+    };
+    // The side on which offsets are positive follows from the positions.
+    let here = || placed.iter().filter(|of| of.is_forward == is_forward);
+    let pairs = || here().flat_map(|of| of.on.iter().zip(&of.piece.samples));
+    let product: f64 = pairs().filter_map(|(on, sample)| Some(offset(on, sample)?.1 * sample.lane_offset_m)).sum();
+    let sign = if product < 0.0 { -1.0 } else { 1.0 };
+    let differences =
+        pairs().filter_map(|(on, sample)| Some((offset(on, sample)?.1 - sign * sample.lane_offset_m).abs()));
+    let difference = median(&mut differences.collect::<Vec<_>>());
+    // Offsets that do not fit the positions are something else.
+    if difference.is_nan() || difference > 0.5 {
+        return Some(difference).filter(|difference| !difference.is_nan());
+    }
+    for of in placed.iter_mut().filter(|of| of.is_forward == is_forward) {
+        // Whole tracks only, so that d does not jump.
+        let all: Option<Vec<f64>> = of
+            .on
+            .iter()
+            .zip(&of.piece.samples)
+            .map(|(on, sample)| offset(on, sample).map(|(middle, _)| middle + sign * sample.lane_offset_m))
+            .collect();
+        let steady = |d: &Vec<f64>| d.windows(2).all(|pair| (pair[1] - pair[0]).abs() < 0.5);
+        if let Some(d) = all.filter(steady) {
+            of.on.iter_mut().zip(d).for_each(|(on, d_m)| on.d_m = d_m);
+        }
+    }
+    Some(difference)
 }
 
 /// Moves the backward carriageway sideways if it does not lie to the left of the forward one, as highD's image wants it.

@@ -29,6 +29,7 @@ const NAN_SAMPLE: RawSample = RawSample {
     acceleration_mps2: f64::NAN,
     acceleration_xy_mps2: [f64::NAN; 2],
     lane: NO_LABEL,
+    lane_offset_m: f64::NAN,
 };
 
 /// Reads the obstacles of a scene as one recording.

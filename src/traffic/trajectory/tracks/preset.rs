@@ -222,6 +222,7 @@ pub enum Role {
     Width,
     Class,
     Lane,
+    LaneOffset,
     Direction,
     FrameRate,
 }
@@ -240,7 +241,7 @@ pub(super) enum Dimension {
 
 impl Role {
     /// All roles.
-    pub const ALL: [Role; 21] = [
+    pub const ALL: [Role; 22] = [
         Role::Recording,
         Role::Vehicle,
         Role::Frame,
@@ -260,6 +261,7 @@ impl Role {
         Role::Width,
         Role::Class,
         Role::Lane,
+        Role::LaneOffset,
         Role::Direction,
         Role::FrameRate,
     ];
@@ -286,6 +288,7 @@ impl Role {
             Role::Width => "width",
             Role::Class => "class",
             Role::Lane => "lane",
+            Role::LaneOffset => "lane_offset",
             Role::Direction => "direction",
             Role::FrameRate => "frame_rate",
         }
@@ -296,7 +299,7 @@ impl Role {
             Role::Recording | Role::Vehicle | Role::Class | Role::Lane => Dimension::Text,
             Role::Frame | Role::Direction | Role::FrameRate => Dimension::Number,
             Role::Time => Dimension::Time,
-            Role::X | Role::Y | Role::Length | Role::Width => Dimension::Length,
+            Role::X | Role::Y | Role::Length | Role::Width | Role::LaneOffset => Dimension::Length,
             Role::Heading => Dimension::Angle,
             Role::Speed | Role::XSpeed | Role::YSpeed | Role::ForwardSpeed | Role::LeftwardSpeed => Dimension::Speed,
             Role::Acceleration | Role::XAcceleration | Role::YAcceleration => Dimension::Acceleration,

@@ -34,6 +34,8 @@ pub(super) struct RawSample {
     pub acceleration_xy_mps2: [f64; 2],
     /// Index of the lane's name, or [`NO_LABEL`].
     pub lane: u32,
+    /// Distance from the middle of the lane, m.
+    pub lane_offset_m: f64,
 }
 
 /// One vehicle.
@@ -188,6 +190,7 @@ impl<'a> Collecting<'a> {
             acceleration_mps2: number(Role::Acceleration)?,
             acceleration_xy_mps2: [number(Role::XAcceleration)?, self.y_sign * number(Role::YAcceleration)?],
             lane: NO_LABEL,
+            lane_offset_m: number(Role::LaneOffset)?,
         };
         if let Some(lane) = row.text(Role::Lane)? {
             sample.lane = self.label(recording, &lane);

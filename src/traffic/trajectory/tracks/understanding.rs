@@ -153,6 +153,8 @@ pub struct Understanding {
     pub findings: Vec<Finding>,
     /// Fraction of the samples whose named lane is not where they are.
     pub label_mismatch: Option<f64>,
+    /// Median difference between positions in the lane as the file gives them and those from the line of the road, m.
+    pub lane_offset_error_m: Option<f64>,
     #[serde(skip)]
     pub(super) off_raster_frames: f64,
     #[serde(skip)]
@@ -384,6 +386,15 @@ impl Understanding {
         } else {
             self.check_slow_side(recording, preset, keeps);
         }
+        if let Some(difference) = self.lane_offset_error_m.filter(|difference| *difference > 0.5) {
+            self.find(
+                false,
+                format!(
+                    "offsets in the lane differ from the positions by {} m (median) and are not used",
+                    significant(difference, 2)
+                ),
+            );
+        }
         if let Some(mismatch) = self.label_mismatch.filter(|mismatch| *mismatch > 0.05) {
             self.find(
                 false,
@@ -543,9 +554,18 @@ impl Understanding {
         lines.push((
             "road",
             format!(
-                "{shape}, {} m in view; vehicles wander by {} m around its line",
+                "{shape}, {} m in view; vehicles wander by {} m around its line{}",
                 significant(self.length_m, 4),
-                significant(self.wander_m, 2)
+                significant(self.wander_m, 2),
+                match self.lane_offset_error_m {
+                    Some(error) if error <= 0.5 => {
+                        format!(
+                            "; positions in the lane are the file's, {} m (median) from those by the line",
+                            significant(error, 2)
+                        )
+                    }
+                    _ => String::new(),
+                }
             ),
         ));
         for of in &self.carriageways {
@@ -603,29 +623,30 @@ fn speed_noise_mps(recording: &Recording) -> f64 {
     if all.is_empty() { 0.0 } else { 1.4826 * median(&mut all) / libm::sqrt(6.0) }
 }
 
-/// Slope of the mean offset from the lane's middle over half the width; ±1 if positions are those of an edge.
+/// Slope of the mean offset from the lane's middle over half the width, of the carriageway where it is steepest; ±1 if
+/// positions are those of an edge.
 fn edge_slope(recording: &Recording) -> Option<f64> {
-    let mut pairs: Vec<(f64, f64, (usize, u16))> = Vec::new();
-    for track in &recording.tracks {
-        let lane = track.lane[0];
-        let is_kept = track.lane.iter().all(|l| *l == lane);
-        let Some(middle) = recording.carriageways[track.carriageway].lane(usize::from(lane)).filter(|_| is_kept) else {
-            continue;
-        };
-        let centre = middle.centre_m();
-        let mean = track.d_m.iter().sum::<f64>() / track.len() as f64 - centre;
-        pairs.push((track.width_m / 2.0, mean, (track.carriageway, lane)));
-    }
-    slope_within(&mut pairs)
+    let of = |carriageway: usize| {
+        let mut pairs: Vec<(f64, f64, u16)> = Vec::new();
+        for track in recording.tracks.iter().filter(|track| track.carriageway == carriageway) {
+            let lane = track.lane[0];
+            let is_kept = track.lane.iter().all(|l| *l == lane);
+            let middle = recording.carriageways[carriageway].lane(usize::from(lane)).filter(|_| is_kept);
+            let Some(centre) = middle.map(|lane| lane.centre_m()) else { continue };
+            let mean = track.d_m.iter().sum::<f64>() / track.len() as f64 - centre;
+            pairs.push((track.width_m / 2.0, mean, lane));
+        }
+        slope_within(&mut pairs)
+    };
+    (0..recording.carriageways.len()).filter_map(of).max_by(|a, b| a.abs().total_cmp(&b.abs()))
 }
 
 /// Slope within groups, so that the middles of the lanes do not matter; `None` if the widths hardly vary.
-fn slope_within(pairs: &mut [(f64, f64, (usize, u16))]) -> Option<f64> {
+fn slope_within(pairs: &mut [(f64, f64, u16)]) -> Option<f64> {
     pairs.sort_by(|a, b| a.2.cmp(&b.2).then(a.0.total_cmp(&b.0)).then(a.1.total_cmp(&b.1)));
     let (mut xx, mut xy, mut n) = (0.0, 0.0, 0);
     for group in pairs.chunk_by(|a, b| a.2 == b.2).filter(|group| group.len() >= MIN_VEHICLES) {
-        let of =
-            |value: fn(&(f64, f64, (usize, u16))) -> f64| group.iter().map(value).sum::<f64>() / group.len() as f64;
+        let of = |value: fn(&(f64, f64, u16)) -> f64| group.iter().map(value).sum::<f64>() / group.len() as f64;
         let (x, y) = (of(|p| p.0), of(|p| p.1));
         for (half, offset, _) in group.iter() {
             xx += (half - x) * (half - x);

@@ -1,0 +1,384 @@
+//! Tracks in other formats: the same traffic gives the same scenarios, and a file that contradicts itself is not used in
+//! silence.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use lanesweep::scenario::{Category, Scenario};
+use lanesweep::support::plausibility::Implausible;
+use lanesweep::traffic::mining::{MiningOptions, mine};
+use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
+use lanesweep::traffic::trajectory::tracks::{self, Preset, TrackFile, Understanding};
+use lanesweep::traffic::trajectory::{Carriageway, Inputs, Loaded, NO_LANE, Recording, Track, VehicleClass};
+
+use crate::common::exid::{self, Plain};
+
+fn generated() -> Recording {
+    let options = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
+    generate_one(&options, 0).unwrap()
+}
+
+fn load(path: &Path) -> Vec<Loaded> {
+    let (files, problems) = Inputs::of(path, None).unwrap().files();
+    assert!(problems.is_empty());
+    files.iter().flat_map(|file| file.read(Implausible::Refused).unwrap()).collect()
+}
+
+/// Scenarios by category, ego and target, with their first frames.
+fn by_vehicles(scenarios: Vec<Scenario>) -> BTreeMap<(Category, u32, u32), Vec<Scenario>> {
+    let mut all: BTreeMap<(Category, u32, u32), Vec<Scenario>> = BTreeMap::new();
+    for scenario in scenarios {
+        all.entry((scenario.category, scenario.ego_id, scenario.target_id)).or_default().push(scenario);
+    }
+    all
+}
+
+/// Number of scenarios, of those that another reading has within some frames, and of those whose `kept` is equal.
+fn matched(ours: &Recording, theirs: &Recording, shift: i64, frames: i64) -> [usize; 3] {
+    let options = MiningOptions::default();
+    let (ours, theirs) = (mine(ours, &options).scenarios, by_vehicles(mine(theirs, &options).scenarios));
+    let mut counts = [ours.len(), 0, 0];
+    for scenario in ours {
+        let near = theirs
+            .get(&(scenario.category, scenario.ego_id, scenario.target_id))
+            .and_then(|list| list.iter().find(|other| (other.frame0 + shift - scenario.frame0).abs() <= frames));
+        counts[1] += usize::from(near.is_some());
+        counts[2] += usize::from(near.is_some_and(|other| other.kept == scenario.kept));
+    }
+    counts
+}
+
+#[test]
+fn exid_files_of_a_curved_road_have_the_scenarios_of_the_straight_one() {
+    let recording = generated();
+    for radius_m in [f64::INFINITY, 2500.0] {
+        let dir = tempfile::tempdir().unwrap();
+        exid::write(dir.path(), &recording, radius_m);
+        let loaded = load(dir.path());
+        assert!(loaded[0].notes.iter().any(|note| note.contains("preset exid")), "{:?}", loaded[0].notes);
+        let read = &loaded[0].recording;
+        assert_eq!(read.tracks.len(), recording.tracks.len(), "{:?}", loaded[0].notes);
+        // Frames begin at 0 instead of 1.
+        let [all, near, _] = matched(&recording, read, 1, 1);
+        let [of_read, ..] = matched(read, &recording, -1, 1);
+        let [_, found, kept] = matched(&recording, read, 1, 30);
+        // On the bend, gaps differ by up to 5 m / 2,500 m: headways reach 2 s some frames earlier or later.
+        let least = if radius_m.is_finite() { 92 } else { 99 };
+        assert!(all > 200 && near * 100 >= all * least, "{radius_m}: {near} of {all}");
+        assert!(found * 100 >= all * 99 && kept * 100 >= all * 98, "{radius_m}: {found}, {kept} of {all}");
+        assert!(of_read * 100 <= all * 101, "{radius_m}: {of_read} of {all}");
+    }
+}
+
+/// A vehicle on the right lane of a bend, and one that merges in front of it from an acceleration lane.
+fn merging() -> Recording {
+    let lanes = Carriageway { name: "2".to_owned(), lane_lines_m: vec![0.0, -3.75, -7.5, -11.25] };
+    let mut tracks = Vec::new();
+    let frames = 500;
+    let mut add = |id: u32, s_m: f64, speed: f64, d: &dyn Fn(f64) -> f64| {
+        let s: Vec<f64> = (0..frames).map(|k| s_m + speed * f64::from(k) / 25.0).collect();
+        let d_m: Vec<f64> = s.iter().map(|s| d(*s)).collect();
+        let v_d_mps: Vec<f64> = (0..frames as usize)
+            .map(|k| {
+                let (a, b) = (k.saturating_sub(1), (k + 1).min(frames as usize - 1));
+                (d_m[b] - d_m[a]) * 25.0 / (b - a) as f64
+            })
+            .collect();
+        tracks.push(Track {
+            id,
+            class: VehicleClass::Car,
+            length_m: 4.5,
+            width_m: 1.8,
+            carriageway: 0,
+            first_frame: 1,
+            d_m,
+            v_s_mps: vec![speed; s.len()],
+            v_d_mps,
+            a_s_mps2: vec![0.0; s.len()],
+            lane: s.iter().map(|s| lanes.lane_at(d(*s)).map_or(NO_LANE, |lane| lane as u16)).collect(),
+            s_m: s,
+        });
+    };
+    for vehicle in 0..6 {
+        add(1 + vehicle, 60.0 * f64::from(vehicle), 32.0, &|_| -1.875);
+        add(11 + vehicle, -35.0 - 90.0 * f64::from(vehicle), 28.0, &|_| -5.625);
+    }
+    // From a ramp onto the acceleration lane, along it, and into the right lane.
+    add(30, 25.0, 24.0, &|s| {
+        let step = |from: f64, to: f64| {
+            let part = ((s - from) / (to - from)).clamp(0.0, 1.0);
+            part * part * part * (10.0 - 15.0 * part + 6.0 * part * part)
+        };
+        -17.0 + 7.625 * step(0.0, 120.0) + 3.75 * step(220.0, 320.0)
+    });
+    Recording { id: "ramp".to_owned(), frame_rate_hz: 25.0, carriageways: vec![lanes], tracks, synthetic: true }
+}
+
+#[test]
+fn merging_from_an_on_ramp_of_a_curved_road_is_a_cut_in() {
+    let dir = tempfile::tempdir().unwrap();
+    exid::write(dir.path(), &merging(), 900.0);
+    let loaded = &load(dir.path())[0];
+    let lines = &loaded.recording.carriageways[0].lane_lines_m;
+    assert_eq!(lines.len(), 4, "{lines:?}");
+    let mined = mine(&loaded.recording, &MiningOptions::default());
+    let cut_in = mined.scenarios.iter().find(|s| s.category == Category::CutIn && s.target_id == 30);
+    assert_eq!(cut_in.map(|s| s.ego_id), Some(11), "{:?}", mined.scenarios.iter().map(|s| &s.id).collect::<Vec<_>>());
+}
+
+/// What is understood of a table under the generic preset, changed.
+fn understood(table: &Plain, change: &dyn Fn(&mut Preset)) -> lanesweep::Result<Understanding> {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("own.csv");
+    std::fs::write(&path, table.text()).unwrap();
+    let mut preset = Preset::load("generic").unwrap();
+    change(&mut preset);
+    let mut all = tracks::read_tracks(&TrackFile { path, id: "own".to_owned() }, &preset)?;
+    Ok(all.remove(0).understanding)
+}
+
+#[test]
+fn a_plain_table_is_understood_and_nothing_is_wrong_with_it() {
+    let table = Plain::of(&generated(), 5);
+    let about = understood(&table, &|_| ()).unwrap();
+    assert!(about.is_usable(), "{:?}", about.findings);
+    assert_eq!(about.rate_hz, 5.0);
+    assert!(about.is_straight && about.carriageways.len() == 2);
+    assert!(about.carriageways.iter().all(|of| of.lanes == 3), "{:?}", about.carriageways);
+    // Without speeds, headings and sizes too, but it is said.
+    let bare = table.without(&["heading", "speed", "vx", "vy", "length", "width", "class"]);
+    let about = understood(&bare, &|_| ()).unwrap();
+    assert!(about.is_usable() && about.derived_speeds && about.derived_lateral, "{:?}", about.findings);
+    assert!(about.findings.iter().any(|finding| finding.text.contains("have no size")));
+}
+
+#[test]
+fn wrong_units_axes_and_reference_points_are_found() {
+    let table = Plain::of(&generated(), 5);
+    let bare = || table.clone().without(&["heading", "vx", "vy"]);
+    let with = |mut table: Plain, change: &dyn Fn(&mut Plain)| {
+        change(&mut table);
+        table
+    };
+    let foot = 1.0 / 0.3048;
+    let cases: Vec<(&str, Plain, &str)> = vec![
+        ("speeds in km/h", with(bare(), &|t| t.map("speed", |v, _| 3.6 * v)), "km/h"),
+        ("positions in feet", with(bare(), &|t| ["x", "y"].iter().for_each(|c| t.map(c, |v, _| foot * v))), "feet"),
+        (
+            "everything in feet",
+            with(bare(), &|t| ["x", "y", "speed", "length", "width"].iter().for_each(|c| t.map(c, |v, _| foot * v))),
+            "feet",
+        ),
+        ("y flipped, with lateral speeds", with(table.clone(), &|t| t.map("y", |v, _| -v)), "mirrored"),
+        ("y flipped, two directions", with(bare(), &|t| t.map("y", |v, _| -v)), "mirrored"),
+        ("radians for degrees", with(table.clone(), &|t| t.map("heading", |v, _| v.to_radians())), "heading"),
+        ("north for x", with(table.clone(), &|t| t.map("heading", |v, _| 90.0 - v)), "heading"),
+        (
+            "a corner for the centre",
+            with(bare(), &|t| {
+                let (length, width) = (t.at("length"), t.at("width"));
+                t.map("x", |v, row| v - 0.5 * row[length].parse::<f64>().unwrap());
+                t.map("y", |v, row| v - 0.5 * row[width].parse::<f64>().unwrap());
+            }),
+            "",
+        ),
+        ("a wrong time unit", with(bare(), &|t| t.map("t", |v, _| 1000.0 * v)), ""),
+    ];
+    for (name, table, expected) in cases {
+        let words = match understood(&table, &|_| ()) {
+            Err(error) => format!("{error} {}", error.help().unwrap_or_default()),
+            Ok(about) => {
+                assert!(!about.is_usable(), "{name} was not found: {:?}", about.findings);
+                about.findings.iter().filter(|f| f.is_grave).map(|f| f.text.clone()).collect::<Vec<_>>().join("; ")
+            }
+        };
+        assert!(words.contains(expected), "{name}: {words}");
+    }
+    // One direction, no lateral speed, no lorry: nothing can tell, and this is said.
+    let mut one_way = bare();
+    let x = one_way.at("x");
+    let first: BTreeMap<String, f64> =
+        one_way.rows.iter().rev().map(|row| (row[0].clone(), row[x].parse().unwrap())).collect();
+    let last: BTreeMap<String, f64> =
+        one_way.rows.iter().map(|row| (row[0].clone(), row[x].parse().unwrap())).collect();
+    one_way.rows.retain(|row| last[&row[0]] > first[&row[0]]);
+    let class = one_way.at("class");
+    one_way.rows.iter_mut().for_each(|row| "car".clone_into(&mut row[class]));
+    one_way.map("length", |_, _| 4.5);
+    one_way.map("y", |v, _| -v);
+    let about = understood(&one_way, &|_| ()).unwrap();
+    assert!(about.findings.iter().any(|finding| finding.text.contains("mirrored")), "{:?}", about.findings);
+}
+
+#[test]
+fn the_preset_says_what_a_wrong_file_means() {
+    let table = Plain::of(&generated(), 5);
+    let mut wrong = table.clone();
+    wrong.map("y", |v, _| -v);
+    wrong.map("vy", |v, _| -v);
+    wrong.map("heading", |v, _| -v);
+    assert!(!understood(&wrong, &|_| ()).unwrap().is_usable());
+    let about = understood(&wrong, &|preset| preset.axes.y = tracks::Side::Right).unwrap();
+    assert!(about.is_usable(), "{:?}", about.findings);
+    let mut corner = table.clone();
+    let (length, width) = (corner.at("length"), corner.at("width"));
+    corner.map("x", |v, row| v - 0.5 * row[length].parse::<f64>().unwrap());
+    corner.map("y", |v, row| v - 0.5 * row[width].parse::<f64>().unwrap());
+    let about = understood(&corner, &|preset| preset.reference = tracks::Reference::Corner).unwrap();
+    assert!(about.is_usable(), "{:?}", about.findings);
+    let mut front = table;
+    let heading = front.at("heading");
+    let cosine = |row: &[String]| libm::cos(row[heading].parse::<f64>().unwrap().to_radians());
+    front.map("x", |v, row| v + 0.5 * cosine(row) * row[length].parse::<f64>().unwrap());
+    let about = understood(&front, &|preset| preset.reference = tracks::Reference::Front).unwrap();
+    assert!(about.is_usable(), "{:?}", about.findings);
+}
+
+#[test]
+fn missing_values_gaps_and_repeated_rows_are_said() {
+    let mut table = Plain::of(&generated(), 5);
+    let (x, t) = (table.at("x"), table.at("t"));
+    let rows_of = |id: &String| table.rows.iter().filter(|row| row[0] == *id).count();
+    let id = table.rows.iter().map(|row| row[0].clone()).find(|id| rows_of(id) > 40).unwrap();
+    let own: Vec<usize> = (0..table.rows.len()).filter(|at| table.rows[*at][0] == id).collect();
+    table.rows[own[2]][x] = "NaN".to_owned();
+    let copy = table.rows[own[4]].clone();
+    table.rows.push(copy);
+    // A hole of two seconds: two tracks.
+    let hole: Vec<usize> = own[10..20].to_vec();
+    table.rows = table.rows.into_iter().enumerate().filter(|(at, _)| !hole.contains(at)).map(|(_, row)| row).collect();
+    let about = understood(&table, &|_| ()).unwrap();
+    assert_eq!((about.incomplete, about.duplicates), (1, 1));
+    assert!(about.interpolated > 0 && about.renumbered, "{about:?}");
+    // What is no number is refused with its place.
+    let mut bad = table.clone();
+    bad.rows[3][t] = "soon".to_owned();
+    let error = understood(&bad, &|_| ()).unwrap_err().to_string();
+    assert!(error.contains("line 5") && error.contains("`t`") && error.contains("soon"), "{error}");
+}
+
+/// The headers of the formats, as their publishers describe them.
+#[test]
+fn every_format_is_detected_by_its_header() {
+    let headers = [
+        (
+            "exid",
+            "07_tracks.csv",
+            "recordingId,trackId,frame,trackLifetime,xCenter,yCenter,heading,width,length,xVelocity,yVelocity,xAcceleration,yAcceleration,lonVelocity,latVelocity,lonAcceleration,latAcceleration",
+        ),
+        (
+            "sumo-fcd",
+            "fcd.csv",
+            "timestep_time;vehicle_id;vehicle_x;vehicle_y;vehicle_angle;vehicle_type;vehicle_speed;vehicle_pos;vehicle_lane;vehicle_edge;vehicle_slope",
+        ),
+        (
+            "mitra",
+            "T1_D1.csv",
+            "Vehicle_ID,Vehicle_type,Time [s],x [m],y [m],Speed [km/h],Lon. Acc. [ms-2],Lat. Acc. [ms-2],Angle [rad],Vehicle_length [m],Vehicle_width [m],Lane,Leader_ID,Follower_ID,Left_Leader_ID,Left_Follower_ID,Right_Leader_ID,Right_Follower_ID",
+        ),
+        (
+            "tgsim",
+            "i294.csv",
+            "id,time,xloc-kf,yloc-kf,lane-kf,speed-kf,acceleration-kf,length-smoothed,width-smoothed,type-most-common,av,run-index",
+        ),
+        (
+            "ngsim",
+            "us101.csv",
+            "Vehicle_ID,Frame_ID,Total_Frames,Global_Time,Local_X,Local_Y,Global_X,Global_Y,v_length,v_Width,v_Class,v_Vel,v_Acc,Lane_ID,Preceding,Following,Space_Headway,Time_Headway,Location",
+        ),
+        (
+            "citysim",
+            "free.csv",
+            "frameNum,carId,carCenterX,carCenterY,headX,headY,tailX,tailY,carCenterXft,carCenterYft,speed,course,heading,laneId",
+        ),
+        ("generic", "x.csv", "track_id,t,x,y,class"),
+    ];
+    let dir = tempfile::tempdir().unwrap();
+    for (name, file, header) in headers {
+        let path = dir.path().join(file);
+        std::fs::write(&path, format!("{header}\n")).unwrap();
+        let found = tracks::detect(&path).unwrap();
+        assert_eq!(found.map(|preset| preset.name).as_deref(), Some(name), "{header}");
+    }
+    let path = dir.path().join("unknown.csv");
+    std::fs::write(&path, "Zeit,Fahrzeug,Ort,Spur\n").unwrap();
+    assert_eq!(tracks::detect(&path).unwrap(), None);
+    let error = Inputs::of(&path, None).unwrap_err();
+    assert!(error.to_string().contains("`Fahrzeug`") && error.help().unwrap().contains("write_preset"), "{error}");
+    // Its draft is a preset as soon as the marks are filled in.
+    let draft = tracks::draft(&path).unwrap();
+    assert!(draft.contains("vehicle = \"?\"") && draft.contains("\"Zeit\""), "{draft}");
+}
+
+#[test]
+fn every_shipped_preset_is_valid() {
+    let names: Vec<&str> = Preset::names().collect();
+    assert!(names.len() >= 13, "{names:?}");
+    for name in names.into_iter().filter(|name| *name != tracks::HIGHD) {
+        assert_eq!(Preset::load(name).unwrap().name, name);
+    }
+    assert!(Preset::load("sumo").unwrap_err().to_string().contains("sumo-fcd"));
+}
+
+#[test]
+fn lists_of_json_and_attributes_of_xml_are_samples() {
+    let dir = tempfile::tempdir().unwrap();
+    let recording = generated();
+    let objects: Vec<String> = recording
+        .tracks
+        .iter()
+        .map(|track| {
+            let of = |value: &dyn Fn(&exid::InPlane) -> f64| {
+                let list = (0..track.len()).map(|k| value(&exid::in_plane(&recording, track, k, f64::INFINITY)));
+                list.map(|v| format!("{v:.4}")).collect::<Vec<_>>().join(",")
+            };
+            let time: Vec<String> = (0..track.len()).map(|k| format!("{:.3}", (track.first_frame + k as i64) as f64 / 25.0)).collect();
+            format!(
+                "{{\"UUID\":\"v{}\",\"type\":\"car\",\"length\":{},\"width\":{},\"time\":[{}],\"x_vec\":[{}],\"y_vec\":[{}],\"psi_vec\":[{}],\"vx_vec\":[{}],\"vy_vec\":[{}],\"ax_vec\":[{}],\"ay_vec\":[{}],\"lane_id_vec\":[{}]}}",
+                track.id, track.length_m, track.width_m, time.join(","),
+                of(&|p| p.x), of(&|p| p.y), of(&|p| p.heading), of(&|p| p.velocity[0]), of(&|p| p.velocity[1]),
+                of(&|p| p.acceleration[0]), of(&|p| p.acceleration[1]),
+                track.lane.iter().map(|lane| format!("{}", u32::from(*lane) + 10 * track.carriageway as u32)).collect::<Vec<_>>().join(",")
+            )
+        })
+        .collect();
+    let json = dir.path().join("dynamicWorld.json");
+    std::fs::write(&json, format!("{{\"UUID\":\"x\",\"objects\":[{}]}}", objects.join(","))).unwrap();
+    let loaded = &load(&json)[0];
+    assert!(loaded.notes[0].contains("automatum"));
+    let [all, near, _] = {
+        let renumbered = &loaded.recording;
+        // Vehicles are numbered in the order of the file.
+        assert_eq!(renumbered.tracks.len(), recording.tracks.len());
+        let mine_count = mine(renumbered, &MiningOptions::default()).scenarios.len();
+        let own = mine(&recording, &MiningOptions::default()).scenarios.len();
+        [own, mine_count, 0]
+    };
+    assert!(all.abs_diff(near) * 50 <= all, "{near} of {all}");
+
+    let mut xml = String::from("<?xml version=\"1.0\"?>\n<fcd-export>\n");
+    for frame in 1..400 {
+        xml += &format!("<timestep time=\"{:.2}\">", f64::from(frame) * 0.04);
+        for track in &recording.tracks {
+            let Some(k) = track.index_of(i64::from(frame)) else { continue };
+            let at = exid::in_plane(&recording, track, k, f64::INFINITY);
+            let (cos, sin) = (libm::cos(at.heading), libm::sin(at.heading));
+            let front = [at.x + 0.5 * track.length_m * cos, at.y + 0.5 * track.length_m * sin];
+            let angle = 90.0 - at.heading.to_degrees();
+            xml += &format!(
+                "<vehicle id=\"v{}\" x=\"{:.3}\" y=\"{:.3}\" angle=\"{angle:.2}\" type=\"car\" speed=\"{:.3}\" pos=\"0\" lane=\"e{}_{}\" slope=\"0\"/>",
+                track.id, front[0], front[1], track.v_s_mps[k], track.carriageway, track.lane[k]
+            );
+        }
+        xml += "</timestep>\n";
+    }
+    xml += "</fcd-export>\n";
+    let path = dir.path().join("fcd.xml");
+    std::fs::write(&path, &xml).unwrap();
+    let loaded = &load(&path)[0];
+    assert!(loaded.notes[0].contains("sumo-fcd-xml") && loaded.recording.carriageways.len() == 2);
+    // A truncated file is refused.
+    std::fs::write(&path, &xml[..xml.len() - 40]).unwrap();
+    let (files, _) = Inputs::of(&path, None).unwrap().files();
+    assert!(files[0].read(Implausible::Refused).unwrap_err().to_string().contains("XML"));
+}
