@@ -168,7 +168,11 @@ fn run_all(first: u64, inputs: u64, readers: &[Reader], seeds: &Seeds) -> (Vec<C
 #[test]
 fn no_input_panics_or_takes_the_memory_or_hangs() {
     let seeds = Seeds::make();
-    let readers = readers::all(&seeds);
+    let mut readers = readers::all(&seeds);
+    // Words in the names of the readers, separated by commas.
+    if let Ok(words) = std::env::var("LANESWEEP_MUTATED_READERS") {
+        readers.retain(|reader| words.split(',').any(|word| reader.name.contains(word)));
+    }
     let dir = tempfile::tempdir().unwrap();
     for reader in &readers {
         for (k, seed) in reader.seeds.iter().enumerate() {

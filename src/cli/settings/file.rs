@@ -126,11 +126,12 @@ pub(super) fn unknown(place: Place, name: &str, is_table: bool, keys: &[Key]) ->
 pub const FILE_VARIABLE: &str = "LANESWEEP_CONFIG";
 
 /// Variables of the program's tests; the program ignores them.
-pub const TEST_VARIABLES: [&str; 10] = [
+pub const TEST_VARIABLES: [&str; 11] = [
     "LANESWEEP_DLR_HT",
     "LANESWEEP_KILLS",
     "LANESWEEP_MUTATED_FIRST",
     "LANESWEEP_MUTATED_INPUTS",
+    "LANESWEEP_MUTATED_READERS",
     "LANESWEEP_RENEW_FIGURES",
     "LANESWEEP_REQUIRE_DEVICE",
     "LANESWEEP_SHARED",

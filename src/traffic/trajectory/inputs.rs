@@ -138,7 +138,7 @@ fn highd_inputs(path: &Path) -> Result<Inputs> {
 /// The first file of a folder that may hold tracks; those with highD's names come first.
 fn first_track_file(folder: &Path) -> Result<Option<PathBuf>> {
     let listed = std::fs::read_dir(folder).map_err(|e| Error::io(folder, "list", e))?;
-    let mut files: Vec<PathBuf> = listed.flatten().map(|entry| entry.path()).filter(|path| path.is_file()).collect();
+    let mut files: Vec<PathBuf> = listed.flatten().map(|entry| entry.path()).filter(|path| !path.is_dir()).collect();
     files.sort();
     if let Some(first) = files.iter().find(|path| is_highd_name(path)) {
         return Ok(Some(first.clone()));

@@ -17,8 +17,11 @@ use lanesweep::run::study::{StudyHead, StudyOptions, plan_study};
 use lanesweep::scenario::parameterization::ParameterizationOptions;
 use lanesweep::scenario::{Category, Scenario, read_scenarios};
 use lanesweep::stats::density::{DensityModel, Exposure, read_density};
+use lanesweep::support::plausibility::Implausible;
 use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine, mine_folder};
+use lanesweep::traffic::trajectory::Inputs;
+use lanesweep::traffic::trajectory::tracks::{Preset, TrackFile, draft, read_usable};
 use lanesweep::{Error, Place, Result};
 use serde_json::value::RawValue;
 
@@ -53,6 +56,11 @@ pub fn all(seeds: &Seeds) -> Vec<Reader> {
         plain("parameterization options", &seeds.parameterization, parameterization),
         plain("score options", &seeds.score, |b, _, _, _| options::<ScoreOptions>(b)?.validate()),
         plain("proposal", &seeds.proposals, proposal),
+        plain("exiD tracks", &seeds.exid, exid),
+        plain("track table", &seeds.track_tables, |b, d, _, _| tracks_named("own.csv", b, d)),
+        plain("track XML", &seeds.track_xml, |b, d, _, _| tracks_named("own.xml", b, d)),
+        plain("track JSON", &seeds.track_json, |b, d, _, _| tracks_named("own.json", b, d)),
+        plain("preset", &seeds.presets, preset),
         plain("distribution", &seeds.distributions, distribution),
     ];
     #[cfg(feature = "parquet")]
@@ -65,6 +73,39 @@ pub fn all(seeds: &Seeds) -> Vec<Reader> {
     readers.push(Reader { reseal: Some(sealed), ..plain("weighted part", &seeds.weighted_parts, weighted_part) });
     readers.push(Reader { reseal: Some(sealed), ..plain("study part", &seeds.study_parts, study_part) });
     readers
+}
+
+/// Alone in a folder, detected by its content, with whatever it is doubted for.
+fn tracks_named(name: &str, bytes: &[u8], dir: &Path) -> Result<()> {
+    let path = file(bytes, dir, name);
+    let read = Inputs::of(&path, None).and_then(|inputs| {
+        let (files, _) = inputs.files();
+        files.iter().try_for_each(|file| {
+            file.read(Implausible::Accepted)?
+                .iter()
+                .for_each(|loaded| drop(mine(&loaded.recording, &MiningOptions::default())));
+            Ok(())
+        })
+    });
+    let drafted = draft(&path).map(drop);
+    std::fs::remove_file(&path).expect("the temporary folder can be written to");
+    read.and(drafted)
+}
+
+fn exid(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {
+    let meta = file(b"recordingId,frameRate\n0,25\n", dir, "01_recordingMeta.csv");
+    let read = tracks_named("01_tracks.csv", bytes, dir);
+    std::fs::remove_file(meta).expect("the temporary folder can be written to");
+    read
+}
+
+fn preset(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
+    let path = file(bytes, dir, "own.toml");
+    let table = file(&seeds.track_tables[0], dir, "own.csv");
+    let preset = Preset::load(&path.to_string_lossy())?;
+    let read = read_usable(&TrackFile { path: table.clone(), id: "own".to_owned() }, &preset, Implausible::Accepted);
+    std::fs::remove_file(&table).expect("the temporary folder can be written to");
+    read.map(drop)
 }
 
 /// As a map of what is deterministic, as samples of what is not.

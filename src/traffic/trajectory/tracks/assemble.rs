@@ -23,8 +23,9 @@ const USUAL_CAR_M: [f64; 2] = [4.6, 1.9];
 const USUAL_TRUCK_M: [f64; 2] = [12.0, 2.5];
 /// A vehicle of this length is a lorry if no class tells, m.
 const TRUCK_FROM_M: f64 = 7.0;
-/// Maximum number of samples of a recording.
-const MAX_SAMPLES: f64 = 2e9;
+/// Maximum number of samples that one row of a file becomes by interpolation, beyond [`FREE_SAMPLES`] for all.
+const SAMPLES_PER_ROW: f64 = 200.0;
+const FREE_SAMPLES: f64 = 1e5;
 
 /// A gapless stretch of a vehicle's track at the frames of the recording.
 struct Piece {
@@ -228,6 +229,7 @@ fn pieces(
     about.rate_hz = rate_hz;
     let frame = |at: f64| first.round() * factor + (at - origin) * scale * factor;
     let max_gap = (preset.max_gap_s * rate_hz).max(1.0) + 0.5 + factor;
+    let rows: usize = raw.vehicles.iter().map(|vehicle| vehicle.samples.len()).sum();
     let mut pieces = Vec::new();
     let mut total = 0.0;
     for (vehicle, of) in raw.vehicles.iter().enumerate() {
@@ -241,8 +243,9 @@ fn pieces(
             from = to;
             let frames: Vec<f64> = piece.iter().map(|sample| frame(sample.at)).collect();
             total += frames[frames.len() - 1] - frames[0] + 1.0;
-            if total > MAX_SAMPLES {
-                return Err(bad("the tracks are too long", "check the unit of `time`"));
+            if total > SAMPLES_PER_ROW * rows as f64 + FREE_SAMPLES {
+                let problem = "the tracks have far more frames than the file has rows";
+                return Err(bad(problem, "check the unit of `time`, the frame rates and `max_gap_s`"));
             }
             let (at_frames, first_frame) = at_frames(piece, &frames, about);
             if at_frames.len() >= MIN_PIECE {

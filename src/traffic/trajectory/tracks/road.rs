@@ -14,6 +14,8 @@ const MIN_TRACK_M: f64 = 30.0;
 const ROUNDS: usize = 3;
 /// Length by which the line goes on straight beyond the tracks, m.
 const BEYOND_M: f64 = 300.0;
+/// Maximum number of steps of a line: 500 km.
+const MAX_STEPS: usize = 100_000;
 /// A direction within this of an axis of the file is that axis, rad.
 const ON_AXIS_RAD: f64 = 2e-4;
 
@@ -250,7 +252,7 @@ fn resampled(path: &[[f64; 2]]) -> Option<RoadLine> {
     let raw = RoadLine::along(path)?;
     let end = raw.s_m[raw.s_m.len() - 1];
     let steps = (end / STEP_M).floor() as usize;
-    if steps < 4 {
+    if !(4..=MAX_STEPS).contains(&steps) {
         return None;
     }
     let mean_near = |s: f64| {
