@@ -28,6 +28,7 @@ __all__ = [
     "study",
     "synth",
     "trace",
+    "tracks",
 ]
 
 
@@ -35,6 +36,7 @@ def study(
     recordings: Value | None = None,
     *,
     scenarios: Value | None = None,
+    preset: Value | None = None,
     accept_implausible: bool = False,
     synth_recordings: Value | None = None,
     categories: Values | None = None,
@@ -68,9 +70,12 @@ def study(
     Parameters
     ----------
     recordings : Value
-        Folder of highD-format recordings [default: synthetic recordings].
+        Folder of recordings, or a track file [default: synthetic recordings]. highD's format, or that of a
+        preset, which the names of the columns tell; see `lanesweep tracks`.
     scenarios : Value
         Scenario file (.jsonl, .parquet, .csv) instead of recordings.
+    preset : Value
+        Format of the recordings: exid, sumo-fcd, … or a TOML file [default: detected].
     accept_implausible : bool
         Use physically impossible values (a speed of 108 m/s) with a warning.
     synth_recordings : Value, default 84
@@ -137,6 +142,7 @@ def study(
         [
             (None, recordings, False),
             ('scenarios', scenarios, False),
+            ('preset', preset, False),
             ('accept-implausible', accept_implausible, False),
             ('synth-recordings', synth_recordings, False),
             ('categories', categories, True),
@@ -165,10 +171,65 @@ def study(
     )
 
 
+def tracks(
+    paths: Value,
+    *,
+    preset: Value | None = None,
+    write_preset: Value | None = None,
+    convert: Value | None = None,
+    config: Values | None = None,
+    threads: Value | None = None,
+    out: Path | None = None,
+) -> Result:
+    """What is in a track file? Check it, draw it, convert it
+
+    Finds the format by the names of the columns, reads the tracks and says what was understood: rate, vehicles,
+    road, lanes, speeds, scenarios. Checks the file against itself: units, axes, reference point, lanes, jumps,
+    overlaps. Verbs that take recordings read the same files. A preset is a TOML file that says what the columns
+    mean.
+
+    Parameters
+    ----------
+    paths : Values
+        Track files, or folders of them.
+    preset : Value
+        Format of the files: exid, sumo-fcd, … or a TOML file [default: detected].
+    write_preset : Value
+        Write a first preset for a file that no preset fits.
+    convert : Value
+        Write the tracks in highD's format into this folder, or as one table: .csv, .parquet.
+    config : Values
+        Configuration file, or one key of it; repeatable. `lanesweep config init` writes such a file. Without
+        --config, LANESWEEP_CONFIG names it.
+    threads : Value
+        Threads; results do not depend on it [default: all cores].
+    out : path, optional
+        Where the files stay; without it they go with the result.
+
+    Returns
+    -------
+    Result
+    """
+    return run(
+        'tracks',
+        [
+            (None, paths, False),
+            ('preset', preset, False),
+            ('write-preset', write_preset, False),
+            ('convert', convert, False),
+            ('config', config, False),
+            ('threads', threads, False),
+        ],
+        out=out,
+        default_out='tracks',
+    )
+
+
 def mine(
     recordings: Value,
     *,
     kept: bool = False,
+    preset: Value | None = None,
     accept_implausible: bool = False,
     config: Values | None = None,
     threads: Value | None = None,
@@ -176,16 +237,18 @@ def mine(
 ) -> Result:
     """Mine cut-ins, cut-outs and leader decelerations from recordings
 
-    Reads a folder of highD-format recordings (three files each) and writes one JSON line per scenario with its
-    series, or one row if FILE ends in .parquet; `study --scenarios FILE` reads it. The driven time and distance go
-    to FILE.exposure.json beside it, so that `fit --scenarios FILE` can compute events per hour.
+    Reads recordings in highD's format or another one (see `lanesweep tracks`) and writes one JSON line per scenario
+    with its series, or one row if FILE ends in .parquet; `study --scenarios FILE` reads it. The driven time and
+    distance go to FILE.exposure.json beside it, so that `fit --scenarios FILE` can compute events per hour.
 
     Parameters
     ----------
     recordings : Value
-        Folder of highD-format recordings.
+        Folder of recordings, or a track file.
     kept : bool
         Only scenarios that pass the paper's filters.
+    preset : Value
+        Format of the recordings: exid, sumo-fcd, … or a TOML file [default: detected].
     accept_implausible : bool
         Use physically impossible values (a speed of 108 m/s) with a warning.
     config : Values
@@ -205,6 +268,7 @@ def mine(
         [
             (None, recordings, False),
             ('kept', kept, False),
+            ('preset', preset, False),
             ('accept-implausible', accept_implausible, False),
             ('config', config, False),
             ('threads', threads, False),
@@ -220,6 +284,7 @@ def fit(
     scenarios: Value | None = None,
     hours: Value | None = None,
     km: Value | None = None,
+    preset: Value | None = None,
     accept_implausible: bool = False,
     synth_recordings: Value | None = None,
     categories: Values | None = None,
@@ -244,13 +309,16 @@ def fit(
     Parameters
     ----------
     recordings : Value
-        Folder of highD-format recordings [default: synthetic recordings].
+        Folder of recordings, or a track file [default: synthetic recordings]. highD's format, or that of a
+        preset, which the names of the columns tell; see `lanesweep tracks`.
     scenarios : Value
         Scenario file (.jsonl, .parquet, .csv) instead of recordings.
     hours : Value, h
         Driven time of all egos [default: from the recordings].
     km : Value, km
         Driven distance of all egos [default: from the recordings].
+    preset : Value
+        Format of the recordings: exid, sumo-fcd, … or a TOML file [default: detected].
     accept_implausible : bool
         Use physically impossible values (a speed of 108 m/s) with a warning.
     synth_recordings : Value, default 84
@@ -295,6 +363,7 @@ def fit(
             ('scenarios', scenarios, False),
             ('hours', hours, False),
             ('km', km, False),
+            ('preset', preset, False),
             ('accept-implausible', accept_implausible, False),
             ('synth-recordings', synth_recordings, False),
             ('categories', categories, True),
@@ -330,6 +399,7 @@ def sample(
     samples: Value | None = None,
     criterion: Value | None = None,
     half_width: Value | None = None,
+    other_profile: Value | None = None,
     dt: Value | None = None,
     points: Value | None = None,
     interval: Value | None = None,
@@ -398,6 +468,8 @@ def sample(
     half_width : Value
         Reach this half-width over estimate. It is that of the draws' interval; mc checks it after 4096·2^k
         samples. The default of is is 0.1 unless the number of samples is given; else none.
+    other_profile : Value
+        Also run the samples under this profile and write ratios to profiles.csv (mc).
     dt : Value, s
         Time step [default: the profile's].
     points : Value, default random
@@ -467,6 +539,7 @@ def sample(
             ('samples', samples, False),
             ('criterion', criterion, False),
             ('half-width', half_width, False),
+            ('other-profile', other_profile, False),
             ('dt', dt, False),
             ('points', points, False),
             ('interval', interval, False),
@@ -498,6 +571,7 @@ def compare(
     scenarios: Value | None = None,
     hours: Value | None = None,
     km: Value | None = None,
+    preset: Value | None = None,
     accept_implausible: bool = False,
     synth_recordings: Value | None = None,
     categories: Values | None = None,
@@ -526,13 +600,16 @@ def compare(
     Parameters
     ----------
     recordings : Value
-        Folder of highD-format recordings [default: synthetic recordings].
+        Folder of recordings, or a track file [default: synthetic recordings]. highD's format, or that of a
+        preset, which the names of the columns tell; see `lanesweep tracks`.
     scenarios : Value
         Scenario file (.jsonl, .parquet, .csv) instead of recordings.
     hours : Value, h
         Driven time of all egos [default: from the recordings].
     km : Value, km
         Driven distance of all egos [default: from the recordings].
+    preset : Value
+        Format of the recordings: exid, sumo-fcd, … or a TOML file [default: detected].
     accept_implausible : bool
         Use physically impossible values (a speed of 108 m/s) with a warning.
     synth_recordings : Value, default 84
@@ -587,6 +664,7 @@ def compare(
             ('scenarios', scenarios, False),
             ('hours', hours, False),
             ('km', km, False),
+            ('preset', preset, False),
             ('accept-implausible', accept_implausible, False),
             ('synth-recordings', synth_recordings, False),
             ('categories', categories, True),
@@ -613,6 +691,7 @@ def justify(
     recordings: Value | None = None,
     *,
     scenarios: Value | None = None,
+    preset: Value | None = None,
     accept_implausible: bool = False,
     synth_recordings: Value | None = None,
     parameterization: Value | None = None,
@@ -639,9 +718,12 @@ def justify(
     Parameters
     ----------
     recordings : Value
-        Folder of highD-format recordings [default: synthetic recordings].
+        Folder of recordings, or a track file [default: synthetic recordings]. highD's format, or that of a
+        preset, which the names of the columns tell; see `lanesweep tracks`.
     scenarios : Value
         Scenario file (.jsonl, .parquet, .csv) instead of recordings.
+    preset : Value
+        Format of the recordings: exid, sumo-fcd, … or a TOML file [default: detected].
     accept_implausible : bool
         Use physically impossible values (a speed of 108 m/s) with a warning.
     synth_recordings : Value, default 84
@@ -690,6 +772,7 @@ def justify(
         [
             (None, recordings, False),
             ('scenarios', scenarios, False),
+            ('preset', preset, False),
             ('accept-implausible', accept_implausible, False),
             ('synth-recordings', synth_recordings, False),
             ('parameterization', parameterization, False),

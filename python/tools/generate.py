@@ -13,6 +13,7 @@ from types import ModuleType
 # Verb of the program → function; what it leaves in a temporary place if no `out` is given.
 FUNCTIONS = {
     "study": ("study", "study"),
+    "tracks": ("tracks", "tracks"),
     "mine": ("mine", "scenarios.jsonl"),
     "fit": ("fit", "densities"),
     "sample": ("sample", "sample"),

@@ -382,3 +382,13 @@ fn lists_of_json_and_attributes_of_xml_are_samples() {
     let (files, _) = Inputs::of(&path, None).unwrap().files();
     assert!(files[0].read(Implausible::Refused).unwrap_err().to_string().contains("XML"));
 }
+
+/// Files for readers in Python: `python benches/python/track_readers.py LANESWEEP target/tmp/exid`.
+#[test]
+#[ignore = "writes files for a comparison with other programs"]
+fn an_exid_fixture_is_left_for_other_readers() {
+    let dir = Path::new(env!("CARGO_TARGET_TMPDIR")).join("exid");
+    for (id, radius_m) in [("00", 2500.0), ("01", f64::INFINITY)] {
+        exid::write(&dir, &Recording { id: id.to_owned(), ..generated() }, radius_m);
+    }
+}

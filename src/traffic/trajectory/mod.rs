@@ -1,7 +1,7 @@
 //! Trajectories: recordings as they come in, and the internal model that everything else reads.
 //!
-//! Here live the recording model, one reader per file format (highD today), the writer of the same
-//! format, the ego-centric view and the generator of synthetic recordings. Here lives nothing about
+//! Here live the recording model, the reader and writer of highD's format, the reader of all other formats (presets), the
+//! ego-centric view and the generator of synthetic recordings. Here lives nothing about
 //! scenarios. Data comes from files or from the generator and goes to [`crate::traffic::mining`].
 
 mod csv_table;
