@@ -6,8 +6,8 @@ use quick_xml::XmlVersion;
 use quick_xml::events::Event;
 use quick_xml::reader::Reader;
 
-use super::preset::Role;
 use super::raw::{NO_LABEL, RawFile, RawRecording, RawSample, RawVehicle};
+use super::roles::Role;
 use crate::support::input_file;
 use crate::support::plain_text::sha256;
 use crate::traffic::trajectory::csv_table::FileChecksum;

@@ -3,7 +3,8 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
-use super::preset::{Preset, Role};
+use super::preset::Preset;
+use super::roles::Role;
 use super::rows::{Rows, is_same_name};
 use super::{FileFormat, format_of};
 use crate::{Error, Place, Result};
@@ -93,7 +94,7 @@ pub fn draft(path: &Path) -> Result<String> {
 }
 
 fn fits(role: Role, unit: &str) -> bool {
-    use super::preset::Dimension as D;
+    use super::roles::Dimension as D;
     match role.dimension() {
         D::Length => unit == "ft",
         D::Speed => matches!(unit, "km/h" | "mph" | "ft/s"),

@@ -1,15 +1,22 @@
 //! Tracks in any format: a [`Preset`] says what the columns of a file mean, this module makes [`Recording`]s of them.
 //!
-//! The stages: rows of a file (`rows`), vehicles in SI units (`raw`, `commonroad`), the line of the road (`road`), lanes
-//! (`lanes`), the recording (`assemble`), and what contradicts itself (`understanding`). highD files have their own reader.
+//! The stages: rows of a file (`rows`, `markup`), vehicles in SI units (`raw`, `commonroad`), gapless pieces (`pieces`,
+//! `boxes`), the lines of the road (`road`, `directions`), lanes (`lanes`), the recording (`assemble`), and what contradicts
+//! itself (`understanding`, `findings`). highD files have their own reader.
 
 mod assemble;
+mod boxes;
 mod commonroad;
+mod directions;
 mod draft;
+mod findings;
 mod lanes;
+mod markup;
+mod pieces;
 mod preset;
 mod raw;
 mod road;
+mod roles;
 mod rows;
 mod smooth;
 mod understanding;
@@ -18,9 +25,9 @@ use std::path::{Path, PathBuf};
 
 pub use draft::draft;
 pub use preset::{
-    Axes, Classes, ColumnName, FileFormat, HIGHD, HeadingOrigin, LaneBands, MetaFile, OneOrMany, Preset, Reference,
-    RoadSource, Role, Side,
+    Axes, Classes, FileFormat, HIGHD, HeadingOrigin, LaneBands, MetaFile, Preset, Reference, RoadSource, Side,
 };
+pub use roles::{ColumnName, OneOrMany, Role};
 pub use understanding::{Exclusion, Finding, Understanding, UnderstoodCarriageway};
 
 use rows::{Columns, Rows};
@@ -82,7 +89,7 @@ pub fn detect(path: &Path) -> Result<Option<Preset>> {
             best.push((score, preset));
         }
     }
-    best.sort_by(|a, b| b.0.cmp(&a.0));
+    best.sort_by_key(|(score, _)| std::cmp::Reverse(*score));
     match best.as_slice() {
         [(first, a), (second, b), ..] if first == second => {
             let problem = format!("it fits the presets {} and {}", a.name, b.name);

@@ -6,6 +6,7 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::roles::{ColumnName, Role, units};
 use crate::support::input_file;
 use crate::support::plain_text::nearest;
 use crate::{Error, Place, Result};
@@ -198,198 +199,6 @@ pub struct MetaFile {
     pub columns: BTreeMap<Role, ColumnName>,
 }
 
-/// Meaning of a column.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-#[allow(missing_docs)] // docs/src/tracks.md has the table
-pub enum Role {
-    Recording,
-    Vehicle,
-    Frame,
-    Time,
-    X,
-    Y,
-    Heading,
-    Speed,
-    XSpeed,
-    YSpeed,
-    ForwardSpeed,
-    LeftwardSpeed,
-    Acceleration,
-    XAcceleration,
-    YAcceleration,
-    Length,
-    Width,
-    Class,
-    Lane,
-    LaneOffset,
-    Direction,
-    FrameRate,
-}
-
-/// What a role measures.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum Dimension {
-    Text,
-    Number,
-    Time,
-    Length,
-    Speed,
-    Acceleration,
-    Angle,
-}
-
-impl Role {
-    /// All roles.
-    pub const ALL: [Role; 22] = [
-        Role::Recording,
-        Role::Vehicle,
-        Role::Frame,
-        Role::Time,
-        Role::X,
-        Role::Y,
-        Role::Heading,
-        Role::Speed,
-        Role::XSpeed,
-        Role::YSpeed,
-        Role::ForwardSpeed,
-        Role::LeftwardSpeed,
-        Role::Acceleration,
-        Role::XAcceleration,
-        Role::YAcceleration,
-        Role::Length,
-        Role::Width,
-        Role::Class,
-        Role::Lane,
-        Role::LaneOffset,
-        Role::Direction,
-        Role::FrameRate,
-    ];
-
-    /// Its key in a preset.
-    pub fn key(self) -> &'static str {
-        match self {
-            Role::Recording => "recording",
-            Role::Vehicle => "vehicle",
-            Role::Frame => "frame",
-            Role::Time => "time",
-            Role::X => "x",
-            Role::Y => "y",
-            Role::Heading => "heading",
-            Role::Speed => "speed",
-            Role::XSpeed => "x_speed",
-            Role::YSpeed => "y_speed",
-            Role::ForwardSpeed => "forward_speed",
-            Role::LeftwardSpeed => "leftward_speed",
-            Role::Acceleration => "acceleration",
-            Role::XAcceleration => "x_acceleration",
-            Role::YAcceleration => "y_acceleration",
-            Role::Length => "length",
-            Role::Width => "width",
-            Role::Class => "class",
-            Role::Lane => "lane",
-            Role::LaneOffset => "lane_offset",
-            Role::Direction => "direction",
-            Role::FrameRate => "frame_rate",
-        }
-    }
-
-    pub(super) fn dimension(self) -> Dimension {
-        match self {
-            Role::Recording | Role::Vehicle | Role::Class | Role::Lane => Dimension::Text,
-            Role::Frame | Role::Direction | Role::FrameRate => Dimension::Number,
-            Role::Time => Dimension::Time,
-            Role::X | Role::Y | Role::Length | Role::Width | Role::LaneOffset => Dimension::Length,
-            Role::Heading => Dimension::Angle,
-            Role::Speed | Role::XSpeed | Role::YSpeed | Role::ForwardSpeed | Role::LeftwardSpeed => Dimension::Speed,
-            Role::Acceleration | Role::XAcceleration | Role::YAcceleration => Dimension::Acceleration,
-        }
-    }
-}
-
-/// Names of a column, and the unit of its values.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged)]
-pub enum ColumnName {
-    /// One name; the unit is that of the SI, headings are in degrees.
-    Name(String),
-    /// Several names, of which the first in the header counts.
-    Names(Vec<String>),
-    /// Names with a unit.
-    WithUnit {
-        /// One name or several.
-        name: OneOrMany,
-        /// The unit.
-        #[serde(default)]
-        unit: Option<String>,
-        /// Factor on the values after the unit; −1 turns a sign.
-        #[serde(default)]
-        factor: Option<f64>,
-    },
-}
-
-/// One text or several.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged)]
-pub enum OneOrMany {
-    /// One.
-    One(String),
-    /// Several.
-    Many(Vec<String>),
-}
-
-impl ColumnName {
-    /// The names, in the order of preference.
-    pub fn names(&self) -> &[String] {
-        match self {
-            ColumnName::Name(name) | ColumnName::WithUnit { name: OneOrMany::One(name), .. } => {
-                std::slice::from_ref(name)
-            }
-            ColumnName::Names(names) | ColumnName::WithUnit { name: OneOrMany::Many(names), .. } => names,
-        }
-    }
-
-    fn unit(&self) -> Option<&str> {
-        match self {
-            ColumnName::WithUnit { unit, .. } => unit.as_deref(),
-            _ => None,
-        }
-    }
-
-    /// What the values are multiplied by to be in SI units.
-    pub(super) fn factor(&self, role: Role) -> Option<f64> {
-        let own = match self {
-            ColumnName::WithUnit { factor, .. } => factor.unwrap_or(1.0),
-            _ => 1.0,
-        };
-        Some(own * unit_factor(role.dimension(), self.unit())?)
-    }
-}
-
-/// Metres of an international foot.
-pub(super) const FOOT_M: f64 = 0.3048;
-
-/// Known units with their factors.
-fn units(dimension: Dimension) -> &'static [(&'static str, f64)] {
-    match dimension {
-        Dimension::Text | Dimension::Number => &[("", 1.0)],
-        // Dates have the factor 1: they are parsed to seconds.
-        Dimension::Time => &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("date", 1.0)],
-        Dimension::Length => &[("m", 1.0), ("ft", FOOT_M), ("cm", 0.01), ("km", 1000.0)],
-        Dimension::Speed => &[("m/s", 1.0), ("km/h", 1.0 / 3.6), ("mph", 0.44704), ("ft/s", FOOT_M)],
-        Dimension::Acceleration => &[("m/s2", 1.0), ("m/s²", 1.0), ("ft/s2", FOOT_M), ("g", 9.80665)],
-        Dimension::Angle => &[("deg", std::f64::consts::PI / 180.0), ("rad", 1.0)],
-    }
-}
-
-fn unit_factor(dimension: Dimension, unit: Option<&str>) -> Option<f64> {
-    let known = units(dimension);
-    match unit {
-        None => Some(known[0].1),
-        Some(unit) => known.iter().find(|(name, _)| *name == unit).map(|(_, factor)| *factor),
-    }
-}
-
 macro_rules! shipped {
     ($($name:literal),* $(,)?) => {
         /// Names and texts of the presets that are part of the program, `generic` last.
@@ -477,7 +286,8 @@ impl Preset {
         }
         let has = |role: Role| self.columns.contains_key(&role);
         let is_table = self.format != FileFormat::Commonroad;
-        for role in [Role::Vehicle, Role::X, Role::Y].into_iter().filter(|role| is_table && !has(*role)) {
+        let needed = [Role::Vehicle, Role::X, Role::Y];
+        if let Some(role) = needed.into_iter().find(|role| is_table && !has(*role)) {
             return bad("columns", format!("`{}` is missing", role.key()), "name its column".to_owned());
         }
         if is_table && !has(Role::Frame) && !has(Role::Time) {

@@ -3,7 +3,8 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use super::preset::{HeadingOrigin, MetaFile, Preset, Reference, Role, Side};
+use super::preset::{HeadingOrigin, MetaFile, Preset, Side};
+use super::roles::Role;
 use super::rows::{Columns, Rows, SampleRow};
 use crate::traffic::trajectory::csv_table::FileChecksum;
 use crate::{Error, Place, Result};
@@ -344,7 +345,7 @@ fn add_types(path: &Path, id: &str, pattern: &str, recordings: &mut [RawRecordin
     for file in files {
         let rows = Rows::open(&file, super::preset::FileFormat::Xml, Some("vType"), None)?;
         let named = [(Role::Vehicle, "id"), (Role::Length, "length"), (Role::Width, "width"), (Role::Class, "vClass")];
-        let named = named.map(|(role, name)| (role, super::preset::ColumnName::Name(name.to_owned())));
+        let named = named.map(|(role, name)| (role, super::roles::ColumnName::Name(name.to_owned())));
         let columns = Columns::of(&named.into_iter().collect(), rows.header(), &[]);
         rows.each(&columns, &mut |row| {
             let Some(key) = row.text(Role::Vehicle)? else { return Ok(()) };
@@ -373,28 +374,6 @@ fn add_types(path: &Path, id: &str, pattern: &str, recordings: &mut [RawRecordin
         vehicle.class = known.class.clone().or_else(|| vehicle.class.take());
     }
     Ok(())
-}
-
-/// The vector from the reference point to the centre of the box, m, of a vehicle that faces along a unit vector.
-pub(super) fn to_centre_m(
-    reference: Reference,
-    heading: [f64; 2],
-    length_m: f64,
-    width_m: f64,
-    y_sign: f64,
-) -> [f64; 2] {
-    let along = |metres: f64| heading.map(|part| metres * part);
-    match reference {
-        Reference::Centre => [0.0; 2],
-        Reference::Front => along(-length_m / 2.0),
-        Reference::Rear => along(length_m / 2.0),
-        // The box lies along the axes: its larger extent along the one that the vehicle drives along.
-        Reference::Corner => {
-            let is_along_x = heading[0].abs() >= heading[1].abs();
-            let (x_m, y_m) = if is_along_x { (length_m, width_m) } else { (width_m, length_m) };
-            [x_m / 2.0, y_sign * y_m / 2.0]
-        }
-    }
 }
 
 /// The error for a file without vehicles.

@@ -425,7 +425,8 @@ mod tests {
     /// Paths at several d of a circle of this radius; every third changes lanes by 3.5 m in the middle.
     fn paths_on_circle(radius_m: f64, length_m: f64) -> Vec<Path> {
         let on = |vehicle: usize, s: f64| {
-            let change = if vehicle % 3 == 0 { 3.5 / (1.0 + libm::exp(-(s - length_m / 2.0) / 15.0)) } else { 0.0 };
+            let change =
+                if vehicle.is_multiple_of(3) { 3.5 / (1.0 + libm::exp(-(s - length_m / 2.0) / 15.0)) } else { 0.0 };
             let d = [-1.75, -5.25, -8.75][vehicle % 3] + change + 0.2 * libm::sin(s / 40.0 + vehicle as f64);
             let (angle, r) = (s / radius_m, radius_m - d);
             [r * libm::sin(angle), radius_m - r * libm::cos(angle)]

@@ -17,7 +17,7 @@ pub(super) fn central(values: &[f64], rate_hz: f64) -> Vec<f64> {
 /// The series, its first and its second derivative per second. The window is made odd and no longer than the series; the
 /// cubic of the outermost windows holds at the ends.
 pub(super) fn savitzky_golay(values: &[f64], window: usize, rate_hz: f64) -> [Vec<f64>; 3] {
-    let longest = if values.len() % 2 == 0 { values.len().saturating_sub(1) } else { values.len() };
+    let longest = if values.len().is_multiple_of(2) { values.len().saturating_sub(1) } else { values.len() };
     let window = (window | 1).max(5).min(longest);
     if window < 5 {
         let first = central(values, rate_hz);

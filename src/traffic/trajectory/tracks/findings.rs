@@ -1,0 +1,328 @@
+//! What contradicts itself in a recording: units, axes, boxes, quality.
+
+use super::preset::{Preset, Side};
+use super::road::median;
+use super::understanding::{Exclusion, Finding, Understanding};
+use crate::support::plausibility::{Doubts, Implausible, Quantity};
+use crate::support::readable::{count, significant};
+use crate::traffic::trajectory::overlap::overlaps;
+use crate::traffic::trajectory::{NO_LANE, Recording, Track, VehicleClass};
+
+/// Positions and speeds that differ by more than this fraction do not belong together.
+const MAX_SPEED_DIFFERENCE: f64 = 0.05;
+/// A step along or across the road that is so much longer than the speed tells is a jump, m.
+const JUMP_ALONG_M: f64 = 2.0;
+const JUMP_ACROSS_M: f64 = 0.8;
+/// Fraction of vehicles that overlap from which on sizes or reference point are wrong.
+const MAX_OVERLAPPING: f64 = 0.1;
+/// Fraction of vehicles that cross the road from which on it is no motorway.
+const MAX_ACROSS: f64 = 0.15;
+/// Fewer vehicles prove nothing.
+const MIN_VEHICLES: usize = 5;
+
+/// Factors that a wrong unit or frame rate would give: positions over speeds, and what it would mean.
+const MISTAKEN: [(f64, &str); 10] = [
+    (1.0 / 3.6, "the speeds look like km/h: add `unit = \"km/h\"`"),
+    (3.6, "the speeds look as if divided by 3.6 twice: they are m/s already"),
+    (3.280_84, "the positions look like feet: add `unit = \"ft\"`"),
+    (0.3048, "the speeds look like ft/s: add `unit = \"ft/s\"`"),
+    (0.447_04, "the speeds look like mph: add `unit = \"mph\"`"),
+    (2.236_94, "the speeds look as if they were converted from mph twice"),
+    (1.466_67, "the positions look like feet and the speeds like mph"),
+    (25.0 / 30.0, "the frame rate looks like 30 instead of 25"),
+    (1.2, "the frame rate looks like 25 instead of 30"),
+    (0.01, "the positions look like metres, not centimetres"),
+];
+
+impl Understanding {
+    pub(super) fn find(&mut self, is_grave: bool, text: impl Into<String>) {
+        self.findings.push(Finding { is_grave, text: text.into() });
+    }
+
+    pub(super) fn check_units(&mut self, recording: &Recording) {
+        if self.ratios.len() >= MIN_VEHICLES.min(recording.tracks.len()) && !self.ratios.is_empty() {
+            let ratio = median(&mut self.ratios);
+            self.positions_over_speeds = Some(ratio);
+            if (ratio - 1.0).abs() > MAX_SPEED_DIFFERENCE {
+                let near = MISTAKEN.iter().find(|(factor, _)| (ratio / factor - 1.0).abs() < 0.06);
+                let why = near.map_or("check units and frame rate", |(_, why)| why);
+                self.find(
+                    true,
+                    format!("vehicles move {} times as far as their speeds tell: {why}", significant(ratio, 3)),
+                );
+            }
+        }
+        // Refused: what is beyond the physical range is grave.
+        let mut doubts = Doubts::new(Implausible::Refused);
+        let mut grave: Vec<String> = Vec::new();
+        let mut check = |quantity: Quantity, value: f64, place: String| {
+            if let Err(problem) = doubts.check(quantity, value, || place.clone()) {
+                grave.push(format!("{place}: {problem}"));
+            }
+        };
+        for track in &recording.tracks {
+            let mean = track.v_s_mps.iter().sum::<f64>() / track.len() as f64;
+            check(Quantity::Speed, mean, format!("vehicle {}, mean speed", track.id));
+            check(Quantity::Length, track.length_m, format!("vehicle {}", track.id));
+            check(Quantity::Width, track.width_m, format!("vehicle {}", track.id));
+        }
+        for of in &self.carriageways {
+            for width_m in of.lane_width_m {
+                check(Quantity::LaneWidth, width_m, format!("carriageway {}", of.name));
+            }
+        }
+        check(Quantity::Rate, self.rate_hz, "frame rate".to_owned());
+        // Half of the vehicles beyond what is plausible is a unit, not an odd vehicle.
+        let general = |of: &dyn Fn(&Track) -> f64, quantity: Quantity| {
+            let mut values: Vec<f64> = recording.tracks.iter().map(of).collect();
+            let middle = median(&mut values);
+            let hint = quantity.limits().mistaken.iter().find(|(_, factor)| quantity.is_plausible(middle / factor));
+            let hint = hint.map_or(String::new(), |(unit, _)| format!(": it looks like {unit}"));
+            (!quantity.is_plausible(middle)).then(|| {
+                format!(
+                    "the median {} is {} {}{hint}",
+                    quantity.limits().name,
+                    significant(middle, 3),
+                    quantity.limits().unit
+                )
+            })
+        };
+        let mean = |track: &Track| track.v_s_mps.iter().sum::<f64>() / track.len() as f64;
+        let general: Vec<String> = [
+            general(&mean, Quantity::Speed),
+            general(&|track| track.length_m, Quantity::Length),
+            general(&|track| track.width_m, Quantity::Width),
+        ]
+        .into_iter()
+        .flatten()
+        .collect();
+        if let Some(first) = grave.first() {
+            let more = if grave.len() > 1 { format!(" ({} more such)", grave.len() - 1) } else { String::new() };
+            self.find(true, format!("{first}{more}"));
+        }
+        general.into_iter().for_each(|text| self.find(true, text));
+        doubts.sentences().into_iter().for_each(|text| self.find(false, text));
+        if self.length_m < 50.0 {
+            self.find(
+                false,
+                format!("only {} m of road are in view: check the unit of x and y", significant(self.length_m, 3)),
+            );
+        }
+    }
+
+    pub(super) fn check_axes(&mut self, recording: &Recording, preset: &Preset) {
+        let [product, of_change, of_given] = self.lateral_sums;
+        let strength = (of_change * of_given).sqrt();
+        if strength > 0.0 && product < -0.5 * strength && recording.tracks.len() >= MIN_VEHICLES {
+            self.find(true, "vehicles move across the road against their lateral speeds: y, or the lateral speed, is mirrored; see `axes.y`");
+        }
+        if let Some((cosine, lateral)) = self.heading_facts {
+            if cosine < 0.9 {
+                self.find(true, format!(
+                    "headings and motion differ (median cosine {}): check the unit of the heading, and `axes.heading` (from-x or from-north)",
+                    significant(cosine, 2)
+                ));
+            } else if lateral < -0.3 {
+                self.find(
+                    true,
+                    "headings turn against the motion across the road: y, or the heading, is mirrored; see `axes.y`",
+                );
+            }
+        }
+        if self.across_fraction > MAX_ACROSS {
+            self.find(true, format!(
+                "{} % of the vehicles cross the road by more than 15 m: this is no motorway, or vehicles of several roads are in one file",
+                significant(100.0 * self.across_fraction, 2)
+            ));
+        }
+        let keeps = if preset.traffic == Side::Left { "left" } else { "right" };
+        if let Some(oncoming) = self.oncoming_left_m {
+            let is_left_hand = oncoming < 0.0;
+            if is_left_hand != (preset.traffic == Side::Left) {
+                self.find(true, format!(
+                    "oncoming vehicles are on the {} of the vehicles, which does not fit traffic on the {keeps}: y is mirrored (`axes.y`), or set `traffic = \"{}\"`",
+                    if is_left_hand { "right" } else { "left" },
+                    if is_left_hand { "left" } else { "right" },
+                ));
+            }
+        } else {
+            self.check_slow_side(recording, preset, keeps);
+        }
+        if let Some(difference) = self.lane_offset_error_m.filter(|difference| *difference > 0.5) {
+            self.find(
+                false,
+                format!(
+                    "offsets in the lane differ from the positions by {} m (median) and are not used",
+                    significant(difference, 2)
+                ),
+            );
+        }
+        if let Some(mismatch) = self.label_mismatch.filter(|mismatch| *mismatch > 0.05) {
+            self.find(
+                false,
+                format!(
+                    "{} % of the samples are not where the name of their lane says; positions decide",
+                    significant(100.0 * mismatch, 2)
+                ),
+            );
+        }
+    }
+
+    /// Lorries drive on the slow side.
+    fn check_slow_side(&mut self, recording: &Recording, preset: &Preset, keeps: &str) {
+        let mean_lane = |class: VehicleClass| {
+            let of = recording.tracks.iter().filter(|track| track.class == class);
+            let lanes: Vec<f64> = of
+                .flat_map(|track| {
+                    track.lane.iter().step_by(25).filter(|lane| **lane != NO_LANE).map(|lane| f64::from(*lane))
+                })
+                .collect();
+            (lanes.len() >= 20).then(|| lanes.iter().sum::<f64>() / lanes.len() as f64)
+        };
+        let (Some(cars), Some(trucks)) = (mean_lane(VehicleClass::Car), mean_lane(VehicleClass::Truck)) else {
+            if self.carriageways.iter().any(|of| of.lanes > 1) {
+                self.find(false, "one direction of travel and few lorries: nothing tells whether y is mirrored");
+            }
+            return;
+        };
+        // Lane 0 is the leftmost.
+        let slow_is_right = trucks > cars;
+        if (trucks - cars).abs() > 0.15 && slow_is_right == (preset.traffic == Side::Left) {
+            self.find(true, format!(
+                "lorries drive in the lanes on the {}, which does not fit traffic on the {keeps}: y is mirrored (`axes.y`), or set `traffic`",
+                if slow_is_right { "right" } else { "left" }
+            ));
+        }
+    }
+
+    pub(super) fn check_boxes(&mut self, recording: &Recording) {
+        let stride = recording.frame_rate_hz.round().max(1.0) as usize;
+        let looked_at = |track: &Track| {
+            let first = (-track.first_frame).rem_euclid(stride as i64) as usize;
+            (first..track.len()).step_by(stride)
+        };
+        if let Some(found) = overlaps(recording, looked_at) {
+            let mut involved: Vec<usize> = found.pairs.iter().flat_map(|(a, b)| [*a, *b]).collect();
+            involved.sort_unstable();
+            involved.dedup();
+            let fraction = involved.len() as f64 / recording.tracks.len() as f64;
+            let is_grave = fraction > MAX_OVERLAPPING && involved.len() >= MIN_VEHICLES;
+            self.find(is_grave, format!(
+                "{} pairs of vehicles overlap, the first are {}: check sizes and `reference` (centre, front, rear, corner)",
+                found.pairs.len(),
+                found.first
+            ));
+            for (a, b) in &found.pairs {
+                let shorter = if recording.tracks[*a].len() < recording.tracks[*b].len() { a } else { b };
+                self.exclude(recording.tracks[*shorter].id, Exclusion::Overlap);
+            }
+        }
+        if let Some(slope) = edge_slope(recording).filter(|slope| slope.abs() > 0.6) {
+            self.find(true, format!(
+                "wide vehicles are beside the middle of their lanes by {} of half their width: the position is that of an edge or a corner; see `reference`",
+                significant(slope.abs(), 2)
+            ));
+        }
+        if self.assumed_sizes > 0 {
+            self.find(
+                false,
+                format!(
+                    "{} vehicles have no size in the file; `sizes` of the preset, or usual ones, take its place",
+                    count(self.assumed_sizes)
+                ),
+            );
+        }
+        if self.changing_sizes > 0 {
+            self.find(
+                false,
+                format!(
+                    "the size of {} vehicles varies by more than a tenth; the median is used",
+                    count(self.changing_sizes)
+                ),
+            );
+        }
+    }
+
+    pub(super) fn check_quality(&mut self, recording: &Recording) {
+        let jumps = |track: &Track| {
+            (1..track.len()).any(|k| {
+                let by_m = track.s_m[k] - track.s_m[k - 1];
+                let told_m = 0.5 * (track.v_s_mps[k] + track.v_s_mps[k - 1]) / recording.frame_rate_hz;
+                (by_m - told_m).abs() > JUMP_ALONG_M || (track.d_m[k] - track.d_m[k - 1]).abs() > JUMP_ACROSS_M
+            })
+        };
+        let jumping: Vec<u32> = recording.tracks.iter().filter(|track| jumps(track)).map(|track| track.id).collect();
+        if let Some(first) = jumping.first() {
+            self.find(false, format!(
+                "{} tracks jump by more than {JUMP_ALONG_M} m along or {JUMP_ACROSS_M} m across the road, the first is vehicle {first}",
+                jumping.len()
+            ));
+            jumping.iter().for_each(|id| self.exclusions.push((*id, Exclusion::Jump)));
+        }
+        let backwards = self.exclusions.iter().filter(|(_, why)| *why == Exclusion::Backwards).count();
+        if backwards > 0 {
+            let is_grave = 2 * backwards > recording.tracks.len();
+            self.find(is_grave, format!(
+                "{backwards} vehicles drive backwards (faster than 0.5 m/s) and are left out: check `direction` and the signs of the speeds"
+            ));
+        }
+        let notes = [
+            (self.incomplete, "rows have no position and are left out"),
+            (self.duplicates, "rows repeat vehicle and time of another row and are left out"),
+            (self.short_pieces, "piece(s) of tracks are too short to be used"),
+            (self.noise_speeds, "speeds between -0.5 m/s and 0 count as 0"),
+        ];
+        for (number, what) in notes {
+            if number > 0 {
+                self.find(false, format!("{} {what}", count(number)));
+            }
+        }
+        if self.interpolated > 0 {
+            self.find(
+                false,
+                format!(
+                    "{} samples are interpolated: times are off the raster by up to {} frames, or there are gaps",
+                    count(self.interpolated),
+                    significant(self.off_raster_frames, 2)
+                ),
+            );
+        }
+        if self.renumbered {
+            self.find(false, "vehicles have other numbers than in the file: their ids are no small whole numbers, or a track was split at a gap");
+        }
+    }
+}
+
+/// Slope of the mean offset from the lane's middle over half the width, of the carriageway where it is steepest; ±1 if
+/// positions are those of an edge.
+fn edge_slope(recording: &Recording) -> Option<f64> {
+    let of = |carriageway: usize| {
+        let mut pairs: Vec<(f64, f64, u16)> = Vec::new();
+        for track in recording.tracks.iter().filter(|track| track.carriageway == carriageway) {
+            let lane = track.lane[0];
+            let is_kept = track.lane.iter().all(|l| *l == lane);
+            let middle = recording.carriageways[carriageway].lane(usize::from(lane)).filter(|_| is_kept);
+            let Some(centre) = middle.map(|lane| lane.centre_m()) else { continue };
+            let mean = track.d_m.iter().sum::<f64>() / track.len() as f64 - centre;
+            pairs.push((track.width_m / 2.0, mean, lane));
+        }
+        slope_within(&mut pairs)
+    };
+    (0..recording.carriageways.len()).filter_map(of).max_by(|a, b| a.abs().total_cmp(&b.abs()))
+}
+
+/// Slope within groups, so that the middles of the lanes do not matter; `None` if the widths hardly vary.
+fn slope_within(pairs: &mut [(f64, f64, u16)]) -> Option<f64> {
+    pairs.sort_by(|a, b| a.2.cmp(&b.2).then(a.0.total_cmp(&b.0)).then(a.1.total_cmp(&b.1)));
+    let (mut xx, mut xy, mut n) = (0.0, 0.0, 0);
+    for group in pairs.chunk_by(|a, b| a.2 == b.2).filter(|group| group.len() >= MIN_VEHICLES) {
+        let of = |value: fn(&(f64, f64, u16)) -> f64| group.iter().map(value).sum::<f64>() / group.len() as f64;
+        let (x, y) = (of(|p| p.0), of(|p| p.1));
+        for (half, offset, _) in group.iter() {
+            xx += (half - x) * (half - x);
+            xy += (half - x) * (offset - y);
+        }
+        n += group.len();
+    }
+    (n >= 20 && xx / n as f64 > 0.08 * 0.08).then(|| xy / xx)
+}

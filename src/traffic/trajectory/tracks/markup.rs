@@ -1,0 +1,132 @@
+//! Rows of XML and JSON files: the attributes of elements, the objects of a list.
+
+use std::io::{BufReader, Read};
+use std::path::Path;
+
+use quick_xml::XmlVersion;
+use quick_xml::events::{BytesStart, Event};
+use quick_xml::reader::Reader;
+use serde_json::Value;
+
+use crate::support::input_file;
+use crate::{Error, Place, Result};
+
+/// Maximum size of a JSON file, bytes: it is held in memory.
+const MAX_JSON_BYTES: u64 = 1 << 30;
+/// Maximum nesting of XML elements.
+const DEEPEST: usize = 64;
+
+/// Gives the attributes of every element with this name, and those of the elements around it as `element.attribute`, until
+/// `each` returns false.
+#[allow(clippy::type_complexity)]
+pub(super) fn each_element(
+    path: &Path,
+    row: &str,
+    each: &mut dyn FnMut(&[(String, String)], &dyn Fn() -> Place) -> Result<bool>,
+) -> Result<()> {
+    let file = BufReader::with_capacity(1 << 18, LimitedLine::new(input_file::open(path)?));
+    let mut reader = Reader::from_reader(file);
+    let mut buffer = Vec::new();
+    let mut around: Vec<Vec<(String, String)>> = Vec::new();
+    let wrong = |at: u64, problem: String| {
+        let problem = format!("not well-formed XML at byte {at}: {problem}");
+        Error::input(Place::file(path), problem, "export the file again")
+    };
+    loop {
+        buffer.clear();
+        let at = reader.buffer_position();
+        let event = reader.read_event_into(&mut buffer).map_err(|error| wrong(at, error.to_string()))?;
+        let (start, is_open) = match event {
+            Event::Start(start) => (start, true),
+            Event::Empty(start) => (start, false),
+            Event::End(_) => {
+                around.pop();
+                continue;
+            }
+            Event::Eof => {
+                let problem = "it ends inside an element: the file is truncated".to_owned();
+                return if around.is_empty() { Ok(()) } else { Err(wrong(at, problem)) };
+            }
+            Event::DocType(_) => return Err(wrong(at, "a document type".to_owned())),
+            _ => continue,
+        };
+        let name = start.name().as_ref().to_owned();
+        let mut attributes = attributes(&start).map_err(|problem| wrong(at, problem))?;
+        if name == row {
+            attributes.extend(around.iter().flatten().cloned());
+            if !each(&attributes, &|| Place::file(path).of(format!("byte {at}")))? {
+                return Ok(());
+            }
+        }
+        if is_open {
+            if around.len() >= DEEPEST {
+                return Err(wrong(at, format!("more than {DEEPEST} elements within one another")));
+            }
+            let qualified = attributes.into_iter().filter(|(key, _)| name != row && !key.contains('.'));
+            around.push(qualified.map(|(key, value)| (format!("{name}.{key}"), value)).collect());
+        }
+    }
+}
+
+/// Refuses a file without an element end within this many bytes, which memory would have to hold.
+const MAX_ELEMENT_BYTES: u64 = 1 << 26;
+
+struct LimitedLine<R> {
+    inner: R,
+    since: u64,
+}
+
+impl<R> LimitedLine<R> {
+    fn new(inner: R) -> Self {
+        LimitedLine { inner, since: 0 }
+    }
+}
+
+impl<R: Read> Read for LimitedLine<R> {
+    fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
+        if self.since > MAX_ELEMENT_BYTES {
+            return Err(std::io::Error::from(std::io::ErrorKind::InvalidData));
+        }
+        let count = self.inner.read(bytes)?;
+        self.since = if bytes[..count].contains(&b'>') { 0 } else { self.since + count as u64 };
+        Ok(count)
+    }
+}
+
+fn attributes(start: &BytesStart) -> std::result::Result<Vec<(String, String)>, String> {
+    let mut found = Vec::new();
+    for attribute in start.attributes() {
+        let attribute = attribute.map_err(|error| error.to_string())?;
+        let value = attribute.normalized_value(XmlVersion::Implicit1_0).map_err(|error| error.to_string())?;
+        found.push((attribute.key.as_ref().to_owned(), value.into_owned()));
+    }
+    Ok(found)
+}
+
+/// The objects of a JSON file: of the list under a key, or of the list that the file is, or one per line.
+pub(super) fn json_rows(path: &Path, key: Option<&str>) -> Result<Vec<serde_json::Map<String, Value>>> {
+    let text = input_file::read(path, MAX_JSON_BYTES)?;
+    let wrong = |problem: String| Error::input(Place::file(path), problem, "export the file again");
+    let mut values = serde_json::Deserializer::from_slice(&text).into_iter::<Value>();
+    let first = values.next().ok_or_else(|| wrong("the file is empty".to_owned()))?;
+    let first = first.map_err(|error| wrong(format!("not JSON: {error}")))?;
+    let list = match first {
+        Value::Array(list) => list,
+        Value::Object(mut object) => match key.and_then(|key| object.remove(key)) {
+            Some(Value::Array(list)) => list,
+            Some(_) => return Err(wrong(format!("`{}` is no list", key.unwrap_or_default()))),
+            None => {
+                let rest: std::result::Result<Vec<Value>, _> = values.collect();
+                let mut list = vec![Value::Object(object)];
+                list.extend(rest.map_err(|error| wrong(format!("not JSON: {error}")))?);
+                list
+            }
+        },
+        _ => return Err(wrong("expected a list of vehicles".to_owned())),
+    };
+    let object = |value| match value {
+        Value::Object(object) => Ok(object),
+        _ => Err(wrong("a vehicle is not an object".to_owned())),
+    };
+    list.into_iter().map(object).collect()
+}

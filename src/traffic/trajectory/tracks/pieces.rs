@@ -1,0 +1,163 @@
+//! The time base of a recording: its frame rate, and gapless pieces of tracks at its frames.
+
+use super::preset::Preset;
+use super::raw::{RawRecording, RawSample};
+use super::road::median;
+use super::understanding::Understanding;
+use crate::{Error, Place, Result};
+
+/// A sample this far off the raster of times, in frames, is interpolated.
+const OFF_RASTER: f64 = 0.02;
+/// Pieces of a track with fewer samples tell nothing.
+const MIN_PIECE: usize = 3;
+/// Maximum number of samples that one row of a file becomes by interpolation, beyond [`FREE_SAMPLES`] for all.
+const SAMPLES_PER_ROW: f64 = 200.0;
+const FREE_SAMPLES: f64 = 1e5;
+
+/// A gapless stretch of a vehicle's track at the frames of the recording.
+pub(super) struct Piece {
+    pub vehicle: usize,
+    pub first_frame: i64,
+    pub samples: Vec<RawSample>,
+}
+
+/// The frame rate, and the tracks in gapless pieces at its frames.
+pub(super) fn pieces(
+    raw: &mut RawRecording,
+    preset: &Preset,
+    about: &mut Understanding,
+    place: &Place,
+) -> Result<(f64, Vec<Piece>)> {
+    for vehicle in &mut raw.vehicles {
+        vehicle.samples.sort_by(|a, b| a.at.total_cmp(&b.at));
+        let count = vehicle.samples.len();
+        vehicle.samples.dedup_by(|a, b| a.at == b.at);
+        about.duplicates += (count - vehicle.samples.len()) as u64;
+    }
+    let bad = |problem: &str, help: &str| Error::input(place.clone(), problem, help);
+    let mut steps: Vec<f64> =
+        raw.vehicles.iter().flat_map(|vehicle| vehicle.samples.windows(2).map(|w| w[1].at - w[0].at)).collect();
+    if steps.is_empty() {
+        return Err(bad("no vehicle has two samples", "check the columns for vehicle and time"));
+    }
+    let step = median(&mut steps);
+    let origin = raw.vehicles.iter().map(|vehicle| vehicle.samples[0].at).fold(f64::INFINITY, f64::min);
+    // (frames of the recording per unit of `at`, frame at the origin)
+    let (rate_hz, scale, first) = if raw.has_frames {
+        let rate_hz = raw.frame_rate_hz.or(preset.frame_rate_hz).ok_or_else(|| {
+            bad("the frame rate is unknown", "set `frame_rate_hz` in the preset, or name a column for `time`")
+        })?;
+        about.rate_source = if raw.frame_rate_hz.is_some() { "meta file" } else { "preset" }.to_owned();
+        let stride = step.round().max(1.0);
+        (rate_hz / stride, 1.0 / stride, origin / stride)
+    } else {
+        let rate_hz = rate_of_times(raw, step);
+        about.rate_source = "times".to_owned();
+        (rate_hz, rate_hz, if origin.abs() < 1e6 { origin * rate_hz } else { 0.0 })
+    };
+    if !(0.1..=1e4).contains(&rate_hz) {
+        return Err(bad(
+            &format!("{rate_hz} frames per second: the times or the frame rate are wrong"),
+            "check the unit of `time` (s, ms, us, ns, date), or `frame_rate_hz`",
+        ));
+    }
+    let factor = preset.resample_hz.map_or(1.0, |wanted| wanted / rate_hz);
+    let rate_hz = rate_hz * factor;
+    about.rate_hz = rate_hz;
+    let frame = |at: f64| first.round() * factor + (at - origin) * scale * factor;
+    let max_gap = (preset.max_gap_s * rate_hz).max(1.0) + 0.5 + factor;
+    let rows: usize = raw.vehicles.iter().map(|vehicle| vehicle.samples.len()).sum();
+    let mut pieces = Vec::new();
+    let mut total = 0.0;
+    for (vehicle, of) in raw.vehicles.iter().enumerate() {
+        let samples = &of.samples;
+        let mut from = 0;
+        for to in 1..=samples.len() {
+            if to < samples.len() && frame(samples[to].at) - frame(samples[to - 1].at) <= max_gap {
+                continue;
+            }
+            let piece = &samples[from..to];
+            from = to;
+            let frames: Vec<f64> = piece.iter().map(|sample| frame(sample.at)).collect();
+            total += frames[frames.len() - 1] - frames[0] + 1.0;
+            if total > SAMPLES_PER_ROW * rows as f64 + FREE_SAMPLES {
+                let problem = "the tracks have far more frames than the file has rows";
+                return Err(bad(problem, "check the unit of `time`, the frame rates and `max_gap_s`"));
+            }
+            let (at_frames, first_frame) = at_frames(piece, &frames, about);
+            if at_frames.len() >= MIN_PIECE {
+                pieces.push(Piece { vehicle, first_frame, samples: at_frames });
+            } else {
+                about.short_pieces += 1;
+            }
+        }
+    }
+    if pieces.is_empty() {
+        return Err(bad("no vehicle is in view for three samples", "check the columns for vehicle and time"));
+    }
+    Ok((rate_hz, pieces))
+}
+
+/// Steps of the recording over its duration, because a rounded step is not exact.
+fn rate_of_times(raw: &RawRecording, step: f64) -> f64 {
+    let mut times: Vec<f64> = raw.vehicles.iter().flat_map(|v| v.samples.iter().map(|sample| sample.at)).collect();
+    times.sort_by(f64::total_cmp);
+    times.dedup_by(|a, b| *a - *b < 0.25 * step);
+    let steps: f64 = times.windows(2).map(|pair| ((pair[1] - pair[0]) / step).round()).sum();
+    let span = times[times.len() - 1] - times[0];
+    let rate = if span > 0.0 { steps / span } else { 1.0 / step };
+    let whole = rate.round();
+    if whole >= 1.0 && (rate / whole - 1.0).abs() < 3e-4 { whole } else { rate }
+}
+
+/// The samples at whole frames: as they are, or by linear interpolation.
+fn at_frames(piece: &[RawSample], frames: &[f64], about: &mut Understanding) -> (Vec<RawSample>, i64) {
+    let first = frames[0].round();
+    let is_on = |(k, frame): (usize, &f64)| (frame - first - k as f64).abs() <= OFF_RASTER;
+    if frames.iter().enumerate().all(is_on) {
+        return (piece.to_vec(), first as i64);
+    }
+    let first = (frames[0] - OFF_RASTER).ceil();
+    let last = (frames[frames.len() - 1] + OFF_RASTER).floor();
+    let mut samples = Vec::new();
+    let mut k = 0;
+    let mut frame = first;
+    while frame <= last {
+        while k + 2 < frames.len() && frames[k + 1] <= frame {
+            k += 1;
+        }
+        let (a, b) = (k, (k + 1).min(frames.len() - 1));
+        let part = if b > a { ((frame - frames[a]) / (frames[b] - frames[a])).clamp(0.0, 1.0) } else { 0.0 };
+        samples.push(mix(&piece[a], &piece[b], part));
+        frame += 1.0;
+    }
+    let off = |frame: &f64| (frame - frame.round()).abs();
+    about.interpolated += samples.len() as u64;
+    about.off_raster_frames = frames.iter().map(off).fold(about.off_raster_frames, f64::max);
+    (samples, first as i64)
+}
+
+fn mix(a: &RawSample, b: &RawSample, part: f64) -> RawSample {
+    let one = |a: f64, b: f64| {
+        if part == 0.0 {
+            a
+        } else if part == 1.0 {
+            b
+        } else {
+            a + part * (b - a)
+        }
+    };
+    let two = |a: [f64; 2], b: [f64; 2]| [one(a[0], b[0]), one(a[1], b[1])];
+    RawSample {
+        at: one(a.at, b.at),
+        xy_m: two(a.xy_m, b.xy_m),
+        heading: two(a.heading, b.heading),
+        speed_mps: one(a.speed_mps, b.speed_mps),
+        velocity_mps: two(a.velocity_mps, b.velocity_mps),
+        along_mps: two(a.along_mps, b.along_mps),
+        acceleration_mps2: one(a.acceleration_mps2, b.acceleration_mps2),
+        acceleration_xy_mps2: two(a.acceleration_xy_mps2, b.acceleration_xy_mps2),
+        lane: if part < 0.5 { a.lane } else { b.lane },
+        lane_offset_m: if part < 0.5 { a.lane_offset_m } else { b.lane_offset_m },
+    }
+}
