@@ -36,6 +36,10 @@ pub fn load(
     if data != source.describe(false) {
         tracing::info!("{data}");
     }
+    if let Some(preset) = collection.recordings.first().and_then(|recording| recording.preset.as_deref()) {
+        let name = preset.split(' ').next().unwrap_or(preset);
+        tracing::info!("read by preset {name}; `lanesweep tracks` says how");
+    }
     tracing::info!("{}", counts_text(&collection.scenarios));
     Ok(collection)
 }

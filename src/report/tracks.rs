@@ -11,6 +11,8 @@ use crate::traffic::trajectory::{Recording, Track, VehicleClass};
 
 /// Maximum number of tracks of a figure; beyond it, every n-th is drawn.
 const MAX_TRACKS: usize = 400;
+/// Tracks that begin within this time are drawn over time, s.
+const SHOWN_S: f64 = 120.0;
 /// Maximum number of points of a drawn track.
 const MAX_POINTS: usize = 60;
 const CAR: &str = "#0072b2";
@@ -167,22 +169,49 @@ fn figure(
     }
 }
 
-/// Positions along the road over time.
+/// Where the road in view begins, m, by carriageway; figures count from there.
+fn begins_m(recording: &Recording) -> Vec<f64> {
+    let mut begins = vec![f64::INFINITY; recording.carriageways.len()];
+    for track in &recording.tracks {
+        let first = track.s_m.iter().copied().fold(f64::INFINITY, f64::min);
+        begins[track.carriageway] = begins[track.carriageway].min(first);
+    }
+    begins
+}
+
+/// Positions along the road over time, from the first frame on.
 pub fn space_time(recording: &Recording) -> Figure {
-    let rate_hz = recording.frame_rate_hz;
-    let value = move |track: &Track, k: usize| ((track.first_frame + k as i64) as f64 / rate_hz, track.s_m[k]);
-    figure(recording, "Positions over time", ["time, s", "position along the road, m"], value, |_| Vec::new())
+    let (rate_hz, begins) = (recording.frame_rate_hz, begins_m(recording));
+    let first = recording.tracks.iter().map(|track| track.first_frame).min().unwrap_or(0);
+    let value = |track: &Track, k: usize| {
+        ((track.first_frame - first + k as i64) as f64 / rate_hz, track.s_m[k] - begins[track.carriageway])
+    };
+    let shown = Recording {
+        tracks: recording
+            .tracks
+            .iter()
+            .filter(|track| ((track.first_frame - first) as f64) < SHOWN_S * rate_hz)
+            .cloned()
+            .collect(),
+        ..recording.clone()
+    };
+    figure(&shown, "Positions over time, first minutes", ["time, s", "position along the road, m"], value, |_| {
+        Vec::new()
+    })
 }
 
 /// Positions across the road over positions along it, with the lane lines.
 pub fn across(recording: &Recording) -> Figure {
-    let value = |track: &Track, k: usize| (track.s_m[k], track.d_m[k]);
+    let begins = begins_m(recording);
+    let left = |carriageway: usize| recording.carriageways[carriageway].lane_lines_m[0];
+    let value =
+        |track: &Track, k: usize| (track.s_m[k] - begins[track.carriageway], track.d_m[k] - left(track.carriageway));
     let lines = |index: usize| {
         let here = || recording.tracks.iter().filter(move |track| track.carriageway == index);
-        let low = here().flat_map(|track| track.s_m.iter().copied()).fold(f64::INFINITY, f64::min);
-        let high = here().flat_map(|track| track.s_m.iter().copied()).fold(f64::NEG_INFINITY, f64::max);
-        recording.carriageways[index].lane_lines_m.iter().map(|line| vec![(low, *line), (high, *line)]).collect()
+        let high = here().flat_map(|track| track.s_m.iter().copied()).fold(f64::NEG_INFINITY, f64::max) - begins[index];
+        let lines = &recording.carriageways[index].lane_lines_m;
+        lines.iter().map(|line| vec![(0.0, line - lines[0]), (high, line - lines[0])]).collect()
     };
-    let labels = ["position along the road, m", "position to the left of the road's line, m"];
+    let labels = ["position along the road, m", "position from the left edge of the leftmost lane, m"];
     figure(recording, "Positions across the road", labels, value, lines)
 }

@@ -18,8 +18,10 @@ fn generated() -> Recording {
     generate_one(&options, 0).unwrap()
 }
 
-fn load(path: &Path) -> Vec<Loaded> {
-    let (files, problems) = Inputs::of(path, None).unwrap().files();
+fn load(path: &Path, preset: &str) -> Vec<Loaded> {
+    let inputs = Inputs::of(path, None).unwrap();
+    assert_eq!(inputs.preset().map(|preset| preset.name.as_str()), Some(preset));
+    let (files, problems) = inputs.files();
     assert!(problems.is_empty());
     files.iter().flat_map(|file| file.read(Implausible::Refused).unwrap()).collect()
 }
@@ -54,8 +56,7 @@ fn exid_files_of_a_curved_road_have_the_scenarios_of_the_straight_one() {
     for radius_m in [f64::INFINITY, 2500.0] {
         let dir = tempfile::tempdir().unwrap();
         exid::write(dir.path(), &recording, radius_m);
-        let loaded = load(dir.path());
-        assert!(loaded[0].notes.iter().any(|note| note.contains("preset exid")), "{:?}", loaded[0].notes);
+        let loaded = load(dir.path(), "exid");
         let read = &loaded[0].recording;
         assert_eq!(read.tracks.len(), recording.tracks.len(), "{:?}", loaded[0].notes);
         // Frames begin at 0 instead of 1.
@@ -118,7 +119,7 @@ fn merging() -> Recording {
 fn merging_from_an_on_ramp_of_a_curved_road_is_a_cut_in() {
     let dir = tempfile::tempdir().unwrap();
     exid::write(dir.path(), &merging(), 900.0);
-    let loaded = &load(dir.path())[0];
+    let loaded = &load(dir.path(), "exid")[0];
     let lines = &loaded.recording.carriageways[0].lane_lines_m;
     assert_eq!(lines.len(), 4, "{lines:?}");
     let mined = mine(&loaded.recording, &MiningOptions::default());
@@ -234,6 +235,35 @@ fn the_preset_says_what_a_wrong_file_means() {
     assert!(about.is_usable(), "{:?}", about.findings);
 }
 
+/// What a newcomer's mistakes in a preset did in silence.
+#[test]
+fn mistakes_in_a_preset_are_not_silent() {
+    let table = Plain::of(&generated(), 5);
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("own.csv");
+    let with = |columns: &str, more: &str| {
+        std::fs::write(&path, table.text()).unwrap();
+        let own = dir.path().join("own.toml");
+        let text = format!(
+            "name = \"own\"\ntitle = \"own\"\nformat = \"csv\"\n{more}\n[columns]\nvehicle = \"track_id\"\ntime = \"t\"\nx = \"x\"\ny = \"y\"\n{columns}"
+        );
+        std::fs::write(&own, text).unwrap();
+        let preset = Preset::load(&own.to_string_lossy())?;
+        let file = TrackFile { path: path.clone(), id: "own".to_owned() };
+        tracks::read_tracks(&file, &preset).map(|mut all| all.remove(0).understanding)
+    };
+    let error = with("speed = \"sped\"", "").unwrap_err().to_string();
+    assert!(error.contains("`speed`") && error.contains("did you mean `speed`"), "{error}");
+    assert!(!with("speed = \"speed\"\ndirection = \"length\"", "").unwrap().is_usable());
+    assert!(!with("speed = \"speed\"", "frame_rate_hz = 50.0").unwrap().is_usable());
+    assert!(!with("lane = \"class\"", "").unwrap().is_usable());
+    let says = |about: &Understanding, words: &str| about.findings.iter().any(|finding| finding.text.contains(words));
+    assert!(says(&with("x_speed = \"vx\"", "").unwrap(), "`x_speed` is not used without `y_speed`"));
+    let about =
+        with("class = \"class\"\nlength = \"length\"\nwidth = \"width\"", "classes = { truck = [\"lorry\"] }").unwrap();
+    assert!(says(&about, "no class begins with `lorry`"), "{:?}", about.findings);
+}
+
 #[test]
 fn missing_values_gaps_and_repeated_rows_are_said() {
     let mut table = Plain::of(&generated(), 5);
@@ -344,8 +374,7 @@ fn lists_of_json_and_attributes_of_xml_are_samples() {
         .collect();
     let json = dir.path().join("dynamicWorld.json");
     std::fs::write(&json, format!("{{\"UUID\":\"x\",\"objects\":[{}]}}", objects.join(","))).unwrap();
-    let loaded = &load(&json)[0];
-    assert!(loaded.notes[0].contains("automatum"));
+    let loaded = &load(&json, "automatum")[0];
     let [all, near, _] = {
         let renumbered = &loaded.recording;
         // Vehicles are numbered in the order of the file.
@@ -375,8 +404,8 @@ fn lists_of_json_and_attributes_of_xml_are_samples() {
     xml += "</fcd-export>\n";
     let path = dir.path().join("fcd.xml");
     std::fs::write(&path, &xml).unwrap();
-    let loaded = &load(&path)[0];
-    assert!(loaded.notes[0].contains("sumo-fcd-xml") && loaded.recording.carriageways.len() == 2);
+    let loaded = &load(&path, "sumo-fcd-xml")[0];
+    assert!(loaded.recording.carriageways.len() == 2);
     // A truncated file is refused.
     std::fs::write(&path, &xml[..xml.len() - 40]).unwrap();
     let (files, _) = Inputs::of(&path, None).unwrap().files();

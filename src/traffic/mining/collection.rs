@@ -34,7 +34,7 @@ pub struct RecordingSummary {
     pub frame_rate_hz: f64,
     /// Its files with their content's SHA-256; empty for generated recordings.
     pub files: Vec<FileChecksum>,
-    /// The preset that the files were read by; none for highD's format and generated recordings.
+    /// Name and checksum of the preset that the files were read by; none for highD's format and generated recordings.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub preset: Option<String>,
 }
@@ -113,7 +113,7 @@ pub fn mine_inputs(
     done: impl Fn() -> Result<()> + Sync,
 ) -> Result<Collection> {
     options.validate()?;
-    let preset = inputs.preset().map(|preset| preset.name.clone());
+    let preset = inputs.preset().map(|preset| format!("{} (sha256 {})", preset.name, preset.sha256));
     let (files, problems) = inputs.files();
     let part = |loaded: Loaded| {
         let mined = mine(&loaded.recording, options);

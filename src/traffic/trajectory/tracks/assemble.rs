@@ -25,10 +25,15 @@ pub(super) struct Placed {
 pub(super) fn assemble(
     mut raw: RawRecording,
     preset: &Preset,
-    roles: &[Role],
+    file: (&[(Role, String)], &[String]),
     place: &Place,
 ) -> Result<(Recording, Understanding)> {
+    let (roles, unused) = file;
     let mut about = Understanding::new(&raw.id, raw.incomplete);
+    about.columns = roles.iter().map(|(role, column)| (role.key(), column.clone())).collect();
+    about.unused = unused.to_vec();
+    about.reference = preset.reference;
+    about.note_classes(&raw, preset);
     let before = raw.vehicles.len();
     raw.vehicles.retain(|vehicle| !is_ignored(vehicle, preset));
     about.ignored = (before - raw.vehicles.len()) as u64;
@@ -36,7 +41,7 @@ pub(super) fn assemble(
     let boxes: Vec<Sized> = raw.vehicles.iter().map(|vehicle| sized(vehicle, preset)).collect();
     about.assumed_sizes = boxes.iter().filter(|of| of.is_assumed).count() as u64;
     about.changing_sizes = boxes.iter().filter(|of| of.changes).count() as u64;
-    let has_heading = roles.contains(&Role::Heading);
+    let has_heading = roles.iter().any(|(role, _)| *role == Role::Heading);
     let y_sign = if preset.axes.y == Side::Right { -1.0 } else { 1.0 };
     let mut pieces = pieces;
     for piece in &mut pieces {

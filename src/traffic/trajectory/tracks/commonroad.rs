@@ -85,8 +85,20 @@ pub(super) fn read(path: &Path, id: &str) -> Result<RawFile> {
     let file = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let checksum = FileChecksum { file, bytes: text.len() as u64, sha256: sha256(&text) };
     let rows = scene.recording.vehicles.iter().map(|vehicle| vehicle.samples.len() as u64).sum();
-    let roles = vec![Role::Vehicle, Role::Frame, Role::X, Role::Y, Role::Heading, Role::Speed];
-    Ok(RawFile { recordings: vec![scene.recording], checksums: vec![checksum], rows, roles })
+    let elements = [
+        (Role::Vehicle, "dynamicObstacle"),
+        (Role::Frame, "time"),
+        (Role::X, "x"),
+        (Role::Y, "y"),
+        (Role::Heading, "orientation"),
+        (Role::Speed, "velocity"),
+        (Role::Acceleration, "acceleration"),
+        (Role::Class, "type"),
+        (Role::Length, "length"),
+        (Role::Width, "width"),
+    ];
+    let roles = elements.map(|(role, name)| (role, name.to_owned())).to_vec();
+    Ok(RawFile { recordings: vec![scene.recording], checksums: vec![checksum], rows, roles, unused: Vec::new() })
 }
 
 #[derive(Default)]

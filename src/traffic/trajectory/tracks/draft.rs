@@ -68,17 +68,18 @@ pub fn draft(path: &Path) -> Result<String> {
             _ => missing.push(role.key()),
         }
     }
-    if !columns.contains("time =") {
-        text.push_str("# Frames per second, because no column was taken for a time.\nframe_rate_hz = 25.0\n");
+    if columns.contains("frame =") && !columns.contains("time =") {
+        text.push_str("# Frames per second, because frames have no time.\nframe_rate_hz = 25.0\n");
     }
     text.push_str("# Texts that stand for no value.\nnone = [\"\", \"NA\", \"-1\"]\n");
     text.push_str("\n[axes]\n# Side of +x on which +y lies: left, or right in images.\ny = \"left\"\n");
     let _ = write!(text, "\n[columns]\n{columns}");
-    for key in ["vehicle", "frame", "x", "y"].into_iter().filter(|key| missing.contains(key)) {
-        if key == "frame" && columns.contains("time =") {
-            continue;
+    let has_time = columns.contains("time =") || columns.contains("frame =");
+    for key in ["vehicle", "time", "x", "y"] {
+        if if key == "time" { !has_time } else { missing.contains(&key) } {
+            let or = if key == "time" { ", or name `frame` instead" } else { "" };
+            let _ = writeln!(text, "{key} = \"?\"  # no usual name was recognized: name the column{or}");
         }
-        let _ = writeln!(text, "{key} = \"?\"  # no column looks like it: fill it in");
     }
     let unused: Vec<String> = rows
         .header()
@@ -89,7 +90,14 @@ pub fn draft(path: &Path) -> Result<String> {
     if !unused.is_empty() {
         let _ = writeln!(text, "# Not used: {}", unused.join(", "));
     }
-    let _ = writeln!(text, "# Other roles: {}", missing.join(", "));
+    let others: Vec<&str> =
+        Role::ALL.iter().map(|role| role.key()).filter(|key| !columns.contains(&format!("{key} ="))).collect();
+    let _ = writeln!(text, "# Other roles: {}", others.join(", "));
+    let _ = writeln!(
+        text,
+        "# With a unit: speed = {{ name = \"Speed\", unit = \"km/h\" }}; m, ft, cm; m/s, km/h, mph; deg, rad; s, ms, ns, date"
+    );
+    text.push_str("\n[classes]\n# How the texts of lorries, and of what is left out, begin; without these, lorries are 7 m and longer.\ntruck = []\nignored = []\n");
     Ok(text)
 }
 

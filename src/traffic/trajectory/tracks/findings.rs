@@ -159,7 +159,7 @@ impl Understanding {
         }
         if let Some(mismatch) = self.label_mismatch.filter(|mismatch| *mismatch > 0.05) {
             self.find(
-                false,
+                mismatch > 0.2,
                 format!(
                     "{} % of the samples are not where the name of their lane says; positions decide",
                     significant(100.0 * mismatch, 2)
@@ -258,6 +258,21 @@ impl Understanding {
                 jumping.len()
             ));
             jumping.iter().for_each(|id| self.exclusions.push((*id, Exclusion::Jump)));
+        }
+        let against = |track: &&Track| track.s_m[track.len() - 1] - track.s_m[0] < -5.0;
+        let against = recording.tracks.iter().filter(against).count();
+        if against > 0 {
+            let is_grave = 10 * against > recording.tracks.len();
+            self.find(
+                is_grave,
+                format!("{against} vehicle(s) move against their direction of travel: check `direction`"),
+            );
+        }
+        for [a, b] in [["x_speed", "y_speed"], ["y_speed", "x_speed"], ["x_acceleration", "y_acceleration"]] {
+            let has = |key: &str| self.columns.iter().any(|(role, _)| *role == key);
+            if has(a) && !has(b) {
+                self.find(false, format!("`{a}` is not used without `{b}`; `speed` is a speed along the road"));
+            }
         }
         let backwards = self.exclusions.iter().filter(|(_, why)| *why == Exclusion::Backwards).count();
         if backwards > 0 {

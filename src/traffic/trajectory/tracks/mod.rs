@@ -203,7 +203,7 @@ pub fn read_tracks(file: &TrackFile, preset: &Preset) -> Result<Vec<LoadedTracks
     for mut recording in raw.recordings {
         recording.synthetic = synthetic || recording.id.contains(SYNTHETIC);
         let place = place.clone().of(format!("recording {}", recording.id));
-        let (recording, understanding) = assemble::assemble(recording, preset, &raw.roles, &place)?;
+        let (recording, understanding) = assemble::assemble(recording, preset, (&raw.roles, &raw.unused), &place)?;
         let loaded =
             Loaded { recording, checksum_sha256: raw.checksums.clone(), rows: raw.rows, bytes, notes: Vec::new() };
         all.push(LoadedTracks { loaded, understanding });
@@ -229,7 +229,6 @@ pub fn read_usable(file: &TrackFile, preset: &Preset, implausible: Implausible) 
                 "`lanesweep tracks` shows all; option `accept_implausible` uses the tracks as they are",
             ));
         }
-        loaded.notes.push(format!("read by preset {}", preset.name));
         loaded.notes.extend(understanding.findings.into_iter().map(|finding| finding.text));
         usable.push(loaded);
     }

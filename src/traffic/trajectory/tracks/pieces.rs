@@ -53,6 +53,9 @@ pub(super) fn pieces(
     } else {
         let rate_hz = rate_of_times(raw, step);
         about.rate_source = "times".to_owned();
+        if let Some(said) = preset.frame_rate_hz.filter(|said| (said / rate_hz - 1.0).abs() > 0.02) {
+            about.find(true, format!("the times have {rate_hz:.2} frames per second, the preset says {said}"));
+        }
         (rate_hz, rate_hz, if origin.abs() < 1e6 { origin * rate_hz } else { 0.0 })
     };
     if !(0.1..=1e4).contains(&rate_hz) {

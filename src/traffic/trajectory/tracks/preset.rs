@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::roles::{ColumnName, Role, units};
 use crate::support::input_file;
-use crate::support::plain_text::nearest;
+use crate::support::plain_text::{nearest, sha256};
 use crate::{Error, Place, Result};
 
 /// Meaning of a track format.
@@ -80,6 +80,12 @@ pub struct Preset {
     /// File with `vType` elements (SUMO) beside the tracks; `*` as in `files`, or any name.
     #[serde(default)]
     pub types_file: Option<String>,
+    /// It is from a user's file: every column that it names must be there.
+    #[serde(skip)]
+    pub is_own: bool,
+    /// SHA-256 of its text.
+    #[serde(skip)]
+    pub sha256: String,
 }
 
 fn any_file() -> String {
@@ -250,7 +256,12 @@ impl Preset {
             return Preset::parse(text, Place::item(format!("preset {name}")));
         }
         if !name.ends_with(".toml") {
-            let near = nearest(name, Preset::names(), 0.6);
+            let file = format!("{name}.toml");
+            let near = if Path::new(&file).exists() {
+                Some(file)
+            } else {
+                nearest(name, Preset::names(), 0.6).map(str::to_owned)
+            };
             let near = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
             let all = Preset::names().collect::<Vec<_>>().join(", ");
             return Err(Error::usage(
@@ -261,13 +272,13 @@ impl Preset {
         }
         let path = Path::new(name);
         let text = input_file::read_text(path, input_file::MAX_SETTINGS_BYTES)?;
-        Preset::parse(&text, Place::file(path))
+        Ok(Preset { is_own: true, ..Preset::parse(&text, Place::file(path))? })
     }
 
     fn parse(text: &str, place: Place) -> Result<Preset> {
         let preset: Preset = input_file::parse_toml(text, &place, "the chapter on tracks has the keys of a preset")?;
         preset.check(&place)?;
-        Ok(preset)
+        Ok(Preset { sha256: sha256(text), ..preset })
     }
 
     fn check(&self, place: &Place) -> Result<()> {

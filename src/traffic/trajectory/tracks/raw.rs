@@ -6,6 +6,7 @@ use std::path::Path;
 use super::preset::{HeadingOrigin, MetaFile, Preset, Side};
 use super::roles::Role;
 use super::rows::{Columns, Rows, SampleRow};
+use crate::support::plain_text::nearest;
 use crate::traffic::trajectory::csv_table::FileChecksum;
 use crate::{Error, Place, Result};
 
@@ -76,8 +77,10 @@ pub(super) struct RawFile {
     pub recordings: Vec<RawRecording>,
     pub checksums: Vec<FileChecksum>,
     pub rows: u64,
-    /// Roles that the file has.
-    pub roles: Vec<Role>,
+    /// Roles that the file has, with their columns.
+    pub roles: Vec<(Role, String)>,
+    /// Columns without a role.
+    pub unused: Vec<String>,
 }
 
 /// Reads a table of samples with its meta files.
@@ -88,6 +91,13 @@ pub(super) fn read_table(path: &Path, id: &str, preset: &Preset) -> Result<RawFi
     let rows = Rows::of_preset(path, preset)?;
     let columns = Columns::of(&preset.columns, rows.header(), &preset.none);
     check_columns(&rows, &columns, preset)?;
+    let roles: Vec<(Role, String)> = Role::ALL
+        .into_iter()
+        .filter(|role| columns.has(*role))
+        .map(|role| (role, columns.name(role).to_owned()))
+        .collect();
+    let is_used = |name: &&String| roles.iter().any(|(_, used)| used == *name);
+    let unused = rows.header().iter().filter(|name| !is_used(name)).cloned().collect();
     let mut file = Collecting::new(id, preset, &columns);
     let (checksum, count) = rows.each(&columns, &mut |row| file.add(row))?;
     let mut recordings = file.recordings;
@@ -101,26 +111,32 @@ pub(super) fn read_table(path: &Path, id: &str, preset: &Preset) -> Result<RawFi
     if let Some(types) = &preset.types_file {
         add_types(path, id, types, &mut recordings)?;
     }
-    let roles = Role::ALL.into_iter().filter(|role| columns.has(*role)).collect();
-    Ok(RawFile { recordings, checksums, rows: count, roles })
+    Ok(RawFile { recordings, checksums, rows: count, roles, unused })
 }
 
 fn check_columns(rows: &Rows, columns: &Columns, preset: &Preset) -> Result<()> {
-    let missing: Vec<&str> = [Role::Vehicle, Role::X, Role::Y]
-        .into_iter()
-        .filter(|role| !columns.has(*role))
-        .filter_map(|role| preset.columns.get(&role)?.names().first().map(String::as_str))
-        .collect();
-    let has_time = columns.has(Role::Frame) || columns.has(Role::Time);
-    if missing.is_empty() && has_time {
-        return Ok(());
-    }
-    let what = if missing.is_empty() { "a frame or time".to_owned() } else { missing.join(", ") };
+    let is_needed = |role: Role| match role {
+        Role::Vehicle | Role::X | Role::Y => true,
+        Role::Frame => !columns.has(Role::Time),
+        Role::Time => !columns.has(Role::Frame),
+        // The names of a shipped preset may be absent in older files.
+        _ => preset.is_own,
+    };
+    let missing = preset.columns.iter().find(|(role, _)| !columns.has(**role) && is_needed(**role));
+    let Some((role, column)) = missing else { return Ok(()) };
     let header: Vec<String> = rows.header().iter().take(30).map(|name| format!("`{name}`")).collect();
+    let near = column.names().first().and_then(|name| nearest(name, rows.header().iter().map(String::as_str), 0.6));
+    let near = near.map_or(String::new(), |near| format!("; did you mean `{near}`?"));
     Err(Error::input(
         rows.header_place(),
-        format!("preset {} needs the column {what}; the header has {}", preset.name, header.join(", ")),
-        "use another preset, or write one: `lanesweep tracks` makes a start (option `write_preset`)",
+        format!(
+            "preset {} takes `{}` from the column `{}`, which is not there{near}; the header has {}",
+            preset.name,
+            role.key(),
+            column.names().join("` or `"),
+            header.join(", ")
+        ),
+        "correct the name in the preset, or remove the line; or use another preset",
     ))
 }
 

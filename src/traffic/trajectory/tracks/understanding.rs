@@ -3,7 +3,8 @@
 use serde::Serialize;
 
 use super::lanes::LaneSource;
-use super::preset::Preset;
+use super::preset::{Preset, Reference};
+use super::raw::RawRecording;
 use super::road::median;
 use crate::support::readable::{count, significant, value};
 use crate::traffic::trajectory::{Recording, Track, VehicleClass};
@@ -71,6 +72,14 @@ pub struct Understanding {
     pub rate_hz: f64,
     /// Where the rate comes from.
     pub rate_source: String,
+    /// Meaning and name of the columns that are used.
+    pub columns: Vec<(&'static str, String)>,
+    /// Columns that are not used.
+    pub unused: Vec<String>,
+    /// Point of the vehicle that positions are taken for.
+    pub reference: Reference,
+    /// Texts of classes in the file, with their numbers of vehicles.
+    pub classes: Vec<(String, u64)>,
     /// Tracks of cars and of lorries.
     pub cars: u64,
     /// Tracks of lorries.
@@ -191,6 +200,27 @@ impl Understanding {
         (about, recording)
     }
 
+    /// Counts the classes, and finds words of the preset that no class begins with.
+    pub(super) fn note_classes(&mut self, raw: &RawRecording, preset: &Preset) {
+        let mut classes: std::collections::BTreeMap<&str, u64> = std::collections::BTreeMap::new();
+        for class in raw.vehicles.iter().filter_map(|vehicle| vehicle.class.as_deref()) {
+            *classes.entry(class).or_default() += 1;
+        }
+        let begins = |word: &String| {
+            let word = word.to_lowercase();
+            classes.keys().any(|class| class.to_lowercase().starts_with(&word))
+        };
+        let without = preset.classes.truck.iter().filter(|word| preset.is_own && !begins(word));
+        let without: Vec<String> = without.map(|word| format!("`{word}`")).collect();
+        if !without.is_empty() && !classes.is_empty() {
+            self.find(
+                false,
+                format!("no class begins with {}, which the preset takes for lorries", without.join(", ")),
+            );
+        }
+        self.classes = classes.into_iter().map(|(class, number)| (class.to_owned(), number)).collect();
+    }
+
     pub(super) fn exclude(&mut self, id: u32, why: Exclusion) {
         self.exclusions.push((id, why));
     }
@@ -261,6 +291,31 @@ impl Understanding {
                 ),
             ),
         ];
+        if !self.columns.is_empty() {
+            let of = |(role, column): &(&str, String)| {
+                if role == column { column.clone() } else { format!("{role} = {column}") }
+            };
+            let used = self.columns.iter().map(of).collect::<Vec<_>>().join(", ");
+            let unused =
+                if self.unused.is_empty() { String::new() } else { format!("; not used: {}", self.unused.join(", ")) };
+            lines.push(("columns", format!("{used}{unused}")));
+            lines.push((
+                "reference",
+                format!(
+                    "{}, as the preset says or assumes",
+                    match self.reference {
+                        Reference::Centre => "centre of the box",
+                        Reference::Front => "front bumper",
+                        Reference::Rear => "rear bumper",
+                        Reference::Corner => "corner of the box",
+                    }
+                ),
+            ));
+        }
+        if !self.classes.is_empty() {
+            let of = |(class, number): &(String, u64)| format!("{} {class}", count(*number));
+            lines.push(("classes", self.classes.iter().take(12).map(of).collect::<Vec<_>>().join(", ")));
+        }
         let shape = if self.is_straight {
             "straight".to_owned()
         } else {
@@ -269,7 +324,7 @@ impl Understanding {
         lines.push((
             "road",
             format!(
-                "{shape}, {} m in view; vehicles wander by {} m around its line{}",
+                "{shape}, {} m in view; vehicles wander by {} m around its line (0.1 to 0.6 is lane keeping){}",
                 significant(self.length_m, 4),
                 significant(self.wander_m, 2),
                 match self.lane_offset_error_m {
@@ -290,7 +345,7 @@ impl Understanding {
             } else {
                 format!("{} to {} m", significant(low, 3), significant(high, 3))
             };
-            let way = if of.name == "2" { "forward" } else { "against it" };
+            let way = if of.name == "2" { "forward" } else { "backward" };
             let lanes = if of.lanes == 1 { "lane" } else { "lanes" };
             lines.push((
                 "lanes",
