@@ -65,6 +65,8 @@ pub(super) fn assemble(
             on.iter_mut().for_each(|p| p.s_m += by_m);
             Placed { piece, is_forward, on }
         })
+        // A direction in which nothing moves has no line.
+        .filter(|of| !of.on.is_empty())
         .collect();
     describe_road(&mut about, &lines, &placed);
     about.oncoming_left_m = oncoming_left_m(&lines, &placed);

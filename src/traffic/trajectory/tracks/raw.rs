@@ -4,7 +4,7 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use super::preset::{HeadingOrigin, MetaFile, Preset, Side};
-use super::roles::Role;
+use super::roles::{ColumnName, Role};
 use super::rows::{Columns, Rows, SampleRow};
 use crate::support::plain_text::nearest;
 use crate::traffic::trajectory::csv_table::FileChecksum;
@@ -115,14 +115,14 @@ pub(super) fn read_table(path: &Path, id: &str, preset: &Preset) -> Result<RawFi
 }
 
 fn check_columns(rows: &Rows, columns: &Columns, preset: &Preset) -> Result<()> {
-    let is_needed = |role: Role| match role {
+    let is_needed = |role: Role, column: &ColumnName| match role {
         Role::Vehicle | Role::X | Role::Y => true,
         Role::Frame => !columns.has(Role::Time),
         Role::Time => !columns.has(Role::Frame),
-        // The names of a shipped preset may be absent in older files.
-        _ => preset.is_own,
+        // The names of a shipped preset may be absent in older files, and of several names the user knows that too.
+        _ => preset.is_own && column.names().len() == 1,
     };
-    let missing = preset.columns.iter().find(|(role, _)| !columns.has(**role) && is_needed(**role));
+    let missing = preset.columns.iter().find(|(role, column)| !columns.has(**role) && is_needed(**role, column));
     let Some((role, column)) = missing else { return Ok(()) };
     let header: Vec<String> = rows.header().iter().take(30).map(|name| format!("`{name}`")).collect();
     let near = column.names().first().and_then(|name| nearest(name, rows.header().iter().map(String::as_str), 0.6));
@@ -361,7 +361,7 @@ fn add_types(path: &Path, id: &str, pattern: &str, recordings: &mut [RawRecordin
     for file in files {
         let rows = Rows::open(&file, super::preset::FileFormat::Xml, Some("vType"), None)?;
         let named = [(Role::Vehicle, "id"), (Role::Length, "length"), (Role::Width, "width"), (Role::Class, "vClass")];
-        let named = named.map(|(role, name)| (role, super::roles::ColumnName::Name(name.to_owned())));
+        let named = named.map(|(role, name)| (role, ColumnName::Name(name.to_owned())));
         let columns = Columns::of(&named.into_iter().collect(), rows.header(), &[]);
         rows.each(&columns, &mut |row| {
             let Some(key) = row.text(Role::Vehicle)? else { return Ok(()) };

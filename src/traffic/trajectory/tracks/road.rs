@@ -14,8 +14,8 @@ const MIN_TRACK_M: f64 = 30.0;
 const ROUNDS: usize = 3;
 /// Length by which the line goes on straight beyond the tracks, m.
 const BEYOND_M: f64 = 300.0;
-/// Maximum number of steps of a line: 500 km.
-const MAX_STEPS: usize = 100_000;
+/// Maximum number of steps of a line: 100 km.
+const MAX_STEPS: usize = 20_000;
 /// A direction within this of an axis of the file is that axis, rad.
 const ON_AXIS_RAD: f64 = 2e-4;
 
