@@ -33,6 +33,17 @@ def test_a_study_has_the_bytes_of_the_command_line(program, scenarios, tmp_path)
     assert ours.status == "ok" and ours.folder == tmp_path / "ours"
 
 
+def test_tracks_say_what_a_table_holds_and_other_verbs_read_it(tmp_path) -> None:
+    recordings = lanesweep.synth(tmp_path / "recordings", synth_recordings=1).folder
+    table = tmp_path / "own.csv"
+    lanesweep.tracks(recordings, convert=table)
+    about = lanesweep.tracks(table, out=tmp_path / "figures")
+    assert about.status == "ok" and "preset     generic" in about.text and "nothing contradicts itself" in about.text
+    assert {path.suffix for path in (tmp_path / "figures").iterdir()} == {".svg", ".json"}
+    found = lanesweep.mine(table, out=tmp_path / "own.jsonl")
+    assert found.status == "ok" and (tmp_path / "own.jsonl").read_text().count("\n") > 200
+
+
 def test_a_sample_has_the_bytes_of_the_command_line(program, density, tmp_path) -> None:
     options = {"samples": 3000, "thw": [1.2, 0.4], "models": ["FSM", "RSS"]}
     lanesweep.sample(density, **options, backend="cpu", out=tmp_path / "ours")

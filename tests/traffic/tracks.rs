@@ -8,7 +8,9 @@ use lanesweep::scenario::{Category, Scenario};
 use lanesweep::support::plausibility::Implausible;
 use lanesweep::traffic::mining::{MiningOptions, mine};
 use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
-use lanesweep::traffic::trajectory::tracks::{self, Preset, TrackFile, Understanding};
+use lanesweep::traffic::trajectory::tracks::{
+    self, FileFormat, HeadingOrigin, Preset, Reference, RoadSource, Role, Side, TrackFile, Understanding,
+};
 use lanesweep::traffic::trajectory::{Carriageway, Inputs, Loaded, NO_LANE, Recording, Track, VehicleClass};
 
 use crate::common::exid::{self, Plain};
@@ -410,6 +412,144 @@ fn lists_of_json_and_attributes_of_xml_are_samples() {
     std::fs::write(&path, &xml[..xml.len() - 40]).unwrap();
     let (files, _) = Inputs::of(&path, None).unwrap().files();
     assert!(files[0].read(Implausible::Refused).unwrap_err().to_string().contains("XML"));
+}
+
+/// A mistake in SI units: role, value, sample → value.
+type Mistake<'a> = &'a dyn Fn(Role, f64, &Track) -> f64;
+
+/// The recording in a preset's format: a table, or lists for JSON, with a row or list item per `stride`-th sample.
+fn in_format_of(preset: &Preset, recording: &Recording, stride: usize, mistake: Mistake) -> String {
+    let y_sign = if preset.axes.y == Side::Right { -1.0 } else { 1.0 };
+    let value = |role: Role, track: &Track, k: usize| -> String {
+        let at = exid::in_plane(recording, track, k, f64::INFINITY);
+        let (cos, sin) = (libm::cos(at.heading), libm::sin(at.heading));
+        let shift = match preset.reference {
+            Reference::Front => 0.5 * track.length_m,
+            Reference::Rear => -0.5 * track.length_m,
+            _ => 0.0,
+        };
+        let (x, y) = (at.x + shift * cos, at.y + shift * sin);
+        // A road along y: the same plane turned, so that left of travel stays left.
+        let (x, y) = if preset.road == RoadSource::Y { (-y, x) } else { (x, y) };
+        let frame = track.first_frame + k as i64;
+        let heading = match preset.axes.heading {
+            HeadingOrigin::FromX => y_sign * at.heading,
+            HeadingOrigin::FromNorth => std::f64::consts::FRAC_PI_2 - at.heading,
+        };
+        let si = match role {
+            Role::Vehicle => return track.id.to_string(),
+            Role::Recording => return "r1".to_owned(),
+            Role::Class => return String::new(),
+            Role::Lane => return format!("{}", 1 + 10 * track.carriageway + usize::from(track.lane[k])),
+            Role::Frame => return (frame / stride as i64).to_string(),
+            Role::Direction => return if at.velocity[0] > 0.0 { "1".to_owned() } else { "-1".to_owned() },
+            Role::Time => frame as f64 / recording.frame_rate_hz,
+            Role::X => x,
+            Role::Y => y_sign * y,
+            Role::Heading => heading,
+            Role::Speed | Role::ForwardSpeed => track.v_s_mps[k],
+            Role::LeftwardSpeed => track.v_d_mps[k],
+            Role::XSpeed => at.velocity[0],
+            Role::YSpeed => y_sign * at.velocity[1],
+            Role::Acceleration => track.a_s_mps2[k],
+            Role::XAcceleration => at.acceleration[0],
+            Role::YAcceleration => y_sign * at.acceleration[1],
+            Role::Length => track.length_m,
+            Role::Width => track.width_m,
+            Role::LaneOffset => {
+                let lane = recording.carriageways[track.carriageway].lane(track.lane[k].into());
+                lane.map_or(0.0, |lane| track.d_m[k] - lane.centre_m())
+            }
+            Role::FrameRate => return String::new(),
+        };
+        let factor = preset.columns[&role].factor(role).unwrap();
+        format!("{:.6}", mistake(role, si, track) / factor)
+    };
+    let columns: Vec<(Role, &str)> =
+        preset.columns.iter().map(|(role, column)| (*role, column.names()[0].as_str())).collect();
+    if preset.format == FileFormat::Json {
+        let is_one =
+            |role: Role| matches!(role, Role::Vehicle | Role::Length | Role::Width | Role::Class | Role::Direction);
+        let object = |track: &Track| {
+            let samples: Vec<usize> = (0..track.len()).step_by(stride).collect();
+            let field = |(role, name): &(Role, &str)| match is_one(*role) {
+                true => format!("\"{name}\":\"{}\"", value(*role, track, 0)),
+                false => {
+                    let list = samples.iter().map(|k| value(*role, track, *k)).collect::<Vec<_>>().join(",");
+                    format!("\"{name}\":[{list}]")
+                }
+            };
+            format!("{{{}}}", columns.iter().map(field).collect::<Vec<_>>().join(","))
+        };
+        let list = format!("[{}]", recording.tracks.iter().map(object).collect::<Vec<_>>().join(","));
+        return preset.rows.as_ref().map_or(list.clone(), |rows| format!("{{\"{rows}\":{list}}}"));
+    }
+    let mut text = columns.iter().map(|(_, name)| *name).collect::<Vec<_>>().join(",") + "\n";
+    for track in &recording.tracks {
+        for k in (0..track.len()).filter(|k| (track.first_frame + *k as i64) % stride as i64 == 0) {
+            text += &(columns.iter().map(|(role, _)| value(*role, track, k)).collect::<Vec<_>>().join(",") + "\n");
+        }
+    }
+    text
+}
+
+/// Every preset reads traffic in its own format, and finds the usual mistakes in it.
+#[test]
+fn every_preset_reads_its_own_format_and_finds_mistakes_in_it() {
+    let recording = generated();
+    let foot = 1.0 / 0.3048;
+    let right: Mistake = &|_, value, _| value;
+    let mistakes: [(&str, Mistake); 4] = [
+        ("positions times 3.28", &|role, value, _| {
+            if matches!(role, Role::X | Role::Y) { foot * value } else { value }
+        }),
+        ("speeds times 3.6", &|role, value, _| {
+            let is_speed = matches!(role, Role::Speed | Role::ForwardSpeed | Role::XSpeed);
+            if is_speed { 3.6 * value } else { value }
+        }),
+        ("everything times 3.28", &|role, value, _| {
+            let is_other = matches!(role, Role::Time | Role::Heading);
+            if is_other { value } else { foot * value }
+        }),
+        ("y flipped", &|role, value, _| if role == Role::Y { -value } else { value }),
+    ];
+    let formats = [FileFormat::Csv, FileFormat::Json];
+    let names = Preset::names().filter(|name| *name != tracks::HIGHD);
+    let presets = names.map(|name| Preset::load(name).unwrap()).filter(|preset| formats.contains(&preset.format));
+    let mut tried = 0;
+    for preset in presets {
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("own_file");
+        let stride = 2;
+        // The rate where only a meta file or the format says it.
+        let rate = preset.columns.contains_key(&Role::Time).then_some(()).map_or(Some(12.5), |()| None);
+        let preset = Preset { frame_rate_hz: rate, smoothing_s: None, recording: None, ..preset };
+        let understood = |mistake: Mistake| {
+            std::fs::write(&path, in_format_of(&preset, &recording, stride, mistake)).unwrap();
+            let file = TrackFile { path: path.clone(), id: "own".to_owned() };
+            tracks::read_tracks(&file, &preset).map(|mut all| all.remove(0).understanding)
+        };
+        let about = understood(right).unwrap();
+        assert!(about.is_usable(), "{}: {:?}", preset.name, about.findings);
+        assert_eq!(about.carriageways.len(), 2, "{}", preset.name);
+        let lanes: Vec<usize> = about.carriageways.iter().map(|of| of.lanes).collect();
+        // Bands of 12 ft are no lanes of 3.5 m.
+        assert!(lanes == [3, 3] || preset.lanes.width_m.is_some(), "{}: {lanes:?}", preset.name);
+        let has_speed = [Role::Speed, Role::ForwardSpeed, Role::XSpeed].iter().any(|r| preset.columns.contains_key(r));
+        for (name, mistake) in mistakes {
+            let is_without = name.starts_with("speeds") && !has_speed;
+            if is_without {
+                continue;
+            }
+            // A direction that the file gives excludes that oncoming traffic tells the side.
+            match understood(mistake) {
+                Ok(about) => assert!(!about.is_usable(), "{}, {name}: {:?}", preset.name, about.findings),
+                Err(error) => assert!(error.help().is_some(), "{error}"),
+            }
+        }
+        tried += 1;
+    }
+    assert!(tried >= 9, "{tried}");
 }
 
 /// Files for readers in Python: `python benches/python/track_readers.py LANESWEEP target/tmp/exid`.

@@ -161,8 +161,8 @@ impl ColumnName {
         }
     }
 
-    /// What the values are multiplied by to be in SI units.
-    pub(super) fn factor(&self, role: Role) -> Option<f64> {
+    /// What the values are multiplied by to be in SI units (angles in rad); `None` for an unknown unit.
+    pub fn factor(&self, role: Role) -> Option<f64> {
         let own = match self {
             ColumnName::WithUnit { factor, .. } => factor.unwrap_or(1.0),
             _ => 1.0,
