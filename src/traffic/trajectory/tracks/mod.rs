@@ -1,4 +1,4 @@
-//! Tracks in any format: a [`Preset`] says what the columns of a file mean, this module makes [`Recording`]s of them.
+//! Tracks in any format: a [`Preset`] says what the columns of a file mean, this module makes [recordings](super::Recording) of them.
 //!
 //! The stages: rows of a file (`rows`, `markup`), vehicles in SI units (`raw`, `commonroad`), gapless pieces (`pieces`,
 //! `boxes`), the lines of the road (`road`, `directions`), lanes (`lanes`), the recording (`assemble`), and what contradicts
