@@ -12,7 +12,7 @@ use crate::support::files::{check_folder, write_atomically};
 use crate::support::run_dir::OutputDir;
 use crate::support::table::{Table, TableMetadata};
 use crate::traffic::mining::mine;
-use crate::traffic::trajectory::highd::{self, RecordingInfo};
+use crate::traffic::trajectory::highd::{self, HighdFiles, RecordingInfo};
 use crate::traffic::trajectory::tracks::{LoadedTracks, Preset, SYNTHETIC, Understanding, draft, read_tracks};
 use crate::traffic::trajectory::{InputFile, Inputs, NO_LANE, Recording, Track, VehicleClass};
 use crate::{Error, Place, Result};
@@ -172,11 +172,21 @@ fn write_figures(out: &Path, reports: &[TrackReport], recordings: &[Recording]) 
 /// Writes recordings in highD's format, or as one table.
 fn convert(to: &Path, recordings: &[Recording]) -> Result<()> {
     let is_table = to.extension().is_some();
+    let name = |at: usize, recording: &Recording| {
+        // Numbers as highD has them, unless the names are such.
+        let is_number = recording.id.parse::<u32>().is_ok();
+        if is_number { recording.id.clone() } else { format!("{:02}", at + 1) }
+    };
+    let files = recordings.iter().enumerate().map(|(at, recording)| HighdFiles::named(to, &name(at, recording)).tracks);
+    let taken =
+        if is_table { Some(to.to_path_buf()) } else { None }.into_iter().chain(files).find(|file| file.exists());
+    if let Some(file) = taken {
+        let problem = "it exists, and would be replaced";
+        return Err(Error::usage(Place::file(file), problem, "choose another name, or remove it"));
+    }
     if !is_table {
         for (at, recording) in recordings.iter().enumerate() {
-            // Numbers as highD has them, unless the names are such.
-            let is_number = recording.id.parse::<u32>().is_ok();
-            let id = if is_number { recording.id.clone() } else { format!("{:02}", at + 1) };
+            let id = name(at, recording);
             highd::write(to, &Recording { id, ..recording.clone() }, &RecordingInfo::default())?;
         }
         tracing::info!("{} recordings written to {}", recordings.len(), to.display());

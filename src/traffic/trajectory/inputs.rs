@@ -17,6 +17,8 @@ pub enum Inputs {
     Tracks {
         /// The files.
         files: Vec<TrackFile>,
+        /// Other files of tracks in the folder, which are not read.
+        problems: Vec<Error>,
         /// The preset.
         preset: Box<Preset>,
     },
@@ -38,7 +40,8 @@ impl Inputs {
     /// [`Error::Io`]; [`Error::Input`] if there is no recording, or if no preset fits; those of [`Preset::load`].
     pub fn of(path: &Path, preset: Option<&str>) -> Result<Inputs> {
         let with = |preset: Preset| {
-            Ok(Inputs::Tracks { files: tracks::track_files(path, &preset)?, preset: Box::new(preset) })
+            let files = tracks::track_files(path, &preset)?;
+            Ok(Inputs::Tracks { files, problems: Vec::new(), preset: Box::new(preset) })
         };
         match preset {
             Some(HIGHD) => return highd_inputs(path),
@@ -56,14 +59,47 @@ impl Inputs {
             };
         }
         let Some(first) = first_track_file(path)? else { return highd_inputs(path) };
-        match tracks::detect(&first) {
+        let inputs = match tracks::detect(&first) {
             Ok(Some(preset)) if !(preset.is_generic() && is_highd_name(&first)) => with(preset),
             // Its reader says what is wrong.
             _ if is_highd_name(&first) => highd_inputs(path),
             Ok(Some(preset)) => with(preset),
             Ok(None) => Err(unknown(&first)),
             Err(error) => Err(error),
+        };
+        inputs?.with_others(path)
+    }
+
+    /// Leaves out files of a folder that are no tracks, and names those of other formats.
+    fn with_others(mut self, folder: &Path) -> Result<Inputs> {
+        let own = self.preset().map(|preset| (preset.name.clone(), preset.format));
+        let mut others: Vec<Error> = Vec::new();
+        for file in files_of(folder)? {
+            let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            let is_highd = own.is_none() && HIGHD_FILES.iter().any(|ending| name.ends_with(ending));
+            if is_highd || !tracks::may_hold_tracks(&file) {
+                continue;
+            }
+            let found = tracks::detect(&file);
+            let is_own = found
+                .as_ref()
+                .is_ok_and(|found| found.as_ref().map(|preset| (preset.name.clone(), preset.format)) == own);
+            if is_own && own.is_some() {
+                continue;
+            }
+            if let Inputs::Tracks { files, .. } = &mut self {
+                files.retain(|track| track.path != file);
+            }
+            if let Ok(Some(other)) = found {
+                let problem = format!("it fits preset {}, the other files here do not", other.name);
+                others.push(Error::input(Place::file(&file), problem, "put it into a folder of its own"));
+            }
         }
+        match &mut self {
+            Inputs::Highd(inventory) => inventory.problems.extend(others),
+            Inputs::Tracks { problems, .. } => *problems = others,
+        }
+        Ok(self)
     }
 
     /// The preset; `None` for highD's format.
@@ -88,8 +124,8 @@ impl Inputs {
             Inputs::Highd(inventory) => {
                 (inventory.recordings.into_iter().map(InputFile::Highd).collect(), inventory.problems)
             }
-            Inputs::Tracks { files, preset } => {
-                (files.into_iter().map(|file| InputFile::Tracks(file, preset.clone())).collect(), Vec::new())
+            Inputs::Tracks { files, problems, preset } => {
+                (files.into_iter().map(|file| InputFile::Tracks(file, preset.clone())).collect(), problems)
             }
         }
     }
@@ -118,6 +154,8 @@ impl InputFile {
 
 /// A table with fewer columns holds no tracks: vehicle, time, x and y.
 const MIN_COLUMNS: usize = 4;
+/// Endings of the files of highD's format.
+const HIGHD_FILES: [&str; 3] = [HIGHD_ENDING, "_tracksMeta.csv", "_recordingMeta.csv"];
 const HIGHD_ENDING: &str = "_tracks.csv";
 
 fn is_highd_name(path: &Path) -> bool {
@@ -135,11 +173,19 @@ fn highd_inputs(path: &Path) -> Result<Inputs> {
     Ok(Inputs::Highd(highd::Inventory { recordings, problems: Vec::new() }))
 }
 
+/// The files of a folder, sorted; hidden ones are left out.
+fn files_of(folder: &Path) -> Result<Vec<PathBuf>> {
+    let listed = std::fs::read_dir(folder).map_err(|e| Error::io(folder, "list", e))?;
+    let is_hidden = |path: &PathBuf| path.file_name().is_some_and(|name| name.to_string_lossy().starts_with('.'));
+    let mut files: Vec<PathBuf> =
+        listed.flatten().map(|entry| entry.path()).filter(|path| !path.is_dir() && !is_hidden(path)).collect();
+    files.sort();
+    Ok(files)
+}
+
 /// The first file of a folder that may hold tracks; those with highD's names come first.
 fn first_track_file(folder: &Path) -> Result<Option<PathBuf>> {
-    let listed = std::fs::read_dir(folder).map_err(|e| Error::io(folder, "list", e))?;
-    let mut files: Vec<PathBuf> = listed.flatten().map(|entry| entry.path()).filter(|path| !path.is_dir()).collect();
-    files.sort();
+    let files = files_of(folder)?;
     if let Some(first) = files.iter().find(|path| is_highd_name(path)) {
         return Ok(Some(first.clone()));
     }

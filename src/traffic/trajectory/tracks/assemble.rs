@@ -112,11 +112,9 @@ pub(super) fn assemble(
     let (recording, excluded) = about.judge(recording, preset);
     about.excluded = excluded;
     if recording.tracks.is_empty() {
-        return Err(Error::input(
-            place.clone(),
-            "no vehicle is left",
-            "see what `lanesweep tracks` says about the file",
-        ));
+        let why = about.findings.iter().map(|finding| finding.text.as_str()).collect::<Vec<_>>().join("; ");
+        let problem = format!("no vehicle is left: {why}");
+        return Err(Error::input(place.clone(), problem, "correct the file, or its preset"));
     }
     Ok((recording, about))
 }
@@ -255,6 +253,9 @@ fn track(
         whole(samples, |sample| sample.along_mps[1]).or_else(|| component(|sample| sample.velocity_mps, cross));
     let given_a = whole(samples, |sample| sample.acceleration_mps2)
         .or_else(|| component(|sample| sample.acceleration_xy_mps2, dot));
+    if let (Some(v), Some(a)) = (&given_s, &given_a) {
+        about.note_accelerations(v, a, rate_hz);
+    }
     about.note_speeds(&s_m, given_s.as_deref(), &d_m, given_d.as_deref(), rate_hz);
     let (mut v_s_mps, v_d_mps, a_s_mps2) = match smoothing_s {
         Some(window_s) => {

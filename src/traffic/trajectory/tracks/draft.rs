@@ -71,7 +71,7 @@ pub fn draft(path: &Path) -> Result<String> {
     if columns.contains("frame =") && !columns.contains("time =") {
         text.push_str("# Frames per second, because frames have no time.\nframe_rate_hz = 25.0\n");
     }
-    text.push_str("# Texts that stand for no value.\nnone = [\"\", \"NA\", \"-1\"]\n");
+    text.push_str("# Texts that stand for no value, in any column.\nnone = [\"\", \"NA\"]\n");
     text.push_str("\n[axes]\n# Side of +x on which +y lies: left, or right in images.\ny = \"left\"\n");
     let _ = write!(text, "\n[columns]\n{columns}");
     let has_time = columns.contains("time =") || columns.contains("frame =");
@@ -97,7 +97,14 @@ pub fn draft(path: &Path) -> Result<String> {
         text,
         "# With a unit: speed = {{ name = \"Speed\", unit = \"km/h\" }}; m, ft, cm; m/s, km/h, mph; deg, rad; s, ms, ns, date"
     );
-    text.push_str("\n[classes]\n# How the texts of lorries, and of what is left out, begin; without these, lorries are 7 m and longer.\ntruck = []\nignored = []\n");
+    let words = |list: &[String]| list.iter().map(|word| format!("{word:?}")).collect::<Vec<_>>().join(", ");
+    let _ = write!(
+        text,
+        "\n[classes]\n# How the texts of lorries, and of what is left out, begin; without a class, lorries are 7 m and longer.\n\
+         truck = [{}]\nignored = [{}]\n",
+        words(&generic.classes.truck),
+        words(&generic.classes.ignored)
+    );
     Ok(text)
 }
 

@@ -52,6 +52,20 @@ impl Understanding {
                 );
             }
         }
+        let [product, of_told, of_change] = self.acceleration_sums;
+        let seconds = f64::from(self.acceleration_seconds);
+        // Below 0.1 m/s in a second there is nothing to compare.
+        if seconds > 50.0 && of_told.max(of_change) > 0.01 * seconds {
+            let slope = product / of_told.max(1e-12);
+            let size = libm::sqrt(of_told / of_change.max(1e-12));
+            if product < 0.0 || !(0.4..=2.5).contains(&size) {
+                self.find(true, format!(
+                    "accelerations do not fit the changes of speed (they are {} times as large, {}): check their unit and sign",
+                    significant(size, 2),
+                    if slope < 0.0 { "of the other sign" } else { "of the same sign" }
+                ));
+            }
+        }
         // Refused: what is beyond the physical range is grave.
         let mut doubts = Doubts::new(Implausible::Refused);
         let mut grave: Vec<String> = Vec::new();
@@ -100,7 +114,28 @@ impl Understanding {
             let more = if grave.len() > 1 { format!(" ({} more such)", grave.len() - 1) } else { String::new() };
             self.find(true, format!("{first}{more}"));
         }
-        general.into_iter().for_each(|text| self.find(true, text));
+        // A wrong ratio names the unit already.
+        if self.positions_over_speeds.is_none_or(|ratio| (ratio - 1.0).abs() <= MAX_SPEED_DIFFERENCE) {
+            general.into_iter().for_each(|text| self.find(true, text));
+        }
+        let narrow =
+            self.carriageways.iter().any(|of| of.lane_width_m.iter().all(|w| !Quantity::LaneWidth.is_plausible(*w)));
+        if narrow {
+            self.find(true, "no lane has a plausible width: check the unit of y, and what `lane` means");
+        }
+        let (mut outside, mut samples) = (0_u64, 0_u64);
+        for track in &recording.tracks {
+            samples += track.len() as u64;
+            outside += track.lane.iter().filter(|lane| **lane == NO_LANE).count() as u64;
+        }
+        if 2 * outside > samples {
+            self.find(true, "vehicles are mostly in no lane: check the axes, and the lanes in the file");
+        }
+        let long =
+            recording.tracks.iter().filter(|track| track.class == VehicleClass::Car && track.length_m >= 9.0).count();
+        if long > 0 && !self.classes.is_empty() {
+            self.find(false, format!("{long} vehicle(s) of 9 m and longer are cars by their class: see `classes`"));
+        }
         doubts.sentences().into_iter().for_each(|text| self.find(false, text));
         if self.length_m < 50.0 {
             self.find(
@@ -276,7 +311,7 @@ impl Understanding {
         }
         let backwards = self.exclusions.iter().filter(|(_, why)| *why == Exclusion::Backwards).count();
         if backwards > 0 {
-            let is_grave = 2 * backwards > recording.tracks.len();
+            let is_grave = 5 * backwards > recording.tracks.len();
             self.find(is_grave, format!(
                 "{backwards} vehicles drive backwards (faster than 0.5 m/s) and are left out: check `direction` and the signs of the speeds"
             ));
@@ -293,13 +328,14 @@ impl Understanding {
             }
         }
         if self.interpolated > 0 {
+            let why = if self.off_raster_frames > 0.02 {
+                format!("times are off the raster by up to {} frames", significant(self.off_raster_frames, 2))
+            } else {
+                "gaps are filled".to_owned()
+            };
             self.find(
                 false,
-                format!(
-                    "{} samples are interpolated: times are off the raster by up to {} frames, or there are gaps",
-                    count(self.interpolated),
-                    significant(self.off_raster_frames, 2)
-                ),
+                format!("{} samples are of tracks that were interpolated: {why}", count(self.interpolated)),
             );
         }
         if self.renumbered {

@@ -65,6 +65,11 @@ fn format_of(path: &Path) -> Option<FileFormat> {
     ENDINGS.iter().find(|(known, _)| *known == ending).map(|(_, format)| *format)
 }
 
+/// Whether the ending of a file's name is that of a format of tracks.
+pub(super) fn may_hold_tracks(path: &Path) -> bool {
+    format_of(path).is_some()
+}
+
 /// The preset that fits a file, and the reason; `None` if none of the shipped ones fits.
 ///
 /// # Errors

@@ -95,20 +95,34 @@ pub(super) fn pieces(
             }
         }
     }
+    about.split_tracks = (pieces.len() as u64).saturating_sub(raw.vehicles.len() as u64);
+    if about.split_tracks > 0 {
+        let text = format!(
+            "gaps longer than {} s split the tracks of {} vehicles into {}: see `max_gap_s`",
+            preset.max_gap_s,
+            raw.vehicles.len(),
+            pieces.len()
+        );
+        about.find(about.split_tracks > raw.vehicles.len() as u64, text);
+    }
     if pieces.is_empty() {
         return Err(bad("no vehicle is in view for three samples", "check the columns for vehicle and time"));
     }
     Ok((rate_hz, pieces))
 }
 
-/// Steps of the recording over its duration, because a rounded step is not exact.
+/// Steps over time of all vehicles, because a rounded step is not exact, and vehicles may have times of their own.
 fn rate_of_times(raw: &RawRecording, step: f64) -> f64 {
-    let mut times: Vec<f64> = raw.vehicles.iter().flat_map(|v| v.samples.iter().map(|sample| sample.at)).collect();
-    times.sort_by(f64::total_cmp);
-    times.dedup_by(|a, b| *a - *b < 0.25 * step);
-    let steps: f64 = times.windows(2).map(|pair| ((pair[1] - pair[0]) / step).round()).sum();
-    let span = times[times.len() - 1] - times[0];
-    let rate = if span > 0.0 { steps / span } else { 1.0 / step };
+    let (mut steps, mut span) = (0.0, 0.0);
+    for pair in raw.vehicles.iter().flat_map(|vehicle| vehicle.samples.windows(2)) {
+        let by = pair[1].at - pair[0].at;
+        // A gap tells less about the step.
+        if by < 5.5 * step {
+            steps += (by / step).round();
+            span += by;
+        }
+    }
+    let rate = if span > 0.0 && steps > 0.0 { steps / span } else { 1.0 / step };
     let whole = rate.round();
     if whole >= 1.0 && (rate / whole - 1.0).abs() < 3e-4 { whole } else { rate }
 }

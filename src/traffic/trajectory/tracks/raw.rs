@@ -278,7 +278,9 @@ impl<'a> Collecting<'a> {
 fn meta_rows(path: &Path, id: &str, meta: &MetaFile, preset: &Preset) -> Result<Option<(Rows, Columns)>> {
     let beside = path.with_file_name(meta.file.replace('*', id));
     if !beside.exists() {
-        return Ok(None);
+        let problem = format!("preset {} names this file, which is not there", preset.name);
+        let missing = || Error::input(Place::file(&beside), problem, "add it, or remove its table from the preset");
+        return if preset.is_own { Err(missing()) } else { Ok(None) };
     }
     let rows = Rows::open(&beside, preset.format, None, preset.delimiter)?;
     let columns = Columns::of(&meta.columns, rows.header(), &preset.none);

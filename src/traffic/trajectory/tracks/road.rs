@@ -422,11 +422,11 @@ fn shifted(line: &RoadLine, paths: &[Path]) -> Option<RoadLine> {
 mod tests {
     use super::*;
 
-    /// Paths at several d of a circle of this radius; every third changes lanes by 3.5 m in the middle.
+    /// Paths at several d of a circle of this radius; every sixth changes lanes by 3.5 m in the middle.
     fn paths_on_circle(radius_m: f64, length_m: f64) -> Vec<Path> {
         let on = |vehicle: usize, s: f64| {
             let change =
-                if vehicle.is_multiple_of(3) { 3.5 / (1.0 + libm::exp(-(s - length_m / 2.0) / 15.0)) } else { 0.0 };
+                if vehicle.is_multiple_of(6) { 3.5 / (1.0 + libm::exp(-(s - length_m / 2.0) / 15.0)) } else { 0.0 };
             let d = [-1.75, -5.25, -8.75][vehicle % 3] + change + 0.2 * libm::sin(s / 40.0 + vehicle as f64);
             let (angle, r) = (s / radius_m, radius_m - d);
             [r * libm::sin(angle), radius_m - r * libm::cos(angle)]
@@ -440,7 +440,7 @@ mod tests {
         let line = RoadLine::fit(&paths).unwrap();
         assert!(!line.is_straight());
         // Lane keepers wander by 0.4 m.
-        let keepers: Vec<Path> = paths.iter().enumerate().filter(|(i, _)| i % 3 != 0).map(|(_, p)| p.clone()).collect();
+        let keepers: Vec<Path> = paths.iter().enumerate().filter(|(i, _)| i % 6 != 0).map(|(_, p)| p.clone()).collect();
         assert!(line.wander_m(&keepers) < 0.6, "{}", line.wander_m(&keepers));
         assert!((line.min_radius_m() / 600.0 - 1.0).abs() < 0.25, "{}", line.min_radius_m());
         // s and d have no jumps, and d differs by the distance of the lanes.
@@ -457,8 +457,9 @@ mod tests {
 
     #[test]
     fn a_straight_road_along_an_axis_stays_exact() {
-        let path = |d: f64| (0..200).map(|k| [2.0 * f64::from(k), d + 0.1 * libm::sin(f64::from(k) / 9.0)]).collect();
-        let line = RoadLine::fit(&[path(0.0), path(3.5), path(7.0), path(3.6)]).unwrap();
+        let path =
+            |d: f64| (0..200).map(|k| [2.0 * f64::from(k), d + 0.1 * libm::sin(f64::from(k) / 9.0 + d)]).collect();
+        let line = RoadLine::fit(&[path(0.0), path(3.5), path(7.0), path(3.6), path(0.2), path(7.3)]).unwrap();
         assert!(line.is_straight());
         let on = line.project([123.0, 4.5], None);
         assert_eq!((on.s_m, on.d_m), (123.0, 4.5));

@@ -246,7 +246,9 @@ fn number_of(text: &[u8], role: Role, columns: &Columns, place: &dyn Fn() -> Pla
                 let parsed = seconds_of_date(&shown);
                 return parsed.map(Some).ok_or_else(|| bad(place(), &shown, "a date such as 2024-10-07 06:00:00.05"));
             }
-            return Err(bad(place(), &shown, "a finite number"));
+            let is_time = role == Role::Time;
+            let expected = if is_time { "a finite number (dates need `unit = \"date\"`)" } else { "a finite number" };
+            return Err(bad(place(), &shown, expected));
         }
     };
     if !columns.none.is_empty() && columns.is_none(&String::from_utf8_lossy(first)) {
@@ -262,7 +264,7 @@ fn scaled(value: f64, factor: f64, place: &dyn Fn() -> Place) -> Result<f64> {
     if scaled.abs() <= number::REAL_LIMIT {
         Ok(scaled)
     } else {
-        Err(bad(place(), &value.to_string(), "a number of this world"))
+        Err(bad(place(), &value.to_string(), "a number below 10¹² in SI units"))
     }
 }
 

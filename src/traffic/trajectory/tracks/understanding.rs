@@ -122,6 +122,8 @@ pub struct Understanding {
     pub duplicates: u64,
     /// Pieces of tracks that were too short.
     pub short_pieces: u64,
+    /// Tracks beyond one per vehicle, because of gaps.
+    pub split_tracks: u64,
     /// Samples that were interpolated.
     pub interpolated: u64,
     /// Speeds between −0.5 m/s and 0, counted as 0.
@@ -152,11 +154,29 @@ pub struct Understanding {
     /// Σ of given times derived lateral speed, and of the squares of both.
     #[serde(skip)]
     pub(super) lateral_sums: [f64; 3],
+    /// Σ of given accelerations over a second times the change of speed, and of the squares of both.
+    #[serde(skip)]
+    pub(super) acceleration_sums: [f64; 3],
+    #[serde(skip)]
+    pub(super) acceleration_seconds: u32,
 }
 
 impl Understanding {
     pub(super) fn new(recording: &str, incomplete: u64) -> Self {
         Understanding { recording: recording.to_owned(), incomplete, ..Understanding::default() }
+    }
+
+    /// Compares given accelerations with the changes of given speeds over a second.
+    pub(super) fn note_accelerations(&mut self, v_mps: &[f64], a_mps2: &[f64], rate_hz: f64) {
+        let reach = rate_hz.round().max(1.0) as usize;
+        for k in (reach..v_mps.len()).step_by(reach) {
+            let told: f64 = a_mps2[k - reach..k].iter().sum::<f64>() / rate_hz;
+            let change = v_mps[k] - v_mps[k - reach];
+            self.acceleration_sums[0] += told * change;
+            self.acceleration_sums[1] += told * told;
+            self.acceleration_sums[2] += change * change;
+            self.acceleration_seconds += 1;
+        }
     }
 
     /// The same checks of a recording that another reader gave, with its notes.
@@ -237,8 +257,8 @@ impl Understanding {
         if let Some(given) = given_s {
             let driven_m: f64 = given.windows(2).map(|pair| 0.5 * (pair[0] + pair[1]) / rate_hz).sum();
             let moved_m = s_m[s_m.len() - 1] - s_m[0];
-            if driven_m.abs() > 10.0 && moved_m.abs() > 1.0 {
-                self.ratios.push(moved_m / driven_m);
+            if driven_m.abs().max(moved_m.abs()) > 20.0 {
+                self.ratios.push(moved_m / driven_m.abs().max(0.1));
             }
         }
         if let Some(given) = given_d {
