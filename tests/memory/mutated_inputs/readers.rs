@@ -102,9 +102,12 @@ fn exid(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {
 fn preset(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
     let path = file(bytes, dir, "own.toml");
     let table = file(&seeds.track_tables[0], dir, "own.csv");
+    let beside = [file(b"id,l\n1,4.5\n", dir, "own_meta.csv"), file(b"fps\n10\n", dir, "own_rec.csv")];
     let preset = Preset::load(&path.to_string_lossy())?;
     let read = read_usable(&TrackFile { path: table.clone(), id: "own".to_owned() }, &preset, Implausible::Accepted);
-    std::fs::remove_file(&table).expect("the temporary folder can be written to");
+    for path in beside.iter().chain([&table]) {
+        std::fs::remove_file(path).expect("the temporary folder can be written to");
+    }
     read.map(drop)
 }
 

@@ -415,7 +415,7 @@ fn seconds_of_date(text: &str) -> Option<f64> {
     };
     let mut parts = clock.splitn(3, ':').map(|part| part.parse::<f64>().ok());
     let (hours, minutes, seconds) = (parts.next()??, parts.next()??, parts.next().unwrap_or(Some(0.0))?);
-    // Days from civil dates (Hinnant, "chrono-compatible low-level date algorithms").
+    // Days from civil dates (Hinnant, low-level date algorithms, 2013).
     let shifted = if month <= 2 { year - 1 } else { year };
     let era = shifted.div_euclid(400);
     let of_era = shifted.rem_euclid(400);
