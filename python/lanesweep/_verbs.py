@@ -244,7 +244,7 @@ def mine(
     Parameters
     ----------
     recordings : Value
-        Folder of recordings, or a track file.
+        Folder of recordings, or a track file; also .xosc files of `export xosc`.
     kept : bool
         Only scenarios that pass the paper's filters.
     preset : Value
