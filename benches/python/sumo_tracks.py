@@ -1,11 +1,12 @@
 """SUMO's own output read directly, beside an independent conversion to highD's format: the same scenarios?
 
-    python gen_sumo.py SIM ...          # writes SIM/fcd.csv, or .xml, .parquet with another --fcd-output
+    python gen_sumo.py SIM --lanes 3 --flow 3600 --truck 0.2 --dur 120 --warm 220 --seed 1 --kg 0.7 --kr 0.7
+    python gen_sumo.py SIM --lanes 3 --flow 4200 --truck 0.18 --ramp --wave --dur 120 --warm 220 --seed 4 --kg 0.7 --kr 0.7
     python fcd2highd.py SIM HIGHD 1 --nosmooth
     python sumo_tracks.py LANESWEEP SIM HIGHD [PRESET]
 
 The conversion keeps the vehicles whose box is inside a window of 420 m, with at least 27 frames; here the rows of fcd.csv are
-cut in the same way, so that both hold the same samples. Scenarios are compared by category, vehicles and frames."""
+cut in the same way (PRESET: a copy of sumo-fcd.toml without `heading` tells what headings do), so that both hold the same samples. Scenarios are compared by category, vehicles and frames."""
 import csv
 import json
 import pathlib

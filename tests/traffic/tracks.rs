@@ -541,7 +541,6 @@ fn every_preset_reads_its_own_format_and_finds_mistakes_in_it() {
             if is_without {
                 continue;
             }
-            // A direction that the file gives excludes that oncoming traffic tells the side.
             match understood(mistake) {
                 Ok(about) => assert!(!about.is_usable(), "{}, {name}: {:?}", preset.name, about.findings),
                 Err(error) => assert!(error.help().is_some(), "{error}"),

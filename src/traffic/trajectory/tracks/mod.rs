@@ -70,7 +70,7 @@ pub(super) fn may_hold_tracks(path: &Path) -> bool {
     format_of(path).is_some()
 }
 
-/// The preset that fits a file, and the reason; `None` if none of the shipped ones fits.
+/// The shipped preset that fits a file; `None` if none fits.
 ///
 /// # Errors
 /// Those of the file; [`Error::Input`] if several presets fit equally well.
@@ -118,7 +118,7 @@ fn fitting(preset: &Preset, header: &[String]) -> usize {
     let columns = Columns::of(&preset.columns, header, &[]);
     let has = |role: Role| columns.has(role);
     let is_needed = has(Role::Vehicle) && has(Role::X) && has(Role::Y) && (has(Role::Frame) || has(Role::Time));
-    // Half of the columns at least, so that two formats that share the names of positions are told apart.
+    // Two thirds of the columns at least, so that two formats that share the names of positions are told apart.
     let found = preset.columns.keys().filter(|role| has(**role)).count();
     if is_needed && (preset.is_generic() || 3 * found >= 2 * preset.columns.len()) { found } else { 0 }
 }
