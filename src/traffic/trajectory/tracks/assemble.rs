@@ -253,7 +253,7 @@ fn track(
         whole(samples, |sample| sample.along_mps[1]).or_else(|| component(|sample| sample.velocity_mps, cross));
     let given_a = whole(samples, |sample| sample.acceleration_mps2)
         .or_else(|| component(|sample| sample.acceleration_xy_mps2, dot));
-    if let (Some(v), Some(a)) = (&given_s, &given_a) {
+    if let (Some(v), Some(a), None) = (&given_s, &given_a, smoothing_s) {
         about.note_accelerations(v, a, rate_hz);
     }
     about.note_speeds(&s_m, given_s.as_deref(), &d_m, given_d.as_deref(), rate_hz);
@@ -263,6 +263,7 @@ fn track(
             let [s, v, a] = savitzky_golay(&s_m, window, rate_hz);
             let [d, vd, _] = savitzky_golay(&d_m, window, rate_hz);
             (s_m, d_m) = (s, d);
+            (about.derived_speeds, about.derived_lateral, about.derived_accelerations) = (true, true, true);
             (v, vd, a)
         }
         None => {
