@@ -15,7 +15,7 @@ use crate::support::atomic_file::AtomicFile;
 use crate::support::input_file;
 use crate::support::lock::FolderLock;
 use crate::support::readable::counted;
-use crate::traffic::mining::{Collection, counts_text};
+use crate::traffic::mining::{Collection, counts, counts_text};
 use crate::traffic::{DataProvenance, Driven, Source};
 
 /// Mine cut-ins, cut-outs and leader decelerations from recordings
@@ -79,7 +79,8 @@ fn of_exported(files: &[PathBuf]) -> Result<Collection> {
         return Err(collection.problems.swap_remove(0));
     }
     source::complain_of(&collection.problems, &collection.notes);
-    tracing::info!("{}", counts_text(&collection.scenarios));
+    tracing::info!("every scenario counts as kept: the filters were applied before the export");
+    tracing::info!("{}", counts_text(&counts(&collection.scenarios)));
     Ok(collection)
 }
 
@@ -93,10 +94,14 @@ impl Mine {
             AtomicFile::create(path).map(drop)?;
         }
         let _lock = self.out.as_deref().map(lock_of).transpose()?;
-        let from = Source::Recordings { path: self.dir.clone(), preset: self.preset.preset.clone() };
-        let mut collection = match exported(&self.dir) {
-            Some(files) if self.preset.preset.is_none() => of_exported(&files)?,
-            _ => source::load(&from, &configured.settings.mining, self.plausibility.policy(), verbosity)?,
+        let (from, mut collection) = match exported(&self.dir) {
+            Some(files) if self.preset.preset.is_none() => (Source::Scenarios(self.dir.clone()), of_exported(&files)?),
+            _ => {
+                let from = Source::Recordings { path: self.dir.clone(), preset: self.preset.preset.clone() };
+                let mining = &configured.settings.mining;
+                let collection = source::load(&from, mining, self.plausibility.policy(), verbosity)?;
+                (from, collection)
+            }
         };
         if self.kept {
             collection.scenarios.retain(|s| s.kept);

@@ -12,7 +12,7 @@ use crate::scenario::{Category, Scenario, ScenarioFile, read_scenario_file};
 use crate::support::plausibility::Implausible;
 use crate::support::ranges::refuse_repeats;
 use crate::traffic::Source;
-use crate::traffic::mining::{Collection, MiningOptions, counts_text};
+use crate::traffic::mining::{Collection, MiningOptions, counts, counts_text};
 use crate::traffic::trajectory::{InputFile, Inputs};
 use crate::{Error, Place, Result};
 
@@ -40,7 +40,7 @@ pub fn load(
         let name = preset.split(' ').next().unwrap_or(preset);
         tracing::info!("read by preset {name}; `lanesweep tracks` says how");
     }
-    tracing::info!("{}", counts_text(&collection.scenarios));
+    tracing::info!("{}", counts_text(&counts(&collection.scenarios)));
     Ok(collection)
 }
 
@@ -81,7 +81,7 @@ impl PlausibilityFlag {
 #[derive(Debug, Clone, Args)]
 pub struct PresetFlag {
     /// Format of the recordings: exid, sumo-fcd, … or a TOML file [default: detected]
-    #[arg(long, value_name = "NAME|FILE", help_heading = "Data", hide_short_help = true)]
+    #[arg(long, value_name = "NAME|FILE", requires = "dir", help_heading = "Data", hide_short_help = true)]
     pub preset: Option<String>,
 }
 

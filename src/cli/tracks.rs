@@ -7,11 +7,11 @@ use clap::Args;
 use super::Exit;
 use super::configured::Configured;
 use super::format::FormatFlag;
-use crate::report::tracks::{TrackReport, across, counts, space_time};
+use crate::report::tracks::{TrackReport, across, space_time};
 use crate::support::files::{check_folder, write_atomically};
 use crate::support::run_dir::OutputDir;
 use crate::support::table::{Table, TableMetadata};
-use crate::traffic::mining::mine;
+use crate::traffic::mining::{CategoryCount, counts, mine};
 use crate::traffic::trajectory::highd::{self, HighdFiles, RecordingInfo};
 use crate::traffic::trajectory::tracks::{LoadedTracks, Preset, SYNTHETIC, Understanding, draft, read_tracks};
 use crate::traffic::trajectory::{InputFile, Inputs, NO_LANE, Recording, Track, VehicleClass};
@@ -119,13 +119,15 @@ impl Tracks {
     }
 
     fn of_file(&self, file: &InputFile, configured: &Configured) -> Result<Vec<(TrackReport, Recording)>> {
-        let mining = &configured.settings.mining;
+        let mined_of = |recording: &Recording| -> Vec<CategoryCount> {
+            counts(&mine(recording, &configured.settings.mining).scenarios).to_vec()
+        };
         let is_detected = self.preset.is_none();
         match file {
             InputFile::Highd(files) => {
                 let loaded = highd::read(files)?;
                 let (understanding, recording) = Understanding::of_recording(loaded.recording, loaded.notes);
-                let mined = counts(&mine(&recording, mining));
+                let mined = mined_of(&recording);
                 let file = files.tracks.display().to_string();
                 let preset = "highd".to_owned();
                 let report =
@@ -137,7 +139,6 @@ impl Tracks {
                 let rough = without.map(|preset| read_tracks(file, &preset)).transpose()?;
                 let mut rough = rough.map(Vec::into_iter);
                 let found = read_tracks(file, preset)?.into_iter().map(|LoadedTracks { loaded, understanding }| {
-                    let mined_of = |recording: &Recording| counts(&mine(recording, mining));
                     let rough = rough.as_mut().and_then(Iterator::next);
                     let report = TrackReport {
                         file: file.path.display().to_string(),

@@ -16,7 +16,7 @@ use crate::report::{records, verification};
 use crate::run::study::{StudyOptions, plan_study};
 use crate::scenario::Category;
 use crate::support::readable::count;
-use crate::traffic::mining::counts_text;
+use crate::traffic::mining::{counts, counts_text};
 use crate::{Error, Place, Result};
 
 /// Check that a device computes every lane as the CPU does
@@ -155,7 +155,7 @@ impl Verify {
         let options = StudyOptions { categories: Category::ALL.to_vec(), ..StudyOptions::default() };
         let plan = plan_study(&collection.scenarios, profile, &options)?;
         if plan.unit_count() == 0 {
-            let problem = format!("no scenario to simulate ({})", counts_text(&collection.scenarios));
+            let problem = format!("no scenario to simulate ({})", counts_text(&counts(&collection.scenarios)));
             let help = "use more recordings or scenarios that pass the paper's filters";
             return Err(Error::input(
                 Place::item(self.data.source(configured).describe(collection.synthetic)),

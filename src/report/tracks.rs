@@ -3,9 +3,10 @@
 use serde::Serialize;
 
 use super::plot::{Figure, Layer, Plot, PlotAxis, Rule};
+use super::tables::wrap;
 use crate::support::readable::count_of;
 use crate::support::table::WIDTH;
-use crate::traffic::mining::{CategoryCount, Mined};
+use crate::traffic::mining::{CategoryCount, counts_text};
 use crate::traffic::trajectory::tracks::Understanding;
 use crate::traffic::trajectory::{Recording, Track, VehicleClass};
 
@@ -36,20 +37,6 @@ pub struct TrackReport {
     pub mined_without_smoothing: Option<Vec<CategoryCount>>,
 }
 
-/// Found and kept scenarios by category.
-pub fn counts(mined: &Mined) -> Vec<CategoryCount> {
-    use crate::scenario::Category;
-    Category::ALL.iter().map(|category| crate::traffic::mining::count(&mined.scenarios, *category)).collect()
-}
-
-fn counts_in_words(counts: &[CategoryCount]) -> String {
-    use crate::scenario::Category;
-    let of = |(category, count): (Category, &CategoryCount)| {
-        format!("{} of {} {}s", count.kept, count.found, category.label())
-    };
-    Category::ALL.into_iter().zip(counts).map(of).collect::<Vec<_>>().join(", ")
-}
-
 impl TrackReport {
     /// The report as text.
     pub fn text(&self) -> String {
@@ -59,9 +46,9 @@ impl TrackReport {
             self.file, "recording", self.understanding.recording, "preset", self.preset
         );
         let mut lines = self.understanding.lines();
-        lines.push(("scenarios", format!("kept: {}", counts_in_words(&self.mined))));
+        lines.push(("scenarios", counts_text(&self.mined)));
         if let Some(without) = &self.mined_without_smoothing {
-            lines.push(("", format!("without smoothing: {}", counts_in_words(without))));
+            lines.push(("", format!("without smoothing {}", counts_text(without))));
         }
         for (name, words) in lines {
             text += &hanging(&format!("  {name:<10} "), &words);
@@ -81,21 +68,9 @@ impl TrackReport {
 
 /// Words after a name, wrapped below one another.
 fn hanging(name: &str, words: &str) -> String {
-    let width = WIDTH.saturating_sub(name.chars().count()).max(20);
-    let mut lines: Vec<String> = vec![String::new()];
-    for word in words.split_whitespace() {
-        let line = lines.last_mut().expect("one line");
-        if !line.is_empty() && line.chars().count() + word.chars().count() + 1 > width {
-            lines.push(word.to_owned());
-        } else {
-            if !line.is_empty() {
-                line.push(' ');
-            }
-            line.push_str(word);
-        }
-    }
-    let indent = " ".repeat(name.chars().count());
-    lines.iter().enumerate().map(|(at, line)| format!("{}{line}\n", if at == 0 { name } else { &indent })).collect()
+    let indent = name.chars().count();
+    let wrapped = wrap(words, WIDTH.saturating_sub(indent).max(20));
+    format!("{name}{}\n", wrapped.replace('\n', &format!("\n{}", " ".repeat(indent))))
 }
 
 /// Tracks of a carriageway and class as lines.

@@ -16,7 +16,7 @@ use crate::stats::density::{BandwidthRule, DensityKind, DensityModel, Exposure, 
 use crate::stats::estimate::Enough;
 use crate::support::error::push_once;
 use crate::traffic::DataProvenance;
-use crate::traffic::mining::counts_text;
+use crate::traffic::mining::{counts, counts_text};
 use crate::{Error, Place, Result};
 
 /// Options of a comparison.
@@ -108,7 +108,7 @@ impl<'a> Compare<'a> {
         if plan.unit_count() == 0 {
             return Err(Error::input(
                 Place::item(&facts.data),
-                format!("no scenario to simulate ({})", counts_text(scenarios)),
+                format!("no scenario to simulate ({})", counts_text(&counts(scenarios))),
                 "use more recordings, or relax the filters ([mining] in option `config`)",
             ));
         }

@@ -80,6 +80,24 @@ fn flags_a_toml_file_a_row_and_an_openscenario_file_are_the_same_case() {
     }
 }
 
+#[test]
+fn exported_scenarios_are_mined_as_a_scenario_file_that_a_study_reads() {
+    let dir = tempfile::tempdir().unwrap();
+    let of = |name: &str| dir.path().join(name);
+    std::fs::create_dir(of("exported")).unwrap();
+    std::fs::write(of("exported/a.xosc"), exported(dir.path())).unwrap();
+    std::fs::write(of("exported/b.xosc"), "<OpenSCENARIO>").unwrap();
+    let (code, _, error) = check(&["mine", text(&of("exported")), "--out", text(&of("s.jsonl"))]);
+    assert_eq!(code, 4, "a bad file is left out and said: {error}");
+    assert!(error.contains("b.xosc") && error.contains("every scenario counts as kept"), "{error}");
+    let mined = std::fs::read_to_string(of("s.jsonl")).unwrap();
+    assert!(mined.lines().count() == 1 && mined.contains("\"id\":\"a\""), "{mined}");
+    assert!(!of("s.exposure.json").exists(), "nobody knows how far was driven");
+    let file = of("s.jsonl");
+    let (code, _, error) = check(&["-q", "simulate", "--scenarios", text(&file), "--lane", "a/S/1.2s/FSM"]);
+    assert_eq!(code, 0, "{error}");
+}
+
 /// A cut-in as flags: speeds in km/h, gap, lateral speed, further flags.
 fn cut_in(ego: &str, other: &str, gap: &str, across: &str, more: &str) -> (i32, String, String) {
     let case = format!(

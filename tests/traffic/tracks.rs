@@ -275,12 +275,15 @@ fn missing_values_gaps_and_repeated_rows_are_said() {
     let own: Vec<usize> = (0..table.rows.len()).filter(|at| table.rows[*at][0] == id).collect();
     table.rows[own[2]][x] = "NaN".to_owned();
     let copy = table.rows[own[4]].clone();
-    table.rows.push(copy);
+    table.rows.push(copy.clone());
+    let mut elsewhere = copy;
+    elsewhere[x] = "1.0".to_owned();
+    table.rows.push(elsewhere);
     // A hole of two seconds: two tracks.
     let hole: Vec<usize> = own[10..20].to_vec();
     table.rows = table.rows.into_iter().enumerate().filter(|(at, _)| !hole.contains(at)).map(|(_, row)| row).collect();
     let about = understood(&table, &|_| ()).unwrap();
-    assert_eq!((about.incomplete, about.duplicates), (1, 1));
+    assert_eq!((about.incomplete, about.duplicates, about.conflicts), (1, 2, 1));
     assert!(about.interpolated > 0 && about.renumbered, "{about:?}");
     // What is no number is refused with its place.
     let mut bad = table.clone();
@@ -345,7 +348,7 @@ fn every_format_is_detected_by_its_header() {
 #[test]
 fn every_shipped_preset_is_valid() {
     let names: Vec<&str> = Preset::names().collect();
-    assert!(names.len() >= 13, "{names:?}");
+    assert_eq!(names.len(), 16, "{names:?}");
     for name in names.into_iter().filter(|name| *name != tracks::HIGHD) {
         assert_eq!(Preset::load(name).unwrap().name, name);
     }
@@ -443,6 +446,10 @@ fn in_format_of(preset: &Preset, recording: &Recording, stride: usize, mistake: 
             Role::Lane => return format!("{}", 1 + 10 * track.carriageway + usize::from(track.lane[k])),
             Role::Frame => return (frame / stride as i64).to_string(),
             Role::Direction => return if at.velocity[0] > 0.0 { "1".to_owned() } else { "-1".to_owned() },
+            Role::Time if preset.name == "dlr-ht" => {
+                let seconds = frame as f64 / recording.frame_rate_hz;
+                return format!("2024-10-07 06:{:02}:{:09.6}+00:00", (seconds / 60.0) as u32, seconds % 60.0);
+            }
             Role::Time => frame as f64 / recording.frame_rate_hz,
             Role::X => x,
             Role::Y => y_sign * y,
@@ -493,6 +500,41 @@ fn in_format_of(preset: &Preset, recording: &Recording, stride: usize, mistake: 
     text
 }
 
+/// A table as Parquet: a row per sample, or per vehicle with lists of all but `single` columns.
+#[cfg(feature = "parquet")]
+fn write_parquet(path: &Path, text: &str, vehicle: &str, single: Option<&[&str]>) {
+    use lanesweep::support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter};
+    let mut lines = text.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let names = lines.next().unwrap();
+    let rows: Vec<Vec<&str>> = lines.collect();
+    let key = names.iter().position(|name| *name == vehicle).unwrap();
+    let kinds: Vec<ColumnKind> = names
+        .iter()
+        .zip(&rows[0])
+        .map(|(name, first)| match first.parse::<f64>() {
+            _ if *name == vehicle => ColumnKind::Whole,
+            Err(_) => ColumnKind::Text,
+            Ok(_) if single.is_some_and(|single| !single.contains(name)) => ColumnKind::Series,
+            Ok(_) => ColumnKind::Binary64,
+        })
+        .collect();
+    let columns = names.iter().zip(&kinds);
+    let columns = columns.map(|(name, kind)| Column { kind: *kind, ..Column::from((*name).to_owned()) }).collect();
+    let mut table = TableWriter::create(path, TableFormat::Parquet, columns, &TableMetadata::default()).unwrap();
+    for group in rows.chunk_by(|a, b| single.is_some() && a[key] == b[key]) {
+        let cell = |(at, kind): (usize, &ColumnKind)| match kind {
+            ColumnKind::Whole => Cell::Whole(group[0][at].parse().unwrap()),
+            ColumnKind::Series => {
+                Cell::Series(group.iter().map(|row| row[at].parse().unwrap()).collect::<Vec<f64>>().into())
+            }
+            ColumnKind::Binary64 => Cell::Number(group[0][at].parse().unwrap()),
+            _ => Cell::text(group[0][at].to_owned()),
+        };
+        table.row(&kinds.iter().enumerate().map(cell).collect::<Vec<_>>()).unwrap();
+    }
+    table.finish().unwrap();
+}
+
 /// Every preset reads traffic in its own format, and finds the usual mistakes in it.
 #[test]
 fn every_preset_reads_its_own_format_and_finds_mistakes_in_it() {
@@ -513,7 +555,10 @@ fn every_preset_reads_its_own_format_and_finds_mistakes_in_it() {
         }),
         ("y flipped", &|role, value, _| if role == Role::Y { -value } else { value }),
     ];
-    let formats = [FileFormat::Csv, FileFormat::Json];
+    let formats: &[FileFormat] = match cfg!(feature = "parquet") {
+        true => &[FileFormat::Csv, FileFormat::Json, FileFormat::Parquet],
+        false => &[FileFormat::Csv, FileFormat::Json],
+    };
     let names = Preset::names().filter(|name| *name != tracks::HIGHD);
     let presets = names.map(|name| Preset::load(name).unwrap()).filter(|preset| formats.contains(&preset.format));
     let mut tried = 0;
@@ -522,10 +567,21 @@ fn every_preset_reads_its_own_format_and_finds_mistakes_in_it() {
         let path = dir.path().join("own_file");
         let stride = 2;
         // The rate where only a meta file or the format says it.
-        let rate = preset.columns.contains_key(&Role::Time).then_some(()).map_or(Some(12.5), |()| None);
+        let rate = (!preset.columns.contains_key(&Role::Time)).then_some(12.5);
         let preset = Preset { frame_rate_hz: rate, smoothing_s: None, recording: None, ..preset };
         let understood = |mistake: Mistake| {
-            std::fs::write(&path, in_format_of(&preset, &recording, stride, mistake)).unwrap();
+            let text = in_format_of(&preset, &recording, stride, mistake);
+            match preset.format {
+                #[cfg(feature = "parquet")]
+                FileFormat::Parquet => {
+                    let name = |role: &Role| preset.columns[role].names()[0].as_str();
+                    let single = [Role::Length, Role::Width].map(|role| preset.columns.get(&role).map(|_| name(&role)));
+                    let single: Vec<&str> = single.into_iter().flatten().collect();
+                    let has_lists = preset.name == "swiftraj";
+                    write_parquet(&path, &text, name(&Role::Vehicle), has_lists.then_some(&single[..]));
+                }
+                _ => std::fs::write(&path, text).unwrap(),
+            }
             let file = TrackFile { path: path.clone(), id: "own".to_owned() };
             tracks::read_tracks(&file, &preset).map(|mut all| all.remove(0).understanding)
         };
@@ -548,7 +604,7 @@ fn every_preset_reads_its_own_format_and_finds_mistakes_in_it() {
         }
         tried += 1;
     }
-    assert!(tried >= 9, "{tried}");
+    assert_eq!(tried, if cfg!(feature = "parquet") { 13 } else { 10 });
 }
 
 /// Files for readers in Python: `python benches/python/track_readers.py LANESWEEP target/tmp/exid`.

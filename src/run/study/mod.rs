@@ -30,7 +30,7 @@ use crate::run::score::{ScoreOptions, ScoreTable, score};
 use crate::support::input_file;
 use crate::support::plain_text::sha256;
 use crate::support::run_dir::Results;
-use crate::traffic::mining::{Collection, MiningOptions, counts_text};
+use crate::traffic::mining::{Collection, MiningOptions, counts, counts_text};
 use crate::{Error, Place, Result};
 
 /// Maximum size of the first line that is read, bytes: checksums of the pages of scenarios, data of the recordings.
@@ -149,7 +149,7 @@ impl StudyBuilder<'_> {
         if cases.outline().unit_count() == 0 {
             return Err(Error::input(
                 Place::item(data),
-                format!("no scenario to simulate ({})", counts_text(&collection.scenarios)),
+                format!("no scenario to simulate ({})", counts_text(&counts(&collection.scenarios))),
                 "use more recordings, or relax the filters ([mining] in option `config`)",
             ));
         }

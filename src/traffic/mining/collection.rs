@@ -72,13 +72,17 @@ pub fn count(scenarios: &[Scenario], category: Category) -> CategoryCount {
     })
 }
 
+/// Found and kept scenarios of every category, in their order.
+pub fn counts(scenarios: &[Scenario]) -> [CategoryCount; 3] {
+    Category::ALL.map(|category| count(scenarios, category))
+}
+
 /// Found and kept, per category, in one line.
-pub fn counts_text(scenarios: &[Scenario]) -> String {
-    let part = |category: Category| {
-        let count = count(scenarios, category);
+pub fn counts_text(counts: &[CategoryCount]) -> String {
+    let part = |(category, count): (Category, &CategoryCount)| {
         format!("{} of {} {}s", readable::count(count.kept), readable::count(count.found), category.label())
     };
-    format!("kept: {}", Category::ALL.map(part).join(", "))
+    format!("kept: {}", Category::ALL.into_iter().zip(counts).map(part).collect::<Vec<_>>().join(", "))
 }
 
 struct MinedPart {

@@ -25,7 +25,9 @@ mod miner;
 mod options;
 pub mod tags;
 
-pub use collection::{Collection, RecordingSummary, count, counts_text, mine_folder, mine_generated, mine_inputs};
+pub use collection::{
+    Collection, RecordingSummary, count, counts, counts_text, mine_folder, mine_generated, mine_inputs,
+};
 pub use miner::{CategoryCount, Mined, mine};
 pub use options::{
     CutInOptions, CutOutOptions, LaneChangeEnd, LateralOptions, LongitudinalOptions, LvdOptions, MiningOptions,

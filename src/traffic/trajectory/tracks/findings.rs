@@ -2,7 +2,7 @@
 
 use super::preset::{Preset, Side};
 use super::road::median;
-use super::understanding::{Exclusion, Finding, Understanding};
+use super::understanding::{Exclusion, Finding, TIMES, Understanding};
 use crate::support::plausibility::{Doubts, Implausible, Quantity};
 use crate::support::readable::{count, significant};
 use crate::traffic::trajectory::overlap::overlaps;
@@ -44,8 +44,12 @@ impl Understanding {
             let ratio = median(&mut self.ratios);
             self.positions_over_speeds = Some(ratio);
             if (ratio - 1.0).abs() > MAX_SPEED_DIFFERENCE {
-                let near = MISTAKEN.iter().find(|(factor, _)| (ratio / factor - 1.0).abs() < 0.06);
-                let why = near.map_or("check units and frame rate", |(_, why)| why);
+                // A rate that the times give is right.
+                let rate = |why: &str| why.starts_with("the frame rate");
+                let near = |(factor, why): &&(f64, &str)| {
+                    (ratio / factor - 1.0).abs() < 0.06 && !(rate(why) && self.rate_source == TIMES)
+                };
+                let why = MISTAKEN.iter().find(near).map_or("check units and frame rate", |(_, why)| why);
                 self.find(
                     true,
                     format!("vehicles move {} times as far as their speeds tell: {why}", significant(ratio, 3)),
@@ -326,6 +330,14 @@ impl Understanding {
             if number > 0 {
                 self.find(false, format!("{} {what}", count(number)));
             }
+        }
+        if self.conflicts > 0 {
+            let text = format!(
+                "{} of these rows name another position; the first row counts: check `vehicle` and `time`",
+                count(self.conflicts)
+            );
+            let samples: usize = recording.tracks.iter().map(Track::len).sum();
+            self.find(100 * self.conflicts > samples as u64, text);
         }
         if self.interpolated > 0 {
             let why = if self.off_raster_frames > 0.02 {

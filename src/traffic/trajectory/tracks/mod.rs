@@ -78,6 +78,7 @@ pub fn detect(path: &Path) -> Result<Option<Preset>> {
     let Some(format) = format_of(path) else { return Ok(None) };
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let mut best: Vec<(usize, Preset)> = Vec::new();
+    let mut headers: Vec<((Option<String>, Option<char>), Result<Vec<String>>)> = Vec::new();
     for preset in Preset::shipped()? {
         if preset.is_generic() || preset.recording_of(&name).is_none() {
             continue;
@@ -85,8 +86,14 @@ pub fn detect(path: &Path) -> Result<Option<Preset>> {
         let score = if preset.format == FileFormat::Commonroad {
             usize::from(format == FileFormat::Xml && is_commonroad(path)?) * 100
         } else if preset.format == format {
-            let Ok(rows) = Rows::of_preset(path, &preset) else { continue };
-            fitting(&preset, rows.header())
+            // Presets that open the file in the same way share its header.
+            let how = (preset.rows.clone(), preset.delimiter);
+            let known = headers.iter().position(|(opened, _)| *opened == how);
+            let at = known.unwrap_or_else(|| {
+                headers.push((how, Rows::of_preset(path, &preset).map(|rows| rows.header().to_vec())));
+                headers.len() - 1
+            });
+            headers[at].1.as_ref().map_or(0, |header| fitting(&preset, header))
         } else {
             0
         };

@@ -3,11 +3,13 @@
 use super::preset::Preset;
 use super::raw::{RawRecording, RawSample};
 use super::road::median;
-use super::understanding::Understanding;
+use super::understanding::{TIMES, Understanding};
 use crate::{Error, Place, Result};
 
 /// A sample this far off the raster of times, in frames, is interpolated.
 const OFF_RASTER: f64 = 0.02;
+/// Rows of one vehicle and time that are farther apart contradict each other, m.
+const SAME_PLACE_M: f64 = 0.1;
 /// Pieces of a track with fewer samples tell nothing.
 const MIN_PIECE: usize = 3;
 /// Maximum number of samples that one row of a file becomes by interpolation, beyond [`FREE_SAMPLES`] for all.
@@ -31,7 +33,12 @@ pub(super) fn pieces(
     for vehicle in &mut raw.vehicles {
         vehicle.samples.sort_by(|a, b| a.at.total_cmp(&b.at));
         let count = vehicle.samples.len();
-        vehicle.samples.dedup_by(|a, b| a.at == b.at);
+        vehicle.samples.dedup_by(|later, first| {
+            let is_repeated = later.at == first.at;
+            let apart_m = |axis: usize| (later.xy_m[axis] - first.xy_m[axis]).abs();
+            about.conflicts += u64::from(is_repeated && apart_m(0).max(apart_m(1)) > SAME_PLACE_M);
+            is_repeated
+        });
         about.duplicates += (count - vehicle.samples.len()) as u64;
     }
     let bad = |problem: &str, help: &str| Error::input(place.clone(), problem, help);
@@ -52,7 +59,7 @@ pub(super) fn pieces(
         (rate_hz / stride, 1.0 / stride, origin / stride)
     } else {
         let rate_hz = rate_of_times(raw, step);
-        about.rate_source = "times".to_owned();
+        about.rate_source = TIMES.to_owned();
         if let Some(said) = preset.frame_rate_hz.filter(|said| (said / rate_hz - 1.0).abs() > 0.02) {
             about.find(true, format!("the times have {rate_hz:.2} frames per second, the preset says {said}"));
         }

@@ -217,6 +217,7 @@ shipped!(
     "automatum",
     "citysim",
     "commonroad",
+    "dlr-ht",
     "exid",
     "i24",
     "mitra",

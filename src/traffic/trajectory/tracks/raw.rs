@@ -54,6 +54,17 @@ pub(super) struct RawVehicle {
     pub samples: Vec<RawSample>,
 }
 
+impl RawVehicle {
+    /// Takes the sizes that it lacks from another source.
+    fn complete_sizes(&mut self, known: &RawVehicle) {
+        for (own, known) in [(&mut self.lengths_m, &known.lengths_m), (&mut self.widths_m, &known.widths_m)] {
+            if own.is_empty() {
+                own.clone_from(known);
+            }
+        }
+    }
+}
+
 /// One recording.
 #[derive(Debug, Clone, Default)]
 pub(super) struct RawRecording {
@@ -315,11 +326,7 @@ fn add_vehicle_facts(
         let Some(known) = facts.get(&vehicle.key) else { continue };
         vehicle.class = vehicle.class.take().or_else(|| known.class.clone());
         vehicle.direction = vehicle.direction.or(known.direction);
-        for (own, known) in [(&mut vehicle.lengths_m, &known.lengths_m), (&mut vehicle.widths_m, &known.widths_m)] {
-            if own.is_empty() {
-                own.clone_from(known);
-            }
-        }
+        vehicle.complete_sizes(known);
     }
     Ok(Some(checksum))
 }
@@ -384,11 +391,7 @@ fn add_types(path: &Path, id: &str, pattern: &str, recordings: &mut [RawRecordin
         let Some(known) = types.get(class).or_else(|| types.get(class.split('@').next().unwrap_or_default())) else {
             continue;
         };
-        for (own, known) in [(&mut vehicle.lengths_m, &known.lengths_m), (&mut vehicle.widths_m, &known.widths_m)] {
-            if own.is_empty() {
-                own.clone_from(known);
-            }
-        }
+        vehicle.complete_sizes(known);
         vehicle.class = known.class.clone().or_else(|| vehicle.class.take());
     }
     Ok(())

@@ -9,6 +9,9 @@ use super::road::median;
 use crate::support::readable::{count, significant, value};
 use crate::traffic::trajectory::{Recording, Track, VehicleClass};
 
+/// The source of a frame rate that times gave.
+pub(super) const TIMES: &str = "times";
+
 /// Something that is strange in a file.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize)]
 pub struct Finding {
@@ -120,6 +123,8 @@ pub struct Understanding {
     pub incomplete: u64,
     /// Rows with the vehicle and time of another row.
     pub duplicates: u64,
+    /// Those of them that name another position.
+    pub conflicts: u64,
     /// Pieces of tracks that were too short.
     pub short_pieces: u64,
     /// Tracks beyond one per vehicle, because of gaps.
