@@ -30,12 +30,13 @@ pub(super) struct Configured {
 /// `--help` shows it, and its verbs. Range, default and help are the key's.
 type KeyFlag = (&'static str, &'static str, &'static str, &'static str, bool, &'static [&'static str]);
 
-const SWEEPING: &[&str] = &["study", "sample", "compare", "justify", "map", "verify", "show"];
-const SIMULATING: &[&str] = &["study", "sample", "compare", "justify", "map", "verify", "show", "simulate", "xosc"];
-const GENERATING: &[&str] = &["study", "fit", "compare", "justify", "verify", "show"];
+const SWEEPING: &[&str] = &["study", "search", "sample", "compare", "justify", "map", "verify", "show"];
+const SIMULATING: &[&str] =
+    &["study", "search", "sample", "compare", "justify", "map", "verify", "show", "simulate", "xosc"];
+const GENERATING: &[&str] = &["study", "search", "fit", "compare", "justify", "verify", "show"];
 
 #[rustfmt::skip] // a table: one line per flag
-pub(super) const FLAGS: [KeyFlag; 23] = [
+pub(super) const FLAGS: [KeyFlag; 27] = [
     ("run.threads", "threads", "", RUN, true, &["lanesweep"]),
     ("run.backend", "backend", "", RUN, false, SWEEPING),
     ("run.device", "device", "NAME|pci:BUS|INDEX", RUN, false, SWEEPING),
@@ -57,6 +58,10 @@ pub(super) const FLAGS: [KeyFlag; 23] = [
     ("sample.time_limit_s", "time_limit", "", MODELS, true, &["sample"]),
     ("sample.worst", "worst", "", OUTPUT, true, &["sample"]),
     ("sample.seed", "seed", "", RUN, false, &["sample"]),
+    ("search.folds", "folds", "", MODELS, true, &["search"]),
+    ("search.max_parameters", "max_parameters", "", MODELS, false, &["search"]),
+    ("search.studies", "studies", "", MODELS, false, &["search"]),
+    ("search.seed", "seed", "", RUN, false, &["search"]),
     ("compare.samples", "samples", "", MODELS, false, &["compare"]),
     ("compare.seed", "seed", "", RUN, false, &["compare"]),
 ];

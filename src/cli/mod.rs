@@ -28,6 +28,7 @@ mod sample;
 mod sample_distribution;
 mod sample_options;
 mod sample_run;
+mod search;
 pub mod settings;
 mod shard_flags;
 mod shell;
@@ -98,6 +99,7 @@ enum Verb {
     Mine(mine::Mine),
     Fit(fit::Fit),
     Sample(Box<sample::Sample>),
+    Search(Box<search::Search>),
     Compare(Box<compare::Compare>),
     Justify(Box<justify::Justify>),
     Synth(synth::Synth),
@@ -168,6 +170,7 @@ fn run(cli: &Cli, configured: &Configured) -> Result<Exit> {
         Verb::Mine(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Fit(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Sample(verb) => verb.run(configured, cli.common.verbosity()),
+        Verb::Search(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Compare(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Justify(verb) => verb.run(configured, cli.common.verbosity()),
         Verb::Synth(verb) => verb.run(configured, cli.common.verbosity()),

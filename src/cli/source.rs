@@ -112,6 +112,11 @@ impl SourceFlags {
         }
     }
 
+    /// The policy for implausible input.
+    pub fn policy(&self) -> Implausible {
+        self.plausibility.policy()
+    }
+
     /// Checks that the data can be read.
     ///
     /// # Errors

@@ -31,6 +31,7 @@ pub mod sampling;
 mod sampling_files;
 mod sampling_page;
 pub mod sampling_tables;
+pub mod search;
 pub mod study;
 mod study_answer;
 pub mod study_figures;

@@ -189,7 +189,7 @@ impl StudyReport {
             figures.push(("parameters", distributions(scores.category, &pictures.parameters, data)));
         }
         if !pictures.modes.is_empty() {
-            figures.push(("modes", modes(scores, &pictures.modes, &pictures.svd_explained, data)));
+            figures.push(("modes", modes(scores.category, &pictures.modes, &pictures.svd_explained, data)));
         }
         figures
     }

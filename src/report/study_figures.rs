@@ -246,7 +246,7 @@ fn pareto_front(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
 }
 
 /// The mean scenario and the scenarios along the first directions of a decomposition, and what the directions explain.
-pub fn modes(scores: &CategoryScores, shapes: &[ModeShape], explained: &[f64], data: &str) -> Figure {
+pub fn modes(category: Category, shapes: &[ModeShape], explained: &[f64], data: &str) -> Figure {
     let over_time = |values: &[f64]| {
         let last = values.len().saturating_sub(1).max(1) as f64;
         values.iter().enumerate().map(|(k, v)| (k as f64 / last, *v)).collect::<Vec<_>>()
@@ -272,14 +272,14 @@ pub fn modes(scores: &CategoryScores, shapes: &[ModeShape], explained: &[f64], d
         ..Plot::default()
     };
     Figure {
-        title: format!("{}: what the singular value decomposition keeps", scores.category.label()),
+        title: format!("{}: what the decomposition keeps", category.label()),
         subtitle: Some(data.to_owned()),
         caption:
             "Lines: the mean of the mined scenarios, and the scenario one standard deviation of a coefficient away \
                   from it; lateral positions are positive on the target's side, and a left-positive decomposition \
                   shows the side with more scenarios. Bars: share of the scaled variance that the first coefficients explain together."
                 .to_owned(),
-        plots: shapes.iter().map(panel).chain([share]).collect(),
+        plots: shapes.iter().map(panel).chain((!explained.is_empty()).then_some(share)).collect(),
         ..Figure::default()
     }
 }

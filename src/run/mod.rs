@@ -19,6 +19,7 @@ mod plan_mutations;
 pub mod reopen;
 pub mod sampling;
 pub mod score;
+pub mod search;
 pub mod study;
 
 use std::path::Path;

@@ -27,11 +27,13 @@ pub const ESTIMATE_RECORD: &str = "estimate.json";
 pub const MAP_RECORD: &str = "map.json";
 /// Record of a comparison.
 pub const COMPARE_RECORD: &str = "compare.json";
+/// Record of a search.
+pub const SEARCH_RECORD: &str = "search.json";
 /// Record of a dossier.
 pub const DOSSIER_RECORD: &str = "dossier.json";
 
 /// Records of runs that write files with the same names, such as `report.html`: a folder holds one of them.
-const RECORDS: [&str; 5] = [STUDY_RECORD, ESTIMATE_RECORD, MAP_RECORD, COMPARE_RECORD, DOSSIER_RECORD];
+const RECORDS: [&str; 6] = [STUDY_RECORD, ESTIMATE_RECORD, MAP_RECORD, COMPARE_RECORD, SEARCH_RECORD, DOSSIER_RECORD];
 
 /// The lock of the whole folder.
 const LOCK: &str = "run.lock";
@@ -43,6 +45,7 @@ fn usual_files(record: &str) -> &'static [&'static str] {
         ESTIMATE_RECORD => &["estimates.csv", "report.html"],
         MAP_RECORD => &["cells.csv", "report.html"],
         COMPARE_RECORD => &["compare.csv", "compare.txt", "report.html"],
+        SEARCH_RECORD => &["fronts.csv", "candidates.csv", "report.html"],
         DOSSIER_RECORD => &["hidden.csv", "report.html"],
         _ => &[],
     }

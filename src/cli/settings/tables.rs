@@ -33,6 +33,8 @@ pub struct Settings {
     pub sample: SampleSettings,
     /// `lanesweep compare`.
     pub compare: CompareSettings,
+    /// `lanesweep search`, and cross-validation.
+    pub search: crate::run::search::SearchLimits,
     /// `lanesweep justify`: when a parameterization is appropriate.
     pub justify: crate::run::justify::Rules,
 }

@@ -45,7 +45,22 @@ pub fn fit_svd(
             format!("at least {} are needed: use more data; the kinematic parameterizations still run", needed + 1),
         ));
     }
-    let p = rows[0].len();
+    let weights = column_weights(rows, (series, lateral), instants, scale, name)?;
+    decompose(rows, weights, name)
+}
+
+/// The weight of each column; series share one. Arguments as in [`fit_svd`].
+///
+/// # Errors
+/// [`Error::Input`] for a series or extra that is equal in all rows.
+pub(super) fn column_weights(
+    rows: &[Vec<f64>],
+    (series, lateral): (usize, Option<SvdLateral>),
+    instants: usize,
+    scale: SeriesScale,
+    name: &str,
+) -> Result<Vec<f64>> {
+    let (n, p) = (rows.len(), rows[0].len());
     let deviation = |column: usize| {
         let mean = rows.iter().map(|r| r[column]).sum::<f64>() / n as f64;
         (rows.iter().map(|r| (r[column] - mean) * (r[column] - mean)).sum::<f64>() / n as f64).sqrt()
@@ -67,17 +82,27 @@ pub fn fit_svd(
     weights.extend((series * instants..p).map(|column| 1.0 / deviation(column)));
     if weights.iter().any(|w| !w.is_finite()) {
         return Err(Error::input(
-            place(),
+            Place::item(name),
             "a series, a duration, a speed or a gap is equal in all scenarios and cannot be scaled",
             "use scenarios that differ in speed, lateral motion, duration and gap",
         ));
     }
+    Ok(weights)
+}
+
+/// The decomposition of rows with given weights of their columns.
+///
+/// # Errors
+/// [`Error::Input`] if it does not converge.
+pub(super) fn decompose(rows: &[Vec<f64>], weights: Vec<f64>, name: &str) -> Result<SvdBasis> {
+    let (n, p) = (rows.len(), weights.len());
     let mean: Vec<f64> = (0..p).map(|c| rows.iter().map(|r| r[c] * weights[c]).sum::<f64>() / n as f64).collect();
     let x = Mat::from_fn(n, p, |r, c| rows[r][c] * weights[c] - mean[c]);
     let svd = x.thin_svd();
     clear_upper_halves();
-    let svd =
-        svd.map_err(|e| Error::input(place(), format!("the decomposition did not converge: {e:?}"), "report this"))?;
+    let svd = svd.map_err(|e| {
+        Error::input(Place::item(name), format!("the decomposition did not converge: {e:?}"), "report this")
+    })?;
     let rank = n.min(p);
     let singular_values = (0..rank).map(|j| svd.S()[j]).collect();
     let directions = (0..rank).map(|j| (0..p).map(|c| svd.V()[(c, j)]).collect()).collect();

@@ -1,0 +1,519 @@
+//! The result of a search: text, tables, figures, page and record.
+
+use std::fmt::Write as _;
+
+use serde_json::{Value as Json, json};
+
+use super::html::{Page, PageFigure, Section};
+use super::plot::{Figure, Layer, Look, Mark, Plot, PlotAxis, Series, Symbol, Value};
+use super::sampling::HostRecord;
+use super::study_figures::modes;
+use super::tables::wrap;
+use crate::model::profile::Profile;
+use crate::run::search::{Candidate, Evaluated, Front, FrontPoint, Judged, PaperPoint, Scope, Scored, SearchResult};
+use crate::scenario::parameterization::ModeShape;
+use crate::support::readable::{count, counted};
+use crate::support::run_dir::Results;
+use crate::support::table::{Table, WIDTH};
+use crate::{Error, Result};
+
+/// Maximum number of candidates of a figure: the best of every family and size come first.
+const MAX_DRAWN: usize = 400;
+const PAPER: &str = "#777777";
+const FRONT: &str = "#0072b2";
+const HELD_OUT: &str = "#d55e00";
+
+/// A search as it is reported.
+pub struct SearchReport<'a> {
+    /// The result.
+    pub result: &'a SearchResult,
+    /// Shapes of the winner's directions.
+    pub modes: Vec<ModeShape>,
+    /// The data in one line.
+    pub data: String,
+    /// The data that the search did not read.
+    pub held_out: Option<String>,
+    /// The data are synthetic.
+    pub synthetic: bool,
+    /// Profile.
+    pub profile: &'a Profile,
+    /// The command.
+    pub command: String,
+    /// The machine.
+    pub host: HostRecord,
+}
+
+/// `0.812 [0.743, 0.866]`.
+fn with_interval(scored: &Scored) -> String {
+    let Some(value) = scored.value else { return "undefined".to_owned() };
+    let interval = scored.interval.map_or(String::new(), |i| format!(" [{:.2}, {:.2}]", i.low, i.high));
+    format!("{value:.3}{interval}")
+}
+
+/// The verdict over all models of gains against the paper's best.
+fn verdict(point: &FrontPoint) -> &'static str {
+    let gains = if point.held_out_gains.is_empty() { &point.gains } else { &point.held_out_gains };
+    let all = |of: &dyn Fn(f64, f64) -> bool| {
+        !gains.is_empty()
+            && gains.iter().all(|(_, gain)| gain.is_some_and(|(_, interval)| of(interval.low, interval.high)))
+    };
+    let any_below = gains.iter().any(|(_, gain)| gain.is_some_and(|(_, interval)| interval.high < 0.0));
+    match () {
+        () if all(&|low, _| low > 0.0) => "better for every model",
+        () if any_below => "worse for a model",
+        () if gains.iter().any(|(_, gain)| gain.is_some_and(|(_, interval)| interval.low > 0.0)) => {
+            "better for a model, worse for none"
+        }
+        () => "no difference shown",
+    }
+}
+
+impl SearchReport<'_> {
+    fn describe(&self, candidate: &Candidate) -> String {
+        candidate.describe(self.result.category)
+    }
+
+    fn goal(&self) -> String {
+        let options = &self.result.options;
+        format!("{} of {}", options.objective.name(), options.criterion.label())
+    }
+
+    /// The rows of a front: paper first.
+    fn table(&self, front: &Front) -> Table {
+        enum Row<'a> {
+            Paper(&'a PaperPoint, bool),
+            Found(&'a FrontPoint, bool),
+        }
+        let paper = front.paper.iter().enumerate().map(|(at, point)| Row::Paper(point, front.best_paper == Some(at)));
+        let found = front.points.iter().enumerate().map(|(at, point)| Row::Found(point, front.winner == Some(at)));
+        let rows: Vec<Row> = paper.chain(found).collect();
+        let parts = |row: &Row| -> (Candidate, usize, Judged) {
+            match row {
+                Row::Paper(point, _) => (point.candidate.clone(), point.parameters, point.judged.clone()),
+                Row::Found(point, _) => (point.candidate.clone(), point.parameters, point.judged.clone()),
+            }
+        };
+        let has_held_out = self.held_out.is_some();
+        let scores: Vec<(&str, fn(&Judged) -> Option<Scored>)> = vec![
+            ("cross-validated", |judged| Some(judged.cross_validated)),
+            ("in sample", |judged| Some(judged.in_sample)),
+            ("held out", |judged| judged.held_out),
+        ];
+        let shown = scores.into_iter().filter(|(name, _)| has_held_out || *name != "held out");
+        Table::of(rows.iter())
+            .column("parameters", |row| parts(row).1)
+            .column("", |row| match row {
+                Row::Paper(_, true) => "paper's best",
+                Row::Paper(..) => "paper",
+                Row::Found(_, true) => "winner",
+                Row::Found(..) => "found",
+            })
+            .columns(
+                shown,
+                |(name, _)| name.to_owned(),
+                |row, (_, of)| of(&parts(row).2).map_or(String::new(), |scored| with_interval(&scored)),
+            )
+            .column("against the paper's best", |row| match row {
+                Row::Found(point, _) => verdict(point),
+                Row::Paper(..) => "",
+            })
+            .column("description", |row| self.describe(&parts(row).0))
+            .build()
+            .captioned(format!("{}, {}", self.goal(), front.scope.name()))
+    }
+
+    /// The answer for the terminal.
+    pub fn text(&self) -> String {
+        let result = self.result;
+        let models: Vec<&str> = result.options.models.iter().map(|model| model.name()).collect();
+        let mut text = format!("{}\n", wrap(&self.data, WIDTH));
+        if let Some(held_out) = &self.held_out {
+            text += &format!("held out: {}\n", wrap(held_out, WIDTH - 10));
+        }
+        let _ = writeln!(
+            text,
+            "\n{}",
+            wrap(
+                &format!(
+                    "{} studies of {} {}s ({} lanes each); goal: {} for {}; {} folds",
+                    count(result.studies as u64),
+                    result.scenarios[0],
+                    result.category.label(),
+                    count(result.lanes),
+                    self.goal(),
+                    models.join(", "),
+                    result.options.limits.folds
+                ),
+                WIDTH
+            )
+        );
+        if let Some(front) = result.fronts.first() {
+            let _ = writeln!(text, "\n{}", self.table(front).fitted(2, WIDTH));
+            if let Some(winner) = front.winner.map(|at| &front.points[at]) {
+                let words = format!(
+                    "winner (fewest parameters whose score is not below the best by more than its interval): {} \
+                     parameters, {}, {} cross-validated{}",
+                    winner.parameters,
+                    self.describe(&winner.candidate),
+                    with_interval(&winner.judged.cross_validated),
+                    winner.judged.held_out.map_or(String::new(), |of| format!(", {} held out", with_interval(&of)))
+                );
+                let _ = writeln!(text, "{}", wrap(&words, WIDTH));
+                let gains = if winner.held_out_gains.is_empty() { &winner.gains } else { &winner.held_out_gains };
+                let of = |(model, gain): &(crate::model::driver::ModelId, _)| -> String {
+                    let gain: &Option<(f64, crate::run::score::ScoreInterval)> = gain;
+                    gain.map_or(format!("{} undefined", model.name()), |(by, i)| {
+                        format!("{} {by:+.3} [{:+.2}, {:+.2}]", model.name(), i.low, i.high)
+                    })
+                };
+                let gains: Vec<String> = gains.iter().map(of).collect();
+                let on = if winner.held_out_gains.is_empty() { "cross-validated" } else { "held out" };
+                let words = format!("against the paper's best, {on}: {}", gains.join("; "));
+                let _ = writeln!(text, "{}", wrap(&words, WIDTH));
+            }
+        }
+        if let Some(correlation) = result.rank_correlation {
+            let words = format!(
+                "a small error of the motions is no goal: rank correlation of RMSE and {} over {} candidates {:+.2} \
+                 (-1: the error orders them as the outcomes do)",
+                result.options.objective.name(),
+                count(result.evaluated.len() as u64),
+                correlation
+            );
+            let _ = writeln!(text, "{}", wrap(&words, WIDTH));
+        }
+        if let Some([close, far]) = &result.disagreement {
+            let of = |of: &Evaluated| {
+                let score = of.score(Scope::All, &result.options).unwrap_or(f64::NAN);
+                format!("{} (RMSE {:.2}, {score:.3})", self.describe(&of.candidate), of.rmse)
+            };
+            let _ = writeln!(text, "{}", wrap(&format!("worst pair: {} against {}", of(close), of(far)), WIDTH));
+        }
+        let largest = result.options.limits.max_parameters;
+        let lost = result.unkept.iter().filter(|of| of.parameters == largest).count();
+        let _ = writeln!(
+            text,
+            "{} of {} scenarios are wrong in some lane under every description of the front (unkept.csv)",
+            lost, result.scenarios[0]
+        );
+        if self.synthetic {
+            text += "SYNTHETIC DATA: no number above is a statement about real traffic\n";
+        }
+        text
+    }
+
+    fn front_figure(&self) -> Figure {
+        let value = |parameters: usize, scored: &Scored, tip: String| {
+            scored.value.map(|y| Value {
+                x: parameters as f64,
+                y,
+                interval: scored.interval.map(|i| (i.low, i.high)),
+                tip,
+                ..Value::default()
+            })
+        };
+        let look = |colour, symbol, is_hollow| Some(Look { colour, symbol, is_hollow, ..Look::of(0, 1) });
+        let plot = |front: &Front| {
+            let paper = front.paper.iter().filter_map(|point| {
+                let Candidate::Paper(key) = &point.candidate else { return None };
+                let scored = point.judged.held_out.as_ref().unwrap_or(&point.judged.cross_validated);
+                value(point.parameters, scored, self.describe(&point.candidate)).map(|value| Value {
+                    label: key.clone(),
+                    interval: None,
+                    ..value
+                })
+            });
+            let found = |of: &dyn Fn(&Judged) -> Option<Scored>| -> Vec<Value> {
+                let values = front
+                    .points
+                    .iter()
+                    .filter_map(|point| value(point.parameters, &of(&point.judged)?, self.describe(&point.candidate)));
+                values.collect()
+            };
+            let marks = &[Mark::Line, Mark::Points, Mark::Intervals];
+            let mut layers: Vec<Layer> = vec![
+                Series {
+                    look: look(PAPER, Symbol::Disc, false),
+                    values: paper.collect(),
+                    ..Series::new("paper", &[Mark::Points], [])
+                }
+                .into(),
+                Series {
+                    look: look(FRONT, Symbol::Disc, false),
+                    values: found(&|judged| Some(judged.cross_validated)),
+                    ..Series::new("found, cross-validated", marks, [])
+                }
+                .into(),
+            ];
+            if self.held_out.is_some() {
+                let values = found(&|judged| judged.held_out).into_iter().map(|v| Value { x: v.x + 0.12, ..v });
+                layers.push(
+                    Series {
+                        look: look(HELD_OUT, Symbol::Polygon(3, 0.0), false),
+                        values: values.collect(),
+                        ..Series::new("found, held-out data", marks, [])
+                    }
+                    .into(),
+                );
+            }
+            Plot {
+                heading: front.scope.name(),
+                x: PlotAxis::new("parameters"),
+                y: PlotAxis::exactly(self.result.options.objective.name(), 0.0, 1.0),
+                layers,
+                ..Plot::default()
+            }
+        };
+        let paper = if self.held_out.is_some() { "on held-out data" } else { "cross-validated" };
+        Figure {
+            title: format!("{}: {} against parameters", self.result.category.label(), self.goal()),
+            subtitle: Some(self.data.clone()),
+            plots: self.result.fronts.iter().map(plot).collect(),
+            caption: format!(
+                "Each point: the best description of its size by cross-validation, with its interval over scenarios. \
+                 Grey: the paper's parameterizations by their keys, {paper}. The duration counts as a parameter."
+            ),
+            ..Figure::default()
+        }
+    }
+
+    /// Error against score: the best of each family and size.
+    fn error_figure(&self) -> Figure {
+        let options = &self.result.options;
+        let score = |of: &Evaluated| of.score(Scope::All, options);
+        let mut drawn: Vec<(String, f64, &Evaluated)> = Vec::new();
+        for of in &self.result.evaluated {
+            let Some(value) = score(of) else { continue };
+            let family = of.candidate.family();
+            drawn.push((family, value, of));
+        }
+        // Evenly over all, in the order of the score.
+        drawn.sort_by(|a, b| b.1.total_cmp(&a.1));
+        let stride = drawn.len().div_ceil(MAX_DRAWN).max(1);
+        let drawn: Vec<_> = drawn.into_iter().step_by(stride).collect();
+        let mut families: Vec<String> = drawn.iter().map(|of| of.0.clone()).collect();
+        families.sort();
+        families.dedup();
+        let series = families.iter().map(|family| {
+            let values = drawn.iter().filter(|of| of.0 == *family).map(|(_, value, of)| Value {
+                x: of.rmse,
+                y: *value,
+                tip: self.describe(&of.candidate),
+                ..Value::default()
+            });
+            let values = values.collect();
+            Series { values, ..Series::new(family.clone(), &[Mark::Points], []) }.into()
+        });
+        let plot = Plot {
+            x: PlotAxis::new("root mean square error of the motions, standard deviations"),
+            y: PlotAxis::exactly(format!("{}, {}", self.goal(), Scope::All.name()), 0.0, 1.0),
+            layers: series.collect(),
+            ..Plot::default()
+        };
+        Figure {
+            title: format!("{}: the error of the motions and the outcomes", self.result.category.label()),
+            subtitle: Some(self.data.clone()),
+            plots: vec![plot],
+            caption: format!(
+                "{} candidates, at most {MAX_DRAWN} drawn; cross-validated.",
+                count(self.result.evaluated.len() as u64)
+            ),
+            ..Figure::default()
+        }
+    }
+
+    fn candidates(&self) -> Table {
+        let options = &self.result.options;
+        let scopes: Vec<Scope> = self.result.fronts.iter().map(|front| front.scope).collect();
+        let mut rows: Vec<&Evaluated> = self.result.evaluated.iter().collect();
+        let score = |of: &Evaluated| of.score(Scope::All, options).unwrap_or(-1.0);
+        rows.sort_by(|a, b| a.parameters.cmp(&b.parameters).then_with(|| score(b).total_cmp(&score(a))));
+        Table::of(rows)
+            .column("family", |of| of.candidate.family())
+            .column("parameters", |of| of.parameters)
+            .column("rmse", |of| of.rmse)
+            .columns(
+                scopes,
+                |scope| format!("score_{}", scope.name().replace(' ', "_")),
+                |of, scope| of.score(scope, options),
+            )
+            .column("candidate", |of| serde_json::to_string(&of.candidate).unwrap_or_default())
+            .build()
+    }
+
+    fn front_csv(&self) -> Table {
+        let category = self.result.category;
+        let rows = self.result.fronts.iter().flat_map(|front| {
+            let paper =
+                front.paper.iter().map(move |p| (front, "paper", &p.candidate, p.parameters, p.rmse, &p.judged));
+            let found =
+                front.points.iter().map(move |p| (front, "found", &p.candidate, p.parameters, p.rmse, &p.judged));
+            paper.chain(found)
+        });
+        let rows: Vec<_> = rows.collect();
+        type Of = fn(&Judged) -> Option<Scored>;
+        let scores: [(&str, Of); 3] = [
+            ("cross_validated", |judged| Some(judged.cross_validated)),
+            ("in_sample", |judged| Some(judged.in_sample)),
+            ("held_out", |judged| judged.held_out),
+        ];
+        type End = fn(&Scored) -> Option<f64>;
+        let ends: [(&str, End); 3] = [
+            ("", |scored| scored.value),
+            ("_low", |scored| scored.interval.map(|i| i.low)),
+            ("_high", |scored| scored.interval.map(|i| i.high)),
+        ];
+        let columns = scores.into_iter().flat_map(|score| ends.map(|end| (score, end)));
+        Table::of(rows.iter())
+            .column("models", |row| row.0.scope.name())
+            .column("origin", |row| row.1)
+            .column("parameters", |row| row.3)
+            .column("rmse", |row| row.4)
+            .columns(
+                columns,
+                |((score, _), (end, _))| format!("{score}{end}"),
+                |row, ((_, of), (_, end))| of(row.5).and_then(|scored| end(&scored)),
+            )
+            .column("description", |row| row.2.describe(category))
+            .column("data", |_| self.data.as_str())
+            .build()
+    }
+
+    fn unkept(&self) -> Table {
+        Table::of(self.result.unkept.iter())
+            .column("max_parameters", |of| of.parameters)
+            .column("scenario", |of| of.scenario.as_str())
+            .column("wrong_lanes", |of| of.lanes)
+            .build()
+    }
+
+    fn record(&self) -> Result<Json> {
+        let to_json = |value: serde_json::Result<Json>| {
+            value.map_err(|error| Error::Internal(format!("a search as JSON: {error}")))
+        };
+        let result = self.result;
+        let winner = result.fronts.first().and_then(|front| Some(&front.points[front.winner?]));
+        Ok(json!({
+            "program": format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
+            "command": self.command,
+            "data": self.data,
+            "held_out": self.held_out,
+            "synthetic": self.synthetic,
+            "profile": self.profile.name,
+            "category": result.category.key(),
+            "models": result.options.models.iter().map(|model| model.name()).collect::<Vec<_>>(),
+            "criterion": result.options.criterion.key(),
+            "objective": result.options.objective.name(),
+            "shuffled": result.options.shuffled,
+            "limits": to_json(serde_json::to_value(&result.options.limits))?,
+            "scenarios": result.scenarios[0],
+            "held_out_scenarios": result.scenarios[1],
+            "studies": result.studies,
+            "lanes_per_study": result.lanes,
+            "rank_correlation_rmse_score": result.rank_correlation,
+            "winner": winner.map(|point| json!({
+                "parameters": point.parameters,
+                "description": self.describe(&point.candidate),
+                "cross_validated": point.judged.cross_validated.value,
+                "in_sample": point.judged.in_sample.value,
+                "held_out": point.judged.held_out.and_then(|of| of.value),
+                "against_the_papers_best": verdict(point),
+            })),
+            "fronts": result.fronts.iter().map(|front| self.table(front).records()).collect::<Vec<_>>(),
+            "host": to_json(serde_json::to_value(&self.host))?,
+        }))
+    }
+
+    /// The record as JSON.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] for a defect of this program.
+    pub fn json(&self) -> Result<String> {
+        super::records::document(&self.record()?)
+    }
+
+    fn page(&self, figures: &[(&str, Figure)]) -> Result<String> {
+        let of = |name: &str| -> Vec<PageFigure> {
+            let found = figures.iter().filter(|(file, _)| *file == name);
+            found.map(|(file, figure)| PageFigure::new(&figure.svg(), &[&format!("{file}.svg")])).collect()
+        };
+        let answer = Section { text: self.text(), figures: of("front"), ..Section::new("answer", "Answer") };
+        let kept = Section {
+            intro: "What the winner keeps, as scenarios one standard deviation of a parameter away from the mean."
+                .to_owned(),
+            figures: of("winner"),
+            ..Section::new("winner", "The winner")
+        };
+        let tables = Section {
+            tables: self.result.fronts.iter().map(|front| self.table(front)).collect(),
+            ..Section::new("fronts", "Fronts")
+        };
+        let error = Section { figures: of("error"), ..Section::new("error", "Error and outcomes") };
+        let lost = self.result.unkept.iter().filter(|of| of.parameters == self.result.options.limits.max_parameters);
+        let lost: String =
+            lost.take(50).map(|of| format!("{}: {}\n", of.scenario, counted(of.lanes as usize, "lane"))).collect();
+        let unkept = Section {
+            intro:
+                "Scenarios with a wrong verdict under every description of the front, and the lanes of the best; at \
+                    most 50 are listed."
+                    .to_owned(),
+            text: lost,
+            ..Section::new("unkept", "What no description keeps")
+        };
+        let program = format!("lanesweep {}", env!("CARGO_PKG_VERSION"));
+        let reproduction = Section {
+            facts: vec![
+                ("program".to_owned(), program.clone()),
+                ("command".to_owned(), self.command.clone()),
+                ("profile".to_owned(), self.profile.name.clone()),
+            ],
+            host: vec![("computed by".to_owned(), self.host.backend.clone())],
+            ..Section::new("reproduction", "Reproduction")
+        };
+        let mut sections = vec![answer, kept, tables, error, unkept, reproduction];
+        sections.retain(|s| s.id != "winner" || !s.figures.is_empty());
+        let page = Page {
+            title: format!("Search for a parameterization: {}", self.result.category.label()),
+            program,
+            lead: format!("{} studies. {}", count(self.result.studies as u64), self.data),
+            warnings: if self.synthetic {
+                vec!["Synthetic data: no statement about real traffic.".to_owned()]
+            } else {
+                Vec::new()
+            },
+            sections,
+        };
+        page.html()
+    }
+
+    /// Writes all files.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn write(&self, mut results: Results) -> Result<()> {
+        let mut figures = vec![("front", self.front_figure()), ("error", self.error_figure())];
+        if !self.modes.is_empty() {
+            let figure = Figure {
+                title: format!("{}: what the winner keeps", self.result.category.label()),
+                caption: "Lines: the mean of the scenarios, and the scenario one standard deviation of a parameter \
+                          away from it, for the first three."
+                    .to_owned(),
+                ..modes(self.result.category, &self.modes, &[], &self.data)
+            };
+            figures.push(("winner", figure));
+        }
+        for (name, figure) in &figures {
+            results.add(&format!("{name}.svg"), figure.svg().as_bytes())?;
+            results.add(&format!("{name}.csv"), figure.csv().as_bytes())?;
+        }
+        results.add("fronts.csv", self.front_csv().csv().as_bytes())?;
+        results.add("candidates.csv", self.candidates().csv().as_bytes())?;
+        results.add("unkept.csv", self.unkept().csv().as_bytes())?;
+        if let Some(winner) = &self.result.winner {
+            results.add("winner.json", &winner.to_json(&self.data)?)?;
+        }
+        results.add("report.txt", self.text().as_bytes())?;
+        results.add("report.html", self.page(&figures)?.as_bytes())?;
+        results.publish(self.json()?.as_bytes())
+    }
+}

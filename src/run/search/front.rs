@@ -1,0 +1,386 @@
+//! The conclusion of a search: the best description of each size, judged again with intervals, in sample, and on data that
+//! the search has not read, beside the paper's parameterizations.
+
+use super::evaluation::{Evaluation, Evaluator, Training, of_paper};
+use super::{Candidate, Evaluated, Scope, Search, SearchOptions, candidates, cell_of};
+use crate::engine::{Confusion, Executor};
+use crate::model::driver::ModelId;
+use crate::run::score::{Contrast, ScenarioRate, ScoreInterval, min_contrast};
+use crate::scenario::parameterization::{Parameterization, Reduction};
+use crate::scenario::{Category, Scenario};
+use crate::{Error, Place, Result};
+
+/// A score with its interval over scenarios.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Scored {
+    /// The objective; `None` for 0/0.
+    pub value: Option<f64>,
+    /// Its interval; `None` for the risk ratio and for 0/0.
+    pub interval: Option<ScoreInterval>,
+}
+
+/// Scores of one description.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Judged {
+    /// By cross-validation.
+    pub cross_validated: Scored,
+    /// Fitted and judged on the same scenarios.
+    pub in_sample: Scored,
+    /// On data that the search has not read; `None` without.
+    pub held_out: Option<Scored>,
+}
+
+/// A parameterization of the paper in a scope.
+#[derive(Debug, Clone, PartialEq)]
+pub struct PaperPoint {
+    /// The candidate.
+    pub candidate: Candidate,
+    /// Number of parameters.
+    pub parameters: usize,
+    /// Its scores.
+    pub judged: Judged,
+    /// Error of the motions.
+    pub rmse: f64,
+}
+
+/// The best description of one size in a scope.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FrontPoint {
+    /// The candidate.
+    pub candidate: Candidate,
+    /// Number of parameters.
+    pub parameters: usize,
+    /// Its scores.
+    pub judged: Judged,
+    /// Error of the motions.
+    pub rmse: f64,
+    /// Per model of the scope: score minus that of the paper's best, cross-validated.
+    pub gains: Vec<(ModelId, Option<(f64, ScoreInterval)>)>,
+    /// The same on held-out data.
+    pub held_out_gains: Vec<(ModelId, Option<(f64, ScoreInterval)>)>,
+    /// Score minus that of the best size of the front, cross-validated.
+    pub below_best: Option<(f64, ScoreInterval)>,
+}
+
+/// The best descriptions of a scope.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Front {
+    /// The models.
+    pub scope: Scope,
+    /// One per size, ascending; each better than all smaller ones.
+    pub points: Vec<FrontPoint>,
+    /// The paper's parameterizations.
+    pub paper: Vec<PaperPoint>,
+    /// Index of the paper's best, by cross-validation.
+    pub best_paper: Option<usize>,
+    /// Index of the winner: the fewest parameters whose score is not significantly below the best.
+    pub winner: Option<usize>,
+}
+
+/// A scenario whose outcomes no description of a size keeps.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Unkept {
+    /// Maximum number of parameters.
+    pub parameters: usize,
+    /// The scenario.
+    pub scenario: String,
+    /// Lanes whose verdict differs in the best of them.
+    pub lanes: u64,
+}
+
+/// The result of a search.
+#[derive(Debug)]
+pub struct SearchResult {
+    /// Kind of scenario.
+    pub category: Category,
+    /// Options, with the models that were scored.
+    pub options: SearchOptions,
+    /// Models without enough failures, with the number of failing scenarios.
+    pub left_out: Vec<(ModelId, u64)>,
+    /// Number of scenarios searched, and held out.
+    pub scenarios: [usize; 2],
+    /// Number of lanes of a study.
+    pub lanes: u64,
+    /// Studies: candidates that were evaluated, those that could not be fitted included.
+    pub studies: usize,
+    /// Every candidate's result.
+    pub evaluated: Vec<Evaluated>,
+    /// One per scope; all models first.
+    pub fronts: Vec<Front>,
+    /// Spearman's rank correlation of error and score over all candidates with a score.
+    pub rank_correlation: Option<f64>,
+    /// A pair that the error orders wrongly, by the largest difference of scores: smaller error and lower score first.
+    pub disagreement: Option<[Evaluated; 2]>,
+    /// Scenarios that no description of the front keeps, by size.
+    pub unkept: Vec<Unkept>,
+    /// The winner for all models, fitted on all scenarios.
+    pub winner: Option<Parameterization>,
+}
+
+/// Judges fronts and winners.
+pub(super) fn conclude(
+    search: &Search,
+    evaluator: &Evaluator,
+    training: &Training,
+    evaluated: Vec<Evaluated>,
+    studies: usize,
+    held_out: Option<&[Scenario]>,
+    executor: &Executor,
+) -> Result<SearchResult> {
+    let (options, category) = (&search.options, search.options.category);
+    let scopes = Scope::all(options);
+    let chosen: Vec<Vec<Candidate>> = scopes.iter().map(|scope| nondominated(&evaluated, *scope, options)).collect();
+    let paper = candidates::paper(category);
+    let mut all: Vec<Candidate> = paper.clone();
+    for candidate in chosen.iter().flatten() {
+        if !all.contains(candidate) {
+            all.push(candidate.clone());
+        }
+    }
+    let cross_validated = evaluator.evaluate(&all, training)?;
+    let in_sample = evaluator.evaluate(&all, &Training::InSample)?;
+    let unread: Option<Vec<&Scenario>> =
+        held_out.map(|all| all.iter().filter(|s| s.kept && s.category == category).collect());
+    let held_out = match &unread {
+        Some(scenarios) if scenarios.len() < 2 => {
+            let problem = format!("{} {} scenarios are too few", scenarios.len(), category.label());
+            return Err(Error::input(Place::item("held-out data"), problem, "hold out more recordings"));
+        }
+        Some(scenarios) => {
+            let evaluator = Evaluator::new(category, scenarios.clone(), search.profile, options, executor)?;
+            Some(evaluator.evaluate(&all, &Training::On(&search.scenarios))?)
+        }
+        None => None,
+    };
+    let found = |candidate: &Candidate| all.iter().position(|known| known == candidate);
+    let judged = |at: usize, scope: Scope| -> Option<Judged> {
+        Some(Judged {
+            cross_validated: scored(cross_validated[at].as_ref()?, scope, options),
+            in_sample: scored(in_sample[at].as_ref()?, scope, options),
+            held_out: held_out.as_ref().and_then(|of| Some(scored(of[at].as_ref()?, scope, options))),
+        })
+    };
+    let rmse = |at: usize| cross_validated[at].as_ref().map_or(f64::NAN, |of| of.rmse);
+    let mut fronts = Vec::new();
+    for (scope, chosen) in scopes.iter().zip(&chosen) {
+        let scope = *scope;
+        let of_paper = paper.iter().enumerate().filter_map(|(at, candidate)| {
+            let parameters = candidate.parameter_count(category);
+            Some((
+                at,
+                PaperPoint { candidate: candidate.clone(), parameters, judged: judged(at, scope)?, rmse: rmse(at) },
+            ))
+        });
+        let of_paper: Vec<(usize, PaperPoint)> = of_paper.collect();
+        let value = |(_, (_, point)): &(usize, &(usize, PaperPoint))| point.judged.cross_validated.value;
+        let best_paper = of_paper
+            .iter()
+            .enumerate()
+            .filter(|item| value(item).is_some())
+            .max_by(|a, b| value(a).unwrap_or_default().total_cmp(&value(b).unwrap_or_default()))
+            .map(|(index, _)| index);
+        let rival = best_paper.map(|index| of_paper[index].0);
+        let best = chosen.last().and_then(found);
+        let gains = |of: &[Option<Evaluation>], at: usize| {
+            let of_model = |model: ModelId| {
+                let scope = Scope::Model(model);
+                let gain = difference(of[at].as_ref()?, of[rival?].as_ref()?, scope, options);
+                Some((model, gain))
+            };
+            scope.models(options).into_iter().filter_map(of_model).collect::<Vec<_>>()
+        };
+        let point = |candidate: &Candidate| {
+            let at = found(candidate)?;
+            let below_best = best.and_then(|best| {
+                difference(cross_validated[at].as_ref()?, cross_validated[best].as_ref()?, scope, options)
+            });
+            Some(FrontPoint {
+                parameters: candidate.parameter_count(category),
+                judged: judged(at, scope)?,
+                rmse: rmse(at),
+                gains: gains(&cross_validated, at),
+                held_out_gains: held_out.as_ref().map_or(Vec::new(), |of| gains(of, at)),
+                below_best,
+                candidate: candidate.clone(),
+            })
+        };
+        let points: Vec<FrontPoint> = chosen.iter().filter_map(point).collect();
+        let is_enough = |point: &FrontPoint| point.below_best.is_none_or(|(_, interval)| interval.high >= 0.0);
+        let winner = points.iter().position(is_enough);
+        let paper = of_paper.into_iter().map(|(_, point)| point).collect();
+        fronts.push(Front { scope, points, paper, best_paper, winner });
+    }
+    let winner = fronts.first().and_then(|front| Some(&front.points[front.winner?].candidate));
+    let winner = winner.map(|candidate| fitted(candidate, search)).transpose()?;
+    let unkept = unkept(&all, &cross_validated, search);
+    let (rank_correlation, disagreement) = rmse_against_score(&evaluated, options);
+    Ok(SearchResult {
+        category,
+        options: options.clone(),
+        left_out: search.left_out.clone(),
+        scenarios: [search.scenarios.len(), unread.map_or(0, |scenarios| scenarios.len())],
+        lanes: search.scenarios.len() as u64 * (options.headways.len() * ModelId::ALL.len()) as u64,
+        studies,
+        evaluated,
+        fronts,
+        rank_correlation,
+        disagreement,
+        unkept,
+        winner,
+    })
+}
+
+/// The best candidate of each size that is better than all smaller ones.
+fn nondominated(evaluated: &[Evaluated], scope: Scope, options: &SearchOptions) -> Vec<Candidate> {
+    let mut front = Vec::new();
+    let mut reached = f64::NEG_INFINITY;
+    for parameters in 1..=options.limits.max_parameters {
+        let of_size = evaluated.iter().filter(|of| of.parameters == parameters);
+        let scores = of_size.filter_map(|of| Some((of.score(scope, options)?, of)));
+        // The first of equals, in the order of their texts.
+        let best = scores.fold(None, |best: Option<(f64, &Evaluated)>, here| match best {
+            Some(known) if known.0 >= here.0 => Some(known),
+            _ => Some(here),
+        });
+        if let Some((score, best)) = best.filter(|(score, _)| *score > reached) {
+            reached = score;
+            front.push(best.candidate.clone());
+        }
+    }
+    front
+}
+
+fn units_of(evaluation: &Evaluation, model: ModelId, options: &SearchOptions) -> Vec<Confusion<u32>> {
+    let cell = cell_of(model, options.criterion);
+    evaluation.units.iter().map(|unit| unit[cell]).collect()
+}
+
+/// The mean score of a scope with its interval.
+fn scored(evaluation: &Evaluation, scope: Scope, options: &SearchOptions) -> Scored {
+    let models = scope.models(options);
+    let units: Vec<Vec<Confusion<u32>>> = models.iter().map(|model| units_of(evaluation, *model, options)).collect();
+    let value = |units: &Vec<Confusion<u32>>| {
+        let mut total = Confusion::default();
+        units.iter().for_each(|unit| total.add(unit));
+        options.objective.of(&total)
+    };
+    let values: Option<Vec<f64>> = units.iter().map(value).collect();
+    let value = values.map(|values| values.iter().sum::<f64>() / values.len() as f64);
+    let rates: Option<Vec<ScenarioRate>> = units.iter().map(|units| options.objective.rate(units)).collect();
+    let share = 1.0 / models.len() as f64;
+    let mean = Contrast { constant: 0.0, terms: (0..models.len()).map(|at| (share, at)).collect() };
+    let interval = rates.and_then(|rates| min_contrast(&rates, &[mean], options.score.confidence));
+    Scored { value, interval: interval.map(|(_, interval)| interval) }
+}
+
+/// The mean score of one description minus that of another, over the same scenarios.
+fn difference(
+    of: &Evaluation,
+    other: &Evaluation,
+    scope: Scope,
+    options: &SearchOptions,
+) -> Option<(f64, ScoreInterval)> {
+    let models = scope.models(options);
+    let share = 1.0 / models.len() as f64;
+    let rates = [of, other].into_iter().flat_map(|evaluation| models.iter().map(move |model| (evaluation, *model)));
+    let rates = rates.map(|(of, model)| options.objective.rate(&units_of(of, model, options)));
+    let rates = rates.collect::<Option<Vec<ScenarioRate>>>()?;
+    let signs = (0..rates.len()).map(|at| (if at < models.len() { share } else { -share }, at));
+    min_contrast(&rates, &[Contrast { constant: 0.0, terms: signs.collect() }], options.score.confidence)
+}
+
+/// The candidate fitted on all scenarios of the search.
+fn fitted(candidate: &Candidate, search: &Search) -> Result<Parameterization> {
+    let (category, parameterization) = (search.options.category, &search.options.parameterization);
+    let spec = match candidate {
+        Candidate::Linear(spec) => spec.clone(),
+        Candidate::Paper(key) => {
+            let id = Parameterization::find(category, key);
+            let id = id.ok_or_else(|| Error::Internal(format!("there is no {key}")))?;
+            match id.coefficients() {
+                None => return Ok(id),
+                Some(coefficients) => of_paper(coefficients, parameterization),
+            }
+        }
+    };
+    let reduction: Reduction = spec.fit(category, &search.scenarios, parameterization)?;
+    Ok(Parameterization::linear("winner", reduction))
+}
+
+/// Scenarios for which every description of at most a size has a wrong verdict, with the lanes of the best.
+fn unkept(all: &[Candidate], evaluations: &[Option<Evaluation>], search: &Search) -> Vec<Unkept> {
+    let options = &search.options;
+    let cells: Vec<usize> = options.models.iter().map(|model| cell_of(*model, options.criterion)).collect();
+    let wrong = |evaluation: &Evaluation, unit: usize| -> u64 {
+        cells.iter().map(|cell| evaluation.units[unit][*cell]).map(|c| u64::from(c.fn_ + c.fp)).sum()
+    };
+    let mut unkept = Vec::new();
+    for parameters in 2..=options.limits.max_parameters {
+        let of_size: Vec<&Evaluation> = all
+            .iter()
+            .zip(evaluations)
+            .filter(|(candidate, _)| candidate.parameter_count(options.category) <= parameters)
+            .filter_map(|(_, evaluation)| evaluation.as_ref())
+            .collect();
+        for (unit, scenario) in search.scenarios.iter().enumerate() {
+            let lanes = of_size.iter().map(|evaluation| wrong(evaluation, unit)).min().unwrap_or(0);
+            if lanes > 0 {
+                unkept.push(Unkept { parameters, scenario: scenario.id.clone(), lanes });
+            }
+        }
+    }
+    unkept.sort_by(|a, b| {
+        (a.parameters, std::cmp::Reverse(a.lanes), &a.scenario).cmp(&(
+            b.parameters,
+            std::cmp::Reverse(b.lanes),
+            &b.scenario,
+        ))
+    });
+    unkept
+}
+
+/// Rank correlation of error and score, and the pair that it orders wrongly by the largest difference of scores.
+fn rmse_against_score(evaluated: &[Evaluated], options: &SearchOptions) -> (Option<f64>, Option<[Evaluated; 2]>) {
+    let mut known: Vec<(f64, f64, &Evaluated)> = evaluated
+        .iter()
+        .filter_map(|of| Some((of.rmse, of.score(Scope::All, options)?, of)))
+        .filter(|(rmse, ..)| rmse.is_finite())
+        .collect();
+    known.sort_by(|a, b| a.0.total_cmp(&b.0));
+    if known.len() < 3 {
+        return (None, None);
+    }
+    let ranks = |values: &[f64]| -> Vec<f64> {
+        let mut order: Vec<usize> = (0..values.len()).collect();
+        order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
+        let mut ranks = vec![0.0; values.len()];
+        let mut from = 0;
+        while from < order.len() {
+            let to = (from..order.len()).take_while(|at| values[order[*at]] == values[order[from]]).count() + from;
+            order[from..to].iter().for_each(|at| ranks[*at] = (from + to - 1) as f64 / 2.0);
+            from = to;
+        }
+        ranks
+    };
+    let a = ranks(&known.iter().map(|of| of.0).collect::<Vec<_>>());
+    let b = ranks(&known.iter().map(|of| of.1).collect::<Vec<_>>());
+    let mean = (known.len() - 1) as f64 / 2.0;
+    let product = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| (x - mean) * (y - mean)).sum::<f64>();
+    let correlation = product(&a, &b) / libm::sqrt(product(&a, &a) * product(&b, &b));
+    // The highest score at a larger error, from the right.
+    let mut best_right: Option<usize> = None;
+    let mut worst: Option<(f64, [usize; 2])> = None;
+    for at in (0..known.len()).rev() {
+        if let Some(right) = best_right.filter(|right| known[*right].0 > known[at].0) {
+            let by = known[right].1 - known[at].1;
+            if worst.is_none_or(|(known, _)| by > known) {
+                worst = Some((by, [at, right]));
+            }
+        }
+        if best_right.is_none_or(|right| known[at].1 > known[right].1) {
+            best_right = Some(at);
+        }
+    }
+    let pair = worst.filter(|(by, _)| *by > 0.0).map(|(_, pair)| pair.map(|at| known[at].2.clone()));
+    (correlation.is_finite().then_some(correlation), pair)
+}
