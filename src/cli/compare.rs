@@ -84,7 +84,15 @@ impl Compare {
         }
 
         let options = CompareOptions {
-            study: StudyOptions { categories, models, headways, parameterization: config.of_densities() },
+            study: StudyOptions {
+                categories,
+                models,
+                headways,
+                parameterization: config.of_densities(),
+                folds: None,
+                searched: ids.iter().filter(|id| id.fitted_basis().is_some()).cloned().collect(),
+                external: Vec::new(),
+            },
             parameterizations: ids,
             samples: config.compare.samples,
             every_form: self.forms,

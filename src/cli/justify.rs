@@ -40,8 +40,8 @@ use crate::{Error, Place, Result};
 pub struct Justify {
     #[command(flatten)]
     data: SourceFlags,
-    /// Parameterization: 1…7 (cut-in), a…g (cut-out), i…v (LVD)
-    #[arg(long, value_name = "KEY", help_heading = "Scenario")]
+    /// Parameterization: 1…7 (cut-in), a…g (cut-out), i…v (LVD), or a file of `search`
+    #[arg(long, value_name = "KEY|FILE", help_heading = "Scenario")]
     parameterization: String,
     /// Driver model: Reg157, CCHDM, RSS, FSM
     #[arg(long, value_name = "NAME", help_heading = "Models and criteria")]
@@ -90,6 +90,9 @@ impl Justify {
                     models: vec![model],
                     headways,
                     parameterization: config.of_densities(),
+                    folds: Some(config.search.folds),
+                    searched: id.fitted_basis().map(|_| id.clone()).into_iter().collect(),
+                    external: Vec::new(),
                 },
                 parameterizations: vec![id],
                 samples: config.compare.samples,
@@ -129,6 +132,9 @@ impl Justify {
 
 /// Finds a parameterization by its key; keys are unique over the categories.
 fn parameterization(key: &str) -> Result<Parameterization> {
+    if lists::is_file(key) {
+        return Parameterization::read(key.trim().as_ref());
+    }
     let found = Category::ALL.into_iter().find_map(|category| Parameterization::find(category, key.trim()));
     found.ok_or_else(|| {
         let keys = Category::ALL.into_iter().flat_map(Parameterization::of).map(|id| id.key.to_string());

@@ -46,12 +46,17 @@ impl CategoriesFlag {
     }
 }
 
+/// Whether the name of a parameterization is that of a file.
+pub fn is_file(name: &str) -> bool {
+    name.trim().ends_with(".json")
+}
+
 /// `--parameterizations`.
 #[derive(Debug, Clone, Args)]
 pub struct ParameterizationsFlag {
-    /// Parameterizations: 1…7, a…g, i…v [default: all]
+    /// Parameterizations: 1…7, a…g, i…v, files of `search` [default: all]
     ///
-    /// 1…7 are for cut-ins, a…g for cut-outs, i…v for leader decelerations.
+    /// 1…7 are for cut-ins, a…g for cut-outs, i…v for leader decelerations. A name that ends in .json is a file.
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Scenario")]
     parameterizations: Vec<String>,
 }
@@ -62,7 +67,22 @@ impl ParameterizationsFlag {
     /// # Errors
     /// As [`parameterizations`].
     pub fn list(&self, categories: &[Category]) -> Result<Vec<Parameterization>> {
-        parameterizations(categories, &self.parameterizations)
+        let (files, keys): (Vec<&String>, Vec<&String>) = self.parameterizations.iter().partition(|name| is_file(name));
+        let keys: Vec<String> = keys.into_iter().cloned().collect();
+        // Files alone are meant alone.
+        let mut found = match keys.is_empty() && !files.is_empty() {
+            true => Vec::new(),
+            false => parameterizations(categories, &keys)?,
+        };
+        for file in files {
+            let id = Parameterization::read(file.trim().as_ref())?;
+            if found.iter().any(|known| (known.category, &known.key) == (id.category, &id.key)) {
+                let problem = format!("{} is given twice", id.name());
+                return Err(Error::usage(Place::item("--parameterizations"), problem, "name each once"));
+            }
+            found.extend(categories.contains(&id.category).then_some(id));
+        }
+        Ok(found)
     }
 }
 

@@ -20,7 +20,8 @@ use crate::report::reference::ReferenceComparison;
 use crate::report::run_record::{StudyHost, Timings};
 use crate::report::study::StudyReport;
 use crate::run::parts::{PLAN_FILE, RUN_PLAN_FILE};
-use crate::run::study::{self, StudyOptions, StudyResult};
+use crate::run::study::{self, GivenReplay, StudyOptions, StudyResult};
+use crate::scenario::parameterization::Parameterization;
 use crate::support::files::{check_folder, check_folder_of};
 use crate::support::input_file;
 use crate::support::readable;
@@ -34,7 +35,8 @@ use crate::traffic::Source;
 /// generated recordings. The answer goes to stdout, tables and figures to --out.
 #[derive(Debug, Args)]
 #[command(mut_args(|arg| match arg.get_id().as_str() {
-    "dir" | "scenarios" | "accept_implausible" | "categories" | "models" | "thw" | "published" | "reference" => {
+    "dir" | "scenarios" | "accept_implausible" | "categories" | "models" | "thw" | "published" | "reference"
+    | "cross_validate" | "external" => {
         arg.conflicts_with("plan")
     }
     "rows" | "compare_reference" | "keep_plan" => arg.conflicts_with_all(["shard", "plan_only"]),
@@ -72,6 +74,15 @@ pub struct Study {
     models: lists::ModelsFlag,
     #[command(flatten)]
     headways: lists::HeadwaysFlag,
+    /// Also replay every scenario by decompositions that have not seen it (5-held-out, …)
+    ///
+    /// Scenarios are divided into folds by recording ([search] folds). A decomposition fitted on the scenarios that it
+    /// replays flatters itself.
+    #[arg(long, help_heading = "Models and criteria")]
+    cross_validate: bool,
+    /// S' from another program (scenario file with the ids of S), or a parameterization of `search` (.json)
+    #[arg(long, value_name = "FILE", help_heading = "Data")]
+    external: Vec<PathBuf>,
     /// Print lanes, memory and estimated time; write nothing
     #[arg(long, conflicts_with_all = ["shard", "plan_only"], help_heading = "Run")]
     dry_run: bool,
@@ -161,6 +172,9 @@ impl Study {
             models: self.models.list()?,
             headways: self.headways.list()?,
             parameterization: configured.settings.parameterization.clone(),
+            folds: self.cross_validate.then_some(configured.settings.search.folds),
+            searched: Vec::new(),
+            external: Vec::new(),
         };
         Ok((profile, options))
     }
@@ -168,7 +182,7 @@ impl Study {
     /// Makes a plan from the data.
     fn prepare(&self, configured: &Configured, verbosity: Verbosity) -> Result<(study::Study, Timings)> {
         let config = configured.settings.clone();
-        let (profile, options) = self.profile_and_options(configured)?;
+        let (profile, mut options) = self.profile_and_options(configured)?;
         let source = self.data.source(configured);
         let has_paper_headways = options.headways == Headway::paper();
         // Generated data are described with the answer.
@@ -177,6 +191,13 @@ impl Study {
         }
         let mut timings = Timings::default();
         let collection = timed(&mut timings.mine_s, || self.data.load(configured, verbosity))?;
+        for path in &self.external {
+            if lists::is_file(&path.to_string_lossy()) {
+                options.searched.push(Parameterization::read(path)?);
+            } else {
+                options.external.extend(GivenReplay::read(path, &collection.scenarios, &options.categories)?);
+            }
+        }
         let data = source.describe(collection.synthetic);
         let builder = study::Study::builder(&collection, profile)
             .options(options)
@@ -276,6 +297,7 @@ impl Study {
         let results = results.into_iter().chain([PLAN_FILE, RUN_PLAN_FILE]);
         let mut others: Vec<PathBuf> = results.map(|name| self.out.join(name)).collect();
         others.extend(self.data.scenarios.clone());
+        others.extend(self.external.iter().cloned());
         others.extend(configured.files().iter().cloned());
         others.extend(self.shards.plan.clone());
         source::refuse_overwriting(lanes, &others, "--rows")?;

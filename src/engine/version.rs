@@ -251,7 +251,7 @@ mod tests {
         let (mut held, mut blocks) = (Vec::new(), Vec::new());
         for category in Category::ALL {
             held.extend((0..2).map(|number| stripped(&scenario(category, number), None)));
-            blocks.push(BlockHead::new(category, 2, Some(&reduction(category, &options))));
+            blocks.push(BlockHead::new(category, 2, Some(&reduction(category, &options)), Vec::new()));
         }
         let headways = vec![Headway::ThwS(1.2), Headway::ThwS(0.4), Headway::GapM(9.0)];
         let head = StudyHead::new(profile.clone(), models(), headways, options, blocks, &held).unwrap();

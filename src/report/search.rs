@@ -151,8 +151,9 @@ impl SearchReport<'_> {
             let _ = writeln!(text, "\n{}", self.table(front).fitted(2, WIDTH));
             if let Some(winner) = front.winner.map(|at| &front.points[at]) {
                 let words = format!(
-                    "winner (fewest parameters whose score is not below the best by more than its interval): {} \
+                    "winner (fewest parameters whose score is shown to be at most {} below the best): {} \
                      parameters, {}, {} cross-validated{}",
+                    result.options.limits.margin,
                     winner.parameters,
                     self.describe(&winner.candidate),
                     with_interval(&winner.judged.cross_validated),

@@ -23,7 +23,7 @@ use crate::run::study::{CategoryProvenance, ParameterHistogram, Study};
 use crate::scenario::Category;
 use crate::scenario::parameterization::{ModeShape, Parameterization};
 use crate::support::run_dir::Results;
-use crate::support::table::Table;
+use crate::support::table::{Column, Digits, Table};
 use serde_json::Value;
 
 /// Data for the figures of one category, in addition to the scores.
@@ -37,6 +37,8 @@ pub struct CategoryPictures {
     pub modes: Vec<ModeShape>,
     /// Cumulative explained variance of its first coefficients.
     pub svd_explained: Vec<f64>,
+    /// Error of the motions of each variant, if S' are given as series or cross-validated.
+    pub rmse: Vec<f64>,
     /// Failures of S from headways below 0.5 s; `None` where the headways are gaps in metres.
     pub close_following: Option<CloseFollowing>,
 }
@@ -83,6 +85,7 @@ impl StudyReport {
                 parameters: of.parameters.clone(),
                 modes: of.modes.clone(),
                 svd_explained: of.svd_explained.clone(),
+                rmse: of.rmse.clone(),
                 close_following: CloseFollowing::of_recorded(plan, counts, block, &of.close_units)?,
             })
         };
@@ -100,12 +103,43 @@ impl StudyReport {
         parts.push(tables::failures(&self.scores, self.published, width));
         parts.push(self.close_following(width));
         parts.extend(self.scores.categories.iter().map(|c| tables::f1_table(c, self.published, width)));
+        parts.extend(self.given_table().map(|table| table.fitted(2, width)));
         parts.extend(Some(tables::claims(&self.claims, width)).filter(|text| !text.is_empty()));
         parts.extend(self.comparison.iter().map(ReferenceComparison::text));
         if self.run.synthetic {
             parts.push(format!("{data}\nNo number above is a statement about real traffic.\n"));
         }
         parts.join("\n")
+    }
+
+    /// Error of the motions beside the mean F1 of every variant; `None` unless S' are given as series or cross-validated.
+    pub(super) fn given_table(&self) -> Option<Table> {
+        let of_categories = self.scores.categories.iter().zip(&self.pictures);
+        let rows = of_categories.flat_map(|(scores, pictures)| {
+            let variants = pictures.rmse.iter().enumerate().skip(1);
+            variants.map(move |(variant, rmse)| (scores, variant, *rmse))
+        });
+        let rows: Vec<(&CategoryScores, usize, f64)> = rows.collect();
+        let mean = |scores: &CategoryScores, variant: usize, criterion: Criterion| {
+            let cells = scores.cells.iter().filter(|cell| (cell.variant, cell.criterion) == (variant, criterion));
+            let values: Vec<f64> = cells.filter_map(|cell| f1(&cell.counts)).collect();
+            (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
+        };
+        let three = |name: String| Column::from(name).digits(Digits::Fixed(3)).null("-");
+        let table = Table::of(rows.iter())
+            .column("scenario", |(scores, ..)| scores.category.label())
+            .column("variant", |(scores, variant, _)| scores.variants[*variant].as_str())
+            .column(three("RMSE".to_owned()), |(.., rmse)| *rmse)
+            .columns(
+                Criterion::ALL,
+                |criterion| three(format!("mean F1, {}", criterion.label())),
+                |(scores, variant, _), criterion| mean(scores, *variant, criterion),
+            )
+            .build()
+            .captioned(
+                "Cross-validation and given S': error of the motions in standard deviations, and F1 over the models",
+            );
+        (!rows.is_empty()).then_some(table)
     }
 
     /// Start of the scenarios, in a few words.
@@ -146,6 +180,9 @@ impl StudyReport {
                 results.add(&file_name(name, category.category, "svg"), figure.svg().as_bytes())?;
                 results.add(&file_name(name, category.category, "csv"), figure.csv().as_bytes())?;
             }
+        }
+        if let Some(given) = self.given_table() {
+            results.add("variants.csv", given.csv().as_bytes())?;
         }
         if let Some(comparison) = &self.comparison {
             results.add("reference.csv", comparison.table().csv().as_bytes())?;

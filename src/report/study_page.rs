@@ -37,6 +37,11 @@ impl StudyReport {
         for at in 0..self.scores.categories.len() {
             sections.push(self.category(at));
         }
+        sections.extend(self.given_table().map(|table| Section {
+            intro: "-held-out: each scenario is replayed by a basis that was fitted on other recordings.".to_owned(),
+            tables: vec![table],
+            ..Section::new("given", "Cross-validation and given S'")
+        }));
         sections.extend(self.claims());
         sections.extend(self.comparison.as_ref().map(compared));
         sections.push(self.reproduction()?);

@@ -13,6 +13,7 @@ pub mod compare;
 pub mod forecast;
 pub mod grid;
 pub mod justify;
+mod motion_error;
 pub mod parts;
 #[cfg(test)]
 mod plan_mutations;

@@ -6,6 +6,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::parameterization::ReducedScenario;
 use crate::model::case::Category;
 use crate::{Error, Place, Result};
 
@@ -125,6 +126,9 @@ pub struct Scenario {
     /// Synthetic data from the generator: results are not statements about real traffic.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub synthetic: bool,
+    /// In the plan of a study: S' that are given as series, in the order of the plan's variants.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub replays: Vec<ReducedScenario>,
 }
 
 fn yes() -> bool {

@@ -271,6 +271,7 @@ fn of_row(
         frame_switch: None,
         tag_frames: None,
         synthetic: false,
+        replays: Vec::new(),
     })
 }
 

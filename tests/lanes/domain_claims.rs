@@ -162,6 +162,7 @@ fn scenario(category: Category, v: Vec<f64>, y: Vec<f64>, lead: Option<Vec<f64>>
         frame_switch: None,
         tag_frames: None,
         synthetic: false,
+        replays: Vec::new(),
     }
 }
 

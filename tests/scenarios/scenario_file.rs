@@ -36,6 +36,7 @@ fn cut_out() -> Scenario {
         frame_switch: Some(79),
         tag_frames: Some([77, 81]),
         synthetic: false,
+        replays: Vec::new(),
     }
 }
 

@@ -68,7 +68,7 @@ prop_compose! {
             id: String::new(), category, recording, ego_id, target_id: 7, lead_id, frame0, frame1: -1, fps, kept, reason,
             ego: Ego { v0, length, width }, lane_width, side: if side { Side::Left } else { Side::Right }, target,
             lead: has_lead.then_some(lead), thw0, gap0, lead_gap: has_lead.then_some(lead_gap), peak_decel: thw0,
-            truncated_start, end_cause, frame_switch, tag_frames: tags, synthetic: kept,
+            truncated_start, end_cause, frame_switch, tag_frames: tags, synthetic: kept, replays: Vec::new(),
         }
     }
 }

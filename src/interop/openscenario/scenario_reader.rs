@@ -85,6 +85,7 @@ pub fn read_scenario(path: &Path) -> Result<Scenario> {
         frame_switch: None,
         tag_frames: None,
         synthetic: header.text("description")?.starts_with("SYNTHETIC DATA"),
+        replays: Vec::new(),
     })
 }
 

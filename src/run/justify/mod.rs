@@ -213,7 +213,7 @@ pub fn justify(
     let close_units = close_units(scenarios.iter().filter(|s| s.kept && s.category == id.category));
     let close_following = CloseFollowing::of_recorded(plan, &replay.counts, 0, &close_units)?;
     let alternatives = Parameterization::of(id.category).filter_map(|other| {
-        let variant = block.variants.iter().position(|name| *name == other.key)?;
+        let variant = replay.variant(&other).ok()?;
         let scored = labels.score(variant, &options.score);
         let findings = options.rules.of_labels(&scored, &options.score);
         Some((other, scored, Conclusion::of(&findings)))

@@ -5,7 +5,7 @@ use super::JustifyOptions;
 use crate::engine::{Confusion, Executor, LanePlan, Partial, SweepSummary, Verdicts, Wanted};
 use crate::model::profile::Profile;
 use crate::run::compare::Compare;
-use crate::run::score::{ScoreOptions, f1, f1_interval, precision, recall};
+use crate::run::score::{HELD_OUT, ScoreOptions, f1, f1_interval, precision, recall};
 use crate::scenario::Scenario;
 use crate::scenario::parameterization::Parameterization;
 use crate::stats::estimate::{Clusters, cluster_rate};
@@ -193,12 +193,16 @@ impl<'a> Replay<'a> {
         self.compare.lane_plan()
     }
 
-    /// Index of a parameterization among the variants.
+    /// Index of a parameterization among the variants: the cross-validated one, if there is one.
     ///
     /// # Errors
     /// [`Error::Input`] for one that is impossible with this data.
     pub fn variant(&self, id: &Parameterization) -> Result<usize> {
-        let found = self.plan().blocks[0].variants.iter().position(|name| *name == id.key);
+        let variants = &self.plan().blocks[0].variants;
+        let held_out = format!("{}{HELD_OUT}", id.key);
+        // A basis that has seen the scenario flatters itself.
+        let found = variants.iter().position(|name| *name == held_out);
+        let found = found.or_else(|| variants.iter().position(|name| *name == id.key));
         found.ok_or_else(|| {
             let problem = format!("the data has no {}", id.name());
             let help = "its decomposition needs more scenarios: use more recordings, or another parameterization";

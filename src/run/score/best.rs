@@ -72,7 +72,14 @@ fn best_score(
     (model, criterion): (ModelId, Criterion),
     level: f64,
 ) -> Option<BestScore> {
-    let places = (1..scores.variants.len()).filter_map(|variant| scores.index(variant, model, criterion));
+    // A basis that has seen its scenarios is no rival of itself.
+    let has_held_out = |variant: &usize| {
+        let held_out = format!("{}{}", scores.variants[*variant], super::HELD_OUT);
+        scores.variants.contains(&held_out)
+    };
+    let places = (1..scores.variants.len())
+        .filter(|variant| !has_held_out(variant))
+        .filter_map(|variant| scores.index(variant, model, criterion));
     let scored: Vec<(usize, f64)> = places.filter_map(|at| Some((at, f1(&scores.cells[at].counts)?))).collect();
     // The first of equals: parameterizations are in the order of the paper.
     let &(best, value) = scored.iter().rev().max_by(|a, b| a.1.total_cmp(&b.1))?;

@@ -30,6 +30,9 @@ use crate::scenario::Category;
 use crate::support::ranges;
 use crate::{Error, Place, Result};
 
+/// Ending of the name of a parameterization that replays each scenario by a basis that has not seen it.
+pub const HELD_OUT: &str = "-held-out";
+
 /// Recall TP/(TP + FN); `None` if S never fails.
 pub fn recall(c: &Confusion) -> Option<f64> {
     ratio(c.tp as f64, c.tp as f64 + c.fn_ as f64)

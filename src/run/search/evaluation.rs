@@ -8,6 +8,7 @@ use crate::engine::{Block, CaseSource, Confusion, Executor, LanePlan, Units, Ver
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
+use crate::run::motion_error::{MotionError, MotionSpread};
 use crate::scenario::parameterization::{
     LinearFamily, LinearSpec, Parameterization, ParameterizationOptions, Reduction, Signal, SvdLateral, TimeGrid,
     recorded_case,
@@ -65,8 +66,7 @@ pub(super) struct Evaluator<'a> {
     recorded: Vec<Verdicts>,
     motions: Vec<LaneCase<f64>>,
     tables: Tables<f64>,
-    /// Variances of speed, lateral position and speed of the vehicle ahead.
-    variances: [f64; 3],
+    spread: MotionSpread,
 }
 
 struct EncodedCases {
@@ -100,7 +100,10 @@ impl<'a> Evaluator<'a> {
         let grid = TimeGrid::of(profile);
         let cases: Vec<Case> = scenarios.iter().map(|scenario| recorded_case(scenario, grid)).collect::<Result<_>>()?;
         let mut tables = Tables::default();
-        let motions = cases.iter().map(|case| LaneCase::encode(case, profile, &mut tables)).collect();
+        let motions: Vec<LaneCase<f64>> =
+            cases.iter().map(|case| LaneCase::encode(case, profile, &mut tables)).collect();
+        let mut spread = MotionSpread::default();
+        motions.iter().for_each(|recorded| spread.add(recorded, &tables));
         let mut evaluator = Evaluator {
             category,
             scenarios,
@@ -110,11 +113,10 @@ impl<'a> Evaluator<'a> {
             recorded: Vec::new(),
             motions,
             tables,
-            variances: [1.0; 3],
+            spread,
         };
         let recorded = evaluator.sweep(&cases.iter().map(|case| vec![case]).collect::<Vec<_>>())?;
         evaluator.recorded = recorded.into_iter().flatten().collect();
-        evaluator.variances = evaluator.variances();
         if options.shuffled {
             evaluator.shuffle();
         }
@@ -147,13 +149,13 @@ impl<'a> Evaluator<'a> {
                 (0..self.scenarios.len()).map(|unit| fitted.iter().map(|of| &of[unit]).collect()).collect();
             let swept = if fitted.is_empty() { Vec::new() } else { self.sweep(&by_unit)? };
             let mut swept = swept.into_iter();
-            for cases in cases {
-                let evaluation = cases.map(|cases| {
-                    let verdicts = swept.next().unwrap_or_default();
-                    Evaluation { units: self.agreement(&verdicts), rmse: self.rmse(&cases) }
-                });
-                all.push(evaluation);
-            }
+            let with_verdicts: Vec<_> =
+                cases.into_iter().map(|cases| cases.map(|cases| (cases, swept.next().unwrap_or_default()))).collect();
+            let evaluation = |(cases, verdicts): (Vec<Case>, Vec<Verdicts>)| Evaluation {
+                units: self.agreement(&verdicts),
+                rmse: self.rmse(&cases),
+            };
+            all.extend(with_verdicts.into_par_iter().map(|of| of.map(evaluation)).collect::<Vec<_>>());
         }
         Ok(all)
     }
@@ -263,52 +265,14 @@ impl<'a> Evaluator<'a> {
         self.recorded.chunks(width).zip(verdicts.chunks(width)).map(of_unit).collect()
     }
 
-    /// Variances of the recorded series over all scenarios, per step.
-    fn variances(&self) -> [f64; 3] {
-        let mut variances = [1.0; 3];
-        for (series, variance) in variances.iter_mut().enumerate() {
-            let (mut count, mut sum, mut squares) = (0.0, 0.0, 0.0);
-            for case in &self.motions {
-                for step in 0..=case.horizon {
-                    let value = value_of(case, &self.tables, series, step);
-                    (count, sum, squares) = (count + 1.0, sum + value, squares + value * value);
-                }
-            }
-            *variance = squares / count - (sum / count) * (sum / count);
-        }
-        variances
-    }
-
     fn rmse(&self, cases: &[Case]) -> f64 {
-        let used: &[usize] = match self.category {
-            Category::CutIn => &[0, 1],
-            Category::CutOut => &[0, 1, 2],
-            Category::Lvd => &[0],
-        };
-        let of = |(recorded, case): (&LaneCase<f64>, &Case)| {
+        let mut error = MotionError::default();
+        for (recorded, case) in self.motions.iter().zip(cases) {
             let mut tables = Tables::default();
             let case = LaneCase::encode(case, self.profile, &mut tables);
-            let steps = f64::from(recorded.horizon + 1);
-            let of_series = |series: usize| {
-                let squares = (0..=recorded.horizon).map(|step| {
-                    let by = value_of(&case, &tables, series, step) - value_of(recorded, &self.tables, series, step);
-                    by * by
-                });
-                squares.sum::<f64>() / steps / self.variances[series]
-            };
-            used.iter().map(|series| of_series(*series)).sum::<f64>() / used.len() as f64
-        };
-        let squares: Vec<f64> = self.motions.par_iter().zip(cases).map(of).collect();
-        libm::sqrt(squares.iter().sum::<f64>() / squares.len() as f64)
-    }
-}
-
-/// Speed, distance from the lane's middle, or speed of the vehicle ahead at a step.
-fn value_of(case: &LaneCase<f64>, tables: &Tables<f64>, series: usize, step: u32) -> f64 {
-    match series {
-        0 => case.others[0].motion.speed(tables, step),
-        1 => case.others[0].motion.lateral(tables, step).position.abs(),
-        _ => case.others[1].motion.speed(tables, step),
+            error.add((recorded, &self.tables), (&case, &tables));
+        }
+        error.root(self.category, &self.spread)
     }
 }
 

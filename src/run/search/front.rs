@@ -73,7 +73,7 @@ pub struct Front {
     pub paper: Vec<PaperPoint>,
     /// Index of the paper's best, by cross-validation.
     pub best_paper: Option<usize>,
-    /// Index of the winner: the fewest parameters whose score is not significantly below the best.
+    /// Index of the winner: the fewest parameters whose score is shown to be at most the margin below the best.
     pub winner: Option<usize>,
 }
 
@@ -205,8 +205,15 @@ pub(super) fn conclude(
             })
         };
         let points: Vec<FrontPoint> = chosen.iter().filter_map(point).collect();
-        let is_enough = |point: &FrontPoint| point.below_best.is_none_or(|(_, interval)| interval.high >= 0.0);
-        let winner = points.iter().position(is_enough);
+        let margin = options.limits.margin;
+        let is_enough = |(at, point): (usize, &FrontPoint)| {
+            // Without an interval the value decides.
+            let low =
+                |best: &FrontPoint| Some(point.judged.cross_validated.value? - best.judged.cross_validated.value?);
+            let low = point.below_best.map(|(_, interval)| interval.low).or_else(|| low(points.last()?));
+            at + 1 == points.len() || low.is_some_and(|low| low >= -margin)
+        };
+        let winner = points.iter().enumerate().position(is_enough);
         let paper = of_paper.into_iter().map(|(_, point)| point).collect();
         fronts.push(Front { scope, points, paper, best_paper, winner });
     }

@@ -96,13 +96,16 @@ pub struct SearchLimits {
     /// Studies that the optimiser of the weights may use in all (8000).
     #[schemars(range(min = 0, max = 10_000_000))]
     pub studies: usize,
+    /// Non-inferiority margin: the winner's score is shown to be at most this much below the best (0.05).
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub margin: f64,
     /// Seed of the optimiser.
     pub seed: u64,
 }
 
 impl Default for SearchLimits {
     fn default() -> Self {
-        SearchLimits { folds: 5, max_parameters: 8, studies: 8000, seed: 157 }
+        SearchLimits { folds: 5, max_parameters: 8, studies: 8000, margin: 0.05, seed: 157 }
     }
 }
 

@@ -11,7 +11,7 @@ use crate::engine::plan::{Block, CaseSource, LanePlan, Units, check_cases};
 use crate::engine::{Chunk, Executor, SweepSummary, Wanted};
 use crate::run::study::plan_file::StudyHead;
 use crate::scenario::parameterization::{
-    Parameterization, ParameterizationOptions, Reduction, TimeGrid, recorded_case, steps_of,
+    Parameterization, ParameterizationOptions, Reduction, Sizes, TimeGrid, recorded_case, steps_of,
 };
 use crate::scenario::{Case, Category, Scenario, Tables};
 use crate::{Error, Place, Result};
@@ -66,6 +66,11 @@ impl StudyCases {
     /// Parts that could not be planned, with the reason; for example too few scenarios for a decomposition.
     pub fn left_out(&self) -> &[Error] {
         &self.left_out
+    }
+
+    /// Whether S' are given as series.
+    pub(super) fn has_given(&self) -> bool {
+        self.head.blocks.iter().any(|block| !block.replays.is_empty())
     }
 
     /// The units whose scenarios are held.
@@ -188,7 +193,7 @@ impl StudyCases {
             let ids = parameterizations(block.category, self.reductions[at].is_some());
             let scenarios = inside.filter_map(|unit| self.scenario(block.first_unit + unit));
             let steps: f64 = scenarios.map(|scenario| steps_of(scenario.duration_s(), grid) as f64).sum();
-            steps * entries_per_step(block.category, ids)
+            steps * entries_per_step(block.category, ids, self.head.blocks[at].replays.len())
         };
         self.outline.segments(units).into_iter().map(of_segment).sum()
     }
@@ -201,7 +206,11 @@ impl StudyCases {
         let reduction = self.reductions[at].as_ref();
         let ids: Vec<Parameterization> = parameterizations(block.category, reduction.is_some()).collect();
         let grid = TimeGrid::of(&self.outline.profile);
-        let cases = cases_of(scenario, &ids, reduction, grid, &self.head.parameterization)?;
+        let mut cases = cases_of(scenario, &ids, reduction, grid, &self.head.parameterization)?;
+        let sizes = Sizes::of(scenario);
+        for replay in &scenario.replays {
+            cases.push(replay.case(block.category, &sizes, grid)?);
+        }
         Ok((cases, scenario.gap0.unwrap_or(0.0)))
     }
 }
@@ -216,8 +225,8 @@ const MAX_ENTRIES_AT_ONCE: f64 = (1 << 28) as f64;
 
 /// Number of series values of a scenario per step, with its parameterizations: speed, lateral position and lateral
 /// speed of each sampled one. A cut-out adds the speed of the vehicle ahead; an LVD has no lateral series.
-pub(super) fn entries_per_step(category: Category, ids: impl Iterator<Item = Parameterization>) -> f64 {
-    let sampled = ids.filter(Parameterization::has_series).count() + 1;
+pub(super) fn entries_per_step(category: Category, ids: impl Iterator<Item = Parameterization>, replays: usize) -> f64 {
+    let sampled = ids.filter(Parameterization::has_series).count() + 1 + replays;
     let series = match category {
         Category::CutIn => 3,
         Category::CutOut => 4,

@@ -3,10 +3,11 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::cases::StudyCases;
+use super::cases::{StudyCases, WINDOW};
 use crate::Result;
 use crate::engine::{Block, Headway};
 use crate::run::close_following::close_units;
+use crate::run::motion_error::{MotionError, MotionSpread};
 use crate::run::score::ScoreOptions;
 use crate::scenario::parameterization::{
     ModeShape, Parameter, Parameterization, ParameterizationOptions, Reduction, SpeedProfile,
@@ -30,6 +31,10 @@ pub struct CategoryProvenance {
     pub parameters: Vec<ParameterHistogram>,
     /// Shapes of the decomposition's first directions.
     pub modes: Vec<ModeShape>,
+    /// Error of the motions of each variant, in standard deviations of the recorded series, S first; only with S' that
+    /// are given as series or cross-validated.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub rmse: Vec<f64>,
     /// Indices among the kept scenarios of those whose recorded headway is below 0.5 s; empty if headways are imposed.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub close_units: Vec<u64>,
@@ -73,7 +78,8 @@ pub(super) fn category_facts(
     planned: &StudyCases,
     options: &ParameterizationOptions,
 ) -> Result<Vec<CategoryProvenance>> {
-    let facts = |(block, reduction): (&Block, &Option<Reduction>)| {
+    let rmse = motion_errors(planned)?;
+    let facts = |(at, (block, reduction)): (usize, (&Block, &Option<Reduction>))| {
         let of = count(&collection.scenarios, block.category);
         let reduction = reduction.as_ref();
         let svd_explained = reduction.map_or(Vec::new(), |r| r.basis.explained().into_iter().take(8).collect());
@@ -83,9 +89,46 @@ pub(super) fn category_facts(
         let parameters = parameter_histograms(block.category, &kept, options)?;
         let is_observed = Headway::is_observed(&planned.outline().headways);
         let close_units = if is_observed { close_units(kept.iter().copied()) } else { Vec::new() };
-        Ok(CategoryProvenance { found: of.found, kept: of.kept, svd_explained, parameters, modes, close_units })
+        Ok(CategoryProvenance {
+            found: of.found,
+            kept: of.kept,
+            svd_explained,
+            parameters,
+            modes,
+            rmse: rmse.get(at).cloned().unwrap_or_default(),
+            close_units,
+        })
     };
-    planned.outline().blocks.iter().zip(&planned.reductions).map(facts).collect()
+    planned.outline().blocks.iter().zip(&planned.reductions).enumerate().map(facts).collect()
+}
+
+/// Errors of every variant of every block; empty without S' that are given as series.
+fn motion_errors(planned: &StudyCases) -> Result<Vec<Vec<f64>>> {
+    let blocks = &planned.outline().blocks;
+    if !planned.has_given() {
+        return Ok(Vec::new());
+    }
+    let mut sums: Vec<(MotionSpread, Vec<MotionError>)> = blocks
+        .iter()
+        .map(|block| (MotionSpread::default(), vec![MotionError::default(); block.variants.len()]))
+        .collect();
+    planned.in_windows(0..planned.outline().unit_count(), WINDOW, |plan, units| {
+        for (at, inside) in plan.segments(units) {
+            let (spread, errors) = &mut sums[at];
+            for unit in inside {
+                let recorded = plan.case(at, unit, 0);
+                spread.add(&recorded, plan.tables());
+                for (variant, error) in errors.iter_mut().enumerate() {
+                    error.add((&recorded, plan.tables()), (&plan.case(at, unit, variant), plan.tables()));
+                }
+            }
+        }
+        Ok(())
+    })?;
+    let root = |(block, (spread, errors)): (&Block, (MotionSpread, Vec<MotionError>))| {
+        errors.iter().map(|error| error.root(block.category, &spread)).collect()
+    };
+    Ok(blocks.iter().zip(sums).map(root).collect())
 }
 
 /// Maximum number of bins of a histogram.

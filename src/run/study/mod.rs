@@ -3,6 +3,7 @@
 
 mod cases;
 mod facts;
+mod given;
 mod plan;
 pub(crate) mod plan_file;
 mod read;
@@ -12,8 +13,10 @@ pub use cases::StudyCases;
 pub(crate) use cases::WINDOW;
 use facts::category_facts;
 pub use facts::{CategoryProvenance, ParameterHistogram, StudyProvenance, parameter_histograms};
+pub use given::GivenReplay;
 pub use plan::{StudyOptions, outline_study, plan_study};
 pub use plan_file::StudyHead;
+
 pub use run::{StudyResult, StudyRun};
 
 use std::fs::File;

@@ -4,9 +4,10 @@ use crate::engine::plan::{Headway, LanePlan};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::study::cases::{StudyCases, entries_per_step, parameterizations};
+use crate::run::study::given::{GivenReplay, held_out, searched};
 use crate::run::study::plan_file::{BlockHead, StudyHead, stripped};
 use crate::scenario::parameterization::{
-    ParameterizationOptions, Reduction, SvdFit, TimeGrid, steps_of, vehicle_ahead,
+    Parameterization, ParameterizationOptions, ReducedScenario, Reduction, SvdFit, TimeGrid, steps_of, vehicle_ahead,
 };
 use crate::scenario::{Category, Scenario};
 use crate::support::ranges::refuse_repeats;
@@ -23,6 +24,13 @@ pub struct StudyOptions {
     pub headways: Vec<Headway>,
     /// Options of the parameterizations.
     pub parameterization: ParameterizationOptions,
+    /// Folds of a cross-validation: each decomposition gets a variant whose scenarios are replayed by a basis that has
+    /// not seen them.
+    pub folds: Option<usize>,
+    /// Searched parameterizations, beside those of the paper.
+    pub searched: Vec<Parameterization>,
+    /// S' of other programs.
+    pub external: Vec<GivenReplay>,
 }
 
 impl Default for StudyOptions {
@@ -32,6 +40,9 @@ impl Default for StudyOptions {
             models: ModelId::ALL.to_vec(),
             headways: Headway::paper(),
             parameterization: ParameterizationOptions::default(),
+            folds: None,
+            searched: Vec::new(),
+            external: Vec::new(),
         }
     }
 }
@@ -87,7 +98,31 @@ pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyO
             }
             Err(error) => return Err(error),
         };
-        let per_step = entries_per_step(category, parameterizations(category, reduction.is_some()));
+        let mut replays = Vec::new();
+        let mut add = |made: Result<Vec<GivenReplay>>| match made {
+            Ok(made) => {
+                replays.extend(made);
+                Ok(())
+            }
+            Err(error @ (Error::Input { .. } | Error::Usage { .. })) => {
+                left_out.push(error);
+                Ok(())
+            }
+            Err(error) => Err(error),
+        };
+        if let Some(count) = options.folds.filter(|_| reduction.is_some()) {
+            add(held_out(category, &kept, parameterization, count))?;
+        }
+        for id in options.searched.iter().filter(|id| id.category == category) {
+            add(searched(id, &kept, options.folds))?;
+        }
+        replays.extend(options.external.iter().filter(|replay| replay.category == category).cloned());
+        let given = |scenario: &Scenario| -> Result<Vec<ReducedScenario>> {
+            let of = |replay: &GivenReplay| replay.scenarios.get(&scenario.id).cloned();
+            let all: Option<Vec<ReducedScenario>> = replays.iter().map(of).collect();
+            all.ok_or_else(|| Error::Internal(format!("an S' of scenario {} is missing", scenario.id)))
+        };
+        let per_step = entries_per_step(category, parameterizations(category, reduction.is_some()), replays.len());
         entries += kept.iter().map(|s| steps_of(s.duration_s(), grid) as f64).sum::<f64>() * per_step;
         let recorded = if category == Category::Lvd { 1.0 } else { 2.0 };
         values += kept.iter().map(|s| s.target.v.len() as f64).sum::<f64>() * recorded;
@@ -97,9 +132,11 @@ pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyO
             if category == Category::CutOut {
                 vehicle_ahead(scenario)?;
             }
-            held.push(stripped(scenario, is_observed.then(|| scenario.start_gap_m()).transpose()?));
+            let gap_m = is_observed.then(|| scenario.start_gap_m()).transpose()?;
+            held.push(Scenario { replays: given(scenario)?, ..stripped(scenario, gap_m) });
         }
-        blocks.push(BlockHead::new(category, kept.len() as u64, reduction.as_ref()));
+        let keys = replays.into_iter().map(|replay| replay.key).collect();
+        blocks.push(BlockHead::new(category, kept.len() as u64, reduction.as_ref(), keys));
         reductions.push(reduction);
     }
     let head = StudyHead::new(

@@ -9,7 +9,9 @@ use crate::engine::plan::Headway;
 use crate::engine::version::Canonical;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction, SvdBasis};
+use crate::scenario::parameterization::{
+    Parameterization, ParameterizationOptions, ReducedScenario, Reduction, SvdBasis,
+};
 use crate::scenario::{Category, Scenario, problem_of};
 use crate::support::plain_text::hex;
 use crate::support::ranges::repeated;
@@ -88,18 +90,21 @@ pub(crate) struct BlockHead {
     pub(super) units: u64,
     /// `None` if there were too few scenarios for a decomposition.
     pub(super) basis: Option<SvdBasis>,
+    /// Names of the S' that the scenarios hold as series.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) replays: Vec<String>,
 }
 
 impl BlockHead {
     /// Keeps the part of the decomposition that cases are made with.
-    pub fn new(category: Category, units: u64, reduction: Option<&Reduction>) -> BlockHead {
+    pub fn new(category: Category, units: u64, reduction: Option<&Reduction>, replays: Vec<String>) -> BlockHead {
         let used = Parameterization::max_coefficients(category);
         let basis = reduction.map(|reduction| {
             let SvdBasis { weights, mean, directions, rows, .. } = reduction.basis.clone();
             let directions = directions.into_iter().take(used).collect();
             SvdBasis { weights, mean, directions, rows, singular_values: Vec::new() }
         });
-        BlockHead { category, units, basis }
+        BlockHead { category, units, basis, replays }
     }
 }
 
@@ -211,6 +216,21 @@ impl StudyHead {
         let wrong = |problem: &str| Err(format!("scenario {}: {problem}", scenario.id));
         if !scenario.kept || block.is_none_or(|block| block.category != scenario.category) {
             return wrong("it is none of its category that is simulated");
+        }
+        let is_whole = |replay: &ReducedScenario| {
+            let n = replay.v.len();
+            let lengths = [
+                (replay.y.len(), scenario.category != Category::Lvd),
+                (replay.v_lead.len(), scenario.category == Category::CutOut),
+            ];
+            let numbers = replay.y.iter().chain(&replay.v).chain(&replay.v_lead);
+            let is_finite = numbers.chain([&replay.v_ego, &replay.lead_gap_m]).all(|number| number.is_finite());
+            n > 1 && lengths.iter().all(|(length, used)| !used || *length == n) && is_finite && replay.duration_s > 0.0
+        };
+        if block.is_none_or(|block| block.replays.len() != scenario.replays.len())
+            || !scenario.replays.iter().all(is_whole)
+        {
+            return wrong("its S' given as series do not fit the plan");
         }
         if Headway::is_observed(&self.headways) && scenario.gap0.is_none() {
             return wrong("it has no recorded gap");

@@ -37,6 +37,7 @@ impl StudyHead {
             let (from, end) = (first_held.clamp(first, first + block.units), first + block.units);
             let names: Vec<String> = ids.by_ref().take((end_held.clamp(from, end) - from) as usize).collect();
             let variants = parameterizations(block.category, block.basis.is_some()).map(|id| id.key.into_owned());
+            let variants = variants.chain(block.replays.iter().cloned());
             blocks.push(Block {
                 category: block.category,
                 units: Units::Held(block.units, from - first, names.into()),

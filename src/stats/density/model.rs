@@ -246,7 +246,7 @@ fn reduction(
     kept: &[&Scenario],
     options: &FitOptions,
 ) -> Result<Option<Reduction>> {
-    if id.coefficients().is_none() {
+    if id.coefficients().is_none() || id.fitted_basis().is_some() {
         return Ok(None);
     }
     let fitted: Vec<&Scenario> = match options.parameterization.svd_fit {

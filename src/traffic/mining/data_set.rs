@@ -221,6 +221,7 @@ impl FoundScenario<'_> {
             frame_switch: None,
             tag_frames: None,
             synthetic: recording_tags.recording.synthetic,
+            replays: Vec::new(),
         })
     }
 

@@ -1,0 +1,146 @@
+//! S' given as series: of other programs, of a searched description, and of decompositions that have not seen the
+//! scenario they replay.
+
+use std::collections::BTreeMap;
+use std::path::Path;
+
+use rayon::prelude::*;
+
+use crate::run::score::HELD_OUT;
+use crate::run::search::folds;
+use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, ReducedScenario, Reduction};
+use crate::scenario::{Category, Scenario, ScenarioFile, read_scenario_file};
+use crate::support::plausibility::Implausible;
+use crate::{Error, Place, Result};
+
+/// S' of the scenarios of a category, by their ids.
+#[derive(Debug, Clone, PartialEq)]
+pub struct GivenReplay {
+    /// Kind of scenario.
+    pub category: Category,
+    /// Name of the variant.
+    pub key: String,
+    /// The series.
+    pub scenarios: BTreeMap<String, ReducedScenario>,
+}
+
+impl GivenReplay {
+    /// S' of a scenario file of another program: the ids of S, any sample rate and length. The variants have the name of
+    /// the file.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Input`] for a damaged file, an unknown or missing id, or a name that is none.
+    pub fn read(path: &Path, scenarios: &[Scenario], categories: &[Category]) -> Result<Vec<GivenReplay>> {
+        let place = || Place::file(path);
+        let ScenarioFile { scenarios: given, mut problems, .. } = read_scenario_file(path, Implausible::Accepted)?;
+        if !problems.is_empty() {
+            return Err(problems.swap_remove(0));
+        }
+        let key = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        let is_taken = Category::ALL.iter().any(|category| Parameterization::find(*category, &key).is_some());
+        if key.is_empty() || key == "S" || key.ends_with(HELD_OUT) || is_taken || !key.chars().all(is_plain) {
+            let problem = format!("`{key}` cannot name the S' of this file");
+            let help = "name the file with letters, digits, - and _, and not as a parameterization of the paper";
+            return Err(Error::input(place(), problem, help));
+        }
+        let known: BTreeMap<&str, &Scenario> = scenarios.iter().map(|s| (s.id.as_str(), s)).collect();
+        let mut replays: BTreeMap<Category, GivenReplay> = BTreeMap::new();
+        for own in given {
+            let at = || place().of(format!("scenario {}", own.id));
+            match known.get(own.id.as_str()) {
+                // What is not kept is not replayed.
+                Some(recorded) if !recorded.kept => continue,
+                Some(recorded) if recorded.category == own.category => (),
+                Some(recorded) => {
+                    let problem = format!("it is no {}, as recorded", recorded.category.label());
+                    return Err(Error::input(at(), problem, "keep the category"));
+                }
+                None => {
+                    let help = "use the ids that `mine` writes, of the same recordings";
+                    return Err(Error::input(at(), "no such scenario was recorded", help));
+                }
+            }
+            let lead = own.lead.as_ref().map_or(Vec::new(), |lead| lead.v.clone());
+            let reduced = ReducedScenario {
+                duration_s: own.duration_s(),
+                v_ego: if own.category == Category::Lvd { own.target.v[0].max(0.0) } else { own.ego.v0 },
+                lead_gap_m: own.lead_gap.unwrap_or(0.0),
+                y: if own.category == Category::Lvd { Vec::new() } else { own.target.y },
+                v: own.target.v,
+                v_lead: lead,
+            };
+            if own.category == Category::CutOut && (reduced.v_lead.len() != reduced.v.len() || own.lead_gap.is_none()) {
+                let problem = "a cut-out needs `lead` with as many samples as `target`, and `D`";
+                return Err(Error::input(at(), problem, "add them"));
+            }
+            let replay = replays.entry(own.category);
+            let replay = replay.or_insert_with(|| GivenReplay {
+                category: own.category,
+                key: key.clone(),
+                scenarios: BTreeMap::new(),
+            });
+            replay.scenarios.insert(own.id, reduced);
+        }
+        for replay in replays.values().filter(|replay| categories.contains(&replay.category)) {
+            let missing = scenarios
+                .iter()
+                .find(|s| s.kept && s.category == replay.category && !replay.scenarios.contains_key(&s.id));
+            if let Some(missing) = missing {
+                let problem = format!("scenario {} is missing; others of its category are there", missing.id);
+                return Err(Error::input(place(), problem, "give all kept scenarios of a category, or none"));
+            }
+        }
+        Ok(replays.into_values().collect())
+    }
+}
+
+/// S' by a searched description as it is fitted, and with folds each scenario by a basis of the other folds.
+///
+/// # Errors
+/// As [`held_out`].
+pub(super) fn searched(id: &Parameterization, kept: &[&Scenario], folds: Option<usize>) -> Result<Vec<GivenReplay>> {
+    let (Some(fitted), Some(d)) = (id.fitted_basis(), id.coefficients()) else { return Ok(Vec::new()) };
+    let reduced = kept.iter().map(|scenario| Ok((scenario.id.clone(), fitted.reduce(scenario, d)?)));
+    let scenarios = reduced.collect::<Result<_>>()?;
+    let mut replays = vec![GivenReplay { category: id.category, key: id.key.to_string(), scenarios }];
+    if let Some(count) = folds {
+        replays.extend(of_folds(kept, count, &[(&id.key, d)], |train| fitted.refit(train))?);
+    }
+    Ok(replays)
+}
+
+/// S' of every decomposition of the paper, each scenario by a basis of the other folds.
+///
+/// # Errors
+/// [`Error::Input`] for too few scenarios; [`Error::Usage`] for folds out of range.
+pub(super) fn held_out(
+    category: Category,
+    kept: &[&Scenario],
+    options: &ParameterizationOptions,
+    count: usize,
+) -> Result<Vec<GivenReplay>> {
+    let ids: Vec<Parameterization> = Parameterization::of(category).collect();
+    let sizes: Vec<(&str, usize)> = ids.iter().filter_map(|id| Some((id.key.as_ref(), id.coefficients()?))).collect();
+    of_folds(kept, count, &sizes, |train| Reduction::fit(category, train, options))
+}
+
+fn of_folds(
+    kept: &[&Scenario],
+    count: usize,
+    sizes: &[(&str, usize)],
+    fit: impl Fn(&[&Scenario]) -> Result<Reduction> + Sync,
+) -> Result<Vec<GivenReplay>> {
+    let of = folds(kept, count)?;
+    let train = |fold: usize| -> Vec<&Scenario> {
+        kept.iter().zip(&of).filter(|(_, of)| **of != fold).map(|(scenario, _)| *scenario).collect()
+    };
+    let fitted: Vec<Reduction> = (0..count).into_par_iter().map(|fold| fit(&train(fold))).collect::<Result<_>>()?;
+    let replay = |(key, d): &(&str, usize)| {
+        let reduced =
+            kept.iter().zip(&of).map(|(scenario, fold)| Ok((scenario.id.clone(), fitted[*fold].reduce(scenario, *d)?)));
+        let category = fitted[0].category;
+        Ok(GivenReplay { category, key: format!("{key}{HELD_OUT}"), scenarios: reduced.collect::<Result<_>>()? })
+    };
+    sizes.iter().map(replay).collect()
+}
