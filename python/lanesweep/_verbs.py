@@ -25,6 +25,7 @@ __all__ = [
     "merge",
     "mine",
     "sample",
+    "search",
     "study",
     "synth",
     "trace",
@@ -36,6 +37,7 @@ def study(
     recordings: Value | None = None,
     *,
     scenarios: Value | None = None,
+    external: Values | None = None,
     preset: Value | None = None,
     accept_implausible: bool = False,
     synth_recordings: Value | None = None,
@@ -44,6 +46,7 @@ def study(
     published: bool = False,
     reference: bool = False,
     models: Models | None = None,
+    cross_validate: bool = False,
     profile: Value | None = None,
     compare_reference: bool = False,
     dt: Value | None = None,
@@ -74,6 +77,8 @@ def study(
         preset, which the names of the columns tell; see `lanesweep tracks`.
     scenarios : Value
         Scenario file (.jsonl, .parquet, .csv) instead of recordings.
+    external : Values
+        S' from another program (scenario file with the ids of S), or a parameterization of `search` (.json).
     preset : Value
         Format of the recordings: exid, sumo-fcd, … or a TOML file [default: detected].
     accept_implausible : bool
@@ -93,6 +98,10 @@ def study(
         Compute in binary64 on the CPU, not in the f32 lane arithmetic.
     models : Models
         Driver models: Reg157, CCHDM, RSS, FSM [default: all].
+    cross_validate : bool
+        Also replay every scenario by decompositions that have not seen it (5-held-out, …). Scenarios are
+        divided into folds by recording ([search] folds). A decomposition fitted on the scenarios that it
+        replays flatters itself.
     profile : Value, default paper
         paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc`
         takes jrc-2021 unless it is set.
@@ -142,6 +151,7 @@ def study(
         [
             (None, recordings, False),
             ('scenarios', scenarios, False),
+            ('external', external, False),
             ('preset', preset, False),
             ('accept-implausible', accept_implausible, False),
             ('synth-recordings', synth_recordings, False),
@@ -150,6 +160,7 @@ def study(
             ('published', published, False),
             ('reference', reference, False),
             ('models', models, True),
+            ('cross-validate', cross_validate, False),
             ('profile', profile, False),
             ('compare-reference', compare_reference, False),
             ('dt', dt, False),
@@ -326,8 +337,8 @@ def fit(
     categories : Values
         Kinds of scenario: cut-in, cut-out, lvd [default: all].
     parameterizations : Values
-        Parameterizations: 1…7, a…g, i…v [default: all]. 1…7 are for cut-ins, a…g for cut-outs, i…v for leader
-        decelerations.
+        Parameterizations: 1…7, a…g, i…v, files of `search` [default: all]. 1…7 are for cut-ins, a…g for cut-
+        outs, i…v for leader decelerations. A name that ends in .json is a file.
     with_thw : bool
         Add the observed time headway as a parameter (thw_s).
     density : Value, default kernel
@@ -617,8 +628,8 @@ def compare(
     categories : Values
         Kinds of scenario: cut-in, cut-out, lvd [default: all].
     parameterizations : Values
-        Parameterizations: 1…7, a…g, i…v [default: all]. 1…7 are for cut-ins, a…g for cut-outs, i…v for leader
-        decelerations.
+        Parameterizations: 1…7, a…g, i…v, files of `search` [default: all]. 1…7 are for cut-ins, a…g for cut-
+        outs, i…v for leader decelerations. A name that ends in .json is a file.
     thw : Values, default paper
         Time headways, s; paper: 2.0, 1.8, … 0.2; r157; observed: the recorded gaps. The paper's claims need all
         of its headways. r157: the minimum following distance of UN R157, 5.2.3.3, for the ego's speed; a list
@@ -687,6 +698,136 @@ def compare(
     )
 
 
+def search(
+    recordings: Value | None = None,
+    *,
+    scenarios: Value | None = None,
+    held_out: Value | None = None,
+    preset: Value | None = None,
+    accept_implausible: bool = False,
+    synth_recordings: Value | None = None,
+    category: Value | None = None,
+    thw: Values | None = None,
+    models: Models | None = None,
+    criterion: Value | None = None,
+    objective: Value | None = None,
+    profile: Value | None = None,
+    max_parameters: Value | None = None,
+    studies: Value | None = None,
+    shuffled: bool = False,
+    dt: Value | None = None,
+    folds: Value | None = None,
+    shard: Value | None = None,
+    config: Values | None = None,
+    backend: Value | None = None,
+    device: Value | None = None,
+    seed: Value | None = None,
+    threads: Value | None = None,
+    out: Path | None = None,
+) -> Result:
+    """Search for a parameterization: the fewest parameters that keep the outcomes
+
+    Fits descriptions of many families and sizes: decompositions, physical features, polynomials, splines, constant
+    accelerations, and decompositions whose weights are tuned to the outcomes. Scores each by cross-validation over
+    recordings. The best of each size form a front beside the paper's parameterizations. The winner is a file for
+    `study`, `fit`, `sample`, `justify` and `export`. Without data it uses generated recordings.
+
+    Parameters
+    ----------
+    recordings : Value
+        Folder of recordings, or a track file [default: synthetic recordings]. highD's format, or that of a
+        preset, which the names of the columns tell; see `lanesweep tracks`.
+    scenarios : Value
+        Scenario file (.jsonl, .parquet, .csv) instead of recordings.
+    held_out : Value
+        Folder of recordings, or scenario file, that the search does not read: it judges the front.
+    preset : Value
+        Format of the recordings: exid, sumo-fcd, … or a TOML file [default: detected].
+    accept_implausible : bool
+        Use physically impossible values (a speed of 108 m/s) with a warning.
+    synth_recordings : Value, default 84
+        Number of generated recordings. They are called `01`, `02`, ….
+    category : Value
+        Kind of scenario: cut-in, cut-out, lvd.
+    thw : Values, default paper
+        Time headways, s; paper: 2.0, 1.8, … 0.2; r157; observed: the recorded gaps. The paper's claims need all
+        of its headways. r157: the minimum following distance of UN R157, 5.2.3.3, for the ego's speed; a list
+        may contain it. observed: each scenario starts from its recorded gap, and a density draws the headway as
+        one more parameter; it cannot be combined with other headways.
+    models : Models
+        Driver models: Reg157, CCHDM, RSS, FSM [default: all].
+    criterion : Value, default collision
+        Criterion to map, rank or estimate. For worst lanes, failure maps, fractions, stop rules and the
+        adaptive estimators.
+    objective : Value, default f1
+        What to keep: F1, recall, or the ratio of failure rates.
+    profile : Value, default paper
+        paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc`
+        takes jrc-2021 unless it is set.
+    max_parameters : Value, default 8
+        Maximum number of parameters of a description, the duration T counted (8).
+    studies : Value, default 8000
+        Studies that the optimiser of the weights may use in all (8000).
+    shuffled : bool
+        Give every scenario the outcomes of another one: no gain may be left on held-out data.
+    dt : Value, s
+        Time step [default: the profile's].
+    folds : Value, default 5
+        Folds of the cross-validation, also of `study` (5).
+    shard : Value
+        Evaluate only part I of N (from 0) of the tasks; the command without it, in the same folder, concludes.
+    config : Values
+        Configuration file, or one key of it; repeatable. `lanesweep config init` writes such a file. Without
+        --config, LANESWEEP_CONFIG names it.
+    backend : Value, default auto
+        Backend; auto: a GPU if there is one.
+        One of auto, cpu, gpu.
+    device : Value
+        Device, by part of its name, PCI bus id or index. `lanesweep verify devices` lists the devices. The
+        default is the first GPU.
+    seed : Value, default 157
+        Seed of the optimiser.
+    threads : Value
+        Threads; results do not depend on it [default: all cores].
+    out : path, optional
+        Where the files stay; without it they go with the result.
+
+    Returns
+    -------
+    Result
+    """
+    return run(
+        'search',
+        [
+            (None, recordings, False),
+            ('scenarios', scenarios, False),
+            ('held-out', held_out, False),
+            ('preset', preset, False),
+            ('accept-implausible', accept_implausible, False),
+            ('synth-recordings', synth_recordings, False),
+            ('category', category, False),
+            ('thw', thw, True),
+            ('models', models, True),
+            ('criterion', criterion, False),
+            ('objective', objective, False),
+            ('profile', profile, False),
+            ('max-parameters', max_parameters, False),
+            ('studies', studies, False),
+            ('shuffled', shuffled, False),
+            ('dt', dt, False),
+            ('folds', folds, False),
+            ('shard', shard, False),
+            ('config', config, False),
+            ('backend', backend, False),
+            ('device', device, False),
+            ('seed', seed, False),
+            ('threads', threads, False),
+        ],
+        out=out,
+        default_out='search',
+    )
+
+
 def justify(
     recordings: Value | None = None,
     *,
@@ -729,7 +870,7 @@ def justify(
     synth_recordings : Value, default 84
         Number of generated recordings. They are called `01`, `02`, ….
     parameterization : Value
-        Parameterization: 1…7 (cut-in), a…g (cut-out), i…v (LVD).
+        Parameterization: 1…7 (cut-in), a…g (cut-out), i…v (LVD), or a file of `search`.
     thw : Values, default paper
         Time headways, s; paper: 2.0, 1.8, … 0.2; r157; observed: the recorded gaps. The paper's claims need all
         of its headways. r157: the minimum following distance of UN R157, 5.2.3.3, for the ego's speed; a list

@@ -18,6 +18,7 @@ FUNCTIONS = {
     "fit": ("fit", "densities"),
     "sample": ("sample", "sample"),
     "compare": ("compare", "compare"),
+    "search": ("search", "search"),
     "justify": ("justify", "dossier"),
     "map": ("map", "map"),
     "check": ("check", None),

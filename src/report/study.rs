@@ -37,6 +37,8 @@ pub struct CategoryPictures {
     pub modes: Vec<ModeShape>,
     /// Cumulative explained variance of its first coefficients.
     pub svd_explained: Vec<f64>,
+    /// Fold of each scenario, with cross-validation.
+    pub folds: Vec<(String, usize)>,
     /// Error of the motions of each variant, if S' are given as series or cross-validated.
     pub rmse: Vec<f64>,
     /// Failures of S from headways below 0.5 s; `None` where the headways are gaps in metres.
@@ -85,6 +87,11 @@ impl StudyReport {
                 parameters: of.parameters.clone(),
                 modes: of.modes.clone(),
                 svd_explained: of.svd_explained.clone(),
+                folds: {
+                    let units = &plan.blocks[block].units;
+                    let id = |(unit, fold): (usize, &usize)| (units.name(unit as u64).into_owned(), *fold);
+                    of.folds.iter().enumerate().map(id).collect()
+                },
                 rmse: of.rmse.clone(),
                 close_following: CloseFollowing::of_recorded(plan, counts, block, &of.close_units)?,
             })
@@ -183,6 +190,11 @@ impl StudyReport {
         }
         if let Some(given) = self.given_table() {
             results.add("variants.csv", given.csv().as_bytes())?;
+        }
+        if self.pictures.iter().any(|of| !of.folds.is_empty()) {
+            let folds = self.pictures.iter().flat_map(|of| &of.folds);
+            let table = Table::of(folds).column("scenario", |(id, _)| id.as_str()).column("fold", |(_, fold)| *fold);
+            results.add("folds.csv", table.build().csv().as_bytes())?;
         }
         if let Some(comparison) = &self.comparison {
             results.add("reference.csv", comparison.table().csv().as_bytes())?;

@@ -3,12 +3,14 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::StudyOptions;
 use super::cases::{StudyCases, WINDOW};
 use crate::Result;
 use crate::engine::{Block, Headway};
 use crate::run::close_following::close_units;
 use crate::run::motion_error::{MotionError, MotionSpread};
-use crate::run::score::ScoreOptions;
+use crate::run::score::{HELD_OUT, ScoreOptions};
+use crate::run::search::folds;
 use crate::scenario::parameterization::{
     ModeShape, Parameter, Parameterization, ParameterizationOptions, Reduction, SpeedProfile,
 };
@@ -31,6 +33,9 @@ pub struct CategoryProvenance {
     pub parameters: Vec<ParameterHistogram>,
     /// Shapes of the decomposition's first directions.
     pub modes: Vec<ModeShape>,
+    /// Fold of each kept scenario, with cross-validation.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub folds: Vec<usize>,
     /// Error of the motions of each variant, in standard deviations of the recorded series, S first; only with S' that
     /// are given as series or cross-validated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -76,7 +81,7 @@ pub struct StudyProvenance {
 pub(super) fn category_facts(
     collection: &Collection,
     planned: &StudyCases,
-    options: &ParameterizationOptions,
+    options: &StudyOptions,
 ) -> Result<Vec<CategoryProvenance>> {
     let rmse = motion_errors(planned)?;
     let facts = |(at, (block, reduction)): (usize, (&Block, &Option<Reduction>))| {
@@ -86,8 +91,12 @@ pub(super) fn category_facts(
         let kept: Vec<&Scenario> =
             collection.scenarios.iter().filter(|s| s.category == block.category && s.kept).collect();
         let modes = reduction.map_or(Ok(Vec::new()), |reduction| reduction.mode_shapes(&kept))?;
-        let parameters = parameter_histograms(block.category, &kept, options)?;
+        let parameters = parameter_histograms(block.category, &kept, &options.parameterization)?;
         let is_observed = Headway::is_observed(&planned.outline().headways);
+        let folds = match options.folds {
+            Some(count) if block.variants.iter().any(|name| name.ends_with(HELD_OUT)) => folds(&kept, count)?,
+            _ => Vec::new(),
+        };
         let close_units = if is_observed { close_units(kept.iter().copied()) } else { Vec::new() };
         Ok(CategoryProvenance {
             found: of.found,
@@ -95,6 +104,7 @@ pub(super) fn category_facts(
             svd_explained,
             parameters,
             modes,
+            folds,
             rmse: rmse.get(at).cloned().unwrap_or_default(),
             close_units,
         })

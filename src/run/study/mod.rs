@@ -163,7 +163,7 @@ impl StudyBuilder<'_> {
             reference: self.reference,
             incomplete: !collection.problems.is_empty(),
             scenario_file_sha256: self.scenario_file_sha256,
-            categories: category_facts(collection, &cases, &options.parameterization)?,
+            categories: category_facts(collection, &cases, &options)?,
             left_out: collection.problems.iter().chain(cases.left_out()).map(Error::to_string).collect(),
             notes: collection.notes.clone(),
             recordings: collection.recordings.clone(),
