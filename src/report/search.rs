@@ -173,6 +173,9 @@ impl SearchReport<'_> {
                 let _ = writeln!(text, "{}", wrap(&words, WIDTH));
             }
         }
+        if let Some(baseline) = result.fronts.first().and_then(|front| front.always_failing) {
+            let _ = writeln!(text, "for comparison: an S' that always fails has {baseline:.3}");
+        }
         if let Some(correlation) = result.rank_correlation {
             let words = format!(
                 "a small error of the motions is no goal: rank correlation of RMSE and {} over {} candidates {:+.2} \

@@ -15,7 +15,9 @@ use lanesweep::run::sampling::{
     plan_samples,
 };
 use lanesweep::run::study::{StudyOptions, plan_study};
-use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions};
+use lanesweep::scenario::parameterization::{
+    Feature, FunctionKind, LinearFamily, LinearSpec, Parameterization, ParameterizationOptions, Signal,
+};
 use lanesweep::scenario::{Category, Scenario, Tables};
 use lanesweep::stats::density::{DensityKind, DensityModel, FitOptions, Mixture};
 use lanesweep::stats::random::Stream;
@@ -29,6 +31,21 @@ fn scenarios() -> &'static [Scenario] {
         let generator = GeneratorOptions { recordings: 12, ..GeneratorOptions::default() };
         mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap().scenarios
     })
+}
+
+/// Descriptions of other families, fitted on the kept scenarios.
+fn searched() -> Vec<Parameterization> {
+    let svd = |signal| LinearFamily::Svd { coefficients: 3, signal, emphasis: Vec::new() };
+    let of = |category: Category, family: LinearFamily| {
+        let kept: Vec<&Scenario> = scenarios().iter().filter(|s| s.kept && s.category == category).collect();
+        let spec = LinearSpec { family, mirrored: true, registered: false };
+        Parameterization::linear("found", spec.fit(category, &kept, &ParameterizationOptions::default()).unwrap())
+    };
+    vec![
+        of(Category::CutIn, LinearFamily::Features(vec![Feature::EgoSpeed, Feature::TargetSpeed, Feature::Duration])),
+        of(Category::CutOut, svd(Signal::Changes)),
+        of(Category::Lvd, LinearFamily::Functions { kind: FunctionKind::Lines, sizes: vec![3] }),
+    ]
 }
 
 fn density(id: Parameterization, with_thw: bool) -> DensityModel {
@@ -60,7 +77,7 @@ fn outcomes(plan: &LanePlan, backend: &dyn Backend, cuts: &[u64]) -> Vec<[u64; 1
 #[test]
 fn a_case_made_for_a_lane_is_the_case_that_the_host_makes() {
     for profile in ["paper", "un-r157"].map(|name| Profile::load(name).unwrap()) {
-        for id in Parameterization::ALL {
+        for id in Parameterization::ALL.into_iter().chain(searched()) {
             let density = density(id.clone(), false);
             let points: Vec<Vec<f64>> = density.kde.points().to_vec();
             let generator = generator_of_points(&density.space, &points, &density.sizes, &profile).unwrap();

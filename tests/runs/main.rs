@@ -16,4 +16,5 @@ mod observed;
 mod parts;
 mod reruns;
 mod sampling;
+mod search;
 mod strange_files;

@@ -71,6 +71,8 @@ pub struct Front {
     pub points: Vec<FrontPoint>,
     /// The paper's parameterizations.
     pub paper: Vec<PaperPoint>,
+    /// The score of an S' that always fails, which says nothing of a scenario.
+    pub always_failing: Option<f64>,
     /// Index of the paper's best, by cross-validation.
     pub best_paper: Option<usize>,
     /// Index of the winner: the fewest parameters whose score is shown to be at most the margin below the best.
@@ -215,7 +217,8 @@ pub(super) fn conclude(
         };
         let winner = points.iter().enumerate().position(is_enough);
         let paper = of_paper.into_iter().map(|(_, point)| point).collect();
-        fronts.push(Front { scope, points, paper, best_paper, winner });
+        let always_failing = always_failing(&cross_validated, scope, options);
+        fronts.push(Front { scope, points, paper, always_failing, best_paper, winner });
     }
     let winner = fronts.first().and_then(|front| Some(&front.points[front.winner?].candidate));
     let winner = winner.map(|candidate| fitted(candidate, search)).transpose()?;
@@ -294,6 +297,18 @@ fn difference(
     let rates = rates.collect::<Option<Vec<ScenarioRate>>>()?;
     let signs = (0..rates.len()).map(|at| (if at < models.len() { share } else { -share }, at));
     min_contrast(&rates, &[Contrast { constant: 0.0, terms: signs.collect() }], options.score.confidence)
+}
+
+/// The score of an S' that fails in every lane.
+fn always_failing(evaluations: &[Option<Evaluation>], scope: Scope, options: &SearchOptions) -> Option<f64> {
+    let totals = evaluations.iter().flatten().next()?.totals();
+    let models = scope.models(options);
+    let of = |model: &ModelId| {
+        let Confusion { tp, fn_, fp, tn } = totals[cell_of(*model, options.criterion)];
+        options.objective.of(&Confusion { tp: tp + fn_, fp: fp + tn, fn_: 0, tn: 0 })
+    };
+    let scores = models.iter().map(of).collect::<Option<Vec<f64>>>()?;
+    Some(scores.iter().sum::<f64>() / scores.len() as f64)
 }
 
 /// The candidate fitted on all scenarios of the search.

@@ -223,17 +223,27 @@ impl Reduction {
 
     /// The first `d` coefficients of a mined scenario.
     pub fn coefficients(&self, scenario: &Scenario, d: usize) -> Result<Vec<f64>> {
-        match self.linear.as_ref().map(|(_, encoder, _)| encoder) {
-            None | Some(Encoder::Directions) => Ok(self.basis.coefficients(&self.vector(scenario)?, d)),
-            Some(Encoder::Affine(rows)) => {
-                let z = self.vector(scenario)?;
-                let of =
-                    |(row, constant): &(Vec<f64>, f64)| row.iter().zip(&z).map(|(a, z)| a * z).sum::<f64>() + constant;
-                Ok(rows[..d].iter().map(of).collect())
-            }
-            Some(Encoder::Features(features)) => {
+        match &self.linear {
+            Some((_, Encoder::Features(features), _)) => {
                 features[..d].iter().map(|feature| feature.of(scenario, &self.options)).collect()
             }
+            _ => self.encode_vector(&self.vector(scenario)?, d),
+        }
+    }
+
+    /// The first `d` coefficients of a vector z.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] for features, which are no functions of the vector.
+    pub fn encode_vector(&self, z: &[f64], d: usize) -> Result<Vec<f64>> {
+        match self.linear.as_ref().map(|(_, encoder, _)| encoder) {
+            None | Some(Encoder::Directions) => Ok(self.basis.coefficients(z, d)),
+            Some(Encoder::Affine(rows)) => {
+                let of =
+                    |(row, constant): &(Vec<f64>, f64)| row.iter().zip(z).map(|(a, z)| a * z).sum::<f64>() + constant;
+                Ok(rows[..d].iter().map(of).collect())
+            }
+            Some(Encoder::Features(_)) => Err(Error::Internal("features need the scenario".to_owned())),
         }
     }
 
