@@ -33,7 +33,9 @@ use crate::{Error, Place, Result};
 pub struct Search {
     #[command(flatten)]
     data: SourceFlags,
-    /// Folder of recordings, or scenario file, that the search does not read: it judges the front
+    /// Data that the search does not read, to judge its front
+    ///
+    /// A folder of recordings, or a scenario file.
     #[arg(long, value_name = "PATH", help_heading = "Data")]
     held_out: Option<PathBuf>,
     /// Kind of scenario: cut-in, cut-out, lvd
@@ -51,10 +53,12 @@ pub struct Search {
     /// Give every scenario the outcomes of another one: no gain may be left on held-out data
     #[arg(long, help_heading = "Models and criteria", hide_short_help = true)]
     shuffled: bool,
-    /// Folder for tables, figures, the winner and the journals
+    /// Folder for results and journals
     #[arg(long, value_name = "DIR", default_value = "lanesweep-search", help_heading = "Output")]
     out: PathBuf,
-    /// Evaluate only part I of N (from 0) of the tasks; the command without it, in the same folder, concludes
+    /// Evaluate part I of N (from 0) only; without it: conclude
+    ///
+    /// Parts share the folder. The command without this flag, in the same folder, concludes.
     #[arg(long, value_name = "I/N", help_heading = "Run")]
     shard: Option<Shard>,
     #[command(flatten)]

@@ -74,13 +74,15 @@ pub struct Study {
     models: lists::ModelsFlag,
     #[command(flatten)]
     headways: lists::HeadwaysFlag,
-    /// Also replay every scenario by decompositions that have not seen it (5-held-out, …)
+    /// Also replay scenarios by bases that have not seen them
     ///
-    /// Scenarios are divided into folds by recording ([search] folds). A decomposition fitted on the scenarios that it
-    /// replays flatters itself.
+    /// Scenarios are divided into folds by recording ([search] folds). Each decomposition gets a variant, 5-held-out. A
+    /// basis fitted on the scenarios that it replays flatters itself.
     #[arg(long, help_heading = "Models and criteria")]
     cross_validate: bool,
-    /// S' from another program (scenario file with the ids of S), or a parameterization of `search` (.json)
+    /// S' of another program (scenario file), or winner.json of `search`
+    ///
+    /// A scenario file has the ids of S; its series may have any sample rate and length. Repeatable.
     #[arg(long, value_name = "FILE", help_heading = "Data")]
     external: Vec<PathBuf>,
     /// Print lanes, memory and estimated time; write nothing

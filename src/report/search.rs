@@ -176,17 +176,19 @@ impl SearchReport<'_> {
         if let Some(baseline) = result.fronts.first().and_then(|front| front.always_failing) {
             let _ = writeln!(text, "for comparison: an S' that always fails has {baseline:.3}");
         }
-        if let Some(correlation) = result.rank_correlation {
+        if let Some(correlation) = result.rmse.correlation {
+            let by_size: Vec<String> =
+                result.rmse.by_size.iter().map(|(size, rho)| format!("{size}: {rho:+.2}")).collect();
             let words = format!(
-                "a small error of the motions is no goal: rank correlation of RMSE and {} over {} candidates {:+.2} \
-                 (-1: the error orders them as the outcomes do)",
+                "rank correlation of RMSE and {} over {} candidates: {correlation:+.2} (-1: the error of the motions \
+                 orders them as the outcomes do); among those of equal size {}",
                 result.options.objective.name(),
                 count(result.evaluated.len() as u64),
-                correlation
+                by_size.join(", ")
             );
             let _ = writeln!(text, "{}", wrap(&words, WIDTH));
         }
-        if let Some([close, far]) = &result.disagreement {
+        if let Some([close, far]) = &result.rmse.disagreement {
             let of = |of: &Evaluated| {
                 let score = of.score(Scope::All, &result.options).unwrap_or(f64::NAN);
                 format!("{} (RMSE {:.2}, {score:.3})", self.describe(&of.candidate), of.rmse)
@@ -414,7 +416,8 @@ impl SearchReport<'_> {
             "held_out_scenarios": result.scenarios[1],
             "studies": result.studies,
             "lanes_per_study": result.lanes,
-            "rank_correlation_rmse_score": result.rank_correlation,
+            "rank_correlation_rmse_score": result.rmse.correlation,
+            "rank_correlation_by_parameters": result.rmse.by_size,
             "winner": winner.map(|point| json!({
                 "parameters": point.parameters,
                 "description": self.describe(&point.candidate),

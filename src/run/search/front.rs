@@ -90,6 +90,17 @@ pub struct Unkept {
     pub lanes: u64,
 }
 
+/// The error of the motions against the score, over all candidates with a score.
+#[derive(Debug)]
+pub struct RmseAgainstScore {
+    /// Spearman's rank correlation over all.
+    pub correlation: Option<f64>,
+    /// The same at equal numbers of parameters.
+    pub by_size: Vec<(usize, f64)>,
+    /// A pair that the error orders wrongly, by the largest difference of scores: smaller error and lower score first.
+    pub disagreement: Option<[Evaluated; 2]>,
+}
+
 /// The result of a search.
 #[derive(Debug)]
 pub struct SearchResult {
@@ -109,10 +120,8 @@ pub struct SearchResult {
     pub evaluated: Vec<Evaluated>,
     /// One per scope; all models first.
     pub fronts: Vec<Front>,
-    /// Spearman's rank correlation of error and score over all candidates with a score.
-    pub rank_correlation: Option<f64>,
-    /// A pair that the error orders wrongly, by the largest difference of scores: smaller error and lower score first.
-    pub disagreement: Option<[Evaluated; 2]>,
+    /// How the error of the motions and the score go together.
+    pub rmse: RmseAgainstScore,
     /// Scenarios that no description of the front keeps, by size.
     pub unkept: Vec<Unkept>,
     /// The winner for all models, fitted on all scenarios.
@@ -223,7 +232,7 @@ pub(super) fn conclude(
     let winner = fronts.first().and_then(|front| Some(&front.points[front.winner?].candidate));
     let winner = winner.map(|candidate| fitted(candidate, search)).transpose()?;
     let unkept = unkept(&all, &cross_validated, search);
-    let (rank_correlation, disagreement) = rmse_against_score(&evaluated, options);
+    let rmse_against_score = rmse_against_score(&evaluated, options);
     Ok(SearchResult {
         category,
         options: options.clone(),
@@ -233,8 +242,7 @@ pub(super) fn conclude(
         studies,
         evaluated,
         fronts,
-        rank_correlation,
-        disagreement,
+        rmse: rmse_against_score,
         unkept,
         winner,
     })
@@ -361,34 +369,42 @@ fn unkept(all: &[Candidate], evaluations: &[Option<Evaluation>], search: &Search
     unkept
 }
 
-/// Rank correlation of error and score, and the pair that it orders wrongly by the largest difference of scores.
-fn rmse_against_score(evaluated: &[Evaluated], options: &SearchOptions) -> (Option<f64>, Option<[Evaluated; 2]>) {
+/// Spearman's rank correlation of pairs; `None` for fewer than three or without any spread.
+fn rank_correlation(pairs: &[(f64, f64)]) -> Option<f64> {
+    let ranks = |values: Vec<f64>| -> Vec<f64> {
+        let mut order: Vec<usize> = (0..values.len()).collect();
+        order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
+        let mut ranks = vec![0.0; values.len()];
+        for equals in order.chunk_by(|a, b| values[*a] == values[*b]) {
+            // Equal values share the mean of their ranks.
+            let below = values.iter().filter(|value| **value < values[equals[0]]).count();
+            equals.iter().for_each(|at| ranks[*at] = below as f64 + (equals.len() - 1) as f64 / 2.0);
+        }
+        ranks
+    };
+    let (a, b): (Vec<f64>, Vec<f64>) = pairs.iter().copied().unzip();
+    let (a, b) = (ranks(a), ranks(b));
+    let mean = (pairs.len().max(1) - 1) as f64 / 2.0;
+    let product = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| (x - mean) * (y - mean)).sum::<f64>();
+    let correlation = product(&a, &b) / libm::sqrt(product(&a, &a) * product(&b, &b));
+    (pairs.len() >= 3).then_some(correlation).filter(|correlation| correlation.is_finite())
+}
+
+/// Rank correlations of error and score, over all and by size, and the pair that the error orders wrongly by the largest
+/// difference of scores.
+fn rmse_against_score(evaluated: &[Evaluated], options: &SearchOptions) -> RmseAgainstScore {
     let mut known: Vec<(f64, f64, &Evaluated)> = evaluated
         .iter()
         .filter_map(|of| Some((of.rmse, of.score(Scope::All, options)?, of)))
         .filter(|(rmse, ..)| rmse.is_finite())
         .collect();
     known.sort_by(|a, b| a.0.total_cmp(&b.0));
-    if known.len() < 3 {
-        return (None, None);
-    }
-    let ranks = |values: &[f64]| -> Vec<f64> {
-        let mut order: Vec<usize> = (0..values.len()).collect();
-        order.sort_by(|a, b| values[*a].total_cmp(&values[*b]));
-        let mut ranks = vec![0.0; values.len()];
-        let mut from = 0;
-        while from < order.len() {
-            let to = (from..order.len()).take_while(|at| values[order[*at]] == values[order[from]]).count() + from;
-            order[from..to].iter().for_each(|at| ranks[*at] = (from + to - 1) as f64 / 2.0);
-            from = to;
-        }
-        ranks
+    let pairs = |size: Option<usize>| -> Vec<(f64, f64)> {
+        let of = known.iter().filter(|(.., of)| size.is_none_or(|size| of.parameters == size));
+        of.map(|(rmse, score, _)| (*rmse, *score)).collect()
     };
-    let a = ranks(&known.iter().map(|of| of.0).collect::<Vec<_>>());
-    let b = ranks(&known.iter().map(|of| of.1).collect::<Vec<_>>());
-    let mean = (known.len() - 1) as f64 / 2.0;
-    let product = |x: &[f64], y: &[f64]| x.iter().zip(y).map(|(x, y)| (x - mean) * (y - mean)).sum::<f64>();
-    let correlation = product(&a, &b) / libm::sqrt(product(&a, &a) * product(&b, &b));
+    let sizes = 1..=options.limits.max_parameters;
+    let by_size = sizes.filter_map(|size| Some((size, rank_correlation(&pairs(Some(size)))?))).collect();
     // The highest score at a larger error, from the right.
     let mut best_right: Option<usize> = None;
     let mut worst: Option<(f64, [usize; 2])> = None;
@@ -404,5 +420,5 @@ fn rmse_against_score(evaluated: &[Evaluated], options: &SearchOptions) -> (Opti
         }
     }
     let pair = worst.filter(|(by, _)| *by > 0.0).map(|(_, pair)| pair.map(|at| known[at].2.clone()));
-    (correlation.is_finite().then_some(correlation), pair)
+    RmseAgainstScore { correlation: rank_correlation(&pairs(None)), by_size, disagreement: pair }
 }

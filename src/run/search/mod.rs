@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 
 pub use evaluation::Evaluation;
 pub use folds::folds;
-pub use front::{Front, FrontPoint, Judged, PaperPoint, Scored, SearchResult, Unkept};
+pub use front::{Front, FrontPoint, Judged, PaperPoint, RmseAgainstScore, Scored, SearchResult, Unkept};
 
 use candidates::Task;
 use evaluation::{Evaluator, Training};
@@ -90,10 +90,10 @@ pub struct SearchLimits {
     /// Folds of the cross-validation, also of `study` (5).
     #[schemars(range(min = 2, max = 100))]
     pub folds: usize,
-    /// Maximum number of parameters of a description, the duration T counted (8).
+    /// Maximum number of parameters, the duration T counted (8).
     #[schemars(range(min = 2, max = 12))]
     pub max_parameters: usize,
-    /// Studies that the optimiser of the weights may use in all (8000).
+    /// Studies for the optimiser of the weights (8000).
     #[schemars(range(min = 0, max = 10_000_000))]
     pub studies: usize,
     /// Non-inferiority margin: the winner's score is shown to be at most this much below the best (0.05).
