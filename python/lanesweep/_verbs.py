@@ -78,7 +78,8 @@ def study(
     scenarios : Value
         Scenario file (.jsonl, .parquet, .csv) instead of recordings.
     external : Values
-        S' from another program (scenario file with the ids of S), or a parameterization of `search` (.json).
+        S' of another program (scenario file), or winner.json of `search`. A scenario file has the ids of S; its
+        series may have any sample rate and length. Repeatable.
     preset : Value
         Format of the recordings: exid, sumo-fcd, … or a TOML file [default: detected].
     accept_implausible : bool
@@ -99,8 +100,8 @@ def study(
     models : Models
         Driver models: Reg157, CCHDM, RSS, FSM [default: all].
     cross_validate : bool
-        Also replay every scenario by decompositions that have not seen it (5-held-out, …). Scenarios are
-        divided into folds by recording ([search] folds). A decomposition fitted on the scenarios that it
+        Also replay scenarios by bases that have not seen them. Scenarios are divided into folds by recording
+        ([search] folds). Each decomposition gets a variant, 5-held-out. A basis fitted on the scenarios that it
         replays flatters itself.
     profile : Value, default paper
         paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc`
@@ -740,7 +741,7 @@ def search(
     scenarios : Value
         Scenario file (.jsonl, .parquet, .csv) instead of recordings.
     held_out : Value
-        Folder of recordings, or scenario file, that the search does not read: it judges the front.
+        Data that the search does not read, to judge its front. A folder of recordings, or a scenario file.
     preset : Value
         Format of the recordings: exid, sumo-fcd, … or a TOML file [default: detected].
     accept_implausible : bool
@@ -765,9 +766,9 @@ def search(
         paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc`
         takes jrc-2021 unless it is set.
     max_parameters : Value, default 8
-        Maximum number of parameters of a description, the duration T counted (8).
+        Maximum number of parameters, the duration T counted (8).
     studies : Value, default 8000
-        Studies that the optimiser of the weights may use in all (8000).
+        Studies for the optimiser of the weights (8000).
     shuffled : bool
         Give every scenario the outcomes of another one: no gain may be left on held-out data.
     dt : Value, s
@@ -775,7 +776,8 @@ def search(
     folds : Value, default 5
         Folds of the cross-validation, also of `study` (5).
     shard : Value
-        Evaluate only part I of N (from 0) of the tasks; the command without it, in the same folder, concludes.
+        Evaluate part I of N (from 0) only; without it: conclude. Parts share the folder. The command without
+        this flag, in the same folder, concludes.
     config : Values
         Configuration file, or one key of it; repeatable. `lanesweep config init` writes such a file. Without
         --config, LANESWEEP_CONFIG names it.

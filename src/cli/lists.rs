@@ -51,6 +51,19 @@ pub fn is_file(name: &str) -> bool {
     name.trim().ends_with(".json")
 }
 
+/// The parameterization of a file, which must be of one of the categories.
+///
+/// # Errors
+/// As [`Parameterization::read`]; [`Error::Usage`] for another category.
+pub fn of_file(name: &str, categories: &[Category]) -> Result<Parameterization> {
+    let id = Parameterization::read(name.trim().as_ref())?;
+    if categories.contains(&id.category) {
+        return Ok(id);
+    }
+    let problem = format!("{} is for a {}, which is not among the categories", name.trim(), id.category.label());
+    Err(Error::usage(Place::file(name.trim()), problem, "choose its category, or leave it out"))
+}
+
 /// `--parameterizations`.
 #[derive(Debug, Clone, Args)]
 pub struct ParameterizationsFlag {
@@ -75,12 +88,12 @@ impl ParameterizationsFlag {
             false => parameterizations(categories, &keys)?,
         };
         for file in files {
-            let id = Parameterization::read(file.trim().as_ref())?;
+            let id = of_file(file, categories)?;
             if found.iter().any(|known| (known.category, &known.key) == (id.category, &id.key)) {
                 let problem = format!("{} is given twice", id.name());
                 return Err(Error::usage(Place::item("--parameterizations"), problem, "name each once"));
             }
-            found.extend(categories.contains(&id.category).then_some(id));
+            found.push(id);
         }
         Ok(found)
     }

@@ -29,7 +29,7 @@ use crate::{Error, Place, Result};
 /// `fit`, `sample`, `justify` and `export`. Without data it uses generated recordings.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  lanesweep search --category lvd --criterion ttc\n  \
-                        lanesweep search recordings --category cut-in --held-out others --out result")]
+                        lanesweep search recordings --category cut-in --held-out others --out found")]
 pub struct Search {
     #[command(flatten)]
     data: SourceFlags,
@@ -96,6 +96,13 @@ impl Search {
         let data = self.data.source(configured);
         let collection = self.data.report_and_load(configured, verbosity)?;
         let held_out = self.held_out(configured, category, verbosity)?;
+        if config.search.studies < config.search.min_studies() {
+            tracing::warn!(
+                "no weights are tuned: that takes {} studies for descriptions of up to {} parameters",
+                config.search.min_studies(),
+                config.search.max_parameters
+            );
+        }
         let search = search::Search::plan(&collection.scenarios, &profile, options)?;
         // Shards share the folder; the run that concludes has it alone.
         let folder = match self.shard {

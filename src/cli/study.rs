@@ -21,7 +21,6 @@ use crate::report::run_record::{StudyHost, Timings};
 use crate::report::study::StudyReport;
 use crate::run::parts::{PLAN_FILE, RUN_PLAN_FILE};
 use crate::run::study::{self, GivenReplay, StudyOptions, StudyResult};
-use crate::scenario::parameterization::Parameterization;
 use crate::support::files::{check_folder, check_folder_of};
 use crate::support::input_file;
 use crate::support::readable;
@@ -76,7 +75,7 @@ pub struct Study {
     headways: lists::HeadwaysFlag,
     /// Also replay scenarios by bases that have not seen them
     ///
-    /// Scenarios are divided into folds by recording ([search] folds). Each decomposition gets a variant, 5-held-out. A
+    /// Scenarios are divided into folds by recording ([search] folds). Each decomposition gets a variant, 5-cv. A
     /// basis fitted on the scenarios that it replays flatters itself.
     #[arg(long, help_heading = "Models and criteria")]
     cross_validate: bool,
@@ -195,9 +194,14 @@ impl Study {
         let collection = timed(&mut timings.mine_s, || self.data.load(configured, verbosity))?;
         for path in &self.external {
             if lists::is_file(&path.to_string_lossy()) {
-                options.searched.push(Parameterization::read(path)?);
+                options.searched.push(lists::of_file(&path.to_string_lossy(), &options.categories)?);
             } else {
-                options.external.extend(GivenReplay::read(path, &collection.scenarios, &options.categories)?);
+                options.external.extend(GivenReplay::read(
+                    path,
+                    &collection.scenarios,
+                    &options.categories,
+                    self.data.policy(),
+                )?);
             }
         }
         let data = source.describe(collection.synthetic);

@@ -15,7 +15,10 @@ impl DossierReport<'_> {
         format!(
             "Under profile {}, {} is {} for {} and {} on this data ({} scenarios, {} simulations of S from {})",
             self.profile.name,
-            dossier.parameterization.name(),
+            match dossier.parameterization.fitted_basis() {
+                Some(_) => format!("{} ({})", dossier.parameterization.name(), dossier.parameterization.description()),
+                None => dossier.parameterization.name(),
+            },
             dossier.conclusion.text().to_uppercase(),
             dossier.model.name(),
             dossier.criterion.label(),

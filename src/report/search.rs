@@ -23,6 +23,14 @@ const PAPER: &str = "#777777";
 const FRONT: &str = "#0072b2";
 const HELD_OUT: &str = "#d55e00";
 
+/// The scores of a description, by their columns.
+type ScoreOf = fn(&Judged) -> Option<Scored>;
+const SCORES: [(&str, ScoreOf); 3] = [
+    ("cross_validated", |judged| Some(judged.cross_validated)),
+    ("in_sample", |judged| Some(judged.in_sample)),
+    ("held_out", |judged| judged.held_out),
+];
+
 /// A search as it is reported.
 pub struct SearchReport<'a> {
     /// The result.
@@ -50,9 +58,20 @@ fn with_interval(scored: &Scored) -> String {
     format!("{value:.3}{interval}")
 }
 
+/// The key of the paper, or `found 4`.
+fn name_of(candidate: &Candidate, parameters: usize) -> String {
+    match candidate {
+        Candidate::Paper(key) => key.clone(),
+        Candidate::Linear(_) => format!("found {parameters}"),
+    }
+}
+
 /// The verdict over all models of gains against the paper's best.
 fn verdict(point: &FrontPoint) -> &'static str {
     let gains = if point.held_out_gains.is_empty() { &point.gains } else { &point.held_out_gains };
+    if gains.iter().any(|(_, gain)| gain.is_none()) {
+        return "not compared: undefined or without interval";
+    }
     let all = |of: &dyn Fn(f64, f64) -> bool| {
         !gains.is_empty()
             && gains.iter().all(|(_, gain)| gain.is_some_and(|(_, interval)| of(interval.low, interval.high)))
@@ -60,9 +79,9 @@ fn verdict(point: &FrontPoint) -> &'static str {
     let any_below = gains.iter().any(|(_, gain)| gain.is_some_and(|(_, interval)| interval.high < 0.0));
     match () {
         () if all(&|low, _| low > 0.0) => "better for every model",
-        () if any_below => "worse for a model",
+        () if any_below => "worse for a model shown",
         () if gains.iter().any(|(_, gain)| gain.is_some_and(|(_, interval)| interval.low > 0.0)) => {
-            "better for a model, worse for none"
+            "better for a model, worse shown for none"
         }
         () => "no difference shown",
     }
@@ -94,13 +113,9 @@ impl SearchReport<'_> {
             }
         };
         let has_held_out = self.held_out.is_some();
-        let scores: Vec<(&str, fn(&Judged) -> Option<Scored>)> = vec![
-            ("cross-validated", |judged| Some(judged.cross_validated)),
-            ("in sample", |judged| Some(judged.in_sample)),
-            ("held out", |judged| judged.held_out),
-        ];
-        let shown = scores.into_iter().filter(|(name, _)| has_held_out || *name != "held out");
+        let shown = SCORES.into_iter().filter(|(name, _)| has_held_out || *name != "held_out");
         Table::of(rows.iter())
+            .column("description", |row| name_of(&parts(row).0, parts(row).1))
             .column("parameters", |row| parts(row).1)
             .column("", |row| match row {
                 Row::Paper(_, true) => "paper's best",
@@ -110,14 +125,13 @@ impl SearchReport<'_> {
             })
             .columns(
                 shown,
-                |(name, _)| name.to_owned(),
+                |(name, _)| name.replace('_', " "),
                 |row, (_, of)| of(&parts(row).2).map_or(String::new(), |scored| with_interval(&scored)),
             )
             .column("against the paper's best", |row| match row {
                 Row::Found(point, _) => verdict(point),
                 Row::Paper(..) => "",
             })
-            .column("description", |row| self.describe(&parts(row).0))
             .build()
             .captioned(format!("{}, {}", self.goal(), front.scope.name()))
     }
@@ -128,31 +142,45 @@ impl SearchReport<'_> {
         let models: Vec<&str> = result.options.models.iter().map(|model| model.name()).collect();
         let mut text = format!("{}\n", wrap(&self.data, WIDTH));
         if let Some(held_out) = &self.held_out {
-            text += &format!("held out: {}\n", wrap(held_out, WIDTH - 10));
+            let data = format!("held out: {held_out}, {} scenarios", self.result.scenarios[1]);
+            text += &format!("{}\n", wrap(&data, WIDTH));
         }
         let _ = writeln!(
             text,
             "\n{}",
             wrap(
                 &format!(
-                    "{} studies of {} {}s ({} lanes each); goal: {} for {}; {} folds",
+                    "{} studies of {} {}s ({} lanes each); goal: {} for {}; {} folds {}",
                     count(result.studies as u64),
                     result.scenarios[0],
                     result.category.label(),
                     count(result.lanes),
                     self.goal(),
                     models.join(", "),
-                    result.options.limits.folds
+                    result.options.limits.folds,
+                    match result.is_by_recording {
+                        true => "by recording",
+                        false => "by stretches of time, because there are fewer recordings",
+                    }
                 ),
                 WIDTH
             )
         );
+        if result.options.shuffled {
+            text += "SHUFFLED OUTCOMES: every scenario has those of another one; no number below says anything of a description\n";
+        }
         if let Some(front) = result.fronts.first() {
-            let _ = writeln!(text, "\n{}", self.table(front).fitted(2, WIDTH));
+            let _ = writeln!(text, "\n{}", self.table(front).fitted(1, WIDTH));
+            for point in &front.points {
+                let words = format!("found {}: {}", point.parameters, self.describe(&point.candidate));
+                let _ = writeln!(text, "{}", wrap(&words, WIDTH));
+            }
+            text.push('\n');
             if let Some(winner) = front.winner.map(|at| &front.points[at]) {
                 let words = format!(
-                    "winner (fewest parameters whose score is shown to be at most {} below the best): {} \
-                     parameters, {}, {} cross-validated{}",
+                    "winner (fewest parameters whose score is {}at most {} below the best): {} parameters, {}, {} \
+                     cross-validated{}",
+                    if winner.below_best.is_some() { "shown to be " } else { "" },
                     result.options.limits.margin,
                     winner.parameters,
                     self.describe(&winner.candidate),
@@ -173,8 +201,9 @@ impl SearchReport<'_> {
                 let _ = writeln!(text, "{}", wrap(&words, WIDTH));
             }
         }
-        if let Some(baseline) = result.fronts.first().and_then(|front| front.always_failing) {
-            let _ = writeln!(text, "for comparison: an S' that always fails has {baseline:.3}");
+        if let Some([Some(baseline), held_out]) = result.fronts.first().map(|front| front.always_failing) {
+            let held_out = held_out.map_or(String::new(), |held_out| format!(", {held_out:.3} held out"));
+            let _ = writeln!(text, "for comparison: an S' that always fails has {baseline:.3}{held_out}");
         }
         if let Some(correlation) = result.rmse.correlation {
             let by_size: Vec<String> =
@@ -276,7 +305,7 @@ impl SearchReport<'_> {
             subtitle: Some(self.data.clone()),
             plots: self.result.fronts.iter().map(plot).collect(),
             caption: format!(
-                "Each point: the best description of its size by cross-validation, with its interval over scenarios. \
+                "Each point: the best description of its size that this search found by cross-validation, with its interval over scenarios if it is known. \
                  Grey: the paper's parameterizations by their keys, {paper}. The duration counts as a parameter."
             ),
             ..Figure::default()
@@ -296,7 +325,8 @@ impl SearchReport<'_> {
         // Evenly over all, in the order of the score.
         drawn.sort_by(|a, b| b.1.total_cmp(&a.1));
         let stride = drawn.len().div_ceil(MAX_DRAWN).max(1);
-        let drawn: Vec<_> = drawn.into_iter().step_by(stride).collect();
+        let drawn = drawn.into_iter().enumerate().filter(|(at, (family, ..))| family == "paper" || at % stride == 0);
+        let drawn: Vec<_> = drawn.map(|(_, of)| of).collect();
         let mut families: Vec<String> = drawn.iter().map(|of| of.0.clone()).collect();
         families.sort();
         families.dedup();
@@ -357,19 +387,13 @@ impl SearchReport<'_> {
             paper.chain(found)
         });
         let rows: Vec<_> = rows.collect();
-        type Of = fn(&Judged) -> Option<Scored>;
-        let scores: [(&str, Of); 3] = [
-            ("cross_validated", |judged| Some(judged.cross_validated)),
-            ("in_sample", |judged| Some(judged.in_sample)),
-            ("held_out", |judged| judged.held_out),
-        ];
         type End = fn(&Scored) -> Option<f64>;
         let ends: [(&str, End); 3] = [
             ("", |scored| scored.value),
             ("_low", |scored| scored.interval.map(|i| i.low)),
             ("_high", |scored| scored.interval.map(|i| i.high)),
         ];
-        let columns = scores.into_iter().flat_map(|score| ends.map(|end| (score, end)));
+        let columns = SCORES.into_iter().flat_map(|score| ends.map(|end| (score, end)));
         Table::of(rows.iter())
             .column("models", |row| row.0.scope.name())
             .column("origin", |row| row.1)
@@ -426,7 +450,8 @@ impl SearchReport<'_> {
                 "held_out": point.judged.held_out.and_then(|of| of.value),
                 "against_the_papers_best": verdict(point),
             })),
-            "fronts": result.fronts.iter().map(|front| self.table(front).records()).collect::<Vec<_>>(),
+            "folds_are_recordings": result.is_by_recording,
+            "fronts": self.front_csv().records(),
             "host": to_json(serde_json::to_value(&self.host))?,
         }))
     }
@@ -451,7 +476,13 @@ impl SearchReport<'_> {
             figures: of("winner"),
             ..Section::new("winner", "The winner")
         };
+        let described = |front: &Front| -> String {
+            let line =
+                |point: &FrontPoint| format!("  found {}: {}\n", point.parameters, self.describe(&point.candidate));
+            format!("{}\n{}", front.scope.name(), front.points.iter().map(line).collect::<String>())
+        };
         let tables = Section {
+            text: self.result.fronts.iter().map(described).collect::<Vec<_>>().join("\n"),
             tables: self.result.fronts.iter().map(|front| self.table(front)).collect(),
             ..Section::new("fronts", "Fronts")
         };

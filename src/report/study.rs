@@ -87,11 +87,7 @@ impl StudyReport {
                 parameters: of.parameters.clone(),
                 modes: of.modes.clone(),
                 svd_explained: of.svd_explained.clone(),
-                folds: {
-                    let units = &plan.blocks[block].units;
-                    let id = |(unit, fold): (usize, &usize)| (units.name(unit as u64).into_owned(), *fold);
-                    of.folds.iter().enumerate().map(id).collect()
-                },
+                folds: of.folds.clone(),
                 rmse: of.rmse.clone(),
                 close_following: CloseFollowing::of_recorded(plan, counts, block, &of.close_units)?,
             })

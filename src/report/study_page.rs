@@ -38,7 +38,7 @@ impl StudyReport {
             sections.push(self.category(at));
         }
         sections.extend(self.given_table().map(|table| Section {
-            intro: "-held-out: each scenario is replayed by a basis that was fitted on other recordings.".to_owned(),
+            intro: "-cv: each scenario is replayed by a basis that was fitted on the other folds (folds.csv): whole recordings, or stretches of time if there are fewer recordings than folds.".to_owned(),
             tables: vec![table],
             ..Section::new("given", "Cross-validation and given S'")
         }));

@@ -68,6 +68,7 @@ fn smaller(line: &str) -> String {
     }
     match words[1] {
         "compare" if !words.contains(&"--samples") => words.extend(["--samples", "50"]),
+        "search" => words.extend(["--studies", "24", "--max-parameters", "3", "--config", "generator.recordings=4"]),
         "fit" => words.extend(["--no-comparison", "--config", "fit.valid_draws=1000"]),
         // One lane is little already.
         "verify" if !["--lane", "devices", "conformance"].iter().any(|word| words.contains(word)) => {
@@ -121,6 +122,9 @@ fn every_example_of_the_help_runs() {
             let own = fcd().replace("vehicle_", "").replace("timestep_", "");
             std::fs::write(dir.join("own.csv"), own.replace("angle;", "").replace(";90;", ";")).unwrap();
             std::fs::write(dir.join("study.toml"), "[score]\nmin_failures = 5\n").unwrap();
+            if verb == "search" && !dir.join("others").exists() {
+                run(dir, "lanesweep synth others --synth-recordings 4 --config generator.seed=2");
+            }
             if verb == "verify conformance" {
                 let Some(tables) = shared("golden/jrc") else { continue };
                 for name in ["cutin.csv", "lvd.csv", "cutout.csv", "functions.csv"] {

@@ -5,7 +5,7 @@ use super::JustifyOptions;
 use crate::engine::{Confusion, Executor, LanePlan, Partial, SweepSummary, Verdicts, Wanted};
 use crate::model::profile::Profile;
 use crate::run::compare::Compare;
-use crate::run::score::{HELD_OUT, ScoreOptions, f1, f1_interval, precision, recall};
+use crate::run::score::{CROSS_VALIDATED, ScoreOptions, f1, f1_interval, precision, recall};
 use crate::scenario::Scenario;
 use crate::scenario::parameterization::Parameterization;
 use crate::stats::estimate::{Clusters, cluster_rate};
@@ -199,7 +199,7 @@ impl<'a> Replay<'a> {
     /// [`Error::Input`] for one that is impossible with this data.
     pub fn variant(&self, id: &Parameterization) -> Result<usize> {
         let variants = &self.plan().blocks[0].variants;
-        let held_out = format!("{}{HELD_OUT}", id.key);
+        let held_out = format!("{}{CROSS_VALIDATED}", id.key);
         // A basis that has seen the scenario flatters itself.
         let found = variants.iter().position(|name| *name == held_out);
         let found = found.or_else(|| variants.iter().position(|name| *name == id.key));

@@ -74,7 +74,7 @@ fn best_score(
 ) -> Option<BestScore> {
     // A basis that has seen its scenarios is no rival of itself.
     let has_held_out = |variant: &usize| {
-        let held_out = format!("{}{}", scores.variants[*variant], super::HELD_OUT);
+        let held_out = format!("{}{}", scores.variants[*variant], super::CROSS_VALIDATED);
         scores.variants.contains(&held_out)
     };
     let places = (1..scores.variants.len())

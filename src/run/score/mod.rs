@@ -31,7 +31,7 @@ use crate::support::ranges;
 use crate::{Error, Place, Result};
 
 /// Ending of the name of a parameterization that replays each scenario by a basis that has not seen it.
-pub const HELD_OUT: &str = "-held-out";
+pub const CROSS_VALIDATED: &str = "-cv";
 
 /// Recall TP/(TP + FN); `None` if S never fails.
 pub fn recall(c: &Confusion) -> Option<f64> {

@@ -8,11 +8,14 @@ use crate::scenario::parameterization::{Feature, FunctionKind, LinearFamily, Lin
 use crate::{Error, Result};
 
 /// Individuals of a generation of the optimiser.
-const POPULATION: usize = 12;
+pub(super) const POPULATION: usize = 12;
 /// Maximum number of starts of the optimiser, if it ends before its budget.
 const MAX_RESTARTS: u64 = 20;
 /// First step of the optimiser, in logarithms of weights.
 const STEP: f64 = 0.7;
+
+/// Looks candidates up or evaluates them.
+pub(super) type Evaluate<'e> = dyn FnMut(&[Candidate]) -> Result<Vec<Option<Evaluated>>> + 'e;
 
 /// A part of the search. Its evaluations follow from the options alone.
 #[derive(Debug, Clone, PartialEq)]
@@ -48,7 +51,7 @@ impl Task {
         category: Category,
         options: &SearchOptions,
         budget: usize,
-        evaluate: &mut dyn FnMut(&[Candidate]) -> Result<Vec<Option<Evaluated>>>,
+        evaluate: &mut Evaluate<'_>,
     ) -> Result<()> {
         match self {
             Task::Paper => evaluate(&paper(category)).map(drop),
@@ -112,12 +115,7 @@ pub(super) fn of_features(features: Vec<Feature>) -> Candidate {
 
 /// Floating forward selection: adds the best feature, then removes features as long as that beats the best known set of
 /// that size (Pudil, Novovičová, Kittler 1994).
-fn features(
-    category: Category,
-    options: &SearchOptions,
-    scope: Scope,
-    evaluate: &mut dyn FnMut(&[Candidate]) -> Result<Vec<Option<Evaluated>>>,
-) -> Result<()> {
+fn features(category: Category, options: &SearchOptions, scope: Scope, evaluate: &mut Evaluate<'_>) -> Result<()> {
     let mut best: Vec<Option<(f64, Vec<Feature>)>> = vec![None; options.limits.max_parameters + 1];
     let mut chosen: Vec<Feature> = Vec::new();
     // Every set is at most once the start of an addition, so the loop ends.
@@ -168,7 +166,7 @@ fn best_of(
     sets: &[Vec<Feature>],
     scope: Scope,
     options: &SearchOptions,
-    evaluate: &mut dyn FnMut(&[Candidate]) -> Result<Vec<Option<Evaluated>>>,
+    evaluate: &mut Evaluate<'_>,
 ) -> Result<Option<(f64, Vec<Feature>)>> {
     let candidates: Vec<Candidate> = sets.iter().cloned().map(of_features).collect();
     let evaluated = evaluate(&candidates)?;
@@ -188,7 +186,7 @@ fn emphasis(
     options: &SearchOptions,
     (scope, coefficients): (Scope, usize),
     budget: usize,
-    evaluate: &mut dyn FnMut(&[Candidate]) -> Result<Vec<Option<Evaluated>>>,
+    evaluate: &mut Evaluate<'_>,
 ) -> Result<()> {
     let count = LinearSpec::emphasis_count(category);
     let mut failed: Option<Error> = None;

@@ -71,11 +71,12 @@ pub struct Front {
     pub points: Vec<FrontPoint>,
     /// The paper's parameterizations.
     pub paper: Vec<PaperPoint>,
-    /// The score of an S' that always fails, which says nothing of a scenario.
-    pub always_failing: Option<f64>,
+    /// The score of an S' that always fails, which says nothing of a scenario: on the searched data, and on held-out data.
+    pub always_failing: [Option<f64>; 2],
     /// Index of the paper's best, by cross-validation.
     pub best_paper: Option<usize>,
-    /// Index of the winner: the fewest parameters whose score is shown to be at most the margin below the best.
+    /// Index of the winner: the fewest parameters whose score is shown to be at most the margin below the best, among
+    /// descriptions that can be sampled; the largest of these if none is.
     pub winner: Option<usize>,
 }
 
@@ -126,6 +127,8 @@ pub struct SearchResult {
     pub unkept: Vec<Unkept>,
     /// The winner for all models, fitted on all scenarios.
     pub winner: Option<Parameterization>,
+    /// The folds are whole recordings.
+    pub is_by_recording: bool,
 }
 
 /// Judges fronts and winners.
@@ -224,9 +227,14 @@ pub(super) fn conclude(
             let low = point.below_best.map(|(_, interval)| interval.low).or_else(|| low(points.last()?));
             at + 1 == points.len() || low.is_some_and(|low| low >= -margin)
         };
-        let winner = points.iter().enumerate().position(is_enough);
+        let is_sampled = |point: &FrontPoint| !matches!(&point.candidate, Candidate::Linear(spec) if spec.registered);
+        let winner = points.iter().enumerate().position(|of| is_enough(of) && is_sampled(of.1));
+        let winner = winner.or_else(|| points.iter().rposition(is_sampled));
         let paper = of_paper.into_iter().map(|(_, point)| point).collect();
-        let always_failing = always_failing(&cross_validated, scope, options);
+        let always_failing = [
+            always_failing(&cross_validated, scope, options),
+            held_out.as_ref().and_then(|of| always_failing(of, scope, options)),
+        ];
         fronts.push(Front { scope, points, paper, always_failing, best_paper, winner });
     }
     let winner = fronts.first().and_then(|front| Some(&front.points[front.winner?].candidate));
@@ -244,7 +252,9 @@ pub(super) fn conclude(
         fronts,
         rmse: rmse_against_score,
         unkept,
-        winner,
+        // Shuffled outcomes have none.
+        winner: winner.filter(|_| !options.shuffled),
+        is_by_recording: search.is_by_recording(),
     })
 }
 

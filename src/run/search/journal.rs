@@ -1,7 +1,7 @@
 //! Evaluated candidates in files: a line of JSON each, appended as they come. A search that is started again reads them in
 //! place of evaluating; shards read one another's.
 
-use std::collections::HashMap;
+use std::collections::{BTreeSet, HashMap};
 use std::fs::File;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -11,6 +11,7 @@ use serde::{Deserialize, Serialize};
 use super::{Candidate, Evaluated};
 use crate::run::parts::Shard;
 use crate::support::input_file;
+use crate::support::plain_text::sha256;
 use crate::{Error, Place, Result};
 
 #[derive(Serialize, Deserialize, PartialEq)]
@@ -19,16 +20,26 @@ struct Head {
     search_sha256: String,
 }
 
-/// A line: a candidate and its result; `None` for one that cannot be fitted.
+/// A line: a candidate and its result, `None` for one that cannot be fitted, and the checksum of both.
 #[derive(Serialize, Deserialize)]
 struct Line {
     candidate: Candidate,
     evaluated: Option<Evaluated>,
+    sha256: String,
+}
+
+impl Line {
+    fn checksum(candidate: &Candidate, evaluated: &Option<Evaluated>) -> Result<String> {
+        let text = serde_json::to_string(&(candidate, evaluated));
+        Ok(sha256(text.map_err(|e| Error::Internal(format!("a result as JSON: {e}")))?))
+    }
 }
 
 /// What has been evaluated, and the file that new results go to.
 pub(super) struct Journal {
     known: HashMap<String, Option<Evaluated>>,
+    /// Candidates of this run: the folder may hold those of a larger one.
+    asked: BTreeSet<String>,
     out: Option<(PathBuf, File)>,
 }
 
@@ -46,7 +57,7 @@ impl Journal {
     /// # Errors
     /// [`Error::Io`]; [`Error::Input`] for the journal of another search.
     pub fn open(folder: Option<&Path>, shard: Option<Shard>, search_sha256: &str) -> Result<Journal> {
-        let mut journal = Journal { known: HashMap::new(), out: None };
+        let mut journal = Journal { known: HashMap::new(), asked: BTreeSet::new(), out: None };
         let Some(folder) = folder else { return Ok(journal) };
         let own = folder.join(name_of(shard));
         let head = Head { lanesweep_search: 1, search_sha256: search_sha256.to_owned() };
@@ -68,13 +79,17 @@ impl Journal {
                 }
                 let damaged = || Error::input(Place::file(&path).row(at as u64 + 1), "the line is damaged", REMOVE);
                 if at == 0 {
-                    let found: Head = serde_json::from_slice(line).map_err(|_| damaged())?;
+                    let none = |_| Error::input(Place::file(&path), "it is no journal of a search", "move it away");
+                    let found: Head = serde_json::from_slice(line).map_err(none)?;
                     if found != head {
                         let problem = "it belongs to a search with other data or options";
                         return Err(Error::input(Place::file(&path), problem, "choose another folder, or remove it"));
                     }
                 } else {
-                    let Line { candidate, evaluated } = serde_json::from_slice(line).map_err(|_| damaged())?;
+                    let Line { candidate, evaluated, sha256 } = serde_json::from_slice(line).map_err(|_| damaged())?;
+                    if Line::checksum(&candidate, &evaluated)? != sha256 {
+                        return Err(damaged());
+                    }
                     journal.known.insert(key_of(&candidate)?, evaluated);
                 }
                 whole += line.len() as u64;
@@ -107,8 +122,11 @@ impl Journal {
     ///
     /// # Errors
     /// [`Error::Internal`].
-    pub fn find(&self, candidate: &Candidate) -> Result<Option<&Option<Evaluated>>> {
-        Ok(self.known.get(&key_of(candidate)?))
+    pub fn find(&mut self, candidate: &Candidate) -> Result<Option<&Option<Evaluated>>> {
+        let key = key_of(candidate)?;
+        let found = self.known.get(&key);
+        self.asked.insert(key);
+        Ok(found)
     }
 
     /// Adds results.
@@ -118,7 +136,8 @@ impl Journal {
     pub fn add(&mut self, results: &[(Candidate, Option<Evaluated>)]) -> Result<()> {
         let mut text = Vec::new();
         for (candidate, evaluated) in results {
-            let line = Line { candidate: candidate.clone(), evaluated: evaluated.clone() };
+            let sha256 = Line::checksum(candidate, evaluated)?;
+            let line = Line { candidate: candidate.clone(), evaluated: evaluated.clone(), sha256 };
             serde_json::to_writer(&mut text, &line).map_err(|e| Error::Internal(format!("a result as JSON: {e}")))?;
             text.push(b'\n');
             self.known.insert(key_of(candidate)?, evaluated.clone());
@@ -127,17 +146,14 @@ impl Journal {
         file.write_all(&text).map_err(|e| Error::io(path, "write", e))
     }
 
-    /// All results, by the text of their candidates.
+    /// The results of this run, by the text of their candidates.
     pub fn all(&self) -> Vec<&Evaluated> {
-        let mut all: Vec<(&String, &Evaluated)> =
-            self.known.iter().filter_map(|(key, evaluated)| Some((key, evaluated.as_ref()?))).collect();
-        all.sort_by(|a, b| a.0.cmp(b.0));
-        all.into_iter().map(|(_, evaluated)| evaluated).collect()
+        self.asked.iter().filter_map(|key| self.known.get(key)?.as_ref()).collect()
     }
 
-    /// Number of candidates, those that could not be fitted included.
+    /// Number of candidates of this run, those that could not be fitted included.
     pub fn len(&self) -> usize {
-        self.known.len()
+        self.asked.len()
     }
 }
 

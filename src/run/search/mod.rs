@@ -17,7 +17,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use evaluation::Evaluation;
-pub use folds::folds;
+pub use folds::{folds, is_by_recording};
 pub use front::{Front, FrontPoint, Judged, PaperPoint, RmseAgainstScore, Scored, SearchResult, Unkept};
 
 use candidates::Task;
@@ -54,7 +54,7 @@ impl Objective {
         match self {
             Objective::F1 => "F1",
             Objective::Recall => "recall",
-            Objective::Risk => "risk ratio",
+            Objective::Risk => "agreement of failure rates",
         }
     }
 
@@ -248,6 +248,13 @@ impl Evaluated {
     }
 }
 
+impl SearchLimits {
+    /// Studies that the optimiser needs at least: one generation for each size.
+    pub fn min_studies(&self) -> usize {
+        candidates::POPULATION * (self.max_parameters - 1)
+    }
+}
+
 /// Data and options of a search.
 pub struct Search<'a> {
     scenarios: Vec<&'a Scenario>,
@@ -269,7 +276,7 @@ impl<'a> Search<'a> {
         let scenarios: Vec<&Scenario> = scenarios.iter().filter(of).collect();
         if scenarios.len() < 10 {
             let problem = format!("{} {} scenarios are too few to search", scenarios.len(), options.category.label());
-            return Err(Error::input(Place::item("scenarios"), problem, "use more recordings: 10 at least"));
+            return Err(Error::input(Place::item("scenarios"), problem, "use more recordings: 10 scenarios at least"));
         }
         folds(&scenarios, options.limits.folds)?;
         Ok(Search { scenarios, profile, options, left_out: Vec::new() })
@@ -290,6 +297,25 @@ impl<'a> Search<'a> {
         Ok(canonical.finish())
     }
 
+    /// Whether the folds are whole recordings.
+    pub fn is_by_recording(&self) -> bool {
+        is_by_recording(&self.scenarios, self.options.limits.folds)
+    }
+
+    /// Refuses held-out data that the search reads.
+    fn refuse_searched(&self, held_out: &[Scenario]) -> Result<()> {
+        let bits = |scenario: &Scenario| scenario.target.v.iter().map(|v| v.to_bits()).collect::<Vec<u64>>();
+        let searched: std::collections::HashSet<Vec<u64>> = self.scenarios.iter().map(|s| bits(s)).collect();
+        let own = held_out.iter().filter(|s| s.kept && s.category == self.options.category);
+        let (all, known) =
+            own.fold((0, 0), |(all, known), s| (all + 1, known + usize::from(searched.contains(&bits(s)))));
+        if known == 0 {
+            return Ok(());
+        }
+        let problem = format!("{known} of {all} scenarios are searched, too: they are not held out");
+        Err(Error::input(Place::item("held-out data"), problem, "hold out other recordings"))
+    }
+
     /// Runs the search: all of it, or the tasks of one shard; `None` for a shard. `folder` holds the journals. `done` is
     /// called with the number of studies so far.
     ///
@@ -304,6 +330,11 @@ impl<'a> Search<'a> {
         done: &dyn Fn(usize),
     ) -> Result<Option<SearchResult>> {
         let (category, profile) = (self.options.category, self.profile);
+        // A signal ends the search after the present sweep; the journal has the rest.
+        let _resumable = folder.map(|_| executor.cancel.resumable());
+        if let Some(held_out) = held_out {
+            self.refuse_searched(held_out)?;
+        }
         let sha256 = self.sha256()?;
         let all = self.options.clone();
         let evaluator = Evaluator::new(category, self.scenarios.clone(), profile, &all, executor)?;

@@ -9,7 +9,7 @@ use crate::Result;
 use crate::engine::{Block, Headway};
 use crate::run::close_following::close_units;
 use crate::run::motion_error::{MotionError, MotionSpread};
-use crate::run::score::{HELD_OUT, ScoreOptions};
+use crate::run::score::{CROSS_VALIDATED, ScoreOptions};
 use crate::run::search::folds;
 use crate::scenario::parameterization::{
     ModeShape, Parameter, Parameterization, ParameterizationOptions, Reduction, SpeedProfile,
@@ -33,9 +33,9 @@ pub struct CategoryProvenance {
     pub parameters: Vec<ParameterHistogram>,
     /// Shapes of the decomposition's first directions.
     pub modes: Vec<ModeShape>,
-    /// Fold of each kept scenario, with cross-validation.
+    /// Id and fold of each kept scenario, with cross-validation.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub folds: Vec<usize>,
+    pub folds: Vec<(String, usize)>,
     /// Error of the motions of each variant, in standard deviations of the recorded series, S first; only with S' that
     /// are given as series or cross-validated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
@@ -94,7 +94,9 @@ pub(super) fn category_facts(
         let parameters = parameter_histograms(block.category, &kept, &options.parameterization)?;
         let is_observed = Headway::is_observed(&planned.outline().headways);
         let folds = match options.folds {
-            Some(count) if block.variants.iter().any(|name| name.ends_with(HELD_OUT)) => folds(&kept, count)?,
+            Some(count) if block.variants.iter().any(|name| name.ends_with(CROSS_VALIDATED)) => {
+                kept.iter().map(|scenario| scenario.id.clone()).zip(folds(&kept, count)?).collect()
+            }
             _ => Vec::new(),
         };
         let close_units = if is_observed { close_units(kept.iter().copied()) } else { Vec::new() };

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use crate::run::score::HELD_OUT;
+use crate::run::score::CROSS_VALIDATED;
 use crate::run::search::folds;
 use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, ReducedScenario, Reduction};
 use crate::scenario::{Category, Scenario, ScenarioFile, read_scenario_file};
@@ -30,16 +30,21 @@ impl GivenReplay {
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Input`] for a damaged file, an unknown or missing id, or a name that is none.
-    pub fn read(path: &Path, scenarios: &[Scenario], categories: &[Category]) -> Result<Vec<GivenReplay>> {
+    pub fn read(
+        path: &Path,
+        scenarios: &[Scenario],
+        categories: &[Category],
+        implausible: Implausible,
+    ) -> Result<Vec<GivenReplay>> {
         let place = || Place::file(path);
-        let ScenarioFile { scenarios: given, mut problems, .. } = read_scenario_file(path, Implausible::Accepted)?;
+        let ScenarioFile { scenarios: given, mut problems, .. } = read_scenario_file(path, implausible)?;
         if !problems.is_empty() {
             return Err(problems.swap_remove(0));
         }
         let key = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
         let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
         let is_taken = Category::ALL.iter().any(|category| Parameterization::find(*category, &key).is_some());
-        if key.is_empty() || key == "S" || key.ends_with(HELD_OUT) || is_taken || !key.chars().all(is_plain) {
+        if key.is_empty() || key == "S" || key.ends_with(CROSS_VALIDATED) || is_taken || !key.chars().all(is_plain) {
             let problem = format!("`{key}` cannot name the S' of this file");
             let help = "name the file with letters, digits, - and _, and not as a parameterization of the paper";
             return Err(Error::input(place(), problem, help));
@@ -140,7 +145,7 @@ fn of_folds(
         let reduced =
             kept.iter().zip(&of).map(|(scenario, fold)| Ok((scenario.id.clone(), fitted[*fold].reduce(scenario, *d)?)));
         let category = fitted[0].category;
-        Ok(GivenReplay { category, key: format!("{key}{HELD_OUT}"), scenarios: reduced.collect::<Result<_>>()? })
+        Ok(GivenReplay { category, key: format!("{key}{CROSS_VALIDATED}"), scenarios: reduced.collect::<Result<_>>()? })
     };
     sizes.iter().map(replay).collect()
 }

@@ -104,7 +104,7 @@ pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyO
                 replays.extend(made);
                 Ok(())
             }
-            Err(error @ (Error::Input { .. } | Error::Usage { .. })) => {
+            Err(error @ Error::Input { .. }) => {
                 left_out.push(error);
                 Ok(())
             }

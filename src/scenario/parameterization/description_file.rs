@@ -103,19 +103,21 @@ impl Parameterization {
         if file.key.is_empty() || file.key.len() > MAX_KEY || !file.key.chars().all(is_plain) {
             return Err(wrong(format!("`{}` is no name of letters, digits and dashes", file.key)));
         }
-        let known = Parameterization::find(file.category, &file.key);
+        // Two winners of one category differ by the names of their files.
+        let stem = path.file_stem().and_then(|stem| stem.to_str()).unwrap_or_default();
+        let is_name = !stem.is_empty() && stem.len() <= MAX_KEY && stem.chars().all(is_plain);
+        let key = if is_name && file.fitted.is_some() { stem.to_owned() } else { file.key };
+        let known = Parameterization::find(file.category, &key);
         match (file.fitted, known) {
             (None, Some(known)) if known.coefficients().is_none() => Ok(known),
-            (None, _) => Err(wrong(format!("it has no basis, and there is no kinematic `{}`", file.key))),
-            (Some(_), Some(_)) => Err(wrong(format!("`{}` is the name of a parameterization of the paper", file.key))),
+            (None, _) => Err(wrong(format!("it has no basis, and there is no kinematic `{}`", key))),
+            (Some(_), Some(_)) => Err(wrong(format!("`{}` is the name of a parameterization of the paper", key))),
             (Some(fitted), None) => {
                 fitted.options.validate()?;
                 let Fitted { spec, parameters, encoder, basis, options } = fitted;
                 let linear = Some((spec, encoder, parameters));
                 let reduction = Reduction::from_linear_parts(file.category, basis, &options, linear);
-                reduction
-                    .map(|reduction| Parameterization::linear(file.key, reduction))
-                    .map_err(|e| wrong(e.to_string()))
+                reduction.map(|reduction| Parameterization::linear(key, reduction)).map_err(|e| wrong(e.to_string()))
             }
         }
     }

@@ -415,9 +415,9 @@ fn of_functions(
             duals.push((dual, 0.0));
         }
     }
-    for column in sizes.len() * n..p {
+    for (column, weight) in weights.iter().enumerate().skip(sizes.len() * n) {
         let unit = |value: f64| (0..p).map(|at| if at == column { value } else { 0.0 }).collect::<Vec<f64>>();
-        directions.push(unit(weights[column]));
+        directions.push(unit(*weight));
         duals.push((unit(1.0), 0.0));
     }
     let basis = SvdBasis { mean: vec![0.0; p], weights, singular_values: Vec::new(), directions, rows };
@@ -432,7 +432,9 @@ fn regression(rows: &[Vec<f64>], points: &[Vec<f64>], weights: Vec<f64>, name: &
     let scale =
         |j: usize| (points.iter().map(|point| (point[j] - centre[j]).powi(2)).sum::<f64>() / count as f64).sqrt();
     let scales: Vec<f64> = (0..m).map(scale).collect();
-    if let Some(j) = scales.iter().zip(&centre).position(|(scale, c)| !(*scale > 1e-9 * c.abs().max(1.0))) {
+    if let Some(j) =
+        scales.iter().zip(&centre).position(|(scale, c)| *scale <= 1e-9 * c.abs().max(1.0) || scale.is_nan())
+    {
         let problem = format!("feature {} is equal in all scenarios", j + 1);
         return Err(Error::input(Place::item(name), problem, "leave it out"));
     }

@@ -78,7 +78,9 @@ pub fn detect(path: &Path) -> Result<Option<Preset>> {
     let Some(format) = format_of(path) else { return Ok(None) };
     let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
     let mut best: Vec<(usize, Preset)> = Vec::new();
-    let mut headers: Vec<((Option<String>, Option<char>), Result<Vec<String>>)> = Vec::new();
+    // By what opens the file: the element or list of rows, the delimiter.
+    type HowOpened = (Option<String>, Option<char>);
+    let mut headers: Vec<(HowOpened, Result<Vec<String>>)> = Vec::new();
     for preset in Preset::shipped()? {
         if preset.is_generic() || preset.recording_of(&name).is_none() {
             continue;
