@@ -201,9 +201,9 @@ impl SearchReport<'_> {
                 let _ = writeln!(text, "{}", wrap(&words, WIDTH));
             }
         }
-        if let Some([Some(baseline), held_out]) = result.fronts.first().map(|front| front.always_failing) {
+        if let Some([Some(baseline), held_out]) = result.fronts.first().map(|front| front.headway_only) {
             let held_out = held_out.map_or(String::new(), |held_out| format!(", {held_out:.3} held out"));
-            let _ = writeln!(text, "for comparison: an S' that always fails has {baseline:.3}{held_out}");
+            let _ = writeln!(text, "for comparison: an S' that knows the headway only has {baseline:.3}{held_out}");
         }
         if let Some(correlation) = result.rmse.correlation {
             let by_size: Vec<String> =

@@ -212,7 +212,7 @@ fn shards_and_a_resumed_search_find_what_one_process_finds() {
     assert!(error.to_string().contains("another data") || error.to_string().contains("other data"), "{error}");
 }
 
-/// With the outcomes of other scenarios, no description may be better on unread data than an S' that always fails.
+/// With the outcomes of other scenarios, no description may be better on unread data than an S' that knows the headway only.
 #[test]
 fn shuffled_outcomes_give_no_gain_on_unread_data() {
     let found = |shuffled: bool| {
@@ -220,12 +220,12 @@ fn shuffled_outcomes_give_no_gain_on_unread_data() {
         let front = &result.fronts[0];
         let best = front.points.iter().map(|point| point.judged.held_out.unwrap());
         let best = best.max_by(|a, b| a.value.unwrap().total_cmp(&b.value.unwrap())).unwrap();
-        (best.value.unwrap(), best.interval.unwrap(), front.always_failing[1].unwrap())
+        (best.value.unwrap(), best.interval.unwrap(), front.headway_only[1].unwrap())
     };
-    let (value, interval, always) = found(true);
-    assert!(interval.low <= always, "{value} {interval:?} against {always}");
-    let (value, interval, always) = found(false);
-    assert!(interval.low > always, "{value} {interval:?} against {always}: the true outcomes are found");
+    let (value, interval, headway) = found(true);
+    assert!(interval.low <= headway, "{value} {interval:?} against {headway}");
+    let (value, interval, headway) = found(false);
+    assert!(interval.low > headway, "{value} {interval:?} against {headway}: the true outcomes are found");
 }
 
 fn text(path: &Path) -> &str {

@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::{Candidate, SearchOptions};
+use super::{Candidate, Objective, Scope, SearchOptions};
 use crate::engine::lane_case::LaneCase;
 use crate::engine::{Block, CaseSource, Confusion, Executor, LanePlan, Units, Verdicts, Wanted};
 use crate::model::criterion::Criterion;
@@ -133,6 +133,27 @@ impl<'a> Evaluator<'a> {
         }
         let of = |from: usize| self.recorded[from * width..(from + 1) * width].to_vec();
         self.recorded = order.into_iter().flat_map(of).collect();
+    }
+
+    /// F1 of an S' that fails from the same headways in every scenario, those that suit best; the mean over the models.
+    /// `None` for other objectives, and if S never fails.
+    pub fn headway_only(&self, scope: Scope, options: &SearchOptions) -> Option<f64> {
+        let (models, scenarios) = (ModelId::ALL.len(), self.scenarios.len() as f64);
+        let headways = options.headways.len();
+        let of_model = |model: ModelId| {
+            let at = ModelId::ALL.iter().position(|known| *known == model)?;
+            let failures = |headway: usize| {
+                let lanes = self.recorded.iter().skip(headway * models + at).step_by(headways * models);
+                lanes.filter(|lane| lane.failed(options.criterion)).count() as f64
+            };
+            let mut counts: Vec<f64> = (0..headways).map(failures).collect();
+            counts.sort_by(|a, b| b.total_cmp(a));
+            let all: f64 = counts.iter().sum();
+            let f1 = |chosen: usize| 2.0 * counts[..chosen].iter().sum::<f64>() / (chosen as f64 * scenarios + all);
+            (all > 0.0).then(|| (1..=headways).map(f1).fold(0.0, f64::max))
+        };
+        let scores = scope.models(options).into_iter().map(of_model).collect::<Option<Vec<f64>>>()?;
+        (options.objective == Objective::F1).then(|| scores.iter().sum::<f64>() / scores.len() as f64)
     }
 
     /// Evaluates candidates; `None` for those that cannot be fitted. One whole study each.

@@ -71,8 +71,8 @@ pub struct Front {
     pub points: Vec<FrontPoint>,
     /// The paper's parameterizations.
     pub paper: Vec<PaperPoint>,
-    /// The score of an S' that always fails, which says nothing of a scenario: on the searched data, and on held-out data.
-    pub always_failing: [Option<f64>; 2],
+    /// F1 of the best S' that knows the headway only, and nothing of a scenario: on the searched data, and on held-out data.
+    pub headway_only: [Option<f64>; 2],
     /// Index of the paper's best, by cross-validation.
     pub best_paper: Option<usize>,
     /// Index of the winner: the fewest parameters whose score is shown to be at most the margin below the best, among
@@ -155,17 +155,16 @@ pub(super) fn conclude(
     let in_sample = evaluator.evaluate(&all, &Training::InSample)?;
     let unread: Option<Vec<&Scenario>> =
         held_out.map(|all| all.iter().filter(|s| s.kept && s.category == category).collect());
-    let held_out = match &unread {
+    let unread_evaluator = match &unread {
         Some(scenarios) if scenarios.len() < 2 => {
             let problem = format!("{} {} scenarios are too few", scenarios.len(), category.label());
             return Err(Error::input(Place::item("held-out data"), problem, "hold out more recordings"));
         }
-        Some(scenarios) => {
-            let evaluator = Evaluator::new(category, scenarios.clone(), search.profile, options, executor)?;
-            Some(evaluator.evaluate(&all, &Training::On(&search.scenarios))?)
-        }
+        Some(scenarios) => Some(Evaluator::new(category, scenarios.clone(), search.profile, options, executor)?),
         None => None,
     };
+    let on_unread = |evaluator: &Evaluator| evaluator.evaluate(&all, &Training::On(&search.scenarios));
+    let held_out = unread_evaluator.as_ref().map(on_unread).transpose()?;
     let found = |candidate: &Candidate| all.iter().position(|known| known == candidate);
     let judged = |at: usize, scope: Scope| -> Option<Judged> {
         Some(Judged {
@@ -231,11 +230,11 @@ pub(super) fn conclude(
         let winner = points.iter().enumerate().position(|of| is_enough(of) && is_sampled(of.1));
         let winner = winner.or_else(|| points.iter().rposition(is_sampled));
         let paper = of_paper.into_iter().map(|(_, point)| point).collect();
-        let always_failing = [
-            always_failing(&cross_validated, scope, options),
-            held_out.as_ref().and_then(|of| always_failing(of, scope, options)),
+        let headway_only = [
+            evaluator.headway_only(scope, options),
+            unread_evaluator.as_ref().and_then(|evaluator| evaluator.headway_only(scope, options)),
         ];
-        fronts.push(Front { scope, points, paper, always_failing, best_paper, winner });
+        fronts.push(Front { scope, points, paper, headway_only, best_paper, winner });
     }
     let winner = fronts.first().and_then(|front| Some(&front.points[front.winner?].candidate));
     let winner = winner.map(|candidate| fitted(candidate, search)).transpose()?;
@@ -315,18 +314,6 @@ fn difference(
     let rates = rates.collect::<Option<Vec<ScenarioRate>>>()?;
     let signs = (0..rates.len()).map(|at| (if at < models.len() { share } else { -share }, at));
     min_contrast(&rates, &[Contrast { constant: 0.0, terms: signs.collect() }], options.score.confidence)
-}
-
-/// The score of an S' that fails in every lane.
-fn always_failing(evaluations: &[Option<Evaluation>], scope: Scope, options: &SearchOptions) -> Option<f64> {
-    let totals = evaluations.iter().flatten().next()?.totals();
-    let models = scope.models(options);
-    let of = |model: &ModelId| {
-        let Confusion { tp, fn_, fp, tn } = totals[cell_of(*model, options.criterion)];
-        options.objective.of(&Confusion { tp: tp + fn_, fp: fp + tn, fn_: 0, tn: 0 })
-    };
-    let scores = models.iter().map(of).collect::<Option<Vec<f64>>>()?;
-    Some(scores.iter().sum::<f64>() / scores.len() as f64)
 }
 
 /// The candidate fitted on all scenarios of the search.
