@@ -138,6 +138,11 @@ impl SearchReport<'_> {
 
     /// The answer for the terminal.
     pub fn text(&self) -> String {
+        self.words(true)
+    }
+
+    /// The answer, with the table of the first front or without it.
+    fn words(&self, with_table: bool) -> String {
         let result = self.result;
         let models: Vec<&str> = result.options.models.iter().map(|model| model.name()).collect();
         let mut text = format!("{}\n", wrap(&self.data, WIDTH));
@@ -170,7 +175,9 @@ impl SearchReport<'_> {
             text += "SHUFFLED OUTCOMES: every scenario has those of another one; no number below says anything of a description\n";
         }
         if let Some(front) = result.fronts.first() {
-            let _ = writeln!(text, "\n{}", self.table(front).fitted(1, WIDTH));
+            if with_table {
+                let _ = writeln!(text, "\n{}", self.table(front).fitted(1, WIDTH));
+            }
             for point in &front.points {
                 let words = format!("found {}: {}", point.parameters, self.describe(&point.candidate));
                 let _ = writeln!(text, "{}", wrap(&words, WIDTH));
@@ -293,7 +300,7 @@ impl SearchReport<'_> {
             }
             Plot {
                 heading: front.scope.name(),
-                x: PlotAxis::new("parameters"),
+                x: PlotAxis::exactly("parameters", 0.5, self.result.options.limits.max_parameters as f64 + 0.5),
                 y: PlotAxis::exactly(self.result.options.objective.name(), 0.0, 1.0),
                 layers,
                 ..Plot::default()
@@ -469,7 +476,12 @@ impl SearchReport<'_> {
             let found = figures.iter().filter(|(file, _)| *file == name);
             found.map(|(file, figure)| PageFigure::new(&figure.svg(), &[&format!("{file}.svg")])).collect()
         };
-        let answer = Section { text: self.text(), figures: of("front"), ..Section::new("answer", "Answer") };
+        let answer = Section {
+            text: self.words(false),
+            tables: self.result.fronts.iter().take(1).map(|front| self.table(front)).collect(),
+            figures: of("front"),
+            ..Section::new("answer", "Answer")
+        };
         let kept = Section {
             intro: "What the winner keeps, as scenarios one standard deviation of a parameter away from the mean."
                 .to_owned(),
