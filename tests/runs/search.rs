@@ -266,6 +266,13 @@ fn a_winner_is_studied_fitted_sampled_and_justified_and_external_s_prime_is_judg
     let justify =
         ["-q", "justify", "--parameterization", "found/winner.json", "--models", "Reg157", "--criterion", "ttc"];
     run(&[&justify[..], &data[..]].concat());
+    #[cfg(feature = "parquet")]
+    {
+        run(&["-q", "mine", "recordings", "--out", "as-parquet.parquet"]);
+        run(&[&["-q", "study", "--external", "as-parquet.parquet", "--out", "parquet"], &data[..]].concat());
+        let variants = std::fs::read_to_string(of("parquet/variants.csv")).unwrap();
+        assert!(variants.contains("LVD,as-parquet,0,1,1,1"), "{variants}");
+    }
     // What is wrong is said.
     let scenarios = read_scenario_file(&of("scenarios.jsonl"), Implausible::Refused).unwrap().scenarios;
     let id = &scenarios.iter().find(|s| s.kept && s.category == Category::CutIn).unwrap().id;

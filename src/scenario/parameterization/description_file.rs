@@ -96,8 +96,11 @@ impl Parameterization {
         if file.lanesweep_parameterization != VERSION {
             return Err(wrong(format!("version {}; this program reads {VERSION}", file.lanesweep_parameterization)));
         }
-        if file.hash()? != file.content_sha256 {
-            return Err(wrong("checksum mismatch: the file was changed".to_owned()));
+        let hash = file.hash()?;
+        if hash != file.content_sha256 {
+            let problem = format!("is {}, but the content has {hash}: checksum mismatch", file.content_sha256);
+            let place = Place::file(path).column("content_sha256");
+            return Err(Error::input(place, problem, "make the file again with `lanesweep search`"));
         }
         let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-';
         if file.key.is_empty() || file.key.len() > MAX_KEY || !file.key.chars().all(is_plain) {

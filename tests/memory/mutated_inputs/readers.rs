@@ -13,10 +13,10 @@ use lanesweep::run::sampling::{
     Estimator, SampleHeadways, SampleOptions, SampleTally, WeightedTally, plan_samples, read_proposal,
 };
 use lanesweep::run::score::ScoreOptions;
-use lanesweep::run::study::{StudyHead, StudyOptions, plan_study};
-use lanesweep::scenario::parameterization::ParameterizationOptions;
+use lanesweep::run::study::{GivenReplay, StudyHead, StudyOptions, plan_study};
+use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions};
 use lanesweep::scenario::{Category, Scenario, read_scenarios};
-use lanesweep::stats::density::{DensityModel, Exposure, read_density};
+use lanesweep::stats::density::{DensityModel, Exposure, ParameterSpace, read_density};
 use lanesweep::support::plausibility::Implausible;
 use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine, mine_folder};
@@ -66,6 +66,8 @@ pub fn all(seeds: &Seeds) -> Vec<Reader> {
     #[cfg(feature = "parquet")]
     readers.push(plain("Parquet scenarios", &seeds.parquets, |b, d, s, h| scenario_table("s.parquet", b, d, s, h)));
     readers.push(Reader { reseal: Some(reseal_density), ..plain("density", &seeds.densities, density) });
+    readers.push(Reader { reseal: Some(reseal_searched), ..plain("searched", &seeds.searched, searched) });
+    readers.push(plain("external S'", &seeds.scenario_files, external));
     let sealed = |b: &[u8], _: &Path, _: &Seeds| resealed(b);
     readers.push(Reader { reseal: Some(sealed), ..plain("part", &seeds.parts, part) });
     readers.push(Reader { reseal: Some(sealed), ..plain("plan", &seeds.plans, plan) });
@@ -232,6 +234,32 @@ fn density(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> {
     if heavy { run_some(&plan, 2) } else { Ok(()) }
 }
 
+/// A searched parameterization: S' of every scenario, its folds, and the space of its densities.
+fn searched(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> {
+    let id = Parameterization::read(&file(bytes, dir, "found.json"))?;
+    let options = StudyOptions {
+        categories: vec![id.category],
+        headways: vec![Headway::ThwS(1.0)],
+        folds: Some(2),
+        searched: vec![id.clone()],
+        ..StudyOptions::default()
+    };
+    let plan = plan_study(&seeds.scenarios, &seeds.profile, &options)?;
+    if heavy {
+        run_some(&plan, 1)?;
+    }
+    ParameterSpace::new(id, &ParameterizationOptions::default(), None, false).map(drop)
+}
+
+/// S' of another program.
+fn external(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> {
+    let path = file(bytes, dir, "other.jsonl");
+    let external = GivenReplay::read(&path, &seeds.scenarios, &Category::ALL, Implausible::Refused)?;
+    let options = StudyOptions { headways: vec![Headway::ThwS(1.0)], external, ..StudyOptions::default() };
+    let plan = plan_study(&seeds.scenarios, &seeds.profile, &options)?;
+    if heavy { run_some(&plan, 1) } else { Ok(()) }
+}
+
 fn proposal(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> {
     let density = density_of(seeds);
     let plan = small_plan(density, &read_proposal(&file(bytes, dir, "g.json"), density)?, &seeds.profile)?;
@@ -240,7 +268,15 @@ fn proposal(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> 
 
 /// The message of a density file whose content was changed says which checksum would fit.
 fn reseal_density(bytes: &[u8], dir: &Path, _: &Seeds) -> Option<Vec<u8>> {
-    let message = read_density(&file(bytes, dir, "d.json")).err()?.to_string();
+    with_named_checksum(bytes, &read_density(&file(bytes, dir, "d.json")).err()?)
+}
+
+fn reseal_searched(bytes: &[u8], dir: &Path, _: &Seeds) -> Option<Vec<u8>> {
+    with_named_checksum(bytes, &Parameterization::read(&file(bytes, dir, "found.json")).err()?)
+}
+
+fn with_named_checksum(bytes: &[u8], error: &Error) -> Option<Vec<u8>> {
+    let message = error.to_string();
     let (_, rest) = message.split_once("content_sha256`: is ")?;
     let (old, rest) = rest.split_once(", but the content has ")?;
     let new = rest.get(..64)?;

@@ -11,7 +11,9 @@ use lanesweep::run::sampling::{
 };
 use lanesweep::run::score::ScoreOptions;
 use lanesweep::run::study::{StudyOptions, outline_study};
-use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions};
+use lanesweep::scenario::parameterization::{
+    Feature, FunctionKind, LinearFamily, LinearSpec, Parameterization, ParameterizationOptions,
+};
 use lanesweep::scenario::{Category, Scenario, write_scenarios};
 use lanesweep::stats::density::{DensityModel, FitOptions, write_density};
 use lanesweep::stats::estimate::{BlockSums, WeightSums};
@@ -44,6 +46,7 @@ pub struct Seeds {
     pub score: Vec<Vec<u8>>,
     pub densities: Vec<Vec<u8>>,
     pub proposals: Vec<Vec<u8>>,
+    pub searched: Vec<Vec<u8>>,
     pub exid: Vec<Vec<u8>>,
     pub track_tables: Vec<Vec<u8>>,
     pub track_xml: Vec<Vec<u8>>,
@@ -270,6 +273,17 @@ impl Seeds {
             let id = Parameterization::find(category, key).unwrap();
             DensityModel::fit(id, &first_of(&mined, category, n), &facts, &options).unwrap().model
         };
+        let searched = |category, family, registered| {
+            let spec = LinearSpec { family, mirrored: true, registered };
+            let some = first_of(&mined, category, 12);
+            let some: Vec<&Scenario> = some.iter().collect();
+            let fitted = spec.fit(category, &some, &ParameterizationOptions::default()).unwrap();
+            Parameterization::linear("found", fitted).to_json("synthetic").unwrap()
+        };
+        let searched = vec![
+            searched(Category::CutIn, LinearFamily::Features(vec![Feature::EgoSpeed, Feature::CrossingTime]), false),
+            searched(Category::Lvd, LinearFamily::Functions { kind: FunctionKind::Lines, sizes: vec![2] }, true),
+        ];
         let density = fit(Category::CutIn, "2", 8);
         let others = [fit(Category::Lvd, "ii", 6), fit(Category::Lvd, "iii", 8), fit(Category::CutOut, "b", 10)];
         let plan = small_plan(&density, &density.mixture().unwrap(), &profile).unwrap();
@@ -373,6 +387,7 @@ impl Seeds {
             track_xml: vec![FCD.as_bytes().to_vec(), commonroad()],
             track_json: vec![AUTOMATUM.as_bytes().to_vec(), I24.as_bytes().to_vec()],
             presets: presets(),
+            searched,
             proposals: vec![proposal_text(&density, &density.mixture().unwrap()).unwrap().into_bytes()],
             parts: parts.into(),
             plans: vec![{
