@@ -101,7 +101,7 @@ def study(
         Driver models: Reg157, CCHDM, RSS, FSM [default: all].
     cross_validate : bool
         Also replay scenarios by bases that have not seen them. Scenarios are divided into folds by recording
-        ([search] folds). Each decomposition gets a variant, 5-held-out. A basis fitted on the scenarios that it
+        ([search] folds). Each decomposition gets a variant, 5-cv. A basis fitted on the scenarios that it
         replays flatters itself.
     profile : Value, default paper
         paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc`

@@ -7,7 +7,7 @@ use super::records::document;
 use super::reference::ReferenceComparison;
 use super::run_record::{RunRecord, StudyHost};
 use super::study_figures::{
-    HeadwayFailures, distributions, f1_by_parameters, legend_name, modes, recall_and_precision,
+    HeadwayFailures, distributions, f1_by_parameters, f1_intervals, legend_name, modes, recall_and_precision,
 };
 use super::tables;
 use crate::Result;
@@ -225,6 +225,7 @@ impl StudyReport {
         let (scores, data) = (&self.scores.categories[at], &self.run.data);
         let mut figures = Vec::new();
         if scores.variants.len() > 1 {
+            figures.push(("f1", f1_intervals(scores, self.scores.options.confidence, data)));
             figures.push(("recall-precision", recall_and_precision(scores, data)));
             figures.push(("f1-by-parameters", f1_by_parameters(scores, data)));
         }

@@ -1,7 +1,7 @@
-//! The figures of a study except the radar charts: recall and precision, failures against the headway, F1 against the
+//! The figures of a study except the radar charts: F1 with intervals, recall and precision, failures against the headway, F1 against the
 //! number of parameters, the shapes of a decomposition, the distributions of parameters.
 
-use super::plot::{Figure, GREY, HOLLOW, Mark, Plot, PlotAxis, Rule, Series, Value, is_few};
+use super::plot::{Figure, GREY, HOLLOW, Height, Layer, Look, Mark, Name, Plot, PlotAxis, Rule, Series, Value, is_few};
 use crate::engine::{Confusion, Headway, LanePlan, Partial};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -106,6 +106,67 @@ impl HeadwayFailures {
             plots: self.models.iter().enumerate().map(panel).collect(),
             ..Figure::default()
         }
+    }
+}
+
+/// Heights of a parameterization and of the space below a row, px.
+const LINE_PX: f64 = 9.0;
+const ROW_GAP_PX: f64 = 14.0;
+
+/// F1 of every parameterization with its interval, a row per driver model and criterion.
+pub fn f1_intervals(scores: &CategoryScores, confidence: f64, data: &str) -> Figure {
+    let variants = scores.variants.len() - 1;
+    let row_px = variants as f64 * LINE_PX + ROW_GAP_PX;
+    let cells: Vec<(ModelId, Criterion)> =
+        scores.models.iter().flat_map(|&model| Criterion::ALL.map(|criterion| (model, criterion))).collect();
+    let top = |row: usize| -(row as f64 * row_px);
+    let name = |(row, (model, criterion)): (usize, &(ModelId, Criterion))| Name {
+        at: top(row),
+        words: format!("{}, {}", model.name(), criterion.label()),
+        note: format!("S fails in {}", counted(scores.failing_scenarios(*model, *criterion) as usize, "scenario")),
+        ..Name::default()
+    };
+    let series = |variant: usize| {
+        let value = |(row, (model, criterion)): (usize, &(ModelId, Criterion))| {
+            let cell = &scores.cells[scores.index(variant, *model, *criterion)?];
+            Some(Value {
+                x: f1(&cell.counts)?,
+                y: top(row) - ROW_GAP_PX / 2.0 - (variant as f64 - 0.5) * LINE_PX,
+                interval: cell.f1_interval.map(|interval| (interval.low, interval.high)),
+                is_few: is_few(cell.failing_scenarios as f64),
+                ..Value::default()
+            })
+        };
+        let values = cells.iter().enumerate().filter_map(value).collect();
+        let look = Look { line_px: 1.6, marker_px: 4.0, ..Look::of(variant - 1, variants) };
+        let marks = &[Mark::Points, Mark::Intervals];
+        let series = Series::new(legend_name(scores, variant), marks, []);
+        Layer::from(Series { values, look: Some(look), is_sideways: true, ..series })
+    };
+    let separators = Rule {
+        runs: (1..cells.len()).map(|row| vec![(0.0, top(row)), (1.0, top(row))]).collect(),
+        colour: GREY,
+        width_px: 0.5,
+        ..Rule::default()
+    };
+    let height_px = cells.len() as f64 * row_px;
+    let plot = Plot {
+        x: PlotAxis { is_doubled: true, ..PlotAxis::exactly("F1", 0.0, 1.0) },
+        y: PlotAxis { names: cells.iter().enumerate().map(name).collect(), ..PlotAxis::exactly("", -height_px, 0.0) },
+        layers: std::iter::once(separators.into()).chain((1..=variants).map(series)).collect(),
+        height: Height::Px(height_px),
+        ..Plot::default()
+    };
+    Figure {
+        title: format!("{}: F1 of parameterized against recorded scenarios", scores.category.label()),
+        subtitle: Some(format!("{} scenarios. {data}", scores.scenarios)),
+        caption: format!(
+            "Marker: F1; further right is better. Line: its {} % interval over scenarios; without one, S fails in too few \
+             scenarios. A parameterization without a marker has no F1, because neither S nor S' fails. {HOLLOW}",
+            100.0 * confidence
+        ),
+        plots: vec![plot],
+        ..Figure::default()
     }
 }
 

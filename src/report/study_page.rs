@@ -120,10 +120,13 @@ impl StudyReport {
     fn category(&self, at: usize) -> Section {
         let scores = &self.scores.categories[at];
         let name = |figure: &str, end: &str| file_name(figure, scores.category, end);
-        let mut figures = vec![PageFigure::new(&self.radar(scores), &[&name("radar", "svg"), "f1.csv"])];
+        let mut figures: Vec<PageFigure> = Vec::new();
         for (figure, drawn) in self.figures(at) {
             figures.push(PageFigure::new(&drawn.svg(), &[&name(figure, "svg"), &name(figure, "csv")]));
         }
+        // After the figure that tells the ranking.
+        let radar = PageFigure::new(&self.radar(scores), &[&name("radar", "svg"), "f1.csv"]);
+        figures.insert(figures.len().min(1), radar);
         let key = scores.category.key().replace('_', "-");
         let level = value(100.0 * self.scores.options.confidence);
         Section {

@@ -70,14 +70,14 @@ fn a_study_says_everything_on_its_page_and_every_figure_has_its_files() {
     for said in ["SYNTHETIC DATA", "Failed simulations of S", "published", "SHA-256 of the plan", "seed", "Claims"] {
         assert!(html.contains(said), "{said}");
     }
-    for figure in ["radar", "recall-precision", "f1-by-parameters", "headways", "parameters", "modes"] {
+    for figure in ["f1", "radar", "recall-precision", "f1-by-parameters", "headways", "parameters", "modes"] {
         for category in ["cut-in", "cut-out", "lvd"] {
             let name = format!("{figure}-{category}.svg");
             assert!(html.contains(&format!("<code>{name}</code>")), "{name}");
         }
     }
     let files: Vec<&str> = html.split("<code>").skip(1).map(|rest| rest.split('<').next().unwrap()).collect();
-    assert!(files.len() >= 36);
+    assert!(files.len() >= 42);
     for file in files {
         assert!(std::fs::metadata(out.join(file)).unwrap().len() > 0, "{file}");
     }
