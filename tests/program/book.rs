@@ -262,7 +262,8 @@ fn every_printed_command_has_a_verb_and_flags_that_exist() {
 }
 
 /// Figures of the book: file, the command that draws it, and where.
-const FIGURES: [(&str, &str, &str); 4] = [
+const FIGURES: [(&str, &str, &str); 5] = [
+    ("f1-cut-in.svg", "study --out OUT", "f1-cut-in.svg"),
     ("radar-cut-in.svg", "study --out OUT", "radar-cut-in.svg"),
     (
         "case.svg",
