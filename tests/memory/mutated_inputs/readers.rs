@@ -14,7 +14,7 @@ use lanesweep::run::sampling::{
 };
 use lanesweep::run::score::ScoreOptions;
 use lanesweep::run::study::{GivenReplay, StudyHead, StudyOptions, plan_study};
-use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions};
+use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction};
 use lanesweep::scenario::{Category, Scenario, read_scenarios};
 use lanesweep::stats::density::{DensityModel, Exposure, ParameterSpace, read_density};
 use lanesweep::support::plausibility::Implausible;
@@ -247,6 +247,10 @@ fn searched(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> 
     let plan = plan_study(&seeds.scenarios, &seeds.profile, &options)?;
     if heavy {
         run_some(&plan, 1)?;
+    }
+    // Aligned series have no density.
+    if id.fitted_basis().is_some_and(Reduction::is_registered) {
+        return Ok(());
     }
     ParameterSpace::new(id, &ParameterizationOptions::default(), None, false).map(drop)
 }
