@@ -67,7 +67,7 @@ pub fn all(seeds: &Seeds) -> Vec<Reader> {
     readers.push(plain("Parquet scenarios", &seeds.parquets, |b, d, s, h| scenario_table("s.parquet", b, d, s, h)));
     readers.push(Reader { reseal: Some(reseal_density), ..plain("density", &seeds.densities, density) });
     readers.push(Reader { reseal: Some(reseal_searched), ..plain("searched", &seeds.searched, searched) });
-    readers.push(plain("external S'", &seeds.scenario_files, external));
+    readers.push(plain("external S'", &seeds.scenario_files[..1], external));
     let sealed = |b: &[u8], _: &Path, _: &Seeds| resealed(b);
     readers.push(Reader { reseal: Some(sealed), ..plain("part", &seeds.parts, part) });
     readers.push(Reader { reseal: Some(sealed), ..plain("plan", &seeds.plans, plan) });
