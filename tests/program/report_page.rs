@@ -81,7 +81,7 @@ fn a_study_says_everything_on_its_page_and_every_figure_has_its_files() {
     for file in files {
         assert!(std::fs::metadata(out.join(file)).unwrap().len() > 0, "{file}");
     }
-    assert_eq!(html.matches("<svg").count(), 18);
+    assert_eq!(html.matches("<svg").count(), 21);
 }
 
 #[test]
