@@ -17,7 +17,7 @@ use crate::support::run_dir::Results;
 use crate::support::table::{Table, WIDTH};
 use crate::{Error, Result};
 
-/// Maximum number of candidates of a figure: the best of every family and size come first.
+/// Approximate number of candidates of a figure, in even steps of their scores; the paper's are all drawn.
 const MAX_DRAWN: usize = 400;
 const PAPER: &str = "#777777";
 const FRONT: &str = "#0072b2";
@@ -184,11 +184,21 @@ impl SearchReport<'_> {
             }
             text.push('\n');
             if let Some(winner) = front.winner.map(|at| &front.points[at]) {
+                let margin = result.options.limits.margin;
+                let rule = match winner.below_best {
+                    Some((_, interval)) if interval.low >= -margin => {
+                        format!("fewest parameters whose score is shown to be at most {margin} below the best")
+                    }
+                    // The best itself cannot be sampled, and nothing smaller is shown to be close to it.
+                    Some(_) => {
+                        "most parameters of those that can be sampled; not shown to be close to the best".to_owned()
+                    }
+                    None => {
+                        format!("fewest parameters whose score is at most {margin} below the best, without interval")
+                    }
+                };
                 let words = format!(
-                    "winner (fewest parameters whose score is {}at most {} below the best): {} parameters, {}, {} \
-                     cross-validated{}",
-                    if winner.below_best.is_some() { "shown to be " } else { "" },
-                    result.options.limits.margin,
+                    "winner ({rule}): {} parameters, {}, {} cross-validated{}",
                     winner.parameters,
                     self.describe(&winner.candidate),
                     with_interval(&winner.judged.cross_validated),
@@ -319,7 +329,7 @@ impl SearchReport<'_> {
         }
     }
 
-    /// Error against score: the best of each family and size.
+    /// Error against score: the paper's parameterizations, and others in even steps of their scores.
     fn error_figure(&self) -> Figure {
         let options = &self.result.options;
         let score = |of: &Evaluated| of.score(Scope::All, options);
@@ -358,7 +368,7 @@ impl SearchReport<'_> {
             subtitle: Some(self.data.clone()),
             plots: vec![plot],
             caption: format!(
-                "{} candidates, at most {MAX_DRAWN} drawn; cross-validated.",
+                "{} candidates, about {MAX_DRAWN} drawn; cross-validated.",
                 count(self.result.evaluated.len() as u64)
             ),
             ..Figure::default()
