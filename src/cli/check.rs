@@ -14,7 +14,7 @@ use crate::interop::openscenario::read_scenario;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::report::case_sheet::CaseSheet;
-use crate::report::trace;
+use crate::report::trace::{self, TracePanels};
 use crate::run::check::{Answer, Check as Checked, Subject, Verdict};
 use crate::scenario::{Category, Scenario};
 use crate::support::files::{make_folder_of, write_atomically};
@@ -60,6 +60,9 @@ pub struct Check {
     /// Also write the case sheet as an HTML page for printing
     #[arg(long, value_name = "FILE.html", help_heading = "Output")]
     sheet: Option<PathBuf>,
+    /// Also write the vehicles in motion, from above, as an animated SVG
+    #[arg(long, value_name = "FILE.svg", help_heading = "Output")]
+    animation: Option<PathBuf>,
     /// Also write every step of every model under the first profile
     #[arg(long, value_name = "FILE.csv", help_heading = "Output")]
     series: Option<PathBuf>,
@@ -108,6 +111,9 @@ impl Check {
         };
         if let Some(path) = &self.sheet {
             write(path, sheet.html()?.as_bytes())?;
+        }
+        if let Some(path) = &self.animation {
+            write(path, sheet.figure(TracePanels::Course).animation().as_bytes())?;
         }
         if let Some(path) = &self.series {
             let named = judgements[0].models.iter().map(|judged| (judged.trace.model.name().to_owned(), &judged.trace));
@@ -185,7 +191,12 @@ impl Check {
     /// Outputs must have the right file ending and must not replace an input.
     fn guard_outputs(&self) -> Result<()> {
         let inputs: Vec<PathBuf> = self.file.iter().cloned().collect();
-        for (path, ending, flag) in [(&self.sheet, "html", "--sheet"), (&self.series, "csv", "--series")] {
+        let outputs = [
+            (&self.sheet, "html", "--sheet"),
+            (&self.animation, "svg", "--animation"),
+            (&self.series, "csv", "--series"),
+        ];
+        for (path, ending, flag) in outputs {
             let Some(path) = path else { continue };
             if path.extension().is_none_or(|found| !found.eq_ignore_ascii_case(ending)) {
                 let problem = format!("{} does not end in .{ending}", path.display());

@@ -101,6 +101,8 @@ pub struct Trace {
     pub ego_width_m: f64,
     /// Widths of the other vehicles, m.
     pub widths_m: [f64; 2],
+    /// Mean of the lengths of the ego and of each other vehicle, m.
+    pub mean_lengths_m: [f64; 2],
     /// Deceleration during the reaction time that does not count as braking, m/s².
     pub coasting_mps2: f64,
     /// A TTC below this fails, s.
@@ -159,6 +161,7 @@ impl Trace {
             initial_gap_m: shifted_gap_m.unwrap_or(nominal_gap_m),
             ego_width_m,
             widths_m: case.others.map(|other| 2.0 * other.half_widths.to_f64() - ego_width_m),
+            mean_lengths_m: case.others.map(|other| other.half_lengths.to_f64()),
             coasting_mps2: if model == ModelId::Cchdm { profile.cchdm.coasting_mps2 } else { 0.0 },
             ttc_threshold_s: profile.criteria.ttc_threshold_s,
             btn_threshold: profile.criteria.btn_threshold,

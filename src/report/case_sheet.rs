@@ -7,7 +7,7 @@ use super::case_sentences::VARIED;
 use super::html::{Page, PageFigure, Section};
 use super::records;
 use super::tables::{WIDTH, wrap};
-use super::trace::{TraceFigure, TraceSeries};
+use super::trace::{TraceFigure, TracePanels, TraceSeries};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::check::{Boundary, Change, Judged, Judgement, Reading, Subject, Verdict};
@@ -245,15 +245,21 @@ impl CaseSheet<'_> {
         }))
     }
 
-    /// The figure of the case under the first profile, step by step.
-    pub fn figure(&self) -> String {
+    /// The figure of the case under the first profile, step by step, with the answer.
+    pub fn figure(&self, panels: TracePanels) -> TraceFigure<'_> {
         let first = self.first();
         let series = first
             .models
             .iter()
             .map(|judged| TraceSeries { name: judged.trace.model.name().to_owned(), trace: &judged.trace });
-        let title = format!("{} under {}", self.subject.category().label(), first.profile);
-        TraceFigure { title, subtitle: Some(self.origin.clone()), series: series.collect(), until_s: None }.svg()
+        let synthetic = if self.is_synthetic { "SYNTHETIC DATA. " } else { "" };
+        TraceFigure {
+            title: format!("{} under {}: {}", self.subject.category().label(), first.profile, first.verdict().label()),
+            subtitle: Some(format!("{synthetic}{}. {}.", self.case(), self.answer())),
+            series: series.collect(),
+            until_s: None,
+            panels,
+        }
     }
 
     /// The sheet as a page.
@@ -300,8 +306,16 @@ impl CaseSheet<'_> {
             tables: vec![self.boundaries().captioned("Distance to the boundary")],
             ..Section::new("boundary", "Distance to another answer")
         };
+        let drawn = |panels: TracePanels| PageFigure::new(&self.figure(panels).svg(), &[]);
+        let above = TraceFigure { subtitle: None, ..self.figure(TracePanels::Course) };
+        let positions = above.positions().svg();
         let course = Section {
-            figures: vec![PageFigure::new(&self.figure(), &["this sheet"])],
+            figures: vec![drawn(TracePanels::Course), PageFigure::new(&positions, &[])],
+            parts: vec![Section {
+                title: "TTC, BTN, fuzzy surrogates and lateral position".to_owned(),
+                figures: vec![drawn(TracePanels::Measures)],
+                ..Section::default()
+            }],
             ..Section::new("course", "Course of the case")
         };
         let constants = serde_json::to_string_pretty(&self.profiles[0])
@@ -313,7 +327,7 @@ impl CaseSheet<'_> {
                 ("data".to_owned(), self.origin.clone()),
                 ("arithmetic".to_owned(), format!("binary64, time step {} s", self.profiles[0].frame.dt_s)),
             ],
-            details: vec![(format!("Profile {}", first.profile), constants)],
+            parts: vec![Section::folded(format!("Profile {}", first.profile), constants)],
             ..Section::new("reproduction", "Reproduction")
         };
         let page = Page {
@@ -327,7 +341,7 @@ impl CaseSheet<'_> {
                 .collect::<Vec<_>>()
                 .join(" "),
             warnings,
-            sections: vec![case, drivers, clauses, boundaries, course, reproduction],
+            sections: vec![course, case, drivers, clauses, boundaries, reproduction],
         };
         page.html()
     }

@@ -4,9 +4,9 @@ use serde::Serialize;
 use std::fmt::Write;
 
 use super::close_following::{CloseRow, close_following};
-use super::forest::{ForestFigure, ForestGroup, ForestRow};
+use super::dots::{DotRow, Dots, dots};
 use super::html::{Page, PageFigure, Section};
-use super::plot::AxisScale;
+use super::plot::{AxisScale, Figure, INK, Look, PlotAxis, Series, Symbol, Value, logarithmic_reach};
 use super::sampling::HostRecord;
 use super::tables::{WIDTH, wrap};
 use crate::engine::Headway;
@@ -107,10 +107,14 @@ impl CompareFile {
         let mut figures = Vec::new();
         for comparison in &self.categories {
             for criterion in Criterion::ALL {
-                let name = format!("rates-{}-{}.svg", comparison.category.key(), criterion.key());
-                let svg = rates(self, comparison, criterion).figure().svg();
-                results.add(&name, svg.as_bytes())?;
-                figures.push(PageFigure::new(&svg, &[&name, "compare.csv"]));
+                let drawn =
+                    [("ratios", ratios(self, comparison, criterion)), ("rates", rates(self, comparison, criterion))];
+                for (kind, figure) in drawn {
+                    let name = format!("{kind}-{}-{}.svg", comparison.category.key(), criterion.key());
+                    let svg = figure.svg();
+                    results.add(&name, svg.as_bytes())?;
+                    figures.push(PageFigure::new(&svg, &[&name, "compare.csv"]));
+                }
             }
         }
         results.add("report.html", self.html(figures)?.as_bytes())?;
@@ -243,8 +247,22 @@ impl CompareFile {
         if !self.left_out.is_empty() {
             warnings.push(format!("{} parts were left out; see the end of Rates.", self.left_out.len()));
         }
-        let rates = Section { text: self.text(), ..Section::new("rates", "Rates and their ratios") };
-        let pictures = Section { figures, ..Section::new("figures", "Figures") };
+        let mut figures = figures.into_iter();
+        let per_category = 2 * Criterion::ALL.len();
+        let shown = self.categories.iter().map(|category| {
+            let label = category.category.label();
+            Section {
+                figures: figures.by_ref().take(per_category).collect(),
+                parts: vec![Section {
+                    title: "Every ratio".to_owned(),
+                    tables: vec![self.ratio_table(category)],
+                    ..Section::default()
+                }],
+                ..Section::new(category.category.key(), &format!("{label}: failures of S' and of densities beside S"))
+            }
+        });
+        let shown: Vec<Section> = shown.collect();
+        let rates = Section { text: self.text(), is_folded: true, ..Section::new("rates", "Rates and their ratios") };
         let facts = [
             ("program", self.program.clone()),
             ("profile", self.profile.clone()),
@@ -272,9 +290,30 @@ impl CompareFile {
             program: self.program.clone(),
             lead: self.data.clone(),
             warnings,
-            sections: vec![rates, pictures, reproduction],
+            sections: shown.into_iter().chain([rates, reproduction]).collect(),
         };
         page.html()
+    }
+
+    /// Every cell of a category.
+    fn ratio_table(&self, category: &CategoryComparison) -> Table {
+        let rows = category
+            .parameterizations
+            .iter()
+            .flat_map(|of| category.recorded.iter().zip(&of.cells).map(move |(s, cell)| (of, s, cell)));
+        let ratio = |ratio: &Ratio| ratio.ratio.map(|value| NumberText(format!("{} {}", factor(value), ends(ratio))));
+        Table::of(rows)
+            .column("criterion", |(_, s, _)| s.criterion.label())
+            .column("model", |(_, s, _)| s.model.name())
+            .column("parameterization", |(of, ..)| of.key.as_str())
+            .column("share of S", |(_, s, _)| NumberText(short(s.rate.rate)))
+            .column("n", |(_, s, _)| s.failing_scenarios)
+            .column(Column::from("S' / S").null("–"), |(.., cell)| ratio(&cell.replayed.ratio))
+            .column("S'", |(.., cell)| cell.replayed.ratio.verdict.text())
+            .column(Column::from("density / S").null("–"), |(.., cell)| ratio(&cell.sampled.ratio))
+            .column("density", |(.., cell)| cell.sampled.ratio.verdict.text())
+            .build()
+            .captioned(format!("Ratios to S with their {} % intervals; n: failing scenarios of S", 100.0 * self.level))
     }
 
     /// What the risk of a category is uncertain by, over all its parameterizations and forms.
@@ -426,12 +465,15 @@ fn cell(rate: &RateRecord, ratio: &Ratio) -> String {
         let low = ratio.low.filter(|low| *low > 0.0).map_or(String::new(), |low| format!("{}… ", factor(low)));
         return format!("{} {low}{mark}", short(rate.rate));
     };
-    let ends = match (ratio.low, ratio.high) {
+    format!("{} {} {} {mark}", short(rate.rate), factor(value), ends(ratio))
+}
+
+fn ends(ratio: &Ratio) -> String {
+    match (ratio.low, ratio.high) {
         (Some(low), Some(high)) => format!("{}…{}", factor(low), factor(high)),
         (Some(low), None) => format!("{}…", factor(low)),
         _ => String::new(),
-    };
-    format!("{} {} {ends} {mark}", short(rate.rate), factor(value))
+    }
 }
 
 /// Per parameterization: F1 label and verdict on the rate.
@@ -481,43 +523,124 @@ fn factor(value: f64) -> String {
     }
 }
 
-fn row(name: String, rate: &RateRecord) -> ForestRow {
-    // A logarithmic axis cannot show a rate of 0, but it can show the bound above it.
-    let estimate = rate.rate.is_finite().then_some(rate.rate);
-    ForestRow { name, estimate, lower: rate.low, upper: rate.high, ..ForestRow::default() }
+/// Rows of the figures: the driver models, with the failing scenarios of S.
+fn rows(comparison: &CategoryComparison, criterion: Criterion) -> (Vec<&RecordedCell>, Vec<DotRow>) {
+    let recorded: Vec<&RecordedCell> = comparison.recorded.iter().filter(|cell| cell.criterion == criterion).collect();
+    let row =
+        |cell: &&RecordedCell| DotRow { name: cell.model.name().to_owned(), failing_scenarios: cell.failing_scenarios };
+    let rows = recorded.iter().map(row).collect();
+    (recorded, rows)
 }
 
-/// The figure of one criterion of one category: a group per driver model, a row per density, the recorded scenarios as
-/// reference.
-pub fn rates(file: &CompareFile, comparison: &CategoryComparison, criterion: Criterion) -> ForestFigure {
-    let recorded = comparison.recorded.iter().filter(|cell| cell.criterion == criterion);
-    let groups = recorded.map(|cell| {
-        let density = |p: &crate::run::sampling::ComparedParameterization| {
-            let found = p.cells.iter().find(|c| c.model == cell.model && c.criterion == criterion)?;
-            let row = row(format!("{} ({} parameters)", p.key, p.parameters), &found.sampled.rate);
-            let [low, high] = found.sampled.with_data;
-            Some(ForestRow { outer: Some((low, high)), ..row })
+/// The cell of a model and criterion of every row.
+fn values(
+    of: &ComparedParameterization,
+    recorded: &[&RecordedCell],
+    value: impl Fn(&ComparedCell) -> Option<Value>,
+) -> Vec<Value> {
+    let at = |(row, s): (usize, &&RecordedCell)| {
+        let cell = of.cells.iter().find(|cell| (cell.model, cell.criterion) == (s.model, s.criterion))?;
+        Some(Value { y: row as f64, ..value(cell)? })
+    };
+    recorded.iter().enumerate().filter_map(at).collect()
+}
+
+fn legend_name(of: &ComparedParameterization) -> String {
+    format!("{} ({} parameters)", of.key, of.parameters)
+}
+
+/// Shares of failed lanes for one criterion of one category: a row per driver model; the recorded scenarios, then every
+/// density.
+pub fn rates(file: &CompareFile, comparison: &CategoryComparison, criterion: Criterion) -> Figure {
+    let (recorded, rows) = rows(comparison, criterion);
+    // A logarithmic axis cannot show a rate of 0, but it can show the bound above it.
+    let value = |rate: &RateRecord| {
+        rate.rate.is_finite().then(|| Value { x: rate.rate, interval: Some((rate.low, rate.high)), ..Value::default() })
+    };
+    let own = recorded.iter().enumerate().filter_map(|(row, s)| Some(Value { y: row as f64, ..value(&s.rate)? }));
+    let look = Look { colour: INK, symbol: Symbol::Polygon(4, 0.0), ..Look::of(0, 1) };
+    let mut series = vec![Series { values: own.collect(), look: Some(look), ..Series::new("S, as recorded", &[], []) }];
+    for (at, of) in comparison.parameterizations.iter().enumerate() {
+        let drawn = |cell: &ComparedCell| {
+            let [low, high] = cell.sampled.with_data;
+            Some(Value { outer: Some((low, high)), ..value(&cell.sampled.rate)? })
         };
-        ForestGroup {
-            name: cell.model.name().to_owned(),
-            reference: Some(ForestRow {
-                failing_scenarios: Some(cell.failing_scenarios),
-                ..row("S, as recorded".to_owned(), &cell.rate)
-            }),
-            rows: comparison.parameterizations.iter().filter_map(density).collect(),
-        }
-    });
-    ForestFigure {
+        let look = Some(Look::of(at, comparison.parameterizations.len()));
+        series.push(Series { values: values(of, &recorded, drawn), look, ..Series::new(legend_name(of), &[], []) });
+    }
+    let all = series.iter().flat_map(|series| &series.values);
+    let reach: Vec<(f64, f64, f64)> = all
+        .filter_map(|value| {
+            let (low, high) = value.outer.or(value.interval)?;
+            Some((value.x, low, high))
+        })
+        .collect();
+    let x = PlotAxis::around("failure probability", AxisScale::Logarithmic, logarithmic_reach(&reach));
+    let panel = Dots { heading: String::new(), x, marked: Vec::new(), series };
+    Figure {
         title: format!("{}: share of lanes that fail {}", comparison.category.label(), criterion.label()),
-        subtitle: Some(format!("{} · densities of {} samples each", file.data, file.samples)),
-        axis: "Failure probability".to_owned(),
-        scale: AxisScale::Logarithmic,
-        intervals: format!(
-            "Line: its {0} % interval, of S over the scenarios, of a density over the draws alone. Thin line, second \
-             numbers: the density's {0} % interval over draws and scenarios, at fixed bandwidth and scale. S and the \
-             densities rest on the same scenarios: compare them by the ratios in the table.",
+        subtitle: Some(format!("{} · densities of {} samples each", file.data, readable::count(file.samples))),
+        caption: format!(
+            "Line: {0} % interval, of S over the scenarios, of a density over the draws alone; thin line: the density's \
+             over draws and scenarios, at fixed bandwidth and scale. A line at the left edge goes on beyond it; an arrow \
+             is a share of zero below its bound. n: scenarios in which S fails; with fewer than ten markers are hollow. \
+             S and the densities rest on the same scenarios: compare them by their ratios.",
             100.0 * file.level
         ),
-        groups: groups.collect(),
+        plots: dots(&rows, vec![panel]),
+        ..Figure::default()
+    }
+}
+
+/// Ratios of the shares of failed lanes to those of S: of S', replayed, and of the density, drawn.
+pub fn ratios(file: &CompareFile, comparison: &CategoryComparison, criterion: Criterion) -> Figure {
+    type Pick = fn(&ComparedCell) -> &Ratio;
+    let sides: [(&str, Pick); 2] =
+        [("S', replayed", |cell| &cell.replayed.ratio), ("density, drawn", |cell| &cell.sampled.ratio)];
+    let (recorded, rows) = rows(comparison, criterion);
+    let value = |ratio: &Ratio| {
+        let (low, high) = (ratio.low.unwrap_or(0.0), ratio.high.unwrap_or(f64::MAX));
+        Some(Value { x: ratio.ratio?, interval: Some((low, high)), ..Value::default() })
+    };
+    let margin = file.enough.margin;
+    let all = sides.iter().flat_map(|(_, pick)| {
+        let cells = comparison.parameterizations.iter().flat_map(|of| &of.cells).filter(|c| c.criterion == criterion);
+        cells.filter_map(|cell| value(pick(cell)))
+    });
+    // Where an interval has no upper end, the axis ends a decade above the ratio.
+    let reach: Vec<(f64, f64, f64)> = all
+        .filter_map(|value| value.interval.map(|(low, high)| (value.x, low, high.min(10.0 * value.x))))
+        .chain([(1.0, 1.0 / margin, margin)])
+        .collect();
+    let panel = |(heading, pick): (&str, Pick)| Dots {
+        heading: heading.to_owned(),
+        x: PlotAxis::around("ratio to S", AxisScale::Logarithmic, logarithmic_reach(&reach)),
+        marked: vec![1.0 / margin, 1.0, margin],
+        series: comparison
+            .parameterizations
+            .iter()
+            .map(|of| Series {
+                values: values(of, &recorded, |cell| value(pick(cell))),
+                ..Series::new(legend_name(of), &[], [])
+            })
+            .collect(),
+    };
+    Figure {
+        title: format!(
+            "{}, {}: failure rates as multiples of that of S",
+            comparison.category.label(),
+            criterion.label()
+        ),
+        subtitle: Some(file.data.clone()),
+        caption: format!(
+            "Ratio of the share of failed lanes to that of S, taken scenario by scenario, with its {} % interval; 1: as \
+             many failures. A ratio agrees where its interval lies between the outer grey lines ({:.2} and {margin}). \
+             Where S never fails there is no ratio. n: scenarios in which S fails; with fewer than ten markers are hollow.",
+            100.0 * file.level,
+            1.0 / margin
+        ),
+        plots: dots(&rows, sides.map(panel).into_iter().collect()),
+        columns: 2,
+        ..Figure::default()
     }
 }

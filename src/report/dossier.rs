@@ -4,7 +4,7 @@ use serde_json::json;
 
 use super::records;
 use super::sampling::HostRecord;
-use super::trace::{TraceFigure, TraceSeries};
+use super::trace::{TraceFigure, TracePanels, TraceSeries};
 use crate::Result;
 use crate::model::profile::Profile;
 use crate::run::justify::{Dossier, REGULATION, Rules, Scored, Share};
@@ -145,7 +145,7 @@ impl DossierReport<'_> {
         let title = format!("Hidden failure: {}, headway {}", hidden.scenario, hidden.headway);
         let subtitle =
             format!("{}, profile {}; {}", self.dossier.model.name(), self.profile.name, self.provenance.data);
-        Some(TraceFigure { title, subtitle: Some(subtitle), series, until_s: None }.svg())
+        Some(TraceFigure { title, subtitle: Some(subtitle), series, until_s: None, panels: TracePanels::All }.svg())
     }
 
     /// The dossier as text.

@@ -198,7 +198,7 @@ impl DossierReport<'_> {
                 ("profile".to_owned(), format!("{}, time step {} s", self.profile.name, self.profile.frame.dt_s)),
             ],
             host: vec![("computed by".to_owned(), self.host.backend.clone())],
-            details: vec![(format!("Profile {}", self.profile.name), profile)],
+            parts: vec![Section::folded(format!("Profile {}", self.profile.name), profile)],
             ..Section::new("reproduction", "Reproduction")
         })
     }

@@ -1,9 +1,11 @@
-//! One self-contained page: texts, tables and figures of a run in one file, without scripts and without external
-//! resources. The caller fills a [`Page`] with content; `templates` define its look.
+//! One self-contained page: texts, tables and figures of a run in one file, without external resources. The caller fills
+//! a [`Page`] with content; `templates` define its look and the one script, which sorts tables and shows values.
 
+use base64::prelude::{BASE64_STANDARD, Engine};
 use minijinja::value::{Serde, Value};
 use minijinja::{Environment, escape_formatter};
 use serde::Serialize;
+use sha2::{Digest, Sha256};
 
 use crate::support::plain_text::shown;
 use crate::support::table::Table;
@@ -11,8 +13,9 @@ use crate::{Error, Result};
 
 const TEMPLATE: &str = include_str!("templates/report.html");
 const STYLE: &str = include_str!("templates/style.css");
+const SCRIPT: &str = include_str!("templates/script.js");
 
-/// Figures narrower than this, such as a column of a paper, do not fill the page.
+/// Figures wider than this fill the page; others, of a paper's column, are two abreast.
 const NARROW_PX: f64 = 700.0;
 
 /// A figure with the names of its files beside the page.
@@ -20,12 +23,14 @@ const NARROW_PX: f64 = 700.0;
 pub struct PageFigure {
     svg: String,
     files: Vec<String>,
+    is_wide: bool,
 }
 
 impl PageFigure {
-    /// From a complete SVG document; it is drawn at the width of the page.
+    /// From a complete SVG document.
     pub fn new(svg: &str, files: &[&str]) -> PageFigure {
-        PageFigure { svg: inline(svg), files: files.iter().map(|file| (*file).to_owned()).collect() }
+        let (svg, width_px) = inline(svg);
+        PageFigure { svg, files: files.iter().map(|file| (*file).to_owned()).collect(), is_wide: width_px > NARROW_PX }
     }
 }
 
@@ -48,8 +53,10 @@ pub struct Section {
     pub facts: Vec<(String, String)>,
     /// Names and values that depend on the machine and differ between runs.
     pub host: Vec<(String, String)>,
-    /// Headings and long texts that open on a click.
-    pub details: Vec<(String, String)>,
+    /// Whether it opens on a click.
+    pub is_folded: bool,
+    /// Parts at its end, which open on a click; they need no anchor.
+    pub parts: Vec<Section>,
 }
 
 /// The page.
@@ -72,6 +79,11 @@ impl Section {
     pub fn new(id: &str, title: &str) -> Section {
         Section { id: id.to_owned(), title: title.to_owned(), ..Section::default() }
     }
+
+    /// A long text that opens on a click.
+    pub fn folded(title: impl Into<String>, text: String) -> Section {
+        Section { title: title.into(), text, ..Section::default() }
+    }
 }
 
 impl Page {
@@ -83,6 +95,8 @@ impl Page {
         #[derive(Serialize)]
         struct Context<'a> {
             style: &'a str,
+            script: &'a str,
+            script_sha256: String,
             #[serde(flatten)]
             page: &'a Page,
         }
@@ -96,26 +110,23 @@ impl Page {
         });
         environment.add_template("report.html", TEMPLATE).map_err(broken)?;
         let template = environment.get_template("report.html").map_err(broken)?;
-        template.render(Serde(Context { style: STYLE, page: self })).map_err(broken)
+        let script_sha256 = BASE64_STANDARD.encode(Sha256::digest(SCRIPT));
+        template.render(Serde(Context { style: STYLE, script: SCRIPT, script_sha256, page: self })).map_err(broken)
     }
 }
 
-/// An SVG document as an element that scales with the page: a view box replaces width and height.
-fn inline(svg: &str) -> String {
-    let start = svg.find("<svg").unwrap_or(0);
-    let svg = &svg[start..];
-    let Some((tag, rest)) = svg.split_once('>') else { return String::new() };
+/// An SVG document as an element that scales with the page, and its width, px: a view box replaces width and height.
+fn inline(svg: &str) -> (String, f64) {
+    let svg = &svg[svg.find("<svg").unwrap_or(0)..];
     let size = |name: &str| {
-        let (_, value) = tag.split_once(&format!(" {name}=\""))?;
+        let (_, value) = svg.split_once('>')?.0.split_once(&format!(" {name}=\""))?;
         value.split_once('"').map(|(value, _)| value.to_owned())
     };
-    let (Some(width), Some(height)) = (size("width"), size("height")) else { return svg.to_owned() };
-    let narrow = width.parse::<f64>().ok().filter(|width| *width < NARROW_PX);
-    let limit = narrow.map_or(String::new(), |width| format!(" style=\"max-width:{:.0}px\"", 1.3 * width));
-    let view_box = format!(" viewBox=\"0 0 {width} {height}\" role=\"img\"{limit}");
-    let tag =
-        tag.replacen(&format!(" width=\"{width}\""), &view_box, 1).replacen(&format!(" height=\"{height}\""), "", 1);
-    format!("{tag}>{}", rest.trim_end())
+    let (Some(width), Some(height)) = (size("width"), size("height")) else { return (svg.to_owned(), 0.0) };
+    let view_box = format!(" viewBox=\"0 0 {width} {height}\" role=\"img\"");
+    let scaled =
+        svg.replacen(&format!(" width=\"{width}\""), &view_box, 1).replacen(&format!(" height=\"{height}\""), "", 1);
+    (scaled.trim_end().to_owned(), width.parse().unwrap_or(0.0))
 }
 
 #[cfg(test)]
@@ -137,7 +148,7 @@ mod tests {
             figures: vec![PageFigure::new(svg, &["a.svg", "a.csv"])],
             facts: vec![("seed".into(), "1".into())],
             host: vec![("device".into(), "none".into())],
-            details: vec![("all".into(), "x < y".into())],
+            parts: vec![Section::folded("all", "x < y".into())],
             ..Section::default()
         };
         Page { title: "T".into(), sections: vec![section], warnings: vec!["W".into()], ..Page::default() }
@@ -146,7 +157,7 @@ mod tests {
     #[test]
     fn texts_are_escaped_and_figures_are_not() {
         let html = page().html().unwrap();
-        assert!(!html.contains("<script"), "{html}");
+        assert_eq!(html.matches("<script").count(), 1, "{html}");
         assert!(html.contains("\\u{202e}\\u{1b}") && !html.contains(['\u{202e}', '\u{1b}']), "{html}");
         assert!(html.contains("&lt;script&gt;") && html.contains("A &amp; B") && html.contains("x &lt; y"));
         assert!(
@@ -159,22 +170,25 @@ mod tests {
     #[test]
     fn nothing_is_fetched_from_elsewhere() {
         let html = page().html().unwrap().replace("http://www.w3.org/2000/svg", "");
-        for outside in ["http:", "https:", "//", "@import", "url(", "<script", "src="] {
+        let html: String = html.lines().filter(|line| !line.starts_with("//")).collect();
+        for outside in ["http:", "https:", "//", "@import", "url(", "src="] {
             assert!(!html.contains(outside), "{outside}");
         }
     }
 
     #[test]
-    fn the_page_forbids_scripts_and_everything_from_elsewhere() {
+    fn the_page_forbids_other_scripts_and_everything_from_elsewhere() {
         let html = page().html().unwrap();
         let head = html.split_once("</head>").unwrap().0;
         let policy = head.split_once("http-equiv=\"Content-Security-Policy\" content=\"").unwrap().1;
         let policy = policy.split_once('"').unwrap().0;
         assert!(policy.starts_with("default-src 'none';"), "{policy}");
-        // Styles are inline and the icon is empty; the policy allows nothing else.
+        // Styles are inline, the icon is empty, and the script is known by its hash; the policy allows nothing else.
+        let script = html.split_once("<script>").unwrap().1.split_once("</script>").unwrap().0;
+        let script = format!("script-src 'sha256-{}'", BASE64_STANDARD.encode(Sha256::digest(script)));
         let allowed: Vec<&str> = policy.split("; ").skip(1).collect();
         let none = ["base-uri 'none'", "form-action 'none'"];
-        assert_eq!(allowed, [&["style-src 'unsafe-inline'", "img-src data:"][..], &none].concat());
+        assert_eq!(allowed, [&["style-src 'unsafe-inline'", script.as_str(), "img-src data:"][..], &none].concat());
         assert!(head.find("Content-Security-Policy") < head.find("<style"), "before what it rules");
     }
 

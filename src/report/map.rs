@@ -4,7 +4,6 @@ use serde::Serialize;
 
 use super::html::PageFigure;
 use super::map_sheet::{MapSheet, agreement, outcome};
-use super::plot::Fill;
 use super::run_record::SweepRecord;
 use crate::Result;
 use crate::engine::DeviceRecord;
@@ -157,14 +156,17 @@ impl MapReport {
         &self,
         plan: &GridPlan,
         what: String,
-        kinds: Vec<(String, Fill)>,
+        kinds: Vec<(String, &'static str)>,
         cells: Vec<u8>,
         not_preventable: Option<Vec<bool>>,
     ) -> String {
         let grid = &plan.grid;
         let mut notes = Vec::new();
         if self.criterion == Criterion::Collision {
-            notes.push("No conflict: no collision even if the ego never reacts.".to_owned());
+            notes.push(
+                "Pass: the driver avoids the collision by braking. No conflict: no collision even if the ego never reacts."
+                    .to_owned(),
+            );
         }
         if self.shown_outcomes().contains(&CellOutcome::FailByReaction) {
             notes.push(

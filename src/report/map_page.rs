@@ -37,7 +37,8 @@ impl MapReport {
                 .chain(hashes)
                 .collect(),
             host,
-            details: vec![("Profile".to_owned(), profile)],
+            parts: vec![Section::folded("Profile", profile)],
+            is_folded: true,
             ..Section::new("reproduction", "Reproduction")
         };
         let page = Page {

@@ -1,10 +1,10 @@
-//! A sheet of `map`: small multiples of one grid. Each combination of speeds has a plot; each cell has the look of its
-//! kind, and lines separate the kinds.
+//! A sheet of `map`: small multiples of one grid. Each combination of speeds has a plot, a row per speed of the ego, a
+//! column per speed of the other vehicle; each cell has the colour of its kind, and lines separate the kinds.
 //!
-//! Kinds differ in lightness and, where two are equally light, in hatching, so that colour-blind readers and grey
-//! prints can distinguish them. A page with three plots in a row stays readable at the width of a column.
+//! Kinds differ in lightness, from white to nearly black, so that colour-blind readers and grey prints can distinguish
+//! them.
 
-use super::plot::{Cells, Figure, Fill, FilledCell, Hatch, Height, INK, Plot, PlotAxis, Rule};
+use super::plot::{Cells, Figure, Fill, FilledCell, Height, INK, Plot, PlotAxis, Rule};
 use crate::run::check::Answer;
 use crate::run::grid::{Agreement, CellOutcome, Grid, boundary, runs};
 
@@ -16,8 +16,8 @@ pub struct MapSheet<'a> {
     pub subtitle: String,
     /// The grid.
     pub grid: &'a Grid,
-    /// Kinds of cells: name and look.
-    pub kinds: Vec<(String, Fill)>,
+    /// Kinds of cells: name and colour.
+    pub kinds: Vec<(String, &'static str)>,
     /// Kind of every cell, in the grid's order.
     pub cells: Vec<u8>,
     /// Per cell: whether it is not preventable. Its boundary is drawn if known.
@@ -28,48 +28,49 @@ pub struct MapSheet<'a> {
 
 /// Colour of the boundary of cases that are not preventable.
 const BOUNDARY: &str = "#c40000";
+/// More plots in a row than this make a wide sheet; with more than the second a row has three.
+const MAX_NARROW: usize = 3;
+const MAX_COLUMNS: usize = 8;
 
-/// Name and look of an outcome.
-pub fn outcome(outcome: CellOutcome) -> (String, Fill) {
-    let (colour, hatch) = match outcome {
+/// Name and colour of an outcome.
+pub fn outcome(outcome: CellOutcome) -> (String, &'static str) {
+    let colour = match outcome {
         CellOutcome::NoConflict => NO_CONFLICT,
-        CellOutcome::Pass => ("#f7f1dc", Hatch::None),
-        CellOutcome::Fail => ("#6f86ad", Hatch::None),
-        CellOutcome::FailByReaction => ("#6f86ad", Hatch::Rising),
+        CellOutcome::Pass => "#f3dfa2",
+        CellOutcome::Fail => "#4a6fa5",
+        CellOutcome::FailByReaction => "#14203c",
         CellOutcome::Undecided => UNDECIDED,
     };
-    kind(outcome.label(), colour, hatch)
+    (outcome.label().to_owned(), colour)
 }
 
-/// Name and look of an agreement of two verdicts.
-pub fn agreement(agreement: Agreement, first: &str, second: &str) -> (String, Fill) {
-    let label = agreement.label();
+/// Name and colour of an agreement of two verdicts.
+pub fn agreement(agreement: Agreement, first: &str, second: &str) -> (String, &'static str) {
+    let label = agreement.label().to_owned();
     match agreement {
-        Agreement::BothPass => kind(label, "#f7f1dc", Hatch::None),
-        Agreement::BothFail => kind(label, "#b9b9b9", Hatch::None),
-        Agreement::OnlyFirst => kind(format!("only {first} fails"), "#0072b2", Hatch::Rising),
-        Agreement::OnlySecond => kind(format!("only {second} fails"), "#e08a00", Hatch::Falling),
-        Agreement::NoConflict => kind(label, NO_CONFLICT.0, NO_CONFLICT.1),
-        Agreement::Undecided => kind(label, UNDECIDED.0, UNDECIDED.1),
+        Agreement::BothPass => (label, "#f3dfa2"),
+        Agreement::BothFail => (label, "#8c8c8c"),
+        Agreement::OnlyFirst => (format!("only {first} fails"), "#1f62a0"),
+        Agreement::OnlySecond => (format!("only {second} fails"), "#651a10"),
+        Agreement::NoConflict => (label, NO_CONFLICT),
+        Agreement::Undecided => (label, UNDECIDED),
     }
 }
 
-/// The same look in every map. In grey print the second colour is midway between pass and fail.
-const NO_CONFLICT: (&str, Hatch) = ("#ffffff", Hatch::Grey);
-const UNDECIDED: (&str, Hatch) = ("#f0b429", Hatch::Crossed);
-
-fn kind(name: impl Into<String>, colour: &str, hatch: Hatch) -> (String, Fill) {
-    (name.into(), Fill { colour: colour.to_owned(), hatch, ..Fill::default() })
-}
+/// The same in every map.
+const NO_CONFLICT: &str = "#ffffff";
+const UNDECIDED: &str = "#e69f00";
 
 impl MapSheet<'_> {
     /// The sheet as a figure.
     pub fn figure(&self) -> Figure {
-        let panels = self.grid.panels().len();
+        let (columns, plots) = self.trellis();
         Figure {
             title: self.title.clone(),
             subtitle: Some(self.subtitle.clone()),
-            plots: (0..panels).map(|panel| self.plot(panel)).collect(),
+            plots,
+            columns,
+            is_wide: columns > MAX_NARROW,
             caption: match &self.not_preventable {
                 Some(cells) if !cells.contains(&true) => {
                     "Black lines: the boundary, between cells of different kinds. In no cell do CCHDM and FSM both collide."
@@ -78,25 +79,53 @@ impl MapSheet<'_> {
             }
             .to_owned(),
             notes: ("Notes:", self.notes.clone()),
+            ..Figure::default()
         }
     }
 
-    fn plot(&self, panel: usize) -> Plot {
+    /// The plots, and how many are in a row (0: any). Of two quantities the first has a row per value, the second a
+    /// column; a combination that is not in the grid leaves its place empty.
+    fn trellis(&self) -> (usize, Vec<Plot>) {
+        let panels = self.grid.panels();
+        let distinct = |at: usize| {
+            let mut values: Vec<f64> = panels.iter().filter_map(|panel| panel.get(at).copied()).collect();
+            values.sort_by(f64::total_cmp);
+            values.dedup();
+            values
+        };
+        let (rows, columns) = (distinct(0), distinct(1));
+        if self.grid.panel_axes().len() != 2 || columns.len() > MAX_COLUMNS || columns.len() < 2 {
+            return (0, (0..panels.len()).map(|panel| self.plot(panel, 0)).collect());
+        }
+        let place = |row: f64, column: f64| {
+            let found = panels.iter().position(|panel| panel[..] == [row, column]);
+            found.map_or(Plot::default(), |panel| self.plot(panel, 1))
+        };
+        let of_row = |row: &f64| {
+            let mut plots: Vec<Plot> = columns.iter().map(|column| place(*row, *column)).collect();
+            plots[0].row = self.value_name(0, *row);
+            plots
+        };
+        (columns.len(), rows.iter().flat_map(of_row).collect())
+    }
+
+    /// `first`: of the panel's values, those from here on are in the heading.
+    fn plot(&self, panel: usize, first: usize) -> Plot {
         let (across, up) = (self.grid.x().edges(), self.grid.y().edges());
         let kind = |i: usize, j: usize| usize::from(self.cells[self.grid.cell(panel, i, j)]);
         let mut cells = Cells { key: self.key(), ..Cells::default() };
-        for (number, (_, fill)) in self.kinds.iter().enumerate() {
+        for (number, (_, colour)) in self.kinds.iter().enumerate() {
             for j in 0..self.grid.y().len() {
                 for (from, to) in runs(self.grid.x().len(), &|i| kind(i, j) == number) {
                     let corners = [(across[from], up[j]), (across[to], up[j + 1])];
-                    cells.cells.push(FilledCell { corners, fill: fill.clone(), tip: String::new() });
+                    cells.cells.push(FilledCell { corners, fill: flat(colour), tip: String::new() });
                 }
             }
         }
         let at = |(i, j): (usize, usize)| (across[i], up[j]);
         let lines = boundary(self.grid, &kind).into_iter().map(|(a, b)| vec![at(a), at(b)]);
         let attributes = "class=\"boundary\" stroke-linecap=\"square\"".to_owned();
-        let rule = Rule { runs: lines.collect(), colour: INK, width_px: 1.8, attributes, ..Rule::default() };
+        let rule = Rule { runs: lines.collect(), colour: INK, width_px: 1.2, attributes, ..Rule::default() };
         let not_preventable = self.not_preventable.iter().filter(|cells| cells.contains(&true)).map(|cells| {
             let kind = |i: usize, j: usize| usize::from(cells[self.grid.cell(panel, i, j)]);
             let lines = boundary(self.grid, &kind).into_iter().map(|(a, b)| vec![at(a), at(b)]);
@@ -106,15 +135,16 @@ impl MapSheet<'_> {
                 runs: lines.collect(),
                 name: format!("around what is {word}, CCHDM and FSM both collide: {count} of {all}"),
                 colour: BOUNDARY,
-                width_px: 2.2,
+                width_px: 1.8,
                 dash: "5 3",
                 attributes: "class=\"not-preventable\"".to_owned(),
+                ..Rule::default()
             }
         });
         let layers = [cells.into(), rule.into()].into_iter().chain(not_preventable.map(Into::into));
         let axis = |title, edges: &[f64]| PlotAxis::exactly(title, edges[0], edges[edges.len() - 1]);
         Plot {
-            heading: self.panel_name(panel),
+            heading: self.panel_name(panel, first),
             x: axis(self.grid.x().parameter.title(), &across),
             y: axis(self.grid.y().parameter.title(), &up),
             layers: layers.collect(),
@@ -123,30 +153,31 @@ impl MapSheet<'_> {
         }
     }
 
-    /// The kinds with their counts.
+    /// The kinds that occur, with their counts.
     fn key(&self) -> Vec<(String, Fill)> {
-        let named = |(number, (name, fill)): (usize, &(String, Fill))| {
+        let named = |(number, (name, colour)): (usize, &(String, &'static str))| {
             let count = self.cells.iter().filter(|c| usize::from(**c) == number).count();
-            (format!("{name}: {count} of {}", self.cells.len()), fill.clone())
+            (count > 0).then(|| (format!("{name}: {count} of {}", self.cells.len()), flat(colour)))
         };
-        self.kinds.iter().enumerate().map(named).collect()
+        self.kinds.iter().enumerate().filter_map(named).collect()
     }
 
-    fn panel_name(&self, panel: usize) -> String {
-        let axes = self.grid.panel_axes().iter().zip(&self.grid.panels()[panel]);
-        let word = |key: &str| match key.split_once("_speed") {
+    /// `ego 90 km/h`.
+    fn value_name(&self, axis: usize, value: f64) -> String {
+        let parameter = self.grid.panel_axes()[axis].parameter;
+        let word = match parameter.key.split_once("_speed") {
             Some((vehicle, _)) => vehicle.to_owned(),
-            None => key.rsplit_once('_').map_or(key, |(name, _)| name).replace('_', " "),
+            None => parameter.key.rsplit_once('_').map_or(parameter.key, |(name, _)| name).replace('_', " "),
         };
-        let units: Vec<&str> = self.grid.panel_axes().iter().map(|a| a.parameter.unit).collect();
-        let parts: Vec<String> = axes
-            .enumerate()
-            .map(|(at, (axis, value))| {
-                // If several units are the same, only the last is shown.
-                let unit = if units[at + 1..].contains(&units[at]) { "" } else { units[at] };
-                format!("{} {value} {unit}", word(axis.parameter.key)).trim_end().to_owned()
-            })
-            .collect();
-        parts.join(", ")
+        format!("{word} {value} {}", parameter.unit).trim_end().to_owned()
     }
+
+    fn panel_name(&self, panel: usize, first: usize) -> String {
+        let values = self.grid.panels()[panel].iter().enumerate().skip(first);
+        values.map(|(at, value)| self.value_name(at, *value)).collect::<Vec<_>>().join(", ")
+    }
+}
+
+fn flat(colour: &str) -> Fill {
+    Fill { colour: colour.to_owned(), ..Fill::default() }
 }

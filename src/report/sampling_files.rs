@@ -2,8 +2,8 @@
 
 use sha2::{Digest, Sha256};
 
-use super::convergence::ConvergenceFigure;
-use super::failure_map::FailureMap;
+use super::convergence::convergence;
+use super::failure_map::FailureMaps;
 use super::html::PageFigure;
 use super::sampling::{DrawRecord, EstimateFile, HostRecord};
 use super::sampling_tables::{WorstRow, convergence_csv, model_ratios_csv, profile_ratios_csv, worst_csv};
@@ -69,7 +69,7 @@ impl EstimateFile {
         if !run.convergence.is_empty() {
             results.add("convergence.csv", convergence_csv(&run.convergence).as_bytes())?;
             let level = self.estimates.first().map_or(0.95, |row| row.estimate.interval.level);
-            let svg = ConvergenceFigure::of(density, &run.convergence, level).figure().svg();
+            let svg = convergence(density, &run.convergence, level).svg();
             results.add("convergence.svg", svg.as_bytes())?;
             figures.push(PageFigure::new(&svg, &["convergence.svg", "convergence.csv"]));
         }
@@ -84,10 +84,11 @@ impl EstimateFile {
             Ok((point, headway))
         })?;
         if let Some(map) = &run.tally.map {
+            let samples = run.tally.samples() - run.tally.voids;
+            let maps = FailureMaps { density, plan, map, samples, criterion: options.criterion };
             for (model, id) in plan.models.iter().enumerate() {
-                let figure = FailureMap::of(density, map, model, *id, options.criterion);
-                let (name, svg) = (format!("map-{}", id.name()), figure.figure().svg());
-                results.add(&format!("{name}.csv"), figure.csv().as_bytes())?;
+                let (name, svg) = (format!("map-{}", id.name()), maps.figure(model).svg());
+                results.add(&format!("{name}.csv"), maps.csv(model).as_bytes())?;
                 results.add(&format!("{name}.svg"), svg.as_bytes())?;
                 figures.push(PageFigure::new(&svg, &[&format!("{name}.svg"), &format!("{name}.csv")]));
             }

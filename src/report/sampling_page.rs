@@ -1,7 +1,7 @@
 //! A sampling run as one page.
 
 use super::html::{Page, PageFigure, Section};
-use super::plot::{Figure, HOLLOW, Layer, Mark, Plot, PlotAxis, Series, Value, is_few};
+use super::plot::{AxisScale, Figure, HOLLOW, Layer, Mark, Plot, PlotAxis, Series, Value, is_few};
 use super::sampling::{EstimateFile, interval_text, rate_text, ratio_text, short, three_digits};
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
@@ -152,6 +152,8 @@ impl EstimateFile {
                 _ => None,
             }
         };
+        let all = self.estimates.iter().filter_map(|row| Some((thw_s(row)?, 100.0 * row.estimate.probability)));
+        let all: Vec<(f64, f64)> = all.chain([(0.0, 0.0)]).collect();
         let panel = |&model: &ModelId| {
             let series = |criterion: Criterion| {
                 let own = self.estimates.iter().filter(|row| row.model == model && row.criterion == criterion);
@@ -159,17 +161,23 @@ impl EstimateFile {
                     let few = row.failing_scenarios.filter(|n| is_few(*n));
                     let label = few.filter(|n| *n > 0.0).map_or(String::new(), |n| format!("{n:.0}"));
                     let place = (thw_s(row)?, 100.0 * row.estimate.probability);
-                    Some(Value { label, is_few: few.is_some(), ..Value::from(place) })
+                    let interval = &row.estimate.interval;
+                    let interval = Some((100.0 * interval.low, 100.0 * interval.high.min(1.0)));
+                    Some(Value { label, interval, is_few: few.is_some(), ..Value::from(place) })
                 };
                 let mut values: Vec<Value> = own.filter_map(point).collect();
                 values.sort_by(|a, b| a.x.total_cmp(&b.x));
-                Series { values, ..Series::new(criterion.label(), &[Mark::Line, Mark::Points], []) }
+                Series { values, ..Series::new(criterion.label(), &[Mark::Band, Mark::Line, Mark::Points], []) }
             };
             let series = Criterion::ALL.map(series).into_iter().filter(|series| !series.values.is_empty());
             Plot {
                 heading: model.name().to_owned(),
-                x: PlotAxis::new("initial time headway in s"),
-                y: PlotAxis::exactly("probability of failure in %", 0.0, 100.0),
+                x: PlotAxis::around("initial time headway in s", AxisScale::Linear, all.iter().map(|v| v.0).collect()),
+                y: PlotAxis::around(
+                    "probability of failure in %",
+                    AxisScale::SquareRoot,
+                    all.iter().map(|v| v.1).collect(),
+                ),
                 layers: series.map(Layer::from).collect(),
                 ..Plot::default()
             }
@@ -178,7 +186,9 @@ impl EstimateFile {
         (headways > 1).then(|| Figure {
             title: format!("{}: probability of failure against the headway", self.name()),
             subtitle: Some(self.density.provenance.data.clone()),
-            caption: format!("Each headway of its own, without its interval, which is in estimates.csv. {HOLLOW}"),
+            caption: format!(
+                "Each headway of its own. Area: its interval, as in estimates.csv. Vertical axis by the square root. {HOLLOW}"
+            ),
             plots: self.models.iter().map(panel).collect(),
             ..Figure::default()
         })
@@ -227,7 +237,8 @@ impl EstimateFile {
                 .to_owned(),
             facts,
             host,
-            details: vec![("Profile".to_owned(), profile)],
+            parts: vec![Section::folded("Profile", profile)],
+            is_folded: true,
             ..Section::new("reproduction", "Reproduction")
         })
     }

@@ -2,12 +2,11 @@
 
 use super::close_following::{CloseRow, close_following};
 use super::plot::Figure;
-use super::radar::{RadarChart, RadarSeries};
 use super::records::document;
 use super::reference::ReferenceComparison;
 use super::run_record::{RunRecord, StudyHost};
 use super::study_figures::{
-    HeadwayFailures, distributions, f1_by_parameters, f1_intervals, legend_name, modes, recall_and_precision,
+    HeadwayFailures, distributions, f1_by_parameters, f1_intervals, modes, radar, recall_and_precision,
 };
 use super::tables;
 use crate::Result;
@@ -16,7 +15,7 @@ use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::close_following::CloseFollowing;
 use crate::run::score::{
-    Best, CategoryScores, ClaimResult, Misfit, ScoreTable, best_parameterizations, check_claims, f1,
+    Best, CategoryScores, ClaimResult, MeanF1, Misfit, ScoreTable, best_parameterizations, check_claims, f1,
     published_failures, published_lvd_f1,
 };
 use crate::run::study::{CategoryProvenance, ParameterHistogram, Study};
@@ -31,6 +30,8 @@ use serde_json::Value;
 pub struct CategoryPictures {
     /// Failures by headway.
     pub headways: HeadwayFailures,
+    /// Mean F1 over all criteria, and over each.
+    pub means: Vec<MeanF1>,
     /// Distributions of the mined parameters.
     pub parameters: Vec<ParameterHistogram>,
     /// Shapes of the decomposition, if there is one.
@@ -82,8 +83,11 @@ impl StudyReport {
         let claims = check_claims(&scores, plan, counts);
         let best = best_parameterizations(&scores, plan, counts, Criterion::Collision);
         let picture = |(block, of): (usize, &CategoryProvenance)| {
+            let criteria = std::iter::once(&Criterion::ALL[..]).chain(Criterion::ALL.chunks(1));
+            let mean = |criteria| MeanF1::of(&scores.categories[block], (plan, counts), criteria, &scores.options);
             Ok(CategoryPictures {
                 headways: HeadwayFailures::of(plan, counts, block)?,
+                means: criteria.map(mean).collect(),
                 parameters: of.parameters.clone(),
                 modes: of.modes.clone(),
                 svd_explained: of.svd_explained.clone(),
@@ -178,7 +182,6 @@ impl StudyReport {
         results.add("report.txt", self.text(tables::WIDTH).as_bytes())?;
         results.add("headways.csv", self.headways(data).csv().as_bytes())?;
         for (at, category) in self.scores.categories.iter().enumerate() {
-            results.add(&file_name("radar", category.category, "svg"), self.radar(category).as_bytes())?;
             for (name, figure) in self.figures(at) {
                 results.add(&file_name(name, category.category, "svg"), figure.svg().as_bytes())?;
                 results.add(&file_name(name, category.category, "csv"), figure.csv().as_bytes())?;
@@ -200,37 +203,20 @@ impl StudyReport {
         results.publish(&self.run.to_json()?)
     }
 
-    /// F1 per model and criterion (spokes), one polygon per parameterization, as in the paper.
-    pub(super) fn radar(&self, scores: &CategoryScores) -> String {
-        let spokes: Vec<_> =
-            scores.models.iter().flat_map(|&m| Criterion::ALL.into_iter().map(move |c| (m, c))).collect();
-        let series = (1..scores.variants.len()).map(|variant| {
-            let value = |&(model, criterion): &(_, _)| {
-                scores.index(variant, model, criterion).and_then(|at| f1(&scores.cells[at].counts))
-            };
-            RadarSeries { name: legend_name(scores, variant), values: spokes.iter().map(value).collect() }
-        });
-        let chart = RadarChart {
-            title: format!("{}: F1 of parameterized against recorded scenarios", scores.category.label()),
-            subtitle: Some(format!("{} scenarios. {}", scores.scenarios, self.run.data)),
-            failing: spokes.iter().map(|&(model, criterion)| scores.failing_scenarios(model, criterion)).collect(),
-            spokes: spokes.iter().map(|(m, c)| format!("{} {}", m.name(), c.label())).collect(),
-            series: series.collect(),
-        };
-        chart.figure().svg()
-    }
-
-    /// The other figures of a category, with the prefixes of their file names; figures without data are skipped.
+    /// The figures of a category, with the prefixes of their file names; figures without data are skipped.
     pub(super) fn figures(&self, at: usize) -> Vec<(&'static str, Figure)> {
         let (scores, data) = (&self.scores.categories[at], &self.run.data);
-        let mut figures = Vec::new();
+        let (confidence, mut figures) = (self.scores.options.confidence, Vec::new());
         if scores.variants.len() > 1 {
-            figures.push(("f1", f1_intervals(scores, self.scores.options.confidence, data)));
-            figures.push(("recall-precision", recall_and_precision(scores, data)));
-            figures.push(("f1-by-parameters", f1_by_parameters(scores, data)));
+            figures.push(("f1", f1_intervals(scores, confidence, data)));
+            figures.push(("radar", radar(scores, data)));
+            figures.push(("recall-precision", recall_and_precision(scores, confidence, data)));
         }
         let Some(pictures) = self.pictures.get(at) else { return figures };
-        figures.push(("headways", pictures.headways.figure(scores, data)));
+        if scores.variants.len() > 1 {
+            figures.push(("f1-by-parameters", f1_by_parameters(scores, &pictures.means, confidence, data)));
+        }
+        figures.push(("headways", pictures.headways.figure(scores, confidence, data)));
         if !pictures.parameters.is_empty() {
             figures.push(("parameters", distributions(scores.category, &pictures.parameters, data)));
         }

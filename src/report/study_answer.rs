@@ -1,6 +1,7 @@
 //! The answer of a study on one terminal screen: the best parameterization, what it hides, and what the data do not
 //! show.
 
+use super::html::Section;
 use super::study::StudyReport;
 use super::tables::wrap;
 use crate::run::score::Best;
@@ -21,35 +22,63 @@ const SCORE: usize = 3;
 /// Columns of numbers.
 const NUMBERS: [usize; 2] = [4, 6];
 
+/// What the last columns say.
+const LEGEND: [(&str, &str); 3] = [
+    ("hides", "colliding runs of S that the best lacks."),
+    ("not told apart", "F1 within chance of the best's."),
+    ("needs", "times as many scenarios to tell, if F1 stays."),
+];
+
+fn table(rows: &[[String; 7]]) -> Table {
+    let words = Table::of(rows).columns(0..4, |at| HEADER[at], |row, at| row[at].as_str());
+    words.columns(4..7, |at| HEADER[at], |row, at| NumberText(row[at].clone())).build()
+}
+
 impl StudyReport {
     /// The answer in at most 20 lines of 80 columns, or fewer columns on a narrower terminal.
     pub fn answer(&self, width: usize) -> String {
         let width = width.clamp(MIN_WIDTH, WIDTH);
         let made_up = if self.run.synthetic { ". No number here is a statement about real traffic." } else { "" };
-        let kinds = self.scores.categories.iter().map(|c| format!("{} {}s", count(c.scenarios), c.category.label()));
-        let models = self.scores.categories.first().map_or(0, |c| c.models.len());
-        let size = format!(
-            "{}; {}, {}: {} lanes",
-            kinds.collect::<Vec<_>>().join(", "),
-            self.headways_in_words(),
-            counted(models, "driver"),
-            count(self.run.lanes)
-        );
-        let level = 100.0 * self.scores.options.confidence;
         let mut lines = vec![
             wrap(&format!("{}{made_up}", self.run.data), width),
-            wrap(&size, width),
+            wrap(&self.size(), width),
             String::new(),
-            wrap(&format!("Which S' collides where S, as recorded, collides? F1 with its {level} % interval:"), width),
+            wrap(&self.question(), width),
         ];
         lines.extend(self.rows(width));
         lines.extend(
             self.comparison.iter().filter_map(|comparison| Some(wrap(comparison.text().lines().next()?, width))),
         );
-        let legend = "hides: colliding runs of S that the best lacks. not told apart: F1 within chance of the \
-                      best's. needs: times as many scenarios to tell, if F1 stays.";
-        lines.push(wrap(legend, width));
+        let legend = LEGEND.map(|(name, words)| format!("{name}: {words}")).join(" ");
+        lines.push(wrap(&legend, width));
         lines.join("\n") + "\n"
+    }
+
+    /// The same as a section of the page, above the others.
+    pub(super) fn answer_section(&self) -> Section {
+        let rows: Vec<[String; 7]> = self.best.iter().map(|best| self.row(best)).collect();
+        Section {
+            intro: format!("{}.", self.size()),
+            tables: vec![table(&rows).captioned(self.question())],
+            facts: LEGEND.map(|(name, words)| (name.to_owned(), words.to_owned())).to_vec(),
+            ..Section::new("answer", "")
+        }
+    }
+
+    fn size(&self) -> String {
+        let kinds = self.scores.categories.iter().map(|c| format!("{} {}s", count(c.scenarios), c.category.label()));
+        format!(
+            "{}; {}, {}: {} lanes",
+            kinds.collect::<Vec<_>>().join(", "),
+            self.headways_in_words(),
+            counted(self.scores.categories.first().map_or(0, |c| c.models.len()), "driver"),
+            count(self.run.lanes)
+        )
+    }
+
+    fn question(&self) -> String {
+        let level = 100.0 * self.scores.options.confidence;
+        format!("Which S' collides where S, as recorded, collides? F1 with its {level} % interval:")
     }
 
     fn rows(&self, screen: usize) -> Vec<String> {
@@ -77,12 +106,7 @@ impl StudyReport {
         };
         let mut lines: Vec<String> = std::iter::once(&header).chain(&known).map(line).collect();
         if lines.iter().any(|line| line.chars().count() > screen) {
-            let table = Table::of(&known).columns(0..4, |at| HEADER[at], |row, at| row[at].as_str()).columns(
-                4..7,
-                |at| HEADER[at],
-                |row, at| NumberText(row[at].clone()),
-            );
-            lines = table.build().fitted(2, screen).lines().map(str::to_owned).collect();
+            lines = table(&known).fitted(2, screen).lines().map(str::to_owned).collect();
         }
         let more = self.best.len().saturating_sub(MAX_ROWS);
         if more > 0 {

@@ -1,15 +1,18 @@
-//! The figures of a study except the radar charts: F1 with intervals, recall and precision, failures against the headway, F1 against the
-//! number of parameters, the shapes of a decomposition, the distributions of parameters.
+//! The figures of a study: F1 with intervals and as the radar chart of the paper, recall and precision, failures against
+//! the headway, F1 against the number of parameters, the shapes of a decomposition, the distributions of parameters.
 
-use super::plot::{Figure, GREY, HOLLOW, Height, Layer, Look, Mark, Name, Plot, PlotAxis, Rule, Series, Value, is_few};
-use crate::engine::{Confusion, Headway, LanePlan, Partial};
+use super::dots::{DotRow, Dots, dots};
+use super::plot::{
+    AxisScale, Figure, GREY, HOLLOW, INK, Layer, Look, Mark, Name, Plot, PlotAxis, Rule, Series, Symbol, Value, is_few,
+};
+use crate::engine::{Headway, LanePlan, Partial};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
-use crate::run::score::{CategoryScores, f1, precision, recall};
+use crate::run::score::{CategoryScores, MeanF1, ScoreInterval, f1, precision, recall};
 use crate::run::study::ParameterHistogram;
 use crate::scenario::Category;
 use crate::scenario::parameterization::{ModeShape, Parameterization};
-use crate::support::readable::counted;
+use crate::stats::estimate::wilson;
 use crate::{Error, Result};
 
 /// Failed lanes of one category by headway.
@@ -65,232 +68,311 @@ impl HeadwayFailures {
         })
     }
 
-    /// Fraction of the recorded scenarios that fail, over the headway: a panel per model, a line per criterion.
-    pub fn figure(&self, scores: &CategoryScores, data: &str) -> Figure {
-        let thw_s = |headway: &Headway| match headway {
+    /// Fraction of the scenarios that fail, over the headway: S with its interval, beside it every S'; a panel per model
+    /// and criterion.
+    pub fn figure(&self, scores: &CategoryScores, confidence: f64, data: &str) -> Figure {
+        let place = |headway: &Headway| match headway {
             Headway::ThwS(seconds) => Some(*seconds),
             Headway::GapM(metres) => Some(*metres),
             // These headways differ between scenarios.
             Headway::MinFollowing | Headway::Observed => None,
         };
         let is_gap = self.headways.iter().any(|headway| matches!(headway, Headway::GapM(_)));
-        let panel = |(model, id): (usize, &ModelId)| {
-            let series = |criterion: Criterion| {
-                let share = |(at, headway): (usize, &Headway)| {
-                    // One lane per scenario and headway.
-                    let failed = self.count((0, at, model, criterion));
-                    let place = (thw_s(headway)?, 100.0 * failed as f64 / scores.scenarios.max(1) as f64);
-                    let is_few = is_few(failed as f64);
-                    let label = if is_few && failed > 0 { failed.to_string() } else { String::new() };
-                    Some(Value { label, is_few, ..Value::from(place) })
+        let cells: Vec<(usize, Criterion)> =
+            (0..self.models.len()).flat_map(|model| Criterion::ALL.map(|criterion| (model, criterion))).collect();
+        let count = |variant: usize, (model, criterion): (usize, Criterion)| {
+            move |at: usize| self.count((variant, at, model, criterion))
+        };
+        // One lane per scenario and headway.
+        let share = |count: u64| 100.0 * count as f64 / scores.scenarios.max(1) as f64;
+        let largest = (0..self.headways.len() * self.variants.len() * cells.len()).map(|at| {
+            let (at, cell) = (at / cells.len(), cells[at % cells.len()]);
+            share(count(at / self.headways.len(), cell)(at % self.headways.len()))
+        });
+        let largest = largest.fold(0.0, f64::max);
+        let panel = |&cell: &(usize, Criterion)| {
+            let series = |variant: usize| {
+                let value = |(at, headway): (usize, &Headway)| {
+                    let failed = count(variant, cell)(at);
+                    let interval = wilson(failed as f64, scores.scenarios as f64, confidence);
+                    let is_few = variant == 0 && is_few(failed as f64);
+                    Some(Value {
+                        label: if is_few { failed.to_string() } else { String::new() },
+                        interval: (variant == 0).then_some((100.0 * interval.low, 100.0 * interval.high)),
+                        is_few,
+                        ..Value::from((place(headway)?, share(failed)))
+                    })
                 };
-                let mut values: Vec<Value> = self.headways.iter().enumerate().filter_map(share).collect();
+                let mut values: Vec<Value> = self.headways.iter().enumerate().filter_map(value).collect();
                 values.sort_by(|a, b| a.x.total_cmp(&b.x));
-                Series { values, ..Series::new(criterion.label(), &[Mark::Line, Mark::Points], []) }
+                if variant == 0 {
+                    let look = Look { colour: INK, dash: "", line_px: 1.8, symbol: Symbol::Disc, ..Look::of(0, 1) };
+                    let series = Series::new("S, as recorded", &[Mark::Band, Mark::Line, Mark::Points], []);
+                    return Series { values, look: Some(Look { marker_px: 3.0, ..look }), ..series };
+                }
+                let look = Look { line_px: 1.2, ..Look::of(variant - 1, self.variants.len() - 1) };
+                Series { values, look: Some(look), ..Series::new(legend_name(scores, variant), &[Mark::Line], []) }
             };
+            let axis = PlotAxis::around("failed scenarios in %", AxisScale::SquareRoot, vec![0.0, largest]);
             Plot {
-                heading: id.name().to_owned(),
-                x: PlotAxis::new(if is_gap { "initial gap in m" } else { "initial time headway in s" }),
-                y: PlotAxis::exactly("failed scenarios in %", 0.0, 100.0),
-                layers: Criterion::ALL.map(|criterion| series(criterion).into()).to_vec(),
+                heading: format!("{}, {}", self.models[cell.0].name(), cell.1.label()),
+                x: PlotAxis::around(
+                    if is_gap { "initial gap in m" } else { "initial time headway in s" },
+                    AxisScale::Linear,
+                    self.headways.iter().filter_map(place).chain([0.0]).collect(),
+                ),
+                y: axis,
+                layers: (0..self.variants.len()).map(|variant| series(variant).into()).collect(),
                 ..Plot::default()
             }
         };
+        let all = 0..self.variants.len();
+        let fails = |cell: &&(usize, Criterion)| {
+            all.clone().any(|variant| (0..self.headways.len()).any(|at| count(variant, **cell)(at) > 0))
+        };
+        let empty = cells.iter().filter(|cell| !fails(cell));
+        let empty = empty.map(|(model, criterion)| format!("{}, {}", self.models[*model].name(), criterion.label()));
         Figure {
-            title: format!("{}: failures of the recorded scenarios against the headway", scores.category.label()),
+            title: format!("{}: failures against the headway", scores.category.label()),
             subtitle: Some(format!("{} scenarios. {data}", scores.scenarios)),
             caption: format!(
-                "Share of the recorded scenarios (S) in which the driver model fails the criterion, without an interval. \
-                 {HOLLOW}"
+                "Black: share of the recorded scenarios in which the driver model fails the criterion; band: its {} % \
+                 interval over scenarios. Colours: the same scenarios, parameterized. Vertical axis by the square root. \
+                 Hollow: fewer than ten failures, with their number where there is room.",
+                100.0 * confidence
             ),
-            plots: self.models.iter().enumerate().map(panel).collect(),
+            plots: cells.iter().filter(fails).map(panel).collect(),
+            columns: Criterion::ALL.len(),
+            notes: ("Left out, because nothing fails:", empty.collect()),
             ..Figure::default()
         }
     }
 }
 
-/// Heights of a parameterization and of the space below a row, px.
-const LINE_PX: f64 = 9.0;
-const ROW_GAP_PX: f64 = 14.0;
+/// The driver models and criteria of a category.
+fn cells(scores: &CategoryScores) -> Vec<(ModelId, Criterion)> {
+    scores.models.iter().flat_map(|&model| Criterion::ALL.map(|criterion| (model, criterion))).collect()
+}
+
+fn ends(interval: Option<ScoreInterval>) -> Option<(f64, f64)> {
+    interval.map(|interval| (interval.low, interval.high))
+}
 
 /// F1 of every parameterization with its interval, a row per driver model and criterion.
 pub fn f1_intervals(scores: &CategoryScores, confidence: f64, data: &str) -> Figure {
-    let variants = scores.variants.len() - 1;
-    let row_px = variants as f64 * LINE_PX + ROW_GAP_PX;
-    let cells: Vec<(ModelId, Criterion)> =
-        scores.models.iter().flat_map(|&model| Criterion::ALL.map(|criterion| (model, criterion))).collect();
-    let top = |row: usize| -(row as f64 * row_px);
-    let name = |(row, (model, criterion)): (usize, &(ModelId, Criterion))| Name {
-        at: top(row),
-        words: format!("{}, {}", model.name(), criterion.label()),
-        note: format!("S fails in {}", counted(scores.failing_scenarios(*model, *criterion) as usize, "scenario")),
-        ..Name::default()
+    let cells = cells(scores);
+    let row = |&(model, criterion): &(ModelId, Criterion)| DotRow {
+        name: format!("{}, {}", model.name(), criterion.label()),
+        failing_scenarios: scores.failing_scenarios(model, criterion),
     };
+    let rows: Vec<DotRow> = cells.iter().map(row).collect();
     let series = |variant: usize| {
         let value = |(row, (model, criterion)): (usize, &(ModelId, Criterion))| {
             let cell = &scores.cells[scores.index(variant, *model, *criterion)?];
-            Some(Value {
-                x: f1(&cell.counts)?,
-                y: top(row) - ROW_GAP_PX / 2.0 - (variant as f64 - 0.5) * LINE_PX,
-                interval: cell.f1_interval.map(|interval| (interval.low, interval.high)),
-                is_few: is_few(cell.failing_scenarios as f64),
-                ..Value::default()
-            })
+            let interval = ends(cell.f1_interval);
+            Some(Value { interval, ..Value::from((f1(&cell.counts)?, row as f64)) })
         };
         let values = cells.iter().enumerate().filter_map(value).collect();
-        let look = Look { line_px: 1.6, marker_px: 4.0, ..Look::of(variant - 1, variants) };
-        let marks = &[Mark::Points, Mark::Intervals];
-        let series = Series::new(legend_name(scores, variant), marks, []);
-        Layer::from(Series { values, look: Some(look), is_sideways: true, ..series })
+        Series { values, ..Series::new(legend_name(scores, variant), &[], []) }
     };
-    let separators = Rule {
-        runs: (1..cells.len()).map(|row| vec![(0.0, top(row)), (1.0, top(row))]).collect(),
-        colour: GREY,
-        width_px: 0.5,
-        ..Rule::default()
-    };
-    let height_px = cells.len() as f64 * row_px;
-    let plot = Plot {
-        x: PlotAxis { is_doubled: true, ..PlotAxis::exactly("F1", 0.0, 1.0) },
-        y: PlotAxis { names: cells.iter().enumerate().map(name).collect(), ..PlotAxis::exactly("", -height_px, 0.0) },
-        layers: std::iter::once(separators.into()).chain((1..=variants).map(series)).collect(),
-        height: Height::Px(height_px),
-        ..Plot::default()
+    let panel = Dots {
+        heading: String::new(),
+        x: PlotAxis::exactly("F1", 0.0, 1.0),
+        marked: Vec::new(),
+        series: (1..scores.variants.len()).map(series).collect(),
     };
     Figure {
         title: format!("{}: F1 of parameterized against recorded scenarios", scores.category.label()),
         subtitle: Some(format!("{} scenarios. {data}", scores.scenarios)),
         caption: format!(
-            "Marker: F1; further right is better. Line: its {} % interval over scenarios; without one, S fails in too few \
-             scenarios. A parameterization without a marker has no F1, because neither S nor S' fails. {HOLLOW}",
+            "Marker: F1; further right is better. Line: its {} % interval over scenarios. n: scenarios in which S fails; \
+             with fewer than ten, markers are hollow and have no line. Without a marker: neither S nor S' fails.",
             100.0 * confidence
         ),
-        plots: vec![plot],
+        plots: dots(&rows, vec![panel]),
         ..Figure::default()
     }
 }
 
-/// Recall and precision of every parameterization, a panel per driver model and criterion.
-pub fn recall_and_precision(scores: &CategoryScores, data: &str) -> Figure {
-    let panel = |model: ModelId, criterion: Criterion| {
-        let failing = scores.failing_scenarios(model, criterion);
-        let series = |variant: usize| {
-            let counts = scores.index(variant, model, criterion).map(|at| scores.cells[at].counts);
-            let of = |share: fn(&Confusion) -> Option<f64>| counts.as_ref().and_then(share).unwrap_or(f64::NAN);
-            let value = Value { is_few: is_few(failing as f64), ..Value::from((of(recall), of(precision))) };
-            Series { values: vec![value], ..Series::new(legend_name(scores, variant), &[Mark::Points], []) }
-        };
-        let equal = Rule {
-            runs: [0.2, 0.4, 0.6, 0.8].map(equal_f1).to_vec(),
-            colour: GREY,
-            width_px: 0.9,
-            dash: "4,4",
-            attributes: "class=\"equal-f1\"".to_owned(),
-            ..Rule::default()
-        };
-        Plot {
-            heading: format!("{}, {}{}", model.name(), criterion.label(), few(failing)),
-            x: PlotAxis::exactly("recall", 0.0, 1.0),
-            y: PlotAxis::exactly("precision", 0.0, 1.0),
-            layers: std::iter::once(equal.into())
-                .chain((1..scores.variants.len()).map(|variant| series(variant).into()))
-                .collect(),
-            ..Plot::default()
-        }
+/// The radar chart of the paper: F1 per model and criterion (spokes), one polygon per parameterization. The line of a
+/// parameterization is broken where its F1 is undefined (0/0): a number would be a false measurement.
+pub fn radar(scores: &CategoryScores, data: &str) -> Figure {
+    let cells = cells(scores);
+    let score = |variant: usize, &(model, criterion): &(ModelId, Criterion)| {
+        scores.index(variant, model, criterion).and_then(|at| f1(&scores.cells[at].counts))
     };
-    let plots = scores.models.iter().flat_map(|&model| Criterion::ALL.map(|criterion| panel(model, criterion)));
+    let variants = 1..scores.variants.len();
+    let is_empty = |cell: &(ModelId, Criterion)| variants.clone().all(|variant| score(variant, cell).is_none());
+    let name = |(at, cell): (usize, &(ModelId, Criterion))| {
+        let (spoke, failing) =
+            (format!("{}, {}", cell.0.name(), cell.1.label()), scores.failing_scenarios(cell.0, cell.1));
+        let words = match is_empty(cell) {
+            true => format!("{spoke} (undefined)"),
+            false => format!("{spoke}{}", few(failing)),
+        };
+        Name { at: at as f64, words, is_empty: is_empty(cell), ..Name::default() }
+    };
+    let series = |variant: usize| {
+        let value = |(at, cell): (usize, &(ModelId, Criterion))| Value {
+            is_few: is_few(scores.failing_scenarios(cell.0, cell.1) as f64),
+            ..Value::from((at as f64, score(variant, cell).unwrap_or(f64::NAN)))
+        };
+        // Many values are equal, most often 1: lines of equal weight, markers that shrink.
+        let look = Look { line_px: 1.4, ..Look::of(variant - 1, scores.variants.len() - 1) };
+        let series = Series::new(legend_name(scores, variant), &[Mark::Line, Mark::Points], []);
+        Layer::from(Series { values: cells.iter().enumerate().map(value).collect(), look: Some(look), ..series })
+    };
+    let rings = [0.2, 0.4, 0.6, 0.8, 1.0].map(|at| Name { at, words: format!("{at:.1}"), ..Name::default() });
+    let plot = Plot {
+        x: PlotAxis {
+            names: cells.iter().enumerate().map(name).collect(),
+            ..PlotAxis::exactly("", 0.0, cells.len() as f64)
+        },
+        y: PlotAxis { names: rings.to_vec(), ..PlotAxis::exactly("", 0.0, 1.0) },
+        layers: variants.clone().map(series).collect(),
+        is_polar: true,
+        ..Plot::default()
+    };
+    let gaps = variants.clone().filter_map(|variant| {
+        let undefined = cells.iter().filter(|cell| score(variant, cell).is_none() && !is_empty(cell));
+        let names: Vec<String> = undefined.map(|(model, c)| format!("{}, {}", model.name(), c.label())).collect();
+        (!names.is_empty()).then(|| format!("{}: {}", legend_name(scores, variant), names.join("; ")))
+    });
+    Figure {
+        title: format!("{}: F1 as the paper draws it", scores.category.label()),
+        subtitle: Some(format!("{} scenarios. {data}", scores.scenarios)),
+        caption: format!("Radius: F1, 0 at the centre, 1 at the outer ring, without its interval. {HOLLOW}"),
+        plots: if cells.is_empty() { Vec::new() } else { vec![plot] },
+        notes: ("Undefined F1 (0/0), where the line is broken:", gaps.collect()),
+        ..Figure::default()
+    }
+}
+
+/// Recall and precision of every parameterization, a panel per driver model and criterion, each around its values.
+pub fn recall_and_precision(scores: &CategoryScores, confidence: f64, data: &str) -> Figure {
+    let panel = |&(model, criterion): &(ModelId, Criterion)| {
+        let failing = scores.failing_scenarios(model, criterion);
+        let value = |variant: usize| {
+            let cell = &scores.cells[scores.index(variant, model, criterion)?];
+            Some(Value {
+                interval: ends(cell.precision_interval),
+                across: ends(cell.recall_interval),
+                is_few: is_few(failing as f64),
+                ..Value::from((recall(&cell.counts)?, precision(&cell.counts)?))
+            })
+        };
+        let values: Vec<Option<Value>> = (1..scores.variants.len()).map(value).collect();
+        let lowest = values.iter().flatten().map(|value| value.x.min(value.y)).reduce(f64::min)?;
+        let low = (10.0 * lowest - 0.5).floor().clamp(0.0, 9.0) / 10.0;
+        let series = |(at, value): (usize, Option<Value>)| {
+            let name = legend_name(scores, at + 1);
+            let look = Look { line_px: 1.4, ..Look::of(at, scores.variants.len() - 1) };
+            let series = Series::new(name, &[Mark::Points, Mark::Intervals], []);
+            Layer::from(Series { values: value.into_iter().collect(), look: Some(look), ..series })
+        };
+        let step = if low < 0.55 { 2 } else { 1 };
+        let equal = (1..10).filter(|tenth| tenth % step == 0).map(|tenth| f64::from(tenth) / 10.0);
+        let equal = equal.filter_map(|f| {
+            let run: Vec<(f64, f64)> = equal_f1(f).into_iter().filter(|(r, p)| r.min(*p) >= low).collect();
+            let (label, attributes) = (f.to_string(), "class=\"equal-f1\"".to_owned());
+            let runs = vec![run];
+            let rule = Rule { runs, label, colour: GREY, width_px: 0.9, dash: "4,4", attributes, ..Rule::default() };
+            (rule.runs[0].len() > 1).then(|| rule.into())
+        });
+        Some(Plot {
+            heading: format!("{}, {}{}", model.name(), criterion.label(), few(failing)),
+            x: PlotAxis::exactly("recall", low, 1.0),
+            y: PlotAxis::exactly("precision", low, 1.0),
+            layers: equal.chain(values.into_iter().enumerate().map(series)).collect(),
+            ..Plot::default()
+        })
+    };
+    let cells = cells(scores);
+    let drawn: Vec<Option<Plot>> = cells.iter().map(panel).collect();
+    let empty = cells.iter().zip(&drawn).filter(|(_, plot)| plot.is_none());
+    let empty: Vec<String> = empty.map(|((model, c), _)| format!("{}, {}", model.name(), c.label())).collect();
     Figure {
         title: format!("{}: recall and precision of S' against S", scores.category.label()),
         subtitle: Some(format!("{} scenarios. {data}", scores.scenarios)),
         caption: format!(
             "Recall: share of the recorded failures that the parameterized scenarios show; precision: share of their \
-             failures that were recorded; both without an interval. Dashed: equal F1, from 0.2 to 0.8. Without a failure \
-             on one side a share is undefined and has no marker. {HOLLOW}"
+             failures that were recorded. Lines: {} % intervals over scenarios, cut at the edge. Dashed: equal F1, its value at the right. The \
+             axes begin where the values do. {HOLLOW}",
+            100.0 * confidence
         ),
-        plots: plots.collect(),
+        plots: drawn.into_iter().flatten().collect(),
+        notes: ("Left out, because a share is undefined without a failure on one side:", empty),
         ..Figure::default()
     }
 }
 
 /// Text for a heading if there are few scenarios.
 fn few(failing_scenarios: u64) -> String {
-    let is_few = is_few(failing_scenarios as f64);
-    if is_few { format!(" ({})", counted(failing_scenarios as usize, "scenario")) } else { String::new() }
+    if is_few(failing_scenarios as f64) { format!(" (n = {failing_scenarios})") } else { String::new() }
 }
 
 /// All pairs of recall and precision with this F1: P = F·R/(2R − F).
 fn equal_f1(f: f64) -> Vec<(f64, f64)> {
     let min_recall = f / (2.0 - f);
     let value = |k: u32| {
-        let r = 1.0 + (min_recall - 1.0) * f64::from(k) / 40.0;
+        let r = 1.0 + (min_recall - 1.0) * f64::from(k) / 20.0;
         (r, (f * r / (2.0 * r - f)).min(1.0))
     };
-    (0..=40).rev().map(value).collect()
+    (0..=20).rev().map(value).collect()
 }
 
 /// F1 against the number of parameters: the mean over the cells that every parameterization defines, over all criteria
 /// and for each. Also the front of parameterizations that no other beats with at most as many parameters.
-pub fn f1_by_parameters(scores: &CategoryScores, data: &str) -> Figure {
-    let panel = |heading: &str, criteria: &[Criterion]| {
-        let shared = shared_cells(scores, criteria);
-        let fewest = shared.iter().map(|&(model, criterion)| scores.failing_scenarios(model, criterion)).min();
-        let fewest = fewest.unwrap_or(0);
-        let means = mean_f1(scores, &shared);
+pub fn f1_by_parameters(scores: &CategoryScores, means: &[MeanF1], confidence: f64, data: &str) -> Figure {
+    let ids: Vec<Option<Parameterization>> =
+        scores.variants.iter().skip(1).map(|key| Parameterization::find(scores.category, key)).collect();
+    let panel = |mean: &MeanF1| {
+        let is_few = is_few(mean.fewest_failing as f64);
         let of = |name: &str| {
-            let own = means.iter().filter(|(id, _)| id.family.name() == name);
-            let values = own.map(|(id, mean)| {
-                let point = Value::from((id.parameter_count() as f64, *mean));
-                Value { label: id.key.to_string(), is_few: is_few(fewest as f64), ..point }
-            });
-            Series { values: values.collect(), ..Series::new(name, &[Mark::Points], []) }
+            let own = ids.iter().flatten().zip(&mean.values).filter(|(id, _)| id.family.name() == name);
+            let value = |(id, (value, interval)): (&Parameterization, &(f64, Option<ScoreInterval>))| {
+                let label = id.key.to_string();
+                let place = Value::from((id.parameter_count() as f64, *value));
+                Value { label, is_few, interval: ends(*interval), ..place }
+            };
+            Series { values: own.map(value).collect(), ..Series::new(name, &[Mark::Points, Mark::Intervals], []) }
         };
-        let points: Vec<(f64, f64)> = means.iter().map(|(id, mean)| (id.parameter_count() as f64, *mean)).collect();
-        let front = "no other is better with as few parameters";
+        let points =
+            ids.iter().flatten().zip(&mean.values).map(|(id, (value, _))| (id.parameter_count() as f64, *value));
+        let front = if is_few { Vec::new() } else { pareto_front(&points.collect::<Vec<_>>()) };
+        let look = Look { colour: GREY, dash: "4,4", line_px: 1.2, ..Look::of(0, 1) };
+        let front = Series {
+            look: Some(look),
+            ..Series::new("no other is better with as few parameters", &[Mark::Line], front)
+        };
+        let name = match mean.criteria[..] {
+            [criterion] => criterion.label(),
+            _ => "all criteria",
+        };
         Plot {
-            heading: if shared.is_empty() { heading.to_owned() } else { format!("{heading}{}", few(fewest)) },
+            heading: format!("{name}{}", if mean.values.is_empty() { String::new() } else { few(mean.fewest_failing) }),
             x: PlotAxis::exactly("parameters beside the headway", 1.0, 8.0),
             y: PlotAxis::exactly("mean F1", 0.0, 1.05),
-            layers: vec![
-                of("kinematic").into(),
-                of("SVD").into(),
-                Series::new(front, &[Mark::Line], pareto_front(&points)).into(),
-            ],
+            layers: vec![of("kinematic").into(), of("SVD").into(), front.into()],
             ..Plot::default()
         }
     };
-    let mut plots = vec![panel("all criteria", &Criterion::ALL)];
-    plots.extend(Criterion::ALL.map(|criterion| panel(criterion.label(), &[criterion])));
+    let (drawn, empty): (Vec<&MeanF1>, Vec<&MeanF1>) = means.iter().partition(|mean| !mean.values.is_empty());
+    let empty = empty.into_iter().map(|mean| mean.criteria.iter().map(|c| c.label()).collect::<Vec<_>>().join(", "));
     Figure {
         title: format!("{}: F1 against the number of parameters", scores.category.label()),
         subtitle: Some(format!("{} scenarios. {data}", scores.scenarios)),
-        caption: "Mean over the driver models (and criteria) whose F1 every parameterization defines, without an interval. \
-                  The fewer parameters, the fewer samples a density needs: of two that are equally good the simpler one \
-                  is preferable. Hollow: in one of these S fails in fewer than ten scenarios; the smallest number stands \
-                  above."
-            .to_owned(),
-        plots,
+        caption: format!(
+            "Mean over the driver models (and criteria) whose F1 every parameterization defines; line: its {} % interval \
+             over scenarios. The fewer parameters, the fewer samples a density needs: of two that are equally good the \
+             simpler one is preferable. Hollow, and without front: in one of these S fails in fewer than ten scenarios; \
+             n is the smallest number.",
+            100.0 * confidence
+        ),
+        plots: drawn.into_iter().map(panel).collect(),
+        notes: ("Left out, because no F1 is defined for all:", empty.collect()),
         ..Figure::default()
     }
-}
-
-fn f1_of(scores: &CategoryScores, variant: usize, (model, criterion): (ModelId, Criterion)) -> Option<f64> {
-    scores.index(variant, model, criterion).and_then(|at| f1(&scores.cells[at].counts))
-}
-
-/// The cells whose F1 is defined for every parameterization.
-fn shared_cells(scores: &CategoryScores, criteria: &[Criterion]) -> Vec<(ModelId, Criterion)> {
-    let cells = scores.models.iter().flat_map(|&model| criteria.iter().map(move |&criterion| (model, criterion)));
-    cells.filter(|&cell| (1..scores.variants.len()).all(|variant| f1_of(scores, variant, cell).is_some())).collect()
-}
-
-/// The mean F1 of every parameterization over these cells; empty without cells.
-fn mean_f1(scores: &CategoryScores, cells: &[(ModelId, Criterion)]) -> Vec<(Parameterization, f64)> {
-    let mean = |variant: usize| {
-        let sum: f64 = cells.iter().filter_map(|&cell| f1_of(scores, variant, cell)).sum();
-        let id = Parameterization::find(scores.category, &scores.variants[variant])?;
-        (!cells.is_empty()).then(|| (id, sum / cells.len() as f64))
-    };
-    (1..scores.variants.len()).filter_map(mean).collect()
 }
 
 /// The points that no other point with at most the same x exceeds, from left to right.
@@ -306,41 +388,50 @@ fn pareto_front(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
     front
 }
 
-/// The mean scenario and the scenarios along the first directions of a decomposition, and what the directions explain.
+/// The mean scenario between nine tenths of all, the scenarios along the first directions of a decomposition, and what
+/// the directions leave unexplained.
 pub fn modes(category: Category, shapes: &[ModeShape], explained: &[f64], data: &str) -> Figure {
-    let over_time = |values: &[f64]| {
-        let last = values.len().saturating_sub(1).max(1) as f64;
-        values.iter().enumerate().map(|(k, v)| (k as f64 / last, *v)).collect::<Vec<_>>()
-    };
-    let line = |name: String, values: &[f64]| Series::new(name, &[Mark::Line], over_time(values)).into();
     let panel = |shape: &ModeShape| {
+        let last = shape.mean.len().saturating_sub(1).max(1) as f64;
+        let at = move |(k, v): (usize, &f64)| Value::from((k as f64 / last, *v));
+        let line = |name: String, values: &[f64]| Series {
+            values: values.iter().enumerate().map(at).collect(),
+            ..Series::new(name, &[Mark::Line], [])
+        };
+        let mut mean = line("mean scenario; area: nine tenths of all".to_owned(), &shape.mean);
+        mean.marks.push(Mark::Band);
+        for (value, [low, high]) in mean.values.iter_mut().zip(&shape.envelope) {
+            value.interval = Some((*low, *high));
+        }
         let along = shape.along.iter().enumerate();
-        let moved = along.map(|(j, values)| line(format!("one standard deviation along direction {}", j + 1), values));
+        let moved = along.map(|(j, values)| line(format!("a standard deviation along direction {}", j + 1), values));
+        let ends = shape.envelope.iter().flatten().chain(&shape.mean).chain(shape.along.iter().flatten());
         Plot {
             heading: shape.quantity.clone(),
             x: PlotAxis::exactly("share of the duration T", 0.0, 1.0),
-            y: PlotAxis::new(&shape.unit),
-            layers: std::iter::once(line("mean scenario".to_owned(), &shape.mean)).chain(moved).collect(),
+            y: PlotAxis::around(&shape.unit, AxisScale::Linear, ends.copied().collect()),
+            layers: std::iter::once(mean).chain(moved).map(Layer::from).collect(),
             ..Plot::default()
         }
     };
-    let shares = explained.iter().enumerate().map(|(k, share)| ((k + 1) as f64, 100.0 * share));
-    let share = Plot {
-        heading: "explained variance".to_owned(),
-        x: PlotAxis::new("coefficients"),
-        y: PlotAxis::exactly("share in %", 0.0, 100.0),
-        layers: vec![Series::new("", &[Mark::Bars(0.8)], shares).into()],
+    // Below a hundred-millionth the share is that of rounding.
+    let rest = explained.iter().enumerate().map(|(k, share)| ((k + 1) as f64, 100.0 * (1.0 - share)));
+    let rest: Vec<(f64, f64)> = rest.filter(|(_, rest)| *rest > 1e-6).collect();
+    let residual = Plot {
+        heading: "variance not explained".to_owned(),
+        x: PlotAxis::exactly("coefficients", 0.0, explained.len() as f64 + 1.0),
+        y: PlotAxis::around("share in %", AxisScale::Logarithmic, rest.iter().map(|(_, rest)| *rest).collect()),
+        layers: vec![Series::new("", &[Mark::Line, Mark::Points], rest.iter().copied()).into()],
         ..Plot::default()
     };
     Figure {
         title: format!("{}: what the decomposition keeps", category.label()),
         subtitle: Some(data.to_owned()),
-        caption:
-            "Lines: the mean of the mined scenarios, and the scenario one standard deviation of a coefficient away \
-                  from it; lateral positions are positive on the target's side, and a left-positive decomposition \
-                  shows the side with more scenarios. Bars: share of the scaled variance that the first coefficients explain together."
-                .to_owned(),
-        plots: shapes.iter().map(panel).chain((!explained.is_empty()).then_some(share)).collect(),
+        caption: "Lateral positions are positive on the target's side; a left-positive decomposition shows the side \
+                  with more scenarios. Variance: of the scaled data, left over by the first coefficients together."
+            .to_owned(),
+        plots: shapes.iter().map(panel).chain((!rest.is_empty()).then_some(residual)).collect(),
+        columns: 2,
         ..Figure::default()
     }
 }

@@ -1,6 +1,7 @@
 //! A study as one page.
 
 use super::html::{Page, PageFigure, Section};
+use super::plot::Figure;
 use super::reference::ReferenceComparison;
 use super::run_record::Timings;
 use super::study::{StudyReport, file_name};
@@ -33,18 +34,25 @@ impl StudyReport {
         if self.published {
             warnings.push("Published numbers are those of highD: other data agrees in shape at best.".to_owned());
         }
-        let mut sections = vec![self.data(), self.failures()];
+        let mut answer = self.answer_section();
+        let mut sections = Vec::new();
         for at in 0..self.scores.categories.len() {
-            sections.push(self.category(at));
+            let mut section = self.category(at);
+            // The figure that tells the ranking.
+            answer.figures.extend((!section.figures.is_empty()).then(|| section.figures.remove(0)));
+            sections.push(section);
         }
+        sections.extend(self.claims());
+        sections.push(self.failures());
         sections.extend(self.given_table().map(|table| Section {
             intro: "-cv: each scenario is replayed by a basis that was fitted on the other folds (folds.csv): whole recordings, or stretches of time if there are fewer recordings than folds.".to_owned(),
             tables: vec![table],
             ..Section::new("given", "Cross-validation and given S'")
         }));
-        sections.extend(self.claims());
         sections.extend(self.comparison.as_ref().map(compared));
-        sections.push(self.reproduction()?);
+        sections.extend([self.data(), self.reproduction()?]);
+        sections.iter_mut().for_each(|section| section.is_folded = true);
+        sections.insert(0, answer);
         let page = Page {
             title: "Parameterized against recorded scenarios".to_owned(),
             program: run.program.clone(),
@@ -87,17 +95,15 @@ impl StudyReport {
         if run.recordings.len() > MAX_RECORDINGS {
             recordings.push(format!("… and {} more in run.json", run.recordings.len() - MAX_RECORDINGS));
         }
-        let mut details = vec![("Thresholds and filters of the mining".to_owned(), toml_text(&run.mining))];
-        if !recordings.is_empty() {
-            details.push((format!("{} recordings with their checksums", run.recordings.len()), recordings.join("\n")));
-        }
-        if !run.notes.is_empty() {
-            details.push(("Notes on the data".to_owned(), run.notes.join("\n")));
-        }
-        if !run.left_out.is_empty() {
-            details.push((format!("{} parts left out", run.left_out.len()), run.left_out.join("\n")));
-        }
-        Section { intro: sentence(&run.data), tables: vec![counts], details, ..Section::new("data", "Data") }
+        let lists = [
+            ("Thresholds and filters of the mining".to_owned(), toml_text(&run.mining)),
+            (format!("{} recordings with their checksums", run.recordings.len()), recordings.join("\n")),
+            ("Notes on the data".to_owned(), run.notes.join("\n")),
+            (format!("{} parts left out", run.left_out.len()), run.left_out.join("\n")),
+        ];
+        let lists = lists.into_iter().filter(|(_, text)| !text.is_empty());
+        let parts = lists.map(|(title, text)| Section::folded(title, text)).collect();
+        Section { intro: sentence(&run.data), tables: vec![counts], parts, ..Section::new("data", "Data") }
     }
 
     fn failures(&self) -> Section {
@@ -120,13 +126,10 @@ impl StudyReport {
     fn category(&self, at: usize) -> Section {
         let scores = &self.scores.categories[at];
         let name = |figure: &str, end: &str| file_name(figure, scores.category, end);
-        let mut figures: Vec<PageFigure> = Vec::new();
-        for (figure, drawn) in self.figures(at) {
-            figures.push(PageFigure::new(&drawn.svg(), &[&name(figure, "svg"), &name(figure, "csv")]));
-        }
-        // After the figure that tells the ranking.
-        let radar = PageFigure::new(&self.radar(scores), &[&name("radar", "svg"), "f1.csv"]);
-        figures.insert(figures.len().min(1), radar);
+        let page_figure = |(figure, drawn): (&'static str, Figure)| {
+            PageFigure::new(&drawn.svg(), &[&name(figure, "svg"), &name(figure, "csv")])
+        };
+        let figures = self.figures(at).into_iter().map(page_figure).collect();
         let key = scores.category.key().replace('_', "-");
         let level = value(100.0 * self.scores.options.confidence);
         Section {
@@ -204,10 +207,10 @@ impl StudyReport {
                 .to_owned(),
             facts,
             host,
-            details: vec![
-                ("Profile".to_owned(), part("profile")),
-                ("Options of the parameterizations".to_owned(), part("parameterization")),
-                ("Options of the scores".to_owned(), part("score")),
+            parts: vec![
+                Section::folded("Profile", part("profile")),
+                Section::folded("Options of the parameterizations", part("parameterization")),
+                Section::folded("Options of the scores", part("score")),
             ],
             ..Section::new("reproduction", "Reproduction")
         })
@@ -226,10 +229,7 @@ fn variants_table(scores: &CategoryScores) -> Table {
 }
 
 fn compared(comparison: &ReferenceComparison) -> Section {
-    Section {
-        details: vec![("Every lane in f32 and in f64".to_owned(), comparison.text())],
-        ..Section::new("reference", "Lane arithmetic against double precision")
-    }
+    Section { text: comparison.text(), ..Section::new("reference", "Lane arithmetic against double precision") }
 }
 
 /// The text with a full stop.

@@ -262,7 +262,16 @@ mod tests {
     fn scores(capped: Vec<u64>) -> ScoreTable {
         let cell = |model, criterion| {
             let counts = Confusion::default();
-            ScoreCell { variant: 0, model, criterion, counts, f1_interval: None, failing_scenarios: 0 }
+            ScoreCell {
+                variant: 0,
+                model,
+                criterion,
+                counts,
+                f1_interval: None,
+                recall_interval: None,
+                precision_interval: None,
+                failing_scenarios: 0,
+            }
         };
         let models = [ModelId::Rss, ModelId::Fsm];
         let scores = CategoryScores {

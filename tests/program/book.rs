@@ -262,9 +262,8 @@ fn every_printed_command_has_a_verb_and_flags_that_exist() {
 }
 
 /// Figures of the book: file, the command that draws it, and where.
-const FIGURES: [(&str, &str, &str); 5] = [
+const FIGURES: [(&str, &str, &str); 4] = [
     ("f1-cut-in.svg", "study --out OUT", "f1-cut-in.svg"),
-    ("radar-cut-in.svg", "study --out OUT", "radar-cut-in.svg"),
     (
         "case.svg",
         "simulate --category cut-in --models all --ego-speed 30 --speed 20 --thw 1.2 --lateral-speed 1.0 --plot OUT/case.svg",

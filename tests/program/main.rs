@@ -10,7 +10,6 @@ mod command_line;
 mod configuration;
 mod help_examples;
 mod messages;
-mod report_figures;
 mod report_page;
 mod report_width;
 mod rooms;

@@ -1,4 +1,4 @@
-//! Axes of the figures: linear or logarithmic, with ticks at round numbers.
+//! Axes of the figures: linear, logarithmic or by the square root, with ticks at round numbers.
 
 use super::svg::Position;
 use crate::support::readable::{OneTwoFive, next, one_two_five, plain_step};
@@ -11,6 +11,8 @@ pub enum AxisScale {
     Linear,
     /// Logarithmic; zero and negative values cannot be shown.
     Logarithmic,
+    /// Square root, from zero: small shares stay legible beside large ones.
+    SquareRoot,
 }
 
 impl AxisScale {
@@ -19,6 +21,7 @@ impl AxisScale {
         match self {
             Self::Linear => value.abs() <= 1e300,
             Self::Logarithmic => (1e-300..=1e300).contains(&value),
+            Self::SquareRoot => (0.0..=1e300).contains(&value),
         }
     }
 
@@ -27,6 +30,7 @@ impl AxisScale {
         match self {
             Self::Linear => value,
             Self::Logarithmic => libm::log10(value),
+            Self::SquareRoot => value.max(0.0).sqrt(),
         }
     }
 }
@@ -75,6 +79,12 @@ impl Axis {
                 }
                 (place(below), place(above))
             }
+            AxisScale::SquareRoot if max > 0.0 => {
+                let above = one_two_five(max);
+                let above = if value(above) < max * (1.0 - 1e-12) { next(above, 1) } else { above };
+                (0.0, value(above).sqrt())
+            }
+            AxisScale::SquareRoot => (0.0, 1.0),
         };
         Some(Self { scale, low, high, from_px, to_px })
     }
@@ -89,13 +99,22 @@ impl Axis {
         self.shows(value) && (self.low - 1e-9..=self.high + 1e-9).contains(&self.scale.place(value))
     }
 
+    /// Its ends on the page, the smaller first.
+    pub fn ends_px(&self) -> (f64, f64) {
+        (self.from_px.min(self.to_px), self.from_px.max(self.to_px))
+    }
+
+    fn reaches(&self, px: f64) -> bool {
+        (self.ends_px().0..=self.ends_px().1).contains(&px)
+    }
+
     pub fn length_px(&self) -> f64 {
         (self.to_px - self.from_px).abs()
     }
 
     /// How many numbers fit above one another without crowding.
     pub fn vertical_numbers(&self) -> usize {
-        let max = if self.scale == AxisScale::Linear { 6.0 } else { 8.0 };
+        let max = if self.scale == AxisScale::Logarithmic { 8.0 } else { 6.0 };
         (self.length_px() / 18.0).clamp(2.0, max) as usize
     }
 
@@ -119,6 +138,7 @@ impl Axis {
         match self.scale {
             AxisScale::Linear => self.linear_ticks(max_ticks),
             AxisScale::Logarithmic => self.decade_ticks(max_ticks),
+            AxisScale::SquareRoot => self.root_ticks(),
         }
     }
 
@@ -139,6 +159,22 @@ impl Axis {
             self.tick(value.clamp(self.low, self.high), Some(digits_text(value, digits.min(15))))
         };
         (0..=count.min(100)).map(tick).collect()
+    }
+
+    /// Zero, the upper end, and between them each of 1, 2 and 5 with room for its number.
+    fn root_ticks(&self) -> Vec<Tick> {
+        let mut ticks = vec![self.tick(self.high, Some(number(self.high * self.high)))];
+        let mut at = one_two_five(self.high * self.high);
+        for _ in 0..12 {
+            at = next(at, -1);
+            let tick = self.tick(value(at).sqrt(), Some(number(value(at))));
+            let has_room = |other: f64| (other - tick.at_px).abs() >= 15.0;
+            if has_room(self.from_px) && ticks.last().is_none_or(|last| has_room(last.at_px)) {
+                ticks.push(tick);
+            }
+        }
+        ticks.push(self.tick(0.0, Some("0".to_owned())));
+        ticks
     }
 
     /// Up to two decades 1, 2 and 5 have numbers, otherwise the decades, and every other decade or fewer if there are
@@ -218,6 +254,11 @@ fn place((digit, exponent): OneTwoFive) -> f64 {
     f64::from(exponent) + libm::log10(f64::from(digit))
 }
 
+/// digit · 10^exponent.
+fn value((digit, exponent): OneTwoFive) -> f64 {
+    f64::from(digit) * libm::pow(10.0, f64::from(exponent))
+}
+
 /// A round number slightly above `value` (positive), at which an axis from zero can end.
 pub(in crate::report) fn plain_end(value: f64) -> f64 {
     let step = plain_step(value / 8.0);
@@ -240,6 +281,11 @@ impl Axes {
     pub fn shows(&self, (x, y): (f64, f64)) -> bool {
         self.x.shows(x) && self.y.shows(y)
     }
+
+    /// Whether a position on the page lies in the plot.
+    pub fn is_inside(&self, (x, y): Position) -> bool {
+        self.centre.is_some() || (self.x.reaches(x) && self.y.reaches(y))
+    }
 }
 
 /// The point at angle `turn` (radians, clockwise from the top) on a circle.
@@ -250,7 +296,7 @@ pub(super) fn on_circle((x, y): Position, radius: f64, turn: f64) -> Position {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use AxisScale::{Linear, Logarithmic};
+    use AxisScale::{Linear, Logarithmic, SquareRoot};
 
     fn labels(scale: AxisScale, values: &[f64], max_ticks: usize) -> Vec<String> {
         let axis = Axis::around(scale, values, (0.0, 100.0)).unwrap();
@@ -283,7 +329,7 @@ mod tests {
     #[test]
     fn the_axis_has_a_place_for_every_value_and_its_ends_are_plain() {
         for values in [vec![3e-6, 4e-2], vec![7.0], vec![1e-5], vec![0.02, 0.021], vec![1e-300, 1e300]] {
-            for scale in [Linear, Logarithmic] {
+            for scale in [Linear, Logarithmic, SquareRoot] {
                 let axis = Axis::around(scale, &values, (10.0, 90.0)).unwrap();
                 for v in &values {
                     assert!((10.0..=90.0).contains(&axis.at(*v)));
@@ -300,6 +346,14 @@ mod tests {
         assert_eq!(labels(Logarithmic, &[2e-7, 0.9], 8), ["1e-6", "1e-5", "1e-4", "0.001", "0.01", "0.1", "1"]);
         assert_eq!(labels(Logarithmic, &[1e-6, 1e-5], 8), ["1e-6", "2e-6", "5e-6", "1e-5"]);
         assert!(labels(Logarithmic, &[1e-300, 1e300], 8).len() <= 10);
+    }
+
+    #[test]
+    fn by_the_square_root_a_share_of_one_percent_has_a_tenth_of_the_axis() {
+        let axis = Axis::around(SquareRoot, &[0.0, 73.0], (200.0, 0.0)).unwrap();
+        assert_eq!([0.0, 1.0, 25.0, 100.0].map(|share| axis.at(share)), [200.0, 180.0, 100.0, 0.0]);
+        let labels: Vec<String> = axis.ticks(6).into_iter().filter_map(|tick| tick.label).collect();
+        assert_eq!(labels, ["100", "50", "20", "10", "5", "2", "0"]);
     }
 
     #[test]

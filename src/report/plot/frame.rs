@@ -1,25 +1,8 @@
 //! The surroundings of a plot: ticks with their numbers, names, the colour scale.
 
-use super::axis::Axis;
-use super::axis::on_circle;
-use super::svg::{Anchor, Canvas, GREY, GRID, INK, Paint, Position, Type, set};
-use super::{
-    ColourBar, HEADING, INDENT_PX, NAME_GAP_PX, NAME_PX, NOTE_PX, Name, Plot, RADIUS_PX, SPOKE_PX, TEXT, TICK,
-};
-
-/// Type of a name beside a plot.
-pub(in crate::report) const ROW: Type = set(14, false, INK);
-
-impl Name {
-    /// Height of its lines beside a plot.
-    pub(in crate::report) fn height_px(&self) -> f64 {
-        if self.is_heading {
-            return HEADING.height_px(&self.words, NAME_PX) + 10.0;
-        }
-        let words = ROW.height_px(&self.words, NAME_PX - INDENT_PX);
-        words.max(ROW.height_px(&self.note, NOTE_PX)).max(ROW.line_px()) + 6.0
-    }
-}
+use super::axis::{Axis, Tick, on_circle};
+use super::svg::{Anchor, Canvas, GREY, GRID, Paint, Position, Type};
+use super::{ColourBar, NAME_GAP_PX, NAME_PX, Name, Plot, RADIUS_PX, SPOKE_PX, TEXT, TICK};
 
 impl Plot {
     /// Draws the horizontal axis: grid, ticks, numbers.
@@ -28,57 +11,58 @@ impl Plot {
         canvas: &mut Canvas,
         axis: &Axis,
         (top, bottom): (f64, f64),
-        has_numbers: bool,
-        has_grid: bool,
+        (has_numbers, has_grid): (bool, bool),
     ) {
-        for tick in axis.ticks((axis.length_px() / 58.0) as usize) {
-            let x = tick.at_px;
-            let Some(label) = &tick.label else {
-                canvas.line((x, bottom), (x, bottom + 3.0), GREY, 0.8);
-                continue;
-            };
-            if has_grid {
-                canvas.line((x, top), (x, bottom), GRID, 0.8);
-            }
-            if has_numbers {
-                canvas.line((x, bottom), (x, bottom + 6.0), GREY, 1.0);
-                canvas.text((x, bottom + 20.0), label, TICK, Anchor::Middle);
-            }
-            if self.x.is_doubled {
-                canvas.line((x, top - 6.0), (x, top), GREY, 1.0);
-                canvas.text((x, top - 10.0), label, TICK, Anchor::Middle);
-            }
+        let ticks = axis.ticks((axis.length_px() / 46.0) as usize);
+        let line = |tick: &Tick, from: f64, to: f64| vec![(tick.at_px, from), (tick.at_px, to)];
+        marks(canvas, &ticks, has_grid, &|tick| line(tick, top, bottom), &|tick, px| line(tick, bottom, bottom + px));
+        for (tick, label) in ticks.iter().filter_map(|tick| Some((tick, tick.label.as_ref()?))).filter(|_| has_numbers)
+        {
+            // A number at an end must not reach into the next plot.
+            let (half, (left, right)) = (TICK.text_px(label) / 2.0, axis.ends_px());
+            let x = tick.at_px.clamp(left + half - 6.0, (right - half + 6.0).max(left + half - 6.0));
+            canvas.text((x, bottom + 17.0), label, TICK, Anchor::Middle);
         }
     }
 
     /// Draws the names of a vertical axis at the left and their notes at the right.
     pub(super) fn names_beside(&self, canvas: &mut Canvas, (left, right): (f64, f64), (top, _): (f64, f64)) {
+        let name_px = self.y.names.iter().map(|name| TEXT.text_px(&name.words)).fold(0.0, f64::max).min(NAME_PX);
         for name in &self.y.names {
-            let (x, y) = (left - NAME_PX - 16.0, top - name.at);
-            if name.is_heading {
-                canvas.paragraph((x, y + 8.0), &name.words, HEADING, NAME_PX);
-            } else {
-                canvas.paragraph((x + INDENT_PX, y + 3.0), &name.words, ROW, NAME_PX - INDENT_PX);
-                canvas.paragraph((right + 18.0, y + 3.0), &name.note, ROW, NOTE_PX);
-            }
+            let y = top - name.at + 2.0;
+            canvas.paragraph((left - name_px - 8.0, y), &name.words, TEXT, name_px + 1.0);
+            canvas.paragraph((right + 8.0, y), &name.note, TEXT, NAME_PX);
         }
     }
 }
 
 /// Draws the vertical axis: grid, ticks, numbers.
-pub(super) fn numbers_left(canvas: &mut Canvas, axis: &Axis, (left, right): (f64, f64), has_grid: bool) {
-    for tick in axis.ticks(axis.vertical_numbers()) {
-        let y = tick.at_px;
-        let Some(label) = &tick.label else {
-            canvas.line((left - 3.0, y), (left, y), GREY, 0.8);
-            continue;
-        };
-        if has_grid {
-            canvas.line((left, y), (right, y), GRID, 0.8);
-        }
-        canvas.line((left - 6.0, y), (left, y), GREY, 1.0);
-        canvas.text((left - 9.0, y + 4.5), label, TICK, Anchor::End);
+pub(super) fn numbers_left(
+    canvas: &mut Canvas,
+    axis: &Axis,
+    (left, right): (f64, f64),
+    (has_numbers, has_grid): (bool, bool),
+) {
+    let ticks = axis.ticks(axis.vertical_numbers());
+    let line = |tick: &Tick, from: f64, to: f64| vec![(from, tick.at_px), (to, tick.at_px)];
+    marks(canvas, &ticks, has_grid, &|tick| line(tick, left, right), &|tick, px| line(tick, left - px, left));
+    for (tick, label) in ticks.iter().filter_map(|tick| Some((tick, tick.label.as_ref()?))).filter(|_| has_numbers) {
+        canvas.text((left - 7.0, tick.at_px + 4.5), label, TICK, Anchor::End);
     }
+}
+
+/// Draws grid lines at the ticks with numbers, and a longer mark there than at the others.
+fn marks(
+    canvas: &mut Canvas,
+    ticks: &[Tick],
+    has_grid: bool,
+    grid: &dyn Fn(&Tick) -> Vec<Position>,
+    mark: &dyn Fn(&Tick, f64) -> Vec<Position>,
+) {
+    let numbered = ticks.iter().filter(|tick| tick.label.is_some() && has_grid);
+    canvas.path(&numbered.map(grid).collect::<Vec<_>>(), false, Paint::line(GRID, 0.6));
+    let marks = ticks.iter().map(|tick| mark(tick, if tick.label.is_some() { 4.0 } else { 2.0 }));
+    canvas.path(&marks.collect::<Vec<_>>(), false, Paint::line(GREY, 1.0));
 }
 
 /// Draws a spoke's name outside the outer ring: upward at the top, downward at the bottom, centred at the sides.
@@ -98,8 +82,10 @@ pub(super) fn spoke_name(canvas: &mut Canvas, name: &Name, centre: Position, tur
 /// Draws the scale from zero to a round number at or above the maximum.
 pub(super) fn colour_bar(canvas: &mut Canvas, bar: &ColourBar, (left, right): (f64, f64), (top, bottom): (f64, f64)) {
     const BANDS: u32 = 100;
-    canvas.text((left, top + 12.0), bar.label, TICK, Anchor::Start);
-    let (top, bottom) = (top + 28.0, bottom.min(top + 420.0));
+    const BAR_TEXT_PX: f64 = 62.0;
+    canvas.block((left, top - 4.0), bar.label, TICK, BAR_TEXT_PX, Anchor::Start);
+    let top = top + TICK.height_px(bar.label, BAR_TEXT_PX) + 2.0;
+    let bottom = bottom.max(top + 90.0).min(top + 300.0);
     let edge = |k: u32| bottom + (top - bottom) * f64::from(k) / f64::from(BANDS);
     canvas.group("shape-rendering=\"crispEdges\" class=\"scale\"", "", |canvas| {
         for k in 0..BANDS {

@@ -10,7 +10,7 @@ pub(in crate::report) const TICK: Type = set(13, false, GREY);
 /// A line with more values than this has no markers, because they would hide it.
 const MAX_MARKERS: usize = 40;
 /// Labels are not drawn if there are more than this.
-const MAX_WORDS: usize = 8;
+const MAX_WORDS: usize = 12;
 
 /// A value with fewer failing scenarios than this is drawn hollow.
 const MIN_SCENARIOS: f64 = 10.0;
@@ -50,6 +50,8 @@ pub struct Value {
     pub interval: Option<(f64, f64)>,
     /// Ends of a wider interval, drawn paler and thinner.
     pub outer: Option<(f64, f64)>,
+    /// Ends of the interval of its other coordinate, drawn thinner.
+    pub across: Option<(f64, f64)>,
     /// Based on few failing scenarios: its marker is hollow.
     pub is_few: bool,
     /// Label beside it.
@@ -94,6 +96,8 @@ pub struct Rule {
     pub runs: Vec<Vec<(f64, f64)>>,
     /// Name in the legend; empty: not in the legend.
     pub name: String,
+    /// Name at the end of the first line.
+    pub label: String,
     /// `#rrggbb`.
     pub colour: &'static str,
     /// Width.
@@ -139,6 +143,14 @@ impl Rule {
             self.runs.iter().map(|run| run.iter().map(|value| axes.at(*value)).collect()).collect();
         let paint = Paint { dash: self.dash, ..Paint::line(self.colour, self.width_px) };
         canvas.group(&self.attributes, "", |canvas| canvas.path(&runs, false, paint));
+    }
+
+    /// Draws the label at the end of the first line.
+    pub(super) fn name_at_end(&self, canvas: &mut Canvas, axes: &Axes, taken: &mut Vec<(f64, f64, f64)>) {
+        let end = self.runs.first().and_then(|run| run.last()).filter(|_| !self.label.is_empty());
+        if let Some(end) = end {
+            label(canvas, axes.at(*end), &self.label, axes, taken);
+        }
     }
 
     /// Draws a sample for the legend.
@@ -261,11 +273,15 @@ impl Series {
                         self.interval(canvas, ends, reaches_lower, look);
                     }
                 }
+                let across = Series { is_sideways: !self.is_sideways, ..Series::default() };
+                if let Some((from, to)) = across.ends(value, value.across, axes) {
+                    canvas.path(&[vec![from, to]], false, Paint::line(look.colour, thin.line_px));
+                }
                 Look { is_hollow: value.is_few, ..*look }.marker(canvas, place);
             });
             // A label per value if there are few; many would cover one another.
             if !value.label.is_empty() && (self.values.len() <= MAX_WORDS || value.is_few) {
-                label(canvas, place, &value.label, taken);
+                label(canvas, place, &value.label, axes, taken);
             }
         }
     }
@@ -315,13 +331,16 @@ impl Series {
     }
 }
 
-/// Draws a label beside a point, unless another one is there.
-fn label(canvas: &mut Canvas, place: Position, words: &str, taken: &mut Vec<(f64, f64, f64)>) {
+/// Draws a label beside a point, if there is room inside the plot and between the others.
+fn label(canvas: &mut Canvas, place: Position, words: &str, axes: &Axes, taken: &mut Vec<(f64, f64, f64)>) {
     let width = TICK.text_px(words);
-    let places = [(9.0, -7.0), (-9.0 - width, -7.0), (9.0, 14.0), (-9.0 - width, 14.0), (9.0, -21.0)];
+    let (right, left) = (6.0, -6.0 - width);
+    let places =
+        [(right, -5.0), (left, -5.0), (right, 14.0), (left, 14.0), (right, -18.0), (left, -18.0), (left, 27.0)];
     let places = places.map(|(dx, dy)| (place.0 + dx, place.1 + dy));
+    let is_inside = |(x, y): &Position| axes.is_inside((*x, y - 11.0)) && axes.is_inside((x + width, *y));
     let is_free = |(x, y): &Position| taken.iter().all(|w| *x > w.0 + w.1 || x + width < w.0 || (y - w.2).abs() > 12.0);
-    let (x, y) = places.into_iter().find(is_free).unwrap_or(places[0]);
+    let Some((x, y)) = places.into_iter().find(|place| is_inside(place) && is_free(place)) else { return };
     taken.push((x, width, y));
     canvas.text((x, y), words, TICK, Anchor::Start);
 }

@@ -57,9 +57,9 @@ impl Look {
         Self {
             colour: COLOURS[index % COLOURS.len()],
             dash: DASHES[(index + index / COLOURS.len()) % DASHES.len()],
-            line_px: 2.6 - depth,
+            line_px: 2.0 - 0.6 * depth,
             symbol: SYMBOLS[index % SYMBOLS.len()],
-            marker_px: 6.0 - 2.0 * depth,
+            marker_px: 4.4 - 1.2 * depth,
             is_hollow: false,
         }
     }
@@ -77,9 +77,7 @@ impl Look {
         };
         match self.symbol {
             Symbol::Disc => canvas.circle((x, y), r * 0.9, rimmed),
-            Symbol::Ring => {
-                canvas.circle((x, y), r * 0.8, Paint { fill: Some(WHITE), ..Paint::line(colour, 2.0) });
-            }
+            Symbol::Ring => canvas.circle((x, y), r * 0.8, Paint { fill: Some(WHITE), ..Paint::line(colour, 2.0) }),
             Symbol::Cross => {
                 let strokes = [vec![(x - r, y - r), (x + r, y + r)], vec![(x - r, y + r), (x + r, y - r)]];
                 canvas.path(&strokes, false, Paint::line(WHITE, 5.0));

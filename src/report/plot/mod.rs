@@ -1,7 +1,8 @@
 //! The one type of all figures: plots with axes, their layers, and a legend built from the layers.
 //!
 //! The caller gives numbers and words; this module defines their look, as a picture and as CSV. A new kind of picture
-//! is a new layer or axis scale. A page is 1000 px wide and as high as its texts need, so no text is cut.
+//! is a new layer or axis scale. A figure has the width of a column of a paper (88 mm, where its type is 6 pt), a wide
+//! one that of two, and is as high as its texts need, so no text is cut.
 
 mod axis;
 mod cells;
@@ -13,63 +14,72 @@ mod svg;
 use std::f64::consts::TAU;
 
 pub use axis::AxisScale;
-pub use cells::{Cells, ColourBar, Fill, FilledCell, Hatch};
+pub use cells::{Cells, ColourBar, Fill, FilledCell};
 pub use layer::{Layer, Mark, Rule, Series, Value};
 pub use look::{Look, Symbol};
 
-pub(super) use axis::{Axis, logarithmic_reach, number, plain_end};
-pub(super) use frame::ROW;
+pub(super) use axis::{logarithmic_reach, number, plain_end};
 pub(super) use layer::{HOLLOW, TICK, is_few};
 #[cfg(test)]
 pub(super) use svg::tests::words;
-pub(super) use svg::{Anchor, Canvas, GREY, GRID, INK, Paint, Position, Type, WHITE, set};
+pub(super) use svg::{Anchor, Canvas, GREY, INK, Type, set};
 
 use crate::support::table::Table;
 use axis::{Axes, on_circle};
 use frame::{colour_bar, numbers_left, spoke_name};
+use svg::{GRID, Paint, Position, WHITE};
 
-const WIDTH_PX: f64 = 1000.0;
-const BORDER_PX: f64 = 36.0;
-const TEXT_WIDTH_PX: f64 = WIDTH_PX - 2.0 * BORDER_PX;
+/// Width of a figure: type of 13 px becomes 6 pt at the 252 pt of a paper's column.
+const COLUMN_PX: f64 = 540.0;
+const MARGIN_PX: f64 = 14.0;
 /// Space between plots.
-const GAP_PX: f64 = 22.0;
+const GAP_PX: f64 = 14.0;
 /// Length of a sample in the legend, and offset of the text after it.
-const SAMPLE_PX: f64 = 56.0;
-const SAMPLE_TEXT_PX: f64 = 68.0;
-/// Widths of the texts left and right of a plot whose vertical axis has named ticks, and the indent of rows.
-const NAME_PX: f64 = 280.0;
-const NOTE_PX: f64 = 226.0;
-const INDENT_PX: f64 = 14.0;
+const SAMPLE_PX: f64 = 38.0;
+const SAMPLE_TEXT_PX: f64 = 46.0;
+/// Maximum width of the texts left and right of a plot whose vertical axis has named ticks.
+const NAME_PX: f64 = 150.0;
+/// Width of a colour scale with its numbers.
+const BAR_PX: f64 = 74.0;
 /// Radius of the outer ring of a polar plot, distance of the names from it, and their width.
-const RADIUS_PX: f64 = 285.0;
-const NAME_GAP_PX: f64 = 20.0;
-const SPOKE_PX: f64 = WIDTH_PX / 2.0 - RADIUS_PX - NAME_GAP_PX - 8.0;
+const RADIUS_PX: f64 = 150.0;
+const NAME_GAP_PX: f64 = 14.0;
+const SPOKE_PX: f64 = COLUMN_PX / 2.0 - RADIUS_PX - NAME_GAP_PX - 8.0;
 
-const TITLE: Type = set(24, true, INK);
-const TEXT: Type = set(16, false, INK);
-const HEADING: Type = set(16, true, INK);
-const NOTE: Type = set(14, false, INK);
+const TITLE: Type = set(17, true, INK);
+const TEXT: Type = set(13, false, INK);
+const HEADING: Type = set(13, true, INK);
 
-/// A page of plots with its texts.
+/// Plots with their texts.
 #[derive(Debug, Clone, Default)]
 pub struct Figure {
     /// Heading; wrapped when long.
     pub title: String,
     /// Line below the heading; wrapped when long.
     pub subtitle: Option<String>,
-    /// The plots, row by row.
+    /// The plots, row by row. Where all have the same axis, its numbers are at the edge only.
     pub plots: Vec<Plot>,
+    /// Plots in a row; 0: as many as their number suggests.
+    pub columns: usize,
+    /// Twice as wide.
+    pub is_wide: bool,
+    /// Colour scale of the cells.
+    pub bar: Option<ColourBar>,
     /// Explains the marks; wrapped when long.
     pub caption: String,
     /// A bold heading and lines at the foot; omitted without lines.
     pub notes: (&'static str, Vec<String>),
 }
 
-/// One plot.
+/// One plot. Without heading and layers its place in the row stays empty.
 #[derive(Debug, Clone, Default)]
 pub struct Plot {
     /// Heading.
     pub heading: String,
+    /// Heading of the row that it begins.
+    pub row: String,
+    /// How to read it, in a few words, at the right of the heading.
+    pub hint: String,
     /// Horizontal axis; in a polar plot the angle, one full turn from end to end.
     pub x: PlotAxis,
     /// Vertical axis; in a polar plot the radius.
@@ -85,7 +95,7 @@ pub struct Plot {
 /// Height of a plot's frame.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub enum Height {
-    /// Depends on the number of plots on the page.
+    /// Depends on the number of plots in a row.
     #[default]
     Usual,
     /// Height, px.
@@ -105,8 +115,6 @@ pub struct PlotAxis {
     pub ends: Ends,
     /// Names instead of numbers.
     pub names: Vec<Name>,
-    /// Whether the numbers are repeated at the top.
-    pub is_doubled: bool,
 }
 
 /// Ends of an axis.
@@ -130,8 +138,6 @@ pub struct Name {
     pub words: String,
     /// Text at the other side of the plot; wrapped when long.
     pub note: String,
-    /// Whether it is the heading of the names below it.
-    pub is_heading: bool,
     /// Whether the row has no values.
     pub is_empty: bool,
 }
@@ -147,11 +153,20 @@ impl PlotAxis {
         PlotAxis { ends: Ends::Exactly(low, high), ..PlotAxis::new(label) }
     }
 
-    fn place(&self, values: impl Iterator<Item = f64>, ends_px: (f64, f64)) -> Option<Axis> {
+    /// An axis of this scale around these values.
+    pub fn around(label: impl Into<String>, scale: AxisScale, values: Vec<f64>) -> Self {
+        PlotAxis { scale, ends: Ends::Around(values), ..PlotAxis::new(label) }
+    }
+
+    fn is_like(&self, other: &PlotAxis) -> bool {
+        self.ends != Ends::Layers && (&self.label, self.scale, &self.ends) == (&other.label, other.scale, &other.ends)
+    }
+
+    fn place(&self, values: impl Iterator<Item = f64>, ends_px: (f64, f64)) -> Option<axis::Axis> {
         match &self.ends {
-            Ends::Exactly(low, high) => Some(Axis::exactly((*low, *high), ends_px)),
-            Ends::Around(values) => Axis::around(self.scale, values, ends_px),
-            Ends::Layers => Axis::around(self.scale, &values.collect::<Vec<_>>(), ends_px),
+            Ends::Exactly(low, high) => Some(axis::Axis::exactly((*low, *high), ends_px)),
+            Ends::Around(values) => axis::Axis::around(self.scale, values, ends_px),
+            Ends::Layers => axis::Axis::around(self.scale, &values.collect::<Vec<_>>(), ends_px),
         }
     }
 }
@@ -160,19 +175,26 @@ impl Figure {
     /// The figure as a complete SVG document. Texts are XML-escaped; control characters become U+FFFD. The same figure
     /// gives the same bytes. It never fails: a plot without a value says so, and without plots only the texts remain.
     pub fn svg(&self) -> String {
-        let mut canvas = Canvas::new(WIDTH_PX);
-        let mut y = canvas.paragraph((BORDER_PX, 24.0), &self.title, TITLE, TEXT_WIDTH_PX);
+        self.svg_with(|_, y| y)
+    }
+
+    /// The same with what `between` draws below the heading, from a y to the y that it returns.
+    pub(super) fn svg_with(&self, between: impl FnOnce(&mut Canvas, f64) -> f64) -> String {
+        let width_px = self.width_px();
+        let mut canvas = Canvas::new(width_px + 2.0 * MARGIN_PX);
+        let mut y = canvas.paragraph((MARGIN_PX, 14.0), &self.title, TITLE, width_px);
         if let Some(subtitle) = &self.subtitle {
-            y = canvas.paragraph((BORDER_PX, y + 4.0), subtitle, TEXT, TEXT_WIDTH_PX);
+            y = canvas.paragraph((MARGIN_PX, y + 3.0), subtitle, TEXT, width_px);
         }
-        y = self.rows(&mut canvas, y + 14.0);
-        y = self.legend(&mut canvas, y + 8.0);
-        y = canvas.paragraph((BORDER_PX, y + 6.0), &self.caption, NOTE, TEXT_WIDTH_PX);
+        y = between(&mut canvas, y + 8.0);
+        y = self.rows(&mut canvas, y);
+        y = self.legend(&mut canvas, y + 2.0);
+        y = canvas.paragraph((MARGIN_PX, y + 3.0), &self.caption, TEXT, width_px);
         if !self.notes.1.is_empty() {
-            y = canvas.paragraph((BORDER_PX, y + 10.0), self.notes.0, Type { bold: true, ..NOTE }, TEXT_WIDTH_PX);
+            y = canvas.paragraph((MARGIN_PX, y + 5.0), self.notes.0, HEADING, width_px);
         }
         for line in &self.notes.1 {
-            y = canvas.paragraph((BORDER_PX, y + 3.0), line, NOTE, TEXT_WIDTH_PX);
+            y = canvas.paragraph((MARGIN_PX, y + 2.0), line, TEXT, width_px);
         }
         canvas.document(y)
     }
@@ -181,6 +203,7 @@ impl Figure {
     pub fn csv(&self) -> String {
         let series = self.plots.iter().flat_map(|plot| plot.series().map(move |series| (plot, series)));
         let rows = series.flat_map(|(plot, series)| series.values.iter().map(move |value| (plot, series, value)));
+        let end = |interval: Option<(f64, f64)>, pick: fn((f64, f64)) -> f64| interval.map(pick);
         Table::of(rows)
             .column("panel", |(plot, ..)| plot.heading.as_str())
             .column("series", |(_, series, _)| series.name.as_str())
@@ -189,8 +212,14 @@ impl Figure {
             .column("x", |(.., value)| value.x)
             .column("y_quantity", |(plot, ..)| plot.y.label.as_str())
             .column("y", |(.., value)| value.y)
+            .column("low", move |(.., value)| end(value.interval, |ends| ends.0))
+            .column("high", move |(.., value)| end(value.interval, |ends| ends.1))
             .build()
             .csv()
+    }
+
+    fn width_px(&self) -> f64 {
+        if self.is_wide { 2.0 * COLUMN_PX - 2.0 * MARGIN_PX } else { COLUMN_PX - 2.0 * MARGIN_PX }
     }
 
     /// The names of the series, in the order of the legend.
@@ -204,61 +233,108 @@ impl Figure {
         names
     }
 
-    /// Draws all plots below `top`, in rows that depend on their number; returns the y below.
+    /// Whether all plots have the same axis.
+    fn shares(&self, axis: fn(&Plot) -> &PlotAxis) -> bool {
+        let mut shown = self.plots.iter().filter(|plot| !plot.is_blank());
+        let first = shown.next();
+        self.plots.len() > 1 && first.is_some_and(|first| shown.all(|plot| axis(plot).is_like(axis(first))))
+    }
+
+    /// Draws all plots below `top`, in rows; returns the y below.
     fn rows(&self, canvas: &mut Canvas, top: f64) -> f64 {
-        let (columns, height_px) = match self.plots.len() {
-            0 | 1 => (1, 420.0),
-            2 | 4 => (2, 290.0),
-            _ => (3, 220.0),
+        let columns = match (self.columns, self.plots.len()) {
+            (0, 0 | 1) => 1,
+            (0, 2 | 4) => 2,
+            (0, _) => 3,
+            (columns, _) => columns,
         };
         let names = self.names();
         let look = |series: &Series| {
             let place = names.iter().position(|name| *name == series.name);
             series.look.unwrap_or_else(|| Look::of(place.unwrap_or(0), names.len()))
         };
-        let width_px = (TEXT_WIDTH_PX - GAP_PX * (columns - 1) as f64) / columns as f64;
-        let words = if columns == 1 { Type { size_px: 15, ..NOTE } } else { TICK };
-        let mut y = top;
-        for in_row in self.plots.chunks(columns) {
-            let above = |plot: &Plot| {
-                let words = words.height_px(&plot.y.label, width_px);
-                let labels = if words > 0.0 { words + 10.0 } else { 0.0 } + if plot.x.is_doubled { 22.0 } else { 0.0 };
-                HEADING.height_px(&plot.heading, width_px) + labels
+        let (shares_x, shares_y) = (self.shares(|plot| &plot.x), self.shares(|plot| &plot.y));
+        // Shared numbers need room at the edges only.
+        let room = |at: usize| {
+            let here = self.plots.iter().skip(at).step_by(columns).map(Plot::room_px);
+            here.fold((0.0, 0.0), |(l, r): (f64, f64), (left, right)| (l.max(left), r.max(right)))
+        };
+        let rooms: Vec<(f64, f64)> = (0..columns).map(room).collect();
+        let left_px = |column: usize| if shares_y && column > 0 { 0.0 } else { rooms[column].0 };
+        let gaps_px = GAP_PX * (columns - 1) as f64 + if self.bar.is_some() { BAR_PX } else { 0.0 };
+        let taken_px: f64 = (0..columns).map(|column| left_px(column) + rooms[column].1).sum();
+        let frame_px = (self.width_px() - gaps_px - taken_px) / columns as f64;
+        let (mut y, mut first_frame) = (top, None);
+        for (row, in_row) in self.plots.chunks(columns).enumerate() {
+            if let Some(heading) = in_row.first().map(|plot| &plot.row).filter(|heading| !heading.is_empty()) {
+                y = canvas.paragraph((MARGIN_PX, y), heading, HEADING, self.width_px()) + 2.0;
+            }
+            // Of a shared axis the first plot has the label; the headings of a row are level.
+            let label_px = |column: usize, plot: &Plot| match shares_y && row > 0 {
+                true => 0.0,
+                false => TICK.height_px(&plot.y.label, left_px(if shares_y { 0 } else { column }) + frame_px),
             };
-            let frame_top = y + in_row.iter().map(above).fold(0.0, f64::max);
-            let mut bottom = frame_top;
+            let above = |(column, plot): (usize, &Plot)| {
+                HEADING.height_px(&plot.heading, frame_px + left_px(column)) + label_px(column, plot) + 4.0
+            };
+            let frame_top = y + in_row.iter().enumerate().map(above).fold(0.0, f64::max);
+            let (mut bottom, mut left) = (frame_top, MARGIN_PX);
             for (column, plot) in in_row.iter().enumerate() {
-                let left = BORDER_PX + column as f64 * (width_px + GAP_PX);
-                canvas.paragraph((left, y), &plot.heading, HEADING, width_px);
-                let label_px = words.height_px(&plot.y.label, width_px);
-                canvas.paragraph((left, frame_top - label_px - 8.0), &plot.y.label, words, width_px);
+                let across = (left + left_px(column), left + left_px(column) + frame_px);
+                let from = if shares_y { across.0 } else { left };
+                left = across.1 + rooms[column].1 + GAP_PX;
+                if plot.is_blank() {
+                    continue;
+                }
+                let label_px = label_px(column, plot);
+                let heading_px = HEADING.height_px(&plot.heading, across.1 - from);
+                let above = frame_top - 4.0 - label_px;
+                canvas.paragraph((from, above - heading_px), &plot.heading, HEADING, across.1 - from);
+                canvas.text((across.1, above - 4.0), &plot.hint, TICK, Anchor::End);
+                if label_px > 0.0 && (!shares_y || column == 0) {
+                    let from = across.0 - left_px(column);
+                    canvas.paragraph((from, above), &plot.y.label, TICK, across.1 - from);
+                }
                 if plot.is_polar {
                     bottom = bottom.max(plot.draw_polar(canvas, &look, frame_top));
                     continue;
                 }
-                let (room_left, room_right) = plot.room_px();
-                let across = (left + room_left, left + width_px - room_right);
                 let frame_px = match plot.height {
-                    Height::Usual => height_px,
+                    Height::Usual => (0.75 * frame_px).clamp(100.0, 260.0),
                     Height::Px(px) => px,
-                    Height::OfWidth(times) => times * (across.1 - across.0),
+                    Height::OfWidth(times) => times * frame_px,
                 };
                 let down = (frame_top, frame_top + frame_px);
-                plot.draw(canvas, &look, across, down, true);
-                let (middle, label_px) = ((across.0 + across.1) / 2.0, across.1 - across.0);
-                let below = canvas.block((middle, down.1 + 26.0), &plot.x.label, words, label_px, Anchor::Middle);
-                bottom = bottom.max(below);
+                let below = self.plots.iter().skip((row + 1) * columns + column).step_by(columns);
+                let is_lowest = !shares_x || below.clone().all(Plot::is_blank);
+                plot.draw(canvas, &look, (across, down), (is_lowest, !shares_y || column == 0));
+                let mut end = down.1 + if is_lowest { 24.0 } else { 6.0 };
+                if !shares_x {
+                    let middle = (across.0 + across.1) / 2.0;
+                    end = canvas.block((middle, end), &plot.x.label, TICK, across.1 - from, Anchor::Middle);
+                }
+                bottom = bottom.max(end);
+                first_frame.get_or_insert(down);
             }
-            y = bottom + 14.0;
+            y = bottom + 8.0;
+        }
+        if let Some(plot) = self.plots.first().filter(|_| shares_x) {
+            let right = self.width_px() - rooms[columns - 1].1 - if self.bar.is_some() { BAR_PX } else { 0.0 };
+            let (from, to) = (MARGIN_PX + left_px(0), MARGIN_PX + right);
+            y = canvas.block(((from + to) / 2.0, y - 6.0), &plot.x.label, TICK, to - from, Anchor::Middle) + 6.0;
+        }
+        if let Some((bar, down)) = self.bar.as_ref().zip(first_frame).filter(|(bar, _)| bar.largest > 0.0) {
+            let left = MARGIN_PX + self.width_px() - BAR_PX + 12.0;
+            colour_bar(canvas, bar, (left, left + 16.0), down);
         }
         y
     }
 
-    /// Draws samples and names of the layers, in two columns read downwards (one if a name is too long for half the
+    /// Draws samples and names of what is drawn, in two columns read downwards (one if a name is too long for half the
     /// width); returns the y below.
     fn legend(&self, canvas: &mut Canvas, top: f64) -> f64 {
         let names = self.names();
-        let series = || self.plots.iter().flat_map(Plot::series);
+        let series = || self.plots.iter().flat_map(|plot| plot.series().filter(|series| plot.shows(series)));
         let looks = names.iter().enumerate().filter_map(|(at, name)| {
             let series = series().find(|series| series.name == *name)?;
             Some((*name, Entry::Series(series, series.look.unwrap_or_else(|| Look::of(at, names.len())))))
@@ -274,22 +350,22 @@ impl Figure {
                 entries.push((&rule.name, Entry::Rule(rule)));
             }
         }
-        let half_px = TEXT_WIDTH_PX / 2.0;
+        let half_px = self.width_px() / 2.0;
         let fits = entries.iter().all(|(name, _)| TEXT.text_px(name) <= half_px - SAMPLE_TEXT_PX - 12.0);
         let columns = if fits { 2 } else { 1 };
-        let width_px = TEXT_WIDTH_PX / columns as f64 - SAMPLE_TEXT_PX;
+        let width_px = self.width_px() / columns as f64 - SAMPLE_TEXT_PX;
         let mut bottom = top;
         for (column, entries) in entries.chunks(entries.len().div_ceil(columns).max(1)).enumerate() {
-            let (x, mut y) = (BORDER_PX + half_px * column as f64, top);
+            let (x, mut y) = (MARGIN_PX + half_px * column as f64, top);
             for (name, entry) in entries {
                 let middle = y + TEXT.line_px() / 2.0;
                 canvas.group("class=\"legend\"", "", |canvas| match entry {
                     Entry::Series(series, look) => series.sample(canvas, (x, middle), SAMPLE_PX, look),
                     Entry::Rule(rule) => rule.sample(canvas, (x, middle), SAMPLE_PX),
-                    Entry::Fill(fill) => fill.sample(canvas, (x + 17.0, middle - 9.0), (x + 39.0, middle + 9.0)),
+                    Entry::Fill(fill) => fill.sample(canvas, (x + 10.0, middle - 7.0), (x + 28.0, middle + 7.0)),
                 });
                 let below = canvas.paragraph((x + SAMPLE_TEXT_PX, y), name, TEXT, width_px);
-                y = below.max(y + TEXT.line_px()) + 5.0;
+                y = below.max(y + TEXT.line_px()) + 2.0;
             }
             bottom = bottom.max(y);
         }
@@ -317,12 +393,27 @@ impl Plot {
         self.layers.iter().filter_map(|layer| if let Layer::Cells(cells) = layer { Some(cells) } else { None })
     }
 
+    fn is_blank(&self) -> bool {
+        self.heading.is_empty() && self.layers.is_empty()
+    }
+
+    /// Whether the axes can show a value of the series, or the upper end of its interval.
+    pub(super) fn shows(&self, series: &Series) -> bool {
+        let is_shown = |v: &Value| self.x.scale.shows(v.x) && self.y.scale.shows(v.y);
+        series.values.iter().any(|value| is_shown(value) || value.interval.is_some())
+    }
+
     /// Space left and right of the frame, px.
     fn room_px(&self) -> (f64, f64) {
-        if !self.y.names.is_empty() {
-            return (NAME_PX + 16.0, NOTE_PX + 18.0);
+        if self.is_polar {
+            return (0.0, 0.0);
         }
-        (60.0, if self.cells().any(|cells| cells.bar.is_some()) { 120.0 } else { 16.0 })
+        let widest = |text: fn(&Name) -> &str| {
+            let widths = self.y.names.iter().map(|name| TEXT.text_px(text(name)).min(NAME_PX));
+            widths.reduce(f64::max).filter(|px| *px > 0.0).map_or(0.0, |px| px + 8.0)
+        };
+        let left = widest(|name| &name.words);
+        (if self.y.names.is_empty() { 46.0 } else { left }, widest(|name| &name.note))
     }
 
     /// The axes within these ends; `None` if there is nothing to show.
@@ -344,22 +435,21 @@ impl Plot {
         Some(Axes { x, y, centre })
     }
 
-    /// Draws the plot in a frame: axes with their numbers, layers.
-    pub(super) fn draw(
+    /// Draws the plot in a frame (across, down): axes with their numbers (below, at the left), layers.
+    fn draw(
         &self,
         canvas: &mut Canvas,
         look: &dyn Fn(&Series) -> Look,
-        across: (f64, f64),
-        down: (f64, f64),
-        has_x_numbers: bool,
+        (across, down): ((f64, f64), (f64, f64)),
+        (has_x_numbers, has_y_numbers): (bool, bool),
     ) {
         let axes = self.axes(across, down, None);
         if let Some(axes) = &axes {
-            let has_grid = self.cells().all(|cells| cells.bar.is_none() && cells.key.is_empty());
+            let has_grid = self.cells().next().is_none();
             if self.y.names.is_empty() {
-                numbers_left(canvas, &axes.y, across, has_grid);
+                numbers_left(canvas, &axes.y, across, (has_y_numbers, has_grid));
             }
-            self.numbers_below(canvas, &axes.x, down, has_x_numbers, has_grid);
+            self.numbers_below(canvas, &axes.x, down, (has_x_numbers, has_grid));
             self.behind(canvas, axes, look);
         }
         canvas.group("class=\"frame\"", "", |canvas| {
@@ -371,9 +461,6 @@ impl Plot {
             return canvas.text(middle, "no value to draw", TICK, Anchor::Middle);
         };
         self.markers(canvas, &axes, look);
-        for bar in self.cells().filter_map(|cells| cells.bar.as_ref()).filter(|bar| bar.largest > 0.0) {
-            colour_bar(canvas, bar, (across.1 + 44.0, across.1 + 66.0), down);
-        }
     }
 
     /// Draws all layers except markers, which are above the frame.
@@ -387,6 +474,7 @@ impl Plot {
 
     fn markers(&self, canvas: &mut Canvas, axes: &Axes, look: &dyn Fn(&Series) -> Look) {
         let mut taken = Vec::new();
+        self.rules().for_each(|rule| rule.name_at_end(canvas, axes, &mut taken));
         for series in self.series() {
             series.markers(canvas, axes, &look(series), (&self.x.label, &self.y.label), &mut taken);
         }
@@ -396,7 +484,7 @@ impl Plot {
     fn draw_polar(&self, canvas: &mut Canvas, look: &dyn Fn(&Series) -> Look, top: f64) -> f64 {
         let name_px = |name: &Name| TEXT.height_px(&name.words, SPOKE_PX);
         let reach = self.x.names.iter().map(name_px).fold(0.0, f64::max) + NAME_GAP_PX + RADIUS_PX;
-        let centre = (WIDTH_PX / 2.0, top + reach);
+        let centre = (COLUMN_PX / 2.0, top + reach);
         let Some(axes) = self.axes((0.0, TAU), (RADIUS_PX, 0.0), Some(centre)) else { return top };
         for ring in &self.y.names {
             let radius_px = axes.y.at(ring.at);

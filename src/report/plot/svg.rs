@@ -134,7 +134,8 @@ impl Canvas {
         )
     }
 
-    fn element(&mut self, text: &str) {
+    /// Adds an element, written verbatim.
+    pub fn element(&mut self, text: &str) {
         self.body.extend(std::iter::repeat_n("  ", self.depth));
         self.body += text;
         self.body.push('\n');
@@ -156,6 +157,11 @@ impl Canvas {
         self.shape(format!("<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\""), paint);
     }
 
+    /// Draws a filled rectangle.
+    pub fn fill_rect(&mut self, [from, to]: [Position; 2], colour: &str) {
+        self.rect(from, to, Paint::fill(colour));
+    }
+
     pub fn circle(&mut self, (x, y): Position, radius_px: f64, paint: Paint) {
         self.shape(format!("<circle cx=\"{}\" cy=\"{}\" r=\"{}\"", Number(x), Number(y), Number(radius_px)), paint);
     }
@@ -163,7 +169,7 @@ impl Canvas {
     /// Draws polylines as one path.
     pub fn path(&mut self, runs: &[Vec<Position>], is_closed: bool, paint: Paint) {
         let run = |points: &Vec<Position>| {
-            let corners: Vec<String> = points.iter().map(|(x, y)| format!("{x:.2},{y:.2}")).collect();
+            let corners: Vec<String> = points.iter().map(|(x, y)| format!("{},{}", Number(*x), Number(*y))).collect();
             format!("M{}{}", corners.join(" L"), if is_closed { " Z" } else { "" })
         };
         let d: Vec<String> = runs.iter().filter(|points| !points.is_empty()).map(run).collect();
@@ -178,20 +184,16 @@ impl Canvas {
 
     /// Draws one line of text on its base line.
     pub fn text(&mut self, (x, y): Position, line: &str, set: Type, anchor: Anchor) {
+        let mut text = format!("<text x=\"{}\" y=\"{}\" font-size=\"{}\"", Number(x), Number(y), set.size_px);
         let anchor = match anchor {
-            Anchor::Start => "start",
-            Anchor::Middle => "middle",
-            Anchor::End => "end",
+            Anchor::Start => None,
+            Anchor::Middle => Some("middle"),
+            Anchor::End => Some("end"),
         };
-        let weight = if set.bold { " font-weight=\"bold\"" } else { "" };
-        self.element(&format!(
-            "<text x=\"{}\" y=\"{}\" font-size=\"{}\" text-anchor=\"{anchor}\"{weight} fill=\"{}\">{}</text>",
-            Number(x),
-            Number(y),
-            set.size_px,
-            set.colour,
-            escaped(line)
-        ));
+        attribute(&mut text, "text-anchor", anchor);
+        attribute(&mut text, "font-weight", set.bold.then_some("bold"));
+        attribute(&mut text, "fill", (set.colour != INK).then_some(set.colour));
+        self.element(&format!("{text}>{}</text>", escaped(line)));
     }
 
     /// Draws a wrapped text with its top at `y`; returns the y below it.

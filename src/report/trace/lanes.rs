@@ -1,6 +1,6 @@
 //! Lanes step by step, as `simulate` shows them: figure, table, document and summaries.
 
-use super::{TraceFigure, TraceSeries, table};
+use super::{TraceFigure, TracePanels, TraceSeries, table};
 use crate::Result;
 use crate::engine::{EndReason, NO_STEP, Outcome, Trace};
 use crate::model::criterion::Criterion;
@@ -23,7 +23,8 @@ impl TracedLanes {
         let synthetic = if self.is_synthetic && !self.origin.contains("SYNTHETIC") { "SYNTHETIC DATA; " } else { "" };
         let series =
             self.lanes.iter().map(|lane| TraceSeries { name: lane.name.clone(), trace: &lane.trace }).collect();
-        TraceFigure { title, subtitle: Some(format!("{synthetic}{}", self.origin)), series, until_s }
+        let subtitle = Some(format!("{synthetic}{}", self.origin));
+        TraceFigure { title, subtitle, series, until_s, panels: TracePanels::All }
     }
 
     /// Every step as CSV.

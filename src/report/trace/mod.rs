@@ -1,18 +1,18 @@
 //! One case step by step: the figure of all that its driver models see and do, over one time axis, and every number as
 //! CSV.
 //!
-//! The sheet has the width of a column of a paper (two for a cut-out, one per vehicle) and a type size that is readable
-//! at that width. Series differ in colour, dashes and line width; marks differ in shape.
+//! Series differ in colour, dashes and line width; marks differ in shape.
 
 mod lanes;
 mod panels;
+mod positions;
 
-use super::plot::{Anchor, Canvas, Ends, Height, INK, Look, Paint, Series, TICK, Type, WHITE, set};
-use super::plot::{Axis, number};
+use super::plot::number;
+use super::plot::{Anchor, Canvas, Ends, Figure, INK, Look, Plot, TICK, Type, set};
 use crate::engine::{StepMark, Trace, TracedStep};
 use crate::support::table::Table;
-pub use panels::TraceSeries;
-use panels::{Column, Panel, Shown, mark_dash, mark_look};
+use panels::{Shown, mark_look};
+pub use panels::{TracePanels, TraceSeries};
 
 /// Lanes of one case, or of variants of a case, on one sheet.
 #[derive(Debug, Clone)]
@@ -25,15 +25,11 @@ pub struct TraceFigure<'a> {
     pub series: Vec<TraceSeries<'a>>,
     /// Last time shown, s; `None`: 2 s after the last change.
     pub until_s: Option<f64>,
+    /// The panels.
+    pub panels: TracePanels,
 }
 
-/// Width of a column of the sheet, px: type of 13 px becomes 6 pt at the 252 pt of a paper's column.
-const COLUMN_PX: f64 = 540.0;
 const MARGIN_PX: f64 = 14.0;
-/// Distance from the column's edge to the plot: room for numbers.
-const LEFT_PX: f64 = 58.0;
-const TITLE: Type = set(17, true, INK);
-const NAME: Type = set(14, true, INK);
 const HINT: Type = TICK;
 const CELL: Type = set(13, false, INK);
 /// Width of a column of the table of marks, and of the line sample before a name.
@@ -42,45 +38,44 @@ const SAMPLE_PX: f64 = 38.0;
 const MARK_PX: f64 = 5.0;
 
 impl TraceFigure<'_> {
-    /// The figure as a complete SVG document, 540 px wide (1080 px for a cut-out) and as high as its panels need.
+    /// The figure as a complete SVG document, as wide as a column of a paper (as two for a cut-out).
     ///
     /// A note says if lanes continue after the last time shown. TTC is shown up to ten times its threshold, BTN up to
-    /// 2.5 times. Texts are XML-escaped; control characters become U+FFFD. The same figure gives the same bytes. It
-    /// never fails: without lanes only the texts remain.
+    /// 2.5 times. The same figure gives the same bytes. It never fails: without lanes only the texts remain.
     pub fn svg(&self) -> String {
-        let shown = Shown::of(&self.series, self.until_s);
-        let columns = shown.columns();
-        let width_px = COLUMN_PX * columns.len() as f64;
-        let across_px = width_px - 2.0 * MARGIN_PX;
-        let mut canvas = Canvas::new(width_px);
-        let mut y = canvas.paragraph((MARGIN_PX, 14.0), &self.title, TITLE, across_px);
-        if let Some(subtitle) = &self.subtitle {
-            y = canvas.paragraph((MARGIN_PX, y + 3.0), subtitle, CELL, across_px);
-        }
+        let (title, subtitle) = (self.title.clone(), self.subtitle.clone());
         if self.series.iter().all(|s| s.trace.steps.is_empty()) {
-            y = canvas.paragraph((MARGIN_PX, y + 8.0), "There is no lane to draw.", CELL, across_px);
-            return canvas.document(y);
+            let caption = "There is no lane to draw.".to_owned();
+            return Figure { title, subtitle, caption, ..Figure::default() }.svg();
         }
-        y = self.table(&mut canvas, &shown.looks, width_px, y + 8.0) + 6.0;
-        let lines = shown.mark_lines();
-        let bottoms = columns.iter().enumerate().map(|(k, panels)| {
-            let left = COLUMN_PX * k as f64;
-            column(&mut canvas, panels, (left + LEFT_PX, left + COLUMN_PX - MARGIN_PX), y, &lines)
-        });
-        y = bottoms.fold(y, f64::max) + 6.0;
-        for note in self.notes(&shown, &columns) {
-            y = canvas.paragraph((MARGIN_PX, y), &note, CELL, across_px) + 3.0;
+        let shown = Shown::of(&self.series, self.until_s);
+        let (columns, plots) = shown.panels(self.panels);
+        let caption = self.notes(&shown, &plots).join(" ");
+        let figure = Figure { title, subtitle, plots, columns, is_wide: columns > 1, caption, ..Figure::default() };
+        figure.svg_with(|canvas, top| match self.panels {
+            TracePanels::Measures => self.names(canvas, &shown.looks, top),
+            _ => self.table(canvas, &shown.looks, top) + 4.0,
+        })
+    }
+
+    /// Draws the names of the series in one line; returns the y below.
+    fn names(&self, canvas: &mut Canvas, looks: &[Look], top: f64) -> f64 {
+        let mut left = MARGIN_PX;
+        for (series, look) in self.series.iter().zip(looks) {
+            sample(canvas, look, (left, top));
+            canvas.text((left + SAMPLE_PX + 6.0, top + 13.0), &series.name, CELL, Anchor::Start);
+            left += SAMPLE_PX + CELL.text_px(&series.name) + 18.0;
         }
-        canvas.document(y)
+        top + CELL.line_px() + 4.0
     }
 
     /// Draws names, marks and worst values of the series; returns the y below.
-    fn table(&self, canvas: &mut Canvas, looks: &[Look], width_px: f64, top: f64) -> f64 {
+    fn table(&self, canvas: &mut Canvas, looks: &[Look], top: f64) -> f64 {
         let columns =
             [StepMark::Reaction.label(), StepMark::Braking.label(), StepMark::Contact.label(), "min TTC", "max BTN"];
         let name_left = MARGIN_PX + SAMPLE_PX + 8.0;
         let longest_px = self.series.iter().map(|s| CELL.text_px(&s.name)).fold(0.0, f64::max);
-        let max_px = width_px - MARGIN_PX - CELL_PX * columns.len() as f64;
+        let max_px = 540.0 - MARGIN_PX - CELL_PX * columns.len() as f64;
         let at = |column: usize| max_px.min(name_left + longest_px + 16.0) + CELL_PX * column as f64;
         let mut y = top + CELL.line_px();
         for (column, head) in columns.iter().enumerate() {
@@ -88,8 +83,7 @@ impl TraceFigure<'_> {
         }
         for (series, look) in self.series.iter().zip(looks) {
             let (baseline, middle) = (y + f64::from(CELL.size_px), y + CELL.line_px() / 2.0);
-            let sample = vec![(MARGIN_PX, middle), (MARGIN_PX + SAMPLE_PX, middle)];
-            canvas.group("class=\"legend\"", "", |canvas| canvas.path(&[sample], false, look.paint()));
+            sample(canvas, look, (MARGIN_PX, y));
             let below = canvas.paragraph((name_left, y), &series.name, CELL, at(0) - name_left - 8.0);
             for (column, mark) in StepMark::ALL.into_iter().enumerate() {
                 let Some(step) = series.trace.step_of(mark) else {
@@ -108,19 +102,21 @@ impl TraceFigure<'_> {
         y
     }
 
-    fn notes(&self, shown: &Shown, columns: &[Column]) -> Vec<String> {
+    fn notes(&self, shown: &Shown, plots: &[Plot]) -> Vec<String> {
         let mut notes = Vec::new();
         if shown.has_unjudged() {
             notes.push("Thin in gap, TTC, BTN: the criteria ignore it.".to_owned());
         }
-        let is_cut = |panel: &Panel| {
-            let Ends::Exactly(_, top) = panel.plot.y.ends else { return false };
-            panel.plot.series().flat_map(|series| &series.values).any(|value| value.y >= top)
+        let is_cut = |plot: &Plot| {
+            let Ends::Exactly(_, top) = plot.y.ends else { return false };
+            plot.series().flat_map(|series| &series.values).any(|value| value.y >= top)
         };
-        if columns.iter().flatten().any(is_cut) {
+        if plots.iter().any(is_cut) {
             notes.push("A curve that ends at the top edge goes on above it.".to_owned());
         }
-        notes.push("Long dashes: edges of a lane 3.5 m wide.".to_owned());
+        if self.panels != TracePanels::Course {
+            notes.push("Long dashes: edges of a lane 3.5 m wide.".to_owned());
+        }
         let end_s = self.series.iter().filter_map(|s| Some(s.trace.steps.last()?.time_s)).fold(0.0, f64::max);
         if end_s > shown.until_s {
             let (until, end) = (thousandths(shown.until_s), thousandths(end_s));
@@ -130,46 +126,11 @@ impl TraceFigure<'_> {
     }
 }
 
-/// Draws one column of panels over one time axis; returns the y below.
-fn column(canvas: &mut Canvas, panels: &[Panel], across: (f64, f64), top: f64, lines: &[(StepMark, f64)]) -> f64 {
-    let look = |series: &Series| series.look.unwrap_or_else(|| Look::of(0, 1));
-    let mut y = top;
-    for (k, Panel { hint, plot }) in panels.iter().enumerate() {
-        let title_bottom = y + NAME.line_px() + 3.0;
-        canvas.text((across.0, title_bottom - 6.0), &plot.heading, NAME, Anchor::Start);
-        canvas.text((across.1, title_bottom - 6.0), hint, HINT, Anchor::End);
-        let mut frame_top = title_bottom;
-        if let (0, Ends::Exactly(low, high)) = (k, &plot.x.ends) {
-            // The labels of the lines through all panels are above the first plot, each in its own row.
-            frame_top += lines.len() as f64 * CELL.line_px();
-            let time = Axis::exactly((*low, *high), across);
-            lines.iter().enumerate().for_each(|(row, line)| {
-                let from = title_bottom + row as f64 * CELL.line_px();
-                mark_label(canvas, *line, time.at(line.1), (from, frame_top), across.1);
-            });
-        }
-        let Height::Px(height_px) = plot.height else { continue };
-        let down = (frame_top, frame_top + height_px);
-        plot.draw(canvas, &look, across, down, k + 1 == panels.len());
-        y = down.1 + 5.0;
-    }
-    canvas.text((across.1, y + 31.0), "Time (s)", NAME, Anchor::End);
-    y + 35.0
-}
-
-/// Draws the label of a line and the line down to the first plot, on the side with room. The label has a white
-/// background, because later lines pass behind it.
-fn mark_label(canvas: &mut Canvas, (mark, at_s): (StepMark, f64), x: f64, (top, bottom): (f64, f64), right: f64) {
-    let words = format!("{} {} s", mark.label(), thousandths(at_s));
-    let width = CELL.text_px(&words);
-    let stub = vec![(x, top + 2.0), (x, bottom)];
-    canvas.path(&[stub], false, Paint { dash: mark_dash(mark), ..Paint::line(INK, 1.0) });
-    let (from, anchor) =
-        if x + 4.0 + width <= right { (x + 4.0, Anchor::Start) } else { (x - 4.0 - width, Anchor::End) };
-    let below = top + CELL.line_px();
-    canvas.rect((from - 1.0, top + 1.0), (from + width + 1.0, below - 1.0), Paint::fill(WHITE));
-    let x = if anchor == Anchor::Start { from } else { from + width };
-    canvas.text((x, below - 4.0), &words, CELL, anchor);
+/// Draws a sample of a line in a text line that begins at `y`.
+fn sample(canvas: &mut Canvas, look: &Look, (x, y): (f64, f64)) {
+    let middle = y + CELL.line_px() / 2.0;
+    let line = vec![(x, middle), (x + SAMPLE_PX, middle)];
+    canvas.group("class=\"legend\"", "", |canvas| canvas.path(&[line], false, look.paint()));
 }
 
 fn thousandths(value: f64) -> String {

@@ -2,6 +2,7 @@
 
 use super::super::plot::plain_end;
 use super::super::plot::{GREY, Height, INK, Layer, Look, Mark, Plot, PlotAxis, Rule, Series, Symbol, Value};
+use super::thousandths;
 use crate::engine::{StepMark, Trace, TracedStep, TracedVehicle};
 
 /// One lane on the sheet.
@@ -32,23 +33,11 @@ struct Curve {
 
 impl From<Curve> for Layer {
     fn from(curve: Curve) -> Self {
-        let line_px = if curve.is_thin && curve.look.colour != GREY { 1.0 } else { curve.look.line_px };
+        let line_px = if curve.is_thin && curve.look.colour != GREY { 0.8 } else { curve.look.line_px };
         let look = Some(Look { line_px, ..curve.look });
         Series { look, ..Series::new("", &[Mark::Line], curve.points) }.into()
     }
 }
-
-/// One panel.
-#[derive(Debug, Clone)]
-pub(super) struct Panel {
-    /// How to read it, in a few words.
-    pub hint: String,
-    /// The plot; its heading names the quantity with unit.
-    pub plot: Plot,
-}
-
-/// The panels of the ego or of one other vehicle, from top to bottom.
-pub(super) type Column = Vec<Panel>;
 
 /// A mark in the colour of its series; shapes distinguish marks.
 pub(super) fn mark_look(mark: StepMark, look: &Look) -> Look {
@@ -68,6 +57,20 @@ pub(super) fn mark_dash(mark: StepMark) -> &'static str {
         StepMark::Contact => "",
     }
 }
+
+/// Which panels of a case are drawn.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TracePanels {
+    /// All.
+    All,
+    /// Speed, acceleration, gap: what happens.
+    Course,
+    /// TTC, BTN, fuzzy surrogates, lateral position: how it is judged.
+    Measures,
+}
+
+/// An acceleration that turns more often than this is drawn thin.
+const MAX_TURNS: usize = 12;
 
 /// A line through a panel.
 fn rule(ends: [(f64, f64); 2], colour: &'static str, width_px: f64, dash: &'static str) -> Rule {
@@ -100,27 +103,44 @@ impl<'a> Shown<'a> {
         Shown { series, looks, until_s: until_s.clamp(0.0, end_s) }
     }
 
-    /// The columns of the sheet: one, or one per other vehicle where there are two.
-    pub fn columns(&self) -> Vec<Column> {
+    /// The panels row by row, and how many are in a row: one, or one per other vehicle where there are two.
+    pub fn panels(&self, which: TracePanels) -> (usize, Vec<Plot>) {
         let vehicles = self.series.iter().map(|s| s.trace.vehicles).max().unwrap_or(1);
-        let speed = self.speed(vehicles);
-        let acceleration = self.acceleration();
         let of = |vehicle: usize| {
             let name = match (vehicles, vehicle) {
                 (1, _) => "",
                 (_, 0) => "to the vehicle that cuts out",
                 _ => "to the vehicle ahead of it",
             };
-            [self.gap(vehicle, name), self.ttc(vehicle), self.btn(vehicle)]
-                .into_iter()
-                .chain([self.surrogate("PFS (–)", "proactive fuzzy surrogate", vehicle, &|other| other.pfs)])
-                .chain([self.surrogate("CFS (–)", "critical fuzzy surrogate", vehicle, &|other| other.cfs)])
-                .chain([self.lateral(vehicle)])
+            [
+                self.gap(vehicle, name),
+                self.ttc(vehicle),
+                self.btn(vehicle),
+                self.surrogate("PFS (–)", "proactive fuzzy surrogate", vehicle, &|other| other.pfs),
+                self.surrogate("CFS (–)", "critical fuzzy surrogate", vehicle, &|other| other.cfs),
+                self.lateral(vehicle),
+            ]
         };
-        if vehicles == 1 {
-            return vec![[speed, acceleration].into_iter().chain(of(0)).collect()];
+        let own = [self.speed(vehicles), self.acceleration()];
+        let others: Vec<[Plot; 6]> = (0..vehicles).map(of).collect();
+        let judged = (0..6).flat_map(|at| others.iter().map(move |plots| plots[at].clone()));
+        let all: Vec<Plot> = own.into_iter().chain(judged).collect();
+        let course = 2 + vehicles;
+        let mut shown = match which {
+            TracePanels::All => all,
+            TracePanels::Course => all[..course].to_vec(),
+            TracePanels::Measures => all[course..].to_vec(),
+        };
+        // The lines through all panels have their names in the first.
+        let named =
+            self.mark_lines().into_iter().map(|(mark, time_s)| format!("{} {} s", mark.label(), thousandths(time_s)));
+        let rules = shown.first_mut().into_iter().flat_map(|plot| &mut plot.layers);
+        for (layer, name) in rules.zip(named) {
+            if let Layer::Rule(rule) = layer {
+                rule.label = name;
+            }
         }
-        vec![std::iter::once(speed).chain(of(0)).collect(), std::iter::once(acceleration).chain(of(1)).collect()]
+        (vehicles, shown)
     }
 
     /// Whether a step is shown at which the criteria ignore a vehicle that is present.
@@ -143,26 +163,26 @@ impl<'a> Shown<'a> {
         height_px: f64,
         ends: (f64, f64),
         layers: Vec<Layer>,
-    ) -> Panel {
+    ) -> Plot {
         // A lane of one step needs an axis too.
         let end_s = if self.until_s > 0.0 { self.until_s } else { 1.0 };
         let through = self.mark_lines().into_iter().map(|(mark, time_s)| {
             let attributes = format!("class=\"mark-line {}\"", mark.label());
             Rule { attributes, ..rule([(time_s, ends.0), (time_s, ends.1)], INK, 1.0, mark_dash(mark)) }.into()
         });
-        let plot = Plot {
+        Plot {
             heading: title.to_owned(),
+            hint: hint.into(),
             x: PlotAxis::exactly("Time (s)", 0.0, end_s),
             y: PlotAxis::exactly("", ends.0, ends.1),
             layers: through.chain(layers).collect(),
             height: Height::Px(height_px),
             ..Plot::default()
-        };
-        Panel { hint: hint.into(), plot }
+        }
     }
 
-    fn level(&self, value: f64, colour: &'static str, width_px: f64, dash: &'static str) -> Layer {
-        rule([(0.0, value), (self.until_s.max(1.0), value)], colour, width_px, dash).into()
+    fn level(&self, value: f64, colour: &'static str, width_px: f64, dash: &'static str) -> Rule {
+        rule([(0.0, value), (self.until_s.max(1.0), value)], colour, width_px, dash)
     }
 
     /// Times of the lines through all panels; only for a single lane, because more would be confusing.
@@ -172,7 +192,7 @@ impl<'a> Shown<'a> {
         StepMark::ALL.into_iter().filter_map(time).filter(|mark| mark.1 <= self.until_s).collect()
     }
 
-    fn speed(&self, vehicles: usize) -> Panel {
+    fn speed(&self, vehicles: usize) -> Plot {
         let mut curves = Vec::new();
         let mut is_shared = true;
         for vehicle in 0..vehicles {
@@ -194,48 +214,56 @@ impl<'a> Shown<'a> {
         self.panel("Speed (m/s)", hint, 92.0, ends, layers(curves, marks))
     }
 
-    fn acceleration(&self) -> Panel {
-        let curves = self.curves(&|step| Some((step.a_ego_mps2, false)));
+    fn acceleration(&self) -> Plot {
+        let mut curves = self.curves(&|step| Some((step.a_ego_mps2, false)));
+        for curve in &mut curves {
+            let steps = curve.points.windows(2).map(|pair| pair[1].1 - pair[0].1).filter(|by| by.abs() > 1e-6);
+            let signs: Vec<bool> = steps.map(|by| by > 0.0).collect();
+            let is_chattering = signs.windows(2).filter(|pair| pair[0] != pair[1]).count() > MAX_TURNS;
+            if is_chattering {
+                curve.look.line_px = 0.6;
+            }
+        }
         let ends = around(values(&curves).chain([0.0, -1.0]));
         let mut layers = layers(curves, self.marks(&StepMark::ALL, None, &|step| Some(step.a_ego_mps2)));
-        layers.push(self.level(0.0, GREY, 1.1, ""));
+        layers.push(self.level(0.0, GREY, 1.1, "").into());
         self.panel("Acceleration (m/s²)", "of the ego", 92.0, ends, layers)
     }
 
-    fn gap(&self, vehicle: usize, name: &str) -> Panel {
+    fn gap(&self, vehicle: usize, name: &str) -> Plot {
         let gap = |step: &TracedStep| Some(step.others[vehicle]).filter(|o| o.is_present).map(|o| o.gap_m);
         let curves = self.judged_curves(vehicle, &|other| other.gap_m);
         let ends = around(values(&curves).chain([0.0]));
         let mut marks = self.marks(&[StepMark::Reaction, StepMark::Braking], None, &gap);
         marks.extend(self.marks(&[StepMark::Contact], Some(vehicle), &gap));
         let mut layers = layers(curves, marks);
-        layers.push(self.level(0.0, GREY, 1.1, ""));
+        layers.push(self.level(0.0, GREY, 1.1, "").into());
         self.panel("Gap (m)", name, 92.0, ends, layers)
     }
 
-    fn ttc(&self, vehicle: usize) -> Panel {
+    fn ttc(&self, vehicle: usize) -> Plot {
         let threshold = self.first(|trace| trace.ttc_threshold_s);
         let curves = self.judged_curves(vehicle, &|other| other.ttc_s);
         let largest = values(&curves).filter(|v| v.is_finite()).fold(0.0, f64::max);
         let top = plain_end(largest.clamp(2.0 * threshold, TTC_SHOWN * threshold));
-        self.measure("TTC (s)", format!("dots: fails below {threshold} s"), top, threshold, curves)
+        self.measure("TTC (s)", format!("fails below {threshold} s"), top, threshold, curves)
     }
 
-    fn btn(&self, vehicle: usize) -> Panel {
+    fn btn(&self, vehicle: usize) -> Plot {
         let threshold = self.first(|trace| trace.btn_threshold);
         let curves = self.judged_curves(vehicle, &|other| other.btn);
         let largest = values(&curves).fold(0.0, f64::max);
         let top = plain_end(largest.clamp(1.25 * threshold, BTN_SHOWN * threshold));
-        self.measure("BTN (–)", format!("dots: fails above {threshold}"), top, threshold, curves)
+        self.measure("BTN (–)", format!("fails above {threshold}"), top, threshold, curves)
     }
 
-    fn measure(&self, title: &str, hint: String, top: f64, threshold: f64, curves: Vec<Curve>) -> Panel {
+    fn measure(&self, title: &str, label: String, top: f64, threshold: f64, curves: Vec<Curve>) -> Plot {
         let mut layers = layers(curves.into_iter().flat_map(|curve| below(curve, top)), Vec::new());
-        layers.push(self.level(threshold, INK, 1.4, "2,3"));
-        self.panel(title, hint, 84.0, (-0.04 * top, top), layers)
+        layers.push(Rule { label, ..self.level(threshold, INK, 1.4, "2,3") }.into());
+        self.panel(title, "", 84.0, (-0.04 * top, top), layers)
     }
 
-    fn surrogate(&self, title: &str, hint: &str, vehicle: usize, value: &dyn Fn(&TracedVehicle) -> f64) -> Panel {
+    fn surrogate(&self, title: &str, hint: &str, vehicle: usize, value: &dyn Fn(&TracedVehicle) -> f64) -> Plot {
         let present = |step: &TracedStep| {
             let other = &step.others[vehicle];
             other.is_present.then(|| (value(other), false))
@@ -244,7 +272,7 @@ impl<'a> Shown<'a> {
         self.panel(title, hint, 58.0, (-0.1, 1.1), layers(self.curves(&present), Vec::new()))
     }
 
-    fn lateral(&self, vehicle: usize) -> Panel {
+    fn lateral(&self, vehicle: usize) -> Plot {
         let (mut curves, mut bands) = (Vec::new(), Vec::new());
         let ego_half_m = self.first(|trace| trace.ego_width_m) / 2.0;
         let mut edges = vec![HALF_LANE_M, -HALF_LANE_M, ego_half_m, -ego_half_m];
@@ -263,8 +291,8 @@ impl<'a> Shown<'a> {
             }
         }
         let contacts = self.marks(&[StepMark::Contact], Some(vehicle), &|step| Some(step.others[vehicle].y_m));
-        let lane = [-HALF_LANE_M, HALF_LANE_M].map(|y| self.level(y, GREY, 1.1, "14,6"));
-        let sides = [-ego_half_m, ego_half_m].map(|y| self.level(y, GREY, 2.4, ""));
+        let lane = [-HALF_LANE_M, HALF_LANE_M].map(|y| self.level(y, GREY, 1.1, "14,6").into());
+        let sides = [-ego_half_m, ego_half_m].map(|y| self.level(y, GREY, 2.4, "").into());
         let layers = lane.into_iter().chain(sides).chain(bands).chain(layers(curves, contacts));
         let ends = around(edges.into_iter());
         self.panel("Lateral position (m)", "grey lines: sides of the ego", 110.0, ends, layers.collect())

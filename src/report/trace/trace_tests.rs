@@ -1,7 +1,7 @@
 //! Properties of every figure and table of a case, including unusual ones.
 
 use super::super::plot::words;
-use super::{TraceFigure, TraceSeries, table};
+use super::{TraceFigure, TracePanels, TraceSeries, table};
 use crate::engine::{Headway, LaneCase, LanePlan, LaneRunner, StepMark, Trace};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -28,7 +28,13 @@ fn trace(profile: &str, case: &Case, gap_m: f64, model: ModelId) -> Trace {
 
 fn figure(traces: &[Trace]) -> TraceFigure<'_> {
     let series = traces.iter().map(|trace| TraceSeries { name: trace.model.name().to_owned(), trace }).collect();
-    TraceFigure { title: "A case".to_owned(), subtitle: Some("SYNTHETIC DATA".to_owned()), series, until_s: None }
+    TraceFigure {
+        title: "A case".to_owned(),
+        subtitle: Some("SYNTHETIC DATA".to_owned()),
+        series,
+        until_s: None,
+        panels: TracePanels::All,
+    }
 }
 
 /// Frames as (left, top, right, bottom), each with the points of its series and its marks.
@@ -175,8 +181,9 @@ fn a_vehicle_that_is_not_in_view_has_no_curves() {
     let traces = ModelId::ALL.map(|model| trace("jrc-2021", &out, 40.0, model));
     assert!(traces.iter().all(|t| t.steps.iter().all(|step| !step.others[0].is_present)));
     let panels = check(&traces);
-    assert!(panels[1..=6].iter().all(|(_, points, _)| points.is_empty()), "its gap, TTC, BTN, PFS, CFS and place");
-    assert!(panels[8..].iter().any(|(_, points, _)| !points.is_empty()), "the one ahead has some");
+    // After speed and acceleration, gap, TTC, BTN, PFS, CFS and place of the one beside those of the other.
+    assert!(panels[2..].iter().step_by(2).all(|(_, points, _)| points.is_empty()), "none of the one that cuts out");
+    assert!(panels[3..].iter().step_by(2).any(|(_, points, _)| !points.is_empty()), "the one ahead has some");
 }
 
 #[test]
@@ -189,10 +196,58 @@ fn the_largest_numbers_that_flags_allow_and_hostile_names_do_no_harm() {
         subtitle: None,
         series: vec![TraceSeries { name, trace: &far }],
         until_s: Some(0.5),
+        panels: TracePanels::All,
     };
     words(&hostile.svg());
-    let none = TraceFigure { title: String::new(), subtitle: None, series: Vec::new(), until_s: None };
+    let none = TraceFigure {
+        title: String::new(),
+        subtitle: None,
+        series: Vec::new(),
+        until_s: None,
+        panels: TracePanels::All,
+    };
     assert!(words(&none.svg()).contains("There is no lane to draw."));
+}
+
+/// Rectangles of a figure from above: vehicles by their tips.
+fn vehicles(svg: &str) -> Vec<(String, f64, f64)> {
+    let cells = svg.split("class=\"cell\"").skip(1).map(|cell| cell.split("</g>").next().unwrap().to_owned());
+    cells
+        .map(|cell| {
+            let name = cell.split("<title>").nth(1).unwrap().split('<').next().unwrap().to_owned();
+            (name, number(&cell, " x"), number(&cell, "width"))
+        })
+        .collect()
+}
+
+#[test]
+fn from_above_the_vehicles_are_as_far_apart_as_their_gap() {
+    let closing = case(Category::Lvd, 30.0, vehicle(25.0, Lateral::Centred));
+    let traces = ModelId::ALL.map(|model| trace("paper", &closing, 20.0, model));
+    let svg = figure(&traces).positions().svg();
+    words(&svg);
+    let drawn = vehicles(&svg);
+    assert_eq!(drawn.len(), 2 * (1 + traces.len()), "ego and leader at the start and for every model");
+    for pair in drawn.chunks(2) {
+        assert_eq!((pair[0].0.as_str(), pair[1].0.as_str()), ("ego", "other vehicle"));
+    }
+    let metre_px = drawn[0].2 / 4.5;
+    let gap_m = |pair: &[(String, f64, f64)]| (pair[1].1 - pair[0].1 - pair[0].2) / metre_px;
+    assert!((gap_m(&drawn[..2]) - traces[0].steps[0].others[0].gap_m).abs() < 0.01);
+    for (pair, trace) in drawn[2..].chunks(2).zip(&traces) {
+        assert!((gap_m(pair) - trace.outcome.min_gap).abs() < 0.01, "{}", trace.model.name());
+    }
+}
+
+#[test]
+fn the_moving_figure_has_a_vehicle_per_lane_that_ends_where_the_lane_does() {
+    let leaving = Lateral::Kinematic { start_m: 0.0, rate_mps: 1.5, end_m: 3.5 };
+    let out = case(Category::CutOut, 30.0, vehicle(28.0, leaving));
+    let traces = ModelId::ALL.map(|model| trace("paper", &out, 25.0, model));
+    let svg = figure(&traces).animation();
+    assert_eq!(svg, figure(&traces).animation());
+    assert!(svg.matches("<animateTransform").count() >= traces.len() && !svg.contains("NaN"));
+    words(&svg);
 }
 
 #[test]

@@ -6,7 +6,7 @@ use crate::stats::density::DensityModel;
 use crate::{Error, Place, Result};
 
 /// Cells along each axis.
-pub const MAP_CELLS: usize = 40;
+pub const MAP_CELLS: usize = 20;
 /// Margin of a map beyond the outermost kernel, in standard deviations of the kernels.
 const MARGIN: f64 = 2.0;
 
@@ -90,28 +90,28 @@ impl MapAxes {
     }
 }
 
-/// Lanes and failures per cell.
+/// Samples and failures per cell.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct MapCounts {
     /// The axes.
     pub axes: MapAxes,
-    /// Lanes per model, row by row from below.
-    pub lanes: Vec<u64>,
-    /// Failed lanes of each model.
+    /// Samples, row by row from below: the lanes of each model from each headway.
+    pub samples: Vec<u64>,
+    /// Failed lanes of each cell: headway × model.
     pub failures: Vec<Vec<u64>>,
 }
 
 impl MapCounts {
-    pub(super) fn new(axes: MapAxes, models: usize) -> MapCounts {
-        let cells = MAP_CELLS * MAP_CELLS;
-        MapCounts { axes, lanes: vec![0; cells], failures: vec![vec![0; cells]; models] }
+    pub(super) fn new(axes: MapAxes, lanes_per_sample: usize) -> MapCounts {
+        let cells = vec![0; MAP_CELLS * MAP_CELLS];
+        MapCounts { axes, failures: vec![cells.clone(); lanes_per_sample], samples: cells }
     }
 
     pub(super) fn add(&mut self, other: &MapCounts) {
         let sum =
             |ours: &mut [u64], theirs: &[u64]| ours.iter_mut().zip(theirs).for_each(|(a, b)| *a = a.saturating_add(*b));
-        sum(&mut self.lanes, &other.lanes);
+        sum(&mut self.samples, &other.samples);
         for (ours, theirs) in self.failures.iter_mut().zip(&other.failures) {
             sum(ours, theirs);
         }

@@ -54,7 +54,7 @@ pub struct SampleTally {
     /// The worst lanes of each model, ascending by (value, lane).
     pub worst: Vec<Vec<WorstSample>>,
     worst_limit: usize,
-    /// The failure map, with failures counted per model.
+    /// The failure map.
     pub map: Option<MapCounts>,
     /// Samples and failures by kernel; `None` if the points do not come from kernels.
     pub by_kernel: Option<KernelCounts>,
@@ -76,7 +76,7 @@ impl SampleTally {
             close_failures: vec![0; models * criteria],
             worst: vec![Vec::new(); models],
             worst_limit: options.worst,
-            map: options.map.as_ref().map(|axes| MapCounts::new(axes.clone(), models)),
+            map: options.map.as_ref().map(|axes| MapCounts::new(axes.clone(), headways * models)),
             by_kernel: KernelCounts::empty(plan),
         }
     }
@@ -172,12 +172,12 @@ impl SampleTally {
             for (square, k) in self.squares[model * criteria..].iter_mut().zip(failed) {
                 *square += k * k;
             }
-            if let (Some(map), Some(cell)) = (&mut self.map, cell) {
-                map.failures[model][cell] += failed[options.criterion.index()];
-            }
         }
         if let (Some(map), Some(cell)) = (&mut self.map, cell) {
-            map.lanes[cell] += headways as u64;
+            map.samples[cell] += 1;
+            for (failures, verdicts) in map.failures.iter_mut().zip(lanes) {
+                failures[cell] += u64::from(verdicts.failed(options.criterion));
+            }
         }
         let kernel = generator.zip(drawn).and_then(|(generator, drawn)| generator.points.component(unit, drawn.tries));
         kernel.unwrap_or(NO_KERNEL)
@@ -285,8 +285,8 @@ impl SampleTally {
             (self.failures.iter().chain(&self.capped).any(|n| *n > samples), "more failures than samples"),
         ];
         if let Some(map) = &self.map {
-            let complete = |cells: &Vec<u64>| cells.len() == MAP_CELLS * MAP_CELLS;
-            let fits = complete(&map.lanes) && map.failures.len() == models && map.failures.iter().all(complete);
+            let complete = |counts: &Vec<u64>| counts.len() == MAP_CELLS * MAP_CELLS;
+            let fits = complete(&map.samples) && map.failures.len() == cells && map.failures.iter().all(complete);
             problems.push((!fits, "the map has another number of cells"));
         }
         if let Some(counts) = &self.by_kernel {

@@ -358,6 +358,9 @@ impl Reduction {
             (true, Side::Right) => (-1.0, ", on the right"),
         };
         let instants = self.options.svd_instants;
+        if vectors.is_empty() {
+            return Ok(Vec::new());
+        }
         let shape = |(at, series): (usize, &ReducedSeries)| {
             let sign = if *series == ReducedSeries::Lateral { mirror } else { 1.0 };
             let part =
@@ -368,11 +371,13 @@ impl Reduction {
                 ReducedSeries::LeadSpeed => ("speed of the vehicle ahead".to_owned(), "m/s"),
             };
             let along = along.iter().map(|z| part(z)).collect();
-            ModeShape { quantity, unit: unit.to_owned(), mean: part(&mean), along }
+            let envelope = (0..instants).map(|instant| {
+                let mut here: Vec<f64> = vectors.iter().map(|z| sign * z[at * instants + instant]).collect();
+                here.sort_by(f64::total_cmp);
+                [0.05, 0.95].map(|share| here[(share * (here.len() - 1) as f64).round() as usize])
+            });
+            ModeShape { quantity, unit: unit.to_owned(), mean: part(&mean), envelope: envelope.collect(), along }
         };
-        if vectors.is_empty() {
-            return Ok(Vec::new());
-        }
         Ok(layout(self.category).0.iter().enumerate().map(shape).collect())
     }
 }
@@ -412,6 +417,8 @@ pub struct ModeShape {
     pub unit: String,
     /// The mean, over equidistant instants of [0, T].
     pub mean: Vec<f64>,
+    /// Between these lie the middle nine tenths of the scenarios, at each instant.
+    pub envelope: Vec<[f64; 2]>,
     /// The mean plus one standard deviation of coefficient j along direction j, for the first directions.
     pub along: Vec<Vec<f64>>,
 }

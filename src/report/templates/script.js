@@ -1,0 +1,34 @@
+"use strict";
+// A click on a column's head sorts the rows by it, a second click the other way round.
+for (const table of document.querySelectorAll("table")) {
+  const heads = [...table.tHead.rows[0].cells];
+  heads.forEach((head, at) => head.addEventListener("click", () => {
+    const down = head.ariaSort === "ascending" ? -1 : 1;
+    heads.forEach((other) => { other.ariaSort = null; });
+    head.ariaSort = down > 0 ? "ascending" : "descending";
+    const text = (row) => row.cells[at].textContent.trim();
+    const number = (row) => Number.parseFloat(text(row).replace(/[≤>±,]/g, ""));
+    const order = (a, b) => {
+      const [x, y] = [number(a), number(b)];
+      if (Number.isNaN(x) && Number.isNaN(y)) { return down * text(a).localeCompare(text(b)); }
+      return Number.isNaN(x) ? 1 : Number.isNaN(y) ? -1 : down * (x - y);
+    };
+    table.tBodies[0].append(...[...table.tBodies[0].rows].sort(order));
+  }));
+}
+// The value of a mark beside the pointer, at once.
+const tip = document.getElementById("tip");
+document.addEventListener("mousemove", (event) => {
+  const mark = event.target.closest("figure g");
+  const title = mark && [...mark.children].find((child) => child.tagName === "title");
+  tip.hidden = !title;
+  if (title) {
+    tip.textContent = title.textContent;
+    tip.style.left = Math.min(event.pageX + 12, document.body.scrollWidth - 260) + "px";
+    tip.style.top = event.pageY + 14 + "px";
+  }
+});
+// A link into a folded part opens it.
+const open = () => document.getElementById(location.hash.slice(1))?.querySelector("details")?.setAttribute("open", "");
+addEventListener("hashchange", open);
+open();
