@@ -113,7 +113,7 @@ impl Check {
             write(path, sheet.html()?.as_bytes())?;
         }
         if let Some(path) = &self.animation {
-            write(path, sheet.figure(TracePanels::Course).animation().as_bytes())?;
+            write(path, sheet.figure(TracePanels::Course).animation().svg().as_bytes())?;
         }
         if let Some(path) = &self.series {
             let named = judgements[0].models.iter().map(|judged| (judged.trace.model.name().to_owned(), &judged.trace));

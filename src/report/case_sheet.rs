@@ -5,7 +5,7 @@ use serde_json::{Value, json};
 
 use super::case_sentences::VARIED;
 use super::html::{Page, PageFigure, Section};
-use super::records;
+use super::records::{self, PROGRAM};
 use super::tables::{WIDTH, wrap};
 use super::trace::{TraceFigure, TracePanels, TraceSeries};
 use crate::model::driver::ModelId;
@@ -232,7 +232,7 @@ impl CaseSheet<'_> {
             .chain(self.subject.duration_s().map(|duration_s| ("duration_s".to_owned(), json!(duration_s))))
             .collect();
         records::document(&json!({
-            "program": program(),
+            "program": PROGRAM,
             "data": self.origin,
             "synthetic": self.is_synthetic,
             "category": self.subject.category().key(),
@@ -269,9 +269,6 @@ impl CaseSheet<'_> {
     pub fn html(&self) -> Result<String> {
         let first = self.first();
         let mut warnings = Vec::new();
-        if self.is_synthetic {
-            warnings.push("SYNTHETIC DATA: nothing on this sheet is a statement about real traffic.".to_owned());
-        }
         if first.verdict() == Verdict::Undecided {
             warnings.push(format!("Undecided: the answer changes with {}.", first.flips.join(", ")));
         }
@@ -323,7 +320,7 @@ impl CaseSheet<'_> {
         let reproduction = Section {
             facts: vec![
                 ("command".to_owned(), self.command.clone()),
-                ("program".to_owned(), program()),
+                ("program".to_owned(), PROGRAM.to_owned()),
                 ("data".to_owned(), self.origin.clone()),
                 ("arithmetic".to_owned(), format!("binary64, time step {} s", self.profiles[0].frame.dt_s)),
             ],
@@ -332,7 +329,6 @@ impl CaseSheet<'_> {
         };
         let page = Page {
             title: format!("One {} against UN R157", self.subject.category().label()),
-            program: program(),
             lead: std::iter::once(self.case())
                 .chain([self.answer()])
                 .chain(self.demand())
@@ -340,6 +336,7 @@ impl CaseSheet<'_> {
                 .map(|sentence| format!("{sentence}."))
                 .collect::<Vec<_>>()
                 .join(" "),
+            synthetic: self.is_synthetic,
             warnings,
             sections: vec![course, case, drivers, clauses, boundaries, reproduction],
         };
@@ -385,8 +382,4 @@ fn ends(change: &Change) -> Value {
 /// A number with its sign.
 fn signed(number: f64) -> String {
     format!("{}{}", if number < 0.0 { "-" } else { "+" }, value(number.abs()))
-}
-
-fn program() -> String {
-    format!("lanesweep {}", env!("CARGO_PKG_VERSION"))
 }

@@ -7,6 +7,7 @@ use super::close_following::{CloseRow, close_following};
 use super::dots::{DotRow, Dots, dots};
 use super::html::{Page, PageFigure, Section};
 use super::plot::{AxisScale, Figure, INK, Look, PlotAxis, Series, Symbol, Value, logarithmic_reach};
+use super::records::PROGRAM;
 use super::sampling::HostRecord;
 use super::tables::{WIDTH, wrap};
 use crate::engine::Headway;
@@ -77,7 +78,7 @@ impl CompareFile {
         let (plan, options, provenance) = (compare.lane_plan(), compare.options(), compare.provenance().clone());
         CompareFile {
             lanesweep_comparison: 1,
-            program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
+            program: PROGRAM.to_owned(),
             data: provenance.data,
             synthetic: provenance.synthetic,
             scenarios_sha256: provenance.scenarios_sha256,
@@ -241,9 +242,6 @@ impl CompareFile {
     /// None for a page of this program.
     pub fn html(&self, figures: Vec<PageFigure>) -> Result<String> {
         let mut warnings = Vec::new();
-        if self.synthetic {
-            warnings.push("Synthetic data: no number on this page is a statement about real traffic.".to_owned());
-        }
         if !self.left_out.is_empty() {
             warnings.push(format!("{} parts were left out; see the end of Rates.", self.left_out.len()));
         }
@@ -287,8 +285,8 @@ impl CompareFile {
         };
         let page = Page {
             title: "Rates of failure: recorded, replayed, drawn".to_owned(),
-            program: self.program.clone(),
             lead: self.data.clone(),
+            synthetic: self.synthetic,
             warnings,
             sections: shown.into_iter().chain([rates, reproduction]).collect(),
         };

@@ -3,6 +3,7 @@
 use serde_json::json;
 
 use super::records;
+use super::records::PROGRAM;
 use super::sampling::HostRecord;
 use super::trace::{TraceFigure, TracePanels, TraceSeries};
 use crate::Result;
@@ -221,7 +222,7 @@ impl DossierReport<'_> {
         let conformance =
             self.conformance.iter().map(|(what, rows, passes)| json!({"what": what, "rows": rows, "passes": passes}));
         records::document(&json!({
-            "program": program(),
+            "program": PROGRAM,
             "data": self.provenance.data,
             "synthetic": self.provenance.synthetic,
             "scenarios_sha256": self.provenance.scenarios_sha256,
@@ -282,8 +283,4 @@ fn interval(interval: Option<(f64, f64)>) -> String {
         Some((low, f64::INFINITY)) => format!("above {}", value(low)),
         Some((low, high)) => format!("[{} {}]", value(low), value(high)),
     }
-}
-
-pub(super) fn program() -> String {
-    format!("lanesweep {}", env!("CARGO_PKG_VERSION"))
 }

@@ -1,7 +1,8 @@
 //! The dossier's page: its chapters.
 
-use super::dossier::{DossierReport, SHOWN, program, share};
+use super::dossier::{DossierReport, SHOWN, share};
 use super::html::{Page, PageFigure, Section};
+use super::records::PROGRAM;
 use crate::support::readable::{count, value};
 use crate::support::table::Table;
 use crate::{Error, Result};
@@ -12,15 +13,11 @@ impl DossierReport<'_> {
     /// # Errors
     /// [`Error::Internal`] if the template does not match: a defect of this program.
     pub fn html(&self) -> Result<String> {
-        let mut warnings = Vec::new();
-        if self.provenance.synthetic {
-            warnings.push("SYNTHETIC DATA: nothing on this page is a statement about real traffic.".to_owned());
-        }
         let page = Page {
             title: format!("Is {} appropriate under {}?", self.dossier.parameterization.name(), self.profile.name),
-            program: program(),
             lead: format!("{}. {} {}", self.answer(), self.recall(), self.provenance.data),
-            warnings,
+            synthetic: self.provenance.synthetic,
+            warnings: Vec::new(),
             sections: vec![
                 self.conclusion_section(),
                 self.hidden_section(),
@@ -190,7 +187,7 @@ impl DossierReport<'_> {
         Ok(Section {
             facts: vec![
                 ("command".to_owned(), self.command.clone()),
-                ("program".to_owned(), format!("{}, engine {}", program(), crate::engine::ENGINE_VERSION)),
+                ("program".to_owned(), format!("{PROGRAM}, engine {}", crate::engine::ENGINE_VERSION)),
                 ("data".to_owned(), self.provenance.data.clone()),
                 ("SHA-256 of the scenarios".to_owned(), self.provenance.scenarios_sha256.clone()),
                 ("SHA-256 of the plan".to_owned(), self.dossier.plan_sha256.clone()),

@@ -5,7 +5,7 @@
 
 use super::convergence::sampled;
 use super::plot::{Cells, ColourBar, Figure, Fill, FilledCell, Height, Plot, PlotAxis};
-use super::plot::{number, plain_end};
+use super::plot::{number, plain_end, quantity};
 use crate::engine::{Headway, LanePlan};
 use crate::model::criterion::Criterion;
 use crate::run::sampling::{MAP_CELLS, MapAxis, MapCounts};
@@ -63,8 +63,7 @@ impl FailureMaps<'_> {
         let (largest, axes) = (self.largest(), &self.map.axes);
         let (x, y) = (axes.x.edges(), axes.y.edges());
         let axis = |axis: &MapAxis| {
-            let name = axis.name.strip_suffix("_mps").or(axis.name.strip_suffix("_mps2")).unwrap_or(&axis.name);
-            let name = name.replace('_', " ");
+            let name = quantity(&axis.name);
             let label = if axis.unit.is_empty() { name } else { format!("{name} in {}", axis.unit) };
             PlotAxis::exactly(label, axis.lower, axis.upper)
         };
@@ -84,6 +83,7 @@ impl FailureMaps<'_> {
                     corners: [(x[i], y[j]), (x[i + 1], y[j + 1])],
                     fill: fill(samples, failures),
                     tip: format!("{}; {}: {failures} of {samples} failed, share {share}", range(&x, i), range(&y, j)),
+                    ..FilledCell::default()
                 }
             };
             let has_none = self.cells(headway, model).any(|(_, _, failures)| failures == 0);

@@ -7,6 +7,7 @@ use minijinja::{Environment, escape_formatter};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
+use super::records::PROGRAM;
 use crate::support::plain_text::shown;
 use crate::support::table::Table;
 use crate::{Error, Result};
@@ -64,10 +65,10 @@ pub struct Section {
 pub struct Page {
     /// Heading.
     pub title: String,
-    /// Program and version.
-    pub program: String,
     /// What was run on which data, in one sentence.
     pub lead: String,
+    /// Whether the data are synthetic, which the page then says first.
+    pub synthetic: bool,
     /// Warnings at the top of the page.
     pub warnings: Vec<String>,
     /// The chapters.
@@ -97,6 +98,7 @@ impl Page {
             style: &'a str,
             script: &'a str,
             script_sha256: String,
+            program: &'a str,
             #[serde(flatten)]
             page: &'a Page,
         }
@@ -111,7 +113,9 @@ impl Page {
         environment.add_template("report.html", TEMPLATE).map_err(broken)?;
         let template = environment.get_template("report.html").map_err(broken)?;
         let script_sha256 = BASE64_STANDARD.encode(Sha256::digest(SCRIPT));
-        template.render(Serde(Context { style: STYLE, script: SCRIPT, script_sha256, page: self })).map_err(broken)
+        template
+            .render(Serde(Context { style: STYLE, script: SCRIPT, script_sha256, program: PROGRAM, page: self }))
+            .map_err(broken)
     }
 }
 

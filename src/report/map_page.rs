@@ -2,6 +2,7 @@
 
 use super::html::{Page, PageFigure, Section};
 use super::map::MapReport;
+use super::records::PROGRAM;
 use crate::support::readable::count;
 use crate::{Error, Result};
 
@@ -28,11 +29,10 @@ impl MapReport {
         });
         let mut host = vec![("computed by".to_owned(), self.host.backend.clone())];
         host.extend(self.host.device.iter().map(|device| ("device".to_owned(), device.line())));
-        let program = format!("lanesweep {}", env!("CARGO_PKG_VERSION"));
         let reproduction = Section {
             intro: "The same grid and profile give the same cells, on any machine. map.json holds all of it."
                 .to_owned(),
-            facts: [("program".to_owned(), program.clone()), ("profile".to_owned(), self.profile.name.clone())]
+            facts: [("program".to_owned(), PROGRAM.to_owned()), ("profile".to_owned(), self.profile.name.clone())]
                 .into_iter()
                 .chain(hashes)
                 .collect(),
@@ -43,15 +43,14 @@ impl MapReport {
         };
         let page = Page {
             title: "Outcomes over a grid".to_owned(),
-            program,
             lead: format!(
                 "{} simulations: {} over a grid of parameters, profile {}.",
                 count(self.simulations()),
                 self.criterion.label(),
                 self.profile.name
             ),
-            warnings: Vec::new(),
             sections: vec![shares, sheets, reproduction],
+            ..Page::default()
         };
         page.html()
     }

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::map::{Difference, MapHost, MapReport};
+use super::records::PROGRAM;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -19,7 +20,7 @@ impl MapReport {
     pub fn json(&self, files: Vec<String>) -> Result<String> {
         let shown = self.shown_outcomes();
         let record = MapRecord {
-            program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
+            program: PROGRAM.to_owned(),
             preset: self.preset.as_deref(),
             criterion: self.criterion.key(),
             against: self.against.as_ref().map(|_| self.against_name()),

@@ -118,7 +118,7 @@ impl MapSheet<'_> {
             for j in 0..self.grid.y().len() {
                 for (from, to) in runs(self.grid.x().len(), &|i| kind(i, j) == number) {
                     let corners = [(across[from], up[j]), (across[to], up[j + 1])];
-                    cells.cells.push(FilledCell { corners, fill: flat(colour), tip: String::new() });
+                    cells.cells.push(FilledCell { corners, fill: flat(colour), ..FilledCell::default() });
                 }
             }
         }

@@ -2,6 +2,9 @@
 
 use serde_json::Value;
 
+/// Program and version.
+pub const PROGRAM: &str = concat!("lanesweep ", env!("CARGO_PKG_VERSION"));
+
 use crate::engine::{NO_STEP, Outcome};
 use crate::model::criterion::Criterion;
 use crate::{Error, Result};

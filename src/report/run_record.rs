@@ -2,6 +2,7 @@
 
 use serde::Serialize;
 
+use super::records::PROGRAM;
 use crate::engine::{Block, DeviceRecord, ENGINE_VERSION, SweepSummary};
 use crate::model::profile::Profile;
 use crate::run::score::{ScoreOptions, ScoreTable, f1};
@@ -149,7 +150,7 @@ impl RunRecord {
     pub fn of(study: &Study, scores: &ScoreTable, host: StudyHost) -> RunRecord {
         let (plan, facts) = (study.plan(), study.facts().clone());
         RunRecord {
-            program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
+            program: PROGRAM.to_owned(),
             engine: ENGINE_VERSION,
             data: facts.data,
             synthetic: facts.synthetic,

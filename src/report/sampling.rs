@@ -6,6 +6,7 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::close_following::{CloseRow, close_following};
+use super::records::PROGRAM;
 use super::tables::{WIDTH, wrap};
 use crate::engine::generated::ATTEMPTS;
 use crate::engine::{DeviceRecord, ENGINE_VERSION, Headway, LanePlan, OpenBackend};
@@ -209,7 +210,7 @@ impl EstimateFile {
         let stopped = estimates.iter().map(|r| r.estimate.stopped).max_by_key(|s| *s == StopReason::TimeLimit);
         EstimateFile {
             lanesweep_estimate: 1,
-            program: format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
+            program: PROGRAM.to_owned(),
             engine: ENGINE_VERSION,
             estimator: options.estimator.key(),
             density,

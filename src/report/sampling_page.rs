@@ -20,9 +20,6 @@ impl EstimateFile {
     pub fn html(&self, figures: Vec<PageFigure>) -> Result<String> {
         let density = &self.density;
         let mut warnings = Vec::new();
-        if density.provenance.synthetic {
-            warnings.push("Synthetic data: no number on this page is a statement about real traffic.".to_owned());
-        }
         if !self.given.is_empty() {
             let list: Vec<String> = self.given.iter().map(|(name, v)| format!("{name} = {}", value(*v))).collect();
             let given = list.join(", ");
@@ -33,7 +30,6 @@ impl EstimateFile {
         }
         let page = Page {
             title: format!("Probability of failure: {}", self.name()),
-            program: self.program.clone(),
             lead: format!(
                 "{} samples of {}, estimator {}, profile {}. {}",
                 count(self.samples),
@@ -48,6 +44,7 @@ impl EstimateFile {
                 self.profile.name,
                 density.provenance.data
             ),
+            synthetic: density.provenance.synthetic,
             warnings,
             sections: vec![self.estimates_section(), pictures(figures), self.reproduction()?],
         };

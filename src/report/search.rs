@@ -6,11 +6,12 @@ use serde_json::{Value as Json, json};
 
 use super::html::{Page, PageFigure, Section};
 use super::plot::{Figure, Layer, Look, Mark, Plot, PlotAxis, Series, Symbol, Value};
+use super::records::PROGRAM;
 use super::sampling::HostRecord;
 use super::study_figures::modes;
 use super::tables::wrap;
 use crate::model::profile::Profile;
-use crate::run::search::{Candidate, Evaluated, Front, FrontPoint, Judged, PaperPoint, Scope, Scored, SearchResult};
+use crate::run::search::{Candidate, Evaluated, Front, FrontPoint, Judged, Scope, Scored, SearchResult};
 use crate::scenario::parameterization::ModeShape;
 use crate::support::readable::{count, counted};
 use crate::support::run_dir::Results;
@@ -97,41 +98,28 @@ impl SearchReport<'_> {
         format!("{} of {}", options.objective.name(), options.criterion.label())
     }
 
-    /// The rows of a front: paper first.
+    /// The rows of a front, the paper's first.
     fn table(&self, front: &Front) -> Table {
-        enum Row<'a> {
-            Paper(&'a PaperPoint, bool),
-            Found(&'a FrontPoint, bool),
-        }
-        let paper = front.paper.iter().enumerate().map(|(at, point)| Row::Paper(point, front.best_paper == Some(at)));
-        let found = front.points.iter().enumerate().map(|(at, point)| Row::Found(point, front.winner == Some(at)));
-        let rows: Vec<Row> = paper.chain(found).collect();
-        let parts = |row: &Row| -> (Candidate, usize, Judged) {
-            match row {
-                Row::Paper(point, _) => (point.candidate.clone(), point.parameters, point.judged.clone()),
-                Row::Found(point, _) => (point.candidate.clone(), point.parameters, point.judged.clone()),
-            }
-        };
+        let paper = front.paper.iter().enumerate();
+        let paper =
+            paper.map(|(at, point)| (point, if front.best_paper == Some(at) { "paper's best" } else { "paper" }));
+        let found = front.points.iter().enumerate();
+        let found = found.map(|(at, point)| (point, if front.winner == Some(at) { "winner" } else { "found" }));
         let has_held_out = self.held_out.is_some();
         let shown = SCORES.into_iter().filter(|(name, _)| has_held_out || *name != "held_out");
-        Table::of(rows.iter())
-            .column("description", |row| name_of(&parts(row).0, parts(row).1))
-            .column("parameters", |row| parts(row).1)
-            .column("", |row| match row {
-                Row::Paper(_, true) => "paper's best",
-                Row::Paper(..) => "paper",
-                Row::Found(_, true) => "winner",
-                Row::Found(..) => "found",
-            })
+        Table::of(paper.chain(found))
+            .column("description", |(point, _)| name_of(&point.candidate, point.parameters))
+            .column("parameters", |(point, _)| point.parameters)
+            .column("", |(_, kind)| kind)
             .columns(
                 shown,
                 |(name, _)| name.replace('_', " "),
-                |row, (_, of)| of(&parts(row).2).map_or(String::new(), |scored| with_interval(&scored)),
+                |(point, _), (_, of)| of(&point.judged).map_or(String::new(), |scored| with_interval(&scored)),
             )
-            .column("against the paper's best", |row| match row {
-                Row::Found(point, _) => verdict(point),
-                Row::Paper(..) => "",
-            })
+            .column(
+                "against the paper's best",
+                |(point, kind)| if kind.starts_with("paper") { "" } else { verdict(point) },
+            )
             .build()
             .captioned(format!("{}, {}", self.goal(), front.scope.name()))
     }
@@ -397,13 +385,9 @@ impl SearchReport<'_> {
     fn front_csv(&self) -> Table {
         let category = self.result.category;
         let rows = self.result.fronts.iter().flat_map(|front| {
-            let paper =
-                front.paper.iter().map(move |p| (front, "paper", &p.candidate, p.parameters, p.rmse, &p.judged));
-            let found =
-                front.points.iter().map(move |p| (front, "found", &p.candidate, p.parameters, p.rmse, &p.judged));
-            paper.chain(found)
+            let paper = front.paper.iter().map(move |point| (front.scope, "paper", point));
+            paper.chain(front.points.iter().map(move |point| (front.scope, "found", point)))
         });
-        let rows: Vec<_> = rows.collect();
         type End = fn(&Scored) -> Option<f64>;
         let ends: [(&str, End); 3] = [
             ("", |scored| scored.value),
@@ -411,17 +395,17 @@ impl SearchReport<'_> {
             ("_high", |scored| scored.interval.map(|i| i.high)),
         ];
         let columns = SCORES.into_iter().flat_map(|score| ends.map(|end| (score, end)));
-        Table::of(rows.iter())
-            .column("models", |row| row.0.scope.name())
-            .column("origin", |row| row.1)
-            .column("parameters", |row| row.3)
-            .column("rmse", |row| row.4)
+        Table::of(rows)
+            .column("models", |(scope, ..)| scope.name())
+            .column("origin", |(_, origin, _)| origin)
+            .column("parameters", |(.., point)| point.parameters)
+            .column("rmse", |(.., point)| point.rmse)
             .columns(
                 columns,
                 |((score, _), (end, _))| format!("{score}{end}"),
-                |row, ((_, of), (_, end))| of(row.5).and_then(|scored| end(&scored)),
+                |(.., point), ((_, of), (_, end))| of(&point.judged).and_then(|scored| end(&scored)),
             )
-            .column("description", |row| row.2.describe(category))
+            .column("description", |(.., point)| point.candidate.describe(category))
             .column("data", |_| self.data.as_str())
             .build()
     }
@@ -441,7 +425,7 @@ impl SearchReport<'_> {
         let result = self.result;
         let winner = result.fronts.first().and_then(|front| Some(&front.points[front.winner?]));
         Ok(json!({
-            "program": format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
+            "program": PROGRAM,
             "command": self.command,
             "data": self.data,
             "held_out": self.held_out,
@@ -520,10 +504,9 @@ impl SearchReport<'_> {
             text: lost,
             ..Section::new("unkept", "What no description keeps")
         };
-        let program = format!("lanesweep {}", env!("CARGO_PKG_VERSION"));
         let reproduction = Section {
             facts: vec![
-                ("program".to_owned(), program.clone()),
+                ("program".to_owned(), PROGRAM.to_owned()),
                 ("command".to_owned(), self.command.clone()),
                 ("profile".to_owned(), self.profile.name.clone()),
             ],
@@ -534,13 +517,9 @@ impl SearchReport<'_> {
         sections.retain(|s| s.id != "winner" || !s.figures.is_empty());
         let page = Page {
             title: format!("Search for a parameterization: {}", self.result.category.label()),
-            program,
             lead: format!("{} studies. {}", count(self.result.studies as u64), self.data),
-            warnings: if self.synthetic {
-                vec!["Synthetic data: no statement about real traffic.".to_owned()]
-            } else {
-                Vec::new()
-            },
+            synthetic: self.synthetic,
+            warnings: Vec::new(),
             sections,
         };
         page.html()

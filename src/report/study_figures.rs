@@ -4,6 +4,7 @@
 use super::dots::{DotRow, Dots, dots};
 use super::plot::{
     AxisScale, Figure, GREY, HOLLOW, INK, Layer, Look, Mark, Name, Plot, PlotAxis, Rule, Series, Symbol, Value, is_few,
+    quantity,
 };
 use crate::engine::{Headway, LanePlan, Partial};
 use crate::model::criterion::Criterion;
@@ -442,7 +443,7 @@ pub fn distributions(category: Category, histograms: &[ParameterHistogram], data
         let middle = |k: usize| histogram.low + (k as f64 + 0.5) * histogram.width;
         let values = histogram.counts.iter().enumerate().map(|(k, count)| (middle(k), *count as f64));
         Plot {
-            heading: histogram.name.clone(),
+            heading: quantity(&histogram.name),
             x: PlotAxis::new(&histogram.unit),
             y: PlotAxis::new("scenarios"),
             layers: vec![Series::new("", &[Mark::Bars(histogram.width)], values).into()],

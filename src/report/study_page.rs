@@ -25,9 +25,6 @@ impl StudyReport {
     pub fn html(&self) -> Result<String> {
         let run = &self.run;
         let mut warnings = Vec::new();
-        if run.synthetic {
-            warnings.push("Synthetic data: no number on this page is a statement about real traffic.".to_owned());
-        }
         if !run.left_out.is_empty() {
             warnings.push(format!("{} parts of the input were left out; see Data.", run.left_out.len()));
         }
@@ -55,7 +52,6 @@ impl StudyReport {
         sections.insert(0, answer);
         let page = Page {
             title: "Parameterized against recorded scenarios".to_owned(),
-            program: run.program.clone(),
             lead: format!(
                 "{} {} lanes: every scenario as recorded (S) and parameterized (S'), from {}, against {} \
                  driver models, judged by collision, TTC and BTN under profile {}.",
@@ -65,6 +61,7 @@ impl StudyReport {
                 self.scores.categories.first().map_or(0, |c| c.models.len()),
                 run.profile.name
             ),
+            synthetic: run.synthetic,
             warnings,
             sections,
         };

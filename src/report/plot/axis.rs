@@ -215,6 +215,13 @@ pub(in crate::report) fn logarithmic_reach(intervals: &[(f64, f64, f64)]) -> Vec
     middles.iter().copied().chain(intervals.iter().map(|(_, _, u)| *u)).chain(lows).filter(shown).collect()
 }
 
+/// The name of a parameter in words, without its unit: `lateral speed` for `lateral_speed_mps`.
+pub(in crate::report) fn quantity(name: &str) -> String {
+    let units = ["_mps2", "_mps", "_m", "_s"];
+    let bare = units.iter().find_map(|unit| name.strip_suffix(unit)).unwrap_or(name);
+    bare.replace('_', " ")
+}
+
 /// A number with three digits in short form: `0.012`, `250`, `1.5e-6`; NaN and infinity in words.
 pub(in crate::report) fn number(value: f64) -> String {
     digits_text(value, 3)

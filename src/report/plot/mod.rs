@@ -18,7 +18,7 @@ pub use cells::{Cells, ColourBar, Fill, FilledCell};
 pub use layer::{Layer, Mark, Rule, Series, Value};
 pub use look::{Look, Symbol};
 
-pub(super) use axis::{logarithmic_reach, number, plain_end};
+pub(super) use axis::{logarithmic_reach, number, plain_end, quantity};
 pub(super) use layer::{HOLLOW, TICK, is_few};
 #[cfg(test)]
 pub(super) use svg::tests::words;

@@ -135,7 +135,7 @@ impl Canvas {
     }
 
     /// Adds an element, written verbatim.
-    pub fn element(&mut self, text: &str) {
+    pub(super) fn element(&mut self, text: &str) {
         self.body.extend(std::iter::repeat_n("  ", self.depth));
         self.body += text;
         self.body.push('\n');
@@ -155,11 +155,6 @@ impl Canvas {
         let (x, y, width, height) =
             (Number(x1.min(x2)), Number(y1.min(y2)), Number((x2 - x1).abs()), Number((y2 - y1).abs()));
         self.shape(format!("<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\""), paint);
-    }
-
-    /// Draws a filled rectangle.
-    pub fn fill_rect(&mut self, [from, to]: [Position; 2], colour: &str) {
-        self.rect(from, to, Paint::fill(colour));
     }
 
     pub fn circle(&mut self, (x, y): Position, radius_px: f64, paint: Paint) {

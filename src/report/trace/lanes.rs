@@ -4,7 +4,7 @@ use super::{TraceFigure, TracePanels, TraceSeries, table};
 use crate::Result;
 use crate::engine::{EndReason, NO_STEP, Outcome, Trace};
 use crate::model::criterion::Criterion;
-use crate::report::records;
+use crate::report::records::{self, PROGRAM};
 use crate::run::reopen::{TracedLane, TracedLanes};
 use crate::support::readable::value;
 
@@ -49,7 +49,7 @@ impl TracedLanes {
             })
         });
         records::document(&serde_json::json!({
-            "program": format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
+            "program": PROGRAM,
             "data": self.origin,
             "synthetic": self.is_synthetic,
             "lanes": outcomes.collect::<Vec<_>>(),

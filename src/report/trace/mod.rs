@@ -52,21 +52,7 @@ impl TraceFigure<'_> {
         let (columns, plots) = shown.panels(self.panels);
         let caption = self.notes(&shown, &plots).join(" ");
         let figure = Figure { title, subtitle, plots, columns, is_wide: columns > 1, caption, ..Figure::default() };
-        figure.svg_with(|canvas, top| match self.panels {
-            TracePanels::Measures => self.names(canvas, &shown.looks, top),
-            _ => self.table(canvas, &shown.looks, top) + 4.0,
-        })
-    }
-
-    /// Draws the names of the series in one line; returns the y below.
-    fn names(&self, canvas: &mut Canvas, looks: &[Look], top: f64) -> f64 {
-        let mut left = MARGIN_PX;
-        for (series, look) in self.series.iter().zip(looks) {
-            sample(canvas, look, (left, top));
-            canvas.text((left + SAMPLE_PX + 6.0, top + 13.0), &series.name, CELL, Anchor::Start);
-            left += SAMPLE_PX + CELL.text_px(&series.name) + 18.0;
-        }
-        top + CELL.line_px() + 4.0
+        figure.svg_with(|canvas, top| self.table(canvas, &shown.looks, top) + 4.0)
     }
 
     /// Draws names, marks and worst values of the series; returns the y below.
@@ -83,7 +69,8 @@ impl TraceFigure<'_> {
         }
         for (series, look) in self.series.iter().zip(looks) {
             let (baseline, middle) = (y + f64::from(CELL.size_px), y + CELL.line_px() / 2.0);
-            sample(canvas, look, (MARGIN_PX, y));
+            let sample = vec![(MARGIN_PX, middle), (MARGIN_PX + SAMPLE_PX, middle)];
+            canvas.group("class=\"legend\"", "", |canvas| canvas.path(&[sample], false, look.paint()));
             let below = canvas.paragraph((name_left, y), &series.name, CELL, at(0) - name_left - 8.0);
             for (column, mark) in StepMark::ALL.into_iter().enumerate() {
                 let Some(step) = series.trace.step_of(mark) else {
@@ -124,13 +111,6 @@ impl TraceFigure<'_> {
         }
         notes
     }
-}
-
-/// Draws a sample of a line in a text line that begins at `y`.
-fn sample(canvas: &mut Canvas, look: &Look, (x, y): (f64, f64)) {
-    let middle = y + CELL.line_px() / 2.0;
-    let line = vec![(x, middle), (x + SAMPLE_PX, middle)];
-    canvas.group("class=\"legend\"", "", |canvas| canvas.path(&[line], false, look.paint()));
 }
 
 fn thousandths(value: f64) -> String {

@@ -244,8 +244,8 @@ fn the_moving_figure_has_a_vehicle_per_lane_that_ends_where_the_lane_does() {
     let leaving = Lateral::Kinematic { start_m: 0.0, rate_mps: 1.5, end_m: 3.5 };
     let out = case(Category::CutOut, 30.0, vehicle(28.0, leaving));
     let traces = ModelId::ALL.map(|model| trace("paper", &out, 25.0, model));
-    let svg = figure(&traces).animation();
-    assert_eq!(svg, figure(&traces).animation());
+    let svg = figure(&traces).animation().svg();
+    assert_eq!(svg, figure(&traces).animation().svg());
     assert!(svg.matches("<animateTransform").count() >= traces.len() && !svg.contains("NaN"));
     words(&svg);
 }

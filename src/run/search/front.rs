@@ -30,20 +30,7 @@ pub struct Judged {
     pub held_out: Option<Scored>,
 }
 
-/// A parameterization of the paper in a scope.
-#[derive(Debug, Clone, PartialEq)]
-pub struct PaperPoint {
-    /// The candidate.
-    pub candidate: Candidate,
-    /// Number of parameters.
-    pub parameters: usize,
-    /// Its scores.
-    pub judged: Judged,
-    /// Error of the motions.
-    pub rmse: f64,
-}
-
-/// The best description of one size in a scope.
+/// A parameterization of the paper, or the best description of one size, in a scope.
 #[derive(Debug, Clone, PartialEq)]
 pub struct FrontPoint {
     /// The candidate.
@@ -54,7 +41,7 @@ pub struct FrontPoint {
     pub judged: Judged,
     /// Error of the motions.
     pub rmse: f64,
-    /// Per model of the scope: score minus that of the paper's best, cross-validated.
+    /// Per model of the scope: score minus that of the paper's best, cross-validated; empty for the paper's own.
     pub gains: Vec<(ModelId, Option<(f64, ScoreInterval)>)>,
     /// The same on held-out data.
     pub held_out_gains: Vec<(ModelId, Option<(f64, ScoreInterval)>)>,
@@ -70,7 +57,7 @@ pub struct Front {
     /// One per size, ascending; each better than all smaller ones.
     pub points: Vec<FrontPoint>,
     /// The paper's parameterizations.
-    pub paper: Vec<PaperPoint>,
+    pub paper: Vec<FrontPoint>,
     /// F1 of the best S' that knows the headway only, and nothing of a scenario: on the searched data, and on held-out data.
     pub headway_only: [Option<f64>; 2],
     /// Index of the paper's best, by cross-validation.
@@ -177,15 +164,21 @@ pub(super) fn conclude(
     let mut fronts = Vec::new();
     for (scope, chosen) in scopes.iter().zip(&chosen) {
         let scope = *scope;
-        let of_paper = paper.iter().enumerate().filter_map(|(at, candidate)| {
-            let parameters = candidate.parameter_count(category);
-            Some((
-                at,
-                PaperPoint { candidate: candidate.clone(), parameters, judged: judged(at, scope)?, rmse: rmse(at) },
-            ))
-        });
-        let of_paper: Vec<(usize, PaperPoint)> = of_paper.collect();
-        let value = |(_, (_, point)): &(usize, &(usize, PaperPoint))| point.judged.cross_validated.value;
+        let plain = |at: usize, candidate: &Candidate| {
+            Some(FrontPoint {
+                candidate: candidate.clone(),
+                parameters: candidate.parameter_count(category),
+                judged: judged(at, scope)?,
+                rmse: rmse(at),
+                gains: Vec::new(),
+                held_out_gains: Vec::new(),
+                below_best: None,
+            })
+        };
+        let of_paper = paper.iter().enumerate();
+        let of_paper = of_paper.filter_map(|(at, candidate)| Some((at, plain(at, candidate)?)));
+        let of_paper: Vec<(usize, FrontPoint)> = of_paper.collect();
+        let value = |(_, (_, point)): &(usize, &(usize, FrontPoint))| point.judged.cross_validated.value;
         let best_paper = of_paper
             .iter()
             .enumerate()
@@ -208,13 +201,10 @@ pub(super) fn conclude(
                 difference(cross_validated[at].as_ref()?, cross_validated[best].as_ref()?, scope, options)
             });
             Some(FrontPoint {
-                parameters: candidate.parameter_count(category),
-                judged: judged(at, scope)?,
-                rmse: rmse(at),
                 gains: gains(&cross_validated, at),
                 held_out_gains: held_out.as_ref().map_or(Vec::new(), |of| gains(of, at)),
                 below_best,
-                candidate: candidate.clone(),
+                ..plain(at, candidate)?
             })
         };
         let points: Vec<FrontPoint> = chosen.iter().filter_map(point).collect();

@@ -18,7 +18,7 @@ use serde::{Deserialize, Serialize};
 
 pub use evaluation::Evaluation;
 pub use folds::{folds, is_by_recording};
-pub use front::{Front, FrontPoint, Judged, PaperPoint, RmseAgainstScore, Scored, SearchResult, Unkept};
+pub use front::{Front, FrontPoint, Judged, RmseAgainstScore, Scored, SearchResult, Unkept};
 
 use candidates::Task;
 use evaluation::{Evaluator, Training};
