@@ -44,6 +44,14 @@ pub enum Headway {
 }
 
 impl Headway {
+    /// The time headway, s, or the gap, m; `None` where it differs between scenarios.
+    pub fn value(&self) -> Option<f64> {
+        match self {
+            Headway::ThwS(value) | Headway::GapM(value) => Some(*value),
+            Headway::MinFollowing | Headway::Observed => None,
+        }
+    }
+
     /// The paper's ten: 2.0, 1.8, … 0.2 s.
     pub fn paper() -> Vec<Headway> {
         (1..=10).rev().map(|k| Headway::ThwS(f64::from(k) / 5.0)).collect()

@@ -8,7 +8,7 @@ use super::plot::{AxisScale, logarithmic_reach, number};
 use super::plot::{Figure, HOLLOW, Layer, Mark, Plot, PlotAxis, Series, Value, is_few};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
-use crate::run::sampling::Checkpoint;
+use crate::run::sampling::{Checkpoint, CheckpointRow};
 use crate::stats::density::DensityModel;
 
 /// The sampled density, for the line below a heading.
@@ -32,8 +32,7 @@ pub fn convergence(density: &DensityModel, checkpoints: &[Checkpoint], level: f6
     let samples: Vec<f64> = checkpoints.iter().map(|checkpoint| checkpoint.samples as f64).collect();
     let series = |model: ModelId, criterion: Criterion| {
         let own = rows().filter(|(_, row)| row.model == model && row.criterion == criterion);
-        let value = |(checkpoint, row): (&Checkpoint, _)| {
-            let row: &crate::run::sampling::CheckpointRow = row;
+        let value = |(checkpoint, row): (&Checkpoint, &CheckpointRow)| {
             let [low, high] = row.interval;
             let [estimate, lower, upper] = [row.probability, low, high].map(number);
             let name = format!("{} {}", model.name(), criterion.label());
@@ -76,7 +75,7 @@ pub fn convergence(density: &DensityModel, checkpoints: &[Checkpoint], level: f6
 }
 
 /// Explains the marks that occur.
-fn caption<'a>(rows: impl Iterator<Item = &'a crate::run::sampling::CheckpointRow> + Clone, level: f64) -> String {
+fn caption<'a>(rows: impl Iterator<Item = &'a CheckpointRow> + Clone, level: f64) -> String {
     let mut words = format!(
         "Marker: estimate. Area: its {} % interval over the draws alone, which more samples make narrower. ",
         100.0 * level

@@ -106,11 +106,8 @@ impl FailureMaps<'_> {
             }
         };
         let mut headways: Vec<usize> = (0..self.plan.headways.len()).collect();
-        let thw_s = |at: usize| match self.plan.headways[at] {
-            Headway::ThwS(value) | Headway::GapM(value) => value,
-            Headway::MinFollowing | Headway::Observed => 0.0,
-        };
-        headways.sort_by(|a, b| thw_s(*a).total_cmp(&thw_s(*b)));
+        let value = |at: usize| self.plan.headways[at].value().unwrap_or(0.0);
+        headways.sort_by(|a, b| value(*a).total_cmp(&value(*b)));
         let outside = self.samples.saturating_sub(self.map.samples.iter().sum());
         let model_name = self.plan.models[model].name();
         Figure {

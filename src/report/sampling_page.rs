@@ -107,14 +107,11 @@ impl EstimateFile {
         if !weights.rows.is_empty() {
             tables.push(weights.captioned("Weights: how much of the sample counts"));
         }
-        let said = overall.iter().flat_map(|row| {
-            let name = format!("{}, {}, {}", row.model.name(), row.criterion.label(), row.headway);
-            row.estimate.trust.warnings.iter().map(move |warning| (name.clone(), warning.to_string()))
-        });
-        let costlier = self
-            .costlier_than_crude()
-            .map(|(row, remark)| (format!("{}, {}, {}", row.model.name(), row.criterion.label(), row.headway), remark));
-        let said = said.chain(costlier);
+        let name = |row: &EstimateRow| format!("{}, {}, {}", row.model.name(), row.criterion.label(), row.headway);
+        let said = overall
+            .iter()
+            .flat_map(|row| row.estimate.trust.warnings.iter().map(move |warning| (name(row), warning.to_string())));
+        let said = said.chain(self.costlier_than_crude().map(|(row, remark)| (name(row), remark)));
         Section {
             intro: format!(
                 "The verdict says whether the interval is to be believed; ≤ bounds from above where nothing failed. \
@@ -143,11 +140,8 @@ impl EstimateFile {
     /// Probability over the headway, a panel per model; `None` for a single headway.
     pub fn headways_figure(&self) -> Option<Figure> {
         let thw_s = |row: &EstimateRow| {
-            let of = |headway: &&Headway| headway.to_string() == row.headway;
-            match self.plan_headways.iter().find(of) {
-                Some(Headway::ThwS(seconds)) => Some(*seconds),
-                _ => None,
-            }
+            let of = self.plan_headways.iter().find(|headway| headway.to_string() == row.headway);
+            of.filter(|headway| matches!(headway, Headway::ThwS(_)))?.value()
         };
         let all = self.estimates.iter().filter_map(|row| Some((thw_s(row)?, 100.0 * row.estimate.probability)));
         let all: Vec<(f64, f64)> = all.chain([(0.0, 0.0)]).collect();

@@ -194,13 +194,12 @@ impl SearchReport<'_> {
                 );
                 let _ = writeln!(text, "{}", wrap(&words, WIDTH));
                 let gains = if winner.held_out_gains.is_empty() { &winner.gains } else { &winner.held_out_gains };
-                let of = |(model, gain): &(crate::model::driver::ModelId, _)| -> String {
-                    let gain: &Option<(f64, crate::run::score::ScoreInterval)> = gain;
+                let gains = gains.iter().map(|(model, gain)| {
                     gain.map_or(format!("{} undefined", model.name()), |(by, i)| {
                         format!("{} {by:+.3} [{:+.2}, {:+.2}]", model.name(), i.low, i.high)
                     })
-                };
-                let gains: Vec<String> = gains.iter().map(of).collect();
+                });
+                let gains: Vec<String> = gains.collect();
                 let on = if winner.held_out_gains.is_empty() { "cross-validated" } else { "held out" };
                 let words = format!("against the paper's best, {on}: {}", gains.join("; "));
                 let _ = writeln!(text, "{}", wrap(&words, WIDTH));
@@ -255,13 +254,9 @@ impl SearchReport<'_> {
         let look = |colour, symbol, is_hollow| Some(Look { colour, symbol, is_hollow, ..Look::of(0, 1) });
         let plot = |front: &Front| {
             let paper = front.paper.iter().filter_map(|point| {
-                let Candidate::Paper(key) = &point.candidate else { return None };
                 let scored = point.judged.held_out.as_ref().unwrap_or(&point.judged.cross_validated);
-                value(point.parameters, scored, self.describe(&point.candidate)).map(|value| Value {
-                    label: key.clone(),
-                    interval: None,
-                    ..value
-                })
+                let value = value(point.parameters, scored, self.describe(&point.candidate))?;
+                Some(Value { label: name_of(&point.candidate, point.parameters), interval: None, ..value })
             });
             let found = |of: &dyn Fn(&Judged) -> Option<Scored>| -> Vec<Value> {
                 let values = front
@@ -321,12 +316,9 @@ impl SearchReport<'_> {
     fn error_figure(&self) -> Figure {
         let options = &self.result.options;
         let score = |of: &Evaluated| of.score(Scope::All, options);
-        let mut drawn: Vec<(String, f64, &Evaluated)> = Vec::new();
-        for of in &self.result.evaluated {
-            let Some(value) = score(of) else { continue };
-            let family = of.candidate.family();
-            drawn.push((family, value, of));
-        }
+        let all = self.result.evaluated.iter();
+        let mut drawn: Vec<(String, f64, &Evaluated)> =
+            all.filter_map(|of| Some((of.candidate.family(), score(of)?, of))).collect();
         // Evenly over all, in the order of the score.
         drawn.sort_by(|a, b| b.1.total_cmp(&a.1));
         let stride = drawn.len().div_ceil(MAX_DRAWN).max(1);
@@ -419,9 +411,7 @@ impl SearchReport<'_> {
     }
 
     fn record(&self) -> Result<Json> {
-        let to_json = |value: serde_json::Result<Json>| {
-            value.map_err(|error| Error::Internal(format!("a search as JSON: {error}")))
-        };
+        let internal = |error| Error::Internal(format!("a search as JSON: {error}"));
         let result = self.result;
         let winner = result.fronts.first().and_then(|front| Some(&front.points[front.winner?]));
         Ok(json!({
@@ -436,7 +426,7 @@ impl SearchReport<'_> {
             "criterion": result.options.criterion.key(),
             "objective": result.options.objective.name(),
             "shuffled": result.options.shuffled,
-            "limits": to_json(serde_json::to_value(&result.options.limits))?,
+            "limits": serde_json::to_value(&result.options.limits).map_err(internal)?,
             "scenarios": result.scenarios[0],
             "held_out_scenarios": result.scenarios[1],
             "studies": result.studies,
@@ -453,7 +443,7 @@ impl SearchReport<'_> {
             })),
             "folds_are_recordings": result.is_by_recording,
             "fronts": self.front_csv().records(),
-            "host": to_json(serde_json::to_value(&self.host))?,
+            "host": serde_json::to_value(&self.host).map_err(internal)?,
         }))
     }
 

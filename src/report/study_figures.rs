@@ -72,12 +72,6 @@ impl HeadwayFailures {
     /// Fraction of the scenarios that fail, over the headway: S with its interval, beside it every S'; a panel per model
     /// and criterion.
     pub fn figure(&self, scores: &CategoryScores, confidence: f64, data: &str) -> Figure {
-        let place = |headway: &Headway| match headway {
-            Headway::ThwS(seconds) => Some(*seconds),
-            Headway::GapM(metres) => Some(*metres),
-            // These headways differ between scenarios.
-            Headway::MinFollowing | Headway::Observed => None,
-        };
         let is_gap = self.headways.iter().any(|headway| matches!(headway, Headway::GapM(_)));
         let cells: Vec<(usize, Criterion)> =
             (0..self.models.len()).flat_map(|model| Criterion::ALL.map(|criterion| (model, criterion))).collect();
@@ -101,7 +95,7 @@ impl HeadwayFailures {
                         label: if is_few { failed.to_string() } else { String::new() },
                         interval: (variant == 0).then_some((100.0 * interval.low, 100.0 * interval.high)),
                         is_few,
-                        ..Value::from((place(headway)?, share(failed)))
+                        ..Value::from((headway.value()?, share(failed)))
                     })
                 };
                 let mut values: Vec<Value> = self.headways.iter().enumerate().filter_map(value).collect();
@@ -120,7 +114,7 @@ impl HeadwayFailures {
                 x: PlotAxis::around(
                     if is_gap { "initial gap in m" } else { "initial time headway in s" },
                     AxisScale::Linear,
-                    self.headways.iter().filter_map(place).chain([0.0]).collect(),
+                    self.headways.iter().filter_map(Headway::value).chain([0.0]).collect(),
                 ),
                 y: axis,
                 layers: (0..self.variants.len()).map(|variant| series(variant).into()).collect(),
@@ -134,8 +128,6 @@ impl HeadwayFailures {
         let empty = cells.iter().filter(|cell| !fails(cell));
         let empty = empty.map(|(model, criterion)| format!("{}, {}", self.models[*model].name(), criterion.label()));
         Figure {
-            title: format!("{}: failures against the headway", scores.category.label()),
-            subtitle: Some(format!("{} scenarios. {data}", scores.scenarios)),
             caption: format!(
                 "Black: share of the recorded scenarios in which the driver model fails the criterion; band: its {} % \
                  interval over scenarios. Colours: the same scenarios, parameterized. Vertical axis by the square root. \
@@ -145,8 +137,22 @@ impl HeadwayFailures {
             plots: cells.iter().filter(fails).map(panel).collect(),
             columns: Criterion::ALL.len(),
             notes: ("Left out, because nothing fails:", empty.collect()),
-            ..Figure::default()
+            ..titled(scores, "failures against the headway", data)
         }
+    }
+}
+
+/// `FSM, TTC`.
+fn cell_name((model, criterion): &(ModelId, Criterion)) -> String {
+    format!("{}, {}", model.name(), criterion.label())
+}
+
+/// A figure of a category without plots.
+fn titled(scores: &CategoryScores, title: &str, data: &str) -> Figure {
+    Figure {
+        title: format!("{}: {title}", scores.category.label()),
+        subtitle: Some(format!("{} scenarios. {data}", scores.scenarios)),
+        ..Figure::default()
     }
 }
 
@@ -162,9 +168,9 @@ fn ends(interval: Option<ScoreInterval>) -> Option<(f64, f64)> {
 /// F1 of every parameterization with its interval, a row per driver model and criterion.
 pub fn f1_intervals(scores: &CategoryScores, confidence: f64, data: &str) -> Figure {
     let cells = cells(scores);
-    let row = |&(model, criterion): &(ModelId, Criterion)| DotRow {
-        name: format!("{}, {}", model.name(), criterion.label()),
-        failing_scenarios: scores.failing_scenarios(model, criterion),
+    let row = |cell: &(ModelId, Criterion)| DotRow {
+        name: cell_name(cell),
+        failing_scenarios: scores.failing_scenarios(cell.0, cell.1),
     };
     let rows: Vec<DotRow> = cells.iter().map(row).collect();
     let series = |variant: usize| {
@@ -183,15 +189,13 @@ pub fn f1_intervals(scores: &CategoryScores, confidence: f64, data: &str) -> Fig
         series: (1..scores.variants.len()).map(series).collect(),
     };
     Figure {
-        title: format!("{}: F1 of parameterized against recorded scenarios", scores.category.label()),
-        subtitle: Some(format!("{} scenarios. {data}", scores.scenarios)),
         caption: format!(
             "Marker: F1; further right is better. Line: its {} % interval over scenarios. n: scenarios in which S fails; \
              with fewer than ten, markers are hollow and have no line. Without a marker: neither S nor S' fails.",
             100.0 * confidence
         ),
         plots: dots(&rows, vec![panel]),
-        ..Figure::default()
+        ..titled(scores, "F1 of parameterized against recorded scenarios", data)
     }
 }
 
@@ -205,8 +209,7 @@ pub fn radar(scores: &CategoryScores, data: &str) -> Figure {
     let variants = 1..scores.variants.len();
     let is_empty = |cell: &(ModelId, Criterion)| variants.clone().all(|variant| score(variant, cell).is_none());
     let name = |(at, cell): (usize, &(ModelId, Criterion))| {
-        let (spoke, failing) =
-            (format!("{}, {}", cell.0.name(), cell.1.label()), scores.failing_scenarios(cell.0, cell.1));
+        let (spoke, failing) = (cell_name(cell), scores.failing_scenarios(cell.0, cell.1));
         let words = match is_empty(cell) {
             true => format!("{spoke} (undefined)"),
             false => format!("{spoke}{}", few(failing)),
@@ -236,16 +239,14 @@ pub fn radar(scores: &CategoryScores, data: &str) -> Figure {
     };
     let gaps = variants.clone().filter_map(|variant| {
         let undefined = cells.iter().filter(|cell| score(variant, cell).is_none() && !is_empty(cell));
-        let names: Vec<String> = undefined.map(|(model, c)| format!("{}, {}", model.name(), c.label())).collect();
+        let names: Vec<String> = undefined.map(cell_name).collect();
         (!names.is_empty()).then(|| format!("{}: {}", legend_name(scores, variant), names.join("; ")))
     });
     Figure {
-        title: format!("{}: F1 as the paper draws it", scores.category.label()),
-        subtitle: Some(format!("{} scenarios. {data}", scores.scenarios)),
         caption: format!("Radius: F1, 0 at the centre, 1 at the outer ring, without its interval. {HOLLOW}"),
         plots: if cells.is_empty() { Vec::new() } else { vec![plot] },
         notes: ("Undefined F1 (0/0), where the line is broken:", gaps.collect()),
-        ..Figure::default()
+        ..titled(scores, "F1 as the paper draws it", data)
     }
 }
 
@@ -291,10 +292,8 @@ pub fn recall_and_precision(scores: &CategoryScores, confidence: f64, data: &str
     let cells = cells(scores);
     let drawn: Vec<Option<Plot>> = cells.iter().map(panel).collect();
     let empty = cells.iter().zip(&drawn).filter(|(_, plot)| plot.is_none());
-    let empty: Vec<String> = empty.map(|((model, c), _)| format!("{}, {}", model.name(), c.label())).collect();
+    let empty: Vec<String> = empty.map(|(cell, _)| cell_name(cell)).collect();
     Figure {
-        title: format!("{}: recall and precision of S' against S", scores.category.label()),
-        subtitle: Some(format!("{} scenarios. {data}", scores.scenarios)),
         caption: format!(
             "Recall: share of the recorded failures that the parameterized scenarios show; precision: share of their \
              failures that were recorded. Lines: {} % intervals over scenarios, cut at the edge. Dashed: equal F1, its value at the right. The \
@@ -303,7 +302,7 @@ pub fn recall_and_precision(scores: &CategoryScores, confidence: f64, data: &str
         ),
         plots: drawn.into_iter().flatten().collect(),
         notes: ("Left out, because a share is undefined without a failure on one side:", empty),
-        ..Figure::default()
+        ..titled(scores, "recall and precision of S' against S", data)
     }
 }
 
@@ -361,8 +360,6 @@ pub fn f1_by_parameters(scores: &CategoryScores, means: &[MeanF1], confidence: f
     let (drawn, empty): (Vec<&MeanF1>, Vec<&MeanF1>) = means.iter().partition(|mean| !mean.values.is_empty());
     let empty = empty.into_iter().map(|mean| mean.criteria.iter().map(|c| c.label()).collect::<Vec<_>>().join(", "));
     Figure {
-        title: format!("{}: F1 against the number of parameters", scores.category.label()),
-        subtitle: Some(format!("{} scenarios. {data}", scores.scenarios)),
         caption: format!(
             "Mean over the driver models (and criteria) whose F1 every parameterization defines; line: its {} % interval \
              over scenarios. The fewer parameters, the fewer samples a density needs: of two that are equally good the \
@@ -372,7 +369,7 @@ pub fn f1_by_parameters(scores: &CategoryScores, means: &[MeanF1], confidence: f
         ),
         plots: drawn.into_iter().map(panel).collect(),
         notes: ("Left out, because no F1 is defined for all:", empty.collect()),
-        ..Figure::default()
+        ..titled(scores, "F1 against the number of parameters", data)
     }
 }
 

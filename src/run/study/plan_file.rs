@@ -175,11 +175,7 @@ impl StudyHead {
         if let Some(problem) = repeated(headways) {
             return wrong(&format!("a headway is there twice: {problem}"));
         }
-        let number = |headway: &Headway| match *headway {
-            Headway::ThwS(number) | Headway::GapM(number) => number,
-            Headway::MinFollowing | Headway::Observed => 0.0,
-        };
-        if !self.headways.iter().all(|headway| (0.0..1e6).contains(&number(headway))) {
+        if !self.headways.iter().filter_map(Headway::value).all(|number| (0.0..1e6).contains(&number)) {
             return wrong("a headway is out of range (0 to 1e6)");
         }
         for block in &self.blocks {
