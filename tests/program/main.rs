@@ -8,6 +8,7 @@ mod book;
 mod check;
 mod command_line;
 mod configuration;
+mod figures;
 mod help_examples;
 mod messages;
 mod report_page;

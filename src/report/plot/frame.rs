@@ -164,6 +164,6 @@ mod tests {
         let mut reader = ::csv::Reader::from_reader(text.as_bytes());
         let rows: Vec<::csv::StringRecord> = reader.records().map(std::result::Result::unwrap).collect();
         assert_eq!(rows.len(), 2);
-        assert_eq!((&rows[0][1], &rows[0][2], &rows[0][4], &rows[1][6]), ("one, two", "\"q\"", "0.5", "NaN"));
+        assert_eq!((&rows[0][2], &rows[0][3], &rows[0][5], &rows[1][9]), ("one, two", "\"q\"", "0.5", "NaN"));
     }
 }

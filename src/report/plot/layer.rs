@@ -184,6 +184,11 @@ impl Series {
         runs.map(|run| (run.iter().copied().flatten().collect(), closes)).collect()
     }
 
+    /// The ends of a value's interval along x, or along y.
+    pub(super) fn ends_of(&self, value: &Value, along_x: bool) -> Option<(f64, f64)> {
+        if self.is_sideways == along_x { value.interval } else { value.across }
+    }
+
     /// The ends of a value's interval on the page.
     fn ends(&self, value: &Value, interval: Option<(f64, f64)>, axes: &Axes) -> Option<(Position, Position)> {
         let (lower, upper) = interval?;

@@ -203,17 +203,19 @@ impl Figure {
     pub fn csv(&self) -> String {
         let series = self.plots.iter().flat_map(|plot| plot.series().map(move |series| (plot, series)));
         let rows = series.flat_map(|(plot, series)| series.values.iter().map(move |value| (plot, series, value)));
-        let end = |interval: Option<(f64, f64)>, pick: fn((f64, f64)) -> f64| interval.map(pick);
         Table::of(rows)
             .column("panel", |(plot, ..)| plot.heading.as_str())
+            .column("row", |(plot, _, value)| plot.row_of(value))
             .column("series", |(_, series, _)| series.name.as_str())
             .column("label", |(.., value)| value.label.as_str())
             .column("x_quantity", |(plot, ..)| plot.x.label.as_str())
             .column("x", |(.., value)| value.x)
+            .column("x_low", |(_, series, value)| series.ends_of(value, true).map(|ends| ends.0))
+            .column("x_high", |(_, series, value)| series.ends_of(value, true).map(|ends| ends.1))
             .column("y_quantity", |(plot, ..)| plot.y.label.as_str())
-            .column("y", |(.., value)| value.y)
-            .column("low", move |(.., value)| end(value.interval, |ends| ends.0))
-            .column("high", move |(.., value)| end(value.interval, |ends| ends.1))
+            .column("y", |(plot, _, value)| (plot.is_polar || plot.y.names.is_empty()).then_some(value.y))
+            .column("y_low", |(_, series, value)| series.ends_of(value, false).map(|ends| ends.0))
+            .column("y_high", |(_, series, value)| series.ends_of(value, false).map(|ends| ends.1))
             .build()
             .csv()
     }
@@ -391,6 +393,15 @@ impl Plot {
 
     fn cells(&self) -> impl Iterator<Item = &Cells> {
         self.layers.iter().filter_map(|layer| if let Layer::Cells(cells) = layer { Some(cells) } else { None })
+    }
+
+    /// The name beside a value, or of its spoke; empty on an axis with numbers.
+    fn row_of(&self, value: &Value) -> &str {
+        let found = match self.is_polar {
+            true => self.x.names.iter().rfind(|name| name.at <= value.x),
+            false => self.y.names.iter().rfind(|name| name.at >= value.y),
+        };
+        found.map_or("", |name| name.words.as_str())
     }
 
     fn is_blank(&self) -> bool {
