@@ -53,7 +53,7 @@ pub(super) fn dots(rows: &[DotRow], panels: Vec<Dots>) -> Vec<Plot> {
             Layer::from(Series {
                 values: series.values.into_iter().map(value).collect(),
                 marks: vec![Mark::Points, Mark::Intervals],
-                look: Some(Look { line_px: 1.4, marker_px: 3.4, ..look }),
+                look: Some(Look { line_px: 1.4, marker_px: 3.8, ..look }),
                 is_sideways: true,
                 ..series
             })

@@ -100,6 +100,13 @@ impl HeadwayFailures {
                 };
                 let mut values: Vec<Value> = self.headways.iter().enumerate().filter_map(value).collect();
                 values.sort_by(|a, b| a.x.total_cmp(&b.x));
+                // A number once is enough for neighbours that share it.
+                let numbers: Vec<String> = values.iter().map(|value| value.label.clone()).collect();
+                for (value, pair) in values.iter_mut().skip(1).zip(numbers.windows(2)) {
+                    if pair[0] == pair[1] {
+                        value.label.clear();
+                    }
+                }
                 if variant == 0 {
                     let look = Look { colour: INK, dash: "", line_px: 1.8, symbol: Symbol::Disc, ..Look::of(0, 1) };
                     let series = Series::new("S, as recorded", &[Mark::Band, Mark::Line, Mark::Points], []);
@@ -190,8 +197,9 @@ pub fn f1_intervals(scores: &CategoryScores, confidence: f64, data: &str) -> Fig
     };
     Figure {
         caption: format!(
-            "Marker: F1; further right is better. Line: its {} % interval over scenarios. n: scenarios in which S fails; \
-             with fewer than ten, markers are hollow and have no line. Without a marker: neither S nor S' fails.",
+            "Marker: F1; further right is better; in each row in the order below. Line: its {} % interval over scenarios. \
+             n: scenarios in which S fails; with fewer than ten, markers are hollow and have no line. Without a marker: \
+             neither S nor S' fails.",
             100.0 * confidence
         ),
         plots: dots(&rows, vec![panel]),
