@@ -573,7 +573,7 @@ pub fn rates(file: &CompareFile, comparison: &CategoryComparison, criterion: Cri
             Some((value.x, low, high))
         })
         .collect();
-    let x = PlotAxis::around("failure probability", AxisScale::Logarithmic, logarithmic_reach(&reach));
+    let x = PlotAxis::around("share of failed lanes", AxisScale::Logarithmic, logarithmic_reach(&reach));
     let panel = Dots { heading: String::new(), x, marked: Vec::new(), series };
     Figure {
         title: format!("{}: share of lanes that fail {}", comparison.category.label(), criterion.label()),
@@ -581,8 +581,8 @@ pub fn rates(file: &CompareFile, comparison: &CategoryComparison, criterion: Cri
         caption: format!(
             "Line: {0} % interval, of S over the scenarios, of a density over the draws alone; thin line: the density's \
              over draws and scenarios, at fixed bandwidth and scale. A line at the left edge goes on beyond it; an arrow \
-             is a share of zero below its bound. n: scenarios in which S fails; with fewer than ten markers are hollow. \
-             S and the densities rest on the same scenarios: compare them by their ratios.",
+             is a share of zero below its bound. n: scenarios in which S fails. S and the densities rest on the same \
+             scenarios: the figure of the ratios compares them.",
             100.0 * file.level
         ),
         plots: dots(&rows, vec![panel]),
@@ -613,7 +613,7 @@ pub fn ratios(file: &CompareFile, comparison: &CategoryComparison, criterion: Cr
     let panel = |(heading, pick): (&str, Pick)| Dots {
         heading: heading.to_owned(),
         x: PlotAxis::around("ratio to S", AxisScale::Logarithmic, logarithmic_reach(&reach)),
-        marked: vec![1.0 / margin, 1.0, margin],
+        marked: vec![(1.0 / margin, "3,3"), (1.0, ""), (margin, "3,3")],
         series: comparison
             .parameterizations
             .iter()
@@ -631,9 +631,9 @@ pub fn ratios(file: &CompareFile, comparison: &CategoryComparison, criterion: Cr
         ),
         subtitle: Some(file.data.clone()),
         caption: format!(
-            "Ratio of the share of failed lanes to that of S, taken scenario by scenario, with its {} % interval; 1: as \
-             many failures. A ratio agrees where its interval lies between the outer grey lines ({:.2} and {margin}). \
-             Where S never fails there is no ratio. n: scenarios in which S fails; with fewer than ten markers are hollow.",
+            "Share of the lanes that fail, as a multiple of that of S, scenario by scenario, with its {} % interval; 1: as \
+             many failures, though perhaps of other scenarios (see F1). A ratio agrees where its interval lies between \
+             the dashed lines ({:.2} and {margin}). Where S never fails there is no ratio. n: scenarios in which S fails.",
             100.0 * file.level,
             1.0 / margin
         ),

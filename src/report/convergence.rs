@@ -5,7 +5,7 @@
 //! upper end is drawn instead, with an arrow downwards.
 
 use super::plot::{AxisScale, logarithmic_reach, number};
-use super::plot::{Figure, HOLLOW, Layer, Mark, Plot, PlotAxis, Series, Value, is_few};
+use super::plot::{Figure, Layer, Mark, Plot, PlotAxis, Series, Value, is_few};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::sampling::{Checkpoint, CheckpointRow};
@@ -87,10 +87,7 @@ fn caption<'a>(rows: impl Iterator<Item = &'a CheckpointRow> + Clone, level: f64
         }
         false => "It does not cover what other scenarios would change. ",
     });
-    words.push_str("Both axes are logarithmic.");
-    if rows.clone().any(|row| row.with_data.is_some_and(|(_, scenarios)| is_few(scenarios))) {
-        words = [&words, HOLLOW].join(" ");
-    }
+    words.push_str("All headways together; both axes are logarithmic.");
     if rows.clone().any(|row| row.probability > 0.0 && row.interval[0] < row.probability / 10.0) {
         words.push_str(" An interval that reaches the lower edge goes on below it.");
     }

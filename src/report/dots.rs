@@ -24,8 +24,8 @@ pub(super) struct Dots {
     pub heading: String,
     /// The axis of the estimates.
     pub x: PlotAxis,
-    /// Values at which a line runs through all rows.
-    pub marked: Vec<f64>,
+    /// Values at which a line runs through all rows, and its dashes.
+    pub marked: Vec<(f64, &'static str)>,
     /// Names and values, the index of the row as y. An estimate is at x, its intervals along it.
     pub series: Vec<Series>,
 }
@@ -64,15 +64,17 @@ pub(super) fn dots(rows: &[DotRow], panels: Vec<Dots>) -> Vec<Plot> {
             width_px: 0.5,
             ..Rule::default()
         };
-        let through = panel.marked.iter().map(|&x| vec![(x, -height_px), (x, 0.0)]).collect();
-        let marked = Rule { runs: through, colour: GREY, width_px: 1.4, ..Rule::default() };
+        let marked = panel.marked.iter().map(|&(x, dash)| {
+            let runs = vec![vec![(x, -height_px), (x, 0.0)]];
+            Layer::from(Rule { runs, colour: GREY, width_px: 1.2, dash, ..Rule::default() })
+        });
         let ends = Ends::Exactly(-height_px, 0.0);
         Plot {
             heading: panel.heading,
             x: panel.x,
             y: PlotAxis { names: rows.iter().enumerate().map(name).collect(), ends, ..PlotAxis::default() },
-            layers: [separators.into(), marked.into()]
-                .into_iter()
+            layers: std::iter::once(separators.into())
+                .chain(marked)
                 .chain(panel.series.into_iter().enumerate().map(line))
                 .collect(),
             height: Height::Px(height_px),

@@ -1,6 +1,6 @@
 //! Where failures occur: the fraction of failed samples per cell of two scenario parameters, as heat maps.
 //!
-//! The colours go from pale yellow to dark blue and darken with each step, so that colour-blind readers and grey prints
+//! The colours go from pale yellow over green to dark blue and darken with each step, so that colour-blind readers and grey prints
 //! can distinguish them; the scale is the same for all models and headways of a run.
 
 use super::convergence::sampled;
@@ -33,7 +33,7 @@ const FEW_SAMPLES: u64 = 10;
 const PALE: f64 = 0.35;
 /// From a fraction of zero to the maximum. Relative luminance decreases from step to step.
 const COLOURS: [(u8, u8, u8); 6] =
-    [(255, 236, 150), (226, 199, 112), (176, 163, 116), (120, 124, 126), (66, 82, 122), (10, 32, 80)];
+    [(255, 236, 150), (178, 214, 118), (96, 174, 124), (44, 126, 136), (38, 74, 122), (10, 32, 80)];
 /// Colour of a cell with samples and without failures.
 const NONE_FAILED: &str = "#dcdcdc";
 
@@ -90,7 +90,7 @@ impl FailureMaps<'_> {
             let has_few = self.cells(headway, model).any(|(_, samples, _)| samples < FEW_SAMPLES);
             let key = [
                 has_none.then(|| ("no failure".to_owned(), fill(FEW_SAMPLES, 0))),
-                has_few.then(|| (format!("paler: fewer than {FEW_SAMPLES} samples"), fill(1, 1))),
+                has_few.then(|| (format!("any colour paler: fewer than {FEW_SAMPLES} samples"), fill(3, 1))),
             ];
             let cells = self.cells(headway, model).map(cell).collect();
             Plot {

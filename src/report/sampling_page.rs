@@ -1,7 +1,7 @@
 //! A sampling run as one page.
 
 use super::html::{Page, PageFigure, Section};
-use super::plot::{AxisScale, Figure, HOLLOW, Layer, Mark, Plot, PlotAxis, Series, Value, is_few};
+use super::plot::{AxisScale, Figure, Layer, Mark, Plot, PlotAxis, Series, Value, is_few};
 use super::sampling::{EstimateFile, interval_text, rate_text, ratio_text, short, three_digits};
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
@@ -177,9 +177,10 @@ impl EstimateFile {
         (headways > 1).then(|| Figure {
             title: format!("{}: probability of failure against the headway", self.name()),
             subtitle: Some(self.density.provenance.data.clone()),
-            caption: format!(
-                "Each headway of its own. Area: its interval, as in estimates.csv. Vertical axis by the square root. {HOLLOW}"
-            ),
+            caption:
+                "Marker: estimate at one headway; area: its interval over draws and scenarios. Vertical axis by the \
+                      square root. n: effective number of recorded scenarios that fail."
+                    .to_owned(),
             plots: self.models.iter().map(panel).collect(),
             ..Figure::default()
         })

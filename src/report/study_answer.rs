@@ -5,6 +5,7 @@ use super::html::Section;
 use super::study::StudyReport;
 use super::tables::wrap;
 use crate::run::score::Best;
+use crate::scenario::parameterization::Parameterization;
 use crate::support::readable::{count, count_of, counted};
 use crate::support::table::{NumberText, Table};
 
@@ -56,7 +57,13 @@ impl StudyReport {
 
     /// The same as a section of the page, above the others.
     pub(super) fn answer_section(&self) -> Section {
-        let rows: Vec<[String; 7]> = self.best.iter().map(|best| self.row(best)).collect();
+        let named = |best: &Best| {
+            let mut row = self.row(best);
+            let id = best.score.as_ref().and_then(|score| Parameterization::find(best.category, &score.variant));
+            id.iter().for_each(|id| row[2] = format!("{}: {}", id.key, id.description()));
+            row
+        };
+        let rows: Vec<[String; 7]> = self.best.iter().map(named).collect();
         Section {
             intro: format!("{}.", self.size()),
             tables: vec![table(&rows).captioned(self.question())],

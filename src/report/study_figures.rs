@@ -3,7 +3,7 @@
 
 use super::dots::{DotRow, Dots, dots};
 use super::plot::{
-    AxisScale, Figure, GREY, HOLLOW, INK, Layer, Look, Mark, Name, Plot, PlotAxis, Rule, Series, Symbol, Value, is_few,
+    AxisScale, Figure, GREY, INK, Layer, Look, Mark, Name, Plot, PlotAxis, Rule, Series, Symbol, Value, is_few,
     quantity,
 };
 use crate::engine::{Headway, LanePlan, Partial};
@@ -80,11 +80,6 @@ impl HeadwayFailures {
         };
         // One lane per scenario and headway.
         let share = |count: u64| 100.0 * count as f64 / scores.scenarios.max(1) as f64;
-        let largest = (0..self.headways.len() * self.variants.len() * cells.len()).map(|at| {
-            let (at, cell) = (at / cells.len(), cells[at % cells.len()]);
-            share(count(at / self.headways.len(), cell)(at % self.headways.len()))
-        });
-        let largest = largest.fold(0.0, f64::max);
         let panel = |&cell: &(usize, Criterion)| {
             let series = |variant: usize| {
                 let value = |(at, headway): (usize, &Headway)| {
@@ -115,7 +110,6 @@ impl HeadwayFailures {
                 let look = Look { line_px: 1.2, ..Look::of(variant - 1, self.variants.len() - 1) };
                 Series { values, look: Some(look), ..Series::new(legend_name(scores, variant), &[Mark::Line], []) }
             };
-            let axis = PlotAxis::around("failed scenarios in %", AxisScale::SquareRoot, vec![0.0, largest]);
             Plot {
                 heading: format!("{}, {}", self.models[cell.0].name(), cell.1.label()),
                 x: PlotAxis::around(
@@ -123,7 +117,7 @@ impl HeadwayFailures {
                     AxisScale::Linear,
                     self.headways.iter().filter_map(Headway::value).chain([0.0]).collect(),
                 ),
-                y: axis,
+                y: PlotAxis { scale: AxisScale::SquareRoot, ..PlotAxis::new("failed scenarios in %") },
                 layers: (0..self.variants.len()).map(|variant| series(variant).into()).collect(),
                 ..Plot::default()
             }
@@ -137,8 +131,7 @@ impl HeadwayFailures {
         Figure {
             caption: format!(
                 "Black: share of the recorded scenarios in which the driver model fails the criterion; band: its {} % \
-                 interval over scenarios. Colours: the same scenarios, parameterized. Vertical axis by the square root. \
-                 Hollow: fewer than ten failures, with their number where there is room.",
+                 interval over scenarios. Colours: the same scenarios, parameterized. Vertical axes by the square root, each with its own end.",
                 100.0 * confidence
             ),
             plots: cells.iter().filter(fails).map(panel).collect(),
@@ -191,15 +184,14 @@ pub fn f1_intervals(scores: &CategoryScores, confidence: f64, data: &str) -> Fig
     };
     let panel = Dots {
         heading: String::new(),
-        x: PlotAxis::exactly("F1", 0.0, 1.0),
+        x: PlotAxis::exactly("F1", -0.02, 1.02),
         marked: Vec::new(),
         series: (1..scores.variants.len()).map(series).collect(),
     };
     Figure {
         caption: format!(
             "Marker: F1; further right is better; in each row in the order below. Line: its {} % interval over scenarios. \
-             n: scenarios in which S fails; with fewer than ten, markers are hollow and have no line. Without a marker: \
-             neither S nor S' fails.",
+             n: scenarios in which S fails; with fewer than ten there is no line. Without a marker: neither S nor S' fails.",
             100.0 * confidence
         ),
         plots: dots(&rows, vec![panel]),
@@ -251,10 +243,10 @@ pub fn radar(scores: &CategoryScores, data: &str) -> Figure {
         (!names.is_empty()).then(|| format!("{}: {}", legend_name(scores, variant), names.join("; ")))
     });
     Figure {
-        caption: format!("Radius: F1, 0 at the centre, 1 at the outer ring, without its interval. {HOLLOW}"),
+        caption: format!("Radius: F1, 0 at the centre, 1 at the outer ring, without its interval."),
         plots: if cells.is_empty() { Vec::new() } else { vec![plot] },
         notes: ("Undefined F1 (0/0), where the line is broken:", gaps.collect()),
-        ..titled(scores, "F1 as the paper draws it", data)
+        ..titled(scores, "F1 as a radar, as de Gelder and Op den Camp draw it", data)
     }
 }
 
@@ -304,8 +296,8 @@ pub fn recall_and_precision(scores: &CategoryScores, confidence: f64, data: &str
     Figure {
         caption: format!(
             "Recall: share of the recorded failures that the parameterized scenarios show; precision: share of their \
-             failures that were recorded. Lines: {} % intervals over scenarios, cut at the edge. Dashed: equal F1, its value at the right. The \
-             axes begin where the values do. {HOLLOW}",
+             failures that were recorded, and undefined where S' never fails. Lines: {} % intervals over scenarios, cut \
+             at the edge, none with fewer than ten failing. Dashed: equal F1. Each panel begins below its lowest value.",
             100.0 * confidence
         ),
         plots: drawn.into_iter().flatten().collect(),
@@ -334,34 +326,40 @@ fn equal_f1(f: f64) -> Vec<(f64, f64)> {
 pub fn f1_by_parameters(scores: &CategoryScores, means: &[MeanF1], confidence: f64, data: &str) -> Figure {
     let ids: Vec<Option<Parameterization>> =
         scores.variants.iter().skip(1).map(|key| Parameterization::find(scores.category, key)).collect();
+    let most = ids.iter().flatten().map(Parameterization::parameter_count).max().unwrap_or(1) as f64;
     let panel = |mean: &MeanF1| {
         let is_few = is_few(mean.fewest_failing as f64);
-        let of = |name: &str| {
+        let of = |name: &str, look: Look| {
             let own = ids.iter().flatten().zip(&mean.values).filter(|(id, _)| id.family.name() == name);
             let value = |(id, (value, interval)): (&Parameterization, &(f64, Option<ScoreInterval>))| {
                 let label = id.key.to_string();
                 let place = Value::from((id.parameter_count() as f64, *value));
                 Value { label, is_few, interval: ends(*interval), ..place }
             };
-            Series { values: own.map(value).collect(), ..Series::new(name, &[Mark::Points, Mark::Intervals], []) }
+            let series = Series::new(name, &[Mark::Points, Mark::Intervals], []);
+            Series { values: own.map(value).collect(), look: Some(look), ..series }
         };
         let points =
             ids.iter().flatten().zip(&mean.values).map(|(id, (value, _))| (id.parameter_count() as f64, *value));
         let front = if is_few { Vec::new() } else { pareto_front(&points.collect::<Vec<_>>()) };
+        // A step at each point: there is nothing between two whole numbers.
+        let steps = front.windows(2).flat_map(|pair| [pair[0], (pair[1].0, pair[0].1)]).chain(front.last().copied());
         let look = Look { colour: GREY, dash: "4,4", line_px: 1.2, ..Look::of(0, 1) };
-        let front = Series {
-            look: Some(look),
-            ..Series::new("no other is better with as few parameters", &[Mark::Line], front)
-        };
+        let own = [
+            ("kinematic", Look { colour: INK, symbol: Symbol::Disc, marker_px: 5.0, ..look }),
+            ("SVD", Look { colour: MEAN_OF_SVD, symbol: Symbol::Polygon(4, 0.5), marker_px: 3.2, ..look }),
+        ];
+        let front =
+            Series { look: Some(look), ..Series::new("best with as many parameters or fewer", &[Mark::Line], steps) };
         let name = match mean.criteria[..] {
             [criterion] => criterion.label(),
             _ => "all criteria",
         };
         Plot {
             heading: format!("{name}{}", if mean.values.is_empty() { String::new() } else { few(mean.fewest_failing) }),
-            x: PlotAxis::exactly("parameters beside the headway", 1.0, 8.0),
+            x: PlotAxis::exactly("parameters beside the headway", 1.0, most + 1.0),
             y: PlotAxis::exactly("mean F1", 0.0, 1.05),
-            layers: vec![of("kinematic").into(), of("SVD").into(), front.into()],
+            layers: own.into_iter().map(|(name, look)| of(name, look).into()).chain([front.into()]).collect(),
             ..Plot::default()
         }
     };
@@ -370,9 +368,9 @@ pub fn f1_by_parameters(scores: &CategoryScores, means: &[MeanF1], confidence: f
     Figure {
         caption: format!(
             "Mean over the driver models (and criteria) whose F1 every parameterization defines; line: its {} % interval \
-             over scenarios. The fewer parameters, the fewer samples a density needs: of two that are equally good the \
-             simpler one is preferable. Hollow, and without front: in one of these S fails in fewer than ten scenarios; \
-             n is the smallest number.",
+             over scenarios. Beside the markers stand the keys of the parameterizations. The fewer parameters, the fewer samples a \
+             density needs: of two that are equally good the simpler one is preferable. n: in a cell of the mean S fails in so \
+             few scenarios, and no front is drawn.",
             100.0 * confidence
         ),
         plots: drawn.into_iter().map(panel).collect(),
@@ -380,6 +378,8 @@ pub fn f1_by_parameters(scores: &CategoryScores, means: &[MeanF1], confidence: f
         ..titled(scores, "F1 against the number of parameters", data)
     }
 }
+
+const MEAN_OF_SVD: &str = "#d55e00";
 
 /// The points that no other point with at most the same x exceeds, from left to right.
 fn pareto_front(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
@@ -404,13 +404,14 @@ pub fn modes(category: Category, shapes: &[ModeShape], explained: &[f64], data: 
             values: values.iter().enumerate().map(at).collect(),
             ..Series::new(name, &[Mark::Line], [])
         };
-        let mut mean = line("mean scenario; area: nine tenths of all".to_owned(), &shape.mean);
+        let mut mean = line("mean; area: 5 % to 95 % of the scenarios at each instant".to_owned(), &shape.mean);
         mean.marks.push(Mark::Band);
         for (value, [low, high]) in mean.values.iter_mut().zip(&shape.envelope) {
             value.interval = Some((*low, *high));
         }
         let along = shape.along.iter().enumerate();
-        let moved = along.map(|(j, values)| line(format!("a standard deviation along direction {}", j + 1), values));
+        let moved =
+            along.map(|(j, values)| line(format!("mean plus a standard deviation of coefficient {}", j + 1), values));
         let ends = shape.envelope.iter().flatten().chain(&shape.mean).chain(shape.along.iter().flatten());
         Plot {
             heading: shape.quantity.clone(),
@@ -426,15 +427,20 @@ pub fn modes(category: Category, shapes: &[ModeShape], explained: &[f64], data: 
     let residual = Plot {
         heading: "variance not explained".to_owned(),
         x: PlotAxis::exactly("coefficients", 0.0, explained.len() as f64 + 1.0),
-        y: PlotAxis::around("share in %", AxisScale::Logarithmic, rest.iter().map(|(_, rest)| *rest).collect()),
+        y: PlotAxis::around(
+            "share in %",
+            AxisScale::Logarithmic,
+            rest.iter().map(|(_, rest)| *rest).chain([100.0]).collect(),
+        ),
         layers: vec![Series::new("", &[Mark::Line, Mark::Points], rest.iter().copied()).into()],
         ..Plot::default()
     };
     Figure {
         title: format!("{}: what the decomposition keeps", category.label()),
         subtitle: Some(data.to_owned()),
-        caption: "Lateral positions are positive on the target's side; a left-positive decomposition shows the side \
-                  with more scenarios. Variance: of the scaled data, left over by the first coefficients together."
+        caption: "Lateral positions: 0 is the middle of the ego, positive is the target's side; where both sides are kept \
+                  apart, the more frequent one is drawn. Variance: share of the scaled data's that the first coefficients \
+                  together leave. A small share of the motions may decide the outcomes: see F1."
             .to_owned(),
         plots: shapes.iter().map(panel).chain((!rest.is_empty()).then_some(residual)).collect(),
         columns: 2,

@@ -13,23 +13,33 @@ impl Plot {
         (top, bottom): (f64, f64),
         (has_numbers, has_grid): (bool, bool),
     ) {
-        let ticks = axis.ticks((axis.length_px() / 46.0) as usize);
+        // As many numbers as have room.
+        let has_room = |ticks: &Vec<Tick>| {
+            let widths: Vec<f64> = ticks.iter().flat_map(|tick| &tick.label).map(|label| TICK.text_px(label)).collect();
+            widths.iter().sum::<f64>() + 10.0 * widths.len() as f64 <= axis.length_px() + 20.0
+        };
+        let most = (axis.length_px() / 18.0) as usize;
+        let ticks = (2..=most).rev().map(|count| axis.ticks(count)).find(has_room);
+        let ticks = ticks.unwrap_or_else(|| axis.ticks(2));
         let line = |tick: &Tick, from: f64, to: f64| vec![(tick.at_px, from), (tick.at_px, to)];
         marks(canvas, &ticks, has_grid, &|tick| line(tick, top, bottom), &|tick, px| line(tick, bottom, bottom + px));
         for (tick, label) in ticks.iter().filter_map(|tick| Some((tick, tick.label.as_ref()?))).filter(|_| has_numbers)
         {
             // A number at an end must not reach into the next plot.
             let (half, (left, right)) = (TICK.text_px(label) / 2.0, axis.ends_px());
-            let x = tick.at_px.clamp(left + half - 6.0, (right - half + 6.0).max(left + half - 6.0));
+            let x = tick.at_px.clamp(left + half - 3.0, (right - half + 3.0).max(left + half - 3.0));
             canvas.text((x, bottom + 17.0), label, TICK, Anchor::Middle);
         }
     }
 
     /// Draws the names of a vertical axis at the left and their notes at the right.
-    pub(super) fn names_beside(&self, canvas: &mut Canvas, (left, right): (f64, f64), (top, _): (f64, f64)) {
+    pub(super) fn names_beside(&self, canvas: &mut Canvas, (left, right): (f64, f64), (top, bottom): (f64, f64)) {
         let name_px = self.y.names.iter().map(|name| TEXT.text_px(&name.words)).fold(0.0, f64::max).min(NAME_PX);
-        for name in &self.y.names {
-            let y = top - name.at + 2.0;
+        for (at, name) in self.y.names.iter().enumerate() {
+            // In the middle between this name and the next.
+            let end = self.y.names.get(at + 1).map_or(bottom, |next| top - next.at);
+            let words_px = TEXT.height_px(&name.words, name_px + 1.0).max(TEXT.line_px());
+            let y = (top - name.at + end - words_px) / 2.0;
             canvas.paragraph((left - name_px - 8.0, y), &name.words, TEXT, name_px + 1.0);
             canvas.paragraph((right + 8.0, y), &name.note, TEXT, NAME_PX);
         }

@@ -16,7 +16,7 @@ const MAX_WORDS: usize = 12;
 const MIN_SCENARIOS: f64 = 10.0;
 
 /// Caption of hollow markers.
-pub(in crate::report) const HOLLOW: &str = "Hollow: fewer than ten failing scenarios, with their number.";
+pub(super) const HOLLOW: &str = "Hollow: fewer than ten failing scenarios, n.";
 
 /// Whether a value is based on few failing scenarios; their number may be an effective one.
 pub(in crate::report) fn is_few(failing_scenarios: f64) -> bool {
@@ -145,12 +145,20 @@ impl Rule {
         canvas.group(&self.attributes, "", |canvas| canvas.path(&runs, false, paint));
     }
 
-    /// Draws the label at the end of the first line.
+    /// Draws the label on the end of the first line: before the end of a level one, beside the end of a steep one.
     pub(super) fn name_at_end(&self, canvas: &mut Canvas, axes: &Axes, taken: &mut Vec<(f64, f64, f64)>) {
-        let end = self.runs.first().and_then(|run| run.last()).filter(|_| !self.label.is_empty());
-        if let Some(end) = end {
-            label(canvas, axes.at(*end), &self.label, axes, taken);
+        let ends = self.runs.first().and_then(|run| Some((run[run.len().checked_sub(2)?], run.last()?)));
+        let Some((before, end)) = ends.filter(|_| !self.label.is_empty()) else { return };
+        let (width, (x, y)) = (TICK.text_px(&self.label), axes.at(*end));
+        let is_steep = before.0 == end.0;
+        let left = if is_steep && axes.is_inside((x + width + 6.0, y)) { x + 4.0 } else { x - width - 4.0 };
+        let mut base = if is_steep { y + 13.0 } else { y + 4.5 };
+        while taken.iter().any(|w| left < w.0 + w.1 && left + width > w.0 && (base - w.2).abs() < 12.0) {
+            base += 13.0;
         }
+        canvas.rect((left - 2.0, base - 11.0), (left + width + 2.0, base + 2.0), Paint::fill(WHITE));
+        canvas.text((left, base), &self.label, TICK, Anchor::Start);
+        taken.push((left, width, base));
     }
 
     /// Draws a sample for the legend.
@@ -275,12 +283,12 @@ impl Series {
                 for (interval, look) in [(value.outer, &thin), (value.interval, look)] {
                     if let Some(ends) = self.ends(value, interval, axes).filter(|_| self.has(Mark::Intervals)) {
                         let reaches_lower = interval.is_some_and(|interval| axis.holds(interval.0));
-                        self.interval(canvas, ends, reaches_lower, look);
+                        self.interval(canvas, ends, (value.across.is_none(), reaches_lower), look);
                     }
                 }
                 let across = Series { is_sideways: !self.is_sideways, ..Series::default() };
                 if let Some((from, to)) = across.ends(value, value.across, axes) {
-                    canvas.path(&[vec![from, to]], false, Paint::line(look.colour, thin.line_px));
+                    canvas.path(&[vec![from, to]], false, Paint::line(look.colour, look.line_px));
                 }
                 Look { is_hollow: value.is_few, ..*look }.marker(canvas, place);
             });
@@ -300,14 +308,21 @@ impl Series {
         words.into_iter().filter(|word| !word.is_empty()).cloned().collect::<Vec<_>>().join("; ")
     }
 
-    /// Draws an interval, without a bar at a lower end beyond the axis.
-    fn interval(&self, canvas: &mut Canvas, (lower, upper): (Position, Position), has_lower: bool, look: &Look) {
+    /// Draws an interval, with bars at its ends or without; none at a lower end beyond the axis.
+    fn interval(
+        &self,
+        canvas: &mut Canvas,
+        (lower, upper): (Position, Position),
+        (has_bars, has_lower): (bool, bool),
+        look: &Look,
+    ) {
         let bar = |(x, y): Position| match self.is_sideways {
             true => vec![(x, y - 4.0), (x, y + 4.0)],
             false => vec![(x - 4.0, y), (x + 4.0, y)],
         };
-        let lower_bar = if has_lower { bar(lower) } else { Vec::new() };
-        canvas.path(&[vec![lower, upper], bar(upper), lower_bar], false, Paint::line(look.colour, look.line_px));
+        let lower_bar = if has_bars && has_lower { bar(lower) } else { Vec::new() };
+        let upper_bar = if has_bars { bar(upper) } else { Vec::new() };
+        canvas.path(&[vec![lower, upper], upper_bar, lower_bar], false, Paint::line(look.colour, look.line_px));
     }
 
     /// Draws an upper limit: a short bar with an arrow towards lower values.
@@ -328,7 +343,8 @@ impl Series {
             canvas.rect((x, y - 7.0), (x + width_px, y + 7.0), Paint { opacity, ..Paint::fill(look.colour) });
         }
         if self.has(Mark::Line) || self.has(Mark::Intervals) {
-            canvas.path(&[vec![(x, y), (x + width_px, y)]], false, look.paint());
+            let dash = if self.has(Mark::Line) { look.dash } else { "" };
+            canvas.path(&[vec![(x, y), (x + width_px, y)]], false, Look { dash, ..*look }.paint());
         }
         if self.has(Mark::Points) {
             look.marker(canvas, (x + width_px / 2.0, y));
@@ -339,11 +355,11 @@ impl Series {
 /// Draws a label beside a point, if there is room inside the plot and between the others.
 fn label(canvas: &mut Canvas, place: Position, words: &str, axes: &Axes, taken: &mut Vec<(f64, f64, f64)>) {
     let width = TICK.text_px(words);
-    let (right, left) = (6.0, -6.0 - width);
-    let places =
-        [(right, -5.0), (left, -5.0), (right, 14.0), (left, 14.0), (right, -18.0), (left, -18.0), (left, 27.0)];
+    let (right, left, middle) = (6.0, -6.0 - width, -0.5 * width);
+    let places = [(middle, -7.0), (right, -5.0), (left, -5.0), (middle, 17.0), (right, 14.0), (left, 14.0)];
     let places = places.map(|(dx, dy)| (place.0 + dx, place.1 + dy));
-    let is_inside = |(x, y): &Position| axes.is_inside((*x, y - 11.0)) && axes.is_inside((x + width, *y));
+    // A number over the last point may reach beyond the frame.
+    let is_inside = |(x, y): &Position| axes.is_inside((x + 7.0, y - 11.0)) && axes.is_inside((x + width - 7.0, *y));
     let is_free = |(x, y): &Position| taken.iter().all(|w| *x > w.0 + w.1 || x + width < w.0 || (y - w.2).abs() > 12.0);
     let Some((x, y)) = places.into_iter().find(|place| is_inside(place) && is_free(place)) else { return };
     taken.push((x, width, y));

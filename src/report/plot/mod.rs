@@ -19,7 +19,8 @@ pub use layer::{Layer, Mark, Rule, Series, Value};
 pub use look::{Look, Symbol};
 
 pub(super) use axis::{logarithmic_reach, number, plain_end, quantity};
-pub(super) use layer::{HOLLOW, TICK, is_few};
+use layer::HOLLOW;
+pub(super) use layer::{TICK, is_few};
 #[cfg(test)]
 pub(super) use svg::tests::words;
 pub(super) use svg::{Anchor, Canvas, GREY, INK, Type, set};
@@ -189,7 +190,9 @@ impl Figure {
         y = between(&mut canvas, y + 8.0);
         y = self.rows(&mut canvas, y);
         y = self.legend(&mut canvas, y + 2.0);
-        y = canvas.paragraph((MARGIN_PX, y + 3.0), &self.caption, TEXT, width_px);
+        let is_few = self.plots.iter().flat_map(Plot::series).flat_map(|series| &series.values).any(|v| v.is_few);
+        let caption = if is_few { [&self.caption, HOLLOW].join(" ") } else { self.caption.clone() };
+        y = canvas.paragraph((MARGIN_PX, y + 3.0), &caption, TEXT, width_px);
         if !self.notes.1.is_empty() {
             y = canvas.paragraph((MARGIN_PX, y + 5.0), self.notes.0, HEADING, width_px);
         }

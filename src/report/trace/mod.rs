@@ -92,7 +92,7 @@ impl TraceFigure<'_> {
     fn notes(&self, shown: &Shown, plots: &[Plot]) -> Vec<String> {
         let mut notes = Vec::new();
         if shown.has_unjudged() {
-            notes.push("Thin in gap, TTC, BTN: the criteria ignore it.".to_owned());
+            notes.push("Thin gap, TTC, BTN: the criteria ignore the vehicle there.".to_owned());
         }
         let is_cut = |plot: &Plot| {
             let Ends::Exactly(_, top) = plot.y.ends else { return false };

@@ -10,7 +10,7 @@ use crate::report::plot::{Cells, Figure, Fill, FilledCell, GREY, Height, Plot, P
 
 /// Names and colours of the vehicles.
 const VEHICLES: [(&str, &str); 3] =
-    [("ego", "#0072b2"), ("other vehicle", "#d55e00"), ("vehicle ahead of it", "#8c8c8c")];
+    [("ego", "#1a1a1a"), ("other vehicle", "#8c8c8c"), ("vehicle ahead of it", "#cfcfcf")];
 /// Half the width of a lane, m.
 const HALF_LANE_M: f64 = 1.75;
 /// Frames per second of the moving figure.
