@@ -607,7 +607,9 @@ pub fn ratios(file: &CompareFile, comparison: &CategoryComparison, criterion: Cr
     });
     // Where an interval has no upper end, the axis ends a decade above the ratio.
     let reach: Vec<(f64, f64, f64)> = all
-        .filter_map(|value| value.interval.map(|(low, high)| (value.x, low, high.min(10.0 * value.x))))
+        .filter_map(|value| {
+            value.interval.filter(|_| value.x > 0.0).map(|(low, high)| (value.x, low, high.min(10.0 * value.x)))
+        })
         .chain([(1.0, 1.0 / margin, margin)])
         .collect();
     let panel = |(heading, pick): (&str, Pick)| Dots {
@@ -633,7 +635,7 @@ pub fn ratios(file: &CompareFile, comparison: &CategoryComparison, criterion: Cr
         caption: format!(
             "Share of the lanes that fail, as a multiple of that of S, scenario by scenario, with its {} % interval; 1: as \
              many failures, though perhaps of other scenarios (see F1). A ratio agrees where its interval lies between \
-             the dashed lines ({:.2} and {margin}). Where S never fails there is no ratio. n: scenarios in which S fails.",
+             the dashed lines ({:.2} and {margin}). Where S never fails there is no ratio; a line at an edge goes on beyond it. n: scenarios in which S fails.",
             100.0 * file.level,
             1.0 / margin
         ),

@@ -47,7 +47,9 @@ pub fn convergence(density: &DensityModel, checkpoints: &[Checkpoint], level: f6
         let mut values: Vec<Value> = own.clone().map(value).collect();
         // A number at every point would cover the line.
         let last = own.fold(None, |_, (_, row)| row.with_data);
-        if let Some((value, scenarios)) = values.last_mut().filter(|value| value.is_few).zip(last.map(|of| of.1)) {
+        if let Some((value, scenarios)) =
+            values.last_mut().filter(|value| value.is_few).zip(last.map(|of| of.1.floor()))
+        {
             value.label = format!("{scenarios:.0}");
         }
         let series = Series::new(criterion.label(), &[Mark::Band, Mark::Line, Mark::Points], []);

@@ -1,7 +1,7 @@
 //! Where failures occur: the fraction of failed samples per cell of two scenario parameters, as heat maps.
 //!
 //! The colours go from pale yellow over green to dark blue and darken with each step, so that colour-blind readers and grey prints
-//! can distinguish them; the scale is the same for all models and headways of a run.
+//! can distinguish them, but for pale cells; the scale is the same for all models and headways of a run.
 
 use super::convergence::sampled;
 use super::plot::{Cells, ColourBar, Figure, Fill, FilledCell, Height, Plot, PlotAxis};
@@ -33,13 +33,18 @@ const FEW_SAMPLES: u64 = 10;
 const PALE: f64 = 0.35;
 /// From a fraction of zero to the maximum. Relative luminance decreases from step to step.
 const COLOURS: [(u8, u8, u8); 6] =
-    [(255, 236, 150), (178, 214, 118), (96, 174, 124), (44, 126, 136), (38, 74, 122), (10, 32, 80)];
+    [(250, 218, 96), (170, 206, 110), (96, 174, 124), (44, 126, 136), (38, 74, 122), (10, 32, 80)];
 /// Colour of a cell with samples and without failures.
-const NONE_FAILED: &str = "#dcdcdc";
+const NONE_FAILED: &str = "#ececec";
 
 impl FailureMaps<'_> {
     fn failures(&self, headway: usize, model: usize) -> &[u64] {
         self.map.failures.get(headway * self.plan.models.len() + model).map_or(&[], Vec::as_slice)
+    }
+
+    /// Whether the headway is a parameter of the density.
+    fn is_drawn(&self) -> bool {
+        self.density.space.thw_s(&vec![0.0; self.density.space.dimensions()]).is_some()
     }
 
     /// Cells with samples: index, samples, failures.
@@ -95,6 +100,7 @@ impl FailureMaps<'_> {
             let cells = self.cells(headway, model).map(cell).collect();
             Plot {
                 heading: match self.plan.headways[headway] {
+                    _ if self.is_drawn() => "headway sampled".to_owned(),
                     Headway::ThwS(thw_s) => format!("THW {thw_s} s"),
                     other => other.to_string(),
                 },
@@ -116,7 +122,7 @@ impl FailureMaps<'_> {
             plots: headways.into_iter().map(plot).collect(),
             bar: Some(ColourBar { label: "Share failed", largest, colour: scale_colour }),
             caption: format!(
-                "The colours mean the same for every model and headway of this run. White: no samples. {} of {} samples \
+                "The colours mean the same for every model and headway of this run. White: no samples. A pale cell may lie beyond the scale. {} of {} samples \
                  lie outside the map.",
                 count(outside),
                 count(self.samples)
@@ -133,7 +139,10 @@ impl FailureMaps<'_> {
         let rows = (0..self.plan.headways.len() * cells).map(|at| (at / cells, at % cells));
         let failures = |(headway, cell): (usize, usize)| self.failures(headway, model).get(cell).copied().unwrap_or(0);
         Table::of(rows)
-            .column("headway", |(headway, _)| self.plan.headways[headway].to_string())
+            .column("headway", |(headway, _)| match self.is_drawn() {
+                true => "sampled".to_owned(),
+                false => self.plan.headways[headway].to_string(),
+            })
             .column("x_lower", |(_, cell)| x[cell % MAP_CELLS])
             .column("x_upper", |(_, cell)| x[cell % MAP_CELLS + 1])
             .column("y_lower", |(_, cell)| y[cell / MAP_CELLS])
@@ -171,7 +180,7 @@ mod tests {
         };
         let scale: Vec<f64> = (0..=50).map(|k| luminance(scale_colour(f64::from(k) / 50.0))).collect();
         assert!(scale.windows(2).all(|l| l[0] > l[1]), "{scale:?}");
-        assert!(scale[0] > 0.8 && scale[50] < 0.02);
+        assert!(scale[0] > 0.7 && scale[50] < 0.02);
         assert!((0..=1000).all(|k| scale_colour(f64::from(k) / 1000.0) != NONE_FAILED));
     }
 }

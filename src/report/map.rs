@@ -168,7 +168,8 @@ impl MapReport {
                     .to_owned(),
             );
         }
-        if self.shown_outcomes().contains(&CellOutcome::FailByReaction) {
+        let by_reaction = kinds.iter().position(|kind| kind.0 == CellOutcome::FailByReaction.label());
+        if by_reaction.is_some_and(|at| cells.contains(&(at as u8))) {
             notes.push(
                 "Fail by reaction: the driver reacts and collides; without a reaction nothing collides.".to_owned(),
             );

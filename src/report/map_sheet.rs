@@ -28,7 +28,7 @@ pub struct MapSheet<'a> {
 
 /// Colour of the boundary of cases that are not preventable.
 const BOUNDARY: &str = "#c40000";
-/// More plots in a row than this make a wide sheet; with more than the second a row has three.
+/// More plots in a row than this make a wide sheet; and how many a row has at most.
 const MAX_NARROW: usize = 3;
 const MAX_COLUMNS: usize = 8;
 
@@ -49,9 +49,9 @@ pub fn agreement(agreement: Agreement, first: &str, second: &str) -> (String, &'
     let label = agreement.label().to_owned();
     match agreement {
         Agreement::BothPass => (label, "#f3dfa2"),
-        Agreement::BothFail => (label, "#8c8c8c"),
-        Agreement::OnlyFirst => (format!("only {first} fails"), "#1f62a0"),
-        Agreement::OnlySecond => (format!("only {second} fails"), "#651a10"),
+        Agreement::BothFail => (label, "#7d7d7d"),
+        Agreement::OnlyFirst => (format!("only {first} fails"), "#0b4f8a"),
+        Agreement::OnlySecond => (format!("only {second} fails"), "#4a0f08"),
         Agreement::NoConflict => (label, NO_CONFLICT),
         Agreement::Undecided => (label, UNDECIDED),
     }
@@ -83,30 +83,32 @@ impl MapSheet<'_> {
         }
     }
 
-    /// The plots, and how many are in a row (0: any). Of two quantities the first has a row per value, the second a
-    /// column; a combination that is not in the grid leaves its place empty.
+    /// The plots, and how many are in a row (0: any). The last quantity of the panels has a column per value, the others
+    /// a row per combination; one that is not in the grid leaves its place empty.
     fn trellis(&self) -> (usize, Vec<Plot>) {
-        let panels = self.grid.panels();
-        let distinct = |at: usize| {
-            let mut values: Vec<f64> = panels.iter().filter_map(|panel| panel.get(at).copied()).collect();
-            values.sort_by(f64::total_cmp);
-            values.dedup();
-            values
-        };
-        let (rows, columns) = (distinct(0), distinct(1));
-        if self.grid.panel_axes().len() != 2 || columns.len() > MAX_COLUMNS || columns.len() < 2 {
+        let (panels, last) = (self.grid.panels(), self.grid.panel_axes().len().saturating_sub(1));
+        let mut values: Vec<f64> = panels.iter().filter_map(|panel| panel.get(last).copied()).collect();
+        values.sort_by(f64::total_cmp);
+        values.dedup();
+        if last == 0 || values.len() < 2 {
             return (0, (0..panels.len()).map(|panel| self.plot(panel, 0)).collect());
         }
-        let place = |row: f64, column: f64| {
-            let found = panels.iter().position(|panel| panel[..] == [row, column]);
-            found.map_or(Plot::default(), |panel| self.plot(panel, 1))
-        };
-        let of_row = |row: &f64| {
-            let mut plots: Vec<Plot> = columns.iter().map(|column| place(*row, *column)).collect();
-            plots[0].row = self.value_name(0, *row);
+        let mut rows: Vec<&[f64]> = panels.iter().map(|panel| &panel[..last]).collect();
+        rows.dedup();
+        // Many columns continue on a second line.
+        let columns = values.len().div_ceil(values.len().div_ceil(MAX_COLUMNS));
+        let of_row = |row: &&[f64]| {
+            let place = |value: &f64| {
+                let found = panels.iter().position(|panel| panel[..last] == **row && panel[last] == *value);
+                found.map_or(Plot::default(), |panel| self.plot(panel, last))
+            };
+            let mut plots: Vec<Plot> = values.iter().map(place).collect();
+            plots.resize_with(values.len().next_multiple_of(columns), Plot::default);
+            let names = row.iter().enumerate().map(|(axis, value)| self.value_name(axis, *value));
+            plots[0].row = names.collect::<Vec<_>>().join(", ");
             plots
         };
-        (columns.len(), rows.iter().flat_map(of_row).collect())
+        (columns, rows.iter().flat_map(of_row).collect())
     }
 
     /// `first`: of the panel's values, those from here on are in the heading.

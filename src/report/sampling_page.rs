@@ -28,6 +28,8 @@ impl EstimateFile {
         if !self.reproducible {
             warnings.push("Ended by the clock: another machine ends elsewhere.".to_owned());
         }
+        let mut sections = vec![self.estimates_section()];
+        sections.extend((!figures.is_empty()).then(|| Section { figures, ..Section::new("figures", "Figures") }));
         let page = Page {
             title: format!("Probability of failure: {}", self.name()),
             lead: format!(
@@ -46,7 +48,7 @@ impl EstimateFile {
             ),
             synthetic: density.provenance.synthetic,
             warnings,
-            sections: vec![self.estimates_section(), pictures(figures), self.reproduction()?],
+            sections: sections.into_iter().chain([self.reproduction()?]).collect(),
         };
         page.html()
     }
@@ -150,7 +152,7 @@ impl EstimateFile {
                 let own = self.estimates.iter().filter(|row| row.model == model && row.criterion == criterion);
                 let point = |row: &EstimateRow| {
                     let few = row.failing_scenarios.filter(|n| is_few(*n));
-                    let label = few.filter(|n| *n > 0.0).map_or(String::new(), |n| format!("{n:.0}"));
+                    let label = few.filter(|n| *n > 0.0).map_or(String::new(), |n| format!("{:.0}", n.floor()));
                     let place = (thw_s(row)?, 100.0 * row.estimate.probability);
                     let interval = &row.estimate.interval;
                     let interval = Some((100.0 * interval.low, 100.0 * interval.high.min(1.0)));
@@ -233,14 +235,5 @@ impl EstimateFile {
             is_folded: true,
             ..Section::new("reproduction", "Reproduction")
         })
-    }
-}
-
-fn pictures(figures: Vec<PageFigure>) -> Section {
-    let none = "This estimator has no figure of its own.";
-    Section {
-        intro: if figures.is_empty() { none } else { "" }.to_owned(),
-        figures,
-        ..Section::new("figures", "Figures")
     }
 }

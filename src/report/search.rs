@@ -252,6 +252,8 @@ impl SearchReport<'_> {
             })
         };
         let look = |colour, symbol, is_hollow| Some(Look { colour, symbol, is_hollow, ..Look::of(0, 1) });
+        let points = |front: &Front| front.paper.iter().chain(&front.points).map(|point| point.parameters).max();
+        let most = self.result.fronts.iter().filter_map(points).max().unwrap_or(1);
         let plot = |front: &Front| {
             let paper = front.paper.iter().filter_map(|point| {
                 let scored = point.judged.held_out.as_ref().unwrap_or(&point.judged.cross_validated);
@@ -293,7 +295,7 @@ impl SearchReport<'_> {
             }
             Plot {
                 heading: front.scope.name(),
-                x: PlotAxis::exactly("parameters", 0.5, self.result.options.limits.max_parameters as f64 + 0.5),
+                x: PlotAxis { is_count: true, ..PlotAxis::exactly("parameters", 0.0, most as f64 + 1.0) },
                 y: PlotAxis::exactly(self.result.options.objective.name(), 0.0, 1.0),
                 layers,
                 ..Plot::default()
@@ -337,6 +339,7 @@ impl SearchReport<'_> {
             let values = values.collect();
             Series { values, ..Series::new(family.clone(), &[Mark::Points], []) }.into()
         });
+        let all = count(self.result.evaluated.len() as u64);
         let plot = Plot {
             x: PlotAxis::new("root mean square error of the motions, standard deviations"),
             y: PlotAxis::exactly(format!("{}, {}", self.goal(), Scope::All.name()), 0.0, 1.0),
@@ -347,10 +350,12 @@ impl SearchReport<'_> {
             title: format!("{}: the error of the motions and the outcomes", self.result.category.label()),
             subtitle: Some(self.data.clone()),
             plots: vec![plot],
-            caption: format!(
-                "{} candidates, about {MAX_DRAWN} drawn; cross-validated.",
-                count(self.result.evaluated.len() as u64)
-            ),
+            caption: match stride {
+                1 => format!("{all} candidates, cross-validated."),
+                _ => format!(
+                    "{all} candidates, cross-validated; one in {stride} is drawn, evenly by score, and the paper's."
+                ),
+            },
             ..Figure::default()
         }
     }

@@ -216,7 +216,7 @@ impl StudyReport {
         if scores.variants.len() > 1 {
             figures.push(("f1-by-parameters", f1_by_parameters(scores, &pictures.means, confidence, data)));
         }
-        figures.push(("headways", pictures.headways.figure(scores, confidence, data)));
+        figures.extend(pictures.headways.figure(scores, confidence, data).map(|figure| ("headways", figure)));
         if !pictures.parameters.is_empty() {
             figures.push(("parameters", distributions(scores.category, &pictures.parameters, data)));
         }

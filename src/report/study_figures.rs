@@ -9,7 +9,7 @@ use super::plot::{
 use crate::engine::{Headway, LanePlan, Partial};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
-use crate::run::score::{CategoryScores, MeanF1, ScoreInterval, f1, precision, recall};
+use crate::run::score::{CROSS_VALIDATED, CategoryScores, MeanF1, ScoreInterval, f1, precision, recall};
 use crate::run::study::ParameterHistogram;
 use crate::scenario::Category;
 use crate::scenario::parameterization::{ModeShape, Parameterization};
@@ -70,8 +70,11 @@ impl HeadwayFailures {
     }
 
     /// Fraction of the scenarios that fail, over the headway: S with its interval, beside it every S'; a panel per model
-    /// and criterion.
-    pub fn figure(&self, scores: &CategoryScores, confidence: f64, data: &str) -> Figure {
+    /// and criterion. `None` with fewer than two headways that are the same for all scenarios.
+    pub fn figure(&self, scores: &CategoryScores, confidence: f64, data: &str) -> Option<Figure> {
+        if self.headways.iter().filter_map(Headway::value).count() < 2 {
+            return None;
+        }
         let is_gap = self.headways.iter().any(|headway| matches!(headway, Headway::GapM(_)));
         let cells: Vec<(usize, Criterion)> =
             (0..self.models.len()).flat_map(|model| Criterion::ALL.map(|criterion| (model, criterion))).collect();
@@ -128,7 +131,7 @@ impl HeadwayFailures {
         };
         let empty = cells.iter().filter(|cell| !fails(cell));
         let empty = empty.map(|(model, criterion)| format!("{}, {}", self.models[*model].name(), criterion.label()));
-        Figure {
+        Some(Figure {
             caption: format!(
                 "Black: share of the recorded scenarios in which the driver model fails the criterion; band: its {} % \
                  interval over scenarios. Colours: the same scenarios, parameterized. Vertical axes by the square root, each with its own end.",
@@ -138,7 +141,7 @@ impl HeadwayFailures {
             columns: Criterion::ALL.len(),
             notes: ("Left out, because nothing fails:", empty.collect()),
             ..titled(scores, "failures against the headway", data)
-        }
+        })
     }
 }
 
@@ -291,8 +294,15 @@ pub fn recall_and_precision(scores: &CategoryScores, confidence: f64, data: &str
     };
     let cells = cells(scores);
     let drawn: Vec<Option<Plot>> = cells.iter().map(panel).collect();
-    let empty = cells.iter().zip(&drawn).filter(|(_, plot)| plot.is_none());
-    let empty: Vec<String> = empty.map(|(cell, _)| cell_name(cell)).collect();
+    let undefined = |(cell, plot): (&(ModelId, Criterion), &Option<Plot>)| {
+        let counts = |variant: usize| scores.index(variant, cell.0, cell.1).map(|at| scores.cells[at].counts);
+        let has_none = |variant: &usize| counts(*variant).is_none_or(|c| recall(&c).and(precision(&c)).is_none());
+        let keys: Vec<&str> =
+            (1..scores.variants.len()).filter(has_none).map(|variant| scores.variants[variant].as_str()).collect();
+        let which = if plot.is_none() { "all".to_owned() } else { keys.join(", ") };
+        (!keys.is_empty()).then(|| format!("{}: {which}", cell_name(cell)))
+    };
+    let empty: Vec<String> = cells.iter().zip(&drawn).filter_map(undefined).collect();
     Figure {
         caption: format!(
             "Recall: share of the recorded failures that the parameterized scenarios show; precision: share of their \
@@ -301,14 +311,15 @@ pub fn recall_and_precision(scores: &CategoryScores, confidence: f64, data: &str
             100.0 * confidence
         ),
         plots: drawn.into_iter().flatten().collect(),
-        notes: ("Left out, because a share is undefined without a failure on one side:", empty),
+        notes: ("Without a marker, because S or S' never fails:", empty),
         ..titled(scores, "recall and precision of S' against S", data)
     }
 }
 
 /// Text for a heading if there are few scenarios.
 fn few(failing_scenarios: u64) -> String {
-    if is_few(failing_scenarios as f64) { format!(" (n = {failing_scenarios})") } else { String::new() }
+    let is_few = is_few(failing_scenarios as f64);
+    if is_few { format!(" (n\u{a0}=\u{a0}{failing_scenarios})") } else { String::new() }
 }
 
 /// All pairs of recall and precision with this F1: P = F·R/(2R − F).
@@ -357,7 +368,7 @@ pub fn f1_by_parameters(scores: &CategoryScores, means: &[MeanF1], confidence: f
         };
         Plot {
             heading: format!("{name}{}", if mean.values.is_empty() { String::new() } else { few(mean.fewest_failing) }),
-            x: PlotAxis::exactly("parameters beside the headway", 1.0, most + 1.0),
+            x: PlotAxis { is_count: true, ..PlotAxis::exactly("parameters beside the headway", 0.0, most + 1.0) },
             y: PlotAxis::exactly("mean F1", 0.0, 1.05),
             layers: own.into_iter().map(|(name, look)| of(name, look).into()).chain([front.into()]).collect(),
             ..Plot::default()
@@ -426,7 +437,7 @@ pub fn modes(category: Category, shapes: &[ModeShape], explained: &[f64], data: 
     let rest: Vec<(f64, f64)> = rest.filter(|(_, rest)| *rest > 1e-6).collect();
     let residual = Plot {
         heading: "variance not explained".to_owned(),
-        x: PlotAxis::exactly("coefficients", 0.0, explained.len() as f64 + 1.0),
+        x: PlotAxis { is_count: true, ..PlotAxis::exactly("coefficients", 0.0, explained.len() as f64 + 1.0) },
         y: PlotAxis::around(
             "share in %",
             AxisScale::Logarithmic,
@@ -440,7 +451,8 @@ pub fn modes(category: Category, shapes: &[ModeShape], explained: &[f64], data: 
         subtitle: Some(data.to_owned()),
         caption: "Lateral positions: 0 is the middle of the ego, positive is the target's side; where both sides are kept \
                   apart, the more frequent one is drawn. Variance: share of the scaled data's that the first coefficients \
-                  together leave. A small share of the motions may decide the outcomes: see F1."
+                  together leave. A small share of the motions may decide the outcomes: see F1. Coefficients go together, so that \
+                  one alone may lead out of the area."
             .to_owned(),
         plots: shapes.iter().map(panel).chain((!rest.is_empty()).then_some(residual)).collect(),
         columns: 2,
@@ -475,7 +487,10 @@ pub fn distributions(category: Category, histograms: &[ParameterHistogram], data
 /// `2: constant acceleration, constant lateral speed`.
 pub(super) fn legend_name(scores: &CategoryScores, variant: usize) -> String {
     let key = &scores.variants[variant];
-    Parameterization::find(scores.category, key).map_or(key.clone(), |id| format!("{key}: {}", id.description()))
+    let (base, suffix) =
+        key.strip_suffix(CROSS_VALIDATED).map_or((key.as_str(), ""), |base| (base, ", cross-validated"));
+    let found = Parameterization::find(scores.category, base);
+    found.map_or(key.clone(), |id| format!("{key}: {}{suffix}", id.description()))
 }
 
 #[cfg(test)]

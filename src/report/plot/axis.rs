@@ -44,6 +44,8 @@ pub(in crate::report) struct Axis {
     high: f64,
     from_px: f64,
     to_px: f64,
+    /// Whether its values are whole numbers.
+    pub is_count: bool,
 }
 
 /// A tick of the axis, with its number if there is room for it.
@@ -86,12 +88,12 @@ impl Axis {
             }
             AxisScale::SquareRoot => (0.0, 1.0),
         };
-        Some(Self { scale, low, high, from_px, to_px })
+        Some(Self { scale, low, high, from_px, to_px, is_count: false })
     }
 
     /// The linear axis that ends exactly at `low` and `high` (finite, `low < high`).
     pub fn exactly((low, high): (f64, f64), (from_px, to_px): (f64, f64)) -> Self {
-        Self { scale: AxisScale::Linear, low, high, from_px, to_px }
+        Self { scale: AxisScale::Linear, low, high, from_px, to_px, is_count: false }
     }
 
     /// Whether `value` is between the ends.
@@ -149,6 +151,7 @@ impl Axis {
 
     fn linear_ticks(&self, max_ticks: usize) -> Vec<Tick> {
         let step = plain_step((self.high - self.low) / max_ticks.max(1) as f64);
+        let step = if self.is_count { step.max(1.0) } else { step };
         let (first, last) = ((self.low / step - 1e-9).ceil(), (self.high / step + 1e-9).floor());
         // Neighbouring numbers must differ, at any distance from zero.
         let largest = self.low.abs().max(self.high.abs()) / step;

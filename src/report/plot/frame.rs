@@ -16,7 +16,7 @@ impl Plot {
         // As many numbers as have room.
         let has_room = |ticks: &Vec<Tick>| {
             let widths: Vec<f64> = ticks.iter().flat_map(|tick| &tick.label).map(|label| TICK.text_px(label)).collect();
-            widths.iter().sum::<f64>() + 10.0 * widths.len() as f64 <= axis.length_px() + 20.0
+            widths.len() > 1 && widths.iter().sum::<f64>() + 10.0 * widths.len() as f64 <= axis.length_px() + 20.0
         };
         let most = (axis.length_px() / 18.0) as usize;
         let ticks = (2..=most).rev().map(|count| axis.ticks(count)).find(has_room);

@@ -263,11 +263,13 @@ impl Series {
         let is_crowded = self.has(Mark::Line) && self.values.len() > MAX_MARKERS;
         for (k, value) in self.values.iter().enumerate() {
             let attributes = if self.attributes.is_empty() { "class=\"value\"" } else { &self.attributes };
-            let own = (if self.is_sideways { value.x } else { value.y }, value.interval.map_or(f64::NAN, |i| i.1));
+            let axis = if self.is_sideways { &axes.x } else { &axes.y };
             if !axes.shows(value.place()) {
-                let axis = if self.is_sideways { &axes.x } else { &axes.y };
-                let ends = self.ends(value, value.interval, axes);
-                if let Some((_, upper)) = ends.filter(|_| own.0 == 0.0 && axis.shows(own.1)) {
+                // Of a zero the upper end of the widest interval.
+                let widest = value.outer.or(value.interval);
+                let is_zero = (if self.is_sideways { value.x } else { value.y }) == 0.0;
+                let is_limit = is_zero && widest.is_some_and(|ends| axis.holds(ends.1));
+                if let Some((_, upper)) = self.ends(value, widest, axes).filter(|_| is_limit) {
                     canvas.group("class=\"limit\"", &value.tip, |canvas| self.limit(canvas, upper, look));
                 }
                 continue;
@@ -278,12 +280,12 @@ impl Series {
             }
             let place = axes.at((value.x, value.y));
             canvas.group(attributes, &self.tip(value, quantities), |canvas| {
-                let axis = if self.is_sideways { &axes.x } else { &axes.y };
                 let thin = Look { line_px: 0.5 * look.line_px, ..*look };
                 for (interval, look) in [(value.outer, &thin), (value.interval, look)] {
                     if let Some(ends) = self.ends(value, interval, axes).filter(|_| self.has(Mark::Intervals)) {
-                        let reaches_lower = interval.is_some_and(|interval| axis.holds(interval.0));
-                        self.interval(canvas, ends, (value.across.is_none(), reaches_lower), look);
+                        let holds = interval.map_or((false, false), |(low, high)| (axis.holds(low), axis.holds(high)));
+                        let is_barred = value.across.is_none();
+                        self.interval(canvas, ends, (is_barred && holds.0, is_barred && holds.1), look);
                     }
                 }
                 let across = Series { is_sideways: !self.is_sideways, ..Series::default() };
@@ -294,7 +296,7 @@ impl Series {
             });
             // A label per value if there are few; many would cover one another.
             if !value.label.is_empty() && (self.values.len() <= MAX_WORDS || value.is_few) {
-                label(canvas, place, &value.label, axes, taken);
+                label(canvas, (place, look.colour), &value.label, axes, taken);
             }
         }
     }
@@ -308,20 +310,20 @@ impl Series {
         words.into_iter().filter(|word| !word.is_empty()).cloned().collect::<Vec<_>>().join("; ")
     }
 
-    /// Draws an interval, with bars at its ends or without; none at a lower end beyond the axis.
+    /// Draws an interval, with a bar at its lower end, at its upper end.
     fn interval(
         &self,
         canvas: &mut Canvas,
         (lower, upper): (Position, Position),
-        (has_bars, has_lower): (bool, bool),
+        (has_lower, has_upper): (bool, bool),
         look: &Look,
     ) {
         let bar = |(x, y): Position| match self.is_sideways {
             true => vec![(x, y - 4.0), (x, y + 4.0)],
             false => vec![(x - 4.0, y), (x + 4.0, y)],
         };
-        let lower_bar = if has_bars && has_lower { bar(lower) } else { Vec::new() };
-        let upper_bar = if has_bars { bar(upper) } else { Vec::new() };
+        let lower_bar = if has_lower { bar(lower) } else { Vec::new() };
+        let upper_bar = if has_upper { bar(upper) } else { Vec::new() };
         canvas.path(&[vec![lower, upper], upper_bar, lower_bar], false, Paint::line(look.colour, look.line_px));
     }
 
@@ -353,7 +355,13 @@ impl Series {
 }
 
 /// Draws a label beside a point, if there is room inside the plot and between the others.
-fn label(canvas: &mut Canvas, place: Position, words: &str, axes: &Axes, taken: &mut Vec<(f64, f64, f64)>) {
+fn label(
+    canvas: &mut Canvas,
+    (place, colour): (Position, &'static str),
+    words: &str,
+    axes: &Axes,
+    taken: &mut Vec<(f64, f64, f64)>,
+) {
     let width = TICK.text_px(words);
     let (right, left, middle) = (6.0, -6.0 - width, -0.5 * width);
     let places = [(middle, -7.0), (right, -5.0), (left, -5.0), (middle, 17.0), (right, 14.0), (left, 14.0)];
@@ -363,7 +371,7 @@ fn label(canvas: &mut Canvas, place: Position, words: &str, axes: &Axes, taken: 
     let is_free = |(x, y): &Position| taken.iter().all(|w| *x > w.0 + w.1 || x + width < w.0 || (y - w.2).abs() > 12.0);
     let Some((x, y)) = places.into_iter().find(|place| is_inside(place) && is_free(place)) else { return };
     taken.push((x, width, y));
-    canvas.text((x, y), words, TICK, Anchor::Start);
+    canvas.text((x, y), words, Type { colour, ..TICK }, Anchor::Start);
 }
 
 /// Removes points that lie on the line between their neighbours: a lane has thousands of steps.

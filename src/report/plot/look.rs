@@ -49,7 +49,7 @@ pub struct Look {
 }
 
 impl Look {
-    /// Colour, dash and marker cycle together; from the eighth series on the dash is shifted, so that no pair repeats
+    /// Colour, dash and marker cycle together; from the eighth series on dash and marker are shifted, so that no pair repeats
     /// before 49 series. Lines go from thick to thin and markers from large to small, so that earlier ones stay
     /// visible.
     pub fn of(index: usize, count: usize) -> Self {
@@ -58,7 +58,7 @@ impl Look {
             colour: COLOURS[index % COLOURS.len()],
             dash: DASHES[(index + index / COLOURS.len()) % DASHES.len()],
             line_px: 2.0 - 0.6 * depth,
-            symbol: SYMBOLS[index % SYMBOLS.len()],
+            symbol: SYMBOLS[(index + index / COLOURS.len()) % SYMBOLS.len()],
             marker_px: 4.4 - 1.2 * depth,
             is_hollow: false,
         }

@@ -116,6 +116,8 @@ pub struct PlotAxis {
     pub ends: Ends,
     /// Names instead of numbers.
     pub names: Vec<Name>,
+    /// Whether the values are whole numbers.
+    pub is_count: bool,
 }
 
 /// Ends of an axis.
@@ -164,11 +166,13 @@ impl PlotAxis {
     }
 
     fn place(&self, values: impl Iterator<Item = f64>, ends_px: (f64, f64)) -> Option<axis::Axis> {
-        match &self.ends {
+        let mut placed = match &self.ends {
             Ends::Exactly(low, high) => Some(axis::Axis::exactly((*low, *high), ends_px)),
             Ends::Around(values) => axis::Axis::around(self.scale, values, ends_px),
             Ends::Layers => axis::Axis::around(self.scale, &values.collect::<Vec<_>>(), ends_px),
-        }
+        };
+        placed.iter_mut().for_each(|axis| axis.is_count = self.is_count);
+        placed
     }
 }
 
@@ -280,7 +284,8 @@ impl Figure {
                 false => TICK.height_px(&plot.y.label, left_px(if shares_y { 0 } else { column }) + frame_px),
             };
             let above = |(column, plot): (usize, &Plot)| {
-                HEADING.height_px(&plot.heading, frame_px + left_px(column)) + label_px(column, plot) + 4.0
+                let heading_px = if shares_y { frame_px } else { frame_px + left_px(column) };
+                HEADING.height_px(&plot.heading, heading_px) + label_px(column, plot) + 4.0
             };
             let frame_top = y + in_row.iter().enumerate().map(above).fold(0.0, f64::max);
             let (mut bottom, mut left) = (frame_top, MARGIN_PX);
@@ -439,8 +444,7 @@ impl Plot {
             let is_shown = |v: &&Value| self.x.scale.shows(v.x) && self.y.scale.shows(v.y);
             self.series().flat_map(|series| &series.values).filter(is_shown)
         };
-        let is_given = self.is_polar || [&self.x, &self.y].iter().any(|axis| matches!(axis.ends, Ends::Around(_)));
-        if !is_given && self.series().next().is_some() && shown().next().is_none() {
+        if !self.is_polar && self.series().next().is_some() && !self.series().any(|series| self.shows(series)) {
             return None;
         }
         let x = self.x.place(shown().flat_map(|v| [v.x - half, v.x + half]), across)?;

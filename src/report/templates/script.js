@@ -7,11 +7,15 @@ for (const table of document.querySelectorAll("table")) {
     heads.forEach((other) => { other.ariaSort = null; });
     head.ariaSort = down > 0 ? "ascending" : "descending";
     const text = (row) => row.cells[at].textContent.trim();
-    const number = (row) => Number.parseFloat(text(row).replace(/[≤>±,]/g, ""));
+    const number = (row) => {
+      const words = text(row).replace(/^[≤>±]\s*/, "").replace(/,/g, "");
+      if (/^[+-]?∞/.test(words)) { return words.startsWith("-") ? -Infinity : Infinity; }
+      return /^[+-]?\d*\.?\d+(e[+-]?\d+)?(?=$|[\sx%…[])/.test(words) ? Number.parseFloat(words) : NaN;
+    };
     const order = (a, b) => {
       const [x, y] = [number(a), number(b)];
       if (Number.isNaN(x) && Number.isNaN(y)) { return down * text(a).localeCompare(text(b)); }
-      return Number.isNaN(x) ? 1 : Number.isNaN(y) ? -1 : down * (x - y);
+      return Number.isNaN(x) ? 1 : Number.isNaN(y) ? -1 : x === y ? 0 : down * (x > y ? 1 : -1);
     };
     table.tBodies[0].append(...[...table.tBodies[0].rows].sort(order));
   }));
@@ -24,7 +28,7 @@ document.addEventListener("mousemove", (event) => {
   tip.hidden = !title;
   if (title) {
     tip.textContent = title.textContent;
-    tip.style.left = Math.min(event.pageX + 12, document.body.scrollWidth - 260) + "px";
+    tip.style.left = Math.min(event.pageX + 12, document.documentElement.clientWidth - 270) + "px";
     tip.style.top = event.pageY + 14 + "px";
   }
 });
@@ -32,3 +36,7 @@ document.addEventListener("mousemove", (event) => {
 const open = () => document.getElementById(location.hash.slice(1))?.querySelector("details")?.setAttribute("open", "");
 addEventListener("hashchange", open);
 open();
+// A part with figures prints, though not a whole folded section.
+addEventListener("beforeprint", () => {
+  document.querySelectorAll("details.part:has(figure)").forEach((part) => { part.open = true; });
+});

@@ -258,9 +258,11 @@ impl<'a> Shown<'a> {
     }
 
     fn measure(&self, title: &str, label: String, top: f64, threshold: f64, curves: Vec<Curve>) -> Plot {
+        let is_beyond = |curve: &Curve| curve.points.iter().all(|point| point.1 > top);
+        let hint = if curves.iter().any(is_beyond) { "a curve not shown is above" } else { "" };
         let mut layers = layers(curves.into_iter().flat_map(|curve| below(curve, top)), Vec::new());
         layers.push(Rule { label, ..self.level(threshold, INK, 1.4, "2,3") }.into());
-        self.panel(title, "", 84.0, (-0.04 * top, top), layers)
+        self.panel(title, hint, 84.0, (-0.04 * top, top), layers)
     }
 
     fn surrogate(&self, title: &str, hint: &str, vehicle: usize, value: &dyn Fn(&TracedVehicle) -> f64) -> Plot {

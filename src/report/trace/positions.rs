@@ -13,6 +13,8 @@ const VEHICLES: [(&str, &str); 3] =
     [("ego", "#1a1a1a"), ("other vehicle", "#8c8c8c"), ("vehicle ahead of it", "#cfcfcf")];
 /// Half the width of a lane, m.
 const HALF_LANE_M: f64 = 1.75;
+/// How far ahead of the ego is shown, m.
+const VIEW_M: f64 = 120.0;
 /// Frames per second of the moving figure.
 const RATE_HZ: f64 = 12.5;
 
@@ -55,7 +57,10 @@ struct Row {
 impl TraceFigure<'_> {
     /// The vehicles at the start and, for every lane, at its contact or smallest gap; a row each.
     pub fn positions(&self) -> Figure {
-        let start = self.series.first().and_then(|s| Some((s.trace, s.trace.steps.first()?, "start".to_owned())));
+        let start = self.series.first().and_then(|s| {
+            let name = format!("start: gap {} m", number(s.trace.initial_gap_m));
+            Some((s.trace, s.trace.steps.first()?, name))
+        });
         let later = self.series.iter().filter_map(|s| {
             let (step, what) = decisive(s.trace)?;
             Some((s.trace, step, format!("{}: {what}", s.name)))
@@ -74,7 +79,8 @@ impl TraceFigure<'_> {
                 s.trace.steps.get(next.saturating_sub(1))
             };
             let frames = (0..=(until_s * RATE_HZ) as usize).filter_map(step);
-            let what = decisive(s.trace).map_or(String::new(), |(_, what)| format!(": {what}"));
+            let what = decisive(s.trace).filter(|(step, _)| step.time_s <= until_s);
+            let what = what.map_or(String::new(), |(_, what)| format!(": {what}"));
             Row { heading: format!("{}{what}", s.name), frames: frames.map(|step| vehicles(s.trace, step)).collect() }
         };
         let words = format!("In real time, {} s; a lane that has ended stays as it is. ", thousandths(until_s));
@@ -87,6 +93,9 @@ impl TraceFigure<'_> {
         let (x, y) = seen.fold(((-8.0, 12.0), (-HALF_LANE_M - 0.3, HALF_LANE_M + 0.3)), |(x, y), [from, to]| {
             (wider(x, from.0 - 2.0, to.0 + 2.0), wider(y, from.1 - 0.3, to.1 + 0.3))
         });
+        let is_cut = x.1 > VIEW_M;
+        let x = (x.0, x.1.min(VIEW_M));
+        let cut = if is_cut { "What is farther than 120 m ahead is not shown. " } else { "" };
         let plot = |row: Row| {
             let cell = |(at, (name, colour)): (usize, &(&str, &str))| {
                 let places: Vec<Option<Corners>> = row.frames.iter().map(|frame| frame[at]).collect();
@@ -119,7 +128,7 @@ impl TraceFigure<'_> {
             plots: rows.into_iter().map(plot).collect(),
             columns: 1,
             caption: format!(
-                "{words}Lateral positions in m, positive on the other vehicle's side. Long dashes: edges of a lane 3.5 m \
+                "{words}{cut}Lateral positions in m, positive on the other vehicle's side. Long dashes: edges of a lane 3.5 m \
                  wide."
             ),
             ..Figure::default()

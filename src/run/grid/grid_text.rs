@@ -168,12 +168,18 @@ impl Grid {
             };
             held.push(format!("lateral distance {} m", number(distance_m)));
         }
+        // A size that the grid sets is not a default.
         let size = |quantity, of_jrc_m: f64, of_profile_m: f64| {
-            point.get(quantity).unwrap_or(if is_jrc { of_jrc_m } else { of_profile_m })
+            (!sets(quantity)).then(|| format!("{} m", number(if is_jrc { of_jrc_m } else { of_profile_m })))
         };
-        let length_m = size(MapQuantity::Length, jrc_case::LENGTH_M, profile.frame.default_length_m);
-        let width_m = size(MapQuantity::Width, jrc_case::WIDTH_M, profile.frame.default_width_m);
-        held.push(format!("vehicles {} m × {} m", number(length_m), number(width_m)));
+        let length = size(MapQuantity::Length, jrc_case::LENGTH_M, profile.frame.default_length_m);
+        let width = size(MapQuantity::Width, jrc_case::WIDTH_M, profile.frame.default_width_m);
+        held.extend(match (length, width) {
+            (Some(length), Some(width)) => Some(format!("vehicles {length} × {width}")),
+            (Some(length), None) => Some(format!("vehicles {length} long")),
+            (None, Some(width)) => Some(format!("vehicles {width} wide")),
+            (None, None) => None,
+        });
         if is_jrc && category == Category::CutOut {
             held.push(format!("a standing vehicle ahead {} m long", number(jrc_case::STANDING_LENGTH_M)));
         }
