@@ -303,11 +303,10 @@ impl CaseSheet<'_> {
             tables: vec![self.boundaries().captioned("Distance to the boundary")],
             ..Section::new("boundary", "Distance to another answer")
         };
-        let drawn = |panels: TracePanels| PageFigure::new(&self.figure(panels).svg(), &[]);
         let above = TraceFigure { subtitle: None, ..self.figure(TracePanels::Course) };
-        let positions = above.positions().svg();
+        let drawn = |panels: TracePanels| PageFigure::new(&self.figure(panels).svg(), &[]);
         let course = Section {
-            figures: vec![drawn(TracePanels::Course), PageFigure::new(&positions, &[])],
+            figures: vec![drawn(TracePanels::Course), PageFigure::new(&above.positions().svg(), &[])],
             parts: vec![Section {
                 title: "TTC, BTN, fuzzy surrogates and lateral position".to_owned(),
                 figures: vec![drawn(TracePanels::Measures)],

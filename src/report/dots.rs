@@ -13,12 +13,6 @@ pub(super) struct DotRow {
     pub failing_scenarios: u64,
 }
 
-impl DotRow {
-    pub fn is_few(&self) -> bool {
-        is_few(self.failing_scenarios as f64)
-    }
-}
-
 /// One panel.
 pub(super) struct Dots {
     pub heading: String,
@@ -46,7 +40,8 @@ pub(super) fn dots(rows: &[DotRow], panels: Vec<Dots>) -> Vec<Plot> {
         let line = |(line, series): (usize, Series)| {
             let look = series.look.unwrap_or_else(|| Look::of(line, lines));
             let value = |value: Value| {
-                let is_few = rows.get(value.y as usize).is_some_and(DotRow::is_few);
+                let row = rows.get(value.y as usize);
+                let is_few = row.is_some_and(|row| is_few(row.failing_scenarios as f64));
                 let y = -(value.y * row_px) - ROW_GAP_PX / 2.0 - (line as f64 + 0.5) * LINE_PX;
                 Value { y, is_few, ..value }
             };

@@ -67,27 +67,6 @@ fn name_of(candidate: &Candidate, parameters: usize) -> String {
     }
 }
 
-/// The verdict over all models of gains against the paper's best.
-fn verdict(point: &FrontPoint) -> &'static str {
-    let gains = if point.held_out_gains.is_empty() { &point.gains } else { &point.held_out_gains };
-    if gains.iter().any(|(_, gain)| gain.is_none()) {
-        return "not compared: undefined or without interval";
-    }
-    let all = |of: &dyn Fn(f64, f64) -> bool| {
-        !gains.is_empty()
-            && gains.iter().all(|(_, gain)| gain.is_some_and(|(_, interval)| of(interval.low, interval.high)))
-    };
-    let any_below = gains.iter().any(|(_, gain)| gain.is_some_and(|(_, interval)| interval.high < 0.0));
-    match () {
-        () if all(&|low, _| low > 0.0) => "better for every model",
-        () if any_below => "worse for a model shown",
-        () if gains.iter().any(|(_, gain)| gain.is_some_and(|(_, interval)| interval.low > 0.0)) => {
-            "better for a model, worse shown for none"
-        }
-        () => "no difference shown",
-    }
-}
-
 impl SearchReport<'_> {
     fn describe(&self, candidate: &Candidate) -> String {
         candidate.describe(self.result.category)
@@ -118,7 +97,7 @@ impl SearchReport<'_> {
             )
             .column(
                 "against the paper's best",
-                |(point, kind)| if kind.starts_with("paper") { "" } else { verdict(point) },
+                |(point, kind)| if kind.starts_with("paper") { "" } else { point.verdict() },
             )
             .build()
             .captioned(format!("{}, {}", self.goal(), front.scope.name()))
@@ -251,7 +230,7 @@ impl SearchReport<'_> {
                 ..Value::default()
             })
         };
-        let look = |colour, symbol, is_hollow| Some(Look { colour, symbol, is_hollow, ..Look::of(0, 1) });
+        let look = |colour, symbol| Some(Look { colour, symbol, ..Look::of(0, 1) });
         let points = |front: &Front| front.paper.iter().chain(&front.points).map(|point| point.parameters).max();
         let most = self.result.fronts.iter().filter_map(points).max().unwrap_or(1);
         let plot = |front: &Front| {
@@ -267,31 +246,19 @@ impl SearchReport<'_> {
                     .filter_map(|point| value(point.parameters, &of(&point.judged)?, self.describe(&point.candidate)));
                 values.collect()
             };
+            let series = |name: &str, marks: &[Mark], look, values| {
+                Layer::from(Series { look, values, ..Series::new(name, marks, []) })
+            };
             let marks = &[Mark::Line, Mark::Points, Mark::Intervals];
-            let mut layers: Vec<Layer> = vec![
-                Series {
-                    look: look(PAPER, Symbol::Disc, false),
-                    values: paper.collect(),
-                    ..Series::new("paper", &[Mark::Points], [])
-                }
-                .into(),
-                Series {
-                    look: look(FRONT, Symbol::Disc, false),
-                    values: found(&|judged| Some(judged.cross_validated)),
-                    ..Series::new("found, cross-validated", marks, [])
-                }
-                .into(),
+            let cross_validated = found(&|judged| Some(judged.cross_validated));
+            let mut layers = vec![
+                series("paper", &[Mark::Points], look(PAPER, Symbol::Disc), paper.collect()),
+                series("found, cross-validated", marks, look(FRONT, Symbol::Disc), cross_validated),
             ];
             if self.held_out.is_some() {
                 let values = found(&|judged| judged.held_out).into_iter().map(|v| Value { x: v.x + 0.12, ..v });
-                layers.push(
-                    Series {
-                        look: look(HELD_OUT, Symbol::Polygon(3, 0.0), false),
-                        values: values.collect(),
-                        ..Series::new("found, held-out data", marks, [])
-                    }
-                    .into(),
-                );
+                let look = look(HELD_OUT, Symbol::Polygon(3, 0.0));
+                layers.push(series("found, held-out data", marks, look, values.collect()));
             }
             Plot {
                 heading: front.scope.name(),
@@ -444,7 +411,7 @@ impl SearchReport<'_> {
                 "cross_validated": point.judged.cross_validated.value,
                 "in_sample": point.judged.in_sample.value,
                 "held_out": point.judged.held_out.and_then(|of| of.value),
-                "against_the_papers_best": verdict(point),
+                "against_the_papers_best": point.verdict(),
             })),
             "folds_are_recordings": result.is_by_recording,
             "fronts": self.front_csv().records(),

@@ -6,7 +6,7 @@ use super::records::document;
 use super::reference::ReferenceComparison;
 use super::run_record::{RunRecord, StudyHost};
 use super::study_figures::{
-    HeadwayFailures, distributions, f1_by_parameters, f1_intervals, modes, radar, recall_and_precision,
+    distributions, f1_by_parameters, f1_intervals, headways, modes, radar, recall_and_precision,
 };
 use super::tables;
 use crate::Result;
@@ -15,8 +15,8 @@ use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::close_following::CloseFollowing;
 use crate::run::score::{
-    Best, CategoryScores, ClaimResult, MeanF1, Misfit, ScoreTable, best_parameterizations, check_claims, f1,
-    published_failures, published_lvd_f1,
+    Best, CategoryScores, ClaimResult, HeadwayFailures, MeanF1, Misfit, ScoreTable, best_parameterizations,
+    check_claims, f1, published_failures, published_lvd_f1,
 };
 use crate::run::study::{CategoryProvenance, ParameterHistogram, Study};
 use crate::scenario::Category;
@@ -216,7 +216,7 @@ impl StudyReport {
         if scores.variants.len() > 1 {
             figures.push(("f1-by-parameters", f1_by_parameters(scores, &pictures.means, confidence, data)));
         }
-        figures.extend(pictures.headways.figure(scores, confidence, data).map(|figure| ("headways", figure)));
+        figures.extend(headways(&pictures.headways, scores, confidence, data).map(|figure| ("headways", figure)));
         if !pictures.parameters.is_empty() {
             figures.push(("parameters", distributions(scores.category, &pictures.parameters, data)));
         }

@@ -6,143 +6,91 @@ use super::plot::{
     AxisScale, Figure, GREY, INK, Layer, Look, Mark, Name, Plot, PlotAxis, Rule, Series, Symbol, Value, is_few,
     quantity,
 };
-use crate::engine::{Headway, LanePlan, Partial};
+use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
-use crate::run::score::{CROSS_VALIDATED, CategoryScores, MeanF1, ScoreInterval, f1, precision, recall};
+use crate::run::score::{
+    CROSS_VALIDATED, CategoryScores, HeadwayFailures, MeanF1, ScoreInterval, equal_f1, f1, pareto_front, precision,
+    recall,
+};
 use crate::run::study::ParameterHistogram;
 use crate::scenario::Category;
 use crate::scenario::parameterization::{ModeShape, Parameterization};
 use crate::stats::estimate::wilson;
-use crate::{Error, Result};
 
-/// Failed lanes of one category by headway.
-#[derive(Debug, Clone, PartialEq)]
-pub struct HeadwayFailures {
-    variants: Vec<String>,
-    headways: Vec<Headway>,
-    models: Vec<ModelId>,
-    /// Counts by variant × headway × model × criterion.
-    failures: Vec<u64>,
-}
-
-impl HeadwayFailures {
-    /// From a block of a plan.
-    ///
-    /// # Errors
-    /// [`crate::Error`] if the counts do not match the plan.
-    pub fn of(plan: &LanePlan, partial: &Partial, block: usize) -> Result<HeadwayFailures> {
-        let failures = partial.headway_failures(plan, block)?.to_vec();
-        HeadwayFailures::new(&plan.blocks[block].variants, &plan.headways, &plan.models, failures)
+/// Fraction of the scenarios that fail, over the headway: S with its interval, beside it every S'; a panel per model
+/// and criterion. `None` with fewer than two headways that are the same for all scenarios.
+pub fn headways(of: &HeadwayFailures, scores: &CategoryScores, confidence: f64, data: &str) -> Option<Figure> {
+    if of.headways.iter().filter_map(Headway::value).count() < 2 {
+        return None;
     }
-
-    fn new(
-        variants: &[String],
-        headways: &[Headway],
-        models: &[ModelId],
-        failures: Vec<u64>,
-    ) -> Result<HeadwayFailures> {
-        let expected = variants.len() * headways.len() * models.len() * Criterion::ALL.len();
-        if failures.len() != expected {
-            let problem = format!("{} counts of failures by headway, expected {expected}", failures.len());
-            return Err(Error::Internal(problem));
-        }
-        let (variants, headways, models) = (variants.to_vec(), headways.to_vec(), models.to_vec());
-        Ok(HeadwayFailures { variants, headways, models, failures })
-    }
-
-    /// Failed lanes of a variant at a headway; models and criteria by their indices in the plan.
-    fn count(&self, (variant, headway, model, criterion): (usize, usize, usize, Criterion)) -> u64 {
-        let lane = (variant * self.headways.len() + headway) * self.models.len() + model;
-        self.failures[lane * Criterion::ALL.len() + criterion.index()]
-    }
-
-    /// Rows ordered by variant, headway, model and criterion.
-    pub(super) fn rows(&self) -> impl Iterator<Item = (&str, Headway, ModelId, Criterion, u64)> {
-        let lanes = self.variants.iter().flat_map(move |variant| {
-            let starts = self.headways.iter().map(move |&headway| (variant, headway));
-            starts.flat_map(|(variant, headway)| self.models.iter().map(move |&model| (variant, headway, model)))
-        });
-        lanes.zip(self.failures.chunks(Criterion::ALL.len())).flat_map(|((variant, headway, model), failures)| {
-            let counts = Criterion::ALL.into_iter().zip(failures);
-            counts.map(move |(criterion, &failures)| (variant.as_str(), headway, model, criterion, failures))
-        })
-    }
-
-    /// Fraction of the scenarios that fail, over the headway: S with its interval, beside it every S'; a panel per model
-    /// and criterion. `None` with fewer than two headways that are the same for all scenarios.
-    pub fn figure(&self, scores: &CategoryScores, confidence: f64, data: &str) -> Option<Figure> {
-        if self.headways.iter().filter_map(Headway::value).count() < 2 {
-            return None;
-        }
-        let is_gap = self.headways.iter().any(|headway| matches!(headway, Headway::GapM(_)));
-        let cells: Vec<(usize, Criterion)> =
-            (0..self.models.len()).flat_map(|model| Criterion::ALL.map(|criterion| (model, criterion))).collect();
-        let count = |variant: usize, (model, criterion): (usize, Criterion)| {
-            move |at: usize| self.count((variant, at, model, criterion))
-        };
-        // One lane per scenario and headway.
-        let share = |count: u64| 100.0 * count as f64 / scores.scenarios.max(1) as f64;
-        let panel = |&cell: &(usize, Criterion)| {
-            let series = |variant: usize| {
-                let value = |(at, headway): (usize, &Headway)| {
-                    let failed = count(variant, cell)(at);
-                    let interval = wilson(failed as f64, scores.scenarios as f64, confidence);
-                    let is_few = variant == 0 && is_few(failed as f64);
-                    Some(Value {
-                        label: if is_few { failed.to_string() } else { String::new() },
-                        interval: (variant == 0).then_some((100.0 * interval.low, 100.0 * interval.high)),
-                        is_few,
-                        ..Value::from((headway.value()?, share(failed)))
-                    })
-                };
-                let mut values: Vec<Value> = self.headways.iter().enumerate().filter_map(value).collect();
-                values.sort_by(|a, b| a.x.total_cmp(&b.x));
-                // A number once is enough for neighbours that share it.
-                let numbers: Vec<String> = values.iter().map(|value| value.label.clone()).collect();
-                for (value, pair) in values.iter_mut().skip(1).zip(numbers.windows(2)) {
-                    if pair[0] == pair[1] {
-                        value.label.clear();
-                    }
-                }
-                if variant == 0 {
-                    let look = Look { colour: INK, dash: "", line_px: 1.8, symbol: Symbol::Disc, ..Look::of(0, 1) };
-                    let series = Series::new("S, as recorded", &[Mark::Band, Mark::Line, Mark::Points], []);
-                    return Series { values, look: Some(Look { marker_px: 3.0, ..look }), ..series };
-                }
-                let look = Look { line_px: 1.2, ..Look::of(variant - 1, self.variants.len() - 1) };
-                Series { values, look: Some(look), ..Series::new(legend_name(scores, variant), &[Mark::Line], []) }
+    let is_gap = of.headways.iter().any(|headway| matches!(headway, Headway::GapM(_)));
+    let cells: Vec<(usize, Criterion)> =
+        (0..of.models.len()).flat_map(|model| Criterion::ALL.map(|criterion| (model, criterion))).collect();
+    let count = |variant: usize, (model, criterion): (usize, Criterion)| {
+        move |at: usize| of.count((variant, at, model, criterion))
+    };
+    // One lane per scenario and headway.
+    let share = |count: u64| 100.0 * count as f64 / scores.scenarios.max(1) as f64;
+    let panel = |&cell: &(usize, Criterion)| {
+        let series = |variant: usize| {
+            let value = |(at, headway): (usize, &Headway)| {
+                let failed = count(variant, cell)(at);
+                let interval = wilson(failed as f64, scores.scenarios as f64, confidence);
+                let is_few = variant == 0 && is_few(failed as f64);
+                Some(Value {
+                    label: if is_few { failed.to_string() } else { String::new() },
+                    interval: (variant == 0).then_some((100.0 * interval.low, 100.0 * interval.high)),
+                    is_few,
+                    ..Value::from((headway.value()?, share(failed)))
+                })
             };
-            Plot {
-                heading: format!("{}, {}", self.models[cell.0].name(), cell.1.label()),
-                x: PlotAxis::around(
-                    if is_gap { "initial gap in m" } else { "initial time headway in s" },
-                    AxisScale::Linear,
-                    self.headways.iter().filter_map(Headway::value).chain([0.0]).collect(),
-                ),
-                y: PlotAxis { scale: AxisScale::SquareRoot, ..PlotAxis::new("failed scenarios in %") },
-                layers: (0..self.variants.len()).map(|variant| series(variant).into()).collect(),
-                ..Plot::default()
+            let mut values: Vec<Value> = of.headways.iter().enumerate().filter_map(value).collect();
+            values.sort_by(|a, b| a.x.total_cmp(&b.x));
+            // A number once is enough for neighbours that share it.
+            let numbers: Vec<String> = values.iter().map(|value| value.label.clone()).collect();
+            for (value, pair) in values.iter_mut().skip(1).zip(numbers.windows(2)) {
+                if pair[0] == pair[1] {
+                    value.label.clear();
+                }
             }
+            if variant == 0 {
+                let look = Look { colour: INK, dash: "", line_px: 1.8, symbol: Symbol::Disc, ..Look::of(0, 1) };
+                let series = Series::new("S, as recorded", &[Mark::Band, Mark::Line, Mark::Points], []);
+                return Series { values, look: Some(Look { marker_px: 3.0, ..look }), ..series };
+            }
+            let look = Look { line_px: 1.2, ..Look::of(variant - 1, of.variants.len() - 1) };
+            Series { values, look: Some(look), ..Series::new(legend_name(scores, variant), &[Mark::Line], []) }
         };
-        let all = 0..self.variants.len();
-        let fails = |cell: &&(usize, Criterion)| {
-            all.clone().any(|variant| (0..self.headways.len()).any(|at| count(variant, **cell)(at) > 0))
-        };
-        let empty = cells.iter().filter(|cell| !fails(cell));
-        let empty = empty.map(|(model, criterion)| format!("{}, {}", self.models[*model].name(), criterion.label()));
-        Some(Figure {
-            caption: format!(
-                "Black: share of the recorded scenarios in which the driver model fails the criterion; band: its {} % \
-                 interval over scenarios. Colours: the same scenarios, parameterized. Vertical axes by the square root, each with its own end.",
-                100.0 * confidence
+        Plot {
+            heading: format!("{}, {}", of.models[cell.0].name(), cell.1.label()),
+            x: PlotAxis::around(
+                if is_gap { "initial gap in m" } else { "initial time headway in s" },
+                AxisScale::Linear,
+                of.headways.iter().filter_map(Headway::value).chain([0.0]).collect(),
             ),
-            plots: cells.iter().filter(fails).map(panel).collect(),
-            columns: Criterion::ALL.len(),
-            notes: ("Left out, because nothing fails:", empty.collect()),
-            ..titled(scores, "failures against the headway", data)
-        })
-    }
+            y: PlotAxis { scale: AxisScale::SquareRoot, ..PlotAxis::new("failed scenarios in %") },
+            layers: (0..of.variants.len()).map(|variant| series(variant).into()).collect(),
+            ..Plot::default()
+        }
+    };
+    let all = 0..of.variants.len();
+    let fails = |cell: &&(usize, Criterion)| {
+        all.clone().any(|variant| (0..of.headways.len()).any(|at| count(variant, **cell)(at) > 0))
+    };
+    let empty = cells.iter().filter(|cell| !fails(cell));
+    let empty = empty.map(|(model, criterion)| format!("{}, {}", of.models[*model].name(), criterion.label()));
+    Some(Figure {
+        caption: format!(
+            "Black: share of the recorded scenarios in which the driver model fails the criterion; band: its {} % \
+             interval over scenarios. Colours: the same scenarios, parameterized. Vertical axes by the square root, each with its own end.",
+            100.0 * confidence
+        ),
+        plots: cells.iter().filter(fails).map(panel).collect(),
+        columns: Criterion::ALL.len(),
+        notes: ("Left out, because nothing fails:", empty.collect()),
+        ..titled(scores, "failures against the headway", data)
+    })
 }
 
 /// `FSM, TTC`.
@@ -322,16 +270,6 @@ fn few(failing_scenarios: u64) -> String {
     if is_few { format!(" (n\u{a0}=\u{a0}{failing_scenarios})") } else { String::new() }
 }
 
-/// All pairs of recall and precision with this F1: P = F·R/(2R − F).
-fn equal_f1(f: f64) -> Vec<(f64, f64)> {
-    let min_recall = f / (2.0 - f);
-    let value = |k: u32| {
-        let r = 1.0 + (min_recall - 1.0) * f64::from(k) / 20.0;
-        (r, (f * r / (2.0 * r - f)).min(1.0))
-    };
-    (0..=20).rev().map(value).collect()
-}
-
 /// F1 against the number of parameters: the mean over the cells that every parameterization defines, over all criteria
 /// and for each. Also the front of parameterizations that no other beats with at most as many parameters.
 pub fn f1_by_parameters(scores: &CategoryScores, means: &[MeanF1], confidence: f64, data: &str) -> Figure {
@@ -391,19 +329,6 @@ pub fn f1_by_parameters(scores: &CategoryScores, means: &[MeanF1], confidence: f
 }
 
 const MEAN_OF_SVD: &str = "#d55e00";
-
-/// The points that no other point with at most the same x exceeds, from left to right.
-fn pareto_front(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
-    let mut sorted = points.to_vec();
-    sorted.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.total_cmp(&a.1)));
-    let mut front: Vec<(f64, f64)> = Vec::new();
-    for point in sorted {
-        if front.last().is_none_or(|last| point.1 > last.1) {
-            front.push(point);
-        }
-    }
-    front
-}
 
 /// The mean scenario between nine tenths of all, the scenarios along the first directions of a decomposition, and what
 /// the directions leave unexplained.
@@ -491,36 +416,4 @@ pub(super) fn legend_name(scores: &CategoryScores, variant: usize) -> String {
         key.strip_suffix(CROSS_VALIDATED).map_or((key.as_str(), ""), |base| (base, ", cross-validated"));
     let found = Parameterization::find(scores.category, base);
     found.map_or(key.clone(), |id| format!("{key}: {}{suffix}", id.description()))
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn failures_by_headway_are_as_many_as_the_lanes_they_count_or_an_error() {
-        let (variants, headways) = (["S".to_owned()], [Headway::ThwS(1.0), Headway::ThwS(0.5)]);
-        let of = |counts: u64| HeadwayFailures::new(&variants, &headways, &[ModelId::Fsm], (0..counts).collect());
-        assert_eq!(of(6).unwrap().count((0, 1, 0, Criterion::Btn)), 5);
-        for wrong in [0, 5, 7] {
-            assert!(matches!(of(wrong), Err(Error::Internal(_))), "{wrong} counts");
-        }
-    }
-
-    #[test]
-    fn points_of_equal_f1_have_that_f1_and_lie_in_the_square() {
-        for f in [0.2, 0.5, 0.8] {
-            for (r, p) in equal_f1(f) {
-                assert!((0.0..=1.0 + 1e-12).contains(&r) && (0.0..=1.0).contains(&p));
-                assert!((2.0 * r * p / (r + p) - f).abs() < 1e-12);
-            }
-        }
-    }
-
-    #[test]
-    fn nothing_on_the_front_is_beaten_by_as_few_parameters() {
-        let points = [(3.0, 0.5), (4.0, 0.4), (2.0, 0.3), (3.0, 0.6), (5.0, 0.6), (7.0, 0.9)];
-        assert_eq!(pareto_front(&points), [(2.0, 0.3), (3.0, 0.6), (7.0, 0.9)]);
-        assert!(pareto_front(&[]).is_empty());
-    }
 }

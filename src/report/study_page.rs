@@ -2,7 +2,6 @@
 
 use super::html::{Page, PageFigure, Section};
 use super::plot::Figure;
-use super::reference::ReferenceComparison;
 use super::run_record::Timings;
 use super::study::{StudyReport, file_name};
 use super::tables;
@@ -46,7 +45,10 @@ impl StudyReport {
             tables: vec![table],
             ..Section::new("given", "Cross-validation and given S'")
         }));
-        sections.extend(self.comparison.as_ref().map(compared));
+        sections.extend(self.comparison.as_ref().map(|comparison| Section {
+            text: comparison.text(),
+            ..Section::new("reference", "Lane arithmetic against double precision")
+        }));
         sections.extend([self.data(), self.reproduction()?]);
         sections.iter_mut().for_each(|section| section.is_folded = true);
         sections.insert(0, answer);
@@ -223,10 +225,6 @@ fn variants_table(scores: &CategoryScores) -> Table {
         .column("parameters beside the headway", |id| id.parameter_count())
         .build()
         .captioned("Parameterizations")
-}
-
-fn compared(comparison: &ReferenceComparison) -> Section {
-    Section { text: comparison.text(), ..Section::new("reference", "Lane arithmetic against double precision") }
 }
 
 /// The text with a full stop.

@@ -97,7 +97,7 @@ impl<'a> Shown<'a> {
     /// Up to a given time, or to the last change: lanes may continue long after their last event.
     pub fn of(series: &'a [TraceSeries<'a>], until_s: Option<f64>) -> Self {
         let end_s = series.iter().filter_map(|s| Some(s.trace.steps.last()?.time_s)).fold(0.0, f64::max);
-        let last_s = series.iter().map(|s| last_change_s(s.trace)).fold(0.0, f64::max) + REST_S;
+        let last_s = series.iter().map(|s| s.trace.last_change_s()).fold(0.0, f64::max) + REST_S;
         let until_s = until_s.unwrap_or(if last_s < 0.8 * end_s { last_s } else { end_s });
         let looks = (0..series.len()).map(|k| Look::of(k, series.len())).collect();
         Shown { series, looks, until_s: until_s.clamp(0.0, end_s) }
@@ -363,27 +363,6 @@ impl<'a> Shown<'a> {
         }
         marks
     }
-}
-
-/// The last time at which anything except positions changes or the worst value occurs, s.
-fn last_change_s(trace: &Trace) -> f64 {
-    let state = |step: &TracedStep| {
-        let of = |other: &TracedVehicle| (other.v_mps, other.y_m, other.is_present, other.is_judged);
-        (step.v_ego_mps, step.is_unsafe, step.others.each_ref().map(of))
-    };
-    let mut changes =
-        trace.steps.windows(2).filter(|pair| state(&pair[0]) != state(&pair[1])).map(|pair| pair[1].time_s);
-    let worst = |value: &dyn Fn(&TracedVehicle) -> f64| {
-        let of = |step: &TracedStep| {
-            let judged = step.others[..trace.vehicles].iter().filter(|other| other.is_judged);
-            judged.map(value).fold(f64::INFINITY, f64::min)
-        };
-        let worst = trace.steps.iter().min_by(|a, b| of(a).total_cmp(&of(b)))?;
-        of(worst).is_finite().then_some(worst.time_s)
-    };
-    let worst = [worst(&|other| other.ttc_s), worst(&|other| -other.btn)];
-    let marks = StepMark::ALL.map(|mark| trace.step_of(mark).map(|step| trace.time_s(step)));
-    changes.next_back().into_iter().chain(worst.into_iter().chain(marks).flatten()).fold(0.0, f64::max)
 }
 
 /// A value over time as runs without a gap, also split where thin drawing begins or ends; such neighbours have a common

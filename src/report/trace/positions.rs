@@ -49,10 +49,7 @@ fn decisive(trace: &Trace) -> Option<(&TracedStep, String)> {
 }
 
 /// A plot's heading, and its vehicles in every frame.
-struct Row {
-    heading: String,
-    frames: Vec<[Option<Corners>; 3]>,
-}
+type Row = (String, Vec<[Option<Corners>; 3]>);
 
 impl TraceFigure<'_> {
     /// The vehicles at the start and, for every lane, at its contact or smallest gap; a row each.
@@ -65,7 +62,7 @@ impl TraceFigure<'_> {
             let (step, what) = decisive(s.trace)?;
             Some((s.trace, step, format!("{}: {what}", s.name)))
         });
-        let row = |(trace, step, heading): (&Trace, _, _)| Row { heading, frames: vec![vehicles(trace, step)] };
+        let row = |(trace, step, heading): (&Trace, _, _)| (heading, vec![vehicles(trace, step)]);
         self.from_above(start.into_iter().chain(later).map(row).collect(), 0.0, "")
     }
 
@@ -81,14 +78,14 @@ impl TraceFigure<'_> {
             let frames = (0..=(until_s * RATE_HZ) as usize).filter_map(step);
             let what = decisive(s.trace).filter(|(step, _)| step.time_s <= until_s);
             let what = what.map_or(String::new(), |(_, what)| format!(": {what}"));
-            Row { heading: format!("{}{what}", s.name), frames: frames.map(|step| vehicles(s.trace, step)).collect() }
+            (format!("{}{what}", s.name), frames.map(|step| vehicles(s.trace, step)).collect())
         };
         let words = format!("In real time, {} s; a lane that has ended stays as it is. ", thousandths(until_s));
         self.from_above(self.series.iter().map(row).collect(), until_s, &words)
     }
 
     fn from_above(&self, rows: Vec<Row>, seconds: f64, words: &str) -> Figure {
-        let seen = rows.iter().flat_map(|row| &row.frames).flatten().flatten();
+        let seen = rows.iter().flat_map(|row| &row.1).flatten().flatten();
         let wider = |(low, high): (f64, f64), a: f64, b: f64| (low.min(a), high.max(b));
         let (x, y) = seen.fold(((-8.0, 12.0), (-HALF_LANE_M - 0.3, HALF_LANE_M + 0.3)), |(x, y), [from, to]| {
             (wider(x, from.0 - 2.0, to.0 + 2.0), wider(y, from.1 - 0.3, to.1 + 0.3))
@@ -96,9 +93,9 @@ impl TraceFigure<'_> {
         let is_cut = x.1 > VIEW_M;
         let x = (x.0, x.1.min(VIEW_M));
         let cut = if is_cut { "What is farther than 120 m ahead is not shown. " } else { "" };
-        let plot = |row: Row| {
+        let plot = |(heading, frames): Row| {
             let cell = |(at, (name, colour)): (usize, &(&str, &str))| {
-                let places: Vec<Option<Corners>> = row.frames.iter().map(|frame| frame[at]).collect();
+                let places: Vec<Option<Corners>> = frames.iter().map(|frame| frame[at]).collect();
                 let corners = places.iter().flatten().next().copied()?;
                 let moving = if places.len() > 1 && at > 0 { &places[..] } else { &[] };
                 Some(FilledCell {
@@ -114,7 +111,7 @@ impl TraceFigure<'_> {
             let lane = [-HALF_LANE_M, HALF_LANE_M].map(|edge| vec![(x.0, edge), (x.1, edge)]).to_vec();
             let edges = Rule { runs: lane, colour: GREY, width_px: 1.0, dash: "14,6", ..Rule::default() };
             Plot {
-                heading: row.heading,
+                heading,
                 x: PlotAxis::exactly("m ahead of the ego's middle", x.0, x.1),
                 y: PlotAxis::exactly("", y.0, y.1),
                 layers: vec![Cells { cells, key }.into(), edges.into()],

@@ -53,3 +53,48 @@ impl MeanF1 {
         MeanF1 { criteria: criteria.to_vec(), fewest_failing, values }
     }
 }
+
+/// All pairs of recall and precision with this F1: P = F·R/(2R − F).
+pub fn equal_f1(f: f64) -> Vec<(f64, f64)> {
+    let min_recall = f / (2.0 - f);
+    let value = |k: u32| {
+        let r = 1.0 + (min_recall - 1.0) * f64::from(k) / 20.0;
+        (r, (f * r / (2.0 * r - f)).min(1.0))
+    };
+    (0..=20).rev().map(value).collect()
+}
+
+/// The points that no other point with at most the same x exceeds, from left to right.
+pub fn pareto_front(points: &[(f64, f64)]) -> Vec<(f64, f64)> {
+    let mut sorted = points.to_vec();
+    sorted.sort_by(|a, b| a.0.total_cmp(&b.0).then(b.1.total_cmp(&a.1)));
+    let mut front: Vec<(f64, f64)> = Vec::new();
+    for point in sorted {
+        if front.last().is_none_or(|last| point.1 > last.1) {
+            front.push(point);
+        }
+    }
+    front
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn points_of_equal_f1_have_that_f1_and_lie_in_the_square() {
+        for f in [0.2, 0.5, 0.8] {
+            for (r, p) in equal_f1(f) {
+                assert!((0.0..=1.0 + 1e-12).contains(&r) && (0.0..=1.0).contains(&p));
+                assert!((2.0 * r * p / (r + p) - f).abs() < 1e-12);
+            }
+        }
+    }
+
+    #[test]
+    fn nothing_on_the_front_is_beaten_by_as_few_parameters() {
+        let points = [(3.0, 0.5), (4.0, 0.4), (2.0, 0.3), (3.0, 0.6), (5.0, 0.6), (7.0, 0.9)];
+        assert_eq!(pareto_front(&points), [(2.0, 0.3), (3.0, 0.6), (7.0, 0.9)]);
+        assert!(pareto_front(&[]).is_empty());
+    }
+}

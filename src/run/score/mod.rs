@@ -8,6 +8,7 @@
 mod best;
 mod claims;
 mod difference;
+mod headways;
 mod mean;
 mod paper_claims;
 mod published;
@@ -16,7 +17,8 @@ mod statistic;
 pub use best::{Best, BestScore, best_parameterizations};
 pub use claims::{Claim, ClaimResult, ClaimRow, ClaimVerdict, check_claims};
 pub use difference::{Contrast, ScenarioRate, ScoreInterval, min_contrast};
-pub use mean::MeanF1;
+pub use headways::HeadwayFailures;
+pub use mean::{MeanF1, equal_f1, pareto_front};
 pub use paper_claims::paper_claims;
 pub use published::{Misfit, PublishedFailures, published_failures, published_lvd_f1};
 pub use statistic::Statistic;

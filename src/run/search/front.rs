@@ -49,6 +49,29 @@ pub struct FrontPoint {
     pub below_best: Option<(f64, ScoreInterval)>,
 }
 
+impl FrontPoint {
+    /// The verdict over all models of gains against the paper's best.
+    pub fn verdict(&self) -> &'static str {
+        let gains = if self.held_out_gains.is_empty() { &self.gains } else { &self.held_out_gains };
+        if gains.iter().any(|(_, gain)| gain.is_none()) {
+            return "not compared: undefined or without interval";
+        }
+        let all = |of: &dyn Fn(f64, f64) -> bool| {
+            !gains.is_empty()
+                && gains.iter().all(|(_, gain)| gain.is_some_and(|(_, interval)| of(interval.low, interval.high)))
+        };
+        let any_below = gains.iter().any(|(_, gain)| gain.is_some_and(|(_, interval)| interval.high < 0.0));
+        match () {
+            () if all(&|low, _| low > 0.0) => "better for every model",
+            () if any_below => "worse for a model shown",
+            () if gains.iter().any(|(_, gain)| gain.is_some_and(|(_, interval)| interval.low > 0.0)) => {
+                "better for a model, worse shown for none"
+            }
+            () => "no difference shown",
+        }
+    }
+}
+
 /// The best descriptions of a scope.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Front {

@@ -1,0 +1,78 @@
+//! Failed lanes by headway, of S and of every S'.
+
+use crate::engine::{Headway, LanePlan, Partial};
+use crate::model::criterion::Criterion;
+use crate::model::driver::ModelId;
+use crate::{Error, Result};
+
+/// Failed lanes of one category by headway.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeadwayFailures {
+    /// Names of the variants.
+    pub variants: Vec<String>,
+    /// Headways.
+    pub headways: Vec<Headway>,
+    /// Models.
+    pub models: Vec<ModelId>,
+    /// Counts by variant × headway × model × criterion.
+    failures: Vec<u64>,
+}
+
+impl HeadwayFailures {
+    /// From a block of a plan.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] if the counts do not match the plan.
+    pub fn of(plan: &LanePlan, partial: &Partial, block: usize) -> Result<HeadwayFailures> {
+        let failures = partial.headway_failures(plan, block)?.to_vec();
+        HeadwayFailures::new(&plan.blocks[block].variants, &plan.headways, &plan.models, failures)
+    }
+
+    fn new(
+        variants: &[String],
+        headways: &[Headway],
+        models: &[ModelId],
+        failures: Vec<u64>,
+    ) -> Result<HeadwayFailures> {
+        let expected = variants.len() * headways.len() * models.len() * Criterion::ALL.len();
+        if failures.len() != expected {
+            let problem = format!("{} counts of failures by headway, expected {expected}", failures.len());
+            return Err(Error::Internal(problem));
+        }
+        let (variants, headways, models) = (variants.to_vec(), headways.to_vec(), models.to_vec());
+        Ok(HeadwayFailures { variants, headways, models, failures })
+    }
+
+    /// Failed lanes of a variant at a headway; models and criteria by their indices in the plan.
+    pub fn count(&self, (variant, headway, model, criterion): (usize, usize, usize, Criterion)) -> u64 {
+        let lane = (variant * self.headways.len() + headway) * self.models.len() + model;
+        self.failures[lane * Criterion::ALL.len() + criterion.index()]
+    }
+
+    /// Rows ordered by variant, headway, model and criterion.
+    pub fn rows(&self) -> impl Iterator<Item = (&str, Headway, ModelId, Criterion, u64)> {
+        let lanes = self.variants.iter().flat_map(move |variant| {
+            let starts = self.headways.iter().map(move |&headway| (variant, headway));
+            starts.flat_map(|(variant, headway)| self.models.iter().map(move |&model| (variant, headway, model)))
+        });
+        lanes.zip(self.failures.chunks(Criterion::ALL.len())).flat_map(|((variant, headway, model), failures)| {
+            let counts = Criterion::ALL.into_iter().zip(failures);
+            counts.map(move |(criterion, &failures)| (variant.as_str(), headway, model, criterion, failures))
+        })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn failures_by_headway_are_as_many_as_the_lanes_they_count_or_an_error() {
+        let (variants, headways) = (["S".to_owned()], [Headway::ThwS(1.0), Headway::ThwS(0.5)]);
+        let of = |counts: u64| HeadwayFailures::new(&variants, &headways, &[ModelId::Fsm], (0..counts).collect());
+        assert_eq!(of(6).unwrap().count((0, 1, 0, Criterion::Btn)), 5);
+        for wrong in [0, 5, 7] {
+            assert!(matches!(of(wrong), Err(Error::Internal(_))), "{wrong} counts");
+        }
+    }
+}
