@@ -194,7 +194,7 @@ pub fn radar(scores: &CategoryScores, data: &str) -> Figure {
         (!names.is_empty()).then(|| format!("{}: {}", legend_name(scores, variant), names.join("; ")))
     });
     Figure {
-        caption: format!("Radius: F1, 0 at the centre, 1 at the outer ring, without its interval."),
+        caption: "Radius: F1, 0 at the centre, 1 at the outer ring, without its interval.".to_owned(),
         plots: if cells.is_empty() { Vec::new() } else { vec![plot] },
         notes: ("Undefined F1 (0/0), where the line is broken:", gaps.collect()),
         ..titled(scores, "F1 as a radar, as de Gelder and Op den Camp draw it", data)

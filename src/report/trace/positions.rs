@@ -63,7 +63,7 @@ impl TraceFigure<'_> {
             Some((s.trace, step, format!("{}: {what}", s.name)))
         });
         let row = |(trace, step, heading): (&Trace, _, _)| (heading, vec![vehicles(trace, step)]);
-        self.from_above(start.into_iter().chain(later).map(row).collect(), 0.0, "")
+        self.seen_from_above(start.into_iter().chain(later).map(row).collect(), 0.0, "")
     }
 
     /// The vehicles in motion, a row per lane, in real time and over again.
@@ -81,10 +81,10 @@ impl TraceFigure<'_> {
             (format!("{}{what}", s.name), frames.map(|step| vehicles(s.trace, step)).collect())
         };
         let words = format!("In real time, {} s; a lane that has ended stays as it is. ", thousandths(until_s));
-        self.from_above(self.series.iter().map(row).collect(), until_s, &words)
+        self.seen_from_above(self.series.iter().map(row).collect(), until_s, &words)
     }
 
-    fn from_above(&self, rows: Vec<Row>, seconds: f64, words: &str) -> Figure {
+    fn seen_from_above(&self, rows: Vec<Row>, seconds: f64, words: &str) -> Figure {
         let seen = rows.iter().flat_map(|row| &row.1).flatten().flatten();
         let wider = |(low, high): (f64, f64), a: f64, b: f64| (low.min(a), high.max(b));
         let (x, y) = seen.fold(((-8.0, 12.0), (-HALF_LANE_M - 0.3, HALF_LANE_M + 0.3)), |(x, y), [from, to]| {
