@@ -122,7 +122,7 @@ impl FailureMaps<'_> {
             plots: headways.into_iter().map(plot).collect(),
             bar: Some(ColourBar { label: "Share failed", largest, colour: scale_colour }),
             caption: format!(
-                "The colours mean the same for every model and headway of this run. White: no samples. A pale cell may lie beyond the scale. {} of {} samples \
+                "The colours mean the same for every model and headway of this run. White: no samples. The scale ends at the largest share of a cell that is not pale. {} of {} samples \
                  lie outside the map.",
                 count(outside),
                 count(self.samples)

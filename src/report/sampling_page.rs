@@ -181,7 +181,7 @@ impl EstimateFile {
             subtitle: Some(self.density.provenance.data.clone()),
             caption:
                 "Marker: estimate at one headway; area: its interval over draws and scenarios. Vertical axis by the \
-                      square root. n: effective number of recorded scenarios that fail."
+                      square root. n: effective number of recorded scenarios that fail, where there is room."
                     .to_owned(),
             plots: self.models.iter().map(panel).collect(),
             ..Figure::default()

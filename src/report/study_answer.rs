@@ -24,11 +24,8 @@ const SCORE: usize = 3;
 const NUMBERS: [usize; 2] = [4, 6];
 
 /// What the last columns say.
-const LEGEND: [(&str, &str); 3] = [
-    ("hides", "colliding runs of S that the best lacks."),
-    ("not told apart", "F1 within chance of the best's."),
-    ("needs", "times as many scenarios to tell, if F1 stays."),
-];
+const LEGEND: &str = "hides: colliding runs of S that the best lacks. not told apart: F1 within chance of the best's. \
+                      needs: times as many scenarios to tell, if F1 stays.";
 
 fn table(rows: &[[String; 7]]) -> Table {
     let words = Table::of(rows).columns(0..4, |at| HEADER[at], |row, at| row[at].as_str());
@@ -50,8 +47,7 @@ impl StudyReport {
         lines.extend(
             self.comparison.iter().filter_map(|comparison| Some(wrap(comparison.text().lines().next()?, width))),
         );
-        let legend = LEGEND.map(|(name, words)| format!("{name}: {words}")).join(" ");
-        lines.push(wrap(&legend, width));
+        lines.push(wrap(LEGEND, width));
         lines.join("\n") + "\n"
     }
 
@@ -65,9 +61,8 @@ impl StudyReport {
         };
         let rows: Vec<[String; 7]> = self.best.iter().map(named).collect();
         Section {
-            intro: format!("{}.", self.size()),
+            intro: format!("{}. {LEGEND}", self.size()),
             tables: vec![table(&rows).captioned(self.question())],
-            facts: LEGEND.map(|(name, words)| (name.to_owned(), words.to_owned())).to_vec(),
             ..Section::new("answer", "")
         }
     }

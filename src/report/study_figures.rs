@@ -3,7 +3,7 @@
 
 use super::dots::{DotRow, Dots, dots};
 use super::plot::{
-    AxisScale, Figure, GREY, INK, Layer, Look, Mark, Name, Plot, PlotAxis, Rule, Series, Symbol, Value, is_few,
+    AxisScale, Figure, GREY, INK, Layer, Look, Mark, Name, Plot, PlotAxis, Rule, Series, Symbol, Value, is_few, number,
     quantity,
 };
 use crate::engine::Headway;
@@ -62,6 +62,9 @@ pub fn headways(of: &HeadwayFailures, scores: &CategoryScores, confidence: f64, 
             let look = Look { line_px: 1.2, ..Look::of(variant - 1, of.variants.len() - 1) };
             Series { values, look: Some(look), ..Series::new(legend_name(scores, variant), &[Mark::Line], []) }
         };
+        let shares = (0..of.variants.len()).flat_map(|variant| (0..of.headways.len()).map(count(variant, cell)));
+        let (least, most) = shares.fold((u64::MAX, 0), |(low, high), count| (low.min(count), high.max(count)));
+        let scale = if least > most / 3 { AxisScale::Linear } else { AxisScale::SquareRoot };
         Plot {
             heading: format!("{}, {}", of.models[cell.0].name(), cell.1.label()),
             x: PlotAxis::around(
@@ -69,7 +72,7 @@ pub fn headways(of: &HeadwayFailures, scores: &CategoryScores, confidence: f64, 
                 AxisScale::Linear,
                 of.headways.iter().filter_map(Headway::value).chain([0.0]).collect(),
             ),
-            y: PlotAxis { scale: AxisScale::SquareRoot, ..PlotAxis::new("failed scenarios in %") },
+            y: PlotAxis { scale, ..PlotAxis::new("failed scenarios in %") },
             layers: (0..of.variants.len()).map(|variant| series(variant).into()).collect(),
             ..Plot::default()
         }
@@ -83,7 +86,8 @@ pub fn headways(of: &HeadwayFailures, scores: &CategoryScores, confidence: f64, 
     Some(Figure {
         caption: format!(
             "Black: share of the recorded scenarios in which the driver model fails the criterion; band: its {} % \
-             interval over scenarios. Colours: the same scenarios, parameterized. Vertical axes by the square root, each with its own end.",
+             interval over scenarios. Colours: the same scenarios, parameterized. Vertical axes by the square root from 0, or linear where all shares are large. Of equal numbers in a row the \
+                 first is written.",
             100.0 * confidence
         ),
         plots: cells.iter().filter(fails).map(panel).collect(),
@@ -250,7 +254,8 @@ pub fn recall_and_precision(scores: &CategoryScores, confidence: f64, data: &str
         let which = if plot.is_none() { "all".to_owned() } else { keys.join(", ") };
         (!keys.is_empty()).then(|| format!("{}: {which}", cell_name(cell)))
     };
-    let empty: Vec<String> = cells.iter().zip(&drawn).filter_map(undefined).collect();
+    let undefined: Vec<String> = cells.iter().zip(&drawn).filter_map(undefined).collect();
+    let undefined = Some(undefined.join("; ")).filter(|text| !text.is_empty());
     Figure {
         caption: format!(
             "Recall: share of the recorded failures that the parameterized scenarios show; precision: share of their \
@@ -259,7 +264,7 @@ pub fn recall_and_precision(scores: &CategoryScores, confidence: f64, data: &str
             100.0 * confidence
         ),
         plots: drawn.into_iter().flatten().collect(),
-        notes: ("Without a marker, because S or S' never fails:", empty),
+        notes: ("Without a marker, because S or S' never fails:", undefined.into_iter().collect()),
         ..titled(scores, "recall and precision of S' against S", data)
     }
 }
@@ -317,7 +322,7 @@ pub fn f1_by_parameters(scores: &CategoryScores, means: &[MeanF1], confidence: f
     Figure {
         caption: format!(
             "Mean over the driver models (and criteria) whose F1 every parameterization defines; line: its {} % interval \
-             over scenarios. Beside the markers stand the keys of the parameterizations. The fewer parameters, the fewer samples a \
+             over scenarios. Beside the markers stand the keys of the parameterizations, as in the figure of F1. The fewer parameters, the fewer samples a \
              density needs: of two that are equally good the simpler one is preferable. n: in a cell of the mean S fails in so \
              few scenarios, and no front is drawn.",
             100.0 * confidence
@@ -340,7 +345,7 @@ pub fn modes(category: Category, shapes: &[ModeShape], explained: &[f64], data: 
             values: values.iter().enumerate().map(at).collect(),
             ..Series::new(name, &[Mark::Line], [])
         };
-        let mut mean = line("mean; area: 5 % to 95 % of the scenarios at each instant".to_owned(), &shape.mean);
+        let mut mean = line("mean; area: the middle 90 % of the scenarios at each instant".to_owned(), &shape.mean);
         mean.marks.push(Mark::Band);
         for (value, [low, high]) in mean.values.iter_mut().zip(&shape.envelope) {
             value.interval = Some((*low, *high));
@@ -387,12 +392,13 @@ pub fn modes(category: Category, shapes: &[ModeShape], explained: &[f64], data: 
 
 /// The histograms of the parameters of mined scenarios.
 pub fn distributions(category: Category, histograms: &[ParameterHistogram], data: &str) -> Figure {
+    let scenarios: u64 = histograms.first().map_or(0, |histogram| histogram.counts.iter().sum());
     let plot = |histogram: &ParameterHistogram| {
         let middle = |k: usize| histogram.low + (k as f64 + 0.5) * histogram.width;
         let values = histogram.counts.iter().enumerate().map(|(k, count)| (middle(k), *count as f64));
         Plot {
             heading: quantity(&histogram.name),
-            x: PlotAxis::new(&histogram.unit),
+            x: PlotAxis::new(format!("{}, bins of {}", histogram.unit, number(histogram.width))),
             y: PlotAxis::new("scenarios"),
             layers: vec![Series::new("", &[Mark::Bars(histogram.width)], values).into()],
             ..Plot::default()
@@ -400,10 +406,8 @@ pub fn distributions(category: Category, histograms: &[ParameterHistogram], data
     };
     Figure {
         title: format!("{}: parameters of the mined scenarios", category.label()),
-        subtitle: Some(data.to_owned()),
-        caption: "Scenarios that passed the filters; bins about as wide as the rule of Freedman and Diaconis has \
-                  them, at plain numbers."
-            .to_owned(),
+        subtitle: Some(format!("{scenarios} scenarios. {data}")),
+        caption: "Scenarios that passed the filters; bins by the rule of Freedman and Diaconis, rounded.".to_owned(),
         plots: histograms.iter().map(plot).collect(),
         ..Figure::default()
     }

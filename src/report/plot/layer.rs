@@ -152,7 +152,7 @@ impl Rule {
         let (width, (x, y)) = (TICK.text_px(&self.label), axes.at(*end));
         let is_steep = before.0 == end.0;
         let left = if is_steep && axes.is_inside((x + width + 6.0, y)) { x + 4.0 } else { x - width - 4.0 };
-        let mut base = if is_steep { y + 13.0 } else { y + 4.5 };
+        let mut base = if is_steep { y + 13.0 } else { (y + 4.5).min(axes.y.ends_px().1 - 3.0) };
         while taken.iter().any(|w| left < w.0 + w.1 && left + width > w.0 && (base - w.2).abs() < 12.0) {
             base += 13.0;
         }
@@ -296,7 +296,7 @@ impl Series {
             });
             // A label per value if there are few; many would cover one another.
             if !value.label.is_empty() && (self.values.len() <= MAX_WORDS || value.is_few) {
-                label(canvas, (place, look.colour), &value.label, axes, taken);
+                label(canvas, (place, look.colour, self.has(Mark::Line)), &value.label, axes, taken);
             }
         }
     }
@@ -357,19 +357,23 @@ impl Series {
 /// Draws a label beside a point, if there is room inside the plot and between the others.
 fn label(
     canvas: &mut Canvas,
-    (place, colour): (Position, &'static str),
+    (place, colour, is_on_line): (Position, &'static str, bool),
     words: &str,
     axes: &Axes,
     taken: &mut Vec<(f64, f64, f64)>,
 ) {
     let width = TICK.text_px(words);
     let (right, left, middle) = (6.0, -6.0 - width, -0.5 * width);
-    let places = [(middle, -7.0), (right, -5.0), (left, -5.0), (middle, 17.0), (right, 14.0), (left, 14.0)];
-    let places = places.map(|(dx, dy)| (place.0 + dx, place.1 + dy));
+    // Beside a line a number belongs to the point above or below it.
+    let places = match is_on_line {
+        true => vec![(middle, -7.0), (middle, 17.0)],
+        false => vec![(right, 4.5), (left, 4.5), (middle, -7.0), (middle, 17.0), (right, -7.0), (left, 15.0)],
+    };
+    let mut places = places.into_iter().map(|(dx, dy)| (place.0 + dx, place.1 + dy));
     // A number over the last point may reach beyond the frame.
     let is_inside = |(x, y): &Position| axes.is_inside((x + 7.0, y - 11.0)) && axes.is_inside((x + width - 7.0, *y));
     let is_free = |(x, y): &Position| taken.iter().all(|w| *x > w.0 + w.1 || x + width < w.0 || (y - w.2).abs() > 12.0);
-    let Some((x, y)) = places.into_iter().find(|place| is_inside(place) && is_free(place)) else { return };
+    let Some((x, y)) = places.find(|place| is_inside(place) && is_free(place)) else { return };
     taken.push((x, width, y));
     canvas.text((x, y), words, Type { colour, ..TICK }, Anchor::Start);
 }

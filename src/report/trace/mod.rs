@@ -94,6 +94,9 @@ impl TraceFigure<'_> {
         if shown.has_unjudged() {
             notes.push("Thin gap, TTC, BTN: the criteria ignore the vehicle there.".to_owned());
         }
+        if self.series.iter().any(|s| s.trace.coasting_mps2 > 0.0) {
+            notes.push("CCHDM's coasting after its reaction is no braking.".to_owned());
+        }
         let is_cut = |plot: &Plot| {
             let Ends::Exactly(_, top) = plot.y.ends else { return false };
             plot.series().flat_map(|series| &series.values).any(|value| value.y >= top)
