@@ -157,6 +157,22 @@ mod tests {
     }
 
     #[test]
+    fn in_a_column_of_a_paper_no_type_is_below_six_points() {
+        for is_wide in [false, true] {
+            let plots = vec![plot(vec![series("s", &[Mark::Points], &[(0.0, 1.0), (1.0, 2.0)])])];
+            let svg = Figure { is_wide, ..figure(plots) }.svg();
+            let of = |key: &str| -> Vec<f64> {
+                let key = format!(" {key}=\"");
+                let values = svg.split(&key).skip(1).map(|rest| rest.split('"').next().unwrap());
+                values.filter_map(|value| value.parse().ok()).collect()
+            };
+            let (width_px, smallest) = (of("width")[0], of("font-size").into_iter().fold(f64::MAX, f64::min));
+            let columns = if is_wide { 2.0 } else { 1.0 };
+            assert!(smallest / width_px * 252.0 * columns >= 6.0, "{smallest} px of {width_px} px");
+        }
+    }
+
+    #[test]
     fn nothing_to_draw_is_said_and_makes_a_picture() {
         for values in [vec![], vec![(f64::NAN, f64::NAN)]] {
             let svg = figure(vec![plot(vec![series("s", &[Mark::Points], &values)])]).svg();
