@@ -86,8 +86,8 @@ pub fn headways(of: &HeadwayFailures, scores: &CategoryScores, confidence: f64, 
     Some(Figure {
         caption: format!(
             "Black: share of the recorded scenarios in which the driver model fails the criterion; band: its {} % \
-             interval over scenarios. Colours: the same scenarios, parameterized. Vertical axes by the square root from 0, or linear where all shares are large. Of equal numbers in a row the \
-                 first is written.",
+             interval over scenarios. Colours: the same scenarios, parameterized. Vertical axes by the square root from \
+             0, or linear where all shares are large. Of equal numbers in a row the first is written.",
             100.0 * confidence
         ),
         plots: cells.iter().filter(fails).map(panel).collect(),
