@@ -635,7 +635,8 @@ pub fn ratios(file: &CompareFile, comparison: &CategoryComparison, criterion: Cr
         caption: format!(
             "Share of the lanes that fail, as a multiple of that of S, scenario by scenario, with its {} % interval; 1: as \
              many failures, though perhaps of other scenarios (see F1). A ratio agrees where its interval lies between \
-             the dashed lines ({:.2} and {margin}). Where S never fails there is no ratio; a line at an edge goes on beyond it. n: scenarios in which S fails.",
+             the dashed lines ({:.2} and {margin}). Where S never fails there is no ratio. A \
+             line at an edge goes on beyond it; an arrow is a ratio of zero below its bound. n: scenarios in which S fails.",
             100.0 * file.level,
             1.0 / margin
         ),

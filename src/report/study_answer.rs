@@ -3,9 +3,9 @@
 
 use super::html::Section;
 use super::study::StudyReport;
+use super::study_figures::variant_name;
 use super::tables::wrap;
 use crate::run::score::Best;
-use crate::scenario::parameterization::Parameterization;
 use crate::support::readable::{count, count_of, counted};
 use crate::support::table::{NumberText, Table};
 
@@ -55,8 +55,7 @@ impl StudyReport {
     pub(super) fn answer_section(&self) -> Section {
         let named = |best: &Best| {
             let mut row = self.row(best);
-            let id = best.score.as_ref().and_then(|score| Parameterization::find(best.category, &score.variant));
-            id.iter().for_each(|id| row[2] = format!("{}: {}", id.key, id.description()));
+            best.score.iter().for_each(|score| row[2] = variant_name(best.category, &score.variant));
             row
         };
         let rows: Vec<[String; 7]> = self.best.iter().map(named).collect();

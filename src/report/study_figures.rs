@@ -146,7 +146,8 @@ pub fn f1_intervals(scores: &CategoryScores, confidence: f64, data: &str) -> Fig
     Figure {
         caption: format!(
             "Marker: F1; further right is better; in each row in the order below. Line: its {} % interval over scenarios. \
-             n: scenarios in which S fails; with fewer than ten there is no line. Without a marker: neither S nor S' fails.",
+             n: scenarios in which S fails; without a line they are too few for an interval. Without a marker: neither S \
+             nor S' fails.",
             100.0 * confidence
         ),
         plots: dots(&rows, vec![panel]),
@@ -260,7 +261,7 @@ pub fn recall_and_precision(scores: &CategoryScores, confidence: f64, data: &str
         caption: format!(
             "Recall: share of the recorded failures that the parameterized scenarios show; precision: share of their \
              failures that were recorded, and undefined where S' never fails. Lines: {} % intervals over scenarios, cut \
-             at the edge, none with fewer than ten failing. Dashed: equal F1. Each panel begins below its lowest value.",
+             at the edge, none where too few scenarios fail. Dashed: equal F1. Each panel begins below its lowest value.",
             100.0 * confidence
         ),
         plots: drawn.into_iter().flatten().collect(),
@@ -278,30 +279,30 @@ fn few(failing_scenarios: u64) -> String {
 /// F1 against the number of parameters: the mean over the cells that every parameterization defines, over all criteria
 /// and for each. Also the front of parameterizations that no other beats with at most as many parameters.
 pub fn f1_by_parameters(scores: &CategoryScores, means: &[MeanF1], confidence: f64, data: &str) -> Figure {
-    let ids: Vec<Option<Parameterization>> =
-        scores.variants.iter().skip(1).map(|key| Parameterization::find(scores.category, key)).collect();
-    let most = ids.iter().flatten().map(Parameterization::parameter_count).max().unwrap_or(1) as f64;
+    // With the place of each among the means: a given or cross-validated variant has no number of parameters.
+    let found = scores.variants.iter().skip(1).map(|key| Parameterization::find(scores.category, key)).enumerate();
+    let ids: Vec<(usize, Parameterization)> = found.filter_map(|(at, id)| Some((at, id?))).collect();
+    let most = ids.iter().map(|(_, id)| id.parameter_count()).max().unwrap_or(1) as f64;
     let panel = |mean: &MeanF1| {
         let is_few = is_few(mean.fewest_failing as f64);
         let of = |name: &str, look: Look| {
-            let own = ids.iter().flatten().zip(&mean.values).filter(|(id, _)| id.family.name() == name);
-            let value = |(id, (value, interval)): (&Parameterization, &(f64, Option<ScoreInterval>))| {
-                let label = id.key.to_string();
-                let place = Value::from((id.parameter_count() as f64, *value));
-                Value { label, is_few, interval: ends(*interval), ..place }
+            let own = ids.iter().filter(|(_, id)| id.family.name() == name);
+            let value = |(at, id): &(usize, Parameterization)| {
+                let (value, interval) = mean.values[*at];
+                let place = Value::from((id.parameter_count() as f64, value));
+                Value { label: id.key.to_string(), is_few, interval: ends(interval), ..place }
             };
             let series = Series::new(name, &[Mark::Points, Mark::Intervals], []);
             Series { values: own.map(value).collect(), look: Some(look), ..series }
         };
-        let points =
-            ids.iter().flatten().zip(&mean.values).map(|(id, (value, _))| (id.parameter_count() as f64, *value));
+        let points = ids.iter().map(|(at, id)| (id.parameter_count() as f64, mean.values[*at].0));
         let front = if is_few { Vec::new() } else { pareto_front(&points.collect::<Vec<_>>()) };
         // A step at each point: there is nothing between two whole numbers.
         let steps = front.windows(2).flat_map(|pair| [pair[0], (pair[1].0, pair[0].1)]).chain(front.last().copied());
         let look = Look { colour: GREY, dash: "4,4", line_px: 1.2, ..Look::of(0, 1) };
         let own = [
             ("kinematic", Look { colour: INK, symbol: Symbol::Disc, marker_px: 5.0, ..look }),
-            ("SVD", Look { colour: MEAN_OF_SVD, symbol: Symbol::Polygon(4, 0.5), marker_px: 3.2, ..look }),
+            ("SVD", Look { colour: "#d55e00", symbol: Symbol::Polygon(4, 0.5), marker_px: 3.2, ..look }),
         ];
         let front =
             Series { look: Some(look), ..Series::new("best with as many parameters or fewer", &[Mark::Line], steps) };
@@ -322,9 +323,10 @@ pub fn f1_by_parameters(scores: &CategoryScores, means: &[MeanF1], confidence: f
     Figure {
         caption: format!(
             "Mean over the driver models (and criteria) whose F1 every parameterization defines; line: its {} % interval \
-             over scenarios. Beside the markers stand the keys of the parameterizations, as in the figure of F1. The fewer parameters, the fewer samples a \
-             density needs: of two that are equally good the simpler one is preferable. n: in a cell of the mean S fails in so \
-             few scenarios, and no front is drawn.",
+             over scenarios. Beside the markers stand the keys of the parameterizations, as in the figure of F1. The fewer \
+             parameters, the fewer samples a density needs: of two that are equally good the simpler one is preferable. \
+             n, if given: the smallest number of scenarios in which S fails, over the cells of the mean; no front is \
+             drawn.",
             100.0 * confidence
         ),
         plots: drawn.into_iter().map(panel).collect(),
@@ -332,8 +334,6 @@ pub fn f1_by_parameters(scores: &CategoryScores, means: &[MeanF1], confidence: f
         ..titled(scores, "F1 against the number of parameters", data)
     }
 }
-
-const MEAN_OF_SVD: &str = "#d55e00";
 
 /// The mean scenario between nine tenths of all, the scenarios along the first directions of a decomposition, and what
 /// the directions leave unexplained.
@@ -381,8 +381,8 @@ pub fn modes(category: Category, shapes: &[ModeShape], explained: &[f64], data: 
         subtitle: Some(data.to_owned()),
         caption: "Lateral positions: 0 is the middle of the ego, positive is the target's side; where both sides are kept \
                   apart, the more frequent one is drawn. Variance: share of the scaled data's that the first coefficients \
-                  together leave. A small share of the motions may decide the outcomes: see F1. Coefficients go together, so that \
-                  one alone may lead out of the area."
+                  together leave. A small share of the motions may decide the outcomes: see F1. The coefficients are \
+                  correlated, so that one alone may lead out of the area."
             .to_owned(),
         plots: shapes.iter().map(panel).chain((!rest.is_empty()).then_some(residual)).collect(),
         columns: 2,
@@ -415,9 +415,12 @@ pub fn distributions(category: Category, histograms: &[ParameterHistogram], data
 
 /// `2: constant acceleration, constant lateral speed`.
 pub(super) fn legend_name(scores: &CategoryScores, variant: usize) -> String {
-    let key = &scores.variants[variant];
-    let (base, suffix) =
-        key.strip_suffix(CROSS_VALIDATED).map_or((key.as_str(), ""), |base| (base, ", cross-validated"));
-    let found = Parameterization::find(scores.category, base);
-    found.map_or(key.clone(), |id| format!("{key}: {}{suffix}", id.description()))
+    variant_name(scores.category, &scores.variants[variant])
+}
+
+/// The same for a key.
+pub(super) fn variant_name(category: Category, key: &str) -> String {
+    let (base, suffix) = key.strip_suffix(CROSS_VALIDATED).map_or((key, ""), |base| (base, ", cross-validated"));
+    let found = Parameterization::find(category, base);
+    found.map_or(key.to_owned(), |id| format!("{key}: {}{suffix}", id.description()))
 }

@@ -109,3 +109,44 @@ fn the_tables_of_the_figures_are_those_that_were_looked_at() {
         assert!(known == now, "{name} differs first in line {:?}", line.map(|line| line + 1));
     }
 }
+
+/// Also beside variants without a number of parameters, which take part in the choice of cells.
+#[test]
+fn a_mean_over_cells_is_that_of_the_scores_in_the_table() {
+    let dir = tempfile::tempdir().unwrap();
+    let flags = ["-q", "study", "--synth-recordings", "6", "--categories", "cut-in", "--cross-validate"];
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lanesweep"));
+    let output = command.args(flags).args(["--backend", "cpu", "--out"]).arg(dir.path()).output().unwrap();
+    assert_eq!(output.status.code(), Some(0), "{}", String::from_utf8_lossy(&output.stderr));
+    let table = |name: &str| {
+        let mut reader = csv::Reader::from_path(dir.path().join(name)).unwrap();
+        let header = reader.headers().unwrap().clone();
+        let rows: Vec<csv::StringRecord> = reader.records().map(Result::unwrap).collect();
+        move |row: usize, column: &str| {
+            let at = header.iter().position(|name| name == column).unwrap();
+            rows.get(row).map(|row| row[at].to_owned())
+        }
+    };
+    let scores = table("f1.csv");
+    let mut cells = std::collections::BTreeMap::<(String, String), Vec<(String, Option<f64>)>>::new();
+    for row in (0..).take_while(|row| scores(*row, "f1").is_some()) {
+        let of = |column: &str| scores(row, column).unwrap();
+        let cell = cells.entry((of("model"), of("criterion"))).or_default();
+        cell.push((of("parameterization"), of("f1").parse().ok()));
+    }
+    let shared: Vec<_> = cells.values().filter(|cell| cell.iter().all(|(_, f1)| f1.is_some())).collect();
+    let means = table("f1-by-parameters-cut-in.csv");
+    let mut compared = 0;
+    for row in (0..).take_while(|row| means(*row, "label").is_some()) {
+        let of = |column: &str| means(row, column).unwrap();
+        if !of("panel").starts_with("all criteria") || of("label").is_empty() {
+            continue;
+        }
+        let own = shared.iter().flat_map(|cell| cell.iter()).filter(|(key, _)| *key == of("label"));
+        let own: Vec<f64> = own.filter_map(|(_, f1)| *f1).collect();
+        let mean = own.iter().sum::<f64>() / own.len() as f64;
+        assert!((mean - of("y").parse::<f64>().unwrap()).abs() < 1e-9, "{}: {mean}", of("label"));
+        compared += 1;
+    }
+    assert_eq!(compared, 7, "the paper's parameterizations");
+}

@@ -16,7 +16,7 @@ const MAX_WORDS: usize = 12;
 const MIN_SCENARIOS: f64 = 10.0;
 
 /// Caption of hollow markers.
-pub(super) const HOLLOW: &str = "Hollow: fewer than ten failing scenarios, n.";
+pub(super) const HOLLOW: &str = "Hollow: fewer than ten failing scenarios; n is their number.";
 
 /// Whether a value is based on few failing scenarios; their number may be an effective one.
 pub(in crate::report) fn is_few(failing_scenarios: f64) -> bool {
