@@ -2,6 +2,7 @@
 
 override driver_always_unsafe: bool;
 override driver_until_equal_speeds: bool;
+override driver_only_while_closing: bool;
 // m
 override driver_lateral_gate: f32;
 // s
@@ -18,9 +19,10 @@ override driver_jerk_per_step: f32;
 override driver_max_deceleration: f32;
 override driver_delay_steps: u32;
 
-// The gap that is a danger, m, at the ego's speed and a closing speed `dv`: a headway, or a TTC of either sign.
+// The gap that is a danger, m, at the ego's speed and a closing speed `dv`: from a headway, or from a TTC.
 fn danger_gap(v_ego: f32, dv: f32) -> f32 {
-    return select(driver_ttc * abs(dv), driver_headway * v_ego + driver_headway_tolerance, driver_headway > 0.0);
+    let closes = select(abs(dv), larger(dv, 0.0), driver_only_while_closing);
+    return select(driver_ttc * closes, driver_headway * v_ego + driver_headway_tolerance, driver_headway > 0.0);
 }
 
 // The ramp starts from the coasting deceleration: the first braking step is 0.4 + jerk·dt.
@@ -28,13 +30,14 @@ fn initial() -> DriverState {
     return DriverState(driver_coasting, driver_delay_steps);
 }
 
-// Unsafe iff h ≤ 0 and |g/dv| ≤ 2.0 s. Because of |TTC| the driver continues braking below the other's speed until
-// the opening gap exceeds 2 s of |dv|. With a headway: unsafe iff h ≤ 0 and g ≤ 2.0 s · v_e.
+// Unsafe iff h ≤ gate and |g/dv| ≤ 2.0 s. Where |TTC| of an opening gap counts, the driver keeps braking below the
+// other's speed until that gap exceeds 2 s of |dv|. With a headway: unsafe iff h ≤ gate and g ≤ 2.0 s · v_e.
 fn check(view: View) -> Hazard {
     let dv = closing(view);
     let near = view.lateral_gap <= driver_lateral_gate;
     let near_gap = danger_gap(view.v_ego, dv);
-    let soon = select((dv != 0.0) & (abs(view.gap) <= near_gap), view.gap <= near_gap, driver_headway > 0.0);
+    let moves = (dv > 0.0) | ((dv < 0.0) & !driver_only_while_closing);
+    let soon = select(moves & (abs(view.gap) <= near_gap), view.gap <= near_gap, driver_headway > 0.0);
     let is_unsafe = !is_behind(view) & (driver_always_unsafe | (near & soon));
     return Hazard(is_unsafe, driver_max_deceleration);
 }

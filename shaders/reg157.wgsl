@@ -1,8 +1,11 @@
 // Reg157: the performance model of UN R157, 5.2.5.2. Twin of src/model/driver/reg157.rs.
 
 override driver_always_unsafe: bool;
+override driver_only_while_closing: bool;
 // m
 override driver_lateral_gate: f32;
+// m; 0: none
+override driver_lane_intrusion: f32;
 // 1/(2·deceleration), s²/m
 override driver_half_inverse_deceleration: f32;
 // reaction time + margin, s
@@ -10,6 +13,11 @@ override driver_constant: f32;
 // m/s²
 override driver_deceleration: f32;
 override driver_delay_steps: u32;
+
+// Lateral gap at the lane intrusion, m.
+fn intrusion_gap(marking_gap: f32) -> f32 {
+    return select(driver_lateral_gate, marking_gap - driver_lane_intrusion, driver_lane_intrusion > 0.0);
+}
 
 // TTC threshold dv/(2·6) + 0.35 + margin, s, at closing speed `dv`.
 fn ttc_threshold(dv: f32) -> f32 {
@@ -20,11 +28,13 @@ fn initial() -> DriverState {
     return DriverState(0.0, driver_delay_steps);
 }
 
-// Unsafe iff h ≤ gate and |g/dv| ≤ dv/(2·6) + 0.35 + margin: absolute TTC, signed dv on the right.
+// Unsafe iff h ≤ gate and |g/dv| ≤ dv/(2·6) + 0.35 + margin: absolute TTC, signed dv on the right; where a TTC exists
+// only while the gap closes, dv > 0.
 fn check(view: View) -> Hazard {
     let dv = closing(view);
-    let near = view.lateral_gap <= driver_lateral_gate;
-    let soon = (dv != 0.0) & (abs(view.gap) <= abs(dv) * ttc_threshold(dv));
+    let near = view.lateral_gap <= intrusion_gap(view.marking_gap);
+    let moves = (dv > 0.0) | ((dv < 0.0) & !driver_only_while_closing);
+    let soon = moves & (abs(view.gap) <= abs(dv) * ttc_threshold(dv));
     let is_unsafe = !is_behind(view) & (driver_always_unsafe | (near & soon));
     return Hazard(is_unsafe, driver_deceleration);
 }

@@ -10,10 +10,16 @@ const ATTENTION_CUTTING_OUT: u32 = 3u;
 const ATTENTION_DECELERATION: u32 = 4u;
 
 const BELOW_TRIGGER_DELAY_ONLY: u32 = 1u;
-const BELOW_TRIGGER_AT_ONCE: u32 = 2u;
 
 // A vehicle moves laterally above this change per step, m.
 const MOVEMENT: f32 = 1e-9f;
+
+// Sizes across the road that decide when the principal vehicle is perceived.
+struct LaneGeometry {
+    half_widths: f32,
+    lane_width: f32,
+    marking_gap: f32,
+}
 
 // Condition on the principal vehicle's motion before a driver may react.
 struct AttentionRule {
@@ -23,33 +29,42 @@ struct AttentionRule {
     threshold: f32,
 }
 
-// First step at which the driver may react to the principal vehicle and to the one ahead of it.
-fn attend_from(rule: AttentionRule, steps: u32, half_widths: f32, motion: Motion) -> vec2<u32> {
+// First step at which the driver may react to the principal vehicle and to the one ahead of it. Nothing after a step
+// decides whether the driver reacts at that step.
+fn attend_from(rule: AttentionRule, steps: u32, geometry: LaneGeometry, motion: Motion) -> vec2<u32> {
     if rule.kind == ATTENTION_ALWAYS || steps == 0u {
         return vec2<u32>(0u, 0u);
     }
     let start = motion_lateral(motion, 0u).position;
-    let is_in_path = abs(start) <= half_widths;
-    let is_seen = ((rule.kind == ATTENTION_VISIBLE_MOVEMENT) & (abs(start) - half_widths <= rule.threshold))
+    let is_in_path = abs(start) <= geometry.half_widths;
+    let has_intruded = abs(start) - geometry.half_widths <= geometry.marking_gap - rule.threshold;
+    let is_seen = ((rule.kind == ATTENTION_VISIBLE_MOVEMENT) & has_intruded)
         | ((rule.kind == ATTENTION_CUTTING_IN) & is_in_path)
         | ((rule.kind == ATTENTION_CUTTING_OUT) & !is_in_path);
     if is_seen {
         return vec2<u32>(0u, 0u);
     }
+    let is_farther = abs(start) - geometry.lane_width > geometry.lane_width * 0.5;
+    let centre = select(geometry.lane_width, abs(start), is_farther);
+    let delay_only = (rule.kind == ATTENTION_DECELERATION) & (rule.below_trigger == BELOW_TRIGGER_DELAY_ONLY);
     var event = NEVER;
-    var slows = NEVER;
     var lateral_before = start;
     var speed_before = motion_speed(motion, 0u);
     for (var step = 0u; step < steps; step++) {
         let position = motion_lateral(motion, step).position;
         let v = motion_speed(motion, step);
-        var happens = abs(position - start) > rule.threshold;
+        var happens = centre - abs(position) > rule.threshold;
         if rule.kind == ATTENTION_VISIBLE_MOVEMENT {
             happens = abs(position - lateral_before) > MOVEMENT;
         } else if rule.kind == ATTENTION_DECELERATION {
             happens = speed_before - v > rule.threshold;
+        } else if rule.kind == ATTENTION_CUTTING_OUT {
+            happens = abs(position) > rule.threshold;
         }
-        slows = select(slows, step, (slows == NEVER) & (speed_before - v > 0.0));
+        if delay_only & !happens & (speed_before - v > 0.0) {
+            event = step;
+            break;
+        }
         if happens {
             // Movement counts from the step before its first change.
             let begins_before = (rule.kind == ATTENTION_VISIBLE_MOVEMENT) & (step > 0u);
@@ -58,10 +73,6 @@ fn attend_from(rule: AttentionRule, steps: u32, half_widths: f32, motion: Motion
         }
         lateral_before = position;
         speed_before = v;
-    }
-    if (rule.kind == ATTENTION_DECELERATION) & (event == NEVER) {
-        event = select(event, slows, rule.below_trigger == BELOW_TRIGGER_DELAY_ONLY);
-        event = select(event, 0u, rule.below_trigger == BELOW_TRIGGER_AT_ONCE);
     }
     let waits_with_ahead = (rule.kind == ATTENTION_CUTTING_OUT) | (rule.kind == ATTENTION_DECELERATION);
     return vec2<u32>(event, select(0u, event, waits_with_ahead));

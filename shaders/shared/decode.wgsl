@@ -98,8 +98,10 @@ fn decode_case(point: array<f32, MAX_PARAMETERS>, speed_at: u32, lateral_at: u32
         second = lane_other(ahead, 1u, headway_gap + (recipe.principal_length + lead_gap), 1u);
     }
     let steps = steps_seen(first.motion);
+    let marking_gap = (recipe.lane_width - recipe.ego_width) * 0.5;
+    let geometry = LaneGeometry(first.half_widths, recipe.lane_width, marking_gap);
     for (var model = 0u; model < MODELS; model++) {
-        let begin = attend_from(recipe.attention[model], steps, first.half_widths, first.motion);
+        let begin = attend_from(recipe.attention[model], steps, geometry, first.motion);
         first.attend_from[model] = begin.x;
         second.attend_from[model] = begin.y;
     }
@@ -108,6 +110,7 @@ fn decode_case(point: array<f32, MAX_PARAMETERS>, speed_at: u32, lateral_at: u32
     lane.others[1] = second;
     lane.ego_speed = ego_speed;
     lane.ego_width = recipe.ego_width;
+    lane.lane_width = recipe.lane_width;
     lane.horizon = horizon;
     lane.pair = recipe.pair;
     return lane;

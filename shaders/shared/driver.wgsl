@@ -9,6 +9,7 @@ struct View {
     lateral_gap: f32,
     lateral_towards: f32,
     half_lengths: f32,
+    marking_gap: f32,
 }
 
 struct Hazard {

@@ -44,6 +44,8 @@ struct EgoState {
     v: f32,
     a: f32,
     width: f32,
+    // From the ego's side to the marking of its lane, m.
+    marking_gap: f32,
 }
 
 // A lane at the beginning of a step; after its last step, at that step.
@@ -99,7 +101,8 @@ fn advance(before: LaneState, lane: LaneCase) -> LaneState {
     var state = before;
     let index = state.index;
     let v_ego = state.v_ego;
-    let ego = EgoState(v_ego, (v_ego - state.v_before) * frame_inverse_dt, lane.ego_width);
+    let ego = EgoState(v_ego, (v_ego - state.v_before) * frame_inverse_dt, lane.ego_width,
+        (lane.lane_width - lane.ego_width) * 0.5);
     let first = see(ego, lane.others[0], state.gap_0, index);
     state.gap_0 = first.view.gap;
     state.record = update_record(state.record, first);
@@ -165,7 +168,8 @@ fn see(ego: EgoState, other: LaneOther, before: f32, index: u32) -> Seen {
         after = select(after, held_in_contact(before, after, other.half_lengths), stops);
     }
     let gap = select(before, after, (index > 0u) | frame_start_shift);
-    let view = View(ego.v, ego.a, v_other, gap, lateral_gap, lateral.towards, other.half_lengths);
+    let view = View(ego.v, ego.a, v_other, gap, lateral_gap, lateral.towards, other.half_lengths,
+        ego.marking_gap);
     let judged = present & (other.judged != 0u)
         & criteria_sees(gap, other.half_lengths, lateral_gap, lateral.position, ego.width);
     return Seen(view, present, judged);

@@ -80,6 +80,8 @@ struct Recipe {
     principal_length: f32,
     // m
     ego_width: f32,
+    // m
+    lane_width: f32,
     attention: array<AttentionRule, MODELS>,
 }
 
@@ -92,5 +94,6 @@ fn void_case() -> LaneCase {
     lane.others[0] = nobody;
     lane.others[1] = nobody;
     lane.ego_width = recipe.ego_width;
+    lane.lane_width = recipe.lane_width;
     return lane;
 }

@@ -36,6 +36,7 @@ struct LaneCase {
     others: array<LaneOther, 2>,
     ego_speed: f32,
     ego_width: f32,
+    lane_width: f32,
     horizon: u32,
     pair: u32,
 }

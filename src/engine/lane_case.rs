@@ -6,7 +6,7 @@
 //! step. Derivation: docs/src/methods/lane.md, time step.
 
 pub use crate::model::driver::NEVER;
-use crate::model::driver::{AttentionRule, DriverProfile, MODELS};
+use crate::model::driver::{AttentionRule, DriverProfile, LaneGeometry, MODELS};
 use crate::model::profile::{CutOutEvaluated, CutOutTarget, Profile};
 use crate::model::scalar::Real;
 use crate::scenario::{Case, Category, LATERAL_SAMPLED, Lateral, Motion, Participant, SPEED_SAMPLED, Speed, Tables};
@@ -47,6 +47,8 @@ pub struct LaneCase<R> {
     pub ego_speed: R,
     /// Width of the ego, m.
     pub ego_width: R,
+    /// Width of its lane, m.
+    pub lane_width: R,
     /// Steps to the later of T and the last parameter event: a lane runs at least this long.
     pub horizon: u32,
     /// 1 if a second vehicle is used.
@@ -77,6 +79,7 @@ impl LaneCase<f64> {
             others,
             ego_speed: case.ego_speed_mps,
             ego_width: case.ego_width_m,
+            lane_width: case.lane_width_m,
             horizon: (case.horizon_s / dt_s - 1e-9).ceil().max(0.0) as u32,
             pair: u32::from(case.ahead.is_some()),
         }
@@ -105,6 +108,7 @@ impl LaneCase<f64> {
             }),
             ego_speed: R::from_f64(self.ego_speed),
             ego_width: R::from_f64(self.ego_width),
+            lane_width: R::from_f64(self.lane_width),
             horizon: self.horizon,
             pair: self.pair,
         }
@@ -169,12 +173,16 @@ impl Series {
 
 /// Sets when each model may react.
 fn attend(case: &Case, profile: &Profile, series: &Series, others: &mut [LaneOther<f64>; 2]) {
-    let half_widths = others[0].half_widths;
+    let geometry = LaneGeometry {
+        half_widths: others[0].half_widths,
+        lane_width: case.lane_width_m,
+        marking_gap: (case.lane_width_m - case.ego_width_m) * 0.5,
+    };
     let steps = series.lateral_m.len() as u32;
     let lateral = |step: u32| series.lateral_m[step as usize];
     let speed = |step: u32| series.speed_mps[step as usize];
     for (model, rule) in attention_rules(profile, case.category).into_iter().enumerate() {
-        let [principal, ahead] = rule.attend_from(steps, half_widths, lateral, speed);
+        let [principal, ahead] = rule.attend_from(steps, geometry, lateral, speed);
         others[0].attend_from[model] = principal;
         others[1].attend_from[model] = ahead;
     }
@@ -302,6 +310,7 @@ mod tests {
             category: Category::CutIn,
             ego_length_m: 4.3,
             ego_width_m: 1.9,
+            lane_width_m: 3.5,
             ego_speed_mps: 30.0,
             principal: vehicle,
             ahead: None,

@@ -43,6 +43,8 @@ pub struct LaneConstants<R> {
     pub others: [OtherConstants<R>; 2],
     /// Width of the ego, m.
     pub ego_width: R,
+    /// From the ego's side to the marking of its lane, m.
+    pub marking_gap: R,
     /// First step that may end a lane in which no further event is possible.
     pub horizon: u32,
 }
@@ -63,6 +65,7 @@ impl<R: Real> LaneConstants<R> {
         LaneConstants {
             others: [of(&case.others[0]), of(&case.others[1])],
             ego_width: case.ego_width,
+            marking_gap: (case.lane_width - case.ego_width) * R::HALF,
             // LATEST_STEP is never reached, because the step cap is below it.
             horizon: known(if simulation.frame.end_when_settled { case.horizon } else { Flag::LATEST_STEP }),
         }
@@ -179,7 +182,7 @@ pub fn advance<R: Real, M: DriverModel<R>>(
     let keeps_values = criteria.keeps_values;
     let a_is_seen = keeps_values || M::SEES_OWN_ACCELERATION;
     let a = if a_is_seen { (v_ego - state.v_before) * frame.inverse_dt } else { R::ZERO };
-    let ego = Ego { v: v_ego, a, width: lane.ego_width };
+    let ego = Ego::of(lane, v_ego, a);
     // Step 0 is the start itself, unless index 0 is one step after it.
     let moves = runs & (Flag::of(frame.start_shift) | Flag::reached(index, 1));
     let mut gaps = state.gaps;
@@ -236,6 +239,14 @@ pub(super) struct Ego<R> {
     pub v: R,
     pub a: R,
     pub width: R,
+    pub marking_gap: R,
+}
+
+impl<R: Real> Ego<R> {
+    #[inline(always)]
+    pub fn of(lane: &LaneConstants<R>, v: R, a: R) -> Self {
+        Ego { v, a, width: lane.ego_width, marking_gap: lane.marking_gap }
+    }
 }
 
 /// The gap one step later; a contact between the two steps holds it.
@@ -282,6 +293,7 @@ pub(super) fn see<R: Real, M>(
         lateral_gap: place.position.abs() - other.half_widths,
         lateral_towards: place.towards,
         half_lengths: other.half_lengths,
+        marking_gap: ego.marking_gap,
     };
     let &Simulation { criteria, scene, .. } = simulation;
     let lateral = place.position;

@@ -237,8 +237,8 @@ mod tests {
             if self.1 == FalsePromise::SafeGap { 0.0 } else { self.0.safe_gap(v_ego, v_other) }
         }
 
-        fn ignores(&self, lateral_gap: f32, lateral_towards: f32) -> Flag {
-            Flag::of(self.1 == FalsePromise::Ignores) | self.0.ignores(lateral_gap, lateral_towards)
+        fn ignores(&self, lateral_gap: f32, lateral_towards: f32, marking_gap: f32) -> Flag {
+            Flag::of(self.1 == FalsePromise::Ignores) | self.0.ignores(lateral_gap, lateral_towards, marking_gap)
         }
 
         fn steady_gap(&self, v_ego: f32, v_other: f32) -> f32 {

@@ -99,6 +99,8 @@ pub struct Trace {
     pub initial_gap_m: f64,
     /// Width of the ego, m.
     pub ego_width_m: f64,
+    /// Width of the lanes, m.
+    pub lane_width_m: f64,
     /// Widths of the other vehicles, m.
     pub widths_m: [f64; 2],
     /// Mean of the lengths of the ego and of each other vehicle, m.
@@ -160,6 +162,7 @@ impl Trace {
             dt_s,
             initial_gap_m: shifted_gap_m.unwrap_or(nominal_gap_m),
             ego_width_m,
+            lane_width_m: case.lane_width.to_f64(),
             widths_m: case.others.map(|other| 2.0 * other.half_widths.to_f64() - ego_width_m),
             mean_lengths_m: case.others.map(|other| other.half_lengths.to_f64()),
             coasting_mps2: if model == ModelId::Cchdm { profile.cchdm.coasting_mps2 } else { 0.0 },
@@ -250,6 +253,7 @@ fn widened<R: Real>(view: &View<R>) -> View<f64> {
         lateral_gap: view.lateral_gap.to_f64(),
         lateral_towards: view.lateral_towards.to_f64(),
         half_lengths: view.half_lengths.to_f64(),
+        marking_gap: view.marking_gap.to_f64(),
     }
 }
 

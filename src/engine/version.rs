@@ -14,7 +14,7 @@ use crate::support::plain_text::hex;
 /// Version of the lane computation, from a scenario or a sample's index to its verdicts and values. Raise it whenever a
 /// bit of any lane can change: plans, parts, journals and records of another version are refused. Package versions with
 /// the same engine version continue and merge each other's runs.
-pub const ENGINE_VERSION: u64 = 4;
+pub const ENGINE_VERSION: u64 = 5;
 
 /// A version, and the SHA-256 of a small set of lanes computed with it. A test uses it to detect that
 /// [`ENGINE_VERSION`] must be raised.
@@ -101,12 +101,12 @@ impl Canonical {
 
     /// A case, field by field.
     pub fn case(&mut self, case: &LaneCase<f64>) {
-        let LaneCase { others, ego_speed, ego_width, horizon, pair } = case;
+        let LaneCase { others, ego_speed, ego_width, lane_width, horizon, pair } = case;
         let mut bytes = Vec::with_capacity(320);
         for other in others {
             put_other(&mut bytes, other);
         }
-        put_floats(&mut bytes, &[*ego_speed, *ego_width]);
+        put_floats(&mut bytes, &[*ego_speed, *ego_width, *lane_width]);
         put_words(&mut bytes, &[*horizon, *pair]);
         self.0.update(&bytes);
     }

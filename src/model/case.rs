@@ -73,6 +73,8 @@ pub struct Case {
     pub ego_length_m: f64,
     /// Width of the ego, > 0.
     pub ego_width_m: f64,
+    /// Width of the ego's lane and of its neighbours, > 0.
+    pub lane_width_m: f64,
     /// Initial and planned speed of the ego, ≥ 0.
     pub ego_speed_mps: f64,
     /// Cutter, cutting-out vehicle or leader. The headway sets its gap to the ego.
@@ -93,8 +95,8 @@ pub struct Ahead {
     pub gap_m: f64,
 }
 
-/// Default lateral distance of a lane change, m.
-pub const LATERAL_DISTANCE_M: f64 = 3.5;
+/// Default width of a lane, m. A lane change covers one width.
+pub const LANE_WIDTH_M: f64 = 3.5;
 
 /// Parameters; speeds in m/s, lengths in m. Fields that do not apply to the category are ignored.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -117,10 +119,16 @@ pub struct PlainCase {
     pub ahead_speed_mps: f64,
     /// Cut-out: gap between the two, ≥ 0.
     pub ahead_gap_m: f64,
-    /// Length of every vehicle, > 0.
+    /// Length of every vehicle but the ego, > 0.
     pub length_m: f64,
-    /// Width of every vehicle, > 0.
+    /// Width of every vehicle but the ego, > 0.
     pub width_m: f64,
+    /// Length of the ego, > 0.
+    pub ego_length_m: f64,
+    /// Width of the ego, > 0.
+    pub ego_width_m: f64,
+    /// Width of the lanes, > 0.
+    pub lane_width_m: f64,
     /// Duration, s, > 0; afterwards speed and lateral position are held. `None`: all motions run to their ends.
     pub duration_s: Option<f64>,
 }
@@ -144,8 +152,9 @@ impl PlainCase {
             Speed::Kinematic { initial_mps: self.speed_mps, acceleration_mps2: self.acceleration_mps2, until_s };
         Ok(Case {
             category: self.category,
-            ego_length_m: self.length_m,
-            ego_width_m: self.width_m,
+            ego_length_m: self.ego_length_m,
+            ego_width_m: self.ego_width_m,
+            lane_width_m: self.lane_width_m,
             ego_speed_mps: self.ego_speed_mps,
             principal: participant(speed, lateral),
             ahead,

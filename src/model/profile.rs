@@ -207,6 +207,13 @@ impl Profile {
             let place = || place.clone().of(format!("`{key}.always_unsafe`"));
             refuse_repeats(place, list.iter().map(|category| (*category, category.key())))?;
         }
+        if self.reg157.visible_lateral_movement_s > 0.0 && self.reg157.lane_intrusion_m == 0.0 {
+            return Err(Error::usage(
+                place.clone().of("`reg157.visible_lateral_movement_s`"),
+                "movement is visible before a lane intrusion, and `reg157.lane_intrusion_m` is 0",
+                "set lane_intrusion_m (0.3 in un-r157), or 0 for the time of visible movement",
+            ));
+        }
         if self.frame.time_cap_s / self.frame.dt_s > MAX_STEPS {
             return Err(Error::usage(
                 place.clone().of("`frame.dt_s`"),

@@ -32,6 +32,8 @@ pub trait Real:
     const ZERO: Self;
     /// 1.
     const ONE: Self;
+    /// ½.
+    const HALF: Self;
     /// +∞: "did not happen" for a minimum, "cannot be avoided" for a Brake Threat Number.
     const INFINITY: Self;
 
@@ -97,6 +99,7 @@ macro_rules! real_float {
         impl Real for $float {
             const ZERO: Self = 0.0;
             const ONE: Self = 1.0;
+            const HALF: Self = 0.5;
             const INFINITY: Self = <$float>::INFINITY;
 
             #[inline(always)]

@@ -2,7 +2,7 @@
 
 use serde::Deserialize;
 
-use super::{Category, LATERAL_DISTANCE_M, PlainCase, check_headway, missing_parameter};
+use super::{Category, LANE_WIDTH_M, PlainCase, check_headway, missing_parameter};
 use crate::model::profile::FrameProfile;
 use crate::support::plausibility::{Doubts, HELP, Quantity};
 use crate::{Error, Place, Result};
@@ -141,10 +141,10 @@ impl CaseParameters {
         let acceleration_mps2 = at_least(self.acceleration.unwrap_or(0.0), f64::NEG_INFINITY, "acceleration")?;
         let end_speed_mps = self.end_speed.map(|v| at_least(v, 0.0, "end_speed")).transpose()?;
         let (lateral_speed_mps, lateral_distance_m) = match category {
-            Category::Lvd => (0.0, LATERAL_DISTANCE_M),
+            Category::Lvd => (0.0, LANE_WIDTH_M),
             Category::CutIn | Category::CutOut => (
                 above_zero(given("lateral_speed"), "lateral_speed")?,
-                above_zero(self.lateral_distance.unwrap_or(LATERAL_DISTANCE_M), "lateral_distance")?,
+                above_zero(self.lateral_distance.unwrap_or(LANE_WIDTH_M), "lateral_distance")?,
             ),
         };
         let (ahead_gap_m, ahead_speed_mps) = match category {
@@ -171,6 +171,9 @@ impl CaseParameters {
             ahead_gap_m,
             length_m,
             width_m,
+            ego_length_m: length_m,
+            ego_width_m: width_m,
+            lane_width_m: LANE_WIDTH_M,
             duration_s: self.duration,
         })
     }

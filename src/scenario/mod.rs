@@ -15,7 +15,7 @@ pub mod parameterization;
 mod schema;
 mod table_reader;
 
-pub use crate::model::case::{Ahead, Case, Category, LATERAL_DISTANCE_M, Participant, PlainCase};
+pub use crate::model::case::{Ahead, Case, Category, LANE_WIDTH_M, Participant, PlainCase};
 pub(crate) use crate::model::case::{check_headway, missing_parameter};
 pub use crate::model::motion::{LATERAL_SAMPLED, Lateral, LateralState, Motion, SPEED_SAMPLED, Speed, Tables};
 pub use case_parameters::CaseParameters;

@@ -31,6 +31,7 @@ pub fn plan(blocks: &[(Category, usize, &[&str])]) -> LanePlan {
         category: Category::Lvd,
         ego_length_m: 4.5,
         ego_width_m: 1.8,
+        lane_width_m: 3.5,
         ego_speed_mps: 25.0,
         principal: vehicle,
         ahead: None,

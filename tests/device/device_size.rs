@@ -43,8 +43,16 @@ fn plan(units: usize, variants: usize, headways: usize) -> LanePlan {
         let principal = Participant { length_m: 4.0, width_m: 2.0, speed: Speed::constant(20.0), lateral };
         let (ego_length_m, ego_width_m) = (4.0, 2.0);
         let category = Category::Lvd;
-        let case =
-            Case { category, ego_length_m, ego_width_m, ego_speed_mps: 20.0, principal, ahead: None, horizon_s: 0.0 };
+        let case = Case {
+            category,
+            ego_length_m,
+            ego_width_m,
+            lane_width_m: 3.5,
+            ego_speed_mps: 20.0,
+            principal,
+            ahead: None,
+            horizon_s: 0.0,
+        };
         LaneCase::encode(&case, &profile, &mut tables)
     };
     let (inside, outside) = (case(0.0), case(9.0));

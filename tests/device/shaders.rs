@@ -53,7 +53,7 @@ fn records() -> Vec<Record> {
             present_until: u32, attend_from: [u32; MODELS], used: u32, judged: u32,
         }),
         record!("LaneCase", LaneCase<f32>, {
-            others: [LaneOther<f32>; 2], ego_speed: f32, ego_width: f32, horizon: u32, pair: u32,
+            others: [LaneOther<f32>; 2], ego_speed: f32, ego_width: f32, lane_width: f32, horizon: u32, pair: u32,
         }),
         record!("Start", StartRecord, { kind: u32, value: f32 }),
         record!("Launch", Launch, {
@@ -83,7 +83,7 @@ fn generator_records() -> Vec<Record> {
             step_cap: u32, slots: [u32; 11], columns: ReducedColumns, lower: [f32; 14], upper: [f32; 14],
             bounded: u32, bounds: [ColumnBound; 8],
             min_duration: f32, longest_duration: f32, dt: f32, inverse_dt: f32, lane_change: f32,
-            half_lengths: [f32; 2], half_widths: [f32; 2], principal_length: f32, ego_width: f32,
+            half_lengths: [f32; 2], half_widths: [f32; 2], principal_length: f32, ego_width: f32, lane_width: f32,
             attention: [AttentionRule<f32>; MODELS],
         }),
         record!("Generation", Generation, {

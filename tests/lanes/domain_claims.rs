@@ -32,6 +32,7 @@ fn lvd(v0: f64, v1: f64, deceleration: f64) -> Case {
         category: Category::Lvd,
         ego_length_m: 4.3,
         ego_width_m: 1.9,
+        lane_width_m: 3.5,
         ego_speed_mps: v0,
         principal: Participant {
             length_m: 4.3,
@@ -49,6 +50,7 @@ fn cut_in(v_ego: f64, v_other: f64, lateral: Lateral) -> Case {
         category: Category::CutIn,
         ego_length_m: 4.6,
         ego_width_m: 1.9,
+        lane_width_m: 3.5,
         ego_speed_mps: v_ego,
         principal: Participant { length_m: 4.3, width_m: 1.8, speed: Speed::constant(v_other), lateral },
         ahead: None,
@@ -64,6 +66,7 @@ fn cut_out(speed: f64, lateral_speed: f64, lead_gap_m: f64) -> Case {
         category: Category::CutOut,
         ego_length_m: 4.3,
         ego_width_m: 1.9,
+        lane_width_m: 3.5,
         ego_speed_mps: speed,
         principal: participant(speed, leaves),
         ahead: Some(Ahead { vehicle: participant(0.0, Lateral::Centred), gap_m: lead_gap_m }),

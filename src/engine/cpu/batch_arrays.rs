@@ -51,6 +51,7 @@ pub(in crate::engine) struct EgoArrays<const N: usize> {
     /// Index of the lane within the stream.
     pub lane: [u32; N],
     width: [f32; N],
+    marking_gap: [f32; N],
     pub horizon: [u32; N],
     /// No search for quiescent steps before this step.
     pub eventful_until: [u32; N],
@@ -195,6 +196,7 @@ impl<const N: usize> LaneArrays<N> {
             }
         }
         fill(&mut self.fixed.ego.width, from, constants.ego_width);
+        fill(&mut self.fixed.ego.marking_gap, from, constants.marking_gap);
         fill(&mut self.fixed.ego.horizon, from, constants.horizon);
         let steady_from = steady_from(tracks);
         fill(&mut self.fixed.ego.eventful_until, from, steady_from);
@@ -266,7 +268,12 @@ impl<const N: usize> FixedArrays<N> {
                 judged: Flag::from_bits(other.judged[k]),
             }
         };
-        LaneConstants { others: [other(0), other(1)], ego_width: self.ego.width[k], horizon: self.ego.horizon[k] }
+        LaneConstants {
+            others: [other(0), other(1)],
+            ego_width: self.ego.width[k],
+            marking_gap: self.ego.marking_gap[k],
+            horizon: self.ego.horizon[k],
+        }
     }
 }
 
@@ -417,7 +424,7 @@ mod tests {
             attend_from: 5,
             judged: Flag::TRUE,
         };
-        let constants = LaneConstants { others: [other; 2], ego_width: 6.0, horizon: 7 };
+        let constants = LaneConstants { others: [other; 2], ego_width: 6.0, marking_gap: 8.0, horizon: 7 };
         let track = Track { first: 8, last: 9 };
         let tracks = [VehicleTracks { speed: track, position: track, towards: track }; 2];
         let record = Record {

@@ -56,7 +56,7 @@ pub(in crate::engine) fn quiescent_steps<M: DriverModel<f32>>(
         let steps = if lane.horizon > index { max_steps.min(lane.horizon - index) } else { max_steps };
         return (steps >= MIN_STEPS).then_some(Quiescent { steps, gaps: state.gaps });
     }
-    let ego = Ego { v: state.v_ego, a: 0.0, width: lane.ego_width };
+    let ego = Ego::of(lane, state.v_ego, 0.0);
     let first = see(simulation, &ego, &lane.others[0], &places[0], state.gaps[0], index, Flag::TRUE);
     if simulation.model.keeps_braking(&state.driver, &first.view).holds() {
         return None;
@@ -138,7 +138,7 @@ pub(in crate::engine) fn is_out_of_the_way<M: DriverModel<f32>>(
 ) -> Flag {
     let lateral_gap = place.position.abs() - other.half_widths;
     let judged = simulation.criteria.sees(0.0, other.half_lengths, lateral_gap, place.position, lane.ego_width);
-    !lateral_gap.is_negative() & !judged & simulation.model.ignores(lateral_gap, place.towards)
+    !lateral_gap.is_negative() & !judged & simulation.model.ignores(lateral_gap, place.towards, lane.marking_gap)
 }
 
 /// The gap down to which no event with a vehicle is possible; `None` if it is not in the ego's lane or already too
@@ -164,7 +164,7 @@ fn quiescent_gap<M: DriverModel<f32>>(
         return None;
     }
     // The safe distances only propose a gap; the step's own check decides.
-    let ego = Ego { v: state.v_ego, a: 0.0, width: lane.ego_width };
+    let ego = Ego::of(lane, state.v_ego, 0.0);
     let seen = see(simulation, &ego, other, place, lowest, index, Flag::TRUE);
     // Evaluates every criterion that the record holds.
     let Record { ttc, btn, min_gap: _ } = update_record(criteria, record, &seen);
@@ -309,6 +309,7 @@ mod tests {
         let lane = LaneConstants {
             others: [other(), other()],
             ego_width: 1.9,
+            marking_gap: 0.8,
             horizon: step(0.3, 2000.0).min(Flag::LATEST_STEP),
         };
         let first = between(-10.0, 150.0);

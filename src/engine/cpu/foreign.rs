@@ -313,6 +313,8 @@ mod tests {
                             lateral_gap: vehicle.lateral_gap[row],
                             lateral_towards: vehicle.lateral_speed[row],
                             half_lengths: vehicle.half_lengths[row],
+                            // RSS does not read it.
+                            marking_gap: 0.0,
                         };
                         let hazard = rss.check(&view);
                         let reacts = vehicle.attended[row] && hazard.is_unsafe.holds();

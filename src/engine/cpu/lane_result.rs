@@ -144,7 +144,7 @@ fn last_seen<R: Real, M>(
     state: &LaneState<R>,
     places: &[OtherState<R>; 2],
 ) -> [Seen<R>; 2] {
-    let ego = Ego { v: state.v_before, a: R::ZERO, width: lane.ego_width };
+    let ego = Ego::of(lane, state.v_before, R::ZERO);
     let index = state.index - 1;
     let seen = |k: usize| see(simulation, &ego, &lane.others[k], &places[k], state.gaps[k], index, Flag::TRUE);
     let first = seen(0);

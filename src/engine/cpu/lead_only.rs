@@ -122,7 +122,7 @@ mod tests {
             let is_out = is_out_of_the_way(pair, &constants, &constants.others[0], &first).holds();
             assert!(present && !is_out, "{name}");
         }
-        let ignores = pair.model.ignores(10.0, 0.0).holds();
+        let ignores = pair.model.ignores(10.0, 0.0, 0.8).holds();
         let comes = constants.others[0].present_from < Flag::LATEST_STEP;
         assert!(ignores || !comes || other.is_none(), "{name}");
         saved

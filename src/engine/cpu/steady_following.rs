@@ -78,7 +78,7 @@ mod tests {
             judged: Flag::of(between(0.0, 1.0) < 0.9),
         };
         let horizon = if between(0.0, 1.0) < 0.5 { between(0.0, 3000.0) as u32 } else { Flag::LATEST_STEP };
-        let lane = LaneConstants { others: [other; 2], ego_width: 1.9, horizon };
+        let lane = LaneConstants { others: [other; 2], ego_width: 1.9, marking_gap: 0.8, horizon };
         let v_ego = (speed + between(-0.2, 1.0) * between(0.0, 10.0)).max(0.0);
         let deceleration = between(0.0, 4.0);
         let state = LaneState {

@@ -1,7 +1,7 @@
 //! Point → validity and case. Twin: `shaders/shared/decode.wgsl`, with the same names and order.
 
 use crate::engine::lane_case::{LaneCase, LaneOther};
-use crate::model::driver::NEVER;
+use crate::model::driver::{LaneGeometry, NEVER};
 use crate::model::scalar::Real;
 use crate::scenario::parameterization::Variable;
 use crate::scenario::{LATERAL_SAMPLED, Motion, SPEED_SAMPLED, Tables};
@@ -108,17 +108,20 @@ pub(super) fn case<R: Real>(recipe: &Recipe, basis: &[f32], point: &[f32], table
     if recipe.pair != 0 {
         second = other(ahead, 1, headway_gap + (number(recipe.principal_length) + lead_gap), 1);
     }
+    let (ego_width, lane_width) = (number(recipe.ego_width), number(recipe.lane_width));
+    let marking_gap = (lane_width - ego_width) * R::HALF;
+    let geometry = LaneGeometry { half_widths: first.half_widths, lane_width, marking_gap };
     for (model, rule) in recipe.attention.iter().enumerate() {
         let [of_principal, of_ahead] = rule.widen::<R>().attend_from(
             steps_seen(recipe, &first.motion),
-            first.half_widths,
+            geometry,
             |step| first.motion.lateral(tables, step).position,
             |step| first.motion.speed(tables, step),
         );
         first.attend_from[model] = of_principal;
         second.attend_from[model] = of_ahead;
     }
-    LaneCase { others: [first, second], ego_speed, ego_width: number(recipe.ego_width), horizon, pair: recipe.pair }
+    LaneCase { others: [first, second], ego_speed, ego_width, lane_width, horizon, pair: recipe.pair }
 }
 
 /// The value of a variable; 0 if no parameter gives it.

@@ -159,6 +159,8 @@ pub struct Recipe {
     pub principal_length: f32,
     /// Width of the ego, m.
     pub ego_width: f32,
+    /// Width of its lane, m.
+    pub lane_width: f32,
     /// Attention rule of each driver model, in the order of [`ModelId::ALL`](crate::model::driver::ModelId::ALL).
     pub attention: [AttentionRule<f32>; MODELS],
 }
@@ -167,7 +169,7 @@ const _: () = assert!(size_of::<AttentionRule<f32>>() == 16);
 const _: () = assert!(size_of::<ReducedColumns>() == 36);
 const _: () = assert!(size_of::<ColumnBound>() == 16);
 const _: () =
-    assert!(size_of::<Recipe>() == 4 * (8 + 11 + 9 + 2 * MAX_PARAMETERS + 1 + 5 + 4 + 2) + 16 * (MAX_BOUNDS + MODELS));
+    assert!(size_of::<Recipe>() == 4 * (8 + 11 + 9 + 2 * MAX_PARAMETERS + 1 + 5 + 4 + 3) + 16 * (MAX_BOUNDS + MODELS));
 
 // SAFETY: `repr(C)`, fields of u32 and f32 only, no padding (asserted above), every bit pattern valid.
 unsafe impl Zeroable for Recipe {}
@@ -218,6 +220,7 @@ impl Recipe {
             others: [nobody; 2],
             ego_speed: R::ZERO,
             ego_width: R::from_f64(self.ego_width.into()),
+            lane_width: R::from_f64(self.lane_width.into()),
             horizon: 0,
             pair: 0,
         }

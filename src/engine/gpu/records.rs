@@ -15,7 +15,7 @@ use crate::scenario::Motion;
 
 const _: () = assert!(size_of::<Motion<f32>>() == 64);
 const _: () = assert!(size_of::<LaneOther<f32>>() == 64 + 4 * (7 + MODELS));
-const _: () = assert!(size_of::<LaneCase<f32>>() == 2 * size_of::<LaneOther<f32>>() + 16);
+const _: () = assert!(size_of::<LaneCase<f32>>() == 2 * size_of::<LaneOther<f32>>() + 20);
 
 // SAFETY: `repr(C)`, fields of u32 and f32 only, no padding (asserted above), every bit pattern valid.
 unsafe impl Zeroable for Motion<f32> {}

@@ -37,6 +37,7 @@ struct FirstStep {
     half_lengths: f32,
     half_widths: f32,
     ego_width: f32,
+    lane_width: f32,
     motion: Motion<f64>,
     attend_from: u32,
     present_from: u32,
@@ -46,6 +47,13 @@ struct FirstStep {
     start: usize,
     /// Slot of the deciding vehicle: 0 the only one, 1 the first of two, 2 the second of two; the other has no effect.
     pairing: u64,
+}
+
+impl FirstStep {
+    /// From the ego's side to the marking, m, as a lane computes it.
+    fn marking_gap(&self) -> f32 {
+        (self.lane_width - self.ego_width) * 0.5
+    }
 }
 
 impl CaseSource for ThresholdCases {
@@ -89,6 +97,7 @@ impl ThresholdCases {
             half_lengths: rounded(draw.between(3.6, 9.0)),
             half_widths: rounded(draw.between(1.3, 2.3)),
             ego_width: rounded(draw.between(1.6, 2.1)),
+            lane_width: rounded(draw.between(2.7, 4.2)),
             motion,
             attend_from: 0,
             present_from: 0,
@@ -254,7 +263,7 @@ impl ThresholdCases {
         let lateral_gap = match on {
             Threshold::Reg157Gate => {
                 s.gap = part * dv * constants.reg157.ttc_threshold(dv);
-                rounded(self.profile.reg157.lateral_gate_m)
+                constants.reg157.intrusion_gap(s.marking_gap())
             }
             Threshold::CchdmGate => {
                 s.gap = part * constants.cchdm.danger_gap(s.v_ego, dv);
@@ -369,6 +378,7 @@ impl ThresholdCases {
             lateral_gap: lateral.position.abs() - s.half_widths,
             lateral_towards: lateral.towards,
             half_lengths: s.half_lengths,
+            marking_gap: s.marking_gap(),
         }
     }
 
@@ -413,6 +423,7 @@ impl ThresholdCases {
             others,
             ego_speed: f64::from(s.v_ego),
             ego_width: f64::from(s.ego_width),
+            lane_width: f64::from(s.lane_width),
             horizon: s.horizon,
             pair: u32::from(s.pairing > 0),
         }

@@ -206,6 +206,7 @@ impl RandomCases {
             category,
             ego_length_m: draw.between(3.6, 5.2),
             ego_width_m: draw.between(1.6, 2.1),
+            lane_width_m: draw.between(2.7, 4.2),
             ego_speed_mps: (v + closing).max(0.0),
             principal,
             ahead: None,
@@ -292,6 +293,7 @@ impl Frozen {
         let closing = ego.ego_speed_mps - initial_speed(&ego.principal.speed);
         lane.ego_speed = (initial_speed(&self.case.principal.speed) + closing).max(0.0);
         lane.ego_width = ego.ego_width_m;
+        lane.lane_width = ego.lane_width_m;
         let ahead = self.case.ahead.as_ref().map_or(&self.case.principal, |a| &a.vehicle);
         for (other, vehicle) in lane.others.iter_mut().zip([&self.case.principal, ahead]) {
             other.half_lengths = (ego.ego_length_m + vehicle.length_m) / 2.0;

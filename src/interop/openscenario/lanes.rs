@@ -28,9 +28,6 @@ pub struct PlayOptions {
     pub lane_width_m: Option<f64>,
 }
 
-/// Default width of a lane, m.
-const LANE_WIDTH_M: f64 = 3.5;
-
 /// Time after the last event for which a scenario with an external ego continues, s.
 const AFTERWARDS_S: f64 = 10.0;
 
@@ -113,7 +110,8 @@ fn lanes<R: Real>(
             None => plan.case(key.block, key.unit, key.variant),
         };
         let size = VehicleSize { length_m: wide.others[0].half_lengths, width_m: wide.ego_width };
-        let alike = || Sizes { ego: size, target: size, lead: (wide.pair != 0).then_some(size) };
+        let alike =
+            || Sizes { ego: size, target: size, lead: (wide.pair != 0).then_some(size), lane_width_m: wide.lane_width };
         let known = reopened.density().map(|d| d.sizes).or_else(|| scenario.map(Sizes::of));
         let sizes = known.or_else(|| reopened.has_one_size().then(alike));
         are_lengths_known &= sizes.is_some();
@@ -148,6 +146,7 @@ fn widened<R: Real>(case: &LaneCase<R>) -> LaneCase<f64> {
         }),
         ego_speed: case.ego_speed.to_f64(),
         ego_width: case.ego_width.to_f64(),
+        lane_width: case.lane_width.to_f64(),
         horizon: case.horizon,
         pair: case.pair,
     }
@@ -196,7 +195,11 @@ fn concrete<R: Real>(
         category: trace.category,
         ego: options.ego,
         side: options.side.or(scenario.map(|s| s.side)).unwrap_or(Side::Left),
-        lane_width_m: options.lane_width_m.or(scenario.map(|s| s.lane_width)).unwrap_or(LANE_WIDTH_M).clamp(1.0, 20.0),
+        lane_width_m: options
+            .lane_width_m
+            .or(scenario.map(|s| s.lane_width))
+            .unwrap_or(wide.lane_width)
+            .clamp(1.0, 20.0),
         vehicles,
         parameters: parameters(trace, wide, facts),
         properties: properties(trace, facts, options, sizes.are_lengths_known),
@@ -317,6 +320,7 @@ fn sizes_of_case(lane: &str, case: &LaneCase<f64>, known: Option<&Sizes>, ego_le
             ego: VehicleSize { length_m: ego, width_m: case.ego_width },
             target: size(0),
             lead: is_pair.then(|| size(1)),
+            lane_width_m: case.lane_width,
         };
         return Ok(KnownSizes { sizes, are_lengths_known: false });
     };

@@ -16,11 +16,11 @@ pub const NEVER: u32 = u32::MAX;
 pub const ALWAYS: u32 = 0;
 /// [`AttentionRule::kind`]: once lateral movement has been visible for the required time.
 pub const VISIBLE_MOVEMENT: u32 = 1;
-/// [`AttentionRule::kind`]: once a vehicle beside the ego's path has deviated from its lane centre for the required
-/// time.
+/// [`AttentionRule::kind`]: once a vehicle beside the ego's path has deviated from the centre of its lane for the
+/// required time.
 pub const CUTTING_IN: u32 = 2;
-/// [`AttentionRule::kind`]: once the vehicle in the ego's path has deviated from its lane centre for the required time;
-/// the vehicle ahead of it becomes visible at the same step.
+/// [`AttentionRule::kind`]: once the vehicle in the ego's path has deviated from the centre of the ego's lane for the
+/// required time; the vehicle ahead of it becomes visible at the same step.
 pub const CUTTING_OUT: u32 = 3;
 /// [`AttentionRule::kind`]: once the vehicle decelerates; the vehicle ahead of it becomes visible at the same step.
 pub const DECELERATION: u32 = 4;
@@ -32,14 +32,15 @@ const MOVEMENT_M: f64 = 1e-9;
 /// that a lead exactly at the trigger does not exceed it.
 const ROUNDING: f64 = 1e-9;
 
-/// What the driver does if the lead never decelerates more than the trigger. The text of Annex 3 does not say; its
-/// charts contain such leads.
+/// What the driver does while the lead has lost speed without decelerating more than the trigger. The text of Annex 3
+/// does not say; its charts contain such leads.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum BelowTrigger {
     /// It does not react (the text alone).
     Never,
-    /// It reacts without the perception time, from the step at which the lead begins to lose speed.
+    /// It reacts without the perception time, from the step at which the lead begins to lose speed, whatever follows. A
+    /// lead whose first loss exceeds the trigger is perceived first.
     DelayOnly,
     /// It reacts from the first step on, whatever the lead does (the JRC's simulator).
     AtOnce,
@@ -55,8 +56,20 @@ pub struct AttentionRule<R> {
     pub delay_steps: u32,
     /// Deceleration: the behaviour below the trigger, a [`BelowTrigger`].
     pub below_trigger: u32,
-    /// Movement: lateral gate, m. Deviation: normal wandering, m. Deceleration: loss of speed per step, m/s.
+    /// Movement: lane intrusion, m beyond the marking. Deviation: normal wandering, m. Deceleration: loss of speed per
+    /// step, m/s.
     pub threshold: R,
+}
+
+/// Sizes across the road that decide when the principal vehicle is perceived.
+#[derive(Debug, Clone, Copy)]
+pub struct LaneGeometry<R> {
+    /// (W_e + W_o)/2, m.
+    pub half_widths: R,
+    /// Width of the lanes, m.
+    pub lane_width: R,
+    /// From the ego's side to the marking of its lane, m.
+    pub marking_gap: R,
 }
 
 impl AttentionRule<f64> {
@@ -65,18 +78,19 @@ impl AttentionRule<f64> {
         AttentionRule { kind: ALWAYS, delay_steps: 0, below_trigger: 0, threshold: 0.0 }
     }
 
-    /// Once lateral movement has been visible for `visible_s`. At once for a vehicle that starts inside the gate, and
-    /// in LVD, which has no lateral movement.
-    pub fn after_visible_movement(visible_s: f64, lateral_gate_m: f64, dt_s: f64, category: Category) -> Self {
+    /// Once lateral movement has been visible for `visible_s`. At once for a vehicle that starts after its lane
+    /// intrusion, because its movement before the start is unknown; also in LVD, which has no lateral movement.
+    pub fn after_visible_movement(visible_s: f64, lane_intrusion_m: f64, dt_s: f64, category: Category) -> Self {
         if visible_s <= 0.0 || category == Category::Lvd {
             return Self::always();
         }
         let delay_steps = delay_steps(visible_s, dt_s);
-        AttentionRule { kind: VISIBLE_MOVEMENT, delay_steps, threshold: lateral_gate_m, ..Self::always() }
+        AttentionRule { kind: VISIBLE_MOVEMENT, delay_steps, threshold: lane_intrusion_m, ..Self::always() }
     }
 
-    /// Once a vehicle that cuts in has deviated from its lane centre by more than `wandering_m` for the perception time
-    /// (Annex 3). A vehicle that starts in the ego's path is perceived at once.
+    /// Once a vehicle that cuts in has deviated from the centre of its lane towards the ego by more than `wandering_m`
+    /// for the perception time (Annex 3). A vehicle that starts in the ego's path is perceived at once. For one from
+    /// beyond the neighbouring lane, the deviation is that from its start.
     pub fn cutting_in(wandering_m: f64, perception_s: f64, dt_s: f64) -> Self {
         Self::deviation(CUTTING_IN, wandering_m, perception_s, dt_s)
     }
@@ -96,7 +110,7 @@ impl AttentionRule<f64> {
 
     /// Once the perception time has passed after the vehicle decelerated more than the trigger.
     pub fn after_deceleration(trigger_mps2: f64, perception_s: f64, below: BelowTrigger, dt_s: f64) -> Self {
-        if trigger_mps2 <= 0.0 {
+        if trigger_mps2 <= 0.0 || below == BelowTrigger::AtOnce {
             return Self::always();
         }
         AttentionRule {
@@ -124,23 +138,24 @@ impl AttentionRule<f32> {
 
 impl<R: Real> AttentionRule<R> {
     /// First steps at which the driver may react to the principal vehicle and to the one ahead of it, or [`NEVER`].
-    /// `lateral` (m) and `speed` (m/s) give the principal vehicle's motion at steps below `steps`; `half_widths` is
-    /// (W_e + W_o)/2, m.
+    /// `lateral` (m) and `speed` (m/s) give the principal vehicle's motion at steps below `steps`. Nothing after a step
+    /// decides whether the driver reacts at that step.
     #[inline]
     pub fn attend_from(
         &self,
         steps: u32,
-        half_widths: R,
+        geometry: LaneGeometry<R>,
         lateral: impl Fn(u32) -> R,
         speed: impl Fn(u32) -> R,
     ) -> [u32; 2] {
         if self.kind == ALWAYS || steps == 0 {
             return [0; 2];
         }
+        let LaneGeometry { half_widths, lane_width, marking_gap } = geometry;
         let start = lateral(0);
         let is_in_path = start.abs() <= half_widths;
         let is_seen = match self.kind {
-            VISIBLE_MOVEMENT => start.abs() - half_widths <= self.threshold,
+            VISIBLE_MOVEMENT => start.abs() - half_widths <= marking_gap - self.threshold,
             CUTTING_IN => is_in_path,
             CUTTING_OUT => !is_in_path,
             _ => false,
@@ -148,18 +163,22 @@ impl<R: Real> AttentionRule<R> {
         if is_seen {
             return [0; 2];
         }
+        let is_farther = start.abs() - lane_width > lane_width * R::HALF;
+        let centre = if is_farther { start.abs() } else { lane_width };
+        let delay_only = self.kind == DECELERATION && self.below_trigger == BelowTrigger::DelayOnly as u32;
         let mut event = NEVER;
-        let mut slows = NEVER;
         let (mut lateral_before, mut speed_before) = (start, speed(0));
         for step in 0..steps {
             let (position, v) = (lateral(step), speed(step));
             let happens = match self.kind {
                 VISIBLE_MOVEMENT => (position - lateral_before).abs() > R::from_f64(MOVEMENT_M),
                 DECELERATION => speed_before - v > self.threshold,
-                _ => (position - start).abs() > self.threshold,
+                CUTTING_OUT => position.abs() > self.threshold,
+                _ => centre - position.abs() > self.threshold,
             };
-            if slows == NEVER && speed_before - v > R::ZERO {
-                slows = step;
+            if delay_only && !happens && speed_before - v > R::ZERO {
+                event = step;
+                break;
             }
             if happens {
                 // Movement becomes visible at the step where it begins.
@@ -169,13 +188,6 @@ impl<R: Real> AttentionRule<R> {
             }
             lateral_before = position;
             speed_before = v;
-        }
-        if self.kind == DECELERATION && event == NEVER {
-            event = match self.below_trigger {
-                below if below == BelowTrigger::DelayOnly as u32 => slows,
-                below if below == BelowTrigger::AtOnce as u32 => 0,
-                _ => NEVER,
-            };
         }
         let waits_with_ahead = self.kind == CUTTING_OUT || self.kind == DECELERATION;
         [event, if waits_with_ahead { event } else { 0 }]

@@ -16,8 +16,11 @@ use crate::model::scalar::{Flag, Real};
 pub struct CchdmProfile {
     /// The check is active below this lateral gap, m; 0 means that the vehicles overlap laterally.
     pub lateral_gate_m: f64,
-    /// Absolute time to collision at which the driver reacts, s (Annex 3: 2.0 s).
+    /// Time to collision at which the driver reacts, s (Annex 3: 2.0 s).
     pub ttc_s: f64,
+    /// A time to collision exists only while the gap closes (the regulation); otherwise the driver also reacts to
+    /// |TTC| of an opening gap (the JRC's simulator, the paper).
+    pub ttc_only_while_closing: bool,
     /// Delay between perception and braking, s (the paper 0.6 s; Annex 3 and the JRC 0.75 s).
     pub delay_s: f64,
     /// Deceleration during the delay, with the foot off the accelerator, m/s² (0.4).
@@ -65,6 +68,7 @@ pub enum CutInBraking {
 pub struct Cchdm<R> {
     always_unsafe: bool,
     until_equal_speeds: bool,
+    only_while_closing: bool,
     lateral_gate: R,
     ttc: R,
     /// Danger is a headway of at most this value, s; 0: danger is a TTC.
@@ -84,6 +88,7 @@ impl DriverProfile for CchdmProfile {
         Cchdm {
             always_unsafe: self.always_unsafe.contains(&category),
             until_equal_speeds: category == Category::CutIn && self.cut_in_braking == CutInBraking::UntilEqualSpeeds,
+            only_while_closing: self.ttc_only_while_closing,
             lateral_gate: R::from_f64(self.lateral_gate_m),
             ttc: R::from_f64(self.ttc_s),
             headway: R::from_f64(if category == Category::CutOut { self.cut_out_headway_s } else { 0.0 }),
@@ -135,10 +140,11 @@ impl DriverProfile for CchdmProfile {
 
 impl<R: Real> Cchdm<R> {
     /// Gap below which the driver sees danger, m, at the ego's speed and a closing speed `dv`: from a headway, or from
-    /// a TTC of either sign.
+    /// a TTC.
     #[inline(always)]
     pub fn danger_gap(&self, v_ego: R, dv: R) -> R {
-        if self.headway > R::ZERO { self.headway * v_ego + self.headway_tolerance } else { self.ttc * dv.abs() }
+        let dv = if self.only_while_closing { dv.larger(R::ZERO) } else { dv.abs() };
+        if self.headway > R::ZERO { self.headway * v_ego + self.headway_tolerance } else { self.ttc * dv }
     }
 }
 
@@ -152,7 +158,7 @@ impl<R: Real> DriverModel<R> for Cchdm<R> {
     }
 
     #[inline(always)]
-    fn ignores(&self, lateral_gap: R, _lateral_towards: R) -> Flag {
+    fn ignores(&self, lateral_gap: R, _lateral_towards: R, _marking_gap: R) -> Flag {
         !Flag::of(self.always_unsafe) & !lateral_gap.is_at_most(self.lateral_gate)
     }
 
@@ -162,13 +168,13 @@ impl<R: Real> DriverModel<R> for Cchdm<R> {
         DriverState { deceleration: self.coasting, delay_steps: self.delay_steps }
     }
 
-    /// Unsafe iff h ≤ 0 and |g/dv| ≤ 2.0 s. Because of |TTC| the driver keeps braking below the other vehicle's speed
-    /// until the opening gap exceeds 2 s of |dv|. With a headway: unsafe iff h ≤ 0 and g ≤ 2.0 s · v_e.
+    /// Unsafe iff h ≤ gate and |g/dv| ≤ 2.0 s. Where |TTC| of an opening gap counts, the driver keeps braking below the
+    /// other vehicle's speed until that gap exceeds 2 s of |dv|. With a headway: unsafe iff h ≤ gate and g ≤ 2.0 s · v_e.
     #[inline(always)]
     fn check(&self, view: &View<R>) -> Hazard<R> {
         let dv = view.closing();
         let near = view.lateral_gap.is_at_most(self.lateral_gate);
-        let moves = dv.is_negative() | dv.is_positive();
+        let moves = dv.is_positive() | (dv.is_negative() & !Flag::of(self.only_while_closing));
         let danger_gap = self.danger_gap(view.v_ego, dv);
         let soon = moves & view.gap.abs().is_at_most(danger_gap);
         let soon = if self.headway > R::ZERO { view.gap.is_at_most(danger_gap) } else { soon };
@@ -190,6 +196,7 @@ impl<R: Real> DriverModel<R> for Cchdm<R> {
         vec![
             ("driver_always_unsafe", f64::from(u8::from(self.always_unsafe))),
             ("driver_until_equal_speeds", f64::from(u8::from(self.until_equal_speeds))),
+            ("driver_only_while_closing", f64::from(u8::from(self.only_while_closing))),
             ("driver_lateral_gate", self.lateral_gate.to_f64()),
             ("driver_ttc", self.ttc.to_f64()),
             ("driver_headway", self.headway.to_f64()),

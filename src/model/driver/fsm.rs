@@ -167,7 +167,7 @@ impl<R: Real> DriverModel<R> for Fsm<R> {
 
     /// The gate is closed for a vehicle outside the lane that does not come in.
     #[inline(always)]
-    fn ignores(&self, lateral_gap: R, lateral_towards: R) -> Flag {
+    fn ignores(&self, lateral_gap: R, lateral_towards: R, _marking_gap: R) -> Flag {
         lateral_gap.is_positive() & !lateral_towards.is_positive()
     }
 
@@ -245,7 +245,16 @@ mod tests {
         for k in 0..4000 {
             let (v_ego, v_other) = (f64::from(k % 40), f64::from(k / 40 % 10) * 4.0);
             let (gap, a_ego) = (f64::from(k / 400) * 12.0 + 0.5, -f64::from(k % 3));
-            let view = View { v_ego, a_ego, v_other, gap, lateral_gap: -1.0, lateral_towards: 0.0, half_lengths: 4.5 };
+            let view = View {
+                v_ego,
+                a_ego,
+                v_other,
+                gap,
+                lateral_gap: -1.0,
+                lateral_towards: 0.0,
+                half_lengths: 4.5,
+                marking_gap: 0.8,
+            };
             let (pfs, cfs) = (fsm.pfs(v_ego, v_other, gap), fsm.cfs(v_ego, v_other, gap, a_ego));
             let hazard = fsm.check(&view);
             let demand = if cfs > 0.0 { cfs * span + comfort } else { pfs * comfort };

@@ -17,7 +17,7 @@ mod foreign;
 mod profile;
 
 pub use attention::{
-    ALWAYS, AttentionRule, BelowTrigger, CUTTING_IN, CUTTING_OUT, DECELERATION, NEVER, VISIBLE_MOVEMENT,
+    ALWAYS, AttentionRule, BelowTrigger, CUTTING_IN, CUTTING_OUT, DECELERATION, LaneGeometry, NEVER, VISIBLE_MOVEMENT,
 };
 pub use foreign::{Accelerations, ForeignId, LaneColumns, MAX_ACCELERATION_MPS2, VectorDriver, VehicleColumns};
 pub use profile::{Bound, DriverProfile, SHORT_STEP_S, delay_bound_s};
@@ -134,6 +134,8 @@ pub struct View<R> {
     pub lateral_towards: R,
     /// (L_e + L_o)/2, m: the centre distance is `gap + half_lengths`.
     pub half_lengths: R,
+    /// From the ego's side to the marking of its lane, m: the lateral gap of a vehicle whose near edge is on it.
+    pub marking_gap: R,
 }
 
 impl<R: Real> View<R> {
@@ -189,10 +191,10 @@ pub trait DriverModel<R: Real>: Copy + Send + Sync {
     }
 
     /// Whether a vehicle beside the ego is safe at every gap, speed and acceleration of the ego, at this lateral gap h
-    /// ≥ 0, m, and lateral speed towards the ego, m/s. It uses the comparisons of the check itself, without the lateral
-    /// speed if the check does not read it.
+    /// ≥ 0, m, lateral speed towards the ego, m/s, and marking gap, m. It uses the comparisons of the check itself,
+    /// without the lateral speed if the check does not read it.
     #[inline(always)]
-    fn ignores(&self, _lateral_gap: R, _lateral_towards: R) -> Flag {
+    fn ignores(&self, _lateral_gap: R, _lateral_towards: R, _marking_gap: R) -> Flag {
         Flag::FALSE
     }
 
@@ -286,6 +288,7 @@ mod tests {
                 lateral_gap: between(-2.0, 0.0),
                 lateral_towards: between(-2.0, 2.0),
                 half_lengths: between(3.0, 10.0),
+                marking_gap: between(0.4, 1.2),
             };
             let safe_gap = model.safe_gap(v_ego, v_other);
             let is_unsafe = model.check(&view).is_unsafe.holds();
@@ -298,7 +301,7 @@ mod tests {
             let (lateral_gap, gap, a_ego) = (between(0.0, 4.0), between(-20.0, 50.0), between(-10.0, 0.0));
             let beside = View { lateral_gap, gap, a_ego, ..view };
             let is_unsafe = model.check(&beside).is_unsafe.holds();
-            if model.ignores(beside.lateral_gap, beside.lateral_towards).holds() {
+            if model.ignores(beside.lateral_gap, beside.lateral_towards, beside.marking_gap).holds() {
                 assert!(!is_unsafe, "{name}: {beside:?} is ignored and unsafe");
                 ignored += 1;
             }

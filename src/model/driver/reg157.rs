@@ -17,9 +17,15 @@ use crate::model::scalar::{Flag, Real};
 pub struct Reg157Profile {
     /// The clause that defines these numbers, as sheets name it.
     pub clause: String,
-    /// The check is active below this lateral gap, m (0.5 m is 0.3 m beyond the marking for 3.5 m lanes and 1.9 m cars:
-    /// R157, 5.2.5.2).
+    /// The check is active below this lateral gap, m, if there is no `lane_intrusion_m` (0.5 m is 0.3 m beyond the
+    /// marking for lanes of 3.5 m and an ego of 1.9 m).
     pub lateral_gate_m: f64,
+    /// The check is active once the other vehicle's near edge is this far beyond the marking of the ego's lane, m (R157,
+    /// 5.2.5.2: 0.3 m). 0: `lateral_gate_m` holds for lanes and vehicles of every width.
+    pub lane_intrusion_m: f64,
+    /// A time to collision exists only while the gap closes (the regulation); otherwise the model also reacts to |TTC|
+    /// of an opening gap (the JRC's simulator, the paper).
+    pub ttc_only_while_closing: bool,
     /// Reaction time, s (R157: 0.35 s).
     pub reaction_time_s: f64,
     /// Deceleration, m/s², reached at once (R157: 6 m/s²).
@@ -32,7 +38,7 @@ pub struct Reg157Profile {
     /// contacts.
     pub margin_steps: f64,
     /// Time for which lateral movement must have been visible before the model may react to a vehicle that starts
-    /// outside the gate, s (R157: 0.72 s; 0 disables the rule).
+    /// before its lane intrusion, s (R157: 0.72 s; 0 disables the rule).
     pub visible_lateral_movement_s: f64,
     /// Categories in which the model brakes from the first step, without a check.
     pub always_unsafe: Vec<Category>,
@@ -42,7 +48,11 @@ pub struct Reg157Profile {
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reg157<R> {
     always_unsafe: bool,
+    only_while_closing: bool,
+    /// Gate as a lateral gap, m, if there is no lane intrusion.
     lateral_gate: R,
+    /// m; 0: none.
+    lane_intrusion: R,
     /// 1/(2·deceleration), s²/m, precomputed so that a lane never divides.
     half_inverse_deceleration: R,
     /// reaction time + margin, s.
@@ -58,7 +68,9 @@ impl DriverProfile for Reg157Profile {
     fn resolve<R: Real>(&self, dt_s: f64, category: Category) -> Reg157<R> {
         Reg157 {
             always_unsafe: self.always_unsafe.contains(&category),
+            only_while_closing: self.ttc_only_while_closing,
             lateral_gate: R::from_f64(self.lateral_gate_m),
+            lane_intrusion: R::from_f64(self.lane_intrusion_m),
             half_inverse_deceleration: R::from_f64(1.0 / (2.0 * self.deceleration_mps2)),
             constant: R::from_f64(self.reaction_and_margin_s(dt_s)),
             deceleration: R::from_f64(self.deceleration_mps2),
@@ -75,6 +87,7 @@ impl DriverProfile for Reg157Profile {
             ("margin_steps", self.margin_steps, Bound::STEPS),
             ("visible_lateral_movement_s", self.visible_lateral_movement_s, Bound::DELAY),
             ("lateral_gate_m", self.lateral_gate_m, Bound::SIGNED_DISTANCE),
+            ("lane_intrusion_m", self.lane_intrusion_m, Bound::DISTANCE),
         ]
     }
 
@@ -94,11 +107,16 @@ impl DriverProfile for Reg157Profile {
     }
 
     fn attention(&self, dt_s: f64, category: Category) -> AttentionRule<f64> {
-        AttentionRule::after_visible_movement(self.visible_lateral_movement_s, self.lateral_gate_m, dt_s, category)
+        AttentionRule::after_visible_movement(self.visible_lateral_movement_s, self.lane_intrusion_m, dt_s, category)
     }
 }
 
 impl Reg157Profile {
+    /// Lateral gap at the lane intrusion, m; `marking_gap_m` is from the ego's side to the marking of its lane.
+    pub fn intrusion_gap_m(&self, marking_gap_m: f64) -> f64 {
+        if self.lane_intrusion_m > 0.0 { marking_gap_m - self.lane_intrusion_m } else { self.lateral_gate_m }
+    }
+
     /// Time that reaction and margins add to the braking time in the threshold, s.
     pub fn reaction_and_margin_s(&self, dt_s: f64) -> f64 {
         if self.margin_steps == 0.0 {
@@ -110,6 +128,12 @@ impl Reg157Profile {
 }
 
 impl<R: Real> Reg157<R> {
+    /// Lateral gap at the lane intrusion, m.
+    #[inline(always)]
+    pub fn intrusion_gap(&self, marking_gap: R) -> R {
+        if self.lane_intrusion > R::ZERO { marking_gap - self.lane_intrusion } else { self.lateral_gate }
+    }
+
     /// TTC threshold dv/(2·6) + 0.35 + margin, s, at closing speed `dv`.
     pub fn ttc_threshold(&self, dv: R) -> R {
         dv * self.half_inverse_deceleration + self.constant
@@ -128,8 +152,8 @@ impl<R: Real> DriverModel<R> for Reg157<R> {
     }
 
     #[inline(always)]
-    fn ignores(&self, lateral_gap: R, _lateral_towards: R) -> Flag {
-        !Flag::of(self.always_unsafe) & !lateral_gap.is_at_most(self.lateral_gate)
+    fn ignores(&self, lateral_gap: R, _lateral_towards: R, marking_gap: R) -> Flag {
+        !Flag::of(self.always_unsafe) & !lateral_gap.is_at_most(self.intrusion_gap(marking_gap))
     }
 
     #[inline(always)]
@@ -137,12 +161,13 @@ impl<R: Real> DriverModel<R> for Reg157<R> {
         DriverState { deceleration: R::ZERO, delay_steps: self.delay_steps }
     }
 
-    /// Unsafe iff h ≤ gate and |g/dv| ≤ dv/(2·6) + 0.35 + margin: absolute TTC on the left, signed dv on the right.
+    /// Unsafe iff h ≤ gate and |g/dv| ≤ dv/(2·6) + 0.35 + margin: absolute TTC on the left, signed dv on the right;
+    /// where a TTC exists only while the gap closes, dv > 0.
     #[inline(always)]
     fn check(&self, view: &View<R>) -> Hazard<R> {
         let dv = view.closing();
-        let near = view.lateral_gap.is_at_most(self.lateral_gate);
-        let moves = dv.is_negative() | dv.is_positive();
+        let near = view.lateral_gap.is_at_most(self.intrusion_gap(view.marking_gap));
+        let moves = dv.is_positive() | (dv.is_negative() & !Flag::of(self.only_while_closing));
         let soon = moves & view.gap.abs().is_at_most(dv.abs() * self.ttc_threshold(dv));
         let is_unsafe = !view.is_behind() & (Flag::of(self.always_unsafe) | (near & soon));
         Hazard { is_unsafe, demand: self.deceleration }
@@ -151,7 +176,9 @@ impl<R: Real> DriverModel<R> for Reg157<R> {
     fn shader_constants(&self) -> Vec<(&'static str, f64)> {
         vec![
             ("driver_always_unsafe", f64::from(u8::from(self.always_unsafe))),
+            ("driver_only_while_closing", f64::from(u8::from(self.only_while_closing))),
             ("driver_lateral_gate", self.lateral_gate.to_f64()),
+            ("driver_lane_intrusion", self.lane_intrusion.to_f64()),
             ("driver_half_inverse_deceleration", self.half_inverse_deceleration.to_f64()),
             ("driver_constant", self.constant.to_f64()),
             ("driver_deceleration", self.deceleration.to_f64()),

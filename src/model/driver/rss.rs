@@ -125,7 +125,7 @@ impl<R: Real> DriverModel<R> for Rss<R> {
     }
 
     #[inline(always)]
-    fn ignores(&self, lateral_gap: R, lateral_towards: R) -> Flag {
+    fn ignores(&self, lateral_gap: R, lateral_towards: R, _marking_gap: R) -> Flag {
         !lateral_gap.is_below(self.lateral_distance(lateral_towards))
     }
 

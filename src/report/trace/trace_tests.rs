@@ -16,7 +16,16 @@ fn vehicle(speed_mps: f64, lateral: Lateral) -> Participant {
 
 fn case(category: Category, ego_mps: f64, principal: Participant) -> Case {
     let ahead = (category == Category::CutOut).then(|| Ahead { vehicle: vehicle(24.0, Lateral::Centred), gap_m: 30.0 });
-    Case { category, ego_length_m: 4.5, ego_width_m: 1.9, ego_speed_mps: ego_mps, principal, ahead, horizon_s: 0.0 }
+    Case {
+        category,
+        ego_length_m: 4.5,
+        ego_width_m: 1.9,
+        lane_width_m: 3.5,
+        ego_speed_mps: ego_mps,
+        principal,
+        ahead,
+        horizon_s: 0.0,
+    }
 }
 
 fn trace(profile: &str, case: &Case, gap_m: f64, model: ModelId) -> Trace {

@@ -37,7 +37,9 @@ impl Subject {
             .with(MapQuantity::OtherSpeed, case.speed_mps)
             .with(start.0, start.1)
             .with(MapQuantity::Length, case.length_m)
-            .with(MapQuantity::Width, case.width_m);
+            .with(MapQuantity::Width, case.width_m)
+            .with(MapQuantity::EgoLength, case.ego_length_m)
+            .with(MapQuantity::EgoWidth, case.ego_width_m);
         if case.acceleration_mps2 != 0.0 {
             point = point.with(MapQuantity::Deceleration, -case.acceleration_mps2);
         }
@@ -47,7 +49,8 @@ impl Subject {
         if case.category != Category::Lvd {
             point = point
                 .with(MapQuantity::LateralSpeed, case.lateral_speed_mps)
-                .with(MapQuantity::LateralDistance, case.lateral_distance_m);
+                .with(MapQuantity::LateralDistance, case.lateral_distance_m)
+                .with(MapQuantity::LaneWidth, case.lane_width_m);
         }
         if case.category == Category::CutOut {
             point =

@@ -5,7 +5,7 @@ use super::axis::GridAxis;
 use super::parameter::{MapParameter, MapQuantity};
 use super::{CaseStyle, Grid, GridParts, MAX_PANELS, jrc_case};
 use crate::model::profile::Profile;
-use crate::scenario::{Category, LATERAL_DISTANCE_M};
+use crate::scenario::{Category, LANE_WIDTH_M};
 use crate::support::plausibility::Doubts;
 use crate::{Error, Place, Result};
 
@@ -162,7 +162,7 @@ impl Grid {
         }
         if category != Category::Lvd && !sets(MapQuantity::LateralDistance) {
             let distance_m = match (is_jrc, category) {
-                (false, _) => LATERAL_DISTANCE_M,
+                (false, _) => point.get(MapQuantity::LaneWidth).unwrap_or(LANE_WIDTH_M),
                 (true, Category::CutOut) => jrc_case::CUT_OUT_LATERAL_M,
                 (true, _) => jrc_case::CUT_IN_LATERAL_M,
             };

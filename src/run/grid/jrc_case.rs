@@ -5,7 +5,7 @@
 
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::scenario::{Ahead, Case, Category, Lateral, Participant, Speed};
+use crate::scenario::{Ahead, Case, Category, LANE_WIDTH_M, Lateral, Participant, Speed};
 
 /// Length of a vehicle, m.
 pub const LENGTH_M: f64 = 4.3;
@@ -31,6 +31,7 @@ pub fn cut_in(ego_mps: f64, cutter_mps: f64, lateral_mps: f64, run_up: u32, dt_s
         category: Category::CutIn,
         ego_length_m: LENGTH_M,
         ego_width_m: WIDTH_M,
+        lane_width_m: LANE_WIDTH_M,
         ego_speed_mps: ego_mps,
         principal: Participant {
             length_m: LENGTH_M,
@@ -79,6 +80,7 @@ pub fn lvd(initial_mps: f64, end_mps: f64, deceleration_mps2: f64) -> Case {
         category: Category::Lvd,
         ego_length_m: LENGTH_M,
         ego_width_m: WIDTH_M,
+        lane_width_m: LANE_WIDTH_M,
         ego_speed_mps: initial_mps,
         principal: Participant { length_m: LENGTH_M, width_m: WIDTH_M, speed, lateral: Lateral::Centred },
         ahead: None,
@@ -103,6 +105,7 @@ pub fn cut_out(speed_mps: f64, lateral_mps: f64, front: Front, dt_s: f64) -> Cas
         category: Category::CutOut,
         ego_length_m: LENGTH_M,
         ego_width_m: WIDTH_M,
+        lane_width_m: LANE_WIDTH_M,
         ego_speed_mps: speed_mps,
         principal: Participant {
             length_m: LENGTH_M,

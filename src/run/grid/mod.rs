@@ -24,7 +24,7 @@ pub use plan::{GridPart, GridPlan};
 pub use robustness::{Perturbation, SPEED_MPS, without_reaction};
 pub use run::{Against, Map, MapGrids, MapOptions, MapResult, MappedGrid};
 
-pub use crate::scenario::{LATERAL_DISTANCE_M, PlainCase};
+pub use crate::scenario::{LANE_WIDTH_M, PlainCase};
 
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;

@@ -1,7 +1,7 @@
 //! The parameters that a grid can vary: their names with units, their ranges, and the categories that have them.
 
 use crate::model::profile::Profile;
-use crate::scenario::{Category, LATERAL_DISTANCE_M, PlainCase, check_headway};
+use crate::scenario::{Category, LANE_WIDTH_M, PlainCase, check_headway};
 use crate::support::plain_text::nearest;
 use crate::support::plausibility::{self, Doubts};
 use crate::{Error, Place, Result};
@@ -29,15 +29,21 @@ pub enum MapQuantity {
     AheadSpeed,
     /// Gap between these two, bumper to bumper.
     AheadGap,
-    /// Length of every vehicle.
+    /// Length of the vehicles, without a length of its own also of the ego.
     Length,
-    /// Width of every vehicle.
+    /// Their width.
     Width,
+    /// Length of the ego.
+    EgoLength,
+    /// Width of the ego.
+    EgoWidth,
+    /// Width of the lanes.
+    LaneWidth,
 }
 
 impl MapQuantity {
     /// Number of quantities.
-    pub const COUNT: usize = 12;
+    pub const COUNT: usize = 15;
 }
 
 /// A parameter as named in flags, tables and files.
@@ -79,7 +85,7 @@ const fn parameter(
 }
 
 /// All, in the order of help texts.
-pub const PARAMETERS: [MapParameter; 16] = [
+pub const PARAMETERS: [MapParameter; 19] = [
     parameter("ego_speed_mps", "Speed of the ego", "m/s", MapQuantity::EgoSpeed, 1.0, (0.0, 150.0), EVERY),
     parameter("ego_speed_kmh", "Speed of the ego", "km/h", MapQuantity::EgoSpeed, KMH, (0.0, 540.0), EVERY),
     parameter(
@@ -158,8 +164,11 @@ pub const PARAMETERS: [MapParameter; 16] = [
         CUT_OUT,
     ),
     parameter("ahead_gap_m", "Gap to the vehicle ahead", "m", MapQuantity::AheadGap, 1.0, (0.0, 1e4), CUT_OUT),
-    parameter("length_m", "Length of every vehicle", "m", MapQuantity::Length, 1.0, (0.1, 50.0), EVERY),
-    parameter("width_m", "Width of every vehicle", "m", MapQuantity::Width, 1.0, (0.1, 10.0), EVERY),
+    parameter("length_m", "Length of the vehicles", "m", MapQuantity::Length, 1.0, (0.1, 50.0), EVERY),
+    parameter("width_m", "Width of the vehicles", "m", MapQuantity::Width, 1.0, (0.1, 10.0), EVERY),
+    parameter("ego_length_m", "Length of the ego", "m", MapQuantity::EgoLength, 1.0, (0.1, 50.0), EVERY),
+    parameter("ego_width_m", "Width of the ego", "m", MapQuantity::EgoWidth, 1.0, (0.1, 10.0), EVERY),
+    parameter("lane_width_m", "Width of the lanes", "m", MapQuantity::LaneWidth, 1.0, (1.0, 20.0), LANE_CHANGES),
 ];
 
 impl MapParameter {
@@ -205,8 +214,9 @@ impl MapParameter {
             MapQuantity::LateralSpeed => (Of::LateralSpeed, 1.0),
             MapQuantity::LateralDistance => (Of::LateralPosition, 1.0),
             MapQuantity::Deceleration => (Of::Acceleration, -1.0),
-            MapQuantity::Length => (Of::Length, 1.0),
-            MapQuantity::Width => (Of::Width, 1.0),
+            MapQuantity::Length | MapQuantity::EgoLength => (Of::Length, 1.0),
+            MapQuantity::Width | MapQuantity::EgoWidth => (Of::Width, 1.0),
+            MapQuantity::LaneWidth => (Of::LaneWidth, 1.0),
         }
     }
 
@@ -270,6 +280,9 @@ impl Point {
         let ego_speed_mps = value(MapQuantity::EgoSpeed, 0.0);
         let deceleration = value(MapQuantity::Deceleration, 0.0);
         check_headway(ego_speed_mps, self.get(MapQuantity::Thw))?;
+        let length_m = value(MapQuantity::Length, profile.frame.default_length_m);
+        let width_m = value(MapQuantity::Width, profile.frame.default_width_m);
+        let lane_width_m = value(MapQuantity::LaneWidth, LANE_WIDTH_M);
         Ok(PlainCase {
             category,
             ego_speed_mps,
@@ -278,11 +291,14 @@ impl Point {
             acceleration_mps2: if deceleration > 0.0 { -deceleration } else { 0.0 },
             end_speed_mps: self.get(MapQuantity::EndSpeed),
             lateral_speed_mps: value(MapQuantity::LateralSpeed, 0.0),
-            lateral_distance_m: value(MapQuantity::LateralDistance, LATERAL_DISTANCE_M),
+            lateral_distance_m: value(MapQuantity::LateralDistance, lane_width_m),
             ahead_speed_mps: value(MapQuantity::AheadSpeed, 0.0),
             ahead_gap_m: value(MapQuantity::AheadGap, 0.0),
-            length_m: value(MapQuantity::Length, profile.frame.default_length_m),
-            width_m: value(MapQuantity::Width, profile.frame.default_width_m),
+            length_m,
+            width_m,
+            ego_length_m: value(MapQuantity::EgoLength, length_m),
+            ego_width_m: value(MapQuantity::EgoWidth, width_m),
+            lane_width_m,
             duration_s: None,
         })
     }

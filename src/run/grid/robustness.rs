@@ -125,7 +125,9 @@ pub fn without_reaction(profile: &Profile) -> Profile {
     let mut without = profile.clone();
     without.reg157.always_unsafe.clear();
     // No lateral gap is below this.
-    without.reg157.lateral_gate_m = -100.0;
+    (without.reg157.lateral_gate_m, without.reg157.lane_intrusion_m) = (-100.0, 0.0);
+    // A lane that ends at the cap then still closes in.
+    without.frame.end_when_settled = true;
     // The delays of a driver that never reacts do not limit the time step.
     (without.reg157.reaction_time_s, without.reg157.visible_lateral_movement_s) = (0.0, 0.0);
     without.reg157.margin_s = 10.0;

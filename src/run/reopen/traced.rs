@@ -57,6 +57,7 @@ impl TracedCase {
             ego: size(case.ego_length_m, case.ego_width_m),
             target: size(case.principal.length_m, case.principal.width_m),
             lead: case.ahead.as_ref().map(|a| size(a.vehicle.length_m, a.vehicle.width_m)),
+            lane_width_m: case.lane_width_m,
         };
         let (category, mut tables) = (case.category, Tables::default());
         let case = LaneCase::encode(case, profile, &mut tables);

@@ -149,6 +149,9 @@ fn recipe(space: &ParameterSpace, sizes: &Sizes, profile: &Profile) -> Result<Re
     }
     let frame = &profile.frame;
     let half = |a: f64, b: f64| ((a + b) / 2.0) as f32;
+    // A kinematic lane change covers one lane, whatever the scenarios' lanes are.
+    let is_reduced = CasePath::of(id) == CasePath::Reduced;
+    let lane_width_m = if is_reduced { sizes.lane_width_m } else { space.options().lane_change_m };
     let unlimited = category != Category::Lvd && space.options().after_duration == AfterDuration::Unlimited;
     let [min_duration, longest_duration] = ParameterSpace::DURATION_RANGE_S;
     Ok(Recipe {
@@ -175,6 +178,7 @@ fn recipe(space: &ParameterSpace, sizes: &Sizes, profile: &Profile) -> Result<Re
         half_widths: [half(sizes.ego.width_m, sizes.target.width_m), half(sizes.ego.width_m, lead.width_m)],
         principal_length: sizes.target.length_m as f32,
         ego_width: sizes.ego.width_m as f32,
+        lane_width: lane_width_m as f32,
         attention: attention_rules(profile, category).map(|rule| rule.cast()),
     })
 }

@@ -185,6 +185,8 @@ impl Kinematic {
             let speed = speed(values.at(Variable::LeadSpeed), values.at(Variable::LeadAcceleration));
             (speed, values.at(Variable::LeadGap))
         });
+        // A kinematic lane change covers one lane, whatever the scenario's lanes are.
+        let sizes = Sizes { lane_width_m: options.lane_change_m, ..*sizes };
         sizes.case(category, ego_speed, (target, lateral), lead, change_s.max(duration_s))
     }
 }

@@ -3,7 +3,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::scenario::{Ahead, Case, Category, Lateral, Other, Participant, Scenario, Speed};
+use crate::scenario::{Ahead, Case, Category, LANE_WIDTH_M, Lateral, Other, Participant, Scenario, Speed};
 use crate::{Error, Place, Result};
 
 /// Length and width of one vehicle, m, > 0.
@@ -16,7 +16,7 @@ pub struct VehicleSize {
     pub width_m: f64,
 }
 
-/// Sizes of all vehicles of a case.
+/// Sizes of all vehicles of a case, and of the lanes.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Sizes {
@@ -26,6 +26,13 @@ pub struct Sizes {
     pub target: VehicleSize,
     /// Cut-out: the vehicle ahead of the cutting-out one.
     pub lead: Option<VehicleSize>,
+    /// Width of the lanes, m.
+    #[serde(default = "default_lane_width_m")]
+    pub lane_width_m: f64,
+}
+
+fn default_lane_width_m() -> f64 {
+    LANE_WIDTH_M
 }
 
 impl Sizes {
@@ -36,6 +43,7 @@ impl Sizes {
             ego: size(scenario.ego.length, scenario.ego.width),
             target: size(scenario.target.length, scenario.target.width),
             lead: scenario.lead.as_ref().map(|lead| size(lead.length, lead.width)),
+            lane_width_m: scenario.lane_width,
         }
     }
 
@@ -53,6 +61,7 @@ impl Sizes {
             ego: mean(all.iter().map(|s| s.ego).collect())?,
             target: mean(all.iter().map(|s| s.target).collect())?,
             lead: mean(all.iter().filter_map(|s| s.lead).collect()),
+            lane_width_m: all.iter().map(|s| s.lane_width_m).sum::<f64>() / all.len() as f64,
         })
     }
 
@@ -89,6 +98,7 @@ impl Sizes {
             category,
             ego_length_m: self.ego.length_m,
             ego_width_m: self.ego.width_m,
+            lane_width_m: self.lane_width_m,
             ego_speed_mps,
             principal: participant(self.target, speed, lateral),
             ahead: lead.map(ahead).transpose()?,
