@@ -123,8 +123,8 @@ impl Check {
         Ok(match judgements[0].verdict() {
             // If input was skipped the answer is incomplete.
             _ if request.incomplete => Exit::Incomplete,
-            Verdict::Undecided => Exit::Undecided,
-            Verdict::OutsideAnnex => Exit::OutsideAnnex,
+            Verdict::Undecided | Verdict::Answer(Answer::Open) => Exit::Undecided,
+            Verdict::OutsideAnnex | Verdict::NotJudged => Exit::OutsideAnnex,
             Verdict::Answer(Answer::Preventable) => Exit::Ok,
             Verdict::Answer(Answer::NotPreventable) => Exit::NotPreventable,
             Verdict::Answer(Answer::NoConflict) => Exit::NoConflict,

@@ -6,7 +6,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::motion::{Lateral, Speed};
+use super::motion::{Lateral, Motion, Speed, Tables};
+use super::profile::{CutOutTarget, Profile};
 use crate::support::readable::value;
 use crate::{Error, Place, Result};
 
@@ -84,6 +85,28 @@ pub struct Case {
     /// Duration of the scenario or time of its last parameter event, whichever is later, s. The run lasts at least this
     /// long.
     pub horizon_s: f64,
+}
+
+impl Case {
+    /// Time from which the vehicle that cuts out drives through the one ahead of it, s. `None` without a vehicle ahead,
+    /// and for a profile that stops a vehicle that hits the one ahead.
+    pub fn drives_through_s(&self, profile: &Profile) -> Option<f64> {
+        let ahead = self.ahead.as_ref().filter(|_| profile.frame.cut_out_target != CutOutTarget::Exposed)?;
+        let (dt_s, mut tables) = (profile.frame.dt_s, Tables::default());
+        let mut motion = |of: &Participant| Motion::encode(&of.speed, &of.lateral, dt_s, &mut tables);
+        let (cutter, front) = (motion(&self.principal), motion(&ahead.vehicle));
+        let half_lengths_m = (self.principal.length_m + ahead.vehicle.length_m) / 2.0;
+        let half_widths_m = (self.principal.width_m + ahead.vehicle.width_m) / 2.0;
+        let mut apart_m = ahead.gap_m + half_lengths_m;
+        (0..profile.step_cap()).find_map(|step| {
+            if step > 0 {
+                apart_m += (front.speed(&tables, step) - cutter.speed(&tables, step)) * dt_s;
+            }
+            let beside_m = cutter.lateral(&tables, step).position - front.lateral(&tables, step).position;
+            let overlaps = apart_m.abs() < half_lengths_m && beside_m.abs() < half_widths_m;
+            overlaps.then_some(f64::from(step) * dt_s)
+        })
+    }
 }
 
 /// The vehicle ahead of the cutting-out one.

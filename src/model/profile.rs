@@ -80,6 +80,9 @@ macro_rules! declare_profile {
             pub name: String,
             /// Description in one sentence.
             pub description: String,
+            /// The drivers that determine what is preventable: a collision that one of them avoids. Empty: the profile
+            /// does not say.
+            pub reference_drivers: Vec<ModelId>,
             /// Time and geometry.
             pub frame: FrameProfile,
             /// Criteria.

@@ -2,12 +2,9 @@
 
 use super::case_sheet::{CaseSheet, KMH};
 use crate::model::driver::ModelId;
-use crate::run::check::{Answer, Judgement, REFERENCE_DRIVERS, Verdict};
-use crate::run::grid::{MapQuantity, PARAMETERS};
+use crate::run::check::{Answer, Demand, Holds, Judged, Judgement, Verdict};
+use crate::run::grid::{MapQuantity, PARAMETERS, VARIED};
 use crate::support::readable::value;
-
-/// Perturbations that a robust verdict survives.
-pub(super) const VARIED: &str = "a tenth of the time step, 1 cm of gap, 0.1 km/h of a speed";
 
 impl CaseSheet<'_> {
     /// The case in one line, with the deciding reading: speeds along the road in km/h, other values in SI units.
@@ -38,44 +35,102 @@ impl CaseSheet<'_> {
         format!("{reading}: {}", parts.collect::<Vec<_>>().join(", "))
     }
 
-    /// The answer in one sentence; "robust" is used only if it holds for every verdict named.
+    /// The answer in one sentence; "robust" is used only if it holds for every verdict named, and says what varied.
     pub fn answer(&self) -> String {
         let first = self.first();
         let names = |list: &[ModelId]| list.iter().map(|m| m.name()).collect::<Vec<_>>().join(" and ");
-        let answer = first.verdicts.answer();
-        let avoided_by = first.verdicts.avoided_by();
-        let collide: Vec<ModelId> = REFERENCE_DRIVERS.into_iter().filter(|m| !avoided_by.contains(m)).collect();
+        let (answer, references) = (first.verdicts.answer(), &first.verdicts.reference_drivers);
+        let (avoided_by, collide) = (first.verdicts.avoided_by(), first.verdicts.collided_by());
+        let s = |list: &[ModelId]| if list.len() > 1 { "" } else { "s" };
         let drivers = match (answer, &avoided_by[..], &collide[..]) {
+            (Answer::Open, ..) => format!(
+                "no contact within the {} s of a run, at whose end the gap still closes",
+                value(first.time_cap_s)
+            ),
             (Answer::NoConflict, _, []) => "nothing collides even if the ego never reacts".to_owned(),
             (Answer::NoConflict, _, all) => format!(
-                "an ego that never reacts does not collide; {} {} and collide{}",
+                "an ego that never reacts does not collide; {} react{} and collide{}",
                 names(all),
-                if all.len() > 1 { "react" } else { "reacts" },
-                if all.len() > 1 { "" } else { "s" }
+                s(all),
+                s(all)
             ),
             (_, [], all) => format!("{} collide", names(all)),
-            (_, all, []) => format!("{} avoid the collision", names(all)),
-            (_, one, other) => format!("{} avoids the collision, {} collides", names(one), names(other)),
+            (_, all, []) => format!("{} avoid{} the collision", names(all), s(all)),
+            (_, one, other) => {
+                format!("{} avoid{} the collision, {} collide{}", names(one), s(one), names(other), s(other))
+            }
         };
+        let verdict = first.verdict();
+        match verdict {
+            Verdict::OutsideAnnex => {
+                let reason = first.outside_annex.as_deref().unwrap_or_default();
+                return format!("{}: {reason}. Its drivers give no answer here ({drivers})", verdict.label());
+            }
+            Verdict::NotJudged => {
+                return format!(
+                    "{}: profile {} has no reference drivers, so it does not say what is preventable",
+                    verdict.label(),
+                    first.profile
+                );
+            }
+            _ => {}
+        }
         let changes = |flips: &[&str]| flips.join(", ");
-        let is_named = |_: &ModelId| answer != Answer::NoConflict || !collide.is_empty();
-        let of_drivers = REFERENCE_DRIVERS.into_iter().filter(is_named).filter_map(|model| {
-            let flips = first.flips_of(model);
+        let is_named = |_: &&ModelId| answer != Answer::NoConflict || !collide.is_empty();
+        let of_drivers = references.iter().filter(is_named).filter_map(|model| {
+            let flips = first.flips_of(*model);
             (!flips.is_empty()).then(|| format!("the verdict of {} changes with {}", model.name(), changes(flips)))
         });
         let mut of_drivers: Vec<String> = of_drivers.collect();
         if !first.annex_flips.is_empty() {
             of_drivers.push(format!("the case leaves Annex 3 with {}", changes(&first.annex_flips)));
         }
-        if let (Verdict::OutsideAnnex, Some(reason)) = (first.verdict(), &first.outside_annex) {
-            return format!("{}: {reason}. Its drivers give no answer here ({drivers})", first.verdict().label());
+        let touching: Vec<ModelId> = avoided_by
+            .iter()
+            .copied()
+            .filter(|model| answer == Answer::Preventable && first.touching.contains(model))
+            .collect();
+        if !touching.is_empty() {
+            of_drivers.push(format!(
+                "{} stop{} so close that the time step does not tell it from a contact",
+                names(&touching),
+                s(&touching)
+            ));
         }
         let robustness = match (&first.flips[..], &of_drivers[..]) {
-            ([], []) => format!("robust: {VARIED} change none of it"),
+            _ if answer == Answer::Open => "longer runs are not computed".to_owned(),
+            ([], of_drivers) if first.rests_on_touching() => {
+                format!("the answer rests on it: {}", of_drivers.join("; "))
+            }
+            ([], []) => "robust: no change listed below alters it".to_owned(),
             ([], of_drivers) => format!("the answer is robust; {}", of_drivers.join("; ")),
             (flips, _) => format!("the answer changes with {}", changes(flips)),
         };
-        format!("{}: {drivers} ({robustness})", first.verdict().label())
+        format!("{}: {drivers} ({robustness})", verdict.label())
+    }
+
+    /// What limits the answer: the changes that *robust* refers to, a Brake Threat Number above 1 of a driver that avoids, and vehicles that drive
+    /// through one another.
+    pub fn cautions(&self) -> Vec<String> {
+        let first = self.first();
+        let above = |judged: &&Judged| !judged.collides() && judged.trace.outcome.max_btn > 1.0;
+        let above: Vec<&str> = first.models.iter().filter(above).map(|judged| judged.trace.model.name()).collect();
+        let mut all =
+            vec![format!("Robust refers to these changes, each alone, as far as the case has the input: {VARIED}")];
+        if !above.is_empty() {
+            all.push(format!(
+                "A BTN above 1 does not contradict an avoided collision ({}): it asks whether braking that begins at that \
+                 instant still suffices, while the driver brakes already",
+                above.join(", ")
+            ));
+        }
+        if let Some(time_s) = first.drives_through_s {
+            all.push(format!(
+                "No such traffic: the vehicle that cuts out drives through the one ahead of it from {} s on",
+                value(time_s)
+            ));
+        }
+        all
     }
 
     /// Readings for which the regulation is silent and another choice changes the answer.
@@ -103,26 +158,26 @@ impl CaseSheet<'_> {
 
     fn demand_of_first(&self) -> Vec<String> {
         let first = self.first();
-        let (Some(is_demanded), Some(demand)) = (first.is_demanded(), demand_of(first)) else { return Vec::new() };
-        let (mut sentences, clause) = (vec![demand], &first.clause);
+        let (Some(demand), Some(sentence)) = (first.demand(), demand_of(first)) else { return Vec::new() };
+        let (mut sentences, clause) = (vec![sentence], &first.clause);
         // A verdict decided by rounding is not a disagreement.
-        if !first.demand_flips.is_empty() || first.verdict() == Verdict::Undecided {
+        if !first.demand_flips.is_empty() || matches!(first.verdict(), Verdict::Undecided | Verdict::NotJudged) {
             return sentences;
         }
         let model_collides = first.verdicts.collides(ModelId::Reg157);
         let model =
             format!("Reg157, the model of the clause, {}", if model_collides { "collides" } else { "avoids it" });
-        match (is_demanded, first.verdicts.answer()) {
-            (true, Answer::NotPreventable) => sentences.push(format!(
+        match (demand, first.verdicts.answer()) {
+            (Demand::Avoid, Answer::NotPreventable) => sentences.push(format!(
                 "Clause and drivers disagree: {clause} demands what CCHDM and FSM do not achieve; {model}"
             )),
-            (true, Answer::Preventable) if model_collides => {
+            (Demand::Avoid, Answer::Preventable) if model_collides => {
                 sentences.push(format!("Clause and model disagree: {clause} demands an avoidance, and {model}"));
             }
-            (true, Answer::NoConflict) => {
+            (Demand::Avoid, Answer::NoConflict) => {
                 sentences.push(format!("The conditions of {clause} hold, but there is no collision to avoid"));
             }
-            (false, Answer::Preventable) => sentences.push(format!(
+            (Demand::Nothing, Answer::Preventable) => sentences.push(format!(
                 "{clause} makes no demand here; that does not mean unavoidable: a driver of Annex 3 avoids the collision"
             )),
             _ => {}
@@ -134,20 +189,26 @@ impl CaseSheet<'_> {
 /// What the clause of a profile demands; `None` if it does not cover this kind of scenario.
 fn demand_of(judgement: &Judgement) -> Option<String> {
     let clause = &judgement.clause;
-    let unmet = judgement.unmet().map(|reading| {
-        let is = reading.value.map_or("does not happen".to_owned(), |v| format!("is {} {}", value(v), reading.unit));
-        let (sign, threshold) = (reading.relation.sign(), value(reading.threshold));
-        format!("{} {is}, and has to be {sign} {threshold} {}", reading.quantity, reading.unit)
-    });
-    let unmet: Vec<String> = unmet.collect();
-    Some(match (judgement.is_demanded()?, &judgement.demand_flips[..]) {
-        (true, []) => format!("{clause}: the system has to avoid the collision (robust)"),
-        (false, []) => format!("{clause}: no demand: {}", unmet.join("; ")),
+    let quantities = |holds: Holds| {
+        let of_kind = judgement.conditions().filter(move |reading| reading.holds() == holds);
+        of_kind.map(|reading| {
+            let is =
+                reading.value.map_or("does not happen".to_owned(), |v| format!("is {} {}", value(v), reading.unit));
+            let (sign, threshold) = (reading.relation.sign(), value(reading.threshold));
+            format!("{} {is}, and has to be {sign} {threshold} {}", reading.quantity, reading.unit)
+        })
+    };
+    let listed = |holds| quantities(holds).collect::<Vec<_>>().join("; ");
+    Some(match (judgement.demand()?, &judgement.demand_flips[..]) {
+        (Demand::Avoid, []) => format!("{clause}: the system has to avoid the collision (robust)"),
+        (Demand::Nothing, []) => format!("{clause}: no demand: {}", listed(Holds::No)),
+        (Demand::Unknown, []) => format!(
+            "{clause}: unknown whether the system has to avoid the collision, because the case begins after the movement \
+             or the lane intrusion began. Of what the case shows: {}",
+            listed(Holds::Unknown)
+        ),
         (_, flips) => {
-            format!(
-                "{clause}: undecided: whether the system has to avoid the collision changes with {}",
-                flips.join(", ")
-            )
+            format!("{clause}: undecided: what the clause demands changes with {}", flips.join(", "))
         }
     })
 }

@@ -3,15 +3,14 @@
 
 use serde_json::{Value, json};
 
-use super::case_sentences::VARIED;
 use super::html::{Page, PageFigure, Section};
 use super::records::{self, PROGRAM};
 use super::tables::{WIDTH, wrap};
 use super::trace::{TraceFigure, TracePanels, TraceSeries};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::check::{Boundary, Change, Judged, Judgement, Reading, Subject, Verdict};
-use crate::run::grid::{MapQuantity, PARAMETERS};
+use crate::run::check::{Boundary, Change, Demand, Judged, Judgement, Reading, Subject, Verdict};
+use crate::run::grid::{MapQuantity, PARAMETERS, VARIED};
 use crate::support::readable::value;
 use crate::support::table::{Column, NumberText, Table};
 use crate::{Error, Result};
@@ -59,6 +58,11 @@ impl CaseSheet<'_> {
             MapQuantity::EndSpeed,
             MapQuantity::AheadSpeed,
             MapQuantity::AheadGap,
+            MapQuantity::EgoLength,
+            MapQuantity::EgoWidth,
+            MapQuantity::Length,
+            MapQuantity::Width,
+            MapQuantity::LaneWidth,
         ];
         for quantity in shown {
             let Some(parameter) = PARAMETERS.iter().find(|p| p.quantity == quantity) else { continue };
@@ -92,7 +96,7 @@ impl CaseSheet<'_> {
         let table = Table::of(judged)
             .column("profile", |(judgement, _)| judgement.profile.as_str())
             .column("model", |(_, judged)| judged.trace.model.name())
-            .column("collision", |(_, judged)| if judged.collides() { "COLLIDES" } else { "avoids" })
+            .column("collision", |(_, judged)| verdict_of(judged))
             .column("gap m", |(_, judged)| judged.trace.outcome.min_gap)
             .column("TTC s", |(_, judged)| judged.trace.outcome.min_ttc)
             .column("BTN", |(_, judged)| judged.trace.outcome.max_btn)
@@ -129,7 +133,7 @@ impl CaseSheet<'_> {
             .column("", |reading| reading.relation.sign())
             .column("threshold", |reading| reading.threshold)
             .column("unit", |reading| if reading.unit == "1" { "" } else { reading.unit })
-            .column("holds", |reading| if reading.holds() { "yes" } else { "no" })
+            .column("holds", |reading| reading.holds().label())
             .build();
         without_repeats(table, own)
     }
@@ -157,7 +161,7 @@ impl CaseSheet<'_> {
         let synthetic = if self.is_synthetic { "SYNTHETIC DATA: " } else { "" };
         let numbers: Vec<String> =
             self.numbers().iter().map(|(name, number)| format!("  {name}: {number}\n")).collect();
-        let sentences = self.demand().into_iter().chain(self.silent());
+        let sentences = self.demand().into_iter().chain(self.silent()).chain(self.cautions());
         let demand: Vec<String> = sentences.map(|sentence| format!("  {sentence}\n")).collect();
         format!(
             "{synthetic}{}\n{}\n{}{}\n{}\n{}\nClauses under {}\n{}\nWhere the \
@@ -187,13 +191,14 @@ impl CaseSheet<'_> {
                 outcome["model"] = json!(judged.trace.model.name());
                 outcome["t_brake_s"] = json!(judged.braking_s());
                 outcome["changes_with"] = json!(judged.flips);
+                outcome["is_contact_like"] = json!(judged.touches);
                 outcome
             });
             let readings = judgement.readings.iter().map(|reading| {
                 json!({
                     "clause": reading.clause, "condition": reading.quantity, "unit": reading.unit,
                     "value": reading.value, "relation": reading.relation.sign(), "threshold": reading.threshold,
-                    "t_s": reading.time_s, "holds": reading.holds(), "then": reading.then,
+                    "t_s": reading.time_s, "holds": reading.holds().label(), "then": reading.then,
                 })
             });
             let boundaries = judgement.boundaries.iter().map(|boundary| {
@@ -213,11 +218,17 @@ impl CaseSheet<'_> {
                 "verdict": judgement.verdict().label(),
                 "answer": judgement.verdicts.answer().label(),
                 "clause": judgement.clause,
-                "demanded": judgement.is_demanded(),
+                "demanded": judgement.demand().map(|demand| match demand {
+                    Demand::Avoid => "avoid",
+                    Demand::Nothing => "nothing",
+                    Demand::Unknown => "unknown",
+                }),
                 "demand_changes_with": judgement.demand_flips,
                 "outside_annex_3": judgement.outside_annex,
                 "silent": judgement.silent,
                 "avoided_by": judgement.verdicts.avoided_by().iter().map(|m| m.name()).collect::<Vec<_>>(),
+                "contact_like": judgement.touching.iter().map(|m| m.name()).collect::<Vec<_>>(),
+                "drives_through_s": judgement.drives_through_s,
                 "changes_with": judgement.flips,
                 "models": models.collect::<Vec<_>>(),
                 "clauses": readings.collect::<Vec<_>>(),
@@ -241,6 +252,7 @@ impl CaseSheet<'_> {
             "answer": self.answer(),
             "demand": self.demand(),
             "silent": self.silent(),
+            "cautions": self.cautions(),
             "profiles": self.judgements.iter().zip(self.profiles).map(judgement).collect::<Vec<_>>(),
         }))
     }
@@ -270,17 +282,19 @@ impl CaseSheet<'_> {
         let first = self.first();
         let mut warnings = Vec::new();
         if first.verdict() == Verdict::Undecided {
-            warnings.push(format!("Undecided: the answer changes with {}.", first.flips.join(", ")));
+            warnings.push(format!("{}.", self.answer()));
         }
         let case = Section { facts: self.numbers(), ..Section::new("case", "Case") };
         let drivers = Section {
             intro: format!(
-                "A collision is preventable where one of the two drivers of Annex 3, CCHDM or FSM, avoids it. Where nothing \
+                "A collision is preventable where one of the reference drivers ({}) avoids it. Where nothing \
                  collides even if the ego never reacts, there is no conflict. Gap and TTC are the smallest, BTN is the \
                  largest. In a rear-end contact the ego's front hits the other vehicle; in a side contact the other vehicle \
                  hits the ego from the side or behind. \"Closing\" is the ego's speed minus the other's at the contact: \
                  negative where the ego is slower. \"Brakes\" is the time from which the ego brakes; CCHDM's coasting \
-                 before it is no braking. \"Changes with\" names what turns the collision verdict, of {VARIED}."
+                 before it is no braking. \"Touches\": the driver avoids by a gap that the time step does not tell from a \
+                 contact. \"Changes with\" names what turns the collision verdict, of {VARIED}.",
+                first.verdicts.reference_drivers.iter().map(|model| model.name()).collect::<Vec<_>>().join(" or "),
             ),
             tables: vec![self.drivers().captioned("Drivers")],
             ..Section::new("drivers", "Drivers")
@@ -320,6 +334,7 @@ impl CaseSheet<'_> {
             facts: vec![
                 ("command".to_owned(), self.command.clone()),
                 ("program".to_owned(), PROGRAM.to_owned()),
+                ("profile".to_owned(), format!("{}: {}", first.profile, self.profiles[0].description)),
                 ("data".to_owned(), self.origin.clone()),
                 ("arithmetic".to_owned(), format!("binary64, time step {} s", self.profiles[0].frame.dt_s)),
             ],
@@ -327,11 +342,12 @@ impl CaseSheet<'_> {
             ..Section::new("reproduction", "Reproduction")
         };
         let page = Page {
-            title: format!("One {} against UN R157", self.subject.category().label()),
+            title: format!("One {} under {}", self.subject.category().label(), first.profile),
             lead: std::iter::once(self.case())
                 .chain([self.answer()])
                 .chain(self.demand())
                 .chain(self.silent())
+                .chain(self.cautions())
                 .map(|sentence| format!("{sentence}."))
                 .collect::<Vec<_>>()
                 .join(" "),
@@ -340,6 +356,15 @@ impl CaseSheet<'_> {
             sections: vec![course, case, drivers, clauses, boundaries, reproduction],
         };
         page.html()
+    }
+}
+
+/// The collision verdict of a driver in a word.
+fn verdict_of(judged: &Judged) -> &'static str {
+    match (judged.collides(), judged.touches) {
+        (true, _) => "COLLIDES",
+        (false, true) => "touches",
+        (false, false) => "avoids",
     }
 }
 

@@ -10,8 +10,7 @@ use crate::engine::DeviceRecord;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::check::REFERENCE_DRIVERS;
-use crate::run::grid::{Against, Agreement, CaseStyle, CellOutcome, Grid, GridPlan, MappedGrid, Perturbation};
+use crate::run::grid::{Against, Agreement, CaseStyle, CellOutcome, Grid, GridPlan, MappedGrid};
 use crate::support::run_dir::Results;
 
 /// A complete run.
@@ -63,8 +62,9 @@ impl MapReport {
         let of = |mapped: &MappedGrid| {
             mapped.plan.lane_count() + mapped.other.as_ref().map_or(0, |(_, plan, _)| plan.lane_count())
         };
-        let times =
-            |mapped: &MappedGrid| if mapped.map.has_undecided() { 1 + Perturbation::ALL.len() as u64 } else { 1 };
+        let times = |mapped: &MappedGrid| {
+            1 + if mapped.map.has_undecided() { mapped.plan.grid.perturbations().len() as u64 } else { 0 }
+        };
         self.grids.iter().map(|mapped| of(mapped) * times(mapped)).sum()
     }
 
@@ -122,10 +122,12 @@ impl MapReport {
         let is_shown = |outcome: &CellOutcome| match outcome {
             CellOutcome::Pass | CellOutcome::Fail => true,
             CellOutcome::NoConflict => self.criterion == Criterion::Collision,
-            CellOutcome::Undecided => self.is_robust(),
-            CellOutcome::FailByReaction => self.grids.iter().any(|MappedGrid { map, .. }| {
-                (0..map.models.len()).any(|at| map.outcomes(at, self.criterion)[*outcome as usize] > 0)
-            }),
+            CellOutcome::Undecided if self.is_robust() => true,
+            CellOutcome::Undecided | CellOutcome::FailByReaction => {
+                self.grids.iter().any(|MappedGrid { map, .. }| {
+                    (0..map.models.len()).any(|at| map.outcomes(at, self.criterion)[*outcome as usize] > 0)
+                })
+            }
         };
         CellOutcome::ALL.into_iter().filter(is_shown).collect()
     }
@@ -134,18 +136,19 @@ impl MapReport {
     pub(super) fn shown_agreements(&self) -> Vec<Agreement> {
         let is_shown = |kind: &Agreement| match kind {
             Agreement::NoConflict => self.criterion == Criterion::Collision,
-            Agreement::Undecided => self.is_robust(),
+            Agreement::Undecided => self.shown_outcomes().contains(&CellOutcome::Undecided),
             _ => true,
         };
         Agreement::ALL.into_iter().filter(is_shown).collect()
     }
 
-    /// Cells in which both drivers of Annex 3 and an ego that never reacts collide. `None` unless both drivers were
-    /// swept and collisions are mapped.
+    /// Cells in which all reference drivers and an ego that never reacts collide. `None` unless these drivers were swept
+    /// and collisions are mapped.
     fn not_preventable(&self, mapped: &MappedGrid) -> Option<Vec<bool>> {
         let MappedGrid { map, .. } = mapped;
-        let at = REFERENCE_DRIVERS.map(|driver| map.models.iter().position(|model| *model == driver));
-        let at: Vec<usize> = at.into_iter().collect::<Option<_>>()?;
+        let references = &self.profile.reference_drivers;
+        let at = references.iter().map(|driver| map.models.iter().position(|model| model == driver));
+        let at: Vec<usize> = at.collect::<Option<Vec<_>>>().filter(|at| !at.is_empty())?;
         let fails =
             |model, cell| map.verdicts(model, cell).failed(Criterion::Collision) && map.is_conflict(model, cell);
         let all_fail = |cell| at.iter().all(|model| fails(*model, cell));

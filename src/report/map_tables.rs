@@ -4,7 +4,9 @@ use std::io::{self, Write};
 
 use super::map::{Difference, MapReport};
 use crate::model::criterion::Criterion;
-use crate::run::grid::{CellOutcome, Grid, MapParameter, MappedGrid, count};
+use crate::model::driver::ModelId;
+use crate::run::grid::{CellOutcome, Grid, MapParameter, MapQuantity, MappedGrid, VARIED, count};
+use crate::scenario::Category;
 use crate::support::readable;
 use crate::support::table::{Column, Digits, NumberText, Table, csv_field};
 
@@ -67,6 +69,16 @@ impl MapReport {
 
     /// What the columns count.
     fn words_of_outcomes(&self, outcomes: &[CellOutcome]) -> String {
+        let undecided = format!(
+            "Undecided: {}the lanes end at the time cap of {} s while the gap still closes; the share counts these cells as \
+             computed.\n",
+            if self.is_robust() {
+                format!("the outcome changes with one of these (the step in binary64): {VARIED}; or ")
+            } else {
+                String::new()
+            },
+            self.profile.frame.time_cap_s,
+        );
         let sentence = |outcome: &CellOutcome| match outcome {
             CellOutcome::NoConflict => {
                 "No conflict: no collision, neither with this driver nor if the ego never reacts.\n"
@@ -74,10 +86,7 @@ impl MapReport {
             CellOutcome::FailByReaction => {
                 "Fail by reaction: the driver reacts and collides; without a reaction nothing collides.\n"
             }
-            CellOutcome::Undecided => {
-                "Undecided: the outcome changes with a tenth of the time step (binary64), 1 cm of gap, or 0.1 km/h of a speed; the share \
-                 counts these cells as computed.\n"
-            }
+            CellOutcome::Undecided => &undecided,
             CellOutcome::Pass | CellOutcome::Fail => "",
         };
         let of_all = match self.criterion {
@@ -86,16 +95,44 @@ impl MapReport {
             }
             Criterion::Ttc | Criterion::Btn => "",
         };
-        outcomes.iter().map(sentence).chain([of_all]).collect()
+        let cautions = self.cautions();
+        outcomes.iter().map(sentence).chain([of_all]).chain(cautions.iter().map(String::as_str)).collect()
+    }
+
+    /// Sentences on cells whose case is not what a reader would take it for.
+    pub(super) fn cautions(&self) -> Vec<String> {
+        let mut all = Vec::new();
+        for MappedGrid { plan, map, drives_through, .. } in &self.grids {
+            let count = drives_through.iter().filter(|drives| **drives).count();
+            if count > 0 {
+                all.push(format!(
+                    "No such traffic in {count} of {} cells of {}: the vehicle that cuts out drives through the one ahead of it.\n",
+                    map.cell_count(),
+                    plan.grid.name()
+                ));
+            }
+            let brakes = (0..plan.grid.cell_count())
+                .any(|cell| plan.grid.point(cell).get(MapQuantity::Deceleration).is_some_and(|a| a != 0.0));
+            let is_clause = plan.grid.category() == Category::CutIn && !self.profile.reg157.clause.is_empty();
+            if brakes && is_clause && map.models.contains(&ModelId::Reg157) {
+                all.push(format!(
+                    "Reg157 in {}: a vehicle that brakes while it cuts in does not keep its speed, so {} demands nothing of these \
+                     cells, whatever the model does.\n",
+                    plan.grid.name(),
+                    self.profile.reg157.clause
+                ));
+            }
+        }
+        all
     }
 
     /// One row per cell and model.
     pub(super) fn write_cells(&self, out: &mut dyn Write) -> io::Result<()> {
         let mut out = io::BufWriter::new(out);
         let is_robust = self.is_robust();
-        let columns = "initial_gap_m,model,collision,ttc,btn,capped,failed,conflict,outcome";
+        let columns = "initial_gap_m,model,collision,ttc,btn,capped,failed,conflict,outcome,drives_through";
         write_header(&mut out, &self.grids, &format!("{columns}{}", if is_robust { ",undecided" } else { "" }))?;
-        for MappedGrid { plan, map, .. } in &self.grids {
+        for MappedGrid { plan, map, drives_through, .. } in &self.grids {
             let profile = &plan.parts[0].plan.profile;
             for cell in 0..map.cell_count() {
                 let place = place_of(&plan.grid, cell);
@@ -107,7 +144,7 @@ impl MapReport {
                     let conflict = u8::from(map.is_conflict(at, cell));
                     let outcome = map.outcome(at, cell, self.criterion).label();
                     write!(out, "{place},{gap_m},{},{collision},{ttc},{btn},{capped},{failed}", model.name())?;
-                    write!(out, ",{conflict},{outcome}")?;
+                    write!(out, ",{conflict},{outcome},{}", u8::from(drives_through[cell]))?;
                     if is_robust {
                         write!(out, ",{}", u8::from(map.is_undecided(at, cell, self.criterion)))?;
                     }

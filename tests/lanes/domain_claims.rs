@@ -1,6 +1,6 @@
 //! What must be true of the physics, whatever the numbers.
 
-use lanesweep::engine::{Constants, EndReason, LaneCase, NO_STEP, Outcome, Silent, Start};
+use lanesweep::engine::{Constants, EndReason, LaneCase, NO_STEP, Outcome, Silent, Start, Step};
 use lanesweep::model::criterion::{BrakeThreat, BtnForm, Contact, Criterion};
 use lanesweep::model::driver::{BelowTrigger, ModelId};
 use lanesweep::model::profile::Profile;
@@ -104,6 +104,115 @@ fn a_mirrored_cut_in_gives_the_same_outcome_to_the_last_bit() {
             }
         }
     }
+}
+
+/// States of the ego, step by step.
+fn course(profile: &Profile, case: &Case, model: ModelId, thw_s: f64) -> Vec<[u64; 2]> {
+    let mut tables = Tables::default();
+    let lane = LaneCase::encode(case, profile, &mut tables);
+    let constants = Constants::<f64>::resolve(profile, case.category);
+    let mut states = Vec::new();
+    let mut see = |step: &Step<f64>| {
+        let first = step.seen[0];
+        let gap_m = if first.present.holds() { first.view.gap } else { 0.0 };
+        states.push([step.v_ego.to_bits(), gap_m.to_bits()]);
+    };
+    constants.run(model, &lane, &tables, Start::Headway(thw_s), &mut see);
+    states
+}
+
+/// No driver knows the future: others that move alike up to a step are answered alike up to it, whatever follows.
+#[test]
+fn what_happens_after_a_step_decides_nothing_before_it() {
+    let mut compared = 0;
+    for name in Profile::names() {
+        let profile = Profile::load(name).unwrap();
+        let dt_s = profile.frame.dt_s;
+        let steps = |time_s: f64| (time_s / dt_s).round() as usize;
+        let count = steps(6.0);
+        let speed = |v0: f64, first_mps2: f64, then_mps2: f64, split: usize| -> Speed {
+            let at = |i: usize| first_mps2 * (i.min(split) as f64) + then_mps2 * (i.saturating_sub(split) as f64);
+            Speed::Sampled((0..count).map(|i| (v0 - dt_s * at(i)).max(0.0)).collect())
+        };
+        let lateral = |from_m: f64, first_mps: f64, then_mps: f64, split: usize| -> Lateral {
+            let rate = |i: usize| if i <= split { first_mps } else { then_mps };
+            let positions = (0..count).scan(from_m, |y, i| {
+                *y = if i == 0 { *y } else { *y + rate(i) * dt_s };
+                Some(*y)
+            });
+            let sign = |i: usize| -rate(i) * from_m.signum();
+            Lateral::Sampled { position_m: positions.collect(), towards_mps: (0..count).map(sign).collect() }
+        };
+        for split_s in [0.3, 0.9, 2.2] {
+            let split = steps(split_s);
+            for (first, [a, b]) in [(0.0, [6.0, 0.0]), (4.0, [8.0, 0.0]), (4.0, [4.0, 8.0]), (6.0, [0.0, 6.0])] {
+                let lead = |then| Case {
+                    principal: Participant { speed: speed(22.0, first, then, split), ..lvd(22.0, 0.0, 1.0).principal },
+                    ..lvd(22.0, 0.0, 1.0)
+                };
+                let cutter = |then| Case {
+                    principal: Participant {
+                        speed: speed(18.0, first, then, split),
+                        ..cut_in(22.0, 18.0, lateral(3.5, -0.9, -0.9, split)).principal
+                    },
+                    ..cut_in(22.0, 18.0, Lateral::Centred)
+                };
+                let turns = |then: f64| cut_in(24.0, 18.0, lateral(3.5, -0.9, -then / 4.0, split));
+                let leaver = |then: f64| Case {
+                    principal: Participant {
+                        lateral: lateral(0.01, 0.9, then / 4.0, split),
+                        ..cut_out(20.0, 1.0, 40.0).principal
+                    },
+                    ..cut_out(20.0, 1.0, 40.0)
+                };
+                let pairs: [[Case; 2]; 4] =
+                    [[a, b].map(lead), [a, b].map(cutter), [a, b].map(turns), [a, b].map(leaver)];
+                for ([one, other], model) in pairs.iter().flat_map(|pair| ModelId::ALL.map(|model| (pair, model))) {
+                    for thw_s in [0.5, 1.0, 1.8] {
+                        let [one_course, other_course] = [one, other].map(|case| course(&profile, case, model, thw_s));
+                        // Up to the step that both motions share; a contact may end a lane earlier.
+                        let until = (split + 1).min(one_course.len()).min(other_course.len());
+                        assert_eq!(
+                            one_course[..until],
+                            other_course[..until],
+                            "{name}, {}, {:?} {split_s} s, {thw_s} s, {first} {a} {b}",
+                            model.name(),
+                            one.category
+                        );
+                        compared += until;
+                    }
+                }
+            }
+        }
+    }
+    assert!(compared > 100_000, "{compared}");
+}
+
+/// Under the regulation's profiles a time to collision exists only while the gap closes.
+#[test]
+fn no_driver_of_the_regulation_reacts_to_a_gap_that_opens() {
+    let opens = Case {
+        principal: Participant {
+            speed: Speed::Kinematic { initial_mps: 100.0 / 3.6, acceleration_mps2: -6.8, until_s: 100.0 / 3.6 / 6.8 },
+            ..cut_in(60.0 / 3.6, 100.0 / 3.6, Lateral::Kinematic { start_m: 3.5, rate_mps: -1.5, end_m: 0.0 }).principal
+        },
+        ..cut_in(60.0 / 3.6, 100.0 / 3.6, Lateral::Kinematic { start_m: 3.5, rate_mps: -1.5, end_m: 0.0 })
+    };
+    let equal_s = (100.0 - 60.0) / 3.6 / 6.8;
+    for name in ["un-r157", "eu-2022-1426", "eu-2022-1426-standing"] {
+        let profile = Profile::load(name).unwrap();
+        for model in [ModelId::Reg157, ModelId::Cchdm] {
+            let outcome = run(&profile, &opens, model, 3.0 / (60.0 / 3.6));
+            let reacts_s = f64::from(outcome.reaction_step) * profile.frame.dt_s;
+            assert!(reacts_s > equal_s, "{name}, {}: {reacts_s} s", model.name());
+        }
+        // By hand: TTC ≤ 2 s from 1.634 s on, contact at 5.2 m/s.
+        let outcome = run(&profile, &opens, ModelId::Cchdm, 3.0 / (60.0 / 3.6));
+        assert!((f64::from(outcome.reaction_step) * profile.frame.dt_s - 1.634).abs() < 0.011);
+        assert!(outcome.verdicts.failed(Criterion::Collision));
+    }
+    let outcome = run(&paper(), &opens, ModelId::Cchdm, 3.0 / (60.0 / 3.6));
+    assert!(f64::from(outcome.reaction_step) * 0.04 < equal_s, "the paper's driver reacts to |TTC|");
 }
 
 #[test]

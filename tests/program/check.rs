@@ -167,7 +167,7 @@ fn a_braking_cutter_makes_no_demand() {
     for (gap, braking) in [("24", "-5"), ("20", "-1.5")] {
         let (_, out, error) = cut_in("60", "45", gap, "1.0", &format!("--acceleration {braking}"));
         assert!(
-            out.contains("5.2.5.2: no demand")
+            out.contains("UN R157, 5.2.5.2: no demand")
                 && out.contains("no demand: (a) largest change of the other vehicle's speed is"),
             "{out} {error}"
         );

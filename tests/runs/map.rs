@@ -813,7 +813,11 @@ fn named_options_explain_every_cell_between_the_readings() {
         }};
     }
     step!("`reg157.margin_steps`, `margin_s`", reg157.margin_s reg157.margin_steps);
-    step!("`reg157.visible_lateral_movement_s`", reg157.visible_lateral_movement_s);
+    step!(
+        "`reg157.visible_lateral_movement_s`, `lane_intrusion_m`",
+        reg157.visible_lateral_movement_s reg157.lane_intrusion_m
+    );
+    step!("`ttc_only_while_closing`", reg157.ttc_only_while_closing cchdm.ttc_only_while_closing);
     step!("`reg157.always_unsafe`", reg157.always_unsafe);
     step!("`cchdm.perception_time_s`", cchdm.perception_time_s);
     step!("`cchdm.wandering_m`, `lateral_gate_m`", cchdm.wandering_m cchdm.lateral_gate_m);

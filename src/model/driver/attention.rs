@@ -198,8 +198,10 @@ impl<R: Real> AttentionRule<R> {
 mod tests {
     use super::*;
 
+    const GEOMETRY: LaneGeometry<f64> = LaneGeometry { half_widths: 1.9, lane_width: 3.5, marking_gap: 0.8 };
+
     fn first(rule: AttentionRule<f64>, lateral: impl Fn(u32) -> f64) -> u32 {
-        rule.attend_from(100, 1.8, lateral, |_| 20.0)[0]
+        rule.attend_from(100, GEOMETRY, lateral, |_| 20.0)[0]
     }
 
     #[test]
@@ -211,42 +213,69 @@ mod tests {
         assert_eq!(first(rule, |_| 3.5), NEVER);
     }
 
+    /// A recording that begins within the lane change has less to show, and the driver reacts no later.
+    #[test]
+    fn the_deviation_is_that_from_the_centre_of_the_lane_wherever_the_data_begin() {
+        let rule = AttentionRule::cutting_in(0.375, 0.4, 0.1);
+        let whole = |i: u32| 3.5 - 0.1 * f64::from(i);
+        for cut in [0, 3, 4, 9, 15] {
+            assert_eq!(first(rule, |i| whole(i + cut)), 4_u32.saturating_sub(cut) + 4, "{cut}");
+        }
+        // Outwards from the centre is no deviation towards the ego; from beyond the next lane the start counts.
+        assert_eq!(first(rule, |_| 4.0), NEVER);
+        assert_eq!(first(rule, |i| 7.0 - 0.1 * f64::from(i)), 4 + 4);
+        let leaves = AttentionRule::cutting_out(0.375, 0.4, 0.1);
+        assert_eq!(first(leaves, |i| 0.3 + 0.1 * f64::from(i)), 1 + 4);
+    }
+
     /// Parameterizations 3, 4, c and d place the other vehicle at its final position from the start.
     #[test]
     fn a_lane_change_that_is_over_at_the_start_is_seen_at_once() {
         let [cuts_in, cuts_out] = [AttentionRule::cutting_in, AttentionRule::cutting_out].map(|of| of(0.375, 0.4, 0.1));
-        assert_eq!(cuts_in.attend_from(100, 1.8, |_| 0.1, |_| 20.0), [0, 0]);
-        assert_eq!(cuts_in.attend_from(100, 1.8, |_| 1.9, |_| 20.0), [NEVER, 0]);
-        assert_eq!(cuts_out.attend_from(100, 1.8, |_| 0.1, |_| 20.0), [NEVER, NEVER]);
-        assert_eq!(cuts_out.attend_from(100, 1.8, |_| -3.5, |_| 20.0), [0, 0]);
+        assert_eq!(cuts_in.attend_from(100, GEOMETRY, |_| 0.1, |_| 20.0), [0, 0]);
+        assert_eq!(cuts_in.attend_from(100, GEOMETRY, |_| 3.3, |_| 20.0), [NEVER, 0]);
+        assert_eq!(cuts_out.attend_from(100, GEOMETRY, |_| 0.1, |_| 20.0), [NEVER, NEVER]);
+        assert_eq!(cuts_out.attend_from(100, GEOMETRY, |_| -3.5, |_| 20.0), [0, 0]);
     }
 
     #[test]
-    fn movement_counts_from_the_step_that_it_begins_at_and_not_inside_the_gate() {
-        let rule = AttentionRule::after_visible_movement(0.72, 0.5, 0.1, Category::CutIn);
+    fn movement_counts_from_the_step_that_it_begins_at_and_not_after_the_lane_intrusion() {
+        let rule = AttentionRule::after_visible_movement(0.72, 0.3, 0.1, Category::CutIn);
         assert_eq!(first(rule, |i| if i < 5 { 3.5 } else { 3.5 - 0.1 * f64::from(i - 4) }), 4 + 8);
-        assert_eq!(first(rule, |_| 2.0), 0);
-        assert_eq!(AttentionRule::after_visible_movement(0.72, 0.5, 0.1, Category::Lvd), AttentionRule::always());
+        // Its edge is 0.3 m beyond the marking of a lane of 3.5 m at 2.4 m, and of one of 3.0 m at 2.15 m.
+        assert_eq!(first(rule, |_| 2.39), 0);
+        assert_eq!(first(rule, |_| 2.41), NEVER);
+        let narrow = LaneGeometry { lane_width: 3.0, marking_gap: 0.55, ..GEOMETRY };
+        assert_eq!(rule.attend_from(100, narrow, |_| 2.39, |_| 20.0)[0], NEVER);
+        assert_eq!(AttentionRule::after_visible_movement(0.72, 0.3, 0.1, Category::Lvd), AttentionRule::always());
     }
 
     #[test]
     fn a_deceleration_beyond_the_trigger_is_perceived_and_others_by_option() {
         let rule = |below| AttentionRule::after_deceleration(5.0, 0.4, below, 0.1);
         let braking = |by: f64| move |i: u32| if i < 3 { 20.0 } else { 20.0 - by * f64::from(i - 2) };
-        for below in [BelowTrigger::Never, BelowTrigger::DelayOnly, BelowTrigger::AtOnce] {
-            assert_eq!(rule(below).attend_from(50, 1.8, |_| 0.0, braking(0.6)), [3 + 4; 2], "{below:?}");
+        for below in [BelowTrigger::Never, BelowTrigger::DelayOnly] {
+            assert_eq!(rule(below).attend_from(50, GEOMETRY, |_| 0.0, braking(0.6)), [3 + 4; 2], "{below:?}");
         }
-        let soft = |below| rule(below).attend_from(50, 1.8, |_| 0.0, braking(0.4));
+        assert_eq!(rule(BelowTrigger::AtOnce), AttentionRule::always());
+        let soft = |below| rule(below).attend_from(50, GEOMETRY, |_| 0.0, braking(0.4));
         assert_eq!(soft(BelowTrigger::Never), [NEVER; 2]);
+        assert_eq!(soft(BelowTrigger::DelayOnly), [3; 2]);
+        assert_eq!(rule(BelowTrigger::DelayOnly).attend_from(50, GEOMETRY, |_| 0.0, |_| 20.0), [NEVER; 2]);
         // A lead exactly at the trigger, at time steps with different rounding of the speeds.
         for dt_s in [0.1, 0.04, 0.01, 0.001] {
             let rule = AttentionRule::after_deceleration(5.0, 0.4, BelowTrigger::Never, dt_s);
             for v in [60.0 / 3.6, 20.0, 130.0 / 3.6] {
-                assert_eq!(rule.attend_from(50, 1.8, |_| 0.0, |i| v - f64::from(i) * (5.0 * dt_s)), [NEVER; 2]);
+                assert_eq!(rule.attend_from(50, GEOMETRY, |_| 0.0, |i| v - f64::from(i) * (5.0 * dt_s)), [NEVER; 2]);
             }
         }
-        assert_eq!(soft(BelowTrigger::DelayOnly), [3; 2]);
-        assert_eq!(soft(BelowTrigger::AtOnce), [0; 2]);
-        assert_eq!(rule(BelowTrigger::DelayOnly).attend_from(50, 1.8, |_| 0.0, |_| 20.0), [NEVER; 2]);
+    }
+
+    /// What a lead does later does not decide an earlier reaction.
+    #[test]
+    fn a_lead_that_brakes_harder_later_is_reacted_to_from_its_first_loss_of_speed() {
+        let rule = AttentionRule::after_deceleration(5.0, 0.4, BelowTrigger::DelayOnly, 0.1);
+        let brakes_twice = |i: u32| 20.0 - 0.4 * f64::from(i) - 0.4 * f64::from(i.saturating_sub(22));
+        assert_eq!(rule.attend_from(50, GEOMETRY, |_| 0.0, brakes_twice), [1; 2]);
     }
 }

@@ -24,7 +24,8 @@ pub(super) fn danger(profile: &Profile, category: Category) -> String {
             format!("leader beyond {} m/s², else {below}", value(trigger_mps2))
         }
         category if cchdm.always_unsafe.contains(&category) => "brakes without a test".to_owned(),
-        _ => format!("TTC ≤ {} s", value(cchdm.ttc_s)),
+        _ if cchdm.ttc_only_while_closing => format!("TTC ≤ {} s", value(cchdm.ttc_s)),
+        _ => format!("|TTC| ≤ {} s, of an opening gap too", value(cchdm.ttc_s)),
     }
 }
 
@@ -36,10 +37,13 @@ pub(super) fn outside(profile: &Profile, category: Category, point: &Point) -> O
     match category {
         Category::Lvd if cchdm.lead_deceleration_trigger_mps2 > 0.0 => {
             let lead_mps = point.get(MapQuantity::OtherSpeed)?;
-            (ego_mps > lead_mps + SPEED_MPS).then(|| {
-                "the ego is faster than the leader from the start; the annex starts at equal speeds, and its driver reacts \
-                 to a deceleration only"
-                    .to_owned()
+            // Equal up to the error of a speed; a thousandth more, for rounding.
+            ((ego_mps - lead_mps).abs() > 1.001 * SPEED_MPS).then(|| {
+                let word = if ego_mps > lead_mps { "faster" } else { "slower" };
+                format!(
+                    "the ego is {word} than the leader at the start; the annex starts at equal speeds, and its driver \
+                     reacts to a deceleration only"
+                )
             })
         }
         Category::CutOut if cchdm.cut_out_headway_s > 0.0 => {
@@ -48,7 +52,8 @@ pub(super) fn outside(profile: &Profile, category: Category, point: &Point) -> O
             let gap_m = gap_m.or_else(|| thw_s.map(|thw_s| thw_s * ego_mps))?;
             (gap_m > headway_s * ego_mps + cchdm.cut_out_headway_tolerance_m + 1e-9).then(|| {
                 format!(
-                    "the headway of {} s is longer than the {} s at which the annex follows and its driver sees a danger",
+                    "the headway of {} s is longer than the {} s at which the annex follows and its driver sees a danger \
+                     (to the error of gap and speed)",
                     value(gap_m / ego_mps),
                     value(headway_s)
                 )

@@ -69,7 +69,7 @@ pub(super) fn boundaries(subject: &Subject, profile: &Profile, budget: &StepBudg
             values.map_while(|value| Some((value, verdicts(value)?))).collect()
         };
         let (below, above) = (side(min.min(value)), side(max.max(value)));
-        let answers = nearest(&below, &above, resolution, &verdicts, &|verdicts| verdicts.verdict());
+        let answers = nearest(&below, &above, resolution, &verdicts, &CaseVerdicts::verdict);
         let change = |model: &ModelId| {
             let found = nearest(&below, &above, resolution, &verdicts, &|verdicts| verdicts.collides(*model));
             change_of(&found)

@@ -2,7 +2,7 @@
 //! those of the profile, so that a reading shows what the lane did.
 
 use crate::engine::{Trace, TracedStep, TracedVehicle};
-use crate::model::driver::ModelId;
+use crate::model::driver::{BelowTrigger, ModelId};
 use crate::model::profile::Profile;
 use crate::run::grid::SPEED_MPS;
 use crate::scenario::Category;
@@ -28,7 +28,7 @@ impl Relation {
         }
     }
 
-    fn holds(self, value: f64, threshold: f64) -> bool {
+    fn compare(self, value: f64, threshold: f64) -> bool {
         // Times are multiples of a step, up to rounding.
         const EPSILON: f64 = 1e-9;
         match self {
@@ -37,6 +37,39 @@ impl Relation {
             Relation::AtMost => value <= threshold + EPSILON,
         }
     }
+}
+
+/// Whether a condition holds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Holds {
+    /// It holds.
+    Yes,
+    /// It does not hold, or its event does not happen.
+    No,
+    /// Its event began before the case, which shows less than the whole of it.
+    Unknown,
+}
+
+impl Holds {
+    /// Text for tables and files.
+    pub fn label(self) -> &'static str {
+        match self {
+            Holds::Yes => "yes",
+            Holds::No => "no",
+            Holds::Unknown => "unknown",
+        }
+    }
+}
+
+/// What the clause of cut-ins demands of the system.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Demand {
+    /// It has to avoid the collision.
+    Avoid,
+    /// Nothing: a condition does not hold.
+    Nothing,
+    /// A condition is unknown, and all others hold.
+    Unknown,
 }
 
 /// One condition of a clause.
@@ -52,6 +85,8 @@ pub struct Reading {
     pub unit: &'static str,
     /// Value of the case; `None` if the event of the clause does not happen.
     pub value: Option<f64>,
+    /// The event began before the case: the value is a lower bound.
+    pub is_cut_off: bool,
     /// Required relation of the value to the threshold.
     pub relation: Relation,
     /// Threshold of the clause.
@@ -63,9 +98,13 @@ pub struct Reading {
 }
 
 impl Reading {
-    /// Whether the condition holds; false if its event does not happen.
-    pub fn holds(&self) -> bool {
-        self.value.is_some_and(|value| self.relation.holds(value, self.threshold))
+    /// Whether the condition holds.
+    pub fn holds(&self) -> Holds {
+        match self.value {
+            Some(value) if self.relation.compare(value, self.threshold) => Holds::Yes,
+            Some(_) if self.is_cut_off => Holds::Unknown,
+            _ => Holds::No,
+        }
     }
 }
 
@@ -89,17 +128,22 @@ pub(super) fn readings(
     list
 }
 
-/// Whether all conditions of the cut-in clause hold. `None` if the clause does not apply.
-pub(super) fn is_demanded(readings: &[Reading]) -> Option<bool> {
-    let mut conditions = readings.iter().filter(|reading| reading.is_condition).peekable();
-    conditions.peek()?;
-    Some(conditions.all(Reading::holds))
+/// What the cut-in clause demands. `None` if there is no clause for the case.
+pub(super) fn demand(readings: &[Reading]) -> Option<Demand> {
+    let conditions = readings.iter().filter(|reading| reading.is_condition).map(Reading::holds);
+    conditions.fold(None, |demand, holds| match (demand, holds) {
+        (Some(Demand::Nothing), _) | (_, Holds::No) => Some(Demand::Nothing),
+        (Some(Demand::Unknown), _) | (_, Holds::Unknown) => Some(Demand::Unknown),
+        _ => Some(Demand::Avoid),
+    })
 }
 
 /// The other vehicle at its intrusion into the ego's lane, interpolated between two steps to the lateral gap of the
 /// clause.
 struct Intrusion {
     time_s: f64,
+    /// It was before the case.
+    is_before: bool,
     closing_mps: f64,
     ttc_s: f64,
 }
@@ -114,18 +158,25 @@ impl Intrusion {
         let gap_m = between(|step| step.others[0].gap_m).max(0.0);
         let closing_mps = between(|step| step.v_ego_mps - step.others[0].v_mps);
         let ttc_s = if closing_mps > 0.0 { gap_m / closing_mps } else { f64::INFINITY };
-        Some(Intrusion { time_s: between(|step| step.time_s), closing_mps, ttc_s })
+        Some(Intrusion { time_s: between(|step| step.time_s), is_before: at == 0, closing_mps, ttc_s })
     }
 }
 
-/// The cut-in clause (UN R157, 5.2.5.2; EU 2022/1426, 1.4.2): a collision must be avoided if (a), (b) and (c) hold. A
-/// profile without a time of visible movement has no (b).
+/// The cut-in clause (UN R157, 5.2.5.2; EU 2022/1426, 1.4.2): a collision must be avoided if (a), (b) and (c) hold. EU
+/// 2022/1426 has no (b). No reading for a profile without a clause.
 pub(super) fn lane_intrusion(profile: &Profile, trace: &Trace) -> Vec<Reading> {
     let constants = &profile.reg157;
+    if constants.clause.is_empty() {
+        return Vec::new();
+    }
     let other = |step: &TracedStep| step.others[0];
-    let intrusion = Intrusion::of(trace, constants.lateral_gate_m);
+    let marking_gap_m = (trace.lane_width_m - trace.ego_width_m) / 2.0;
+    let intrusion = Intrusion::of(trace, constants.intrusion_gap_m(marking_gap_m));
+    let is_before = intrusion.as_ref().is_some_and(|intrusion| intrusion.is_before);
     let first = trace.steps.first().map(other);
     let start_m = first.map_or(0.0, |other| other.y_m);
+    // Beyond normal wandering from the centre of its lane the movement began earlier.
+    let has_begun = trace.lane_width_m - start_m.abs() > profile.cchdm.wandering_m;
     let moves = |step: &&TracedStep| (other(step).y_m - start_m).abs() > 1e-9;
     // Movement counts from the step before its first change.
     let moved_s = trace.steps.iter().find(moves).map(|step| trace.time_s(step.step.saturating_sub(1)));
@@ -137,6 +188,7 @@ pub(super) fn lane_intrusion(profile: &Profile, trace: &Trace) -> Vec<Reading> {
         quantity,
         unit,
         value,
+        is_cut_off: false,
         relation,
         threshold,
         time_s: intrusion.as_ref().map(|intrusion| intrusion.time_s),
@@ -167,23 +219,25 @@ pub(super) fn lane_intrusion(profile: &Profile, trace: &Trace) -> Vec<Reading> {
         },
     ];
     if constants.visible_lateral_movement_s > 0.0 {
-        list.push(reading(
+        let visible = reading(
             "(b) lateral movement visible before lane intrusion",
             "s",
             intrusion.as_ref().zip(moved_s).map(|(intrusion, moved_s)| intrusion.time_s - moved_s),
             Relation::AtLeast,
             constants.visible_lateral_movement_s,
             "the movement could be seen",
-        ));
+        );
+        list.push(Reading { is_cut_off: has_begun, ..visible });
     }
-    list.push(reading(
+    let ttc = reading(
         "(c) TTC at lane intrusion",
         "s",
         intrusion.as_ref().map(|intrusion| intrusion.ttc_s),
         Relation::Above,
         required_s,
         "with the conditions above: the system has to avoid the collision",
-    ));
+    );
+    list.push(Reading { is_cut_off: is_before, ..ttc });
     list
 }
 
@@ -201,7 +255,14 @@ fn first_above(values: impl Iterator<Item = (f64, f64)> + Clone, threshold: f64)
 fn competent_driver(profile: &Profile, category: Category, trace: &Trace) -> Vec<Reading> {
     let constants = &profile.cchdm;
     let first = trace.steps.first().map_or(0.0, |step| step.others[0].y_m);
-    let deviation_m = |step: &TracedStep| (step.others[0].y_m - first).abs();
+    // From the centre of its lane: the ego's in a cut-out.
+    let deviation_m = |step: &TracedStep| match category {
+        Category::CutIn => {
+            let is_farther = first.abs() > 1.5 * trace.lane_width_m;
+            (if is_farther { first.abs() } else { trace.lane_width_m }) - step.others[0].y_m.abs()
+        }
+        _ => step.others[0].y_m.abs(),
+    };
     let perceived = |event: Option<&TracedStep>| {
         let at_s = event.map(|step| step.time_s + constants.perception_time_s)?;
         trace.steps.iter().find(|step| step.time_s >= at_s - 1e-9)
@@ -212,6 +273,7 @@ fn competent_driver(profile: &Profile, category: Category, trace: &Trace) -> Vec
         quantity,
         unit,
         value,
+        is_cut_off: false,
         relation,
         threshold,
         time_s,
@@ -224,15 +286,22 @@ fn competent_driver(profile: &Profile, category: Category, trace: &Trace) -> Vec
             .windows(2)
             .map(|pair| (pair[0].time_s, (pair[0].others[0].v_mps - pair[1].others[0].v_mps) / trace.dt_s));
         let trigger_mps2 = constants.lead_deceleration_trigger_mps2;
-        let found = first_above(decelerations, trigger_mps2);
+        // With `delay-only`, the first loss of speed decides.
+        let delay_only = constants.lvd_below_threshold == BelowTrigger::DelayOnly;
+        let found = first_above(decelerations, if delay_only { 0.0 } else { trigger_mps2 });
+        let then = if delay_only {
+            "perceived after the risk perception time; else the delay only"
+        } else {
+            "perceived after the risk perception time"
+        };
         return vec![reading(
-            "deceleration of the leader",
+            if delay_only { "deceleration at the leader's first loss of speed" } else { "deceleration of the leader" },
             "m/s²",
             found.map(|(_, deceleration)| deceleration),
             Relation::Above,
             trigger_mps2,
             found.map(|(time_s, _)| time_s),
-            "perceived after the risk perception time",
+            then,
         )];
     }
     let wandering_m = constants.wandering_m;
@@ -282,6 +351,7 @@ fn fuzzy_driver(trace: &Trace) -> Vec<Reading> {
         quantity,
         unit: "1",
         value,
+        is_cut_off: false,
         relation: Relation::Above,
         threshold: 0.0,
         time_s: first.map(|step| step.time_s),

@@ -14,21 +14,18 @@ use std::cell::Cell;
 use rayon::prelude::*;
 
 pub use boundary::{Boundary, Change};
-pub use clauses::{Reading, Relation};
+pub use clauses::{Demand, Holds, Reading, Relation};
 pub use subject::{Lane, Subject};
-pub use verdict::{Answer, CaseVerdicts, Verdict};
+pub use verdict::{Answer, CaseVerdicts, RunEnd, Verdict};
 
 use crate::engine::{NO_STEP, Outcome, StepMark, Trace, check_time_step};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::grid::{Perturbation, Point, without_reaction};
+use crate::run::grid::{GAP_M, Perturbation, Point, without_reaction};
 use crate::scenario::Category;
 use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
-
-/// The drivers of Annex 3: a collision is *preventable* if one of them avoids it.
-pub const REFERENCE_DRIVERS: [ModelId; 2] = [ModelId::Cchdm, ModelId::Fsm];
 
 /// Input of a check.
 #[derive(Debug, Clone)]
@@ -48,6 +45,8 @@ pub struct Judged {
     pub trace: Trace,
     /// Perturbations that change the collision verdict.
     pub flips: Vec<&'static str>,
+    /// See [`Judgement::touching`].
+    pub touches: bool,
 }
 
 /// The case under one profile.
@@ -63,9 +62,12 @@ pub struct Judgement {
     pub flips: Vec<&'static str>,
     /// Perturbations that change each driver's collision verdict, in the order of [`ModelId::ALL`].
     pub driver_flips: Vec<Vec<&'static str>>,
-    /// Perturbations that change whether the cut-in clause demands avoidance.
+    /// Drivers that avoid the collision by a gap that is not distinguishable from a contact: it is below 1 cm, or
+    /// becomes so as the time step goes to 0.
+    pub touching: Vec<ModelId>,
+    /// Perturbations that change what the cut-in clause demands.
     pub demand_flips: Vec<&'static str>,
-    /// Clause of cut-ins, according to the profile.
+    /// Clause of cut-ins, according to the profile; empty without one.
     pub clause: String,
     /// The danger that the profile's CCHDM detects, in a few words.
     pub danger: String,
@@ -79,6 +81,10 @@ pub struct Judgement {
     pub readings: Vec<Reading>,
     /// Values of each parameter at which the answer changes.
     pub boundaries: Vec<Boundary>,
+    /// Maximum duration of a run, s.
+    pub time_cap_s: f64,
+    /// Cut-out: the time from which the vehicle that cuts out drives through the one ahead of it, s.
+    pub drives_through_s: Option<f64>,
 }
 
 impl Judged {
@@ -105,20 +111,25 @@ impl Judged {
 }
 
 impl Judgement {
-    /// The answer, if no perturbation changes it and Annex 3 describes the case. An answer of no conflict does not need
-    /// Annex 3.
+    /// The answer, if no perturbation changes it, the time step resolves the gap that it rests on, and Annex 3 describes
+    /// the case. An answer of no conflict does not need Annex 3.
     pub fn verdict(&self) -> Verdict {
         match self.verdicts.verdict() {
-            Verdict::OutsideAnnex => Verdict::OutsideAnnex,
-            verdict if self.flips.is_empty() => verdict,
+            verdict @ (Verdict::OutsideAnnex | Verdict::NotJudged) => verdict,
+            verdict if self.flips.is_empty() && !self.rests_on_touching() => verdict,
             _ => Verdict::Undecided,
         }
     }
 
-    /// Whether all conditions of the clause hold, so that the system must avoid the collision. `None` except for
-    /// cut-ins.
-    pub fn is_demanded(&self) -> Option<bool> {
-        clauses::is_demanded(&self.readings)
+    /// Whether every driver that avoids the collision touches.
+    pub fn rests_on_touching(&self) -> bool {
+        self.verdicts.answer() == Answer::Preventable
+            && self.verdicts.avoided_by().iter().all(|model| self.touching.contains(model))
+    }
+
+    /// What the clause of cut-ins demands. `None` for other cases and for a profile without a clause.
+    pub fn demand(&self) -> Option<Demand> {
+        clauses::demand(&self.readings)
     }
 
     /// The conditions of the clause of cut-ins.
@@ -128,7 +139,7 @@ impl Judgement {
 
     /// The conditions that do not hold.
     pub fn unmet(&self) -> impl Iterator<Item = &Reading> {
-        self.conditions().filter(|reading| !reading.holds())
+        self.conditions().filter(|reading| reading.holds() != Holds::Yes)
     }
 
     /// Perturbations that change a driver's collision verdict.
@@ -138,18 +149,26 @@ impl Judgement {
     }
 }
 
-/// Whether each model collides, and whether an ego that never reacts collides.
+/// How the run of each model and that of an ego that never reacts end. The profile ends settled runs.
 fn verdicts(lane: &Lane, point: &Point, profile: &Profile, category: Category, budget: &StepBudget) -> CaseVerdicts {
     let ran = |profile: &Profile, model| {
-        let outcome = lane.run(profile, category, model);
+        let (outcome, min_gap_m) = lane.run(profile, category, model);
         budget.take(&outcome);
-        collides(&outcome)
+        (RunEnd::of(&outcome), min_gap_m)
     };
+    let drivers = ModelId::ALL.map(|model| ran(profile, model));
     CaseVerdicts {
-        collide: ModelId::ALL.map(|model| ran(profile, model)),
-        conflict: ran(&without_reaction(profile), ModelId::Reg157),
+        ends: drivers.map(|(end, _)| end),
+        min_gap_m: drivers.map(|(_, min_gap_m)| min_gap_m),
+        unreacting: ran(&without_reaction(profile), ModelId::Reg157).0,
         is_outside_annex: annex::outside(profile, category, point).is_some(),
+        reference_drivers: profile.reference_drivers.clone(),
     }
+}
+
+/// The gap to which that of two time steps tends as the step goes to 0, m. The error of a step is proportional to it.
+fn limit_gap_m((gap_m, dt_s): (f64, f64), (finer_gap_m, finer_dt_s): (f64, f64)) -> f64 {
+    if finer_dt_s < dt_s { finer_gap_m - (gap_m - finer_gap_m) * finer_dt_s / (dt_s - finer_dt_s) } else { gap_m }
 }
 
 fn collides(outcome: &Outcome<f64>) -> bool {
@@ -214,16 +233,24 @@ impl Check {
         check_time_step(&lane.case, &lane.tables, profile.frame.dt_s, || Place::item("the case"))?;
         let trace = |model| lane.trace(profile, self.subject.category(), model);
         let budget = StepBudget { profile, left: Cell::new(MAX_STEPS) };
-        let run = |model: &ModelId| lane.run(profile, self.subject.category(), *model);
-        let unreacting = lane.run(&without_reaction(profile), self.subject.category(), ModelId::Reg157);
+        let run = |model: &ModelId| lane.run(profile, self.subject.category(), *model).0;
+        let unreacting = lane.run(&without_reaction(profile), self.subject.category(), ModelId::Reg157).0;
         let traced = self.models.iter().map(run).chain([unreacting]).map(|outcome| u64::from(outcome.end_step) + 1);
         let traced: u64 = traced.sum();
         if traced > MAX_TRACED_STEPS {
             return Err(too_many_steps(profile));
         }
-        let changed = self.perturbed(profile, &budget)?;
+        // A run that ends at the cap then still closes in.
+        let mut settling = profile.clone();
+        settling.frame.end_when_settled = true;
+        let changed = self.perturbed(&settling, &budget)?;
+        let touching = self.touching(&changed, profile)?;
         let driver = |model: ModelId| flips(&changed, |changed| changed.verdicts.collides(model));
-        let models = self.models.iter().map(|&model| Judged { trace: trace(model), flips: driver(model) });
+        let models = self.models.iter().map(|&model| Judged {
+            trace: trace(model),
+            flips: driver(model),
+            touches: touching.contains(&model),
+        });
         let unreacting = lane.unreacting(profile, self.subject.category());
         let attends_at_once = annex::attends_at_once(profile, self.subject.category(), &lane);
         Ok(Judgement {
@@ -232,12 +259,13 @@ impl Check {
             verdicts: changed[0].verdicts.clone(),
             flips: flips(&changed, |changed| changed.verdicts.answer()),
             driver_flips: ModelId::ALL.map(driver).to_vec(),
-            demand_flips: flips(&changed, |changed| changed.is_demanded),
+            touching,
+            demand_flips: flips(&changed, |changed| changed.demand),
             clause: profile.reg157.clause.clone(),
             danger: annex::danger(profile, self.subject.category()),
             outside_annex: annex::outside(profile, self.subject.category(), self.subject.point()),
             annex_flips: flips(&changed, |changed| changed.verdicts.is_outside_annex),
-            silent: self.silent(profile, &changed[0].verdicts, attends_at_once, &budget)?,
+            silent: self.silent(&settling, &changed[0].verdicts, attends_at_once, &budget)?,
             readings: clauses::readings(
                 profile,
                 self.subject.category(),
@@ -245,8 +273,23 @@ impl Check {
                 &trace,
                 attends_at_once.is_some(),
             ),
-            boundaries: boundary::boundaries(&self.subject, profile, &budget)?,
+            boundaries: boundary::boundaries(&self.subject, &settling, &budget)?,
+            time_cap_s: profile.frame.time_cap_s,
+            drives_through_s: self.subject.case(profile, self.subject.point())?.drives_through_s(profile),
         })
+    }
+
+    /// Drivers whose smallest gap is not distinguishable from a contact.
+    fn touching(&self, changed: &[Changed], profile: &Profile) -> Result<Vec<ModelId>> {
+        let finer = Perturbation::FinerStep;
+        let Some(found) = changed.iter().find(|changed| changed.by == finer.label()) else { return Ok(Vec::new()) };
+        let finer_dt_s = finer.profile(profile)?.frame.dt_s;
+        let touches = |model: &ModelId| {
+            let [gap, finer_gap] = [&changed[0], found].map(|of| of.verdicts.min_gap_m[model.index()]);
+            let limit_m = limit_gap_m((gap, profile.frame.dt_s), (finer_gap, finer_dt_s));
+            changed[0].verdicts.end(*model) == RunEnd::Clear && gap.min(limit_m) < GAP_M
+        };
+        Ok(ModelId::ALL.into_iter().filter(touches).collect())
     }
 
     /// Interpretations where the regulation is silent on which the answer depends.
@@ -285,10 +328,10 @@ impl Check {
                 Category::CutIn => clauses::lane_intrusion(profile, &lane.unreacting(profile, category)),
                 Category::CutOut | Category::Lvd => Vec::new(),
             };
-            Ok(Changed { by, verdicts, is_demanded: clauses::is_demanded(&readings) })
+            Ok(Changed { by, verdicts, demand: clauses::demand(&readings) })
         };
         let mut all = vec![changed("", profile, self.subject.point())?];
-        for perturbation in Perturbation::ALL {
+        for perturbation in Perturbation::all(category) {
             let point = perturbation.of_point(*self.subject.point());
             all.push(changed(perturbation.label(), &perturbation.profile(profile)?, &point)?);
         }
@@ -300,7 +343,7 @@ impl Check {
 struct Changed {
     by: &'static str,
     verdicts: CaseVerdicts,
-    is_demanded: Option<bool>,
+    demand: Option<Demand>,
 }
 
 /// Perturbations under which a result differs from that of the first entry.

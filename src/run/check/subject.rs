@@ -1,11 +1,11 @@
 //! The checked case and its neighbours: the same case with one number changed.
 
-use crate::engine::{Constants, Headway, LaneCase, Outcome, Silent, Trace};
+use crate::engine::{Constants, Headway, LaneCase, Outcome, Step, Trace};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::grid::{MapQuantity, Point, without_reaction};
 use crate::scenario::parameterization::{TimeGrid, recorded_case};
-use crate::scenario::{Case, Category, PlainCase, Scenario, Speed, Tables};
+use crate::scenario::{Case, Category, Lateral, PlainCase, Scenario, Speed, Tables};
 use crate::{Error, Place, Result};
 
 /// A concrete case.
@@ -13,8 +13,8 @@ use crate::{Error, Place, Result};
 pub enum Subject {
     /// Constant speeds, one deceleration, a lane change at constant lateral speed: the case, and its numbers.
     Plain(PlainCase, Point),
-    /// A scenario whose other vehicles follow their series. The point has the ego's speed, the first speed of the other
-    /// vehicle and the initial gap.
+    /// A scenario whose other vehicles follow their series. The point has the ego's speed, the first speed and lateral
+    /// position of the other vehicle, the initial gap, the sizes of both and the lane's width.
     Recorded(Box<Scenario>, Point),
 }
 
@@ -74,10 +74,18 @@ impl Subject {
             Some(headway) => start(headway, ego_mps),
             None => (MapQuantity::Gap, scenario.gap0.filter(|gap| gap.is_finite()).ok_or_else(missing)?),
         };
-        let point = Point::default()
+        let mut point = Point::default()
             .with(MapQuantity::EgoSpeed, ego_mps)
             .with(MapQuantity::OtherSpeed, other_mps)
-            .with(start.0, start.1);
+            .with(start.0, start.1)
+            .with(MapQuantity::Length, scenario.target.length)
+            .with(MapQuantity::Width, scenario.target.width)
+            .with(MapQuantity::EgoLength, scenario.ego.length)
+            .with(MapQuantity::EgoWidth, scenario.ego.width);
+        if let Some(y_m) = scenario.target.y.first().filter(|_| scenario.category != Category::Lvd) {
+            point =
+                point.with(MapQuantity::LateralDistance, y_m.abs()).with(MapQuantity::LaneWidth, scenario.lane_width);
+        }
         Ok(Subject::Recorded(Box::new(scenario), point))
     }
 
@@ -104,25 +112,32 @@ impl Subject {
         }
     }
 
+    /// The case with the numbers of a point.
+    ///
+    /// # Errors
+    /// As [`Subject::lane`].
+    pub fn case(&self, profile: &Profile, point: &Point) -> Result<Case> {
+        match self {
+            Subject::Plain(case, _) => plain(case, point, profile),
+            Subject::Recorded(scenario, recorded) => {
+                let mut case = recorded_case(scenario, TimeGrid::of(profile))?;
+                move_to(&mut case, recorded, point);
+                Ok(case)
+            }
+        }
+    }
+
     /// The case with the numbers of a point, ready to run.
     ///
     /// # Errors
     /// [`Error::Usage`] for contradictory numbers; [`Error::Input`] for a cut-out without a vehicle ahead.
     pub fn lane(&self, profile: &Profile, point: &Point) -> Result<Lane> {
-        let case = match self {
-            Subject::Plain(case, _) => plain(case, point, profile)?,
-            Subject::Recorded(scenario, recorded) => {
-                let mut case = recorded_case(scenario, TimeGrid::of(profile))?;
-                move_to(&mut case, recorded, point);
-                case
-            }
-        };
         let headway = match (point.get(MapQuantity::Thw), point.get(MapQuantity::Gap)) {
             (Some(thw_s), _) => Headway::ThwS(thw_s),
             (None, gap_m) => Headway::GapM(gap_m.unwrap_or(0.0)),
         };
         let mut tables = Tables::default();
-        let case = LaneCase::encode(&case, profile, &mut tables);
+        let case = LaneCase::encode(&self.case(profile, point)?, profile, &mut tables);
         Ok(Lane { case, tables, headway })
     }
 }
@@ -147,7 +162,7 @@ fn plain(of: &PlainCase, point: &Point, profile: &Profile) -> Result<Case> {
     case.case(profile.frame.time_cap_s)
 }
 
-/// Changes the initial speeds of a recorded case; series keep their shape.
+/// Changes the first values and the sizes of a recorded case; series keep their shape.
 fn move_to(case: &mut Case, from: &Point, to: &Point) {
     let change = |quantity| to.get(quantity).zip(from.get(quantity)).map_or(0.0, |(to, from)| to - from);
     case.ego_speed_mps = (case.ego_speed_mps + change(MapQuantity::EgoSpeed)).max(0.0);
@@ -157,13 +172,35 @@ fn move_to(case: &mut Case, from: &Point, to: &Point) {
     {
         series.iter_mut().for_each(|v| *v = (*v + by_mps).max(0.0));
     }
+    let by_m = change(MapQuantity::LateralDistance);
+    if let Lateral::Sampled { position_m, .. } = &mut case.principal.lateral
+        && by_m != 0.0
+    {
+        let side = position_m.first().map_or(1.0, |y| y.signum());
+        position_m.iter_mut().for_each(|y| *y += side * by_m);
+    }
+    case.ego_length_m += change(MapQuantity::EgoLength);
+    case.ego_width_m += change(MapQuantity::EgoWidth);
+    case.principal.length_m += change(MapQuantity::Length);
+    case.principal.width_m += change(MapQuantity::Width);
+    case.lane_width_m += change(MapQuantity::LaneWidth);
 }
 
 impl Lane {
-    /// Its outcome for a model.
-    pub fn run(&self, profile: &Profile, category: Category, model: ModelId) -> Outcome<f64> {
+    /// Its outcome for a model, and the smallest gap to a vehicle ahead that overlaps the ego laterally, m; infinite
+    /// without one.
+    pub fn run(&self, profile: &Profile, category: Category, model: ModelId) -> (Outcome<f64>, f64) {
         let constants = Constants::<f64>::resolve(profile, category);
-        constants.run(model, &self.case, &self.tables, self.headway.start(), &mut Silent)
+        let mut min_gap_m = f64::INFINITY;
+        let mut in_path = |step: &Step<f64>| {
+            for seen in &step.seen {
+                if seen.present.holds() && seen.view.lateral_gap < 0.0 && !seen.view.is_behind().holds() {
+                    min_gap_m = min_gap_m.min(seen.view.gap);
+                }
+            }
+        };
+        let outcome = constants.run(model, &self.case, &self.tables, self.headway.start(), &mut in_path);
+        (outcome, min_gap_m)
     }
 
     /// The same with every step.

@@ -1,17 +1,20 @@
-//! The answer of a check, derived from the collisions of the drivers and of an ego that never reacts.
+//! The answer of a check, derived from the ends of the runs of the drivers and of an ego that never reacts.
 
-use super::REFERENCE_DRIVERS;
+use crate::engine::{EndReason, Outcome};
+use crate::model::criterion::Criterion;
 use crate::model::driver::{MODELS, ModelId};
 
 /// The answer to one case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Answer {
-    /// A collision threatens, and a driver of Annex 3 avoids it.
+    /// A collision threatens, and a reference driver avoids it.
     Preventable,
-    /// A collision threatens, and both drivers of Annex 3 collide.
+    /// A collision threatens, and all reference drivers collide.
     NotPreventable,
     /// No collision occurs even if the ego never reacts.
     NoConflict,
+    /// The runs that decide end at the time cap while the gap still closes.
+    Open,
 }
 
 impl Answer {
@@ -21,6 +24,7 @@ impl Answer {
             Answer::Preventable => "preventable",
             Answer::NotPreventable => "not preventable",
             Answer::NoConflict => "no conflict",
+            Answer::Open => "undecided",
         }
     }
 }
@@ -30,10 +34,12 @@ impl Answer {
 pub enum Verdict {
     /// No perturbation changes the answer.
     Answer(Answer),
-    /// A perturbation changes it.
+    /// A perturbation changes it, it rests on a gap that the time step does not resolve, or the runs end before it.
     Undecided,
     /// Annex 3 does not describe the case, so its drivers do not determine what is preventable.
     OutsideAnnex,
+    /// The profile has no reference drivers.
+    NotJudged,
 }
 
 impl Verdict {
@@ -41,49 +47,94 @@ impl Verdict {
     pub fn label(self) -> &'static str {
         match self {
             Verdict::Answer(answer) => answer.label(),
-            Verdict::Undecided => "undecided",
+            Verdict::Undecided => Answer::Open.label(),
             Verdict::OutsideAnnex => "outside Annex 3",
+            Verdict::NotJudged => "not judged",
         }
     }
 }
 
-/// Collisions of one case.
-#[derive(Debug, Clone, PartialEq, Eq)]
+/// How a run ends.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum RunEnd {
+    /// The vehicles touch.
+    Contact,
+    /// No contact is possible any more.
+    Clear,
+    /// The time cap, while the gap still closes.
+    Open,
+}
+
+impl RunEnd {
+    /// The end of a lane whose profile ends settled runs.
+    pub(super) fn of(outcome: &Outcome<f64>) -> RunEnd {
+        match outcome.end {
+            _ if outcome.verdicts.failed(Criterion::Collision) => RunEnd::Contact,
+            EndReason::Cap => RunEnd::Open,
+            _ => RunEnd::Clear,
+        }
+    }
+}
+
+/// The ends of the runs of one case.
+#[derive(Debug, Clone, PartialEq)]
 pub struct CaseVerdicts {
     /// Each driver, in the order of [`ModelId::ALL`].
-    pub collide: [bool; MODELS],
+    pub ends: [RunEnd; MODELS],
+    /// Minimum gap of each to a vehicle in its path, m; infinite without one.
+    pub min_gap_m: [f64; MODELS],
     /// The ego that never reacts.
-    pub conflict: bool,
+    pub unreacting: RunEnd,
     /// Annex 3 does not describe the case.
     pub is_outside_annex: bool,
+    /// The drivers that determine what is preventable.
+    pub reference_drivers: Vec<ModelId>,
 }
 
 impl CaseVerdicts {
-    /// Whether a driver collides.
-    pub fn collides(&self, model: ModelId) -> bool {
-        ModelId::ALL.into_iter().zip(self.collide).any(|(m, collides)| m == model && collides)
+    /// How the run of a driver ends.
+    pub fn end(&self, model: ModelId) -> RunEnd {
+        self.ends[model.index()]
     }
 
-    /// Drivers of Annex 3 that do not collide.
+    /// Whether a driver collides.
+    pub fn collides(&self, model: ModelId) -> bool {
+        self.end(model) == RunEnd::Contact
+    }
+
+    fn references(&self, end: RunEnd) -> Vec<ModelId> {
+        self.reference_drivers.iter().copied().filter(|model| self.end(*model) == end).collect()
+    }
+
+    /// Reference drivers that avoid the collision.
     pub fn avoided_by(&self) -> Vec<ModelId> {
-        REFERENCE_DRIVERS.into_iter().filter(|model| !self.collides(*model)).collect()
+        self.references(RunEnd::Clear)
+    }
+
+    /// Reference drivers that collide.
+    pub fn collided_by(&self) -> Vec<ModelId> {
+        self.references(RunEnd::Contact)
     }
 
     /// The answer if Annex 3 describes the case. An answer of no conflict does not need Annex 3.
     pub fn verdict(&self) -> Verdict {
         match self.answer() {
+            _ if self.reference_drivers.is_empty() => Verdict::NotJudged,
             Answer::NoConflict => Verdict::Answer(Answer::NoConflict),
             _ if self.is_outside_annex => Verdict::OutsideAnnex,
+            Answer::Open => Verdict::Undecided,
             answer => Verdict::Answer(answer),
         }
     }
 
-    /// The answer that follows from the collisions.
+    /// The answer that follows from the ends.
     pub fn answer(&self) -> Answer {
-        match (self.conflict, self.avoided_by().is_empty()) {
-            (false, _) => Answer::NoConflict,
-            (true, false) => Answer::Preventable,
-            (true, true) => Answer::NotPreventable,
+        match self.unreacting {
+            RunEnd::Clear => Answer::NoConflict,
+            RunEnd::Open => Answer::Open,
+            RunEnd::Contact if !self.avoided_by().is_empty() => Answer::Preventable,
+            RunEnd::Contact if !self.references(RunEnd::Open).is_empty() => Answer::Open,
+            RunEnd::Contact => Answer::NotPreventable,
         }
     }
 }

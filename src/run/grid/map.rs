@@ -16,8 +16,11 @@ pub struct GridMap {
     pub models: Vec<ModelId>,
     /// Per model, per cell.
     verdicts: Vec<Vec<Verdicts>>,
-    /// Per model and cell: whether an ego that never reacts collides. Models differ if each starts at its own distance.
-    conflicts: Vec<Vec<bool>>,
+    /// Per model and cell: an ego that never reacts, whose lane ends once it is settled. Models differ if each starts at
+    /// its own distance.
+    unreacting: Vec<Vec<Verdicts>>,
+    /// The drivers' lanes end once they are settled, so that one at the cap still closes in.
+    settles: bool,
     /// Per model and criterion: the cells whose outcome a perturbation changes; empty if none was swept.
     undecided: Vec<[Vec<bool>; Criterion::ALL.len()]>,
 }
@@ -94,7 +97,7 @@ impl GridMap {
     pub fn sweep(plan: &GridPlan, executor: &Executor) -> Result<(GridMap, SweepSummary)> {
         let cells = plan.grid.cell_count();
         let mut verdicts = vec![vec![Verdicts::default(); cells]; plan.models.len()];
-        let mut conflicts = vec![vec![false; cells]; plan.models.len()];
+        let mut unreacting = vec![vec![Verdicts::default(); cells]; plan.models.len()];
         let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
         for part in &plan.parts {
             // Index of the part's model in the whole plan.
@@ -108,12 +111,13 @@ impl GridMap {
             summary.add(&swept);
             let swept = sweep_cells(plan, part, &part.unreacting, executor, |_, cell, verdict| {
                 for model in of_part.iter().flatten() {
-                    conflicts[*model][cell] = verdict.failed(Criterion::Collision);
+                    unreacting[*model][cell] = verdict;
                 }
             })?;
             summary.add(&swept);
         }
-        let map = GridMap { models: plan.models.clone(), verdicts, conflicts, undecided: Vec::new() };
+        let settles = plan.parts.iter().all(|part| part.plan.profile.frame.end_when_settled);
+        let map = GridMap { models: plan.models.clone(), verdicts, unreacting, settles, undecided: Vec::new() };
         map.check_ends(plan)?;
         Ok((map, summary))
     }
@@ -121,17 +125,19 @@ impl GridMap {
     /// Marks the cells whose outcome changes in a perturbed sweep of the same grid.
     pub fn mark_undecided(&mut self, perturbed: &GridMap) {
         let cells = self.cell_count();
-        self.undecided.resize_with(self.models.len(), || std::array::from_fn(|_| vec![false; cells]));
-        for (model, of_model) in self.undecided.iter_mut().enumerate() {
+        let mut undecided = std::mem::take(&mut self.undecided);
+        undecided.resize_with(self.models.len(), || std::array::from_fn(|_| vec![false; cells]));
+        for (model, of_model) in undecided.iter_mut().enumerate() {
             for (criterion, marks) in Criterion::ALL.into_iter().zip(of_model) {
                 for (cell, mark) in marks.iter_mut().enumerate() {
                     let [ours, theirs] = [&*self.verdicts, &*perturbed.verdicts].map(|of| of[model][cell]);
-                    let conflict_differs = self.conflicts[model][cell] != perturbed.conflicts[model][cell];
+                    let conflict_differs = self.is_conflict(model, cell) != perturbed.is_conflict(model, cell);
                     *mark |= ours.failed(criterion) != theirs.failed(criterion)
                         || criterion == Criterion::Collision && conflict_differs;
                 }
             }
         }
+        self.undecided = undecided;
     }
 
     /// Whether perturbed grids were swept.
@@ -146,7 +152,16 @@ impl GridMap {
 
     /// Whether an ego that never reacts collides when it starts where the model starts.
     pub fn is_conflict(&self, model: usize, cell: usize) -> bool {
-        self.conflicts[model][cell]
+        self.unreacting[model][cell].failed(Criterion::Collision)
+    }
+
+    /// Whether the lanes of a cell end at the time cap while the gap still closes, so that they do not show that the
+    /// criterion holds. A collision also needs to know what an ego does that never reacts.
+    fn is_open(&self, model: usize, cell: usize, criterion: Criterion) -> bool {
+        let [driver, unreacting] = [self.verdicts[model][cell], self.unreacting[model][cell]];
+        let unreacting_is_open = unreacting.capped() && !unreacting.failed(Criterion::Collision);
+        !driver.failed(criterion)
+            && (self.settles && driver.capped() || criterion == Criterion::Collision && unreacting_is_open)
     }
 
     /// The outcome of a model's cell.
@@ -154,7 +169,8 @@ impl GridMap {
         let fails = self.verdicts[model][cell].failed(criterion);
         // A conflict is an imminent collision; it has no meaning for the other criteria.
         let is_conflict = criterion != Criterion::Collision || self.is_conflict(model, cell);
-        match (self.is_undecided(model, cell, criterion), is_conflict, fails) {
+        let is_undecided = self.is_undecided(model, cell, criterion) || self.is_open(model, cell, criterion);
+        match (is_undecided, is_conflict, fails) {
             (true, ..) => CellOutcome::Undecided,
             (false, true, false) => CellOutcome::Pass,
             (false, true, true) => CellOutcome::Fail,
@@ -215,9 +231,11 @@ impl GridMap {
                 other.verdicts[second][cell].failed(criterion),
             );
             let is_undecided = self.is_undecided(first, cell, criterion) || other.is_undecided(second, cell, criterion);
+            let is_open = self.is_open(first, cell, criterion) || other.is_open(second, cell, criterion);
             let no_conflict =
                 criterion == Criterion::Collision && !self.is_conflict(first, cell) && !other.is_conflict(second, cell);
             match found {
+                Agreement::BothPass if is_open => Agreement::Undecided,
                 Agreement::BothPass if no_conflict => Agreement::NoConflict,
                 Agreement::OnlyFirst | Agreement::OnlySecond if is_undecided => Agreement::Undecided,
                 found => found,
@@ -305,7 +323,8 @@ pub enum CellOutcome {
     Fail,
     /// There is no conflict, but the driver reacts and collides.
     FailByReaction,
-    /// A perturbation changes the verdict, or whether there is a conflict.
+    /// A perturbation changes the verdict, or whether there is a conflict; or the lanes end at the time cap while the gap
+    /// still closes.
     Undecided,
 }
 

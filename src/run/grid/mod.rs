@@ -21,7 +21,7 @@ use jrc_case::Front;
 pub use map::{Agreement, CellOutcome, GridMap, boundary, count, runs};
 pub use parameter::{MapParameter, MapQuantity, PARAMETERS, Point};
 pub use plan::{GridPart, GridPlan};
-pub use robustness::{Perturbation, SPEED_MPS, without_reaction};
+pub use robustness::{GAP_M, Perturbation, SPEED_MPS, VARIED, without_reaction};
 pub use run::{Against, Map, MapGrids, MapOptions, MapResult, MappedGrid};
 
 pub use crate::scenario::{LANE_WIDTH_M, PlainCase};
@@ -227,12 +227,28 @@ impl Grid {
         let mut point = self.panel_point(&self.panels[panel]);
         point.set(self.y.parameter, self.y.values[j]);
         point.set(self.x.parameter, self.x.values[i]);
-        self.perturbation.map_or(point, |perturbation| perturbation.of_speeds(point))
+        self.perturbation.map_or(point, |perturbation| perturbation.of_inputs(point))
     }
 
-    /// The same cells with a perturbed case each.
-    fn perturbed(&self, perturbation: Perturbation) -> Grid {
-        Grid { perturbation: Some(perturbation), ..self.clone() }
+    /// The same cells with a perturbed case each; sizes that the grid does not set are those of the profile.
+    fn perturbed(&self, perturbation: Perturbation, profile: &Profile) -> Grid {
+        let mut grid = Grid { perturbation: Some(perturbation), ..self.clone() };
+        let is_set = |quantity| self.values(0).iter().chain(&self.fixed).any(|(known, _)| known.quantity == quantity);
+        let frame = &profile.frame;
+        for (quantity, size_m) in
+            [(MapQuantity::Length, frame.default_length_m), (MapQuantity::Width, frame.default_width_m)]
+        {
+            let parameter = PARAMETERS.iter().find(|known| known.quantity == quantity);
+            grid.fixed.extend(parameter.filter(|_| !is_set(quantity)).map(|parameter| (parameter, size_m)));
+        }
+        grid
+    }
+
+    /// The perturbations of the cells' inputs.
+    pub fn perturbations(&self) -> Vec<Perturbation> {
+        let mut all = Perturbation::all(self.category);
+        all.retain(|by| self.style == CaseStyle::Plain || !by.is_of_geometry());
+        all
     }
 
     fn panel_point(&self, panel: &[f64]) -> Point {

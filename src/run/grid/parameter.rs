@@ -271,6 +271,20 @@ impl Point {
         self.0[quantity as usize]
     }
 
+    /// The value of a quantity that a case has; one that is not set follows from others: the other vehicle is as fast
+    /// as the ego, all vehicles have one size, a lane change covers one lane.
+    pub(super) fn value(&self, quantity: MapQuantity) -> Option<f64> {
+        self.get(quantity).or_else(|| match quantity {
+            MapQuantity::OtherSpeed => self.get(MapQuantity::EgoSpeed),
+            MapQuantity::EgoLength => self.get(MapQuantity::Length),
+            MapQuantity::EgoWidth => self.get(MapQuantity::Width),
+            MapQuantity::LateralDistance => self.value(MapQuantity::LaneWidth),
+            MapQuantity::LaneWidth => Some(LANE_WIDTH_M),
+            MapQuantity::AheadSpeed => Some(0.0),
+            _ => None,
+        })
+    }
+
     /// The plain case of these values; unset quantities have the defaults of `simulate`.
     ///
     /// # Errors

@@ -97,7 +97,19 @@ impl GridPlan {
     /// # Errors
     /// As [`GridPlan::new`].
     pub fn perturbed(&self, profile: &Profile, perturbation: Perturbation) -> Result<GridPlan> {
-        GridPlan::new(self.grid.perturbed(perturbation), &perturbation.profile(profile)?, &self.models)
+        GridPlan::new(self.grid.perturbed(perturbation, profile), &perturbation.profile(profile)?, &self.models)
+    }
+
+    /// Per cell, whether the vehicle that cuts out drives through the one ahead of it.
+    ///
+    /// # Errors
+    /// As [`Grid::case`].
+    pub fn drives_through(&self) -> Result<Vec<bool>> {
+        let Some(part) = self.parts.first() else { return Ok(Vec::new()) };
+        let profile = &part.plan.profile;
+        (0..self.grid.cell_count())
+            .map(|cell| Ok(self.grid.case(cell, profile)?.drives_through_s(profile).is_some()))
+            .collect()
     }
 
     /// Number of lanes of driver models.

@@ -100,6 +100,8 @@ pub struct MappedGrid {
     pub is_chosen_to_match: bool,
     /// The same grid under another profile, with the profile's name.
     pub other: Option<(String, GridPlan, GridMap)>,
+    /// Cut-outs: per cell, whether the vehicle that cuts out drives through the one ahead of it.
+    pub drives_through: Vec<bool>,
 }
 
 /// Swept maps.
@@ -172,8 +174,8 @@ impl Map {
             };
             let known = |model: &ModelId| if is_published { preset.known(*model) } else { None };
             let perturbed = |plan: &GridPlan, profile: &Profile| {
-                let all = Perturbation::ALL.iter().filter(|_| options.robust);
-                all.map(|by| Ok((*by, plan.perturbed(profile, *by)?))).collect::<Result<Vec<_>>>()
+                let all = plan.grid.perturbations().into_iter().filter(|_| options.robust);
+                all.map(|by| Ok((by, plan.perturbed(profile, by)?))).collect::<Result<Vec<_>>>()
             };
             let plan = GridPlan::new(preset.grid.clone(), profile, &preset.models)?;
             grids.push(PlannedGrid {
@@ -247,7 +249,8 @@ impl Map {
                 }
                 None => None,
             };
-            grids.push(MappedGrid { plan, map, known_percent, is_chosen_to_match, other });
+            let drives_through = plan.drives_through()?;
+            grids.push(MappedGrid { plan, map, known_percent, is_chosen_to_match, other, drives_through });
         }
         Ok(MapResult { grids, summary })
     }
