@@ -1,10 +1,10 @@
 //! A concrete case from the few numbers that a user gives: on the command line, in a file, or in a row of a table.
 
-use serde::Deserialize;
-
+use super::units::{self, Written};
 use super::{Category, LATERAL_DISTANCE_M, PlainCase, check_headway, missing_parameter};
 use crate::model::profile::FrameProfile;
 use crate::support::plausibility::{Doubts, HELP, Quantity};
+use crate::support::table::{NameUnit, Named, Resolved, resolve};
 use crate::{Error, Place, Result};
 
 /// Shortest and longest duration, s: the longest is the time cap of the paper's profile.
@@ -12,8 +12,7 @@ pub(super) const DURATIONS_S: (f64, f64) = (0.1, 120.0);
 
 /// The given values; speeds in m/s, lengths in m, accelerations in m/s², times in s. The names are the flags of
 /// `simulate`.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-#[serde(default)]
+#[derive(Debug, Clone, Default, PartialEq)]
 #[allow(missing_docs)] // see PlainCase
 pub struct CaseParameters {
     pub category: Option<String>,
@@ -32,7 +31,121 @@ pub struct CaseParameters {
     pub duration: Option<f64>,
 }
 
+/// A number of a case: its key, what it measures, and its field. A time span has no plausible range.
+pub(crate) struct CaseNumber {
+    pub key: &'static str,
+    quantity: Option<Quantity>,
+    get: fn(&CaseParameters) -> Option<f64>,
+    field: fn(&mut CaseParameters) -> &mut Option<f64>,
+}
+
+macro_rules! number {
+    ($key:ident, $quantity:expr) => {
+        CaseNumber {
+            key: stringify!($key),
+            quantity: $quantity,
+            get: |case| case.$key,
+            field: |case| &mut case.$key,
+        }
+    };
+}
+
+/// Every number of a case.
+pub(crate) const NUMBERS: [CaseNumber; 13] = [
+    number!(gap, Some(Quantity::Gap)),
+    number!(thw, Some(Quantity::Headway)),
+    number!(ego_speed, Some(Quantity::Speed)),
+    number!(speed, Some(Quantity::Speed)),
+    number!(end_speed, Some(Quantity::Speed)),
+    number!(ahead_speed, Some(Quantity::Speed)),
+    number!(lateral_speed, Some(Quantity::LateralSpeed)),
+    number!(lateral_distance, Some(Quantity::LateralPosition)),
+    number!(acceleration, Some(Quantity::Acceleration)),
+    number!(ahead_gap, Some(Quantity::Gap)),
+    number!(length, Some(Quantity::Length)),
+    number!(width, Some(Quantity::Width)),
+    number!(duration, None),
+];
+
+impl CaseNumber {
+    /// Its SI unit.
+    pub fn unit(&self) -> &'static str {
+        self.quantity.map_or("s", |quantity| quantity.limits().unit)
+    }
+
+    /// The name that users give it. A speed along the road needs a unit; every other quantity has one customary unit.
+    pub fn named(&self) -> Named {
+        Named { name: self.key.to_owned(), unit: self.unit(), needs_unit: self.quantity == Some(Quantity::Speed) }
+    }
+}
+
+/// A number of a case under the name that a user gives it: its key, with or without its unit at the end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NamedNumber {
+    at: usize,
+    unit: NameUnit,
+}
+
+impl NamedNumber {
+    /// Finds the number of a name; `None` if there is none.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a unit that the number cannot have.
+    pub fn find(name: &str) -> Result<Option<NamedNumber>> {
+        match resolve(name, &NUMBERS.map(|number| number.named())) {
+            Resolved::Field(at, unit) => Ok(Some(NamedNumber { at, unit })),
+            Resolved::WrongUnit(problem, help) => Err(Error::usage(Place::item(name), problem, help)),
+            Resolved::Unknown => Ok(None),
+        }
+    }
+
+    /// The number of [`NUMBERS`] at an index, whose name has this unit.
+    pub(crate) fn at(at: usize, unit: NameUnit) -> NamedNumber {
+        NamedNumber { at, unit }
+    }
+
+    /// Its key, without a unit.
+    pub fn key(self) -> &'static str {
+        NUMBERS[self.at].key
+    }
+
+    /// Sets it to a written value.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] at the key: a text that is no such quantity, or a speed without a unit.
+    pub fn set(self, case: &mut CaseParameters, written: Written<'_>) -> Result<()> {
+        let number = &NUMBERS[self.at];
+        let si = units::si(written, number.unit(), self.unit).map_err(|unusable| {
+            let help = unusable.help(number.key);
+            Error::usage(Place::item(number.key), unusable.problem, help)
+        })?;
+        *(number.field)(case) = Some(si);
+        Ok(())
+    }
+
+    /// Names of all numbers, with their units at the end.
+    pub fn names() -> Vec<String> {
+        let ending = |unit| match unit {
+            "m/s" => "mps",
+            "m/s²" => "mps2",
+            other => other,
+        };
+        NUMBERS.iter().map(|number| format!("{}_{}", number.key, ending(number.unit()))).collect()
+    }
+}
+
 impl CaseParameters {
+    /// Values of `self` where given, otherwise those of `other`. A gap replaces a headway, and vice versa.
+    pub fn over(mut self, other: &CaseParameters) -> CaseParameters {
+        let has_start = self.gap.is_some() || self.thw.is_some();
+        for number in NUMBERS.iter().filter(|number| !(has_start && matches!(number.key, "gap" | "thw"))) {
+            let field = (number.field)(&mut self);
+            *field = field.or((number.get)(other));
+        }
+        self.category = self.category.or_else(|| other.category.clone());
+        self
+    }
+
     /// The kind of scenario.
     ///
     /// # Errors
@@ -66,11 +179,11 @@ impl CaseParameters {
     /// # Errors
     /// [`Error::Usage`] for a value outside the physical range, unless such values are accepted.
     pub fn check_plausible(&self, doubts: &mut Doubts) -> Result<()> {
-        for (key, quantity, value) in self.numbers() {
-            let Some(value) = value else { continue };
+        for CaseNumber { key, quantity, get, .. } in &NUMBERS {
+            let (Some(quantity), Some(value)) = (*quantity, get(self)) else { continue };
             doubts
-                .check(quantity, value, || key.to_owned())
-                .map_err(|problem| Error::usage(Place::item(key), problem, HELP))?;
+                .check(quantity, value, || (*key).to_owned())
+                .map_err(|problem| Error::usage(Place::item(*key), problem, HELP))?;
         }
         Ok(())
     }
@@ -98,26 +211,8 @@ impl CaseParameters {
 
     /// Names of the given values.
     pub fn given(&self) -> Vec<&'static str> {
-        let numbers = self.numbers().into_iter().filter_map(|(key, _, value)| value.map(|_| key));
+        let numbers = NUMBERS.iter().filter_map(|number| (number.get)(self).map(|_| number.key));
         self.category.iter().map(|_| "category").chain(numbers).collect()
-    }
-
-    /// Every number that has a range of plausible values.
-    fn numbers(&self) -> [(&'static str, Quantity, Option<f64>); 12] {
-        [
-            ("gap", Quantity::Gap, self.gap),
-            ("thw", Quantity::Headway, self.thw),
-            ("ego_speed", Quantity::Speed, self.ego_speed),
-            ("speed", Quantity::Speed, self.speed),
-            ("end_speed", Quantity::Speed, self.end_speed),
-            ("ahead_speed", Quantity::Speed, self.ahead_speed),
-            ("lateral_speed", Quantity::LateralSpeed, self.lateral_speed),
-            ("lateral_distance", Quantity::LateralPosition, self.lateral_distance),
-            ("acceleration", Quantity::Acceleration, self.acceleration),
-            ("ahead_gap", Quantity::Gap, self.ahead_gap),
-            ("length", Quantity::Length, self.length),
-            ("width", Quantity::Width, self.width),
-        ]
     }
 
     /// Returns the case; vehicles without a given size have the size of the arguments, m.
@@ -127,8 +222,7 @@ impl CaseParameters {
     pub fn plain_case(&self, length_m: f64, width_m: f64) -> Result<PlainCase> {
         let category = self.category()?;
         self.refuse_of_other_categories(category)?;
-        let number =
-            |key: &str| self.numbers().into_iter().find_map(|(known, _, value)| value.filter(|_| known == key));
+        let number = |key: &str| NUMBERS.iter().find(|number| number.key == key).and_then(|number| (number.get)(self));
         if let Some(key) = missing_parameter(category, |key| number(key).is_some()) {
             return Err(missing(key));
         }
@@ -213,7 +307,8 @@ fn missing(key: &str) -> Error {
         "category" => "cut-in, cut-out or lvd",
         "ahead_gap" => "a gap in m",
         "acceleration" => "an acceleration in m/s², below 0 for a leader that brakes,",
-        _ => "a speed in m/s",
+        "lateral_speed" => "a speed in m/s",
+        _ => "a speed with its unit, such as 60km/h,",
     };
     let help = format!("give {what} with option `{key}` or as `{key}` in the file");
     Error::usage(Place::item(key), "it is missing", help)
