@@ -76,7 +76,7 @@ def simulate(
         `thw`, `lateral_speed`, `lateral_distance`, `acceleration`, `end_speed_kmh`, `ahead_speed_kmh`, `ahead_gap`, `length`,
         `width`, `duration`. They mean what the arguments of `trace` mean; a null is a value that is not given. A speed along
         the road has its unit in the column's name or in the value (``"60km/h"``); a bare number other than 0 is refused.
-        Other columns are in m, s, m/s and m/s², and may say so (`gap_m`).
+        Other columns are in m, s, m/s and m/s², and may say so (`gap_m`). A column `id` may name the cases, each by its own.
     category : str, optional
         Kind of all cases, in place of the column.
     models : str, Driver or list of these, optional

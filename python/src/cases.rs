@@ -65,13 +65,32 @@ fn of_column(name: &str, problem: String, help: &str) -> Error {
     Error::input(Place::default().column(name), problem, help)
 }
 
-/// The cases of a batch.
-fn rows_of(batch: &RecordBatch, category: Option<&str>, first_row: u64) -> Result<Vec<CaseParameters>> {
+/// The cases of a batch. `ids` has the row of every id so far.
+fn rows_of(
+    batch: &RecordBatch,
+    category: Option<&str>,
+    first_row: u64,
+    ids: &mut HashMap<String, u64>,
+) -> Result<Vec<CaseParameters>> {
     let blank = CaseParameters { category: category.map(str::to_owned), ..CaseParameters::default() };
     let mut rows = vec![blank; batch.num_rows()];
     let mut seen: HashMap<&str, &str> = HashMap::new();
     for (field, array) in batch.schema_ref().fields().iter().zip(batch.columns()) {
         let name = field.name().as_str();
+        let place = |at: usize| Place::item(format!("row {}", first_row + at as u64)).column(name);
+        if name == "id" {
+            let as_texts = || Some(numbers(array.as_ref())?.into_iter().map(|id| Some(id?.to_string())).collect());
+            let found = texts(array.as_ref()).or_else(as_texts).ok_or_else(|| {
+                of_column(name, format!("holds values of the type {}", array.data_type()), "expected texts or numbers")
+            })?;
+            for (at, id) in found.into_iter().enumerate().filter_map(|(at, id)| Some((at, id?))) {
+                if let Some(first) = ids.insert(id, first_row + at as u64) {
+                    let problem = format!("this id belongs to row {first} too, but every case needs its own id");
+                    return Err(Error::input(place(at), problem, "rename one of the two"));
+                }
+            }
+            continue;
+        }
         if name == "category" && category.is_some() {
             return Err(of_column(name, "the argument `category` is given too".to_owned(), "leave out one of the two"));
         }
@@ -92,13 +111,12 @@ fn rows_of(batch: &RecordBatch, category: Option<&str>, first_row: u64) -> Resul
         });
         let Some(number) = found? else {
             let known = NamedNumber::names().join(", ");
-            let help = format!("leave it out, or use one of category, {known}; speeds also with _kmh");
+            let help = format!("leave it out, or use one of id, category, {known}; speeds also with _kmh");
             return Err(of_column(name, "there is no such column".to_owned(), &help));
         };
         if let Some(other) = seen.insert(number.key(), name) {
             return Err(of_column(name, format!("column `{other}` says the same"), "leave out one of the two"));
         }
-        let place = |at: usize| Place::item(format!("row {}", first_row + at as u64)).column(name);
         let set = |(at, row, written): (usize, &mut CaseParameters, Written<'_>)| {
             number.set(row, written).map_err(|error| match error {
                 Error::Usage { problem, help, .. } => Error::input(place(at), problem, help),
@@ -233,13 +251,13 @@ pub fn simulate(
             let options =
                 options(category, &models, &thw, &profile, dt, &backend, device.as_deref(), accept_implausible)?;
             let mut rows = ArrowRows::new(&case_columns(), HashMap::new());
-            let (mut frames, mut notes, mut first_row) = (Vec::new(), Vec::new(), 0);
+            let (mut frames, mut notes, mut first_row, mut ids) = (Vec::new(), Vec::new(), 0, HashMap::new());
             let pieces = batches.iter().flat_map(|batch| {
                 (0..batch.num_rows().div_ceil(CASES))
                     .map(|k| batch.slice(k * CASES, CASES.min(batch.num_rows() - k * CASES)))
             });
             for piece in pieces {
-                let of_piece = rows_of(&piece, options.category.as_deref(), first_row)?;
+                let of_piece = rows_of(&piece, options.category.as_deref(), first_row, &mut ids)?;
                 notes.extend(missing_speed(&of_piece, first_row));
                 notes.extend(run(of_piece, first_row, &options, &mut rows)?);
                 first_row += piece.num_rows() as u64;

@@ -1,4 +1,4 @@
-//! `lanesweep check`: one concrete case against the regulation.
+//! `lanesweep check`: concrete cases against the regulation.
 
 use std::path::{Path, PathBuf};
 
@@ -27,21 +27,24 @@ use crate::{Error, Place, Result};
 /// Default profiles; the first one decides.
 const PROFILES: [&str; 6] = ["un-r157", "eu-2022-1426", "eu-2022-1426-standing", "jrc-2021", "paper", "paper-fit"];
 
-/// Check one concrete case: do the reference drivers of UN R157 avoid the collision?
+/// Check concrete cases: do the reference drivers of UN R157 avoid the collision?
 ///
-/// The case comes from flags, from a TOML file or a row of a table (keys and columns are the flags' names with `_`;
-/// flags override them), from a scenario of a file, or from an OpenSCENARIO file of `export xosc`. Every model runs
+/// The case comes from flags, from a TOML file or a table (keys and columns are the flags' names with `_`, speeds with
+/// their unit, `ego_speed_kmh`; flags override them), from a scenario of a file, or from an OpenSCENARIO file of `export xosc`. Every model runs
 /// under every profile. The case is preventable if CCHDM or FSM, the drivers of Annex 3, avoids the collision under the
 /// first profile. It has no conflict if nothing collides even when the ego never reacts. It is undecided if one of
 /// these changes the answer: a tenth of the time step, 1 cm of gap, 0.1 km/h of speed. It is outside Annex 3 if the
 /// annex does not describe such a case. The output also has the margins, the clauses, and the distance to another
-/// answer along each parameter. Exit status: 0 preventable, 1 not preventable, 8 undecided, 9 no conflict, 10 outside
+/// answer along each parameter. A table without --row is judged whole under the first profile, with a line per row; its
+/// exit status is that of its worst answer, in the order not preventable, undecided, outside Annex 3, preventable, no
+/// conflict. Exit status: 0 preventable, 1 not preventable, 8 undecided, 9 no conflict, 10 outside
 /// Annex 3, 4 parts of the input were skipped.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  \
                   lanesweep check --category cut-in --ego-speed 60km/h --speed 40km/h --gap 15 --lateral-speed 1.0 \\\n      \
                   --sheet case.html\n  \
+                  lanesweep check cases.csv\n  \
                   lanesweep check cases.csv --row 2\n  \
                   lanesweep check scenarios.jsonl --scenario 01_cut_in_97_91_957 --thw 1.2")]
 pub struct Check {
@@ -134,9 +137,9 @@ impl Check {
     /// The table to be judged with all rows.
     fn whole_table(&self) -> Result<Option<&Path>> {
         let Some(path) = &self.file else { return Ok(None) };
-        let is_table = path.extension().is_some_and(|ending| {
-            ["csv", "parquet"].iter().any(|table| ending.eq_ignore_ascii_case(table))
-        });
+        let is_table = path
+            .extension()
+            .is_some_and(|ending| ["csv", "parquet"].iter().any(|table| ending.eq_ignore_ascii_case(table)));
         if !is_table || self.row.is_some() || self.scenario.is_some() {
             return Ok(None);
         }

@@ -18,8 +18,8 @@ use crate::{Error, Place, Result};
 
 /// Run one concrete scenario and print or draw its time series
 ///
-/// The case comes from flags, from a TOML file, from a row of a table (keys and columns are the flags' names with `_`;
-/// flags override them), or from a finished run or a scenario file with a lane key. The series goes to stdout as CSV,
+/// The case comes from flags, from a TOML file, from a row of a table (keys and columns are the flags' names with `_`,
+/// speeds with their unit, `ego_speed_kmh`; flags override them), or from a finished run or a scenario file with a lane key. The series goes to stdout as CSV,
 /// the outcome to stderr, the figure to --plot. Several models (--models FSM,RSS) or variants (--compare) follow one
 /// another in the CSV and share one figure.
 #[derive(Debug, Args)]

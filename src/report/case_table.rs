@@ -72,7 +72,8 @@ fn note(judgement: &Judgement) -> String {
         (Verdict::OutsideAnnex, Some(reason)) => reason.clone(),
         _ => {
             let of_drivers = judgement.models.iter().filter(|judged| !judged.flips.is_empty());
-            let text = of_drivers.map(|judged| format!("{} changes with {}", judged.trace.model.name(), judged.flips.join(", ")));
+            let text = of_drivers
+                .map(|judged| format!("{} changes with {}", judged.trace.model.name(), judged.flips.join(", ")));
             text.collect::<Vec<_>>().join("; ")
         }
     }

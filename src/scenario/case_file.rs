@@ -40,7 +40,9 @@ impl<'de> Visitor<'de> for Keys {
                 FileKey::Models => file.models = Some(map.next_value()?),
                 FileKey::Number(number, name) => {
                     if let Some((_, other)) = seen.iter().find(|(other, _)| other.key() == number.key()) {
-                        return Err(A::Error::custom(format!("`{name}` says the same as `{other}`: leave out one of the two")));
+                        return Err(A::Error::custom(format!(
+                            "`{name}` says the same as `{other}`: leave out one of the two"
+                        )));
                     }
                     map.next_value_seed(Number(number, &mut file.parameters))?;
                     seen.push((number, name));
@@ -71,8 +73,11 @@ impl<'de> DeserializeSeed<'de> for Key {
             (_, Ok(Some(number))) => Ok(FileKey::Number(number, name)),
             (_, Err(error)) => Err(custom(&error)),
             (_, Ok(None)) => {
-                let known: Vec<String> =
-                    ["category", "models"].into_iter().chain(NUMBERS.iter().map(|number| number.key)).map(|key| format!("`{key}`")).collect();
+                let known: Vec<String> = ["category", "models"]
+                    .into_iter()
+                    .chain(NUMBERS.iter().map(|number| number.key))
+                    .map(|key| format!("`{key}`"))
+                    .collect();
                 Err(D::Error::custom(format!("unknown field `{name}`, expected one of {}", known.join(", "))))
             }
         }

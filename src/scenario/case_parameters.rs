@@ -41,12 +41,7 @@ pub(crate) struct CaseNumber {
 
 macro_rules! number {
     ($key:ident, $quantity:expr) => {
-        CaseNumber {
-            key: stringify!($key),
-            quantity: $quantity,
-            get: |case| case.$key,
-            field: |case| &mut case.$key,
-        }
+        CaseNumber { key: stringify!($key), quantity: $quantity, get: |case| case.$key, field: |case| &mut case.$key }
     };
 }
 

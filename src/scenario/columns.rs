@@ -4,8 +4,8 @@
 use serde_json::{Map, Value};
 
 use super::Category;
-use super::units::{Unusable, Written, si};
 use super::schema::{Content, FIELDS, Field, Presence};
+use super::units::{Unusable, Written, si};
 use crate::support::error::{Error, Result};
 use crate::support::table::{Column, ColumnKind, NameUnit, Named, Resolved, TableReader, nearest, resolve};
 
@@ -53,7 +53,8 @@ pub(super) fn leaves() -> Vec<Leaf> {
 
 /// All column names: the leaves, then alternative names; each with its leaf and whether the value may change.
 pub(super) fn names(leaves: &[Leaf]) -> Vec<(Named, usize, bool)> {
-    let named = |name: &str, at: usize, needs_unit| Named { name: name.to_owned(), unit: leaves[at].field.unit, needs_unit };
+    let named =
+        |name: &str, at: usize, needs_unit| Named { name: name.to_owned(), unit: leaves[at].field.unit, needs_unit };
     let own = leaves.iter().enumerate().map(|(at, leaf)| (named(&leaf.flat, at, false), at, false));
     // The program's own names are in m/s; other names do not say so.
     let other = OTHER_NAMES.iter().filter_map(|(name, of, may_change)| {

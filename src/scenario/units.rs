@@ -161,14 +161,24 @@ mod tests {
 
     #[test]
     fn a_quantity_with_one_customary_unit_needs_none_and_takes_no_other() {
-        for (number, unit, si_value) in
-            [("12", "m", 12.0), ("12m", "m", 12.0), ("1.2 s", "s", 1.2), ("-5m/s2", "m/s²", -5.0), ("25 Hz", "Hz", 25.0)]
-        {
+        for (number, unit, si_value) in [
+            ("12", "m", 12.0),
+            ("12m", "m", 12.0),
+            ("1.2 s", "s", 1.2),
+            ("-5m/s2", "m/s²", -5.0),
+            ("25 Hz", "Hz", 25.0),
+        ] {
             assert_eq!(text(number, unit, NameUnit::Customary), Ok(si_value), "{number}");
         }
-        for (number, unit) in
-            [("12km", "m"), ("1200ms", "s"), ("12s", "m"), ("-5km/h", "m/s²"), ("60m", "m/s"), ("inf", "m"), ("1,2", "s")]
-        {
+        for (number, unit) in [
+            ("12km", "m"),
+            ("1200ms", "s"),
+            ("12s", "m"),
+            ("-5km/h", "m/s²"),
+            ("60m", "m/s"),
+            ("inf", "m"),
+            ("1,2", "s"),
+        ] {
             assert!(text(number, unit, NameUnit::Customary).is_err(), "{number}");
         }
         let gravity = text("-0.6g", "m/s²", NameUnit::Customary).unwrap_err();

@@ -40,7 +40,8 @@ const CUT_IN: [&str; 12] = [
 fn exported(dir: &Path) -> String {
     let out = dir.join("xosc");
     let export = ["-q", "export", "xosc", "--models", "FSM", "--ego", "external", "--out"];
-    let case = ["--category", "cut-in", "--ego-speed", "30m/s", "--speed", "20m/s", "--gap", "36", "--lateral-speed", "1"];
+    let case =
+        ["--category", "cut-in", "--ego-speed", "30m/s", "--speed", "20m/s", "--gap", "36", "--lateral-speed", "1"];
     let (code, _, error) = check(&[&export[..], &[text(&out)], &case].concat());
     assert_eq!(code, 0, "{error}");
     let mut files = std::fs::read_dir(out).unwrap().map(|entry| entry.unwrap().path());
@@ -56,8 +57,11 @@ fn flags_a_toml_file_a_row_and_an_openscenario_file_are_the_same_case() {
         "category = \"cut-in\"\nego_speed_kmh = 108\nspeed = \"20m/s\"\ngap = 36.0\nlateral_speed = 1.0\n",
     )
     .unwrap();
-    std::fs::write(of("cases.csv"), "category,ego_speed_mps,speed,gap,lateral_speed\ncut-in,9,9km/h,9,1\ncut-in,30,72km/h,36m,1\n")
-        .unwrap();
+    std::fs::write(
+        of("cases.csv"),
+        "category,ego_speed_mps,speed,gap,lateral_speed\ncut-in,9,9km/h,9,1\ncut-in,30,72km/h,36m,1\n",
+    )
+    .unwrap();
     let file = of("exported.xosc");
     std::fs::write(&file, exported(dir.path())).unwrap();
     let flags = json(&[&["check"], &CUT_IN[..]].concat());
@@ -208,7 +212,10 @@ fn a_speed_without_a_unit_that_reads_as_kmh_is_refused_with_both_readings() {
         (code, out, said)
     };
     let (code, _, said) = run("check --category cut-in --ego-speed 60 --speed 45km/h --gap 12 --lateral-speed 1");
-    assert!(code == 2 && said.contains("as m/s it is 216 km/h, as km/h 16.67 m/s") && said.contains("60km/h or 60m/s"), "{said}");
+    assert!(
+        code == 2 && said.contains("as m/s it is 216 km/h, as km/h 16.67 m/s") && said.contains("60km/h or 60m/s"),
+        "{said}"
+    );
     let (code, _, said) = run("check --category lvd --ego-speed 60km/h --thw 1 --acceleration -6g");
     assert!(code == 2 && said.contains("-58.84m/s2") && said.contains("-6m/s2"), "{said}");
     let (_, plain, _) = run(

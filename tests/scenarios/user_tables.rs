@@ -140,7 +140,8 @@ fn what_is_wrong_with_a_row_per_instant_is_told_with_line_scenario_and_column() 
     assert!(of("s.csv", "").is_err() && of("s.csv", "id,category\n").is_err());
 }
 
-const CASES: &str = "id,category,models,ego_speed_kmh,speed_mps,thw,gap,lateral_speed,acceleration,end_speed,ahead_gap,\
+const CASES: &str =
+    "id,category,models,ego_speed_kmh,speed_mps,thw,gap,lateral_speed,acceleration,end_speed,ahead_gap,\
 ahead_speed_kmh,duration_s,rate_hz
 a,cut-in,FSM,108,20,1.2,,1.0,,,,,,
 ,lvd,RSS,108,30,,30,,-6,0,,,,10
@@ -533,7 +534,10 @@ fn flags_that_no_road_has_are_refused_with_the_likely_unit_unless_accepted() {
     let cut_in = "simulate --category cut-in --models FSM --lateral-speed 1 --thw 1.2 --speed 20m/s --ego-speed";
     let simulate = |more: &str| said(dir.path(), &format!("{cut_in} {more}").split(' ').collect::<Vec<_>>());
     let (code, text) = simulate("108");
-    assert!(code == 2 && text.contains("108 has no unit: as m/s it is 388.8 km/h, as km/h 30 m/s; write 108km/h or 108m/s"), "{text}");
+    assert!(
+        code == 2 && text.contains("108 has no unit: as m/s it is 388.8 km/h, as km/h 30 m/s; write 108km/h or 108m/s"),
+        "{text}"
+    );
     let (code, text) = simulate("108m/s");
     assert!(
         code == 2 && text.contains("108 looks like km/h: 30 m/s") && text.contains("--accept-implausible"),
