@@ -1100,7 +1100,7 @@ def check(
     never reacts. It is undecided if one of these changes the answer: a tenth of the time step, 1 cm of gap, 0.1
     km/h of speed. It is outside Annex 3 if the annex does not describe such a case. The output also has the
     margins, the clauses, and the distance to another answer along each parameter. A table without --row is judged
-    whole under the first profile, with a line per row; its exit status is that of its worst answer, in the order
+    whole, under one profile, with a line per row; its exit status is that of its worst answer, in the order
     not preventable, undecided, outside Annex 3, preventable, no conflict. Exit status: 0 preventable, 1 not
     preventable, 8 undecided, 9 no conflict, 10 outside Annex 3, 4 parts of the input were skipped.
 

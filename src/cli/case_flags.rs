@@ -1,6 +1,6 @@
 //! Concrete cases from flags, a TOML file or a table.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::path::Path;
 
 use clap::Args;
@@ -220,15 +220,15 @@ pub(super) struct CaseTable {
     row: usize,
     /// Where each id was first.
     lines: HashMap<String, u64>,
-    /// Ids that occurred more than once.
-    doubled: HashSet<String>,
+    /// Where each id of several rows was last.
+    doubled: HashMap<String, u64>,
 }
 
 impl CaseTable {
     pub(super) fn open(path: &Path) -> Result<CaseTable> {
         let format = TableFormat::of(path, &[TableFormat::Csv, TableFormat::Parquet], "--table")?;
         let rows = ParameterRows::new(TableReader::open(path, format)?)?;
-        Ok(CaseTable { rows, row: 0, lines: HashMap::new(), doubled: HashSet::new() })
+        Ok(CaseTable { rows, row: 0, lines: HashMap::new(), doubled: HashMap::new() })
     }
 
     /// Number of the last row, from 1 after the header.
@@ -236,9 +236,15 @@ impl CaseTable {
         self.row
     }
 
-    /// Whether several rows have this id: it is unknown which one is meant.
-    pub(super) fn is_doubled(&self, id: &str) -> bool {
-        self.doubled.contains(id)
+    /// The error for the first row of an id that several rows have: it is unknown which one is meant.
+    pub(super) fn refused_later(&self, id: &str) -> Option<Error> {
+        let (first, next) = (self.lines.get(id)?, self.doubled.get(id)?);
+        Some(self.rows.row_place(*first).locate(self.doubled_with(*next)))
+    }
+
+    fn doubled_with(&self, line: u64) -> Error {
+        let problem = format!("this id belongs to {} {line} too, but every case needs its own id", self.rows.word());
+        Error::usage(Place::item("id"), problem, "rename one of the two: neither is used")
     }
 
     /// The next row, or its error, which names file, line and column.
@@ -247,14 +253,10 @@ impl CaseTable {
         self.row += 1;
         let row = row.and_then(|CaseRow { id, models, parameters, .. }| {
             let given = GivenCase { parameters, models, id, row: Some(self.rows.row_place(line)) };
-            let first = given.id.as_ref().and_then(|id| Some((id, *self.lines.get(id)?)));
-            let refused = first.map(|(id, first)| {
-                self.doubled.insert(id.clone());
-                let problem =
-                    format!("this id belongs to {} {first} too, but every case needs its own id", self.rows.word());
-                Err(Error::usage(Place::item("id"), problem, "rename one of the two: neither is used"))
-            });
-            given.located(refused.unwrap_or(Ok(())))?;
+            if let Some((id, first)) = given.id.as_ref().and_then(|id| Some((id, *self.lines.get(id)?))) {
+                self.doubled.insert(id.clone(), line);
+                given.located(Err(self.doubled_with(first)))?;
+            }
             self.lines.extend(given.id.clone().map(|id| (id, line)));
             Ok(given)
         });

@@ -35,7 +35,7 @@ const PROFILES: [&str; 6] = ["un-r157", "eu-2022-1426", "eu-2022-1426-standing",
 /// first profile. It has no conflict if nothing collides even when the ego never reacts. It is undecided if one of
 /// these changes the answer: a tenth of the time step, 1 cm of gap, 0.1 km/h of speed. It is outside Annex 3 if the
 /// annex does not describe such a case. The output also has the margins, the clauses, and the distance to another
-/// answer along each parameter. A table without --row is judged whole under the first profile, with a line per row; its
+/// answer along each parameter. A table without --row is judged whole, under one profile, with a line per row; its
 /// exit status is that of its worst answer, in the order not preventable, undecided, outside Annex 3, preventable, no
 /// conflict. Exit status: 0 preventable, 1 not preventable, 8 undecided, 9 no conflict, 10 outside
 /// Annex 3, 4 parts of the input were skipped.
@@ -137,14 +137,23 @@ impl Check {
     /// The table to be judged with all rows.
     fn whole_table(&self) -> Result<Option<&Path>> {
         let Some(path) = &self.file else { return Ok(None) };
-        let is_table = path
-            .extension()
-            .is_some_and(|ending| ["csv", "parquet"].iter().any(|table| ending.eq_ignore_ascii_case(table)));
+        let is_table = ["csv", "parquet"]
+            .iter()
+            .any(|table| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(table)));
         if !is_table || self.row.is_some() || self.scenario.is_some() {
             return Ok(None);
         }
-        let of_one = [("--sheet", &self.sheet), ("--animation", &self.animation), ("--series", &self.series)];
-        match of_one.iter().find(|(_, path)| path.is_some()) {
+        let of_one = [
+            ("--sheet", self.sheet.is_some()),
+            ("--animation", self.animation.is_some()),
+            ("--series", self.series.is_some()),
+            ("--profiles", self.profiles.len() > 1),
+        ];
+        match of_one.iter().find(|(_, is_given)| *is_given) {
+            Some(("--profiles", _)) => {
+                let problem = format!("{} is judged with all its rows, under one profile", path.display());
+                Err(Error::usage(Place::item("--profiles"), problem, "name one profile, or choose a row: --row N"))
+            }
             Some((flag, _)) => {
                 let problem = format!("it shows one case, and {} is judged with all its rows", path.display());
                 Err(Error::usage(Place::item(*flag), problem, "choose a row: --row N, from 1 after the header"))
@@ -184,7 +193,12 @@ impl Check {
             }
             CANCEL.check()?;
         }
-        cases.retain(|case: &CaseAnswer| !case.id().is_some_and(|id| table.is_doubled(id)));
+        cases.retain(|case: &CaseAnswer| {
+            let refused = case.id().and_then(|id| table.refused_later(id));
+            let is_used = refused.is_none();
+            broken.extend(refused);
+            is_used
+        });
         doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
         complain_of(&broken, &[]);
         if cases.is_empty() {

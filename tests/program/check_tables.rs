@@ -203,12 +203,13 @@ fn a_row_that_cannot_be_judged_is_named_and_the_others_are_judged() {
 fn of_two_rows_with_one_id_neither_is_used_in_any_path() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    let far = "away,cut-in,108,72,40,1";
-    file(dir, "cases.csv", &format!("{HEADER}{}\n{}\n{far}\n", ROWS[2].0, ROWS[1].0));
+    let again = "away,cut-in,108,72,40,1";
+    file(dir, "cases.csv", &format!("{HEADER}{}\n{}\n{again}\n", ROWS[2].0, ROWS[1].0));
     let said = "cases.csv, line 4, column `id`: this id belongs to line 2 too";
     let (code, out, error) = run(dir, &["check", "cases.csv"]);
     assert!(code == 4 && error.contains(said), "{error}");
-    assert!(out.contains("1 case under un-r157: 1 preventable;") && !out.contains("away"), "{out}");
+    assert!(out.contains("1 case under un-r157: 1 preventable; 2 rows cannot be judged"), "{out}");
+    assert!(!out.contains("away") && error.contains("line 2, column `id`: this id belongs to line 4 too"), "{error}");
     for args in [&["check", "cases.csv", "--row", "3"][..], &["simulate", "--table", "cases.csv", "--row", "3"]] {
         let (code, _, error) = run(dir, args);
         assert!(code == 3 && error.contains(said), "{args:?}: {error}");
@@ -228,6 +229,8 @@ fn what_shows_one_case_asks_for_a_row_of_a_table_with_several() {
         let (code, _, error) = run(dir, &[&["check", "cases.csv", "--row", "2"], &flag[..]].concat());
         assert!(code == 0 && dir.join(flag[1]).exists(), "{error}");
     }
+    let (code, _, error) = run(dir, &["check", "cases.csv", "--profiles", "un-r157,paper"]);
+    assert!(code == 2 && error.contains("under one profile"), "{error}");
     let (code, _, error) = run(dir, &["simulate", "--table", "cases.csv"]);
     assert!(code == 2 && error.contains("the table has several cases") && error.contains("--row N"), "{error}");
 }
