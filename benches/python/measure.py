@@ -60,8 +60,8 @@ def cases(count: int = 10**6) -> None:
     rng = np.random.default_rng(1)
     table = pd.DataFrame({
         "category": "cut-in",
-        "ego_speed": rng.uniform(15, 40, count),
-        "speed": rng.uniform(10, 35, count),
+        "ego_speed_mps": rng.uniform(15, 40, count),
+        "speed_mps": rng.uniform(10, 35, count),
         "gap": rng.uniform(2, 80, count),
         "lateral_speed": rng.uniform(0.3, 2.5, count),
         "duration": 8.0,
@@ -109,8 +109,8 @@ def driver() -> None:
     count = 200_000
     rng = np.random.default_rng(1)
     table = {
-        "ego_speed": rng.uniform(15, 40, count),
-        "speed": rng.uniform(10, 35, count),
+        "ego_speed_mps": rng.uniform(15, 40, count),
+        "speed_mps": rng.uniform(10, 35, count),
         "gap": rng.uniform(2, 80, count),
         "lateral_speed": rng.uniform(0.3, 2.5, count),
     }
@@ -126,7 +126,7 @@ def driver() -> None:
     start = time.perf_counter()
     steps = 0
     for k in range(sample):
-        v, u, gap, w = (table[key][k] for key in ("ego_speed", "speed", "gap", "lateral_speed"))
+        v, u, gap, w = (table[key][k] for key in ("ego_speed_mps", "speed_mps", "gap", "lateral_speed"))
         y, delay = 3.5, 9
         for _ in range(3000):
             steps += 1

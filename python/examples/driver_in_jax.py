@@ -50,8 +50,8 @@ def main() -> None:
     """Compare it with two built-in drivers on cut-ins."""
     rng = np.random.default_rng(1)
     cases = {
-        "ego_speed": rng.uniform(20, 35, 2000),
-        "speed": rng.uniform(15, 30, 2000),
+        "ego_speed_mps": rng.uniform(20, 35, 2000),
+        "speed_mps": rng.uniform(15, 30, 2000),
         "gap": rng.uniform(5, 60, 2000),
         "lateral_speed": rng.uniform(0.5, 2.0, 2000),
     }

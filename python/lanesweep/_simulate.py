@@ -31,8 +31,10 @@ def _column(name: str, values: Any) -> Any:
         return array.astype(np.float64)
     items = [None if value is None or type(value).__name__ == "NAType" else value for value in array.reshape(-1).tolist()]
     if any(isinstance(value, str) for value in items) or array.dtype.kind in "cmM":
-        if not all(value is None or isinstance(value, str) for value in items):
-            raise _core.InputError(f"column `{name}` holds {array.dtype}; expected numbers, or texts for `category`")
+        if not all(value is None or isinstance(value, (str, int, float)) for value in items):
+            raise _core.InputError(f"column `{name}` holds {array.dtype}; expected numbers, or texts such as 60km/h")
+        # NaN beside texts is a value that is not given; a number beside texts may need no unit.
+        items = [None if value != value else repr(value) if isinstance(value, (int, float)) else value for value in items]
         return np.array(items, dtype=object).reshape(array.shape)
     try:
         return np.array([np.nan if value is None else float(value) for value in items]).reshape(array.shape)
@@ -70,10 +72,11 @@ def simulate(
     ----------
     cases : table
         One case per row: a DataFrame of pandas or Polars, a pyarrow table, anything with the Arrow interface, or a mapping
-        of columns. Columns, with or without their unit: `category` (cut-in, cut-out, lvd), `ego_speed_mps`, `speed_mps`,
-        `gap_m` or `thw_s`, `lateral_speed_mps`, `lateral_distance_m`, `acceleration_mps2`, `end_speed_mps`,
-        `ahead_speed_mps`, `ahead_gap_m`, `length_m`, `width_m`, `duration_s`; speeds also as `_kmh`. They mean what the arguments of `trace` mean;
-        a null is a value that is not given.
+        of columns. Columns: `category` (cut-in, cut-out, lvd), `ego_speed_kmh` or `ego_speed_mps`, `speed_kmh`, `gap` or
+        `thw`, `lateral_speed`, `lateral_distance`, `acceleration`, `end_speed_kmh`, `ahead_speed_kmh`, `ahead_gap`, `length`,
+        `width`, `ego_length`, `ego_width`, `lane_width`, `duration`. They mean what the arguments of `trace` mean; a null is a value that is not given. A speed along
+        the road has its unit in the column's name or in the value (``"60km/h"``); a bare number other than 0 is refused.
+        Other columns are in m, s, m/s and m/s², and may say so (`gap_m`). A column `id` may name the cases, each by its own.
     category : str, optional
         Kind of all cases, in place of the column.
     models : str, Driver or list of these, optional

@@ -1091,33 +1091,35 @@ def check(
     config: Values | None = None,
     threads: Value | None = None,
 ) -> Result:
-    """Check one concrete case: do the reference drivers of UN R157 avoid the collision?
+    """Check concrete cases: do the reference drivers of UN R157 avoid the collision?
 
-    The case comes from flags, from a TOML file or a row of a table (keys and columns are the flags' names with `_`;
-    flags override them), from a scenario of a file, or from an OpenSCENARIO file of `export xosc`. Every model runs
-    under every profile. The case is preventable if CCHDM or FSM, the drivers of Annex 3, avoids the collision under
-    the first profile. It has no conflict if nothing collides even when the ego never reacts. It is undecided if one
-    of these changes the answer: a tenth of the time step, 1 cm of gap, 0.1 km/h of speed. It is outside Annex 3 if
-    the annex does not describe such a case. The output also has the margins, the clauses, and the distance to
-    another answer along each parameter. Exit status: 0 preventable, 1 not preventable, 8 undecided, 9 no conflict,
-    10 outside Annex 3, 4 parts of the input were skipped.
+    The case comes from flags, from a TOML file or a table (keys and columns are the flags' names with `_`, speeds
+    with their unit, `ego_speed_kmh`; flags override them), from a scenario of a file, or from an OpenSCENARIO file
+    of `export xosc`. Every model runs under every profile. The case is preventable if CCHDM or FSM, the drivers of
+    Annex 3, avoids the collision under the first profile. It has no conflict if nothing collides even when the ego
+    never reacts. It is undecided if one of these changes the answer: a tenth of the time step, 1 cm of gap, 0.1
+    km/h of speed. It is outside Annex 3 if the annex does not describe such a case. The output also has the
+    margins, the clauses, and the distance to another answer along each parameter. A table without --row is judged
+    whole, under one profile, with a line per row; its exit status is that of its worst answer, in the order
+    not preventable, undecided, outside Annex 3, preventable, no conflict. Exit status: 0 preventable, 1 not
+    preventable, 8 undecided, 9 no conflict, 10 outside Annex 3, 4 parts of the input were skipped.
 
     Parameters
     ----------
     file : Value
         TOML file, table (.csv, .parquet), scenario file (.jsonl) or OpenSCENARIO file (.xosc) with the case.
-    row : Value, default 1
-        Row of a table, from 1 after the header.
+    row : Value
+        Row of a table, from 1 after the header [default: all rows].
     scenario : Value
         Scenario of a scenario file, by its id. It starts with its observed gap, or with --gap or --thw.
     accept_implausible : bool
         Use physically impossible values (a speed of 108 m/s) with a warning.
     category : Value
         Kind of scenario: cut-in, cut-out, lvd.
-    ego_speed : Value, m/s
-        Initial speed of the ego.
-    speed : Value, m/s
-        Initial speed of the other vehicle [default: the ego's].
+    ego_speed : Value
+        Initial speed of the ego, with its unit: 60km/h.
+    speed : Value
+        Initial speed of the other vehicle, with its unit [default: the ego's].
     gap : Value, m
         Initial gap, bumper to bumper.
     thw : Value, s
@@ -1130,10 +1132,10 @@ def check(
         Cut-out: gap between the two, bumper to bumper.
     lateral_distance : Value, m
         Cut-in: lateral distance at the start; cut-out: at the end [default: 3.5].
-    end_speed : Value, m/s
-        Speed at which the acceleration ends [default: standstill, or never].
-    ahead_speed : Value, m/s
-        Cut-out: speed of the vehicle ahead of the cutting-out one [default: 0].
+    end_speed : Value
+        Speed at which the acceleration ends, with its unit [default: standstill, or never].
+    ahead_speed : Value
+        Cut-out: speed of the vehicle ahead of the cutting-out one, with its unit [default: 0].
     length : Value, m
         Length of every vehicle [default: the profile's].
     width : Value, m
@@ -1223,9 +1225,9 @@ def trace(
     """Run one concrete scenario and print or draw its time series
 
     The case comes from flags, from a TOML file, from a row of a table (keys and columns are the flags' names with
-    `_`; flags override them), or from a finished run or a scenario file with a lane key. The series goes to stdout
-    as CSV, the outcome to stderr, the figure to --plot. Several models (--models FSM,RSS) or variants (--compare)
-    follow one another in the CSV and share one figure.
+    `_`, speeds with their unit, `ego_speed_kmh`; flags override them), or from a finished run or a scenario file
+    with a lane key. The series goes to stdout as CSV, the outcome to stderr, the figure to --plot. Several models
+    (--models FSM,RSS) or variants (--compare) follow one another in the CSV and share one figure.
 
     Parameters
     ----------
@@ -1233,8 +1235,8 @@ def trace(
         TOML file with the case.
     table : Value
         Table (.csv, .parquet) with one case per row.
-    row : Value, default 1
-        Row of the table, from 1 after the header.
+    row : Value
+        Row of the table, from 1 after the header; needed if it has several.
     scenarios : Value
         Scenario file (.jsonl, .parquet, .csv) for --lane.
     from_ : Value
@@ -1246,10 +1248,10 @@ def trace(
         Use physically impossible values (a speed of 108 m/s) with a warning.
     category : Value
         Kind of scenario: cut-in, cut-out, lvd.
-    ego_speed : Value, m/s
-        Initial speed of the ego.
-    speed : Value, m/s
-        Initial speed of the other vehicle [default: the ego's].
+    ego_speed : Value
+        Initial speed of the ego, with its unit: 60km/h.
+    speed : Value
+        Initial speed of the other vehicle, with its unit [default: the ego's].
     gap : Value, m
         Initial gap, bumper to bumper.
     thw : Value, s
@@ -1265,10 +1267,10 @@ def trace(
         value), keys of parameterizations, or all.
     lateral_distance : Value, m
         Cut-in: lateral distance at the start; cut-out: at the end [default: 3.5].
-    end_speed : Value, m/s
-        Speed at which the acceleration ends [default: standstill, or never].
-    ahead_speed : Value, m/s
-        Cut-out: speed of the vehicle ahead of the cutting-out one [default: 0].
+    end_speed : Value
+        Speed at which the acceleration ends, with its unit [default: standstill, or never].
+    ahead_speed : Value
+        Cut-out: speed of the vehicle ahead of the cutting-out one, with its unit [default: 0].
     length : Value, m
         Length of every vehicle [default: the profile's].
     width : Value, m
@@ -1385,10 +1387,10 @@ def export_xosc(
         Use physically impossible values (a speed of 108 m/s) with a warning.
     category : Value
         Kind of scenario: cut-in, cut-out, lvd.
-    ego_speed : Value, m/s
-        Initial speed of the ego.
-    speed : Value, m/s
-        Initial speed of the other vehicle [default: the ego's].
+    ego_speed : Value
+        Initial speed of the ego, with its unit: 60km/h.
+    speed : Value
+        Initial speed of the other vehicle, with its unit [default: the ego's].
     gap : Value, m
         Initial gap, bumper to bumper.
     thw : Value, s
@@ -1404,10 +1406,10 @@ def export_xosc(
         One of model, external.
     lateral_distance : Value, m
         Cut-in: lateral distance at the start; cut-out: at the end [default: 3.5].
-    end_speed : Value, m/s
-        Speed at which the acceleration ends [default: standstill, or never].
-    ahead_speed : Value, m/s
-        Cut-out: speed of the vehicle ahead of the cutting-out one [default: 0].
+    end_speed : Value
+        Speed at which the acceleration ends, with its unit [default: standstill, or never].
+    ahead_speed : Value
+        Cut-out: speed of the vehicle ahead of the cutting-out one, with its unit [default: 0].
     length : Value, m
         Length of every vehicle [default: the profile's].
     width : Value, m

@@ -14,7 +14,7 @@ use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::report::lanes::{case_columns, case_row};
 use lanesweep::run::cases::Cases;
-use lanesweep::scenario::CaseParameters;
+use lanesweep::scenario::{CaseParameters, NamedNumber, Written};
 use lanesweep::support::plausibility::Implausible;
 use lanesweep::support::table::ArrowRows;
 use lanesweep::{Error, Place, Result};
@@ -26,26 +26,6 @@ use crate::verb::watched;
 
 /// Cases that are planned and run together: memory does not grow with the table beyond its result.
 const CASES: usize = 1 << 16;
-
-/// Kilometres per hour, for each metre per second.
-const KMH: f64 = 3.6;
-
-/// Columns of numbers, with their unit as an optional ending; speeds also have `_kmh`.
-const NUMBERS: [(&str, &str); 13] = [
-    ("ego_speed", "_mps"),
-    ("speed", "_mps"),
-    ("gap", "_m"),
-    ("thw", "_s"),
-    ("lateral_speed", "_mps"),
-    ("lateral_distance", "_m"),
-    ("acceleration", "_mps2"),
-    ("end_speed", "_mps"),
-    ("ahead_speed", "_mps"),
-    ("ahead_gap", "_m"),
-    ("length", "_m"),
-    ("width", "_m"),
-    ("duration", "_s"),
-];
 
 /// A column of a batch as numbers; null and NaN are missing values.
 fn numbers(array: &dyn Array) -> Option<Vec<Option<f64>>> {
@@ -85,16 +65,32 @@ fn of_column(name: &str, problem: String, help: &str) -> Error {
     Error::input(Place::default().column(name), problem, help)
 }
 
-/// The cases of a batch.
-fn rows_of(batch: &RecordBatch, category: Option<&str>, first_row: u64) -> Result<Vec<CaseParameters>> {
+/// The cases of a batch. `ids` has the row of every id so far.
+fn rows_of(
+    batch: &RecordBatch,
+    category: Option<&str>,
+    first_row: u64,
+    ids: &mut HashMap<String, u64>,
+) -> Result<Vec<CaseParameters>> {
     let blank = CaseParameters { category: category.map(str::to_owned), ..CaseParameters::default() };
     let mut rows = vec![blank; batch.num_rows()];
     let mut seen: HashMap<&str, &str> = HashMap::new();
     for (field, array) in batch.schema_ref().fields().iter().zip(batch.columns()) {
         let name = field.name().as_str();
-        let is_kmh = |key: &str, unit: &str| unit == "_mps" && name.strip_prefix(key) == Some("_kmh");
-        let is =
-            |(key, unit): &&(&str, &str)| name == *key || name.strip_prefix(key) == Some(unit) || is_kmh(key, unit);
+        let place = |at: usize| Place::item(format!("row {}", first_row + at as u64)).column(name);
+        if name == "id" {
+            let as_texts = || Some(numbers(array.as_ref())?.into_iter().map(|id| Some(id?.to_string())).collect());
+            let found = texts(array.as_ref()).or_else(as_texts).ok_or_else(|| {
+                of_column(name, format!("holds values of the type {}", array.data_type()), "expected texts or numbers")
+            })?;
+            for (at, id) in found.into_iter().enumerate().filter_map(|(at, id)| Some((at, id?))) {
+                if let Some(first) = ids.insert(id, first_row + at as u64) {
+                    let problem = format!("this id belongs to row {first} too, but every case needs its own id");
+                    return Err(Error::input(place(at), problem, "rename one of the two"));
+                }
+            }
+            continue;
+        }
         if name == "category" && category.is_some() {
             return Err(of_column(name, "the argument `category` is given too".to_owned(), "leave out one of the two"));
         }
@@ -109,42 +105,42 @@ fn rows_of(batch: &RecordBatch, category: Option<&str>, first_row: u64) -> Resul
             rows.iter_mut().zip(found).for_each(|(row, text)| row.category = text);
             continue;
         }
-        let Some((key, unit)) = NUMBERS.iter().find(is) else {
-            let known = NUMBERS.map(|(key, unit)| format!("{key}{unit}")).join(", ");
-            let help = format!("leave it out, or use one of category, {known}; units may be left out");
+        let found = NamedNumber::find(name).map_err(|error| match error {
+            Error::Usage { problem, help, .. } => of_column(name, problem, &help),
+            other => other,
+        });
+        let Some(number) = found? else {
+            let known = NamedNumber::names().join(", ");
+            let help = format!("leave it out, or use one of id, category, {known}; speeds also with _kmh");
             return Err(of_column(name, "there is no such column".to_owned(), &help));
         };
-        if let Some(other) = seen.insert(key, name) {
+        if let Some(other) = seen.insert(number.key(), name) {
             return Err(of_column(name, format!("column `{other}` says the same"), "leave out one of the two"));
         }
-        let values = numbers(array.as_ref()).ok_or_else(|| {
-            of_column(name, format!("holds values of the type {}", array.data_type()), "expected numbers")
-        })?;
-        for (at, (row, value)) in rows.iter_mut().zip(values).enumerate() {
-            if value.is_some_and(|value| !value.is_finite()) {
-                let place = Place::item(format!("row {}", first_row + at as u64)).column(name);
-                let problem = format!("{} is no number", value.unwrap_or(f64::NAN));
-                return Err(Error::input(
-                    place,
-                    problem,
-                    "give a finite number, or null for a value that is not given",
-                ));
+        let set = |(at, row, written): (usize, &mut CaseParameters, Written<'_>)| {
+            number.set(row, written).map_err(|error| match error {
+                Error::Usage { problem, help, .. } => Error::input(place(at), problem, help),
+                other => other,
+            })
+        };
+        if let Some(values) = numbers(array.as_ref()) {
+            for (at, (row, value)) in rows.iter_mut().zip(values).enumerate() {
+                match value {
+                    Some(value) if !value.is_finite() => {
+                        let help = "give a finite number, or null for a value that is not given";
+                        return Err(Error::input(place(at), format!("{value} is no number"), help));
+                    }
+                    Some(value) => set((at, row, Written::Number(value)))?,
+                    None => {}
+                }
             }
-            *match *key {
-                "ego_speed" => &mut row.ego_speed,
-                "speed" => &mut row.speed,
-                "gap" => &mut row.gap,
-                "thw" => &mut row.thw,
-                "lateral_speed" => &mut row.lateral_speed,
-                "lateral_distance" => &mut row.lateral_distance,
-                "acceleration" => &mut row.acceleration,
-                "end_speed" => &mut row.end_speed,
-                "ahead_speed" => &mut row.ahead_speed,
-                "ahead_gap" => &mut row.ahead_gap,
-                "length" => &mut row.length,
-                "width" => &mut row.width,
-                _ => &mut row.duration,
-            } = value.map(|value| if is_kmh(key, unit) { value / KMH } else { value });
+        } else if let Some(values) = texts(array.as_ref()) {
+            for (at, (row, text)) in rows.iter_mut().zip(values).enumerate() {
+                text.map_or(Ok(()), |text| set((at, row, Written::Text(&text))))?;
+            }
+        } else {
+            let problem = format!("holds values of the type {}", array.data_type());
+            return Err(of_column(name, problem, "expected numbers, or texts with units"));
         }
     }
     Ok(rows)
@@ -255,13 +251,13 @@ pub fn simulate(
             let options =
                 options(category, &models, &thw, &profile, dt, &backend, device.as_deref(), accept_implausible)?;
             let mut rows = ArrowRows::new(&case_columns(), HashMap::new());
-            let (mut frames, mut notes, mut first_row) = (Vec::new(), Vec::new(), 0);
+            let (mut frames, mut notes, mut first_row, mut ids) = (Vec::new(), Vec::new(), 0, HashMap::new());
             let pieces = batches.iter().flat_map(|batch| {
                 (0..batch.num_rows().div_ceil(CASES))
                     .map(|k| batch.slice(k * CASES, CASES.min(batch.num_rows() - k * CASES)))
             });
             for piece in pieces {
-                let of_piece = rows_of(&piece, options.category.as_deref(), first_row)?;
+                let of_piece = rows_of(&piece, options.category.as_deref(), first_row, &mut ids)?;
                 notes.extend(missing_speed(&of_piece, first_row));
                 notes.extend(run(of_piece, first_row, &options, &mut rows)?);
                 first_row += piece.num_rows() as u64;

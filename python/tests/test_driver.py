@@ -18,8 +18,8 @@ from lanesweep.drivers import IDM, Reg157
 FIXED = {"set": {"ego_speed_kmh": 90, "lateral_speed_mps": 1.0}}
 
 CASES = {
-    "ego_speed": np.linspace(15, 40, 200),
-    "speed": np.linspace(10, 30, 200),
+    "ego_speed_mps": np.linspace(15, 40, 200),
+    "speed_mps": np.linspace(10, 30, 200),
     "gap": np.tile([5.0, 15.0, 30.0, 60.0], 50),
     "lateral_speed": np.tile([0.5, 1.0, 1.5, 2.0, 2.5], 40),
 }

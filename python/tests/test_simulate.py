@@ -22,6 +22,33 @@ CASES = {
 }
 
 
+def test_a_speed_has_its_unit_in_the_name_or_in_the_value_or_is_refused() -> None:
+    options = {"category": "cut-in", "models": "FSM"}
+    named = {"ego_speed_kmh": [60.0, 90.0], "speed_kmh": [40, 0], "gap": [15, 40], "lateral_speed": 1.0}
+    written = {"ego_speed": ["60km/h", "25m/s"], "speed": ["40 km/h", 0], "gap": ["15m", "40"], "lateral_speed": "1m/s"}
+    assert lanesweep.simulate(named, **options).rows() == lanesweep.simulate(written, **options).rows()
+    for bare in ([60.0, 90.0], [0, 60], ["60", "90"]):
+        with pytest.raises(lanesweep.InputError, match="60 has no unit: as m/s it is 216 km/h, as km/h 16.67 m/s") as raised:
+            lanesweep.simulate({"ego_speed": bare, "speed_kmh": 40, "gap": 15, "lateral_speed": 1}, **options)
+        assert "ego_speed_kmh" in raised.value.help and "row" in str(raised.value)
+    with pytest.raises(lanesweep.InputError, match="says the same"):
+        lanesweep.simulate({**named, "speed_mps": 11.0}, **options)
+    for column, wrong in (("gap", "15km"), ("speed", "40m"), ("lateral_speed", "fast")):
+        with pytest.raises(lanesweep.InputError, match=f"{column}.*{wrong}"):
+            others = {key: values for key, values in named.items() if not key.startswith(column)}
+            lanesweep.simulate({**others, column: wrong}, **options)
+    with pytest.raises(lanesweep.UsageError, match="60 has no unit"):
+        lanesweep.check(category="cut-in", ego_speed=60, speed="40km/h", gap=15, lateral_speed=1)
+
+
+def test_every_case_has_its_own_id() -> None:
+    cases = {"ego_speed_kmh": 90.0, "gap": [15.0, 40.0], "acceleration": -5}
+    assert len(lanesweep.simulate({**cases, "id": ["a", "b"]}, category="lvd", models="FSM").rows()) == 2
+    for ids in (["a", "a"], [7, 7]):
+        with pytest.raises(lanesweep.InputError, match="row 1.*this id belongs to row 0 too|id.*row 0 too"):
+            lanesweep.simulate({**cases, "id": ids}, category="lvd", models="FSM")
+
+
 def test_every_library_of_tables_gives_the_same_outcomes() -> None:
     tables = [CASES, pd.DataFrame(CASES), pl.DataFrame(CASES), pa.table(CASES), {k: np.array(v) for k, v in CASES.items()}]
     frames = [lanesweep.simulate(table, category="cut-in").to_pandas() for table in tables]
@@ -34,7 +61,8 @@ def test_a_row_is_the_case_that_trace_runs() -> None:
     frame = lanesweep.simulate(CASES, category="cut-in", models="FSM")
     for row in frame.rows():
         at = row["case"]
-        case = {key.rsplit("_", 1)[0]: values[at] for key, values in CASES.items()}
+        with_unit = {"mps": "{}m/s", "m": "{}m"}
+        case = {key.rsplit("_", 1)[0]: with_unit[key.rsplit("_", 1)[1]].format(values[at]) for key, values in CASES.items()}
         traced = lanesweep.trace(category="cut-in", models="FSM", **case).document["lanes"][0]
         outcome = traced.get("outcome", traced)
         assert outcome["collision"] == row["collision"]
@@ -45,8 +73,8 @@ def test_a_row_is_the_case_that_trace_runs() -> None:
 def test_headways_for_all_cases_and_mixed_categories_keep_the_order() -> None:
     table = {
         "category": ["lvd", "cut-in", "lvd"],
-        "ego_speed": [30, 30, 20],
-        "speed": [30, 20, 20],
+        "ego_speed_mps": [30, 30, 20],
+        "speed_mps": [30, 20, 20],
         "lateral_speed": [None, 1.0, None],
         "acceleration": [-6.0, None, -6.0],
     }
@@ -60,8 +88,8 @@ def test_cases_of_any_number_are_those_of_their_parts() -> None:
     rng = np.random.default_rng(1)
     n = 70_000
     table = {
-        "ego_speed": rng.uniform(10, 40, n),
-        "speed": rng.uniform(5, 35, n),
+        "ego_speed_mps": rng.uniform(10, 40, n),
+        "speed_mps": rng.uniform(5, 35, n),
         "gap": rng.uniform(2, 60, n),
         "lateral_speed": rng.uniform(0.3, 2.5, n),
     }
@@ -131,22 +159,22 @@ def test_a_child_of_a_process_that_has_simulated_simulates_too() -> None:
 
 def test_kilometres_per_hour_and_speeds_that_are_not_given() -> None:
     kmh = {"ego_speed_kmh": [108.0, 90.0], "speed_kmh": [72.0, 72.0], "gap": [12, 40], "lateral_speed": [1.0, 1.5]}
-    mps = {"ego_speed": [30.0, 25.0], "speed": [20.0, 20.0], "gap": [12, 40], "lateral_speed": [1.0, 1.5]}
+    mps = {"ego_speed_mps": [30.0, 25.0], "speed_mps": [20.0, 20.0], "gap": [12, 40], "lateral_speed": [1.0, 1.5]}
     ours, theirs = (lanesweep.simulate(table, category="cut-in", models="FSM").to_pandas() for table in (kmh, mps))
     pd.testing.assert_frame_equal(ours, theirs)
     with pytest.warns(UserWarning, match="speed.*row 1.*the ego's speed"):
-        lanesweep.simulate(pd.DataFrame(mps).assign(speed=[20.0, None]), category="cut-in", models="FSM")
+        lanesweep.simulate(pd.DataFrame(mps).assign(speed_mps=[20.0, None]), category="cut-in", models="FSM")
 
 
 def test_what_is_no_table_is_refused() -> None:
     with pytest.raises(TypeError, match="no table"):
         lanesweep.simulate([1, 2, 3])
     with pytest.raises(lanesweep.InputError, match="no rows"):
-        lanesweep.simulate(pd.DataFrame({"ego_speed": pd.Series([], dtype=float)}), category="cut-in", thw=1)
+        lanesweep.simulate(pd.DataFrame({"ego_speed_mps": pd.Series([], dtype=float)}), category="cut-in", thw=1)
     with pytest.raises(lanesweep.InputError, match="initial distance is missing"):
-        lanesweep.simulate({"ego_speed": 30, "speed": 20, "lateral_speed": 1}, category="cut-in")
+        lanesweep.simulate({"ego_speed_mps": 30, "speed_mps": 20, "lateral_speed": 1}, category="cut-in")
     for thw in ("soon", -1, float("nan"), float("inf"), "observed"):
         with pytest.raises(lanesweep.UsageError, match="no headway"):
-            lanesweep.simulate({"ego_speed": 30, "lateral_speed": 1}, category="cut-in", thw=thw)
+            lanesweep.simulate({"ego_speed_mps": 30, "lateral_speed": 1}, category="cut-in", thw=thw)
     with pytest.raises(lanesweep.UsageError, match="no profile|profile"):
-        lanesweep.simulate({"ego_speed": 30, "lateral_speed": 1}, category="cut-in", thw=1, profile="none-such")
+        lanesweep.simulate({"ego_speed_mps": 30, "lateral_speed": 1}, category="cut-in", thw=1, profile="none-such")

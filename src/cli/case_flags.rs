@@ -1,35 +1,33 @@
-//! A concrete case from flags, a TOML file or a row of a table.
+//! Concrete cases from flags, a TOML file or a table.
 
+use std::collections::HashMap;
 use std::path::Path;
 
 use clap::Args;
-use serde::Deserialize;
 
 use crate::engine::Headway;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::reopen::TracedCase;
-use crate::scenario::{CaseParameters, ParameterRows, PlainCase, RowPlace};
+use crate::scenario::{CaseFile, CaseParameters, CaseRow, ParameterRows, PlainCase, RowPlace, Written, si};
 use crate::support::input_file;
 use crate::support::plausibility::{Doubts, Implausible};
-use crate::support::readable::value;
-use crate::support::table::{TableFormat, TableReader};
+use crate::support::table::{NameUnit, TableFormat, TableReader};
 use crate::{Error, Place, Result};
 
-/// A case in words. Speeds in m/s, lengths in m, accelerations in m/s², times in s.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize, Args)]
-#[serde(deny_unknown_fields, default)]
+/// A case in flags. Speeds in m/s, lengths in m, accelerations in m/s², times in s.
+#[derive(Debug, Clone, Args)]
 pub(super) struct CaseFlags {
     /// Kind of scenario: cut-in, cut-out, lvd
     #[arg(long, value_name = "NAME", help_heading = "Scenario")]
     category: Option<String>,
     #[arg(long, value_name = "LIST", help = super::lists::models_help(), help_heading = "Models and criteria")]
     models: Option<String>,
-    /// Initial speed of the ego
-    #[arg(long, value_name = "m/s", value_parser = speed_mps, help_heading = "Scenario")]
+    /// Initial speed of the ego, with its unit: 60km/h
+    #[arg(long, value_name = "km/h|m/s", value_parser = speed_mps, help_heading = "Scenario")]
     ego_speed: Option<f64>,
-    /// Initial speed of the other vehicle [default: the ego's]
-    #[arg(long, value_name = "m/s", value_parser = speed_mps, help_heading = "Scenario")]
+    /// Initial speed of the other vehicle, with its unit [default: the ego's]
+    #[arg(long, value_name = "km/h|m/s", value_parser = speed_mps, help_heading = "Scenario")]
     speed: Option<f64>,
     /// Initial gap, bumper to bumper
     #[arg(long, value_name = "m", value_parser = length_m, conflicts_with = "thw", help_heading = "Scenario")]
@@ -38,19 +36,19 @@ pub(super) struct CaseFlags {
     #[arg(long, value_name = "s", value_parser = time_s, help_heading = "Scenario")]
     thw: Option<f64>,
     /// Cut-in, cut-out: lateral speed
-    #[arg(long, value_name = "m/s", value_parser = speed_mps, help_heading = "Scenario")]
+    #[arg(long, value_name = "m/s", value_parser = lateral_speed_mps, help_heading = "Scenario")]
     lateral_speed: Option<f64>,
-    /// Cut-in: lateral distance at the start; cut-out: at the end [default: 3.5]
+    /// Cut-in: lateral distance at the start; cut-out: at the end [default: the lane's width]
     #[arg(long, value_name = "m", value_parser = length_m, help_heading = "Scenario", hide_short_help = true)]
     lateral_distance: Option<f64>,
     /// Acceleration of the other vehicle; an LVD needs one [default: 0]
     #[arg(long, value_name = "m/s²", value_parser = acceleration_mps2, allow_hyphen_values = true, help_heading = "Scenario")]
     acceleration: Option<f64>,
-    /// Speed at which the acceleration ends [default: standstill, or never]
-    #[arg(long, value_name = "m/s", value_parser = speed_mps, help_heading = "Scenario", hide_short_help = true)]
+    /// Speed at which the acceleration ends, with its unit [default: standstill, or never]
+    #[arg(long, value_name = "km/h|m/s", value_parser = speed_mps, help_heading = "Scenario", hide_short_help = true)]
     end_speed: Option<f64>,
-    /// Cut-out: speed of the vehicle ahead of the cutting-out one [default: 0]
-    #[arg(long, value_name = "m/s", value_parser = speed_mps, help_heading = "Scenario", hide_short_help = true)]
+    /// Cut-out: speed of the vehicle ahead of the cutting-out one, with its unit [default: 0]
+    #[arg(long, value_name = "km/h|m/s", value_parser = speed_mps, help_heading = "Scenario", hide_short_help = true)]
     ahead_speed: Option<f64>,
     /// Cut-out: gap between the two, bumper to bumper
     #[arg(long, value_name = "m", value_parser = length_m, help_heading = "Scenario")]
@@ -61,106 +59,59 @@ pub(super) struct CaseFlags {
     /// Width of every vehicle [default: the profile's]
     #[arg(long, value_name = "m", value_parser = length_m, help_heading = "Scenario", hide_short_help = true)]
     width: Option<f64>,
-    /// Only in files: time after which the other vehicles keep their speed and lateral position, s.
-    #[arg(skip)]
-    duration: Option<f64>,
-    /// The place of a table's values.
-    #[arg(skip)]
-    #[serde(skip)]
+    /// Length of the ego [default: that of every vehicle]
+    #[arg(long, value_name = "m", value_parser = length_m, help_heading = "Scenario", hide_short_help = true)]
+    ego_length: Option<f64>,
+    /// Width of the ego [default: that of every vehicle]
+    #[arg(long, value_name = "m", value_parser = length_m, help_heading = "Scenario", hide_short_help = true)]
+    ego_width: Option<f64>,
+    /// Cut-in, cut-out: width of the lanes [default: 3.5]
+    #[arg(long, value_name = "m", value_parser = length_m, help_heading = "Scenario", hide_short_help = true)]
+    lane_width: Option<f64>,
+}
+
+/// A case as it is given: flags over a file or a row of a table.
+#[derive(Debug, Default)]
+pub(super) struct GivenCase {
+    parameters: CaseParameters,
+    models: Option<String>,
+    /// Its key in a table.
+    pub id: Option<String>,
+    /// The place of a row's values.
     row: Option<RowPlace>,
 }
 
 impl CaseFlags {
-    /// Values of `self` where given, otherwise those of `other`.
-    pub(super) fn over(&self, other: CaseFlags) -> CaseFlags {
-        // A gap on the command line replaces a headway of the file, and vice versa.
-        let (gap, thw) = match (self.gap, self.thw) {
-            (None, None) => (other.gap, other.thw),
-            typed => typed,
-        };
-        CaseFlags {
-            category: self.category.clone().or(other.category),
-            models: self.models.clone().or(other.models),
-            ego_speed: self.ego_speed.or(other.ego_speed),
-            speed: self.speed.or(other.speed),
-            gap,
-            thw,
-            lateral_speed: self.lateral_speed.or(other.lateral_speed),
-            lateral_distance: self.lateral_distance.or(other.lateral_distance),
-            acceleration: self.acceleration.or(other.acceleration),
-            end_speed: self.end_speed.or(other.end_speed),
-            ahead_speed: self.ahead_speed.or(other.ahead_speed),
-            ahead_gap: self.ahead_gap.or(other.ahead_gap),
-            length: self.length.or(other.length),
-            width: self.width.or(other.width),
-            duration: other.duration,
-            row: other.row.map(|row| row.without(&self.parameters().given())),
+    /// Values of `self` where given, otherwise those of a file.
+    pub(super) fn over(&self, file: GivenCase) -> GivenCase {
+        let flags = self.parameters();
+        GivenCase {
+            row: file.row.map(|row| row.without(&flags.given())),
+            models: self.models.clone().or(file.models),
+            id: file.id,
+            parameters: flags.over(&file.parameters),
         }
-    }
-
-    /// Adds the place of a table's value to its error.
-    fn located<T>(&self, result: Result<T>) -> Result<T> {
-        result.map_err(|error| match &self.row {
-            Some(row) => row.locate(error),
-            None => error,
-        })
     }
 
     /// Whether it gives any value of the case.
     pub(super) fn says_a_case(&self) -> bool {
-        CaseFlags { models: None, row: None, ..self.clone() } != CaseFlags::default()
+        self.parameters() != CaseParameters::default()
     }
 
-    /// Whether it gives the ego's start.
-    pub(super) fn says_a_start(&self) -> bool {
-        self.gap.is_some() || self.thw.is_some()
+    /// The initial distance, if given.
+    pub(super) fn start(&self) -> Result<Option<Headway>> {
+        let is_given = self.gap.is_some() || self.thw.is_some();
+        if is_given { self.over(GivenCase::default()).headway().map(Some) } else { Ok(None) }
     }
 
     /// Whether it gives a value of the case other than the ego's start.
     pub(super) fn says_more_than_a_start(&self) -> bool {
-        CaseFlags { gap: None, thw: None, ..self.clone() }.says_a_case()
+        CaseParameters { gap: None, thw: None, ..self.parameters() } != CaseParameters::default()
     }
 
     /// The named models; `None` if none is named.
     pub(super) fn named_models(&self) -> Result<Option<Vec<ModelId>>> {
-        self.models.as_ref().map(|_| self.models()).transpose()
-    }
-
-    /// The named models in the given order; all if none is named.
-    fn models(&self) -> Result<Vec<ModelId>> {
-        let names = self.models.iter().flat_map(|list| list.split(','));
-        self.located(super::lists::models(names, "models"))
-    }
-
-    pub(super) fn headway(&self) -> Result<Headway> {
-        let parameters = self.parameters();
-        self.located(parameters.check_start())?;
-        parameters.gap.map(Headway::GapM).or(parameters.thw.map(Headway::ThwS)).ok_or_else(|| {
-            Error::usage(
-                Place::item("gap, thw"),
-                "the initial distance is missing",
-                "give --gap in metres or --thw in seconds",
-            )
-        })
-    }
-
-    /// Runs the case with each of its models; warns about doubtful values.
-    pub(super) fn traced(&self, profile: &Profile, implausible: Implausible) -> Result<TracedCase> {
-        let case = self.located(self.plain_case(profile, implausible)?.case(profile.frame.time_cap_s))?;
-        TracedCase::run(&case, self.headway()?, profile, &self.models()?)
-    }
-
-    /// The numbers of the case; warns about doubtful values.
-    pub(super) fn plain_case(&self, profile: &Profile, implausible: Implausible) -> Result<PlainCase> {
-        self.located(self.checked(profile, implausible))
-    }
-
-    fn checked(&self, profile: &Profile, implausible: Implausible) -> Result<PlainCase> {
-        let mut doubts = Doubts::new(implausible);
-        let plain = self.parameters().checked_case(&profile.frame, &mut doubts)?;
-        self.headway()?;
-        doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
-        Ok(plain)
+        self.models.as_ref().map(|list| super::lists::models(list.split(','), "models")).transpose()
     }
 
     fn parameters(&self) -> CaseParameters {
@@ -178,88 +129,165 @@ impl CaseFlags {
             ahead_gap: self.ahead_gap,
             length: self.length,
             width: self.width,
-            duration: self.duration,
+            ego_length: self.ego_length,
+            ego_width: self.ego_width,
+            lane_width: self.lane_width,
+            // Only files have it.
+            duration: None,
         }
     }
 }
 
-/// A unit, and its number per SI unit.
-type Unit = (&'static str, f64);
+impl GivenCase {
+    /// Whether it gives any value of the case.
+    pub(super) fn says_a_case(&self) -> bool {
+        self.parameters != CaseParameters::default()
+    }
 
-/// Units of a speed.
-const SPEEDS: [Unit; 6] =
-    [("km/h", 3.6), ("kmh", 3.6), ("kph", 3.6), ("mph", 1.0 / 0.44704), ("m/s", 1.0), ("mps", 1.0)];
-/// Units of an acceleration.
-const ACCELERATIONS: [Unit; 4] = [("m/s2", 1.0), ("m/s²", 1.0), ("m/s^2", 1.0), ("mps2", 1.0)];
+    /// The named models in the given order; all if none is named.
+    fn models(&self) -> Result<Vec<ModelId>> {
+        let names = self.models.iter().flat_map(|list| list.split(','));
+        self.located(super::lists::models(names, "models"))
+    }
 
-/// A speed above this needs a unit, m/s: it is 162 km/h, or 45 km/h without its unit.
-const UNITLESS_MPS: f64 = 45.0;
+    /// Adds the place of a table's value to its error.
+    pub(super) fn located<T>(&self, result: Result<T>) -> Result<T> {
+        result.map_err(|error| match &self.row {
+            Some(row) => row.locate(error),
+            None => error,
+        })
+    }
 
-/// A number in SI units, and whether it has a unit.
-fn si(text: &str, units: &[Unit]) -> Option<(f64, bool)> {
-    let text = text.trim();
-    let with_unit = units.iter().find_map(|(unit, per_si)| Some((text.strip_suffix(unit)?, *per_si)));
-    let (number, per_si) = with_unit.unwrap_or((text, 1.0));
-    let value = number.trim_end().parse::<f64>().ok().filter(|value| value.is_finite())?;
-    Some((value / per_si, with_unit.is_some()))
-}
+    pub(super) fn headway(&self) -> Result<Headway> {
+        let CaseParameters { gap, thw, .. } = self.parameters;
+        self.located(self.parameters.check_start())?;
+        let start = gap.map(Headway::GapM).or(thw.map(Headway::ThwS));
+        self.located(start.ok_or_else(|| {
+            let help = "give option `gap` in metres or option `thw` in seconds";
+            Error::usage(Place::item("gap, thw"), "the initial distance is missing", help)
+        }))
+    }
 
-/// A speed in m/s, from a number (m/s) or a number with its unit: `16.7`, `60km/h`, `37 mph`.
-///
-/// # Errors
-/// What to write, if the text is not a speed, or if a number without a unit is too high for a car in m/s.
-fn speed_mps(text: &str) -> std::result::Result<f64, String> {
-    match si(text, &SPEEDS) {
-        Some((speed, false)) if speed > UNITLESS_MPS => Err(format!(
-            "{speed} has no unit: as m/s it is {} km/h; write {speed}km/h or {speed}m/s",
-            value(speed * 3.6)
-        )),
-        Some((speed, _)) => Ok(speed),
-        None => Err("write a speed such as 16.7, 60km/h or 37mph".to_owned()),
+    /// Runs the case with each of its models; warns about doubtful values.
+    pub(super) fn traced(&self, profile: &Profile, implausible: Implausible) -> Result<TracedCase> {
+        let mut doubts = Doubts::new(implausible);
+        let plain = self.plain_case(profile, &mut doubts)?;
+        doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
+        let case = self.located(plain.case(profile.frame.time_cap_s))?;
+        TracedCase::run(&case, self.headway()?, profile, &self.models()?)
+    }
+
+    /// The numbers of the case.
+    pub(super) fn plain_case(&self, profile: &Profile, doubts: &mut Doubts) -> Result<PlainCase> {
+        let plain = self.located(self.parameters.clone().checked_case(&profile.frame, doubts))?;
+        self.headway()?;
+        Ok(plain)
     }
 }
 
-/// A length in m: `12`, `12m`.
-fn length_m(text: &str) -> std::result::Result<f64, String> {
-    let found = si(text, &[("m", 1.0)]).map(|(length, _)| length);
-    found.ok_or_else(|| "write a length in metres, such as 12 or 12m".to_owned())
+type Parsed = std::result::Result<f64, String>;
+
+fn parse(text: &str, unit: &str, name: NameUnit) -> Parsed {
+    si(Written::Text(text), unit, name).map_err(|unusable| match unusable.lacks_unit {
+        true => format!("{}; write {}", unusable.problem, unusable.write),
+        false => format!("write {}", unusable.write),
+    })
 }
 
-/// A time in s: `1.2`, `1.2s`.
-fn time_s(text: &str) -> std::result::Result<f64, String> {
-    let found = si(text, &[("s", 1.0)]).map(|(time, _)| time);
-    found.ok_or_else(|| "write a time in seconds, such as 1.2 or 1.2s".to_owned())
+/// A speed along the road with its unit: `60km/h`, `37 mph`, `16.7m/s`.
+fn speed_mps(text: &str) -> Parsed {
+    parse(text, "m/s", NameUnit::Needed)
 }
 
-/// An acceleration in m/s²: `-5`, `-5m/s2`. Multiples of g are refused with their value: -6g often means -6 m/s².
-fn acceleration_mps2(text: &str) -> std::result::Result<f64, String> {
-    const G_MPS2: f64 = 9.80665;
-    if let Some((g, true)) = si(text, &[("g", 1.0)]) {
-        return Err(format!("write m/s²: {}m/s2 if {g} g is meant, {g}m/s2 otherwise", value(g * G_MPS2)));
+/// A speed across the road: `1.2`, `1.2m/s`.
+fn lateral_speed_mps(text: &str) -> Parsed {
+    parse(text, "m/s", NameUnit::Customary)
+}
+
+/// A length: `12`, `12m`.
+pub(super) fn length_m(text: &str) -> Parsed {
+    parse(text, "m", NameUnit::Customary)
+}
+
+/// A time: `1.2`, `1.2s`.
+pub(super) fn time_s(text: &str) -> Parsed {
+    parse(text, "s", NameUnit::Customary)
+}
+
+/// An acceleration: `-5`, `-5m/s2`.
+fn acceleration_mps2(text: &str) -> Parsed {
+    parse(text, "m/s²", NameUnit::Customary)
+}
+
+/// Reads a case from a TOML file.
+pub(super) fn from_toml(path: &Path) -> Result<GivenCase> {
+    let help = "the keys are the flags of `simulate --help` with `_`";
+    let CaseFile { models, parameters } = input_file::read_toml(path, help)?;
+    Ok(GivenCase { parameters, models, ..GivenCase::default() })
+}
+
+/// A CSV or Parquet table of cases.
+pub(super) struct CaseTable {
+    rows: ParameterRows,
+    row: usize,
+    /// Where each id was first.
+    lines: HashMap<String, u64>,
+    /// Where each id of several rows was last.
+    doubled: HashMap<String, u64>,
+}
+
+impl CaseTable {
+    pub(super) fn open(path: &Path) -> Result<CaseTable> {
+        let format = TableFormat::of(path, &[TableFormat::Csv, TableFormat::Parquet], "--table")?;
+        let rows = ParameterRows::new(TableReader::open(path, format)?)?;
+        Ok(CaseTable { rows, row: 0, lines: HashMap::new(), doubled: HashMap::new() })
     }
-    let found = si(text, &ACCELERATIONS).map(|(acceleration, _)| acceleration);
-    found.ok_or_else(|| "write an acceleration in m/s², such as -5 or -5m/s2".to_owned())
-}
 
-/// Reads the flags from a TOML file.
-pub(super) fn from_toml(path: &Path) -> Result<CaseFlags> {
-    input_file::read_toml(path, "the keys are the flags of `simulate --help` with `_`")
-}
-
-/// Reads the flags from a row of a CSV or Parquet table; rows count from 1 after the header.
-pub(super) fn from_table(path: &Path, row: usize) -> Result<CaseFlags> {
-    let format = TableFormat::of(path, &[TableFormat::Csv, TableFormat::Parquet], "--table")?;
-    let mut rows = ParameterRows::new(TableReader::open(path, format)?)?;
-    let missing =
-        || Error::usage(Place::file(path), format!("there is no row {row}"), "rows count from 1 after the header");
-    for _ in 1..row {
-        drop(rows.next_row()?.ok_or_else(missing)?);
+    /// Number of the last row, from 1 after the header.
+    pub(super) fn row(&self) -> usize {
+        self.row
     }
-    let (line, found) = if row == 0 { None } else { rows.next_row()? }.ok_or_else(missing)?;
-    let mut found = found?;
-    // Only tables of scenarios use these: a single run has no key and no samples.
-    ["id", "rate"].iter().for_each(|key| drop(found.remove(*key)));
-    let flags: CaseFlags = serde_json::from_value(serde_json::Value::Object(found))
-        .map_err(|e| Error::Internal(format!("{}, row {row}: {e}", path.display())))?;
-    Ok(CaseFlags { row: Some(rows.row_place(line)), ..flags })
+
+    /// The error for the first row of an id that several rows have: it is unknown which one is meant.
+    pub(super) fn refused_later(&self, id: &str) -> Option<Error> {
+        let (first, next) = (self.lines.get(id)?, self.doubled.get(id)?);
+        Some(self.rows.row_place(*first).locate(self.doubled_with(*next)))
+    }
+
+    fn doubled_with(&self, line: u64) -> Error {
+        let problem = format!("this id belongs to {} {line} too, but every case needs its own id", self.rows.word());
+        Error::usage(Place::item("id"), problem, "rename one of the two: neither is used")
+    }
+
+    /// The next row, or its error, which names file, line and column.
+    pub(super) fn next(&mut self) -> Result<Option<Result<GivenCase>>> {
+        let Some((line, row)) = self.rows.next_row()? else { return Ok(None) };
+        self.row += 1;
+        let row = row.and_then(|CaseRow { id, models, parameters, .. }| {
+            let given = GivenCase { parameters, models, id, row: Some(self.rows.row_place(line)) };
+            if let Some((id, first)) = given.id.as_ref().and_then(|id| Some((id, *self.lines.get(id)?))) {
+                self.doubled.insert(id.clone(), line);
+                given.located(Err(self.doubled_with(first)))?;
+            }
+            self.lines.extend(given.id.clone().map(|id| (id, line)));
+            Ok(given)
+        });
+        Ok(Some(row))
+    }
+}
+
+/// Reads a case from a row of a table; rows count from 1 after the header. Without a number the table has one row.
+pub(super) fn from_table(path: &Path, row: Option<usize>) -> Result<GivenCase> {
+    let mut table = CaseTable::open(path)?;
+    let (wanted, help) = (row.unwrap_or(1), "rows count from 1 after the header");
+    let missing = || Error::usage(Place::file(path), format!("there is no row {wanted}"), help);
+    for _ in 1..wanted {
+        drop(table.next()?.ok_or_else(missing)?);
+    }
+    let found = if wanted == 0 { None } else { table.next()? }.ok_or_else(missing)??;
+    if row.is_none() && table.next()?.is_some() {
+        let help = "name one: --row N, from 1 after the header";
+        return Err(Error::usage(Place::file(path), "the table has several cases", help));
+    }
+    Ok(found)
 }

@@ -1,52 +1,59 @@
-//! `lanesweep check`: one concrete case against the regulation.
+//! `lanesweep check`: concrete cases against the regulation.
 
 use std::path::{Path, PathBuf};
 
 use clap::Args;
+use rayon::prelude::*;
 
 use super::Exit;
-use super::case_flags::{CaseFlags, from_table, from_toml};
+use super::case_flags::{CaseFlags, CaseTable, GivenCase, from_table, from_toml};
 use super::configured::Configured;
 use super::console;
 use super::format::FormatFlag;
-use super::source::{PlausibilityFlag, refuse_overwriting, scenarios_of};
+use super::signals::CANCEL;
+use super::source::{PlausibilityFlag, complain_of, refuse_overwriting, scenarios_of};
 use crate::interop::openscenario::read_scenario;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::report::case_sheet::CaseSheet;
+use crate::report::case_table::{CaseAnswer, CaseTable as Answers};
 use crate::report::trace::{self, TracePanels};
 use crate::run::check::{Answer, Check as Checked, Subject, Verdict};
 use crate::scenario::{Category, Scenario};
 use crate::support::files::{make_folder_of, write_atomically};
+use crate::support::plausibility::Doubts;
 use crate::{Error, Place, Result};
 
 /// Default profiles; the first one decides.
 const PROFILES: [&str; 6] = ["un-r157", "eu-2022-1426", "eu-2022-1426-standing", "jrc-2021", "paper", "paper-fit"];
 
-/// Check one concrete case: do the reference drivers of UN R157 avoid the collision?
+/// Check concrete cases: do the reference drivers of UN R157 avoid the collision?
 ///
-/// The case comes from flags, from a TOML file or a row of a table (keys and columns are the flags' names with `_`;
-/// flags override them), from a scenario of a file, or from an OpenSCENARIO file of `export xosc`. Every model runs
+/// The case comes from flags, from a TOML file or a table (keys and columns are the flags' names with `_`, speeds with
+/// their unit, `ego_speed_kmh`; flags override them), from a scenario of a file, or from an OpenSCENARIO file of `export xosc`. Every model runs
 /// under every profile. The case is preventable if CCHDM or FSM, the drivers of Annex 3, avoids the collision under the
 /// first profile. It has no conflict if nothing collides even when the ego never reacts. It is undecided if one of
 /// these changes the answer: a tenth of the time step, 1 cm of gap, 0.1 km/h of speed. It is outside Annex 3 if the
 /// annex does not describe such a case. The output also has the margins, the clauses, and the distance to another
-/// answer along each parameter. Exit status: 0 preventable, 1 not preventable, 8 undecided, 9 no conflict, 10 outside
+/// answer along each parameter. A table without --row is judged whole, under one profile, with a line per row; its
+/// exit status is that of its worst answer, in the order not preventable, undecided, outside Annex 3, preventable, no
+/// conflict. Exit status: 0 preventable, 1 not preventable, 8 undecided, 9 no conflict, 10 outside
 /// Annex 3, 4 parts of the input were skipped.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  \
                   lanesweep check --category cut-in --ego-speed 60km/h --speed 40km/h --gap 15 --lateral-speed 1.0 \\\n      \
                   --sheet case.html\n  \
+                  lanesweep check cases.csv\n  \
                   lanesweep check cases.csv --row 2\n  \
                   lanesweep check scenarios.jsonl --scenario 01_cut_in_97_91_957 --thw 1.2")]
 pub struct Check {
     /// TOML file, table (.csv, .parquet), scenario file (.jsonl) or OpenSCENARIO file (.xosc) with the case
     #[arg(value_name = "FILE", help_heading = "Data")]
     file: Option<PathBuf>,
-    /// Row of a table, from 1 after the header
-    #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Data")]
-    row: usize,
+    /// Row of a table, from 1 after the header [default: all rows]
+    #[arg(long, value_name = "N", help_heading = "Data")]
+    row: Option<usize>,
     /// Scenario of a scenario file, by its id
     ///
     /// It starts with its observed gap, or with --gap or --thw.
@@ -89,6 +96,10 @@ impl Check {
         self.guard_outputs()?;
         let names = if self.profiles.is_empty() { PROFILES.map(str::to_owned).to_vec() } else { self.profiles.clone() };
         let mut profiles = names.iter().map(|name| Profile::load(name.trim())).collect::<Result<Vec<_>>>()?;
+        let models = self.case.named_models()?.unwrap_or_else(|| ModelId::ALL.to_vec());
+        if let Some(path) = self.whole_table()? {
+            return self.check_all(path, &profiles[0], &models);
+        }
         let request = self.request(&profiles[0])?;
         // A profile that only adds its own cut-in clause does not apply to other cases.
         if self.profiles.is_empty() && request.subject.category() != Category::CutIn {
@@ -98,7 +109,6 @@ impl Check {
             };
             profiles.retain(|profile| profile.name == first.name || !is_first(profile));
         }
-        let models = self.case.named_models()?.unwrap_or_else(|| ModelId::ALL.to_vec());
         let check = Checked { subject: request.subject, profiles, models };
         let judgements = check.run()?;
         let sheet = CaseSheet {
@@ -120,20 +130,92 @@ impl Check {
             write(path, trace::table(&named.collect::<Vec<_>>()).csv().as_bytes())?;
         }
         self.format.print(|| sheet.text(), || sheet.json())?;
-        Ok(match judgements[0].verdict() {
-            // If input was skipped the answer is incomplete.
-            _ if request.incomplete => Exit::Incomplete,
-            Verdict::Undecided | Verdict::Answer(Answer::Open) => Exit::Undecided,
-            Verdict::OutsideAnnex | Verdict::NotJudged => Exit::OutsideAnnex,
-            Verdict::Answer(Answer::Preventable) => Exit::Ok,
-            Verdict::Answer(Answer::NotPreventable) => Exit::NotPreventable,
-            Verdict::Answer(Answer::NoConflict) => Exit::NoConflict,
-        })
+        // If input was skipped the answer is incomplete.
+        Ok(if request.incomplete { Exit::Incomplete } else { status(judgements[0].verdict()) })
+    }
+
+    /// The table to be judged with all rows.
+    fn whole_table(&self) -> Result<Option<&Path>> {
+        let Some(path) = &self.file else { return Ok(None) };
+        let is_table = ["csv", "parquet"]
+            .iter()
+            .any(|table| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(table)));
+        if !is_table || self.row.is_some() || self.scenario.is_some() {
+            return Ok(None);
+        }
+        let of_one = [
+            ("--sheet", self.sheet.is_some()),
+            ("--animation", self.animation.is_some()),
+            ("--series", self.series.is_some()),
+            ("--profiles", self.profiles.len() > 1),
+        ];
+        match of_one.iter().find(|(_, is_given)| *is_given) {
+            Some(("--profiles", _)) => {
+                let problem = format!("{} is judged with all its rows, under one profile", path.display());
+                Err(Error::usage(Place::item("--profiles"), problem, "name one profile, or choose a row: --row N"))
+            }
+            Some((flag, _)) => {
+                let problem = format!("it shows one case, and {} is judged with all its rows", path.display());
+                Err(Error::usage(Place::item(*flag), problem, "choose a row: --row N, from 1 after the header"))
+            }
+            None => Ok(Some(path)),
+        }
+    }
+
+    /// Judges every row of a table under one profile.
+    fn check_all(&self, path: &Path, profile: &Profile, models: &[ModelId]) -> Result<Exit> {
+        let mut table = CaseTable::open(path)?;
+        let mut doubts = Doubts::new(self.plausibility.policy());
+        let (mut cases, mut broken, mut is_end) = (Vec::new(), Vec::new(), false);
+        while !is_end {
+            let mut subjects = Vec::new();
+            while subjects.len() < ROWS && !is_end {
+                let Some(given) = table.next()? else {
+                    is_end = true;
+                    continue;
+                };
+                let subject = given.and_then(|given| {
+                    let given = self.case.over(given);
+                    Ok((subject(&given, profile, &mut doubts)?, given))
+                });
+                subjects.push((table.row(), subject));
+            }
+            let answers = subjects.into_par_iter().map(|(row, subject)| {
+                let (subject, given) = subject?;
+                given.located(judge(row, given.id.clone(), subject, profile, models))
+            });
+            // In the order of the rows.
+            for answer in answers.collect::<Vec<_>>() {
+                match answer {
+                    Ok(answer) => cases.push(answer),
+                    Err(error) => broken.push(error),
+                }
+            }
+            CANCEL.check()?;
+        }
+        cases.retain(|case: &CaseAnswer| {
+            let refused = case.id().and_then(|id| table.refused_later(id));
+            let is_used = refused.is_none();
+            broken.extend(refused);
+            is_used
+        });
+        doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
+        complain_of(&broken, &[]);
+        if cases.is_empty() {
+            let help = "the chapter on tables lists the columns (docs/src/tables.md)";
+            return Err(Error::input(Place::file(path), "no row of it can be judged", help));
+        }
+        let broken: Vec<String> = broken.iter().map(ToString::to_string).collect();
+        let is_complete = broken.is_empty();
+        let origin = path.display().to_string();
+        let answers = Answers { origin, profile: profile.name.clone(), cases, broken };
+        self.format.print(|| answers.text(console::width()), || answers.json())?;
+        Ok(if is_complete { status(answers.worst()) } else { Exit::Incomplete })
     }
 
     fn request(&self, profile: &Profile) -> Result<CheckRequest> {
         let Some(path) = &self.file else {
-            return self.of_flags(CaseFlags::default(), profile, "a case of flags".to_owned());
+            return self.of_flags(GivenCase::default(), profile, "a case of flags".to_owned());
         };
         let origin = path.display().to_string();
         let ending = path.extension().map(|ending| ending.to_ascii_lowercase()).unwrap_or_default();
@@ -141,7 +223,8 @@ impl Check {
             ("xosc", None) => self.of_scenario(read_scenario(path)?, origin, false),
             ("toml", None) => self.of_flags(from_toml(path)?, profile, origin),
             ("csv" | "parquet", None) => {
-                self.of_flags(from_table(path, self.row)?, profile, format!("{origin}, row {}", self.row))
+                let row = self.row.unwrap_or(1);
+                self.of_flags(from_table(path, Some(row))?, profile, format!("{origin}, row {row}"))
             }
             ("jsonl" | "csv" | "parquet", Some(id)) => {
                 let (scenarios, incomplete) = scenarios_of(path, self.plausibility.policy())?;
@@ -164,19 +247,20 @@ impl Check {
         }
     }
 
-    fn of_flags(&self, file: CaseFlags, profile: &Profile, origin: String) -> Result<CheckRequest> {
-        let flags = self.case.over(file);
-        if !flags.says_a_case() {
+    fn of_flags(&self, file: GivenCase, profile: &Profile, origin: String) -> Result<CheckRequest> {
+        let given = self.case.over(file);
+        if !given.says_a_case() {
             let help = "give a case (--category, --ego-speed, …) or a FILE";
             return Err(Error::usage(Place::item("lanesweep check"), "there is nothing to check", help));
         }
-        let plain = flags.plain_case(profile, self.plausibility.policy())?;
-        let subject = Subject::plain(&plain, flags.headway()?);
+        let mut doubts = Doubts::new(self.plausibility.policy());
+        let subject = subject(&given, profile, &mut doubts)?;
+        doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
         Ok(CheckRequest { subject, origin, is_synthetic: false, incomplete: false })
     }
 
     fn of_scenario(&self, scenario: Scenario, origin: String, incomplete: bool) -> Result<CheckRequest> {
-        let headway = if self.case.says_a_start() { Some(self.case.headway()?) } else { None };
+        let headway = self.case.start()?;
         if self.case.says_more_than_a_start() {
             return Err(Error::usage(
                 Place::item(origin),
@@ -205,6 +289,46 @@ impl Check {
             refuse_overwriting(path, &inputs, flag)?;
         }
         Ok(())
+    }
+}
+
+/// The case that is given.
+fn subject(given: &GivenCase, profile: &Profile, doubts: &mut Doubts) -> Result<Subject> {
+    Ok(Subject::plain(&given.plain_case(profile, doubts)?, given.headway()?))
+}
+
+/// Rows of a table that are judged together.
+const ROWS: usize = 256;
+
+/// Judges a row of a table.
+fn judge(
+    row: usize,
+    id: Option<String>,
+    subject: Subject,
+    profile: &Profile,
+    models: &[ModelId],
+) -> Result<CaseAnswer> {
+    let check = Checked { subject, profiles: vec![profile.clone()], models: models.to_vec() };
+    let judgements = check.run_without_boundaries()?;
+    let sheet = CaseSheet {
+        subject: &check.subject,
+        origin: String::new(),
+        is_synthetic: false,
+        profiles: &check.profiles,
+        judgements: &judgements,
+        command: String::new(),
+    };
+    Ok(CaseAnswer::new(row, id, &sheet))
+}
+
+/// The exit status of an answer.
+fn status(verdict: Verdict) -> Exit {
+    match verdict {
+        Verdict::Undecided | Verdict::Answer(Answer::Open) => Exit::Undecided,
+        Verdict::OutsideAnnex | Verdict::NotJudged => Exit::OutsideAnnex,
+        Verdict::Answer(Answer::Preventable) => Exit::Ok,
+        Verdict::Answer(Answer::NotPreventable) => Exit::NotPreventable,
+        Verdict::Answer(Answer::NoConflict) => Exit::NoConflict,
     }
 }
 

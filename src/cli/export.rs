@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand, ValueEnum};
 
 use super::Exit;
-use super::case_flags::{CaseFlags, from_toml};
+use super::case_flags::{CaseFlags, from_toml, length_m, time_s};
 use super::configured::Configured;
 use super::format::FormatFlag;
 use super::lists;
@@ -23,7 +23,7 @@ use crate::{Error, Place, Result};
 /// Write scenarios for other simulators
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  \
-                  lanesweep export xosc --category cut-in --models FSM --ego-speed 30 --speed 20 --thw 1.2 \\\n      \
+                  lanesweep export xosc --category cut-in --models FSM --ego-speed 30m/s --speed 20m/s --thw 1.2 \\\n      \
                   --lateral-speed 1.0 --out played")]
 pub struct Export {
     #[command(subcommand)]
@@ -54,7 +54,7 @@ impl Export {
 #[command(after_help = "Examples:\n  \
                   lanesweep export xosc --from lanesweep-out --worst 5 --models FSM --ego external --out worst\n  \
                   lanesweep export xosc --scenarios scenarios.jsonl --lane 01_cut_in_97_91_957/S/1.2s/RSS\n  \
-                  lanesweep export xosc --category cut-in --models FSM --ego-speed 30 --speed 20 --thw 1.2 \\\n      \
+                  lanesweep export xosc --category cut-in --models FSM --ego-speed 30m/s --speed 20m/s --thw 1.2 \\\n      \
                   --lateral-speed 1.0 --out played")]
 pub struct Xosc {
     #[command(flatten)]
@@ -100,13 +100,13 @@ pub struct Xosc {
     #[arg(long, value_enum, default_value_t, help_heading = "Scenario")]
     ego: EgoFlag,
     /// End of the scenario with --ego external [default: 10 s after the lane's last event and end]
-    #[arg(long, value_name = "s", help_heading = "Scenario", hide_short_help = true)]
+    #[arg(long, value_name = "s", value_parser = time_s, help_heading = "Scenario", hide_short_help = true)]
     duration: Option<f64>,
     /// Side that the other vehicle comes from or leaves to [default: the scenario's, else left]
     #[arg(long, value_enum, help_heading = "Scenario", hide_short_help = true)]
     side: Option<SideFlag>,
     /// Width of the road's lanes [default: the scenario's, else 3.5]
-    #[arg(long, value_name = "m", help_heading = "Scenario", hide_short_help = true)]
+    #[arg(long, value_name = "m", value_parser = length_m, help_heading = "Scenario", hide_short_help = true)]
     lane_width: Option<f64>,
     /// Folder of the files
     #[arg(long, value_name = "DIR", default_value = "lanesweep-xosc", help_heading = "Output")]

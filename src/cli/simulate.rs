@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 
 use super::Exit;
-use super::case_flags::{CaseFlags, from_table, from_toml};
+use super::case_flags::{CaseFlags, GivenCase, from_table, from_toml, time_s};
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
@@ -18,14 +18,14 @@ use crate::{Error, Place, Result};
 
 /// Run one concrete scenario and print or draw its time series
 ///
-/// The case comes from flags, from a TOML file, from a row of a table (keys and columns are the flags' names with `_`;
-/// flags override them), or from a finished run or a scenario file with a lane key. The series goes to stdout as CSV,
+/// The case comes from flags, from a TOML file, from a row of a table (keys and columns are the flags' names with `_`,
+/// speeds with their unit, `ego_speed_kmh`; flags override them), or from a finished run or a scenario file with a lane key. The series goes to stdout as CSV,
 /// the outcome to stderr, the figure to --plot. Several models (--models FSM,RSS) or variants (--compare) follow one
 /// another in the CSV and share one figure.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  \
-                  lanesweep simulate --category cut-in --ego-speed 30 --speed 20 --thw 1.2 --lateral-speed 1.0 \\\n      \
+                  lanesweep simulate --category cut-in --ego-speed 30m/s --speed 20m/s --thw 1.2 --lateral-speed 1.0 \\\n      \
                   --plot case.svg\n  \
                   lanesweep simulate --from lanesweep-out --lane 01_cut_in_97_91_957/2/1.2s/RSS --compare S\n  \
                   lanesweep simulate --scenarios scenarios.jsonl --lane 01_cut_in_97_91_957/S/1.2s/RSS")]
@@ -38,9 +38,9 @@ pub struct Simulate {
     /// Table (.csv, .parquet) with one case per row
     #[arg(long, value_name = "FILE", help_heading = "Data")]
     table: Option<PathBuf>,
-    /// Row of the table, from 1 after the header
-    #[arg(long, value_name = "N", default_value_t = 1, help_heading = "Data")]
-    row: usize,
+    /// Row of the table, from 1 after the header; needed if it has several
+    #[arg(long, value_name = "N", help_heading = "Data")]
+    row: Option<usize>,
     /// Scenario file (.jsonl, .parquet, .csv) for --lane
     #[arg(long, value_name = "FILE", requires = "lane", help_heading = "Data")]
     scenarios: Option<PathBuf>,
@@ -64,7 +64,7 @@ pub struct Simulate {
     #[arg(long, value_name = "FILE.svg", help_heading = "Output")]
     plot: Option<PathBuf>,
     /// End of the figure's time axis [default: 2 s after the last change]
-    #[arg(long, value_name = "s", requires = "plot", help_heading = "Output", hide_short_help = true)]
+    #[arg(long, value_name = "s", value_parser = time_s, requires = "plot", help_heading = "Output", hide_short_help = true)]
     plot_end: Option<f64>,
     #[command(flatten)]
     plausibility: PlausibilityFlag,
@@ -121,19 +121,19 @@ impl Simulate {
         Ok((reopened.traced(key, self.case.named_models()?.as_deref(), &self.compare)?, incomplete))
     }
 
-    fn flags(&self) -> Result<CaseFlags> {
+    fn flags(&self) -> Result<GivenCase> {
         let file = match (&self.case_file, &self.table) {
             (Some(path), _) => from_toml(path)?,
             (None, Some(path)) => from_table(path, self.row)?,
-            (None, None) => CaseFlags::default(),
+            (None, None) => GivenCase::default(),
         };
-        let flags = self.case.over(file);
-        if !flags.says_a_case() {
+        let given = self.case.over(file);
+        if !given.says_a_case() {
             let help = "give a case (--category, --ego-speed, …), --case-file, --table, or a --lane with --from or \
                         --scenarios";
             return Err(Error::usage(Place::item("lanesweep simulate"), "there is nothing to simulate", help));
         }
-        Ok(flags)
+        Ok(given)
     }
 
     /// Checks that the figure is an SVG file and replaces no input.

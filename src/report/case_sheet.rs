@@ -360,7 +360,7 @@ impl CaseSheet<'_> {
 }
 
 /// The collision verdict of a driver in a word.
-fn verdict_of(judged: &Judged) -> &'static str {
+pub(super) fn verdict_of(judged: &Judged) -> &'static str {
     match (judged.collides(), judged.touches) {
         (true, _) => "COLLIDES",
         (false, true) => "touches",

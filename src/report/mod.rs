@@ -6,6 +6,7 @@
 
 mod case_sentences;
 pub mod case_sheet;
+pub mod case_table;
 mod close_following;
 pub mod compare;
 pub mod convergence;

@@ -1,10 +1,10 @@
 //! A concrete case from the few numbers that a user gives: on the command line, in a file, or in a row of a table.
 
-use serde::Deserialize;
-
+use super::units::{self, Written};
 use super::{Category, LANE_WIDTH_M, PlainCase, check_headway, missing_parameter};
 use crate::model::profile::FrameProfile;
 use crate::support::plausibility::{Doubts, HELP, Quantity};
+use crate::support::table::{NameUnit, Named, Resolved, resolve};
 use crate::{Error, Place, Result};
 
 /// Shortest and longest duration, s: the longest is the time cap of the paper's profile.
@@ -12,8 +12,7 @@ pub(super) const DURATIONS_S: (f64, f64) = (0.1, 120.0);
 
 /// The given values; speeds in m/s, lengths in m, accelerations in m/s², times in s. The names are the flags of
 /// `simulate`.
-#[derive(Debug, Clone, Default, PartialEq, Deserialize)]
-#[serde(default)]
+#[derive(Debug, Clone, Default, PartialEq)]
 #[allow(missing_docs)] // see PlainCase
 pub struct CaseParameters {
     pub category: Option<String>,
@@ -29,10 +28,125 @@ pub struct CaseParameters {
     pub ahead_gap: Option<f64>,
     pub length: Option<f64>,
     pub width: Option<f64>,
+    pub ego_length: Option<f64>,
+    pub ego_width: Option<f64>,
+    pub lane_width: Option<f64>,
     pub duration: Option<f64>,
 }
 
+/// A number of a case: its key, what it measures, and its field. A time span has no plausible range.
+pub(crate) struct CaseNumber {
+    pub key: &'static str,
+    quantity: Option<Quantity>,
+    get: fn(&CaseParameters) -> Option<f64>,
+    field: fn(&mut CaseParameters) -> &mut Option<f64>,
+}
+
+macro_rules! number {
+    ($key:ident, $quantity:expr) => {
+        CaseNumber { key: stringify!($key), quantity: $quantity, get: |case| case.$key, field: |case| &mut case.$key }
+    };
+}
+
+/// Every number of a case.
+pub(crate) const NUMBERS: [CaseNumber; 16] = [
+    number!(gap, Some(Quantity::Gap)),
+    number!(thw, Some(Quantity::Headway)),
+    number!(ego_speed, Some(Quantity::Speed)),
+    number!(speed, Some(Quantity::Speed)),
+    number!(end_speed, Some(Quantity::Speed)),
+    number!(ahead_speed, Some(Quantity::Speed)),
+    number!(lateral_speed, Some(Quantity::LateralSpeed)),
+    number!(lateral_distance, Some(Quantity::LateralPosition)),
+    number!(acceleration, Some(Quantity::Acceleration)),
+    number!(ahead_gap, Some(Quantity::Gap)),
+    number!(length, Some(Quantity::Length)),
+    number!(width, Some(Quantity::Width)),
+    number!(ego_length, Some(Quantity::Length)),
+    number!(ego_width, Some(Quantity::Width)),
+    number!(lane_width, Some(Quantity::LaneWidth)),
+    number!(duration, None),
+];
+
+impl CaseNumber {
+    /// Its SI unit.
+    pub fn unit(&self) -> &'static str {
+        self.quantity.map_or("s", |quantity| quantity.limits().unit)
+    }
+
+    /// The name that users give it. A speed along the road needs a unit; every other quantity has one customary unit.
+    pub fn named(&self) -> Named {
+        Named { name: self.key.to_owned(), unit: self.unit(), needs_unit: self.quantity == Some(Quantity::Speed) }
+    }
+}
+
+/// A number of a case under the name that a user gives it: its key, with or without its unit at the end.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct NamedNumber {
+    at: usize,
+    unit: NameUnit,
+}
+
+impl NamedNumber {
+    /// Finds the number of a name; `None` if there is none.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for a unit that the number cannot have.
+    pub fn find(name: &str) -> Result<Option<NamedNumber>> {
+        match resolve(name, &NUMBERS.map(|number| number.named())) {
+            Resolved::Field(at, unit) => Ok(Some(NamedNumber { at, unit })),
+            Resolved::WrongUnit(problem, help) => Err(Error::usage(Place::item(name), problem, help)),
+            Resolved::Unknown => Ok(None),
+        }
+    }
+
+    /// The number of [`NUMBERS`] at an index, whose name has this unit.
+    pub(crate) fn at(at: usize, unit: NameUnit) -> NamedNumber {
+        NamedNumber { at, unit }
+    }
+
+    /// Its key, without a unit.
+    pub fn key(self) -> &'static str {
+        NUMBERS[self.at].key
+    }
+
+    /// Sets it to a written value.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] at the key: a text that is no such quantity, or a speed without a unit.
+    pub fn set(self, case: &mut CaseParameters, written: Written<'_>) -> Result<()> {
+        let number = &NUMBERS[self.at];
+        let si = units::si(written, number.unit(), self.unit).map_err(|unusable| {
+            let help = unusable.help(number.key);
+            Error::usage(Place::item(number.key), unusable.problem, help)
+        })?;
+        *(number.field)(case) = Some(si);
+        Ok(())
+    }
+
+    /// Names of all numbers, with their units at the end.
+    pub fn names() -> Vec<String> {
+        let ending = |unit| match unit {
+            "m/s" => "mps",
+            "m/s²" => "mps2",
+            other => other,
+        };
+        NUMBERS.iter().map(|number| format!("{}_{}", number.key, ending(number.unit()))).collect()
+    }
+}
+
 impl CaseParameters {
+    /// Values of `self` where given, otherwise those of `other`. A gap replaces a headway, and vice versa.
+    pub fn over(mut self, other: &CaseParameters) -> CaseParameters {
+        let has_start = self.gap.is_some() || self.thw.is_some();
+        for number in NUMBERS.iter().filter(|number| !(has_start && matches!(number.key, "gap" | "thw"))) {
+            let field = (number.field)(&mut self);
+            *field = field.or((number.get)(other));
+        }
+        self.category = self.category.or_else(|| other.category.clone());
+        self
+    }
+
     /// The kind of scenario.
     ///
     /// # Errors
@@ -66,11 +180,11 @@ impl CaseParameters {
     /// # Errors
     /// [`Error::Usage`] for a value outside the physical range, unless such values are accepted.
     pub fn check_plausible(&self, doubts: &mut Doubts) -> Result<()> {
-        for (key, quantity, value) in self.numbers() {
-            let Some(value) = value else { continue };
+        for CaseNumber { key, quantity, get, .. } in &NUMBERS {
+            let (Some(quantity), Some(value)) = (*quantity, get(self)) else { continue };
             doubts
-                .check(quantity, value, || key.to_owned())
-                .map_err(|problem| Error::usage(Place::item(key), problem, HELP))?;
+                .check(quantity, value, || (*key).to_owned())
+                .map_err(|problem| Error::usage(Place::item(*key), problem, HELP))?;
         }
         Ok(())
     }
@@ -98,26 +212,8 @@ impl CaseParameters {
 
     /// Names of the given values.
     pub fn given(&self) -> Vec<&'static str> {
-        let numbers = self.numbers().into_iter().filter_map(|(key, _, value)| value.map(|_| key));
+        let numbers = NUMBERS.iter().filter_map(|number| (number.get)(self).map(|_| number.key));
         self.category.iter().map(|_| "category").chain(numbers).collect()
-    }
-
-    /// Every number that has a range of plausible values.
-    fn numbers(&self) -> [(&'static str, Quantity, Option<f64>); 12] {
-        [
-            ("gap", Quantity::Gap, self.gap),
-            ("thw", Quantity::Headway, self.thw),
-            ("ego_speed", Quantity::Speed, self.ego_speed),
-            ("speed", Quantity::Speed, self.speed),
-            ("end_speed", Quantity::Speed, self.end_speed),
-            ("ahead_speed", Quantity::Speed, self.ahead_speed),
-            ("lateral_speed", Quantity::LateralSpeed, self.lateral_speed),
-            ("lateral_distance", Quantity::LateralPosition, self.lateral_distance),
-            ("acceleration", Quantity::Acceleration, self.acceleration),
-            ("ahead_gap", Quantity::Gap, self.ahead_gap),
-            ("length", Quantity::Length, self.length),
-            ("width", Quantity::Width, self.width),
-        ]
     }
 
     /// Returns the case; vehicles without a given size have the size of the arguments, m.
@@ -127,8 +223,7 @@ impl CaseParameters {
     pub fn plain_case(&self, length_m: f64, width_m: f64) -> Result<PlainCase> {
         let category = self.category()?;
         self.refuse_of_other_categories(category)?;
-        let number =
-            |key: &str| self.numbers().into_iter().find_map(|(known, _, value)| value.filter(|_| known == key));
+        let number = |key: &str| NUMBERS.iter().find(|number| number.key == key).and_then(|number| (number.get)(self));
         if let Some(key) = missing_parameter(category, |key| number(key).is_some()) {
             return Err(missing(key));
         }
@@ -137,14 +232,17 @@ impl CaseParameters {
         self.check_start()?;
         let length_m = above_zero(self.length.unwrap_or(length_m), "length")?;
         let width_m = above_zero(self.width.unwrap_or(width_m), "width")?;
+        let ego_length_m = above_zero(self.ego_length.unwrap_or(length_m), "ego_length")?;
+        let ego_width_m = above_zero(self.ego_width.unwrap_or(width_m), "ego_width")?;
+        let lane_width_m = above_zero(self.lane_width.unwrap_or(LANE_WIDTH_M), "lane_width")?;
         let speed_mps = at_least(self.speed.unwrap_or(ego_speed_mps), 0.0, "speed")?;
         let acceleration_mps2 = at_least(self.acceleration.unwrap_or(0.0), f64::NEG_INFINITY, "acceleration")?;
         let end_speed_mps = self.end_speed.map(|v| at_least(v, 0.0, "end_speed")).transpose()?;
         let (lateral_speed_mps, lateral_distance_m) = match category {
-            Category::Lvd => (0.0, LANE_WIDTH_M),
+            Category::Lvd => (0.0, lane_width_m),
             Category::CutIn | Category::CutOut => (
                 above_zero(given("lateral_speed"), "lateral_speed")?,
-                above_zero(self.lateral_distance.unwrap_or(LANE_WIDTH_M), "lateral_distance")?,
+                above_zero(self.lateral_distance.unwrap_or(lane_width_m), "lateral_distance")?,
             ),
         };
         let (ahead_gap_m, ahead_speed_mps) = match category {
@@ -171,9 +269,9 @@ impl CaseParameters {
             ahead_gap_m,
             length_m,
             width_m,
-            ego_length_m: length_m,
-            ego_width_m: width_m,
-            lane_width_m: LANE_WIDTH_M,
+            ego_length_m,
+            ego_width_m,
+            lane_width_m,
             duration_s: self.duration,
         })
     }
@@ -197,6 +295,7 @@ impl CaseParameters {
         let given = [
             ("lateral_speed", self.lateral_speed, category == Category::Lvd),
             ("lateral_distance", self.lateral_distance, category == Category::Lvd),
+            ("lane_width", self.lane_width, category == Category::Lvd),
             ("ahead_speed", self.ahead_speed, category != Category::CutOut),
             ("ahead_gap", self.ahead_gap, category != Category::CutOut),
         ];
@@ -216,7 +315,8 @@ fn missing(key: &str) -> Error {
         "category" => "cut-in, cut-out or lvd",
         "ahead_gap" => "a gap in m",
         "acceleration" => "an acceleration in m/s², below 0 for a leader that brakes,",
-        _ => "a speed in m/s",
+        "lateral_speed" => "a speed in m/s",
+        _ => "a speed with its unit, such as 60km/h,",
     };
     let help = format!("give {what} with option `{key}` or as `{key}` in the file");
     Error::usage(Place::item(key), "it is missing", help)

@@ -5,8 +5,9 @@ use serde_json::{Map, Value};
 
 use super::Category;
 use super::schema::{Content, FIELDS, Field, Presence};
+use super::units::{Unusable, Written, si};
 use crate::support::error::{Error, Result};
-use crate::support::table::{Column, ColumnKind, Named, Resolved, TableReader, nearest, resolve};
+use crate::support::table::{Column, ColumnKind, NameUnit, Named, Resolved, TableReader, nearest, resolve};
 
 /// A field that is not a record.
 pub(super) struct Leaf {
@@ -52,12 +53,15 @@ pub(super) fn leaves() -> Vec<Leaf> {
 
 /// All column names: the leaves, then alternative names; each with its leaf and whether the value may change.
 pub(super) fn names(leaves: &[Leaf]) -> Vec<(Named, usize, bool)> {
-    let own = leaves.iter().enumerate().map(|(at, leaf)| (leaf.flat.clone(), leaf.field.unit, at, false));
+    let named =
+        |name: &str, at: usize, needs_unit| Named { name: name.to_owned(), unit: leaves[at].field.unit, needs_unit };
+    let own = leaves.iter().enumerate().map(|(at, leaf)| (named(&leaf.flat, at, false), at, false));
+    // The program's own names are in m/s; other names do not say so.
     let other = OTHER_NAMES.iter().filter_map(|(name, of, may_change)| {
         let at = leaves.iter().position(|leaf| leaf.flat == *of)?;
-        Some(((*name).to_owned(), leaves[at].field.unit, at, *may_change))
+        Some((named(name, at, leaves[at].field.unit == "m/s"), at, *may_change))
     });
-    own.chain(other).map(|(name, unit, at, may_change)| (Named { name, unit }, at, may_change)).collect()
+    own.chain(other).collect()
 }
 
 impl Leaf {
@@ -107,15 +111,19 @@ impl Leaf {
         matches!(self.field.content, Content::Series)
     }
 
-    /// Converts a table value to the JSON of a scenario. Texts of CSV are converted to the field's type; a text that
+    /// Converts a table value to the JSON of a scenario. Texts of CSV are converted to the field's type; a value that
     /// cannot be converted is kept, so that the field's check can show it.
-    pub fn typed(&self, value: Value, divisor: f64) -> Value {
-        match self.field.content {
-            Content::Number => number(value, divisor),
+    ///
+    /// # Errors
+    /// A number that lacks a unit.
+    pub fn typed(&self, value: Value, unit: NameUnit) -> std::result::Result<Value, Unusable> {
+        let number = |value| number(value, self.field.unit, unit);
+        Ok(match self.field.content {
+            Content::Number => number(value)?,
             // The value of the series at one instant.
             Content::Series => match value {
-                Value::Array(values) => values.into_iter().map(|value| number(value, divisor)).collect(),
-                one => number(one, divisor),
+                Value::Array(values) => values.into_iter().map(number).collect::<std::result::Result<_, _>>()?,
+                one => number(one)?,
             },
             Content::VehicleId | Content::Frame => whole(value),
             Content::TwoFrames => match value {
@@ -138,7 +146,7 @@ impl Leaf {
                 other => other,
             },
             Content::Object(_) => value,
-        }
+        })
     }
 }
 
@@ -147,18 +155,20 @@ fn uncapitalized(text: &str) -> String {
     letters.next().map_or(String::new(), |first| first.to_lowercase().chain(letters).collect())
 }
 
-/// A number in the field's unit.
-pub(super) fn number(value: Value, divisor: f64) -> Value {
-    let parsed = match &value {
-        Value::String(text) => text.trim().parse::<f64>().ok().filter(|number| number.is_finite()),
-        Value::Number(number) => number.as_f64(),
+/// A number in the field's unit; what is no number is kept.
+///
+/// # Errors
+/// A number that lacks a unit.
+pub(super) fn number(value: Value, field_unit: &str, unit: NameUnit) -> std::result::Result<Value, Unusable> {
+    let written = match &value {
+        Value::String(text) => Some(Written::Text(text)),
+        Value::Number(number) => number.as_f64().map(Written::Number),
         _ => None,
     };
-    match parsed {
-        // No division by 1, so that written values read back unchanged.
-        Some(number) if divisor == 1.0 => Value::from(number),
-        Some(number) => Value::from(number / divisor),
-        None => value,
+    match written.map(|written| si(written, field_unit, unit)) {
+        Some(Ok(number)) => Ok(Value::from(number)),
+        Some(Err(unusable)) if unusable.lacks_unit => Err(unusable),
+        _ => Ok(value),
     }
 }
 
@@ -212,13 +222,13 @@ pub(super) fn choose(
     for (at, column) in table.columns().iter().enumerate() {
         let refused = |problem: String, help: String| Err(Error::input(table.header().column(column), problem, help));
         match resolve(column, known) {
-            Resolved::Field(known, divisor) => {
+            Resolved::Field(known, unit) => {
                 let field = field_of(known);
                 if let Some(other) = chosen.iter().find(|other| other.field == field) {
                     let problem = format!("holds the same as the column `{}`", other.column);
                     return refused(problem, "remove one of the two".to_owned());
                 }
-                chosen.push(Chosen { at, column: column.clone(), known, field, divisor });
+                chosen.push(Chosen { at, column: column.clone(), known, field, unit });
             }
             Resolved::WrongUnit(problem, help) => return refused(problem, help),
             // The index column that pandas writes.
@@ -255,5 +265,6 @@ pub(super) struct Chosen {
     /// Index of the name that it matched.
     pub known: usize,
     pub field: usize,
-    pub divisor: f64,
+    /// Unit of its plain numbers.
+    pub unit: NameUnit,
 }

@@ -1,37 +1,34 @@
 //! Concrete cases in a table, one per row, with the names of `simulate`'s flags as columns. Their motions are sampled
 //! to obtain scenarios.
 
-use serde_json::{Map, Value};
+use serde_json::Value;
 
-use super::case_parameters::{CaseParameters, DURATIONS_S};
+use super::case_parameters::{CaseNumber, CaseParameters, DURATIONS_S, NUMBERS, NamedNumber};
 use super::check::name;
-use super::columns::{Chosen, HELP, choose, number};
+use super::columns::{Chosen, HELP, choose};
 use super::found::{ScenarioFile, ScenariosRead};
+use super::units::{Written, si};
 use super::{Category, Ego, Lateral, Other, PlainCase, Scenario, Side, Speed};
 use crate::support::error::{Error, Place, Result};
 use crate::support::plausibility::{Doubts, Implausible};
 use crate::support::table::{Named, Row, TableReader};
 
-/// Columns and their units.
-const COLUMNS: [(&str, &str); 17] = [
-    ("id", ""),
-    ("category", ""),
-    ("models", ""),
-    ("ego_speed", "m/s"),
-    ("speed", "m/s"),
-    ("gap", "m"),
-    ("thw", "s"),
-    ("lateral_speed", "m/s"),
-    ("lateral_distance", "m"),
-    ("acceleration", "m/s²"),
-    ("end_speed", "m/s"),
-    ("ahead_speed", "m/s"),
-    ("ahead_gap", "m"),
-    ("length", "m"),
-    ("width", "m"),
-    ("duration", "s"),
-    ("rate", "Hz"),
-];
+/// Columns that are texts; those of the numbers of a case follow, then [`RATE`].
+const TEXTS: [&str; 3] = ["id", "category", "models"];
+const RATE: &str = "rate";
+
+/// All columns, in the order of [`Chosen::field`].
+fn columns() -> Vec<Named> {
+    let plain = |name: &str, unit| Named { name: name.to_owned(), unit, needs_unit: false };
+    let texts = TEXTS.map(|name| plain(name, ""));
+    texts.into_iter().chain(NUMBERS.iter().map(CaseNumber::named)).chain([plain(RATE, "Hz")]).collect()
+}
+
+/// The key of a column.
+fn key(field: usize) -> &'static str {
+    let number = || NUMBERS.get(field - TEXTS.len()).map(|number| number.key);
+    TEXTS.get(field).copied().or_else(number).unwrap_or(RATE)
+}
 
 /// Default vehicle sizes, m: those of all shipped profiles.
 const LENGTH_M: f64 = 4.3;
@@ -47,10 +44,20 @@ const RATES_HZ: (f64, f64) = (1.0, 1000.0);
 const MAX_SAMPLES: f64 = (2 << 20) as f64;
 const MAX_SAMPLES_PER_ROW: f64 = 128.0;
 
-/// A row's number, and its fields or its error.
-type NumberedRow = (u64, Result<Map<String, Value>>);
+/// A row of a table of cases.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct CaseRow {
+    pub id: Option<String>,
+    pub models: Option<String>,
+    pub parameters: CaseParameters,
+    /// Samples per second, for a scenario made of it.
+    rate_hz: Option<f64>,
+}
 
-/// A row of parameters: names without units as keys, numbers in the units of [`COLUMNS`].
+/// A row's number, and its fields or its error, which names the place.
+type NumberedRow = (u64, Result<CaseRow>);
+
+/// The rows of a table of cases.
 pub(crate) struct ParameterRows {
     table: TableReader,
     chosen: Vec<Chosen>,
@@ -60,58 +67,89 @@ impl ParameterRows {
     /// # Errors
     /// As [`choose`], for every unknown column.
     pub fn new(mut table: TableReader) -> Result<ParameterRows> {
-        let known = COLUMNS.map(|(name, unit)| Named { name: name.to_owned(), unit });
-        let chosen = choose(&mut table, &known, |at| at, false)?;
+        let chosen = choose(&mut table, &columns(), |at| at, false)?;
         Ok(ParameterRows { table, chosen })
     }
 
-    /// Returns the next row or its error; empty fields are skipped.
+    /// Returns the next row or its error; empty fields are skipped. A row with too many or too few fields is one error,
+    /// and the next rows follow.
     ///
     /// # Errors
     /// As [`TableReader::next_row`].
     pub fn next_row(&mut self) -> Result<Option<NumberedRow>> {
-        let Some(row) = self.table.next_row()? else { return Ok(None) };
-        Ok(Some((row.number, self.typed(row))))
+        match self.table.next_row() {
+            Ok(Some(row)) => Ok(Some((row.number, self.typed(row)))),
+            Ok(None) => Ok(None),
+            Err(Error::Input { place, problem, help }) => match place.row {
+                Some(row) => Ok(Some((row, Err(Error::Input { place, problem, help })))),
+                None => Err(Error::Input { place, problem, help }),
+            },
+            Err(error) => Err(error),
+        }
     }
 
-    fn typed(&self, Row { number: row, values }: Row) -> Result<Map<String, Value>> {
-        let mut map = Map::new();
-        for (column, value) in self.chosen.iter().zip(values) {
-            let (key, unit) = COLUMNS[column.field];
-            let value = match (unit, value) {
-                (_, Value::Null) => continue,
-                ("", Value::Number(number)) => Value::from(number.to_string()),
-                ("", value) => value,
-                (_, value) => number(value, column.divisor),
-            };
-            let (is_right, expected) =
-                if unit.is_empty() { (value.is_string(), "a text") } else { (value.is_number(), "a number") };
-            if !is_right {
-                let problem = format!("is {value}; expected {expected}");
-                return Err(Error::input(self.table.place(row, None).column(&column.column), problem, HELP));
-            }
-            let (min, max) = RATES_HZ;
-            if key == "rate" && !value.as_f64().is_some_and(|rate_hz| (min..=max).contains(&rate_hz)) {
-                let help = format!("give a number of at least {min} and at most {max}");
-                return Err(Error::input(
-                    self.table.place(row, None).column(&column.column),
-                    format!("{value} cannot be used"),
-                    help,
-                ));
-            }
-            map.insert(key.to_owned(), value);
+    fn typed(&self, Row { number: row, values }: Row) -> Result<CaseRow> {
+        let mut case = CaseRow::default();
+        for (column, value) in self.chosen.iter().zip(values).filter(|(_, value)| !value.is_null()) {
+            case.set(column, &value).map_err(|error| self.row_place(row).locate(error))?;
         }
-        Ok(map)
+        Ok(case)
+    }
+
+    /// The word for counting rows.
+    pub fn word(&self) -> &'static str {
+        self.table.word()
     }
 
     /// The place of a row's values.
     pub fn row_place(&self, row: u64) -> RowPlace {
-        let column = |column: &Chosen| (COLUMNS[column.field].0, column.column.clone());
+        let column = |column: &Chosen| (key(column.field), column.column.clone());
         RowPlace {
             row: self.table.place(row, None),
             columns: self.chosen.iter().map(column).collect(),
             replaced: Vec::new(),
         }
+    }
+}
+
+impl CaseRow {
+    /// Sets the value of a column; errors name its key.
+    fn set(&mut self, column: &Chosen, value: &Value) -> Result<()> {
+        let key = key(column.field);
+        let wrong = |problem: String, help: String| Err(Error::usage(Place::item(key), problem, help));
+        let written = match value {
+            Value::String(text) => Some(Written::Text(text)),
+            value => value.as_f64().map(Written::Number),
+        };
+        match (TEXTS.contains(&key), value, written) {
+            (true, Value::String(_) | Value::Number(_), _) => {
+                let text = value.as_str().map_or_else(|| value.to_string(), str::to_owned);
+                *match key {
+                    "id" => &mut self.id,
+                    "models" => &mut self.models,
+                    _ => &mut self.parameters.category,
+                } = Some(text);
+            }
+            (false, _, Some(written)) if key == RATE => {
+                let (min, max) = RATES_HZ;
+                match si(written, "Hz", column.unit) {
+                    Ok(rate_hz) if (min..=max).contains(&rate_hz) => self.rate_hz = Some(rate_hz),
+                    Ok(rate_hz) => {
+                        let help = format!("give a number of at least {min} and at most {max}");
+                        return wrong(format!("{rate_hz} cannot be used"), help);
+                    }
+                    Err(unusable) => return wrong(unusable.problem.clone(), unusable.help(key)),
+                }
+            }
+            (false, _, Some(written)) => {
+                NamedNumber::at(column.field - TEXTS.len(), column.unit).set(&mut self.parameters, written)?;
+            }
+            (is_text, ..) => {
+                let expected = if is_text { "a text" } else { "a number" };
+                return wrong(format!("is {value}; expected {expected}"), HELP.to_owned());
+            }
+        }
+        Ok(())
     }
 }
 
@@ -157,21 +195,16 @@ impl RowPlace {
     }
 }
 
-/// The case parameters of a row.
-fn parameters(row: &Map<String, Value>) -> Result<CaseParameters> {
-    serde_json::from_value(Value::Object(row.clone())).map_err(|e| Error::Internal(format!("a row of a table: {e}")))
-}
-
 /// Reads every row as a scenario.
 pub(super) fn read(table: TableReader, implausible: Implausible) -> Result<ScenarioFile> {
     let header = table.header();
     let mut rows = ParameterRows::new(table)?;
-    if rows.chosen.iter().all(|column| COLUMNS[column.field].0 != "category") {
+    if rows.chosen.iter().all(|column| key(column.field) != "category") {
         return Err(Error::input(header, "no column `category`: this is not a table of scenarios", HELP));
     }
     let mut found = ScenariosRead::new(implausible, "rename one of the two; rows of one scenario must be adjacent");
     let mut samples = 0.0;
-    while let Some((row, map)) = rows.next_row()? {
+    while let Some((row, case)) = rows.next_row()? {
         let count = found.count();
         if samples > MAX_SAMPLES + MAX_SAMPLES_PER_ROW * count as f64 {
             let problem = format!("the scenarios above have {samples} samples, too many for this number of rows");
@@ -181,8 +214,8 @@ pub(super) fn read(table: TableReader, implausible: Implausible) -> Result<Scena
         let mut doubts = found.doubts();
         let at = rows.row_place(row);
         let place = |key: &str| at.of(key).to_string();
-        let scenario = map.and_then(|map| {
-            of_row(&map, count + 1, &mut samples, &mut doubts, &place).map_err(|error| at.locate(error))
+        let scenario = case.and_then(|case| {
+            of_row(case, count + 1, &mut samples, &mut doubts, &place).map_err(|error| at.locate(error))
         });
         match scenario {
             Err(error) => found.refuse(error),
@@ -215,18 +248,16 @@ fn key_of(field: &str) -> &str {
 }
 
 fn of_row(
-    map: &Map<String, Value>,
+    CaseRow { id, mut parameters, rate_hz, .. }: CaseRow,
     row: u64,
     samples: &mut f64,
     doubts: &mut Doubts,
     place: &dyn Fn(&str) -> String,
 ) -> Result<Scenario> {
-    let text = |key: &str| map.get(key).and_then(Value::as_str).map(str::to_owned);
-    let mut parameters = parameters(map)?;
     parameters.settle(doubts, place);
     let plain = parameters.plain_case(LENGTH_M, WIDTH_M)?;
     let case = plain.case(DURATIONS_S.1)?;
-    let rate_hz = map.get("rate").and_then(Value::as_f64).unwrap_or(RATE_HZ);
+    let rate_hz = rate_hz.unwrap_or(RATE_HZ);
     let duration_s = plain.duration_s.unwrap_or(case.horizon_s.max(MIN_DEFAULT_DURATION_S));
     let of_headway = parameters.thw.map(|thw_s| thw_s * plain.ego_speed_mps);
     let of_gap = parameters.gap.filter(|_| plain.ego_speed_mps > 0.0).map(|gap_m| gap_m / plain.ego_speed_mps);
@@ -246,7 +277,7 @@ fn of_row(
     });
     let PlainCase { category, ego_speed_mps, .. } = plain;
     Ok(Scenario {
-        id: text("id").unwrap_or_else(|| format!("row-{row}")),
+        id: id.unwrap_or_else(|| format!("row-{row}")),
         category,
         recording: String::new(),
         ego_id: 0,
@@ -257,8 +288,8 @@ fn of_row(
         fps: rate_hz,
         kept: true,
         reason: "parameters".to_owned(),
-        ego: Ego { v0: ego_speed_mps, length: plain.length_m, width: plain.width_m },
-        lane_width: 3.5,
+        ego: Ego { v0: ego_speed_mps, length: plain.ego_length_m, width: plain.ego_width_m },
+        lane_width: plain.lane_width_m,
         side: Side::Left,
         target,
         lead,

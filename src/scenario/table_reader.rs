@@ -8,7 +8,7 @@ use std::path::Path;
 use serde_json::{Map, Value};
 
 use super::check::name;
-use super::columns::{Chosen, HELP, Leaf, choose, leaves, names};
+use super::columns::{Chosen, HELP, Leaf, choose, leaves, names, number};
 use super::found::{ScenarioFile, ScenariosRead};
 use super::schema::wrong_field;
 use super::{Scenario, parameter_table};
@@ -24,7 +24,7 @@ use crate::support::table::{Named, Resolved, Row, TableFormat, TableReader, reso
 pub(super) fn read(path: &Path, format: TableFormat, implausible: Implausible) -> Result<ScenarioFile> {
     let table = TableReader::open(path, format).map_err(|error| of_unreadable_tracks(path, error))?;
     refuse_tracks(table.columns(), table.header())?;
-    let (leaves, time) = (leaves(), [Named { name: "time".to_owned(), unit: "s" }]);
+    let (leaves, time) = (leaves(), [Named { name: "time".to_owned(), unit: "s", needs_unit: false }]);
     let names = names(&leaves);
     let known: Vec<Named> = names.iter().map(|(named, ..)| named.clone()).collect();
     let is = |column: &String, field: &str| match resolve(column, &known) {
@@ -106,43 +106,63 @@ impl Reader {
 
     /// Reads a row that is a scenario.
     fn scenario(&mut self, row: Row) {
-        let values = self.chosen.iter().zip(row.values);
+        let id = self.id_of(&row.values);
+        let values = match self.typed(row.number, &id, row.values) {
+            Ok(values) => values,
+            Err(error) => return self.found.refuse(error),
+        };
         let mut scenario = Map::new();
-        for (column, value) in values {
-            let leaf = &self.leaves[column.field];
-            leaf.put(&mut scenario, leaf.typed(value, column.divisor));
+        for (column, value) in self.chosen.iter().zip(values) {
+            self.leaves[column.field].put(&mut scenario, value);
         }
         self.take(scenario, &[row.number]);
     }
 
+    /// The id in a row.
+    fn id_of(&self, values: &[Value]) -> Value {
+        let is_id = |column: &Chosen| self.leaves.get(column.field).is_some_and(|leaf| leaf.flat == "id");
+        let id = self.chosen.iter().position(is_id).map_or(Value::Null, |at| values[at].clone());
+        // Some programs write ids as numbers.
+        if id.is_number() { Value::from(id.to_string()) } else { id }
+    }
+
+    /// The values of a row in the fields' types and units.
+    fn typed(&self, row: u64, id: &Value, values: Vec<Value>) -> Result<Vec<Value>> {
+        let typed = |(column, value): (&Chosen, Value)| {
+            let typed = match self.leaves.get(column.field) {
+                Some(leaf) => leaf.typed(value, column.unit),
+                None => number(value, "s", column.unit),
+            };
+            typed.map_err(|unusable| {
+                let place = self.table.place(row, id.as_str().map(name)).column(&column.column);
+                let help = unusable.help(&column.column);
+                Error::input(place, unusable.problem, help)
+            })
+        };
+        self.chosen.iter().zip(values).map(typed).collect()
+    }
+
     /// Reads a row that is an instant of a scenario.
     fn instant(&mut self, row: Row) {
-        let time = self.leaves.len();
-        let typed = |(column, value): (&Chosen, Value)| match self.leaves.get(column.field) {
-            Some(leaf) => leaf.typed(value, column.divisor),
-            None => super::columns::number(value, column.divisor),
-        };
-        let values: Vec<Value> = self.chosen.iter().zip(row.values).map(typed).collect();
-        let value_of = |field: usize| {
-            self.chosen.iter().position(|column| column.field == field).map_or(Value::Null, |at| values[at].clone())
-        };
-        let id = value_of(self.leaves.iter().position(|leaf| leaf.flat == "id").unwrap_or(time));
+        let id = self.id_of(&row.values);
         if self.refused.as_ref() == Some(&id) {
             return;
         }
-        let time = value_of(time);
         if self.open.as_ref().is_some_and(|open| open.id != id) {
             self.end();
         }
-        if let Err(error) = self.add_instant(row.number, &id, &time, values) {
+        let values = self.typed(row.number, &id, row.values);
+        if let Err(error) = values.and_then(|values| self.add_instant(row.number, &id, values)) {
             self.found.refuse(error);
             (self.open, self.refused) = (None, Some(id));
         }
     }
 
     /// Appends an instant to the open scenario, or opens one.
-    fn add_instant(&mut self, row: u64, id: &Value, time: &Value, values: Vec<Value>) -> Result<()> {
+    fn add_instant(&mut self, row: u64, id: &Value, values: Vec<Value>) -> Result<()> {
         let item = id.as_str().map(name);
+        let at = self.chosen.iter().position(|column| column.field == self.leaves.len());
+        let time = at.map_or(&Value::Null, |at| &values[at]);
         let Some(time_s) = time.as_f64() else {
             let problem = format!("is {time}; expected a time in seconds");
             return Err(Error::input(self.table.place(row, item).column("time_s"), problem, HELP));

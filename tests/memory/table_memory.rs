@@ -123,9 +123,10 @@ fn no_small_file_of_scenarios_takes_more_than_200_mb() {
     lines(&path("few.jsonl"), "cut_in", 260_000, "0.1", 2_100_000);
     lines(&path("dense.jsonl"), "cut_in", 1300, "10", 2_100_000);
     let cases = |header: &str, row: &str, rows: usize| format!("{header}\n{}", format!("{row}\n").repeat(rows));
-    let cut_ins = cases("category,ego_speed,speed,lateral_speed,duration_s,rate_hz", "cut-in,30,20,1,120,1000", 139);
+    let cut_ins =
+        cases("category,ego_speed_mps,speed_mps,lateral_speed,duration_s,rate_hz", "cut-in,30,20,1,120,1000", 139);
     std::fs::write(path("fine.csv"), cut_ins).unwrap();
-    let header = "category,ego_speed,speed,lateral_speed,ahead_gap,duration_s";
+    let header = "category,ego_speed_mps,speed_mps,lateral_speed,ahead_gap,duration_s";
     std::fs::write(path("long.csv"), cases(header, "cut-out,30,20,1,30,120", 5000)).unwrap();
     parquet(&path("million.parquet"), 1, 1_000_000, 1);
     parquet(&path("half-a-million.parquet"), 1, 500_000, 1);

@@ -137,7 +137,7 @@ fn touches_nothing_else(ours: &Tree, theirs: &Tree) {
 }
 
 /// A leader that brakes to a standstill.
-const CASE: &str = "simulate --category lvd --ego-speed 12 --thw 1.5 --acceleration -6 --models AEB";
+const CASE: &str = "simulate --category lvd --ego-speed 12m/s --thw 1.5 --acceleration -6 --models AEB";
 
 fn reaction(output: &Output) -> f64 {
     assert!(output.status.success(), "{}", said(output));

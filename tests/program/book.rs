@@ -266,7 +266,7 @@ const FIGURES: [(&str, &str, &str); 4] = [
     ("f1-cut-in.svg", "study --out OUT", "f1-cut-in.svg"),
     (
         "case.svg",
-        "simulate --category cut-in --models all --ego-speed 30 --speed 20 --thw 1.2 --lateral-speed 1.0 --plot OUT/case.svg",
+        "simulate --category cut-in --models all --ego-speed 30m/s --speed 20m/s --thw 1.2 --lateral-speed 1.0 --plot OUT/case.svg",
         "case.svg",
     ),
     (

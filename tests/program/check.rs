@@ -27,7 +27,7 @@ const CUT_IN: [&str; 12] = [
     "--ego-speed",
     "108km/h",
     "--speed",
-    "20",
+    "20m/s",
     "--gap",
     "36",
     "--lateral-speed",
@@ -40,7 +40,8 @@ const CUT_IN: [&str; 12] = [
 fn exported(dir: &Path) -> String {
     let out = dir.join("xosc");
     let export = ["-q", "export", "xosc", "--models", "FSM", "--ego", "external", "--out"];
-    let case = ["--category", "cut-in", "--ego-speed", "30", "--speed", "20", "--gap", "36", "--lateral-speed", "1"];
+    let case =
+        ["--category", "cut-in", "--ego-speed", "30m/s", "--speed", "20m/s", "--gap", "36", "--lateral-speed", "1"];
     let (code, _, error) = check(&[&export[..], &[text(&out)], &case].concat());
     assert_eq!(code, 0, "{error}");
     let mut files = std::fs::read_dir(out).unwrap().map(|entry| entry.unwrap().path());
@@ -53,11 +54,14 @@ fn flags_a_toml_file_a_row_and_an_openscenario_file_are_the_same_case() {
     let of = |name: &str| dir.path().join(name);
     std::fs::write(
         of("case.toml"),
-        "category = \"cut-in\"\nego_speed = 30.0\nspeed = 20.0\ngap = 36.0\nlateral_speed = 1.0\n",
+        "category = \"cut-in\"\nego_speed_kmh = 108\nspeed = \"20m/s\"\ngap = 36.0\nlateral_speed = 1.0\n",
     )
     .unwrap();
-    std::fs::write(of("cases.csv"), "category,ego_speed,speed,gap,lateral_speed\ncut-in,9,9,9,1\ncut-in,30,20,36,1\n")
-        .unwrap();
+    std::fs::write(
+        of("cases.csv"),
+        "category,ego_speed_mps,speed,gap,lateral_speed\ncut-in,9,9km/h,9,1\ncut-in,30,72km/h,36m,1\n",
+    )
+    .unwrap();
     let file = of("exported.xosc");
     std::fs::write(&file, exported(dir.path())).unwrap();
     let flags = json(&[&["check"], &CUT_IN[..]].concat());
@@ -207,12 +211,15 @@ fn a_speed_without_a_unit_that_reads_as_kmh_is_refused_with_both_readings() {
         let said = error.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
         (code, out, said)
     };
-    let (code, _, said) = run("check --category cut-in --ego-speed 60 --speed 45 --gap 12 --lateral-speed 1");
-    assert!(code == 2 && said.contains("216 km/h") && said.contains("60km/h or 60m/s"), "{said}");
+    let (code, _, said) = run("check --category cut-in --ego-speed 60 --speed 45km/h --gap 12 --lateral-speed 1");
+    assert!(
+        code == 2 && said.contains("as m/s it is 216 km/h, as km/h 16.67 m/s") && said.contains("60km/h or 60m/s"),
+        "{said}"
+    );
     let (code, _, said) = run("check --category lvd --ego-speed 60km/h --thw 1 --acceleration -6g");
     assert!(code == 2 && said.contains("-58.84m/s2") && said.contains("-6m/s2"), "{said}");
     let (_, plain, _) = run(
-        "check --category cut-in --ego-speed 20 --speed 12 --gap 12 --lateral-speed 1 --acceleration -5 --profiles paper",
+        "check --category cut-in --ego-speed 20m/s --speed 12m/s --gap 12 --lateral-speed 1 --acceleration -5 --profiles paper",
     );
     let (_, united, said) = run(
         "check --category cut-in --ego-speed 20m/s --speed 12mps --gap 12m --lateral-speed 1m/s --acceleration -5m/s2 \
@@ -244,7 +251,7 @@ fn a_mined_scenario_is_checked_by_its_id() {
     assert_eq!(closer["case"]["thw_s"], 0.3);
     let (code, _, error) = check(&["check", text(&scenarios), "--scenario", "nobody"]);
     assert!(code == 2 && error.contains("it has no scenario `nobody`") && error.contains(&ids[0]), "{error}");
-    let (code, _, error) = check(&["check", text(&scenarios), "--scenario", &ids[0], "--speed", "10"]);
+    let (code, _, error) = check(&["check", text(&scenarios), "--scenario", &ids[0], "--speed", "10m/s"]);
     assert!(code == 2 && error.contains("complete case"), "{error}");
     let (code, _, error) = check(&["check", text(&scenarios)]);
     assert!(code == 2 && error.contains("--scenario ID"), "{error}");
@@ -311,7 +318,7 @@ fn a_check_of_lanes_with_too_many_steps_is_refused_in_seconds() {
     let path = dir.path().join("cap.toml");
     let profile = include_str!("../../configs/profiles/jrc-2021.toml");
     assert!(profile.contains("time_cap_s = 34.9"));
-    let case = "check --category cut-in --ego-speed 30 --speed 20 --gap 36 --lateral-speed 1 --profiles";
+    let case = "check --category cut-in --ego-speed 30m/s --speed 20m/s --gap 36 --lateral-speed 1 --profiles";
     // A cap that lost its point; then the longest one, whose lanes never settle.
     for (cap, dt, expected) in [
         ("34900.0", "0.1", "0.001 to 3600 s"),
@@ -333,21 +340,21 @@ fn a_check_of_lanes_with_too_many_steps_is_refused_in_seconds() {
 
 /// Descriptions of a case as flags, and what is wrong with each: the key, and a part of the sentence.
 const CONTRADICTIONS: [(&str, &str, &str); 15] = [
-    ("lvd --ego-speed 30 --thw 1", "acceleration", "it is missing"),
-    ("lvd --ego-speed 30 --thw 1 --end-speed 0", "acceleration", "it is missing"),
-    ("lvd --ego-speed 30 --thw 1 --acceleration 0 --end-speed 0", "end_speed", "without an acceleration"),
-    ("lvd --ego-speed 30 --thw 1 --acceleration -5 --end-speed 40", "end_speed", "cannot be reached"),
-    ("lvd --ego-speed 30 --thw 1 --acceleration -5 --end-speed 30", "end_speed", "would have no effect"),
-    ("lvd --ego-speed 30 --thw 1 --acceleration 5 --end-speed 40", "acceleration", "leader of an LVD faster"),
-    ("lvd --ego-speed 30 --thw 1 --acceleration -5 --ahead-gap 40", "ahead_gap", "no such parameter"),
-    ("lvd --ego-speed 0 --thw 1 --acceleration -5 --speed 20", "thw", "is no distance"),
-    ("cut-in --ego-speed 30 --thw 1 --lateral-speed 1 --end-speed 10", "end_speed", "without an acceleration"),
-    ("cut-in --ego-speed 30 --thw 1 --lateral-speed 1 --acceleration 2 --end-speed 10", "end_speed", "cannot be"),
-    ("cut-in --ego-speed 30 --thw 1 --lateral-speed 0", "lateral_speed", "0 cannot be used"),
-    ("cut-in --ego-speed 30 --thw 1 --lateral-speed 1 --lateral-distance 0", "lateral_distance", "0 cannot be used"),
-    ("cut-in --ego-speed 30 --thw 1", "lateral_speed", "it is missing"),
-    ("cut-out --ego-speed 30 --thw 1 --lateral-speed 1", "ahead_gap", "it is missing"),
-    ("cut-out --ego-speed 30 --thw 1 --lateral-speed 1 --ahead-gap 40 --end-speed 9", "end_speed", "without"),
+    ("lvd --ego-speed 30m/s --thw 1", "acceleration", "it is missing"),
+    ("lvd --ego-speed 30m/s --thw 1 --end-speed 0", "acceleration", "it is missing"),
+    ("lvd --ego-speed 30m/s --thw 1 --acceleration 0 --end-speed 0", "end_speed", "without an acceleration"),
+    ("lvd --ego-speed 30m/s --thw 1 --acceleration -5 --end-speed 40m/s", "end_speed", "cannot be reached"),
+    ("lvd --ego-speed 30m/s --thw 1 --acceleration -5 --end-speed 30m/s", "end_speed", "would have no effect"),
+    ("lvd --ego-speed 30m/s --thw 1 --acceleration 5 --end-speed 40m/s", "acceleration", "leader of an LVD faster"),
+    ("lvd --ego-speed 30m/s --thw 1 --acceleration -5 --ahead-gap 40", "ahead_gap", "no such parameter"),
+    ("lvd --ego-speed 0 --thw 1 --acceleration -5 --speed 20m/s", "thw", "is no distance"),
+    ("cut-in --ego-speed 30m/s --thw 1 --lateral-speed 1 --end-speed 10m/s", "end_speed", "without an acceleration"),
+    ("cut-in --ego-speed 30m/s --thw 1 --lateral-speed 1 --acceleration 2 --end-speed 10m/s", "end_speed", "cannot be"),
+    ("cut-in --ego-speed 30m/s --thw 1 --lateral-speed 0", "lateral_speed", "0 cannot be used"),
+    ("cut-in --ego-speed 30m/s --thw 1 --lateral-speed 1 --lateral-distance 0", "lateral_distance", "0 cannot be used"),
+    ("cut-in --ego-speed 30m/s --thw 1", "lateral_speed", "it is missing"),
+    ("cut-out --ego-speed 30m/s --thw 1 --lateral-speed 1", "ahead_gap", "it is missing"),
+    ("cut-out --ego-speed 30m/s --thw 1 --lateral-speed 1 --ahead-gap 40 --end-speed 9m/s", "end_speed", "without"),
 ];
 
 #[test]
@@ -400,14 +407,14 @@ fn a_description_that_contradicts_itself_is_refused_alike_by_every_verb_and_from
         assert!(code == 2 && said.contains(problem), "{values}: {said}");
     }
     // A value that was typed is not of the table.
-    std::fs::write(&table, "category,ego_speed,thw,acceleration\nlvd,30,1,-5\n").unwrap();
-    let (code, _, error) = check(&["check", text(&table), "--end-speed", "40"]);
+    std::fs::write(&table, "category,ego_speed_mps,thw,acceleration\nlvd,30,1,-5\n").unwrap();
+    let (code, _, error) = check(&["check", text(&table), "--row", "1", "--end-speed", "40m/s"]);
     assert!(code == 2 && error.contains("end_speed: 40 m/s cannot be reached"), "{error}");
 }
 
 #[test]
 fn an_end_speed_a_perturbation_away_from_the_initial_one_is_still_a_case() {
-    let case = "check --category lvd --ego-speed 30 --thw 1 --acceleration -5 --end-speed 29.99 --profiles paper";
+    let case = "check --category lvd --ego-speed 30m/s --thw 1 --acceleration -5 --end-speed 29.99m/s --profiles paper";
     let (code, out, error) = check(&case.split(' ').collect::<Vec<_>>());
     assert!(code == 9 && out.contains("no conflict"), "{code} {out} {error}");
 }

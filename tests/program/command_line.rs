@@ -153,15 +153,15 @@ fn a_case_from_flags_from_toml_and_from_a_table_row_is_the_same_case() {
     let (toml, table) = (dir.path().join("case.toml"), dir.path().join("cases.csv"));
     std::fs::write(
         &toml,
-        "category = \"cut-in\"\nmodels = \"FSM\"\nego_speed = 30.0\nspeed = 20.0\nthw = 1.2\nlateral_speed = 1.0\n",
+        "category = \"cut-in\"\nmodels = \"FSM\"\nego_speed_mps = 30\nspeed_kmh = 72\nthw = 1.2\nlateral_speed = 1.0\n",
     )
     .unwrap();
     std::fs::write(
         &table,
-        "category,models,ego_speed,speed,thw,lateral_speed\nlvd,RSS,1,1,1,\ncut-in,FSM,30,20,1.2,1.0\n",
+        "category,models,ego_speed_mps,speed_mps,thw,lateral_speed\nlvd,RSS,1,1,1,\ncut-in,FSM,30,20,1.2,1.0\n",
     )
     .unwrap();
-    let flags = "simulate --category cut-in --models FSM --ego-speed 30 --speed 20 --thw 1.2 --lateral-speed 1";
+    let flags = "simulate --category cut-in --models FSM --ego-speed 30m/s --speed 20m/s --thw 1.2 --lateral-speed 1";
     let by_flags = lanesweep(&flags.split(' ').collect::<Vec<_>>());
     let by_toml = lanesweep(&["simulate", "--case-file", text(&toml)]);
     let by_table = lanesweep(&["simulate", "--table", text(&table), "--row", "2"]);
@@ -237,7 +237,7 @@ fn wrong_words_are_answered_with_what_to_write_instead() {
                 "--category",
                 "lvd",
                 "--ego-speed",
-                "20",
+                "20m/s",
                 "--gap",
                 "5",
                 "--acceleration",
@@ -249,11 +249,11 @@ fn wrong_words_are_answered_with_what_to_write_instead() {
             "Reg157, CCHDM",
         ),
         (
-            &["simulate", "--category", "lvd", "--ego-speed", "-3", "--gap", "5", "--acceleration", "-6"],
+            &["simulate", "--category", "lvd", "--ego-speed", "-3m/s", "--gap", "5", "--acceleration", "-6"],
             2,
             "at least 0",
         ),
-        (&["simulate", "--category", "lvd", "--ego-speed", "20", "--acceleration", "-6"], 2, "--thw"),
+        (&["simulate", "--category", "lvd", "--ego-speed", "20m/s", "--acceleration", "-6"], 2, "--thw"),
         (&["verify", "conformance"], 2, "nothing to compare"),
         (&["verify", "conformance", &no_table], 3, "no conformance table"),
     ];
@@ -271,7 +271,7 @@ fn a_list_with_a_value_twice_is_refused_with_the_value() {
     let lane = "01_cut_in_81_74_836/S/0.6s/RSS";
     let scenarios = common::golden("paper_sumo_01_02_scenarios.jsonl");
     let export = ["export", "xosc", "--scenarios", text(&scenarios), "--lane", lane, "--lane"];
-    let case = "--category lvd --ego-speed 20 --gap 20 --acceleration -6 --models FSM,fsm";
+    let case = "--category lvd --ego-speed 20m/s --gap 20 --acceleration -6 --models FSM,fsm";
     let case: Vec<&str> = case.split(' ').collect();
     let lists: [(&[&str], &str); 18] = [
         (&["study", "--thw", "0.6,0.6"], "--thw: `0.6` is given twice"),
@@ -299,7 +299,7 @@ fn a_list_with_a_value_twice_is_refused_with_the_value() {
                 "--category",
                 "lvd",
                 "--ego-speed",
-                "20",
+                "20m/s",
                 "--gap",
                 "9",
                 "--acceleration",
@@ -335,8 +335,8 @@ fn a_result_folder_that_cannot_be_written_is_named() {
 fn a_reader_that_goes_away_is_no_error() {
     let program = env!("CARGO_BIN_EXE_lanesweep");
     let mut child = std::process::Command::new(program)
-        .args(["simulate", "--category", "lvd", "--models", "RSS", "--ego-speed", "30", "--thw", "2"])
-        .args(["--acceleration", "-0.1", "--end-speed", "1"])
+        .args(["simulate", "--category", "lvd", "--models", "RSS", "--ego-speed", "30m/s", "--thw", "2"])
+        .args(["--acceleration", "-0.1", "--end-speed", "1m/s"])
         .stdout(std::process::Stdio::piped())
         .stderr(std::process::Stdio::null())
         .spawn()
@@ -361,7 +361,7 @@ fn help_names_every_verb_and_every_exit_code() {
     }
 }
 
-const CASE: &str = "simulate --category cut-in --ego-speed 30 --speed 20 --lateral-speed 1.5 --models Reg157";
+const CASE: &str = "simulate --category cut-in --ego-speed 30m/s --speed 20m/s --lateral-speed 1.5 --models Reg157";
 
 /// `simulate` on a case with more flags: stdout and, as one line, stderr.
 fn simulated(flags: &str) -> (String, String) {

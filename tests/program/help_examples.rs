@@ -116,7 +116,7 @@ fn every_example_of_the_help_runs() {
                 let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/examples").join(name);
                 std::fs::copy(shipped, dir.join(name)).unwrap();
             }
-            let case = "category,ego_speed,speed,gap,lateral_speed\n";
+            let case = "category,ego_speed_mps,speed_mps,gap,lateral_speed\n";
             std::fs::write(dir.join("cases.csv"), format!("{case}cut-in,30,20,20,1\ncut-in,30,20,40,1\n")).unwrap();
             std::fs::write(dir.join("fcd.csv"), fcd()).unwrap();
             let own = fcd().replace("vehicle_", "").replace("timestep_", "");

@@ -229,7 +229,7 @@ fn a_command_that_its_verb_refuses_is_refused_before_anything_is_written() {
         ("broken.toml", &b"[score\n"[..]),
         ("wrong.toml", b"[score]\nleast_failurez = 5\n"),
         ("profile.toml", b"[run]\nprofile = \"papr\"\n"),
-        ("scenarios.csv", b"category,ego_speed\nlvd,30\n"),
+        ("scenarios.csv", b"category,ego_speed_kmh\nlvd,108\n"),
         ("d.json", density()),
     ] {
         std::fs::write(dir.path().join(name), content).unwrap();

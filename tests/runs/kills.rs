@@ -127,7 +127,7 @@ const VERBS: [Verb; 17] = [
         "export",
         Some("index.csv"),
         Some(
-            "export xosc --category cut-in --models FSM --ego-speed 30 --speed 20 --thw 1.2 --lateral-speed 1 --out out",
+            "export xosc --category cut-in --models FSM --ego-speed 30m/s --speed 20m/s --thw 1.2 --lateral-speed 1 --out out",
         ),
         "export xosc --from old-study --worst 3 --ego external --out out",
     ),

@@ -124,7 +124,7 @@ fn files_that_a_foreign_record_names_stay_and_the_record_is_refused() {
             std::fs::remove_file(at(name)).unwrap();
         }
     };
-    let lvd = ["export", "xosc", "--category", "lvd", "--models", "FSM", "--ego-speed", "30", "--thw", "1"];
+    let lvd = ["export", "xosc", "--category", "lvd", "--models", "FSM", "--ego-speed", "30m/s", "--thw", "1"];
     let export = [&lvd[..], &["--acceleration=-5", "--out", out]].concat();
     let map = [
         "map",
@@ -291,7 +291,7 @@ fn values_that_no_lane_can_hold_are_refused_with_their_line() {
             "--models",
             "FSM",
             "--ego-speed",
-            "30",
+            "30m/s",
             "--gap",
             "1e300",
             "--acceleration=-5",
@@ -312,7 +312,7 @@ fn flags_that_would_not_be_heeded_and_absurd_numbers_of_threads_are_refused() {
         &[&["export", "xosc", "--from", "run", "--lane", lane][..], &dt].concat(),
         "is decided by the run (--from)",
     );
-    let check = ["check", "--category", "lvd", "--ego-speed", "30", "--thw", "1", "--acceleration", "-6"];
+    let check = ["check", "--category", "lvd", "--ego-speed", "30m/s", "--thw", "1", "--acceleration", "-6"];
     refused(&[&check[..], &dt].concat(), "`run.dt_s` has no effect on a check");
     for data in [&["--scenarios", text(&scenarios)][..], &["recordings"]] {
         refused(&[&["study", "--synth-recordings", "2"], data].concat(), "cannot be used with");
@@ -353,7 +353,7 @@ fn the_label_of_made_up_data_is_in_the_data_and_follows_them_everywhere() {
     }
     std::fs::write(
         at("s.csv"),
-        "id,category,ego_speed,time_s,ego_length,ego_width,side,target_length,target_width,target_v,\
+        "id,category,ego_speed_mps,time_s,ego_length,ego_width,side,target_length,target_width,target_v,\
          target_y,synthetic\na,cut-in,30,0,4,2,left,4,2,20,3.5,1\na,,,1,,,,,,20,2.5,\n",
     )
     .unwrap();

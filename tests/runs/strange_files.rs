@@ -417,7 +417,7 @@ fn a_table_for_spreadsheets_begins_no_formula_with_foreign_text_and_reads_back_t
             &["verify", "conformance", "--scenarios", "s.jsonl", "--golden-lanes", "lanes.csv"],
         );
         assert_eq!(code, 0, "{id}: {err}");
-        let row = format!("id,category,ego_speed,speed,lateral_speed\n\"'{id}\",cut-in,30,20,1\n");
+        let row = format!("id,category,ego_speed_mps,speed_mps,lateral_speed\n\"'{id}\",cut-in,30,20,1\n");
         std::fs::write(dir.join("cases.csv"), row).unwrap();
         let lane = format!("--lane={id}/S/1.2s/FSM");
         let (code, _, err) = program::lanesweep(dir, &["simulate", "--scenarios", "cases.csv", &lane]);

@@ -156,9 +156,9 @@ const CUT_IN: [&str; 12] = [
     "--models",
     "FSM",
     "--ego-speed",
-    "30",
+    "30m/s",
     "--speed",
-    "20",
+    "20m/s",
     "--thw",
     "1.2",
     "--lateral-speed",
@@ -170,7 +170,7 @@ const CUT_OUT: [&str; 14] = [
     "--models",
     "RSS",
     "--ego-speed",
-    "27.3",
+    "27.3m/s",
     "--gap",
     "31",
     "--lateral-speed",
@@ -178,10 +178,10 @@ const CUT_OUT: [&str; 14] = [
     "--ahead-gap",
     "42",
     "--ahead-speed",
-    "26",
+    "26m/s",
 ];
 const LVD: [&str; 10] =
-    ["--category", "lvd", "--models", "CCHDM", "--ego-speed", "25", "--gap", "20", "--acceleration", "-6.5"];
+    ["--category", "lvd", "--models", "CCHDM", "--ego-speed", "25m/s", "--gap", "20", "--acceleration", "-6.5"];
 
 fn only_scenario(dir: &Path) -> String {
     let found: Vec<_> = std::fs::read_dir(dir).unwrap().map(|e| e.unwrap().path()).collect();
@@ -208,7 +208,7 @@ fn a_cut_out_whose_other_vehicles_overlap_says_so_in_its_file() {
     let dir = tempfile::tempdir().unwrap();
     let case = |lateral: &'static str, ahead_gap: &'static str| {
         let case =
-            ["--category", "cut-out", "--models", "FSM", "--ego-speed", "20", "--gap", "40", "--ahead-speed", "0"];
+            ["--category", "cut-out", "--models", "FSM", "--ego-speed", "20m/s", "--gap", "40", "--ahead-speed", "0"];
         [&case[..], &["--lateral-speed", lateral, "--ahead-gap", ahead_gap]].concat()
     };
     // By hand: 1.9 m across at 0.8 m/s take 2.375 s; at 20 m/s the bumpers meet after 30 m in 1.5 s. After 100 m in 5 s
@@ -382,7 +382,7 @@ fn the_declared_speed_of_an_ego_of_the_users_own_is_the_cases_to_the_bit() {
     let dir = tempfile::tempdir().unwrap();
     for kmh in [7.0, 20.0, 33.3, 50.0, 108.0] {
         let ego = format!("{kmh}km/h");
-        let case = ["--category", "cut-in", "--models", "FSM", "--ego-speed", &ego, "--speed", "1", "--gap", "9"];
+        let case = ["--category", "cut-in", "--models", "FSM", "--ego-speed", &ego, "--speed", "1m/s", "--gap", "9"];
         let flags = ["export", "xosc", "--ego", "external", "--out", "x", "--lateral-speed", "1"];
         good(dir.path(), &[&flags[..], &case].concat());
         let (_, all) = played(&only_scenario(&dir.path().join("x")));
@@ -467,7 +467,7 @@ fn what_cannot_be_exported_is_named() {
         "--models",
         "FSM",
         "--ego-speed",
-        "30",
+        "30m/s",
         "--gap",
         "40",
         "--lateral-speed",

@@ -113,7 +113,8 @@ fn maps_traces_and_checks_print_documents() {
         assert_eq!(sum, cells, "{row}");
     }
 
-    let case = ["--category", "cut-in", "--ego-speed", "30", "--speed", "20", "--thw", "0.4", "--lateral-speed", "1.5"];
+    let case =
+        ["--category", "cut-in", "--ego-speed", "30m/s", "--speed", "20m/s", "--thw", "0.4", "--lateral-speed", "1.5"];
     let simulate: Vec<&str> = ["simulate", "--models", "all"].iter().chain(&case).copied().collect();
     let (printed, csv) = (json(dir.path(), &simulate), lanesweep(dir.path(), &simulate));
     assert_eq!(printed["steps"].as_array().unwrap().len(), csv.lines().count() - 1);

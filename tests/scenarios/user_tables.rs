@@ -140,7 +140,8 @@ fn what_is_wrong_with_a_row_per_instant_is_told_with_line_scenario_and_column() 
     assert!(of("s.csv", "").is_err() && of("s.csv", "id,category\n").is_err());
 }
 
-const CASES: &str = "id,category,models,ego_speed_kmh,speed,thw,gap,lateral_speed,acceleration,end_speed,ahead_gap,\
+const CASES: &str =
+    "id,category,models,ego_speed_kmh,speed_mps,thw,gap,lateral_speed,acceleration,end_speed,ahead_gap,\
 ahead_speed_kmh,duration_s,rate_hz
 a,cut-in,FSM,108,20,1.2,,1.0,,,,,,
 ,lvd,RSS,108,30,,30,,-6,0,,,,10
@@ -183,11 +184,11 @@ fn parameters_make_the_scenarios_that_simulate_runs() {
 #[test]
 fn what_is_wrong_with_parameters_is_told_with_line_and_column() {
     let cases = [
-        ("speed,thw", "sped,thw", "line 1, column `sped`", "no such column", "did you mean `speed`?"),
+        ("speed_mps,thw", "sped,thw", "line 1, column `sped`", "no such column", "did you mean `speed`?"),
         ("id,category", "id,note,category", "column `note`", "no such column", "remove it"),
         ("lateral_speed", "lateral_speed_ms", "column `lateral_speed_ms`", "milliseconds", "`lateral_speed_mps`"),
         ("cut-in,FSM", "cutin,FSM", "line 2, column `category`", "no category `cutin`", "use cut-in, cut-out or lvd"),
-        ("FSM,108,20", "FSM,,20", "line 2, column `ego_speed_kmh`", "missing", "a speed in m/s"),
+        ("FSM,108,20", "FSM,,20", "line 2, column `ego_speed_kmh`", "missing", "such as 60km/h"),
         (
             "1.2,,1.0,,,,",
             "1.2,8,1.0,,,,",
@@ -195,9 +196,9 @@ fn what_is_wrong_with_parameters_is_told_with_line_and_column() {
             "both gap and time headway are given",
             "leave one of the two empty",
         ),
-        ("-6,0", "-6,40", "line 3, column `end_speed`", "cannot be reached", "sign"),
+        ("-6,0", "-6,40m/s", "line 3, column `end_speed`", "cannot be reached", "sign"),
         ("36,4,", "36,2000,", "line 4, column `duration_s`", "2000 cannot be used", "at most 120"),
-        ("108,20,", "108,fast,", "line 2, column `speed`", "expected a number", "tables"),
+        ("108,20,", "108,fast,", "line 2, column `speed_mps`", "is \"fast\"", "60km/h"),
     ];
     for (old, new, place, problem, help) in cases {
         assert!(CASES.contains(old), "{old}");
@@ -213,7 +214,7 @@ fn what_is_wrong_with_parameters_is_told_with_line_and_column() {
         assert!(error.help().unwrap().contains(help), "{new}: {:?}", error.help());
     }
     let rows: String = (0..6000).map(|_| "lvd,20,-1,120,1000\n").collect();
-    let error = of("p.csv", &format!("category,ego_speed,acceleration,duration_s,rate_hz\n{rows}")).unwrap_err();
+    let error = of("p.csv", &format!("category,ego_speed_mps,acceleration,duration_s,rate_hz\n{rows}")).unwrap_err();
     assert!(error.to_string().contains("too many for this number of rows"), "{error}");
 }
 
@@ -349,14 +350,14 @@ fn simulate_takes_a_row_of_a_parquet_table() {
     let columns = vec![
         ("category", texts(&["lvd", "cut-in"])),
         ("models", texts(&["RSS", "FSM"])),
-        ("ego_speed", numbers(&[20.0, 30.0])),
+        ("ego_speed_mps", numbers(&[20.0, 30.0])),
         ("speed_kmh", numbers(&[72.0, 72.0])),
         ("thw", numbers(&[1.0, 1.2])),
         ("lateral_speed", numbers(&[f64::NAN, 1.0])),
     ];
     made::write(&dir.path().join("cases.parquet"), columns, Compression::SNAPPY);
     let table = lanesweep(dir.path(), &["simulate", "--table", "cases.parquet", "--row", "2"]);
-    let flags = "simulate --category cut-in --models FSM --ego-speed 30 --speed 20 --thw 1.2 --lateral-speed 1";
+    let flags = "simulate --category cut-in --models FSM --ego-speed 30m/s --speed 20m/s --thw 1.2 --lateral-speed 1";
     assert_eq!(table, lanesweep(dir.path(), &flags.split(' ').collect::<Vec<_>>()));
     let (code, text) = said(dir.path(), &["simulate", "--table", "cases.parquet", "--row", "3"]);
     assert!(code == 2 && text.contains("there is no row 3"), "{text}");
@@ -488,10 +489,10 @@ fn small_negative_speeds_are_0_in_every_table_and_flag_and_larger_ones_an_error(
     assert!(
         of("i.csv", &INSTANTS.replace("36,0.1", "-1.8,0.1")).unwrap_err().to_string().contains("is -0.5; expected")
     );
-    let cases = "category,ego_speed,speed,acceleration\nlvd,20,SPEED,0\n";
+    let cases = "category,ego_speed_mps,speed_mps,acceleration\nlvd,20,SPEED,0\n";
     is_still("c.csv", &cases.replace("SPEED", "-0.01"));
     let error = of("c.csv", &cases.replace("SPEED", "-0.5")).unwrap_err().to_string();
-    assert!(error.contains("line 2, column `speed`"), "{error}");
+    assert!(error.contains("line 2, column `speed_mps`"), "{error}");
     let line = |speed: f64| {
         format!(
             "{{\"id\":\"a\",\"category\":\"lvd\",\"fps\":10,\"side\":\"left\",\"ego\":{{\"v0\":20,\"length\":4,\"width\":2}},\
@@ -510,12 +511,12 @@ fn small_negative_speeds_are_0_in_every_table_and_flag_and_larger_ones_an_error(
     assert!(of_parquet(-0.5).unwrap_err().to_string().contains("column `target_v[1]`, row 2"));
 
     let lvd = |speed: &str| {
-        ["simulate --category lvd --models FSM --ego-speed 30 --gap 30 --acceleration 0 --speed", speed].join(" ")
+        ["simulate --category lvd --models FSM --ego-speed 30m/s --gap 30 --acceleration 0 --speed", speed].join(" ")
     };
     let simulate = |line: &str| said(dir.path(), &line.split(' ').collect::<Vec<_>>());
-    let (code, text) = simulate(&lvd("-0.01"));
+    let (code, text) = simulate(&lvd("-0.01m/s"));
     assert!(code == 0 && text.contains("taken as 0, once: speed"), "{text}");
-    assert_eq!(simulate(&lvd("-0.5")).0, 2);
+    assert_eq!(simulate(&lvd("-0.5m/s")).0, 2);
     let map = |speed: &str| {
         let set = format!("other_speed_mps={speed}");
         let map = ["map", "lvd", "--x", "gap_m=10,20", "--y", "ego_speed_mps=10,20", "--set", "deceleration_mps2=1"];
@@ -530,10 +531,13 @@ fn small_negative_speeds_are_0_in_every_table_and_flag_and_larger_ones_an_error(
 #[test]
 fn flags_that_no_road_has_are_refused_with_the_likely_unit_unless_accepted() {
     let dir = tempfile::tempdir().unwrap();
-    let cut_in = "simulate --category cut-in --models FSM --lateral-speed 1 --thw 1.2 --speed 20 --ego-speed";
+    let cut_in = "simulate --category cut-in --models FSM --lateral-speed 1 --thw 1.2 --speed 20m/s --ego-speed";
     let simulate = |more: &str| said(dir.path(), &format!("{cut_in} {more}").split(' ').collect::<Vec<_>>());
     let (code, text) = simulate("108");
-    assert!(code == 2 && text.contains("108 has no unit: as m/s it is 388.8 km/h; write 108km/h or 108m/s"), "{text}");
+    assert!(
+        code == 2 && text.contains("108 has no unit: as m/s it is 388.8 km/h, as km/h 30 m/s; write 108km/h or 108m/s"),
+        "{text}"
+    );
     let (code, text) = simulate("108m/s");
     assert!(
         code == 2 && text.contains("108 looks like km/h: 30 m/s") && text.contains("--accept-implausible"),
@@ -543,9 +547,9 @@ fn flags_that_no_road_has_are_refused_with_the_likely_unit_unless_accepted() {
     assert!(code == 0 && text.contains("WARN an implausible speed is used as it is"), "{text}");
     let (code, text) = simulate("90m/s");
     assert!(code == 0 && text.contains("90 looks like km/h: 25 m/s"), "{text}");
-    let (code, text) = simulate("30 --acceleration 6");
+    let (code, text) = simulate("30m/s --acceleration 6");
     assert!(code == 2 && text.contains("acceleration: it results in a speed that no vehicle has: 740 m/s"), "{text}");
-    assert_eq!(simulate("30 --acceleration 6 --end-speed 40").0, 0);
-    let (code, text) = simulate("30 --length 430");
+    assert_eq!(simulate("30m/s --acceleration 6 --end-speed 40m/s").0, 0);
+    let (code, text) = simulate("30m/s --length 430");
     assert!(code == 2 && text.contains("430 looks like cm: 4.3 m"), "{text}");
 }

@@ -222,12 +222,24 @@ impl Check {
     /// [`Error::Usage`] for an invalid case, a time step that is too long for it, lanes with too many steps, and a
     /// duplicate profile or model.
     pub fn run(&self) -> Result<Vec<Judgement>> {
-        refuse_repeats(|| Place::option("profiles"), self.profiles.iter().map(|p| (&p.name, &p.name)))?;
-        refuse_repeats(|| Place::option("models"), self.models.iter().map(|model| (*model, model.name())))?;
-        self.profiles.par_iter().map(|profile| self.under(profile)).collect()
+        self.judge(true)
     }
 
-    fn under(&self, profile: &Profile) -> Result<Judgement> {
+    /// Like [`Check::run`], without the search for the values at which the answer changes: by far the most lanes.
+    ///
+    /// # Errors
+    /// As [`Check::run`].
+    pub fn run_without_boundaries(&self) -> Result<Vec<Judgement>> {
+        self.judge(false)
+    }
+
+    fn judge(&self, with_boundaries: bool) -> Result<Vec<Judgement>> {
+        refuse_repeats(|| Place::option("profiles"), self.profiles.iter().map(|p| (&p.name, &p.name)))?;
+        refuse_repeats(|| Place::option("models"), self.models.iter().map(|model| (*model, model.name())))?;
+        self.profiles.par_iter().map(|profile| self.under(profile, with_boundaries)).collect()
+    }
+
+    fn under(&self, profile: &Profile, with_boundaries: bool) -> Result<Judgement> {
         let lane = self.subject.lane(profile, self.subject.point())?;
         profile.check_time_step(&self.models)?;
         check_time_step(&lane.case, &lane.tables, profile.frame.dt_s, || Place::item("the case"))?;
@@ -273,7 +285,10 @@ impl Check {
                 &trace,
                 attends_at_once.is_some(),
             ),
-            boundaries: boundary::boundaries(&self.subject, &settling, &budget)?,
+            boundaries: match with_boundaries {
+                true => boundary::boundaries(&self.subject, &settling, &budget)?,
+                false => Vec::new(),
+            },
             time_cap_s: profile.frame.time_cap_s,
             drives_through_s: self.subject.case(profile, self.subject.point())?.drives_through_s(profile),
         })

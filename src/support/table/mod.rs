@@ -27,7 +27,7 @@ pub use arrow::ArrowRows;
 pub(crate) use column::Row;
 pub use column::{Cell, Column, ColumnKind, Digits, TableMetadata};
 pub use memory::{CellValue, NumberText, Table, TableOf};
-pub(crate) use names::{Named, Resolved, nearest, resolve};
+pub(crate) use names::{NameUnit, Named, Resolved, nearest, resolve};
 #[cfg(feature = "parquet")]
 pub use parquet_reader::is_panic_caught;
 pub(crate) use reader::TableReader;

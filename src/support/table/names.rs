@@ -9,10 +9,20 @@ pub(crate) struct Named {
     pub name: String,
     /// Unit; empty for fields that are not numbers, `1` for a dimensionless number.
     pub unit: &'static str,
+    /// Whether a plain number means nothing without a unit: speeds along the road are written in km/h and in m/s.
+    pub needs_unit: bool,
 }
 
-/// Divisor that converts a column's values to the field's unit.
-pub(crate) type Divisor = f64;
+/// The unit of the plain numbers under a name.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum NameUnit {
+    /// The name says it: divide by this to convert to the field's unit.
+    Said(f64),
+    /// The name does not say it; it is the field's unit.
+    Customary,
+    /// The name does not say it, and the field needs one: every number must have its own.
+    Needed,
+}
 
 /// Unit suffixes of names.
 const SUFFIXES: [(&str, &str); 17] = [
@@ -38,8 +48,8 @@ const SUFFIXES: [(&str, &str); 17] = [
 /// The field of a column.
 #[derive(Debug, PartialEq)]
 pub(crate) enum Resolved {
-    /// Index of the field, and the divisor of the values.
-    Field(usize, Divisor),
+    /// Index of the field, and the unit of its plain numbers.
+    Field(usize, NameUnit),
     /// A field, but in an unusable unit: the problem and what to do.
     WrongUnit(String, String),
     /// No field.
@@ -51,7 +61,7 @@ pub(crate) fn resolve(column: &str, fields: &[Named]) -> Resolved {
     let folded = column.trim().replace('.', "_").to_ascii_lowercase();
     let is = |field: &Named| field.name.eq_ignore_ascii_case(&folded);
     if let Some(at) = fields.iter().position(is) {
-        return Resolved::Field(at, 1.0);
+        return Resolved::Field(at, if fields[at].needs_unit { NameUnit::Needed } else { NameUnit::Customary });
     }
     for (at, field) in fields.iter().enumerate() {
         let Some(rest) = folded.strip_prefix(&field.name.to_ascii_lowercase()).and_then(|rest| rest.strip_prefix('_'))
@@ -60,10 +70,10 @@ pub(crate) fn resolve(column: &str, fields: &[Named]) -> Resolved {
         };
         let Some((_, unit)) = SUFFIXES.iter().find(|(suffix, _)| *suffix == rest) else { continue };
         if *unit == field.unit {
-            return Resolved::Field(at, 1.0);
+            return Resolved::Field(at, NameUnit::Said(1.0));
         }
         if *unit == "km/h" && field.unit == "m/s" {
-            return Resolved::Field(at, 3.6);
+            return Resolved::Field(at, NameUnit::Said(3.6));
         }
         let suffix = SUFFIXES.iter().find(|(_, unit)| *unit == field.unit).map_or("", |(suffix, _)| suffix);
         let wanted = match field.unit {
@@ -86,18 +96,19 @@ mod tests {
     use super::*;
 
     fn fields() -> Vec<Named> {
-        [("id", ""), ("ego_v0", "m/s"), ("target_y", "m"), ("D", "m"), ("fps", "Hz")]
-            .map(|(name, unit)| Named { name: name.to_owned(), unit })
+        [("id", ""), ("ego_v0", "m/s"), ("target_y", "m"), ("D", "m"), ("fps", "Hz"), ("ego_speed", "m/s")]
+            .map(|(name, unit)| Named { name: name.to_owned(), unit, needs_unit: name == "ego_speed" })
             .into()
     }
 
     #[test]
     fn a_name_may_have_its_unit_and_kilometres_per_hour_are_converted() {
         let of = |name: &str| resolve(name, &fields());
-        assert_eq!(of("ego.v0"), Resolved::Field(1, 1.0));
-        assert_eq!(of("ego_v0_mps"), Resolved::Field(1, 1.0));
-        assert_eq!(of(" ego_v0_kmh"), Resolved::Field(1, 3.6));
-        assert_eq!(of("d_m"), Resolved::Field(3, 1.0));
+        assert_eq!(of("ego.v0"), Resolved::Field(1, NameUnit::Customary));
+        assert_eq!(of("ego_v0_mps"), Resolved::Field(1, NameUnit::Said(1.0)));
+        assert_eq!(of(" ego_v0_kmh"), Resolved::Field(1, NameUnit::Said(3.6)));
+        assert_eq!(of("d_m"), Resolved::Field(3, NameUnit::Said(1.0)));
+        assert_eq!(of("ego_speed"), Resolved::Field(5, NameUnit::Needed));
         assert_eq!(of("weather"), Resolved::Unknown);
     }
 

@@ -242,7 +242,8 @@ b,lvd,0,90,4.5,1.8,Right,4.2,1.9,90,0,1,
 b,,0.1,,,,,,,36,0.1,,
 ";
 
-const CASES: &str = "id,category,models,ego_speed_kmh,speed,thw,gap,lateral_speed,acceleration,end_speed,ahead_gap,\
+const CASES: &str =
+    "id,category,models,ego_speed_kmh,speed_mps,thw,gap,lateral_speed,acceleration,end_speed,ahead_gap,\
 ahead_speed_kmh,duration_s,rate_hz
 a,cut-in,FSM,108,20,1.2,,1.0,,,,,,
 ,lvd,RSS,108,30,,30,,-6,0,,,,10
