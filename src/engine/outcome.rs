@@ -92,6 +92,13 @@ impl Outcome<f64> {
 }
 
 impl<R: Real> Outcome<R> {
+    /// Minimum TTC for reports: `None` where the vehicles meet side by side without an approach along one path. There
+    /// infinity would read as "never near".
+    pub fn approach_ttc(&self) -> Option<R> {
+        let is_beside = self.contact == Contact::BySide && !self.min_ttc.to_f64().is_finite();
+        (!is_beside).then_some(self.min_ttc)
+    }
+
     /// The same in f64; exact.
     pub fn widen(&self) -> Outcome<f64> {
         Outcome {
