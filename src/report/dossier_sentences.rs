@@ -140,7 +140,7 @@ impl DossierReport<'_> {
         let more = (times * self.dossier.scenarios as f64).ceil();
         Some(if times < 1000.0 {
             format!(
-                "At least about {} scenarios ({} times as many) would decide, if the rates stay as they are: an interval narrows with \
+                "At least about {} kept scenarios ({} times as many) would decide, if the rates stay as they are: an interval narrows with \
                  the square root of their number.",
                 count(more as u64),
                 value(times)
