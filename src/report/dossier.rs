@@ -109,7 +109,7 @@ impl DossierReport<'_> {
             .column("S: BTN", |hidden| hidden.recorded.max_btn)
             .column(Column::from("S': TTC s").null("–"), |hidden| hidden.parameterized.approach_ttc())
             .column("S': BTN", |hidden| hidden.parameterized.max_btn)
-            .column("S': gap m", |hidden| hidden.parameterized.min_gap)
+            .column(Column::from("S': gap m").null("–"), |hidden| hidden.parameterized.gap_in_path())
             .build()
     }
 

@@ -61,12 +61,12 @@ impl DossierReport<'_> {
             dropped => format!(" The filters of mining left out {}, about which nothing is said here.", count(dropped)),
         };
         format!(
-            "Coverage is {} of the {} kept scenarios, and {} of the {} found ones: {} are points of the parameter space.{filters}",
-            value(of_kept),
+            "{} of {} kept scenarios are points of the parameter space (coverage {}), which is {} of the {} found ones.{filters}",
+            count(coverage.points),
             count(coverage.kept),
+            value(of_kept),
             value(of_found),
-            count(coverage.found),
-            count(coverage.points)
+            count(coverage.found)
         )
     }
 
@@ -74,7 +74,7 @@ impl DossierReport<'_> {
     pub(super) fn beside(&self, max_rows: usize) -> String {
         let mut shown = self.dossier.hidden.iter().take(max_rows);
         match shown.any(|of| of.recorded.approach_ttc().is_none() || of.parameterized.approach_ttc().is_none()) {
-            true => "TTC –: a side contact without an approach along one path has none.".to_owned(),
+            true => "TTC –: the vehicles met beside each other, without an approach along one path.".to_owned(),
             false => String::new(),
         }
     }

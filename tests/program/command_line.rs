@@ -386,7 +386,7 @@ fn a_contact_is_told_by_its_kind_and_its_closing_speed() {
     // The ego is past the other's middle before that comes into its path.
     let beside = "simulate --category cut-in --ego-speed 30 --speed 20 --gap 14 --lateral-speed 0.8 --models Reg157";
     let said = stderr(&lanesweep(&beside.split(' ').collect::<Vec<_>>()));
-    assert!(said.contains("side contact") && said.contains("min TTC –, max BTN"), "{said}");
+    assert!(said.contains("side contact") && said.contains("min TTC –, max BTN ∞, min gap –"), "{said}");
 }
 
 #[test]

@@ -253,7 +253,7 @@ fn each_conclusion_has_an_exit_status_of_its_own() {
 
 /// The vehicles meet beside each other: infinity would read as "never near".
 #[test]
-fn a_hidden_side_contact_has_no_ttc_instead_of_an_infinite_one() {
+fn a_hidden_contact_without_an_approach_has_no_ttc_instead_of_an_infinite_one() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("out");
     let args = ["-q", "justify", "--synth-recordings", "4", "--parameterization", "5", "--models", "CCHDM"];
@@ -262,10 +262,10 @@ fn a_hidden_side_contact_has_no_ttc_instead_of_an_infinite_one() {
     let mut lines = rows.lines().map(|line| line.split(',').collect::<Vec<_>>());
     let header = lines.next().unwrap();
     let of = |row: &[&str], name: &str| row[header.iter().position(|column| *column == name).unwrap()].to_owned();
-    let sides: Vec<_> = lines.filter(|row| of(row, "s_contact") == "side").collect();
-    assert!(sides.iter().any(|row| of(row, "s_min_ttc_s").is_empty()), "{rows}");
-    assert!(sides.iter().all(|row| of(row, "s_min_ttc_s") != "inf"), "{rows}");
-    assert!(text.contains("| side "), "{text}");
+    let contacts: Vec<_> = lines.filter(|row| !of(row, "s_contact").is_empty()).collect();
+    let is_beside = |row: &Vec<&str>| of(row, "s_contact") == "side" && of(row, "s_min_ttc_s").is_empty();
+    assert!(contacts.iter().any(is_beside) && contacts.iter().all(|row| of(row, "s_min_ttc_s") != "inf"), "{rows}");
+    assert!(text.contains("| side ") && text.contains("TTC –: the vehicles met beside each other"), "{text}");
 }
 
 #[test]
@@ -283,8 +283,7 @@ fn the_conclusion_names_its_profile_and_the_page_has_limits_credibility_and_room
         " found scenarios, ",
         "Recall is ",
         "under un-r157, a reading of UN R157",
-        "Coverage is ",
-        " kept scenarios, and ",
+        " kept scenarios are points of the parameter space (coverage ",
         "Where the interval contains a limit, neither is shown: undecided.",
         "The limits are conventions of this program, not of a standard.",
         "justify.min_recall (0.9)",

@@ -96,7 +96,7 @@ impl TraceFigure<'_> {
             notes.push("Thin gap, TTC, BTN: the criteria ignore the vehicle there.".to_owned());
         }
         if self.series.iter().any(|s| s.trace.outcome.approach_ttc().is_none()) {
-            notes.push("Min TTC –: a side contact without an approach along one path has none.".to_owned());
+            notes.push("Min TTC –: the vehicles met beside each other, without an approach along one path.".to_owned());
         }
         if self.series.iter().any(|s| s.trace.coasting_mps2 > 0.0) {
             notes.push("CCHDM's coasting after its reaction is no braking.".to_owned());
