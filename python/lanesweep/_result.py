@@ -21,6 +21,7 @@ STATUS = {
     8: "undecided",
     9: "no conflict",
     10: "outside Annex 3",
+    11: "not appropriate",
 }
 
 #: Columns whose values are names, even where all of them look like numbers.
@@ -64,7 +65,7 @@ class Result:
     Attributes
     ----------
     status : str
-        ``"ok"``, ``"incomplete"`` if parts of the input were left out, or the answer of `check`.
+        ``"ok"``, ``"incomplete"`` if parts of the input were left out, or the answer of `check` or `justify`.
     text : str
         The result for people, as the command line prints it; `print` shows it.
     document : dict

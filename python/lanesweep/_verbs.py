@@ -856,7 +856,8 @@ def justify(
     Replays the recorded scenarios as recorded (S) and parameterized (S'), fits a density, and applies the rules of
     [justify] in the configuration: appropriate, not appropriate, or undecided, with the amount of data that would
     decide. The dossier (report.html) lists the failures that S' hides, shows the worst of them, and gives the risk
-    ratio, the coverage and the alternatives. Without data it uses generated recordings.
+    ratio, the coverage and the alternatives. Without data it uses generated recordings. Exit status: 0 appropriate,
+    11 not appropriate, 8 undecided, 4 parts of the input were skipped.
 
     Parameters
     ----------

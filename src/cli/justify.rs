@@ -15,7 +15,7 @@ use crate::model::driver::ModelId;
 use crate::report::dossier::DossierReport;
 use crate::report::sampling::HostRecord;
 use crate::run::compare::CompareOptions;
-use crate::run::justify::{JustifyOptions, justify};
+use crate::run::justify::{Conclusion, JustifyOptions, justify};
 use crate::run::study::StudyOptions;
 use crate::scenario::Category;
 use crate::scenario::parameterization::Parameterization;
@@ -30,7 +30,8 @@ use crate::{Error, Place, Result};
 /// Replays the recorded scenarios as recorded (S) and parameterized (S'), fits a density, and applies the rules of
 /// [justify] in the configuration: appropriate, not appropriate, or undecided, with the amount of data that would
 /// decide. The dossier (report.html) lists the failures that S' hides, shows the worst of them, and gives the risk
-/// ratio, the coverage and the alternatives. Without data it uses generated recordings.
+/// ratio, the coverage and the alternatives. Without data it uses generated recordings. Exit status: 0 appropriate, 11 not
+/// appropriate, 8 undecided, 4 parts of the input were skipped.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  \
@@ -114,7 +115,7 @@ impl Justify {
             dossier: &dossier,
             rules: &options.rules,
             margin: options.compare.enough.margin,
-            confidence: options.score.confidence,
+            score: &options.score,
             provenance: &facts,
             profile: &profile,
             conformance: conformance.iter().map(|tally| (named(tally), tally.rows, tally.passes())).collect(),
@@ -125,8 +126,14 @@ impl Justify {
         };
         let files = report.write(folder.results()?)?;
         self.format.print_results(|| report.text(), || report.json(&files), &self.out)?;
-        let is_complete = collection.problems.is_empty() && dossier.left_out.is_empty();
-        Ok(if is_complete { Exit::Ok } else { Exit::Incomplete })
+        if !collection.problems.is_empty() || !dossier.left_out.is_empty() {
+            return Ok(Exit::Incomplete);
+        }
+        Ok(match dossier.conclusion {
+            Conclusion::Appropriate => Exit::Ok,
+            Conclusion::NotAppropriate => Exit::NotAppropriate,
+            Conclusion::Undecided => Exit::Undecided,
+        })
     }
 }
 

@@ -92,6 +92,18 @@ impl Outcome<f64> {
 }
 
 impl<R: Real> Outcome<R> {
+    /// Minimum TTC for reports: `None` for a contact without an approach along one path, such as a side contact. There
+    /// infinity would read as "never near".
+    pub fn approach_ttc(&self) -> Option<R> {
+        let is_beside = self.contact != Contact::None && !self.min_ttc.to_f64().is_finite();
+        (!is_beside).then_some(self.min_ttc)
+    }
+
+    /// Minimum gap for reports: `None` where no vehicle was in the ego's path.
+    pub fn gap_in_path(&self) -> Option<R> {
+        self.min_gap.to_f64().is_finite().then_some(self.min_gap)
+    }
+
     /// The same in f64; exact.
     pub fn widen(&self) -> Outcome<f64> {
         Outcome {

@@ -8,8 +8,9 @@ use super::sampling::HostRecord;
 use super::trace::{TraceFigure, TracePanels, TraceSeries};
 use crate::Result;
 use crate::model::profile::Profile;
-use crate::run::justify::{Dossier, REGULATION, Rules, Scored, Share};
+use crate::run::justify::{Dossier, Hidden, REGULATION, Rules, Scored, Share};
 use crate::run::sampling::RateRecord;
+use crate::run::score::ScoreOptions;
 use crate::scenario::parameterization::Parameterization;
 use crate::stats::estimate::Ratio;
 use crate::support::readable::{count, value};
@@ -28,8 +29,8 @@ pub struct DossierReport<'a> {
     pub rules: &'a Rules,
     /// Ratios within 1/margin to margin agree.
     pub margin: f64,
-    /// Confidence of the intervals.
-    pub confidence: f64,
+    /// Confidence of the intervals, and how many failing scenarios they need.
+    pub score: &'a ScoreOptions,
     /// Provenance of the scenarios.
     pub provenance: &'a DataProvenance,
     /// Profile.
@@ -100,12 +101,15 @@ impl DossierReport<'_> {
     pub(super) fn hidden(&self, max_rows: usize) -> Table {
         Table::of(self.dossier.hidden.iter().take(max_rows))
             .column("lane of S'", |hidden| hidden.key.as_str())
-            .column("S: impact km/h", |hidden| hidden.recorded.impact_closing_speed * 3.6)
-            .column("S: TTC s", |hidden| hidden.recorded.min_ttc)
+            .column(Column::from("S: contact").null("–"), Hidden::contact)
+            .column(Column::from("S: closing km/h").null("–"), |hidden| {
+                hidden.contact().map(|_| hidden.recorded.impact_closing_speed * 3.6)
+            })
+            .column(Column::from("S: TTC s").null("–"), |hidden| hidden.recorded.approach_ttc())
             .column("S: BTN", |hidden| hidden.recorded.max_btn)
-            .column("S': TTC s", |hidden| hidden.parameterized.min_ttc)
+            .column(Column::from("S': TTC s").null("–"), |hidden| hidden.parameterized.approach_ttc())
             .column("S': BTN", |hidden| hidden.parameterized.max_btn)
-            .column("S': gap m", |hidden| hidden.parameterized.min_gap)
+            .column(Column::from("S': gap m").null("–"), |hidden| hidden.parameterized.gap_in_path())
             .build()
     }
 
@@ -130,8 +134,7 @@ impl DossierReport<'_> {
             .column("rate", |(_, (.., rate), _)| rate)
             .column("interval", |(.., of)| of.map(|(rate, _)| format!("[{} {}]", value(rate.low), value(rate.high))))
             .column(Column::from("ratio to S").null("–"), |(.., of)| of.map_or(Some(1.0), |(_, ratio)| ratio.ratio))
-            .column("its interval", |(.., of)| of.map(|(_, ratio)| interval(ratio.interval())))
-            .column("verdict", |(.., of)| of.map(|(_, ratio)| ratio.verdict.text()));
+            .column("its interval", |(.., of)| of.map(|(_, ratio)| interval(ratio.interval())));
         Some(table.build())
     }
 
@@ -151,18 +154,26 @@ impl DossierReport<'_> {
 
     /// The dossier as text.
     pub fn text(&self) -> String {
-        let need = self.need().map_or(String::new(), |need| format!("{need}\n"));
-        let sentences = [self.answer(), self.recall(), self.close_following()];
-        let sentences: Vec<String> = sentences.into_iter().filter(|sentence| !sentence.is_empty()).collect();
+        let lines = |sentences: &[String]| {
+            let present = sentences.iter().filter(|sentence| !sentence.is_empty());
+            present.map(|sentence| format!("{sentence}\n")).collect::<String>()
+        };
+        let need = self.need().unwrap_or_default();
         let hidden = match self.dossier.hidden.len() {
             0 => String::new(),
-            n => format!("\nHidden failures, the most severe of {}\n{}", count(n as u64), self.hidden(5).text()),
+            n => format!(
+                "\nHidden failures, the most severe of {}\n{}{}",
+                count(n as u64),
+                self.hidden(5).text(),
+                lines(&[self.beside(5)])
+            ),
         };
         format!(
-            "{}\n{}\n{need}\n{}{hidden}\nThe alternatives\n{}",
+            "{}\n{}\n{}{}{hidden}\nThe alternatives, by the rules for recall and precision alone\n{}",
             self.provenance.data,
-            sentences.join("\n"),
+            lines(&[self.answer(), self.recall(), self.coverage(), self.close_following(), need]),
             self.findings().text(),
+            lines(&[self.rule(), self.limits_of_rules()]),
             self.alternatives().text()
         )
     }
@@ -173,10 +184,11 @@ impl DossierReport<'_> {
             .column("scenario", |hidden| hidden.scenario.as_str())
             .column("headway", |hidden| hidden.headway.as_str())
             .column("lane", |hidden| hidden.key.as_str())
+            .column("s_contact", Hidden::contact)
             .column("s_impact_closing_speed_mps", |hidden| hidden.recorded.impact_closing_speed)
-            .column("s_min_ttc_s", |hidden| hidden.recorded.min_ttc)
+            .column("s_min_ttc_s", |hidden| hidden.recorded.approach_ttc())
             .column("s_max_btn", |hidden| hidden.recorded.max_btn)
-            .column("sp_min_ttc_s", |hidden| hidden.parameterized.min_ttc)
+            .column("sp_min_ttc_s", |hidden| hidden.parameterized.approach_ttc())
             .column("sp_max_btn", |hidden| hidden.parameterized.max_btn)
             .column("sp_min_gap_m", |hidden| hidden.parameterized.min_gap)
             .build()
@@ -213,6 +225,7 @@ impl DossierReport<'_> {
         let coverage = dossier.coverage.as_ref().map(|coverage| {
             json!({
                 "found": coverage.found, "kept": coverage.kept, "points": coverage.points,
+                "points_of_kept": coverage.of_kept(), "points_of_found": coverage.of_found(),
                 "valid_share": coverage.valid_fraction,
                 "representativeness": coverage.representativeness.map(|(metric, train_test)| {
                     json!({"metric": metric, "train_test": train_test})
@@ -237,8 +250,11 @@ impl DossierReport<'_> {
             "sentence": self.answer(),
             "rules": self.rules,
             "margin": self.margin,
-            "confidence": self.confidence,
+            "confidence": self.score.confidence,
+            "min_failures": self.score.min_failures,
             "findings": dossier.findings,
+            "rule": self.rule(),
+            "found": dossier.found,
             "scenarios": dossier.scenarios,
             "simulations": dossier.lanes,
             "headways": dossier.headways.iter().map(ToString::to_string).collect::<Vec<_>>(),

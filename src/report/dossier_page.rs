@@ -15,7 +15,7 @@ impl DossierReport<'_> {
     pub fn html(&self) -> Result<String> {
         let page = Page {
             title: format!("Is {} appropriate under {}?", self.dossier.parameterization.name(), self.profile.name),
-            lead: format!("{}. {} {}", self.answer(), self.recall(), self.provenance.data),
+            lead: format!("{}. {} {} {}", self.answer(), self.recall(), self.coverage(), self.provenance.data),
             synthetic: self.provenance.synthetic,
             warnings: Vec::new(),
             sections: vec![
@@ -48,26 +48,16 @@ impl DossierReport<'_> {
     }
 
     fn conclusion_section(&self) -> Section {
-        let share = |limit: f64| format!("{limit}: the whole interval at or above it passes, the whole below it fails");
-        let (margin, lower) = (self.margin, value(1.0 / self.margin));
         Section {
             intro: [self.need().unwrap_or_default(), self.close_following()].join(" ").trim().to_owned(),
             tables: vec![self.findings().captioned("What each rule finds; the worst decides")],
             facts: vec![
-                ("recall, limit".to_owned(), share(self.rules.min_recall)),
-                ("precision, limit".to_owned(), share(self.rules.min_precision)),
+                ("rule".to_owned(), self.rule()),
+                ("source of the limits".to_owned(), self.limits_of_rules()),
                 (
-                    "risk ratio, limits".to_owned(),
-                    format!("{lower} to {margin}: the whole interval between them passes"),
+                    "statistical significance".to_owned(),
+                    format!("intervals of {} % over scenarios", value(100.0 * self.score.confidence)),
                 ),
-                (
-                    "least data".to_owned(),
-                    "as many failing scenarios as score.min_failures; with fewer, recall and precision are undecided and have no interval"
-                        .to_owned(),
-                ),
-                ("coverage, limit".to_owned(), format!("{} of the kept scenarios", self.rules.min_coverage)),
-                ("statistical significance".to_owned(), format!("intervals of {} %", value(100.0 * self.confidence))),
-                ("where to change them".to_owned(), "[justify], [score] and [compare] of the configuration".to_owned()),
             ],
             ..Section::new("conclusion", "Conclusion")
         }
@@ -92,7 +82,8 @@ impl DossierReport<'_> {
         };
         let mut section = Section { intro, ..Section::new("hidden", "Failures that are hidden") };
         if counts.fn_ > 0 {
-            section.tables.push(self.hidden(SHOWN).captioned("Hidden failures, the most severe first"));
+            let caption = format!("Hidden failures, the most severe first. {}", self.beside(SHOWN));
+            section.tables.push(self.hidden(SHOWN).captioned(caption.trim()));
         }
         section.figures.extend(self.example().map(|svg| PageFigure::new(&svg, &["hidden.svg"])));
         section
@@ -133,15 +124,7 @@ impl DossierReport<'_> {
             ),
         ];
         if let Some(coverage) = &self.dossier.coverage {
-            facts.push((
-                "coverage".to_owned(),
-                format!(
-                    "{} found, {} passed the filters, {} are points of the parameter space",
-                    count(coverage.found),
-                    count(coverage.kept),
-                    count(coverage.points)
-                ),
-            ));
+            facts.push(("coverage".to_owned(), self.coverage()));
             let percent = value(100.0 * coverage.valid_fraction);
             facts.push(("share of the density inside its valid region".to_owned(), format!("{percent} %")));
             facts.push((

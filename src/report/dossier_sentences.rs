@@ -2,7 +2,7 @@
 
 use super::dossier::{DossierReport, share};
 use crate::engine::{CLOSE_HEADWAY_S, Headway};
-use crate::run::justify::{Conclusion, Need, REGULATION, Share};
+use crate::run::justify::{Conclusion, Need, REGULATION, Rules, Share};
 use crate::support::readable::{count, value};
 
 /// A line to be filled in by hand.
@@ -13,7 +13,7 @@ impl DossierReport<'_> {
     pub fn answer(&self) -> String {
         let dossier = self.dossier;
         format!(
-            "Under profile {}, {} is {} for {} and {} on this data ({} scenarios, {} simulations of S from {})",
+            "Under profile {}, {} is {} for {} and {} on this data ({} of {} found scenarios, {} simulations of S from {})",
             self.profile.name,
             match dossier.parameterization.fitted_basis() {
                 Some(_) => format!("{} ({})", dossier.parameterization.name(), dossier.parameterization.description()),
@@ -23,9 +23,60 @@ impl DossierReport<'_> {
             dossier.model.name(),
             dossier.criterion.label(),
             count(dossier.scenarios),
+            count(dossier.found),
             count(dossier.lanes),
             self.headways()
         )
+    }
+
+    /// The rules in words, beside their findings.
+    pub(super) fn rule(&self) -> String {
+        format!(
+            "A rule passes where the whole interval lies within its limits, and fails where the whole interval lies outside. Where \
+             the interval contains a limit, neither is shown: undecided. So are recall and precision with fewer than {} failing \
+             scenarios. Coverage is a count without an interval. One rule that fails makes the parameterization not appropriate; \
+             all have to pass for appropriate.",
+            self.score.min_failures
+        )
+    }
+
+    /// Where the limits come from, and how to change them.
+    pub(super) fn limits_of_rules(&self) -> String {
+        let Rules { min_recall, min_precision, min_coverage } = self.rules;
+        format!(
+            "The limits are conventions of this program, not of a standard. Change them by `--config KEY=VALUE`: \
+             justify.min_recall ({min_recall}), justify.min_precision ({min_precision}), justify.min_coverage ({min_coverage}), \
+             compare.margin ({}), score.min_failures ({}), score.confidence ({}).",
+            self.margin, self.score.min_failures, self.score.confidence
+        )
+    }
+
+    /// Coverage of the kept and of the found scenarios; empty if there is no density.
+    pub(super) fn coverage(&self) -> String {
+        let Some(coverage) = &self.dossier.coverage else { return String::new() };
+        let Some((of_kept, of_found)) = coverage.of_kept().zip(coverage.of_found()) else { return String::new() };
+        let filters = match coverage.found - coverage.kept {
+            0 => String::new(),
+            1 => " The filters of mining left out one, about which nothing is said here.".to_owned(),
+            dropped => format!(" The filters of mining left out {}, about which nothing is said here.", count(dropped)),
+        };
+        format!(
+            "{} of {} kept scenarios are points of the parameter space (coverage {}), which is {} of the {} found ones.{filters}",
+            count(coverage.points),
+            count(coverage.kept),
+            value(of_kept),
+            value(of_found),
+            count(coverage.found)
+        )
+    }
+
+    /// Why some of the first hidden failures have no TTC; empty if all have one.
+    pub(super) fn beside(&self, max_rows: usize) -> String {
+        let mut shown = self.dossier.hidden.iter().take(max_rows);
+        match shown.any(|of| of.recorded.approach_ttc().is_none() || of.parameterized.approach_ttc().is_none()) {
+            true => "TTC –: the vehicles met beside each other, without an approach along one path.".to_owned(),
+            false => String::new(),
+        }
     }
 
     /// The headways in words.
@@ -37,14 +88,14 @@ impl DossierReport<'_> {
         }
     }
 
-    /// Recall under the profile, and under the regulation's profile for comparison.
+    /// Recall under the profile, and under the reading of the regulation for comparison.
     pub(super) fn recall(&self) -> String {
         let (profile, ours) = (&self.profile.name, self.recall_of(&self.dossier.scored.recall));
         match &self.dossier.regulation {
-            None => format!("Recall is {ours} under {profile}, the profile of the regulation."),
+            None => format!("Recall is {ours} under {profile}, a reading of UN R157."),
             Some(scored) => format!(
-                "Recall is {ours} under {profile}, and {} under {REGULATION}, the profile of the regulation. The conclusion is \
-                 that of {profile}.",
+                "Recall is {ours} under {profile}, and {} under {REGULATION}, a reading of UN R157. The conclusion is that of \
+                 {profile}.",
                 self.recall_of(&scored.recall)
             ),
         }
@@ -89,7 +140,7 @@ impl DossierReport<'_> {
         let more = (times * self.dossier.scenarios as f64).ceil();
         Some(if times < 1000.0 {
             format!(
-                "At least about {} scenarios ({} times as many) would decide, if the rates stay as they are: an interval narrows with \
+                "At least about {} kept scenarios ({} times as many) would decide, if the rates stay as they are: an interval narrows with \
                  the square root of their number.",
                 count(more as u64),
                 value(times)
@@ -125,7 +176,14 @@ impl DossierReport<'_> {
         };
         let limit = |name: &str, words: String| (name.to_owned(), words);
         vec![
-            limit("data", format!("these {} scenarios; no other road, country or year", count(self.dossier.scenarios))),
+            limit(
+                "data",
+                format!(
+                    "these {} scenarios of {} found; no other road, country or year",
+                    count(self.dossier.scenarios),
+                    count(self.dossier.found)
+                ),
+            ),
             limit("headways", headways),
             limit(
                 "profile",

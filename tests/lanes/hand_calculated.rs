@@ -1,5 +1,6 @@
 //! Twenty cases of a type-approval kind under `un-r157` and EU 2022/1426, calculated by hand with the formulas of motion and compared with what
-//! `lanesweep check` says. Time step 0.001 s for the numbers; the verdicts are the same with the profile's own step.
+//! `lanesweep check` says. Time step 0.001 s for the numbers; the verdicts are the same with the profile's own step, whose
+//! numbers the book prints.
 
 use lanesweep::engine::Headway;
 use lanesweep::model::criterion::Criterion;
@@ -417,6 +418,36 @@ fn case_17_a_cutter_in_the_path_is_attended_at_once_and_the_sheet_says_so() {
     let beside = un_r157(&case(Category::CutIn, V, V / 2.0), Headway::GapM(16.0));
     near(of(&beside, ModelId::Cchdm).reaction_s().unwrap(), 0.775, 0.011);
     assert!(!beside.silent.iter().any(|sentence| sentence.contains("attends at once")));
+}
+
+/// The column *printed* of the book's table: the same cases at the shipped time step, which no flag of `check` changes.
+#[test]
+fn the_book_prints_the_numbers_of_the_shipped_time_step() {
+    let lvd = |decel: f64| PlainCase { acceleration_mps2: -decel, ..case(Category::Lvd, V, V) };
+    let cut_out =
+        |v: f64, ahead_gap_m| PlainCase { lateral_speed_mps: 1.5, ahead_gap_m, ..case(Category::CutOut, v, v) };
+    let v = 70.0 * KMH;
+    // Start of braking, s, and the smallest gap where the book has one, m.
+    for (case, headway, brakes_s, gap_m) in [
+        (lvd(6.0), Headway::ThwS(2.0), 1.16, Some(15.40)),
+        (lvd(5.0), Headway::GapM(20.0), 0.76, Some(13.19)),
+        (case(Category::CutIn, V, V / 2.0), Headway::GapM(20.0), 1.53, None),
+        (cut_out(V, 40.0), Headway::ThwS(2.0), 1.41, Some(32.47)),
+        (case(Category::CutIn, 80.0 * KMH, 50.0 * KMH), Headway::GapM(20.0), 1.53, Some(1.14)),
+        (cut_out(v, 60.0), Headway::GapM(38.89), 1.41, None),
+    ] {
+        let judgement = un_r157(&case, headway);
+        let driver = of(&judgement, ModelId::Cchdm);
+        near(driver.braking_s().unwrap(), brakes_s, 1e-9);
+        gap_m.into_iter().for_each(|gap_m| near(driver.trace.outcome.min_gap, gap_m, 0.005));
+    }
+    let cut_in = un_r157(&case(Category::CutIn, V, V / 2.0), Headway::GapM(20.0));
+    near(of(&cut_in, ModelId::Cchdm).reaction_s().unwrap(), 0.78, 1e-9);
+    near(reading(&cut_in, "TTC when perceived").value.unwrap(), 1.62, 1e-6);
+    let hit = un_r157(&case(Category::CutIn, V, V / 2.0), Headway::GapM(17.0));
+    near(of(&hit, ModelId::Reg157).impact_closing_mps().unwrap() / KMH, 11.42, 0.005);
+    let late = un_r157(&cut_out(v, 8.0), Headway::ThwS(2.3));
+    near(of(&late, ModelId::Cchdm).reaction_s().unwrap(), 0.94, 1e-9);
 }
 
 /// The first speed below the initial one is that of index 1: a reaction to a loss of speed comes one step late.

@@ -383,6 +383,10 @@ fn a_contact_is_told_by_its_kind_and_its_closing_speed() {
     assert!(said.contains("(rear-end contact, closing at ") && said.contains(" m/s, the ego at "), "{said}");
     let printed = said.split("closing at ").nth(1).unwrap().split(' ').next().unwrap().parse::<f64>().unwrap();
     assert!((printed - closing).abs() < 0.01, "{said}");
+    // The ego is past the other's middle before that comes into its path.
+    let beside = "simulate --category cut-in --ego-speed 30 --speed 20 --gap 14 --lateral-speed 0.8 --models Reg157";
+    let said = stderr(&lanesweep(&beside.split(' ').collect::<Vec<_>>()));
+    assert!(said.contains("side contact") && said.contains("min TTC –, max BTN ∞, min gap –"), "{said}");
 }
 
 #[test]

@@ -165,11 +165,46 @@ fn min_failures_counts_scenarios_in_the_dossier_as_in_the_study_and_the_comparis
             for share in [found.scored.recall, found.scored.f1] {
                 assert_eq!(share.interval.is_some(), is_enough, "{model:?} {criterion:?} {:?}", found.scored);
             }
+            says_only_what_its_intervals_show(&found);
             let ratio = found.compared.as_ref().unwrap().replayed.ratio;
             assert!(is_enough || ratio.method == RatioMethod::Separate, "{model:?} {criterion:?}");
         }
     }
     assert!(seen[0] > 0 && seen[1] > 0, "{seen:?}");
+}
+
+/// A rule passes with its whole interval inside the limits, fails with the whole interval outside, and is undecided else.
+fn says_only_what_its_intervals_show(found: &Dossier) {
+    let Rules { min_recall, min_precision, .. } = Rules::default();
+    let margin = Enough::default().margin;
+    for finding in &found.findings {
+        let (lower, upper) = match finding.quantity {
+            "recall" => (min_recall, 1.0),
+            "precision" => (min_precision, 1.0),
+            "risk ratio P/S" => (1.0 / margin, margin),
+            _ => continue,
+        };
+        let is_inside = finding.interval.is_some_and(|(low, high)| lower <= low && high <= upper);
+        let is_outside = finding.interval.is_some_and(|(low, high)| high < lower || upper < low);
+        match finding.conclusion {
+            Conclusion::Appropriate => assert!(is_inside, "{finding:?}"),
+            Conclusion::NotAppropriate => assert!(is_outside, "{finding:?}"),
+            Conclusion::Undecided => assert!(!is_outside, "{finding:?}"),
+        }
+    }
+}
+
+/// Mining drops many scenarios, so a full coverage of the kept ones is little of what was found.
+#[test]
+fn coverage_is_told_of_the_kept_and_of_the_found_scenarios() {
+    let data = recordings(4);
+    let found = dossier(&data, (Category::CutIn, "2"), ModelId::Fsm, Criterion::Collision);
+    let of_category = || data.scenarios.iter().filter(|scenario| scenario.category == Category::CutIn);
+    let (all, kept) = (of_category().count() as u64, of_category().filter(|scenario| scenario.kept).count() as u64);
+    assert!(kept < all && (found.found, found.scenarios) == (all, kept));
+    let coverage = found.coverage.unwrap();
+    assert_eq!(coverage.of_kept(), Some(coverage.points as f64 / kept as f64));
+    assert_eq!(coverage.of_found(), Some(coverage.points as f64 / all as f64));
 }
 
 /// P fails and S never does: the ratio is infinite, its lower end is not.
@@ -185,10 +220,52 @@ fn a_ratio_without_a_value_never_decides_without_a_number() {
     assert_eq!(paired_ratio(side(&none), side(&none), Enough::default(), 0.95).interval(), None);
 }
 
+/// `justify` with few recordings; what it prints. Its exit status has to be that of its conclusion.
 fn lanesweep(args: &[&str]) -> String {
     let output = Command::new(env!("CARGO_BIN_EXE_lanesweep")).env("NO_COLOR", "1").args(args).output().unwrap();
-    assert_eq!(output.status.code(), Some(0), "{args:?}: {}", String::from_utf8_lossy(&output.stderr));
-    String::from_utf8(output.stdout).unwrap()
+    let text = String::from_utf8(output.stdout).unwrap();
+    let answer = text.lines().find(|line| line.starts_with("Under profile")).unwrap_or_default();
+    let expected = match answer {
+        line if line.contains(" is APPROPRIATE ") => 0,
+        line if line.contains(" is NOT APPROPRIATE ") => 11,
+        line if line.contains(" is UNDECIDED ") => 8,
+        _ => panic!("{args:?}: {}", String::from_utf8_lossy(&output.stderr)),
+    };
+    assert_eq!(output.status.code(), Some(expected), "{answer}");
+    text
+}
+
+#[test]
+fn each_conclusion_has_an_exit_status_of_its_own() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("out");
+    for (recordings, parameterization, model, criterion, conclusion) in [
+        ("12", "v", "CCHDM", "ttc", " is APPROPRIATE for CCHDM"),
+        ("12", "5", "FSM", "collision", " is NOT APPROPRIATE for FSM"),
+        ("1", "2", "FSM", "collision", " is UNDECIDED for FSM"),
+    ] {
+        let of = ["--parameterization", parameterization, "--models", model, "--criterion", criterion];
+        let args = ["-q", "justify", "--synth-recordings", recordings, "--out", out.to_str().unwrap()];
+        let text = lanesweep(&[&args[..], &of].concat());
+        assert!(text.contains(conclusion), "{text}");
+    }
+}
+
+/// The vehicles meet beside each other: infinity would read as "never near".
+#[test]
+fn a_hidden_contact_without_an_approach_has_no_ttc_instead_of_an_infinite_one() {
+    let dir = tempfile::tempdir().unwrap();
+    let out = dir.path().join("out");
+    let args = ["-q", "justify", "--synth-recordings", "4", "--parameterization", "5", "--models", "CCHDM"];
+    let text = lanesweep(&[&args[..], &["--out", out.to_str().unwrap()]].concat());
+    let rows = std::fs::read_to_string(out.join("hidden.csv")).unwrap();
+    let mut lines = rows.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let header = lines.next().unwrap();
+    let of = |row: &[&str], name: &str| row[header.iter().position(|column| *column == name).unwrap()].to_owned();
+    let contacts: Vec<_> = lines.filter(|row| !of(row, "s_contact").is_empty()).collect();
+    let is_beside = |row: &Vec<&str>| of(row, "s_contact") == "side" && of(row, "s_min_ttc_s").is_empty();
+    assert!(contacts.iter().any(is_beside) && contacts.iter().all(|row| of(row, "s_min_ttc_s") != "inf"), "{rows}");
+    assert!(text.contains("| side ") && text.contains("TTC –: the vehicles met beside each other"), "{text}");
 }
 
 #[test]
@@ -201,7 +278,16 @@ fn the_conclusion_names_its_profile_and_the_page_has_limits_credibility_and_room
         (text, std::fs::read_to_string(out.join("report.html")).unwrap(), out)
     };
     let (text, page, out) = made("paper", &["--parameterization", "1"]);
-    for words in ["Under profile paper, cut-in 1 is", "Recall is ", "under un-r157, the profile of the regulation"] {
+    for words in [
+        "Under profile paper, cut-in 1 is",
+        " found scenarios, ",
+        "Recall is ",
+        "under un-r157, a reading of UN R157",
+        " kept scenarios are points of the parameter space (coverage ",
+        "Where the interval contains a limit, neither is shown: undecided.",
+        "The limits are conventions of this program, not of a standard.",
+        "justify.min_recall (0.9)",
+    ] {
         assert!(text.contains(words) && page.contains(words), "{words}: {text}");
     }
     assert!(text.contains("failures of S come from headways below 0.5 s"), "{text}");

@@ -149,7 +149,9 @@ fn start(dir: &Path, line: &str) -> Child {
 
 fn done(dir: &Path, line: &str) {
     let (code, said) = ended(start(dir, line));
-    assert_eq!(code, 0, "{line}: {said}");
+    // The answers of `justify`.
+    let is_answer = line.starts_with("justify") && [8, 11].contains(&code);
+    assert!(code == 0 || is_answer, "{code}, {line}: {said}");
 }
 
 /// Not a result: the plan, and what is there only while a run is at work.

@@ -228,7 +228,8 @@ fn every_verb_takes_observed_headways_and_says_how_many_failures_come_from_close
     assert!(!compared.contains("imposed"), "{compared}");
     let out = path("dossier");
     let args = ["-q", "justify", "--parameterization", "i", "--models", "FSM", "--thw", "observed"];
-    let dossier = run(&[&args[..], &["--backend", "cpu", "--out", &out], &small[..]].concat());
+    let (code, dossier, err) = lanesweep(&[&args[..], &["--backend", "cpu", "--out", &out], &small[..]].concat());
+    assert_eq!(code, Some(8), "undecided: {err}");
     assert!(dossier.contains("recorded gap"), "{dossier}");
     let density = path("i.json");
     run(&[&["-q", "fit", "--parameterizations", "i", "--with-thw", "--out", &density], &small[..]].concat());

@@ -265,7 +265,8 @@ fn a_winner_is_studied_fitted_sampled_and_justified_and_external_s_prime_is_judg
     run(&["-q", "sample", "density.json", "--samples", "200", "--out", "sampled"]);
     let justify =
         ["-q", "justify", "--parameterization", "found/winner.json", "--models", "Reg157", "--criterion", "ttc"];
-    run(&[&justify[..], &data[..]].concat());
+    let (code, dossier, error) = lanesweep(dir.path(), &[&justify[..], &data[..]].concat());
+    assert!([0, 8, 11].contains(&code) && dossier.contains("Under profile paper"), "{code}: {error}");
     #[cfg(feature = "parquet")]
     {
         run(&["-q", "mine", "recordings", "--out", "as-parquet.parquet"]);

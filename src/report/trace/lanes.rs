@@ -77,7 +77,7 @@ fn summary(lane: &TracedLane, is_one_of_many: bool) -> String {
     let outcome = &trace.outcome;
     let name = if is_one_of_many { format!("{key}: ") } else { String::new() };
     let mut text = format!(
-        "{name}{} {}, initial gap {} m: {}\n  reacted: {}  end: {} ({})\n  min TTC {} s, max BTN {}, min gap {} m\n",
+        "{name}{} {}, initial gap {} m: {}\n  reacted: {}  end: {} ({})\n  min TTC {}, max BTN {}, min gap {}\n",
         trace.category.label(),
         trace.model.name(),
         value(trace.initial_gap_m),
@@ -85,9 +85,9 @@ fn summary(lane: &TracedLane, is_one_of_many: bool) -> String {
         time(outcome.reaction_step),
         time(outcome.end_step),
         end(outcome),
-        value(outcome.min_ttc),
+        outcome.approach_ttc().map_or_else(|| "–".to_owned(), |ttc_s| format!("{} s", value(ttc_s))),
         value(outcome.max_btn),
-        value(outcome.min_gap)
+        outcome.gap_in_path().map_or_else(|| "–".to_owned(), |gap_m| format!("{} m", value(gap_m)))
     );
     if let Some(reference) = reference {
         text.push_str(&match differences(outcome, reference, &time) {

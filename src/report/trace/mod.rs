@@ -82,7 +82,8 @@ impl TraceFigure<'_> {
                 canvas.text((at(column) + 2.0 * MARK_PX + 5.0, baseline), &time, CELL, Anchor::Start);
             }
             let outcome = &series.trace.outcome;
-            canvas.text((at(3), baseline), &worst(outcome.min_ttc, " s"), CELL, Anchor::Start);
+            let ttc = outcome.approach_ttc().map_or_else(|| "–".to_owned(), |ttc_s| worst(ttc_s, " s"));
+            canvas.text((at(3), baseline), &ttc, CELL, Anchor::Start);
             canvas.text((at(4), baseline), &worst(outcome.max_btn, ""), CELL, Anchor::Start);
             y = below.max(y + CELL.line_px()) + 3.0;
         }
@@ -93,6 +94,9 @@ impl TraceFigure<'_> {
         let mut notes = Vec::new();
         if shown.has_unjudged() {
             notes.push("Thin gap, TTC, BTN: the criteria ignore the vehicle there.".to_owned());
+        }
+        if self.series.iter().any(|s| s.trace.outcome.approach_ttc().is_none()) {
+            notes.push("Min TTC –: the vehicles met beside each other, without an approach along one path.".to_owned());
         }
         if self.series.iter().any(|s| s.trace.coasting_mps2 > 0.0) {
             notes.push("CCHDM's coasting after its reaction is no braking.".to_owned());

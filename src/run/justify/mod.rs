@@ -12,7 +12,7 @@ use scores::Replay;
 pub use scores::{Group, Scored, Share};
 
 use crate::engine::{Executor, Headway, LaneKey, LaneRunner, Outcome, SweepSummary, Trace};
-use crate::model::criterion::Criterion;
+use crate::model::criterion::{Contact, Criterion};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::close_following::{CloseFollowing, close_units};
@@ -26,7 +26,7 @@ use crate::support::ranges;
 use crate::traffic::DataProvenance;
 use crate::{Error, Place, Result};
 
-/// Profile whose recall is reported in addition to that of the selected profile.
+/// Profile whose recall is reported in addition to that of the selected profile: a reading of UN R157.
 pub const REGULATION: &str = "un-r157";
 
 /// Options of a dossier.
@@ -59,12 +59,20 @@ pub struct Hidden {
     pub parameterized: Outcome<f64>,
 }
 
+impl Hidden {
+    /// Kind of the recorded contact in a word, if S collides.
+    pub fn contact(&self) -> Option<&'static str> {
+        let label = self.recorded.contact.label().split(' ').next();
+        label.filter(|_| self.recorded.contact != Contact::None)
+    }
+}
+
 /// Coverage of the recorded scenarios by the parameters and their density.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Coverage {
     /// Number of scenarios of the category that were found.
     pub found: u64,
-    /// Number that passed the filters of mining.
+    /// Number that passed the filters of mining: the rule on coverage is about these.
     pub kept: u64,
     /// Number of kept scenarios that are points of the parameter space.
     pub points: u64,
@@ -83,7 +91,9 @@ pub struct Dossier {
     pub model: ModelId,
     /// Criterion.
     pub criterion: Criterion,
-    /// Number of scenarios.
+    /// Number of scenarios of the category that were found.
+    pub found: u64,
+    /// Number that passed the filters of mining: the simulated ones.
     pub scenarios: u64,
     /// Lanes of S.
     pub lanes: u64,
@@ -221,10 +231,12 @@ pub fn justify(
     let alternatives = alternatives.collect();
     let mut findings = options.rules.of_labels(&scored, &options.score);
     findings.extend(options.rules.of_density(compared.as_ref(), coverage.as_ref(), options.compare.enough.margin));
+    let found = scenarios.iter().filter(|scenario| scenario.category == id.category).count() as u64;
     Ok(Dossier {
         parameterization: id,
         model,
         criterion: options.criterion,
+        found,
         scenarios: block.units.len(),
         lanes: block.units.len() * plan.headways.len() as u64,
         conclusion: Conclusion::of(&findings),
@@ -259,6 +271,16 @@ fn severity(outcome: &Outcome<f64>, criterion: Criterion) -> f64 {
 }
 
 impl Coverage {
+    /// Points per kept scenario.
+    pub fn of_kept(&self) -> Option<f64> {
+        (self.kept > 0).then(|| self.points as f64 / self.kept as f64)
+    }
+
+    /// Points per found scenario: the filters of mining count too.
+    pub fn of_found(&self) -> Option<f64> {
+        (self.found > 0).then(|| self.points as f64 / self.found as f64)
+    }
+
     /// The coverage of a density and of its scenarios.
     fn of(fitted: &Fitted) -> Coverage {
         let Fitted { model, left_out, .. } = fitted;

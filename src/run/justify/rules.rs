@@ -7,9 +7,10 @@ use super::Coverage;
 use super::scores::{Scored, Share};
 use crate::run::sampling::ComparedCell;
 use crate::run::score::ScoreOptions;
-use crate::stats::estimate::{Ratio, RatioVerdict};
+use crate::stats::estimate::Ratio;
 
-/// Limits; a quantity passes where its whole interval does.
+/// Limits, conventions of this program: a quantity passes where its whole interval lies within them, fails where the
+/// whole interval lies outside, and is undecided otherwise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Rules {
@@ -115,7 +116,7 @@ impl Rules {
                     (Conclusion::Undecided, (failing > 0).then_some(Need { times: times.max(1.1) }))
                 }
             };
-            let rule = format!("at least {limit}");
+            let rule = format!("interval at least {limit}");
             Finding { quantity, value: share.value, interval: share.interval, rule, conclusion, need }
         };
         vec![share("recall", scored.recall, self.min_recall), share("precision", scored.precision, self.min_precision)]
@@ -129,21 +130,19 @@ impl Rules {
         margin: f64,
     ) -> Vec<Finding> {
         let ratio = compared.map(|cell| cell.sampled.ratio);
+        let (conclusion, need) =
+            ratio.map_or((Conclusion::Undecided, None), |ratio| self::conclude_ratio(&ratio, margin));
         let risk = Finding {
             quantity: "risk ratio P/S",
             value: ratio.and_then(|r| r.ratio),
             interval: ratio.and_then(|r| r.interval()),
             rule: format!("interval within {:.2} to {margin}", 1.0 / margin),
-            conclusion: match ratio.map(|r| r.verdict) {
-                Some(RatioVerdict::Agrees) => Conclusion::Appropriate,
-                Some(RatioVerdict::TooHigh | RatioVerdict::TooLow) => Conclusion::NotAppropriate,
-                Some(RatioVerdict::Undecided) | None => Conclusion::Undecided,
-            },
-            need: ratio.and_then(|ratio| self::need_of_ratio(&ratio, margin)),
+            conclusion,
+            need,
         };
-        let share = coverage.filter(|c| c.kept > 0).map(|c| c.points as f64 / c.kept as f64);
+        let share = coverage.and_then(|coverage| coverage.of_kept());
         let covered = Finding {
-            quantity: "coverage",
+            quantity: "coverage of kept",
             value: share,
             interval: None,
             rule: format!("at least {}", self.min_coverage),
@@ -173,17 +172,82 @@ fn conclude(value: f64, (low, high): (f64, f64), limit: f64) -> (Conclusion, Opt
     }
 }
 
-/// What would decide an undecided ratio. Its logarithm is nearly normal, so its interval narrows like that of a
-/// fraction.
-fn need_of_ratio(ratio: &Ratio, margin: f64) -> Option<Need> {
-    let (value, (low, high)) = ratio.ratio.zip(ratio.low.zip(ratio.high))?;
-    if ratio.verdict != RatioVerdict::Undecided || value <= 0.0 || low <= 0.0 {
-        return None;
+/// A ratio passes if its whole interval lies within 1/margin to margin, and fails if the whole interval lies outside.
+/// [`crate::stats::estimate::RatioVerdict`] asks another question: whether the rates differ at all.
+fn conclude_ratio(ratio: &Ratio, margin: f64) -> (Conclusion, Option<Need>) {
+    if ratio.agrees() {
+        return (Conclusion::Appropriate, None);
     }
-    let log = value.ln();
-    // Distance to the limit of agreement if the ratio is inside it, else to 1.
-    let distance = if log.abs() < margin.ln() { margin.ln() - log.abs() } else { log.abs() };
-    let half_width = if log > 0.0 { (high / value).ln() } else { (value / low).ln() };
-    let times = (half_width / distance).powi(2);
-    times.is_finite().then_some(Need { times: times.max(1.1) })
+    if ratio.interval().is_some_and(|(low, high)| low > margin || high < 1.0 / margin) {
+        return (Conclusion::NotAppropriate, None);
+    }
+    // The logarithm is nearly normal, so its interval narrows like that of a fraction.
+    let times = ratio.ratio.zip(ratio.low.zip(ratio.high)).map(|(value, (low, high))| {
+        let (log, limit) = (value.ln(), margin.ln());
+        let towards_limit = if (log > 0.0) == (log.abs() < limit) { high / value } else { value / low };
+        (towards_limit.ln() / (limit - log.abs())).powi(2)
+    });
+    let need = times.filter(|times| times.is_finite()).map(|times| Need { times: times.max(1.1) });
+    (Conclusion::Undecided, need)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::stats::estimate::{RatioMethod, RatioVerdict};
+
+    const MARGIN: f64 = 1.25;
+
+    /// A ratio with enough failing scenarios; `verdict` is that of `compare`.
+    fn ratio((low, high): (f64, f64)) -> Ratio {
+        let verdict = match () {
+            () if low >= 1.0 / MARGIN && high <= MARGIN => RatioVerdict::Agrees,
+            () if low > 1.0 => RatioVerdict::TooHigh,
+            () if high < 1.0 => RatioVerdict::TooLow,
+            () => RatioVerdict::Undecided,
+        };
+        let (ratio, low, high) = (Some((low * high).sqrt()), Some(low), Some(high));
+        Ratio { ratio, low, high, method: RatioMethod::Paired, verdict }
+    }
+
+    #[test]
+    fn an_interval_that_contains_a_limit_is_undecided_even_where_it_excludes_1() {
+        for (interval, expected) in [
+            ((0.9, 1.2), Conclusion::Appropriate),
+            // The rates differ, and by how much is not shown.
+            ((1.05, 1.30), Conclusion::Undecided),
+            ((0.60, 0.95), Conclusion::Undecided),
+            ((0.5, 2.0), Conclusion::Undecided),
+            ((1.26, 1.9), Conclusion::NotAppropriate),
+            ((0.3, 0.79), Conclusion::NotAppropriate),
+        ] {
+            assert_eq!(conclude_ratio(&ratio(interval), MARGIN).0, expected, "{interval:?}");
+        }
+        assert_eq!(conclude(0.87, (0.80, 0.92), 0.9).0, Conclusion::Undecided);
+        assert_eq!(conclude(0.80, (0.75, 0.89), 0.9).0, Conclusion::NotAppropriate);
+    }
+
+    #[test]
+    fn as_much_data_as_needed_moves_the_interval_off_its_nearest_limit() {
+        for interval in [(1.05, 1.30), (1.10, 1.60), (0.60, 0.95), (0.5, 0.9), (0.78, 1.2)] {
+            let needed = conclude_ratio(&ratio(interval), MARGIN).1.unwrap().times;
+            let (value, half_width) = ((interval.0 * interval.1).sqrt(), (interval.1 / interval.0).sqrt().ln());
+            let narrowed = |times: f64| (half_width / times.sqrt()).exp();
+            let contains_limit = |times| {
+                let (low, high) = (value / narrowed(times), value * narrowed(times));
+                [MARGIN, 1.0 / MARGIN].iter().any(|limit| low < *limit && *limit < high)
+            };
+            assert!(contains_limit(1.0) && !contains_limit(needed * 1.001), "{interval:?}: {needed} times");
+        }
+    }
+
+    /// Nine failing scenarios cannot show agreement, and a ratio to an S that never fails is above every limit or open.
+    #[test]
+    fn without_enough_failures_a_ratio_fails_or_is_undecided() {
+        let few =
+            |low, high| Ratio { ratio: None, low, high, method: RatioMethod::Separate, verdict: RatioVerdict::TooHigh };
+        assert_eq!(conclude_ratio(&few(Some(3.0), None), MARGIN), (Conclusion::NotAppropriate, None));
+        assert_eq!(conclude_ratio(&few(Some(1.1), None), MARGIN), (Conclusion::Undecided, None));
+        assert_eq!(conclude_ratio(&few(None, None), MARGIN), (Conclusion::Undecided, None));
+    }
 }
