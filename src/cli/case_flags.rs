@@ -135,7 +135,7 @@ impl CaseFlags {
     pub(super) fn headway(&self) -> Result<Headway> {
         let parameters = self.parameters();
         self.located(parameters.check_start())?;
-        parameters.gap.map(Headway::GapM).or(parameters.thw.map(Headway::ThwS)).ok_or_else(|| {
+        parameters.gap.map(Headway::GapM).or(parameters.thw.map(Headway::thw)).ok_or_else(|| {
             Error::usage(
                 Place::item("gap, thw"),
                 "the initial distance is missing",

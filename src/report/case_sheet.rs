@@ -93,7 +93,7 @@ impl CaseSheet<'_> {
             .column("profile", |(judgement, _)| judgement.profile.as_str())
             .column("model", |(_, judged)| judged.trace.model.name())
             .column("collision", |(_, judged)| if judged.collides() { "COLLIDES" } else { "avoids" })
-            .column("gap m", |(_, judged)| judged.trace.outcome.min_gap)
+            .column("gap m", |(_, judged)| records::smallest_gap_m(&judged.trace.outcome))
             .column("TTC s", |(_, judged)| judged.trace.outcome.min_ttc)
             .column("BTN", |(_, judged)| judged.trace.outcome.max_btn)
             .column(Column::from("contact").null("–"), |(_, judged)| {

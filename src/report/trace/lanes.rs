@@ -87,7 +87,7 @@ fn summary(lane: &TracedLane, is_one_of_many: bool) -> String {
         end(outcome),
         value(outcome.min_ttc),
         value(outcome.max_btn),
-        value(outcome.min_gap)
+        value(records::smallest_gap_m(outcome))
     );
     if let Some(reference) = reference {
         text.push_str(&match differences(outcome, reference, &time) {
