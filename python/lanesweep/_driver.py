@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 import abc
-import hashlib
-import inspect
-import pickle
-import textwrap
+import re
 import threading
-import uuid
+from collections.abc import Iterable
 from typing import Any, ClassVar
 
 import numpy.typing as npt
 
 from . import _core
 from ._core import View
+from ._identity import Unreadable, digest
 
 
 class Driver(abc.ABC):
@@ -23,6 +21,9 @@ class Driver(abc.ABC):
     Subclass it, implement `acceleration`, and give an instance wherever a driver model is expected: ``models=["FSM",
     MyDriver()]``. The engine steps the lanes; frame, criteria and order of a step are those of the built-in drivers. Lanes
     are in binary32 on the CPU.
+
+    A driver is its code, its present values and what the code reads: change a value, and it is another driver in the next run. What
+    a run changes belongs into what `start` returns.
 
     Attributes
     ----------
@@ -76,60 +77,87 @@ class Driver(abc.ABC):
         """
 
 
-#: Drivers by what the engine knows them by: name and fingerprint.
+#: The driver that the engine last got for a name and fingerprint.
 _registered: dict[str, Driver] = {}
-#: Fingerprints of drivers that have none of their own: never taken for another's.
-_unknown: dict[int, tuple[Driver, str]] = {}
+#: The last driver of each name, which stands for it where the name alone is given.
+_named: dict[str, Driver] = {}
 _lock = threading.Lock()
 
 
 def fingerprint(driver: Driver) -> str:
-    """Distinguish drivers of one name: by the code of their classes, and by their values."""
-    digest = hashlib.sha256()
+    """Distinguish drivers of one name: by their code, their present values, and what the code reads."""
     try:
-        for kind in type(driver).__mro__:
-            if kind in (Driver, object) or kind.__module__ == "abc":
-                continue
-            digest.update(textwrap.dedent(inspect.getsource(kind)).encode())
-            for name, value in sorted(vars(kind).items()):
-                if name.startswith("__") or name in ("_abc_impl",):
-                    continue
-                function = getattr(value, "__func__", value)
-                if inspect.isfunction(function):
-                    cells = [name for name in function.__code__.co_freevars if name != "__class__"]
-                    if cells or function.__defaults__ or function.__kwdefaults__:
-                        # Its source does not say what it computes.
-                        raise ValueError("a function holds values")
-                else:
-                    digest.update(pickle.dumps((name, value)))
-        digest.update(pickle.dumps(sorted(vars(driver).items())))
-    except Exception:
-        # No source, or values that cannot be pickled: a run with this driver is not resumed by another process.
-        with _lock:
-            return _unknown.setdefault(id(driver), (driver, uuid.uuid4().hex[:16]))[1]
-    return digest.hexdigest()[:16]
+        return digest(driver, driver.name, driver.may_accelerate, driver.attention)
+    except Unreadable as error:
+        raise _core.UsageError(
+            f"driver {name_of(driver)}: {error}\n  help: a driver is known by its code and its values: make this in `start`, "
+            "or define `__getstate__`, which returns the values that the driver computes with"
+        ) from error
+
+
+def name_of(driver: Driver) -> str:
+    return driver.name or type(driver).__name__
 
 
 def register(driver: Driver, known_as: str | None = None) -> str:
-    """Make a driver known to the engine; return its name and fingerprint, which is another process's if given."""
-    name = driver.name or type(driver).__name__
-    identity = known_as or f"{name}@{fingerprint(driver)}"
+    """Make a driver known to the engine as it is now; return its name and fingerprint, which must be `known_as` if given."""
+    name, attention = name_of(driver), driver.attention
+    if not isinstance(name, str) or not isinstance(attention, str):
+        raise TypeError(f"driver {type(driver).__name__}: `name` and `attention` are texts, not {name!r} and {attention!r}")
+    identity = f"{name}@{fingerprint(driver)}"
+    if known_as not in (None, identity):
+        raise _core.InputError(
+            f"driver {name} is not the one that was planned: its code, its values or what they read differ here\n  help: "
+            "plan again; what a run changes belongs into what `start` returns"
+        )
     with _lock:
-        if identity not in _registered:
-            _core.register(name, identity.rpartition("@")[2], driver, bool(driver.may_accelerate), driver.attention)
+        # Another object with these values is another driver: it may change later.
+        if _registered.get(identity) is not driver:
+            _core.register(name, identity.rpartition("@")[2], driver, bool(driver.may_accelerate), attention)
             _registered[identity] = driver
+        _named[name.casefold()] = driver
     return identity
 
 
-def names_of(models: Any) -> list[str]:
-    """Names of models as the engine knows them; drivers are registered."""
+def refresh(words: Iterable[str]) -> None:
+    """Make the drivers that words name by their names alone known as they are now."""
+    names = set(re.split(r"[^\w.@-]+", ",".join(words).casefold()))
+    for driver in [driver for name, driver in list(_named.items()) if name in names]:
+        register(driver)
+
+
+def models_of(models: Any) -> list[str | Driver]:
+    """What an argument `models` names; empty for None, which means all."""
     if models is None:
         return []
     if isinstance(models, (str, Driver)):
         models = [models]
-    names = [register(model) if isinstance(model, Driver) else str(model) for model in models]
+    wants = "give a name, a Driver, or a list of these"
+    if isinstance(models, (type, bytes)) or not isinstance(models, Iterable):
+        raise TypeError(f"`models` is {_shown(models)}; {wants}")
+    found: list[str | Driver] = list(models)
+    if not found:
+        raise ValueError("`models` is empty; name at least one, or leave it out for all")
+    for model in found:
+        if not isinstance(model, (str, Driver)):
+            raise TypeError(f"`models` holds {_shown(model)}; {wants}")
+    return found
+
+
+def names_of(models: Any) -> list[str]:
+    """Names of models as the engine knows them; drivers are registered."""
+    found = models_of(models)
+    refresh(model for model in found if isinstance(model, str))
+    names = [register(model) if isinstance(model, Driver) else model for model in found]
     shown = [name.partition("@")[0] for name in names]
     for at, name in enumerate(shown):
         if name in shown[:at] and names[at] not in names[:at]:
             raise _core.UsageError(f"two drivers are called {name}: give one of them another `name`")
     return names
+
+
+def _shown(value: Any) -> str:
+    """What stands in place of a model."""
+    if isinstance(value, type) and issubclass(value, Driver):
+        return f"the class {value.__name__}, not a driver of it: {value.__name__}(…)"
+    return f"{value!r}"[:80]

@@ -11,7 +11,9 @@ from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, TypeGuard
 
-from ._core import Frame, frame_of_records
+import numpy as np
+
+from ._core import Frame, frame_of_columns, frame_of_records
 
 #: What the exit code of a result means; other codes are exceptions.
 STATUS = {
@@ -26,10 +28,6 @@ STATUS = {
 
 #: Columns whose values are names, even where all of them look like numbers.
 _NAMES = {"id", "scenario", "param", "parameterization", "variant", "headway", "category", "model", "criterion", "lane", "claim"}
-
-
-#: Written for values without a number: null in a frame.
-_NO_NUMBER = {"inf", "-inf", "NaN"}
 
 
 class Figure:
@@ -95,14 +93,16 @@ class Result:
     @property
     def document(self) -> dict[str, Any]:
         if self._document is None:
-            found = json.loads(self._json or "{}")
+            found = json.loads(self._json or "{}", object_hook=_with_infinity)
             self._document = found if isinstance(found, dict) else {"rows": found}
         return self._document
 
     @property
     def densities(self) -> dict[str, Path]:
         """Density files of a fit, by category and parameterization: ``"cut-in-2"``."""
-        found = self._files("*.json") if self.verb == "fit" else iter(())
+        if self.verb != "fit" or self.path is None:
+            return {}
+        found = self._files("*.json") if self.path.is_dir() else iter([self.path])
         return {path.stem: path for path in sorted(found) if not path.name.startswith("lanesweep-")}
 
     @property
@@ -119,7 +119,7 @@ class Result:
         has_file = path is not None and path.is_file()
         # Types are those of the document, unless its rows hold more than values.
         if _is_table(value) and not (has_file and any(isinstance(one, dict) for row in value for one in row.values())):
-            return frame_of_records(json.dumps(value), _header(path) if path is not None and has_file else [])
+            return frame_of_records(_json(value), _header(path) if path is not None and has_file else [])
         if path is None or not has_file:
             raise KeyError(f"there is no table `{name}`; there are {', '.join(self.tables)}")
         return _read_csv(path)
@@ -182,6 +182,22 @@ def _is_table(value: Any) -> TypeGuard[list[dict[str, Any]]]:
     return isinstance(value, list) and bool(value) and all(isinstance(row, dict) for row in value)
 
 
+def _with_infinity(record: dict[str, Any]) -> dict[str, Any]:
+    """Read infinite numbers, which JSON has not and the program writes as texts."""
+    infinite = {"Infinity": float("inf"), "-Infinity": float("-inf")}
+    return {key: infinite.get(value, value) if isinstance(value, str) else value for key, value in record.items()}
+
+
+def _json(records: list[dict[str, Any]]) -> str:
+    """Write records as the program does."""
+    infinite = {float("inf"): "Infinity", float("-inf"): "-Infinity"}
+
+    def finite(value: Any) -> Any:
+        return infinite.get(value, value) if isinstance(value, float) else value
+
+    return json.dumps([{key: finite(value) for key, value in record.items()} for record in records])
+
+
 def _header(path: Path) -> list[str]:
     """Names of the columns of a CSV file."""
     with path.open(encoding="utf-8", newline="") as file:
@@ -189,10 +205,10 @@ def _header(path: Path) -> list[str]:
 
 
 def _typed(values: list[str]) -> list[Any]:
-    """Read a column of texts as whole numbers or numbers, if all of them are."""
+    """Read a column of texts as whole numbers or numbers, if all of them are. Empty or NaN is no value."""
     for read in (int, float):
         try:
-            return [None if value == "" or value in _NO_NUMBER else read(value) for value in values]
+            return [None if value in ("", "NaN") else read(value) for value in values]
         except ValueError:
             continue
     return [value or None for value in values]
@@ -210,8 +226,8 @@ def _read_csv(path: str | os.PathLike[str]) -> Frame:
         columns[name] = [text or None for text in texts] if name in _NAMES else _typed(texts)
     records = [dict(zip(columns, values, strict=True)) for values in zip(*columns.values(), strict=True)]
     if not records:
-        return frame_of_records(json.dumps([{name: None for name in header}]), header)
-    return frame_of_records(json.dumps(records), header)
+        return frame_of_columns({name: [] if name in _NAMES else np.empty(0) for name in header})
+    return frame_of_records(_json(records), header)
 
 
 def temporary() -> tempfile.TemporaryDirectory[str]:

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import importlib
+import json
+import keyword
 import logging
+import numbers
 import os
 import sys
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, KeysView, Mapping, Sequence, Set, ValuesView
 from pathlib import Path
 from typing import Any
 
 from . import _core
-from ._driver import names_of
+from ._driver import names_of, refresh
 from ._result import Result, temporary
 
 _log = logging.getLogger("lanesweep")
@@ -65,14 +68,41 @@ def word(value: Any) -> str:
     return str(value)
 
 
-def words_of(value: Any, *, is_list: bool) -> list[str]:
-    """Write a value, or several, as on the command line."""
+def path_of(value: Any, name: str) -> str:
+    """Write the path of an argument."""
+    try:
+        return str(os.fspath(value))
+    except TypeError as error:
+        raise TypeError(f"`{name}`: {error}") from None
+
+
+def words_of(value: Any, name: str, *, is_list: bool) -> list[str]:
+    """Write the value of an argument, or several values, as on the command line."""
     if hasattr(value, "tolist"):
-        value = value.tolist()  # of NumPy
-    if isinstance(value, dict):
-        value = [f"{name}={word(one)}" for name, one in value.items()]
-    several = [word(value)] if isinstance(value, (str, os.PathLike)) or not isinstance(value, Sequence) else [*map(word, value)]
-    return [",".join(several)] if is_list else several
+        # Of NumPy and pandas. A text has the digits of its arithmetic: 0.6 of binary32, not 0.6000000238418579.
+        value = [str(one) for one in value] if str(getattr(value, "dtype", "")) == "float32" else value.tolist()
+    if isinstance(value, Mapping):
+        value = [f"{key}={word(one)}" for key, one in value.items()]
+    elif isinstance(value, (Set, range, KeysView, ValuesView)):
+        value = list(value)
+    several = list(value) if isinstance(value, Sequence) and not isinstance(value, (str, bytes)) else [value]
+    if not several:
+        raise ValueError(f"`{name}` is empty; give at least one value, or leave it out")
+    for one in several:
+        if not isinstance(one, (str, bool, numbers.Number, os.PathLike)):
+            raise TypeError(f"`{name}` is {one!r:.80}; give a number, a text or a path" + ("" if one is value else ", or a list of these"))
+    words = [word(one) for one in several]
+    return [",".join(words)] if is_list else words
+
+
+def name_of(verb: str, flag: str | None) -> str:
+    """The name of an argument; that of a position is not known by its flag."""
+    if flag is None:
+        of_verb = next(one for one in json.loads(_core.definition()) if one["verb"] == verb)
+        flag = next(str(one["id"]) for one in of_verb["arguments"] if one["flag"] is None)
+        flag = ("folder" if verb in ("synth", "cluster merge") else "recordings") if flag == "dir" else flag
+    name = flag.replace("-", "_")
+    return name + "_" if keyword.iskeyword(name) else name
 
 
 def command(words: Sequence[Any]) -> tuple[int, str]:
@@ -96,6 +126,7 @@ def _run(words: Sequence[Any]) -> tuple[int, str, str, list[str]]:
         messages.append(line)
         on_message(level, line)
 
+    refresh(map(word, words))
     try:
         return *_core.run([word(one) for one in words], move, keep), messages
     finally:
@@ -118,22 +149,22 @@ def run(
     positions: list[str] = []
     for flag, value, is_list in arguments:
         value = value.item() if hasattr(value, "item") and getattr(value, "ndim", None) == 0 else value
-        if value is None or value is False or (isinstance(value, (list, tuple)) and not value):
+        if value is None or value is False:
             continue
         if flag is None:
-            positions += words_of(value, is_list=False)
+            positions += words_of(value, name_of(verb, flag), is_list=False)
         elif value is True:
             words.append(f"--{flag}")
         else:
             given = names_of(value) if flag == "models" else value
-            words += [f"--{flag}={one}" for one in words_of(given, is_list=is_list)]
+            words += [f"--{flag}={one}" for one in words_of(given, name_of(verb, flag), is_list=is_list)]
     keep = None
     if out is None and default_out is not None:
         keep = temporary()
         out = Path(keep.name) / default_out
     if out is not None:
         path = out
-        words.append(f"--out={os.fspath(out)}")
+        words.append(f"--out={path_of(out, 'out')}")
     if positions:
         words += ["--", *positions]
     code, text, document, messages = _run(words)

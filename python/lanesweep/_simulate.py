@@ -13,8 +13,8 @@ import numpy.typing as npt
 
 from . import _core
 from ._core import Frame
-from ._driver import Driver, names_of
-from ._run import on_message, words_of
+from ._driver import Driver, name_of, names_of, register
+from ._run import on_message, path_of, word, words_of
 
 if TYPE_CHECKING:
     from ._verbs import Models, Path, Values
@@ -118,8 +118,8 @@ def simulate(
         cases,
         category=category,
         models=names_of(models),
-        thw=[] if thw is None else words_of(thw, is_list=False),
-        profile=os.fspath(profile),
+        thw=[] if thw is None else words_of(thw, "thw", is_list=False),
+        profile=path_of(profile, "profile"),
         dt=dt,
         backend=backend,
         device=device,
@@ -173,28 +173,32 @@ class LimitState(_core.LimitState):
         device: str | None = None,
     ) -> LimitState:
         if not isinstance(model, (str, Driver)):
-            raise _core.UsageError(f"`model` is {model!r}; give one model: a name or a Driver")
+            raise TypeError(f"`model` is {model!r:.80}; give one model: a name or a Driver")
+        (known_as,) = names_of(model)
         made = super().__new__(
             cls,
-            os.fspath(density),
-            model=names_of(model)[0],
+            path_of(density, "density"),
+            model=known_as,
             criterion=criterion,
-            thw=None if thw is None else str(thw),
-            profile=os.fspath(profile),
+            thw=None if thw is None else word(thw),
+            profile=path_of(profile, "profile"),
             backend=backend,
             device=device,
         )
         assert isinstance(made, cls)
         made._arguments = os.fspath(density), model, criterion, thw, profile, backend, device
+        made._known_as = known_as
         return made
 
     _arguments: tuple[Any, ...]
+    _known_as: str
 
     def __reduce__(self) -> tuple[Any, ...]:
         return _opened, self._arguments
 
     def __call__(self, points: npt.ArrayLike) -> npt.NDArray[np.float64]:
         array = self._array(points)
+        self._check_driver()
         return super().__call__(array) if len(array) else np.empty(0)
 
     def is_valid(self, points: npt.ArrayLike) -> npt.NDArray[np.bool_]:
@@ -202,6 +206,12 @@ class LimitState(_core.LimitState):
 
     def log_density(self, points: npt.ArrayLike) -> npt.NDArray[np.float64]:
         return super().log_density(self._array(points))
+
+    def _check_driver(self) -> None:
+        """Refuse a driver that has changed since: the values of one limit state are those of one driver."""
+        model = self._arguments[1]
+        if isinstance(model, Driver) and register(model) != self._known_as:
+            raise _core.UsageError(f"driver {name_of(model)} has changed since this limit state was made: make another one")
 
     def _array(self, points: Any) -> npt.NDArray[np.float64]:
         """Points as an array; columns of a data frame by their names."""
@@ -246,6 +256,7 @@ class LimitState(_core.LimitState):
             ``probability``, ``low``, ``high``, ``level``, ``points``, ``valid``, ``failures``, ``effective_size`` (of the
             failures) and ``mean_weight`` (both None without `log_density`), ``verdict`` and ``warnings``.
         """
+        self._check_driver()
         logs = None if log_density is None else np.ascontiguousarray(log_density, dtype=np.float64).reshape(-1)
         found: dict[str, Any] = json.loads(super()._estimate(self._array(points), logs, level))
         return found

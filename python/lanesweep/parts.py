@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any
 
 from ._core import InputError
-from ._driver import Driver, register
+from ._driver import Driver, models_of, register
 from ._result import Result, temporary
 from ._run import command
 from ._verbs import merge
@@ -71,7 +71,7 @@ def plan(function: Callable[..., Result], *args: Any, shards: int = 8, **argumen
     if shards < 1:
         raise ValueError(f"{shards} parts; give at least 1")
     models = arguments.get("models")
-    several = [models] if models is None or isinstance(models, (str, Driver)) else list(models)
+    several = models_of(models)
     if models is not None:
         arguments["models"] = several
     drivers = tuple((model, register(model)) for model in several if isinstance(model, Driver))

@@ -250,8 +250,8 @@ pub fn frame_of_columns(columns: &Bound<'_, PyDict>) -> PyResult<Frame> {
     Ok(Frame::new(schema, vec![batch.map_err(|error| InputError::new_err(format!("the columns: {error}")))?]))
 }
 
-/// A table of records: a list of objects with equal keys, as JSON; columns in this order, then the others. A column has the type of its values; whole numbers
-/// beside others become numbers.
+/// A table of records: a list of objects with equal keys, as JSON; columns in this order, then the others. A column has
+/// the type of its values; whole numbers beside others become numbers.
 #[pyfunction]
 #[pyo3(signature = (json, order=vec![]))]
 pub fn frame_of_records(py: Python<'_>, json: &str, order: Vec<String>) -> PyResult<Frame> {
@@ -264,6 +264,12 @@ pub fn frame_of_records(py: Python<'_>, json: &str, order: Vec<String>) -> PyRes
             names.push(name);
         }
     }
+    // JSON has no infinity: the program writes a text.
+    let infinite = |value: &Value| match value.as_str() {
+        Some("Infinity") => Some(f64::INFINITY),
+        Some("-Infinity") => Some(f64::NEG_INFINITY),
+        _ => None,
+    };
     let kind = |name: &str| {
         let mut values =
             records.iter().filter_map(|record| record.get(name)).filter(|value| !value.is_null()).peekable();
@@ -272,6 +278,7 @@ pub fn frame_of_records(py: Python<'_>, json: &str, order: Vec<String>) -> PyRes
             Value::Bool(_) => ColumnKind::Flag,
             Value::Number(number) if number.is_i64() => ColumnKind::Whole,
             Value::Number(_) => ColumnKind::Binary64,
+            text if infinite(text).is_some() => ColumnKind::Binary64,
             _ => ColumnKind::Text,
         });
         let first = kinds.next().unwrap_or(ColumnKind::Binary64);
@@ -294,7 +301,7 @@ pub fn frame_of_records(py: Python<'_>, json: &str, order: Vec<String>) -> PyRes
             (ColumnKind::Text, Some(other)) => Cell::text(other.to_string()),
             (_, Some(Value::Bool(flag))) => Cell::Flag(*flag),
             (ColumnKind::Whole, Some(number)) => number.as_i64().map_or(Cell::Null, Cell::Whole),
-            (_, Some(number)) => Cell::number(number.as_f64()),
+            (_, Some(number)) => Cell::number(number.as_f64().or_else(|| infinite(number))),
         };
         let row: Vec<Cell> = columns.iter().map(cell).collect();
         rows.row(&row).map_err(|error| exception(py, &error))?;

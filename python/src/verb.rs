@@ -12,7 +12,7 @@ use pyo3::exceptions::{PyException, PyKeyboardInterrupt};
 use pyo3::prelude::*;
 
 use crate::driver;
-use crate::error::exception;
+use crate::error::{exception, in_arguments};
 
 /// How often the calling thread looks for signals.
 const LOOK: Duration = Duration::from_millis(20);
@@ -80,7 +80,7 @@ fn pass_on(
 ) -> PyResult<()> {
     for (level, line) in embedded::take_messages() {
         if let Some(on_message) = on_message {
-            on_message.call1((level.as_str(), line))?;
+            on_message.call1((level.as_str(), in_arguments(&line)))?;
         }
     }
     if let Some(on_progress) = on_progress

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
 import sys
 import threading
 import time
@@ -155,15 +156,24 @@ def test_an_interrupt_stops_a_slow_driver() -> None:
 def test_a_second_interrupt_leaves_a_driver_that_blocks() -> None:
     released = threading.Event()
 
-    def block(view: lanesweep.View) -> float:
-        released.wait(60)
-        return 0.0
+    class Blocks(lanesweep.Driver):
+        may_accelerate = False
+
+        def __init__(self) -> None:
+            self.released = released
+
+        def __getstate__(self) -> None:
+            """An event says nothing about what the driver computes."""
+
+        def acceleration(self, view: lanesweep.View, state: Any) -> float:
+            self.released.wait(60)
+            return 0.0
 
     for delay_s in (0.5, 1.0):
         threading.Timer(delay_s, lambda: signal.raise_signal(signal.SIGINT)).start()
     start = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
-        lanesweep.simulate(CASES, category="cut-in", models=[Wrong(block)])
+        lanesweep.simulate(CASES, category="cut-in", models=[Blocks()])
     assert time.monotonic() - start < 20
     with pytest.raises(lanesweep.BusyError):
         lanesweep.simulate(CASES, category="cut-in", models="FSM")
@@ -185,3 +195,206 @@ def test_the_example_in_jax_avoids_what_it_can() -> None:
 
     counts = [lanesweep.simulate(CASES, category="cut-in", models=[model])["collision"].sum() for model in (JaxDriver(), Wrong(0))]
     assert 0 < counts[0] < counts[1]
+
+
+class Brake(lanesweep.Driver):
+    """Brakes from the start on."""
+
+    may_accelerate = False
+
+    def __init__(self, decel: float) -> None:
+        self.decel = decel
+
+    def acceleration(self, view: lanesweep.View, state: Any) -> Any:
+        return np.full(len(view), -self.decel)
+
+
+def outcomes(driver: lanesweep.Driver) -> Any:
+    return lanesweep.simulate(CASES, category="cut-in", models=[driver]).to_pandas()
+
+
+def test_a_driver_is_its_present_values_and_another_object_with_these_values_is_a_fresh_one() -> None:
+    expected = {decel: outcomes(Brake(decel)) for decel in (6.0, 4.0, 0.2)}
+    assert len({frame["collision"].sum() for frame in expected.values()}) == 3
+    base = Brake(6.0)
+    for decel in (6.0, 4.0, 0.2):
+        base.decel = decel
+        assert outcomes(base).equals(expected[decel]), decel
+    assert outcomes(Brake(6.0)).equals(expected[6.0])
+    # The name alone stands for the last driver of that name, as it is now.
+    base = Brake(6.0)
+    outcomes(base)
+    base.decel = 0.2
+    named = lanesweep.simulate(CASES, category="cut-in", models="Brake").to_pandas()
+    assert named.equals(expected[0.2]) and outcomes(Brake(6.0)).equals(expected[6.0])
+    # Values within values, changed in place.
+    fixed = [outcomes(one) for one in (Listed([-6.0]), Listed([-0.2]))]
+    listed = Listed([-6.0])
+    assert outcomes(listed).equals(fixed[0])
+    listed.values[0] = -0.2
+    assert outcomes(listed).equals(fixed[1]) and outcomes(Listed([-6.0])).equals(fixed[0])
+
+
+class Listed(lanesweep.Driver):
+    may_accelerate = False
+
+    def __init__(self, values: list[float]) -> None:
+        self.values = values
+
+    def acceleration(self, view: lanesweep.View, state: Any) -> Any:
+        return np.full(len(view), self.values[0])
+
+
+SCRIPT = """
+import numpy as np, lanesweep
+
+CASES = {{"ego_speed_mps": np.linspace(15, 40, 200), "speed_mps": np.linspace(10, 30, 200), "gap": 20.0, "lateral_speed_mps": 1.0}}
+
+class Brake(lanesweep.Driver):
+    may_accelerate = False
+    def acceleration(self, view, state):
+        return np.full(len(view), -{first})
+
+weak = lanesweep.simulate(CASES, category="cut-in", models=[Brake()])["collision"].sum()
+
+class Brake(lanesweep.Driver):
+    may_accelerate = False
+    def acceleration(self, view, state):
+        return np.full(len(view), -{second})
+
+print(weak, lanesweep.simulate(CASES, category="cut-in", models=[Brake()])["collision"].sum())
+"""
+
+
+def test_two_classes_of_one_name_in_a_script_are_two_drivers(tmp_path) -> None:
+    script = tmp_path / "two.py"
+    script.write_text(SCRIPT.format(first=0.2, second=8.0))
+    done = subprocess.run([sys.executable, script], capture_output=True, text=True, check=True)
+    weak, strong = map(int, done.stdout.split())
+    assert weak > strong
+
+
+MODULE = "import numpy as np, lanesweep\n"
+MODULE += "DECEL = {decel}\n"
+MODULE += "def helper(n): return np.full(n, -DECEL)\n"
+MODULE += "class Constant(lanesweep.Driver):\n"
+MODULE += "    may_accelerate = False\n"
+MODULE += "    def acceleration(self, view, state): return helper(len(view))\n"
+
+
+def test_what_the_code_reads_is_a_part_of_the_driver_wherever_it_stands(tmp_path) -> None:
+    """Constants, functions, closures, defaults and class attributes, by their values, not by their text."""
+    from lanesweep._driver import fingerprint
+
+    def made(decel: float, comment: str = "") -> str:
+        space: dict[str, Any] = {"__name__": "__main__"}
+        exec(MODULE.format(decel=decel) + comment, space)
+        return fingerprint(space["Constant"]())
+
+    assert made(6.0) == made(6.0) == made(6.0, "\n# a comment") != made(4.0)
+
+    def closed(decel: float) -> lanesweep.Driver:
+        class Closed(lanesweep.Driver):
+            def acceleration(self, view: lanesweep.View, state: Any, scale: float = decel / 2) -> Any:
+                return [-decel * scale] * len(view)
+
+        return Closed()
+
+    assert fingerprint(closed(6.0)) == fingerprint(closed(6.0)) != fingerprint(closed(4.0))
+
+    class Fixed(Brake):
+        factor = 1.0
+
+        def acceleration(self, view: lanesweep.View, state: Any) -> Any:
+            return super().acceleration(view, state) * self.factor
+
+    before = fingerprint(Fixed(6.0))
+    Fixed.factor = 0.5
+    assert fingerprint(Fixed(6.0)) != before
+    # A module of one's own, read by attribute.
+    (tmp_path / "own_constants.py").write_text("DECEL = 6.0\nUNUSED = 1\n")
+    sys.path.insert(0, str(tmp_path))
+    try:
+        import own_constants  # type: ignore[import-not-found]
+
+        driver = Wrong(lambda view: -own_constants.DECEL)
+        before = fingerprint(driver)
+        own_constants.UNUSED = 2
+        assert fingerprint(driver) == before
+        own_constants.DECEL = 4.0
+        assert fingerprint(driver) != before
+    finally:
+        sys.path.remove(str(tmp_path))
+
+
+def test_a_resumed_run_does_not_mix_drivers_whose_constant_changed(density, tmp_path) -> None:
+    module = tmp_path / "constant_driver.py"
+    script = "import sys, lanesweep\nfrom constant_driver import Constant\ndensity, out, *rest = sys.argv[1:]\n"
+    script += "lanesweep.sample(density, models=[Constant()], samples=300_000, thw=0.6, out=out, stop_after=rest[0] if rest else None)\n"
+    (tmp_path / "run.py").write_text(script)
+
+    def run(decel: float, *words: str) -> subprocess.CompletedProcess[str]:
+        module.write_text(MODULE.format(decel=decel))
+        command = [sys.executable, "-B", tmp_path / "run.py", density, tmp_path / "out", *words]
+        return subprocess.run(command, capture_output=True, text=True, check=False)
+
+    stopped = run(6.0, "1")
+    assert "RunStopped" in stopped.stderr, stopped.stderr
+    mixed = run(4.0)
+    assert mixed.returncode != 0 and "another run" in mixed.stderr, mixed.stderr
+    resumed = run(6.0)
+    assert resumed.returncode == 0, resumed.stderr
+
+
+def test_a_part_of_a_run_is_refused_where_the_driver_is_another_one(density) -> None:
+    from lanesweep import parts
+
+    driver = Brake(6.0)
+    plan = parts.plan(lanesweep.sample, density, samples=2000, thw=0.6, models=[driver], shards=2)
+    first = parts.run(plan, 0)
+    driver.decel = 4.0
+    with pytest.raises(lanesweep.InputError, match="not the one that was planned"):
+        parts.run(plan, 1)
+    driver.decel = 6.0
+    assert parts.join(plan, [first, parts.run(plan, 1)]).status == "ok"
+
+
+LOCK = threading.Lock()
+
+
+@pytest.mark.parametrize(
+    ("driver", "message"),
+    [
+        (Wrong(threading.Lock()), "attribute `answer` is a `lock`"),
+        (Wrong(lambda view: LOCK.locked() * -1.0), "`LOCK`, which `<lambda>` reads, is a `lock`"),
+        (Wrong([open(os.devnull)]), r"attribute `answer`\[0\] is a `TextIOWrapper`"),
+    ],
+)
+def test_a_driver_that_cannot_be_told_from_another_is_refused_with_what_to_do(driver, message) -> None:
+    with pytest.raises(lanesweep.UsageError, match=f"(?s)driver Wrong: {message}.*`start`.*`__getstate__`"):
+        lanesweep.simulate(CASES, category="cut-in", models=[driver])
+
+
+def test_a_limit_state_refuses_a_driver_that_has_changed(density) -> None:
+    driver = Brake(6.0)
+    limit_state = lanesweep.LimitState(density, model=driver, thw=0.6)
+    points = limit_state.draw(50, rng=1)
+    before = limit_state(points)
+    driver.decel = 0.2
+    with pytest.raises(lanesweep.UsageError, match="has changed since"):
+        limit_state(points)
+    weak = lanesweep.LimitState(density, model=driver, thw=0.6)(points)
+    driver.decel = 6.0
+    assert np.array_equal(limit_state(points), before) and (weak <= before).all() and (weak < before).any()
+
+
+def test_what_is_no_model_is_named() -> None:
+    for models, message in [
+        (Brake, r"`models` is the class Brake.*Brake\(…\)"),
+        ([Brake], r"`models` holds the class Brake.*Brake\(…\)"),
+        ([3], "`models` holds 3"),
+        (3.5, "`models` is 3.5"),
+    ]:
+        for call in (lambda: lanesweep.simulate(CASES, category="cut-in", models=models), lambda: lanesweep.study(models=models)):
+            with pytest.raises(TypeError, match=message):
+                call()

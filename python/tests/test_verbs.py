@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import os
+import re
 import signal
 import subprocess
 import sys
@@ -12,7 +14,10 @@ import time
 from pathlib import Path
 
 import lanesweep
+import numpy as np
+import pandas as pd
 import pytest
+from lanesweep._result import _read_csv
 
 ROOT = Path(__file__).parents[1]
 
@@ -176,3 +181,50 @@ def test_the_command_line_is_complete(program) -> None:
     assert program("--version").stdout.startswith("lanesweep ")
     refused = program("study", "--no-such-flag")
     assert refused.returncode == 2 and "no-such-flag" in refused.stderr
+
+
+def test_infinite_numbers_and_empty_tables_of_verbs_are_what_they_are(density, tmp_path) -> None:
+    options = {"models": ["Reg157", "FSM"], "thw": 0.4, "samples": 2000, "worst": 50}
+    sample = lanesweep.sample(density, **options, rows=tmp_path / "rows.csv")
+    worst = sample.table("worst").to_pandas()
+    assert len(worst) > 50 and worst[["min_ttc_s", "max_btn", "min_gap_m"]].notna().all().all()
+    collided = worst[worst["collision"] == 1]
+    assert len(collided) and np.isinf(collided["max_btn"]).all() and (collided["min_gap_m"] <= 0).all()
+    rows = pd.read_csv(tmp_path / "rows.csv")
+    assert (rows["btn"].astype(bool) == (rows["max_btn"] > 0.8)).all() and np.isinf(rows["max_btn"]).any()
+    # JSON has no infinity: there it is a text, which no filter drops in silence.
+    lanesweep.sample(density, **options, rows=tmp_path / "rows.jsonl")
+    lines = [json.loads(line) for line in (tmp_path / "rows.jsonl").read_text().splitlines()]
+    assert [line["max_btn"] == "Infinity" for line in lines] == list(np.isinf(rows["max_btn"]))
+    assert pd.read_json(tmp_path / "rows.jsonl", lines=True)["max_btn"].equals(rows["max_btn"])
+    # A ratio without a failure has no value, and an interval around no failure is infinitely wide.
+    rare = lanesweep.sample(density, models="FSM", thw=2.0, samples=100).table("estimates").to_pandas()
+    assert (rare["failures"] == 0).any() and np.isinf(rare.loc[rare["failures"] == 0, "relative_half_width"]).all()
+    (tmp_path / "empty.csv").write_text("model,probability\n")
+    empty = _read_csv(tmp_path / "empty.csv")
+    assert len(empty) == 0 and empty.columns == ["model", "probability"] and len(empty.to_pandas()) == 0
+
+
+def test_a_single_density_is_among_the_densities_of_its_fit(density, tmp_path) -> None:
+    options = {"synth_recordings": 6, "categories": "cut-in", "parameterizations": 2, "no_comparison": True}
+    one = lanesweep.fit(**options, out=tmp_path / "one.json")
+    assert one.densities == {"one": tmp_path / "one.json"} and os.fspath(one) == str(tmp_path / "one.json")
+    assert lanesweep.sample(one.densities["one"], samples=100, thw=1.2, models="FSM").status == "ok"
+
+
+def test_messages_name_arguments_and_no_flags(density) -> None:
+    for call, kind, message in [
+        (lambda: lanesweep.study(synth_recordings=1, thw="soon"), lanesweep.UsageError, "`thw`: `soon` is not a time headway"),
+        (lambda: lanesweep.study(synth_recordings=1, categories="cut"), lanesweep.UsageError, "`categories`"),
+        (lambda: lanesweep.study(synth_recordings="many"), lanesweep.UsageError, "`synth_recordings`"),
+        (lambda: lanesweep.sample(density, samples=True), lanesweep.UsageError, "`samples`"),
+        (lambda: lanesweep.sample(density, criterion="speed", thw=1), lanesweep.UsageError, "`criterion`"),
+        (lambda: lanesweep.study(synth_recordings=1, thw=[]), ValueError, "`thw` is empty"),
+        (lambda: lanesweep.study(synth_recordings=1, models=[]), ValueError, "`models` is empty"),
+        (lambda: lanesweep.mine([]), ValueError, "`recordings` is empty"),
+        (lambda: lanesweep.study(synth_recordings=1, categories=object()), TypeError, "`categories` is <object"),
+        (lambda: lanesweep.study(synth_recordings=1, dt=[object()]), TypeError, "`dt` is <object"),
+    ]:
+        with pytest.raises(kind, match=message) as raised:
+            call()
+        assert not re.search(r"(?<![a-z])--[a-z]", str(raised.value)), raised.value

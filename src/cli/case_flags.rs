@@ -161,7 +161,7 @@ impl GivenCase {
     pub(super) fn headway(&self) -> Result<Headway> {
         let CaseParameters { gap, thw, .. } = self.parameters;
         self.located(self.parameters.check_start())?;
-        let start = gap.map(Headway::GapM).or(thw.map(Headway::ThwS));
+        let start = gap.map(Headway::GapM).or(thw.map(Headway::thw));
         self.located(start.ok_or_else(|| {
             let help = "give option `gap` in metres or option `thw` in seconds";
             Error::usage(Place::item("gap, thw"), "the initial distance is missing", help)

@@ -245,7 +245,7 @@ pub fn headways(list: &str, words: &str) -> Result<Vec<Headway>> {
             return Ok(Headway::MinFollowing);
         }
         let value = text.trim().parse::<f64>().ok().filter(|v| v.is_finite() && *v > 0.0 && *v < 1e4);
-        value.map(Headway::ThwS).ok_or_else(|| {
+        value.map(Headway::thw).ok_or_else(|| {
             let problem = format!("`{text}` is not a time headway");
             let help = format!("give seconds above 0 with commas, `r157`, {words}");
             Error::usage(Place::item("--thw"), problem, help)

@@ -6,6 +6,7 @@ use std::time::Duration;
 use super::sample::Sample;
 use super::source::file_of;
 use crate::cli::settings::{EstimatorKind, IntervalKind, PointKind};
+use crate::model::driver::ModelId;
 use crate::report::lanes::table_format;
 use crate::run::sampling::{Estimator, MapAxes, SampleOptions, SampleSource, read_proposal};
 use crate::stats::density::{DensityModel, Mixture};
@@ -71,13 +72,21 @@ impl Sample {
         Ok(())
     }
 
+    /// The search of importance sampling. The lanes of a driver outside the registry are thousands of times as slow, so
+    /// that crude draws are fewer: the estimate says how deep the search has looked.
+    pub(super) fn search(&self, models: &[ModelId]) -> Search {
+        let search = Search { defence: self.settings.defensive_weight, ..Search::default() };
+        match models.iter().any(|model| model.foreign().is_some()) {
+            true => Search { crude: DRIVER_CRUDE, ..search },
+            false => search,
+        }
+    }
+
     fn estimator(&self, density: &DensityModel) -> Result<Estimator> {
         let settings = &self.settings;
         Ok(match settings.estimator {
             EstimatorKind::Auto | EstimatorKind::Mc => Estimator::Crude { interval: self.interval() },
-            EstimatorKind::Is if self.proposal.is_empty() => {
-                Estimator::Search(Search { defence: settings.defensive_weight, ..Search::default() })
-            }
+            EstimatorKind::Is if self.proposal.is_empty() => Estimator::Search(self.search(&self.models()?)),
             EstimatorKind::Is => {
                 let read = |path: &PathBuf| read_proposal(path, density);
                 let proposals: Vec<Mixture> = self.proposal.iter().map(read).collect::<Result<_>>()?;
@@ -115,6 +124,8 @@ impl Sample {
 
 /// Number of samples if none is given.
 const DEFAULT_SAMPLES: u64 = 100_000;
+/// Maximum number of crude draws of a search with a driver outside the registry.
+const DRIVER_CRUDE: u64 = 1 << 15;
 /// Half-width of importance sampling if neither it nor a number of samples is given.
 const DEFAULT_HALF_WIDTH: f64 = 0.1;
 /// Maximum number of draws of importance sampling after a search, if none is given.

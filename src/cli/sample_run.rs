@@ -2,6 +2,8 @@
 
 use std::time::Instant;
 
+use indicatif::ProgressBar;
+
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::dry_run::{DryRun, time};
@@ -115,16 +117,21 @@ impl Sample {
         }
         let executor = opened.executor().with_recheck(sample.options.seed);
         let is_split = self.shards.plan_only || self.shards.is_part();
-        let sample = if !matches!(sample.kind, SampleKind::Search(_)) {
-            sample
-        } else if is_split {
-            sample.searched(&executor, &self.out, true)?
-        } else {
-            // The search is kept in the folder, so it needs the folder's lock too.
-            let _folder = OutputDir::open(&self.out, ESTIMATE_RECORD)?;
-            let found = sample.searched(&executor, &self.out, false)?;
-            found.keep_search(&self.out)?;
-            found
+        let sample = match &sample.kind {
+            SampleKind::Search(search) => {
+                let (searching, bar) = searching(&sample, search, &executor, verbosity);
+                let found = if is_split {
+                    sample.searched(&searching, &self.out, true)
+                } else {
+                    // The search is kept in the folder, so it needs the folder's lock too.
+                    let _folder = OutputDir::open(&self.out, ESTIMATE_RECORD)?;
+                    let found = sample.searched(&searching, &self.out, false);
+                    found.and_then(|found| found.keep_search(&self.out).map(|()| found))
+                };
+                bar.finish_and_clear();
+                found?
+            }
+            _ => sample,
         };
         if is_split {
             sample.write_plan(&self.out)?;
@@ -177,8 +184,11 @@ impl Sample {
         let mut result = run.take_result()?;
         if let Some(half_width) = self.settings.half_width.filter(|_| self.is_refined()) {
             tracing::info!("importance sampling of what is rare");
-            let search = Search { defence: self.settings.defensive_weight, ..Search::default() };
-            result = sample.refined(result, &search, half_width, executor)?;
+            let search = self.search(&sample.options.models);
+            let (searching, bar) = searching(sample, &search, executor, verbosity);
+            let refined = sample.refined(result, &search, half_width, &searching);
+            bar.finish_and_clear();
+            result = refined?;
         }
         if let Some(other) = other {
             tracing::info!("the same samples under profile {}", other.name);
@@ -203,6 +213,29 @@ impl Sample {
         run.close()?;
         Ok(exit)
     }
+}
+
+/// An executor whose points move a bar, for a search, which may end long before its maximum. Warns where it takes long.
+fn searching<'a>(
+    sample: &sampling::Sample,
+    search: &Search,
+    executor: &Executor<'a>,
+    verbosity: Verbosity,
+) -> (Executor<'a>, ProgressBar) {
+    let most = search.most_points(sample.options.asked().len());
+    for model in &sample.options.models {
+        if model.foreign().is_some_and(|driver| driver.may_accelerate()) {
+            tracing::warn!(
+                "driver {} may accelerate, so that each lane runs to a contact or the time cap, {} steps; the search has up \
+                 to {} points",
+                model.name(),
+                count(u64::from(sample.profile.step_cap())),
+                count(most)
+            );
+        }
+    }
+    let bar = console::progress(verbosity, most, "searching");
+    (executor.clone().with_progress(console::inc(&bar)), bar)
 }
 
 /// Warns about limits of the estimates of crude Monte Carlo.

@@ -99,11 +99,6 @@ impl<R: Real> Outcome<R> {
         (!is_beside).then_some(self.min_ttc)
     }
 
-    /// Minimum gap for reports: `None` where no vehicle was in the ego's path.
-    pub fn gap_in_path(&self) -> Option<R> {
-        self.min_gap.to_f64().is_finite().then_some(self.min_gap)
-    }
-
     /// The same in f64; exact.
     pub fn widen(&self) -> Outcome<f64> {
         Outcome {

@@ -57,7 +57,13 @@ impl Headway {
         (1..=10).rev().map(|k| Headway::ThwS(f64::from(k) / 5.0)).collect()
     }
 
-    /// Parses `1.2s`, `30m`, `r157` or `observed`; also `2.0s`, as in tables, for `2s`.
+    /// A time headway, s, to 15 significant digits: 0.6000000000000001, which a computation leaves, is 0.6, so that keys
+    /// and tables of two runs join.
+    pub fn thw(s: f64) -> Headway {
+        Headway::ThwS(shortest(s))
+    }
+
+    /// Parses `1.2s`, `30m`, `r157` or `observed`; also `2.0s`, as in tables, for `2s`. Numbers are those of [`Headway::thw`].
     pub fn parse(text: &str) -> Option<Headway> {
         match text {
             R157 => return Some(Headway::MinFollowing),
@@ -66,8 +72,8 @@ impl Headway {
         }
         let number = |text: &str| text.parse::<f64>().ok().filter(|value| value.is_finite() && *value >= 0.0);
         match text.strip_suffix('s') {
-            Some(seconds) => number(seconds).map(Headway::ThwS),
-            None => number(text.strip_suffix('m')?).map(Headway::GapM),
+            Some(seconds) => number(seconds).map(Headway::thw),
+            None => number(text.strip_suffix('m')?).map(|gap_m| Headway::GapM(shortest(gap_m))),
         }
     }
 
@@ -109,6 +115,10 @@ impl Headway {
             Headway::Observed => Start::Gap(R::ZERO),
         }
     }
+}
+
+fn shortest(value: f64) -> f64 {
+    format!("{value:.14e}").parse().unwrap_or(value)
 }
 
 impl std::fmt::Display for Headway {
@@ -484,7 +494,18 @@ impl FromIterator<String> for Units {
 
 #[cfg(test)]
 mod tests {
-    use super::Units;
+    use super::{Headway, Units};
+
+    #[test]
+    fn a_headway_that_was_computed_has_the_key_of_the_one_that_was_written() {
+        for (computed, written) in [("0.6000000000000001s", "0.6s"), ("1.9000000000000006s", "1.9s"), ("2.0s", "2s")] {
+            assert_eq!(Headway::parse(computed), Headway::parse(written));
+            assert_eq!(Headway::parse(computed).unwrap().to_string(), written);
+        }
+        assert_eq!(Headway::parse("29.999999999999996m").unwrap().to_string(), "30m");
+        assert_eq!(Headway::parse("0.123456789012345s").unwrap().to_string(), "0.123456789012345s");
+        assert_eq!((1..=10).map(|k| Headway::thw(f64::from(k) * 0.2)).rev().collect::<Vec<_>>(), Headway::paper());
+    }
 
     #[test]
     fn names_lead_back_to_their_units() {

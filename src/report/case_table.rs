@@ -70,7 +70,9 @@ impl CaseAnswer {
 /// What the answer rests on, if a small change or the annex decides.
 fn note(judgement: &Judgement) -> String {
     match (judgement.verdict(), &judgement.outside_annex) {
-        (Verdict::Undecided, _) if !judgement.flips.is_empty() => format!("changes with {}", judgement.flips.join(", ")),
+        (Verdict::Undecided, _) if !judgement.flips.is_empty() => {
+            format!("changes with {}", judgement.flips.join(", "))
+        }
         (Verdict::OutsideAnnex, Some(reason)) => reason.clone(),
         _ => {
             let of_drivers = judgement.models.iter().filter(|judged| !judged.flips.is_empty());

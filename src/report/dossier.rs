@@ -3,7 +3,7 @@
 use serde_json::json;
 
 use super::records;
-use super::records::PROGRAM;
+use super::records::{PROGRAM, smallest_gap_m};
 use super::sampling::HostRecord;
 use super::trace::{TraceFigure, TracePanels, TraceSeries};
 use crate::Result;
@@ -109,7 +109,7 @@ impl DossierReport<'_> {
             .column("S: BTN", |hidden| hidden.recorded.max_btn)
             .column(Column::from("S': TTC s").null("–"), |hidden| hidden.parameterized.approach_ttc())
             .column("S': BTN", |hidden| hidden.parameterized.max_btn)
-            .column(Column::from("S': gap m").null("–"), |hidden| hidden.parameterized.gap_in_path())
+            .column("S': gap m", |hidden| smallest_gap_m(&hidden.parameterized))
             .build()
     }
 
@@ -190,7 +190,7 @@ impl DossierReport<'_> {
             .column("s_max_btn", |hidden| hidden.recorded.max_btn)
             .column("sp_min_ttc_s", |hidden| hidden.parameterized.approach_ttc())
             .column("sp_max_btn", |hidden| hidden.parameterized.max_btn)
-            .column("sp_min_gap_m", |hidden| hidden.parameterized.min_gap)
+            .column("sp_min_gap_m", |hidden| smallest_gap_m(&hidden.parameterized))
             .build()
             .csv()
     }

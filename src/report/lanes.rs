@@ -10,6 +10,7 @@ use crate::engine::{
 };
 use crate::model::criterion::Criterion;
 use crate::model::scalar::Real;
+use crate::report::records::smallest_gap_m;
 use crate::run::study::Study;
 use crate::stats::density::DensityModel;
 use crate::support::atomic_file::StagedFile;
@@ -87,7 +88,7 @@ pub fn columns(digits: Digits) -> Vec<Column> {
         c("ttc", ColumnKind::Flag, "", "Failed the criterion TTC."),
         c("btn", ColumnKind::Flag, "", "Failed the criterion BTN."),
         c("min_ttc", value, "s", "Smallest time to collision; infinite where the vehicles never approached."),
-        c("max_btn", value, "1", "Largest Brake Threat Number."),
+        c("max_btn", value, "1", "Largest Brake Threat Number; infinite where no braking avoids the contact."),
         c("crash_type", ColumnKind::Whole, "1", "Kind of contact; 0 without one."),
         c("t_react", ColumnKind::Binary64, "s", "When the driver first reacted; null if never."),
         c("t_crash", ColumnKind::Binary64, "s", "When vehicles touched; null if never."),
@@ -174,9 +175,9 @@ fn outcome_columns() -> Vec<Column> {
         c("ttc", ColumnKind::Flag, "", "Failed the criterion TTC."),
         c("btn", ColumnKind::Flag, "", "Failed the criterion BTN."),
         c("capped", ColumnKind::Flag, "", "Ended by the time cap."),
-        c("min_ttc_s", ColumnKind::Binary32, "s", "Smallest time to collision; null where the vehicles never approached."),
-        c("max_btn", ColumnKind::Binary32, "1", "Largest Brake Threat Number; null where it has no bound."),
-        c("min_gap_m", ColumnKind::Binary32, "m", "Smallest gap, bumper to bumper; null where there was none."),
+        c("min_ttc_s", ColumnKind::Binary32, "s", "Smallest time to collision; infinite where the vehicles never approached."),
+        c("max_btn", ColumnKind::Binary32, "1", "Largest Brake Threat Number; infinite where no braking avoids the contact."),
+        c("min_gap_m", ColumnKind::Binary32, "m", "Smallest gap to a vehicle that TTC and BTN evaluate, bumper to bumper; at most 0 where vehicles touched, infinite where none was evaluated."),
         c("contact_type", ColumnKind::Whole, "1", "Kind of contact; 0 without one."),
         c("reaction_s", ColumnKind::Binary64, "s", "When the driver first reacted; null if never."),
         c("end_s", ColumnKind::Binary64, "s", "When the run ended."),
@@ -185,9 +186,8 @@ fn outcome_columns() -> Vec<Column> {
     ]
 }
 
-/// The values of [`outcome_columns`]. Null: did not happen, or unbounded.
+/// The values of [`outcome_columns`]. Null: did not happen.
 fn outcome_cells(outcome: &Outcome<f64>, dt_s: f64) -> [Cell<'static>; 12] {
-    let value = |v: f64| Cell::number(v.is_finite().then_some(v));
     let at_contact = |v: f64| Cell::number((outcome.contact_step != NO_STEP).then_some(v));
     let time = |step: u32| Cell::number((step != NO_STEP).then(|| time(step, dt_s)));
     let [collision, ttc, btn] = Criterion::ALL.map(|c| Cell::Flag(outcome.verdicts.failed(c)));
@@ -196,9 +196,9 @@ fn outcome_cells(outcome: &Outcome<f64>, dt_s: f64) -> [Cell<'static>; 12] {
         ttc,
         btn,
         Cell::Flag(outcome.verdicts.capped()),
-        value(outcome.min_ttc),
-        value(outcome.max_btn),
-        value(outcome.min_gap),
+        Cell::Number(outcome.min_ttc),
+        Cell::Number(outcome.max_btn),
+        Cell::Number(smallest_gap_m(outcome)),
         Cell::Whole(i64::from(outcome.contact.code())),
         time(outcome.reaction_step),
         time(outcome.end_step),
@@ -247,7 +247,7 @@ pub fn sampled_columns(density: &DensityModel) -> Vec<Column> {
     columns
 }
 
-/// Writes the lanes of a chunk with outcomes, in the plan's order. Null: did not happen, or unbounded.
+/// Writes the lanes of a chunk with outcomes, in the plan's order. Null: did not happen.
 ///
 /// # Errors
 /// As [`TableWriter::row`]; [`Error::Internal`] for a plan that is not sampled.

@@ -7,9 +7,10 @@ pub const PROGRAM: &str = concat!("lanesweep ", env!("CARGO_PKG_VERSION"));
 
 use crate::engine::{NO_STEP, Outcome};
 use crate::model::criterion::Criterion;
+use crate::support::table::json_number;
 use crate::{Error, Result};
 
-/// How a lane ended. Times in seconds; null for events that did not happen and for infinite values.
+/// How a lane ended. Times in seconds; null for events that did not happen.
 pub fn outcome(outcome: &Outcome<f64>, dt_s: f64) -> Value {
     let time = |step: u32| (step != NO_STEP).then(|| (f64::from(step) * dt_s * 1e9).round() / 1e9);
     let failed = |c: Criterion| outcome.verdicts.failed(c);
@@ -19,9 +20,9 @@ pub fn outcome(outcome: &Outcome<f64>, dt_s: f64) -> Value {
         "ttc": failed(Criterion::Ttc),
         "btn": failed(Criterion::Btn),
         "capped": outcome.verdicts.capped(),
-        "min_ttc_s": outcome.min_ttc,
-        "max_btn": outcome.max_btn,
-        "min_gap_m": outcome.min_gap,
+        "min_ttc_s": json_number(outcome.min_ttc),
+        "max_btn": json_number(outcome.max_btn),
+        "min_gap_m": json_number(smallest_gap_m(outcome)),
         "crash_type": outcome.contact.code(),
         "t_react_s": time(outcome.reaction_step),
         "t_crash_s": time(outcome.contact_step),
@@ -29,6 +30,12 @@ pub fn outcome(outcome: &Outcome<f64>, dt_s: f64) -> Value {
         "impact_closing_speed_mps": is_contact.then_some(outcome.impact_closing_speed),
         "t_end_s": time(outcome.end_step),
     })
+}
+
+/// The smallest gap of a lane, m, as tables and records have it. The lane measures it to the vehicles that TTC and BTN
+/// evaluate; a side contact may have none. Vehicles that touch have no gap left.
+pub(crate) fn smallest_gap_m(outcome: &Outcome<f64>) -> f64 {
+    if outcome.contact_step == NO_STEP { outcome.min_gap } else { outcome.min_gap.min(0.0) }
 }
 
 /// A document as text, with a final line break.

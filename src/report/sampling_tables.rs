@@ -1,6 +1,7 @@
 //! The tables of a sampling run as CSV: numbers in full precision, empty where undefined. Also the sentences that
 //! explain them on the terminal and the page.
 
+use super::records::smallest_gap_m;
 use super::sampling::EstimateFile;
 use crate::engine::{NO_STEP, Outcome};
 use crate::model::criterion::Criterion;
@@ -47,42 +48,38 @@ impl EstimateFile {
             .column("headway", |row| row.headway.as_str())
             .column("runs", |row| row.estimate.runs)
             .column("failures", |row| row.estimate.failures)
-            .column("probability", |row| finite(row.estimate.probability))
-            .column("low", |row| finite(row.estimate.interval.low))
-            .column("high", |row| finite(row.estimate.interval.high))
-            .column("level", |row| finite(row.estimate.interval.level))
+            .column("probability", |row| known(row.estimate.probability))
+            .column("low", |row| known(row.estimate.interval.low))
+            .column("high", |row| known(row.estimate.interval.high))
+            .column("level", |row| known(row.estimate.interval.level))
             .column("interval", |row| kind_name(row.estimate.interval.kind))
-            .column("draws_low", |row| finite(row.draws[0]))
-            .column("draws_high", |row| finite(row.draws[1]))
-            .column("failing_scenarios", |row| row.failing_scenarios.and_then(finite))
-            .column("relative_half_width", |row| finite(row.estimate.relative_half_width))
-            .column("coefficient_of_variation", |row| finite(row.estimate.coefficient_of_variation))
-            .column("variance_reduction", |row| finite(row.estimate.variance_reduction))
-            .columns(
-                weights,
-                |(name, _)| name,
-                |row, (_, of)| row.estimate.weights.as_ref().and_then(|w| finite(of(w))),
-            )
-            .columns(risks, |(end, _)| format!("{hour}{end}"), |row, (_, of)| per_hour(row).and_then(|r| finite(of(r))))
+            .column("draws_low", |row| known(row.draws[0]))
+            .column("draws_high", |row| known(row.draws[1]))
+            .column("failing_scenarios", |row| row.failing_scenarios.and_then(known))
+            .column("relative_half_width", |row| known(row.estimate.relative_half_width))
+            .column("coefficient_of_variation", |row| known(row.estimate.coefficient_of_variation))
+            .column("variance_reduction", |row| known(row.estimate.variance_reduction))
+            .columns(weights, |(name, _)| name, |row, (_, of)| row.estimate.weights.as_ref().and_then(|w| known(of(w))))
+            .columns(risks, |(end, _)| format!("{hour}{end}"), |row, (_, of)| per_hour(row).and_then(|r| known(of(r))))
             .columns(
                 risks,
                 |(end, _)| format!("{kilometres}{end}"),
-                |row, (_, of)| per_1000_km(row).and_then(|r| finite(of(r))),
+                |row, (_, of)| per_1000_km(row).and_then(|r| known(of(r))),
             )
             .columns(
                 ends,
                 |(end, _)| format!("replayed_ratio{end}"),
-                |row, (_, of)| replayed(row).and_then(of).and_then(finite),
+                |row, (_, of)| replayed(row).and_then(of).and_then(known),
             )
             .columns(
                 ends,
                 |(end, _)| format!("sampled_ratio{end}"),
-                |row, (_, of)| sampled(row).and_then(of).and_then(finite),
+                |row, (_, of)| sampled(row).and_then(of).and_then(known),
             )
             .columns(
                 sources,
                 |(name, _)| name,
-                |row, (_, of)| row.uncertainty.and_then(|uncertainty| of(&uncertainty)).and_then(finite),
+                |row, (_, of)| row.uncertainty.and_then(|uncertainty| of(&uncertainty)).and_then(known),
             )
             .column("verdict", |row| row.estimate.trust.verdict().to_string())
             .column("data", |_| self.density.provenance.data.as_str())
@@ -101,9 +98,9 @@ pub fn convergence_csv(checkpoints: &[Checkpoint]) -> String {
         .column("probability", |(_, row)| row.probability)
         .column("low", |(_, row)| row.interval[0])
         .column("high", |(_, row)| row.interval[1])
-        .column("low_with_data", |(_, row)| row.with_data.and_then(|(ends, _)| finite(ends[0])))
-        .column("high_with_data", |(_, row)| row.with_data.and_then(|(ends, _)| finite(ends[1])))
-        .column("failing_scenarios", |(_, row)| row.with_data.and_then(|(_, scenarios)| finite(scenarios)))
+        .column("low_with_data", |(_, row)| row.with_data.and_then(|(ends, _)| known(ends[0])))
+        .column("high_with_data", |(_, row)| row.with_data.and_then(|(ends, _)| known(ends[1])))
+        .column("failing_scenarios", |(_, row)| row.with_data.and_then(|(_, scenarios)| known(scenarios)))
         .build()
         .csv()
 }
@@ -164,7 +161,7 @@ pub struct WorstRow {
 
 /// `worst.csv`: the lanes with the smallest limit state of `criterion`, rerunnable by key.
 pub fn worst_csv(rows: &[WorstRow], parameters: &[String], criterion: Criterion) -> String {
-    let at_contact = |row: &WorstRow, v: f64| finite(v).filter(|_| row.outcome.contact_step != NO_STEP);
+    let at_contact = |row: &WorstRow, v: f64| (row.outcome.contact_step != NO_STEP).then_some(v);
     Table::of(rows)
         .column("model", |row| row.model.name())
         .column("rank", |row| row.rank)
@@ -174,9 +171,9 @@ pub fn worst_csv(rows: &[WorstRow], parameters: &[String], criterion: Criterion)
         .column("criterion", |_| criterion.key())
         .column("limit_state", |row| row.lane.value)
         .columns(Criterion::ALL, |of| of.key(), |row, of| u8::from(row.outcome.verdicts.failed(of)))
-        .column("min_ttc_s", |row| finite(row.outcome.min_ttc))
-        .column("max_btn", |row| finite(row.outcome.max_btn))
-        .column("min_gap_m", |row| finite(row.outcome.min_gap))
+        .column("min_ttc_s", |row| row.outcome.min_ttc)
+        .column("max_btn", |row| row.outcome.max_btn)
+        .column("min_gap_m", |row| smallest_gap_m(&row.outcome))
         .column("impact_speed_mps", |row| at_contact(row, row.outcome.impact_speed))
         .column("impact_closing_speed_mps", |row| at_contact(row, row.outcome.impact_closing_speed))
         .columns(parameters.iter().enumerate(), |(_, name)| name.clone(), |row, (at, _)| row.point[at])
@@ -184,8 +181,9 @@ pub fn worst_csv(rows: &[WorstRow], parameters: &[String], criterion: Criterion)
         .csv()
 }
 
-fn finite(value: f64) -> Option<f64> {
-    Some(value).filter(|v| v.is_finite())
+/// A number; NaN is none.
+fn known(value: f64) -> Option<f64> {
+    Some(value).filter(|v| !v.is_nan())
 }
 
 fn kind_name(kind: IntervalKind) -> &'static str {

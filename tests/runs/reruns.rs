@@ -77,8 +77,10 @@ fn compare_with_row(dir: &Path, from: &str, row: &Row, wide: bool) {
     let (document, _) = done(dir, &["simulate", "--from", from, "--lane", &key, "--format", "json"]);
     let document: serde_json::Value = serde_json::from_str(&document).unwrap();
     let outcome = &document["lanes"][0]["outcome"];
-    // Null: infinite.
-    let word = |name: &str| outcome[name].as_f64().unwrap_or(f64::INFINITY).to_string();
+    let word = |name: &str| match &outcome[name] {
+        serde_json::Value::String(text) if text == "Infinity" => f64::INFINITY.to_string(),
+        number => number.as_f64().unwrap().to_string(),
+    };
     for (name, column) in [("Collision", "collision"), ("TTC", "ttc"), ("BTN", "btn")] {
         let verdict = if row[column] == "1" { "FAIL" } else { "pass" };
         assert!(summary.contains(&format!("{name} {verdict}")), "{key}: {summary}");

@@ -10,6 +10,7 @@ use crate::model::criterion::Criterion;
 use crate::model::driver::NEVER;
 use crate::model::profile::{CutOutTarget, Profile};
 use crate::model::scalar::Real;
+use crate::report::records::smallest_gap_m;
 use crate::run::reopen::{Reopened, TracedCase};
 use crate::scenario::parameterization::{Sizes, VehicleSize};
 use crate::scenario::{Category, LATERAL_SAMPLED, Motion, SPEED_SAMPLED, Scenario, Side, Tables};
@@ -250,7 +251,7 @@ fn properties(
 ) -> Vec<(String, String)> {
     let outcome = &trace.outcome;
     let time = |step: u32| if step == NO_STEP { String::new() } else { trace.time_s(step).to_string() };
-    let value = |v: f64| if v.is_finite() { v.to_string() } else { String::new() };
+    let value = |v: f64| v.to_string();
     let at_contact = |v: f64| if outcome.contact_step == NO_STEP { String::new() } else { value(v) };
     let verdict = |c: Criterion| if outcome.verdicts.failed(c) { "fail" } else { "pass" }.to_owned();
     let end = match outcome.end {
@@ -279,7 +280,7 @@ fn properties(
         ("btn", verdict(Criterion::Btn)),
         ("min_ttc_s", value(outcome.min_ttc)),
         ("max_btn", value(outcome.max_btn)),
-        ("min_gap_m", value(outcome.min_gap)),
+        ("min_gap_m", value(smallest_gap_m(outcome))),
         ("reaction_s", time(outcome.reaction_step)),
         ("contact_s", time(outcome.contact_step)),
         ("impact_speed_mps", at_contact(outcome.impact_speed)),

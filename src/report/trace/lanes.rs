@@ -77,7 +77,7 @@ fn summary(lane: &TracedLane, is_one_of_many: bool) -> String {
     let outcome = &trace.outcome;
     let name = if is_one_of_many { format!("{key}: ") } else { String::new() };
     let mut text = format!(
-        "{name}{} {}, initial gap {} m: {}\n  reacted: {}  end: {} ({})\n  min TTC {}, max BTN {}, min gap {}\n",
+        "{name}{} {}, initial gap {} m: {}\n  reacted: {}  end: {} ({})\n  min TTC {}, max BTN {}, min gap {} m\n",
         trace.category.label(),
         trace.model.name(),
         value(trace.initial_gap_m),
@@ -87,7 +87,7 @@ fn summary(lane: &TracedLane, is_one_of_many: bool) -> String {
         end(outcome),
         outcome.approach_ttc().map_or_else(|| "–".to_owned(), |ttc_s| format!("{} s", value(ttc_s))),
         value(outcome.max_btn),
-        outcome.gap_in_path().map_or_else(|| "–".to_owned(), |gap_m| format!("{} m", value(gap_m)))
+        value(records::smallest_gap_m(outcome))
     );
     if let Some(reference) = reference {
         text.push_str(&match differences(outcome, reference, &time) {

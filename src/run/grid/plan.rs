@@ -199,7 +199,7 @@ fn is_distance(parameter: &MapParameter) -> bool {
 
 fn headway(parameter: &MapParameter, value: f64) -> Headway {
     match parameter.quantity {
-        MapQuantity::Thw => Headway::ThwS(parameter.si(value)),
+        MapQuantity::Thw => Headway::thw(parameter.si(value)),
         _ => Headway::GapM(parameter.si(value)),
     }
 }

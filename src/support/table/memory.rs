@@ -49,7 +49,7 @@ impl Table {
         text
     }
 
-    /// The rows as a list of objects. Infinity and NaN become null, because JSON lacks them. The column `data` is
+    /// The rows as a list of objects. NaN becomes null and infinity the text `Infinity`, because JSON lacks them. The column `data` is
     /// skipped: a document names its data once.
     pub fn records(&self) -> Value {
         let record = |row: &Vec<Cell>| {
@@ -231,7 +231,7 @@ mod tests {
             serde_json::json!([
                 {"parameterization": "1", "f1": 1.0, "fn": 3, "headway": "1.2"},
                 {"parameterization": "-i", "f1": null, "fn": 0, "headway": null},
-                {"parameterization": "a,b", "f1": null, "fn": null, "headway": "inf"},
+                {"parameterization": "a,b", "f1": "Infinity", "fn": null, "headway": "inf"},
             ])
         );
         let csv = "parameterization,f1,fn,headway,data\n1,1,3,1.2,synthetic\n'-i,,0,,synthetic\n\
@@ -256,5 +256,7 @@ mod tests {
         table().save(&path, &TableMetadata::default()).unwrap();
         let first = std::fs::read_to_string(&path).unwrap().lines().next().unwrap().to_owned();
         assert_eq!(first, r#"{"parameterization":"1","f1":1.0,"fn":3,"headway":"1.2","data":"synthetic"}"#);
+        let infinite = std::fs::read_to_string(&path).unwrap().lines().nth(2).unwrap().to_owned();
+        assert!(infinite.contains(r#""f1":"Infinity""#), "a null would vanish from a filter: {infinite}");
     }
 }

@@ -33,7 +33,7 @@ pub use parquet_reader::is_panic_caught;
 pub(crate) use reader::TableReader;
 pub(crate) use text::WIDTH;
 pub use writer::TableWriter;
-pub(crate) use writer::{csv_field, text_of_cell};
+pub(crate) use writer::{csv_field, json_number, text_of_cell};
 
 use std::path::Path;
 

@@ -3,7 +3,7 @@
 //! **CSV.** A spreadsheet treats a field that begins with `=`, `+`, `-` or `@` as a formula, and ids may come from
 //! anybody. Such a text gets a leading apostrophe, which our readers remove. Numbers are unchanged.
 //!
-//! **JSON Lines.** NaN and infinity become null, because JSON lacks them.
+//! **JSON Lines.** JSON lacks NaN and infinity: NaN, which is no value, becomes null, and infinity the text `Infinity`.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
@@ -191,6 +191,15 @@ fn append_json(line: &mut String, columns: &[Column], row: &[Cell]) {
     line.push_str("}\n");
 }
 
+/// A number as JSON. An infinite one is a text, because a null would vanish from every filter and mean.
+pub(crate) fn json_number(number: f64) -> Value {
+    match number {
+        f64::INFINITY => Value::from("Infinity"),
+        f64::NEG_INFINITY => Value::from("-Infinity"),
+        finite => Value::from(finite),
+    }
+}
+
 /// Converts a cell to JSON.
 pub(super) fn json_value(kind: ColumnKind, cell: &Cell) -> Value {
     match cell {
@@ -199,10 +208,10 @@ pub(super) fn json_value(kind: ColumnKind, cell: &Cell) -> Value {
         Cell::Flag(flag) => Value::from(*flag),
         Cell::Whole(number) => Value::from(*number),
         // The shortest text that reads back to the same binary32.
-        Cell::Number(number) | Cell::Decimal(number) if kind == ColumnKind::Binary32 => {
+        Cell::Number(number) | Cell::Decimal(number) if kind == ColumnKind::Binary32 && number.is_finite() => {
             (*number as f32).to_string().parse::<f64>().map_or(Value::Null, Value::from)
         }
-        Cell::Number(number) | Cell::Decimal(number) => Value::from(*number),
+        Cell::Number(number) | Cell::Decimal(number) => json_number(*number),
         Cell::Series(series) => Value::from(series.to_vec()),
         Cell::Wholes(numbers) => Value::from(numbers.to_vec()),
     }
