@@ -47,7 +47,9 @@ impl CaseSheet<'_> {
                 "no contact within the {} s of a run, at whose end the gap still closes",
                 value(first.time_cap_s)
             ),
-            (Answer::NoConflict, _, []) => "nothing collides even if the ego never reacts".to_owned(),
+            (Answer::NoConflict, _, []) => {
+                "nothing collides even if the ego never reacts, until the gap no longer closes".to_owned()
+            }
             (Answer::NoConflict, _, all) => format!(
                 "an ego that never reacts does not collide; {} react{} and collide{}",
                 names(all),
@@ -57,14 +59,24 @@ impl CaseSheet<'_> {
             (_, [], all) => format!("{} collide", names(all)),
             (_, all, []) => format!("{} avoid{} the collision", names(all), s(all)),
             (_, one, other) => {
-                format!("{} avoid{} the collision, {} collide{}", names(one), s(one), names(other), s(other))
+                format!(
+                    "{} avoid{} the collision, {} collide{}; one that avoids suffices (ours)",
+                    names(one),
+                    s(one),
+                    names(other),
+                    s(other)
+                )
             }
         };
         let verdict = first.verdict();
         match verdict {
             Verdict::OutsideAnnex => {
                 let reason = first.outside_annex.as_deref().unwrap_or_default();
-                return format!("{}: {reason}. Its drivers give no answer here ({drivers})", verdict.label());
+                return format!(
+                    "{} under {}: {reason}. Its drivers give no answer here ({drivers})",
+                    verdict.label(),
+                    first.profile
+                );
             }
             Verdict::NotJudged => {
                 return format!(
@@ -106,7 +118,7 @@ impl CaseSheet<'_> {
             ([], of_drivers) => format!("the answer is robust; {}", of_drivers.join("; ")),
             (flips, _) => format!("the answer changes with {}", changes(flips)),
         };
-        format!("{}: {drivers} ({robustness})", verdict.label())
+        format!("{} under {}: {drivers} ({robustness})", verdict.label(), first.profile)
     }
 
     /// What limits the answer: the changes that *robust* refers to, a Brake Threat Number above 1 of a driver that avoids, and vehicles that drive
@@ -195,7 +207,7 @@ fn demand_of(judgement: &Judgement) -> Option<String> {
             let is =
                 reading.value.map_or("does not happen".to_owned(), |v| format!("is {} {}", value(v), reading.unit));
             let (sign, threshold) = (reading.relation.sign(), value(reading.threshold));
-            format!("{} {is}, and has to be {sign} {threshold} {}", reading.quantity, reading.unit)
+            format!("{} {is}; the clause applies where it is {sign} {threshold} {}", reading.quantity, reading.unit)
         })
     };
     let listed = |holds| quantities(holds).collect::<Vec<_>>().join("; ");

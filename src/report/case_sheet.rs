@@ -18,9 +18,11 @@ use crate::{Error, Result};
 /// Kilometres per hour in one metre per second.
 pub(super) const KMH: f64 = 3.6;
 /// What the columns of the drivers show.
-const DRIVERS: &str = "Drivers; smallest gap and TTC, largest BTN. At a contact: rear-end where the ego's front hits, side where \
-                       the other vehicle hits the ego's side or rear; closing is the ego's speed minus the other's. A row that \
-                       equals that of a profile above is left out";
+const DRIVERS: &str = "Drivers; smallest gap to a vehicle in the ego's path, smallest TTC, largest BTN; at a contact TTC is 0 and BTN ∞ \
+                       by definition. Touches: no contact, but a gap that the time step does not tell from one. Contact: rear-end where \
+                       the ego's front hits, side where the other vehicle hits the ego's side or rear; closing is the ego's speed minus \
+                       the other's. Times count from the start of the case; –: not before the end of the run. A row that equals that of \
+                       a profile above is left out";
 
 /// A checked case with the facts that its sheet states.
 pub struct CaseSheet<'a> {
@@ -97,7 +99,7 @@ impl CaseSheet<'_> {
             .column("profile", |(judgement, _)| judgement.profile.as_str())
             .column("model", |(_, judged)| judged.trace.model.name())
             .column("collision", |(_, judged)| verdict_of(judged))
-            .column("gap m", |(_, judged)| records::smallest_gap_m(&judged.trace.outcome))
+            .column("gap in path m", |(_, judged)| records::smallest_gap_m(&judged.trace.outcome))
             .column(Column::from("TTC s").null("–"), |(_, judged)| judged.trace.outcome.approach_ttc())
             .column("BTN", |(_, judged)| judged.trace.outcome.max_btn)
             .column(Column::from("contact").null("–"), |(_, judged)| {
@@ -106,8 +108,8 @@ impl CaseSheet<'_> {
             .column(Column::from("closing km/h").null("–"), |(_, judged)| {
                 judged.impact_closing_mps().map(|v| v * KMH)
             })
-            .column(Column::from("reacts s").null("never"), |(_, judged)| judged.reaction_s())
-            .column(Column::from("brakes s").null("never"), |(_, judged)| judged.braking_s())
+            .column(Column::from("reacts s").null("–"), |(_, judged)| judged.reaction_s())
+            .column(Column::from("brakes s").null("–"), |(_, judged)| judged.braking_s())
             .column("changes with", |(_, judged)| judged.flips.join(", "))
             .build();
         without_repeats(table, 0)
@@ -364,7 +366,7 @@ pub(super) fn verdict_of(judged: &Judged) -> &'static str {
     match (judged.collides(), judged.touches) {
         (true, _) => "COLLIDES",
         (false, true) => "touches",
-        (false, false) => "avoids",
+        (false, false) => "no contact",
     }
 }
 

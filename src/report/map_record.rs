@@ -69,6 +69,8 @@ struct GridRecord<'a> {
     cases: CaseStyle,
     native_gap: bool,
     cells: usize,
+    /// Cut-outs: cells in which the vehicle that cuts out drives through the one ahead of it.
+    drives_through: usize,
     /// Whether the grid was chosen to match a known fraction.
     chosen_to_match: bool,
     shares: Vec<ShareRecord>,
@@ -163,6 +165,7 @@ impl<'a> GridRecord<'a> {
             fixed: grid.fixed().iter().map(|(p, value)| (p.key, *value)).collect(),
             cases: grid.style(),
             native_gap: grid.has_native_gap(),
+            drives_through: mapped.drives_through.iter().filter(|drives| **drives).count(),
             cells: map.cell_count(),
             chosen_to_match: mapped.is_chosen_to_match,
             shares: map.models.iter().enumerate().map(share).collect(),

@@ -160,7 +160,11 @@ fn a_table_is_judged_whole_and_its_status_is_that_of_the_worst_row() {
             let sheet = document(dir, &alone);
             assert_eq!(case["answer"], sheet["answer"]);
             for model in sheet["profiles"][0]["models"].as_array().unwrap() {
-                let word = if model["collision"] == true { "COLLIDES" } else { "avoids" };
+                let word = match (model["collision"] == true, model["is_contact_like"] == true) {
+                    (true, _) => "COLLIDES",
+                    (false, true) => "touches",
+                    (false, false) => "no contact",
+                };
                 assert_eq!(case[model["model"].as_str().unwrap()], word, "{case}");
             }
         }

@@ -109,7 +109,7 @@ impl TraceFigure<'_> {
             notes.push("A curve that ends at the top edge goes on above it.".to_owned());
         }
         if self.panels != TracePanels::Course {
-            notes.push("Long dashes: edges of a lane 3.5 m wide.".to_owned());
+            notes.push(format!("Long dashes: edges of a lane {} m wide.", thousandths(self.lane_width_m())));
         }
         let end_s = self.series.iter().filter_map(|s| Some(s.trace.steps.last()?.time_s)).fold(0.0, f64::max);
         if end_s > shown.until_s {

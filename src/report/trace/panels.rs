@@ -14,8 +14,6 @@ pub struct TraceSeries<'a> {
     pub trace: &'a Trace,
 }
 
-/// Half the width of the drawn lane, m: that of the paper's cut-ins and cut-outs, which start or end at 3.5 m.
-const HALF_LANE_M: f64 = 1.75;
 /// Time shown after the last change, s.
 const REST_S: f64 = 2.0;
 /// TTC and BTN are shown up to these multiples of their thresholds.
@@ -277,7 +275,8 @@ impl<'a> Shown<'a> {
     fn lateral(&self, vehicle: usize) -> Plot {
         let (mut curves, mut bands) = (Vec::new(), Vec::new());
         let ego_half_m = self.first(|trace| trace.ego_width_m) / 2.0;
-        let mut edges = vec![HALF_LANE_M, -HALF_LANE_M, ego_half_m, -ego_half_m];
+        let half_lane_m = self.lane_width_m() / 2.0;
+        let mut edges = vec![half_lane_m, -half_lane_m, ego_half_m, -ego_half_m];
         for (look, trace) in self.courses(vehicle, &|other| other.y_m) {
             let half_m = trace.widths_m[vehicle] / 2.0;
             let centre = |step: &TracedStep| {
@@ -293,7 +292,7 @@ impl<'a> Shown<'a> {
             }
         }
         let contacts = self.marks(&[StepMark::Contact], Some(vehicle), &|step| Some(step.others[vehicle].y_m));
-        let lane = [-HALF_LANE_M, HALF_LANE_M].map(|y| self.level(y, GREY, 1.1, "14,6").into());
+        let lane = [-half_lane_m, half_lane_m].map(|y| self.level(y, GREY, 1.1, "14,6").into());
         let sides = [-ego_half_m, ego_half_m].map(|y| self.level(y, GREY, 2.4, "").into());
         let layers = lane.into_iter().chain(sides).chain(bands).chain(layers(curves, contacts));
         let ends = around(edges.into_iter());
@@ -303,6 +302,11 @@ impl<'a> Shown<'a> {
     /// A value of the first series; equal for all of a sheet.
     fn first(&self, value: impl Fn(&Trace) -> f64) -> f64 {
         self.series.first().map_or(1.0, |s| value(s.trace))
+    }
+
+    /// Width of the lanes, m.
+    pub(super) fn lane_width_m(&self) -> f64 {
+        self.first(|trace| trace.lane_width_m)
     }
 
     /// The distinct courses of a vehicle's value, grey if all lanes have the same one; the longest stands for equal

@@ -11,8 +11,6 @@ use crate::report::plot::{Cells, Figure, Fill, FilledCell, GREY, Height, Plot, P
 /// Names and colours of the vehicles.
 const VEHICLES: [(&str, &str); 3] =
     [("ego", "#1a1a1a"), ("other vehicle", "#8c8c8c"), ("vehicle ahead of it", "#cfcfcf")];
-/// Half the width of a lane, m.
-const HALF_LANE_M: f64 = 1.75;
 /// How far ahead of the ego is shown, m.
 const VIEW_M: f64 = 120.0;
 /// Frames per second of the moving figure.
@@ -85,9 +83,10 @@ impl TraceFigure<'_> {
     }
 
     fn seen_from_above(&self, rows: Vec<Row>, seconds: f64, words: &str) -> Figure {
+        let half_lane_m = self.lane_width_m() / 2.0;
         let seen = rows.iter().flat_map(|row| &row.1).flatten().flatten();
         let wider = |(low, high): (f64, f64), a: f64, b: f64| (low.min(a), high.max(b));
-        let (x, y) = seen.fold(((-8.0, 12.0), (-HALF_LANE_M - 0.3, HALF_LANE_M + 0.3)), |(x, y), [from, to]| {
+        let (x, y) = seen.fold(((-8.0, 12.0), (-half_lane_m - 0.3, half_lane_m + 0.3)), |(x, y), [from, to]| {
             (wider(x, from.0 - 2.0, to.0 + 2.0), wider(y, from.1 - 0.3, to.1 + 0.3))
         });
         let is_cut = x.1 > VIEW_M;
@@ -108,7 +107,7 @@ impl TraceFigure<'_> {
             };
             let cells: Vec<FilledCell> = VEHICLES.iter().enumerate().filter_map(cell).collect();
             let key = cells.iter().map(|cell| (cell.tip.clone(), cell.fill.clone())).collect();
-            let lane = [-HALF_LANE_M, HALF_LANE_M].map(|edge| vec![(x.0, edge), (x.1, edge)]).to_vec();
+            let lane = [-half_lane_m, half_lane_m].map(|edge| vec![(x.0, edge), (x.1, edge)]).to_vec();
             let edges = Rule { runs: lane, colour: GREY, width_px: 1.0, dash: "14,6", ..Rule::default() };
             Plot {
                 heading,
@@ -125,8 +124,9 @@ impl TraceFigure<'_> {
             plots: rows.into_iter().map(plot).collect(),
             columns: 1,
             caption: format!(
-                "{words}{cut}Lateral positions in m, positive on the other vehicle's side. Long dashes: edges of a lane 3.5 m \
-                 wide."
+                "{words}{cut}Lateral positions in m, positive on the other vehicle's side. Long dashes: edges of a lane {} m \
+                 wide.",
+                number(2.0 * half_lane_m)
             ),
             ..Figure::default()
         }

@@ -145,7 +145,8 @@ struct Intrusion {
     /// It was before the case.
     is_before: bool,
     closing_mps: f64,
-    ttc_s: f64,
+    /// `None` if the vehicle is behind the ego.
+    ttc_s: Option<f64>,
 }
 
 impl Intrusion {
@@ -155,9 +156,10 @@ impl Intrusion {
         let change_m = before.others[0].lateral_gap_m - after.others[0].lateral_gap_m;
         let share = if change_m > 0.0 { (before.others[0].lateral_gap_m - lateral_gate_m) / change_m } else { 1.0 };
         let between = |of: fn(&TracedStep) -> f64| of(before) + share * (of(after) - of(before));
-        let gap_m = between(|step| step.others[0].gap_m).max(0.0);
+        let gap_m = between(|step| step.others[0].gap_m);
         let closing_mps = between(|step| step.v_ego_mps - step.others[0].v_mps);
-        let ttc_s = if closing_mps > 0.0 { gap_m / closing_mps } else { f64::INFINITY };
+        let ttc_s = if closing_mps > 0.0 { gap_m.max(0.0) / closing_mps } else { f64::INFINITY };
+        let ttc_s = (gap_m + trace.mean_lengths_m[0] >= 0.0).then_some(ttc_s);
         Some(Intrusion { time_s: between(|step| step.time_s), is_before: at == 0, closing_mps, ttc_s })
     }
 }
@@ -232,10 +234,10 @@ pub(super) fn lane_intrusion(profile: &Profile, trace: &Trace) -> Vec<Reading> {
     let ttc = reading(
         "(c) TTC at lane intrusion",
         "s",
-        intrusion.as_ref().map(|intrusion| intrusion.ttc_s),
+        intrusion.as_ref().and_then(|intrusion| intrusion.ttc_s),
         Relation::Above,
         required_s,
-        "with the conditions above: the system has to avoid the collision",
+        "with (a) and (b): the system has to avoid the collision",
     );
     list.push(Reading { is_cut_off: is_before, ..ttc });
     list
@@ -319,7 +321,9 @@ fn competent_driver(profile: &Profile, category: Category, trace: &Trace) -> Vec
     )];
     let danger = match category {
         Category::CutIn => {
-            let ttc_s = seen.map(|step| step.others[0].ttc_s);
+            // A vehicle behind the ego has no TTC.
+            let is_ahead = |step: &&TracedStep| step.others[0].gap_m + trace.mean_lengths_m[0] >= 0.0;
+            let ttc_s = seen.filter(is_ahead).map(|step| step.others[0].ttc_s);
             ("TTC when perceived", ttc_s, constants.ttc_s)
         }
         _ => {
