@@ -267,7 +267,7 @@ impl CaseTable {
             let given = GivenCase { parameters, models, id, row: Some(self.rows.row_place(line)) };
             if let Some((id, first)) = given.id.as_ref().and_then(|id| Some((id, *self.lines.get(id)?))) {
                 self.doubled.insert(id.clone(), line);
-                given.located(Err(self.doubled_with(first)))?;
+                given.located::<()>(Err(self.doubled_with(first)))?;
             }
             self.lines.extend(given.id.clone().map(|id| (id, line)));
             Ok(given)

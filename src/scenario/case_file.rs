@@ -34,16 +34,11 @@ impl<'de> Visitor<'de> for Keys {
     fn visit_map<A: MapAccess<'de>>(self, mut map: A) -> Result<CaseFile, A::Error> {
         let mut file = CaseFile::default();
         let mut seen: Vec<(NamedNumber, String)> = Vec::new();
-        while let Some(key) = map.next_key_seed(Key)? {
+        while let Some(key) = map.next_key_seed(Key(&seen))? {
             match key {
                 FileKey::Category => file.parameters.category = Some(map.next_value()?),
                 FileKey::Models => file.models = Some(map.next_value()?),
                 FileKey::Number(number, name) => {
-                    if let Some((_, other)) = seen.iter().find(|(other, _)| other.key() == number.key()) {
-                        return Err(A::Error::custom(format!(
-                            "`{name}` says the same as `{other}`: leave out one of the two"
-                        )));
-                    }
                     map.next_value_seed(Number(number, &mut file.parameters))?;
                     seen.push((number, name));
                 }
@@ -59,10 +54,10 @@ enum FileKey {
     Number(NamedNumber, String),
 }
 
-/// Reads a key.
-struct Key;
+/// Reads a key; the numbers before it have these names.
+struct Key<'a>(&'a [(NamedNumber, String)]);
 
-impl<'de> DeserializeSeed<'de> for Key {
+impl<'de> DeserializeSeed<'de> for Key<'_> {
     type Value = FileKey;
 
     fn deserialize<D: Deserializer<'de>>(self, deserializer: D) -> Result<FileKey, D::Error> {
@@ -70,7 +65,12 @@ impl<'de> DeserializeSeed<'de> for Key {
         match (name.as_str(), NamedNumber::find(&name)) {
             ("category", _) => Ok(FileKey::Category),
             ("models", _) => Ok(FileKey::Models),
-            (_, Ok(Some(number))) => Ok(FileKey::Number(number, name)),
+            (_, Ok(Some(number))) => match self.0.iter().find(|(other, _)| other.key() == number.key()) {
+                Some((_, other)) => {
+                    Err(D::Error::custom(format!("`{name}` says the same as `{other}`: leave out one of the two")))
+                }
+                None => Ok(FileKey::Number(number, name)),
+            },
             (_, Err(error)) => Err(custom(&error)),
             (_, Ok(None)) => {
                 let known: Vec<String> = ["category", "models"]

@@ -12,7 +12,12 @@ fn run(dir: &Path, args: &[&str]) -> (i32, String, String) {
     let text = |bytes: &[u8]| String::from_utf8_lossy(bytes).into_owned();
     let error = text(&output.stderr);
     let words: Vec<&str> = error.split_whitespace().filter(|word| *word != "│").collect();
-    (output.status.code().unwrap(), text(&output.stdout), words.join(" "))
+    // Lines break after a slash too.
+    (
+        output.status.code().unwrap(),
+        text(&output.stdout),
+        words.join(" ").replace("km/ h", "km/h").replace("m/ s", "m/s"),
+    )
 }
 
 fn document(dir: &Path, args: &[&str]) -> Value {
