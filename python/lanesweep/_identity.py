@@ -81,13 +81,21 @@ class _Walk:
         if type(value) in _PLAIN:
             self.say(type(value).__name__, value)
         elif isinstance(value, types.ModuleType):
-            self.say("module", value.__name__, _version(value.__name__.partition(".")[0]))
+            self._module(value)
         elif (installed := _installed(value)) is not None:
             self.say("installed", *installed)
             # What a package made of one's own functions.
             self._closure(value, f"`{value.__qualname__}`")
         elif self.is_first(value):
             self._first(value, where)
+
+    def _module(self, module: types.ModuleType) -> None:
+        """Add a module that is a value: of one that is not installed, all that it holds."""
+        self.say("module", module.__name__, _version(module.__name__.partition(".")[0]))
+        if not _is_installed(module.__name__) and self.is_first(module):
+            for name in sorted(name for name in vars(module) if not name.startswith("__")):
+                self.say(name)
+                self.add(vars(module)[name], f"`{module.__name__}.{name}`")
 
     def _first(self, value: Any, where: str) -> None:
         wrapped = next((names for kind, names in _WRAPPERS.items() if type(value) is kind), None)
@@ -169,7 +177,7 @@ class _Walk:
         self.add(function.__kwdefaults__, f"a default of {name}")
         self._closure(function, name)
         around, (loaded, imported) = function.__globals__, _reads(function.__code__)
-        names = {name for code in _codes(function.__code__) for name in code.co_names}
+        names = _names(function.__code__)
         for variable in loaded:
             if variable in around:
                 self.say(variable)
@@ -181,9 +189,11 @@ class _Walk:
         cells = getattr(function, "__closure__", None) or ()
         for variable, cell in zip(function.__code__.co_freevars if cells else (), cells, strict=True):
             try:
-                self.add(cell.cell_contents, f"`{variable}`, which {name} reads,")
+                value = cell.cell_contents
             except ValueError:
                 self.say("empty")
+            else:
+                self._read(value, _names(function.__code__), f"`{variable}`, which {name} reads,")
 
     def _read(self, value: Any, names: set[str], where: str, within: tuple[str, ...] = ()) -> None:
         """Add a value that code reads; of a module that is not installed, all that has one of the code's names."""
@@ -207,6 +217,10 @@ def _codes(code: types.CodeType) -> Iterator[types.CodeType]:
     for constant in code.co_consts:
         if isinstance(constant, types.CodeType):
             yield from _codes(constant)
+
+
+def _names(code: types.CodeType) -> set[str]:
+    return {name for one in _codes(code) for name in one.co_names}
 
 
 @functools.lru_cache(maxsize=4096)

@@ -81,16 +81,18 @@ def words_of(value: Any, name: str, *, is_list: bool) -> list[str]:
     if hasattr(value, "tolist"):
         # Of NumPy and pandas. A text has the digits of its arithmetic: 0.6 of binary32, not 0.6000000238418579.
         value = [str(one) for one in value] if str(getattr(value, "dtype", "")) == "float32" else value.tolist()
-    if isinstance(value, Mapping):
-        value = [f"{key}={word(one)}" for key, one in value.items()]
-    elif isinstance(value, (Set, range, KeysView, ValuesView)):
+    if isinstance(value, (Set, range, KeysView, ValuesView)):
         value = list(value)
-    several = list(value) if isinstance(value, Sequence) and not isinstance(value, (str, bytes)) else [value]
+    is_several = isinstance(value, (Mapping, Sequence)) and not isinstance(value, (str, bytes))
+    several = list(value) if is_several else [value]
     if not several:
         raise ValueError(f"`{name}` is empty; give at least one value, or leave it out")
-    for one in several:
+    for one in value.values() if isinstance(value, Mapping) else several:
         if not isinstance(one, (str, bool, numbers.Number, os.PathLike)):
-            raise TypeError(f"`{name}` is {one!r:.80}; give a number, a text or a path" + ("" if one is value else ", or a list of these"))
+            wants = "give a number, a text or a path" + (", or a list of these" if one is value else "")
+            raise TypeError(f"`{name}` {'holds' if is_several else 'is'} {one!r:.80}; {wants}")
+    if isinstance(value, Mapping):
+        several = [f"{key}={word(one)}" for key, one in value.items()]
     words = [word(one) for one in several]
     return [",".join(words)] if is_list else words
 

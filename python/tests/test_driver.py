@@ -321,8 +321,9 @@ def test_what_the_code_reads_is_a_part_of_the_driver_wherever_it_stands(tmp_path
         before = fingerprint(driver)
         own_constants.UNUSED = 2
         assert fingerprint(driver) == before
+        held = fingerprint(Wrong(own_constants))
         own_constants.DECEL = 4.0
-        assert fingerprint(driver) != before
+        assert fingerprint(driver) != before and fingerprint(Wrong(own_constants)) != held
     finally:
         sys.path.remove(str(tmp_path))
 
@@ -398,3 +399,25 @@ def test_what_is_no_model_is_named() -> None:
         for call in (lambda: lanesweep.simulate(CASES, category="cut-in", models=models), lambda: lanesweep.study(models=models)):
             with pytest.raises(TypeError, match=message):
                 call()
+
+
+def test_importance_sampling_with_a_driver_moves_a_bar_and_ends(density, monkeypatch, caplog) -> None:
+    from lanesweep import _run
+
+    seen: list[tuple[str, int, int]] = []
+    monkeypatch.setattr(_run, "progress", lambda: (lambda *bar: seen.append(bar), lambda: None))
+    options = {"estimator": "is", "half_width": 0.3, "thw": 0.4}
+    ours, theirs = (
+        lanesweep.sample(density, models=[model], **options).table("estimates").rows()[0] for model in (Reg157(), "Reg157")
+    )
+    assert ours["low"] < theirs["probability"] < ours["high"]
+    searched = [done for what, done, _ in seen if what == "searching"]
+    assert len(set(searched)) > 2 and all(0 <= done <= total for _, done, total in seen)
+    # One that never fails: the search ends, and the estimate says how deep it was.
+    never = lanesweep.sample(density, models=[Brake(9.0)], **{**options, "thw": 2.0})
+    (row,) = never.table("estimates").rows()
+    assert row["failures"] == 0 and row["verdict"] == "unusable" and "it saw what is more likely than" in never.text
+    # One that may accelerate is slow, and that is said before it starts.
+    with caplog.at_level("WARNING", logger="lanesweep"), pytest.raises(lanesweep.RunStopped):
+        lanesweep.sample(density, models=[IDM()], **options, stop_after=1)
+    assert "IDM may accelerate" in caplog.text and "12,000 steps" in caplog.text

@@ -186,7 +186,7 @@ def test_infinity_stays_infinity_and_null_is_no_value() -> None:
     table = {
         "ego_speed_mps": rng.uniform(10, 40, 4000),
         "speed_mps": rng.uniform(5, 35, 4000),
-        "gap_m": rng.uniform(-4, 30, 4000),
+        "gap_m": rng.uniform(0, 20, 4000),
         "lateral_speed_mps": rng.uniform(0.3, 2.5, 4000),
     }
     frame = lanesweep.simulate(table, category="cut-in")
