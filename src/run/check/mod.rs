@@ -149,12 +149,12 @@ impl Judgement {
     }
 }
 
-/// How the run of each model and that of an ego that never reacts end. The profile ends settled runs.
+/// How the run of each model and that of an ego that never reacts end.
 fn verdicts(lane: &Lane, point: &Point, profile: &Profile, category: Category, budget: &StepBudget) -> CaseVerdicts {
     let ran = |profile: &Profile, model| {
-        let (outcome, min_gap_m) = lane.run(profile, category, model);
-        budget.take(&outcome);
-        (RunEnd::of(&outcome), min_gap_m)
+        let run = lane.run(profile, category, model);
+        budget.take(&run.outcome);
+        (RunEnd::of(&run), run.min_gap_m)
     };
     let drivers = ModelId::ALL.map(|model| ran(profile, model));
     CaseVerdicts {
@@ -245,17 +245,14 @@ impl Check {
         check_time_step(&lane.case, &lane.tables, profile.frame.dt_s, || Place::item("the case"))?;
         let trace = |model| lane.trace(profile, self.subject.category(), model);
         let budget = StepBudget { profile, left: Cell::new(MAX_STEPS) };
-        let run = |model: &ModelId| lane.run(profile, self.subject.category(), *model).0;
-        let unreacting = lane.run(&without_reaction(profile), self.subject.category(), ModelId::Reg157).0;
+        let run = |model: &ModelId| lane.run(profile, self.subject.category(), *model).outcome;
+        let unreacting = lane.run(&without_reaction(profile), self.subject.category(), ModelId::Reg157).outcome;
         let traced = self.models.iter().map(run).chain([unreacting]).map(|outcome| u64::from(outcome.end_step) + 1);
         let traced: u64 = traced.sum();
         if traced > MAX_TRACED_STEPS {
             return Err(too_many_steps(profile));
         }
-        // A run that ends at the cap then still closes in.
-        let mut settling = profile.clone();
-        settling.frame.end_when_settled = true;
-        let changed = self.perturbed(&settling, &budget)?;
+        let changed = self.perturbed(profile, &budget)?;
         let touching = self.touching(&changed, profile)?;
         let driver = |model: ModelId| flips(&changed, |changed| changed.verdicts.collides(model));
         let models = self.models.iter().map(|&model| Judged {
@@ -277,7 +274,7 @@ impl Check {
             danger: annex::danger(profile, self.subject.category()),
             outside_annex: annex::outside(profile, self.subject.category(), self.subject.point()),
             annex_flips: flips(&changed, |changed| changed.verdicts.is_outside_annex),
-            silent: self.silent(&settling, &changed[0].verdicts, attends_at_once, &budget)?,
+            silent: self.silent(profile, &changed[0].verdicts, attends_at_once, &budget)?,
             readings: clauses::readings(
                 profile,
                 self.subject.category(),
@@ -286,7 +283,7 @@ impl Check {
                 attends_at_once.is_some(),
             ),
             boundaries: match with_boundaries {
-                true => boundary::boundaries(&self.subject, &settling, &budget)?,
+                true => boundary::boundaries(&self.subject, profile, &budget)?,
                 false => Vec::new(),
             },
             time_cap_s: profile.frame.time_cap_s,

@@ -28,6 +28,16 @@ pub struct Lane {
     pub headway: Headway,
 }
 
+/// A run of a lane.
+pub struct LaneRun {
+    /// Its outcome.
+    pub outcome: Outcome<f64>,
+    /// Smallest gap to a vehicle ahead that overlaps the ego laterally, m; infinite without one.
+    pub min_gap_m: f64,
+    /// At the last step the gap closes to a vehicle ahead that is in the path or comes into it.
+    pub still_closes: bool,
+}
+
 impl Subject {
     /// From plain numbers.
     pub fn plain(case: &PlainCase, headway: Headway) -> Subject {
@@ -187,20 +197,22 @@ fn move_to(case: &mut Case, from: &Point, to: &Point) {
 }
 
 impl Lane {
-    /// Its outcome for a model, and the smallest gap to a vehicle ahead that overlaps the ego laterally, m; infinite
-    /// without one.
-    pub fn run(&self, profile: &Profile, category: Category, model: ModelId) -> (Outcome<f64>, f64) {
+    /// Runs a model.
+    pub fn run(&self, profile: &Profile, category: Category, model: ModelId) -> LaneRun {
         let constants = Constants::<f64>::resolve(profile, category);
-        let mut min_gap_m = f64::INFINITY;
-        let mut in_path = |step: &Step<f64>| {
-            for seen in &step.seen {
-                if seen.present.holds() && seen.view.lateral_gap < 0.0 && !seen.view.is_behind().holds() {
+        let (mut min_gap_m, mut still_closes) = (f64::INFINITY, false);
+        let mut see = |step: &Step<f64>| {
+            still_closes = false;
+            for seen in step.seen.iter().filter(|seen| seen.present.holds() && !seen.view.is_behind().holds()) {
+                let is_in_path = seen.view.lateral_gap < 0.0;
+                if is_in_path {
                     min_gap_m = min_gap_m.min(seen.view.gap);
                 }
+                still_closes |= seen.view.closing() > 0.0 && (is_in_path || seen.view.lateral_towards > 0.0);
             }
         };
-        let outcome = constants.run(model, &self.case, &self.tables, self.headway.start(), &mut in_path);
-        (outcome, min_gap_m)
+        let outcome = constants.run(model, &self.case, &self.tables, self.headway.start(), &mut see);
+        LaneRun { outcome, min_gap_m, still_closes }
     }
 
     /// The same with every step.

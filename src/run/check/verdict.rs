@@ -1,6 +1,7 @@
 //! The answer of a check, derived from the ends of the runs of the drivers and of an ego that never reacts.
 
-use crate::engine::{EndReason, Outcome};
+use super::subject::LaneRun;
+use crate::engine::EndReason;
 use crate::model::criterion::Criterion;
 use crate::model::driver::{MODELS, ModelId};
 
@@ -66,11 +67,10 @@ pub enum RunEnd {
 }
 
 impl RunEnd {
-    /// The end of a lane whose profile ends settled runs.
-    pub(super) fn of(outcome: &Outcome<f64>) -> RunEnd {
-        match outcome.end {
-            _ if outcome.verdicts.failed(Criterion::Collision) => RunEnd::Contact,
-            EndReason::Cap => RunEnd::Open,
+    pub(super) fn of(run: &LaneRun) -> RunEnd {
+        match run.outcome.end {
+            _ if run.outcome.verdicts.failed(Criterion::Collision) => RunEnd::Contact,
+            EndReason::Cap if run.still_closes => RunEnd::Open,
             _ => RunEnd::Clear,
         }
     }
