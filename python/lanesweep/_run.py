@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import importlib
 import json
 import keyword
@@ -97,11 +98,16 @@ def words_of(value: Any, name: str, *, is_list: bool) -> list[str]:
     return [",".join(words)] if is_list else words
 
 
+@functools.lru_cache(maxsize=1)
+def _definition() -> dict[str, list[dict[str, Any]]]:
+    """The arguments of every verb."""
+    return {str(verb["verb"]): verb["arguments"] for verb in json.loads(_core.definition())}
+
+
 def name_of(verb: str, flag: str | None) -> str:
     """The name of an argument; that of a position is not known by its flag."""
     if flag is None:
-        of_verb = next(one for one in json.loads(_core.definition()) if one["verb"] == verb)
-        flag = next(str(one["id"]) for one in of_verb["arguments"] if one["flag"] is None)
+        flag = next(str(one["id"]) for one in _definition()[verb] if one["flag"] is None)
         flag = ("folder" if verb in ("synth", "cluster merge") else "recordings") if flag == "dir" else flag
     name = flag.replace("-", "_")
     return name + "_" if keyword.iskeyword(name) else name
@@ -151,6 +157,8 @@ def run(
     positions: list[str] = []
     for flag, value, is_list in arguments:
         value = value.item() if hasattr(value, "item") and getattr(value, "ndim", None) == 0 else value
+        if value is False and any(one["takes_value"] for one in _definition()[verb] if one["flag"] == flag):
+            raise TypeError(f"`{name_of(verb, flag)}` is False; give a value, or leave it out")
         if value is None or value is False:
             continue
         if flag is None:

@@ -221,6 +221,7 @@ def test_messages_name_arguments_and_no_flags(density) -> None:
         (lambda: lanesweep.sample(density, criterion="speed", thw=1), lanesweep.UsageError, "`criterion`"),
         (lambda: lanesweep.study(synth_recordings=1, thw=[]), ValueError, "`thw` is empty"),
         (lambda: lanesweep.study(synth_recordings=1, models=[]), ValueError, "`models` is empty"),
+        (lambda: lanesweep.study(synth_recordings=1, thw=False), TypeError, "`thw` is False"),
         (lambda: lanesweep.mine([]), ValueError, "`recordings` is empty"),
         (lambda: lanesweep.study(synth_recordings=1, categories=object()), TypeError, "`categories` is <object"),
         (lambda: lanesweep.study(synth_recordings=1, dt=[object()]), TypeError, "`dt` holds <object"),
