@@ -189,7 +189,8 @@ fn says_only_what_its_intervals_show(found: &Dossier) {
         match finding.conclusion {
             Conclusion::Appropriate => assert!(is_inside, "{finding:?}"),
             Conclusion::NotAppropriate => assert!(is_outside, "{finding:?}"),
-            Conclusion::Undecided => assert!(!is_outside, "{finding:?}"),
+            // Precision with an interval stays undecided where S fails in too few scenarios.
+            Conclusion::Undecided => assert!(!is_outside || found.scored.failing_scenarios < 10, "{finding:?}"),
         }
     }
 }
