@@ -38,6 +38,11 @@ const SAMPLE_PX: f64 = 38.0;
 const MARK_PX: f64 = 5.0;
 
 impl TraceFigure<'_> {
+    /// Width of the lanes, m.
+    fn lane_width_m(&self) -> f64 {
+        self.series.first().map_or(0.0, |series| series.trace.lane_width_m)
+    }
+
     /// The figure as a complete SVG document, as wide as a column of a paper (as two for a cut-out).
     ///
     /// A note says if lanes continue after the last time shown. TTC is shown up to ten times its threshold, BTN up to

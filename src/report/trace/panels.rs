@@ -275,7 +275,7 @@ impl<'a> Shown<'a> {
     fn lateral(&self, vehicle: usize) -> Plot {
         let (mut curves, mut bands) = (Vec::new(), Vec::new());
         let ego_half_m = self.first(|trace| trace.ego_width_m) / 2.0;
-        let half_lane_m = self.lane_width_m() / 2.0;
+        let half_lane_m = self.first(|trace| trace.lane_width_m) / 2.0;
         let mut edges = vec![half_lane_m, -half_lane_m, ego_half_m, -ego_half_m];
         for (look, trace) in self.courses(vehicle, &|other| other.y_m) {
             let half_m = trace.widths_m[vehicle] / 2.0;
@@ -302,11 +302,6 @@ impl<'a> Shown<'a> {
     /// A value of the first series; equal for all of a sheet.
     fn first(&self, value: impl Fn(&Trace) -> f64) -> f64 {
         self.series.first().map_or(1.0, |s| value(s.trace))
-    }
-
-    /// Width of the lanes, m.
-    pub(super) fn lane_width_m(&self) -> f64 {
-        self.first(|trace| trace.lane_width_m)
     }
 
     /// The distinct courses of a vehicle's value, grey if all lanes have the same one; the longest stands for equal
