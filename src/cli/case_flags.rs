@@ -24,10 +24,10 @@ pub(super) struct CaseFlags {
     #[arg(long, value_name = "LIST", help = super::lists::models_help(), help_heading = "Models and criteria")]
     models: Option<String>,
     /// Initial speed of the ego, with its unit: 60km/h
-    #[arg(long, value_name = "km/h|m/s", value_parser = speed_mps, help_heading = "Scenario")]
+    #[arg(long, value_name = "km/h|m/s", value_parser = speed_mps, allow_hyphen_values = true, help_heading = "Scenario")]
     ego_speed: Option<f64>,
     /// Initial speed of the other vehicle, with its unit [default: the ego's]
-    #[arg(long, value_name = "km/h|m/s", value_parser = speed_mps, help_heading = "Scenario")]
+    #[arg(long, value_name = "km/h|m/s", value_parser = speed_mps, allow_hyphen_values = true, help_heading = "Scenario")]
     speed: Option<f64>,
     /// Initial gap, bumper to bumper
     #[arg(long, value_name = "m", value_parser = length_m, conflicts_with = "thw", help_heading = "Scenario")]
@@ -36,7 +36,7 @@ pub(super) struct CaseFlags {
     #[arg(long, value_name = "s", value_parser = time_s, help_heading = "Scenario")]
     thw: Option<f64>,
     /// Cut-in, cut-out: lateral speed
-    #[arg(long, value_name = "m/s", value_parser = lateral_speed_mps, help_heading = "Scenario")]
+    #[arg(long, value_name = "m/s", value_parser = lateral_speed_mps, allow_hyphen_values = true, help_heading = "Scenario")]
     lateral_speed: Option<f64>,
     /// Cut-in: lateral distance at the start; cut-out: at the end [default: the lane's width]
     #[arg(long, value_name = "m", value_parser = length_m, help_heading = "Scenario", hide_short_help = true)]
@@ -45,10 +45,10 @@ pub(super) struct CaseFlags {
     #[arg(long, value_name = "m/s²", value_parser = acceleration_mps2, allow_hyphen_values = true, help_heading = "Scenario")]
     acceleration: Option<f64>,
     /// Speed at which the acceleration ends, with its unit [default: standstill, or never]
-    #[arg(long, value_name = "km/h|m/s", value_parser = speed_mps, help_heading = "Scenario", hide_short_help = true)]
+    #[arg(long, value_name = "km/h|m/s", value_parser = speed_mps, allow_hyphen_values = true, help_heading = "Scenario", hide_short_help = true)]
     end_speed: Option<f64>,
     /// Cut-out: speed of the vehicle ahead of the cutting-out one, with its unit [default: 0]
-    #[arg(long, value_name = "km/h|m/s", value_parser = speed_mps, help_heading = "Scenario", hide_short_help = true)]
+    #[arg(long, value_name = "km/h|m/s", value_parser = speed_mps, allow_hyphen_values = true, help_heading = "Scenario", hide_short_help = true)]
     ahead_speed: Option<f64>,
     /// Cut-out: gap between the two, bumper to bumper
     #[arg(long, value_name = "m", value_parser = length_m, help_heading = "Scenario")]

@@ -203,7 +203,8 @@ impl Check {
         complain_of(&broken, &[]);
         if cases.is_empty() {
             let help = "the chapter on tables lists the columns (docs/src/tables.md)";
-            return Err(Error::input(Place::file(path), "no row of it can be judged", help));
+            let problem = if table.row() == 0 { "it has no rows" } else { "no row of it can be judged" };
+            return Err(Error::input(Place::file(path), problem, help));
         }
         let broken: Vec<String> = broken.iter().map(ToString::to_string).collect();
         let is_complete = broken.is_empty();

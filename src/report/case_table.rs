@@ -134,8 +134,8 @@ impl CaseTable {
 
     /// The table as text.
     pub fn text(&self, width: usize) -> String {
-        let legend = "Verdict: as on the sheet of one case (--row N). Demanded: whether the profile's clause of cut-ins \
-                      demands that the system avoids the collision.";
+        let legend = "Verdict: as on the sheet of one case. Demanded: whether the profile's clause of cut-ins demands that \
+                      the system avoids the collision.";
         format!("{}\n{}{}\n", self.summary(), self.columns().build().text(), wrap(legend, width))
     }
 

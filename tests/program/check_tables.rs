@@ -173,7 +173,7 @@ fn a_table_is_judged_whole_and_its_status_is_that_of_the_worst_row() {
                 assert_eq!(case[model["model"].as_str().unwrap()], word, "{case}");
             }
         }
-        let line = out.lines().find(|line| line.contains("| away") && line.contains("no conflict"));
+        let line = out.lines().find(|line| line.contains(" away |") && line.contains("no conflict"));
         assert_eq!(line.is_some(), rows.contains(&2), "{out}");
     }
     // Flags override every row, as they override one.
