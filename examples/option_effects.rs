@@ -23,7 +23,7 @@ use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
 use lanesweep::traffic::trajectory::{Recording, Track};
 
 /// Where an option stands, its key, and another value of it in TOML.
-const OPTIONS: [(&str, &str, &str); 60] = [
+const OPTIONS: [(&str, &str, &str); 63] = [
     ("frame", "dt_s", "0.01"),
     ("frame", "dt_s", "0.1"),
     ("frame", "time_cap_s", "60.0"),
@@ -41,7 +41,10 @@ const OPTIONS: [(&str, &str, &str); 60] = [
     ("reg157", "margin_s", "0.0"),
     ("reg157", "margin_s", "0.2"),
     ("reg157", "visible_lateral_movement_s", "0.72"),
+    ("reg157", "lane_intrusion_m", "0.3"),
+    ("reg157", "ttc_only_while_closing", "true"),
     ("reg157", "always_unsafe", "[\"lvd\", \"cut_out\"]"),
+    ("cchdm", "ttc_only_while_closing", "true"),
     ("cchdm", "delay_s", "0.75"),
     ("cchdm", "delay_s", "1.15"),
     ("cchdm", "coasting_mps2", "0.0"),

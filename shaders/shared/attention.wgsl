@@ -29,6 +29,12 @@ struct AttentionRule {
     threshold: f32,
 }
 
+// Distance from the ego's path to the centre of the lane that a cutter comes from, m; from beyond the neighbouring lane,
+// to its start.
+fn lane_centre(start: f32, lane_width: f32) -> f32 {
+    return select(lane_width, abs(start), abs(start) - lane_width > lane_width * 0.5);
+}
+
 // First step at which the driver may react to the principal vehicle and to the one ahead of it. Nothing after a step
 // decides whether the driver reacts at that step.
 fn attend_from(rule: AttentionRule, steps: u32, geometry: LaneGeometry, motion: Motion) -> vec2<u32> {
@@ -44,8 +50,7 @@ fn attend_from(rule: AttentionRule, steps: u32, geometry: LaneGeometry, motion: 
     if is_seen {
         return vec2<u32>(0u, 0u);
     }
-    let is_farther = abs(start) - geometry.lane_width > geometry.lane_width * 0.5;
-    let centre = select(geometry.lane_width, abs(start), is_farther);
+    let centre = lane_centre(start, geometry.lane_width);
     let delay_only = (rule.kind == ATTENTION_DECELERATION) & (rule.below_trigger == BELOW_TRIGGER_DELAY_ONLY);
     var event = NEVER;
     var lateral_before = start;

@@ -99,7 +99,7 @@ impl CaseSheet<'_> {
             .column("profile", |(judgement, _)| judgement.profile.as_str())
             .column("model", |(_, judged)| judged.trace.model.name())
             .column("collision", |(_, judged)| verdict_of(judged))
-            .column("gap in path m", |(_, judged)| records::smallest_gap_m(&judged.trace.outcome))
+            .column("gap m", |(_, judged)| records::smallest_gap_m(&judged.trace.outcome))
             .column(Column::from("TTC s").null("–"), |(_, judged)| judged.trace.outcome.approach_ttc())
             .column("BTN", |(_, judged)| judged.trace.outcome.max_btn)
             .column(Column::from("contact").null("–"), |(_, judged)| {

@@ -70,7 +70,7 @@ impl MapReport {
     /// What the columns count.
     fn words_of_outcomes(&self, outcomes: &[CellOutcome]) -> String {
         let undecided = format!(
-            "Undecided: {}the lanes end at the time cap of {} s while the gap still closes; the share counts these cells as \
+            "Undecided: {}an ego that never reacts is still closing in at the time cap of {} s; the share counts these cells as \
              computed.\n",
             if self.is_robust() {
                 format!("the outcome changes with one of these (the step in binary64): {VARIED}; or ")

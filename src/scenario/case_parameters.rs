@@ -295,7 +295,6 @@ impl CaseParameters {
         let given = [
             ("lateral_speed", self.lateral_speed, category == Category::Lvd),
             ("lateral_distance", self.lateral_distance, category == Category::Lvd),
-            ("lane_width", self.lane_width, category == Category::Lvd),
             ("ahead_speed", self.ahead_speed, category != Category::CutOut),
             ("ahead_gap", self.ahead_gap, category != Category::CutOut),
         ];

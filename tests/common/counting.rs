@@ -106,6 +106,7 @@ impl PartialOrd for Counting {
 impl Real for Counting {
     const ZERO: Self = Counting(0.0);
     const ONE: Self = Counting(1.0);
+    const HALF: Self = Counting(0.5);
     const INFINITY: Self = Counting(f64::INFINITY);
 
     fn from_f64(value: f64) -> Self {

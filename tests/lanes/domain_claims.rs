@@ -1,10 +1,13 @@
 //! What must be true of the physics, whatever the numbers.
 
-use lanesweep::engine::{Constants, EndReason, LaneCase, NO_STEP, Outcome, Silent, Start, Step};
+use lanesweep::engine::{
+    Constants, EndReason, Headway, LaneCase, LaneKey, LaneRunner, NO_STEP, Outcome, Silent, Start, Step,
+};
 use lanesweep::model::criterion::{BrakeThreat, BtnForm, Contact, Criterion};
 use lanesweep::model::driver::{BelowTrigger, ModelId};
 use lanesweep::model::profile::Profile;
 use lanesweep::model::scalar::Real;
+use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions, TimeGrid, recorded_case};
 use lanesweep::scenario::{Ahead, Case, Category, Ego, Lateral, Other, Participant, Scenario, Side, Speed, Tables};
 
@@ -278,6 +281,34 @@ fn scenario(category: Category, v: Vec<f64>, y: Vec<f64>, lead: Option<Vec<f64>>
     }
 }
 
+/// A planned study keeps what decides a lane: S is the recorded case in its own lane, wide or narrow.
+#[test]
+fn a_planned_lane_of_s_is_that_of_the_recorded_case_at_every_lane_width() {
+    let profile = Profile::load("un-r157").unwrap();
+    let n = 101;
+    let incoming: Vec<f64> = (0..n).map(|i| 3.4 - 0.9 * f64::from(i) / 25.0).collect();
+    let mut reactions = Vec::new();
+    for lane_width in [3.0, 3.5, 4.0] {
+        let recorded = Scenario { lane_width, ..scenario(Category::CutIn, vec![20.0; 101], incoming.clone(), None) };
+        let options = StudyOptions {
+            categories: vec![Category::CutIn],
+            headways: vec![Headway::ThwS(0.8)],
+            ..StudyOptions::default()
+        };
+        let plan = plan_study(std::slice::from_ref(&recorded), &profile, &options).unwrap();
+        for (at, model) in plan.models.iter().enumerate() {
+            let key = LaneKey { block: 0, unit: 0, variant: 0, headway: 0, model: at };
+            let planned = LaneRunner::<f64>::new(&plan).run(&key);
+            let case = recorded_case(&recorded, TimeGrid::of(&profile)).unwrap();
+            assert_eq!(planned, run(&profile, &case, *model, 0.8), "{} at {lane_width} m", model.name());
+            if *model == ModelId::Reg157 {
+                reactions.push(planned.reaction_step);
+            }
+        }
+    }
+    assert!(reactions[0] > reactions[1] && reactions[1] > reactions[2], "{reactions:?}");
+}
+
 #[test]
 fn s_prime_equals_s_when_the_recorded_motion_has_the_parameterized_form() {
     let n = 101;
@@ -514,7 +545,8 @@ fn named_options_alone_turn_un_r157_into_jrc_2021() {
     set! {
         frame.dt_s frame.time_cap_s frame.start_shift frame.end_when_settled frame.cut_out_target
         criteria.gate
-        reg157.margin_s reg157.margin_steps reg157.visible_lateral_movement_s reg157.always_unsafe
+        reg157.margin_s reg157.margin_steps reg157.visible_lateral_movement_s reg157.always_unsafe reg157.clause
+        reg157.lane_intrusion_m reg157.ttc_only_while_closing cchdm.ttc_only_while_closing
         cchdm.lateral_gate_m cchdm.always_unsafe cchdm.wandering_m cchdm.perception_time_s cchdm.cut_out_headway_s
         cchdm.cut_out_headway_tolerance_m cchdm.cut_in_braking
         cchdm.lead_deceleration_trigger_mps2
@@ -539,7 +571,7 @@ fn under_un_r157_cchdm_brakes_in_a_cut_out_by_headway_and_goes_on() {
     // Farther away the driver waits until the vehicle ahead is 2.0 s away.
     let far = run(&profile, &case, ModelId::Cchdm, 2.2);
     let first_gap_m = 2.2 * speed + 4.3 + 150.0;
-    let steps = ((first_gap_m - 2.0 * speed - 0.005) / (speed * 0.01)).ceil() as u32;
+    let steps = ((first_gap_m - 2.0 * speed - 0.08) / (speed * 0.01)).ceil() as u32;
     assert_eq!(far.reaction_step, steps, "a headway above 2.0 s is none");
     // From 2.0 s the car stops within 0.75 s, 0.6 s of ramp and v²/2a: 20 m/s need 47 m, and 44 + 150 are there.
     let near = run(&profile, &case, ModelId::Cchdm, 2.0);

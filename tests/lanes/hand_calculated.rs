@@ -6,7 +6,7 @@ use lanesweep::engine::Headway;
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::{CutInBraking, ModelId};
 use lanesweep::model::profile::Profile;
-use lanesweep::run::check::{Answer, Check, Judged, Judgement, Reading, Subject, Verdict};
+use lanesweep::run::check::{Answer, Check, Demand, Holds, Judged, Judgement, Reading, RunEnd, Subject, Verdict};
 use lanesweep::scenario::{Category, PlainCase};
 use lanesweep::stats::random::philox4x32_10;
 
@@ -41,6 +41,9 @@ fn case(category: Category, ego_mps: f64, speed_mps: f64) -> PlainCase {
         ahead_gap_m: 0.0,
         length_m: 4.3,
         width_m: 1.9,
+        ego_length_m: 4.3,
+        ego_width_m: 1.9,
+        lane_width_m: 3.5,
         duration_s: None,
     }
 }
@@ -56,7 +59,7 @@ fn judged(case: &PlainCase, headway: Headway) -> Judgement {
     };
     let (coarse, fine) = (of(None), of(Some(0.001)));
     assert_eq!(coarse.verdicts.answer(), fine.verdicts.answer());
-    assert_eq!(coarse.is_demanded(), fine.is_demanded());
+    assert_eq!(coarse.demand(), fine.demand());
     fine
 }
 
@@ -113,7 +116,7 @@ fn case_3_a_leader_at_the_threshold_of_5_is_answered_after_the_delay_alone() {
     let expected_m = 20.0 + V * V / 10.0 - stopping_m(V);
     near(expected_m, 13.46, 0.01);
     near(last_gap_m(driver, 0), expected_m, 0.05);
-    assert!(!judgement.readings[0].holds(), "5 m/s² do not exceed 5 m/s²");
+    assert!(judgement.readings[0].holds() == Holds::No, "5 m/s² do not exceed 5 m/s²");
 }
 
 #[test]
@@ -125,7 +128,7 @@ fn case_4_a_cut_in_with_1_3_s_at_lane_intrusion_has_to_be_avoided_and_is() {
     near(ttc.time_s.unwrap(), 1.1, 1e-6);
     near(ttc.value.unwrap(), (20.0 - 1.1 * closing) / closing, 1e-6);
     near(ttc.threshold, closing / 12.0 + 0.35, 1e-9);
-    assert_eq!(judgement.is_demanded(), Some(true));
+    assert_eq!(judgement.demand(), Some(Demand::Avoid));
     assert!(!of(&judgement, ModelId::Reg157).collides());
 }
 
@@ -134,7 +137,7 @@ fn case_5_a_cut_in_with_0_94_s_is_not_demanded_and_6_mps2_hit_at_3_2_mps() {
     let judgement = judged(&case(Category::CutIn, V, V / 2.0), Headway::GapM(17.0));
     let closing = V / 2.0;
     let at_intrusion_m = 17.0 - 1.1 * closing;
-    assert_eq!(judgement.is_demanded(), Some(false));
+    assert_eq!(judgement.demand(), Some(Demand::Nothing));
     // After 0.35 s 4.92 m are left; braking at 6 m/s² takes 59 of the 69.4 m²/s².
     let expected_mps = (closing * closing - 12.0 * (at_intrusion_m - 0.35 * closing)).sqrt();
     near(expected_mps, 3.23, 0.01);
@@ -151,7 +154,7 @@ fn case_6_a_cut_in_is_perceived_0_4_s_after_0_375_m() {
     near(driver.braking_s().unwrap(), 1.525, 0.003);
     // (20 m − 0.775 s · 8.33 m/s)/8.33 m/s = 1.625 s, at most 2 s.
     near(reading(&judgement, "TTC when perceived").value.unwrap(), 20.0 / (V / 2.0) - 0.775, 0.003);
-    assert!(reading(&judgement, "TTC when perceived").holds());
+    assert!(reading(&judgement, "TTC when perceived").holds() == Holds::Yes);
 }
 
 #[test]
@@ -164,7 +167,7 @@ fn case_7_a_cut_out_that_uncovers_a_stationary_vehicle_is_answered_by_headway() 
     let expected_m = 2.0 * V + 4.3 + 40.0 - 0.65 * V - stopping_m(V);
     near(expected_m, 32.48, 0.01);
     near(last_gap_m(driver, 1), expected_m, 0.05);
-    assert!(judgement.readings[1].holds(), "2.0 s is inclusive");
+    assert!(judgement.readings[1].holds() == Holds::Yes, "2.0 s is inclusive");
 }
 
 #[test]
@@ -182,7 +185,7 @@ fn case_8_a_cut_out_at_130_kmh_41_8_m_before_a_stationary_vehicle_is_not_prevent
 fn case_9_a_faster_vehicle_that_cuts_in_is_no_danger() {
     let judgement = judged(&case(Category::CutIn, V, 70.0 * KMH), Headway::GapM(5.0));
     assert!(is(&judgement, Answer::NoConflict) && judgement.models.iter().all(|judged| !judged.collides()));
-    assert_eq!(judgement.is_demanded(), Some(false), "(a): it is not slower");
+    assert_eq!(judgement.demand(), Some(Demand::Nothing), "(a): it is not slower");
     assert!(of(&judgement, ModelId::Cchdm).reaction_s().is_none());
     assert!(of(&judgement, ModelId::Cchdm).trace.outcome.min_ttc.is_infinite());
 }
@@ -194,8 +197,8 @@ fn case_10_a_quick_cut_in_is_not_visible_for_0_72_s() {
     let judgement = judged(&quick, Headway::GapM(20.0));
     let visible = reading(&judgement, "(b)");
     near(visible.value.unwrap(), 0.55, 1e-6);
-    assert!(!visible.holds() && reading(&judgement, "(c)").holds());
-    assert_eq!(judgement.is_demanded(), Some(false));
+    assert!(visible.holds() == Holds::No && reading(&judgement, "(c)").holds() == Holds::Yes);
+    assert_eq!(judgement.demand(), Some(Demand::Nothing));
 }
 
 #[test]
@@ -244,7 +247,7 @@ fn every_value_of_the_clauses_is_that_of_its_own_time() {
     let judgement = judged(&braking, Headway::GapM(20.0));
     near(reading(&judgement, "(a) relative speed").value.unwrap(), closing + 2.2, 0.001);
     near(reading(&judgement, "(c)").value.unwrap(), (20.0 - 1.1 * closing - 1.21) / (closing + 2.2), 0.01);
-    assert!(!reading(&judgement, "(a) largest change").holds());
+    assert!(reading(&judgement, "(a) largest change").holds() == Holds::No);
     // A leader that brakes at 6 m/s² from the start.
     let braking = PlainCase { acceleration_mps2: -6.0, ..case(Category::Lvd, V, V) };
     at(&judged(&braking, Headway::ThwS(2.0)), "deceleration of the leader", 0.0, 6.0);
@@ -263,7 +266,7 @@ fn lane_intrusion_is_not_rounded_to_a_step() {
     let ttc = reading(&judgement, "(c)");
     near(ttc.value.unwrap(), 7.53 / (15.0 * KMH) - 1.1, 1e-6);
     near(ttc.threshold, 15.0 * KMH / 12.0 + 0.35, 1e-9);
-    assert_eq!(judgement.is_demanded(), Some(true));
+    assert_eq!(judgement.demand(), Some(Demand::Avoid));
 }
 
 /// 0.697 + 1.1 s at 4.1667 m/s are 7.489 m: a centimetre decides the demand there.
@@ -283,7 +286,7 @@ fn without_a_collision_of_an_ego_that_never_reacts_there_is_no_conflict() {
     assert!(is(&judged(&case(Category::CutIn, V, V), Headway::GapM(12.0)), Answer::NoConflict));
     let braking = PlainCase { acceleration_mps2: -3.0, ..case(Category::CutIn, V, V) };
     let judgement = judged(&braking, Headway::GapM(20.0));
-    assert!(judgement.verdicts.conflict && !is(&judgement, Answer::NoConflict));
+    assert!(judgement.verdicts.unreacting == RunEnd::Contact && !is(&judgement, Answer::NoConflict));
 }
 
 /// The judgement under a profile, at its own time step.
@@ -350,7 +353,7 @@ fn case_13_a_gap_typed_to_the_centimetre_is_the_annex_headway_of_2_s() {
         let judgement = un_r157(&cut_out, headway);
         assert_eq!(judgement.outside_annex, None, "{headway:?}");
         near(of(&judgement, ModelId::Cchdm).braking_s().unwrap(), brakes_s, 0.02);
-        assert!(reading(&judgement, "headway when perceived").holds());
+        assert!(reading(&judgement, "headway when perceived").holds() == Holds::Yes);
     }
 }
 
@@ -385,7 +388,11 @@ fn case_15_the_demand_of_eu_2022_1426_begins_at_the_published_times() {
                 under(profile.clone(), &case(Category::CutIn, 100.0 * KMH, 100.0 * KMH - closing), Headway::GapM(gap_m))
             };
             let (above, below) = (with_ttc(published_s + 0.011), with_ttc(published_s - 0.011));
-            assert_eq!((above.is_demanded(), below.is_demanded()), (Some(true), Some(false)), "{name}, {kmh} km/h");
+            assert_eq!(
+                (above.demand(), below.demand()),
+                (Some(Demand::Avoid), Some(Demand::Nothing)),
+                "{name}, {kmh} km/h"
+            );
             near(reading(&above, "(c)").threshold, published_s, 0.01);
             assert!(above.clause.starts_with("EU 2022/1426"));
             assert!(!above.readings.iter().any(|reading| reading.quantity.starts_with("(b)")));
@@ -400,9 +407,9 @@ fn case_16_the_eu_demands_what_r157_does_not() {
     let closing = 30.0 * KMH;
     let cut_in = case(Category::CutIn, 50.0 * KMH, 20.0 * KMH);
     let gap = Headway::GapM((1.1 + 1.0) * closing);
-    assert_eq!(un_r157(&cut_in, gap).is_demanded(), Some(false));
-    let eu = |name: &str| under(Profile::load(name).unwrap(), &cut_in, gap).is_demanded();
-    assert_eq!((eu("eu-2022-1426"), eu("eu-2022-1426-standing")), (Some(true), Some(false)));
+    assert_eq!(un_r157(&cut_in, gap).demand(), Some(Demand::Nothing));
+    let eu = |name: &str| under(Profile::load(name).unwrap(), &cut_in, gap).demand();
+    assert_eq!((eu("eu-2022-1426"), eu("eu-2022-1426-standing")), (Some(Demand::Avoid), Some(Demand::Nothing)));
 }
 
 /// Centre at 1.8 m: the vehicles overlap by 0.1 m at the start.
@@ -515,7 +522,7 @@ fn robust_verdicts_of_random_cases(cases: u32) {
         let collide = |profile: &Profile| {
             let subject = Subject::plain(&plain, headway);
             let lane = subject.lane(profile, subject.point()).unwrap();
-            let fails = |model| lane.run(profile, category, model).verdicts.failed(Criterion::Collision);
+            let fails = |model| lane.run(profile, category, model).outcome.verdicts.failed(Criterion::Collision);
             ModelId::ALL.map(fails)
         };
         let of_steps = [0, 1, 2].map(|at| collide(&finer[at]));

@@ -72,6 +72,14 @@ pub struct LaneGeometry<R> {
     pub marking_gap: R,
 }
 
+/// Distance from the ego's path to the centre of the lane that a cutter comes from, m; from beyond the neighbouring lane,
+/// to its start.
+#[inline]
+pub fn lane_centre<R: Real>(start: R, lane_width: R) -> R {
+    let is_farther = start.abs() - lane_width > lane_width * R::HALF;
+    if is_farther { start.abs() } else { lane_width }
+}
+
 impl AttentionRule<f64> {
     /// From the first step on.
     pub fn always() -> Self {
@@ -163,8 +171,7 @@ impl<R: Real> AttentionRule<R> {
         if is_seen {
             return [0; 2];
         }
-        let is_farther = start.abs() - lane_width > lane_width * R::HALF;
-        let centre = if is_farther { start.abs() } else { lane_width };
+        let centre = lane_centre(start, lane_width);
         let delay_only = self.kind == DECELERATION && self.below_trigger == BelowTrigger::DelayOnly as u32;
         let mut event = NEVER;
         let (mut lateral_before, mut speed_before) = (start, speed(0));

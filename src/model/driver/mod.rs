@@ -18,6 +18,7 @@ mod profile;
 
 pub use attention::{
     ALWAYS, AttentionRule, BelowTrigger, CUTTING_IN, CUTTING_OUT, DECELERATION, LaneGeometry, NEVER, VISIBLE_MOVEMENT,
+    lane_centre,
 };
 pub use foreign::{Accelerations, ForeignId, LaneColumns, MAX_ACCELERATION_MPS2, VectorDriver, VehicleColumns};
 pub use profile::{Bound, DriverProfile, SHORT_STEP_S, delay_bound_s};

@@ -2,7 +2,7 @@
 //! those of the profile, so that a reading shows what the lane did.
 
 use crate::engine::{Trace, TracedStep, TracedVehicle};
-use crate::model::driver::{BelowTrigger, ModelId};
+use crate::model::driver::{BelowTrigger, ModelId, lane_centre};
 use crate::model::profile::Profile;
 use crate::run::grid::SPEED_MPS;
 use crate::scenario::Category;
@@ -178,7 +178,7 @@ pub(super) fn lane_intrusion(profile: &Profile, trace: &Trace) -> Vec<Reading> {
     let first = trace.steps.first().map(other);
     let start_m = first.map_or(0.0, |other| other.y_m);
     // Beyond normal wandering from the centre of its lane the movement began earlier.
-    let has_begun = trace.lane_width_m - start_m.abs() > profile.cchdm.wandering_m;
+    let has_begun = lane_centre(start_m, trace.lane_width_m) - start_m.abs() > profile.cchdm.wandering_m;
     let moves = |step: &&TracedStep| (other(step).y_m - start_m).abs() > 1e-9;
     // Movement counts from the step before its first change.
     let moved_s = trace.steps.iter().find(moves).map(|step| trace.time_s(step.step.saturating_sub(1)));
@@ -259,10 +259,7 @@ fn competent_driver(profile: &Profile, category: Category, trace: &Trace) -> Vec
     let first = trace.steps.first().map_or(0.0, |step| step.others[0].y_m);
     // From the centre of its lane: the ego's in a cut-out.
     let deviation_m = |step: &TracedStep| match category {
-        Category::CutIn => {
-            let is_farther = first.abs() > 1.5 * trace.lane_width_m;
-            (if is_farther { first.abs() } else { trace.lane_width_m }) - step.others[0].y_m.abs()
-        }
+        Category::CutIn => lane_centre(first, trace.lane_width_m) - step.others[0].y_m.abs(),
         _ => step.others[0].y_m.abs(),
     };
     let perceived = |event: Option<&TracedStep>| {

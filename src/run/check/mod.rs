@@ -158,7 +158,7 @@ fn verdicts(lane: &Lane, point: &Point, profile: &Profile, category: Category, b
     };
     let drivers = ModelId::ALL.map(|model| ran(profile, model));
     CaseVerdicts {
-        ends: drivers.map(|(end, _)| end),
+        collide: drivers.map(|(end, _)| end == RunEnd::Contact),
         min_gap_m: drivers.map(|(_, min_gap_m)| min_gap_m),
         unreacting: ran(&without_reaction(profile), ModelId::Reg157).0,
         is_outside_annex: annex::outside(profile, category, point).is_some(),
@@ -299,7 +299,7 @@ impl Check {
         let touches = |model: &ModelId| {
             let [gap, finer_gap] = [&changed[0], found].map(|of| of.verdicts.min_gap_m[model.index()]);
             let limit_m = limit_gap_m((gap, profile.frame.dt_s), (finer_gap, finer_dt_s));
-            changed[0].verdicts.end(*model) == RunEnd::Clear && gap.min(limit_m) < GAP_M
+            !changed[0].verdicts.collides(*model) && gap.min(limit_m) < GAP_M
         };
         Ok(ModelId::ALL.into_iter().filter(touches).collect())
     }

@@ -14,7 +14,7 @@ pub enum Answer {
     NotPreventable,
     /// No collision occurs even if the ego never reacts.
     NoConflict,
-    /// The runs that decide end at the time cap while the gap still closes.
+    /// The run of an ego that never reacts ends at the time cap while the gap still closes.
     Open,
 }
 
@@ -79,11 +79,12 @@ impl RunEnd {
 /// The ends of the runs of one case.
 #[derive(Debug, Clone, PartialEq)]
 pub struct CaseVerdicts {
-    /// Each driver, in the order of [`ModelId::ALL`].
-    pub ends: [RunEnd; MODELS],
+    /// Whether each driver collides, in the order of [`ModelId::ALL`].
+    pub collide: [bool; MODELS],
     /// Minimum gap of each to a vehicle in its path, m; infinite without one.
     pub min_gap_m: [f64; MODELS],
-    /// The ego that never reacts.
+    /// The ego that never reacts. A driver that reacts brakes again where a gap closes for long, so that only this run
+    /// can be open.
     pub unreacting: RunEnd,
     /// Annex 3 does not describe the case.
     pub is_outside_annex: bool,
@@ -92,28 +93,23 @@ pub struct CaseVerdicts {
 }
 
 impl CaseVerdicts {
-    /// How the run of a driver ends.
-    pub fn end(&self, model: ModelId) -> RunEnd {
-        self.ends[model.index()]
-    }
-
     /// Whether a driver collides.
     pub fn collides(&self, model: ModelId) -> bool {
-        self.end(model) == RunEnd::Contact
+        self.collide[model.index()]
     }
 
-    fn references(&self, end: RunEnd) -> Vec<ModelId> {
-        self.reference_drivers.iter().copied().filter(|model| self.end(*model) == end).collect()
+    fn references(&self, collide: bool) -> Vec<ModelId> {
+        self.reference_drivers.iter().copied().filter(|model| self.collides(*model) == collide).collect()
     }
 
     /// Reference drivers that avoid the collision.
     pub fn avoided_by(&self) -> Vec<ModelId> {
-        self.references(RunEnd::Clear)
+        self.references(false)
     }
 
     /// Reference drivers that collide.
     pub fn collided_by(&self) -> Vec<ModelId> {
-        self.references(RunEnd::Contact)
+        self.references(true)
     }
 
     /// The answer if Annex 3 describes the case. An answer of no conflict does not need Annex 3.
@@ -133,7 +129,6 @@ impl CaseVerdicts {
             RunEnd::Clear => Answer::NoConflict,
             RunEnd::Open => Answer::Open,
             RunEnd::Contact if !self.avoided_by().is_empty() => Answer::Preventable,
-            RunEnd::Contact if !self.references(RunEnd::Open).is_empty() => Answer::Open,
             RunEnd::Contact => Answer::NotPreventable,
         }
     }

@@ -19,8 +19,6 @@ pub struct GridMap {
     /// Per model and cell: an ego that never reacts, whose lane ends once it is settled. Models differ if each starts at
     /// its own distance.
     unreacting: Vec<Vec<Verdicts>>,
-    /// The drivers' lanes end once they are settled, so that one at the cap still closes in.
-    settles: bool,
     /// Per model and criterion: the cells whose outcome a perturbation changes; empty if none was swept.
     undecided: Vec<[Vec<bool>; Criterion::ALL.len()]>,
 }
@@ -116,8 +114,7 @@ impl GridMap {
             })?;
             summary.add(&swept);
         }
-        let settles = plan.parts.iter().all(|part| part.plan.profile.frame.end_when_settled);
-        let map = GridMap { models: plan.models.clone(), verdicts, unreacting, settles, undecided: Vec::new() };
+        let map = GridMap { models: plan.models.clone(), verdicts, unreacting, undecided: Vec::new() };
         map.check_ends(plan)?;
         Ok((map, summary))
     }
@@ -155,13 +152,12 @@ impl GridMap {
         self.unreacting[model][cell].failed(Criterion::Collision)
     }
 
-    /// Whether the lanes of a cell end at the time cap while the gap still closes, so that they do not show that the
-    /// criterion holds. A collision also needs to know what an ego does that never reacts.
+    /// Whether the lane of an ego that never reacts ends at the time cap while the gap still closes, so that it does not
+    /// show whether there is a conflict.
     fn is_open(&self, model: usize, cell: usize, criterion: Criterion) -> bool {
-        let [driver, unreacting] = [self.verdicts[model][cell], self.unreacting[model][cell]];
-        let unreacting_is_open = unreacting.capped() && !unreacting.failed(Criterion::Collision);
-        !driver.failed(criterion)
-            && (self.settles && driver.capped() || criterion == Criterion::Collision && unreacting_is_open)
+        let unreacting = self.unreacting[model][cell];
+        let is_open = unreacting.capped() && !unreacting.failed(Criterion::Collision);
+        criterion == Criterion::Collision && is_open && !self.verdicts[model][cell].failed(criterion)
     }
 
     /// The outcome of a model's cell.
@@ -323,8 +319,8 @@ pub enum CellOutcome {
     Fail,
     /// There is no conflict, but the driver reacts and collides.
     FailByReaction,
-    /// A perturbation changes the verdict, or whether there is a conflict; or the lanes end at the time cap while the gap
-    /// still closes.
+    /// A perturbation changes the verdict, or whether there is a conflict; or the lane of an ego that never
+    /// reacts ends at the time cap while the gap still closes.
     Undecided,
 }
 

@@ -31,7 +31,6 @@ pub(crate) fn stripped(scenario: &Scenario, gap_m: Option<f64>) -> Scenario {
         frame0: 0,
         frame1: 0,
         reason: String::new(),
-        lane_width: 3.5,
         thw0: None,
         gap0: gap_m,
         peak_decel: None,
