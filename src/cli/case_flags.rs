@@ -65,9 +65,9 @@ pub(super) struct CaseFlags {
     /// Width of the ego [default: that of every vehicle]
     #[arg(long, value_name = "m", value_parser = length_m, help_heading = "Scenario", hide_short_help = true)]
     ego_width: Option<f64>,
-    /// Cut-in, cut-out: width of the lanes [default: 3.5]
+    /// Width of the lanes [default: the scenario's, else 3.5]
     #[arg(long, value_name = "m", value_parser = length_m, help_heading = "Scenario", hide_short_help = true)]
-    lane_width: Option<f64>,
+    pub(super) lane_width: Option<f64>,
 }
 
 /// A case as it is given: flags over a file or a row of a table.
@@ -102,6 +102,11 @@ impl CaseFlags {
     pub(super) fn start(&self) -> Result<Option<Headway>> {
         let is_given = self.gap.is_some() || self.thw.is_some();
         if is_given { self.over(GivenCase::default()).headway().map(Some) } else { Ok(None) }
+    }
+
+    /// Whether it gives a value of the case other than the width of the lanes.
+    pub(super) fn says_more_than_lanes(&self) -> bool {
+        CaseParameters { lane_width: None, ..self.parameters() } != CaseParameters::default()
     }
 
     /// Whether it gives a value of the case other than the ego's start.

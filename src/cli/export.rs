@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::{Args, Subcommand, ValueEnum};
 
 use super::Exit;
-use super::case_flags::{CaseFlags, from_toml, length_m, time_s};
+use super::case_flags::{CaseFlags, from_toml, time_s};
 use super::configured::Configured;
 use super::format::FormatFlag;
 use super::lists;
@@ -105,9 +105,6 @@ pub struct Xosc {
     /// Side that the other vehicle comes from or leaves to [default: the scenario's, else left]
     #[arg(long, value_enum, help_heading = "Scenario", hide_short_help = true)]
     side: Option<SideFlag>,
-    /// Width of the road's lanes [default: the scenario's, else 3.5]
-    #[arg(long, value_name = "m", value_parser = length_m, help_heading = "Scenario", hide_short_help = true)]
-    lane_width: Option<f64>,
     /// Folder of the files
     #[arg(long, value_name = "DIR", default_value = "lanesweep-xosc", help_heading = "Output")]
     out: PathBuf,
@@ -150,7 +147,7 @@ impl Xosc {
     fn scenarios(&self, configured: &Configured, options: &PlayOptions) -> Result<(Vec<Concrete>, bool)> {
         let wrong = |flag: &str, problem: &str, help: &str| Err(Error::usage(Place::item(flag), problem, help));
         let is_lane = self.from.is_some() || self.scenarios.is_some();
-        if is_lane && self.case.says_a_case() {
+        if is_lane && self.case.says_more_than_lanes() {
             let help = "leave out the case's flags, or --from and --scenarios";
             return wrong("--lane", "a lane is a complete case: the other flags would be ignored", help);
         }
@@ -243,7 +240,7 @@ impl Xosc {
             let problem = format!("{duration} s is out of range");
             return Err(Error::usage(Place::item("--duration"), problem, "give seconds above 0 and at most 3600"));
         }
-        if let Some(width) = self.lane_width.filter(|w| !(1.0..=20.0).contains(w)) {
+        if let Some(width) = self.case.lane_width.filter(|w| !(1.0..=20.0).contains(w)) {
             let problem = format!("{width} m is not a lane width");
             return Err(Error::usage(Place::item("--lane-width"), problem, "give 1 to 20 m, such as 3.5"));
         }
@@ -251,6 +248,6 @@ impl Xosc {
             SideFlag::Left => Side::Left,
             SideFlag::Right => Side::Right,
         });
-        Ok(PlayOptions { ego, duration_s: self.duration, side, lane_width_m: self.lane_width })
+        Ok(PlayOptions { ego, duration_s: self.duration, side, lane_width_m: self.case.lane_width })
     }
 }

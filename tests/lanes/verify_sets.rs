@@ -295,6 +295,9 @@ fn sides(
             let constant = f(p.reg157.reaction_and_margin_s(p.frame.dt_s));
             (g.abs(), dv.abs() * (dv * f(1.0 / (2.0 * p.reg157.deceleration_mps2)) + constant))
         }
+        Threshold::Reg157Gate if p.reg157.lane_intrusion_m > 0.0 => {
+            (h, view.marking_gap - f(p.reg157.lane_intrusion_m))
+        }
         Threshold::Reg157Gate => (h, f(p.reg157.lateral_gate_m)),
         Threshold::CchdmTtc if category == Category::CutOut && p.cchdm.cut_out_headway_s > 0.0 => {
             (g, f(p.cchdm.cut_out_headway_s) * v + f(p.cchdm.cut_out_headway_tolerance_m))

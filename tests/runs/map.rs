@@ -574,7 +574,7 @@ fn an_undecided_cell_has_a_neighbour_with_the_other_verdict_and_a_decided_one_ke
 /// What the sheet of one case says, the map says of its cell.
 #[test]
 fn a_cell_is_undecided_where_the_single_case_is() {
-    use lanesweep::run::check::{Check, Subject};
+    use lanesweep::run::check::{Check, RunEnd, Subject};
     let grid = Grid::new(GridParts {
         fixed: vec![value(Category::CutIn, "other_speed_kmh", 30.0), value(Category::CutIn, "ego_speed_kmh", 60.0)],
         panel_axes: Vec::new(),
@@ -599,7 +599,7 @@ fn a_cell_is_undecided_where_the_single_case_is() {
         let check = Check { subject, profiles: vec![profile.clone()], models: vec![ModelId::Cchdm] };
         let judged = &check.run().unwrap()[0];
         let flips = &judged.models[0].flips;
-        assert_eq!(judged.verdicts.conflict, map.is_conflict(0, cell), "cell {cell}");
+        assert_eq!(judged.verdicts.unreacting == RunEnd::Contact, map.is_conflict(0, cell), "cell {cell}");
         // A perturbation may change the driver's collision, or whether there is a conflict.
         let is_undecided = map.is_undecided(0, cell, Criterion::Collision);
         assert!(is_undecided || flips.is_empty(), "cell {cell}: {flips:?}");

@@ -401,7 +401,7 @@ fn a_right_hand_cutter_is_mirrored_and_the_road_holds_everybody() {
         let road = road.into_iter().find(|p| p.extension().is_some_and(|e| e == "xodr")).unwrap();
         (played(&text).0, elements(&std::fs::read_to_string(road).unwrap()))
     };
-    let (left, _) = read(&["--side", "left"]);
+    let (left, _) = read(&["--side", "left", "--lane-width", "3"]);
     let (right, road) = read(&["--side", "right", "--lane-width", "3"]);
     for (a, b) in left["Other"].path.iter().zip(&right["Other"].path) {
         assert_eq!((a.0, a.1, a.2), (b.0, b.1, -b.2));
@@ -456,7 +456,7 @@ fn what_cannot_be_exported_is_named() {
     refused(root, &xosc(&["--lane", "a/S/1.2s/FSM"]), 2, "a key alone does not identify a lane");
     refused(root, &xosc(&["--from", "nowhere", "--lane", "a/S/1.2s/FSM"]), 3, "there is no run here");
     refused(root, &xosc(&["--category", "cut-in", "--models", "FSM"]), 2, "ego_speed: it is missing");
-    refused(root, &[&xosc(&["--lane-width", "0"])[..], &CUT_IN].concat(), 2, "not a lane width");
+    refused(root, &[&xosc(&["--lane-width", "0"])[..], &CUT_IN].concat(), 2, "cannot be used");
     refused(root, &[&xosc(&["--out", "file/x"])[..], &CUT_IN].concat(), 0, "");
     std::fs::write(root.join("taken"), "").unwrap();
     refused(root, &[&xosc(&["--out", "taken"])[..], &CUT_IN].concat(), 6, "cannot create the folder");

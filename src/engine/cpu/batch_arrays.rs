@@ -407,7 +407,7 @@ mod tests {
     fn rows_lie_in_the_order_of_their_names() {
         let mut ego = EgoArrays::<4>::zeroed();
         ego.horizon[3] = 7;
-        assert_eq!(ego.rows(), [[0; 4], [0; 4], [0, 0, 0, 7], [0; 4], [0; 4], [0; 4]]);
+        assert_eq!(ego.rows(), [[0; 4], [0; 4], [0; 4], [0, 0, 0, 7], [0; 4], [0; 4], [0; 4]]);
         let mut moving = MovingArrays::<4>::zeroed();
         moving.rows_mut().last_mut().unwrap()[1] = 5;
         assert_eq!(moving.over, [0, 5, 0, 0]);
