@@ -44,7 +44,6 @@ const PROFILES: [&str; 6] = ["un-r157", "eu-2022-1426", "eu-2022-1426-standing",
 #[command(after_help = "Examples:\n  \
                   lanesweep check --category cut-in --ego-speed 60km/h --speed 40km/h --gap 15 --lateral-speed 1.0 \\\n      \
                   --sheet case.html\n  \
-                  lanesweep check cases.csv\n  \
                   lanesweep check cases.csv --row 2\n  \
                   lanesweep check scenarios.jsonl --scenario 01_cut_in_97_91_957 --thw 1.2")]
 pub struct Check {

@@ -44,7 +44,7 @@ impl DossierReport<'_> {
     pub(super) fn limits_of_rules(&self) -> String {
         let Rules { min_recall, min_precision, min_coverage } = self.rules;
         format!(
-            "The limits are conventions of this program, not of a standard. Change them by `--config KEY=VALUE`: \
+            "The limits are conventions of this program, not of a standard. Keys of the configuration change them: \
              justify.min_recall ({min_recall}), justify.min_precision ({min_precision}), justify.min_coverage ({min_coverage}), \
              compare.margin ({}), score.min_failures ({}), score.confidence ({}).",
             self.margin, self.score.min_failures, self.score.confidence

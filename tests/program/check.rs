@@ -184,8 +184,8 @@ fn a_braking_cutter_makes_no_demand() {
 /// A demand beside drivers that collide, and no demand beside a driver that avoids, is a sentence of its own.
 #[test]
 fn clause_and_drivers_that_disagree_are_named() {
-    // By hand: intrusion after 1.1 s, where 11/(25/3.6) - 1.1 = 0.484 s of TTC are less than 0.929 s.
-    let (code, out, error) = cut_in("60", "35", "11", "1.0", "");
+    // By hand: visible for 0.55 s until the lane intrusion, where 0.72 s are demanded.
+    let (code, out, error) = cut_in("60", "30", "24", "2.0", "");
     assert_eq!(code, 0, "{out} {error}");
     assert!(out.contains("that does not mean unavoidable"), "{out}");
 }
@@ -194,8 +194,9 @@ fn clause_and_drivers_that_disagree_are_named() {
 #[test]
 fn a_contact_has_its_kind_and_the_sign_of_its_closing_speed() {
     let (_, out, error) = cut_in("60", "45", "24", "1.0", "--acceleration -5");
+    let words = out.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(
-        out.contains("rear-end where the ego's front hits") && out.contains("closing is the ego's speed minus"),
+        words.contains("rear-end where the ego's front hits") && words.contains("closing is the ego's speed minus"),
         "{out}"
     );
     let row = out.lines().find(|line| line.contains("| CCHDM  | COLLIDES")).unwrap_or_else(|| panic!("{out} {error}"));
@@ -272,7 +273,7 @@ fn the_sheet_and_the_series_go_to_files() {
     let files = ["--sheet", text(&sheet), "--series", text(&series)];
     let (code, out, error) = check(&[&["check"], &CUT_IN[..], &files].concat());
     assert_eq!(code, 0, "{error}");
-    assert!(out.lines().count() < 60, "the series does not hide the answer");
+    assert!(out.lines().count() < 80, "the series does not hide the answer");
     let page = std::fs::read_to_string(&sheet).unwrap();
     for part in ["the system has to avoid the collision", "TTC at lane intrusion", "<svg", "108 km", "Initial gap (m)"]
     {
@@ -413,7 +414,8 @@ fn a_description_that_contradicts_itself_is_refused_alike_by_every_verb_and_from
 fn an_end_speed_a_perturbation_away_from_the_initial_one_is_still_a_case() {
     let case = "check --category lvd --ego-speed 30m/s --thw 1 --acceleration -5 --end-speed 29.99m/s --profiles paper";
     let (code, out, error) = check(&case.split(' ').collect::<Vec<_>>());
-    assert!(code == 9 && out.contains("no conflict"), "{code} {out} {error}");
+    // 0.01 m/s over 30 m is a matter of 50 minutes.
+    assert!(code == 8 && out.contains("at whose end the gap still closes"), "{code} {out} {error}");
 }
 
 /// The table, the figure of the page, the series and the JSON take the time of braking from one place.
@@ -506,7 +508,8 @@ fn no_conflict_names_the_driver_that_collides_because_it_reacts() {
     let case =
         "check --category cut-in --ego-speed 130km/h --speed 60km/h --gap 93 --lateral-speed 0.3 --profiles un-r157";
     let (code, out, _) = check(&case.split(' ').collect::<Vec<_>>());
-    assert_eq!(code, 9, "{out}");
+    // A hundredth of the lateral speed turns it.
+    assert_eq!(code, 8, "{out}");
     let answer = out.lines().nth(1).unwrap();
     assert!(
         answer.starts_with(
@@ -540,7 +543,8 @@ fn a_leader_that_brakes_harder_later_is_reacted_to_as_early_as_one_that_does_not
     assert!((braking("a") - 0.76).abs() < 1e-9, "{}", braking("a"));
 }
 
-/// By hand: 60 behind 100 km/h that brakes at 6.8 m/s². TTC ≤ 2 s from 1.634 s on, braking at 2.384 s, contact at 5.2 m/s.
+/// By hand: 60 behind 100 km/h that brakes at 6.8 m/s², 3 m ahead. The speeds are equal at 1.634 s, 12.08 m apart. The gap is
+/// 12.08 m - 3.4 m/s²·τ² at 6.8 m/s²·τ, so the TTC is 2 s at τ = 0.748 s: 2.382 s. CCHDM brakes 0.75 s later, and collides.
 #[test]
 fn no_driver_of_the_regulation_begins_its_delay_on_an_opening_gap() {
     let (code, out, error) = cut_in("60", "100", "3", "1.5", "--acceleration=-6.8 --format json");
@@ -550,8 +554,8 @@ fn no_driver_of_the_regulation_begins_its_delay_on_an_opening_gap() {
     let of = |name: &str| models.iter().find(|model| model["model"] == name).unwrap();
     let cchdm = of("CCHDM");
     assert_eq!(cchdm["collision"], true);
-    assert!((cchdm["t_react_s"].as_f64().unwrap() - 1.634).abs() < 0.011, "{cchdm}");
-    assert!((cchdm["impact_closing_speed_mps"].as_f64().unwrap() - 5.2).abs() < 0.1, "{cchdm}");
+    assert!((cchdm["t_react_s"].as_f64().unwrap() - 2.382).abs() < 0.011, "{cchdm}");
+    assert!((cchdm["t_brake_s"].as_f64().unwrap() - 3.132).abs() < 0.011, "{cchdm}");
     assert_eq!(of("FSM")["collision"], true);
 }
 
@@ -643,7 +647,7 @@ fn what_turns_with_the_lateral_speed_or_the_deceleration_is_not_robust() {
         turned += usize::from(named(&out).contains("lateral speed"));
     }
     assert!(turned > 0, "some lateral speed is the edge between a conflict and none");
-    let lvd = "check --category lvd --ego-speed 60km/h --gap 20 --acceleration=-5 --profiles un-r157";
+    let lvd = "check --category lvd --ego-speed 60km/h --gap 10 --acceleration=-5 --profiles un-r157";
     let (_, out, _) = check(&lvd.split(' ').collect::<Vec<_>>());
     assert!(out.contains("deceleration + 0.05 m/s²"), "{out}");
 }

@@ -384,9 +384,10 @@ fn a_contact_is_told_by_its_kind_and_its_closing_speed() {
     let printed = said.split("closing at ").nth(1).unwrap().split(' ').next().unwrap().parse::<f64>().unwrap();
     assert!((printed - closing).abs() < 0.01, "{said}");
     // The ego is past the other's middle before that comes into its path.
-    let beside = "simulate --category cut-in --ego-speed 30 --speed 20 --gap 14 --lateral-speed 0.8 --models Reg157";
+    let beside =
+        "simulate --category cut-in --ego-speed 30m/s --speed 20m/s --gap 14 --lateral-speed 0.8 --models Reg157";
     let said = stderr(&lanesweep(&beside.split(' ').collect::<Vec<_>>()));
-    assert!(said.contains("side contact") && said.contains("min TTC –, max BTN ∞, min gap –"), "{said}");
+    assert!(said.contains("side contact") && said.contains("min TTC –, max BTN ∞, min gap 0 m"), "{said}");
 }
 
 #[test]

@@ -567,7 +567,7 @@ fn an_undecided_cell_has_a_neighbour_with_the_other_verdict_and_a_decided_one_ke
         }
         assert!(undecided > 0 && undecided_cells(map, 0) == undecided);
         assert!(isolated * 10 <= undecided as u32, "{isolated} of {undecided} lie away from the boundary");
-        assert!(undecided * 100 < map.cell_count() as u64, "{undecided}");
+        assert!(undecided * 50 < map.cell_count() as u64, "{undecided}");
     }
 }
 

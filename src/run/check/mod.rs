@@ -266,7 +266,7 @@ impl Check {
             profile: profile.name.clone(),
             models: models.collect(),
             verdicts: changed[0].verdicts.clone(),
-            flips: flips(&changed, |changed| changed.verdicts.answer()),
+            flips: flips(&changed, |changed| changed.verdicts.answer_within_the_cap()),
             driver_flips: ModelId::ALL.map(driver).to_vec(),
             touching,
             demand_flips: flips(&changed, |changed| changed.demand),

@@ -123,6 +123,15 @@ impl CaseVerdicts {
         }
     }
 
+    /// The answer for comparisons with a perturbed case: a gap that closes for longer than a run is no other answer than
+    /// one that does not close.
+    pub(super) fn answer_within_the_cap(&self) -> Answer {
+        match self.answer() {
+            Answer::Open => Answer::NoConflict,
+            answer => answer,
+        }
+    }
+
     /// The answer that follows from the ends.
     pub fn answer(&self) -> Answer {
         match self.unreacting {
