@@ -1084,6 +1084,9 @@ def check(
     ahead_speed: Value | None = None,
     length: Value | None = None,
     width: Value | None = None,
+    ego_length: Value | None = None,
+    ego_width: Value | None = None,
+    lane_width: Value | None = None,
     models: Models | None = None,
     profiles: Values | None = None,
     sheet: Value | None = None,
@@ -1098,12 +1101,12 @@ def check(
     with their unit, `ego_speed_kmh`; flags override them), from a scenario of a file, or from an OpenSCENARIO file
     of `export xosc`. Every model runs under every profile. The case is preventable if CCHDM or FSM, the drivers of
     Annex 3, avoids the collision under the first profile. It has no conflict if nothing collides even when the ego
-    never reacts. It is undecided if one of these changes the answer: a tenth of the time step, 1 cm of gap, 0.1
-    km/h of speed. It is outside Annex 3 if the annex does not describe such a case. The output also has the
-    margins, the clauses, and the distance to another answer along each parameter. A table without --row is judged
-    whole, under one profile, with a line per row; its exit status is that of its worst answer, in the order
-    not preventable, undecided, outside Annex 3, preventable, no conflict. Exit status: 0 preventable, 1 not
-    preventable, 8 undecided, 9 no conflict, 10 outside Annex 3, 4 parts of the input were skipped.
+    never reacts. It is undecided if a tenth of the time step or a measurement error of an input changes the answer.
+    It is outside Annex 3 if the annex does not describe such a case. The output also has the margins, the clauses,
+    and the distance to another answer along each parameter. A table without --row is judged whole, under one
+    profile, with a line per row; its exit status is that of its worst answer, in the order not preventable,
+    undecided, outside Annex 3, preventable, no conflict. Exit status: 0 preventable, 1 not preventable, 8
+    undecided, 9 no conflict, 10 outside Annex 3, 4 parts of the input were skipped.
 
     Parameters
     ----------
@@ -1132,7 +1135,7 @@ def check(
     ahead_gap : Value, m
         Cut-out: gap between the two, bumper to bumper.
     lateral_distance : Value, m
-        Cut-in: lateral distance at the start; cut-out: at the end [default: 3.5].
+        Cut-in: lateral distance at the start; cut-out: at the end [default: the lane's width].
     end_speed : Value
         Speed at which the acceleration ends, with its unit [default: standstill, or never].
     ahead_speed : Value
@@ -1141,6 +1144,12 @@ def check(
         Length of every vehicle [default: the profile's].
     width : Value, m
         Width of every vehicle [default: the profile's].
+    ego_length : Value, m
+        Length of the ego [default: that of every vehicle].
+    ego_width : Value, m
+        Width of the ego [default: that of every vehicle].
+    lane_width : Value, m
+        Width of the lanes [default: the scenario's, else 3.5].
     models : Models
         Driver models: Reg157, CCHDM, RSS, FSM [default: all].
     profiles : Values
@@ -1181,6 +1190,9 @@ def check(
             ('ahead-speed', ahead_speed, False),
             ('length', length, False),
             ('width', width, False),
+            ('ego-length', ego_length, False),
+            ('ego-width', ego_width, False),
+            ('lane-width', lane_width, False),
             ('models', models, True),
             ('profiles', profiles, True),
             ('sheet', sheet, False),
@@ -1215,6 +1227,9 @@ def trace(
     ahead_speed: Value | None = None,
     length: Value | None = None,
     width: Value | None = None,
+    ego_length: Value | None = None,
+    ego_width: Value | None = None,
+    lane_width: Value | None = None,
     models: Models | None = None,
     profile: Value | None = None,
     dt: Value | None = None,
@@ -1267,7 +1282,7 @@ def trace(
         Also simulate other variants of the lane's scenario. S (the recorded scenario; the default without a
         value), keys of parameterizations, or all.
     lateral_distance : Value, m
-        Cut-in: lateral distance at the start; cut-out: at the end [default: 3.5].
+        Cut-in: lateral distance at the start; cut-out: at the end [default: the lane's width].
     end_speed : Value
         Speed at which the acceleration ends, with its unit [default: standstill, or never].
     ahead_speed : Value
@@ -1276,6 +1291,12 @@ def trace(
         Length of every vehicle [default: the profile's].
     width : Value, m
         Width of every vehicle [default: the profile's].
+    ego_length : Value, m
+        Length of the ego [default: that of every vehicle].
+    ego_width : Value, m
+        Width of the ego [default: that of every vehicle].
+    lane_width : Value, m
+        Width of the lanes [default: the scenario's, else 3.5].
     models : Models
         Driver models: Reg157, CCHDM, RSS, FSM [default: all].
     profile : Value, default paper
@@ -1322,6 +1343,9 @@ def trace(
             ('ahead-speed', ahead_speed, False),
             ('length', length, False),
             ('width', width, False),
+            ('ego-length', ego_length, False),
+            ('ego-width', ego_width, False),
+            ('lane-width', lane_width, False),
             ('models', models, True),
             ('profile', profile, False),
             ('dt', dt, False),
@@ -1354,10 +1378,12 @@ def export_xosc(
     ahead_speed: Value | None = None,
     length: Value | None = None,
     width: Value | None = None,
+    ego_length: Value | None = None,
+    ego_width: Value | None = None,
+    lane_width: Value | None = None,
     variant: Values | None = None,
     duration: Value | None = None,
     side: Value | None = None,
-    lane_width: Value | None = None,
     models: Models | None = None,
     criterion: Value | None = None,
     profile: Value | None = None,
@@ -1406,7 +1432,7 @@ def export_xosc(
         Driver of the ego.
         One of model, external.
     lateral_distance : Value, m
-        Cut-in: lateral distance at the start; cut-out: at the end [default: 3.5].
+        Cut-in: lateral distance at the start; cut-out: at the end [default: the lane's width].
     end_speed : Value
         Speed at which the acceleration ends, with its unit [default: standstill, or never].
     ahead_speed : Value
@@ -1415,6 +1441,12 @@ def export_xosc(
         Length of every vehicle [default: the profile's].
     width : Value, m
         Width of every vehicle [default: the profile's].
+    ego_length : Value, m
+        Length of the ego [default: that of every vehicle].
+    ego_width : Value, m
+        Width of the ego [default: that of every vehicle].
+    lane_width : Value, m
+        Width of the lanes [default: the scenario's, else 3.5].
     variant : Values
         Variants of --worst: S, keys of parameterizations [default: all].
     duration : Value, s
@@ -1422,8 +1454,6 @@ def export_xosc(
     side : Value
         Side that the other vehicle comes from or leaves to [default: the scenario's, else left].
         One of left, right.
-    lane_width : Value, m
-        Width of the road's lanes [default: the scenario's, else 3.5].
     models : Models
         Driver models: Reg157, CCHDM, RSS, FSM [default: all].
     criterion : Value
@@ -1468,10 +1498,12 @@ def export_xosc(
             ('ahead-speed', ahead_speed, False),
             ('length', length, False),
             ('width', width, False),
+            ('ego-length', ego_length, False),
+            ('ego-width', ego_width, False),
+            ('lane-width', lane_width, False),
             ('variant', variant, True),
             ('duration', duration, False),
             ('side', side, False),
-            ('lane-width', lane_width, False),
             ('models', models, True),
             ('criterion', criterion, False),
             ('profile', profile, False),

@@ -32,8 +32,8 @@ const PROFILES: [&str; 6] = ["un-r157", "eu-2022-1426", "eu-2022-1426-standing",
 /// The case comes from flags, from a TOML file or a table (keys and columns are the flags' names with `_`, speeds with
 /// their unit, `ego_speed_kmh`; flags override them), from a scenario of a file, or from an OpenSCENARIO file of `export xosc`. Every model runs
 /// under every profile. The case is preventable if CCHDM or FSM, the drivers of Annex 3, avoids the collision under the
-/// first profile. It has no conflict if nothing collides even when the ego never reacts. It is undecided if one of
-/// these changes the answer: a tenth of the time step, 1 cm of gap, 0.1 km/h of speed. It is outside Annex 3 if the
+/// first profile. It has no conflict if nothing collides even when the ego never reacts. It is undecided if a
+/// tenth of the time step or a measurement error of an input changes the answer. It is outside Annex 3 if the
 /// annex does not describe such a case. The output also has the margins, the clauses, and the distance to another
 /// answer along each parameter. A table without --row is judged whole, under one profile, with a line per row; its
 /// exit status is that of its worst answer, in the order not preventable, undecided, outside Annex 3, preventable, no

@@ -25,7 +25,7 @@ use crate::{Error, Place, Result};
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  \
-                  lanesweep simulate --category cut-in --ego-speed 30m/s --speed 20m/s --thw 1.2 --lateral-speed 1.0 \\\n      \
+                  lanesweep simulate --category cut-in --ego-speed 30m/s --speed 20m/s --thw 1.2 --lateral-speed 1 \\\n      \
                   --plot case.svg\n  \
                   lanesweep simulate --from lanesweep-out --lane 01_cut_in_97_91_957/2/1.2s/RSS --compare S\n  \
                   lanesweep simulate --scenarios scenarios.jsonl --lane 01_cut_in_97_91_957/S/1.2s/RSS")]

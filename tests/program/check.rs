@@ -511,12 +511,7 @@ fn no_conflict_names_the_driver_that_collides_because_it_reacts() {
     // A hundredth of the lateral speed turns it.
     assert_eq!(code, 8, "{out}");
     let answer = out.lines().nth(1).unwrap();
-    assert!(
-        answer.starts_with(
-            "no conflict under un-r157: an ego that never reacts does not collide; CCHDM reacts and collides"
-        ),
-        "{answer}"
-    );
+    assert!(answer.contains("an ego that never reacts does not collide; CCHDM reacts and collides"), "{answer}");
 }
 
 /// What a driver does may not follow from what comes later: both leaders brake alike until 2.2 s.
