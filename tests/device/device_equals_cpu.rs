@@ -157,7 +157,7 @@ fn one_unit_in_the_last_place_of_a_constant_is_found() {
             "dv * driver_half_inverse_deceleration",
             "dv * bitcast<f32>(bitcast<u32>(driver_half_inverse_deceleration) + 1u)",
         ),
-        ("driver_ttc * abs(dv)", "bitcast<f32>(bitcast<u32>(driver_ttc) + 1u) * abs(dv)"),
+        ("driver_ttc * closes", "bitcast<f32>(bitcast<u32>(driver_ttc) + 1u) * closes"),
         ("v_ego * driver_tau", "v_ego * bitcast<f32>(bitcast<u32>(driver_tau) + 1u)"),
         ("v_ego * driver_response_time", "v_ego * bitcast<f32>(bitcast<u32>(driver_response_time) + 1u)"),
         (

@@ -456,7 +456,7 @@ fn what_cannot_be_exported_is_named() {
     refused(root, &xosc(&["--lane", "a/S/1.2s/FSM"]), 2, "a key alone does not identify a lane");
     refused(root, &xosc(&["--from", "nowhere", "--lane", "a/S/1.2s/FSM"]), 3, "there is no run here");
     refused(root, &xosc(&["--category", "cut-in", "--models", "FSM"]), 2, "ego_speed: it is missing");
-    refused(root, &[&xosc(&["--lane-width", "0"])[..], &CUT_IN].concat(), 2, "cannot be used");
+    refused(root, &[&xosc(&["--lane-width", "0"])[..], &CUT_IN].concat(), 2, "not a lane width");
     refused(root, &[&xosc(&["--out", "file/x"])[..], &CUT_IN].concat(), 0, "");
     std::fs::write(root.join("taken"), "").unwrap();
     refused(root, &[&xosc(&["--out", "taken"])[..], &CUT_IN].concat(), 6, "cannot create the folder");
