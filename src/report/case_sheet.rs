@@ -366,7 +366,7 @@ pub(super) fn verdict_of(judged: &Judged) -> &'static str {
     match (judged.collides(), judged.touches) {
         (true, _) => "COLLIDES",
         (false, true) => "touches",
-        (false, false) => "no contact",
+        (false, false) => "avoids",
     }
 }
 

@@ -134,7 +134,8 @@ impl MapReport {
         write_header(&mut out, &self.grids, &format!("{columns}{}", if is_robust { ",undecided" } else { "" }))?;
         for MappedGrid { plan, map, drives_through, .. } in &self.grids {
             let profile = &plan.parts[0].plan.profile;
-            for cell in 0..map.cell_count() {
+            for (cell, drives_through) in drives_through.iter().enumerate() {
+                let drives_through = u8::from(*drives_through);
                 let place = place_of(&plan.grid, cell);
                 for (at, &model) in map.models.iter().enumerate() {
                     let verdicts = map.verdicts(at, cell);
@@ -144,7 +145,7 @@ impl MapReport {
                     let conflict = u8::from(map.is_conflict(at, cell));
                     let outcome = map.outcome(at, cell, self.criterion).label();
                     write!(out, "{place},{gap_m},{},{collision},{ttc},{btn},{capped},{failed}", model.name())?;
-                    write!(out, ",{conflict},{outcome},{}", u8::from(drives_through[cell]))?;
+                    write!(out, ",{conflict},{outcome},{drives_through}")?;
                     if is_robust {
                         write!(out, ",{}", u8::from(map.is_undecided(at, cell, self.criterion)))?;
                     }

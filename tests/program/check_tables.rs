@@ -168,7 +168,7 @@ fn a_table_is_judged_whole_and_its_status_is_that_of_the_worst_row() {
                 let word = match (model["collision"] == true, model["is_contact_like"] == true) {
                     (true, _) => "COLLIDES",
                     (false, true) => "touches",
-                    (false, false) => "no contact",
+                    (false, false) => "avoids",
                 };
                 assert_eq!(case[model["model"].as_str().unwrap()], word, "{case}");
             }
