@@ -16,9 +16,11 @@ pub struct GridMap {
     pub models: Vec<ModelId>,
     /// Per model, per cell.
     verdicts: Vec<Vec<Verdicts>>,
-    /// Per model and cell: an ego that never reacts, whose lane ends once it is settled. Models differ if each starts at
+    /// Per model and cell: an ego that never reacts. Models differ if each starts at
     /// its own distance.
     unreacting: Vec<Vec<Verdicts>>,
+    /// Lanes end once they are settled, so that one at the time cap still closes in.
+    settles: bool,
     /// Per model and criterion: the cells whose outcome a perturbation changes; empty if none was swept.
     undecided: Vec<[Vec<bool>; Criterion::ALL.len()]>,
 }
@@ -114,7 +116,8 @@ impl GridMap {
             })?;
             summary.add(&swept);
         }
-        let map = GridMap { models: plan.models.clone(), verdicts, unreacting, undecided: Vec::new() };
+        let settles = plan.parts.iter().all(|part| part.plan.profile.frame.end_when_settled);
+        let map = GridMap { models: plan.models.clone(), verdicts, unreacting, settles, undecided: Vec::new() };
         map.check_ends(plan)?;
         Ok((map, summary))
     }
@@ -156,7 +159,7 @@ impl GridMap {
     /// show whether there is a conflict.
     fn is_open(&self, model: usize, cell: usize, criterion: Criterion) -> bool {
         let unreacting = self.unreacting[model][cell];
-        let is_open = unreacting.capped() && !unreacting.failed(Criterion::Collision);
+        let is_open = self.settles && unreacting.capped() && !unreacting.failed(Criterion::Collision);
         criterion == Criterion::Collision && is_open && !self.verdicts[model][cell].failed(criterion)
     }
 

@@ -168,8 +168,6 @@ pub fn without_reaction(profile: &Profile) -> Profile {
     without.reg157.always_unsafe.clear();
     // No lateral gap is below this.
     (without.reg157.lateral_gate_m, without.reg157.lane_intrusion_m) = (-100.0, 0.0);
-    // A map then sees from the cap that the gap still closes.
-    without.frame.end_when_settled = true;
     // The delays of a driver that never reacts do not limit the time step.
     (without.reg157.reaction_time_s, without.reg157.visible_lateral_movement_s) = (0.0, 0.0);
     without.reg157.margin_s = 10.0;
