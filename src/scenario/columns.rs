@@ -155,7 +155,7 @@ fn uncapitalized(text: &str) -> String {
     letters.next().map_or(String::new(), |first| first.to_lowercase().chain(letters).collect())
 }
 
-/// A number in the field's unit; what is no number is kept.
+/// A number in the field's unit; another value stays as it is.
 ///
 /// # Errors
 /// A number that lacks a unit.

@@ -48,7 +48,7 @@ impl Unusable {
 /// Converts a written number to SI units. `unit` is the SI unit, as [`NameUnit`] says how plain numbers are read.
 ///
 /// # Errors
-/// A text that is no number of this kind; a unit that contradicts the name's; a number without a unit that needs one,
+/// A text that does not give such a quantity; a unit that contradicts the name's; a number without a unit that needs one,
 /// except 0.
 pub(crate) fn si(written: Written<'_>, unit: &str, name: NameUnit) -> Result<f64, Unusable> {
     let (number, own) = match written {
@@ -104,7 +104,7 @@ fn parse(text: &str, units: &[Unit]) -> Option<(f64, Option<f64>)> {
     Some((number, with_unit.map(|(_, per_si)| per_si)))
 }
 
-/// The error for a text that is no number of this kind.
+/// The error for a text that does not give such a quantity.
 fn not_such(text: &str, unit: &str) -> Unusable {
     let write = match (unit, parse(text, &[("g", 1.0)])) {
         // -6g often means -6 m/s².
