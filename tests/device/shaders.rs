@@ -344,6 +344,7 @@ fn every_model_has_a_shader_with_the_functions_of_its_rust_file_in_their_order()
         "abort_above_ttc_s",
         "reaction_and_margin_s",
         "safe_gap",
+        "intrusion_gap_m",
         "ignores",
         "steady_gap",
         "check_steady",
