@@ -38,15 +38,10 @@ impl CaseSheet<'_> {
     /// The answer in one sentence; "robust" is used only if it holds for every verdict named, and says what varied.
     pub fn answer(&self) -> String {
         let first = self.first();
-        let names = |list: &[ModelId]| list.iter().map(|m| m.name()).collect::<Vec<_>>().join(" and ");
         let (answer, references) = (first.verdicts.answer(), &first.verdicts.reference_drivers);
         let (avoided_by, collide) = (first.verdicts.avoided_by(), first.verdicts.collided_by());
-        let s = |list: &[ModelId]| if list.len() > 1 { "" } else { "s" };
         let drivers = match (answer, &avoided_by[..], &collide[..]) {
-            (Answer::Open, ..) => format!(
-                "no contact within the {} s of a run, at whose end the gap still closes",
-                value(first.time_cap_s)
-            ),
+            (Answer::Open, ..) => past_the_cap(first),
             (Answer::NoConflict, _, []) => {
                 "nothing collides even if the ego never reacts, until the gap no longer closes".to_owned()
             }
@@ -97,18 +92,7 @@ impl CaseSheet<'_> {
         if !first.annex_flips.is_empty() {
             of_drivers.push(format!("the case leaves Annex 3 with {}", changes(&first.annex_flips)));
         }
-        let touching: Vec<ModelId> = avoided_by
-            .iter()
-            .copied()
-            .filter(|model| answer == Answer::Preventable && first.touching.contains(model))
-            .collect();
-        if !touching.is_empty() {
-            of_drivers.push(format!(
-                "{} stop{} so close that the time step does not tell it from a contact",
-                names(&touching),
-                s(&touching)
-            ));
-        }
+        of_drivers.extend(touching(first));
         let robustness = match (&first.flips[..], &of_drivers[..]) {
             _ if answer == Answer::Open => "longer runs are not computed".to_owned(),
             ([], of_drivers) if first.rests_on_touching() => {
@@ -121,8 +105,8 @@ impl CaseSheet<'_> {
         format!("{} under {}: {drivers} ({robustness})", verdict.label(), first.profile)
     }
 
-    /// What limits the answer: the changes that *robust* refers to, a Brake Threat Number above 1 of a driver that avoids, and vehicles that drive
-    /// through one another.
+    /// What limits the answer: the changes that *robust* refers to, a Brake Threat Number above 1 of a driver that avoids,
+    /// and vehicles that drive through one another.
     pub fn cautions(&self) -> Vec<String> {
         let first = self.first();
         let above = |judged: &&Judged| !judged.collides() && judged.trace.outcome.max_btn > 1.0;
@@ -196,6 +180,32 @@ impl CaseSheet<'_> {
         }
         sentences
     }
+}
+
+fn names(list: &[ModelId]) -> String {
+    list.iter().map(|model| model.name()).collect::<Vec<_>>().join(" and ")
+}
+
+/// The ending of a verb after a list of drivers.
+fn s(list: &[ModelId]) -> &'static str {
+    if list.len() > 1 { "" } else { "s" }
+}
+
+/// Which reference drivers avoid the collision by a gap that is not distinguishable from a contact.
+pub(super) fn touching(judgement: &Judgement) -> Option<String> {
+    let is_named = |model: &ModelId| judgement.touching.contains(model);
+    let touching: Vec<ModelId> = judgement.verdicts.avoided_by().into_iter().filter(is_named).collect();
+    let is_some = judgement.verdicts.answer() == Answer::Preventable && !touching.is_empty();
+    is_some.then(|| {
+        let s = s(&touching);
+        format!("{} stop{s} so close that the time step does not tell it from a contact", names(&touching))
+    })
+}
+
+/// How a run ends whose gap still closes at the cap.
+pub(super) fn past_the_cap(judgement: &Judgement) -> String {
+    let cap_s = value(judgement.time_cap_s);
+    format!("no contact within the {cap_s} s of a run, at whose end the gap still closes")
 }
 
 /// What the clause of a profile demands; `None` if it does not cover this kind of scenario.

@@ -9,20 +9,21 @@ use super::tables::{WIDTH, wrap};
 use super::trace::{TraceFigure, TracePanels, TraceSeries};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::check::{Boundary, Change, Demand, Judged, Judgement, Reading, Subject, Verdict};
+use crate::run::check::{Boundary, Change, Demand, Judged, Judgement, Reading, RunEnd, Subject, Verdict};
 use crate::run::grid::{MapQuantity, PARAMETERS, VARIED};
 use crate::support::readable::value;
-use crate::support::table::{Column, NumberText, Table};
+use crate::support::table::{Column, NumberText, Table, json_number};
 use crate::{Error, Result};
 
 /// Kilometres per hour in one metre per second.
 pub(super) const KMH: f64 = 3.6;
 /// What the columns of the drivers show.
-const DRIVERS: &str = "Drivers; smallest gap to a vehicle in the ego's path, smallest TTC, largest BTN; at a contact TTC is 0 and BTN ∞ \
-                       by definition. Touches: no contact, but a gap that the time step does not tell from one. Contact: rear-end where \
-                       the ego's front hits, side where the other vehicle hits the ego's side or rear; closing is the ego's speed minus \
-                       the other's. Times count from the start of the case; –: not before the end of the run. A row that equals that of \
-                       a profile above is left out";
+const DRIVERS: &str = "Drivers; smallest gap to a vehicle in the ego's path, smallest TTC, largest BTN; at a contact \
+     TTC is 0 and BTN ∞ by definition. Touches: no contact, but a gap that the time step does not \
+     tell from one. No contact: nothing to avoid. Contact: rear-end where the ego's front hits, side \
+     where the other vehicle hits the ego's side or rear; closing is the ego's speed minus the \
+     other's. Times count from the start of the case; –: not before the end of the run. A row that \
+     equals that of a profile above is left out";
 
 /// A checked case with the facts that its sheet states.
 pub struct CaseSheet<'a> {
@@ -98,7 +99,7 @@ impl CaseSheet<'_> {
         let table = Table::of(judged)
             .column("profile", |(judgement, _)| judgement.profile.as_str())
             .column("model", |(_, judged)| judged.trace.model.name())
-            .column("collision", |(_, judged)| verdict_of(judged))
+            .column("collision", |(judgement, judged)| verdict_of(judgement, judged))
             .column("gap m", |(_, judged)| records::smallest_gap_m(&judged.trace.outcome))
             .column(Column::from("TTC s").null("–"), |(_, judged)| judged.trace.outcome.approach_ttc())
             .column("BTN", |(_, judged)| judged.trace.outcome.max_btn)
@@ -163,7 +164,8 @@ impl CaseSheet<'_> {
         let synthetic = if self.is_synthetic { "SYNTHETIC DATA: " } else { "" };
         let numbers: Vec<String> =
             self.numbers().iter().map(|(name, number)| format!("  {name}: {number}\n")).collect();
-        let sentences = self.demand().into_iter().chain(self.silent()).chain(self.cautions());
+        let cautions = self.cautions().into_iter().map(|caution| wrap(&caution, WIDTH - 2).replace('\n', "\n  "));
+        let sentences = self.demand().into_iter().chain(self.silent()).chain(cautions);
         let demand: Vec<String> = sentences.map(|sentence| format!("  {sentence}\n")).collect();
         format!(
             "{synthetic}{}\n{}\n{}{}\n{}\n{}\nClauses under {}\n{}\nWhere the \
@@ -199,7 +201,7 @@ impl CaseSheet<'_> {
             let readings = judgement.readings.iter().map(|reading| {
                 json!({
                     "clause": reading.clause, "condition": reading.quantity, "unit": reading.unit,
-                    "value": reading.value, "relation": reading.relation.sign(), "threshold": reading.threshold,
+                    "value": reading.value.map(json_number), "relation": reading.relation.sign(), "threshold": json_number(reading.threshold),
                     "t_s": reading.time_s, "holds": reading.holds().label(), "then": reading.then,
                 })
             });
@@ -295,7 +297,7 @@ impl CaseSheet<'_> {
                  hits the ego from the side or behind. \"Closing\" is the ego's speed minus the other's at the contact: \
                  negative where the ego is slower. \"Brakes\" is the time from which the ego brakes; CCHDM's coasting \
                  before it is no braking. \"Touches\": the driver avoids by a gap that the time step does not tell from a \
-                 contact. \"Changes with\" names what turns the collision verdict, of {VARIED}.",
+                 contact. \"No contact\": there was nothing to avoid. \"Changes with\" names what turns the collision verdict, of {VARIED}.",
                 first.verdicts.reference_drivers.iter().map(|model| model.name()).collect::<Vec<_>>().join(" or "),
             ),
             tables: vec![self.drivers().captioned("Drivers")],
@@ -362,11 +364,12 @@ impl CaseSheet<'_> {
 }
 
 /// The collision verdict of a driver in a word.
-pub(super) fn verdict_of(judged: &Judged) -> &'static str {
+pub(super) fn verdict_of(judgement: &Judgement, judged: &Judged) -> &'static str {
     match (judged.collides(), judged.touches) {
         (true, _) => "COLLIDES",
         (false, true) => "touches",
-        (false, false) => "avoids",
+        (false, false) if judgement.verdicts.unreacting == RunEnd::Contact => "avoids",
+        (false, false) => "no contact",
     }
 }
 

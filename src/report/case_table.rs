@@ -2,6 +2,7 @@
 
 use serde_json::json;
 
+use super::case_sentences::{past_the_cap, touching};
 use super::case_sheet::{CaseSheet, verdict_of};
 use super::records::{self, PROGRAM};
 use super::tables::wrap;
@@ -56,7 +57,7 @@ impl CaseAnswer {
                 (Some(Demand::Unknown), []) => "unknown",
                 (Some(_), _) => "undecided",
             },
-            collisions: models.map(|judged| (judged.trace.model.name(), verdict_of(judged))).collect(),
+            collisions: models.map(|judged| (judged.trace.model.name(), verdict_of(judgement, judged))).collect(),
             note: note(judgement),
         }
     }
@@ -73,6 +74,8 @@ fn note(judgement: &Judgement) -> String {
         (Verdict::Undecided, _) if !judgement.flips.is_empty() => {
             format!("changes with {}", judgement.flips.join(", "))
         }
+        (Verdict::Undecided, _) if judgement.verdicts.answer() == Answer::Open => past_the_cap(judgement),
+        (Verdict::Undecided, _) => touching(judgement).unwrap_or_default(),
         (Verdict::OutsideAnnex, Some(reason)) => reason.clone(),
         _ => {
             let of_drivers = judgement.models.iter().filter(|judged| !judged.flips.is_empty());
