@@ -54,13 +54,7 @@ impl CaseSheet<'_> {
             (_, [], all) => format!("{} collide", names(all)),
             (_, all, []) => format!("{} avoid{} the collision", names(all), s(all)),
             (_, one, other) => {
-                format!(
-                    "{} avoid{} the collision, {} collide{}; one that avoids suffices (ours)",
-                    names(one),
-                    s(one),
-                    names(other),
-                    s(other)
-                )
+                format!("{} avoid{} the collision, {} collide{}", names(one), s(one), names(other), s(other))
             }
         };
         let verdict = first.verdict();
@@ -68,7 +62,7 @@ impl CaseSheet<'_> {
             Verdict::OutsideAnnex => {
                 let reason = first.outside_annex.as_deref().unwrap_or_default();
                 return format!(
-                    "{} under {}: {reason}. Its drivers give no answer here ({drivers})",
+                    "{} under {}: {reason}. Its drivers give no answer here (computed all the same: {drivers})",
                     verdict.label(),
                     first.profile
                 );
@@ -82,6 +76,8 @@ impl CaseSheet<'_> {
             }
             _ => {}
         }
+        let is_split = answer == Answer::Preventable && !collide.is_empty();
+        let suffices = if is_split { "; one that avoids suffices (ours)" } else { "" };
         let changes = |flips: &[&str]| flips.join(", ");
         let is_named = |_: &&ModelId| answer != Answer::NoConflict || !collide.is_empty();
         let of_drivers = references.iter().filter(is_named).filter_map(|model| {
@@ -98,18 +94,23 @@ impl CaseSheet<'_> {
             ([], of_drivers) if first.rests_on_touching() => {
                 format!("the answer rests on it: {}", of_drivers.join("; "))
             }
+            ([], []) if !first.open_with.is_empty() => format!(
+                "robust within the {} s of a run: with {} the gap still closes at its end",
+                value(first.time_cap_s),
+                changes(&first.open_with)
+            ),
             ([], []) => "robust: no change listed below alters it".to_owned(),
             ([], of_drivers) => format!("the answer is robust; {}", of_drivers.join("; ")),
             (flips, _) => format!("the answer changes with {}", changes(flips)),
         };
-        format!("{} under {}: {drivers} ({robustness})", verdict.label(), first.profile)
+        format!("{} under {}: {drivers}{suffices} ({robustness})", verdict.label(), first.profile)
     }
 
     /// What limits the answer: the changes that *robust* refers to, a Brake Threat Number above 1 of a driver that avoids,
     /// and vehicles that drive through one another.
     pub fn cautions(&self) -> Vec<String> {
         let first = self.first();
-        let above = |judged: &&Judged| !judged.collides() && judged.trace.outcome.max_btn > 1.0;
+        let above = |judged: &&Judged| !judged.collides() && !judged.touches && judged.trace.outcome.max_btn > 1.0;
         let above: Vec<&str> = first.models.iter().filter(above).map(|judged| judged.trace.model.name()).collect();
         let mut all =
             vec![format!("Robust refers to these changes, each alone, as far as the case has the input: {VARIED}")];
@@ -120,12 +121,7 @@ impl CaseSheet<'_> {
                 above.join(", ")
             ));
         }
-        if let Some(time_s) = first.drives_through_s {
-            all.push(format!(
-                "No such traffic: the vehicle that cuts out drives through the one ahead of it from {} s on",
-                value(time_s)
-            ));
-        }
+        all.extend(drives_through(first));
         all
     }
 
@@ -200,6 +196,12 @@ pub(super) fn touching(judgement: &Judgement) -> Option<String> {
         let s = s(&touching);
         format!("{} stop{s} so close that the time step does not tell it from a contact", names(&touching))
     })
+}
+
+/// Why a case cannot be traffic.
+pub(super) fn drives_through(judgement: &Judgement) -> Option<String> {
+    let time_s = value(judgement.drives_through_s?);
+    Some(format!("No such traffic: the vehicle that cuts out drives through the one ahead of it from {time_s} s on"))
 }
 
 /// How a run ends whose gap still closes at the cap.

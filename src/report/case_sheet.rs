@@ -18,12 +18,20 @@ use crate::{Error, Result};
 /// Kilometres per hour in one metre per second.
 pub(super) const KMH: f64 = 3.6;
 /// What the columns of the drivers show.
-const DRIVERS: &str = "Drivers; smallest gap to a vehicle in the ego's path, smallest TTC, largest BTN; at a contact \
-     TTC is 0 and BTN ∞ by definition. Touches: no contact, but a gap that the time step does not \
-     tell from one. No contact: nothing to avoid. Contact: rear-end where the ego's front hits, side \
-     where the other vehicle hits the ego's side or rear; closing is the ego's speed minus the \
-     other's. Times count from the start of the case; –: not before the end of the run. A row that \
-     equals that of a profile above is left out";
+const DRIVERS: &str = "Smallest gap to a vehicle in the ego's path, smallest TTC, largest BTN; at a contact that closes, \
+     TTC is 0 and BTN ∞ by definition. Touches: no contact, but the smallest gap is below 1 cm, or tends \
+     to it as the time step goes to 0. No contact: nothing to avoid. Still closes: no contact until the \
+     end of the run. Contact: rear-end where the ego's front hits, side where the other vehicle hits the \
+     ego's side or rear; closing is the ego's speed minus the other's. Times count from the start of the \
+     case; brakes: the time from which the ego brakes, without CCHDM's coasting. –: not before the end of \
+     the run, or no TTC because the gap does not close. A row that equals that of a profile above is left \
+     out";
+/// What the columns of the boundaries show.
+const BOUNDARIES: &str = "One number is changed, all others stay, in 100 steps to either end of its range (JSON: searched). \
+     Changes at: the nearest value found below and above, to 4 digits, at which the computed answer is \
+     another one; without the tests that make an answer undecided, which begin nearer. At least one \
+     change lies between the case and this value; one that lasts for less than a step is missed. –: no \
+     change found. The last columns: where each driver's collision changes";
 
 /// A checked case with the facts that its sheet states.
 pub struct CaseSheet<'a> {
@@ -146,11 +154,14 @@ impl CaseSheet<'_> {
             let at = nearest(&boundary.answer, boundary.value)?;
             Some(NumberText(signed(at - boundary.value)))
         };
-        Table::of(&self.first().boundaries)
+        let mut table = Table::of(&self.first().boundaries)
             .column("parameter", |boundary| boundary.parameter.title())
-            .column("value", |boundary| boundary.value)
-            .column("changes at", becomes)
-            .column(Column::from("distance").null("–"), distance)
+            .column("value", |boundary| boundary.value);
+        // Without reference drivers there is no answer that could change.
+        if !self.first().verdicts.reference_drivers.is_empty() {
+            table = table.column("changes at", becomes).column(Column::from("distance").null("–"), distance);
+        }
+        table
             .columns(
                 ModelId::ALL.iter().enumerate(),
                 |(_, model)| format!("{} at", model.name()),
@@ -168,18 +179,16 @@ impl CaseSheet<'_> {
         let sentences = self.demand().into_iter().chain(self.silent()).chain(cautions);
         let demand: Vec<String> = sentences.map(|sentence| format!("  {sentence}\n")).collect();
         format!(
-            "{synthetic}{}\n{}\n{}{}\n{}\n{}\nClauses under {}\n{}\nWhere the \
-             answer changes, and each driver's collision, under {}.\nAt least one change lies between the case and this value; \
-             the answer may change again beyond it\n{}",
+            "{synthetic}{}\n{}\n{}{}\n{}\n{}\nClauses under {}\n{}\n{}\n{}",
             self.case(),
             self.answer(),
             demand.concat(),
             numbers.concat(),
-            wrap(DRIVERS, WIDTH),
+            wrap(&format!("Drivers. {DRIVERS}"), WIDTH),
             self.drivers().text(),
             self.first().profile,
             self.clauses().text(),
-            self.first().profile,
+            wrap(&format!("Where the answer changes under {}. {BOUNDARIES}", self.first().profile), WIDTH),
             self.boundaries().text(),
         )
     }
@@ -216,11 +225,12 @@ impl CaseSheet<'_> {
                     "collision_changes_at": models,
                 })
             });
+            let is_answer = matches!(judgement.verdict(), Verdict::Answer(_) | Verdict::Undecided);
             json!({
                 "profile": judgement.profile,
                 "dt_s": profile.frame.dt_s,
                 "verdict": judgement.verdict().label(),
-                "answer": judgement.verdicts.answer().label(),
+                "nominal_answer": is_answer.then(|| judgement.verdicts.answer().label()),
                 "clause": judgement.clause,
                 "demanded": judgement.demand().map(|demand| match demand {
                     Demand::Avoid => "avoid",
@@ -230,7 +240,7 @@ impl CaseSheet<'_> {
                 "demand_changes_with": judgement.demand_flips,
                 "outside_annex_3": judgement.outside_annex,
                 "silent": judgement.silent,
-                "avoided_by": judgement.verdicts.avoided_by().iter().map(|m| m.name()).collect::<Vec<_>>(),
+                "avoided_by": judgement.avoiders().iter().map(|m| m.name()).collect::<Vec<_>>(),
                 "contact_like": judgement.touching.iter().map(|m| m.name()).collect::<Vec<_>>(),
                 "drives_through_s": judgement.drives_through_s,
                 "changes_with": judgement.flips,
@@ -291,14 +301,15 @@ impl CaseSheet<'_> {
         let case = Section { facts: self.numbers(), ..Section::new("case", "Case") };
         let drivers = Section {
             intro: format!(
-                "A collision is preventable where one of the reference drivers ({}) avoids it. Where nothing \
-                 collides even if the ego never reacts, there is no conflict. Gap and TTC are the smallest, BTN is the \
-                 largest. In a rear-end contact the ego's front hits the other vehicle; in a side contact the other vehicle \
-                 hits the ego from the side or behind. \"Closing\" is the ego's speed minus the other's at the contact: \
-                 negative where the ego is slower. \"Brakes\" is the time from which the ego brakes; CCHDM's coasting \
-                 before it is no braking. \"Touches\": the driver avoids by a gap that the time step does not tell from a \
-                 contact. \"No contact\": there was nothing to avoid. \"Changes with\" names what turns the collision verdict, of {VARIED}.",
-                first.verdicts.reference_drivers.iter().map(|model| model.name()).collect::<Vec<_>>().join(" or "),
+                "{} {DRIVERS}. Changes with: what turns the collision verdict, of {VARIED}.",
+                match &first.verdicts.reference_drivers[..] {
+                    [] => format!("{} has no reference drivers: it does not say what is preventable.", first.profile),
+                    drivers => format!(
+                        "A collision is preventable where one of the reference drivers ({}) avoids it. Where nothing \
+                         collides even if the ego never reacts, there is no conflict.",
+                        drivers.iter().map(|model| model.name()).collect::<Vec<_>>().join(" or ")
+                    ),
+                },
             ),
             tables: vec![self.drivers().captioned("Drivers")],
             ..Section::new("drivers", "Drivers")
@@ -313,11 +324,7 @@ impl CaseSheet<'_> {
             ..Section::new("clauses", "Clauses")
         };
         let boundaries = Section {
-            intro: "One number is changed, all others stay, in 100 steps to either end of its range. \"Changes at\" is the \
-                    nearest value found on either side (below, above) at which the answer is another one, and what it is \
-                    there: at least one change lies between, and one that lasts for less than a step of the scan is missed. \
-                    The last columns say so of each model's collision."
-                .to_owned(),
+            intro: format!("{BOUNDARIES}."),
             tables: vec![self.boundaries().captioned("Distance to the boundary")],
             ..Section::new("boundary", "Distance to another answer")
         };
@@ -368,8 +375,11 @@ pub(super) fn verdict_of(judgement: &Judgement, judged: &Judged) -> &'static str
     match (judged.collides(), judged.touches) {
         (true, _) => "COLLIDES",
         (false, true) => "touches",
-        (false, false) if judgement.verdicts.unreacting == RunEnd::Contact => "avoids",
-        (false, false) => "no contact",
+        (false, false) => match judgement.verdicts.unreacting {
+            RunEnd::Contact => "avoids",
+            RunEnd::Open if judged.trace.outcome.verdicts.capped() => "still closes",
+            RunEnd::Open | RunEnd::Clear => "no contact",
+        },
     }
 }
 

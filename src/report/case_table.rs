@@ -1,8 +1,10 @@
 //! A table of concrete cases against the regulation: a row per case with its answer, as text and as JSON.
 
+use std::iter::once;
+
 use serde_json::json;
 
-use super::case_sentences::{past_the_cap, touching};
+use super::case_sentences::{drives_through, past_the_cap, touching};
 use super::case_sheet::{CaseSheet, verdict_of};
 use super::records::{self, PROGRAM};
 use super::tables::wrap;
@@ -58,7 +60,12 @@ impl CaseAnswer {
                 (Some(_), _) => "undecided",
             },
             collisions: models.map(|judged| (judged.trace.model.name(), verdict_of(judgement, judged))).collect(),
-            note: note(judgement),
+            note: once(note(judgement))
+                .chain(sheet.silent())
+                .chain(drives_through(judgement))
+                .filter(|text| !text.is_empty())
+                .collect::<Vec<_>>()
+                .join(". "),
         }
     }
 
@@ -71,10 +78,10 @@ impl CaseAnswer {
 /// What the answer rests on, if a small change or the annex decides.
 fn note(judgement: &Judgement) -> String {
     match (judgement.verdict(), &judgement.outside_annex) {
+        (Verdict::Undecided, _) if judgement.verdicts.answer() == Answer::Open => past_the_cap(judgement),
         (Verdict::Undecided, _) if !judgement.flips.is_empty() => {
             format!("changes with {}", judgement.flips.join(", "))
         }
-        (Verdict::Undecided, _) if judgement.verdicts.answer() == Answer::Open => past_the_cap(judgement),
         (Verdict::Undecided, _) => touching(judgement).unwrap_or_default(),
         (Verdict::OutsideAnnex, Some(reason)) => reason.clone(),
         _ => {

@@ -671,3 +671,24 @@ fn the_annex_starts_at_equal_speeds_on_both_sides() {
         assert_eq!(code == 10, is_outside, "{speed}: {out}");
     }
 }
+
+#[test]
+fn a_document_gives_an_answer_only_where_the_profile_has_one() {
+    let case = ["check", "--category", "cut-in", "--ego-speed", "60km/h", "--speed", "40km/h", "--lateral-speed", "1"];
+    let first = |more: &[&str]| json(&[&case, more].concat())["profiles"][0].clone();
+    let eu = first(&["--gap", "15", "--profiles", "eu-2022-1426"]);
+    assert_eq!((&eu["verdict"], &eu["nominal_answer"]), (&"not judged".into(), &Value::Null));
+    let near = first(&["--gap", "8", "--profiles", "un-r157"]);
+    assert_eq!((&near["verdict"], &near["nominal_answer"]), (&"undecided".into(), &"preventable".into()));
+    // At equal speeds nothing is avoided; with 0.1 km/h more the gap closes beyond the end of a run.
+    let equal = ["check", "--category", "cut-in", "--ego-speed", "60km/h", "--speed", "60km/h", "--gap", "15"];
+    let equal = [&equal[..], &["--lateral-speed", "1", "--profiles", "un-r157"]].concat();
+    let profile = json(&equal)["profiles"][0].clone();
+    assert_eq!((&profile["verdict"], &profile["avoided_by"]), (&"no conflict".into(), &Value::Array(Vec::new())));
+    let (_, out, _) = check(&equal);
+    assert!(out.contains("(robust within the 120 s of a run: with ego + 0.1 km/h"), "{out}");
+    // A TTC that does not exist stays infinite.
+    let readings = profile["clauses"].as_array().unwrap();
+    let ttc = readings.iter().find(|reading| reading["condition"] == "(c) TTC at lane intrusion").unwrap();
+    assert_eq!(ttc["value"], "Infinity");
+}

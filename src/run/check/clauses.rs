@@ -237,7 +237,11 @@ pub(super) fn lane_intrusion(profile: &Profile, trace: &Trace) -> Vec<Reading> {
         intrusion.as_ref().and_then(|intrusion| intrusion.ttc_s),
         Relation::Above,
         required_s,
-        "with (a) and (b): the system has to avoid the collision",
+        if list.len() > 2 {
+            "with (a) and (b): the system has to avoid the collision"
+        } else {
+            "with (a): the system has to avoid the collision; the profile has no (b)"
+        },
     );
     list.push(Reading { is_cut_off: is_before, ..ttc });
     list
@@ -267,7 +271,11 @@ fn competent_driver(profile: &Profile, category: Category, trace: &Trace) -> Vec
         trace.steps.iter().find(|step| step.time_s >= at_s - 1e-9)
     };
     let reading = |quantity, unit, value, relation, threshold, time_s, then| Reading {
-        clause: "Annex 3, CCHDM".to_owned(),
+        clause: if constants.wandering_m > 0.0 {
+            "Annex 3, CCHDM".to_owned()
+        } else {
+            format!("CCHDM of {}", profile.name)
+        },
         is_condition: false,
         quantity,
         unit,
@@ -304,18 +312,34 @@ fn competent_driver(profile: &Profile, category: Category, trace: &Trace) -> Vec
         )];
     }
     let wandering_m = constants.wandering_m;
-    let deviates = trace.steps.iter().find(|step| deviation_m(step) > wandering_m);
-    let seen = perceived(deviates);
+    // A driver without wandering attends to vehicles within its lateral gate.
+    let sees_gate = wandering_m <= 0.0 && category == Category::CutIn;
+    let is_near = |step: &TracedStep| step.others[0].lateral_gap_m < constants.lateral_gate_m;
+    let deviates = |step: &&TracedStep| if sees_gate { is_near(step) } else { deviation_m(step) > wandering_m };
+    let event = trace.steps.iter().find(deviates);
+    let seen = perceived(event);
     let found = first_above(trace.steps.iter().map(|step| (step.time_s, deviation_m(step))), wandering_m);
-    let mut list = vec![reading(
-        "deviation from the lane centre",
-        "m",
-        found.map(|(_, deviation)| deviation),
-        Relation::Above,
-        wandering_m,
-        found.map(|(time_s, _)| time_s),
-        "perceived after the risk perception time",
-    )];
+    let mut list = if sees_gate {
+        vec![reading(
+            "lateral gap at which the driver begins to see",
+            "m",
+            event.map(|step| step.others[0].lateral_gap_m),
+            Relation::AtMost,
+            constants.lateral_gate_m,
+            event.map(|step| step.time_s),
+            "perceived at once",
+        )]
+    } else {
+        vec![reading(
+            "deviation from the lane centre",
+            "m",
+            found.map(|(_, deviation)| deviation),
+            Relation::Above,
+            wandering_m,
+            found.map(|(time_s, _)| time_s),
+            "perceived after the risk perception time",
+        )]
+    };
     let danger = match category {
         Category::CutIn => {
             // A vehicle behind the ego has no TTC.
@@ -334,7 +358,10 @@ fn competent_driver(profile: &Profile, category: Category, trace: &Trace) -> Vec
     let (quantity, value, threshold) = danger;
     // Profiles without the headway test a TTC instead.
     if threshold > 0.0 {
-        let then = "braking begins after the delay; else once it holds";
+        let then = match category {
+            Category::CutIn => "braking begins after the delay; else once it holds",
+            _ => "braking begins after the delay; else once it holds (8 cm more for errors of measurement, ours)",
+        };
         list.push(reading(quantity, "s", value, Relation::AtMost, threshold, seen.map(|step| step.time_s), then));
     }
     list

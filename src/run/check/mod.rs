@@ -60,6 +60,8 @@ pub struct Judgement {
     pub verdicts: CaseVerdicts,
     /// Perturbations that change the answer.
     pub flips: Vec<&'static str>,
+    /// Perturbations of a case without conflict under which an ego that never reacts still closes at the time cap.
+    pub open_with: Vec<&'static str>,
     /// Perturbations that change each driver's collision verdict, in the order of [`ModelId::ALL`].
     pub driver_flips: Vec<Vec<&'static str>>,
     /// Drivers that avoid the collision by a gap that is not distinguishable from a contact: it is below 1 cm, or
@@ -119,6 +121,11 @@ impl Judgement {
             verdict if self.flips.is_empty() && !self.rests_on_touching() => verdict,
             _ => Verdict::Undecided,
         }
+    }
+
+    /// Reference drivers that avoid a collision which an ego without a reaction has.
+    pub fn avoiders(&self) -> Vec<ModelId> {
+        if self.verdicts.unreacting == RunEnd::Contact { self.verdicts.avoided_by() } else { Vec::new() }
     }
 
     /// Whether every driver that avoids the collision touches.
@@ -254,6 +261,8 @@ impl Check {
         }
         let changed = self.perturbed(profile, &budget)?;
         let touching = self.touching(&changed, profile)?;
+        let is_quiet = changed[0].verdicts.answer() == Answer::NoConflict;
+        let opens = |changed: &&Changed| is_quiet && changed.verdicts.answer() == Answer::Open;
         let driver = |model: ModelId| flips(&changed, |changed| changed.verdicts.collides(model));
         let models = self.models.iter().map(|&model| Judged {
             trace: trace(model),
@@ -267,6 +276,7 @@ impl Check {
             models: models.collect(),
             verdicts: changed[0].verdicts.clone(),
             flips: flips(&changed, |changed| changed.verdicts.answer_within_the_cap()),
+            open_with: changed.iter().filter(opens).map(|changed| changed.by).collect(),
             driver_flips: ModelId::ALL.map(driver).to_vec(),
             touching,
             demand_flips: flips(&changed, |changed| changed.demand),

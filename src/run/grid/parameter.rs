@@ -111,7 +111,7 @@ pub const PARAMETERS: [MapParameter; 19] = [
     parameter("lateral_speed_mps", "Lateral speed", "m/s", MapQuantity::LateralSpeed, 1.0, (0.0, 20.0), LANE_CHANGES),
     parameter(
         "lateral_distance_m",
-        "Lateral distance",
+        "Lateral distance of the lane change",
         "m",
         MapQuantity::LateralDistance,
         1.0,
