@@ -84,7 +84,7 @@ fn pairs<T: MergeableCounts>(name: &str, folder: &Path, units: u64, cuts: &[u64]
             let mut ledger = Ledger::new(0..units, cuts);
             if with {
                 let (journal, found) = Journal::open(&folder.join("run.journal"), "run", 0..units).unwrap();
-                ledger.resume(journal, found, &|_| Ok(())).unwrap();
+                ledger.resume(journal, found).unwrap();
             }
             run(&mut ledger);
             let (segments, journal) = ledger.finish().unwrap();
@@ -106,7 +106,7 @@ fn pairs<T: MergeableCounts>(name: &str, folder: &Path, units: u64, cuts: &[u64]
         let part = Part { run_sha256: "run".to_owned(), units: 0..units, lanes_redone_and_rechecked: [0; 2], segments };
         write_part(&path, &part).unwrap();
         let written_s = start.elapsed().as_secs_f64();
-        read_part::<T>(&path, "run", &(0..units), "again", &|_| Ok(())).unwrap();
+        read_part::<T>(&path, "run", &(0..units), "again").unwrap();
         let read_s = start.elapsed().as_secs_f64() - written_s;
         println!("{name},{repetition},{without_s},{with_s},{in_journal_s},{written_s},{read_s}");
         ratios.push(with_s / without_s);

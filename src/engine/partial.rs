@@ -141,60 +141,6 @@ impl Partial {
         intervals
     }
 
-    /// Checks whether counts read from a file can be those of a study.
-    ///
-    /// # Errors
-    /// The contradiction found.
-    pub fn check(&self) -> std::result::Result<(), String> {
-        if self.units.windows(2).any(|pair| pair[0].unit >= pair[1].unit) {
-            return Err("its units are not in order, or not each there once".to_owned());
-        }
-        if self.units.last().is_some_and(|last| last.unit >> 63 != 0) {
-            return Err("a unit is beyond any plan".to_owned());
-        }
-        Ok(())
-    }
-
-    /// Checks whether counts read from a file can be those of this plan.
-    ///
-    /// # Errors
-    /// The difference found.
-    pub fn check_of(&self, plan: &LanePlan) -> std::result::Result<(), String> {
-        if self.plan_hash != plan.hash() {
-            return Err(format!("they belong to plan {}, not to {}", self.plan_hash, plan.hash()));
-        }
-        if !self.fits(plan) {
-            return Err("they do not fit the units, variants and models of the plan".to_owned());
-        }
-        Ok(())
-    }
-
-    /// Whether the counts by headway add up to the failures of the units. The units must fit the plan.
-    pub fn adds_up(&self, plan: &LanePlan) -> bool {
-        (0..plan.blocks.len()).all(|block| self.block_adds_up(plan, block))
-    }
-
-    fn block_adds_up(&self, plan: &LanePlan, index: usize) -> bool {
-        let block = &plan.blocks[index];
-        let (models, criteria) = (plan.models.len(), Criterion::ALL.len());
-        let Ok(by_headway) = self.headway_failures(plan, index) else { return false };
-        let mut sums = vec![0_u64; block.variants.len() * models * criteria];
-        for (at, count) in by_headway.iter().enumerate() {
-            let (variant, in_lane) = (at / (plan.headways.len() * models * criteria), at % (models * criteria));
-            let sum = &mut sums[variant * models * criteria + in_lane];
-            *sum = sum.saturating_add(*count);
-        }
-        let first = self.units.partition_point(|unit| unit.unit < block.first_unit);
-        let units = self.units[first..].iter().take_while(|unit| unit.unit < block.first_unit + block.units.len());
-        let mut of_units = vec![0_u64; sums.len()];
-        for unit in units {
-            for (sum, cell) in of_units.iter_mut().zip(&unit.cells) {
-                *sum += u64::from(cell.tp) + u64::from(cell.fp);
-            }
-        }
-        sums == of_units
-    }
-
     /// Whether every unit has as many counts as the plan's variants, models and criteria require.
     pub fn fits(&self, plan: &LanePlan) -> bool {
         let models = plan.models.len();

@@ -15,8 +15,6 @@ pub mod grid;
 pub mod justify;
 mod motion_error;
 pub mod parts;
-#[cfg(test)]
-mod plan_mutations;
 pub mod reopen;
 pub mod sampling;
 pub mod score;

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 
 use super::Shard;
-use super::ledger::{Fits, MergeableCounts};
+use super::ledger::MergeableCounts;
 use super::sealed::{read_sealed, seal};
 use crate::support::files::write_inside;
 use crate::{Error, Place, Result};
@@ -57,7 +57,7 @@ pub fn collect(dir: &Path, units: u64, again: impl Fn(Shard) -> String) -> Resul
     Ok(Found { parts })
 }
 
-/// Reads all parts of a folder and checks that they are whole, belong to this run, and cover everything exactly once.
+/// Reads all parts of a folder and checks that they belong to this run and together have all units, each once.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] with the missing, duplicate, foreign or damaged parts, and the command from `again`.
@@ -66,26 +66,9 @@ pub fn read_parts<T: MergeableCounts>(
     run_sha256: &str,
     units: u64,
     again: &dyn Fn(Shard) -> String,
-    fits: &Fits<T>,
 ) -> Result<Vec<Part<T>>> {
     let found = collect(dir, units, again)?;
-    let read = |(shard, path): &(Shard, PathBuf)| {
-        let part: Part<T> = read_part(path, run_sha256, &shard.units(units), &again(*shard), fits)?;
-        let wrong = |problem: &str| {
-            let help = format!("delete it and make it again: {}", again(*shard));
-            Error::input(Place::file(path), problem, help)
-        };
-        let mut covered: Vec<_> = part.segments.iter().flat_map(MergeableCounts::covered).collect();
-        covered.sort_by_key(|range| range.start);
-        let mut at = part.units.start;
-        for range in covered {
-            if range.start != at {
-                return Err(wrong("it does not hold each of its units exactly once"));
-            }
-            at = range.end;
-        }
-        if at == part.units.end { Ok(part) } else { Err(wrong("it does not hold all of its units")) }
-    };
+    let read = |(shard, path): &(Shard, PathBuf)| read_part(path, run_sha256, &shard.units(units), &again(*shard));
     found.parts.iter().map(read).collect()
 }
 
@@ -165,7 +148,7 @@ pub fn write_part<T: Serialize>(path: &Path, part: &Part<T>) -> Result<()> {
     write_inside(path, |file| file.write_all(&text))
 }
 
-/// Reads a part of a run. `again` is the command that makes it; `fits` checks that the counts belong to the run.
+/// Reads a part of a run. `again` is the command that makes it.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] for a damaged part, one of another run, or of another interval.
@@ -174,7 +157,6 @@ pub fn read_part<T: MergeableCounts>(
     run_sha256: &str,
     units: &Range<u64>,
     again: &str,
-    fits: &Fits<T>,
 ) -> Result<Part<T>> {
     let redo = format!("delete it and make it again: {again}");
     let (part, _): (Part<T>, _) = read_sealed("part", path, MAX_BYTES, &redo)?;
@@ -186,12 +168,6 @@ pub fn read_part<T: MergeableCounts>(
     if part.units != *units {
         let problem = format!("it holds units {:?}, its name stands for {units:?}", part.units);
         return Err(wrong(problem, &redo));
-    }
-    for segment in &part.segments {
-        segment
-            .check()
-            .and_then(|()| fits(segment))
-            .map_err(|problem| wrong(format!("its counts cannot be: {problem}"), &redo))?;
     }
     Ok(part)
 }

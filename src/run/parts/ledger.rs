@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::journal::{Journal, Records};
 use crate::engine::Partial;
-use crate::{Error, Place, Result};
+use crate::{Error, Result};
 
 /// Counts over a set of units of one plan that can be merged in any order.
 pub trait MergeableCounts: Sized + Clone + Serialize + DeserializeOwned {
@@ -18,11 +18,6 @@ pub trait MergeableCounts: Sized + Clone + Serialize + DeserializeOwned {
     /// # Errors
     /// If a unit is in both, or the plans differ.
     fn join(self, other: Self) -> Result<Self>;
-    /// Checks whether counts read from a file can be those of a run.
-    ///
-    /// # Errors
-    /// The contradiction found.
-    fn check(&self) -> std::result::Result<(), String>;
 }
 
 /// A record of a journal.
@@ -68,27 +63,14 @@ impl<T: MergeableCounts> Ledger<T> {
     }
 
     /// Takes over the records of a journal and continues it. Returns the number of units that need not be computed.
-    /// `fits` checks that counts belong to the run.
     ///
     /// # Errors
-    /// [`Error::Input`] with the journal's path if a record's counts are invalid, duplicate, or fit no segment of the
-    /// interval, although its checksum matches.
-    pub fn resume(&mut self, journal: CountsJournal<T>, found: Records<Counted<T>>, fits: &Fits<T>) -> Result<u64> {
+    /// [`Error::Internal`] for counts that this program did not write.
+    pub fn resume(&mut self, journal: CountsJournal<T>, found: Records<Counted<T>>) -> Result<u64> {
         if found.torn {
             tracing::warn!("{}: the last record is not whole; it is computed again", journal.path().display());
         }
-        for record in found.records {
-            let refused = |problem: String| {
-                let help = "move the journal away; what it holds is then computed again";
-                Error::input(Place::file(journal.path()), format!("its counts cannot be: {problem}"), help)
-            };
-            record.counts.check().and_then(|()| fits(&record.counts)).map_err(refused)?;
-            let covered = record.counts.covered();
-            if !covered.is_empty() && self.segment_holding(&covered).is_none() {
-                return Err(refused(format!("units {covered:?} fit no segment of {:?}", self.units)));
-            }
-            self.place(record).map_err(|error| refused(error.to_string()))?;
-        }
+        found.records.into_iter().try_for_each(|record| self.place(record))?;
         self.journal = Some(journal);
         Ok(self.done())
     }
@@ -274,9 +256,6 @@ impl<T: MergeableCounts> Ledger<T> {
     }
 }
 
-/// Checks that counts belong to the present run, independent of their checksum; the error says what is wrong.
-pub type Fits<'f, T> = dyn Fn(&T) -> std::result::Result<(), String> + 'f;
-
 fn add(sum: &mut [u64; 2], more: [u64; 2]) {
     sum.iter_mut().zip(more).for_each(|(sum, more)| *sum = sum.saturating_add(more));
 }
@@ -288,10 +267,6 @@ impl MergeableCounts for Partial {
 
     fn join(self, other: Self) -> Result<Self> {
         self.merge(other)
-    }
-
-    fn check(&self) -> std::result::Result<(), String> {
-        Partial::check(self)
     }
 }
 
@@ -315,30 +290,10 @@ mod tests {
             let is_twice = self.0.windows(2).any(|pair| pair[0] == pair[1]);
             if is_twice { Err(Error::Internal("a unit is there twice".to_owned())) } else { Ok(self) }
         }
-
-        fn check(&self) -> std::result::Result<(), String> {
-            Ok(())
-        }
     }
 
     fn units(range: Range<u64>) -> Units {
         Units(range.collect())
-    }
-
-    /// The ledger's error for a journal with these records; it must name the journal.
-    fn refused(path: &std::path::Path, records: &[Units], fits: &Fits<Units>) -> String {
-        let mut journal = Journal::open(path, "run", 10..100).unwrap().0;
-        for record in records {
-            let record = Counted { counts: record.clone(), redone_and_rechecked: [0; 2] };
-            journal.append(std::slice::from_ref(&record)).unwrap();
-        }
-        let (journal, found) = Journal::open(path, "run", 10..100).unwrap();
-        let error = Ledger::new(10..100, &[20, 40]).resume(journal, found, fits).unwrap_err();
-        std::fs::remove_file(path).unwrap();
-        assert!(matches!(error, Error::Input { .. }), "{error}");
-        let error = error.to_string();
-        assert!(error.contains(&path.display().to_string()), "{error}");
-        error
     }
 
     #[test]
@@ -347,7 +302,7 @@ mod tests {
         let path = dir.path().join("journal");
         let open = |ledger: &mut Ledger<Units>| {
             let (journal, found) = Journal::open(&path, "run", 10..100).unwrap();
-            ledger.resume(journal, found, &|_| Ok(())).unwrap()
+            ledger.resume(journal, found).unwrap()
         };
         let mut ledger = Ledger::new(10..100, &[5, 20, 40, 100, 400]);
         assert_eq!(open(&mut ledger), 0);
@@ -369,16 +324,6 @@ mod tests {
         }
         assert_eq!(ledger.redone_and_rechecked(), [4, 43]);
         assert_eq!(ledger.counts(10..40).unwrap(), Some(units(10..40)));
-        // Intact records of other units, or of two segments: an error of the file.
-        for strange in [units(15..25), units(0..11), units(99..101)] {
-            let path = dir.path().join("strange");
-            let error = refused(&path, &[strange], &|_| Ok(()));
-            assert!(error.contains("no segment"), "{error}");
-        }
-        // Duplicate units, and counts of another run.
-        let path = dir.path().join("twice");
-        assert!(refused(&path, &[units(20..30), units(25..27)], &|_| Ok(())).contains("twice"));
-        assert!(refused(&path, &[units(20..30)], &|_| Err("of another run".to_owned())).contains("of another run"));
         let (segments, journal) = ledger.finish().unwrap();
         assert_eq!(segments, [units(10..20), units(20..40), units(40..100)]);
         journal.unwrap().remove().unwrap();

@@ -12,7 +12,7 @@ mod sealed;
 
 pub use folder::{Found, Part, collect, read_part, read_parts, write_part};
 pub use journal::{Journal, Records};
-pub use ledger::{Counted, CountsJournal, Fits, Ledger, MergeableCounts};
+pub use ledger::{Counted, CountsJournal, Ledger, MergeableCounts};
 pub use run_dir::{PLAN_FILE, RUN_PLAN_FILE, RunDir, RunState, leave_plan, units_of};
 pub use sealed::{kind_of, read_sealed, read_sealed_line, seal, unseal};
 

@@ -8,7 +8,7 @@ use std::path::{Path, PathBuf};
 use super::Shard;
 use super::folder::{Part, read_part, write_part};
 use super::journal::Journal;
-use super::ledger::{Fits, Ledger, MergeableCounts};
+use super::ledger::{Ledger, MergeableCounts};
 use crate::support::files::{make_folder, write_inside};
 use crate::support::input_file;
 use crate::support::lock::FolderLock;
@@ -67,9 +67,9 @@ impl RunDir {
     ///
     /// # Errors
     /// [`Error::Input`] for a damaged or foreign file in its place.
-    pub fn is_done<T: MergeableCounts>(&self, fits: &Fits<T>) -> Result<bool> {
+    pub fn is_done<T: MergeableCounts>(&self) -> Result<bool> {
         let Some(path) = self.part().filter(|path| path.exists()) else { return Ok(false) };
-        read_part::<T>(&path, &self.run_sha256, &self.units(), "run this command again", fits).map(|_| true)
+        read_part::<T>(&path, &self.run_sha256, &self.units(), "run this command again").map(|_| true)
     }
 
     /// Locks the interval, so that no other process computes it, and takes over the counts of an earlier process, cut
@@ -77,7 +77,7 @@ impl RunDir {
     ///
     /// # Errors
     /// [`Error::Busy`] if another process computes it; [`Error::Io`]; as [`Ledger::resume`].
-    pub fn begin<T: MergeableCounts>(&self, cuts: &[u64], is_journalled: bool, fits: &Fits<T>) -> Result<RunState<T>> {
+    pub fn begin<T: MergeableCounts>(&self, cuts: &[u64], is_journalled: bool) -> Result<RunState<T>> {
         let stem = self.shard.map(|shard| shard.stem());
         let (folder, part) = match &stem {
             None => (OutputDir::open(&self.out, self.record)?, None),
@@ -94,7 +94,7 @@ impl RunDir {
             let run = &self.run_sha256[..16.min(self.run_sha256.len())];
             let name = stem.map_or(format!("run-{run}.journal"), |s| format!("{s}.journal"));
             let (journal, found) = Journal::open(&self.out.join(name), &self.run_sha256, units.clone())?;
-            let done = ledger.resume(journal, found, fits)?;
+            let done = ledger.resume(journal, found)?;
             if done > 0 {
                 let (done, all) = (count(done), count(units.end - units.start));
                 tracing::info!("{done} of {all} units are done already: this run continues");

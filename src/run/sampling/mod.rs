@@ -215,25 +215,6 @@ impl Sample {
         self.density.exposure.as_ref().filter(|_| self.options.given.is_empty())
     }
 
-    /// Checks whether counts read from a file can be those of a plan of crude Monte Carlo.
-    ///
-    /// # Errors
-    /// The difference found.
-    fn check_tally(&self, plan: &LanePlan, tally: &SampleTally) -> std::result::Result<(), String> {
-        let joined = SampleTally::empty(plan, &self.options).merge(tally.clone());
-        joined.map(drop).map_err(|error| error.to_string())
-    }
-
-    /// Checks whether sums read from a file can be those of this run.
-    ///
-    /// # Errors
-    /// The difference found.
-    fn check_sums(&self, tally: &WeightedTally) -> std::result::Result<(), String> {
-        let is_ours = tally.sums.iter().map(|(question, _)| *question).eq(self.options.asked());
-        let is_ours = is_ours && tally.pairs.len() == self.options.pairs().len();
-        if is_ours { Ok(()) } else { Err("they answer other questions".to_owned()) }
-    }
-
     /// Finds the proposal if a search is needed, unless the folder has that of an interrupted run or of another shard. A
     /// repeated search gives the same bits, but takes time.
     ///

@@ -74,25 +74,7 @@ impl Sample {
         let PlanFile { profile, options, mut search, draws, .. } = file;
         let place = Place::file(path);
         let wrong = |problem: &str| Error::input(place.clone(), problem, HOW_TO_REMAKE);
-        profile.check(&place)?;
-        if !(options.level > 0.0 && options.level < 1.0) {
-            return Err(wrong("its confidence level must lie between 0 and 1"));
-        }
-        if !(0.0..1.0).contains(&options.estimator.defence()) {
-            return Err(wrong("its defensive mixture weight must be at least 0 and below 1"));
-        }
-        if options.stop.samples == 0 || options.stop.samples >= 1 << 63 {
-            return Err(wrong("its number of samples is out of range"));
-        }
         let density = DensityModel::from_json(file.density.as_bytes(), &place)?;
-        let parameters = density.space.parameters().len();
-        if options.map.as_ref().is_some_and(|map| map.x.parameter >= parameters || map.y.parameter >= parameters) {
-            return Err(wrong("its map is over parameters that the density does not have"));
-        }
-        let headways = options.headways().len().max(1);
-        if options.questions.iter().any(|asked| asked.headway >= headways || !options.models.contains(&asked.model)) {
-            return Err(wrong("its questions are not of its headways and driver models"));
-        }
         let proposal = file.proposal.as_ref().map(|text| proposal_from_text(text.as_bytes(), &density, &place));
         let proposal = proposal.transpose()?;
         if let Some(search) = search.as_mut().filter(|search| search.has_found()) {

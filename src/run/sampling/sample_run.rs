@@ -77,20 +77,18 @@ impl Sample {
         let (run_sha256, unit_count) = (self.seal()?.1, self.samples());
         let run_dir = RunDir { out: out.to_path_buf(), record: ESTIMATE_RECORD, run_sha256, shard, unit_count };
         let state = match &self.kind {
-            SampleKind::Crude(plan) => {
-                let fits = |tally: &SampleTally| self.check_tally(plan, tally);
-                if run_dir.is_done(&fits)? {
+            SampleKind::Crude(_) => {
+                if run_dir.is_done::<SampleTally>()? {
                     return Ok(None);
                 }
                 let cuts = cuts(unit_count, &units_of(shard, unit_count));
-                State::Crude(Box::new(run_dir.begin(&cuts, is_journalled, &fits)?))
+                State::Crude(Box::new(run_dir.begin(&cuts, is_journalled)?))
             }
             SampleKind::Weighted(_) => {
-                let fits = |tally: &WeightedTally| self.check_sums(tally);
-                if run_dir.is_done(&fits)? {
+                if run_dir.is_done::<WeightedTally>()? {
                     return Ok(None);
                 }
-                State::Weighted(Box::new(run_dir.begin(&[], is_journalled, &fits)?))
+                State::Weighted(Box::new(run_dir.begin(&[], is_journalled)?))
             }
             SampleKind::Search(_) => {
                 return Err(Error::Internal("a run without a proposal was opened in a folder".to_owned()));
@@ -124,8 +122,7 @@ impl Sample {
         let run_sha256 = sample.seal()?.1;
         let result = match &sample.kind {
             SampleKind::Crude(plan) => {
-                let fits = |tally: &SampleTally| sample.check_tally(plan, tally);
-                let parts = read_parts(out, &run_sha256, plan.unit_count(), again, &fits)?;
+                let parts = read_parts(out, &run_sha256, plan.unit_count(), again)?;
                 let rechecked_lanes = parts.iter().map(|part| part.lanes_redone_and_rechecked[1]).sum();
                 let count = parts.len();
                 let segments = parts.into_iter().flat_map(|part| part.segments).collect();
@@ -137,7 +134,7 @@ impl Sample {
                 SampleResult { parts: count, rechecked_lanes, ..SampleResult::of_crude(crude) }
             }
             SampleKind::Weighted(weighted) => {
-                let parts = read_parts(out, &run_sha256, sample.samples(), again, &|tally| sample.check_sums(tally))?;
+                let parts = read_parts(out, &run_sha256, sample.samples(), again)?;
                 let count = parts.len();
                 let mut segments = parts.into_iter().flat_map(|part| part.segments);
                 let first = segments.next();

@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 
 use super::kernels::{KernelCounts, NO_KERNEL};
 use super::limit_state::limit_state;
-use super::map::{MAP_CELLS, MapCounts};
+use super::map::MapCounts;
 use super::sample_options::SampleOptions;
 use crate::engine::generated::{ATTEMPTS, DrawnPoint, Generator};
 use crate::engine::{CLOSE_HEADWAY_S, Chunk, Headway, LanePlan};
@@ -263,46 +263,6 @@ impl SampleTally {
         [self.failures.len(), self.squares.len(), self.capped.len(), self.worst.len(), groups, counts, close]
     }
 
-    /// Checks whether counts read from a file can be those of a run.
-    pub(super) fn check(&self) -> std::result::Result<(), String> {
-        let mut free_from = 0;
-        for range in &self.covered {
-            if range.start < free_from || range.end <= range.start || range.end >> 63 != 0 {
-                return Err(format!("samples {} to {} are misplaced", range.start, range.end));
-            }
-            free_from = range.end;
-        }
-        let (models, criteria, samples) = (self.worst.len(), Criterion::ALL.len(), self.samples());
-        let cells = self.capped.len();
-        let mut problems = vec![
-            (self.squares.len() != models * criteria || self.failures.len() != cells * criteria, "lengths differ"),
-            (self.close_failures.len() != models * criteria, "lengths differ"),
-            (!self.holds_its_close(), "more failures from short headways than failures"),
-            (models == 0 || cells == 0 || !cells.is_multiple_of(models), "no whole number of headways per model"),
-            (self.worst.iter().any(|lanes| lanes.len() > self.worst_limit), "more worst lanes than are kept"),
-            (!self.holds_its_worst(), "a worst lane is not among the lanes that were counted"),
-            (self.voids > samples, "more void samples than samples"),
-            (self.failures.iter().chain(&self.capped).any(|n| *n > samples), "more failures than samples"),
-        ];
-        if let Some(map) = &self.map {
-            let complete = |counts: &Vec<u64>| counts.len() == MAP_CELLS * MAP_CELLS;
-            let fits = complete(&map.samples) && map.failures.len() == cells && map.failures.iter().all(complete);
-            problems.push((!fits, "the map has another number of cells"));
-        }
-        if let Some(counts) = &self.by_kernel {
-            let adds_up = counts.adds_up(samples.saturating_sub(self.voids), &self.failures);
-            problems.push((!adds_up, "the counts by kernel do not add up"));
-        }
-        problems.into_iter().find(|(wrong, _)| *wrong).map_or(Ok(()), |(_, problem)| Err(problem.to_owned()))
-    }
-
-    /// Whether failures from short headways do not exceed all failures.
-    fn holds_its_close(&self) -> bool {
-        let cells = self.close_failures.len().max(1);
-        let all = |at: usize| self.failures.iter().skip(at).step_by(cells).fold(0, |a: u64, b| a.saturating_add(*b));
-        self.close_failures.iter().enumerate().all(|(at, close)| *close <= all(at))
-    }
-
     /// Lanes and failures, in total and from short headways.
     pub fn close_following(&self) -> CloseFollowing {
         let cells = self.close_failures.len().max(1);
@@ -310,18 +270,6 @@ impl SampleTally {
         let lanes = self.valid() * (self.failures.len() / cells) as u64;
         let failures = self.close_failures.iter().enumerate().map(|(at, close)| [*close, all(at)]);
         CloseFollowing { close_lanes: self.close_lanes, lanes, failures: failures.collect() }
-    }
-
-    /// Whether every worst lane belongs to its model and to a counted sample. The lanes of a sample are consecutive:
-    /// headway by headway, then model by model.
-    fn holds_its_worst(&self) -> bool {
-        let (models, lanes_per_sample) = (self.worst.len() as u64, self.capped.len() as u64);
-        self.worst.iter().zip(0..).all(|(lanes, model)| {
-            lanes.iter().all(|worst| {
-                let sample = worst.lane / lanes_per_sample.max(1);
-                worst.lane % models == model && self.covered.iter().any(|range| range.contains(&sample))
-            })
-        })
     }
 
     /// Worst lanes kept per model.
@@ -352,10 +300,6 @@ impl MergeableCounts for SampleTally {
 
     fn join(self, other: Self) -> Result<Self> {
         self.merge(other)
-    }
-
-    fn check(&self) -> std::result::Result<(), String> {
-        SampleTally::check(self)
     }
 }
 

@@ -9,13 +9,10 @@ use crate::engine::plan::Headway;
 use crate::engine::version::Canonical;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::scenario::parameterization::{
-    Parameterization, ParameterizationOptions, ReducedScenario, Reduction, SvdBasis,
-};
-use crate::scenario::{Category, Scenario, problem_of};
+use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction, SvdBasis};
+use crate::scenario::{Category, Scenario};
 use crate::support::plain_text::hex;
-use crate::support::ranges::repeated;
-use crate::{Error, Place, Result};
+use crate::{Error, Result};
 
 /// Number of scenarios in a page.
 pub(super) const PAGE: u64 = 64;
@@ -126,16 +123,6 @@ impl StudyHead {
         Ok(head)
     }
 
-    /// The head with matching checksums and hash for these lines of one page, valid or not.
-    #[cfg(test)]
-    pub(crate) fn with_changed_lines(&self, lines: &[u8]) -> Result<StudyHead> {
-        assert!(self.unit_count() <= PAGE, "the scenarios of one page");
-        let mut head = self.clone();
-        head.pages = vec![(lines.len() as u64, hex(&Sha256::digest(lines)))];
-        head.plan_sha256 = head.hash()?;
-        Ok(head)
-    }
-
     /// Hash of the plan: everything that determines the outcomes.
     fn hash(&self) -> Result<String> {
         let StudyHead { plan_sha256: _, profile, models, headways, parameterization, blocks, pages } = self;
@@ -153,84 +140,8 @@ impl StudyHead {
         self.blocks.iter().map(|block| block.units).fold(0, u64::saturating_add)
     }
 
-    /// Checks whether this can be the head of a study.
-    pub(super) fn check(&self, place: &Place) -> Result<()> {
-        let wrong =
-            |problem: &str| Err(Error::input(place.clone(), problem, "make the plan again with option `plan_only`"));
-        self.profile.check(place)?;
-        self.parameterization.validate()?;
-        if self.blocks.is_empty() || self.blocks.iter().any(|block| block.units == 0) {
-            return wrong("a category has no scenario");
-        }
-        let is_twice = |at: usize| self.blocks[..at].iter().any(|block| block.category == self.blocks[at].category);
-        if (0..self.blocks.len()).any(is_twice) {
-            return wrong("a category is there twice");
-        }
-        if (0..self.models.len()).any(|at| self.models[..at].contains(&self.models[at])) {
-            return wrong("a driver model is there twice");
-        }
-        Headway::refuse_mixture(&self.headways)?;
-        let headways = self.headways.iter().map(|headway| (headway.identity(), headway));
-        if let Some(problem) = repeated(headways) {
-            return wrong(&format!("a headway is there twice: {problem}"));
-        }
-        if !self.headways.iter().filter_map(Headway::value).all(|number| (0.0..1e6).contains(&number)) {
-            return wrong("a headway is out of range (0 to 1e6)");
-        }
-        for block in &self.blocks {
-            let used = Parameterization::max_coefficients(block.category);
-            if block.basis.as_ref().is_some_and(|basis| basis.directions.len() != used) {
-                return wrong("a decomposition does not have the directions of its parameterizations");
-            }
-        }
-        if self.pages.len() as u64 != self.unit_count().div_ceil(PAGE) {
-            return wrong("it does not have the checksums of all scenarios");
-        }
-        if self.hash()? != self.plan_sha256 {
-            return wrong(
-                "its content is not that of its hash: it was changed, or another version of lanesweep made it",
-            );
-        }
-        Ok(())
-    }
-
     /// Total size of all scenarios, bytes.
     pub(super) fn scenario_bytes(&self) -> u64 {
         self.pages.iter().map(|(bytes, _)| *bytes).fold(0, u64::saturating_add)
-    }
-
-    /// Parses the scenario of a line and checks that it can be simulated.
-    pub(super) fn scenario(&self, unit: u64, line: &[u8]) -> std::result::Result<Scenario, String> {
-        let mut first = 0;
-        let block = self.blocks.iter().find(|block| {
-            first += block.units;
-            unit < first
-        });
-        let scenario: Scenario =
-            serde_json::from_slice(line).map_err(|e| format!("scenario {unit} cannot be read: {e}"))?;
-        let wrong = |problem: &str| Err(format!("scenario {}: {problem}", scenario.id));
-        if !scenario.kept || block.is_none_or(|block| block.category != scenario.category) {
-            return wrong("it is none of its category that is simulated");
-        }
-        let is_whole = |replay: &ReducedScenario| {
-            let n = replay.v.len();
-            let lengths = [
-                (replay.y.len(), scenario.category != Category::Lvd),
-                (replay.v_lead.len(), scenario.category == Category::CutOut),
-            ];
-            let numbers = replay.y.iter().chain(&replay.v).chain(&replay.v_lead);
-            let is_finite = numbers.chain([&replay.v_ego, &replay.lead_gap_m]).all(|number| number.is_finite());
-            n > 1 && lengths.iter().all(|(length, used)| !used || *length == n) && is_finite && replay.duration_s > 0.0
-        };
-        if block.is_none_or(|block| block.replays.len() != scenario.replays.len())
-            || !scenario.replays.iter().all(is_whole)
-        {
-            return wrong("its S' given as series do not fit the plan");
-        }
-        if Headway::is_observed(&self.headways) && scenario.gap0.is_none() {
-            return wrong("it has no recorded gap");
-        }
-        // Copies the scenario without excess memory.
-        problem_of(&scenario).map_or_else(|| Ok(stripped(&scenario, scenario.gap0)), |problem| wrong(&problem))
     }
 }

@@ -57,11 +57,10 @@ impl Study {
             shard,
             unit_count: self.plan().unit_count(),
         };
-        let fits = |counts: &Partial| counts.check_of(self.plan());
-        if run_dir.is_done(&fits)? {
+        if run_dir.is_done::<Partial>()? {
             return Ok(None);
         }
-        let state = run_dir.begin(&[], true, &fits)?;
+        let state = run_dir.begin(&[], true)?;
         let summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
         Ok(Some(StudyRun { study: self, run_dir, state, summary }))
     }
@@ -90,9 +89,7 @@ impl Study {
         // Merging needs only counts and no scenarios.
         let study = Study::read_units(&out.join(PLAN_FILE), |_| 0..0)?;
         let plan = study.plan();
-        let found = read_parts::<Partial>(out, &study.run_sha256(true)?, plan.unit_count(), again, &|counts| {
-            counts.check_of(plan)
-        })?;
+        let found = read_parts::<Partial>(out, &study.run_sha256(true)?, plan.unit_count(), again)?;
         let mut summary = SweepSummary { lanes: plan.lane_count(), ..SweepSummary::default() };
         let parts = found.len();
         let mut counts = Partial::empty(plan);

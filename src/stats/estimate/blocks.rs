@@ -35,22 +35,6 @@ impl<S> Default for BlockSums<S> {
     }
 }
 
-impl<S> BlockSums<S> {
-    /// Checks nodes read from a file: aligned to their size, disjoint, below 2⁶³.
-    pub(crate) fn check(&self) -> std::result::Result<(), String> {
-        let mut free_from = 0;
-        for (&start, &(level, _)) in &self.nodes {
-            let fits = level < 63 && start >> 63 == 0 && start.trailing_zeros() >= level;
-            if !fits || start < free_from {
-                return Err(format!("the node of level {level} at index {start} is misplaced"));
-            }
-            // Both below 2^63.
-            free_from = start + (1 << level);
-        }
-        Ok(())
-    }
-}
-
 impl<S: Join + Clone> BlockSums<S> {
     /// Sums of the indices first, first + 1, …, one leaf each.
     pub fn of_leaves(first: u64, leaves: &[S]) -> BlockSums<S> {

@@ -8,7 +8,7 @@ use lanesweep::interop::openscenario::{DistributionSamples, Distributions, Names
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
-use lanesweep::run::parts::{Counted, Journal, Ledger, MergeableCounts, read_part, read_sealed_line, seal};
+use lanesweep::run::parts::{Counted, Journal, Ledger, MergeableCounts, read_part, read_sealed_line};
 use lanesweep::run::sampling::{
     Estimator, SampleHeadways, SampleOptions, SampleTally, WeightedTally, plan_samples, read_proposal,
 };
@@ -23,7 +23,6 @@ use lanesweep::traffic::mining::{MiningOptions, mine, mine_folder};
 use lanesweep::traffic::trajectory::Inputs;
 use lanesweep::traffic::trajectory::tracks::{Preset, TrackFile, draft, read_usable};
 use lanesweep::{Error, Place, Result};
-use serde_json::value::RawValue;
 
 use super::seeds::{Seeds, density_of};
 
@@ -68,12 +67,11 @@ pub fn all(seeds: &Seeds) -> Vec<Reader> {
     readers.push(Reader { reseal: Some(reseal_density), ..plain("density", &seeds.densities, density) });
     readers.push(Reader { reseal: Some(reseal_searched), ..plain("searched", &seeds.searched, searched) });
     readers.push(plain("external S'", &seeds.scenario_files[..1], external));
-    let sealed = |b: &[u8], _: &Path, _: &Seeds| resealed(b);
-    readers.push(Reader { reseal: Some(sealed), ..plain("part", &seeds.parts, part) });
-    readers.push(Reader { reseal: Some(sealed), ..plain("plan", &seeds.plans, plan) });
+    readers.push(plain("part", &seeds.parts, part));
+    readers.push(plain("plan", &seeds.plans, plan));
     readers.push(plain("journal", &seeds.journals, journal));
-    readers.push(Reader { reseal: Some(sealed), ..plain("weighted part", &seeds.weighted_parts, weighted_part) });
-    readers.push(Reader { reseal: Some(sealed), ..plain("study part", &seeds.study_parts, study_part) });
+    readers.push(plain("weighted part", &seeds.weighted_parts, weighted_part));
+    readers.push(plain("study part", &seeds.study_parts, study_part));
     readers
 }
 
@@ -287,23 +285,9 @@ fn with_named_checksum(bytes: &[u8], error: &Error) -> Option<Vec<u8>> {
     Some(String::from_utf8(bytes.to_vec()).ok()?.replacen(old, new, 1).into_bytes())
 }
 
-/// The first line of a sealed file, sealed anew.
-fn resealed(bytes: &[u8]) -> Option<Vec<u8>> {
-    #[derive(serde::Deserialize)]
-    struct Sealed {
-        lanesweep: String,
-        content: Box<RawValue>,
-    }
-    let end = bytes.iter().position(|byte| *byte == b'\n').unwrap_or(bytes.len());
-    let Sealed { lanesweep, content } = serde_json::from_slice(&bytes[..end]).ok()?;
-    let mut text = seal(&lanesweep, &content).ok()?.0;
-    text.extend(bytes.get(end + 1..).unwrap_or_default());
-    Some(text)
-}
-
 fn part(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
     let path = file(bytes, dir, "part.json");
-    let read = read_part::<SampleTally>(&path, "00", &PART_UNITS, "make it again", &|_| Ok(()))?;
+    let read = read_part::<SampleTally>(&path, "00", &PART_UNITS, "make it again")?;
     for tally in read.segments {
         tally.samples();
         tally.valid();
@@ -332,7 +316,7 @@ fn journal(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {
     let path = file(bytes, dir, "part.journal");
     let (journal, found) = Journal::<Counted<SampleTally>>::open(&path, "00", PART_UNITS)?;
     let mut ledger = Ledger::new(PART_UNITS, &[]);
-    ledger.resume(journal, found, &|_| Ok(()))?;
+    ledger.resume(journal, found)?;
     ledger.missing(PART_UNITS)?;
     Ok(())
 }
@@ -348,7 +332,7 @@ pub const WEIGHTED_UNITS: std::ops::Range<u64> = 5..14;
 
 fn weighted_part(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {
     let path = file(bytes, dir, "part.json");
-    let part = read_part::<WeightedTally>(&path, "00", &WEIGHTED_UNITS, "again", &|_| Ok(()))?;
+    let part = read_part::<WeightedTally>(&path, "00", &WEIGHTED_UNITS, "again")?;
     for segment in part.segments {
         for (_, sums) in &segment.sums {
             sums.total().unwrap_or_default().figures();
@@ -361,7 +345,7 @@ fn weighted_part(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {
 
 fn study_part(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
     let path = file(bytes, dir, "part.json");
-    let part = read_part::<Partial>(&path, "00", &STUDY_UNITS, "again", &|_| Ok(()))?;
+    let part = read_part::<Partial>(&path, "00", &STUDY_UNITS, "again")?;
     for partial in part.segments {
         partial.covered();
         let merged = Partial::empty(&seeds.study).merge(partial)?;

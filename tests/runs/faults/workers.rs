@@ -70,7 +70,7 @@ fn journalled(plan: &LanePlan, backend: &dyn Backend, path: &Path) -> Result<(u6
     let units = 0..plan.unit_count();
     let mut ledger = Ledger::<Partial>::new(units.clone(), &[]);
     let (journal, found) = Journal::open(path, RUN, units.clone())?;
-    let before = ledger.resume(journal, found, &|counts| counts.check_of(plan))?;
+    let before = ledger.resume(journal, found)?;
     for range in ledger.missing(units.clone())? {
         Executor::new(backend).sweep(plan, range, Wanted::Verdicts, |chunk| {
             ledger.add(Partial::from_chunk(plan, &chunk)?, chunk.redone_and_rechecked)
