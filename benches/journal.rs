@@ -17,10 +17,10 @@ use lanesweep::run::sampling::{
     Estimator, SampleHeadways, SampleOptions, SampleTally, cuts, plan_samples, sample_into,
 };
 use lanesweep::run::study::{StudyCases, StudyHead, StudyOptions, outline_study};
+use lanesweep::scenario::DataProvenance;
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{DensityModel, FitOptions};
-use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 

@@ -22,11 +22,11 @@ use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{
     Estimator, LaneLimitState, Question, SampleHeadways, SampleOptions, plan_samples, sample_crude, truncated,
 };
+use lanesweep::scenario::DataProvenance;
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{DensityModel, FitOptions};
 use lanesweep::stats::estimate::{Density, Goal, LimitState, Search, StandardNormal, adaptive};
-use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_folder, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 

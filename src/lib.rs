@@ -59,21 +59,14 @@
 //! # }
 //! ```
 
-// Some crate-wide items are used only by the command line.
-#![cfg_attr(not(feature = "cli"), allow(dead_code, unused_imports))]
-
-#[macro_use]
-pub mod model;
 #[cfg(feature = "cli")]
-pub mod cli;
-pub mod engine;
-pub mod interop;
-pub mod prelude;
-pub mod report;
-pub mod run;
-pub mod scenario;
-pub mod stats;
-pub mod support;
-pub mod traffic;
+pub use lanesweep_cli::cli;
+pub use lanesweep_engine::engine;
+pub use lanesweep_model::{model, scenario};
+pub use lanesweep_report::{interop, report};
+pub use lanesweep_run::run;
+pub use lanesweep_stats::stats;
+pub use lanesweep_support::{Error, Place, Result, support};
+pub use lanesweep_traffic::traffic;
 
-pub use support::error::{Error, Place, Result};
+pub mod prelude;

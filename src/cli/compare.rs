@@ -15,12 +15,12 @@ use crate::report::compare::CompareFile;
 use crate::report::sampling::HostRecord;
 use crate::run::compare::{self, CompareOptions, CompareResult};
 use crate::run::study::StudyOptions;
+use crate::scenario::DataProvenance;
 use crate::stats::density::DensityKind;
 use crate::stats::estimate::Enough;
 use crate::support::files::check_folder;
 use crate::support::readable::count;
 use crate::support::run_dir::{COMPARE_RECORD, OutputDir};
-use crate::traffic::DataProvenance;
 use crate::{Error, Result};
 
 /// Which parameterizations give the right risk, not only the right labels?
@@ -76,7 +76,7 @@ impl Compare {
         check_folder(&self.out)?;
         let opened = configured.open()?;
         let collection = self.data.report_and_load(configured, verbosity)?;
-        let facts = DataProvenance::of(&self.data.source(configured), &collection, typed)?;
+        let facts = self.data.source(configured).provenance(&collection, typed)?;
         if facts.driven.is_none() {
             tracing::warn!(
                 "exposure is unknown, because the scenarios have no driven time and distance; give --hours and --km"

@@ -13,13 +13,13 @@ use super::source::{self, SourceFlags};
 use crate::cli::settings::BandwidthInterval;
 use crate::report::density;
 use crate::report::records;
+use crate::scenario::DataProvenance;
 use crate::scenario::parameterization::Parameterization;
 use crate::stats::density::{BandwidthRule, DensityModel, FitOptions, write_density};
 use crate::support::error::push_once;
 use crate::support::files::{check_folder_of, make_folder_of};
 use crate::support::readable::counted;
 use crate::support::run_dir::OutputDir;
-use crate::traffic::DataProvenance;
 use crate::{Error, Place, Result};
 
 /// How are the parameters of scenarios distributed?
@@ -80,7 +80,7 @@ impl Fit {
         };
         let files = self.files(&ids, configured)?;
         let collection = self.data.report_and_load(configured, verbosity)?;
-        let facts = DataProvenance::of(&self.data.source(configured), &collection, typed)?;
+        let facts = self.data.source(configured).provenance(&collection, typed)?;
         if facts.driven.is_none() {
             tracing::warn!(
                 "exposure is unknown, because the scenarios have no driven time and distance; give --hours and --km"

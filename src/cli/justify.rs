@@ -19,10 +19,10 @@ use crate::run::justify::{Conclusion, JustifyOptions, justify};
 use crate::run::study::StudyOptions;
 use crate::scenario::Category;
 use crate::scenario::parameterization::Parameterization;
+use crate::scenario::{DataProvenance, Driven};
 use crate::stats::estimate::Enough;
 use crate::support::files::check_folder;
 use crate::support::run_dir::{DOSSIER_RECORD, OutputDir};
-use crate::traffic::{DataProvenance, Driven};
 use crate::{Error, Place, Result};
 
 /// Is a parameterization appropriate for this driver model, scenario type and criterion?
@@ -82,8 +82,7 @@ impl Justify {
         check_folder(&self.out)?;
         let opened = configured.open()?;
         let collection = self.data.report_and_load(configured, verbosity)?;
-        let facts =
-            DataProvenance::of(&self.data.source(configured), &collection, Driven { hours: None, kilometres: None })?;
+        let facts = self.data.source(configured).provenance(&collection, Driven { hours: None, kilometres: None })?;
         let options = JustifyOptions {
             compare: CompareOptions {
                 study: StudyOptions {

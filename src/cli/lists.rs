@@ -8,9 +8,9 @@ use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::scenario::Category;
+use crate::scenario::Driven;
 use crate::scenario::parameterization::Parameterization;
 use crate::support::ranges::refuse_repeats;
-use crate::traffic::Driven;
 use crate::{Error, Place, Result};
 
 /// Parses an integer as in the configuration: `10000`, `10_000` or `1e4`.

@@ -10,13 +10,14 @@ use super::source::{self, PlausibilityFlag, PresetFlag};
 use super::{Exit, console};
 use crate::Result;
 use crate::interop::openscenario::read_scenario;
+use crate::scenario::{DataProvenance, Driven};
 use crate::scenario::{Scenario, check_scenario_file, write_scenarios, write_scenarios_to};
 use crate::support::atomic_file::AtomicFile;
 use crate::support::input_file;
 use crate::support::lock::FolderLock;
 use crate::support::readable::counted;
+use crate::traffic::Source;
 use crate::traffic::mining::{Collection, counts, counts_text};
-use crate::traffic::{DataProvenance, Driven, Source};
 
 /// Mine cut-ins, cut-outs and leader decelerations from recordings
 ///
@@ -115,7 +116,7 @@ impl Mine {
                     data: from.describe(collection.synthetic),
                     synthetic: collection.synthetic,
                     scenarios_sha256: input_file::sha256(path)?,
-                    driven: Driven::of(&collection),
+                    driven: collection.driven(),
                 }
                 .write_beside(path)?;
                 tracing::info!("{} written to {}", counted(collection.scenarios.len(), "scenario"), path.display());

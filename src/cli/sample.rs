@@ -46,7 +46,7 @@ use crate::stats::density::DensityModel;
 pub struct Sample {
     /// Density file
     #[arg(value_name = "DENSITY", required_unless_present_any = ["plan", "distribution"], help_heading = "Data")]
-    pub(super) density: Option<PathBuf>,
+    pub density: Option<PathBuf>,
     /// OpenSCENARIO file with stochastic distributions, not a density
     ///
     /// Its numberOfTestRuns and randomSeed are the defaults of --samples and --seed.

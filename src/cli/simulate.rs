@@ -11,6 +11,7 @@ use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::source::{PlausibilityFlag, refuse_overwriting, scenarios_of};
 use crate::interop::openscenario::reopen;
+use crate::report::trace::TraceReport;
 use crate::run::reopen::{Reopened, TracedLanes};
 use crate::support::files::{make_folder_of, write_atomically};
 use crate::support::run_dir::is_listed;
@@ -76,14 +77,15 @@ impl Simulate {
     pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         self.guard_plot()?;
         let (lanes, incomplete) = self.lanes(configured)?;
+        let report = TraceReport(&lanes);
         if let Some(path) = &self.plot {
             // Write the figure before the table: a closed stdout must not prevent it.
             make_folder_of(path)?;
-            write_atomically(path, lanes.figure(self.plot_end).svg().as_bytes())?;
+            write_atomically(path, report.figure(self.plot_end).svg().as_bytes())?;
         }
-        self.format.print(|| lanes.csv(), || lanes.json())?;
+        self.format.print(|| report.csv(), || report.json())?;
         if verbosity != Verbosity::Quiet {
-            console::say(&lanes.text());
+            console::say(&report.text());
         }
         Ok(if incomplete { Exit::Incomplete } else { Exit::Ok })
     }

@@ -126,7 +126,7 @@ macro_rules! declare_constants {
         }
     };
 }
-for_every_driver_model!(declare_constants);
+crate::for_every_driver_model!(declare_constants);
 
 /// A single lane of a driver outside the registry.
 ///

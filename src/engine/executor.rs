@@ -98,7 +98,7 @@ impl<'a> Executor<'a> {
     ///
     /// # Errors
     /// [`Error::Interrupted`].
-    pub(crate) fn check_cancelled(&self, done: u64, of: u64) -> Result<()> {
+    pub fn check_cancelled(&self, done: u64, of: u64) -> Result<()> {
         if done < of && self.cancel.requested() {
             return Err(Error::Interrupted { done: format!("{done} of {of} units are done"), is_kept: false });
         }

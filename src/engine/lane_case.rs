@@ -87,7 +87,7 @@ impl LaneCase<f64> {
 
     /// The same case with the other vehicles this much farther ahead, m, for a headway or gap that is part of the case.
     #[must_use]
-    pub(crate) fn ahead_by(mut self, gap_m: f64) -> Self {
+    pub fn ahead_by(mut self, gap_m: f64) -> Self {
         self.others.iter_mut().for_each(|other| other.gap_offset += gap_m);
         self
     }
@@ -192,12 +192,12 @@ fn attend(case: &Case, profile: &Profile, series: &Series, others: &mut [LaneOth
 macro_rules! declare_attention {
     ($($(#[$attribute:meta])* $file:ident, $model:ident, $profile:ident, $name:literal;)+) => {
         /// Attention rule of each driver model, in the order of [`ModelId::ALL`](crate::model::driver::ModelId::ALL).
-        pub(crate) fn attention_rules(profile: &Profile, category: Category) -> [AttentionRule<f64>; MODELS] {
+        pub fn attention_rules(profile: &Profile, category: Category) -> [AttentionRule<f64>; MODELS] {
             [$(profile.$file.attention(profile.frame.dt_s, category)),+]
         }
     };
 }
-for_every_driver_model!(declare_attention);
+crate::for_every_driver_model!(declare_attention);
 
 /// The JRC's cut-out: no vehicle is present before the exposure, then the vehicle ahead. A cutting-out vehicle that
 /// hits it freezes there and takes its place.

@@ -17,22 +17,22 @@ pub mod generated;
 #[cfg(feature = "gpu")]
 pub mod gpu;
 mod lane;
-pub(crate) mod lane_case;
+pub mod lane_case;
 mod lane_step;
 mod open;
 mod outcome;
 mod partial;
-pub(crate) mod plan;
+pub mod plan;
 mod recheck;
 mod scene;
 mod trace;
 pub mod verify;
-pub(crate) mod version;
+pub mod version;
 
 pub use backend::{Backend, Chunk, Marks, RecheckBy, Session, Wanted, Watch};
 pub use confusion::Confusion;
 pub use cpu::backend::CpuBackend;
-pub(crate) use cpu::backend::lanes_within_seconds;
+pub use cpu::backend::lanes_within_seconds;
 pub use cpu::lane_result::Ending;
 pub use cpu::runner::LaneRunner;
 pub use cpu::simd::Instructions;
@@ -42,7 +42,7 @@ pub use executor::{Executor, SweepSummary, chunks};
 pub use forecast::{Forecast, forecast};
 pub use frame::{Frame, Simulation, Start};
 pub use lane::{Observer, Silent, Step, run_lane};
-pub(crate) use lane_case::attention_rules;
+pub use lane_case::attention_rules;
 pub use lane_case::{LaneCase, LaneOther, check_time_step};
 pub use lane_step::Seen;
 #[cfg(not(feature = "gpu"))]

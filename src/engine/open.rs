@@ -27,7 +27,7 @@ pub struct DeviceRecord {
 
 impl DeviceRecord {
     /// One line for reports.
-    pub(crate) fn line(&self) -> String {
+    pub fn line(&self) -> String {
         let path = if self.exact_path { "exact path" } else { "plain path" };
         let at = self.pci_bus_id.as_ref().map_or(String::new(), |id| format!(", PCI {id}"));
         format!("{} ({}, {}{at}, {path})", self.name, self.api, self.driver)

@@ -78,7 +78,7 @@ impl Headway {
     }
 
     /// Identity of a headway: two that start every lane alike are equal.
-    pub(crate) fn identity(self) -> (u8, u32) {
+    pub fn identity(self) -> (u8, u32) {
         match (self, self.start::<f32>()) {
             (Headway::Observed, _) => (3, 0),
             (_, Start::Headway(s)) => (0, s.to_bits()),
@@ -88,7 +88,7 @@ impl Headway {
     }
 
     /// Whether the list consists of the recorded gap.
-    pub(crate) fn is_observed(list: &[Headway]) -> bool {
+    pub fn is_observed(list: &[Headway]) -> bool {
         list.contains(&Headway::Observed)
     }
 
@@ -210,7 +210,7 @@ impl LanePlan {
     ///
     /// # Errors
     /// [`Error::Usage`] without models or headways, for a duplicate one, and for too many lanes.
-    pub(crate) fn with_hash(
+    pub fn with_hash(
         hash: String,
         profile: Profile,
         models: Vec<ModelId>,
@@ -251,7 +251,7 @@ impl LanePlan {
 
     /// The same plan that holds the cases of some units only: the units held of each block, and the source of their
     /// cases.
-    pub(crate) fn holding(&self, units: Vec<Units>, source: Box<dyn CaseSource>) -> LanePlan {
+    pub fn holding(&self, units: Vec<Units>, source: Box<dyn CaseSource>) -> LanePlan {
         let blocks = self.blocks.iter().zip(units).map(|(block, units)| Block { units, ..block.clone() });
         LanePlan {
             profile: self.profile.clone(),
@@ -412,7 +412,7 @@ impl LanePlan {
 ///
 /// # Errors
 /// As [`check_time_step`].
-pub(crate) fn check_cases(
+pub fn check_cases(
     profile: &Profile,
     blocks: &[Block],
     source: &dyn CaseSource,

@@ -22,7 +22,7 @@ pub const ENGINE_VERSION: u64 = 5;
 const PINNED_LANES: (u64, &str) = (5, "8f4403ba050f053642e79786f40be37d4764dc0a2eaeedb11b8e7b4e34a03f42");
 
 /// A hash over numbers and texts: little-endian, texts and lists preceded by their length, floats as bits.
-pub(crate) struct Canonical(Sha256);
+pub struct Canonical(Sha256);
 
 impl Canonical {
     /// Begins with the engine version and the kind of content.

@@ -253,7 +253,7 @@ impl PlainCase {
 }
 
 /// The first missing parameter that the category needs, by the name of its `simulate` flag.
-pub(crate) fn missing_parameter(category: Category, has: impl Fn(&str) -> bool) -> Option<&'static str> {
+pub fn missing_parameter(category: Category, has: impl Fn(&str) -> bool) -> Option<&'static str> {
     let changes_lane = category != Category::Lvd;
     let needs = [
         ("ego_speed", true),
@@ -268,7 +268,7 @@ pub(crate) fn missing_parameter(category: Category, has: impl Fn(&str) -> bool) 
 ///
 /// # Errors
 /// [`Error::Usage`].
-pub(crate) fn check_headway(ego_speed_mps: f64, thw_s: Option<f64>) -> Result<()> {
+pub fn check_headway(ego_speed_mps: f64, thw_s: Option<f64>) -> Result<()> {
     match thw_s {
         Some(thw_s) if ego_speed_mps == 0.0 => Err(Error::usage(
             Place::item("thw"),

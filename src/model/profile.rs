@@ -14,7 +14,7 @@ use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
 /// Maximum number of steps of a run.
-pub(crate) const MAX_STEPS: f64 = 4e6;
+pub const MAX_STEPS: f64 = 4e6;
 
 /// Which vehicles the ego's driver reacts to in a cut-out.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -138,7 +138,7 @@ impl Profile {
     }
 
     /// The files of the shipped profiles, in the same order.
-    pub(crate) fn files() -> impl Iterator<Item = &'static str> {
+    pub fn files() -> impl Iterator<Item = &'static str> {
         BUILT_IN.iter().map(|(_, text)| *text)
     }
 
@@ -179,7 +179,7 @@ impl Profile {
     }
 
     /// Every numeric constant: key, value, range.
-    pub(crate) fn bounds(&self) -> Vec<(String, f64, Bound)> {
+    pub fn bounds(&self) -> Vec<(String, f64, Bound)> {
         let (frame, criteria) = (&self.frame, &self.criteria);
         let own = [
             ("frame.dt_s", frame.dt_s, Bound::TIME_STEP),
@@ -271,7 +271,7 @@ mod tests {
     use crate::engine::Constants;
     use crate::model::case::Category;
     use crate::model::driver::ModelId;
-    use crate::stats::random::philox4x32_10;
+    use crate::random::philox4x32_10;
     use crate::support::plain_text::cut;
     use serde_json::Value;
 

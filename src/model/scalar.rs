@@ -174,13 +174,13 @@ impl Flag {
 
     /// From the sign bit of a word.
     #[inline(always)]
-    pub(crate) fn from_bits(bits: u32) -> Flag {
+    pub fn from_bits(bits: u32) -> Flag {
         Flag(bits as i32)
     }
 
     /// A word whose sign bit is the flag.
     #[inline(always)]
-    pub(crate) fn to_bits(self) -> u32 {
+    pub fn to_bits(self) -> u32 {
         self.0 as u32
     }
 

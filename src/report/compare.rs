@@ -18,12 +18,12 @@ use crate::run::sampling::{
     CategoryComparison, ComparedCell, ComparedParameterization, RateRecord, RecordedCell, RiskRate, Uncertainty,
 };
 use crate::run::score::f1;
+use crate::scenario::Driven;
 use crate::stats::density::{DensityKind, Representativeness, normal_quantile};
 use crate::stats::estimate::{Enough, Ratio, RatioVerdict};
 use crate::support::readable;
 use crate::support::run_dir::Results;
 use crate::support::table::{Column, Digits, NumberText, Table};
-use crate::traffic::Driven;
 use crate::{Error, Result};
 
 /// `compare.json`.

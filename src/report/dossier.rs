@@ -11,12 +11,12 @@ use crate::model::profile::Profile;
 use crate::run::justify::{Dossier, Hidden, REGULATION, Rules, Scored, Share};
 use crate::run::sampling::RateRecord;
 use crate::run::score::ScoreOptions;
+use crate::scenario::DataProvenance;
 use crate::scenario::parameterization::Parameterization;
 use crate::stats::estimate::Ratio;
 use crate::support::readable::{count, value};
 use crate::support::run_dir::Results;
 use crate::support::table::{Column, NumberText, Table};
-use crate::traffic::DataProvenance;
 
 /// Maximum number of hidden failures on the page; `hidden.csv` has all.
 pub(super) const SHOWN: usize = 20;

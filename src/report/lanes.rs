@@ -23,7 +23,7 @@ use crate::{Error, Result};
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Usage`] for an unknown ending of the name; errors of the lanes.
-pub(crate) fn write_study(path: &Path, study: &Study, executor: &Executor) -> Result<(SweepSummary, StagedFile)> {
+pub fn write_study(path: &Path, study: &Study, executor: &Executor) -> Result<(SweepSummary, StagedFile)> {
     make_folder_of(path)?;
     let (plan, facts) = (study.plan(), study.facts());
     let digits = if facts.reference { Digits::Binary64 } else { Digits::Binary32 };

@@ -418,18 +418,6 @@ impl EstimateFile {
     }
 }
 
-impl EstimateRow {
-    /// Whether the row is of importance sampling beside rows of crude Monte Carlo over all headways.
-    pub(super) fn is_rare_beside(&self, all: &[EstimateRow]) -> bool {
-        self.estimate.weights.is_some() && !self.is_overall(all)
-    }
-
-    /// Whether the row is over all headways, if there are several.
-    pub(super) fn is_overall(&self, all: &[EstimateRow]) -> bool {
-        self.headway == "all" || !all.iter().any(|row| row.headway == "all")
-    }
-}
-
 /// A column of numbers with three digits.
 pub(super) fn three_digits(name: &'static str) -> Column {
     Column::from(name).digits(Digits::Significant(3))

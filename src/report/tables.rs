@@ -7,7 +7,7 @@ use crate::run::score::{
 };
 use crate::scenario::parameterization::Parameterization;
 use crate::support::readable;
-pub(crate) use crate::support::table::WIDTH;
+pub use crate::support::table::WIDTH;
 use crate::support::table::{Column, Digits, NumberText, Table};
 use crate::{Error, Result};
 
@@ -235,7 +235,7 @@ pub fn claim_records(results: &[ClaimResult], data: &str) -> Table {
 }
 
 /// The text wrapped between words; a longer word stays whole.
-pub(crate) fn wrap(text: &str, width: usize) -> String {
+pub fn wrap(text: &str, width: usize) -> String {
     let mut lines = vec![String::new()];
     for word in text.split(' ') {
         let last = lines.len() - 1;

@@ -10,12 +10,12 @@ use crate::run::sampling::{
     sample_crude,
 };
 use crate::run::study::{StudyOptions, plan_study};
+use crate::scenario::DataProvenance;
 use crate::scenario::Scenario;
 use crate::scenario::parameterization::Parameterization;
 use crate::stats::density::{BandwidthRule, DensityKind, DensityModel, Exposure, FitOptions, Fitted};
 use crate::stats::estimate::Enough;
 use crate::support::error::push_once;
-use crate::traffic::DataProvenance;
 use crate::traffic::mining::{counts, counts_text};
 use crate::{Error, Place, Result};
 
@@ -45,7 +45,7 @@ pub struct CompareOptions {
 /// use lanesweep::run::study::StudyOptions;
 /// use lanesweep::scenario::Category;
 /// use lanesweep::scenario::parameterization::Parameterization;
-/// # use lanesweep::traffic::DataProvenance;
+/// # use lanesweep::scenario::DataProvenance;
 /// # use lanesweep::stats::estimate::Enough;
 /// # use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 /// # use lanesweep::traffic::trajectory::generator::GeneratorOptions;

@@ -43,7 +43,7 @@ pub enum Merged {
 /// # Errors
 /// [`Error::Io`]; [`Error::Busy`] if another process writes there; [`Error::Input`] with the missing, duplicate,
 /// foreign or damaged parts.
-pub(crate) fn merge(dir: &Path, again: &dyn Fn(&str, Shard) -> String) -> Result<(OutputDir, Merged)> {
+pub fn merge(dir: &Path, again: &dyn Fn(&str, Shard) -> String) -> Result<(OutputDir, Merged)> {
     check_run_folder(dir)?;
     let plan = dir.join(PLAN_FILE);
     if !plan.exists() {

@@ -4,4 +4,5 @@
 
 pub mod density;
 pub mod estimate;
-pub mod random;
+
+pub use lanesweep_random::random;

@@ -24,7 +24,7 @@ const LONGEST: usize = 200;
 
 /// Removes from `dir` the hidden files of killed processes, of one target or of all. A process locks the hidden files
 /// that it writes, and the lock ends with the process. Files that cannot be removed are harmless and stay.
-pub(crate) fn clear_stale(dir: &Path, target: Option<&Path>) {
+pub fn clear_stale(dir: &Path, target: Option<&Path>) {
     let Ok(entries) = std::fs::read_dir(dir) else { return };
     let wanted = target.map(|target| target.file_name().and_then(|name| name.to_str()));
     for entry in entries.flatten() {
@@ -50,7 +50,7 @@ pub(crate) fn clear_stale(dir: &Path, target: Option<&Path>) {
 
 /// Whether `path` itself, not the target of a link, is the file open as `file`.
 #[cfg(unix)]
-pub(crate) fn is_named(path: &Path, file: &File) -> bool {
+pub fn is_named(path: &Path, file: &File) -> bool {
     use std::os::unix::fs::MetadataExt;
     match (std::fs::symlink_metadata(path), file.metadata()) {
         (Ok(named), Ok(open)) => (named.dev(), named.ino()) == (open.dev(), open.ino()),
@@ -60,7 +60,7 @@ pub(crate) fn is_named(path: &Path, file: &File) -> bool {
 
 /// On other systems std cannot compare the files; there the name of an open file stays in use until it is closed.
 #[cfg(not(unix))]
-pub(crate) fn is_named(_: &Path, _: &File) -> bool {
+pub fn is_named(_: &Path, _: &File) -> bool {
     true
 }
 
@@ -69,7 +69,7 @@ pub(crate) fn is_named(_: &Path, _: &File) -> bool {
 ///
 /// # Errors
 /// [`Error::Input`].
-pub(crate) fn refuse_link(path: &Path) -> Result<()> {
+pub fn refuse_link(path: &Path) -> Result<()> {
     let what = match std::fs::symlink_metadata(path) {
         Ok(about) if about.is_symlink() => "a link",
         Ok(about) if about.is_dir() => "a folder",
@@ -132,7 +132,7 @@ fn failed(target: &Path, source: std::io::Error) -> Error {
 }
 
 /// Makes a rename in `folder` survive a power loss, if the system supports it.
-pub(crate) fn sync_folder(folder: &Path) {
+pub fn sync_folder(folder: &Path) {
     #[cfg(unix)]
     if let Ok(folder) = std::fs::File::open(folder) {
         // Some file systems refuse to sync folders; the file's content is already on disk.
@@ -143,7 +143,7 @@ pub(crate) fn sync_folder(folder: &Path) {
 }
 
 /// A file being written; dropping it before [`AtomicFile::stage`] removes it.
-pub(crate) struct AtomicFile {
+pub struct AtomicFile {
     target: PathBuf,
     writer: BufWriter<NamedTempFile>,
     // Declared after the file, so that the registry entry outlives it.
@@ -151,7 +151,7 @@ pub(crate) struct AtomicFile {
 }
 
 /// A complete file under its hidden name; dropping it before [`StagedFile::publish`] removes it.
-pub(crate) struct StagedFile {
+pub struct StagedFile {
     target: PathBuf,
     path: TempPath,
     /// Kept open for its lock.
@@ -165,7 +165,7 @@ impl AtomicFile {
     ///
     /// # Errors
     /// If the folder cannot be written to.
-    pub(crate) fn create(target: &Path) -> Result<Self> {
+    pub fn create(target: &Path) -> Result<Self> {
         let target = &resolve(target)?;
         clear_stale(folder_of(target), Some(target));
         AtomicFile::begin(target)
@@ -175,7 +175,7 @@ impl AtomicFile {
     ///
     /// # Errors
     /// As [`refuse_link`]; if the folder cannot be written to.
-    pub(crate) fn create_inside(target: &Path) -> Result<Self> {
+    pub fn create_inside(target: &Path) -> Result<Self> {
         refuse_link(target)?;
         AtomicFile::begin(target)
     }
@@ -212,7 +212,7 @@ impl AtomicFile {
     ///
     /// # Errors
     /// If the system refuses, for instance because the disk is full.
-    pub(crate) fn append(&mut self, bytes: &[u8]) -> Result<()> {
+    pub fn append(&mut self, bytes: &[u8]) -> Result<()> {
         self.writer.write_all(bytes).map_err(|source| failed(&self.target, source))
     }
 
@@ -220,7 +220,7 @@ impl AtomicFile {
     ///
     /// # Errors
     /// If the system refuses.
-    pub(crate) fn stage(self) -> Result<StagedFile> {
+    pub fn stage(self) -> Result<StagedFile> {
         let AtomicFile { target, writer, live } = self;
         let failed = |source| failed(&target, source);
         let file = writer.into_inner().map_err(|error| failed(error.into_error()))?;
@@ -260,7 +260,7 @@ impl StagedFile {
     ///
     /// # Errors
     /// If the system refuses.
-    pub(crate) fn publish(self) -> Result<()> {
+    pub fn publish(self) -> Result<()> {
         let folder = folder_of(&self.target).to_path_buf();
         self.place()?;
         sync_folder(&folder);
@@ -271,7 +271,7 @@ impl StagedFile {
     ///
     /// # Errors
     /// If the system refuses.
-    pub(crate) fn place(self) -> Result<()> {
+    pub fn place(self) -> Result<()> {
         let StagedFile { target, path, file, live } = self;
         path.persist(&target).map_err(|error| failed(&target, error.error))?;
         drop((file, live));
@@ -279,13 +279,13 @@ impl StagedFile {
     }
 
     /// Closes the file, for a caller that holds a lock on its folder; the number of open files per process is limited.
-    pub(crate) fn closed(mut self) -> Self {
+    pub fn closed(mut self) -> Self {
         self.file = None;
         self
     }
 
     /// The final path.
-    pub(crate) fn target(&self) -> &Path {
+    pub fn target(&self) -> &Path {
         &self.target
     }
 }
@@ -299,11 +299,11 @@ fn live() -> MutexGuard<'static, BTreeSet<PathBuf>> {
 
 /// An entry in the registry of hidden files; dropping it removes the entry.
 #[derive(Debug)]
-pub(crate) struct Live(PathBuf);
+pub struct Live(PathBuf);
 
 impl Live {
     /// Registers a lock file, or a folder to be removed if it is empty.
-    pub(crate) fn enter(path: PathBuf) -> Live {
+    pub fn enter(path: PathBuf) -> Live {
         live().insert(path.clone());
         Live(path)
     }
@@ -318,7 +318,7 @@ impl Drop for Live {
 /// Removes the hidden files of this process, which is about to end. While the returned guard lives, no file can be
 /// created.
 #[cfg(unix)]
-pub(crate) fn remove_live() -> Option<MutexGuard<'static, BTreeSet<PathBuf>>> {
+pub fn remove_live() -> Option<MutexGuard<'static, BTreeSet<PathBuf>>> {
     // A file system that hangs while creating a file must not prevent the process from ending.
     for _ in 0..100 {
         let paths = match LIVE.try_lock() {

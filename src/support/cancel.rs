@@ -34,7 +34,7 @@ impl Cancel {
     ///
     /// # Errors
     /// [`Error::Interrupted`].
-    pub(crate) fn check(&self) -> Result<()> {
+    pub fn check(&self) -> Result<()> {
         if self.0.requested.load(Ordering::SeqCst) {
             return Err(Error::Interrupted { done: "the data were not read to the end".to_owned(), is_kept: false });
         }

@@ -12,7 +12,7 @@ use crate::support::plain_text::{MAX_PATH, cut, cut_names, shown_in_line};
 pub type Result<T> = std::result::Result<T, Error>;
 
 /// Adds an error to a list shown to users, unless the list already has it.
-pub(crate) fn push_once(list: &mut Vec<Error>, error: Error) {
+pub fn push_once(list: &mut Vec<Error>, error: Error) {
     if !list.iter().any(|known| known.to_string() == error.to_string()) {
         list.push(error);
     }
@@ -106,7 +106,6 @@ impl fmt::Display for Place {
 
 /// Errors, grouped by who must act.
 #[derive(Debug, thiserror::Error)]
-#[non_exhaustive]
 pub enum Error {
     /// Invalid data: missing file or column, a bad number, a wrong order.
     #[error("{place}: {problem}")]

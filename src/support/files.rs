@@ -80,7 +80,7 @@ pub fn write_atomically_with(path: &Path, produce: impl FnOnce(&mut dyn Write) -
 ///
 /// # Errors
 /// [`Error::Input`] for a link; [`Error::Io`].
-pub(crate) fn write_inside(path: &Path, produce: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
+pub fn write_inside(path: &Path, produce: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
     let mut file = AtomicFile::create_inside(path)?;
     produce(&mut file).map_err(|e| Error::io(path, "write", e))?;
     file.stage()?.publish()

@@ -15,17 +15,17 @@ use crate::{Error, Place, Result};
 
 /// Maximum size of a settings file (configurations, profiles, exposures), bytes; those that the program writes have a
 /// few kilobytes.
-pub(crate) const MAX_SETTINGS_BYTES: u64 = 1 << 20;
+pub const MAX_SETTINGS_BYTES: u64 = 1 << 20;
 /// Maximum size of an XML file, bytes; an OpenSCENARIO file has a few kilobytes, plus some per second of a trajectory.
-pub(crate) const MAX_XML_BYTES: u64 = 4 << 20;
+pub const MAX_XML_BYTES: u64 = 4 << 20;
 /// Maximum size of a table that is held in memory, bytes: a few million rows.
-pub(crate) const MAX_TABLE_BYTES: u64 = 256 << 20;
+pub const MAX_TABLE_BYTES: u64 = 256 << 20;
 
 /// Opens a regular file, or a link to one.
 ///
 /// # Errors
 /// [`Error::Io`] if it cannot be opened; [`Error::Input`] for a folder, a pipe, a device or a socket.
-pub(crate) fn open(path: &Path) -> Result<File> {
+pub fn open(path: &Path) -> Result<File> {
     let io = |e| Error::io(path, "read", e);
     // Check before opening, because opening a pipe blocks until it has a writer.
     let kind = std::fs::metadata(path).map_err(io)?.file_type();
@@ -47,7 +47,7 @@ pub(crate) fn open(path: &Path) -> Result<File> {
 ///
 /// # Errors
 /// As [`open`]; [`Error::Input`] for a larger file.
-pub(crate) fn read(path: &Path, largest: u64) -> Result<Vec<u8>> {
+pub fn read(path: &Path, largest: u64) -> Result<Vec<u8>> {
     let file = open(path)?;
     let mut content = Vec::new();
     // The reported size may be wrong or change, so the bytes read are limited.
@@ -67,7 +67,7 @@ pub(crate) fn read(path: &Path, largest: u64) -> Result<Vec<u8>> {
 ///
 /// # Errors
 /// As [`read`]; [`Error::Input`] with `help` for anything but `{…}`.
-pub(crate) fn read_json(path: &Path, largest: u64, kind: &str, help: &str) -> Result<Vec<u8>> {
+pub fn read_json(path: &Path, largest: u64, kind: &str, help: &str) -> Result<Vec<u8>> {
     let (begin, end) = ends(&mut open(path)?).map_err(|e| Error::io(path, "read", e))?;
     if begin.trim_ascii_start().first() != Some(&b'{') || end.trim_ascii_end().last() != Some(&b'}') {
         let problem = format!("not {kind}: it does not begin with {{ and end with }}");
@@ -77,7 +77,7 @@ pub(crate) fn read_json(path: &Path, largest: u64, kind: &str, help: &str) -> Re
 }
 
 /// The first and last bytes of a file, at most 256 each; afterwards the file is at its beginning.
-pub(crate) fn ends(file: &mut File) -> std::io::Result<(Vec<u8>, Vec<u8>)> {
+pub fn ends(file: &mut File) -> std::io::Result<(Vec<u8>, Vec<u8>)> {
     const BYTES: u64 = 256;
     let length = file.seek(SeekFrom::End(0))?;
     let piece = |file: &mut File, at: u64| {
@@ -95,7 +95,7 @@ pub(crate) fn ends(file: &mut File) -> std::io::Result<(Vec<u8>, Vec<u8>)> {
 ///
 /// # Errors
 /// As [`read`]; [`Error::Input`] for text that is not UTF-8.
-pub(crate) fn read_text(path: &Path, largest: u64) -> Result<String> {
+pub fn read_text(path: &Path, largest: u64) -> Result<String> {
     String::from_utf8(read(path, largest)?).map_err(|e| {
         let at = e.utf8_error().valid_up_to();
         let row = 1 + e.as_bytes()[..at].iter().filter(|&&b| b == b'\n').count() as u64;
@@ -107,7 +107,7 @@ pub(crate) fn read_text(path: &Path, largest: u64) -> Result<String> {
 ///
 /// # Errors
 /// As [`open`].
-pub(crate) fn sha256(path: &Path) -> Result<String> {
+pub fn sha256(path: &Path) -> Result<String> {
     let mut file = open(path)?;
     let mut hash = Sha256::new();
     let mut piece = vec![0; 1 << 16];
@@ -125,7 +125,7 @@ pub(crate) fn sha256(path: &Path) -> Result<String> {
 ///
 /// # Errors
 /// [`Error::Usage`] with the line, for invalid TOML, an unknown key or a value of another type.
-pub(crate) fn parse_toml<T: DeserializeOwned>(text: &str, place: &Place, help: &str) -> Result<T> {
+pub fn parse_toml<T: DeserializeOwned>(text: &str, place: &Place, help: &str) -> Result<T> {
     toml::from_str(text).map_err(|e| {
         let mut place = place.clone();
         if let Some(span) = e.span() {
@@ -173,7 +173,7 @@ fn meant(message: &str) -> Option<&str> {
 ///
 /// # Errors
 /// As [`parse_toml`]; [`Error::Io`]; [`Error::Input`] if it is not a text file or is too large.
-pub(crate) fn read_toml<T: DeserializeOwned>(path: &Path, help: &str) -> Result<T> {
+pub fn read_toml<T: DeserializeOwned>(path: &Path, help: &str) -> Result<T> {
     parse_toml(&read_text(path, MAX_SETTINGS_BYTES)?, &Place::file(path), help)
 }
 

@@ -13,7 +13,7 @@ const MAX_LOCK_BYTES: u64 = 32;
 
 /// Exclusive or shared right to write what a lock file protects; dropping it removes the file and releases the lock.
 #[derive(Debug)]
-pub(crate) struct FolderLock {
+pub struct FolderLock {
     path: PathBuf,
     /// Holds the lock while it is open.
     file: File,
@@ -25,7 +25,7 @@ impl FolderLock {
     /// # Errors
     /// [`Error::Busy`] if another process holds it, with its process id if readable; [`Error::Io`] if the file cannot
     /// be created or the file system has no locks.
-    pub(crate) fn acquire(path: &Path) -> Result<FolderLock> {
+    pub fn acquire(path: &Path) -> Result<FolderLock> {
         FolderLock::take(path, File::try_lock, true)
     }
 
@@ -33,7 +33,7 @@ impl FolderLock {
     ///
     /// # Errors
     /// As [`FolderLock::acquire`].
-    pub(crate) fn share(path: &Path) -> Result<FolderLock> {
+    pub fn share(path: &Path) -> Result<FolderLock> {
         FolderLock::take(path, File::try_lock_shared, false)
     }
 

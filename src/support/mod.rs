@@ -3,17 +3,17 @@
 //! This module holds the error type, atomic files, run directories and their locks, tables in three formats, ranges of
 //! settings, and plausibility of input. All other modules may use it; it uses none of them.
 
-pub(crate) mod atomic_file;
+pub mod atomic_file;
 pub mod cancel;
 pub mod error;
-mod file_list;
+pub mod file_list;
 pub mod files;
-pub(crate) mod input_file;
-pub(crate) mod lock;
-pub(crate) mod plain_text;
+pub mod input_file;
+pub mod lock;
+pub mod plain_text;
 pub mod plausibility;
 pub mod ranges;
-pub(crate) mod readable;
+pub mod readable;
 pub mod run_dir;
 pub mod table;
-pub(crate) mod vector_state;
+pub mod vector_state;

@@ -7,20 +7,20 @@ use sha2::{Digest, Sha256};
 
 /// Whether a terminal or a browser acts on the character instead of showing it: control characters (C0, DEL, C1), marks
 /// of the reading direction, line separators, and zero-width characters.
-pub(crate) fn acts(c: char) -> bool {
+pub fn acts(c: char) -> bool {
     c.is_control()
         || matches!(c, '\u{61c}' | '\u{200b}'..='\u{200f}' | '\u{2028}'..='\u{202e}' | '\u{2060}'..='\u{2069}' | '\u{feff}')
 }
 
 /// Maximum characters of a name in a message: an id, a key, a value.
-pub(crate) const MAX_NAME: usize = 80;
+pub const MAX_NAME: usize = 80;
 /// Maximum characters of a word in a message that may be a path; the limit of systems.
-pub(crate) const MAX_PATH: usize = 4096;
+pub const MAX_PATH: usize = 4096;
 /// Maximum characters of a message.
 const MAX_MESSAGE: usize = 16_384;
 
 /// Shortens a name to [`MAX_NAME`] characters by keeping its beginning and end.
-pub(crate) fn cut(name: &str) -> Cow<'_, str> {
+pub fn cut(name: &str) -> Cow<'_, str> {
     cut_to(name, MAX_NAME)
 }
 
@@ -37,7 +37,7 @@ fn cut_to(text: &str, max_chars: usize) -> Cow<'_, str> {
 }
 
 /// Limits a message: quoted text, and every word that is not a path, is shortened like a name.
-pub(crate) fn cut_names(message: &str) -> String {
+pub fn cut_names(message: &str) -> String {
     let mut out = String::with_capacity(message.len().min(MAX_MESSAGE));
     let mut rest = message;
     while let Some(at) = rest.find(['`', '"']) {
@@ -72,7 +72,7 @@ fn escaped(text: &str, stays: &[char]) -> String {
 }
 
 /// Escapes a text of several lines: line breaks stay, all other acting characters become `\u{1b}`.
-pub(crate) fn shown(text: &str) -> Cow<'_, str> {
+pub fn shown(text: &str) -> Cow<'_, str> {
     let stays = ['\n', '\t'];
     match text.chars().any(|c| acts(c) && !stays.contains(&c)) {
         true => Cow::Owned(escaped(text, &stays)),
@@ -81,13 +81,13 @@ pub(crate) fn shown(text: &str) -> Cow<'_, str> {
 }
 
 /// Escapes a name within a line, line breaks included.
-pub(crate) fn shown_in_line(text: &str) -> String {
+pub fn shown_in_line(text: &str) -> String {
     escaped(text, &[])
 }
 
 /// Escapes a JSON document: acting characters become `\u001b`, which reads back unchanged. Line breaks between tokens
 /// stay; those in texts are already escapes.
-pub(crate) fn shown_json(json: &str) -> Cow<'_, str> {
+pub fn shown_json(json: &str) -> Cow<'_, str> {
     if !json.chars().any(|c| acts(c) && c != '\n') {
         return Cow::Borrowed(json);
     }
@@ -103,7 +103,7 @@ pub(crate) fn shown_json(json: &str) -> Cow<'_, str> {
 
 /// The most similar name, if its similarity (0 to 1) is above `min_likeness`. Case and separators are ignored. A text
 /// longer than any name resembles none.
-pub(crate) fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>, min_likeness: f64) -> Option<&'a str> {
+pub fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>, min_likeness: f64) -> Option<&'a str> {
     if wrong.len() > 4 * MAX_NAME {
         return None;
     }
@@ -115,12 +115,12 @@ pub(crate) fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>,
 }
 
 /// Bytes as lower-case hexadecimal digits.
-pub(crate) fn hex(bytes: &[u8]) -> String {
+pub fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|byte| format!("{byte:02x}")).collect()
 }
 
 /// SHA-256 of some bytes, as [`hex`].
-pub(crate) fn sha256(bytes: impl AsRef<[u8]>) -> String {
+pub fn sha256(bytes: impl AsRef<[u8]>) -> String {
     hex(&Sha256::digest(bytes))
 }
 

@@ -100,7 +100,7 @@ fn check_value(name: &str, value: &Value, schema: &Value) -> Result<()> {
 
 /// The first value that repeats an earlier one, in words. The list has pairs of a value and its text: `0.60` repeats
 /// `0.6`.
-pub(crate) fn repeated<K: Eq + Hash, S: Display>(list: impl IntoIterator<Item = (K, S)>) -> Option<String> {
+pub fn repeated<K: Eq + Hash, S: Display>(list: impl IntoIterator<Item = (K, S)>) -> Option<String> {
     let mut known: HashMap<K, S> = HashMap::new();
     for (meaning, written) in list {
         if let Some(before) = known.get(&meaning) {
@@ -119,7 +119,7 @@ pub(crate) fn repeated<K: Eq + Hash, S: Display>(list: impl IntoIterator<Item = 
 ///
 /// # Errors
 /// [`Error::Usage`] at `place`, with the text of [`repeated`].
-pub(crate) fn refuse_repeats<K: Eq + Hash, S: Display>(
+pub fn refuse_repeats<K: Eq + Hash, S: Display>(
     place: impl FnOnce() -> Place,
     list: impl IntoIterator<Item = (K, S)>,
 ) -> Result<()> {
@@ -128,4 +128,4 @@ pub(crate) fn refuse_repeats<K: Eq + Hash, S: Display>(
 }
 
 /// Help for a repeated value.
-pub(crate) const GIVE_ONCE: &str = "give every value once";
+pub const GIVE_ONCE: &str = "give every value once";

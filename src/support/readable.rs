@@ -5,27 +5,27 @@
 const DIGITS: usize = 4;
 
 /// Formats a count: `1,234,567`.
-pub(crate) fn count(count: impl Into<u64>) -> String {
+pub fn count(count: impl Into<u64>) -> String {
     grouped(&count.into().to_string())
 }
 
 /// Like [`count`], for a length in memory.
-pub(crate) fn count_of(length: usize) -> String {
+pub fn count_of(length: usize) -> String {
     grouped(&length.to_string())
 }
 
 /// Like [`count`], for a signed number.
-pub(crate) fn whole(number: i64) -> String {
+pub fn whole(number: i64) -> String {
     grouped(&number.to_string())
 }
 
 /// Formats a count with its noun: `1 scenario`, `2 scenarios`.
-pub(crate) fn counted(length: usize, noun: &str) -> String {
+pub fn counted(length: usize, noun: &str) -> String {
     format!("{} {noun}{}", count_of(length), if length == 1 { "" } else { "s" })
 }
 
 /// Formats a quantity with at most four significant digits and no trailing zeros: `0.45`, `36`, `1,235`, `3.2e-9`, `∞`.
-pub(crate) fn value(value: f64) -> String {
+pub fn value(value: f64) -> String {
     let text = significant(value, DIGITS);
     let (digits, power) = text.split_at(text.find('e').unwrap_or(text.len()));
     match digits.contains('.') {
@@ -36,7 +36,7 @@ pub(crate) fn value(value: f64) -> String {
 
 /// Formats a number with a fixed number of significant digits, so that columns align: `0.450`, `36.0`. Below 0.001 and
 /// from 10⁹ it uses powers of ten.
-pub(crate) fn significant(value: f64, digits: usize) -> String {
+pub fn significant(value: f64, digits: usize) -> String {
     if value.is_nan() {
         return "–".to_owned();
     }
@@ -70,10 +70,10 @@ fn grouped(number: &str) -> String {
 }
 
 /// 1, 2 or 5 times a power of ten, as digit and exponent.
-pub(crate) type OneTwoFive = (u8, i32);
+pub type OneTwoFive = (u8, i32);
 
 /// The largest 1, 2 or 5 times a power of ten that is at most `value` (positive, finite).
-pub(crate) fn one_two_five(value: f64) -> OneTwoFive {
+pub fn one_two_five(value: f64) -> OneTwoFive {
     // The shortest decimal text gives digit and exponent without rounding.
     let written = format!("{value:e}");
     let (mantissa, exponent) = written.split_once('e').unwrap_or((&written, "0"));
@@ -89,7 +89,7 @@ pub(crate) fn one_two_five(value: f64) -> OneTwoFive {
 }
 
 /// The neighbour above (`way` = 1) or below (-1).
-pub(crate) fn next((digit, exponent): OneTwoFive, way: i32) -> OneTwoFive {
+pub fn next((digit, exponent): OneTwoFive, way: i32) -> OneTwoFive {
     match (digit, way > 0) {
         (1, true) => (2, exponent),
         (2, true) => (5, exponent),
@@ -101,7 +101,7 @@ pub(crate) fn next((digit, exponent): OneTwoFive, way: i32) -> OneTwoFive {
 }
 
 /// The smallest 1, 2 or 5 times a power of ten that is at least `step` (positive).
-pub(crate) fn plain_step(step: f64) -> f64 {
+pub fn plain_step(step: f64) -> f64 {
     let step = step.max(f64::MIN_POSITIVE);
     let (digit, exponent) = one_two_five(step);
     let value = |(digit, exponent): OneTwoFive| format!("{digit}e{exponent}").parse().unwrap_or(step);

@@ -216,7 +216,7 @@ impl Results<'_> {
     }
 
     /// Adds a complete file that a user named, in this folder or elsewhere.
-    pub(crate) fn join(&mut self, file: StagedFile) {
+    pub fn join(&mut self, file: StagedFile) {
         let folder_of = |path: &Path| match path.parent() {
             Some(folder) if !folder.as_os_str().is_empty() => folder.canonicalize().ok(),
             _ => Path::new(".").canonicalize().ok(),

@@ -8,7 +8,7 @@
 #![allow(unsafe_code)]
 
 /// Clears the upper halves, on CPUs that have them.
-pub(crate) fn clear_upper_halves() {
+pub fn clear_upper_halves() {
     #[cfg(target_arch = "x86_64")]
     if is_x86_feature_detected!("avx") {
         #[target_feature(enable = "avx")]
@@ -21,12 +21,12 @@ pub(crate) fn clear_upper_halves() {
 }
 
 #[cfg(all(test, target_arch = "x86_64"))]
-pub(crate) mod tests {
+pub mod tests {
     use std::arch::x86_64::{__cpuid_count, _xgetbv};
 
     /// Whether upper halves of the 256-bit registers are in use. `None` if the CPU does not report it, or always
     /// reports true.
-    pub(crate) fn upper_halves_in_use() -> Option<bool> {
+    pub fn upper_halves_in_use() -> Option<bool> {
         let in_use = what_the_machine_says()?;
         super::clear_upper_halves();
         (what_the_machine_says() == Some(false)).then_some(in_use)

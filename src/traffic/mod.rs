@@ -8,4 +8,4 @@ pub mod mining;
 mod provenance;
 pub mod trajectory;
 
-pub use provenance::{DataProvenance, Driven, Source};
+pub use provenance::Source;

@@ -149,7 +149,7 @@ fn the_generator_has_the_records_the_numbers_and_the_arithmetic_of_its_rust_twin
         ("MAX_PARAMETERS", MAX_PARAMETERS as u32),
         ("MAX_BOUNDS", MAX_BOUNDS as u32),
         ("ATTEMPTS", ATTEMPTS),
-        ("PIECES", lanesweep::stats::density::PIECES as u32),
+        ("PIECES", lanesweep::stats::random::PIECES as u32),
         ("NO_SLOT", NO_SLOT),
         ("TARGET_SPEED", Variable::TargetSpeed as u32),
         ("LATERAL_SPEED", Variable::LateralSpeed as u32),

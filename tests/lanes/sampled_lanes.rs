@@ -15,13 +15,13 @@ use lanesweep::run::sampling::{
     plan_samples,
 };
 use lanesweep::run::study::{StudyOptions, plan_study};
+use lanesweep::scenario::DataProvenance;
 use lanesweep::scenario::parameterization::{
     Feature, FunctionKind, LinearFamily, LinearSpec, Parameterization, ParameterizationOptions, Signal,
 };
 use lanesweep::scenario::{Category, Scenario, Tables};
 use lanesweep::stats::density::{DensityKind, DensityModel, FitOptions, Mixture};
 use lanesweep::stats::random::Stream;
-use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 

@@ -9,11 +9,11 @@ use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::Shard;
 use lanesweep::run::sampling::{EstimateRow, Estimator, Sample, SampleHeadways, SampleOptions};
+use lanesweep::scenario::DataProvenance;
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{DensityModel, FitOptions};
 use lanesweep::stats::estimate::{Search, Verdict, Warning};
-use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 

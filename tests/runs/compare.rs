@@ -15,9 +15,9 @@ use lanesweep::run::sampling::{
 };
 use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::Category;
+use lanesweep::scenario::DataProvenance;
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::stats::density::{DensityModel, FitOptions, Kde};
-use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 

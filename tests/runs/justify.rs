@@ -10,10 +10,10 @@ use lanesweep::run::justify::{Conclusion, Dossier, JustifyOptions, Rules, justif
 use lanesweep::run::score::ScoreOptions;
 use lanesweep::run::study::{Study, StudyOptions};
 use lanesweep::scenario::Category;
+use lanesweep::scenario::DataProvenance;
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::stats::density::{DensityModel, FitOptions};
 use lanesweep::stats::estimate::{Clusters, Enough, RatioMethod, RatioVerdict, paired_ratio};
-use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{Collection, MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 

@@ -12,10 +12,10 @@ use lanesweep::run::close_following::{CloseFollowing, close_units};
 use lanesweep::run::parts::Shard;
 use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, SampleTally, plan_samples};
 use lanesweep::run::study::{Study, StudyOptions, plan_study};
+use lanesweep::scenario::DataProvenance;
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{DensityModel, FitOptions};
-use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{Collection, MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 

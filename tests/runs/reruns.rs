@@ -12,10 +12,10 @@ use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::read_sealed_line;
 use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, plan_samples};
 use lanesweep::run::study::{StudyHead, StudyOptions, plan_study};
+use lanesweep::scenario::DataProvenance;
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{DensityModel, FitOptions};
-use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 

@@ -14,10 +14,10 @@ use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{
     Estimator, MapAxes, SampleHeadways, SampleOptions, SampleSource, SampleTally, plan_samples, sample_crude,
 };
+use lanesweep::scenario::DataProvenance;
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{DensityModel, FitOptions, Kde, read_density, write_density};
-use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 

@@ -8,11 +8,11 @@ use crate::common::tables::run;
 use std::collections::BTreeMap;
 use std::path::Path;
 
+use lanesweep::scenario::DataProvenance;
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Ego, Other, Scenario, Side, read_scenarios, write_scenarios, write_scenarios_to};
 use lanesweep::stats::density::{DensityModel, FitOptions, write_density};
 use lanesweep::support::plausibility::LIMITS;
-use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 use made::{Read, read};

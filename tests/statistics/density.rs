@@ -11,6 +11,7 @@ use lanesweep::scenario::parameterization::{
     SpeedProfile, SvdLateral, Variable, fit_svd,
 };
 use lanesweep::scenario::{Case, Category, Lateral, Scenario, Side, Speed};
+use lanesweep::scenario::{DataProvenance, Driven};
 use lanesweep::stats::density::{
     Bandwidth, BandwidthRule, DensityKind, DensityModel, FitOptions, Kde, LeaveOneOut, ParameterSpace, SearchEnd,
     ValidFraction, metric, normal_cdf, read_density, wasserstein, write_density,
@@ -18,7 +19,6 @@ use lanesweep::stats::density::{
 use lanesweep::stats::random::Stream;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
-use lanesweep::traffic::{DataProvenance, Driven};
 use rayon::prelude::*;
 use serde_json::Value;
 

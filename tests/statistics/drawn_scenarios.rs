@@ -4,12 +4,12 @@ use std::sync::OnceLock;
 
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{SampleSource, generator_of};
+use lanesweep::scenario::DataProvenance;
 use lanesweep::scenario::parameterization::{
     Parameterization, ParameterizationOptions, ReducedScenario, Reduction, SeriesScale, SvdBasis, SvdLateral, fit_svd,
 };
 use lanesweep::scenario::{Category, Scenario, Side};
 use lanesweep::stats::density::{DensityModel, FitOptions};
-use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 

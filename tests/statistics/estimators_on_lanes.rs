@@ -14,11 +14,11 @@ use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{
     Estimator, LaneLimitState, Question, SampleHeadways, SampleOptions, plan_samples, sample_crude, truncated,
 };
+use lanesweep::scenario::DataProvenance;
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::stats::density::{DensityModel, FitOptions};
 use lanesweep::stats::estimate::{Estimate, Goal, Search, Verdict, adaptive, wilson};
-use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine_folder, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 

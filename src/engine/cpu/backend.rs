@@ -35,7 +35,7 @@ const CHUNK_STEPS_OF_SINGLE_LANES: u64 = 1 << 25;
 const CHUNK_LANES: u64 = 1 << 17;
 
 /// Number of lanes with this many steps that all threads together compute in batches within seconds; at least one.
-pub(crate) fn lanes_within_seconds(step_cap: u32) -> u64 {
+pub fn lanes_within_seconds(step_cap: u32) -> u64 {
     lanes_of_steps(CHUNK_STEPS, step_cap)
 }
 

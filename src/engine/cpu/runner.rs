@@ -97,7 +97,7 @@ impl<'p, R: Real> LaneRunner<'p, R> {
     }
 
     /// A case and the tables that it references.
-    pub(crate) fn case(&self, block: usize, unit: u64, variant: usize) -> (LaneCase<R>, Cow<'_, Tables<R>>) {
+    pub fn case(&self, block: usize, unit: u64, variant: usize) -> (LaneCase<R>, Cow<'_, Tables<R>>) {
         if self.has_tables && self.plan.generator().is_none() {
             return (self.plan.case(block, unit, variant).cast(), Cow::Borrowed(&self.tables));
         }

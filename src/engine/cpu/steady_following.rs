@@ -57,8 +57,8 @@ mod tests {
     use crate::model::driver::{DriverProfile, DriverState};
     use crate::model::profile::Profile;
     use crate::model::scalar::Flag;
+    use crate::random::{philox4x32_10, unit_uniform};
     use crate::scenario::Category;
-    use crate::stats::random::{philox4x32_10, unit_uniform};
 
     /// A lane behind a vehicle that keeps its speed, at some step of its run: the ego brakes or has braked.
     fn lane(number: u32) -> (LaneConstants<f32>, LaneState<f32>, OtherState<f32>) {

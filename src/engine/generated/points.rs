@@ -1,8 +1,7 @@
 //! Sample index → point: a Gaussian mixture drawn with counter-based random words or with scrambled Sobol points and
 //! then transformed parameter by parameter, or a table of given points. Twin: `shaders/shared/points.wgsl`.
 
-use crate::stats::density::{KNOT_LIMIT, PIECES};
-use crate::stats::random::{AliasTable, SOBOL_POINTS, Sobol, Stream, choose, standard_normal};
+use crate::random::{AliasTable, KNOT_LIMIT, PIECES, SOBOL_POINTS, Sobol, Stream, choose, standard_normal};
 
 /// Maximum number of parameters of a point.
 pub const MAX_PARAMETERS: usize = 14;
@@ -56,7 +55,7 @@ pub struct Points {
     pub factor_of: Vec<u32>,
     /// Factors: `dimensions`² each, row by row, zeros above the diagonal.
     pub factors: Vec<f32>,
-    /// Value at each knot of a [transformation](crate::stats::density::Transformation), `PIECES` + 1 per parameter; empty
+    /// Value at each knot of a transformation, `PIECES` + 1 per parameter; empty
     /// if draws of the mixture are points.
     pub knots: Vec<f32>,
 }

@@ -6,7 +6,7 @@ use super::shader::WORKGROUP;
 use crate::Result;
 use crate::engine::LaneCase;
 use crate::engine::generated::{Generator, PointSource, Recipe};
-use crate::stats::random::normal_table;
+use crate::random::normal_table;
 
 /// The tables of a session.
 pub(super) struct Inputs {

@@ -18,10 +18,6 @@ const _: () = assert!(size_of::<LaneOther<f32>>() == 64 + 4 * (7 + MODELS));
 const _: () = assert!(size_of::<LaneCase<f32>>() == 2 * size_of::<LaneOther<f32>>() + 20);
 
 // SAFETY: `repr(C)`, fields of u32 and f32 only, no padding (asserted above), every bit pattern valid.
-unsafe impl Zeroable for Motion<f32> {}
-// SAFETY: as above.
-unsafe impl Pod for Motion<f32> {}
-// SAFETY: as above.
 unsafe impl Zeroable for LaneOther<f32> {}
 // SAFETY: as above.
 unsafe impl Pod for LaneOther<f32> {}

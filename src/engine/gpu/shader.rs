@@ -24,9 +24,9 @@ pub const SHARED: [(&str, &str); 11] = [
 ];
 
 /// Fragments of sampling, twins of `src/stats/random`, for a kernel that declares their tables: `normal_table:
-/// array<vec4<f32>>` ([`normal_table`](crate::stats::random::normal_table)), `sobol_table: array<u32>`
-/// ([`Sobol::table`](crate::stats::random::Sobol::table)) and `alias_table: array<vec2<u32>>`
-/// ([`AliasTable::table`](crate::stats::random::AliasTable::table)).
+/// array<vec4<f32>>` ([`normal_table`](crate::random::normal_table)), `sobol_table: array<u32>`
+/// ([`Sobol::table`](crate::random::Sobol::table)) and `alias_table: array<vec2<u32>>`
+/// ([`AliasTable::table`](crate::random::AliasTable::table)).
 pub const RANDOM: [(&str, &str); 4] = [
     ("shared/philox.wgsl", include_str!("../../../shaders/shared/philox.wgsl")),
     ("shared/uniform.wgsl", include_str!("../../../shaders/shared/uniform.wgsl")),
@@ -65,7 +65,7 @@ macro_rules! declare_shaders {
         }
     };
 }
-for_every_driver_model!(declare_shaders);
+crate::for_every_driver_model!(declare_shaders);
 
 /// Default of models whose shader does not define this function, as in its trait.
 const NO_LATCH: &str = "fn keeps_braking(state: DriverState, view: View) -> bool { return false; }\n";

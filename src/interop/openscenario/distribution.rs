@@ -203,8 +203,8 @@ fn steps(all_steps: impl Iterator<Item = (Range, f64)>, within: Range, all: f64)
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::random::Stream;
     use crate::stats::density::Draws;
-    use crate::stats::random::Stream;
     use statrs::distribution::{ContinuousCDF, Discrete, Normal, Poisson};
 
     const N: u64 = 100_000;

@@ -10,10 +10,10 @@ use super::parameters::Names;
 use crate::engine::{Block, CaseSource, Headway, LaneCase, LanePlan, Units};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
+use crate::random::Stream;
 use crate::run::grid::{MapParameter, MapQuantity, Point, check_complete};
 use crate::scenario::{Case, Category, Tables};
 use crate::stats::density::Draws;
-use crate::stats::random::Stream;
 use crate::{Error, Place, Result};
 
 /// Purpose of this random stream.

@@ -132,7 +132,7 @@ impl<R: Real> BrakeThreat<R> {
     /// The same constants with `form` as a compile-time constant, so that the compiler removes the code of the other
     /// forms.
     #[inline(always)]
-    pub(crate) fn known_as(self, form: BtnForm) -> Self {
+    pub fn known_as(self, form: BtnForm) -> Self {
         BrakeThreat { form, ..self }
     }
 

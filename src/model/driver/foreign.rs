@@ -128,7 +128,7 @@ impl ModelId {
     ///
     /// # Errors
     /// [`Error::Usage`] that names the driver and `what` cannot run it.
-    pub(crate) fn refuse_foreign(models: &[ModelId], what: &str) -> Result<()> {
+    pub fn refuse_foreign(models: &[ModelId], what: &str) -> Result<()> {
         match models.iter().find(|model| model.foreign().is_some()) {
             None => Ok(()),
             Some(model) => {

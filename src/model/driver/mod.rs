@@ -257,7 +257,7 @@ mod tests {
     use super::*;
     use crate::model::case::Category;
     use crate::model::profile::Profile;
-    use crate::stats::random::{philox4x32_10, unit_uniform};
+    use crate::random::{philox4x32_10, unit_uniform};
 
     #[test]
     fn delays_are_whole_steps_rounded_up_without_the_error_of_the_quotient() {

@@ -6,6 +6,7 @@
 /// Attributes before a line apply only to the model's field in [`Profile`](crate::model::profile::Profile). With
 /// `#[serde(default)]` a profile may omit the model's table if the constants have defaults. The models below have none,
 /// so that a profile must give all their constants.
+#[macro_export]
 macro_rules! for_every_driver_model {
     ($callback:ident) => {
         $callback! {

@@ -8,22 +8,26 @@ use crate::report::records::{self, PROGRAM};
 use crate::run::reopen::{TracedLane, TracedLanes};
 use crate::support::readable::value;
 
-impl TracedLanes {
+/// Lanes step by step, as figure, table, document and text.
+pub struct TraceReport<'a>(pub &'a TracedLanes);
+
+impl TraceReport<'_> {
     /// The lanes on one sheet, up to a time, s, or 2 s after the last change.
     pub fn figure(&self, until_s: Option<f64>) -> TraceFigure<'_> {
-        let first = &self.lanes[0];
+        let first = &self.0.lanes[0];
         let category = first.trace.category.label();
-        let title = match self.lanes.len() {
+        let title = match self.0.lanes.len() {
             1 => format!("{category}: {}", first.key),
             _ => match first.key.rsplitn(4, '/').collect::<Vec<_>>()[..] {
                 [_, headway, _, scenario] => format!("{category}: {scenario}, headway {headway}"),
                 _ => format!("{category}, initial gap {} m", value(first.trace.initial_gap_m)),
             },
         };
-        let synthetic = if self.is_synthetic && !self.origin.contains("SYNTHETIC") { "SYNTHETIC DATA; " } else { "" };
+        let synthetic =
+            if self.0.is_synthetic && !self.0.origin.contains("SYNTHETIC") { "SYNTHETIC DATA; " } else { "" };
         let series =
-            self.lanes.iter().map(|lane| TraceSeries { name: lane.name.clone(), trace: &lane.trace }).collect();
-        let subtitle = Some(format!("{synthetic}{}", self.origin));
+            self.0.lanes.iter().map(|lane| TraceSeries { name: lane.name.clone(), trace: &lane.trace }).collect();
+        let subtitle = Some(format!("{synthetic}{}", self.0.origin));
         TraceFigure { title, subtitle, series, until_s, panels: TracePanels::All }
     }
 
@@ -37,7 +41,7 @@ impl TracedLanes {
     /// # Errors
     /// None for a document of this program.
     pub fn json(&self) -> Result<String> {
-        let outcomes = self.lanes.iter().map(|lane| {
+        let outcomes = self.0.lanes.iter().map(|lane| {
             let reference = lane.reference.as_ref().map(|reference| records::outcome(reference, lane.trace.dt_s));
             serde_json::json!({
                 "lane": lane.key,
@@ -50,8 +54,8 @@ impl TracedLanes {
         });
         records::document(&serde_json::json!({
             "program": PROGRAM,
-            "data": self.origin,
-            "synthetic": self.is_synthetic,
+            "data": self.0.origin,
+            "synthetic": self.0.is_synthetic,
             "lanes": outcomes.collect::<Vec<_>>(),
             "steps": table(&self.named()).records(),
         }))
@@ -59,11 +63,11 @@ impl TracedLanes {
 
     /// How the lanes ended, in words.
     pub fn text(&self) -> String {
-        self.lanes.iter().map(|lane| summary(lane, self.lanes.len() > 1)).collect()
+        self.0.lanes.iter().map(|lane| summary(lane, self.0.lanes.len() > 1)).collect()
     }
 
     fn named(&self) -> Vec<(String, &Trace)> {
-        self.lanes.iter().map(|lane| (lane.key.clone(), &lane.trace)).collect()
+        self.0.lanes.iter().map(|lane| (lane.key.clone(), &lane.trace)).collect()
     }
 }
 

@@ -11,6 +11,7 @@ use super::plot::number;
 use super::plot::{Anchor, Canvas, Ends, Figure, INK, Look, Plot, TICK, Type, set};
 use crate::engine::{StepMark, Trace, TracedStep};
 use crate::support::table::Table;
+pub use lanes::TraceReport;
 use panels::{Shown, mark_look};
 pub use panels::{TracePanels, TraceSeries};
 

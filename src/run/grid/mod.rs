@@ -356,7 +356,7 @@ fn checked(rows: Vec<Vec<f64>>, axes: &[GridAxis]) -> Result<Vec<Vec<f64>>> {
 ///
 /// # Errors
 /// [`Error::Usage`] with the quantity that is missing or duplicate.
-pub(crate) fn check_complete(
+pub fn check_complete(
     category: Category,
     native_gap: bool,
     has: &dyn Fn(MapQuantity) -> bool,

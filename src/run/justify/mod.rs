@@ -19,11 +19,11 @@ use crate::run::close_following::{CloseFollowing, close_units};
 use crate::run::compare::CompareOptions;
 use crate::run::sampling::ComparedCell;
 use crate::run::score::ScoreOptions;
+use crate::scenario::DataProvenance;
 use crate::scenario::Scenario;
 use crate::scenario::parameterization::Parameterization;
 use crate::stats::density::{DensityKind, Fitted};
 use crate::support::ranges;
-use crate::traffic::DataProvenance;
 use crate::{Error, Place, Result};
 
 /// Profile whose recall is reported in addition to that of the selected profile: a reading of UN R157.

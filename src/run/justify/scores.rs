@@ -6,10 +6,10 @@ use crate::engine::{Confusion, Executor, LanePlan, Partial, SweepSummary, Verdic
 use crate::model::profile::Profile;
 use crate::run::compare::Compare;
 use crate::run::score::{CROSS_VALIDATED, ScoreOptions, f1, f1_interval, precision, recall};
+use crate::scenario::DataProvenance;
 use crate::scenario::Scenario;
 use crate::scenario::parameterization::Parameterization;
 use crate::stats::estimate::{Clusters, cluster_rate};
-use crate::traffic::DataProvenance;
 use crate::{Error, Place, Result};
 
 /// A fraction with its interval. The value is `None` for 0/0; the interval is `None` with too few failing scenarios.

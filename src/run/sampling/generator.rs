@@ -9,10 +9,10 @@ use crate::engine::generated::{
 };
 use crate::model::profile::{CutOutEvaluated, CutOutTarget, Profile};
 use crate::model::scalar::Real;
+use crate::random::{AliasTable, Sobol, Stream};
 use crate::scenario::Category;
 use crate::scenario::parameterization::{AfterDuration, ReducedSeries, Sizes, Variable};
 use crate::stats::density::{Mixture, ParameterSpace};
-use crate::stats::random::{AliasTable, Sobol, Stream};
 use crate::{Error, Place, Result};
 
 /// Purpose of the random stream of the samples.

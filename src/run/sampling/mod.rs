@@ -66,7 +66,7 @@ use crate::{Error, Result};
 /// # use lanesweep::scenario::Category;
 /// # use lanesweep::scenario::parameterization::Parameterization;
 /// # use lanesweep::stats::density::{DensityModel, FitOptions};
-/// # use lanesweep::traffic::DataProvenance;
+/// # use lanesweep::scenario::DataProvenance;
 /// # use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 /// # use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 ///
@@ -97,14 +97,14 @@ use crate::{Error, Result};
 /// # }
 /// ```
 pub struct Sample {
-    pub(crate) density: DensityModel,
-    pub(crate) profile: Profile,
-    pub(crate) options: SampleOptions,
-    pub(crate) kind: SampleKind,
+    pub density: DensityModel,
+    pub profile: Profile,
+    pub options: SampleOptions,
+    pub kind: SampleKind,
 }
 
 /// Kinds of sampling runs.
-pub(crate) enum SampleKind {
+pub enum SampleKind {
     /// Crude Monte Carlo: its lanes.
     Crude(Box<LanePlan>),
     /// Importance sampling of a known proposal.

@@ -9,9 +9,9 @@ use crate::engine::{Block, CaseSource, Headway, LaneCase, LanePlan, Units};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::model::scalar::Real;
+use crate::random::SOBOL_POINTS;
 use crate::scenario::Tables;
 use crate::stats::density::{DensityKind, DensityModel, Mixture};
-use crate::stats::random::SOBOL_POINTS;
 use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 

@@ -133,7 +133,7 @@ impl Sample {
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub(crate) fn keep_search(&self, out: &Path) -> Result<()> {
+    pub fn keep_search(&self, out: &Path) -> Result<()> {
         make_folder(out)?;
         let text = self.plan_file()?.0;
         write_inside(&out.join(SEARCH_FILE), |file| file.write_all(&text))

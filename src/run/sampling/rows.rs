@@ -39,6 +39,16 @@ pub struct EstimateRow {
 }
 
 impl EstimateRow {
+    /// Whether the row is of importance sampling beside rows of crude Monte Carlo over all headways.
+    pub fn is_rare_beside(&self, all: &[EstimateRow]) -> bool {
+        self.estimate.weights.is_some() && !self.is_overall(all)
+    }
+
+    /// Whether the row is over all headways, if there are several.
+    pub fn is_overall(&self, all: &[EstimateRow]) -> bool {
+        self.headway == "all" || !all.iter().any(|row| row.headway == "all")
+    }
+
     /// A row whose interval covers the draws alone.
     pub fn of_draws(
         model: ModelId,
@@ -194,8 +204,8 @@ impl Risk {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::scenario::Driven;
     use crate::stats::estimate::{BinomialInterval, Counts, StopReason, from_counts};
-    use crate::traffic::Driven;
 
     #[test]
     fn risk_without_failures_is_bounded_and_not_zero() {

@@ -8,6 +8,7 @@ use crate::engine::{Block, CaseSource, Confusion, Executor, LanePlan, Units, Ver
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
+use crate::random::Stream;
 use crate::run::motion_error::{MotionError, MotionSpread};
 use crate::scenario::parameterization::{
     LinearFamily, LinearSpec, Parameterization, ParameterizationOptions, Reduction, Signal, SvdLateral, TimeGrid,
@@ -15,7 +16,6 @@ use crate::scenario::parameterization::{
 };
 use crate::scenario::{Case, Category, Lateral, Scenario, Speed, Tables};
 use crate::stats::density::Draws;
-use crate::stats::random::Stream;
 use crate::{Error, Result};
 
 /// Purpose of the random stream that shuffles the outcomes.

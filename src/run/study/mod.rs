@@ -10,7 +10,7 @@ mod read;
 mod run;
 
 pub use cases::StudyCases;
-pub(crate) use cases::WINDOW;
+pub use cases::WINDOW;
 use facts::category_facts;
 pub use facts::{CategoryProvenance, ParameterHistogram, StudyProvenance, parameter_histograms};
 pub use given::GivenReplay;
@@ -251,7 +251,7 @@ impl Study {
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub(crate) fn keep(&self, results: &mut Results, name: &str, max_bytes: u64) -> Result<bool> {
+    pub fn keep(&self, results: &mut Results, name: &str, max_bytes: u64) -> Result<bool> {
         let line = self.seal()?.0;
         let is_kept = line.len() as u64 + self.cases.head().scenario_bytes() <= max_bytes;
         if is_kept {

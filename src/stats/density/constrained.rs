@@ -6,7 +6,7 @@ use nalgebra::{Cholesky, DMatrix, DVector, DVectorView, Dyn};
 
 use super::kde::Kde;
 use super::normal::Draws;
-use crate::stats::random::Stream;
+use crate::random::Stream;
 use crate::{Error, Place, Result};
 
 /// A pivot below this fraction of its diagonal element is rounding error: the equations are linearly dependent.

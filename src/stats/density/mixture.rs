@@ -5,7 +5,7 @@ use std::ops::Range;
 use nalgebra::{Cholesky, DMatrix, DVector};
 
 use super::normal::{normal, uniform};
-use crate::stats::random::Stream;
+use crate::random::Stream;
 use crate::{Error, Place, Result};
 
 /// Maximum number of blocks of four words per attempt at a draw.

@@ -7,7 +7,7 @@ use rayon::prelude::*;
 use super::Mixture;
 use super::moments::{factor_or_diagonal, moments};
 use super::normal::uniform;
-use crate::stats::random::Stream;
+use crate::random::Stream;
 use crate::{Error, Place, Result};
 
 /// Purpose of the random words that select the initial centres.

@@ -16,10 +16,10 @@ use super::parameters::ParameterSpace;
 use super::representativeness::Representativeness;
 use super::transformed::{DensityKind, TransformedMixture};
 use super::valid::{VALID_FRACTION_DRAWS, ValidFraction};
+use crate::random::Stream;
 use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction, Sizes, SvdFit};
 use crate::scenario::{Category, Scenario};
-use crate::stats::random::Stream;
-use crate::traffic::{DataProvenance, Driven};
+use crate::scenario::{DataProvenance, Driven};
 use crate::{Error, Place, Result};
 
 /// Provenance of a density.

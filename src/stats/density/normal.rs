@@ -1,6 +1,6 @@
 //! The standard normal distribution in f64, through `libm` only, so that draws have the same bits on every machine.
 
-use crate::stats::random::Stream;
+use crate::random::Stream;
 
 /// Cumulative probability at `x`, accurate also far in the tails.
 pub fn normal_cdf(x: f64) -> f64 {
@@ -35,7 +35,7 @@ pub(crate) fn uniform(word: u32) -> f64 {
 }
 
 /// Random numbers of one index of a stream, two 32-bit words each.
-pub(crate) struct Draws {
+pub struct Draws {
     stream: Stream,
     index: u64,
     block: u32,

@@ -24,8 +24,8 @@ use super::normal::Draws;
 use super::parameters::ParameterSpace;
 use super::transformed::TransformedMixture;
 use super::transport::{mean_distance, sinkhorn, wasserstein};
+use crate::random::Stream;
 use crate::scenario::Scenario;
-use crate::stats::random::Stream;
 use crate::{Error, Place, Result};
 
 /// β of the metric.

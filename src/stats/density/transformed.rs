@@ -21,8 +21,8 @@ use super::mixture::Mixture;
 use super::mixture_fit::FitOptions;
 use super::moments::{scale_of, standard_deviation};
 use super::normal::normal_cdf;
+use crate::random::{KNOT_LIMIT, PIECES, Stream};
 use crate::scenario::parameterization::Parameter;
-use crate::stats::random::Stream;
 use crate::{Error, Place, Result};
 
 /// Form of a density.
@@ -52,10 +52,6 @@ impl DensityKind {
     }
 }
 
-/// Knots are at −8, −8 + 1/16, …, 8. Beyond, the outermost pieces continue.
-pub const KNOT_LIMIT: f64 = 8.0;
-/// Number of pieces between the knots.
-pub const PIECES: usize = 256;
 /// A bound is moved outwards by this fraction of the parameter's scale, because recorded values may lie on it.
 const CLEARANCE: f64 = 0.01;
 /// Minimum slope of a transformation, relative to the parameter's scale.
@@ -137,7 +133,7 @@ impl Transformation {
     }
 
     /// The knots of all parameters, one parameter after the other.
-    pub(crate) fn table(&self) -> impl Iterator<Item = f64> + '_ {
+    pub fn table(&self) -> impl Iterator<Item = f64> + '_ {
         self.knots.iter().flatten().copied()
     }
 }

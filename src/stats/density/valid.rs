@@ -7,7 +7,7 @@ use serde::{Deserialize, Serialize};
 
 use super::normal::normal_quantile;
 use super::parameters::{Invalid, ParameterSpace};
-use crate::stats::random::Stream;
+use crate::random::Stream;
 use crate::{Error, Place, Result};
 
 /// [`Stream::purpose`] of these draws.

@@ -78,7 +78,7 @@ fn nothing_found(level: f64) -> Estimate {
 }
 
 /// Adds the points of the search to an estimate, and what the search says against it.
-pub(crate) fn after_search(mut estimate: Estimate, found: &Found, points: u64, options: &Search) -> Estimate {
+pub fn after_search(mut estimate: Estimate, found: &Found, points: u64, options: &Search) -> Estimate {
     let draws = estimate.runs;
     estimate.set_runs(draws + points);
     let Some(variance) = found.relative_variance else {

@@ -13,9 +13,9 @@ use super::stop::StopReason;
 use super::summary::Estimate;
 use super::trust::Warning;
 use super::weights::{WeightSums, WeightedDraw};
+use crate::random::Stream;
 use crate::stats::density::Mixture;
 use crate::stats::density::normal::uniform;
-use crate::stats::random::Stream;
 use crate::{Error, Place, Result};
 
 /// (1 − δ) g + δ f, truncated like f. Every attempt selects g or f anew, so the mixture is truncated as a whole.

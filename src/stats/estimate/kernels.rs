@@ -8,8 +8,8 @@ use super::problem::{Density, LimitState, draw, evaluate_checked, purpose};
 use super::summary::Estimate;
 use super::trust::Warning;
 use crate::Result;
+use crate::random::Stream;
 use crate::stats::density::Mixture;
-use crate::stats::random::Stream;
 
 /// Number of draws of the proposal for counting the fractions.
 const DRAWS: u64 = 4096;
@@ -100,7 +100,7 @@ impl Counts {
 impl Estimate {
     /// Adds the uncertainty of the data, which is independent of that of the draws. The variance reduction remains that
     /// of the draws.
-    pub(crate) fn over_kernels(mut self, shares: &KernelShares) -> Estimate {
+    pub fn over_kernels(mut self, shares: &KernelShares) -> Estimate {
         let (p, own) = (self.probability, self.interval);
         let scenarios = shares.effective_failing;
         if p > 0.0 {

@@ -21,7 +21,7 @@ mod summary;
 mod trust;
 mod weights;
 
-pub(crate) use adaptive::after_search;
+pub use adaptive::after_search;
 pub use adaptive::{AdaptiveRun, Goal, adaptive};
 pub use blocks::{BLOCK, BlockSums, Join};
 pub use importance::{

@@ -6,8 +6,8 @@ use rayon::prelude::*;
 
 use super::problem::{BATCH, Density, LimitState, evaluate_checked};
 use crate::Result;
+use crate::random::Stream;
 use crate::stats::density::Mixture;
-use crate::stats::random::Stream;
 
 /// A proposal that points were drawn from.
 pub(super) struct Source {

@@ -6,9 +6,9 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
+use crate::random::Stream;
 use crate::stats::density::Mixture;
 use crate::stats::density::normal::normal;
-use crate::stats::random::Stream;
 use crate::{Error, Place, Result};
 
 /// Maximum number of attempts at a valid point; after these the index is void. With a valid fraction of one half, one

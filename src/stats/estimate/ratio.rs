@@ -258,7 +258,7 @@ pub fn weighted_ratio([numerator, denominator, both]: [&WeightSums; 3], enough: 
 mod tests {
     use super::super::{StopReason, from_clusters};
     use super::*;
-    use crate::stats::random::{Stream, unit_uniform};
+    use crate::random::{Stream, unit_uniform};
 
     #[test]
     fn clusters_of_equal_size_have_the_interval_of_equal_clusters() {

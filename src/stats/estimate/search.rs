@@ -14,9 +14,9 @@ use super::pool::{Pool, effective_size};
 use super::problem::{Density, LimitState, purpose};
 use super::shapes::{designs, fitted};
 use crate::Result;
+use crate::random::Stream;
 use crate::stats::density::Mixture;
 use crate::stats::density::moments::{factor_or_diagonal, moments};
-use crate::stats::random::Stream;
 
 /// Variances of the wider copies of the density in the first round, relative to its own.
 const WIDER: [f64; 2] = [4.0, 9.0];
@@ -75,7 +75,7 @@ impl Search {
     }
 
     /// Maximum number of evaluated points.
-    pub(crate) fn most_points(&self, questions: usize) -> u64 {
+    pub fn most_points(&self, questions: usize) -> u64 {
         let rounds = self.batch.max(self.test).saturating_mul(self.most_rounds(questions) as u64);
         rounds.saturating_add(self.crude).saturating_add(2 * self.batch.max(MAX_FIRST))
     }
@@ -123,7 +123,7 @@ pub struct SearchRun {
 
 impl SearchRun {
     /// Whether there is a proposal.
-    pub(crate) fn has_found(&self) -> bool {
+    pub fn has_found(&self) -> bool {
         self.questions.iter().any(|found| found.relative_variance.is_some())
     }
 }

@@ -87,13 +87,7 @@ impl StopRule {
     }
 
     /// Whether to end at this checkpoint.
-    pub(crate) fn at(
-        &self,
-        samples: u64,
-        failures: u64,
-        relative_half_width: f64,
-        started: Instant,
-    ) -> Option<StopReason> {
+    pub fn at(&self, samples: u64, failures: u64, relative_half_width: f64, started: Instant) -> Option<StopReason> {
         let is_narrow = self.relative_half_width.is_some_and(|goal| relative_half_width <= goal);
         if is_narrow && failures >= Self::MIN_FAILURES {
             Some(StopReason::RelativeHalfWidth)

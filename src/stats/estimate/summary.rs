@@ -100,7 +100,7 @@ impl Estimate {
 
     /// Adds the uncertainty of the data: `clusters` are the draws around each scenario. Neither variance nor interval
     /// becomes smaller; the variance reduction remains that of the draws.
-    pub(crate) fn over_scenarios(mut self, clusters: &ClusterRate) -> Estimate {
+    pub fn over_scenarios(mut self, clusters: &ClusterRate) -> Estimate {
         let (own, with_data) = (self.interval, clusters.interval);
         self.interval.low = own.low.min(with_data.low);
         self.interval.high = own.high.max(with_data.high);

@@ -248,7 +248,7 @@ impl Trust {
     }
 
     /// Adds a warning if its condition holds.
-    pub(crate) fn warn_if(&mut self, condition: bool, warning: Warning) {
+    pub fn warn_if(&mut self, condition: bool, warning: Warning) {
         if condition {
             self.warnings.push(warning);
         }

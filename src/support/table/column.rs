@@ -158,7 +158,7 @@ pub struct TableMetadata {
 }
 
 /// A row with one value per requested column. CSV values are texts; an empty field is null.
-pub(crate) struct Row {
+pub struct Row {
     /// CSV: line of the file, counted from 1 with the header; Parquet: row, counted from 1.
     pub number: u64,
     pub values: Vec<Value>,

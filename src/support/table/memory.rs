@@ -77,7 +77,7 @@ impl Table {
     }
 
     /// Column names and rows as people read them.
-    pub(crate) fn shown(&self) -> (Vec<String>, Vec<Vec<String>>) {
+    pub fn shown(&self) -> (Vec<String>, Vec<Vec<String>>) {
         let row = |row: &Vec<Cell>| self.columns.iter().zip(row).map(|(column, cell)| shown(column, cell)).collect();
         (self.columns.iter().map(|column| column.name.to_string()).collect(), self.rows.iter().map(row).collect())
     }

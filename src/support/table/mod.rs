@@ -24,16 +24,16 @@ mod writer;
 
 #[cfg(feature = "arrow")]
 pub use arrow::ArrowRows;
-pub(crate) use column::Row;
+pub use column::Row;
 pub use column::{Cell, Column, ColumnKind, Digits, TableMetadata};
 pub use memory::{CellValue, NumberText, Table, TableOf};
-pub(crate) use names::{NameUnit, Named, Resolved, nearest, resolve};
+pub use names::{NameUnit, Named, Resolved, nearest, resolve};
 #[cfg(feature = "parquet")]
 pub use parquet_reader::is_panic_caught;
-pub(crate) use reader::TableReader;
-pub(crate) use text::WIDTH;
+pub use reader::TableReader;
+pub use text::WIDTH;
 pub use writer::TableWriter;
-pub(crate) use writer::{csv_field, json_number, text_of_cell};
+pub use writer::{csv_field, json_number, text_of_cell};
 
 use std::path::Path;
 

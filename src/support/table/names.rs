@@ -4,7 +4,7 @@ use crate::support::plain_text;
 
 /// A field that a table can have.
 #[derive(Debug, Clone)]
-pub(crate) struct Named {
+pub struct Named {
     /// Name without a unit.
     pub name: String,
     /// Unit; empty for fields that are not numbers, `1` for a dimensionless number.
@@ -15,7 +15,7 @@ pub(crate) struct Named {
 
 /// The unit of the plain numbers under a name.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum NameUnit {
+pub enum NameUnit {
     /// The name says it: divide by this to convert to the field's unit.
     Said(f64),
     /// The name does not say it; it is the field's unit.
@@ -47,7 +47,7 @@ const SUFFIXES: [(&str, &str); 17] = [
 
 /// The field of a column.
 #[derive(Debug, PartialEq)]
-pub(crate) enum Resolved {
+pub enum Resolved {
     /// Index of the field, and the unit of its plain numbers.
     Field(usize, NameUnit),
     /// A field, but in an unusable unit: the problem and what to do.
@@ -57,7 +57,7 @@ pub(crate) enum Resolved {
 }
 
 /// Finds the field of a column. Dots count as underscores, so that JSON names (`ego.v0`) are accepted.
-pub(crate) fn resolve(column: &str, fields: &[Named]) -> Resolved {
+pub fn resolve(column: &str, fields: &[Named]) -> Resolved {
     let folded = column.trim().replace('.', "_").to_ascii_lowercase();
     let is = |field: &Named| field.name.eq_ignore_ascii_case(&folded);
     if let Some(at) = fields.iter().position(is) {
@@ -87,7 +87,7 @@ pub(crate) fn resolve(column: &str, fields: &[Named]) -> Resolved {
 }
 
 /// The known name most similar to an unknown one, if any.
-pub(crate) fn nearest<'a>(column: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
+pub fn nearest<'a>(column: &str, names: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     plain_text::nearest(column, names, 0.8)
 }
 

@@ -11,7 +11,7 @@ use super::parquet_reader::ParquetRows;
 use crate::{Error, Place, Result};
 
 /// A table being read.
-pub(crate) struct TableReader {
+pub struct TableReader {
     path: PathBuf,
     columns: Vec<String>,
     rows: Rows,

@@ -5,7 +5,7 @@ use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Width, pr
 use super::Table;
 
 /// Default width of tables, in characters, if the terminal's width is unknown.
-pub(crate) const WIDTH: usize = 120;
+pub const WIDTH: usize = 120;
 
 /// A non-breaking space.
 const NO_BREAK: char = '\u{a0}';

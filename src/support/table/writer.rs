@@ -100,7 +100,7 @@ impl TableWriter {
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub(crate) fn stage(self) -> Result<StagedFile> {
+    pub fn stage(self) -> Result<StagedFile> {
         let file = match self.out {
             Out::Csv(file, _) | Out::JsonLines(file, _) => file,
             #[cfg(feature = "parquet")]
@@ -158,7 +158,7 @@ fn begins_formula(text: &str) -> bool {
 
 /// Protects a text so that a spreadsheet shows it and does not compute it: `=1+1` becomes `'=1+1`. Numbers are
 /// unchanged.
-pub(crate) fn cell_text(text: &str) -> Cow<'_, str> {
+pub fn cell_text(text: &str) -> Cow<'_, str> {
     match begins_formula(text) && text.parse::<f64>().is_err() {
         true => Cow::Owned(format!("'{text}")),
         false => Cow::Borrowed(text),
@@ -166,12 +166,12 @@ pub(crate) fn cell_text(text: &str) -> Cow<'_, str> {
 }
 
 /// Inverse of [`cell_text`].
-pub(crate) fn text_of_cell(field: &str) -> &str {
+pub fn text_of_cell(field: &str) -> &str {
     field.strip_prefix('\'').filter(|text| begins_formula(text)).unwrap_or(field)
 }
 
 /// A text as a CSV field, quoted if needed.
-pub(crate) fn csv_field(text: &str) -> String {
+pub fn csv_field(text: &str) -> String {
     let field = cell_text(text);
     match field.contains([',', '"', '\n', '\r']) {
         true => format!("\"{}\"", field.replace('"', "\"\"")),
@@ -192,7 +192,7 @@ fn append_json(line: &mut String, columns: &[Column], row: &[Cell]) {
 }
 
 /// A number as JSON. An infinite one is a text, because a null would vanish from every filter and mean.
-pub(crate) fn json_number(number: f64) -> Value {
+pub fn json_number(number: f64) -> Value {
     match number {
         f64::INFINITY => Value::from("Infinity"),
         f64::NEG_INFINITY => Value::from("-Infinity"),

@@ -14,11 +14,11 @@ use lanesweep::run::sampling::{
 };
 use lanesweep::run::score::ScoreOptions;
 use lanesweep::run::study::{GivenReplay, StudyHead, StudyOptions, plan_study};
+use lanesweep::scenario::DataProvenance;
 use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction};
 use lanesweep::scenario::{Category, Scenario, read_scenarios};
 use lanesweep::stats::density::{DensityModel, Exposure, ParameterSpace, read_density};
 use lanesweep::support::plausibility::Implausible;
-use lanesweep::traffic::DataProvenance;
 use lanesweep::traffic::mining::{MiningOptions, mine, mine_folder};
 use lanesweep::traffic::trajectory::Inputs;
 use lanesweep::traffic::trajectory::tracks::{Preset, TrackFile, draft, read_usable};

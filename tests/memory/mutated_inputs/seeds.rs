@@ -15,12 +15,12 @@ use lanesweep::scenario::parameterization::{
     Feature, FunctionKind, LinearFamily, LinearSpec, Parameterization, ParameterizationOptions,
 };
 use lanesweep::scenario::{Category, Scenario, write_scenarios};
+use lanesweep::scenario::{DataProvenance, Driven};
 use lanesweep::stats::density::{DensityModel, FitOptions, write_density};
 use lanesweep::stats::estimate::{BlockSums, WeightSums};
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::Recording;
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
-use lanesweep::traffic::{DataProvenance, Driven};
 
 use super::plans;
 use super::readers::{CRITERION, PART_UNITS, STUDY_UNITS, WEIGHTED_UNITS, small_plan};

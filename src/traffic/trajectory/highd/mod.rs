@@ -17,5 +17,5 @@ mod write;
 pub use inventory::{HighdFiles, Inventory, SYNTHETIC_MARKER, inventory, made_up};
 pub use read::{read, read_checked};
 pub use writable::quantize;
-pub(crate) use write::stage;
+pub use write::stage;
 pub use write::{RecordingInfo, write};

@@ -71,7 +71,7 @@ pub fn write(dir: &Path, recording: &Recording, info: &RecordingInfo) -> Result<
 ///
 /// # Errors
 /// As [`write`].
-pub(crate) fn stage(dir: &Path, recording: &Recording, info: &RecordingInfo) -> Result<[StagedFile; 3]> {
+pub fn stage(dir: &Path, recording: &Recording, info: &RecordingInfo) -> Result<[StagedFile; 3]> {
     let layout = ImageLayout::of(recording, info.precision)?;
     check_texts(info)?;
     fs::create_dir_all(dir).map_err(|source| Error::io(dir, "create the folder", source))?;

@@ -12,6 +12,11 @@
 
 use std::sync::LazyLock;
 
+/// A piecewise linear function of a standard normal deviate has its knots at −8, −8 + 1/16, …, 8. Beyond, the outermost
+/// pieces continue.
+pub const KNOT_LIMIT: f64 = 8.0;
+/// Number of pieces between the knots.
+pub const PIECES: usize = 256;
 /// Number of bits that select the segment of an octave.
 const SEGMENT_BITS: u32 = 4;
 /// Octaves of tail probability: 2⁻¹ … 2⁻², 2⁻² … 2⁻³, and so on down to 2⁻³³.
@@ -257,7 +262,7 @@ mod tests {
 
     #[test]
     fn deviates_of_random_words_pass_kolmogorov_and_smirnov() {
-        let stream = crate::stats::random::Stream { seed: 157, purpose: 1 };
+        let stream = crate::random::Stream { seed: 157, purpose: 1 };
         let mut z: Vec<f32> = (0..50_000).flat_map(|k| stream.words(k, 0)).map(standard_normal).collect();
         z.sort_by(f32::total_cmp);
         let n = z.len() as f64;

@@ -46,7 +46,7 @@ const MAX_SAMPLES_PER_ROW: f64 = 128.0;
 
 /// A row of a table of cases.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct CaseRow {
+pub struct CaseRow {
     pub id: Option<String>,
     pub models: Option<String>,
     pub parameters: CaseParameters,
@@ -58,7 +58,7 @@ pub(crate) struct CaseRow {
 type NumberedRow = (u64, Result<CaseRow>);
 
 /// The rows of a table of cases.
-pub(crate) struct ParameterRows {
+pub struct ParameterRows {
     table: TableReader,
     chosen: Vec<Chosen>,
 }
@@ -155,7 +155,7 @@ impl CaseRow {
 
 /// The place of a row's values: file, line, and the columns as the file names them.
 #[derive(Debug, Clone, Default, PartialEq)]
-pub(crate) struct RowPlace {
+pub struct RowPlace {
     row: Place,
     columns: Vec<(&'static str, String)>,
     /// Columns whose values have been replaced.

@@ -29,9 +29,9 @@ pub use options::{
 };
 pub use parameter::{MAX_DURATION_S, MIN_DURATION_S, Parameter, Variable};
 pub use reduction::{Encoder, ModeShape, ReducedScenario, ReducedSeries, Reduction};
-pub(crate) use series::steps_of;
+pub use series::steps_of;
 pub use series::{TimeGrid, recorded_case};
-pub(crate) use sizes::vehicle_ahead;
+pub use sizes::vehicle_ahead;
 pub use sizes::{Sizes, VehicleSize};
 pub use svd::{SvdBasis, fit_svd};
 

@@ -163,7 +163,7 @@ impl Reduction {
         &self.options
     }
 
-    pub(crate) fn linear_parts(&self) -> Option<&(LinearSpec, Encoder, Vec<Parameter>)> {
+    pub fn linear_parts(&self) -> Option<&(LinearSpec, Encoder, Vec<Parameter>)> {
         self.linear.as_ref()
     }
 
@@ -182,7 +182,7 @@ impl Reduction {
     }
 
     /// The same for a basis of another family.
-    pub(crate) fn from_linear_parts(
+    pub fn from_linear_parts(
         category: Category,
         basis: SvdBasis,
         options: &ParameterizationOptions,

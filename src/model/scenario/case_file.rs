@@ -11,7 +11,7 @@ use crate::Error;
 
 /// The values of a file.
 #[derive(Debug, Default)]
-pub(crate) struct CaseFile {
+pub struct CaseFile {
     pub models: Option<String>,
     pub parameters: CaseParameters,
 }

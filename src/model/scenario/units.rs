@@ -25,7 +25,7 @@ pub enum Written<'a> {
 
 /// Why a written number cannot be used.
 #[derive(Debug, Clone, PartialEq)]
-pub(crate) struct Unusable {
+pub struct Unusable {
     /// What is wrong.
     pub problem: String,
     /// What to write as the value.
@@ -50,7 +50,7 @@ impl Unusable {
 /// # Errors
 /// A text that does not give such a quantity; a unit that contradicts the name's; a number without a unit that needs one,
 /// except 0.
-pub(crate) fn si(written: Written<'_>, unit: &str, name: NameUnit) -> Result<f64, Unusable> {
+pub fn si(written: Written<'_>, unit: &str, name: NameUnit) -> Result<f64, Unusable> {
     let (number, own) = match written {
         Written::Number(number) => (number, None),
         Written::Text(text) => parse(text, units_of(unit)).ok_or_else(|| not_such(text, unit))?,

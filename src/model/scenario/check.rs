@@ -15,7 +15,7 @@ pub(super) fn check_written(scenario: &Scenario) -> Result<()> {
 }
 
 /// Why readers would refuse the scenario, as a sentence; `None` if they would not.
-pub(crate) fn problem_of(scenario: &Scenario) -> Option<String> {
+pub fn problem_of(scenario: &Scenario) -> Option<String> {
     check(scenario).err().map(|p| format!("`{}` {}", p.field, p.problem))
 }
 

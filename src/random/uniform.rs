@@ -103,7 +103,7 @@ fn columns(mut quotas: Vec<u64>) -> Vec<[u32; 2]> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::stats::random::Stream;
+    use crate::random::Stream;
     use proptest::prelude::*;
 
     /// Probability of every component in units of 2⁻³²/n, if columns were chosen without bias.

@@ -13,21 +13,22 @@ mod found;
 mod mined;
 mod parameter_table;
 pub mod parameterization;
+mod provenance;
 mod schema;
 mod table_reader;
 mod units;
 
 pub use crate::model::case::{Ahead, Case, Category, LANE_WIDTH_M, Participant, PlainCase};
-pub(crate) use crate::model::case::{check_headway, missing_parameter};
+pub use crate::model::case::{check_headway, missing_parameter};
 pub use crate::model::motion::{LATERAL_SAMPLED, Lateral, LateralState, Motion, SPEED_SAMPLED, Speed, Tables};
-pub(crate) use case_file::CaseFile;
+pub use case_file::CaseFile;
 pub use case_parameters::{CaseParameters, NamedNumber};
-pub(crate) use check::problem_of;
+pub use check::problem_of;
 pub use file::{
     check_scenario_file, read_scenario_file, read_scenarios, scenario_columns, write_scenarios, write_scenarios_to,
 };
 pub use found::ScenarioFile;
 pub use mined::{Ego, Other, Scenario, Side};
-pub(crate) use parameter_table::{CaseRow, ParameterRows, RowPlace};
-pub use units::Written;
-pub(crate) use units::si;
+pub use parameter_table::{CaseRow, ParameterRows, RowPlace};
+pub use provenance::{DataProvenance, Driven};
+pub use units::{Unusable, Written, si};

@@ -108,7 +108,7 @@ impl Sizes {
 }
 
 /// The vehicle ahead of a cut-out and its gap, m; fails for a scenario without them.
-pub(crate) fn vehicle_ahead(scenario: &Scenario) -> Result<(&Other, f64)> {
+pub fn vehicle_ahead(scenario: &Scenario) -> Result<(&Other, f64)> {
     match (&scenario.lead, scenario.lead_gap) {
         (Some(lead), Some(gap)) => Ok((lead, gap)),
         _ => Err(Error::input(

@@ -1,0 +1,8 @@
+//! Lanes on CPUs and GPUs. The rooms that its modules may use stand below; `lanesweep` is the crate for users.
+
+use lanesweep_model::{for_every_driver_model, model, scenario};
+use lanesweep_random::random;
+use lanesweep_support::{Error, Place, Result, support};
+
+#[path = "mod.rs"]
+pub mod engine;
