@@ -11,8 +11,8 @@ use super::{Exit, console};
 use crate::cli::settings::{
     Assignment, DEFAULT_FILE, DEFAULT_FILE_NAME, Layers, Setting, profile_schema, settings_schema, text_of,
 };
-use crate::interop::cluster::quoted_word;
 use crate::support::files::{make_folder_of, write_atomically};
+use crate::support::plain_text::quoted_word;
 use crate::{Error, Place, Result};
 
 /// Configurations, completions for your shell, manual pages

@@ -195,10 +195,6 @@ impl Configured {
         let unread = |e: clap::Error| Error::Internal(format!("the command line cannot be read: {e}"));
         let mut cli = Cli::from_arg_matches(matches).map_err(unread)?;
         let (path, typed, last) = verb_of(matches);
-        if path.last() == Some(&"slurm") && !typed.is_empty() {
-            let help = "give it to the run: lanesweep cluster slurm … -- study --config FILE";
-            return Err(Error::usage(Place::item("--config"), "the scripts do not carry it", help));
-        }
         // A missing file is named by the system's error if its name says that a file is meant.
         let is_neither = |one: &&Assignment| match one {
             Assignment::File(path) => !path.exists() && path.extension().is_none_or(|ending| ending != "toml"),
@@ -326,7 +322,7 @@ impl Configured {
 
 /// Whether a verb reads the configuration and the environment.
 fn reads_configuration(path: &[&str]) -> bool {
-    !matches!(path, ["cluster", "slurm"] | ["config", "init" | "schema" | "check" | "completions" | "man"])
+    !matches!(path, ["config", "init" | "schema" | "check" | "completions" | "man"])
 }
 
 /// The verb and its subverb, the values of `--config` before and after them, and the matches of the last one.

@@ -13,9 +13,8 @@ use tracing_subscriber::fmt::MakeWriter;
 use tracing_subscriber::fmt::format::debug_fn;
 
 use super::Exit;
-use crate::interop::cluster::quoted_word;
 use crate::report::tables::WIDTH;
-use crate::support::plain_text::{cut, cut_names, shown, shown_in_line, shown_json};
+use crate::support::plain_text::{cut, cut_names, quoted_word, shown, shown_in_line, shown_json};
 use crate::{Error, Result};
 
 /// Name of standard output in errors.

@@ -34,7 +34,6 @@ mod shard_flags;
 mod shell;
 pub mod signals;
 mod simulate;
-mod slurm;
 mod source;
 mod study;
 mod synth;

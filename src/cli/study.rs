@@ -14,7 +14,6 @@ use super::source::{self, SourceFlags};
 use super::{Exit, lists};
 use crate::Result;
 use crate::engine::{Headway, OpenBackend};
-use crate::model::profile::Profile;
 use crate::report::lanes::{self, table_format};
 use crate::report::reference::ReferenceComparison;
 use crate::report::run_record::{StudyHost, Timings};
@@ -153,37 +152,19 @@ impl Study {
         self.sweep(&study, &opened, configured, timings, verbosity)
     }
 
-    /// Checks the inputs of a plan except recordings, which are not read; for callers that only write the command.
-    ///
-    /// # Errors
-    /// Those that the run would end with.
-    pub(super) fn check(&self, configured: &Configured) -> Result<()> {
-        self.guard_inputs(configured)?;
-        check_folder(&self.out)?;
-        let (profile, options) = self.profile_and_options(configured)?;
-        profile.check_time_step(&options.models)?;
-        self.data.check(configured)
-    }
-
-    /// The profile and the options of the study.
-    fn profile_and_options(&self, configured: &Configured) -> Result<(Profile, StudyOptions)> {
-        let profile = configured.profile()?;
-        let options = StudyOptions {
-            categories: self.categories.list()?,
-            models: self.models.list()?,
-            headways: self.headways.list()?,
-            parameterization: configured.settings.parameterization.clone(),
-            folds: self.cross_validate.then_some(configured.settings.search.folds),
-            searched: Vec::new(),
-            external: Vec::new(),
-        };
-        Ok((profile, options))
-    }
-
     /// Makes a plan from the data.
     fn prepare(&self, configured: &Configured, verbosity: Verbosity) -> Result<(study::Study, Timings)> {
         let config = configured.settings.clone();
-        let (profile, mut options) = self.profile_and_options(configured)?;
+        let profile = configured.profile()?;
+        let mut options = StudyOptions {
+            categories: self.categories.list()?,
+            models: self.models.list()?,
+            headways: self.headways.list()?,
+            parameterization: config.parameterization.clone(),
+            folds: self.cross_validate.then_some(config.search.folds),
+            searched: Vec::new(),
+            external: Vec::new(),
+        };
         let source = self.data.source(configured);
         let has_paper_headways = options.headways == Headway::paper();
         // Generated data are described with the answer.

@@ -175,9 +175,6 @@ fn a_wrong_word_is_answered_with_its_place_and_the_nearest_right_one() {
     assert!(said.contains("--config score.sed=3") && said.contains("`score.seed`"), "{said}");
     let said = refused(dir, &[], &["study", "--config", "score.seed=x"]);
     assert!(said.contains("--config score.seed=x: `x` cannot be used"), "{said}");
-    let said =
-        refused(dir, &[], &["cluster", "slurm", "--config", "a.toml", "--array", "2", "--out", "x", "--", "study"]);
-    assert!(said.contains("give it to the run"), "{said}");
     assert_eq!(std::fs::read_dir(dir).unwrap().count(), 1, "nothing was written");
 }
 

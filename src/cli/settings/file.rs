@@ -126,7 +126,7 @@ pub(super) fn unknown(place: Place, name: &str, is_table: bool, keys: &[Key]) ->
 pub const FILE_VARIABLE: &str = "LANESWEEP_CONFIG";
 
 /// Variables of the program's tests; the program ignores them.
-pub const TEST_VARIABLES: [&str; 11] = [
+pub const TEST_VARIABLES: [&str; 10] = [
     "LANESWEEP_DLR_HT",
     "LANESWEEP_KILLS",
     "LANESWEEP_MUTATED_FIRST",
@@ -135,7 +135,6 @@ pub const TEST_VARIABLES: [&str; 11] = [
     "LANESWEEP_RENEW_FIGURES",
     "LANESWEEP_REQUIRE_DEVICE",
     "LANESWEEP_SHARED",
-    "LANESWEEP_SLURM_TEST",
     "LANESWEEP_SUMO",
     "LANESWEEP_TEST_RESUMABLE_RUN",
 ];
