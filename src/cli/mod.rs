@@ -12,7 +12,6 @@ mod console;
 #[cfg(feature = "gpu")]
 mod device_list;
 mod devices;
-mod dry_run;
 pub mod embedded;
 mod exit;
 mod export;

@@ -7,7 +7,6 @@ use clap::Args;
 
 use super::configured::Configured;
 use super::console::{self, Verbosity};
-use super::dry_run::DryRun;
 use super::format::{FormatFlag, TablesFlag};
 use super::shard_flags::ShardFlags;
 use super::source::{self, SourceFlags};
@@ -83,9 +82,6 @@ pub struct Study {
     /// A scenario file has the ids of S; its series may have any sample rate and length. Repeatable.
     #[arg(long, value_name = "FILE", help_heading = "Data")]
     external: Vec<PathBuf>,
-    /// Print lanes, memory and estimated time; write nothing
-    #[arg(long, conflicts_with_all = ["shard", "plan_only"], help_heading = "Run")]
-    dry_run: bool,
     #[command(flatten)]
     tables: TablesFlag,
     #[command(flatten)]
@@ -129,9 +125,6 @@ impl Study {
             if study.facts().reference {
                 opened = configured.open_reference()?;
             }
-            if self.dry_run {
-                return self.forecast(&study, &opened, None);
-            }
             return self.sweep(&study, &opened, configured, Timings::default(), verbosity);
         }
         if self.shards.plan_only {
@@ -146,9 +139,6 @@ impl Study {
         // Open before the work, so that a missing device is reported at once.
         let opened = if self.reference { configured.open_reference()? } else { configured.open()? };
         let (study, timings) = self.prepare(configured, verbosity)?;
-        if self.dry_run {
-            return self.forecast(&study, &opened, Some(timings.mine_s + timings.plan_s));
-        }
         self.sweep(&study, &opened, configured, timings, verbosity)
     }
 
@@ -199,12 +189,6 @@ impl Study {
         let study = timed(&mut timings.plan_s, || builder.plan())?;
         console::warn(study.cases().left_out());
         Ok((study, timings))
-    }
-
-    /// Prints the forecast of the run.
-    fn forecast(&self, study: &study::Study, opened: &OpenBackend, before_s: Option<f64>) -> Result<Exit> {
-        let backend = opened.backend();
-        DryRun { run: study.forecast(backend)?, backend: backend.describe(), before_s }.print(self.format)
     }
 
     /// Runs a plan; returns a report, or a part of a run.
