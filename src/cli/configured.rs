@@ -11,7 +11,7 @@ use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, FromArgMatches};
 use super::help::{DATA, MODELS, OUTPUT, RUN};
 use super::signals::CANCEL;
 use super::{Cli, Verb};
-use crate::cli::settings::{Assignment, Key, KeyKind, Layers, Origin, Setting, Settings};
+use crate::cli::settings::{Assignment, FILE_VARIABLE, Key, KeyKind, Layers, Origin, Setting, Settings};
 use crate::engine::{BackendChoice, DeviceName, OpenBackend};
 use crate::model::profile::Profile;
 use crate::report::run_record::SettingRecord;
@@ -206,7 +206,7 @@ impl Configured {
             return Err(Error::usage(Place::item("--config"), problem, help));
         }
         let mut layers = match reads_configuration(&path) {
-            true => Layers::read(&typed, &std::env::vars_os().collect::<Vec<_>>())?,
+            true => Layers::read(&typed, std::env::var_os(FILE_VARIABLE).as_deref())?,
             false => Layers::defaults(),
         };
         let verb = path.last().unwrap_or(&"");
@@ -254,7 +254,7 @@ impl Configured {
         profile.with_dt(dt_s).map_err(|error| self.at_origin("run.dt_s", "dt", error))
     }
 
-    /// Adds the file or variable that sets the key to an error about an option.
+    /// Adds the file or assignment that sets the key to an error about an option.
     pub fn at_origin(&self, key: &str, option: &'static str, error: Error) -> Error {
         let origin = self.layers.get(key).map(|setting| setting.origin);
         match (error, origin) {
@@ -286,18 +286,18 @@ impl Configured {
         self.layers.given().map(record).collect()
     }
 
-    /// Refuses flags about lanes together with a plan file, which would ignore them. Variables are allowed, because the
-    /// plan may have been made with them.
+    /// Refuses flags about lanes together with a plan file, which would ignore them. A file that the environment names is
+    /// allowed, because the plan may have been made with it.
     ///
     /// # Errors
     /// [`Error::Usage`].
     pub fn refuse_with_plan(&self) -> Result<()> {
-        let are_files_typed = std::env::var_os(crate::cli::settings::FILE_VARIABLE).is_none();
+        let are_files_typed = std::env::var_os(FILE_VARIABLE).is_none();
         self.refuse_lane_keys(are_files_typed, "is decided by the plan (--plan)", "leave it out, or make another plan")
     }
 
-    /// Refuses `--config KEY=VALUE` about lanes where `why` says that it has no effect. Files and variables are
-    /// allowed, because other commands share them.
+    /// Refuses `--config KEY=VALUE` about lanes where `why` says that it has no effect. Files are allowed, because
+    /// other commands share them.
     ///
     /// # Errors
     /// [`Error::Usage`].
@@ -320,7 +320,7 @@ impl Configured {
     }
 }
 
-/// Whether a verb reads the configuration and the environment.
+/// Whether a verb reads the configuration.
 fn reads_configuration(path: &[&str]) -> bool {
     !matches!(path, ["config", "init" | "schema" | "check" | "completions" | "man"])
 }
@@ -355,7 +355,7 @@ impl Configured {
         Ok((run.backend, device))
     }
 
-    /// Opens the backend that flags, files and the environment select.
+    /// Opens the backend that flags and files select.
     ///
     /// # Errors
     /// As [`Configured::backend`] and [`OpenBackend::open`].
