@@ -52,7 +52,6 @@ def study(
     dt: Value | None = None,
     rows: Value | None = None,
     keep_plan: Value | None = None,
-    dry_run: bool = False,
     shard: Value | None = None,
     config: Values | None = None,
     backend: Value | None = None,
@@ -116,8 +115,6 @@ def study(
         Keep the plan in --out for `simulate --from`. The plan is run-plan.json; with it you can repeat each
         lane. auto keeps it up to 256 MiB, about 135,000 scenarios.
         One of auto, always, never.
-    dry_run : bool
-        Print lanes, memory and estimated time; write nothing.
     shard : Value
         Compute shard I of N (from 0); `cluster merge` merges them. The part is written to --out. `auto/N` takes
         I from a Kubernetes Indexed Job or a Slurm array.
@@ -167,7 +164,6 @@ def study(
             ('dt', dt, False),
             ('rows', rows, False),
             ('keep-plan', keep_plan, False),
-            ('dry-run', dry_run, False),
             ('shard', shard, False),
             ('config', config, False),
             ('backend', backend, False),
@@ -421,7 +417,6 @@ def sample(
     rows: Value | None = None,
     simultaneous: bool = False,
     worst: Value | None = None,
-    dry_run: bool = False,
     shard: Value | None = None,
     config: Values | None = None,
     backend: Value | None = None,
@@ -502,8 +497,6 @@ def sample(
         Intervals of all rows hold together at --level (Bonferroni), not each on its own.
     worst : Value, default 20
         Worst lanes to list per model; 0 runs faster.
-    dry_run : bool
-        Print lanes, memory and estimated time; write nothing.
     shard : Value
         Compute shard I of N (from 0); `cluster merge` merges them. The part is written to --out. `auto/N` takes
         I from a Kubernetes Indexed Job or a Slurm array.
@@ -561,7 +554,6 @@ def sample(
             ('rows', rows, False),
             ('simultaneous', simultaneous, False),
             ('worst', worst, False),
-            ('dry-run', dry_run, False),
             ('shard', shard, False),
             ('config', config, False),
             ('backend', backend, False),
@@ -594,7 +586,6 @@ def compare(
     samples: Value | None = None,
     forms: bool = False,
     dt: Value | None = None,
-    dry_run: bool = False,
     config: Values | None = None,
     backend: Value | None = None,
     device: Value | None = None,
@@ -647,8 +638,6 @@ def compare(
         Sample Gaussian mixtures and copulas too, to see what the form of the density changes.
     dt : Value, s
         Time step [default: the profile's].
-    dry_run : bool
-        Print lanes, memory and estimated time; write nothing.
     config : Values
         Configuration file, or one key of it; repeatable. `lanesweep config init` writes such a file. Without
         --config, LANESWEEP_CONFIG names it.
@@ -687,7 +676,6 @@ def compare(
             ('samples', samples, False),
             ('forms', forms, False),
             ('dt', dt, False),
-            ('dry-run', dry_run, False),
             ('config', config, False),
             ('backend', backend, False),
             ('device', device, False),
@@ -957,7 +945,6 @@ def map(
     profile: Value | None = None,
     reference: bool = False,
     dt: Value | None = None,
-    dry_run: bool = False,
     config: Values | None = None,
     backend: Value | None = None,
     device: Value | None = None,
@@ -1013,8 +1000,6 @@ def map(
         Compute in binary64 on the CPU: the reference of the lane arithmetic.
     dt : Value, s
         Time step [default: the profile's].
-    dry_run : bool
-        Print lanes, memory and estimated time; write nothing.
     config : Values
         Configuration file, or one key of it; repeatable. `lanesweep config init` writes such a file. Without
         --config, LANESWEEP_CONFIG names it.
@@ -1054,7 +1039,6 @@ def map(
             ('profile', profile, False),
             ('reference', reference, False),
             ('dt', dt, False),
-            ('dry-run', dry_run, False),
             ('config', config, False),
             ('backend', backend, False),
             ('device', device, False),

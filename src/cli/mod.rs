@@ -12,7 +12,6 @@ mod console;
 #[cfg(feature = "gpu")]
 mod device_list;
 mod devices;
-mod dry_run;
 pub mod embedded;
 mod exit;
 mod export;
@@ -34,7 +33,6 @@ mod shard_flags;
 mod shell;
 pub mod signals;
 mod simulate;
-mod slurm;
 mod source;
 mod study;
 mod synth;

@@ -382,7 +382,7 @@ fn a_description_that_contradicts_itself_is_refused_alike_by_every_verb_and_from
             ([&xosc[..], &["--case-file", text(&toml)]].concat(), false),
             (vec!["check", text(&table)], true),
             (vec!["simulate", "--table", text(&table)], true),
-            (vec!["study", "--dry-run", "--scenarios", text(&table)], true),
+            (vec!["study", "--scenarios", text(&table)], true),
         ] {
             let (code, _, error) = check(&args);
             let said = error.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");

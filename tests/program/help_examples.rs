@@ -1,10 +1,21 @@
 //! Every example that `--help` ends with, run as it stands there, in one folder; only sizes are smaller.
 
 use std::collections::BTreeSet;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
+use std::sync::OnceLock;
 
 use crate::common::{shared, skipped};
+
+/// A configuration with fewer recordings.
+fn fewer_recordings() -> &'static Path {
+    static FILE: OnceLock<PathBuf> = OnceLock::new();
+    FILE.get_or_init(|| {
+        let file = Path::new(env!("CARGO_TARGET_TMPDIR")).join("fewer-recordings.toml");
+        std::fs::write(&file, "[generator]\nrecordings = 12\n").unwrap();
+        file
+    })
+}
 
 fn run(dir: &Path, line: &str) -> Output {
     let args = line.split_whitespace().skip(1);
@@ -12,7 +23,7 @@ fn run(dir: &Path, line: &str) -> Output {
         .current_dir(dir)
         // Help in one line per example.
         .env("COLUMNS", "1000")
-        .env("LANESWEEP_GENERATOR_RECORDINGS", "12")
+        .env("LANESWEEP_CONFIG", fewer_recordings())
         .args(args)
         .output()
         .unwrap()

@@ -85,7 +85,7 @@ fn a_cut_in_that_moves_away_or_stands_on_the_other_side_is_told_by_name() {
     let dir = tempfile::tempdir().unwrap();
     let warned = |name: &str, content: &str| {
         file(dir.path(), name, content);
-        let (code, said) = said(dir.path(), &["study", "--scenarios", name, "--dry-run", "--backend", "cpu"]);
+        let (code, said) = said(dir.path(), &["study", "--scenarios", name, "--plan-only"]);
         assert_eq!(code, 0, "{said}");
         said
     };
@@ -250,11 +250,7 @@ fn a_row_is_the_same_case_in_every_verb_and_ends_its_motions_after_its_duration(
     // What is no duration is refused by all of them, with its place.
     for duration in ["0", "-1", "1e9", "nan", "0.01"] {
         braking(duration);
-        for args in [
-            &["check", "a.csv"][..],
-            &["simulate", "--table", "a.csv"],
-            &["study", "--scenarios", "a.csv", "--dry-run"],
-        ] {
+        for args in [&["check", "a.csv"][..], &["simulate", "--table", "a.csv"], &["study", "--scenarios", "a.csv"]] {
             let (code, text) = run(args);
             assert!(code == 3 && text.contains("a.csv, line 2, column `duration_s`"), "{args:?}, {duration}: {text}");
         }
