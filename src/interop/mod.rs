@@ -1,5 +1,4 @@
-//! Other programs: OpenSCENARIO files, tables of other simulators, scripts for workload managers.
+//! Other programs: OpenSCENARIO files, scripts for workload managers.
 
 pub mod cluster;
-pub mod conformance;
 pub mod openscenario;
