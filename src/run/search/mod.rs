@@ -6,6 +6,7 @@
 //! has not read (`front`). Scores come from [`crate::run::score`].
 
 mod candidates;
+mod cma_es;
 mod evaluation;
 mod folds;
 mod front;
@@ -16,6 +17,7 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use cma_es::CmaEs;
 pub use evaluation::Evaluation;
 pub use folds::{folds, is_by_recording};
 pub use front::{Front, FrontPoint, Judged, RmseAgainstScore, Scored, SearchResult, Unkept};
