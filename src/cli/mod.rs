@@ -7,7 +7,6 @@ mod cluster;
 mod compare;
 mod config;
 mod configured;
-mod conformance;
 mod console;
 #[cfg(feature = "gpu")]
 mod device_list;

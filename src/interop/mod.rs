@@ -1,4 +1,3 @@
-//! Other programs: OpenSCENARIO files, tables of other simulators.
+//! Other programs: OpenSCENARIO files.
 
-pub mod conformance;
 pub mod openscenario;
