@@ -28,8 +28,7 @@ const DEEPEST: usize = 32;
 /// Maximum number of elements.
 const MAX_ELEMENTS: usize = 500_000;
 
-const NOT_XML: &str =
-    "give a whole file of ASAM OpenSCENARIO XML 1.1 to 1.3: a ParameterValueDistribution, or one of `export xosc`";
+const NOT_XML: &str = "give a whole file of ASAM OpenSCENARIO XML 1.1 to 1.3 with a ParameterValueDistribution";
 
 /// The root element of a file.
 ///
