@@ -15,7 +15,6 @@ mod sampled_file;
 mod samples;
 mod scenario_file;
 mod xml_at;
-mod xml_tree;
 
 pub use concrete::{Concrete, EgoMotion, PlayedVehicle, Vertex, paths};
 pub use distribution::{Distribution, Draw, MAX_POISSON, Range};
