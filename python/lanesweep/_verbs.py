@@ -1090,7 +1090,6 @@ def check(
     models: Models | None = None,
     profiles: Values | None = None,
     sheet: Value | None = None,
-    animation: Value | None = None,
     series: Value | None = None,
     config: Values | None = None,
     threads: Value | None = None,
@@ -1156,8 +1155,6 @@ def check(
         Profiles; the first one decides [default: un-r157, the two of EU 2022/1426, jrc-2021, paper, paper-fit].
     sheet : Value
         Also write the case sheet as an HTML page for printing.
-    animation : Value
-        Also write the vehicles in motion, from above, as an animated SVG.
     series : Value
         Also write every step of every model under the first profile.
     config : Values
@@ -1196,7 +1193,6 @@ def check(
             ('models', models, True),
             ('profiles', profiles, True),
             ('sheet', sheet, False),
-            ('animation', animation, False),
             ('series', series, False),
             ('config', config, False),
             ('threads', threads, False),

@@ -16,7 +16,7 @@ use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::report::case_sheet::CaseSheet;
 use crate::report::case_table::{CaseAnswer, CaseTable as Answers};
-use crate::report::trace::{self, TracePanels};
+use crate::report::trace;
 use crate::run::check::{Answer, Check as Checked, Subject, Verdict};
 use crate::scenario::{Category, Scenario};
 use crate::support::files::{make_folder_of, write_atomically};
@@ -65,9 +65,6 @@ pub struct Check {
     /// Also write the case sheet as an HTML page for printing
     #[arg(long, value_name = "FILE.html", help_heading = "Output")]
     sheet: Option<PathBuf>,
-    /// Also write the vehicles in motion, from above, as an animated SVG
-    #[arg(long, value_name = "FILE.svg", help_heading = "Output")]
-    animation: Option<PathBuf>,
     /// Also write every step of every model under the first profile
     #[arg(long, value_name = "FILE.csv", help_heading = "Output")]
     series: Option<PathBuf>,
@@ -120,9 +117,6 @@ impl Check {
         if let Some(path) = &self.sheet {
             write(path, sheet.html()?.as_bytes())?;
         }
-        if let Some(path) = &self.animation {
-            write(path, sheet.figure(TracePanels::Course).animation().svg().as_bytes())?;
-        }
         if let Some(path) = &self.series {
             let named = judgements[0].models.iter().map(|judged| (judged.trace.model.name().to_owned(), &judged.trace));
             write(path, trace::table(&named.collect::<Vec<_>>()).csv().as_bytes())?;
@@ -143,7 +137,6 @@ impl Check {
         }
         let of_one = [
             ("--sheet", self.sheet.is_some()),
-            ("--animation", self.animation.is_some()),
             ("--series", self.series.is_some()),
             ("--profiles", self.profiles.len() > 1),
         ];
@@ -277,11 +270,7 @@ impl Check {
     /// Outputs must have the right file ending and must not replace an input.
     fn guard_outputs(&self) -> Result<()> {
         let inputs: Vec<PathBuf> = self.file.iter().cloned().collect();
-        let outputs = [
-            (&self.sheet, "html", "--sheet"),
-            (&self.animation, "svg", "--animation"),
-            (&self.series, "csv", "--series"),
-        ];
+        let outputs = [(&self.sheet, "html", "--sheet"), (&self.series, "csv", "--series")];
         for (path, ending, flag) in outputs {
             let Some(path) = path else { continue };
             if path.extension().is_none_or(|found| !found.eq_ignore_ascii_case(ending)) {
