@@ -252,7 +252,7 @@ def mine(
     Parameters
     ----------
     recordings : Value
-        Folder of recordings, or a track file; also .xosc files of `export xosc`.
+        Folder of recordings, or a track file.
     kept : bool
         Only scenarios that pass the paper's filters.
     preset : Value
@@ -1074,7 +1074,6 @@ def check(
     models: Models | None = None,
     profiles: Values | None = None,
     sheet: Value | None = None,
-    animation: Value | None = None,
     series: Value | None = None,
     config: Values | None = None,
     threads: Value | None = None,
@@ -1082,20 +1081,20 @@ def check(
     """Check concrete cases: do the reference drivers of UN R157 avoid the collision?
 
     The case comes from flags, from a TOML file or a table (keys and columns are the flags' names with `_`, speeds
-    with their unit, `ego_speed_kmh`; flags override them), from a scenario of a file, or from an OpenSCENARIO file
-    of `export xosc`. Every model runs under every profile. The case is preventable if CCHDM or FSM, the drivers of
-    Annex 3, avoids the collision under the first profile. It has no conflict if nothing collides even when the ego
-    never reacts. It is undecided if a tenth of the time step or a measurement error of an input changes the answer.
-    It is outside Annex 3 if the annex does not describe such a case. The output also has the margins, the clauses,
-    and the distance to another answer along each parameter. A table without --row is judged whole, under one
-    profile, with a line per row; its exit status is that of its worst answer, in the order not preventable,
-    undecided, outside Annex 3, preventable, no conflict. Exit status: 0 preventable, 1 not preventable, 8
-    undecided, 9 no conflict, 10 outside Annex 3, 4 parts of the input were skipped.
+    with their unit, `ego_speed_kmh`; flags override them), or from a scenario of a file. Every model runs under
+    every profile. The case is preventable if CCHDM or FSM, the drivers of Annex 3, avoids the collision under the
+    first profile. It has no conflict if nothing collides even when the ego never reacts. It is undecided if a tenth
+    of the time step or a measurement error of an input changes the answer. It is outside Annex 3 if the annex does
+    not describe such a case. The output also has the margins, the clauses, and the distance to another answer along
+    each parameter. A table without --row is judged whole, under one profile, with a line per row; its exit status
+    is that of its worst answer, in the order not preventable, undecided, outside Annex 3, preventable, no conflict.
+    Exit status: 0 preventable, 1 not preventable, 8 undecided, 9 no conflict, 10 outside Annex 3, 4 parts of the
+    input were skipped.
 
     Parameters
     ----------
     file : Value
-        TOML file, table (.csv, .parquet), scenario file (.jsonl) or OpenSCENARIO file (.xosc) with the case.
+        TOML file, table (.csv, .parquet) or scenario file (.jsonl) with the case.
     row : Value
         Row of a table, from 1 after the header [default: all rows].
     scenario : Value
@@ -1140,8 +1139,6 @@ def check(
         Profiles; the first one decides [default: un-r157, the two of EU 2022/1426, jrc-2021, paper, paper-fit].
     sheet : Value
         Also write the case sheet as an HTML page for printing.
-    animation : Value
-        Also write the vehicles in motion, from above, as an animated SVG.
     series : Value
         Also write every step of every model under the first profile.
     config : Values
@@ -1180,7 +1177,6 @@ def check(
             ('models', models, True),
             ('profiles', profiles, True),
             ('sheet', sheet, False),
-            ('animation', animation, False),
             ('series', series, False),
             ('config', config, False),
             ('threads', threads, False),

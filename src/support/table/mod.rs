@@ -13,8 +13,6 @@ mod csv_reader;
 mod memory;
 mod names;
 #[cfg(feature = "parquet")]
-mod parquet_pages;
-#[cfg(feature = "parquet")]
 mod parquet_reader;
 #[cfg(feature = "parquet")]
 mod parquet_writer;
@@ -28,8 +26,6 @@ pub(crate) use column::Row;
 pub use column::{Cell, Column, ColumnKind, Digits, TableMetadata};
 pub use memory::{CellValue, NumberText, Table, TableOf};
 pub(crate) use names::{NameUnit, Named, Resolved, nearest, resolve};
-#[cfg(feature = "parquet")]
-pub use parquet_reader::is_panic_caught;
 pub(crate) use reader::TableReader;
 pub(crate) use text::WIDTH;
 pub use writer::TableWriter;
@@ -38,12 +34,6 @@ pub(crate) use writer::{csv_field, json_number, text_of_cell};
 use std::path::Path;
 
 use crate::{Error, Place, Result};
-
-/// Always false: without Parquet no reader here panics. See the function of this name with the feature.
-#[cfg(not(feature = "parquet"))]
-pub fn is_panic_caught() -> bool {
-    false
-}
 
 /// A format of tables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

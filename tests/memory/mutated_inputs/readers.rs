@@ -60,8 +60,6 @@ pub fn all(seeds: &Seeds) -> Vec<Reader> {
         plain("preset", &seeds.presets, preset),
         plain("distribution", &seeds.distributions, distribution),
     ];
-    #[cfg(feature = "parquet")]
-    readers.push(plain("Parquet scenarios", &seeds.parquets, |b, d, s, h| scenario_table("s.parquet", b, d, s, h)));
     readers.push(Reader { reseal: Some(reseal_density), ..plain("density", &seeds.densities, density) });
     readers.push(Reader { reseal: Some(reseal_searched), ..plain("searched", &seeds.searched, searched) });
     readers.push(plain("external S'", &seeds.scenario_files[..1], external));

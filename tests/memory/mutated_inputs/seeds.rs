@@ -36,8 +36,6 @@ pub struct Seeds {
     pub scenario_files: Vec<Vec<u8>>,
     /// A row per instant, and one per concrete case.
     pub scenario_tables: Vec<Vec<u8>>,
-    #[cfg(feature = "parquet")]
-    pub parquets: Vec<Vec<u8>>,
     pub exposures: Vec<Vec<u8>>,
     pub profiles: Vec<Vec<u8>>,
     pub mining: Vec<Vec<u8>>,
@@ -319,15 +317,6 @@ impl Seeds {
                 .map(|s| written(|path| write_scenarios(path, s).unwrap()))
                 .into(),
             scenario_tables: vec![INSTANTS.into(), CASES.into()],
-            #[cfg(feature = "parquet")]
-            parquets: [&few[..], &few[..1]]
-                .map(|s| {
-                    let dir = tempfile::tempdir().unwrap();
-                    let path = dir.path().join("s.parquet");
-                    write_scenarios(&path, s).unwrap();
-                    std::fs::read(path).unwrap()
-                })
-                .into(),
             exposures: vec![{
                 let dir = tempfile::tempdir().unwrap();
                 exposure.write_beside(&dir.path().join("s.jsonl")).unwrap();
