@@ -13,6 +13,7 @@ const STACK_BYTES: usize = 8 << 20;
 
 fn main() -> ExitCode {
     quiet_drivers();
+    quiet_caught_panics();
     #[cfg(unix)]
     out_of_memory::is_no_crash();
     if is_stack_large() {
@@ -46,4 +47,14 @@ fn quiet_drivers() {
         // SAFETY: this runs first, before any other thread exists.
         unsafe { std::env::set_var("NODEVICE_SELECT", "1") };
     }
+}
+
+/// Suppresses the panic message where the library turns the panic into an error.
+fn quiet_caught_panics() {
+    let others = std::panic::take_hook();
+    std::panic::set_hook(Box::new(move |info| {
+        if !lanesweep::support::table::is_panic_caught() {
+            others(info);
+        }
+    }));
 }

@@ -54,8 +54,7 @@ fn every_room_imports_only_those_before_it() {
 }
 
 /// Verbs that hold other verbs.
-const GROUPS: [(&str, &[&str]); 3] =
-    [("cluster", &["merge"]), ("verify", &["devices"]), ("config", &["shell"])];
+const GROUPS: [(&str, &[&str]); 3] = [("cluster", &["merge"]), ("verify", &["devices"]), ("config", &["shell"])];
 
 /// A verb's file is `VERB.rs`, its further parts are `VERB_*.rs`.
 #[test]

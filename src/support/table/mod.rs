@@ -26,6 +26,8 @@ pub(crate) use column::Row;
 pub use column::{Cell, Column, ColumnKind, Digits, TableMetadata};
 pub use memory::{CellValue, NumberText, Table, TableOf};
 pub(crate) use names::{NameUnit, Named, Resolved, nearest, resolve};
+#[cfg(feature = "parquet")]
+pub use parquet_reader::is_panic_caught;
 pub(crate) use reader::TableReader;
 pub(crate) use text::WIDTH;
 pub use writer::TableWriter;
@@ -34,6 +36,12 @@ pub(crate) use writer::{csv_field, json_number, text_of_cell};
 use std::path::Path;
 
 use crate::{Error, Place, Result};
+
+/// Always false: without Parquet no reader here panics. See the function of this name with the feature.
+#[cfg(not(feature = "parquet"))]
+pub fn is_panic_caught() -> bool {
+    false
+}
 
 /// A format of tables.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,6 +1,9 @@
-//! Rows of a Parquet file that any program may have written. A few rows at a time are in memory.
+//! Rows of a Parquet file that any program may have written. A few rows at a time are in memory; panics of
+//! the decoder on damaged files become errors about the file.
 
+use std::cell::Cell;
 use std::fs::File;
+use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 use arrow_array::cast::AsArray;
@@ -50,6 +53,28 @@ struct Leaf {
     values: ArrayRef,
 }
 
+thread_local! {
+    /// Whether a panic of this thread will be caught here.
+    static IS_CAUGHT: Cell<bool> = const { Cell::new(false) };
+}
+
+/// Whether a panic of this thread, which decodes a damaged Parquet file, becomes an error about that file. A program's
+/// panic hook (`std::panic::set_hook`) can then suppress its message. The library sets no hook.
+pub fn is_panic_caught() -> bool {
+    IS_CAUGHT.get()
+}
+
+/// Runs the decoder. Damage that makes it panic becomes an error about the file.
+fn guarded<T, E: std::fmt::Display>(path: &Path, work: impl FnOnce() -> std::result::Result<T, E>) -> Result<T> {
+    IS_CAUGHT.set(true);
+    let result = catch_unwind(AssertUnwindSafe(work));
+    IS_CAUGHT.set(false);
+    match result {
+        Ok(result) => result.map_err(|problem| damaged(path, problem)),
+        Err(_) => Err(damaged(path, "its content contradicts itself")),
+    }
+}
+
 fn damaged(path: &Path, problem: impl std::fmt::Display) -> Error {
     let problem = format!("not a Parquet file that can be read: {problem}");
     Error::input(Place::file(path), problem, "write the file again, or use JSON Lines or CSV")
@@ -60,7 +85,7 @@ impl ParquetRows {
         let file = input_file::open(path)?;
         // Use only Parquet's own types and ignore the Arrow schema of another program.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-        let metadata = ArrowReaderMetadata::load(&file, options).map_err(|e| damaged(path, e))?;
+        let metadata = guarded(path, || ArrowReaderMetadata::load(&file, options))?;
         let (mut names, mut leaves) = (Vec::new(), Vec::new());
         for (root, field) in metadata.schema().fields().iter().enumerate() {
             match field.data_type() {
@@ -119,7 +144,7 @@ impl ParquetRows {
         let file = self.file.try_clone().map_err(|e| Error::io(&self.path, "read", e))?;
         let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.metadata.clone());
         let builder = builder.with_projection(mask).with_batch_size(BATCH_ROWS);
-        self.reader = Some(builder.build().map_err(|e| damaged(&self.path, e))?);
+        self.reader = Some(guarded(&self.path, || builder.build())?);
         Ok(())
     }
 
@@ -135,14 +160,14 @@ impl ParquetRows {
     pub(super) fn next_row(&mut self) -> Result<Option<Row>> {
         while self.at == self.batch_rows {
             let Some(reader) = &mut self.reader else { return Ok(None) };
-            let next = reader.next().transpose().map_err(|e| damaged(&self.path, e))?;
+            let next = guarded(&self.path, || reader.next().transpose())?;
             let Some(batch) = next else { return Ok(None) };
-            self.batch = self.leaves_of(&batch).map_err(|problem| damaged(&self.path, problem))?;
+            self.batch = guarded(&self.path, || self.leaves_of(&batch))?;
             (self.batch_rows, self.at) = (batch.num_rows(), 0);
         }
         let at = self.at;
-        let values = self.batch.iter().map(|leaf| value(leaf, at)).collect::<std::result::Result<_, _>>();
-        let values = values.map_err(|problem| damaged(&self.path, problem))?;
+        let batch = &self.batch;
+        let values = guarded(&self.path, || batch.iter().map(|leaf| value(leaf, at)).collect())?;
         self.at += 1;
         self.number += 1;
         Ok(Some(Row { number: self.number, values }))
