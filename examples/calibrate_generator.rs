@@ -15,12 +15,12 @@
 
 use std::error::Error;
 
-use cmaes::{CMAESOptions, DVector};
 use lanesweep::engine::{CpuBackend, Executor};
 use lanesweep::model::profile::Profile;
 use lanesweep::run::score::{
     CategoryScores, ClaimResult, Misfit, ScoreTable, check_claims, f1, published_failures, published_lvd_f1,
 };
+use lanesweep::run::search::CmaEs;
 use lanesweep::run::study::Study;
 use lanesweep::scenario::Category;
 use lanesweep::traffic::mining::{Collection, MiningOptions, count, mine};
@@ -231,10 +231,10 @@ fn fit(evaluations: usize, start: Behaviour, profile: &Profile) -> Result<(), Bo
     };
     let start = RANGES.into_iter().map(place).collect::<Result<Vec<f64>, String>>()?;
     let (mut best, mut evaluation) = (f64::INFINITY, 0);
-    let loss = |point: &DVector<f64>| {
+    let mut loss = |point: &Vec<f64>| {
         evaluation += 1;
         let mut tried = || -> Result<f64, Box<dyn Error>> {
-            let behaviour = behaviour(point.as_slice())?;
+            let behaviour = behaviour(point)?;
             let options = GeneratorOptions {
                 seed: FITTED_SEED,
                 recordings: FITTED_RECORDINGS,
@@ -256,12 +256,12 @@ fn fit(evaluations: usize, start: Behaviour, profile: &Profile) -> Result<(), Bo
             f64::INFINITY
         })
     };
-    let mut search = CMAESOptions::new(start, 0.06)
-        .seed(1)
-        .max_function_evals(evaluations)
-        .build(loss)
-        .map_err(|error| format!("{error:?}"))?;
-    search.run();
+    let population = 4 + (3.0 * (start.len() as f64).ln()) as usize;
+    let mut search = CmaEs::new(&start, 0.06, population, 1);
+    for _ in 0..evaluations / population {
+        let values: Vec<f64> = search.ask().iter().map(&mut loss).collect();
+        search.tell(&values);
+    }
     Ok(())
 }
 

@@ -52,7 +52,6 @@ def study(
     dt: Value | None = None,
     rows: Value | None = None,
     keep_plan: Value | None = None,
-    dry_run: bool = False,
     shard: Value | None = None,
     config: Values | None = None,
     backend: Value | None = None,
@@ -116,8 +115,6 @@ def study(
         Keep the plan in --out for `simulate --from`. The plan is run-plan.json; with it you can repeat each
         lane. auto keeps it up to 256 MiB, about 135,000 scenarios.
         One of auto, always, never.
-    dry_run : bool
-        Print lanes, memory and estimated time; write nothing.
     shard : Value
         Compute shard I of N (from 0); `cluster merge` merges them. The part is written to --out. `auto/N` takes
         I from a Kubernetes Indexed Job or a Slurm array.
@@ -167,7 +164,6 @@ def study(
             ('dt', dt, False),
             ('rows', rows, False),
             ('keep-plan', keep_plan, False),
-            ('dry-run', dry_run, False),
             ('shard', shard, False),
             ('config', config, False),
             ('backend', backend, False),
@@ -256,7 +252,7 @@ def mine(
     Parameters
     ----------
     recordings : Value
-        Folder of recordings, or a track file; also .xosc files of `export xosc`.
+        Folder of recordings, or a track file.
     kept : bool
         Only scenarios that pass the paper's filters.
     preset : Value
@@ -421,7 +417,6 @@ def sample(
     rows: Value | None = None,
     simultaneous: bool = False,
     worst: Value | None = None,
-    dry_run: bool = False,
     shard: Value | None = None,
     config: Values | None = None,
     backend: Value | None = None,
@@ -502,8 +497,6 @@ def sample(
         Intervals of all rows hold together at --level (Bonferroni), not each on its own.
     worst : Value, default 20
         Worst lanes to list per model; 0 runs faster.
-    dry_run : bool
-        Print lanes, memory and estimated time; write nothing.
     shard : Value
         Compute shard I of N (from 0); `cluster merge` merges them. The part is written to --out. `auto/N` takes
         I from a Kubernetes Indexed Job or a Slurm array.
@@ -561,7 +554,6 @@ def sample(
             ('rows', rows, False),
             ('simultaneous', simultaneous, False),
             ('worst', worst, False),
-            ('dry-run', dry_run, False),
             ('shard', shard, False),
             ('config', config, False),
             ('backend', backend, False),
@@ -594,7 +586,6 @@ def compare(
     samples: Value | None = None,
     forms: bool = False,
     dt: Value | None = None,
-    dry_run: bool = False,
     config: Values | None = None,
     backend: Value | None = None,
     device: Value | None = None,
@@ -647,8 +638,6 @@ def compare(
         Sample Gaussian mixtures and copulas too, to see what the form of the density changes.
     dt : Value, s
         Time step [default: the profile's].
-    dry_run : bool
-        Print lanes, memory and estimated time; write nothing.
     config : Values
         Configuration file, or one key of it; repeatable. `lanesweep config init` writes such a file. Without
         --config, LANESWEEP_CONFIG names it.
@@ -687,7 +676,6 @@ def compare(
             ('samples', samples, False),
             ('forms', forms, False),
             ('dt', dt, False),
-            ('dry-run', dry_run, False),
             ('config', config, False),
             ('backend', backend, False),
             ('device', device, False),
@@ -957,7 +945,6 @@ def map(
     profile: Value | None = None,
     reference: bool = False,
     dt: Value | None = None,
-    dry_run: bool = False,
     config: Values | None = None,
     backend: Value | None = None,
     device: Value | None = None,
@@ -1013,8 +1000,6 @@ def map(
         Compute in binary64 on the CPU: the reference of the lane arithmetic.
     dt : Value, s
         Time step [default: the profile's].
-    dry_run : bool
-        Print lanes, memory and estimated time; write nothing.
     config : Values
         Configuration file, or one key of it; repeatable. `lanesweep config init` writes such a file. Without
         --config, LANESWEEP_CONFIG names it.
@@ -1054,7 +1039,6 @@ def map(
             ('profile', profile, False),
             ('reference', reference, False),
             ('dt', dt, False),
-            ('dry-run', dry_run, False),
             ('config', config, False),
             ('backend', backend, False),
             ('device', device, False),
@@ -1090,7 +1074,6 @@ def check(
     models: Models | None = None,
     profiles: Values | None = None,
     sheet: Value | None = None,
-    animation: Value | None = None,
     series: Value | None = None,
     config: Values | None = None,
     threads: Value | None = None,
@@ -1098,20 +1081,20 @@ def check(
     """Check concrete cases: do the reference drivers of UN R157 avoid the collision?
 
     The case comes from flags, from a TOML file or a table (keys and columns are the flags' names with `_`, speeds
-    with their unit, `ego_speed_kmh`; flags override them), from a scenario of a file, or from an OpenSCENARIO file
-    of `export xosc`. Every model runs under every profile. The case is preventable if CCHDM or FSM, the drivers of
-    Annex 3, avoids the collision under the first profile. It has no conflict if nothing collides even when the ego
-    never reacts. It is undecided if a tenth of the time step or a measurement error of an input changes the answer.
-    It is outside Annex 3 if the annex does not describe such a case. The output also has the margins, the clauses,
-    and the distance to another answer along each parameter. A table without --row is judged whole, under one
-    profile, with a line per row; its exit status is that of its worst answer, in the order not preventable,
-    undecided, outside Annex 3, preventable, no conflict. Exit status: 0 preventable, 1 not preventable, 8
-    undecided, 9 no conflict, 10 outside Annex 3, 4 parts of the input were skipped.
+    with their unit, `ego_speed_kmh`; flags override them), or from a scenario of a file. Every model runs under
+    every profile. The case is preventable if CCHDM or FSM, the drivers of Annex 3, avoids the collision under the
+    first profile. It has no conflict if nothing collides even when the ego never reacts. It is undecided if a tenth
+    of the time step or a measurement error of an input changes the answer. It is outside Annex 3 if the annex does
+    not describe such a case. The output also has the margins, the clauses, and the distance to another answer along
+    each parameter. A table without --row is judged whole, under one profile, with a line per row; its exit status
+    is that of its worst answer, in the order not preventable, undecided, outside Annex 3, preventable, no conflict.
+    Exit status: 0 preventable, 1 not preventable, 8 undecided, 9 no conflict, 10 outside Annex 3, 4 parts of the
+    input were skipped.
 
     Parameters
     ----------
     file : Value
-        TOML file, table (.csv, .parquet), scenario file (.jsonl) or OpenSCENARIO file (.xosc) with the case.
+        TOML file, table (.csv, .parquet) or scenario file (.jsonl) with the case.
     row : Value
         Row of a table, from 1 after the header [default: all rows].
     scenario : Value
@@ -1156,8 +1139,6 @@ def check(
         Profiles; the first one decides [default: un-r157, the two of EU 2022/1426, jrc-2021, paper, paper-fit].
     sheet : Value
         Also write the case sheet as an HTML page for printing.
-    animation : Value
-        Also write the vehicles in motion, from above, as an animated SVG.
     series : Value
         Also write every step of every model under the first profile.
     config : Values
@@ -1196,7 +1177,6 @@ def check(
             ('models', models, True),
             ('profiles', profiles, True),
             ('sheet', sheet, False),
-            ('animation', animation, False),
             ('series', series, False),
             ('config', config, False),
             ('threads', threads, False),

@@ -12,12 +12,11 @@ use super::console;
 use super::format::FormatFlag;
 use super::signals::CANCEL;
 use super::source::{PlausibilityFlag, complain_of, refuse_overwriting, scenarios_of};
-use crate::interop::openscenario::read_scenario;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::report::case_sheet::CaseSheet;
 use crate::report::case_table::{CaseAnswer, CaseTable as Answers};
-use crate::report::trace::{self, TracePanels};
+use crate::report::trace;
 use crate::run::check::{Answer, Check as Checked, Subject, Verdict};
 use crate::scenario::{Category, Scenario};
 use crate::support::files::{make_folder_of, write_atomically};
@@ -30,7 +29,7 @@ const PROFILES: [&str; 6] = ["un-r157", "eu-2022-1426", "eu-2022-1426-standing",
 /// Check concrete cases: do the reference drivers of UN R157 avoid the collision?
 ///
 /// The case comes from flags, from a TOML file or a table (keys and columns are the flags' names with `_`, speeds with
-/// their unit, `ego_speed_kmh`; flags override them), from a scenario of a file, or from an OpenSCENARIO file of `export xosc`. Every model runs
+/// their unit, `ego_speed_kmh`; flags override them), or from a scenario of a file. Every model runs
 /// under every profile. The case is preventable if CCHDM or FSM, the drivers of Annex 3, avoids the collision under the
 /// first profile. It has no conflict if nothing collides even when the ego never reacts. It is undecided if a
 /// tenth of the time step or a measurement error of an input changes the answer. It is outside Annex 3 if the
@@ -47,7 +46,7 @@ const PROFILES: [&str; 6] = ["un-r157", "eu-2022-1426", "eu-2022-1426-standing",
                   lanesweep check cases.csv --row 2\n  \
                   lanesweep check scenarios.jsonl --scenario 01_cut_in_97_91_957 --thw 1.2")]
 pub struct Check {
-    /// TOML file, table (.csv, .parquet), scenario file (.jsonl) or OpenSCENARIO file (.xosc) with the case
+    /// TOML file, table (.csv, .parquet) or scenario file (.jsonl) with the case
     #[arg(value_name = "FILE", help_heading = "Data")]
     file: Option<PathBuf>,
     /// Row of a table, from 1 after the header [default: all rows]
@@ -66,9 +65,6 @@ pub struct Check {
     /// Also write the case sheet as an HTML page for printing
     #[arg(long, value_name = "FILE.html", help_heading = "Output")]
     sheet: Option<PathBuf>,
-    /// Also write the vehicles in motion, from above, as an animated SVG
-    #[arg(long, value_name = "FILE.svg", help_heading = "Output")]
-    animation: Option<PathBuf>,
     /// Also write every step of every model under the first profile
     #[arg(long, value_name = "FILE.csv", help_heading = "Output")]
     series: Option<PathBuf>,
@@ -121,9 +117,6 @@ impl Check {
         if let Some(path) = &self.sheet {
             write(path, sheet.html()?.as_bytes())?;
         }
-        if let Some(path) = &self.animation {
-            write(path, sheet.figure(TracePanels::Course).animation().svg().as_bytes())?;
-        }
         if let Some(path) = &self.series {
             let named = judgements[0].models.iter().map(|judged| (judged.trace.model.name().to_owned(), &judged.trace));
             write(path, trace::table(&named.collect::<Vec<_>>()).csv().as_bytes())?;
@@ -144,7 +137,6 @@ impl Check {
         }
         let of_one = [
             ("--sheet", self.sheet.is_some()),
-            ("--animation", self.animation.is_some()),
             ("--series", self.series.is_some()),
             ("--profiles", self.profiles.len() > 1),
         ];
@@ -220,7 +212,6 @@ impl Check {
         let origin = path.display().to_string();
         let ending = path.extension().map(|ending| ending.to_ascii_lowercase()).unwrap_or_default();
         match (ending.to_str().unwrap_or_default(), &self.scenario) {
-            ("xosc", None) => self.of_scenario(read_scenario(path)?, origin, false),
             ("toml", None) => self.of_flags(from_toml(path)?, profile, origin),
             ("csv" | "parquet", None) => {
                 let row = self.row.unwrap_or(1);
@@ -236,12 +227,16 @@ impl Check {
                 let help = "name one: --scenario ID";
                 Err(Error::usage(Place::file(path), "a scenario file has many scenarios", help))
             }
+            ("xosc", _) => {
+                let help = "give a .jsonl scenario file; `export` writes OpenSCENARIO only";
+                Err(Error::usage(Place::file(path), "OpenSCENARIO files are not read as cases", help))
+            }
             (_, Some(_)) => {
                 let help = "give a .jsonl, .csv or .parquet file of scenarios";
                 Err(Error::usage(Place::item("--scenario"), format!("{origin} has no scenarios"), help))
             }
             _ => {
-                let help = "give a .toml, .csv, .parquet, .jsonl or .xosc file";
+                let help = "give a .toml, .csv, .parquet or .jsonl file";
                 Err(Error::usage(Place::file(path), "this kind of file holds no case", help))
             }
         }
@@ -275,11 +270,7 @@ impl Check {
     /// Outputs must have the right file ending and must not replace an input.
     fn guard_outputs(&self) -> Result<()> {
         let inputs: Vec<PathBuf> = self.file.iter().cloned().collect();
-        let outputs = [
-            (&self.sheet, "html", "--sheet"),
-            (&self.animation, "svg", "--animation"),
-            (&self.series, "csv", "--series"),
-        ];
+        let outputs = [(&self.sheet, "html", "--sheet"), (&self.series, "csv", "--series")];
         for (path, ending, flag) in outputs {
             let Some(path) = path else { continue };
             if path.extension().is_none_or(|found| !found.eq_ignore_ascii_case(ending)) {

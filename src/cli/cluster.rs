@@ -4,17 +4,14 @@ use clap::{Args, Subcommand};
 
 use super::Exit;
 use super::merge::Merge;
-use super::slurm::Slurm;
 use crate::Result;
 
 /// Split a run over several machines and merge its parts
 ///
 /// `--shard I/N` of `study` and `sample` computes one part. `cluster merge` merges all parts into the result.
-/// `cluster slurm` writes the scripts of a Slurm job array.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  lanesweep study --shard 0/2 --out result\n  lanesweep study --shard 1/2 --out \
-                        result\n  lanesweep cluster merge result\n  lanesweep cluster slurm study.toml --array 20 \
-                        --out result")]
+                        result\n  lanesweep cluster merge result")]
 pub struct Cluster {
     #[command(subcommand)]
     verb: ClusterVerb,
@@ -23,14 +20,12 @@ pub struct Cluster {
 #[derive(Debug, Subcommand)]
 enum ClusterVerb {
     Merge(Merge),
-    Slurm(Box<Slurm>),
 }
 
 impl Cluster {
     pub fn run(&self) -> Result<Exit> {
         match &self.verb {
             ClusterVerb::Merge(verb) => verb.run(),
-            ClusterVerb::Slurm(verb) => verb.run(),
         }
     }
 }

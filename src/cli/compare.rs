@@ -7,7 +7,6 @@ use clap::Args;
 
 use super::configured::Configured;
 use super::console::{self, Verbosity};
-use super::dry_run::DryRun;
 use super::format::FormatFlag;
 use super::source::SourceFlags;
 use super::{Exit, lists};
@@ -53,9 +52,6 @@ pub struct Compare {
     /// Sample Gaussian mixtures and copulas too, to see what the form of the density changes
     #[arg(long, help_heading = "Models and criteria", hide_short_help = true)]
     forms: bool,
-    /// Print lanes, memory and estimated time; write nothing
-    #[arg(long, help_heading = "Run")]
-    dry_run: bool,
     #[command(flatten)]
     exposure: lists::ExposureFlags,
     #[command(flatten)]
@@ -101,11 +97,6 @@ impl Compare {
         };
         let compare = compare::Compare::plan(&collection.scenarios, &facts, profile, options)?;
         let plan = compare.lane_plan();
-        if self.dry_run {
-            let (backend, before_s) = (opened.backend(), Some(started.elapsed().as_secs_f64()));
-            return DryRun { run: compare.forecast(backend)?, backend: backend.describe(), before_s }
-                .print(self.format);
-        }
         let folder = OutputDir::open(&self.out, COMPARE_RECORD)?;
         tracing::info!("{} lanes of S and S' on {}", count(plan.lane_count()), opened.backend().describe());
         let executor = opened.executor().with_recheck(config.compare.seed);

@@ -11,15 +11,14 @@ use super::{Exit, console};
 use crate::cli::settings::{
     Assignment, DEFAULT_FILE, DEFAULT_FILE_NAME, Layers, Setting, profile_schema, settings_schema, text_of,
 };
-use crate::interop::cluster::quoted_word;
 use crate::support::files::{make_folder_of, write_atomically};
+use crate::support::plain_text::quoted_word;
 use crate::{Error, Place, Result};
 
 /// Configurations, completions for your shell, manual pages
 ///
-/// Every option has a default. A file (--config FILE), the environment (LANESWEEP_RUN_BACKEND, …), --config KEY=VALUE
-/// and the option's own flag (--backend) override it; the last of these that sets an option wins. Only a named file is
-/// read.
+/// Every option has a default. A file (--config FILE), --config KEY=VALUE and the option's own flag (--backend) override
+/// it; the last of these that sets an option wins. Only a named file is read.
 #[derive(Debug, Args)]
 #[command(
     after_help = "Examples:\n  lanesweep config init\n  lanesweep config show --config lanesweep.toml\n  lanesweep \
@@ -51,8 +50,8 @@ struct Init {
 
 /// Show every effective value and its source
 ///
-/// After all layers: defaults, file, environment, flags. With --format toml it prints a file that sets the same, for
-/// another machine or an appendix.
+/// After all layers: defaults, file, flags. With --format toml it prints a file that sets the same, for another machine
+/// or an appendix.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  lanesweep config show --config mining.leader_max_thw_s=2.5 --backend cpu")]
 struct Show {
@@ -153,7 +152,7 @@ impl Show {
 
 impl Check {
     fn run(&self) -> Result<Exit> {
-        let layers = Layers::read(&[Assignment::File(self.file.clone())], &[])?;
+        let layers = Layers::read(&[Assignment::File(self.file.clone())], None)?;
         layers.settings()?;
         let count = layers.given().count();
         console::print(&format!("{}: {count} keys set, all of them known and in range\n", self.file.display()))?;

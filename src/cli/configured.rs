@@ -11,7 +11,7 @@ use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, FromArgMatches};
 use super::help::{DATA, MODELS, OUTPUT, RUN};
 use super::signals::CANCEL;
 use super::{Cli, Verb};
-use crate::cli::settings::{Assignment, Key, KeyKind, Layers, Origin, Setting, Settings};
+use crate::cli::settings::{Assignment, FILE_VARIABLE, Key, KeyKind, Layers, Origin, Setting, Settings};
 use crate::engine::{BackendChoice, DeviceName, OpenBackend};
 use crate::model::profile::Profile;
 use crate::report::run_record::SettingRecord;
@@ -195,10 +195,6 @@ impl Configured {
         let unread = |e: clap::Error| Error::Internal(format!("the command line cannot be read: {e}"));
         let mut cli = Cli::from_arg_matches(matches).map_err(unread)?;
         let (path, typed, last) = verb_of(matches);
-        if path.last() == Some(&"slurm") && !typed.is_empty() {
-            let help = "give it to the run: lanesweep cluster slurm … -- study --config FILE";
-            return Err(Error::usage(Place::item("--config"), "the scripts do not carry it", help));
-        }
         // A missing file is named by the system's error if its name says that a file is meant.
         let is_neither = |one: &&Assignment| match one {
             Assignment::File(path) => !path.exists() && path.extension().is_none_or(|ending| ending != "toml"),
@@ -210,7 +206,7 @@ impl Configured {
             return Err(Error::usage(Place::item("--config"), problem, help));
         }
         let mut layers = match reads_configuration(&path) {
-            true => Layers::read(&typed, &std::env::vars_os().collect::<Vec<_>>())?,
+            true => Layers::read(&typed, std::env::var_os(FILE_VARIABLE).as_deref())?,
             false => Layers::defaults(),
         };
         let verb = path.last().unwrap_or(&"");
@@ -258,7 +254,7 @@ impl Configured {
         profile.with_dt(dt_s).map_err(|error| self.at_origin("run.dt_s", "dt", error))
     }
 
-    /// Adds the file or variable that sets the key to an error about an option.
+    /// Adds the file or assignment that sets the key to an error about an option.
     pub fn at_origin(&self, key: &str, option: &'static str, error: Error) -> Error {
         let origin = self.layers.get(key).map(|setting| setting.origin);
         match (error, origin) {
@@ -290,18 +286,18 @@ impl Configured {
         self.layers.given().map(record).collect()
     }
 
-    /// Refuses flags about lanes together with a plan file, which would ignore them. Variables are allowed, because the
-    /// plan may have been made with them.
+    /// Refuses flags about lanes together with a plan file, which would ignore them. A file that the environment names is
+    /// allowed, because the plan may have been made with it.
     ///
     /// # Errors
     /// [`Error::Usage`].
     pub fn refuse_with_plan(&self) -> Result<()> {
-        let are_files_typed = std::env::var_os(crate::cli::settings::FILE_VARIABLE).is_none();
+        let are_files_typed = std::env::var_os(FILE_VARIABLE).is_none();
         self.refuse_lane_keys(are_files_typed, "is decided by the plan (--plan)", "leave it out, or make another plan")
     }
 
-    /// Refuses `--config KEY=VALUE` about lanes where `why` says that it has no effect. Files and variables are
-    /// allowed, because other commands share them.
+    /// Refuses `--config KEY=VALUE` about lanes where `why` says that it has no effect. Files are allowed, because
+    /// other commands share them.
     ///
     /// # Errors
     /// [`Error::Usage`].
@@ -324,9 +320,9 @@ impl Configured {
     }
 }
 
-/// Whether a verb reads the configuration and the environment.
+/// Whether a verb reads the configuration.
 fn reads_configuration(path: &[&str]) -> bool {
-    !matches!(path, ["cluster", "slurm"] | ["config", "init" | "schema" | "check" | "completions" | "man"])
+    !matches!(path, ["config", "init" | "schema" | "check" | "completions" | "man"])
 }
 
 /// The verb and its subverb, the values of `--config` before and after them, and the matches of the last one.
@@ -359,7 +355,7 @@ impl Configured {
         Ok((run.backend, device))
     }
 
-    /// Opens the backend that flags, files and the environment select.
+    /// Opens the backend that flags and files select.
     ///
     /// # Errors
     /// As [`Configured::backend`] and [`OpenBackend::open`].

@@ -3,19 +3,20 @@
 
 use std::borrow::Cow;
 use std::ffi::OsString;
+use std::fmt;
 use std::io::{self, IsTerminal, Write};
 use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::Duration;
 
 use clap::error::ContextValue;
-use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
 use tracing::{Level, Metadata};
 use tracing_subscriber::fmt::MakeWriter;
 use tracing_subscriber::fmt::format::debug_fn;
 
 use super::Exit;
-use crate::interop::cluster::quoted_word;
 use crate::report::tables::WIDTH;
-use crate::support::plain_text::{cut, cut_names, shown, shown_in_line, shown_json};
+use crate::support::plain_text::{cut, cut_names, quoted_word, shown, shown_in_line, shown_json};
 use crate::{Error, Result};
 
 /// Name of standard output in errors.
@@ -170,14 +171,27 @@ pub fn inc(bar: &ProgressBar) -> impl Fn(u64) + Send + Sync + 'static {
     move |units| bar.inc(units)
 }
 
-/// A progress bar on stderr; silent unless stderr is a terminal.
+/// A progress bar on stderr; silent unless stderr is a terminal. Its remaining time follows from the units per time.
 pub fn progress(verbosity: Verbosity, length: u64, what: &str) -> ProgressBar {
+    bar_of(verbosity, length, what, "about")
+}
+
+/// The same for work that may end before its last unit.
+pub fn progress_to_maximum(verbosity: Verbosity, length: u64, what: &str) -> ProgressBar {
+    bar_of(verbosity, length, what, "at most about")
+}
+
+fn bar_of(verbosity: Verbosity, length: u64, what: &str, bound: &'static str) -> ProgressBar {
     let bar = ProgressBar::new(length);
     if verbosity == Verbosity::Quiet || !io::stderr().is_terminal() {
         bar.set_draw_target(ProgressDrawTarget::hidden());
     }
-    if let Ok(style) = ProgressStyle::with_template("{msg:24} {wide_bar} {pos}/{len} {eta}") {
-        bar.set_style(style);
+    if let Ok(style) = ProgressStyle::with_template("{msg:24} {wide_bar} {pos}/{len} {elapsed}{left}") {
+        bar.set_style(style.with_key("left", move |state: &ProgressState, out: &mut dyn fmt::Write| {
+            let measured = (state.pos() > 0).then(|| state.elapsed());
+            // A bar that cannot be drawn is no error of the run.
+            let _ = out.write_str(&remaining(bound, measured.unwrap_or_default(), state.eta()));
+        }));
     }
     bar.set_message(what.to_owned());
     if let Some(captured) = captured().as_mut() {
@@ -185,6 +199,17 @@ pub fn progress(verbosity: Verbosity, length: u64, what: &str) -> ProgressBar {
         captured.bar = Some(bar.clone());
     }
     bar
+}
+
+/// Measured work before the remaining time is told: first units are slower, and few tell little.
+const MIN_MEASURED: Duration = Duration::from_secs(3);
+
+/// The remaining time in words; empty before enough is measured. Indicatif's estimate is 0 where it has none.
+fn remaining(bound: &str, measured: Duration, left: Duration) -> String {
+    match measured < MIN_MEASURED || left.is_zero() {
+        true => String::new(),
+        false => format!(", {bound} {:#} left", HumanDuration(left)),
+    }
 }
 
 /// Option fields whose flag has another name. All others use the field's name with dashes.
@@ -278,7 +303,16 @@ impl miette::Diagnostic for Diagnostic {
 
 #[cfg(test)]
 mod tests {
-    use super::{flag_of, with_flags};
+    use super::{flag_of, remaining, with_flags};
+    use std::time::Duration;
+
+    #[test]
+    fn the_remaining_time_is_told_once_some_seconds_are_measured() {
+        let told =
+            |measured_s, left_s| remaining("about", Duration::from_secs(measured_s), Duration::from_secs(left_s));
+        assert_eq!([told(0, 60), told(2, 60), told(60, 0)], ["", "", ""]);
+        assert_eq!([told(3, 40), told(600, 7200)], [", about 40s left", ", about 2h left"]);
+    }
 
     #[test]
     fn an_option_of_the_library_is_a_flag_on_the_command_line() {

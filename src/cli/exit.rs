@@ -18,7 +18,7 @@ pub enum Exit {
     BadInput = 3,
     /// A result was written, but parts of the input were skipped; stderr names each.
     Incomplete = 4,
-    /// A requested check failed (conformance).
+    /// A requested check failed (`verify`).
     VerificationFailed = 5,
     /// The system refused to read or write, to start a thread or to allocate memory.
     Io = 6,

@@ -10,7 +10,6 @@ use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::source::SourceFlags;
 use super::{Exit, lists};
-use crate::interop::conformance::check_shipped_tables;
 use crate::model::driver::ModelId;
 use crate::report::dossier::DossierReport;
 use crate::report::sampling::HostRecord;
@@ -108,8 +107,6 @@ impl Justify {
         let executor = opened.executor().with_recheck(config.compare.seed);
         let dossier = justify(&collection.scenarios, &facts, &profile, &options, &executor)?;
         console::warn(&dossier.left_out);
-        let mut conformance = check_shipped_tables(dossier.parameterization.category, &profile)?;
-        conformance.retain(|tally| tally.model.is_none_or(|of| of == model));
         let report = DossierReport {
             dossier: &dossier,
             rules: &options.rules,
@@ -117,7 +114,6 @@ impl Justify {
             score: &options.score,
             provenance: &facts,
             profile: &profile,
-            conformance: conformance.iter().map(|tally| (named(tally), tally.rows, tally.passes())).collect(),
             author: self.author.clone(),
             date: self.date.clone(),
             command: console::command_line(),
@@ -154,8 +150,4 @@ fn date(text: &str) -> std::result::Result<String, String> {
     let parts: Vec<Option<u32>> = text.split('-').map(|part| part.parse().ok()).collect();
     let is_day = matches!(parts[..], [Some(_), Some(1..=12), Some(1..=31)]) && text.len() == 10;
     if is_day { Ok(text.to_owned()) } else { Err("write a day such as 2026-11-24".to_owned()) }
-}
-
-fn named(tally: &crate::interop::conformance::Tally) -> String {
-    tally.model.map_or_else(|| tally.label.clone(), |model| format!("{}, {}", tally.label, model.name()))
 }

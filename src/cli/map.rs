@@ -7,7 +7,6 @@ use clap::Args;
 
 use super::configured::Configured;
 use super::console::{self, Verbosity};
-use super::dry_run::DryRun;
 use super::format::FormatFlag;
 use super::source::PlausibilityFlag;
 use super::{Exit, lists};
@@ -90,9 +89,6 @@ pub struct Map {
     /// Compute in binary64 on the CPU: the reference of the lane arithmetic
     #[arg(long, help_heading = "Models and criteria", hide_short_help = true)]
     reference: bool,
-    /// Print lanes, memory and estimated time; write nothing
-    #[arg(long, help_heading = "Run")]
-    dry_run: bool,
     /// Folder of the results
     #[arg(long, value_name = "DIR", default_value = "lanesweep-map", help_heading = "Output")]
     out: PathBuf,
@@ -137,10 +133,6 @@ impl Map {
         let map = grid::Map::plan(options, &profile)?;
         let plan_s = started.elapsed().as_secs_f64();
         let opened = if self.reference { configured.open_reference()? } else { configured.open()? };
-        if self.dry_run {
-            let run = map.forecast(opened.backend())?;
-            return DryRun { run, backend: opened.backend().describe(), before_s: None }.print(self.format);
-        }
         let folder = OutputDir::open(&self.out, MAP_RECORD)?;
         let executor = opened.executor().with_recheck(RECHECK_SEED);
         let bar = console::progress(verbosity, map.unit_count(), "sweeping");

@@ -7,12 +7,12 @@ use clap::Args;
 use super::Exit;
 use super::format::{FormatFlag, TablesFlag};
 use crate::Result;
-use crate::interop::cluster::quoted_word;
 use crate::report::run_record::StudyHost;
 use crate::report::sampling::{EstimateFile, HostRecord};
 use crate::report::study::StudyReport;
 use crate::run::parts::PLAN_FILE;
 use crate::run::{Merged, merge};
+use crate::support::plain_text::quoted_word;
 
 /// Merge the parts of a run into its result
 ///

@@ -9,15 +9,12 @@ use super::console::Verbosity;
 use super::source::{self, PlausibilityFlag, PresetFlag};
 use super::{Exit, console};
 use crate::Result;
-use crate::interop::openscenario::read_scenario;
-use crate::scenario::{DataProvenance, Driven};
-use crate::scenario::{Scenario, check_scenario_file, write_scenarios, write_scenarios_to};
+use crate::scenario::{DataProvenance, Driven, check_scenario_file, write_scenarios, write_scenarios_to};
 use crate::support::atomic_file::AtomicFile;
 use crate::support::input_file;
 use crate::support::lock::FolderLock;
 use crate::support::readable::counted;
 use crate::traffic::Source;
-use crate::traffic::mining::{Collection, counts, counts_text};
 
 /// Mine cut-ins, cut-outs and leader decelerations from recordings
 ///
@@ -27,7 +24,7 @@ use crate::traffic::mining::{Collection, counts, counts_text};
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  lanesweep mine recordings --out scenarios.jsonl")]
 pub struct Mine {
-    /// Folder of recordings, or a track file; also .xosc files of `export xosc`
+    /// Folder of recordings, or a track file
     #[arg(value_name = "DIR", help_heading = "Data")]
     dir: PathBuf,
     #[command(flatten)]
@@ -48,43 +45,6 @@ fn lock_of(path: &Path) -> Result<FolderLock> {
     FolderLock::acquire(&path.with_file_name(format!(".lanesweep-{name}.lock")))
 }
 
-/// The OpenSCENARIO files of a folder, or the one file; `None` if it is something else.
-fn exported(path: &Path) -> Option<Vec<PathBuf>> {
-    let is_exported = |path: &PathBuf| path.extension().is_some_and(|ending| ending == "xosc");
-    let mut files: Vec<PathBuf> = match std::fs::read_dir(path) {
-        Ok(listed) => listed.flatten().map(|entry| entry.path()).collect(),
-        Err(_) => vec![path.to_path_buf()],
-    };
-    files.retain(is_exported);
-    files.sort();
-    (!files.is_empty()).then_some(files)
-}
-
-/// The scenarios of files that `export xosc` wrote, named by the files; bad files are reported and left out.
-///
-/// # Errors
-/// That of the first file if all are bad.
-fn of_exported(files: &[PathBuf]) -> Result<Collection> {
-    let mut collection = Collection::default();
-    for file in files {
-        match read_scenario(file) {
-            Ok(scenario) => {
-                let id = file.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-                collection.synthetic |= scenario.synthetic;
-                collection.scenarios.push(Scenario { id, ..scenario });
-            }
-            Err(error) => collection.problems.push(error),
-        }
-    }
-    if collection.scenarios.is_empty() && !collection.problems.is_empty() {
-        return Err(collection.problems.swap_remove(0));
-    }
-    source::complain_of(&collection.problems, &collection.notes);
-    tracing::info!("every scenario counts as kept: the filters were applied before the export");
-    tracing::info!("{}", counts_text(&counts(&collection.scenarios)));
-    Ok(collection)
-}
-
 impl Mine {
     pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         if let Some(path) = &self.out {
@@ -95,15 +55,8 @@ impl Mine {
             AtomicFile::create(path).map(drop)?;
         }
         let _lock = self.out.as_deref().map(lock_of).transpose()?;
-        let (from, mut collection) = match exported(&self.dir) {
-            Some(files) if self.preset.preset.is_none() => (Source::Scenarios(self.dir.clone()), of_exported(&files)?),
-            _ => {
-                let from = Source::Recordings { path: self.dir.clone(), preset: self.preset.preset.clone() };
-                let mining = &configured.settings.mining;
-                let collection = source::load(&from, mining, self.plausibility.policy(), verbosity)?;
-                (from, collection)
-            }
-        };
+        let from = Source::Recordings { path: self.dir.clone(), preset: self.preset.preset.clone() };
+        let mut collection = source::load(&from, &configured.settings.mining, self.plausibility.policy(), verbosity)?;
         if self.kept {
             collection.scenarios.retain(|s| s.kept);
         }

@@ -98,9 +98,6 @@ pub struct Sample {
     /// Folder for estimate.json, tables and figures
     #[arg(long, value_name = "DIR", default_value = "lanesweep-sample", help_heading = "Output")]
     pub(super) out: PathBuf,
-    /// Print lanes, memory and estimated time; write nothing
-    #[arg(long, conflicts_with_all = ["shard", "plan_only"], help_heading = "Run")]
-    pub(super) dry_run: bool,
     #[command(flatten)]
     pub(super) plausibility: PlausibilityFlag,
     #[command(flatten)]

@@ -6,7 +6,6 @@ use indicatif::ProgressBar;
 
 use super::configured::Configured;
 use super::console::{self, Verbosity};
-use super::dry_run::{DryRun, time};
 use super::format::FormatFlag;
 use super::sample::Sample;
 use super::sample_options::{guard, only_crude};
@@ -21,7 +20,7 @@ use crate::stats::density::read_density;
 use crate::stats::estimate::{Search, StopRule};
 use crate::support::atomic_file::StagedFile;
 use crate::support::files::check_folder;
-use crate::support::readable::{count, counted};
+use crate::support::readable::{count, counted, duration};
 use crate::support::run_dir::{ESTIMATE_RECORD, OutputDir, Results};
 use crate::support::table::TableWriter;
 use crate::{Error, Place, Result};
@@ -59,7 +58,7 @@ impl Sample {
     /// The run of crude Monte Carlo with as many samples as are cheaper than importance sampling.
     fn chosen(&self, sample: sampling::Sample, opened: &OpenBackend) -> Result<sampling::Sample> {
         let choice = sample.choice(self.settings.half_width.unwrap_or_default(), &opened.executor())?;
-        let seconds = |samples: f64| time(samples * choice.seconds_per_sample);
+        let seconds = |samples: f64| duration(samples * choice.seconds_per_sample);
         let samples = self.settings.samples.unwrap_or(choice.samples).min(choice.samples);
         let all = match choice.samples_for_all {
             Some(all) => format!("{} samples for all, about {}", count(all as u64), seconds(all)),
@@ -91,9 +90,7 @@ impl Sample {
             ));
         };
         let density = read_density(density)?;
-        if !self.dry_run {
-            check_folder(&self.out)?;
-        }
+        check_folder(&self.out)?;
         let profile = configured.profile()?;
         let options = self.options(&density)?;
         if let Some(rows) = &self.rows {
@@ -111,10 +108,6 @@ impl Sample {
         started: Instant,
         verbosity: Verbosity,
     ) -> Result<Exit> {
-        if self.dry_run {
-            let (run, backend) = (sample.forecast(&opened.executor())?, opened.backend().describe());
-            return DryRun { run, backend, before_s: None }.print(self.format);
-        }
         let executor = opened.executor().with_recheck(sample.options.seed);
         let is_split = self.shards.plan_only || self.shards.is_part();
         let sample = match &sample.kind {
@@ -164,7 +157,10 @@ impl Sample {
         let (density, lane_plan) = (sample.density(), sample.lane_plan());
         let rows = self.rows.as_deref().filter(|_| !is_empty).zip(lane_plan);
         let mut table = rows.map(|(path, plan)| lanes::sampled_table(path, plan, density)).transpose()?;
-        let bar = console::progress(verbosity, missing, "sampling");
+        let bar = match sample.options.stop.is_fixed() {
+            true => console::progress(verbosity, missing, "sampling"),
+            false => console::progress_to_maximum(verbosity, missing, "sampling"),
+        };
         let mut progress = |samples| bar.inc(samples);
         let sampled = match table.as_mut().zip(lane_plan) {
             Some((table, plan)) => {
@@ -234,7 +230,7 @@ fn searching<'a>(
             );
         }
     }
-    let bar = console::progress(verbosity, most, "searching");
+    let bar = console::progress_to_maximum(verbosity, most, "searching");
     (executor.clone().with_progress(console::inc(&bar)), bar)
 }
 

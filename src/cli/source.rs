@@ -117,14 +117,6 @@ impl SourceFlags {
         self.plausibility.policy()
     }
 
-    /// Checks that the data can be read.
-    ///
-    /// # Errors
-    /// As [`Source::check`].
-    pub fn check(&self, configured: &Configured) -> Result<()> {
-        self.source(configured).check(self.plausibility.policy())
-    }
-
     /// Like [`load`].
     pub fn load(&self, configured: &Configured, verbosity: Verbosity) -> Result<Collection> {
         load(&self.source(configured), &configured.settings.mining, self.plausibility.policy(), verbosity)

@@ -7,14 +7,12 @@ use clap::Args;
 
 use super::configured::Configured;
 use super::console::{self, Verbosity};
-use super::dry_run::DryRun;
 use super::format::{FormatFlag, TablesFlag};
 use super::shard_flags::ShardFlags;
 use super::source::{self, SourceFlags};
 use super::{Exit, lists};
 use crate::Result;
 use crate::engine::{Headway, OpenBackend};
-use crate::model::profile::Profile;
 use crate::report::lanes::{self, table_format};
 use crate::report::reference::ReferenceComparison;
 use crate::report::run_record::{StudyHost, Timings};
@@ -84,9 +82,6 @@ pub struct Study {
     /// A scenario file has the ids of S; its series may have any sample rate and length. Repeatable.
     #[arg(long, value_name = "FILE", help_heading = "Data")]
     external: Vec<PathBuf>,
-    /// Print lanes, memory and estimated time; write nothing
-    #[arg(long, conflicts_with_all = ["shard", "plan_only"], help_heading = "Run")]
-    dry_run: bool,
     #[command(flatten)]
     tables: TablesFlag,
     #[command(flatten)]
@@ -130,9 +125,6 @@ impl Study {
             if study.facts().reference {
                 opened = configured.open_reference()?;
             }
-            if self.dry_run {
-                return self.forecast(&study, &opened, None);
-            }
             return self.sweep(&study, &opened, configured, Timings::default(), verbosity);
         }
         if self.shards.plan_only {
@@ -147,43 +139,22 @@ impl Study {
         // Open before the work, so that a missing device is reported at once.
         let opened = if self.reference { configured.open_reference()? } else { configured.open()? };
         let (study, timings) = self.prepare(configured, verbosity)?;
-        if self.dry_run {
-            return self.forecast(&study, &opened, Some(timings.mine_s + timings.plan_s));
-        }
         self.sweep(&study, &opened, configured, timings, verbosity)
-    }
-
-    /// Checks the inputs of a plan except recordings, which are not read; for callers that only write the command.
-    ///
-    /// # Errors
-    /// Those that the run would end with.
-    pub(super) fn check(&self, configured: &Configured) -> Result<()> {
-        self.guard_inputs(configured)?;
-        check_folder(&self.out)?;
-        let (profile, options) = self.profile_and_options(configured)?;
-        profile.check_time_step(&options.models)?;
-        self.data.check(configured)
-    }
-
-    /// The profile and the options of the study.
-    fn profile_and_options(&self, configured: &Configured) -> Result<(Profile, StudyOptions)> {
-        let profile = configured.profile()?;
-        let options = StudyOptions {
-            categories: self.categories.list()?,
-            models: self.models.list()?,
-            headways: self.headways.list()?,
-            parameterization: configured.settings.parameterization.clone(),
-            folds: self.cross_validate.then_some(configured.settings.search.folds),
-            searched: Vec::new(),
-            external: Vec::new(),
-        };
-        Ok((profile, options))
     }
 
     /// Makes a plan from the data.
     fn prepare(&self, configured: &Configured, verbosity: Verbosity) -> Result<(study::Study, Timings)> {
         let config = configured.settings.clone();
-        let (profile, mut options) = self.profile_and_options(configured)?;
+        let profile = configured.profile()?;
+        let mut options = StudyOptions {
+            categories: self.categories.list()?,
+            models: self.models.list()?,
+            headways: self.headways.list()?,
+            parameterization: config.parameterization.clone(),
+            folds: self.cross_validate.then_some(config.search.folds),
+            searched: Vec::new(),
+            external: Vec::new(),
+        };
         let source = self.data.source(configured);
         let has_paper_headways = options.headways == Headway::paper();
         // Generated data are described with the answer.
@@ -218,12 +189,6 @@ impl Study {
         let study = timed(&mut timings.plan_s, || builder.plan())?;
         console::warn(study.cases().left_out());
         Ok((study, timings))
-    }
-
-    /// Prints the forecast of the run.
-    fn forecast(&self, study: &study::Study, opened: &OpenBackend, before_s: Option<f64>) -> Result<Exit> {
-        let backend = opened.backend();
-        DryRun { run: study.forecast(backend)?, backend: backend.describe(), before_s }.print(self.format)
     }
 
     /// Runs a plan; returns a report, or a part of a run.

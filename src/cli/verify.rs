@@ -3,7 +3,6 @@
 use clap::{Args, Subcommand};
 
 use super::configured::Configured;
-use super::conformance::Conformance;
 use super::console::{self, Verbosity};
 use super::devices::Devices;
 use super::format::FormatFlag;
@@ -54,7 +53,6 @@ pub struct Verify {
 #[derive(Debug, Subcommand)]
 enum VerifyVerb {
     Devices(Devices),
-    Conformance(Conformance),
 }
 
 /// Maximum number of random lanes per model and category: their units have individual names.
@@ -64,7 +62,6 @@ impl Verify {
     pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         match &self.verb {
             Some(VerifyVerb::Devices(verb)) => return verb.run(),
-            Some(VerifyVerb::Conformance(verb)) => return verb.run(),
             None => (),
         }
         for (flag, value, max) in [

@@ -11,7 +11,6 @@ pub(crate) mod cpu;
 mod device_choice;
 mod drivers;
 mod executor;
-mod forecast;
 mod frame;
 pub mod generated;
 #[cfg(feature = "gpu")]
@@ -39,7 +38,6 @@ pub use cpu::simd::Instructions;
 pub use device_choice::{BackendChoice, DeviceName};
 pub use drivers::Constants;
 pub use executor::{Executor, SweepSummary, chunks};
-pub use forecast::{Forecast, forecast};
 pub use frame::{Frame, Simulation, Start};
 pub use lane::{Observer, Silent, Step, run_lane};
 pub use lane_case::attention_rules;

@@ -1,5 +1,3 @@
-//! Other programs: OpenSCENARIO files, tables of other simulators, scripts for workload managers.
+//! Other programs: OpenSCENARIO files.
 
-pub mod cluster;
-pub mod conformance;
 pub mod openscenario;

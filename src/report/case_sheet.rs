@@ -272,7 +272,7 @@ impl CaseSheet<'_> {
     }
 
     /// The figure of the case under the first profile, step by step, with the answer.
-    pub fn figure(&self, panels: TracePanels) -> TraceFigure<'_> {
+    fn figure(&self, panels: TracePanels) -> TraceFigure<'_> {
         let first = self.first();
         let series = first
             .models

@@ -35,8 +35,6 @@ pub struct DossierReport<'a> {
     pub provenance: &'a DataProvenance,
     /// Profile.
     pub profile: &'a Profile,
-    /// Shipped conformance tables of this category and profile: name, rows, whether they pass.
-    pub conformance: Vec<(String, u64, bool)>,
     /// The person responsible, if given.
     pub author: Option<String>,
     /// Date as given. The program adds no date, so that the same inputs give the same bytes.
@@ -232,8 +230,6 @@ impl DossierReport<'_> {
                 }),
             })
         });
-        let conformance =
-            self.conformance.iter().map(|(what, rows, passes)| json!({"what": what, "rows": rows, "passes": passes}));
         records::document(&json!({
             "program": PROGRAM,
             "data": self.provenance.data,
@@ -267,7 +263,6 @@ impl DossierReport<'_> {
             "no_density": dossier.no_density.as_ref().map(ToString::to_string),
             "alternatives": alternatives.collect::<Vec<_>>(),
             "hidden": dossier.hidden.len(),
-            "conformance": conformance.collect::<Vec<_>>(),
             "plan_sha256": dossier.plan_sha256,
             "density_sha256": dossier.density_sha256,
             "left_out": dossier.left_out.iter().map(ToString::to_string).collect::<Vec<_>>(),

@@ -4,7 +4,6 @@ use super::dossier::{DossierReport, SHOWN, share};
 use super::html::{Page, PageFigure, Section};
 use super::records::PROGRAM;
 use crate::support::readable::{count, value};
-use crate::support::table::Table;
 use crate::{Error, Result};
 
 impl DossierReport<'_> {
@@ -139,19 +138,11 @@ impl DossierReport<'_> {
     }
 
     fn credibility_section(&self) -> Section {
-        let table = Table::of(&self.conformance)
-            .column("table", |(what, ..)| what.as_str())
-            .column("in this build", |(.., passes)| if *passes { "passes" } else { "FAILS" })
-            .column("rows", |(_, rows, _)| *rows)
-            .build();
-        let tables = if self.conformance.is_empty() { Vec::new() } else { vec![table.captioned("Conformance")] };
         let recheck = format!(
             "{} lanes were computed again on the CPU with every step, and were equal to the bit",
             count(self.host.rechecked_lanes)
         );
         Section {
-            intro: self.conformance_words(),
-            tables,
             facts: vec![
                 ("exactness".to_owned(), recheck),
                 (

@@ -150,22 +150,6 @@ impl DossierReport<'_> {
         })
     }
 
-    /// Results of other simulators' tables for these lanes.
-    pub(super) fn conformance_words(&self) -> String {
-        let (category, profile) = (self.dossier.parameterization.category.label(), &self.profile.name);
-        let own = "`lanesweep verify conformance` takes tables of your own.";
-        if self.conformance.is_empty() {
-            return format!(
-                "No table of another simulator for {category} under {profile} ships with the program: nothing outside this \
-                 program was compared with these lanes. {own}"
-            );
-        }
-        format!(
-            "Tables of the JRC's public simulator for {category} under {profile} that ship with the program, and its functions, \
-             computed in this run. {own}"
-        )
-    }
-
     /// Purposes that the conclusion does not support.
     pub(super) fn limits(&self) -> Vec<(String, String)> {
         let model = self.dossier.model.name();

@@ -88,7 +88,6 @@ impl FailureMaps<'_> {
                     corners: [(x[i], y[j]), (x[i + 1], y[j + 1])],
                     fill: fill(samples, failures),
                     tip: format!("{}; {}: {failures} of {samples} failed, share {share}", range(&x, i), range(&y, j)),
-                    ..FilledCell::default()
                 }
             };
             let has_none = self.cells(headway, model).any(|(_, _, failures)| failures == 0);

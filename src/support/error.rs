@@ -148,7 +148,7 @@ pub enum Error {
         /// What to do.
         help: String,
     },
-    /// A check requested by the user failed (conformance, verification).
+    /// A check requested by the user failed (`verify`).
     #[error("{0}")]
     Verification(String),
     /// Another process works on the same run or part; the same command can be repeated later.

@@ -1,5 +1,6 @@
 //! Makes foreign text (file names, ids, contents) safe for a terminal, a page and a spreadsheet: characters that act
-//! instead of being shown become escapes. Also finds the known name closest to an unknown one, and formats digests.
+//! instead of being shown become escapes. Also quotes words for a shell, finds the known name closest to an unknown one, and formats
+//! digests.
 
 use std::borrow::Cow;
 
@@ -101,6 +102,16 @@ pub fn shown_json(json: &str) -> Cow<'_, str> {
     Cow::Owned(shown)
 }
 
+/// One word of a POSIX shell, for commands in messages: as it is where nothing in it is special, else in single quotes.
+pub(crate) fn quoted_word(word: &str) -> String {
+    // `=` is special: before a command it makes an assignment.
+    let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-./:,+@%".contains(c);
+    match !word.is_empty() && word.chars().all(is_plain) {
+        true => word.to_owned(),
+        false => format!("'{}'", word.replace('\'', r"'\''")),
+    }
+}
+
 /// The most similar name, if its similarity (0 to 1) is above `min_likeness`. Case and separators are ignored. A text
 /// longer than any name resembles none.
 pub fn nearest<'a>(wrong: &str, names: impl IntoIterator<Item = &'a str>, min_likeness: f64) -> Option<&'a str> {
@@ -173,6 +184,22 @@ mod tests {
         assert!(!text.chars().any(|c| acts(c) && c != '\n'), "{text:?}");
         let read = |text: &str| serde_json::from_str::<serde_json::Value>(text).unwrap();
         assert_eq!(read(&text), read(&json));
+    }
+
+    #[test]
+    fn the_shell_reads_back_what_was_quoted_and_plain_words_stay_readable() {
+        for word in ["study", "--config", "a/b-1.toml", "paper,0.4", "64+1", "user@host:x", "50%"] {
+            assert_eq!(quoted_word(word), word);
+        }
+        let words = [
+            "", " ", "my data", "it's", "\"", "$HOME", "`id`", "$(id)", "a\\", "a;b", "*", "~", "x=1", "#", "!", "ä",
+            "&", "'",
+        ];
+        for word in words {
+            let quoted = quoted_word(word);
+            let echoed = std::process::Command::new("sh").args(["-c", &format!("printf %s {quoted}")]).output();
+            assert_eq!(String::from_utf8(echoed.unwrap().stdout).unwrap(), word, "{quoted}");
+        }
     }
 
     #[test]

@@ -59,6 +59,17 @@ pub fn significant(value: f64, digits: usize) -> String {
     }
 }
 
+/// Formats a time in the unit that a person uses: `0.30 s`, `61 s`, `15 min`, `10.0 h`, `3 days`.
+pub(crate) fn duration(seconds: f64) -> String {
+    match seconds {
+        s if s < 10.0 => format!("{s:.2} s"),
+        s if s < 600.0 => format!("{s:.0} s"),
+        s if s < 7200.0 => format!("{:.0} min", s / 60.0),
+        s if s < 172_800.0 => format!("{:.1} h", s / 3600.0),
+        s => format!("{} days", value(s / 86_400.0)),
+    }
+}
+
 /// Inserts thousands separators into the integer part of a decimal number.
 fn grouped(number: &str) -> String {
     let (sign, number) = number.split_at(usize::from(number.starts_with('-')));
@@ -121,6 +132,12 @@ mod tests {
         );
         assert_eq!([1, 1200].map(|n| counted(n, "file")), ["1 file", "1,200 files"]);
         assert_eq!((count(7_u32), count_of(4114)), ("7".to_owned(), "4,114".to_owned()));
+    }
+
+    #[test]
+    fn times_have_the_unit_that_a_person_uses() {
+        let times = [0.3, 61.0, 900.0, 36_000.0, 259_200.0].map(duration);
+        assert_eq!(times, ["0.30 s", "61 s", "15 min", "10.0 h", "3 days"]);
     }
 
     #[test]

@@ -47,18 +47,6 @@ impl Source {
         if synthetic && !text.starts_with("SYNTHETIC DATA") { format!("SYNTHETIC DATA: {text}") } else { text }
     }
 
-    /// Checks that the data can be read: the whole scenario file, or the file names of a folder's recordings.
-    ///
-    /// # Errors
-    /// As [`Source::load`].
-    pub fn check(&self, implausible: Implausible) -> Result<()> {
-        match self {
-            Source::Scenarios(path) => read_scenario_file(path, implausible).map(drop),
-            Source::Recordings { path, preset } => Inputs::of(path, preset.as_deref()).map(drop),
-            Source::Generated(options) => options.validate(),
-        }
-    }
-
     /// Number of recordings to be mined.
     pub fn recordings(&self) -> u64 {
         match self {

@@ -214,12 +214,9 @@ fn inputs_that_once_took_the_memory_or_panicked_are_refused_by_name() {
         assert!(error.to_string().contains(says), "{name}, {new}: {error}");
         assert!(error.help().is_some_and(|h| !h.is_empty()), "{error}");
     };
-    // A duration of 10^300 s; windows of 10^300 samples; a lane change that takes 10^300 s.
+    // A duration of 10^300 s; windows of 10^300 samples.
     refused("scenarios", "\"fps\":25.0", "\"fps\":1e-300", "fps");
     refused("mining options", "window_s = 1.0", "window_s = 1e300", "window_s");
-    refused("conformance table", ",0.9,3,", ",1e-300,3,", "vlat");
-    // A table asks for a parameterization by SVD, which it cannot have.
-    refused("conformance table", ",cut_in,1,", ",cut_in,6,", "no kinematic parameterization `6`");
     // Lengths of a density follow from its options.
     refused("density", "\"svd_instants\": 50", "\"svd_instants\": 9223372036854775808", "svd_instants");
     refused("density", "\"sinusoid_intervals\": 0", "\"sinusoid_intervals\": 4000000000", "sinusoid_intervals");

@@ -313,6 +313,15 @@ fn the_code_of_the_chapter_on_driver_models_is_that_of_the_example_which_a_test_
 }
 
 #[test]
+fn the_slurm_script_of_the_chapter_on_clusters_is_the_one_to_deploy_and_bash_can_read_it() {
+    let script = root().join("deploy/slurm-array.sh");
+    let text = fs::read_to_string(&script).unwrap();
+    let chapter = Document::read(root(), "docs/src/on-a-cluster.md");
+    assert!(chapter.blocks().any(|block| block.content == text), "no block of the chapter is the script");
+    assert!(Command::new("bash").arg("-n").arg(&script).status().unwrap().success());
+}
+
+#[test]
 fn the_time_of_a_study_of_the_papers_size_stands_in_one_place_with_its_command() {
     let mut found = Vec::new();
     for path in markdown_below("docs/src").into_iter().chain(["README.md".to_owned()]) {

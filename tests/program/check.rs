@@ -36,20 +36,8 @@ const CUT_IN: [&str; 12] = [
     "un-r157,paper",
 ];
 
-/// The case of [`CUT_IN`] as `export xosc` writes it.
-fn exported(dir: &Path) -> String {
-    let out = dir.join("xosc");
-    let export = ["-q", "export", "xosc", "--models", "FSM", "--ego", "external", "--out"];
-    let case =
-        ["--category", "cut-in", "--ego-speed", "30m/s", "--speed", "20m/s", "--gap", "36", "--lateral-speed", "1"];
-    let (code, _, error) = check(&[&export[..], &[text(&out)], &case].concat());
-    assert_eq!(code, 0, "{error}");
-    let mut files = std::fs::read_dir(out).unwrap().map(|entry| entry.unwrap().path());
-    std::fs::read_to_string(files.find(|path| path.extension().is_some_and(|e| e == "xosc")).unwrap()).unwrap()
-}
-
 #[test]
-fn flags_a_toml_file_a_row_and_an_openscenario_file_are_the_same_case() {
+fn flags_a_toml_file_and_a_row_are_the_same_case() {
     let dir = tempfile::tempdir().unwrap();
     let of = |name: &str| dir.path().join(name);
     std::fs::write(
@@ -62,44 +50,12 @@ fn flags_a_toml_file_a_row_and_an_openscenario_file_are_the_same_case() {
         "category,ego_speed_mps,speed,gap,lateral_speed\ncut-in,9,9km/h,9,1\ncut-in,30,72km/h,36m,1\n",
     )
     .unwrap();
-    let file = of("exported.xosc");
-    std::fs::write(&file, exported(dir.path())).unwrap();
     let flags = json(&[&["check"], &CUT_IN[..]].concat());
     let profiles = ["--profiles", "un-r157,paper"];
     let toml = json(&[&["check", text(&of("case.toml"))], &profiles[..]].concat());
     let row = json(&[&["check", text(&of("cases.csv")), "--row", "2"], &profiles[..]].concat());
-    let xosc = json(&[&["check", text(&file)], &profiles[..]].concat());
     assert_eq!(flags["profiles"], toml["profiles"]);
     assert_eq!(flags["profiles"], row["profiles"]);
-    for (ours, theirs) in flags["profiles"].as_array().unwrap().iter().zip(xosc["profiles"].as_array().unwrap()) {
-        assert_eq!(ours["avoided_by"], theirs["avoided_by"]);
-        for (a, b) in ours["models"].as_array().unwrap().iter().zip(theirs["models"].as_array().unwrap()) {
-            assert_eq!(
-                (&a["model"], &a["collision"], &a["t_react_s"]),
-                (&b["model"], &b["collision"], &b["t_react_s"])
-            );
-            let [a, b] = [a, b].map(|model| model["min_gap_m"].as_f64().unwrap());
-            assert!((a - b).abs() < 1e-6, "{a} {b}");
-        }
-    }
-}
-
-#[test]
-fn exported_scenarios_are_mined_as_a_scenario_file_that_a_study_reads() {
-    let dir = tempfile::tempdir().unwrap();
-    let of = |name: &str| dir.path().join(name);
-    std::fs::create_dir(of("exported")).unwrap();
-    std::fs::write(of("exported/a.xosc"), exported(dir.path())).unwrap();
-    std::fs::write(of("exported/b.xosc"), "<OpenSCENARIO>").unwrap();
-    let (code, _, error) = check(&["mine", text(&of("exported")), "--out", text(&of("s.jsonl"))]);
-    assert_eq!(code, 4, "a bad file is left out and said: {error}");
-    assert!(error.contains("b.xosc") && error.contains("every scenario counts as kept"), "{error}");
-    let mined = std::fs::read_to_string(of("s.jsonl")).unwrap();
-    assert!(mined.lines().count() == 1 && mined.contains("\"id\":\"a\""), "{mined}");
-    assert!(!of("s.exposure.json").exists(), "nobody knows how far was driven");
-    let file = of("s.jsonl");
-    let (code, _, error) = check(&["-q", "simulate", "--scenarios", text(&file), "--lane", "a/S/1.2s/FSM"]);
-    assert_eq!(code, 0, "{error}");
 }
 
 /// A cut-in as flags: speeds in km/h, gap, lateral speed, further flags.
@@ -292,17 +248,14 @@ fn what_holds_no_case_is_refused_with_what_to_give() {
         std::fs::write(&path, content).unwrap();
         path
     };
-    let foreign = of("a.xosc", "<OpenSCENARIO><FileHeader author=\"somebody\" description=\"x\"/></OpenSCENARIO>");
-    let broken = of("b.xosc", "<OpenSCENARIO>");
+    let exported = of("a.xosc", "<OpenSCENARIO/>");
     let empty = of("c.csv", "category\n");
     let other = of("d.txt", "cut-in");
-    let whole = exported(dir.path());
-    let gap = of("e.xosc", &whole.replacen("<Vertex time=\"0.04\"", "<Vertex time=\"0.05\"", 1));
     for (args, says) in [
         (vec!["check"], "there is nothing to check"),
-        (vec!["check", text(&foreign)], "export xosc"),
-        (vec!["check", text(&broken)], "does not end"),
-        (vec!["check", text(&gap)], "after 1 steps of 0.04 s"),
+        (vec!["check", text(&exported)], "give a .jsonl scenario file"),
+        (vec!["check", text(&exported), "--scenario", "a"], "give a .jsonl scenario file"),
+        (vec!["mine", text(&exported)], "`export` writes OpenSCENARIO only"),
         (vec!["check", text(&empty)], "it has no rows"),
         (vec!["check", text(&other)], "holds no case"),
         (vec!["check", "--category", "cut-in", "--ego-speed", "fast"], "60km/h"),
@@ -382,7 +335,7 @@ fn a_description_that_contradicts_itself_is_refused_alike_by_every_verb_and_from
             ([&xosc[..], &["--case-file", text(&toml)]].concat(), false),
             (vec!["check", text(&table)], true),
             (vec!["simulate", "--table", text(&table)], true),
-            (vec!["study", "--dry-run", "--scenarios", text(&table)], true),
+            (vec!["study", "--scenarios", text(&table)], true),
         ] {
             let (code, _, error) = check(&args);
             let said = error.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");

@@ -234,7 +234,7 @@ fn what_shows_one_case_asks_for_a_row_of_a_table_with_several() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     file(dir, "cases.csv", &format!("{HEADER}{}\n{}\n", ROWS[0].0, ROWS[1].0));
-    for flag in [["--sheet", "case.html"], ["--series", "case.csv"], ["--animation", "case.svg"]] {
+    for flag in [["--sheet", "case.html"], ["--series", "case.csv"]] {
         let (code, _, error) = run(dir, &[&["check", "cases.csv"], &flag[..]].concat());
         assert!(code == 2 && error.contains(flag[0]) && error.contains("--row N"), "{error}");
         let (code, _, error) = run(dir, &[&["check", "cases.csv", "--row", "2"], &flag[..]].concat());

@@ -171,20 +171,6 @@ fn a_case_from_flags_from_toml_and_from_a_table_row_is_the_same_case() {
     assert_eq!(by_flags.stdout, by_table.stdout, "{}", stderr(&by_table));
 }
 
-#[test]
-fn conformance_passes_on_the_golden_tables_and_fails_with_code_5_on_a_wrong_one() {
-    let (functions, lvd) = (common::golden("functions.csv"), common::golden("lvd.csv"));
-    let good = lanesweep(&["verify", "conformance", text(&functions), text(&lvd)]);
-    assert_eq!(code(&good), 0, "{}", stderr(&good));
-    let dir = tempfile::tempdir().unwrap();
-    let wrong = dir.path().join("functions.csv");
-    let content = std::fs::read_to_string(&functions).unwrap().replace("PFS,0,0,1,,1", "PFS,0,0,1,,0");
-    std::fs::write(&wrong, content).unwrap();
-    let bad = lanesweep(&["verify", "conformance", text(&wrong)]);
-    assert_eq!(code(&bad), 5, "{}", stderr(&bad));
-    assert!(stderr(&bad).contains("line 2"), "{}", stderr(&bad));
-}
-
 /// A standing vehicle 20 m ahead of 50 m/s: every time step ends in its rear, or is refused with the longest one.
 #[test]
 fn no_time_step_lets_the_ego_drive_through_a_vehicle() {
@@ -218,8 +204,7 @@ fn wrong_words_are_answered_with_what_to_write_instead() {
     let range = file("range.toml", "[score]\nconfidence = 0\n");
     let svd = file("svd.toml", "[parameterization]\nsvd_instants = 1\n");
     let profile = file("profile.toml", "name = \"x\"\n");
-    let no_table = file("table.csv", "a,b\n1,2\n");
-    let cases: [(&[&str], i32, &str); 16] = [
+    let cases: [(&[&str], i32, &str); 14] = [
         (&["study", "--profile", "papr"], 2, "did you mean `paper`"),
         (&["study", "--profile", &profile], 2, "missing field"),
         (&["study", "--dt", "0"], 2, "--dt"),
@@ -254,8 +239,6 @@ fn wrong_words_are_answered_with_what_to_write_instead() {
             "at least 0",
         ),
         (&["simulate", "--category", "lvd", "--ego-speed", "20m/s", "--acceleration", "-6"], 2, "--thw"),
-        (&["verify", "conformance"], 2, "nothing to compare"),
-        (&["verify", "conformance", &no_table], 3, "no conformance table"),
     ];
     for (args, expected, hint) in cases {
         let output = lanesweep(args);
@@ -273,7 +256,7 @@ fn a_list_with_a_value_twice_is_refused_with_the_value() {
     let export = ["export", "xosc", "--scenarios", text(&scenarios), "--lane", lane, "--lane"];
     let case = "--category lvd --ego-speed 20m/s --gap 20 --acceleration -6 --models FSM,fsm";
     let case: Vec<&str> = case.split(' ').collect();
-    let lists: [(&[&str], &str); 18] = [
+    let lists: [(&[&str], &str); 17] = [
         (&["study", "--thw", "0.6,0.6"], "--thw: `0.6` is given twice"),
         (&["study", "--thw", "0.6,1, 0.60"], "--thw: `0.60` repeats `0.6`"),
         (&["study", "--thw", "0.6,0.6000000001"], "--thw: `0.6000000001` repeats `0.6`"),
@@ -286,7 +269,6 @@ fn a_list_with_a_value_twice_is_refused_with_the_value() {
         (&["fit", "--parameterizations", "2,i,2"], "--parameterizations: `2` is given twice"),
         (&["compare", "--parameterizations", "all,2"], "--parameterizations: `2` repeats `all`"),
         (&["map", "lvd", "--preset", "r157", "--models", "RSS,RSS"], "--models: `RSS` is given twice"),
-        (&["verify", "conformance", "a.csv", "./a.csv"], "FILE: `./a.csv` repeats `a.csv`"),
         (
             &["sample", "a.json", "--estimator", "is", "--proposal", "p.json", "--proposal", "p.json"],
             "--proposal: `p.json` is given twice",

@@ -5,7 +5,6 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::{Command, Output};
 
-use lanesweep::model::driver::ModelId;
 use serde_json::Value;
 
 /// Runs the program with nothing configured but what the test configures.
@@ -43,12 +42,11 @@ fn shown(dir: &Path, variables: &[(&str, &str)], args: &[&str], key: &str) -> (V
 }
 
 #[test]
-fn a_flag_wins_over_an_assignment_over_the_environment_over_a_file_over_the_default() {
+fn a_flag_wins_over_an_assignment_over_a_file_over_the_default() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     std::fs::write(dir.join("a.toml"), "# mine\n[generator]\nseed = 2\n[run]\ndt_s = 0.2\n").unwrap();
     let file = ["--config", "a.toml"];
-    let environment = [("LANESWEEP_GENERATOR_SEED", "3"), ("LANESWEEP_RUN_DT_S", "0.3")];
     let assigned = ["--config", "a.toml", "--config", "generator.seed=4", "--config", "run.dt_s=0.4"];
     let flags = [&assigned[..], &["--config", "generator.seed=5", "--dt", "0.5"]].concat();
     let seed = |variables: &[(&str, &str)], args: &[&str]| shown(dir, variables, args, "generator.seed");
@@ -58,11 +56,10 @@ fn a_flag_wins_over_an_assignment_over_the_environment_over_a_file_over_the_defa
     assert_eq!(dt(&[], &[]), is(Value::Null, "default"));
     assert_eq!(seed(&[], &file), is(2.into(), "file a.toml, line 3"));
     assert_eq!(dt(&[], &file), is(0.2.into(), "file a.toml, line 5"));
-    assert_eq!(seed(&environment, &file), is(3.into(), "environment LANESWEEP_GENERATOR_SEED"));
-    assert_eq!(dt(&environment, &file), is(0.3.into(), "environment LANESWEEP_RUN_DT_S"));
-    assert_eq!(seed(&environment, &assigned), is(4.into(), "flag --config"));
-    assert_eq!(dt(&environment, &flags), is(0.5.into(), "flag --dt"));
-    assert_eq!(seed(&environment, &flags), is(5.into(), "flag --config"));
+    assert_eq!(seed(&[], &assigned), is(4.into(), "flag --config"));
+    assert_eq!(dt(&[], &assigned), is(0.4.into(), "flag --config"));
+    assert_eq!(dt(&[], &flags), is(0.5.into(), "flag --dt"));
+    assert_eq!(seed(&[], &flags), is(5.into(), "flag --config"));
     // The environment names the file where no flag does, and nothing after `=` is the default again.
     assert_eq!(seed(&[("LANESWEEP_CONFIG", "a.toml")], &[]), is(2.into(), "file a.toml, line 3"));
     std::fs::write(dir.join("b.toml"), "").unwrap();
@@ -84,24 +81,21 @@ fn every_verb_takes_its_values_from_all_layers() {
     let fit = ["fit", "--categories", "lvd", "--parameterizations", "i", "--no-comparison", "--out", "lvd-i.json"];
     let compare = ["compare", "--categories", "lvd", "--parameterizations", "i", "--models", "FSM", "--thw", "1"];
     let verbs: [(&[&str], &str, &str, &str, u64); 4] = [
-        (&["study"], "lanesweep-out/run.json", "/score/seed", "SCORE", 11),
-        (&fit, "lvd-i.json", "/p_valid/seed", "FIT", 12),
-        (&["sample", "lvd-i.json"], "lanesweep-sample/estimate.json", "/seed", "SAMPLE", 13),
-        (&compare, "lanesweep-compare/compare.json", "/seed", "COMPARE", 14),
+        (&["study"], "lanesweep-out/run.json", "/score/seed", "score", 11),
+        (&fit, "lvd-i.json", "/p_valid/seed", "fit", 12),
+        (&["sample", "lvd-i.json"], "lanesweep-sample/estimate.json", "/seed", "sample", 13),
+        (&compare, "lanesweep-compare/compare.json", "/seed", "compare", 14),
     ];
     for (verb, result, pointer, table, in_file) in verbs {
-        let variable = format!("LANESWEEP_{table}_SEED");
-        let assignment = format!("{}.seed=31", table.to_lowercase());
-        let with = |variables: &[(&str, &str)], args: &[&str]| {
-            good(dir, variables, &[&["-q", "--config", "a.toml"], verb, args].concat());
+        let assignment = format!("{table}.seed=31");
+        let with = |args: &[&str]| {
+            good(dir, &[], &[&["-q", "--config", "a.toml"], verb, args].concat());
             let record = json(&dir.join(result));
             record.pointer(pointer).and_then(Value::as_u64)
         };
-        let environment = [(variable.as_str(), "21")];
-        assert_eq!(with(&[], &[]), Some(in_file), "{verb:?}: file");
-        assert_eq!(with(&environment, &[]), Some(21), "{verb:?}: environment");
-        assert_eq!(with(&environment, &["--config", &assignment]), Some(31), "{verb:?}: assignment");
-        assert_eq!(with(&environment, &["--config", &assignment, "--seed", "41"]), Some(41), "{verb:?}: flag");
+        assert_eq!(with(&[]), Some(in_file), "{verb:?}: file");
+        assert_eq!(with(&["--config", &assignment]), Some(31), "{verb:?}: assignment");
+        assert_eq!(with(&["--config", &assignment, "--seed", "41"]), Some(41), "{verb:?}: flag");
     }
     let record = json(&dir.join("lanesweep-out/run.json"));
     let settings = record["settings"].as_array().unwrap();
@@ -118,14 +112,14 @@ fn mining_is_configured_alike_for_mine_and_study() {
     let dir = dir.path();
     std::fs::write(dir.join("a.toml"), "[mining.lvd]\nmin_peak_deceleration_mps2 = 1e6\n").unwrap();
     good(dir, &[], &["-q", "synth", "data", "--synth-recordings", "2", "--config", "generator.duration_s=120"]);
-    let kept = |variables: &[(&str, &str)], args: &[&str]| {
-        let text = good(dir, variables, &[&["-q", "mine", "data", "--kept"], args].concat());
+    let kept = |args: &[&str]| {
+        let text = good(dir, &[], &[&["-q", "mine", "data", "--kept"], args].concat());
         text.lines().filter(|line| line.contains("_lvd_")).count()
     };
-    assert!(kept(&[], &[]) > 0);
-    assert_eq!(kept(&[], &["--config", "a.toml"]), 0);
-    let environment = [("LANESWEEP_MINING_LVD_MIN_PEAK_DECELERATION_MPS2", "2")];
-    assert_eq!(kept(&environment, &["--config", "a.toml"]), kept(&[], &[]));
+    assert!(kept(&[]) > 0);
+    assert_eq!(kept(&["--config", "a.toml"]), 0);
+    let default = ["--config", "a.toml", "--config", "mining.lvd.min_peak_deceleration_mps2="];
+    assert_eq!(kept(&default), kept(&[]));
     let study = ["-q", "study", "data", "--backend", "cpu", "--categories", "cut-in,lvd", "--config", "a.toml"];
     good(dir, &[], &study);
     let record = json(&dir.join("lanesweep-out/run.json"));
@@ -167,17 +161,12 @@ fn a_wrong_word_is_answered_with_its_place_and_the_nearest_right_one() {
             assert!(said.contains(place) && said.contains(hint), "{text:?}: {said}");
         }
     }
-    let said = refused(dir, &[("LANESWEEP_RUN_BAKEND", "cpu")], &["study"]);
-    assert!(said.contains("variable LANESWEEP_RUN_BAKEND") && said.contains("LANESWEEP_RUN_BACKEND?"), "{said}");
-    let said = refused(dir, &[("LANESWEEP_SAMPLE_LEVEL", "2")], &["config", "show"]);
-    assert!(said.contains("variable LANESWEEP_SAMPLE_LEVEL: `2` cannot be used"), "{said}");
+    let said = refused(dir, &[], &["config", "show", "--config", "sample.level=2"]);
+    assert!(said.contains("--config sample.level=2: `2` cannot be used"), "{said}");
     let said = refused(dir, &[], &["study", "--config", "score.sed=3"]);
     assert!(said.contains("--config score.sed=3") && said.contains("`score.seed`"), "{said}");
     let said = refused(dir, &[], &["study", "--config", "score.seed=x"]);
     assert!(said.contains("--config score.seed=x: `x` cannot be used"), "{said}");
-    let said =
-        refused(dir, &[], &["cluster", "slurm", "--config", "a.toml", "--array", "2", "--out", "x", "--", "study"]);
-    assert!(said.contains("give it to the run"), "{said}");
     assert_eq!(std::fs::read_dir(dir).unwrap().count(), 1, "nothing was written");
 }
 
@@ -185,19 +174,25 @@ fn a_wrong_word_is_answered_with_its_place_and_the_nearest_right_one() {
 fn what_is_configured_yields_to_a_flag_that_contradicts_it() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    let device = [("LANESWEEP_RUN_DEVICE", "no such device"), ("LANESWEEP_GENERATOR_RECORDINGS", "1")];
-    let gpu = [("LANESWEEP_RUN_BACKEND", "gpu"), ("LANESWEEP_GENERATOR_RECORDINGS", "1")];
-    good(dir, &device, &["-q", "study", "--dry-run", "--backend", "cpu"]);
-    good(dir, &gpu, &["-q", "study", "--dry-run", "--reference"]);
-    refused(dir, &device, &["-q", "study", "--dry-run"]);
-    let both = [("LANESWEEP_RUN_BACKEND", "cpu"), ("LANESWEEP_RUN_DEVICE", "0")];
-    let said = refused(dir, &both, &["-q", "study", "--dry-run"]);
-    assert!(said.contains("variable LANESWEEP_RUN_DEVICE: `0` is named") && !said.contains("--backend"), "{said}");
-    assert!(said.contains("variable LANESWEEP_RUN_BACKEND chooses the CPU"), "{said}");
-    // A plan's lanes are decided; what the environment says of them was there when it was made.
-    let small = [("LANESWEEP_GENERATOR_RECORDINGS", "1"), ("LANESWEEP_RUN_BACKEND", "cpu")];
+    for (name, run) in [
+        ("device.toml", "device = \"no such device\""),
+        ("gpu.toml", "backend = \"gpu\""),
+        ("both.toml", "backend = \"cpu\"\ndevice = \"0\""),
+        ("small.toml", "backend = \"cpu\""),
+    ] {
+        std::fs::write(dir.join(name), format!("[run]\n{run}\n[generator]\nrecordings = 1\n")).unwrap();
+    }
+    let [device, gpu, both, small] =
+        ["device.toml", "gpu.toml", "both.toml", "small.toml"].map(|file| [("LANESWEEP_CONFIG", file)]);
+    good(dir, &device, &["-q", "study", "--backend", "cpu"]);
+    good(dir, &gpu, &["-q", "study", "--reference"]);
+    refused(dir, &device, &["-q", "study"]);
+    let said = refused(dir, &both, &["-q", "study"]);
+    assert!(said.contains("both.toml, line 3, `run.device`: `0` is named") && !said.contains("--backend"), "{said}");
+    assert!(said.contains("both.toml, line 2, `run.backend` chooses the CPU"), "{said}");
+    // A plan's lanes are decided; what the file of the environment says of them was there when it was made.
     good(dir, &small, &["-q", "study", "--plan-only", "--out", "run"]);
-    good(dir, &small, &["-q", "study", "--plan", "run/plan.json", "--dry-run"]);
+    good(dir, &small, &["-q", "study", "--plan", "run/plan.json"]);
     let said = refused(dir, &small, &["study", "--plan", "run/plan.json", "--config", "score.seed=3"]);
     assert!(said.contains("`score.seed` is decided by the plan"), "{said}");
 }
@@ -311,61 +306,18 @@ fn walk(schema: &Value, prefix: &str, each: &mut dyn FnMut(&str, &Value)) {
 }
 
 #[test]
-fn a_dry_run_counts_the_lanes_of_the_run_and_writes_nothing() {
+fn counts_of_flags_are_written_as_in_a_configuration_file() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    let lanes = |text: &str| {
-        let line = text.lines().find_map(|line| line.strip_prefix("Lanes   ")).unwrap_or_else(|| panic!("{text}"));
-        assert!(text.contains("Memory  ") && text.contains("Time    "), "{text}");
-        line.replace(',', "").replace("at most ", "").parse::<u64>().unwrap()
-    };
-    let small = [("LANESWEEP_GENERATOR_RECORDINGS", "2"), ("LANESWEEP_RUN_BACKEND", "cpu")];
-    let study = lanes(&good(dir, &small, &["-q", "study", "--dry-run"]));
-    assert_eq!(std::fs::read_dir(dir).unwrap().count(), 0, "nothing was written");
-    let fit = ["-q", "fit", "--categories", "cut-in", "--parameterizations", "2", "--no-comparison", "--out", "d.json"];
-    good(dir, &small, &fit);
-    let files = || std::fs::read_dir(dir).unwrap().count();
-    let before = files();
-    let compare =
-        ["-q", "compare", "--dry-run", "--categories", "lvd", "--parameterizations", "i", "--samples", "1000"];
-    let compare = lanes(&good(dir, &small, &compare));
-    assert_eq!(compare % (10 * ModelId::ALL.len() as u64), 0);
-    let sample = |args: &[&str]| lanes(&good(dir, &small, &[&["-q", "sample", "d.json", "--dry-run"], args].concat()));
-    assert_eq!(sample(&["--samples", "1000000000", "--models", "FSM,RSS"]), 20_000_000_000);
-    // Counts are written as in a configuration file.
-    assert_eq!(sample(&["--samples", "1e9", "--models", "FSM,RSS"]), 20_000_000_000);
-    assert_eq!(sample(&["--samples", "1_000", "--models", "FSM"]), 10_000);
-    let said = refused(dir, &small, &["-q", "sample", "d.json", "--given", "v_ego_mps=300"]);
-    assert!(said.contains("300 m/s is beyond what is physical") && said.contains("--given"), "{said}");
-    // A search is counted with its maximum.
-    assert!(sample(&["--estimator", "is", "--samples", "1000", "--thw", "0.6", "--models", "FSM"]) > 2_000_000);
-    let map = ["-q", "map", "cut-in", "--preset", "jrc", "--dry-run"];
-    assert_eq!(lanes(&good(dir, &small, &map)), 29_970 * ModelId::ALL.len() as u64);
-    assert_eq!(files(), before, "nothing was written");
-    good(dir, &small, &["-q", "study", "--out", "run"]);
-    assert_eq!(json(&dir.join("run/run.json"))["lanes"], study);
-}
-
-#[test]
-fn the_variables_of_tests_and_ci_are_known() {
-    let root = Path::new(env!("CARGO_MANIFEST_DIR"));
-    let known: BTreeSet<String> = lanesweep::cli::settings::Key::all()
-        .iter()
-        .map(|key| lanesweep::cli::settings::variable_of(&key.name))
-        .chain(lanesweep::cli::settings::TEST_VARIABLES.map(str::to_owned))
-        .chain([lanesweep::cli::settings::FILE_VARIABLE.to_owned()])
-        .collect();
-    let programs = std::fs::read_dir(root.join("tests")).unwrap().map(|entry| entry.unwrap().path());
-    let others = [".ci", "benches", "deploy"].map(|folder| root.join(folder));
-    for folder in programs.chain(others) {
-        let Ok(files) = std::fs::read_dir(folder) else { continue };
-        for path in files.map(|file| file.unwrap().path()).filter(|path| !path.ends_with("configuration.rs")) {
-            let Ok(text) = std::fs::read_to_string(&path) else { continue };
-            for (at, prefix) in text.match_indices("LANESWEEP_") {
-                let rest = text[at + prefix.len()..].split(|c: char| !(c.is_ascii_uppercase() || c == '_')).next();
-                let name = format!("{prefix}{}", rest.unwrap_or_default());
-                assert!(known.contains(&name), "{}: add {name} to settings::TEST_VARIABLES", path.display());
-            }
-        }
+    let fit = "-q fit --synth-recordings 2 --categories cut-in --parameterizations 2 --no-comparison --out d.json";
+    good(dir, &[], &fit.split(' ').collect::<Vec<_>>());
+    for (samples, lanes) in
+        [("1000000000", "20,000,000,000 lanes"), ("1e9", "20,000,000,000 lanes"), ("1_000", "20,000 lanes")]
+    {
+        let sample = ["-q", "sample", "d.json", "--models", "FSM,RSS", "--plan-only", "--samples", samples];
+        let planned = good(dir, &[], &sample);
+        assert!(planned.starts_with(lanes), "{samples}: {planned}");
     }
+    let said = refused(dir, &[], &["-q", "sample", "d.json", "--given", "v_ego_mps=300"]);
+    assert!(said.contains("300 m/s is beyond what is physical") && said.contains("--given"), "{said}");
 }

@@ -16,5 +16,4 @@ mod report_page;
 mod report_width;
 mod rooms;
 mod shell;
-mod slurm_script;
 mod source_rules;

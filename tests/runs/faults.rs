@@ -173,7 +173,6 @@ fn an_output_that_is_a_file_or_inside_one_is_refused_before_the_work() {
         "compare --scenarios scenarios.jsonl --samples 1000 --out @",
         "fit --scenarios scenarios.jsonl --out @",
         "synth @",
-        "cluster slurm --array 2 --out @ -- study",
         "cluster merge @",
         "simulate --from @ --lane a/S/1.0s/FSM",
     ];
@@ -195,7 +194,6 @@ fn an_output_that_is_a_file_or_inside_one_is_refused_before_the_work() {
         "sample density.json --samples 1000 --out fresh --rows taken/rows.csv",
         "mine recordings --out taken/scenarios.jsonl",
         "fit --scenarios scenarios.jsonl --categories cut-in --parameterizations 2 --out taken/density.json",
-        "cluster slurm --array 2 --out fresh --scripts taken/scripts -- study",
     ] {
         let args: Vec<&str> = command.split(' ').collect();
         let (code, said) = lanesweep(dir, &args);

@@ -7,7 +7,7 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use crate::common::program::{self, PATIENCE, done, kill, limited, send, start, wait_for_run, wait_until};
+use crate::common::program::{self, PATIENCE, done, kill, send, start, wait_for_run, wait_until};
 use lanesweep::Error;
 use lanesweep::cli::signals;
 use lanesweep::engine::verify::{RandomOptions, random_plan};
@@ -127,20 +127,6 @@ fn long_scenarios(dir: &Path) -> PathBuf {
     let scenarios = dir.join("long.jsonl");
     std::fs::write(&scenarios, (0..10).map(line).collect::<String>()).unwrap();
     scenarios
-}
-
-#[test]
-fn a_dry_run_makes_the_series_of_few_of_many_long_scenarios() {
-    let dir = tempfile::tempdir().unwrap();
-    let scenarios = long_scenarios(dir.path());
-    // All series have 1.7 GB at this time step, those of one scenario 0.2 GB.
-    let run = "-q --threads 1 study --dry-run --backend cpu --dt 0.0001 --scenarios";
-    let run = [&run.split(' ').collect::<Vec<_>>()[..], &[scenarios.to_str().unwrap()]].concat();
-    let (code, log, said) = limited(dir.path(), "ulimit -v 700000", &run);
-    assert_eq!(code, 0, "{said}");
-    // What the run itself will hold is told all the same.
-    let peak = log.split("Memory  about ").nth(1).and_then(|rest| rest.split(' ').next()).unwrap().replace(',', "");
-    assert!(peak.parse::<f64>().unwrap() > 1000.0, "{log}");
 }
 
 #[test]

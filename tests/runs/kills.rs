@@ -36,7 +36,7 @@ const fn verb(
 
 const SAMPLE: &str = "sample d.json --thw 0.6 --models RSS --samples 3000 --worst 3 --out out";
 
-const VERBS: [Verb; 17] = [
+const VERBS: [Verb; 16] = [
     verb(
         "study",
         Some("run.json"),
@@ -130,12 +130,6 @@ const VERBS: [Verb; 17] = [
             "export xosc --category cut-in --models FSM --ego-speed 30m/s --speed 20m/s --thw 1.2 --lateral-speed 1 --out out",
         ),
         "export xosc --from old-study --worst 3 --ego external --out out",
-    ),
-    verb(
-        "slurm",
-        Some("submit.sh"),
-        Some("cluster slurm --array 3 --out result --scripts out -- study --synth-recordings 2"),
-        "cluster slurm --array 2 --out result --scripts out -- sample d.json",
     ),
 ];
 

@@ -229,7 +229,15 @@ fn what_is_not_understood_is_named_with_line_and_element() {
     );
     changed("</ParameterValueDistribution>", "", "line", "not well-formed");
     changed("<OpenSCENARIO>", "<!DOCTYPE a [<!ENTITY b \"c\">]>\n<OpenSCENARIO>", "line 2", "document type");
-    changed("Ego_Speed_kph\"", "&b;\"", "line 7", "attribute `parameterName`");
+    changed("Ego_Speed_kph\"", "&b;\"", "line 7", "unknown entity reference 'b'");
+    let foreign = |value: &str| format!("<NormalDistribution xmlns:o=\"o\" {value}=\"9\" expectedValue");
+    changed(
+        "<NormalDistribution expectedValue",
+        &foreign("o:variance"),
+        "line 8",
+        "there is no attribute `o:variance`",
+    );
+    changed("<NormalDistribution expectedValue", &foreign("p:variance"), "line 8", "unknown namespace prefix 'p'");
     let says = |args: &[&str], says: &str| {
         let message = said(root, args);
         assert!(message.contains(says), "{args:?}: {message}");
@@ -286,16 +294,18 @@ fn hostile_xml_is_refused_at_once() {
         assert!(error.to_string().contains(says), "{error}");
         assert!(error.help().is_some_and(|help| !help.is_empty()));
     };
-    refused(&"<a>".repeat(1_000_000), "within one another");
+    refused(&"<a>".repeat(400_000), "never closed");
+    refused(&format!("{}{}", "<a>".repeat(400_000), "</a>".repeat(400_000)), "is not `OpenSCENARIO`");
+    refused(&"<a>".repeat(1_000_000), "more than 500000 elements");
     refused(&format!("<a>{}</a>", "<b/>".repeat(600_000)), "more than 500000 elements");
-    refused("", "there is no element");
-    refused("<a/><b/>", "a second root element `b`");
-    refused("<a x=\"1\" x=\"2\"/>", "attributes of `a` are broken");
-    refused("<a x=1/>", "attributes of `a` are broken");
-    refused("<a x=\"&lol;\"/>", "attribute `x` of `a` is broken");
-    refused("<a><b></a>", "not well-formed");
-    refused("<a>", "does not end");
-    refused("<a/>text", "text outside");
+    refused("", "does not have a root node");
+    refused("<a/><b/>", "line 1: not well-formed XML: unknown token");
+    refused("<a x=\"1\" x=\"2\"/>", "attribute 'x' at 1:10 is already defined");
+    refused("<a x=1/>", "expected a quote");
+    refused("<a x=\"&lol;\"/>", "unknown entity reference 'lol'");
+    refused("<a><b></a>", "expected 'b' tag, not 'a'");
+    refused("<a>", "never closed");
+    refused("<a/>text", "unknown token");
     refused("\u{feff}<a/>", "the root element is not `OpenSCENARIO`");
     refused("<OpenSCENARIO><Storyboard/></OpenSCENARIO>", "this is a scenario or a catalog");
     // Entities of its own would be declared here.

@@ -1,7 +1,5 @@
-//! Reads a configuration file, each value with its line, and the environment variables: `LANESWEEP_` and a key's name
-//! in capitals.
+//! Reads a configuration file, each value with its line.
 
-use std::ffi::{OsStr, OsString};
 use std::path::Path;
 
 use serde_json::Value;
@@ -124,62 +122,3 @@ pub(super) fn unknown(place: Place, name: &str, is_table: bool, keys: &[Key]) ->
 
 /// Variable that names the configuration file if `--config` names none.
 pub const FILE_VARIABLE: &str = "LANESWEEP_CONFIG";
-
-/// Variables of the program's tests; the program ignores them.
-pub const TEST_VARIABLES: [&str; 11] = [
-    "LANESWEEP_DLR_HT",
-    "LANESWEEP_KILLS",
-    "LANESWEEP_MUTATED_FIRST",
-    "LANESWEEP_MUTATED_INPUTS",
-    "LANESWEEP_MUTATED_READERS",
-    "LANESWEEP_RENEW_FIGURES",
-    "LANESWEEP_REQUIRE_DEVICE",
-    "LANESWEEP_SHARED",
-    "LANESWEEP_SLURM_TEST",
-    "LANESWEEP_SUMO",
-    "LANESWEEP_TEST_RESUMABLE_RUN",
-];
-
-const PREFIX: &str = "LANESWEEP_";
-
-/// The variable of a key: `LANESWEEP_MINING_CUT_IN_MAX_THW_S` of `mining.cut_in.max_thw_s`.
-pub fn variable_of(key: &str) -> String {
-    format!("{PREFIX}{}", key.replace('.', "_").to_ascii_uppercase())
-}
-
-/// The variables that set keys: key, name, text. An empty variable counts as not set.
-///
-/// # Errors
-/// [`Error::Usage`] for an unknown variable with the program's prefix, with the most similar name.
-pub(super) fn read_variables<'k>(
-    variables: &[(OsString, OsString)],
-    keys: &'k [Key],
-) -> Result<Vec<(&'k Key, String, String)>> {
-    let known: Vec<(String, &Key)> = keys.iter().map(|key| (variable_of(&key.name), key)).collect();
-    let mut found = Vec::new();
-    for (name, word) in variables {
-        // A name that is not UTF-8 is unknown, too.
-        let name = &*name.to_string_lossy();
-        if !name.starts_with(PREFIX) || name == FILE_VARIABLE || TEST_VARIABLES.contains(&name) || word.is_empty() {
-            continue;
-        }
-        let place = || Place::item(format!("environment variable {name}"));
-        let Some(key) = known.iter().find(|(variable, _)| variable == name).map(|(_, key)| *key) else {
-            let names = known.iter().map(|(variable, _)| variable.as_str()).chain([FILE_VARIABLE]);
-            let help = nearest(name, names).map_or(String::new(), |near| format!("did you mean {near}? "));
-            let help = format!("{help}Variables are LANESWEEP_ and a key of `lanesweep config show` in capitals");
-            return Err(Error::usage(place(), "there is no such variable", help));
-        };
-        let Some(word) = word.to_str() else {
-            return Err(Error::usage(place(), "it is not UTF-8 text", format!("expected {}", key.expected())));
-        };
-        found.push((key, name.to_owned(), word.to_owned()));
-    }
-    found.sort_by(|a, b| a.1.cmp(&b.1));
-    Ok(found)
-}
-
-/// The file that the environment names.
-pub(super) fn config_file(value: Option<&OsStr>) -> Option<std::path::PathBuf> {
-    value.filter(|path| !path.is_empty()).map(Into::into)
-}

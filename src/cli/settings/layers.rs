@@ -1,14 +1,14 @@
-//! The layers of a configuration (defaults, files, environment, flags), combined key by key.
+//! The layers of a configuration (defaults, files, flags), combined key by key.
 
 use std::collections::BTreeMap;
-use std::ffi::OsString;
+use std::ffi::OsStr;
 use std::fmt;
 use std::path::{Path, PathBuf};
 
 use serde_json::{Map, Value};
 
 use super::keys::{Key, KeyKind, from_word, keys_in_order};
-use super::{FILE_VARIABLE, Settings, file};
+use super::{Settings, file};
 use crate::{Error, Place, Result};
 
 /// Source of a value; a later one overrides an earlier one.
@@ -23,8 +23,6 @@ pub enum Origin {
         /// Line, from 1.
         row: u64,
     },
-    /// A variable of the environment.
-    Environment(String),
     /// `--config KEY=VALUE`.
     Assignment(String),
     /// The key's own flag, with its dashes.
@@ -37,7 +35,6 @@ impl Origin {
         match self {
             Origin::File { path, row } => Place::file(path).row(*row).of(format!("`{key}`")),
             Origin::Default => Place::item(format!("`{key}`")),
-            Origin::Environment(name) => Place::item(format!("environment variable {name}")),
             Origin::Assignment(text) => Place::item(format!("--config {text}")),
             Origin::Flag(flag) => Place::item(flag),
         }
@@ -48,9 +45,8 @@ impl Origin {
         match self {
             Origin::Default => 0,
             Origin::File { .. } => 1,
-            Origin::Environment(_) => 2,
-            Origin::Assignment(_) => 3,
-            Origin::Flag(_) => 4,
+            Origin::Assignment(_) => 2,
+            Origin::Flag(_) => 3,
         }
     }
 }
@@ -60,7 +56,6 @@ impl fmt::Display for Origin {
         match self {
             Origin::Default => f.write_str("default"),
             Origin::File { path, row } => write!(f, "file {}, line {row}", path.display()),
-            Origin::Environment(name) => write!(f, "environment {name}"),
             Origin::Assignment(_) => f.write_str("flag --config"),
             Origin::Flag(flag) => write!(f, "flag {flag}"),
         }
@@ -119,13 +114,13 @@ impl Layers {
         Layers { keys, values, files: Vec::new() }
     }
 
-    /// Reads files, environment and `--config`, in their order. A file named by `--config` replaces the one named by
-    /// the environment.
+    /// Reads the files and assignments of `--config`, in this order. Without a file among them, it reads the one named by
+    /// `variable`, the value of [`FILE_VARIABLE`](super::FILE_VARIABLE); an empty one names none.
     ///
     /// # Errors
-    /// [`Error::Usage`] naming file and line, variable or flag: unknown keys, with the most similar known one, and
-    /// invalid values. [`Error::Io`] and [`Error::Input`] of the files.
-    pub fn read(typed: &[Assignment], variables: &[(OsString, OsString)]) -> Result<Layers> {
+    /// [`Error::Usage`] naming file and line, or flag: unknown keys, with the most similar known one, and invalid values.
+    /// [`Error::Io`] and [`Error::Input`] of the files.
+    pub fn read(typed: &[Assignment], variable: Option<&OsStr>) -> Result<Layers> {
         let mut layers = Layers::defaults();
         let named = typed.iter().filter_map(|one| match one {
             Assignment::File(path) => Some(path.clone()),
@@ -133,18 +128,13 @@ impl Layers {
         });
         let mut files: Vec<PathBuf> = named.collect();
         if files.is_empty() {
-            let value = variables.iter().find(|(name, _)| name == FILE_VARIABLE).map(|(_, value)| value);
-            files.extend(file::config_file(value.map(OsString::as_os_str)));
+            files.extend(variable.filter(|path| !path.is_empty()).map(PathBuf::from));
         }
         for path in files {
             for line in file::read(&path, &layers.keys)? {
                 layers.set(&line.key, line.value, Origin::File { path: path.clone(), row: line.row });
             }
             layers.files.push(path);
-        }
-        let keys = layers.keys.clone();
-        for (key, name, word) in file::read_variables(variables, &keys)? {
-            layers.set_word(key, &word, Origin::Environment(name))?;
         }
         for one in typed {
             if let Assignment::Value(text) = one {
@@ -254,16 +244,6 @@ fn insert(table: &mut Map<String, Value>, name: &str, value: Value) {
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    #[cfg(unix)]
-    #[test]
-    fn a_variable_of_ours_whose_name_is_no_text_is_refused() {
-        use std::os::unix::ffi::OsStringExt;
-        let read = |name: &[u8]| Layers::read(&[], &[(OsString::from_vec(name.to_vec()), "1".into())]);
-        let error = read(b"LANESWEEP_RUN_DT\xff").unwrap_err();
-        assert!(error.to_string().contains("there is no such variable"), "{error}");
-        assert!(read(b"OTHER_\xff").is_ok());
-    }
 
     #[test]
     fn what_the_checks_let_pass_the_types_take() {

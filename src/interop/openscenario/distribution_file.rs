@@ -6,9 +6,9 @@
 use std::path::{Path, PathBuf};
 
 use super::distribution::{Distribution, MAX_POISSON, Range};
-use super::xml_at::At;
-use super::xml_tree::{Node, parse_tree, read_tree};
+use super::xml_at::{At, parse};
 use crate::run::grid::{GridAxis, MAX_VALUES};
+use crate::support::input_file;
 use crate::{Error, Place, Result};
 
 /// The content of a file.
@@ -69,7 +69,7 @@ pub struct Stochastic {
 /// [`Error::Io`]; [`Error::Input`] with line and element for another kind of file, an unknown element, or contradictory
 /// values.
 pub fn read_distribution(path: &Path) -> Result<DistributionFile> {
-    of_tree(read_tree(path)?, path)
+    parse_distribution(&input_file::read_text(path, input_file::MAX_XML_BYTES)?, path)
 }
 
 /// Parses a file's text; `path` is for messages.
@@ -77,15 +77,12 @@ pub fn read_distribution(path: &Path) -> Result<DistributionFile> {
 /// # Errors
 /// As [`read_distribution`].
 pub fn parse_distribution(text: &str, path: &Path) -> Result<DistributionFile> {
-    of_tree(parse_tree(text, path)?, path)
-}
-
-fn of_tree(root: Node, path: &Path) -> Result<DistributionFile> {
-    let at = At { node: &root, path };
-    if root.name != "OpenSCENARIO" {
+    let document = parse(text, path)?;
+    let at = At { node: document.root_element(), path };
+    if at.name() != "OpenSCENARIO" {
         return Err(at.wrong("the root element is not `OpenSCENARIO`", "give a file of ASAM OpenSCENARIO XML"));
     }
-    let has = |name: &str| root.children.iter().any(|child| child.name == name);
+    let has = |name: &str| at.all().any(|child| child.name() == name);
     if !has("ParameterValueDistribution") && (has("Storyboard") || has("Catalog")) {
         let help = "give the file whose `ParameterValueDistribution` varies the scenario's parameters";
         return Err(at.wrong("this is a scenario or a catalog, and no distribution of parameters", help));
@@ -101,12 +98,12 @@ fn of_tree(root: Node, path: &Path) -> Result<DistributionFile> {
     content.attributes(&[])?;
     content.children(&["ScenarioFile", "Deterministic", "Stochastic"])?;
     content.only("ScenarioFile")?.attributes(&["filepath"])?;
-    let kinds: Vec<At> = content.all().filter(|child| child.node.name != "ScenarioFile").collect();
+    let kinds: Vec<At> = content.all().filter(|child| child.name() != "ScenarioFile").collect();
     let [kind] = kinds[..] else {
         let help = "give one of `Deterministic` and `Stochastic`";
         return Err(content.wrong(format!("it has {} kinds of distributions", kinds.len()), help));
     };
-    let distributions = if kind.node.name == "Deterministic" {
+    let distributions = if kind.name() == "Deterministic" {
         Distributions::Deterministic(deterministic(kind)?)
     } else {
         Distributions::Stochastic(stochastic(kind)?)
@@ -150,7 +147,7 @@ fn deterministic(at: At) -> Result<Vec<Deterministic>> {
     at.children(&[SINGLE, MULTI])?;
     let mut list = Vec::new();
     for one in at.all() {
-        list.push(if one.node.name == SINGLE { single(one)? } else { multi(one)? });
+        list.push(if one.name() == SINGLE { single(one)? } else { multi(one)? });
     }
     if list.is_empty() {
         return Err(at.wrong("there is no distribution in it", format!("add a `{SINGLE}`")));
@@ -162,7 +159,7 @@ fn single(at: At) -> Result<Deterministic> {
     at.attributes(&["parameterName"])?;
     let name = at.text("parameterName")?.to_owned();
     let inner = at.choice(&["DistributionSet", "DistributionRange"])?;
-    let values = if inner.node.name == "DistributionSet" {
+    let values = if inner.name() == "DistributionSet" {
         inner.attributes(&[])?;
         let each = |element: At| {
             element.attributes(&["value"])?;
@@ -180,7 +177,7 @@ fn single(at: At) -> Result<Deterministic> {
     if values.len() > MAX_VALUES {
         return Err(inner.wrong(format!("{} values", values.len()), format!("give {MAX_VALUES} at most")));
     }
-    Ok(Deterministic::Values { name, line: at.node.line, values })
+    Ok(Deterministic::Values { name, line: at.line(), values })
 }
 
 fn multi(at: At) -> Result<Deterministic> {
@@ -215,7 +212,7 @@ fn multi(at: At) -> Result<Deterministic> {
             }
         }
     }
-    Ok(Deterministic::Sets { names: known.unwrap_or_default(), line: at.node.line, rows })
+    Ok(Deterministic::Sets { names: known.unwrap_or_default(), line: at.line(), rows })
 }
 
 fn stochastic(at: At) -> Result<Stochastic> {
@@ -234,7 +231,7 @@ fn stochastic(at: At) -> Result<Stochastic> {
     let mut parameters = Vec::new();
     for one in at.some("StochasticDistribution")? {
         one.attributes(&["parameterName"])?;
-        parameters.push((one.text("parameterName")?.to_owned(), one.node.line, distribution(one)?));
+        parameters.push((one.text("parameterName")?.to_owned(), one.line(), distribution(one)?));
     }
     Ok(Stochastic { runs: whole("numberOfTestRuns", 1.0)?, seed, parameters })
 }
@@ -261,7 +258,7 @@ fn distribution(at: At) -> Result<Distribution> {
         }
         Err(one.wrong(format!("the attribute `{name}` is {value}"), "write a number of at least 0"))
     };
-    let found = match inner.node.name.as_str() {
+    let found = match inner.name() {
         "UniformDistribution" => {
             inner.attributes(&[])?;
             inner.children(&["Range"])?;

@@ -1,7 +1,7 @@
 //! OpenSCENARIO: export of concrete scenarios, import of parameter distributions.
 //!
 //! This module holds exported scenarios ([`Concrete`]), their two files (ASAM OpenSCENARIO XML 1.2 and ASAM OpenDRIVE
-//! 1.7), the conversion of lanes, and the readers of exported scenarios and of `ParameterValueDistribution` files.
+//! 1.7), the conversion of lanes, and the reader of `ParameterValueDistribution` files.
 //! Lanes come from [`crate::run::reopen`]; imported data go to [`crate::run::grid`] and [`crate::engine`].
 
 mod concrete;
@@ -14,9 +14,7 @@ mod road;
 mod sampled_file;
 mod samples;
 mod scenario_file;
-mod scenario_reader;
 mod xml_at;
-mod xml_tree;
 
 pub use concrete::{Concrete, EgoMotion, PlayedVehicle, Vertex, paths};
 pub use distribution::{Distribution, Draw, MAX_POISSON, Range};
@@ -29,7 +27,6 @@ pub use road::{Road, road_file};
 pub use sampled_file::{SampledFile, reopen};
 pub use samples::{ATTEMPTS, DISTRIBUTION_PURPOSE, DistributionSamples, MAX_SAMPLES, Sampled, SampledParameter};
 pub use scenario_file::{IndexRow, export_folder, scenario_file};
-pub use scenario_reader::read_scenario;
 
 /// Author of every file.
 pub(crate) const AUTHOR: &str = concat!("lanesweep ", env!("CARGO_PKG_VERSION"));

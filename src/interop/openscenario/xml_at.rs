@@ -2,21 +2,70 @@
 
 use std::path::Path;
 
+use roxmltree::{Attribute, Document, Node, ParsingOptions, TextPos};
+
 use super::distribution::Range;
-use super::xml_tree::Node;
 use crate::support::plain_text;
 use crate::{Error, Place, Result};
+
+/// Maximum number of elements, texts between them and comments.
+const MAX_NODES: u32 = 500_000;
+
+/// Attributes of this namespace are for checkers of schemas.
+const XSI: &str = "http://www.w3.org/2001/XMLSchema-instance";
+
+const NOT_XML: &str = "give a whole file of ASAM OpenSCENARIO XML 1.1 to 1.3 with a ParameterValueDistribution";
+
+/// Parses a text; `path` is for messages.
+///
+/// # Errors
+/// [`Error::Input`] with the line for XML that is not well-formed, too large, or has a document type.
+pub(super) fn parse<'a>(text: &'a str, path: &Path) -> Result<Document<'a>> {
+    // Without document types there are no entities to expand. The parser does not recurse, so depth needs no limit.
+    let options = ParsingOptions { nodes_limit: MAX_NODES, ..ParsingOptions::default() };
+    Document::parse_with_options(text, options).map_err(|error| {
+        let file = Place::file(path);
+        match error {
+            roxmltree::Error::DtdDetected => {
+                let line = text.lines().take_while(|line| !line.contains("<!DOCTYPE")).count() as u64 + 1;
+                let problem = "it has a document type, and with it could have entities of its own";
+                Error::input(file.row(line), problem, "leave the line <!DOCTYPE …> out: OpenSCENARIO has none")
+            }
+            roxmltree::Error::NodesLimitReached => {
+                let problem = format!("more than {MAX_NODES} elements, texts and comments");
+                Error::input(file, problem, "split the file")
+            }
+            _ => {
+                // Errors about the whole file stand at its start.
+                let place = match error.pos() {
+                    TextPos { row: 1, col: 1 } => file,
+                    at => file.row(u64::from(at.row)),
+                };
+                Error::input(place, format!("not well-formed XML: {error}"), NOT_XML)
+            }
+        }
+    })
+}
 
 /// An element and its place.
 #[derive(Clone, Copy)]
 pub(super) struct At<'a> {
-    pub node: &'a Node,
+    pub node: Node<'a, 'a>,
     pub path: &'a Path,
 }
 
 impl<'a> At<'a> {
+    pub fn name(&self) -> &'a str {
+        self.node.tag_name().name()
+    }
+
+    /// Line of its start, from 1.
+    pub fn line(&self) -> u64 {
+        u64::from(self.node.document().text_pos_at(self.node.range().start).row)
+    }
+
     pub fn wrong(&self, problem: impl Into<String>, help: impl Into<String>) -> Error {
-        let place = Place::file(self.path).row(self.node.line).of(format!("element `{}`", self.node.name));
+        let place = Place::file(self.path).row(self.line()).of(format!("element `{}`", self.name()));
         Error::input(place, problem, help)
     }
 
@@ -26,22 +75,25 @@ impl<'a> At<'a> {
     }
 
     pub fn all(self) -> impl Iterator<Item = At<'a>> {
-        self.node.children.iter().map(move |node| At { node, path: self.path })
+        self.node.children().filter(Node::is_element).map(move |node| At { node, path: self.path })
     }
 
-    /// Checks that there are only these attributes (except namespaces), and no text.
+    /// Checks that there are only these attributes (except those for schemas), and no text.
     pub fn attributes(&self, known: &[&str]) -> Result<()> {
-        let is_foreign = |key: &str| key == "xmlns" || key.starts_with("xmlns:") || key.starts_with("xsi:");
-        for (key, _) in self.node.attributes.iter().filter(|(key, _)| !is_foreign(key)) {
-            if !known.contains(&key.as_str()) {
-                let help = match known {
-                    [] => "leave it out: the element has no attributes".to_owned(),
-                    list => format!("it has {}{}", list.join(", "), nearest(key, list)),
-                };
-                return Err(self.wrong(format!("there is no attribute `{key}`"), help));
-            }
+        let is_known = |a: &Attribute| match a.namespace() {
+            None => known.contains(&a.name()),
+            Some(namespace) => namespace == XSI,
+        };
+        if let Some(unknown) = self.node.attributes().find(|attribute| !is_known(attribute)) {
+            let key = &self.node.document().input_text()[unknown.range_qname()];
+            let help = match known {
+                [] => "leave it out: the element has no attributes".to_owned(),
+                list => format!("it has {}{}", list.join(", "), nearest(key, list)),
+            };
+            return Err(self.wrong(format!("there is no attribute `{key}`"), help));
         }
-        if !self.node.text.is_empty() {
+        let is_text = |child: Node| child.is_text() && !child.text().unwrap_or_default().trim().is_empty();
+        if self.node.children().any(is_text) {
             return Err(self.wrong("text stands in it", "leave the text out: values are attributes"));
         }
         Ok(())
@@ -49,22 +101,22 @@ impl<'a> At<'a> {
 
     /// Checks that there are only these child elements.
     pub fn children(&self, known: &[&str]) -> Result<()> {
-        match self.node.children.iter().find(|child| !known.contains(&child.name.as_str())) {
+        match self.all().find(|child| !known.contains(&child.name())) {
             None => Ok(()),
             Some(child) => {
-                let inside = format!("inside `{}`", self.node.name);
+                let inside = format!("inside `{}`", self.name());
                 let help = match known {
                     [] => format!("leave it out: nothing stands {inside}"),
-                    list => format!("{inside} stand {}{}", list.join(", "), nearest(&child.name, list)),
+                    list => format!("{inside} stand {}{}", list.join(", "), nearest(child.name(), list)),
                 };
-                Err(At { node: child, path: self.path }.wrong("this element is not known here", help))
+                Err(child.wrong("this element is not known here", help))
             }
         }
     }
 
     /// The only child of this name.
     pub fn only(self, name: &str) -> Result<At<'a>> {
-        let found: Vec<At> = self.all().filter(|child| child.node.name == name).collect();
+        let found: Vec<At> = self.all().filter(|child| child.name() == name).collect();
         match found[..] {
             [one] => Ok(one),
             _ => Err(self.wrong(format!("it has {} elements `{name}`", found.len()), format!("give one `{name}`"))),
@@ -84,7 +136,7 @@ impl<'a> At<'a> {
     /// The only child, with one of these names.
     pub fn choice(self, names: &[&str]) -> Result<At<'a>> {
         if let Some(child) =
-            self.all().find(|c| matches!(c.node.name.as_str(), "UserDefinedDistribution" | "LogNormalDistribution"))
+            self.all().find(|c| matches!(c.name(), "UserDefinedDistribution" | "LogNormalDistribution"))
         {
             let help = format!("what it means is not told here: write one of {}", names.join(", "));
             return Err(child.wrong("this kind of distribution is not read", help));
@@ -98,13 +150,19 @@ impl<'a> At<'a> {
         }
     }
 
+    /// The value of an attribute without a namespace.
+    fn value(&self, name: &str) -> Option<&'a str> {
+        let mut own = self.node.attributes().filter(|attribute| attribute.namespace().is_none());
+        own.find(|attribute| attribute.name() == name).map(|attribute| attribute.value())
+    }
+
     pub fn has(&self, name: &str) -> bool {
-        self.node.attributes.iter().any(|(key, _)| key == name)
+        self.value(name).is_some()
     }
 
     pub fn text(&self, name: &str) -> Result<&'a str> {
-        let found = self.node.attributes.iter().find(|(key, _)| key == name);
-        let (_, value) = found
+        let value = self
+            .value(name)
             .ok_or_else(|| self.wrong(format!("the attribute `{name}` is missing"), format!("write {name}=\"…\"")))?;
         if value.starts_with('$') {
             let problem = format!("the attribute `{name}` is `{value}`");

@@ -24,10 +24,6 @@ pub struct FilledCell {
     pub fill: Fill,
     /// Tooltip in a browser.
     pub tip: String,
-    /// Where its first corner is in frames of equal length; `None`: not there. Empty: it stays.
-    pub places: Vec<Option<(f64, f64)>>,
-    /// Length of all frames together, s; then they begin again.
-    pub seconds: f64,
 }
 
 /// A colour scale from zero to a maximum, at the right of the plots.
@@ -65,28 +61,6 @@ impl Fill {
     }
 }
 
-impl FilledCell {
-    /// Moves the group that is being drawn.
-    fn moves(&self, canvas: &mut Canvas, axes: &Axes) {
-        let (x0, y0) = axes.at(self.corners[0]);
-        let place = |at: &Option<(f64, f64)>| {
-            let (x, y) = at.map_or((x0, y0), |at| axes.at(at));
-            format!("{:.1},{:.1}", x - x0, y - y0)
-        };
-        let mut element = |name: &str, rest: &str, values: Vec<String>| {
-            let (seconds, values) = (self.seconds, values.join(";"));
-            let repeat = format!("dur=\"{seconds:.2}s\" repeatCount=\"indefinite\" values=\"{values}\"");
-            canvas.element(&format!("<{name} {rest} {repeat} />"));
-        };
-        if !self.places.is_empty() {
-            let move_by = "attributeName=\"transform\" type=\"translate\"";
-            element("animateTransform", move_by, self.places.iter().map(place).collect());
-            let shown = self.places.iter().map(|at| u8::from(at.is_some()).to_string()).collect();
-            element("animate", "attributeName=\"opacity\" calcMode=\"discrete\"", shown);
-        }
-    }
-}
-
 impl Cells {
     /// Draws the cells without anti-aliasing, to avoid white seams.
     pub(super) fn draw(&self, canvas: &mut Canvas, axes: &Axes) {
@@ -95,10 +69,7 @@ impl Cells {
                 let (from, to) = (axes.at(cell.corners[0]), axes.at(cell.corners[1]));
                 match cell.tip.as_str() {
                     "" => cell.fill.draw(canvas, from, to),
-                    tip => canvas.group("class=\"cell\"", tip, |canvas| {
-                        cell.moves(canvas, axes);
-                        cell.fill.draw(canvas, from, to);
-                    }),
+                    tip => canvas.group("class=\"cell\"", tip, |canvas| cell.fill.draw(canvas, from, to)),
                 }
             }
         });

@@ -135,7 +135,7 @@ impl Canvas {
     }
 
     /// Adds an element, written verbatim.
-    pub(super) fn element(&mut self, text: &str) {
+    fn element(&mut self, text: &str) {
         self.body.extend(std::iter::repeat_n("  ", self.depth));
         self.body += text;
         self.body.push('\n');

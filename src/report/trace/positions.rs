@@ -1,9 +1,8 @@
-//! A case from above: the vehicles at the instants that decide it, and the same moving.
+//! A case from above: the vehicles at the instants that decide it.
 //!
 //! All positions are relative to the ego. Each pair of vehicles is drawn with the mean of its lengths, which is all that
 //! a lane knows; their gap is exact.
 
-use super::panels::Shown;
 use super::{TraceFigure, thousandths};
 use crate::engine::{StepMark, Trace, TracedStep};
 use crate::report::plot::{Cells, Figure, Fill, FilledCell, GREY, Height, Plot, PlotAxis, Rule, number};
@@ -13,8 +12,6 @@ const VEHICLES: [(&str, &str); 3] =
     [("ego", "#1a1a1a"), ("other vehicle", "#8c8c8c"), ("vehicle ahead of it", "#cfcfcf")];
 /// How far ahead of the ego is shown, m.
 const VIEW_M: f64 = 120.0;
-/// Frames per second of the moving figure.
-const RATE_HZ: f64 = 12.5;
 
 /// A vehicle: opposite corners, m ahead of the ego's middle and beside it.
 type Corners = [(f64, f64); 2];
@@ -46,8 +43,8 @@ fn decisive(trace: &Trace) -> Option<(&TracedStep, String)> {
     Some((step, format!("smallest gap {} m, at {} s", number(gap(step)), thousandths(step.time_s))))
 }
 
-/// A plot's heading, and its vehicles in every frame.
-type Row = (String, Vec<[Option<Corners>; 3]>);
+/// A plot's heading, and its vehicles.
+type Row = (String, [Option<Corners>; 3]);
 
 impl TraceFigure<'_> {
     /// The vehicles at the start and, for every lane, at its contact or smallest gap; a row each.
@@ -60,31 +57,13 @@ impl TraceFigure<'_> {
             let (step, what) = decisive(s.trace)?;
             Some((s.trace, step, format!("{}: {what}", s.name)))
         });
-        let row = |(trace, step, heading): (&Trace, _, _)| (heading, vec![vehicles(trace, step)]);
-        self.seen_from_above(start.into_iter().chain(later).map(row).collect(), 0.0, "")
+        let row = |(trace, step, heading): (&Trace, _, _)| (heading, vehicles(trace, step));
+        self.seen_from_above(start.into_iter().chain(later).map(row).collect())
     }
 
-    /// The vehicles in motion, a row per lane, in real time and over again.
-    pub fn animation(&self) -> Figure {
-        let until_s = Shown::of(&self.series, self.until_s).until_s.max(1.0 / RATE_HZ);
-        let row = |s: &super::TraceSeries| {
-            let step = |frame: usize| {
-                let time_s = frame as f64 / RATE_HZ;
-                let next = s.trace.steps.partition_point(|step| step.time_s <= time_s);
-                s.trace.steps.get(next.saturating_sub(1))
-            };
-            let frames = (0..=(until_s * RATE_HZ) as usize).filter_map(step);
-            let what = decisive(s.trace).filter(|(step, _)| step.time_s <= until_s);
-            let what = what.map_or(String::new(), |(_, what)| format!(": {what}"));
-            (format!("{}{what}", s.name), frames.map(|step| vehicles(s.trace, step)).collect())
-        };
-        let words = format!("In real time, {} s; a lane that has ended stays as it is. ", thousandths(until_s));
-        self.seen_from_above(self.series.iter().map(row).collect(), until_s, &words)
-    }
-
-    fn seen_from_above(&self, rows: Vec<Row>, seconds: f64, words: &str) -> Figure {
+    fn seen_from_above(&self, rows: Vec<Row>) -> Figure {
         let half_lane_m = self.lane_width_m() / 2.0;
-        let seen = rows.iter().flat_map(|row| &row.1).flatten().flatten();
+        let seen = rows.iter().flat_map(|row| row.1).flatten();
         let wider = |(low, high): (f64, f64), a: f64, b: f64| (low.min(a), high.max(b));
         let (x, y) = seen.fold(((-8.0, 12.0), (-half_lane_m - 0.3, half_lane_m + 0.3)), |(x, y), [from, to]| {
             (wider(x, from.0 - 2.0, to.0 + 2.0), wider(y, from.1 - 0.3, to.1 + 0.3))
@@ -92,20 +71,15 @@ impl TraceFigure<'_> {
         let is_cut = x.1 > VIEW_M;
         let x = (x.0, x.1.min(VIEW_M));
         let cut = if is_cut { "What is farther than 120 m ahead is not shown. " } else { "" };
-        let plot = |(heading, frames): Row| {
-            let cell = |(at, (name, colour)): (usize, &(&str, &str))| {
-                let places: Vec<Option<Corners>> = frames.iter().map(|frame| frame[at]).collect();
-                let corners = places.iter().flatten().next().copied()?;
-                let moving = if places.len() > 1 && at > 0 { &places[..] } else { &[] };
+        let plot = |(heading, vehicles): Row| {
+            let cell = |(corners, (name, colour)): (Option<Corners>, &(&str, &str))| {
                 Some(FilledCell {
-                    corners,
+                    corners: corners?,
                     fill: Fill { colour: (*colour).to_owned(), ..Fill::default() },
                     tip: (*name).to_owned(),
-                    places: moving.iter().map(|corners| corners.map(|corners| corners[0])).collect(),
-                    seconds,
                 })
             };
-            let cells: Vec<FilledCell> = VEHICLES.iter().enumerate().filter_map(cell).collect();
+            let cells: Vec<FilledCell> = vehicles.into_iter().zip(&VEHICLES).filter_map(cell).collect();
             let key = cells.iter().map(|cell| (cell.tip.clone(), cell.fill.clone())).collect();
             let lane = [-half_lane_m, half_lane_m].map(|edge| vec![(x.0, edge), (x.1, edge)]).to_vec();
             let edges = Rule { runs: lane, colour: GREY, width_px: 1.0, dash: "14,6", ..Rule::default() };
@@ -124,7 +98,7 @@ impl TraceFigure<'_> {
             plots: rows.into_iter().map(plot).collect(),
             columns: 1,
             caption: format!(
-                "{words}{cut}Lateral positions in m, positive on the other vehicle's side. Long dashes: edges of a lane {} m \
+                "{cut}Lateral positions in m, positive on the other vehicle's side. Long dashes: edges of a lane {} m \
                  wide.",
                 number(2.0 * half_lane_m)
             ),

@@ -249,17 +249,6 @@ fn from_above_the_vehicles_are_as_far_apart_as_their_gap() {
 }
 
 #[test]
-fn the_moving_figure_has_a_vehicle_per_lane_that_ends_where_the_lane_does() {
-    let leaving = Lateral::Kinematic { start_m: 0.0, rate_mps: 1.5, end_m: 3.5 };
-    let out = case(Category::CutOut, 30.0, vehicle(28.0, leaving));
-    let traces = ModelId::ALL.map(|model| trace("paper", &out, 25.0, model));
-    let svg = figure(&traces).animation().svg();
-    assert_eq!(svg, figure(&traces).animation().svg());
-    assert!(svg.matches("<animateTransform").count() >= traces.len() && !svg.contains("NaN"));
-    words(&svg);
-}
-
-#[test]
 fn series_differ_without_colour() {
     let traces = ModelId::ALL
         .map(|model| trace("paper", &case(Category::Lvd, 30.0, vehicle(20.0, Lateral::Centred)), 40.0, model));

@@ -8,7 +8,7 @@ use super::map::GridMap;
 use super::plan::GridPlan;
 use super::presets::{self, Preset, Presets};
 use super::robustness::Perturbation;
-use crate::engine::{CpuBackend, Executor, LanePlan, SweepSummary};
+use crate::engine::{CpuBackend, Executor, SweepSummary};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -193,30 +193,24 @@ impl Map {
         Ok(Map { grids })
     }
 
-    /// Every grid's plan, with the name of the other profile if the plan uses it.
-    pub fn plans(&self) -> impl Iterator<Item = (Option<&str>, &GridPlan)> {
+    /// Every grid's plans.
+    fn plans(&self) -> impl Iterator<Item = &GridPlan> {
         self.grids.iter().flat_map(|grid| {
-            let other = grid.other.iter().map(|(name, plan)| (Some(name.as_str()), plan));
-            let perturbed = grid.perturbed.iter().chain(&grid.other_perturbed);
-            let perturbed = perturbed.map(|(_, plan)| (Some("a perturbation"), plan));
-            std::iter::once((None, &grid.plan)).chain(other).chain(perturbed)
+            let other = grid.other.iter().map(|(_, plan)| plan);
+            let perturbed = grid.perturbed.iter().chain(&grid.other_perturbed).map(|(_, plan)| plan);
+            std::iter::once(&grid.plan).chain(other).chain(perturbed)
         })
-    }
-
-    /// The lanes of all plans, including those of an ego that never reacts.
-    pub fn lane_plans(&self) -> impl Iterator<Item = &LanePlan> {
-        self.plans().flat_map(|(_, plan)| plan.parts.iter().flat_map(|part| [&part.plan, &part.unreacting]))
     }
 
     /// Number of units that the run sweeps, including those of the unreacting ego.
     pub fn unit_count(&self) -> u64 {
-        let parts = self.plans().flat_map(|(_, plan)| &plan.parts);
+        let parts = self.plans().flat_map(|plan| &plan.parts);
         parts.map(|part| part.plan.unit_count() + part.unreacting.unit_count()).sum()
     }
 
     /// Lanes of driver models in all plans.
     pub fn lane_count(&self) -> u64 {
-        self.plans().map(|(_, plan)| plan.lane_count()).sum()
+        self.plans().map(GridPlan::lane_count).sum()
     }
 
     /// Sweeps every grid.

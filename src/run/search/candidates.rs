@@ -1,11 +1,10 @@
 //! The order of the search: tasks that do not depend on one another, each a rule that says what to evaluate next.
 
-use cmaes::{CMAESOptions, DVector};
-
+use super::cma_es::CmaEs;
 use super::{Candidate, Evaluated, Scope, SearchOptions};
+use crate::Result;
 use crate::scenario::Category;
 use crate::scenario::parameterization::{Feature, FunctionKind, LinearFamily, LinearSpec, Parameterization, Signal};
-use crate::{Error, Result};
 
 /// Individuals of a generation of the optimiser.
 pub(super) const POPULATION: usize = 12;
@@ -13,6 +12,10 @@ pub(super) const POPULATION: usize = 12;
 const MAX_RESTARTS: u64 = 20;
 /// First step of the optimiser, in logarithms of weights.
 const STEP: f64 = 0.7;
+/// Step at which the optimiser starts again, half of what the weights are rounded to.
+const MIN_STEP: f64 = 5e-4;
+/// Largest logarithm of a weight.
+const MAX_WEIGHT: f64 = 8.0;
 
 /// Looks candidates up or evaluates them.
 pub(super) type Evaluate<'e> = dyn FnMut(&[Candidate]) -> Result<Vec<Option<Evaluated>>> + 'e;
@@ -188,46 +191,29 @@ fn emphasis(
     budget: usize,
     evaluate: &mut Evaluate<'_>,
 ) -> Result<()> {
-    let count = LinearSpec::emphasis_count(category);
-    let mut failed: Option<Error> = None;
-    let loss = |x: &DVector<f64>| {
-        if failed.is_some() {
-            return f64::INFINITY;
-        }
+    let start = vec![0.0; LinearSpec::emphasis_count(category)];
+    let candidate = |x: &Vec<f64>| {
         // Three decimals: a journal of text gives the same candidates.
-        let emphasis: Vec<f64> = x.iter().map(|v| (v.clamp(-8.0, 8.0) * 1e3).round() / 1e3).collect();
+        let emphasis = x.iter().map(|v| (v.clamp(-MAX_WEIGHT, MAX_WEIGHT) * 1e3).round() / 1e3).collect();
         let family = LinearFamily::Svd { coefficients, signal: Signal::Values, emphasis };
-        let spec = LinearSpec { family, mirrored: true, registered: false };
-        match evaluate(&[Candidate::Linear(spec)]) {
-            Ok(evaluated) => {
-                let score = evaluated.into_iter().flatten().next().and_then(|of| of.score(scope, options));
-                // Beyond the bounds the distance to them counts.
-                let beyond: f64 = x.iter().map(|v| (v.abs() - 8.0).max(0.0)).sum();
-                1.0 - score.unwrap_or(0.0) + beyond
-            }
-            Err(error) => {
-                failed = Some(error);
-                f64::INFINITY
-            }
-        }
+        Candidate::Linear(LinearSpec { family, mirrored: true, registered: false })
     };
-    let mut loss = loss;
     let mut left = budget;
     for restart in 0..MAX_RESTARTS {
-        if left < POPULATION {
-            break;
+        let seed = options.limits.seed.wrapping_add(1000 * restart + coefficients as u64);
+        let mut search = CmaEs::new(&start, STEP, POPULATION, seed);
+        while left >= POPULATION && !search.has_ended(MIN_STEP) {
+            let points = search.ask();
+            let evaluated = evaluate(&points.iter().map(candidate).collect::<Vec<_>>())?;
+            let loss = |(x, evaluated): (&Vec<f64>, Option<Evaluated>)| {
+                let score = evaluated.and_then(|of| of.score(scope, options));
+                // Beyond the bounds the distance to them counts.
+                let beyond: f64 = x.iter().map(|v| (v.abs() - MAX_WEIGHT).max(0.0)).sum();
+                1.0 - score.unwrap_or(0.0) + beyond
+            };
+            search.tell(&points.iter().zip(evaluated).map(loss).collect::<Vec<f64>>());
+            left -= POPULATION;
         }
-        let mut search = CMAESOptions::new(vec![0.0; count], STEP)
-            .population_size(POPULATION)
-            .seed(options.limits.seed.wrapping_add(1000 * restart + coefficients as u64))
-            .max_generations(left / POPULATION)
-            // The outcomes are counts: plateaus are no end.
-            .tol_fun(0.0)
-            .tol_fun_hist(0.0)
-            .build(&mut loss)
-            .map_err(|error| Error::Internal(format!("the optimiser: {error:?}")))?;
-        search.run();
-        left = left.saturating_sub(search.function_evals());
     }
-    failed.map_or(Ok(()), Err)
+    Ok(())
 }

@@ -2,27 +2,29 @@
 //!
 //! Candidates are the paper's parameterizations and [linear descriptions](LinearSpec) of many families and sizes. Each is
 //! fitted and judged by cross-validation (`folds`, `evaluation`), in an order that the results decide (`candidates`).
-//! Results are journalled (`journal`). The best of each size form fronts, which are judged again on data that the search
+//! Results are journalled (`results`). The best of each size form fronts, which are judged again on data that the search
 //! has not read (`front`). Scores come from [`crate::run::score`].
 
 mod candidates;
+mod cma_es;
 mod evaluation;
 mod folds;
 mod front;
-mod journal;
+mod results;
 
 use std::path::Path;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+pub use cma_es::CmaEs;
 pub use evaluation::Evaluation;
 pub use folds::{folds, is_by_recording};
 pub use front::{Front, FrontPoint, Judged, RmseAgainstScore, Scored, SearchResult, Unkept};
 
 use candidates::Task;
 use evaluation::{Evaluator, Training};
-use journal::Journal;
+use results::{Results, Tried};
 
 use crate::engine::version::Canonical;
 use crate::engine::{Confusion, Executor, Headway};
@@ -351,27 +353,27 @@ impl<'a> Search<'a> {
         let options = &self.options;
         let of_folds = folds(&self.scenarios, options.limits.folds)?;
         let training = Training::Folds(of_folds, options.limits.folds);
-        let mut journal = Journal::open(folder, shard, &sha256)?;
+        let mut results = Results::open(folder, shard, &sha256)?;
         let mut evaluate = |candidates: &[Candidate]| -> Result<Vec<Option<Evaluated>>> {
             let mut unknown: Vec<Candidate> = Vec::new();
             for candidate in candidates {
-                if journal.find(candidate)?.is_none() && !unknown.contains(candidate) {
+                if results.find(candidate)?.is_none() && !unknown.contains(candidate) {
                     unknown.push(candidate.clone());
                 }
             }
             let evaluations = evaluator.evaluate(&unknown, &training)?;
-            let results = unknown.into_iter().zip(evaluations).map(|(candidate, evaluation)| {
+            let tried = unknown.into_iter().zip(evaluations).map(|(candidate, evaluation)| {
                 let evaluated = evaluation.map(|evaluation| Evaluated {
                     parameters: candidate.parameter_count(category),
                     cells: evaluation.totals(),
                     rmse: evaluation.rmse,
                     candidate: candidate.clone(),
                 });
-                (candidate, evaluated)
+                Tried { candidate, evaluated }
             });
-            journal.add(&results.collect::<Vec<_>>())?;
-            done(journal.len());
-            candidates.iter().map(|candidate| Ok(journal.find(candidate)?.cloned().flatten())).collect()
+            results.add(tried.collect())?;
+            done(results.len());
+            candidates.iter().map(|candidate| Ok(results.find(candidate)?.cloned().flatten())).collect()
         };
         let tasks = Task::all(options);
         let budget = options.limits.studies / (options.limits.max_parameters - 1);
@@ -383,8 +385,6 @@ impl<'a> Search<'a> {
         if shard.is_some() {
             return Ok(None);
         }
-        let evaluated: Vec<Evaluated> = journal.all().into_iter().cloned().collect();
-        let studies = journal.len();
-        front::conclude(&self, &evaluator, &training, evaluated, studies, held_out, executor).map(Some)
+        front::conclude(&self, &evaluator, &training, results.all(), results.len(), held_out, executor).map(Some)
     }
 }

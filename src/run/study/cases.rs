@@ -172,19 +172,6 @@ impl StudyCases {
         Ok(summary)
     }
 
-    /// Maximum size of the series of these units' cases, bytes.
-    pub(super) fn series_bytes(&self, units: Range<u64>) -> u64 {
-        (self.entries(units) * size_of::<f64>() as f64) as u64
-    }
-
-    /// Approximate size of the series that a sweep holds at once, bytes: those of its first window, and as much again
-    /// for their binary32 copy and for unrolled series.
-    pub(crate) fn window_bytes(&self) -> u64 {
-        let first = self.held_units();
-        let bytes = self.series_bytes(first.start..first.end.min(first.start + WINDOW));
-        2 * bytes.min((MAX_ENTRIES_AT_ONCE * size_of::<f64>() as f64) as u64)
-    }
-
     /// Maximum total number of values in the series of these units' cases.
     fn entries(&self, units: Range<u64>) -> f64 {
         let grid = TimeGrid::of(&self.outline.profile);

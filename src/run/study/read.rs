@@ -6,7 +6,7 @@ use std::ops::Range;
 use sha2::{Digest, Sha256};
 
 use super::cases::{StudyCases, parameterizations};
-use super::plan_file::{BlockHead, PAGE, StudyHead, lines, stripped};
+use super::plan_file::{PAGE, StudyHead, lines, stripped};
 use crate::engine::lane_case::LaneCase;
 use crate::engine::plan::{Block, CaseSource, LanePlan, Units};
 use crate::scenario::parameterization::Reduction;
@@ -110,27 +110,6 @@ impl StudyCases {
     /// The data before the scenarios in a file.
     pub fn head(&self) -> &StudyHead {
         &self.head
-    }
-
-    /// A separate plan over an even selection of the held scenarios, for extrapolation to all. It has at most about
-    /// `max_scenarios` scenarios and `max_bytes` bytes of series, but at least one scenario of each category.
-    ///
-    /// # Errors
-    /// None for types of this program.
-    /// None for what this program makes.
-    pub(crate) fn thinned(&self, max_scenarios: u64, max_bytes: u64) -> Result<LanePlan> {
-        let by_bytes = self.series_bytes(self.held_units()).div_ceil(max_bytes.max(1));
-        let step = (self.held.len() as u64).div_ceil(max_scenarios.max(1)).max(by_bytes).max(1);
-        let (mut held, mut blocks) = (Vec::new(), Vec::new());
-        for (head, block) in self.head.blocks.iter().zip(&self.outline.blocks) {
-            let units = block.units.held().map(|unit| block.first_unit + unit).step_by(step as usize);
-            let before = held.len();
-            held.extend(units.filter_map(|unit| self.scenario(unit)).cloned());
-            blocks.push(BlockHead { units: (held.len() - before) as u64, ..head.clone() });
-        }
-        let head = StudyHead { blocks, ..self.head.clone() };
-        let study = head.with_scenarios(0, held)?;
-        study.window(0..study.outline.unit_count())
     }
 
     /// Writes the plan file: its first line, then the scenarios.

@@ -13,8 +13,6 @@ mod csv_reader;
 mod memory;
 mod names;
 #[cfg(feature = "parquet")]
-mod parquet_pages;
-#[cfg(feature = "parquet")]
 mod parquet_reader;
 #[cfg(feature = "parquet")]
 mod parquet_writer;

@@ -1,7 +1,5 @@
-//! Rows of a Parquet file that any program may have written or damaged.
-//!
-//! A few rows at a time are in memory. [`super::parquet_pages`] checks the sizes before the decoder relies on them;
-//! panics of the decoder on damaged files become errors about the file.
+//! Rows of a Parquet file that any program may have written. A few rows at a time are in memory; panics of
+//! the decoder on damaged files become errors about the file.
 
 use std::cell::Cell;
 use std::fs::File;
@@ -23,13 +21,11 @@ use parquet::basic::Compression;
 use serde_json::Value;
 
 use super::Row;
-use super::parquet_pages::{check_footer, check_pages};
 use crate::support::input_file;
 use crate::{Error, Place, Result};
 
-/// Rows decoded together; fewer if pages are large, because each row may repeat the longest text of a page.
-const BATCH_ROWS: u64 = 64;
-const BATCH_BYTES: u64 = 8 << 20;
+/// Rows decoded together.
+const BATCH_ROWS: usize = 64;
 /// Maximum length of a series: eleven hours at 25 Hz.
 const MAX_SERIES: usize = 1 << 20;
 /// Maximum length of a text, bytes: every row may repeat it.
@@ -38,7 +34,6 @@ const MAX_TEXT: usize = 1 << 16;
 pub(super) struct ParquetRows {
     path: PathBuf,
     file: File,
-    size: u64,
     metadata: ArrowReaderMetadata,
     /// Position of each column: field of the root, and field of the record there.
     leaves: Vec<(usize, Option<usize>)>,
@@ -70,29 +65,27 @@ pub fn is_panic_caught() -> bool {
 }
 
 /// Runs the decoder. Damage that makes it panic becomes an error about the file.
-fn guarded<T>(path: &Path, work: impl FnOnce() -> std::result::Result<T, String>) -> Result<T> {
+fn guarded<T, E: std::fmt::Display>(path: &Path, work: impl FnOnce() -> std::result::Result<T, E>) -> Result<T> {
     IS_CAUGHT.set(true);
     let result = catch_unwind(AssertUnwindSafe(work));
     IS_CAUGHT.set(false);
     match result {
-        Ok(result) => result.map_err(|problem| damaged(path, &problem)),
+        Ok(result) => result.map_err(|problem| damaged(path, problem)),
         Err(_) => Err(damaged(path, "its content contradicts itself")),
     }
 }
 
-fn damaged(path: &Path, problem: &str) -> Error {
+fn damaged(path: &Path, problem: impl std::fmt::Display) -> Error {
     let problem = format!("not a Parquet file that can be read: {problem}");
     Error::input(Place::file(path), problem, "write the file again, or use JSON Lines or CSV")
 }
 
 impl ParquetRows {
     pub(super) fn open(path: &Path) -> Result<(Vec<String>, ParquetRows)> {
-        let mut file = input_file::open(path)?;
-        let size = file.metadata().map_err(|e| Error::io(path, "read", e))?.len();
-        check_footer(&mut file, size).map_err(|problem| damaged(path, problem))?;
+        let file = input_file::open(path)?;
         // Use only Parquet's own types and ignore the Arrow schema of another program.
         let options = ArrowReaderOptions::new().with_skip_arrow_metadata(true);
-        let metadata = guarded(path, || ArrowReaderMetadata::load(&file, options).map_err(|e| e.to_string()))?;
+        let metadata = guarded(path, || ArrowReaderMetadata::load(&file, options))?;
         let (mut names, mut leaves) = (Vec::new(), Vec::new());
         for (root, field) in metadata.schema().fields().iter().enumerate() {
             match field.data_type() {
@@ -111,7 +104,6 @@ impl ParquetRows {
         let rows = ParquetRows {
             path: path.to_path_buf(),
             file,
-            size,
             metadata,
             leaves,
             names: names.clone(),
@@ -149,14 +141,10 @@ impl ParquetRows {
             let problem = format!("compressed with {}; expected zstd, snappy or none", chunk.compression());
             return Err(Error::input(Place::file(&self.path), problem, "write it again with compression=\"zstd\""));
         }
-        let mut pages = self.file.try_clone().map_err(|e| Error::io(&self.path, "read", e))?;
-        let size = self.size;
-        let largest = guarded(&self.path, || check_pages(&mut pages, size, chunks()).map_err(str::to_owned))?;
-        let batch_rows = (BATCH_BYTES / largest.max(1)).clamp(1, BATCH_ROWS) as usize;
         let file = self.file.try_clone().map_err(|e| Error::io(&self.path, "read", e))?;
         let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.metadata.clone());
-        let builder = builder.with_projection(mask.clone()).with_batch_size(batch_rows);
-        self.reader = Some(guarded(&self.path, || builder.build().map_err(|e| e.to_string()))?);
+        let builder = builder.with_projection(mask).with_batch_size(BATCH_ROWS);
+        self.reader = Some(guarded(&self.path, || builder.build())?);
         Ok(())
     }
 
@@ -172,7 +160,7 @@ impl ParquetRows {
     pub(super) fn next_row(&mut self) -> Result<Option<Row>> {
         while self.at == self.batch_rows {
             let Some(reader) = &mut self.reader else { return Ok(None) };
-            let next = guarded(&self.path, || reader.next().transpose().map_err(|e| e.to_string()))?;
+            let next = guarded(&self.path, || reader.next().transpose())?;
             let Some(batch) = next else { return Ok(None) };
             self.batch = guarded(&self.path, || self.leaves_of(&batch))?;
             (self.batch_rows, self.at) = (batch.num_rows(), 0);

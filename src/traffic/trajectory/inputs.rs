@@ -196,6 +196,10 @@ fn first_track_file(folder: &Path) -> Result<Option<PathBuf>> {
 }
 
 fn unknown(path: &Path) -> Error {
+    if path.extension().is_some_and(|ending| ending == "xosc") {
+        let help = "give recordings; a scenario file is a .jsonl file, and `export` writes OpenSCENARIO only";
+        return Error::input(Place::file(path), "an OpenSCENARIO file is no recording", help);
+    }
     let columns = match tracks::columns_of(path) {
         Ok(columns) => {
             let names: Vec<String> = columns.iter().take(30).map(|name| format!("`{name}`")).collect();

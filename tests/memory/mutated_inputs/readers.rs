@@ -3,7 +3,6 @@
 use std::path::Path;
 
 use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, Partial, Wanted};
-use lanesweep::interop::conformance::{Table, TableKind, compare_functions, compare_jrc, compare_lanes};
 use lanesweep::interop::openscenario::{DistributionSamples, Distributions, Names, read_distribution, variations};
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
@@ -49,7 +48,6 @@ pub fn all(seeds: &Seeds) -> Vec<Reader> {
         plain("scenarios", &seeds.scenario_files, scenarios),
         plain("scenario table", &seeds.scenario_tables, |b, d, s, h| scenario_table("s.csv", b, d, s, h)),
         plain("exposure", &seeds.exposures, exposure),
-        plain("conformance table", &seeds.tables, table),
         plain("profile", &seeds.profiles, profile),
         plain("mining options", &seeds.mining, mining),
         plain("parameterization options", &seeds.parameterization, parameterization),
@@ -62,8 +60,6 @@ pub fn all(seeds: &Seeds) -> Vec<Reader> {
         plain("preset", &seeds.presets, preset),
         plain("distribution", &seeds.distributions, distribution),
     ];
-    #[cfg(feature = "parquet")]
-    readers.push(plain("Parquet scenarios", &seeds.parquets, |b, d, s, h| scenario_table("s.parquet", b, d, s, h)));
     readers.push(Reader { reseal: Some(reseal_density), ..plain("density", &seeds.densities, density) });
     readers.push(Reader { reseal: Some(reseal_searched), ..plain("searched", &seeds.searched, searched) });
     readers.push(plain("external S'", &seeds.scenario_files[..1], external));
@@ -176,17 +172,6 @@ fn exposure(bytes: &[u8], dir: &Path, _: &Seeds, _: bool) -> Result<()> {
         Exposure::new(3, read.driven.unwrap());
     }
     Ok(())
-}
-
-fn table(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
-    let table = Table::read(&file(bytes, dir, "table.csv"))?;
-    if table.has("param") {
-        return compare_lanes(&seeds.scenarios, &table, &seeds.profile).map(drop);
-    }
-    match table.kind()? {
-        TableKind::JrcCases => compare_jrc(&table, &seeds.jrc).map(drop),
-        TableKind::Functions => compare_functions(&table, &seeds.jrc).map(drop),
-    }
 }
 
 fn profile(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> {

@@ -36,10 +36,7 @@ pub struct Seeds {
     pub scenario_files: Vec<Vec<u8>>,
     /// A row per instant, and one per concrete case.
     pub scenario_tables: Vec<Vec<u8>>,
-    #[cfg(feature = "parquet")]
-    pub parquets: Vec<Vec<u8>>,
     pub exposures: Vec<Vec<u8>>,
-    pub tables: Vec<Vec<u8>>,
     pub profiles: Vec<Vec<u8>>,
     pub mining: Vec<Vec<u8>>,
     pub parameterization: Vec<Vec<u8>>,
@@ -59,7 +56,6 @@ pub struct Seeds {
     pub weighted_parts: Vec<Vec<u8>>,
     pub study_parts: Vec<Vec<u8>>,
     pub profile: Profile,
-    pub jrc: Profile,
     pub study: LanePlan,
     density: DensityModel,
 }
@@ -90,13 +86,6 @@ fn written(write: impl FnOnce(&Path)) -> Vec<u8> {
     let path = dir.path().join("file.json");
     write(&path);
     std::fs::read(path).unwrap()
-}
-
-/// The header and every k-th line of a table, a few lines.
-fn some_lines(table: &str, k: usize) -> Vec<u8> {
-    let lines: Vec<&str> = table.lines().collect();
-    let some = lines[..1].iter().chain(lines[1..].iter().step_by(k).take(4));
-    some.map(|line| format!("{line}\n")).collect::<String>().into_bytes()
 }
 
 /// A table of a few vehicles: header, and a line for vehicle, sample, x, y.
@@ -226,13 +215,6 @@ columns = { frame_rate = "fps" }
     vec![std::fs::read(generic).unwrap(), own.as_bytes().to_vec()]
 }
 
-const CUT_INS: &str = "scenario,variant,check,model,ego_kmh,cutin_kmh,vlat,n_prepended,dist_ref,collision,crash_type,\
-t_react,t_crash,impact_speed,impact_rel_speed,min_ttc,min_gap,v@0.5,v@1,v@1.5,v@2,v@2.5,v@3,v@4,v@5,v@6,v@8,v@10,v@15,\
-x@1,x@2,x@3,x@5,x@10,robust
-cut_in,comparison,,CC_human_driver,60,40,0.9,3,20,0,0,,,,,1.5,2.0,,,,,,,,,,,,,,,,,,1
-cut_in,plain,,FSM,60,40,0.3,0,20,1,2,,,,,1.5,2.0,,,,,,,,,,,,,,,,,,1
-";
-
 const INSTANTS: &str = "id,category,time_s,ego_speed_kmh,ego_length_m,ego_width_m,side,target_length_m,\
 target_width_m,target_speed_kmh,target_lateral_m,kept,tag_frames
 a,cut-in,10.00,108,4.5,1.8,left,4.2,1.9,72,3.5,yes,1 2
@@ -248,13 +230,6 @@ ahead_speed_kmh,duration_s,rate_hz
 a,cut-in,FSM,108,20,1.2,,1.0,,,,,,
 ,lvd,RSS,108,30,,30,,-6,0,,,,10
 c,cut-out,FSM,108,,1.2,,1.0,,,40,36,4,
-";
-
-const CUT_OUTS: &str = "scenario,check,model,v0_kmh,vlat,front_length,vfront_kmh,front_dist,initial_gap_nominal,\
-collision,crash_type,t_react,t_crash,impact_speed,impact_rel_speed,min_ttc,min_gap,v@0.5,v@1,v@1.5,v@2,v@2.5,v@3,v@4,\
-v@5,v@6,v@8,v@10,v@15,x@1,x@2,x@3,x@5,x@10,robust
-cut_out,cutin_check,FSM,80,1.0,4.3,0,30,25,0,0,,,,,1.5,2.0,,,,,,,,,,,,,,,,,,1
-cut_out,plain,RSS,80,0.5,4.3,10,30,25,1,2,,,,,1.5,2.0,,,,,,,,,,,,,,,,,,0
 ";
 
 impl Seeds {
@@ -334,14 +309,6 @@ impl Seeds {
         let exposure =
             DataProvenance { scenarios_sha256: "00".to_owned(), data: "synthetic".to_owned(), synthetic: true, driven };
         let texts = small::Texts::small();
-        let golden = |name: &str| {
-            std::fs::read_to_string(Path::new(env!("CARGO_MANIFEST_DIR")).join("tests/golden").join(name)).unwrap()
-        };
-        let lanes = few.iter().zip(["1", "S", "a", "b", "i", "ii"]).map(|(s, param)| {
-            format!("{},{},{param},2.0,Reg157,0,1,1,0.44,1.19,0,5.08,,,13.92,1\n", s.id, s.category.key())
-        });
-        let lanes =
-            golden("paper_sumo_01_02_lanes.csv").lines().next().unwrap().to_owned() + "\n" + &lanes.collect::<String>();
         let toml = |text: String| vec![text.into_bytes()];
         Seeds {
             recording: [texts.tracks, texts.tracks_meta, texts.recording_meta].map(String::into_bytes),
@@ -350,27 +317,11 @@ impl Seeds {
                 .map(|s| written(|path| write_scenarios(path, s).unwrap()))
                 .into(),
             scenario_tables: vec![INSTANTS.into(), CASES.into()],
-            #[cfg(feature = "parquet")]
-            parquets: [&few[..], &few[..1]]
-                .map(|s| {
-                    let dir = tempfile::tempdir().unwrap();
-                    let path = dir.path().join("s.parquet");
-                    write_scenarios(&path, s).unwrap();
-                    std::fs::read(path).unwrap()
-                })
-                .into(),
             exposures: vec![{
                 let dir = tempfile::tempdir().unwrap();
                 exposure.write_beside(&dir.path().join("s.jsonl")).unwrap();
                 std::fs::read(dir.path().join("s.exposure.json")).unwrap()
             }],
-            tables: vec![
-                some_lines(&golden("lvd.csv"), 150),
-                some_lines(&golden("functions.csv"), 200),
-                CUT_INS.into(),
-                CUT_OUTS.into(),
-                lanes.into_bytes(),
-            ],
             profiles: ["paper", "jrc-2021"]
                 .map(|n| toml::to_string(&Profile::load(n).unwrap()).unwrap().into_bytes())
                 .into(),
@@ -401,7 +352,6 @@ impl Seeds {
             weighted_parts: vec![written(|p| write_part(p, &weighted).unwrap())],
             study_parts: vec![written(|p| write_part(p, &study_part).unwrap())],
             profile,
-            jrc: Profile::load("jrc-2021").unwrap(),
             study,
             density,
             scenarios: few,

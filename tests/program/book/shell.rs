@@ -56,6 +56,11 @@ fn calls(line: &str) -> Vec<Called> {
         let words = &command[assignments.count()..];
         let arguments = match words.first().map(String::as_str) {
             Some("lanesweep") => &words[1..],
+            // A launcher before the program.
+            Some("srun") => {
+                let Some(at) = words.iter().position(|word| word == "lanesweep") else { continue };
+                &words[at + 1..]
+            }
             Some("cargo") if words.get(1).is_some_and(|word| word == "run") => {
                 let Some(at) = words.iter().position(|word| word == "--") else { continue };
                 &words[at + 1..]
@@ -80,7 +85,7 @@ fn called(arguments: &[String]) -> Option<Called> {
     let flags = flags.map(|word| word.split('=').next().unwrap_or_default().to_owned()).collect();
     let has_inner = |inner: &str| match verb.as_str() {
         "config" | "export" | "cluster" => true,
-        "verify" => ["devices", "conformance"].contains(&inner),
+        "verify" => inner == "devices",
         _ => false,
     };
     let inner = arguments.iter().skip_while(|word| *word != verb).nth(1).filter(|inner| has_inner(inner)).cloned();
