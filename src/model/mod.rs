@@ -1,7 +1,7 @@
 //! The simulated system: drivers, criteria, the profile with every constant, the concrete case, the motion of its
 //! vehicles, and the lane arithmetic.
 //!
-//! The only file read here is a profile. Nothing is simulated here: [`engine`](crate::engine) steps these definitions.
+//! The only file read here is a profile. Nothing is simulated here: the engine steps these definitions.
 
 pub mod case;
 #[macro_use]

@@ -14,6 +14,8 @@ pub mod grid;
 pub mod justify;
 mod motion_error;
 pub mod parts;
+#[cfg(test)]
+mod pinned_lanes;
 pub mod reopen;
 pub mod sampling;
 pub mod score;

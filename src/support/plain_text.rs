@@ -103,7 +103,7 @@ pub fn shown_json(json: &str) -> Cow<'_, str> {
 }
 
 /// One word of a POSIX shell, for commands in messages: as it is where nothing in it is special, else in single quotes.
-pub(crate) fn quoted_word(word: &str) -> String {
+pub fn quoted_word(word: &str) -> String {
     // `=` is special: before a command it makes an assignment.
     let is_plain = |c: char| c.is_ascii_alphanumeric() || "_-./:,+@%".contains(c);
     match !word.is_empty() && word.chars().all(is_plain) {

@@ -60,7 +60,7 @@ pub fn significant(value: f64, digits: usize) -> String {
 }
 
 /// Formats a time in the unit that a person uses: `0.30 s`, `61 s`, `15 min`, `10.0 h`, `3 days`.
-pub(crate) fn duration(seconds: f64) -> String {
+pub fn duration(seconds: f64) -> String {
     match seconds {
         s if s < 10.0 => format!("{s:.2} s"),
         s if s < 600.0 => format!("{s:.0} s"),

@@ -6,7 +6,7 @@
 //! record is renamed last, and the list is complete. After a kill in between, the next run removes the listed files
 //! that it does not write itself. Readers of independent files (recordings) refuse an incomplete folder.
 //!
-//! Parts of a run use the folder together and exclude whole runs: [`parts`](crate::run::parts).
+//! Parts of a run use the folder together and exclude whole runs: `parts`.
 
 use std::collections::BTreeSet;
 use std::io::{ErrorKind, Write};

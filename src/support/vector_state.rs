@@ -20,29 +20,31 @@ pub fn clear_upper_halves() {
     }
 }
 
+/// For tests: whether upper halves of the 256-bit registers are in use. `None` if the CPU does not report it, or always
+/// reports true.
+#[cfg(target_arch = "x86_64")]
+pub fn upper_halves_in_use() -> Option<bool> {
+    let in_use = what_the_machine_says()?;
+    clear_upper_halves();
+    (what_the_machine_says() == Some(false)).then_some(in_use)
+}
+
+#[cfg(target_arch = "x86_64")]
+fn what_the_machine_says() -> Option<bool> {
+    // Leaf 13, subleaf 1, bit 2: XGETBV with 1.
+    let says = is_x86_feature_detected!("xsave") && std::arch::x86_64::__cpuid_count(13, 1).eax & 4 != 0;
+    #[target_feature(enable = "xsave")]
+    fn in_use() -> u64 {
+        // SAFETY: the CPU reports that XGETBV with 1 is available.
+        unsafe { std::arch::x86_64::_xgetbv(1) }
+    }
+    // SAFETY: the CPU has XSAVE.
+    says.then(|| unsafe { in_use() } & 0b100 != 0)
+}
+
 #[cfg(all(test, target_arch = "x86_64"))]
-pub mod tests {
-    use std::arch::x86_64::{__cpuid_count, _xgetbv};
-
-    /// Whether upper halves of the 256-bit registers are in use. `None` if the CPU does not report it, or always
-    /// reports true.
-    pub fn upper_halves_in_use() -> Option<bool> {
-        let in_use = what_the_machine_says()?;
-        super::clear_upper_halves();
-        (what_the_machine_says() == Some(false)).then_some(in_use)
-    }
-
-    fn what_the_machine_says() -> Option<bool> {
-        // Leaf 13, subleaf 1, bit 2: XGETBV with 1.
-        let says = is_x86_feature_detected!("xsave") && __cpuid_count(13, 1).eax & 4 != 0;
-        #[target_feature(enable = "xsave")]
-        fn in_use() -> u64 {
-            // SAFETY: the CPU reports that XGETBV with 1 is available.
-            unsafe { _xgetbv(1) }
-        }
-        // SAFETY: the CPU has XSAVE.
-        says.then(|| unsafe { in_use() } & 0b100 != 0)
-    }
+mod tests {
+    use super::*;
 
     #[test]
     fn halves_that_are_in_use_are_cleared() {
@@ -54,7 +56,7 @@ pub mod tests {
         // SAFETY: the CPU has AVX; the instruction reads eight values into a register and leaves them there.
         unsafe { std::arch::asm!("vmovups ymm5, [{p}]", out("xmm5") _, p = in(reg) &values) };
         assert_eq!(what_the_machine_says(), Some(true));
-        super::clear_upper_halves();
+        clear_upper_halves();
         assert_eq!(what_the_machine_says(), Some(false));
     }
 }

@@ -59,7 +59,6 @@ pub(in crate::engine) fn lead_only_from<M: DriverModel<f32>>(
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::LanePlan;
     use crate::engine::cpu::series::Series;
     use crate::engine::drivers::Constants;
     use crate::engine::frame::Start;
@@ -69,17 +68,25 @@ mod tests {
     use crate::model::criterion::Criteria;
     use crate::model::driver::ModelId;
     use crate::model::profile::Profile;
-    use crate::run::study::{StudyOptions, plan_study};
+    use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, recorded_case};
     use crate::scenario::{Category, Tables};
-    use crate::traffic::mining::{MiningOptions, mine_generated};
-    use crate::traffic::trajectory::generator::GeneratorOptions;
+    use lanesweep_traffic::traffic::mining::{MiningOptions, mine_generated};
+    use lanesweep_traffic::traffic::trajectory::generator::GeneratorOptions;
 
-    /// Cut-outs of a synthetic recording, recorded and parameterized.
-    fn cut_outs(profile: &Profile) -> LanePlan {
+    /// Recorded and kinematic cut-outs of a synthetic recording.
+    fn cut_outs(profile: &Profile) -> (Vec<LaneCase<f32>>, Tables<f32>) {
         let generator = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
         let mined = mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap();
-        let options = StudyOptions { categories: vec![Category::CutOut], ..StudyOptions::default() };
-        plan_study(&mined.scenarios, profile, &options).unwrap()
+        let kept = mined.scenarios.iter().filter(|scenario| scenario.kept && scenario.category == Category::CutOut);
+        let (mut tables, options) = (Tables::default(), ParameterizationOptions::default());
+        let kinematic = Parameterization::find(Category::CutOut, "b").unwrap();
+        let mut cases = Vec::new();
+        for scenario in kept {
+            let recorded = recorded_case(scenario, profile.frame.dt_s).unwrap();
+            let kinematic = kinematic.case(scenario, profile.frame.dt_s, &options, None).unwrap();
+            cases.extend([recorded, kinematic].map(|case| LaneCase::encode(&case, profile, &mut tables)));
+        }
+        (cases.iter().map(LaneCase::cast).collect(), tables.cast())
     }
 
     /// Steps two lanes together: one with both vehicles, and one with only the second vehicle after it leaves. Ego,
@@ -132,33 +139,29 @@ mod tests {
     fn from_there_on_the_second_vehicle_alone_decides() {
         for name in Profile::names() {
             let profile = Profile::load(name).unwrap();
-            let plan = cut_outs(&profile);
+            let (cases, tables) = cut_outs(&profile);
             let constants = Constants::<f32>::resolve(&profile, Category::CutOut);
             let criteria = &Criteria { keeps_values: false, ..constants.criteria };
-            let tables = plan.tables().cast();
             let (mut saved, mut lead_only, mut all) = (0, 0, 0);
             for id in ModelId::ALL {
-                for unit in 0..plan.unit_count() {
-                    for variant in 0..plan.blocks[0].variants.len() {
-                        let case: LaneCase<f32> = plan.case(0, unit, variant).cast();
-                        let (frame, model_index) = (&constants.frames[id.index()], id.index());
-                        let what = format!("{name}, {}, unit {unit}, variant {variant}", id.name());
-                        macro_rules! run {
-                            ($model:ident) => {{
-                                let (model, scene) = (&constants.$model, Scene::unknown(true));
-                                let pair = Simulation { frame, criteria, model, model_index, scene };
-                                steps_side_by_side(&pair, &case, &tables, &what)
-                            }};
-                        }
-                        let steps = match id {
-                            ModelId::Reg157 => run!(reg157),
-                            ModelId::Cchdm => run!(cchdm),
-                            ModelId::Rss => run!(rss),
-                            ModelId::Fsm => run!(fsm),
-                            ModelId::Foreign(_) => continue,
-                        };
-                        (saved, lead_only, all) = (saved + steps, lead_only + u32::from(steps > 0), all + 1);
+                for (at, case) in cases.iter().enumerate() {
+                    let (frame, model_index) = (&constants.frames[id.index()], id.index());
+                    let what = format!("{name}, {}, case {at}", id.name());
+                    macro_rules! run {
+                        ($model:ident) => {{
+                            let (model, scene) = (&constants.$model, Scene::unknown(true));
+                            let pair = Simulation { frame, criteria, model, model_index, scene };
+                            steps_side_by_side(&pair, case, &tables, &what)
+                        }};
                     }
+                    let steps = match id {
+                        ModelId::Reg157 => run!(reg157),
+                        ModelId::Cchdm => run!(cchdm),
+                        ModelId::Rss => run!(rss),
+                        ModelId::Fsm => run!(fsm),
+                        ModelId::Foreign(_) => continue,
+                    };
+                    (saved, lead_only, all) = (saved + steps, lead_only + u32::from(steps > 0), all + 1);
                 }
             }
             assert!(lead_only * 2 > all && saved > 100 * all, "{name}: {lead_only} of {all}, {saved}");

@@ -4,7 +4,7 @@
 //! A driver that is a function of the calling program is registered at run time ([`ModelId::register`]).
 //!
 //! This module defines what a driver sees ([`View`]), what it decides ([`Hazard`]) and how it brakes. It has no time
-//! loop: [`crate::engine`] has the only one. Parameters come from a profile; decisions go to the lane's frame.
+//! loop: the engine has the only one. Parameters come from a profile; decisions go to the lane's frame.
 //!
 //! To add a model: one file here, its twin in `shaders/`, one line in the registry (`registry.rs`). A test builds and
 //! runs the worked example in `examples/adding-a-driver-model`.
@@ -257,7 +257,7 @@ mod tests {
     use super::*;
     use crate::model::case::Category;
     use crate::model::profile::Profile;
-    use crate::random::{philox4x32_10, unit_uniform};
+    use lanesweep_random::random::{philox4x32_10, unit_uniform};
 
     #[test]
     fn delays_are_whole_steps_rounded_up_without_the_error_of_the_quotient() {

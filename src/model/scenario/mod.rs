@@ -1,7 +1,7 @@
 //! Scenarios as found in a recording ([`Scenario`]) and cases as simulated ([`Case`]).
 //!
 //! This module holds the mined scenario, its files and tables, and the concrete case with its motions. Mining and
-//! simulation are elsewhere. Data comes from [`crate::traffic::mining`] or a scenario file and goes to
+//! simulation are elsewhere. Data comes from mining or a scenario file and goes to
 //! [`crate::scenario::parameterization`].
 
 mod case_file;

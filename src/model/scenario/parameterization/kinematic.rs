@@ -220,7 +220,7 @@ mod tests {
     #[test]
     fn the_sinusoidal_leader_equals_the_golden_one() {
         let golden: serde_json::Value =
-            serde_json::from_str(include_str!("../../../tests/golden/lvd_sinusoidal.json")).unwrap();
+            serde_json::from_str(include_str!("../../../../tests/golden/lvd_sinusoidal.json")).unwrap();
         let mut compared = 0;
         for profile in golden["profiles"].as_array().unwrap() {
             let number = |key: &str| profile[key].as_f64().unwrap();

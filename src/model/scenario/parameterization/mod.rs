@@ -2,7 +2,7 @@
 //!
 //! This module holds S (the scenario as recorded), the kinematic parameterizations and the reduction by singular value
 //! decomposition. It knows nothing about headways, models or verdicts. Scenarios come from [`crate::scenario`]; cases
-//! go to [`crate::engine`].
+//! go to the engine.
 //!
 //! A [`Parameterization`] is data: its parameters, description, encoding and decoding follow from its category and its
 //! [`Family`]. To add one of an existing family: a line in [`Parameterization::ALL`].

@@ -22,7 +22,7 @@ pub const MAX_DURATION_S: f64 = 600.0;
 const PHYSICAL_RANGES: [(&str, f64, f64); 5] =
     [("m/s", 1e-9, 200.0), ("m/s²", 1e-9, 100.0), ("m", 1e-9, 10_000.0), ("s", 1e-9, 1000.0), ("1", 1e-9, 1e6)];
 
-/// A number that defines a kinematic case. Its code is its slot in the [recipe](crate::engine::generated::Recipe) of a
+/// A number that defines a kinematic case. Its code is its slot in the recipe of a
 /// case generator.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 #[repr(u32)]

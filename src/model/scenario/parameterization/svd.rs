@@ -144,7 +144,7 @@ impl SvdBasis {
 #[cfg(all(test, target_arch = "x86_64"))]
 mod tests {
     use super::*;
-    use crate::support::vector_state::tests::upper_halves_in_use;
+    use crate::support::vector_state::upper_halves_in_use;
 
     /// A fit does not slow down the code that runs after it.
     #[test]
