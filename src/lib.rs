@@ -1,9 +1,9 @@
 //! lanesweep: a massively parallel sweeper for the scenario-based assessment of automated driving systems.
 //!
-//! Modules, each importing only those before it: [`support`] (errors, files, tables), [`model`] (drivers, criteria,
+//! Modules, each from a crate that depends only on those before it: [`support`] (errors, files, tables), [`model`] (drivers, criteria,
 //! profile, case), [`scenario`] (recorded scenarios and their parameterizations), [`traffic`] (recordings, mining),
 //! [`stats`] (random numbers, densities, estimators), [`engine`] (lanes on CPUs and GPUs), [`run`] (studies, samples,
-//! maps, scores), [`report`] (tables, figures, pages), [`interop`] (other programs) and `cli` (feature `cli`).
+//! maps, scores), [`report`] (tables, figures, pages, exported scenarios) and `cli` (feature `cli`).
 //! [`prelude`] has the names that most users need; `examples/library.rs` uses nothing else.
 //!
 //! A cut-in against one driver, in binary64:
@@ -63,7 +63,7 @@
 pub use lanesweep_cli::cli;
 pub use lanesweep_engine::engine;
 pub use lanesweep_model::{model, scenario};
-pub use lanesweep_report::{interop, report};
+pub use lanesweep_report::report;
 pub use lanesweep_run::run;
 pub use lanesweep_stats::stats;
 pub use lanesweep_support::{Error, Place, Result, support};

@@ -1,4 +1,4 @@
-// Standard normal deviates, as src/stats/random/normal.rs. Reads `normal_table: array<vec4<f32>>`, which the
+// Standard normal deviates, as src/random/normal.rs. Reads `normal_table: array<vec4<f32>>`, which the
 // including kernel declares and the host fills with `normal_table()`.
 
 const NORMAL_SEGMENT_BITS: u32 = 4u;

@@ -1,4 +1,4 @@
-// Philox4x32-10, as src/stats/random/philox.rs. Pairs of words hold 64 bits with the low word first, except for
+// Philox4x32-10, as src/random/philox.rs. Pairs of words hold 64 bits with the low word first, except for
 // products.
 
 const PHILOX_MULTIPLIER_0: u32 = 0xD2511F53u;

@@ -1,4 +1,4 @@
-// Sobol's sequence with nested uniform scrambling, as src/stats/random/sobol.rs. Reads `sobol_table: array<u32>`,
+// Sobol's sequence with nested uniform scrambling, as src/random/sobol.rs. Reads `sobol_table: array<u32>`,
 // which the including kernel declares and the host fills with `Sobol::table`.
 
 const SOBOL_DIGITS: u32 = 32u;

@@ -1,4 +1,4 @@
-// Uniform numbers, and uniform or weighted choices, as src/stats/random/uniform.rs; needs shared/philox.wgsl. Reads
+// Uniform numbers, and uniform or weighted choices, as src/random/uniform.rs; needs shared/philox.wgsl. Reads
 // `alias_table: array<vec2<u32>>`, which the including kernel declares and the host fills with `AliasTable::table`.
 // It may hold several tables in sequence.
 

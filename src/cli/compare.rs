@@ -14,7 +14,6 @@ use crate::report::compare::CompareFile;
 use crate::report::sampling::HostRecord;
 use crate::run::compare::{self, CompareOptions, CompareResult};
 use crate::run::study::StudyOptions;
-use crate::scenario::DataProvenance;
 use crate::stats::density::DensityKind;
 use crate::stats::estimate::Enough;
 use crate::support::files::check_folder;

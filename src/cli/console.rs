@@ -340,7 +340,7 @@ mod tests {
         }
         let mut known = Vec::new();
         flags(&crate::cli::configured::command(), &mut known);
-        let mut folders = vec![std::path::PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/src"))];
+        let mut folders = vec![std::path::PathBuf::from(concat!(env!("CARGO_MANIFEST_DIR"), "/.."))];
         let mut found = 0;
         while let Some(path) = folders.pop() {
             if path.is_dir() {

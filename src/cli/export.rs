@@ -10,7 +10,7 @@ use super::configured::Configured;
 use super::format::FormatFlag;
 use super::lists;
 use super::source::{PlausibilityFlag, scenarios_of};
-use crate::interop::openscenario::{
+use crate::report::openscenario::{
     Concrete, EgoMotion, PlayOptions, concrete_case, concrete_lanes, export_folder, reopen,
 };
 use crate::report::records::document;

@@ -2,8 +2,7 @@
 
 use lanesweep_engine::engine;
 use lanesweep_model::{model, scenario};
-use lanesweep_random::random;
-use lanesweep_report::{interop, report};
+use lanesweep_report::report;
 use lanesweep_run::run;
 use lanesweep_stats::stats;
 use lanesweep_support::{Error, Place, Result, support};

@@ -9,7 +9,7 @@ use super::console::Verbosity;
 use super::source::{self, PlausibilityFlag, PresetFlag};
 use super::{Exit, console};
 use crate::Result;
-use crate::scenario::{DataProvenance, Driven, check_scenario_file, write_scenarios, write_scenarios_to};
+use crate::scenario::{DataProvenance, check_scenario_file, write_scenarios, write_scenarios_to};
 use crate::support::atomic_file::AtomicFile;
 use crate::support::input_file;
 use crate::support::lock::FolderLock;

@@ -11,8 +11,8 @@ use super::source::PlausibilityFlag;
 use crate::Result;
 use crate::cli::settings::{EstimatorKind, PointKind, SampleSettings};
 use crate::engine::Headway;
-use crate::interop::openscenario::Rename;
 use crate::model::driver::ModelId;
+use crate::report::openscenario::Rename;
 use crate::run::sampling::SampleHeadways;
 use crate::stats::density::DensityModel;
 

@@ -11,7 +11,7 @@ use super::sample::Sample;
 use super::sample_options::only_crude;
 use crate::cli::settings::{EstimatorKind, PointKind};
 use crate::engine::Headway;
-use crate::interop::openscenario::{DistributionSamples, SampledFile};
+use crate::report::openscenario::{DistributionSamples, SampledFile};
 use crate::report::sampling::{DensityRecord, DrawRecord, EstimateFile, HostRecord};
 use crate::report::sampling_tables::convergence_csv;
 use crate::run::reopen::DISTRIBUTION_FILE;

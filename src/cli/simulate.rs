@@ -10,7 +10,7 @@ use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::source::{PlausibilityFlag, refuse_overwriting, scenarios_of};
-use crate::interop::openscenario::reopen;
+use crate::report::openscenario::reopen;
 use crate::report::trace::TraceReport;
 use crate::run::reopen::{Reopened, TracedLanes};
 use crate::support::files::{make_folder_of, write_atomically};

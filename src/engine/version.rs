@@ -29,6 +29,7 @@ impl Canonical {
         canonical
     }
 
+    /// Adds a number.
     pub fn word(&mut self, word: u64) {
         self.0.update(word.to_le_bytes());
     }
@@ -43,6 +44,7 @@ impl Canonical {
         floats.iter().for_each(|value| self.0.update(value.to_bits().to_le_bytes()));
     }
 
+    /// Adds a text with its length.
     pub fn text(&mut self, text: &str) {
         self.word(text.len() as u64);
         self.0.update(text.as_bytes());

@@ -268,7 +268,7 @@ impl Profile {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::case::Category;
+
     use crate::model::driver::ModelId;
     use crate::support::plain_text::cut;
     use serde_json::Value;

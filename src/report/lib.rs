@@ -8,7 +8,5 @@ use lanesweep_stats::stats;
 use lanesweep_support::{Error, Place, Result, support};
 use lanesweep_traffic::traffic;
 
-#[path = "../interop/mod.rs"]
-pub mod interop;
 #[path = "mod.rs"]
 pub mod report;

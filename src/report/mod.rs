@@ -23,6 +23,7 @@ mod map_page;
 mod map_record;
 pub mod map_sheet;
 mod map_tables;
+pub mod openscenario;
 pub mod plot;
 pub mod records;
 pub mod reference;

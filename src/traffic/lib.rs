@@ -1,6 +1,6 @@
 //! Recordings, generated traffic and the mining of scenarios. The rooms that its modules may use stand below; `lanesweep` is the crate for users.
 
-use lanesweep_model::{model, scenario};
+use lanesweep_model::scenario;
 use lanesweep_support::{Error, Place, Result, support};
 
 #[path = "mod.rs"]

@@ -1,7 +1,7 @@
 //! The source of scenarios, and their provenance.
 
 use std::io::Write;
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use sha2::{Digest, Sha256};
 

@@ -1,4 +1,4 @@
-//! What `src/stats/random` makes of (seed, index), `shaders/shared/{philox,uniform,normal,sobol}.wgsl` make bit for bit: on
+//! What `src/random` makes of (seed, index), `shaders/shared/{philox,uniform,normal,sobol}.wgsl` make bit for bit: on
 //! the software Vulkan, for a million indices in eight dimensions, and for the words at which the table of normal
 //! deviates goes from one cubic to the next.
 
@@ -171,7 +171,7 @@ fn the_ends_of_every_cubic_have_the_bits_of_rust() {
     let mut words: Vec<u32> = vec![];
     for octave in 0..32_u32 {
         for step in 0..16_u64 {
-            // First tail word of a segment, see src/stats/random/normal.rs.
+            // First tail word of a segment, see src/random/normal.rs.
             let tail = ((((16 + step) << 28) >> (octave + 1)) / 2) as u32;
             words.extend((0..64).map(|k| tail.wrapping_add(k).wrapping_sub(32)));
         }

@@ -373,7 +373,7 @@ fn the_fragments_of_sampling_have_the_functions_of_their_rust_files_in_their_ord
     let renamed = [("words", "stream_words"), ("pick", "alias_pick")];
     for (file, shader) in RANDOM {
         let name = Path::new(file).file_name().unwrap();
-        let twin = in_crate("src/stats/random").join(name).with_extension("rs");
+        let twin = in_crate("src/random").join(name).with_extension("rs");
         let text = std::fs::read_to_string(&twin).unwrap_or_else(|e| panic!("{}: {e}", twin.display()));
         let mut names = function_names(text.split("#[cfg(test)]").next().unwrap());
         names.retain(|name| !no_twin.contains(&name.as_str()));

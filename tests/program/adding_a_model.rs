@@ -88,10 +88,20 @@ fn build(copy: &Path) {
     command.current_dir(copy).args(["build", "--release", "--offline", "--locked", "--bin", "lanesweep"]);
     // As the dependencies have been built; CI says with which further flags.
     command.arg("--all-features").args(std::env::var_os("CARGO_SELECTION"));
-    command.args(["--config", "profile.release.package.lanesweep.debug=false"]);
+    for package in packages(copy) {
+        command.args(["--config", &format!("profile.release.package.{package}.debug=false")]);
+    }
     command.env("CARGO_BUILD_BUILD_DIR", build_dir).env("CARGO_TARGET_DIR", target_dir());
     let output = command.output().unwrap();
     assert!(output.status.success(), "{command:?}: {}\n{}", output.status, said(&output));
+}
+
+/// Our packages that the program consists of.
+fn packages(copy: &Path) -> Vec<String> {
+    let folders = fs::read_dir(copy.join("src")).unwrap().map(|entry| entry.unwrap());
+    let crates = folders.filter(|entry| entry.path().join("Cargo.toml").exists());
+    let names = crates.map(|entry| format!("lanesweep-{}", entry.file_name().to_string_lossy()));
+    names.chain(["lanesweep".to_owned()]).collect()
 }
 
 fn target_dir() -> PathBuf {

@@ -1,10 +1,10 @@
-//! The order of the rooms in `src`: each imports only itself and those before it.
+//! What the crates of `src` promise beside their order, which Cargo enforces.
 
 use std::fs;
 use std::path::{Path, PathBuf};
 
-const ROOMS: [&str; 10] =
-    ["support", "model", "scenario", "traffic", "stats", "engine", "run", "report", "interop", "cli"];
+/// All but the command line.
+const LIBRARY: [&str; 8] = ["support", "model", "random", "traffic", "stats", "engine", "run", "report"];
 
 fn files(dir: &Path, found: &mut Vec<PathBuf>) {
     for entry in fs::read_dir(dir).unwrap() {
@@ -23,34 +23,6 @@ fn code(path: &Path) -> String {
     let end = text.find("#[cfg(test)]\nmod ").unwrap_or(text.len());
     let is_code = |line: &&str| !line.trim_start().starts_with("//");
     text[..end].lines().filter(is_code).collect::<Vec<_>>().join("\n")
-}
-
-/// Rooms that a path names after `crate::`.
-fn rooms_named(code: &str) -> impl Iterator<Item = usize> {
-    code.split("crate::").skip(1).filter_map(|rest| {
-        let name: &str = rest.split(|c: char| !(c.is_ascii_lowercase() || c == '_')).next()?;
-        ROOMS.iter().position(|room| *room == name)
-    })
-}
-
-#[test]
-fn every_room_imports_only_those_before_it() {
-    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut imports = 0;
-    for (at, room) in ROOMS.iter().enumerate() {
-        let mut found = Vec::new();
-        files(&src.join(room), &mut found);
-        assert!(!found.is_empty(), "src/{room} is empty");
-        for path in
-            found.iter().filter(|path| !path.ends_with("plan_mutations.rs") && !path.ends_with("trace_tests.rs"))
-        {
-            for named in rooms_named(&code(path)) {
-                imports += 1;
-                assert!(named <= at, "{} imports `{}`, which comes after `{room}`", path.display(), ROOMS[named]);
-            }
-        }
-    }
-    assert!(imports > 1000, "only {imports} imports were found");
 }
 
 /// Verbs that hold other verbs.
@@ -92,7 +64,7 @@ fn no_verb_imports_another() {
 fn the_library_names_no_flag() {
     let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
     let mut texts = 0;
-    for room in ROOMS.iter().filter(|room| **room != "cli") {
+    for room in LIBRARY {
         let mut found = Vec::new();
         files(&src.join(room), &mut found);
         for path in &found {
@@ -106,21 +78,6 @@ fn the_library_names_no_flag() {
         }
     }
     assert!(texts > 1000, "only {texts} texts were found");
-}
-
-#[test]
-fn the_rooms_are_the_folders_of_the_source() {
-    let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");
-    let mut folders: Vec<String> = fs::read_dir(src)
-        .unwrap()
-        .map(|entry| entry.unwrap())
-        .filter(|entry| entry.path().is_dir())
-        .map(|entry| entry.file_name().into_string().unwrap())
-        .collect();
-    folders.sort_unstable();
-    let mut rooms = ROOMS.to_vec();
-    rooms.sort_unstable();
-    assert_eq!(folders, rooms);
 }
 
 /// ARCHITECTURE.md names these four: the FSM's demand, a sampled case's times, the BTN and the reported TTC.

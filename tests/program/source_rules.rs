@@ -43,7 +43,7 @@ fn features_of(edges: &str, features: &[&str]) -> BTreeMap<String, String> {
     let text = String::from_utf8(cargo.stdout).expect("text");
     let package = |line: &str| {
         let (name, features) = line.trim_end_matches(" (*)").split_once('|')?;
-        (!name.starts_with("lanesweep ")).then(|| (name.to_owned(), features.to_owned()))
+        (!name.starts_with("lanesweep")).then(|| (name.to_owned(), features.to_owned()))
     };
     text.lines().filter_map(package).collect()
 }

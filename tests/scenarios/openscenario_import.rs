@@ -5,11 +5,11 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 use lanesweep::engine::{Backend, CpuBackend, Executor, Headway, Wanted};
-use lanesweep::interop::openscenario::{
-    DistributionSamples, Names, Rename, parse_distribution, read_distribution, variations,
-};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
+use lanesweep::report::openscenario::{
+    DistributionSamples, Names, Rename, parse_distribution, read_distribution, variations,
+};
 use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, SampleTally};
 use lanesweep::scenario::Category;
 

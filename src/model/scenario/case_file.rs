@@ -12,7 +12,9 @@ use crate::Error;
 /// The values of a file.
 #[derive(Debug, Default)]
 pub struct CaseFile {
+    /// Driver models, as `--models` lists them.
     pub models: Option<String>,
+    /// The numbers of the case.
     pub parameters: CaseParameters,
 }
 

@@ -47,8 +47,11 @@ const MAX_SAMPLES_PER_ROW: f64 = 128.0;
 /// A row of a table of cases.
 #[derive(Debug, Clone, Default)]
 pub struct CaseRow {
+    /// Its key.
     pub id: Option<String>,
+    /// Driver models, as `--models` lists them.
     pub models: Option<String>,
+    /// The numbers of the case.
     pub parameters: CaseParameters,
     /// Samples per second, for a scenario made of it.
     rate_hz: Option<f64>,

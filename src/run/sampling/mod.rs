@@ -97,9 +97,13 @@ use crate::{Error, Result};
 /// # }
 /// ```
 pub struct Sample {
+    /// Density of the parameters.
     pub density: DensityModel,
+    /// Constants of the lanes.
     pub profile: Profile,
+    /// Estimator, models, headways and criteria.
     pub options: SampleOptions,
+    /// What the estimator needs.
     pub kind: SampleKind,
 }
 
@@ -115,7 +119,7 @@ pub enum SampleKind {
 
 /// Importance sampling of a known proposal.
 #[derive(Debug, Clone)]
-pub(crate) struct Weighted {
+pub struct Weighted {
     /// The proposal of all questions, without its defensive part.
     pub proposal: Mixture,
     /// Number of draws.

@@ -44,6 +44,7 @@ pub struct Draws {
 }
 
 impl Draws {
+    /// The words of one index.
     pub fn new(stream: Stream, index: u64) -> Draws {
         Draws { stream, index, block: 0, words: stream.words(index, 0), used: 0 }
     }

@@ -161,5 +161,6 @@ pub struct TableMetadata {
 pub struct Row {
     /// CSV: line of the file, counted from 1 with the header; Parquet: row, counted from 1.
     pub number: u64,
+    /// One per requested column.
     pub values: Vec<Value>,
 }

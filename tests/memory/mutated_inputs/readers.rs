@@ -3,10 +3,10 @@
 use std::path::Path;
 
 use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, Partial, Wanted};
-use lanesweep::interop::openscenario::{DistributionSamples, Distributions, Names, read_distribution, variations};
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
+use lanesweep::report::openscenario::{DistributionSamples, Distributions, Names, read_distribution, variations};
 use lanesweep::run::parts::{Counted, Journal, Ledger, MergeableCounts, read_part, read_sealed_line};
 use lanesweep::run::sampling::{
     Estimator, SampleHeadways, SampleOptions, SampleTally, WeightedTally, plan_samples, read_proposal,

@@ -163,6 +163,7 @@ impl Reduction {
         &self.options
     }
 
+    /// Description, encoder and parameters of a searched linear description.
     pub fn linear_parts(&self) -> Option<&(LinearSpec, Encoder, Vec<Parameter>)> {
         self.linear.as_ref()
     }

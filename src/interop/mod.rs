@@ -1,3 +1,0 @@
-//! Other programs: OpenSCENARIO files.
-
-pub mod openscenario;
