@@ -6,7 +6,7 @@ check:
 
 # All tests
 test:
-    cargo test --release --all-features --workspace
+    cargo test --profile work --all-features --workspace
 
 # The whole gate
 ci:
