@@ -3,7 +3,7 @@
 //! This module contains the lane's record and step, the lane plan and the backends (`cpu`, `gpu`). It also contains the
 //! checks of one backend against another ([`verify`], rechecks during a sweep), outcomes and partial counts. Cases come
 //! from [`model`](crate::model) and [`scenario`](crate::scenario::parameterization); partials go to
-//! [`run`](crate::run). Driver models and criteria are in [`model`](crate::model).
+//! the run. Driver models and criteria are in [`model`](crate::model).
 
 mod backend;
 mod confusion;
@@ -44,7 +44,7 @@ pub use lane_case::attention_rules;
 pub use lane_case::{LaneCase, LaneOther, check_time_step};
 pub use lane_step::Seen;
 #[cfg(not(feature = "gpu"))]
-pub(crate) use open::no_gpu;
+pub use open::no_gpu;
 pub use open::{DeviceRecord, OpenBackend};
 pub use outcome::{EndReason, NO_STEP, Outcome, Verdicts};
 pub use partial::{Partial, UnitCounts};

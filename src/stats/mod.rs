@@ -1,6 +1,6 @@
 //! Statistics: random numbers, densities of scenario parameters, estimators of rare events and their intervals.
 //!
-//! Nothing here steps a lane: estimators ask a limit state, which [`run`](crate::run) answers with lanes.
+//! Nothing here steps a lane: estimators ask a limit state, which the run answers with lanes.
 
 pub mod density;
 pub mod estimate;

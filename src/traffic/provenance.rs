@@ -62,7 +62,7 @@ impl Source {
     /// ends the work.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Input`] if nothing can be read; [`Error::Usage`] for options out of range; that of `done`.
+    /// [`Error::Io`](crate::support::error::Error::Io); [`Error::Input`](crate::support::error::Error::Input) if nothing can be read; [`Error::Usage`](crate::support::error::Error::Usage) for options out of range; that of `done`.
     pub fn load(
         &self,
         mining: &MiningOptions,
@@ -86,7 +86,7 @@ impl Source {
     /// values: hours of one data set must not mix with kilometres of another.
     ///
     /// # Errors
-    /// [`Error::Io`]; as [`DataProvenance::read_beside`].
+    /// [`Error::Io`](crate::support::error::Error::Io); as [`DataProvenance::read_beside`].
     pub fn provenance(&self, collection: &Collection, given: Driven) -> Result<DataProvenance> {
         let mut provenance = DataProvenance {
             data: self.describe(collection.synthetic),

@@ -68,7 +68,7 @@ pub struct ParameterRows {
 
 impl ParameterRows {
     /// # Errors
-    /// As [`choose`], for every unknown column.
+    /// As `choose`, for every unknown column.
     pub fn new(mut table: TableReader) -> Result<ParameterRows> {
         let chosen = choose(&mut table, &columns(), |at| at, false)?;
         Ok(ParameterRows { table, chosen })

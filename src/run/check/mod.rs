@@ -1,7 +1,7 @@
 //! Checks one concrete case against the regulation: every profile and model, the margins, the clauses, and the distance
 //! to another answer.
 //!
-//! All computations here are in f64. The case comes from [`crate::scenario`]; [`crate::report`] makes the sheet.
+//! All computations here are in f64. The case comes from [`crate::scenario`]; the report makes the sheet.
 
 mod annex;
 mod boundary;

@@ -2,7 +2,7 @@
 //!
 //! This module contains parameters and axes, the conversion of cells to cases and of grids to lane plans, the presets,
 //! and the swept map with its differences. It contains no physics and no drawing. Cases and plans go to
-//! [`crate::engine`], maps to [`crate::report`]. The conformance tests use the cases of
+//! [`crate::engine`], maps to the report. The conformance tests use the cases of
 //! the JRC's simulator.
 
 mod axis;

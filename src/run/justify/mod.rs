@@ -2,7 +2,7 @@
 //! this data. The paper ends with this question.
 //!
 //! This module computes hidden failures, scores with intervals, groups, risk ratios, coverage and the conclusion by
-//! rules. Lanes and densities come from [`crate::run::compare`]; [`crate::report`] makes the page.
+//! rules. Lanes and densities come from [`crate::run::compare`]; the report makes the page.
 
 mod rules;
 mod scores;

@@ -3,7 +3,7 @@
 //! This module contains recall, precision and F1 ([`ScoreTable`]), intervals of their differences over scenarios, and
 //! the best parameterizations. It also contains the paper's claims as data with their verdicts, and the paper's
 //! published numbers. It contains nothing about lanes. Counts come from [`crate::engine`]'s partials; scores go to
-//! [`crate::report`].
+//! the report.
 
 mod best;
 mod claims;

@@ -3,7 +3,7 @@
 //! This module holds the formats (CSV, JSON Lines, Apache Parquet, Arrow in memory), the columns, and the [`Table`] in memory with its
 //! renderings for terminals, pages and documents. It also holds the writer, which streams rows to an atomic file, and
 //! the reader of other programs' tables. The meaning of rows is defined elsewhere: lanes and samples in
-//! [`crate::report`], scenarios in [`crate::scenario`]. `docs/src/tables.md` documents the columns; a test compares it
+//! the report, scenarios in `scenario`. `docs/src/tables.md` documents the columns; a test compares it
 //! with the written files.
 
 #[cfg(feature = "arrow")]

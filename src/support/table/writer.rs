@@ -165,7 +165,7 @@ pub fn cell_text(text: &str) -> Cow<'_, str> {
     }
 }
 
-/// Inverse of [`cell_text`].
+/// Inverse of `cell_text`.
 pub fn text_of_cell(field: &str) -> &str {
     field.strip_prefix('\'').filter(|text| begins_formula(text)).unwrap_or(field)
 }

@@ -70,7 +70,7 @@ pub fn write(dir: &Path, recording: &Recording, info: &RecordingInfo) -> Result<
 /// The three complete temporary files of a recording; that of the tracks comes last.
 ///
 /// # Errors
-/// As [`write`].
+/// As [`write`](fn@write).
 pub fn stage(dir: &Path, recording: &Recording, info: &RecordingInfo) -> Result<[StagedFile; 3]> {
     let layout = ImageLayout::of(recording, info.precision)?;
     check_texts(info)?;
