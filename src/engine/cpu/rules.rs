@@ -12,18 +12,21 @@ pub(in crate::engine) struct Rules {
     pub scene: Scene,
     is_ratio: bool,
     sees_overlap: bool,
-    aborts: bool,
+    /// Rarely used rules share a loop that tests the lateral gate and the abort.
+    is_seldom: bool,
     /// The sweep returns only verdicts: minima and maxima are not gathered.
     pub is_verdict_only: bool,
 }
 
 impl Rules {
     /// Number of sets.
-    pub(in crate::engine) const SETS: u32 = 26;
+    pub(in crate::engine) const SETS: u32 = 18;
 
-    const IN_LANE: u32 = 20;
-    const STEADY_FOLLOWING: u32 = 21;
-    const CROSSING: u32 = 22;
+    const VERDICT_ONLY: u32 = 4;
+    const SELDOM: u32 = 8;
+    const IN_LANE: u32 = 12;
+    const STEADY_FOLLOWING: u32 = 13;
+    const CROSSING: u32 = 14;
 
     /// Rules of a simulation; `None` for the exact form of the BTN, which iterates and runs lane by lane.
     /// `values`: the sweep returns values, not only verdicts.
@@ -38,14 +41,13 @@ impl Rules {
             BtnForm::DistanceRatio => true,
             BtnForm::Exact => return None,
         };
-        let sees_overlap = criteria.gate == LateralGate::Overlap;
-        let aborts = frame.abort_above_ttc > 0.0;
-        // Rarely used rules have no verdict-only loop.
-        let is_verdict_only = !values && !is_ratio && !aborts;
+        let is_seldom = is_ratio || frame.abort_above_ttc > 0.0;
+        let sees_overlap = criteria.gate == LateralGate::Overlap && !is_seldom;
+        let is_verdict_only = !values && !is_seldom;
         // Rarely used rules always test for contacts between two steps.
-        let may_cross = scene.may_cross || is_ratio || aborts;
+        let may_cross = scene.may_cross || is_seldom;
         let scene = Scene { in_lane: scene.in_lane && is_verdict_only, may_cross, ..scene };
-        Some(Rules { scene, is_ratio, sees_overlap, aborts, is_verdict_only })
+        Some(Rules { scene, is_ratio, sees_overlap, is_seldom, is_verdict_only })
     }
 
     /// Rules of steady-following steps with a single vehicle, for verdicts only.
@@ -62,40 +64,41 @@ impl Rules {
             // Lateral motion is not evaluated, so there is no gate.
             return Rules::IN_LANE;
         }
-        let seldom = if self.is_verdict_only { 4 } else { self.is_ratio as u32 | (self.aborts as u32) << 1 };
-        if self.scene.may_cross && (seldom == 0 || seldom == 4) {
+        if self.is_seldom {
+            return Rules::SELDOM + (self.scene.is_pair as u32 | (self.is_ratio as u32) << 1);
+        }
+        if self.scene.may_cross {
             return Rules::CROSSING + (self.sees_overlap as u32 | (self.is_verdict_only as u32) << 1);
         }
-        self.scene.is_pair as u32 | (self.sees_overlap as u32) << 1 | seldom << 2
+        let first = if self.is_verdict_only { Rules::VERDICT_ONLY } else { 0 };
+        first + (self.scene.is_pair as u32 | (self.sees_overlap as u32) << 1)
     }
 
     /// Inverse of [`Rules::bits`].
     pub(in crate::engine) const fn from_bits(bits: u32) -> Rules {
+        let is_pair = bits & 1 != 0;
+        let scene = Scene { is_pair, always_there: !is_pair, in_lane: false, is_steady: false, may_cross: false };
+        let common = Rules { scene, is_ratio: false, sees_overlap: false, is_seldom: false, is_verdict_only: false };
         if bits >= Rules::CROSSING {
-            let scene = Scene { is_pair: true, always_there: false, in_lane: false, is_steady: false, may_cross: true };
-            let sees_overlap = (bits - Rules::CROSSING) & 1 != 0;
-            let is_verdict_only = (bits - Rules::CROSSING) & 2 != 0;
-            return Rules { scene, is_ratio: false, sees_overlap, aborts: false, is_verdict_only };
+            let scene = Scene { is_pair: true, always_there: false, may_cross: true, ..scene };
+            let (sees_overlap, is_verdict_only) =
+                ((bits - Rules::CROSSING) & 1 != 0, (bits - Rules::CROSSING) & 2 != 0);
+            return Rules { scene, sees_overlap, is_verdict_only, ..common };
         }
         if bits >= Rules::IN_LANE {
+            // Lateral motion is not evaluated, so there is no gate.
             let scene = Scene { is_steady: bits == Rules::STEADY_FOLLOWING, ..Scene::in_lane() };
-            return Rules { scene, is_ratio: false, sees_overlap: false, aborts: false, is_verdict_only: true };
+            return Rules { scene, is_verdict_only: true, ..common };
         }
-        let seldom = bits >> 2;
-        let is_pair = bits & 1 != 0;
-        Rules {
-            scene: Scene {
-                is_pair,
-                always_there: !is_pair,
-                in_lane: false,
-                is_steady: false,
-                may_cross: seldom != 0 && seldom != 4,
-            },
-            sees_overlap: bits & 2 != 0,
-            is_ratio: seldom & 1 != 0,
-            aborts: seldom & 2 != 0,
-            is_verdict_only: seldom & 4 != 0,
+        if bits >= Rules::SELDOM {
+            return Rules {
+                scene: Scene { may_cross: true, ..scene },
+                is_ratio: bits & 2 != 0,
+                is_seldom: true,
+                ..common
+            };
         }
+        Rules { sees_overlap: bits & 2 != 0, is_verdict_only: bits >= Rules::VERDICT_ONLY, ..common }
     }
 
     /// The constants of the simulation; those that the rules fix become compile-time constants.
@@ -106,8 +109,11 @@ impl Rules {
         criteria: &Criteria<f32>,
     ) -> (Frame<f32>, Criteria<f32>) {
         let form = if self.is_ratio { BtnForm::DistanceRatio } else { BtnForm::EquivalentDelay };
-        let gate = if self.sees_overlap { LateralGate::Overlap } else { LateralGate::EgoWidth };
-        let abort_above_ttc = if self.aborts { frame.abort_above_ttc } else { 0.0 };
+        let (gate, abort_above_ttc) = match (self.is_seldom, self.sees_overlap) {
+            (true, _) => (criteria.gate, frame.abort_above_ttc),
+            (false, true) => (LateralGate::Overlap, 0.0),
+            (false, false) => (LateralGate::EgoWidth, 0.0),
+        };
         let frame = Frame { abort_above_ttc, ..*frame };
         let keeps_values = !self.is_verdict_only;
         (frame, Criteria { gate, keeps_values, btn: criteria.btn.known_as(form), ..*criteria })

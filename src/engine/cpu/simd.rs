@@ -61,14 +61,6 @@ macro_rules! for_rules {
             15 => $burst::<$model, 15>,
             16 => $burst::<$model, 16>,
             17 => $burst::<$model, 17>,
-            18 => $burst::<$model, 18>,
-            19 => $burst::<$model, 19>,
-            20 => $burst::<$model, 20>,
-            21 => $burst::<$model, 21>,
-            22 => $burst::<$model, 22>,
-            23 => $burst::<$model, 23>,
-            24 => $burst::<$model, 24>,
-            25 => $burst::<$model, 25>,
             Rules::SETS.. => return None,
         }
     };
