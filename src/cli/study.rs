@@ -12,13 +12,13 @@ use super::shard_flags::ShardFlags;
 use super::source::{self, SourceFlags};
 use super::{Exit, lists};
 use crate::Result;
-use crate::engine::{Headway, OpenBackend};
-use crate::report::lanes::{self, table_format};
+use crate::engine::{Chunk, Headway, LanePlan, OpenBackend};
+use crate::report::lanes::{StudyRows, table_format};
 use crate::report::reference::ReferenceComparison;
 use crate::report::run_record::{StudyHost, Timings};
 use crate::report::study::StudyReport;
 use crate::run::parts::{PLAN_FILE, RUN_PLAN_FILE};
-use crate::run::study::{self, GivenReplay, StudyOptions, StudyResult};
+use crate::run::study::{self, EachChunk, GivenReplay, StudyOptions, StudyResult};
 use crate::support::files::{check_folder, check_folder_of};
 use crate::support::input_file;
 use crate::support::readable;
@@ -215,18 +215,21 @@ impl Study {
         let lanes = plan.first_lane_of(units.end) - plan.first_lane_of(units.start);
         tracing::info!("{} lanes on {}", readable::count(lanes), backend.describe());
         let bar = console::progress(verbosity, run.missing()?, "sweeping");
-        timed(&mut timings.sweep_s, || run.sweep(&executor.clone().with_progress(console::inc(&bar))))?;
+        let mut rows = self.rows.as_deref().map(|path| StudyRows::create(path, study)).transpose()?;
+        let mut write = rows.as_mut().map(|rows| |plan: &LanePlan, chunk: &Chunk| rows.write(plan, chunk));
+        timed(&mut timings.sweep_s, || {
+            let each = write.as_mut().map(|write| write as &mut EachChunk);
+            run.sweep(&executor.clone().with_progress(console::inc(&bar)), each)
+        })?;
         bar.finish_and_clear();
         if self.shards.is_part() {
             run.write_part()?;
             return Ok(Exit::Ok);
         }
-        let StudyResult { counts, summary: mut swept, .. } = run.take_result()?;
+        let StudyResult { counts, summary: swept, .. } = run.take_result()?;
         let mut results = run.results()?;
-        if let Some(path) = &self.rows {
-            let (again, table) = lanes::write_study(path, study, &executor)?;
-            swept.add(&again);
-            results.join(table);
+        if let Some(rows) = rows {
+            results.join(rows.stage()?);
         }
         let comparison = self.compare_reference.then(|| ReferenceComparison::of_study(study.cases())).transpose()?;
         let host = StudyHost {

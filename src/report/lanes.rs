@@ -5,9 +5,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use crate::engine::{
-    Chunk, Constants, Executor, Headway, LaneKey, LanePlan, NO_STEP, Outcome, Silent, Start, SweepSummary, Wanted,
-};
+use crate::engine::{Chunk, Constants, Headway, LaneKey, LanePlan, NO_STEP, Outcome, Silent, Start};
 use crate::model::criterion::Criterion;
 use crate::model::scalar::Real;
 use crate::report::records::smallest_gap_m;
@@ -18,20 +16,37 @@ use crate::support::files::make_folder_of;
 use crate::support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter};
 use crate::{Error, Result};
 
-/// Writes one row per lane of a study, chunk by chunk, so that memory does not grow with the lanes. The table is
-/// renamed to its final name together with the study's other results.
-///
-/// # Errors
-/// [`Error::Io`]; [`Error::Usage`] for an unknown ending of the name; errors of the lanes.
-pub fn write_study(path: &Path, study: &Study, executor: &Executor) -> Result<(SweepSummary, StagedFile)> {
-    make_folder_of(path)?;
-    let (plan, facts) = (study.plan(), study.facts());
-    let digits = if facts.reference { Digits::Binary64 } else { Digits::Binary32 };
-    let mut table = create(path, "lanes", plan, facts.synthetic, columns(digits))?;
-    let swept = study
-        .cases()
-        .sweep(0..plan.unit_count(), Wanted::Outcomes, executor, |plan, chunk| write_chunk(&mut table, plan, &chunk))?;
-    Ok((swept, table.stage()?))
+/// One row per lane of a study, written chunk by chunk, so that memory does not grow with the lanes. The table is renamed
+/// to its final name together with the study's other results.
+pub struct StudyRows(TableWriter);
+
+impl StudyRows {
+    /// Begins the table.
+    ///
+    /// # Errors
+    /// [`Error::Io`]; [`Error::Usage`] for an unknown ending of the name.
+    pub fn create(path: &Path, study: &Study) -> Result<StudyRows> {
+        make_folder_of(path)?;
+        let facts = study.facts();
+        let digits = if facts.reference { Digits::Binary64 } else { Digits::Binary32 };
+        create(path, "lanes", study.plan(), facts.synthetic, columns(digits)).map(StudyRows)
+    }
+
+    /// Writes the rows of a chunk with outcomes. Chunks come in the plan's order.
+    ///
+    /// # Errors
+    /// As [`TableWriter::row`].
+    pub fn write(&mut self, plan: &LanePlan, chunk: &Chunk) -> Result<()> {
+        write_chunk(&mut self.0, plan, chunk)
+    }
+
+    /// Ends the table.
+    ///
+    /// # Errors
+    /// [`Error::Io`].
+    pub fn stage(self) -> Result<StagedFile> {
+        self.0.stage()
+    }
 }
 
 /// A table for the lanes of a sampling run; see [`write_sampled_chunk`].

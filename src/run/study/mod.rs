@@ -17,7 +17,7 @@ pub use given::GivenReplay;
 pub use plan::{StudyOptions, outline_study, plan_study};
 pub use plan_file::StudyHead;
 
-pub use run::{StudyResult, StudyRun};
+pub use run::{EachChunk, StudyResult, StudyRun};
 
 use std::fs::File;
 use std::io::{BufRead, BufReader};

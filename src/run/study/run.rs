@@ -4,7 +4,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use super::Study;
-use crate::engine::{Executor, Partial, SweepSummary, Wanted};
+use crate::engine::{Chunk, Executor, LanePlan, Partial, SweepSummary, Wanted};
 use crate::run::parts::{PLAN_FILE, RunDir, RunState, Shard, read_parts};
 use crate::support::run_dir::{Results, STUDY_RECORD};
 use crate::{Error, Place, Result};
@@ -27,6 +27,9 @@ pub struct StudyRun<'s> {
     state: RunState<Partial>,
     summary: SweepSummary,
 }
+
+/// Receives the chunks of a sweep with the plan of their window.
+pub type EachChunk<'c> = dyn FnMut(&LanePlan, &Chunk) -> Result<()> + 'c;
 
 impl Study {
     /// Runs every lane, in memory.
@@ -72,7 +75,7 @@ impl Study {
     pub fn run_shard(&self, out: &Path, shard: Shard, executor: &Executor) -> Result<()> {
         self.write_plan(out)?;
         let Some(mut run) = self.open(out, Some(shard))? else { return Ok(()) };
-        run.sweep(executor)?;
+        run.sweep(executor, None)?;
         run.write_part()
     }
 
@@ -120,18 +123,29 @@ impl StudyRun<'_> {
         Ok(self.state.ledger.missing(self.units())?.iter().map(|range| range.end - range.start).sum())
     }
 
-    /// Runs the missing lanes.
+    /// Runs the missing lanes. `rows` receives their chunks in order, with outcomes; if an earlier process has counted
+    /// lanes, their chunks come too, for which these lanes run again.
     ///
     /// # Errors
-    /// As [`Study::run`]; [`Error::Interrupted`] after cancellation: finished counts are in the journal.
-    pub fn sweep(&mut self, executor: &Executor) -> Result<SweepSummary> {
+    /// As [`Study::run`]; those of `rows`; [`Error::Interrupted`] after cancellation: finished counts are in the journal.
+    pub fn sweep(&mut self, executor: &Executor, mut rows: Option<&mut EachChunk>) -> Result<SweepSummary> {
         let _resumable = executor.cancel.resumable();
-        let ledger = &mut self.state.ledger;
-        for range in ledger.missing(self.state.units.clone())? {
-            let part = self.study.cases.sweep(range, Wanted::Verdicts, executor, |plan, chunk| {
+        let (units, ledger) = (self.state.units.clone(), &mut self.state.ledger);
+        let missing = ledger.missing(units.clone())?;
+        let is_fresh = missing == [units.clone()];
+        let wanted = if rows.is_some() && is_fresh { Wanted::Outcomes } else { Wanted::Verdicts };
+        for range in missing {
+            let part = self.study.cases.sweep(range, wanted, executor, |plan, chunk| {
+                if let Some(rows) = rows.as_mut().filter(|_| is_fresh) {
+                    rows(plan, &chunk)?;
+                }
                 ledger.add(Partial::from_chunk(plan, &chunk)?, chunk.redone_and_rechecked)
             });
             self.summary.add(&ledger.kept(part)?);
+        }
+        if let Some(rows) = rows.filter(|_| !is_fresh) {
+            let again = self.study.cases.sweep(units, Wanted::Outcomes, executor, |plan, chunk| rows(plan, &chunk))?;
+            self.summary.add(&again);
         }
         // Rechecks of earlier processes are recorded in the journal.
         [self.summary.redone_lanes, self.summary.rechecked_lanes] = ledger.redone_and_rechecked();
