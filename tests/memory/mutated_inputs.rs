@@ -28,7 +28,7 @@ use readers::Reader;
 use seeds::Seeds;
 
 /// Inputs of a quick run.
-const QUICK: u64 = 4_000;
+const QUICK: u64 = 600;
 /// Longest time of one input.
 const LONGEST: Duration = Duration::from_secs(5);
 /// An input that takes this long hangs: the process ends.

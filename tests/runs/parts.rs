@@ -44,19 +44,19 @@ fn a_study_in_shards_is_the_study_in_one_piece() {
     assert_eq!(std::fs::metadata(&part).unwrap().modified().unwrap(), before);
     done(dir, &["-q", "cluster", "merge", "three"]);
     same(&dir.join("whole"), &dir.join("three"));
-    // More shards than units, from one plan: the data are not read again.
+    // From one plan: the data are not read again. Shards without a unit are in `run/parts/folder.rs`.
     done(dir, &[&STUDY[..], &["--out", "plan", "--plan-only"]].concat());
     let read = |path: &str| std::fs::read(dir.join(path)).unwrap();
     assert!(read("whole/run-plan.json") == read("plan/plan.json"), "the plan that a whole run leaves is the same file");
-    for shard in 0..100 {
-        let shard = format!("{shard}/100");
+    for shard in 0..7 {
+        let shard = format!("{shard}/7");
         done(
             dir,
-            &["-q", "study", "--plan", "plan/plan.json", "--out", "hundred", "--shard", &shard, "--backend", "cpu"],
+            &["-q", "study", "--plan", "plan/plan.json", "--out", "seven", "--shard", &shard, "--backend", "cpu"],
         );
     }
-    assert_eq!(done(dir, &["-q", "cluster", "merge", "hundred"]), whole);
-    same(&dir.join("whole"), &dir.join("hundred"));
+    assert_eq!(done(dir, &["-q", "cluster", "merge", "seven"]), whole);
+    same(&dir.join("whole"), &dir.join("seven"));
     assert_eq!(done(dir, &["-q", "study", "--plan", "plan/plan.json", "--out", "planned", "--backend", "cpu"]), whole);
     same(&dir.join("whole"), &dir.join("planned"));
 }
