@@ -220,11 +220,6 @@ fn inputs_that_once_took_the_memory_or_panicked_are_refused_by_name() {
     // Lengths of a density follow from its options.
     refused("density", "\"svd_instants\": 50", "\"svd_instants\": 9223372036854775808", "svd_instants");
     refused("density", "\"sinusoid_intervals\": 0", "\"sinusoid_intervals\": 4000000000", "sinusoid_intervals");
-    // Counts that no run leaves, with a checksum that fits.
-    refused("part", "\"covered\":[{\"start\":3,", "\"covered\":[{\"start\":30,", "misplaced");
-    refused("part", "\"voids\":0", "\"voids\":4000000000", "void samples");
-    refused("part", "\"worst_limit\":3", "\"worst_limit\":1", "worst lanes");
-    refused("weighted part", "\"5\":[0,", "\"5\":[64,", "misplaced");
 }
 
 /// To open a pipe without a writer is to wait for ever.
