@@ -3,13 +3,11 @@
 
 use std::path::Path;
 
-use rayon::prelude::*;
-
-use crate::engine::{Chunk, Constants, Headway, LaneKey, LanePlan, NO_STEP, Outcome, Silent, Start};
+use crate::engine::{Chunk, Headway, LanePlan, NO_STEP, Outcome};
 use crate::model::criterion::Criterion;
 use crate::model::scalar::Real;
 use crate::report::records::smallest_gap_m;
-use crate::run::study::Study;
+use crate::run::study::{Study, robust_lanes};
 use crate::stats::density::DensityModel;
 use crate::support::atomic_file::StagedFile;
 use crate::support::files::make_folder_of;
@@ -120,18 +118,7 @@ pub fn columns(digits: Digits) -> Vec<Column> {
 /// As [`TableWriter::row`].
 pub fn write_chunk(table: &mut TableWriter, plan: &LanePlan, chunk: &Chunk) -> Result<()> {
     let dt = plan.profile.frame.dt_s;
-    let constants: Vec<Constants<f64>> =
-        plan.blocks.iter().map(|b| Constants::resolve(&plan.profile, b.category)).collect();
-    // Three more lanes for each: the only step worth parallelizing.
-    let robust: Vec<Option<bool>> = (0..chunk.outcomes.len())
-        .into_par_iter()
-        .map(|at| {
-            let key = plan.key(chunk.first_lane + at as u64)?;
-            // A driver outside the registry is slow lane by lane.
-            let is_built_in = plan.models[key.model].foreign().is_none();
-            is_built_in.then(|| is_robust(&constants[key.block], plan, &key))
-        })
-        .collect();
+    let robust = robust_lanes(plan, chunk);
     for (at, outcome) in chunk.outcomes.iter().enumerate() {
         let Some(key) = plan.key(chunk.first_lane + at as u64) else { continue };
         let block = &plan.blocks[key.block];
@@ -163,17 +150,6 @@ pub fn write_chunk(table: &mut TableWriter, plan: &LanePlan, chunk: &Chunk) -> R
         ])?;
     }
     Ok(())
-}
-
-fn is_robust(constants: &Constants<f64>, plan: &LanePlan, key: &LaneKey) -> bool {
-    let case = plan.case(key.block, key.unit, key.variant);
-    let gap = plan.headways[key.headway].start::<f64>().gap(case.ego_speed);
-    let run = |gap: f64| -> Outcome<f64> {
-        constants.run(plan.models[key.model], &case, plan.tables(), Start::Gap(gap), &mut Silent)
-    };
-    let seen = |o: Outcome<f64>| (o.verdicts.0 & 0b111, o.contact);
-    let middle = seen(run(gap));
-    seen(run(gap - 1e-9)) == middle && seen(run(gap + 1e-9)) == middle
 }
 
 /// i·dt without the rounding error of the product, s.

@@ -1,108 +1,32 @@
-//! Comparison of the lane arithmetic with the f64 reference, lane by lane: which verdicts differ, and how close each is
-//! to the threshold.
+//! The comparison of the lane arithmetic with the f64 reference, as text and as a table.
 
-use crate::Result;
-use crate::engine::{Backend, Chunk, CpuBackend, LanePlan, Outcome, Wanted, chunks};
 use crate::model::criterion::Criterion;
-use crate::run::study::{StudyCases, WINDOW};
+use crate::run::study::ReferenceComparison;
 use crate::support::readable::{count, count_of};
 use crate::support::table::Table;
 
-/// A verdict that differs between f32 and f64.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Difference {
-    /// Key of the lane.
-    pub lane: String,
-    /// Criterion.
-    pub criterion: Criterion,
-    /// Whether it failed in f32; in f64 the verdict is the opposite.
-    pub failed_in_f32: bool,
-    /// Distance of the f64 value from the threshold: TTC in s, BTN, for a collision the minimum gap in m.
-    pub distance: f64,
+/// One line for the terminal, and the first differences.
+pub fn text(comparison: &ReferenceComparison) -> String {
+    let mut text = format!(
+        "f32 against the f64 reference: {} of {} verdicts differ ({} lanes; the cap differs in {})\n",
+        count_of(comparison.differences.len()),
+        count(comparison.lanes * Criterion::ALL.len() as u64),
+        count(comparison.lanes),
+        count(comparison.cap_differs)
+    );
+    for d in comparison.differences.iter().take(20) {
+        let side = if d.failed_in_f32 { "fails in f32 only" } else { "fails in f64 only" };
+        text += &format!("  {} {}: {side}, {:.3e} from the threshold\n", d.lane, d.criterion.label(), d.distance);
+    }
+    text
 }
 
-/// Result of a comparison.
-#[derive(Debug, Clone, Default, PartialEq)]
-pub struct ReferenceComparison {
-    /// Lanes compared.
-    pub lanes: u64,
-    /// Verdicts that differ.
-    pub differences: Vec<Difference>,
-    /// Lanes in which only one arithmetic reached the time cap; information, not a verdict.
-    pub cap_differs: u64,
-}
-
-impl ReferenceComparison {
-    /// Runs every lane of a study in f32 and in f64, chunk by chunk.
-    ///
-    /// # Errors
-    /// Errors of the lanes.
-    pub fn of_study(study: &StudyCases) -> Result<ReferenceComparison> {
-        let (narrow, wide) = (CpuBackend::lane_arithmetic(), CpuBackend::reference());
-        let mut comparison = ReferenceComparison::default();
-        study.in_windows(0..study.outline().unit_count(), WINDOW, |plan, window| {
-            let (mut narrow, mut wide) = (narrow.prepare(plan)?, wide.prepare(plan)?);
-            for units in chunks(plan, window) {
-                let reference = wide.run(units.clone(), Wanted::Outcomes)?;
-                comparison.add(plan, &narrow.run(units, Wanted::Outcomes)?, &reference);
-            }
-            Ok(())
-        })?;
-        Ok(comparison)
-    }
-
-    /// Adds two chunks of the same units.
-    pub fn add(&mut self, plan: &LanePlan, narrow: &Chunk, wide: &Chunk) {
-        let thresholds = (plan.profile.criteria.ttc_threshold_s, plan.profile.criteria.btn_threshold);
-        for (at, (f32, f64)) in narrow.outcomes.iter().zip(&wide.outcomes).enumerate() {
-            self.lanes += 1;
-            self.cap_differs += u64::from(f32.verdicts.capped() != f64.verdicts.capped());
-            for criterion in Criterion::ALL {
-                let failed = f32.verdicts.failed(criterion);
-                if failed == f64.verdicts.failed(criterion) {
-                    continue;
-                }
-                let lane = plan.key(narrow.first_lane + at as u64).map_or(String::new(), |k| plan.key_text(&k));
-                let distance = distance(criterion, f64, f32, thresholds);
-                self.differences.push(Difference { lane, criterion, failed_in_f32: failed, distance });
-            }
-        }
-    }
-
-    /// One line for the terminal, and the first differences.
-    pub fn text(&self) -> String {
-        let mut text = format!(
-            "f32 against the f64 reference: {} of {} verdicts differ ({} lanes; the cap differs in {})\n",
-            count_of(self.differences.len()),
-            count(self.lanes * Criterion::ALL.len() as u64),
-            count(self.lanes),
-            count(self.cap_differs)
-        );
-        for d in self.differences.iter().take(20) {
-            let side = if d.failed_in_f32 { "fails in f32 only" } else { "fails in f64 only" };
-            text += &format!("  {} {}: {side}, {:.3e} from the threshold\n", d.lane, d.criterion.label(), d.distance);
-        }
-        text
-    }
-
-    /// All differences, one per row.
-    pub fn table(&self) -> Table {
-        Table::of(&self.differences)
-            .column("lane", |of| of.lane.as_str())
-            .column("criterion", |of| of.criterion.key())
-            .column("failed_in_f32", |of| u8::from(of.failed_in_f32))
-            .column("distance_to_threshold", |of| of.distance)
-            .build()
-    }
-}
-
-/// Distance of the value nearest to the threshold. A contact makes the value of its side infinite or 0, so the other
-/// side's is used.
-fn distance(criterion: Criterion, a: &Outcome<f64>, b: &Outcome<f64>, (ttc, btn): (f64, f64)) -> f64 {
-    let of = |o: &Outcome<f64>| match criterion {
-        Criterion::Collision => o.min_gap.abs(),
-        Criterion::Ttc => (o.min_ttc - ttc).abs(),
-        Criterion::Btn => (o.max_btn - btn).abs(),
-    };
-    of(a).min(of(b))
+/// All differences, one per row.
+pub fn table(comparison: &ReferenceComparison) -> Table {
+    Table::of(&comparison.differences)
+        .column("lane", |of| of.lane.as_str())
+        .column("criterion", |of| of.criterion.key())
+        .column("failed_in_f32", |of| u8::from(of.failed_in_f32))
+        .column("distance_to_threshold", |of| of.distance)
+        .build()
 }

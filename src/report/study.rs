@@ -3,7 +3,7 @@
 use super::close_following::{CloseRow, close_following};
 use super::plot::Figure;
 use super::records::document;
-use super::reference::ReferenceComparison;
+use super::reference;
 use super::run_record::{RunRecord, StudyHost};
 use super::study_figures::{
     distributions, f1_by_parameters, f1_intervals, headways, modes, radar, recall_and_precision,
@@ -18,7 +18,7 @@ use crate::run::score::{
     Best, CategoryScores, ClaimResult, HeadwayFailures, MeanF1, Misfit, ScoreTable, best_parameterizations,
     check_claims, f1, published_failures, published_lvd_f1,
 };
-use crate::run::study::{CategoryProvenance, ParameterHistogram, Study};
+use crate::run::study::{CategoryProvenance, ParameterHistogram, ReferenceComparison, Study};
 use crate::scenario::Category;
 use crate::scenario::parameterization::{ModeShape, Parameterization};
 use crate::support::run_dir::Results;
@@ -112,7 +112,7 @@ impl StudyReport {
         parts.extend(self.scores.categories.iter().map(|c| tables::f1_table(c, self.published, width)));
         parts.extend(self.given_table().map(|table| table.fitted(2, width)));
         parts.extend(Some(tables::claims(&self.claims, width)).filter(|text| !text.is_empty()));
-        parts.extend(self.comparison.iter().map(ReferenceComparison::text));
+        parts.extend(self.comparison.iter().map(reference::text));
         if self.run.synthetic {
             parts.push(format!("{data}\nNo number above is a statement about real traffic.\n"));
         }
@@ -196,7 +196,7 @@ impl StudyReport {
             results.add("folds.csv", table.build().csv().as_bytes())?;
         }
         if let Some(comparison) = &self.comparison {
-            results.add("reference.csv", comparison.table().csv().as_bytes())?;
+            results.add("reference.csv", reference::table(comparison).csv().as_bytes())?;
         }
         results.add("report.html", self.html()?.as_bytes())?;
         self.run.files = results.names();
@@ -281,7 +281,7 @@ impl StudyReport {
             value["published"] = published(&self.scores);
         }
         if let Some(comparison) = &self.comparison {
-            value["reference"] = comparison.table().records();
+            value["reference"] = reference::table(comparison).records();
         }
         document(&value)
     }

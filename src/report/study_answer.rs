@@ -2,6 +2,7 @@
 //! show.
 
 use super::html::Section;
+use super::reference;
 use super::study::StudyReport;
 use super::study_figures::variant_name;
 use super::tables::wrap;
@@ -45,7 +46,9 @@ impl StudyReport {
         ];
         lines.extend(self.rows(width));
         lines.extend(
-            self.comparison.iter().filter_map(|comparison| Some(wrap(comparison.text().lines().next()?, width))),
+            self.comparison
+                .iter()
+                .filter_map(|comparison| Some(wrap(reference::text(comparison).lines().next()?, width))),
         );
         lines.push(wrap(LEGEND, width));
         lines.join("\n") + "\n"

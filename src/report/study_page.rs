@@ -2,6 +2,7 @@
 
 use super::html::{Page, PageFigure, Section};
 use super::plot::Figure;
+use super::reference;
 use super::run_record::Timings;
 use super::study::{StudyReport, file_name};
 use super::tables;
@@ -46,7 +47,7 @@ impl StudyReport {
             ..Section::new("given", "Cross-validation and given S'")
         }));
         sections.extend(self.comparison.as_ref().map(|comparison| Section {
-            text: comparison.text(),
+            text: reference::text(comparison),
             ..Section::new("reference", "Lane arithmetic against double precision")
         }));
         sections.extend([self.data(), self.reproduction()?]);

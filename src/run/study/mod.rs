@@ -7,6 +7,8 @@ mod given;
 mod plan;
 pub(crate) mod plan_file;
 mod read;
+mod reference;
+mod robustness;
 mod run;
 
 pub use cases::StudyCases;
@@ -17,6 +19,8 @@ pub use given::GivenReplay;
 pub use plan::{StudyOptions, outline_study, plan_study};
 pub use plan_file::StudyHead;
 
+pub use reference::{Difference, ReferenceComparison};
+pub use robustness::robust_lanes;
 pub use run::{EachChunk, StudyResult, StudyRun};
 
 use std::fs::File;
