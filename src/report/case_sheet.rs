@@ -20,8 +20,8 @@ pub(super) const KMH: f64 = 3.6;
 /// What the columns of the drivers show.
 const DRIVERS: &str = "Smallest gap to a vehicle in the ego's path, smallest TTC, largest BTN; at a contact that closes, \
      TTC is 0 and BTN ∞ by definition. Touches: no contact, but the smallest gap is below 1 cm, or tends \
-     to it as the time step goes to 0. No contact: nothing to avoid. Still closes: no contact until the \
-     end of the run. Contact: rear-end where the ego's front hits, side where the other vehicle hits the \
+     to it as the time step goes to 0. None: there is nothing to avoid. Open: no contact until the end of \
+     the run, at which the gap still closes. Contact: rear-end where the ego's front hits, side where the other vehicle hits the \
      ego's side or rear; closing is the ego's speed minus the other's. Times count from the start of the \
      case; brakes: the time from which the ego brakes, without CCHDM's coasting. –: not before the end of \
      the run, or no TTC because the gap does not close. A row that equals that of a profile above is left \
@@ -377,8 +377,8 @@ pub(super) fn verdict_of(judgement: &Judgement, judged: &Judged) -> &'static str
         (false, true) => "touches",
         (false, false) => match judgement.verdicts.unreacting {
             RunEnd::Contact => "avoids",
-            RunEnd::Open if judged.trace.outcome.verdicts.capped() => "still closes",
-            RunEnd::Open | RunEnd::Clear => "no contact",
+            RunEnd::Open if judged.trace.outcome.verdicts.capped() => "open",
+            RunEnd::Open | RunEnd::Clear => "none",
         },
     }
 }

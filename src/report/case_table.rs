@@ -145,7 +145,7 @@ impl CaseTable {
     /// The table as text.
     pub fn text(&self, width: usize) -> String {
         let legend = "Verdict: as on the sheet of one case. Demanded: whether the profile's clause of cut-ins demands that \
-                      the system avoids the collision.";
+                      the system avoids the collision. None: there is nothing to avoid.";
         format!("{}\n{}{}\n", self.summary(), self.columns().build().text(), wrap(legend, width))
     }
 

@@ -169,7 +169,7 @@ fn a_table_is_judged_whole_and_its_status_is_that_of_the_worst_row() {
                 let word = match (model["collision"] == true, model["is_contact_like"] == true) {
                     (true, _) => "COLLIDES",
                     (false, true) => "touches",
-                    (false, false) if is_quiet => "no contact",
+                    (false, false) if is_quiet => "none",
                     (false, false) => "avoids",
                 };
                 assert_eq!(case[model["model"].as_str().unwrap()], word, "{case}");

@@ -315,7 +315,7 @@ fn counts_of_flags_are_written_as_in_a_configuration_file() {
         [("1000000000", "20,000,000,000 lanes"), ("1e9", "20,000,000,000 lanes"), ("1_000", "20,000 lanes")]
     {
         let sample = ["-q", "sample", "d.json", "--models", "FSM,RSS", "--plan-only", "--samples", samples];
-        let planned = good(dir, &[], &sample);
+        let planned = good(dir, &[], &[&sample[..], &["--out", samples]].concat());
         assert!(planned.starts_with(lanes), "{samples}: {planned}");
     }
     let said = refused(dir, &[], &["-q", "sample", "d.json", "--given", "v_ego_mps=300"]);
