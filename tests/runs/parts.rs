@@ -2,6 +2,7 @@
 //! the undisturbed run, byte for byte; a folder that cannot give it says what is missing.
 
 use crate::common::program::{self, done, flat, kill, lanesweep, limited, start, wait_for_run, without_host};
+use lanesweep::engine::ENGINE_VERSION;
 
 use std::path::Path;
 
@@ -153,24 +154,27 @@ fn files_of_another_engine_or_an_earlier_version_are_neither_merged_nor_continue
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     density(dir);
+    let (own, other) = (ENGINE_VERSION, ENGINE_VERSION + 1);
+    let (engine, another) = (format!("\"engine\":{own},"), format!("\"engine\":{other},"));
+    let is_of_another = format!("of engine {other}, this program has engine {own}");
     for (run, name) in [(&STUDY[..], "study"), (&SAMPLE, "sample")] {
         let shard = |shard: &'static str| [run, &["--out", name, "--shard", shard]].concat();
         let _ = ["0/2", "1/2"].map(|of| done(dir, &shard(of)));
         for file in ["part-00001-of-00002.json", "plan.json"] {
             let path = dir.join(name).join(file);
             let whole = std::fs::read(&path).unwrap();
-            edit(&path, "\"engine\":4,", "\"engine\":5,");
-            refused(dir, &["cluster", "merge", name], "of engine 5, this program has engine 4");
+            edit(&path, &engine, &another);
+            refused(dir, &["cluster", "merge", name], &is_of_another);
             if file != "plan.json" {
-                refused(dir, &shard("1/2"), "of engine 5, this program has engine 4");
+                refused(dir, &shard("1/2"), &is_of_another);
             } else {
                 let plan = format!("{name}/plan.json");
-                refused(dir, &[run[1], "--plan", &plan, "--out", "x"], "of engine 5, this program has engine 4");
+                refused(dir, &[run[1], "--plan", &plan, "--out", "x"], &is_of_another);
             }
             // As versions before engines wrote it, all in one line.
             let earlier = r#""version":1,"sha256":"00","content":"#;
             std::fs::write(&path, &whole).unwrap();
-            edit(&path, "\"version\":2,\"engine\":4,", earlier);
+            edit(&path, &format!("\"version\":2,{engine}"), earlier);
             refused(dir, &["cluster", "merge", name], "its version is 1, this program reads 2");
             if file == "plan.json" {
                 let plan = format!("{name}/plan.json");
@@ -186,12 +190,12 @@ fn files_of_another_engine_or_an_earlier_version_are_neither_merged_nor_continue
         |name: &str| -> serde_json::Value { serde_json::from_slice(&std::fs::read(dir.join(name)).unwrap()).unwrap() };
     assert_eq!(
         (&record("study/run.json")["engine"], &record("sample/estimate.json")["engine"]),
-        (&4.into(), &4.into())
+        (&own.into(), &own.into())
     );
     let lane = ["simulate", "--from", "sample", "--lane", "#0/2/0.6s/FSM"];
     done(dir, &lane);
-    edit(&dir.join("sample/estimate.json"), "\"engine\": 4", "\"engine\": 5");
-    refused(dir, &lane, "of engine 5, this program has engine 4");
+    edit(&dir.join("sample/estimate.json"), &format!("\"engine\": {own}"), &format!("\"engine\": {other}"));
+    refused(dir, &lane, &is_of_another);
 }
 
 #[test]
