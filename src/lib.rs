@@ -27,8 +27,11 @@
 //!     lateral_distance_m: 3.5,
 //!     ahead_speed_mps: 0.0,
 //!     ahead_gap_m: 0.0,
+//!     ego_length_m: 4.3,
+//!     ego_width_m: 1.9,
 //!     length_m: 4.3,
 //!     width_m: 1.9,
+//!     lane_width_m: 3.5,
 //!     duration_s: None,
 //! };
 //! let mut tables = Tables::default();
