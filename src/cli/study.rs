@@ -17,7 +17,7 @@ use crate::report::lanes::{StudyRows, table_format};
 use crate::report::run_record::{StudyHost, Timings};
 use crate::report::study::StudyReport;
 use crate::run::parts::{PLAN_FILE, RUN_PLAN_FILE};
-use crate::run::study::{self, EachChunk, GivenReplay, ReferenceComparison, StudyOptions, StudyResult};
+use crate::run::study::{self, ChunkSink, GivenReplay, ReferenceComparison, StudyOptions, StudyResult};
 use crate::support::files::{check_folder, check_folder_of};
 use crate::support::input_file;
 use crate::support::readable;
@@ -217,7 +217,7 @@ impl Study {
         let mut rows = self.rows.as_deref().map(|path| StudyRows::create(path, study)).transpose()?;
         let mut write = rows.as_mut().map(|rows| |plan: &LanePlan, chunk: &Chunk| rows.write(plan, chunk));
         timed(&mut timings.sweep_s, || {
-            let each = write.as_mut().map(|write| write as &mut EachChunk);
+            let each = write.as_mut().map(|write| write as &mut ChunkSink);
             run.sweep(&executor.clone().with_progress(console::inc(&bar)), each)
         })?;
         bar.finish_and_clear();

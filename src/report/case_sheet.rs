@@ -18,20 +18,17 @@ use crate::{Error, Result};
 /// Kilometres per hour in one metre per second.
 pub(super) const KMH: f64 = 3.6;
 /// What the columns of the drivers show.
-const DRIVERS: &str = "Smallest gap to a vehicle in the ego's path, smallest TTC, largest BTN; at a contact that closes, \
-     TTC is 0 and BTN ∞ by definition. Touches: no contact, but the smallest gap is below 1 cm, or tends \
-     to it as the time step goes to 0. None: there is nothing to avoid. Open: no contact until the end of \
-     the run, at which the gap still closes. Contact: rear-end where the ego's front hits, side where the other vehicle hits the \
-     ego's side or rear; closing is the ego's speed minus the other's. Times count from the start of the \
-     case; brakes: the time from which the ego brakes, without CCHDM's coasting. –: not before the end of \
-     the run, or no TTC because the gap does not close. A row that equals that of a profile above is left \
-     out";
+const DRIVERS: &str = "Smallest gap to a vehicle in the ego's path, smallest TTC, largest BTN. At a contact while the gap \
+     closes, TTC is 0 and BTN ∞ by definition. Touches: no contact, but the smallest gap is below 1 cm, or becomes so as the \
+     time step goes to 0. None: there is nothing to avoid. Open: the gap still closes at the end of the run. Contact: rear-end \
+     where the ego's front hits, side where the other vehicle hits the ego's side or rear; closing is the ego's speed minus the \
+     other's. Times count from the start of the case. Brakes: the time from which the ego brakes; CCHDM's coasting is no braking. \
+     –: not before the end of the run; for TTC: the gap does not close. A row that equals that of a profile above is left out";
 /// What the columns of the boundaries show.
 const BOUNDARIES: &str = "One number is changed, all others stay, in 100 steps to either end of its range (JSON: searched). \
-     Changes at: the nearest value found below and above, to 4 digits, at which the computed answer is \
-     another one; without the tests that make an answer undecided, which begin nearer. At least one \
-     change lies between the case and this value; one that lasts for less than a step is missed. –: no \
-     change found. The last columns: where each driver's collision changes";
+     Changes at: the nearest values below and above, rounded to 4 digits, at which the computed answer is another one. The \
+     answer may be undecided before that value. At least one change lies between the case and this value; a change that lasts \
+     for less than a step of the scan is missed. –: no change found. The last columns: where each driver's collision changes";
 
 /// A checked case with the facts that its sheet states.
 pub struct CaseSheet<'a> {
@@ -210,7 +207,8 @@ impl CaseSheet<'_> {
             let readings = judgement.readings.iter().map(|reading| {
                 json!({
                     "clause": reading.clause, "condition": reading.quantity, "unit": reading.unit,
-                    "value": reading.value.map(json_number), "relation": reading.relation.sign(), "threshold": json_number(reading.threshold),
+                    "value": reading.value.map(json_number), "relation": reading.relation.sign(),
+                    "threshold": json_number(reading.threshold),
                     "t_s": reading.time_s, "holds": reading.holds().label(), "then": reading.then,
                 })
             });

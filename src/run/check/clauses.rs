@@ -360,7 +360,10 @@ fn competent_driver(profile: &Profile, category: Category, trace: &Trace) -> Vec
     if threshold > 0.0 {
         let then = match category {
             Category::CutIn => "braking begins after the delay; else once it holds",
-            _ => "braking begins after the delay; else once it holds (8 cm more for errors of measurement, ours)",
+            _ if constants.cut_out_headway_tolerance_m > 0.0 => {
+                "braking begins after the delay; else once it holds (the threshold has the profile's tolerance, ours)"
+            }
+            _ => "braking begins after the delay; else once it holds",
         };
         list.push(reading(quantity, "s", value, Relation::AtMost, threshold, seen.map(|step| step.time_s), then));
     }

@@ -144,11 +144,6 @@ impl Judgement {
         self.readings.iter().filter(|reading| reading.is_condition)
     }
 
-    /// The conditions that do not hold.
-    pub fn unmet(&self) -> impl Iterator<Item = &Reading> {
-        self.conditions().filter(|reading| reading.holds() != Holds::Yes)
-    }
-
     /// Perturbations that change a driver's collision verdict.
     pub fn flips_of(&self, model: ModelId) -> &[&'static str] {
         let at = ModelId::ALL.iter().position(|m| *m == model);

@@ -98,15 +98,6 @@ impl<'a> LaneLimitState<'a> {
         let executor = Executor { recheck: None, ..executor };
         LaneLimitState { density, profile, models, headways, questions, executor }
     }
-
-    /// Number of lanes of each point.
-    pub fn lanes_per_point(&self) -> u64 {
-        let headways = match &self.headways {
-            SampleHeadways::Each(list) => list.len(),
-            SampleHeadways::Sampled => 1,
-        };
-        (self.models.len() * headways) as u64
-    }
 }
 
 impl LimitState for LaneLimitState<'_> {

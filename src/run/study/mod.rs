@@ -21,7 +21,7 @@ pub use plan_file::StudyHead;
 
 pub use reference::{Difference, ReferenceComparison};
 pub use robustness::robust_lanes;
-pub use run::{EachChunk, StudyResult, StudyRun};
+pub use run::{ChunkSink, StudyResult, StudyRun};
 
 use std::fs::File;
 use std::io::{BufRead, BufReader};

@@ -28,8 +28,8 @@ pub struct StudyRun<'s> {
     summary: SweepSummary,
 }
 
-/// Receives the chunks of a sweep with the plan of their window.
-pub type EachChunk<'c> = dyn FnMut(&LanePlan, &Chunk) -> Result<()> + 'c;
+/// Receives the chunks of a study's sweep in order, with the plan of their window.
+pub type ChunkSink<'c> = dyn FnMut(&LanePlan, &Chunk) -> Result<()> + 'c;
 
 impl Study {
     /// Runs every lane, in memory.
@@ -128,7 +128,7 @@ impl StudyRun<'_> {
     ///
     /// # Errors
     /// As [`Study::run`]; those of `rows`; [`Error::Interrupted`] after cancellation: finished counts are in the journal.
-    pub fn sweep(&mut self, executor: &Executor, mut rows: Option<&mut EachChunk>) -> Result<SweepSummary> {
+    pub fn sweep(&mut self, executor: &Executor, mut rows: Option<&mut ChunkSink>) -> Result<SweepSummary> {
         let _resumable = executor.cancel.resumable();
         let (units, ledger) = (self.state.units.clone(), &mut self.state.ledger);
         let missing = ledger.missing(units.clone())?;

@@ -49,8 +49,8 @@ impl Table {
         text
     }
 
-    /// The rows as a list of objects. NaN becomes null and infinity the text `Infinity`, because JSON lacks them. The column `data` is
-    /// skipped: a document names its data once.
+    /// The rows as a list of objects. JSON has neither NaN nor infinity: NaN becomes null, infinity the text `Infinity`.
+    /// The column `data` is skipped: a document names its data once.
     pub fn records(&self) -> Value {
         let record = |row: &Vec<Cell>| {
             let fields = self.columns.iter().zip(row).filter(|(column, _)| column.name != "data");

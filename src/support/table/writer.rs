@@ -3,7 +3,7 @@
 //! **CSV.** A spreadsheet treats a field that begins with `=`, `+`, `-` or `@` as a formula, and ids may come from
 //! anybody. Such a text gets a leading apostrophe, which our readers remove. Numbers are unchanged.
 //!
-//! **JSON Lines.** JSON lacks NaN and infinity: NaN, which is no value, becomes null, and infinity the text `Infinity`.
+//! **JSON Lines.** JSON lacks NaN and infinity: NaN means a missing value and becomes null; infinity becomes the text `Infinity`.
 
 use std::borrow::Cow;
 use std::fmt::Write as _;
