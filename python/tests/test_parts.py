@@ -1,10 +1,7 @@
-"""Runs in parts, alone and on Ray."""
+"""Runs in parts."""
 
 from __future__ import annotations
 
-import os
-import signal
-import time
 from pathlib import Path
 
 import lanesweep
@@ -85,60 +82,3 @@ def test_missing_parts_and_verbs_that_cannot_be_split_are_errors(density) -> Non
         parts.plan(lanesweep.check)
     with pytest.raises(lanesweep.UsageError):
         parts.run(plan, 3)
-
-
-@pytest.fixture(scope="module")
-def cluster():
-    ray = pytest.importorskip("ray")
-    ray.init(num_cpus=2, include_dashboard=False, _node_ip_address="127.0.0.1", log_to_driver=False)
-    yield ray
-    ray.shutdown()
-
-
-def test_a_run_on_ray_whose_worker_is_killed_has_the_bytes_of_the_whole(cluster, density) -> None:
-    from lanesweep import ray as on_ray
-
-    options = {"samples": 400_000, "thw": 1.2, "models": "FSM"}
-    whole = lanesweep.sample(density, **options, backend="cpu")
-    killed: list[int] = []
-
-    def kill() -> None:
-        """Ends a worker that runs a part."""
-        for _ in range(200):
-            for path in Path("/proc").glob("[0-9]*/cmdline"):
-                try:
-                    name = path.read_bytes()
-                except OSError:
-                    continue
-                if name.startswith(b"ray::run"):
-                    killed.append(int(path.parent.name))
-                    os.kill(killed[0], signal.SIGKILL)
-                    return
-            time.sleep(0.02)
-
-    import threading
-
-    thread = threading.Thread(target=kill)
-    thread.start()
-    result = on_ray.sample(density, **options, shards=8)
-    thread.join()
-    assert killed or not Path("/proc").is_dir()
-    assert contents(result, FILES) == contents(whole, FILES)
-
-
-def test_a_limit_state_on_ray_is_the_limit_state(cluster, density) -> None:
-    from lanesweep import ray as on_ray
-
-    here = lanesweep.LimitState(density, model="FSM", criterion="ttc", thw=0.6)
-    there = on_ray.limit_state(str(density), model="FSM", criterion="ttc", thw=0.6, workers=2)
-    points = here.draw(301)
-    assert (there(points) == here(points)).all()
-
-
-def test_an_exception_of_a_task_reaches_the_caller(cluster, density) -> None:
-    from lanesweep import ray as on_ray
-
-    plan = parts.plan(lanesweep.sample, density, samples=200, thw=1.2, shards=2)
-    broken = parts.Plan(plan.verb, plan.content[:-50], plan.shards)
-    with pytest.raises(Exception, match="plan"):
-        on_ray.run(broken)

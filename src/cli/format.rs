@@ -107,7 +107,7 @@ impl TablesFlag {
         let out = results.dir().to_path_buf();
         report.write(results)?;
         let width = console::width();
-        let claims = if report.claims.is_empty() { "" } else { ", claims" };
+        let claims = if report.evaluation.claims.is_empty() { "" } else { ", claims" };
         let rest = format!("TTC, BTN, every interval{claims}: --tables, or report.html and report.txt.");
         let answer = || format!("{}{}\n", report.answer(width), tables::wrap(&rest, width));
         format.print(|| if self.tables { report.text(width) } else { answer() }, || report.json())?;

@@ -15,7 +15,7 @@ use crate::report::openscenario::{DistributionSamples, SampledFile};
 use crate::report::sampling::{DensityRecord, DrawRecord, EstimateFile, HostRecord};
 use crate::report::sampling_tables::convergence_csv;
 use crate::run::reopen::DISTRIBUTION_FILE;
-use crate::run::sampling::{Estimator, SampleHeadways, SampleOptions, sample_crude};
+use crate::run::sampling::{Estimator, SampleHeadways, SampleOptions, WorstLane, sample_crude};
 use crate::scenario::Category;
 use crate::stats::density::Provenance;
 use crate::support::plain_text::sha256;
@@ -112,10 +112,11 @@ pub(super) fn run(
     let mut results = folder.results()?;
     results.add("convergence.csv", convergence_csv(&crude.convergence).as_bytes())?;
     let names: Vec<String> = samples.parameters.iter().map(|p| p.parameter.key.to_owned()).collect();
-    file.add_worst(&mut results, &plan, &crude.tally, &options, &names, |key| {
+    let worst = WorstLane::of_tally(&plan, &crude.tally, |key| {
         let point = samples.draw(seed, key.unit, &plan.profile)?.values;
         Ok((point, samples.has_distance().then(|| "sampled".to_owned())))
     })?;
+    file.add_worst(&mut results, &worst, &options, &names)?;
     results.add(DISTRIBUTION_FILE, &sampled.to_json()?)?;
     file.publish(results, Vec::new())?;
     flags.format.print_results(|| file.text(), || file.json(), &flags.out)?;

@@ -6,9 +6,9 @@ use super::convergence::convergence;
 use super::failure_map::FailureMaps;
 use super::html::PageFigure;
 use super::sampling::{DrawRecord, EstimateFile, HostRecord};
-use super::sampling_tables::{WorstRow, convergence_csv, model_ratios_csv, profile_ratios_csv, worst_csv};
-use crate::engine::{LaneKey, LanePlan, LaneRunner};
-use crate::run::sampling::{CrudeRun, Estimator, Sample, SampleOptions, SampleResult, SampleTally, proposal_text};
+use super::sampling_tables::{convergence_csv, model_ratios_csv, profile_ratios_csv, worst_csv};
+use crate::engine::LanePlan;
+use crate::run::sampling::{CrudeRun, Estimator, Sample, SampleOptions, SampleResult, WorstLane, proposal_text};
 use crate::stats::density::DensityModel;
 use crate::support::plain_text::hex;
 use crate::support::run_dir::Results;
@@ -77,12 +77,13 @@ impl EstimateFile {
             return Err(Error::Internal("the plan has no generator".to_owned()));
         };
         let names: Vec<String> = density.space.parameters().iter().map(|p| p.name.clone()).collect();
-        self.add_worst(results, plan, &run.tally, options, &names, |key| {
+        let worst = WorstLane::of_tally(plan, &run.tally, |key| {
             let drawn = generator.draw(key.unit).values;
             let point: Vec<f64> = drawn[..names.len()].iter().map(|&v| f64::from(v)).collect();
             let headway = density.space.thw_s(&point).map(|thw_s| format!("{thw_s}s"));
             Ok((point, headway))
         })?;
+        self.add_worst(results, &worst, options, &names)?;
         if let Some(map) = &run.tally.map {
             let samples = run.tally.samples() - run.tally.voids;
             let maps = FailureMaps { density, plan, map, samples, criterion: options.criterion };
@@ -96,42 +97,21 @@ impl EstimateFile {
         Ok(figures)
     }
 
-    /// Adds the table of the worst lanes, if recorded, and its checksum to the record. `drawn` returns the point of a
-    /// lane's sample, and its headway if sampled.
+    /// Adds the table of the worst lanes, if the run has one, and its checksum to the record.
     ///
     /// # Errors
-    /// Errors of `drawn`; [`Error::Io`].
+    /// [`Error::Io`].
     pub fn add_worst(
         &mut self,
         results: &mut Results,
-        plan: &LanePlan,
-        tally: &SampleTally,
+        lanes: &[WorstLane],
         options: &SampleOptions,
         names: &[String],
-        drawn: impl Fn(&LaneKey) -> Result<(Vec<f64>, Option<String>)>,
     ) -> Result<()> {
         if options.worst == 0 {
             return Ok(());
         }
-        let (runner, mut rows) = (LaneRunner::<f32>::new(plan), Vec::new());
-        for (model, lanes) in plan.models.iter().zip(&tally.worst) {
-            for (rank, lane) in (1..).zip(lanes) {
-                let missing = || Error::Internal(format!("lane {} is not in the plan", lane.lane));
-                let key = plan.key(lane.lane).ok_or_else(missing)?;
-                let (point, headway) = drawn(&key)?;
-                rows.push(WorstRow {
-                    rank,
-                    lane: *lane,
-                    key: plan.key_text(&key),
-                    sample: key.unit,
-                    model: *model,
-                    headway: headway.unwrap_or_else(|| plan.headways[key.headway].to_string()),
-                    point,
-                    outcome: runner.run(&key).widen(),
-                });
-            }
-        }
-        let table = worst_csv(&rows, names, options.criterion);
+        let table = worst_csv(lanes, names, options.criterion);
         self.worst_sha256 = Some(hex(&Sha256::digest(&table)));
         results.add("worst.csv", table.as_bytes())
     }

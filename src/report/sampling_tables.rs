@@ -3,10 +3,9 @@
 
 use super::records::smallest_gap_m;
 use super::sampling::EstimateFile;
-use crate::engine::{NO_STEP, Outcome};
+use crate::engine::NO_STEP;
 use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::run::sampling::{Checkpoint, EstimateRow, ModelRatio, ProfileRatios, RiskRate, Uncertainty, WorstSample};
+use crate::run::sampling::{Checkpoint, EstimateRow, ModelRatio, ProfileRatios, RiskRate, Uncertainty, WorstLane};
 use crate::stats::estimate::{IntervalKind, Ratio, RatioMethod, RatioVerdict, WeightFigures};
 use crate::support::readable::{significant, value};
 use crate::support::table::{Table, TableOf};
@@ -139,29 +138,9 @@ fn ratio_columns(sides: TableOf<&ModelRatio>) -> TableOf<&ModelRatio> {
         })
 }
 
-/// One of the worst lanes, with its facts.
-pub struct WorstRow {
-    /// Rank among the model's worst lanes, from 1.
-    pub rank: usize,
-    /// The lane and its limit state.
-    pub lane: WorstSample,
-    /// Its key.
-    pub key: String,
-    /// Its sample index.
-    pub sample: u64,
-    /// Driver model.
-    pub model: ModelId,
-    /// Headway, s, from the plan or the parameters.
-    pub headway: String,
-    /// Its point.
-    pub point: Vec<f64>,
-    /// Its outcome.
-    pub outcome: Outcome<f64>,
-}
-
 /// `worst.csv`: the lanes with the smallest limit state of `criterion`, rerunnable by key.
-pub fn worst_csv(rows: &[WorstRow], parameters: &[String], criterion: Criterion) -> String {
-    let at_contact = |row: &WorstRow, v: f64| (row.outcome.contact_step != NO_STEP).then_some(v);
+pub fn worst_csv(rows: &[WorstLane], parameters: &[String], criterion: Criterion) -> String {
+    let at_contact = |row: &WorstLane, v: f64| (row.outcome.contact_step != NO_STEP).then_some(v);
     Table::of(rows)
         .column("model", |row| row.model.name())
         .column("rank", |row| row.rank)

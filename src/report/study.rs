@@ -13,49 +13,18 @@ use crate::Result;
 use crate::engine::{CLOSE_HEADWAY_S, Headway, Partial};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
-use crate::run::close_following::CloseFollowing;
-use crate::run::score::{
-    Best, CategoryScores, ClaimResult, HeadwayFailures, MeanF1, Misfit, ScoreTable, best_parameterizations,
-    check_claims, f1, published_failures, published_lvd_f1,
-};
-use crate::run::study::{CategoryProvenance, ParameterHistogram, ReferenceComparison, Study};
+use crate::run::score::{Best, CategoryScores, Misfit, ScoreTable, published_failures, published_lvd_f1};
+use crate::run::study::{ReferenceComparison, Study, StudyEvaluation};
 use crate::scenario::Category;
-use crate::scenario::parameterization::{ModeShape, Parameterization};
+use crate::scenario::parameterization::Parameterization;
 use crate::support::run_dir::Results;
 use crate::support::table::{Column, Digits, Table};
 use serde_json::Value;
 
-/// Data for the figures of one category, in addition to the scores.
-#[derive(Debug, Clone)]
-pub struct CategoryPictures {
-    /// Failures by headway.
-    pub headways: HeadwayFailures,
-    /// Mean F1 over all criteria, and over each.
-    pub means: Vec<MeanF1>,
-    /// Distributions of the mined parameters.
-    pub parameters: Vec<ParameterHistogram>,
-    /// Shapes of the decomposition, if there is one.
-    pub modes: Vec<ModeShape>,
-    /// Cumulative explained variance of its first coefficients.
-    pub svd_explained: Vec<f64>,
-    /// Fold of each scenario, with cross-validation.
-    pub folds: Vec<(String, usize)>,
-    /// Error of the motions of each variant, if S' are given as series or cross-validated.
-    pub rmse: Vec<f64>,
-    /// Failures of S from headways below 0.5 s; `None` where the headways are gaps in metres.
-    pub close_following: Option<CloseFollowing>,
-}
-
 /// A study's complete report.
 pub struct StudyReport {
-    /// Scores.
-    pub scores: ScoreTable,
-    /// Claims with their verdicts.
-    pub claims: Vec<ClaimResult>,
-    /// One per category of the scores.
-    pub pictures: Vec<CategoryPictures>,
-    /// The best parameterizations for collisions.
-    pub best: Vec<Best>,
+    /// What the counts say.
+    pub evaluation: StudyEvaluation,
     /// Record of the run.
     pub run: RunRecord,
     /// Whether to show the paper's published numbers.
@@ -75,29 +44,11 @@ impl StudyReport {
         comparison: Option<ReferenceComparison>,
         mut host: StudyHost,
     ) -> Result<StudyReport> {
-        let (plan, facts) = (study.plan(), study.facts());
         let started = std::time::Instant::now();
-        let scores = study.score(counts)?;
+        let evaluation = study.evaluate(counts)?;
         host.timings.score_s = started.elapsed().as_secs_f64();
-        let run = RunRecord::of(study, &scores, host);
-        let claims = check_claims(&scores, plan, counts);
-        let best = best_parameterizations(&scores, plan, counts, Criterion::Collision);
-        let picture = |(block, of): (usize, &CategoryProvenance)| {
-            let criteria = std::iter::once(&Criterion::ALL[..]).chain(Criterion::ALL.chunks(1));
-            let mean = |criteria| MeanF1::of(&scores.categories[block], (plan, counts), criteria, &scores.options);
-            Ok(CategoryPictures {
-                headways: HeadwayFailures::of(plan, counts, block)?,
-                means: criteria.map(mean).collect(),
-                parameters: of.parameters.clone(),
-                modes: of.modes.clone(),
-                svd_explained: of.svd_explained.clone(),
-                folds: of.folds.clone(),
-                rmse: of.rmse.clone(),
-                close_following: CloseFollowing::of_recorded(plan, counts, block, &of.close_units)?,
-            })
-        };
-        let pictures = facts.categories.iter().enumerate().map(picture).collect::<Result<_>>()?;
-        Ok(StudyReport { scores, claims, best, pictures, run, published: facts.published, comparison })
+        let run = RunRecord::of(study, &evaluation.scores, host);
+        Ok(StudyReport { evaluation, run, published: study.facts().published, comparison })
     }
 
     /// All tables, at most `width` columns wide; only a long word in the data's description (a path) can exceed this.
@@ -107,11 +58,11 @@ impl StudyReport {
         if self.published {
             parts.push("Published numbers are those of highD: other data agrees in shape at best.\n".to_owned());
         }
-        parts.push(tables::failures(&self.scores, self.published, width));
+        parts.push(tables::failures(&self.evaluation.scores, self.published, width));
         parts.push(self.close_following(width));
-        parts.extend(self.scores.categories.iter().map(|c| tables::f1_table(c, self.published, width)));
+        parts.extend(self.evaluation.scores.categories.iter().map(|c| tables::f1_table(c, self.published, width)));
         parts.extend(self.given_table().map(|table| table.fitted(2, width)));
-        parts.extend(Some(tables::claims(&self.claims, width)).filter(|text| !text.is_empty()));
+        parts.extend(Some(tables::claims(&self.evaluation.claims, width)).filter(|text| !text.is_empty()));
         parts.extend(self.comparison.iter().map(reference::text));
         if self.run.synthetic {
             parts.push(format!("{data}\nNo number above is a statement about real traffic.\n"));
@@ -121,17 +72,12 @@ impl StudyReport {
 
     /// Error of the motions beside the mean F1 of every variant; `None` unless S' are given as series or cross-validated.
     pub(super) fn given_table(&self) -> Option<Table> {
-        let of_categories = self.scores.categories.iter().zip(&self.pictures);
+        let of_categories = self.evaluation.scores.categories.iter().zip(&self.evaluation.categories);
         let rows = of_categories.flat_map(|(scores, pictures)| {
             let variants = pictures.rmse.iter().enumerate().skip(1);
             variants.map(move |(variant, rmse)| (scores, variant, *rmse))
         });
         let rows: Vec<(&CategoryScores, usize, f64)> = rows.collect();
-        let mean = |scores: &CategoryScores, variant: usize, criterion: Criterion| {
-            let cells = scores.cells.iter().filter(|cell| (cell.variant, cell.criterion) == (variant, criterion));
-            let values: Vec<f64> = cells.filter_map(|cell| f1(&cell.counts)).collect();
-            (!values.is_empty()).then(|| values.iter().sum::<f64>() / values.len() as f64)
-        };
         let three = |name: String| Column::from(name).digits(Digits::Fixed(3)).null("-");
         let table = Table::of(rows.iter())
             .column("scenario", |(scores, ..)| scores.category.label())
@@ -140,7 +86,7 @@ impl StudyReport {
             .columns(
                 Criterion::ALL,
                 |criterion| three(format!("mean F1, {}", criterion.label())),
-                |(scores, variant, _), criterion| mean(scores, *variant, criterion),
+                |(scores, variant, _), criterion| scores.mean_f1(*variant, criterion),
             )
             .build()
             .captioned(
@@ -151,8 +97,8 @@ impl StudyReport {
 
     /// Start of the scenarios, in a few words.
     pub(super) fn headways_in_words(&self) -> String {
-        match self.scores.headways.len() {
-            _ if Headway::is_observed(&self.scores.headways) => "recorded THW".to_owned(),
+        match self.evaluation.scores.headways.len() {
+            _ if Headway::is_observed(&self.evaluation.scores.headways) => "recorded THW".to_owned(),
             1 => "1 imposed THW".to_owned(),
             n => format!("{n} imposed THW"),
         }
@@ -160,14 +106,16 @@ impl StudyReport {
 
     /// Failures of S from close following.
     pub(super) fn close_following(&self, width: usize) -> String {
-        let rows = self.scores.categories.iter().zip(&self.pictures).filter_map(|(scores, pictures)| {
-            Some(CloseRow {
-                category: scores.category,
-                models: &scores.models,
-                close: pictures.close_following.as_ref()?,
-            })
-        });
-        close_following(&rows.collect::<Vec<_>>(), "S", &self.scores.headways, width)
+        let rows = self.evaluation.scores.categories.iter().zip(&self.evaluation.categories).filter_map(
+            |(scores, pictures)| {
+                Some(CloseRow {
+                    category: scores.category,
+                    models: &scores.models,
+                    close: pictures.close_following.as_ref()?,
+                })
+            },
+        );
+        close_following(&rows.collect::<Vec<_>>(), "S", &self.evaluation.scores.headways, width)
     }
 
     /// Writes CSV tables, figures, the files already in `results` and `run.json` to the folder.
@@ -176,12 +124,12 @@ impl StudyReport {
     /// [`crate::Error::Io`].
     pub fn write(&mut self, mut results: Results) -> Result<()> {
         let data = if self.run.synthetic { "synthetic" } else { "recorded" };
-        results.add("failures.csv", tables::failure_records(&self.scores, data)?.csv().as_bytes())?;
-        results.add("f1.csv", tables::f1_records(&self.scores, data).csv().as_bytes())?;
-        results.add("claims.csv", tables::claim_records(&self.claims, data).csv().as_bytes())?;
+        results.add("failures.csv", tables::failure_records(&self.evaluation.scores, data)?.csv().as_bytes())?;
+        results.add("f1.csv", tables::f1_records(&self.evaluation.scores, data).csv().as_bytes())?;
+        results.add("claims.csv", tables::claim_records(&self.evaluation.claims, data).csv().as_bytes())?;
         results.add("report.txt", self.text(tables::WIDTH).as_bytes())?;
         results.add("headways.csv", self.headways(data).csv().as_bytes())?;
-        for (at, category) in self.scores.categories.iter().enumerate() {
+        for (at, category) in self.evaluation.scores.categories.iter().enumerate() {
             for (name, figure) in self.figures(at) {
                 results.add(&file_name(name, category.category, "svg"), figure.svg().as_bytes())?;
                 results.add(&file_name(name, category.category, "csv"), figure.csv().as_bytes())?;
@@ -190,8 +138,8 @@ impl StudyReport {
         if let Some(given) = self.given_table() {
             results.add("variants.csv", given.csv().as_bytes())?;
         }
-        if self.pictures.iter().any(|of| !of.folds.is_empty()) {
-            let folds = self.pictures.iter().flat_map(|of| &of.folds);
+        if self.evaluation.categories.iter().any(|of| !of.folds.is_empty()) {
+            let folds = self.evaluation.categories.iter().flat_map(|of| &of.folds);
             let table = Table::of(folds).column("scenario", |(id, _)| id.as_str()).column("fold", |(_, fold)| *fold);
             results.add("folds.csv", table.build().csv().as_bytes())?;
         }
@@ -205,14 +153,14 @@ impl StudyReport {
 
     /// The figures of a category, with the prefixes of their file names; figures without data are skipped.
     pub(super) fn figures(&self, at: usize) -> Vec<(&'static str, Figure)> {
-        let (scores, data) = (&self.scores.categories[at], &self.run.data);
-        let (confidence, mut figures) = (self.scores.options.confidence, Vec::new());
+        let (scores, data) = (&self.evaluation.scores.categories[at], &self.run.data);
+        let (confidence, mut figures) = (self.evaluation.scores.options.confidence, Vec::new());
         if scores.variants.len() > 1 {
             figures.push(("f1", f1_intervals(scores, confidence, data)));
             figures.push(("radar", radar(scores, data)));
             figures.push(("recall-precision", recall_and_precision(scores, confidence, data)));
         }
-        let Some(pictures) = self.pictures.get(at) else { return figures };
+        let Some(pictures) = self.evaluation.categories.get(at) else { return figures };
         if scores.variants.len() > 1 {
             figures.push(("f1-by-parameters", f1_by_parameters(scores, &pictures.means, confidence, data)));
         }
@@ -229,10 +177,11 @@ impl StudyReport {
     /// Failures of every variant by headway.
     fn headways(&self, data: &str) -> Table {
         let rows = self
+            .evaluation
             .scores
             .categories
             .iter()
-            .zip(&self.pictures)
+            .zip(&self.evaluation.categories)
             .flat_map(|(scores, pictures)| pictures.headways.rows().map(move |row| (scores, row)));
         Table::of(rows)
             .column("category", |(scores, _)| scores.category.key())
@@ -265,20 +214,21 @@ impl StudyReport {
             "plan_sha256": self.run.plan_sha256,
             "lanes": self.run.lanes,
             "left_out": self.run.left_out,
-            "failures": tables::failure_records(&self.scores, "")?.records(),
-            "f1": tables::f1_records(&self.scores, "").records(),
-            "claims": tables::claim_records(&self.claims, "").records(),
+            "failures": tables::failure_records(&self.evaluation.scores, "")?.records(),
+            "f1": tables::f1_records(&self.evaluation.scores, "").records(),
+            "claims": tables::claim_records(&self.evaluation.claims, "").records(),
         });
-        value["best"] = self.best.iter().map(best).collect();
-        let close = self.scores.categories.iter().zip(&self.pictures).map(|(scores, pictures)| {
-            serde_json::json!({
-                "category": scores.category.key(), "models": scores.models, "below_s": CLOSE_HEADWAY_S,
-                "counts": pictures.close_following,
-            })
-        });
+        value["best"] = self.evaluation.best.iter().map(best).collect();
+        let close =
+            self.evaluation.scores.categories.iter().zip(&self.evaluation.categories).map(|(scores, pictures)| {
+                serde_json::json!({
+                    "category": scores.category.key(), "models": scores.models, "below_s": CLOSE_HEADWAY_S,
+                    "counts": pictures.close_following,
+                })
+            });
         value["close_following"] = close.collect();
         if self.published {
-            value["published"] = published(&self.scores);
+            value["published"] = published(&self.evaluation.scores);
         }
         if let Some(comparison) = &self.comparison {
             value["reference"] = reference::table(comparison).records();

@@ -61,7 +61,7 @@ impl StudyReport {
             best.score.iter().for_each(|score| row[2] = variant_name(best.category, &score.variant));
             row
         };
-        let rows: Vec<[String; 7]> = self.best.iter().map(named).collect();
+        let rows: Vec<[String; 7]> = self.evaluation.best.iter().map(named).collect();
         Section {
             intro: format!("{}. {LEGEND}", self.size()),
             tables: vec![table(&rows).captioned(self.question())],
@@ -70,23 +70,24 @@ impl StudyReport {
     }
 
     fn size(&self) -> String {
-        let kinds = self.scores.categories.iter().map(|c| format!("{} {}s", count(c.scenarios), c.category.label()));
+        let kinds =
+            self.evaluation.scores.categories.iter().map(|c| format!("{} {}s", count(c.scenarios), c.category.label()));
         format!(
             "{}; {}, {}: {} lanes",
             kinds.collect::<Vec<_>>().join(", "),
             self.headways_in_words(),
-            counted(self.scores.categories.first().map_or(0, |c| c.models.len()), "driver"),
+            counted(self.evaluation.scores.categories.first().map_or(0, |c| c.models.len()), "driver"),
             count(self.run.lanes)
         )
     }
 
     fn question(&self) -> String {
-        let level = 100.0 * self.scores.options.confidence;
+        let level = 100.0 * self.evaluation.scores.options.confidence;
         format!("Which S' collides where S, as recorded, collides? F1 with its {level} % interval:")
     }
 
     fn rows(&self, screen: usize) -> Vec<String> {
-        let known: Vec<[String; 7]> = self.best.iter().take(MAX_ROWS).map(|best| self.row(best)).collect();
+        let known: Vec<[String; 7]> = self.evaluation.best.iter().take(MAX_ROWS).map(|best| self.row(best)).collect();
         let header = HEADER.map(str::to_owned);
         let is_sentence = |row: &[String; 7], at: usize| at == SCORE && row[SCORE + 1].is_empty();
         let width = |at: usize| {
@@ -112,7 +113,7 @@ impl StudyReport {
         if lines.iter().any(|line| line.chars().count() > screen) {
             lines = table(&known).fitted(2, screen).lines().map(str::to_owned).collect();
         }
-        let more = self.best.len().saturating_sub(MAX_ROWS);
+        let more = self.evaluation.best.len().saturating_sub(MAX_ROWS);
         if more > 0 {
             lines.push(format!("… and {} more: report.txt", count_of(more)));
         }
@@ -120,7 +121,7 @@ impl StudyReport {
     }
 
     fn row(&self, best: &Best) -> [String; 7] {
-        let min_scenarios = u64::from(self.scores.options.min_failures.max(1));
+        let min_scenarios = u64::from(self.evaluation.scores.options.min_failures.max(1));
         let name = [best.category.label(), best.model.name()].map(str::to_owned);
         let Some(score) = &best.score else {
             let scenarios = best.failing_scenarios;

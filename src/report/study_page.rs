@@ -33,7 +33,7 @@ impl StudyReport {
         }
         let mut answer = self.answer_section();
         let mut sections = Vec::new();
-        for at in 0..self.scores.categories.len() {
+        for at in 0..self.evaluation.scores.categories.len() {
             let mut section = self.category(at);
             // The figure that tells the ranking.
             answer.figures.extend((!section.figures.is_empty()).then(|| section.figures.remove(0)));
@@ -61,7 +61,7 @@ impl StudyReport {
                 sentence(&run.data),
                 count(run.lanes),
                 self.headways_in_words(),
-                self.scores.categories.first().map_or(0, |c| c.models.len()),
+                self.evaluation.scores.categories.first().map_or(0, |c| c.models.len()),
                 run.profile.name
             ),
             synthetic: run.synthetic,
@@ -107,7 +107,7 @@ impl StudyReport {
     }
 
     fn failures(&self) -> Section {
-        let table = tables::failure_table(&self.scores, self.published, "at the time cap");
+        let table = tables::failure_table(&self.evaluation.scores, self.published, "at the time cap");
         Section {
             intro: [
                 "How often each driver model fails each criterion when the recorded motions of the others are replayed \
@@ -115,7 +115,7 @@ impl StudyReport {
             ]
             .into_iter()
             .map(str::to_owned)
-            .chain(Misfit::of(&self.scores).filter(|_| self.published).map(|misfit| misfit.sentence()))
+            .chain(Misfit::of(&self.evaluation.scores).filter(|_| self.published).map(|misfit| misfit.sentence()))
             .collect::<Vec<_>>()
             .join(" "),
             tables: vec![table.captioned("Failed simulations of S")],
@@ -124,14 +124,14 @@ impl StudyReport {
     }
 
     fn category(&self, at: usize) -> Section {
-        let scores = &self.scores.categories[at];
+        let scores = &self.evaluation.scores.categories[at];
         let name = |figure: &str, end: &str| file_name(figure, scores.category, end);
         let page_figure = |(figure, drawn): (&'static str, Figure)| {
             PageFigure::new(&drawn.svg(), &[&name(figure, "svg"), &name(figure, "csv")])
         };
         let figures = self.figures(at).into_iter().map(page_figure).collect();
         let key = scores.category.key().replace('_', "-");
-        let level = value(100.0 * self.scores.options.confidence);
+        let level = value(100.0 * self.evaluation.scores.options.confidence);
         Section {
             id: key,
             title: format!("{}: agreement of S' with S", scores.category.label()),
@@ -154,8 +154,8 @@ impl StudyReport {
 
     /// `None` if no claim could be computed, for instance with a single model.
     fn claims(&self) -> Option<Section> {
-        let table = tables::claim_table(&self.claims, usize::MAX);
-        let level = value(100.0 * self.scores.options.confidence);
+        let table = tables::claim_table(&self.evaluation.claims, usize::MAX);
+        let level = value(100.0 * self.evaluation.scores.options.confidence);
         (!table.rows.is_empty()).then(|| Section {
             intro: format!(
                 "What de Gelder and Op den Camp found on highD, tested here. A cell holds or contradicts a claim where \

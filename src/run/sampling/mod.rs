@@ -21,6 +21,7 @@ mod sample_run;
 mod tally;
 mod uncertainty;
 mod weighted;
+mod worst;
 
 pub use against_recorded::RecordedRatios;
 pub use choice::Choice;
@@ -44,6 +45,7 @@ pub use sample_run::{EachChunk, SampleResult, SampleRun};
 pub use tally::{SampleTally, WorstSample};
 pub use uncertainty::Uncertainty;
 pub use weighted::WeightedTally;
+pub use worst::WorstLane;
 
 use std::path::Path;
 

@@ -2,6 +2,7 @@
 //! and scored. [`Study`] is the entry point.
 
 mod cases;
+mod evaluation;
 mod facts;
 mod given;
 mod plan;
@@ -13,6 +14,7 @@ mod run;
 
 pub use cases::StudyCases;
 pub use cases::WINDOW;
+pub use evaluation::{CategoryNumbers, StudyEvaluation};
 use facts::category_facts;
 pub use facts::{CategoryProvenance, ParameterHistogram, StudyProvenance, parameter_histograms};
 pub use given::GivenReplay;
