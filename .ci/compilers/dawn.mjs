@@ -1,4 +1,4 @@
-// Chrome's WGSL compiler on every kernel of a folder of `cargo bench --bench pipelines`, with its constants: any message, also
+// Chrome's WGSL compiler on every kernel of a folder of `pipelines`, with its constants: any message, also
 // a warning, is an error.
 import { readFileSync, readdirSync } from 'node:fs';
 import { create } from 'webgpu';

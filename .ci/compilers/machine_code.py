@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """What compilers made of the kernels: machine_code.py FOLDER CSV... [--steps CSV] [--check] [--out CSV].
 
-FOLDER is the output folder of `cargo bench --bench pipelines`, the CSV files are what that benchmark and nvidia_code.py
+FOLDER is the output folder of `pipelines`, the CSV files are what that benchmark and nvidia_code.py
 printed. Prints one row per device and kernel: registers, spills, instructions, fused operations, instructions of one
 pass of the step loop. --check fails on a spill, on more registers than the budget, and on a fused operation that can
-change a result. --steps adds the predicted lane-steps per second from the steps of a study (`--bench pipelines -- --steps`), and
+change a result. --steps adds the predicted lane-steps per second from the steps of a study (`pipelines --steps`), and
 --measured the rows of `--bench device` beside them.
 """
 import argparse

@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Kernels as NVIDIA's compiler makes them: nvidia_code.py FOLDER ARCHITECTURE... (sm_90 is H100 and H200).
 
-Reads every FOLDER/*.metal of `cargo bench --bench pipelines`, compiles it as CUDA C++ with the header beside this file
+Reads every FOLDER/*.metal of `pipelines`, compiles it as CUDA C++ with the header beside this file
 (no fused multiply-add, approximate division, as Vulkan has it), and writes the machine code to FOLDER/nvidia-ARCHITECTURE.
 Prints rows `device,kernel,statistic,value`. Vulkan's driver has another front end before the same back end, so counts are
 near those of a device, not equal. Needs the PyPI packages nvidia-cuda-nvrtc and nvidia-cuda-nvdisasm.

@@ -1,7 +1,7 @@
 //! Adding a driver model touches one Rust file, one WGSL file and one line of the registry: the example of
 //! `examples/adding-a-driver-model` is built in a copy of the sources and runs on the CPU and on a device.
 //!
-//! Ignored, because it compiles the crate a second time (a minute or two):
+//! Ignored, because it compiles the crate a second time (about a minute):
 //! `cargo test --release --test program adding_a_model:: -- --ignored`
 
 use std::collections::BTreeMap;
@@ -89,7 +89,8 @@ fn build(copy: &Path) {
     // As the dependencies have been built; CI says with which further flags.
     command.arg("--all-features").args(std::env::var_os("CARGO_SELECTION"));
     for package in packages(copy) {
-        command.args(["--config", &format!("profile.release.package.{package}.debug=false")]);
+        command.args(["--config", &format!("profile.release.package.{package}.opt-level=1")]);
+        command.args(["--config", &format!("profile.release.package.{package}.codegen-units=16")]);
     }
     command.env("CARGO_BUILD_BUILD_DIR", build_dir).env("CARGO_TARGET_DIR", target_dir());
     let output = command.output().unwrap();

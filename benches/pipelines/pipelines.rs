@@ -1,7 +1,7 @@
 //! Every kernel as a Vulkan driver compiles it: registers, spills, instructions and machine code. No lane runs, so a
 //! driver without its chip is sufficient (`.ci/compilers` names Mesa's).
 //!
-//! `cargo bench --bench pipelines -- --out FOLDER [--profile NAME]...` writes every kernel as WGSL with
+//! `cargo run --release -p lanesweep-pipelines -- --out FOLDER [--profile NAME]...` writes every kernel as WGSL with
 //! its constants, SPIR-V, HLSL and MSL to FOLDER, and below it the machine code of each device that gives it. CSV rows go to stdout: one per
 //! device, kernel and statistic of the driver. All profiles are compiled unless some are named; a kernel that two
 //! profiles share is compiled once. `--plant fused`, `spill` or `wgsl` puts in a defect that a check must find. `--steps` prints how many steps the lanes of a study and their warps make instead.
@@ -9,6 +9,7 @@
 // Vulkan's functions are unsafe: every handle comes from this file and outlives its use.
 #![allow(unsafe_code)]
 
+#[path = "../common/mod.rs"]
 mod common;
 
 use std::cmp::Reverse;
@@ -39,10 +40,6 @@ struct Kernel {
 
 fn main() {
     let args: Vec<String> = std::env::args().collect();
-    // `cargo test --benches` calls without `--bench`: nothing to compile then.
-    if !args.iter().any(|arg| arg == "--bench") {
-        return;
-    }
     let values = |flag: &str| -> Vec<&str> {
         args.windows(2).filter(|pair| pair[0] == flag).map(|pair| pair[1].as_str()).collect()
     };
