@@ -578,7 +578,7 @@ fn a_cell_is_undecided_where_the_single_case_is() {
     let grid = Grid::new(GridParts {
         fixed: vec![value(Category::CutIn, "other_speed_kmh", 30.0), value(Category::CutIn, "ego_speed_kmh", 60.0)],
         panel_axes: Vec::new(),
-        ..parts(Category::CutIn, "gap_m=8..20/0.25", "lateral_speed_mps=0.5..1.5/0.25")
+        ..parts(Category::CutIn, "gap_m=8..20/0.5", "lateral_speed_mps=0.5..1.5/0.25")
     })
     .unwrap();
     let profile = profile("un-r157");
@@ -653,8 +653,8 @@ fn a_cell_without_a_conflict_is_a_case_without_one() {
 fn tables_files_and_legends_of_a_map_count_the_same_cells() {
     let dir = tempfile::tempdir().unwrap();
     for (category, preset, more) in [
-        ("cut-in", "r157", &["--robust"][..]),
-        ("cut-out", "r157", &[]),
+        ("cut-in", "r157", &[][..]),
+        ("cut-out", "r157", &["--robust"]),
         ("lvd", "r157", &["--robust", "--against", "paper"]),
         ("cut-in", "jrc", &[]),
         ("lvd", "jrc", &[]),
