@@ -1,5 +1,6 @@
 //! The recordings that a user names: a folder or a file, in highD's format or in that of a preset.
 
+use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use super::highd::{self, HighdFiles};
@@ -58,7 +59,7 @@ impl Inputs {
                 None => Err(unknown(path)),
             };
         }
-        let Some(first) = first_track_file(path)? else { return highd_inputs(path) };
+        let Some(first) = first_track_file(path)? else { return nothing_in(path) };
         let inputs = match tracks::detect(&first) {
             Ok(Some(preset)) if !(preset.is_generic() && is_highd_name(&first)) => with(preset),
             // Its reader says what is wrong.
@@ -70,14 +71,24 @@ impl Inputs {
         inputs?.with_others(path)
     }
 
-    /// Leaves out files of a folder that are no tracks, and names those of other formats.
+    /// Leaves out files of a folder that are no tracks, and names those that could be: of other formats, compressed, and those
+    /// with the ending of the files that are read which do not fit or cannot be read.
     fn with_others(mut self, folder: &Path) -> Result<Inputs> {
         let own = self.preset().map(|preset| (preset.name.clone(), preset.format));
+        let endings: Vec<_> = match &self {
+            Inputs::Highd(_) => vec![Some(OsString::from("csv"))],
+            Inputs::Tracks { files, .. } => files.iter().map(|track| track.path.extension().map(Into::into)).collect(),
+        };
         let mut others: Vec<Error> = Vec::new();
         for file in files_of(folder)? {
             let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            if tracks::is_compressed(&file) {
+                let help = "unpack it; compressed files are not read";
+                others.push(Error::input(Place::file(&file), "it may hold tracks, and is compressed", help));
+            }
             let is_highd = own.is_none() && HIGHD_FILES.iter().any(|ending| name.ends_with(ending));
-            if is_highd || !tracks::may_hold_tracks(&file) {
+            let is_meta = self.preset().is_some_and(|preset| tracks::is_meta(&name, preset)) || is_of_sumo(&name);
+            if is_highd || is_meta || !tracks::may_hold_tracks(&file) {
                 continue;
             }
             let found = tracks::detect(&file);
@@ -90,9 +101,16 @@ impl Inputs {
             if let Inputs::Tracks { files, .. } = &mut self {
                 files.retain(|track| track.path != file);
             }
-            if let Ok(Some(other)) = found {
-                let problem = format!("it fits preset {}, the other files here do not", other.name);
-                others.push(Error::input(Place::file(&file), problem, "put it into a folder of its own"));
+            let has_ending = endings.contains(&file.extension().map(Into::into));
+            match found {
+                Ok(Some(other)) => {
+                    let problem = format!("it fits preset {}, the other files here do not", other.name);
+                    others.push(Error::input(Place::file(&file), problem, "put it into a folder of its own"));
+                }
+                // A table with few columns is a list of something else.
+                Ok(None) if has_ending && has_columns(&file) => others.push(unknown(&file)),
+                Err(error) if has_ending => others.push(error),
+                _ => {}
             }
         }
         match &mut self {
@@ -157,6 +175,8 @@ const MIN_COLUMNS: usize = 4;
 /// Endings of the files of highD's format.
 const HIGHD_FILES: [&str; 3] = [HIGHD_ENDING, "_tracksMeta.csv", "_recordingMeta.csv"];
 const HIGHD_ENDING: &str = "_tracks.csv";
+/// Files that a message lists.
+const MAX_TRIED: usize = 5;
 
 fn is_highd_name(path: &Path) -> bool {
     path.file_name().is_some_and(|name| name.to_string_lossy().ends_with(HIGHD_ENDING))
@@ -189,10 +209,46 @@ fn first_track_file(folder: &Path) -> Result<Option<PathBuf>> {
     if let Some(first) = files.iter().find(|path| is_highd_name(path)) {
         return Ok(Some(first.clone()));
     }
-    // Meta files and settings fit no preset.
-    let has_columns = |path: &&PathBuf| tracks::columns_of(path).is_ok_and(|columns| columns.len() >= MIN_COLUMNS);
     let fits = |path: &&PathBuf| tracks::detect(path).is_ok_and(|preset| preset.is_some());
-    Ok(files.iter().find(fits).or_else(|| files.iter().find(has_columns)).cloned())
+    // Meta files and settings fit no preset.
+    Ok(files.iter().find(fits).or_else(|| files.iter().find(|path| has_columns(path))).cloned())
+}
+
+fn has_columns(path: &Path) -> bool {
+    tracks::columns_of(path).is_ok_and(|columns| columns.len() >= MIN_COLUMNS)
+}
+
+/// Whether a file is one of SUMO's beside its traffic: `demo.rou.xml`.
+fn is_of_sumo(name: &str) -> bool {
+    [".rou.xml", ".net.xml", ".add.xml", ".poly.xml", ".trips.xml", ".sumo.xml"]
+        .iter()
+        .any(|ending| name.ends_with(ending))
+}
+
+/// A folder without a file that fits: says what was tried.
+fn nothing_in(folder: &Path) -> Result<Inputs> {
+    let files = files_of(folder)?;
+    let is_highd = |path: &PathBuf| HIGHD_FILES.iter().any(|ending| path.to_string_lossy().ends_with(ending));
+    if files.is_empty() || files.iter().any(is_highd) {
+        return highd_inputs(folder);
+    }
+    let tried = |path: &PathBuf| {
+        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let why = match tracks::detect(path) {
+            _ if tracks::is_compressed(path) => "compressed".to_owned(),
+            _ if !tracks::may_hold_tracks(path) => "no format of tracks".to_owned(),
+            Ok(_) => "no preset fits".to_owned(),
+            Err(error) => error.to_string(),
+        };
+        format!("{name}: {why}")
+    };
+    let more = if files.len() > MAX_TRIED { format!("; and {} more", files.len() - MAX_TRIED) } else { String::new() };
+    let tried: Vec<String> = files.iter().take(MAX_TRIED).map(tried).collect();
+    Err(Error::input(
+        Place::file(folder),
+        format!("no file here is a recording ({}{more})", tried.join("; ")),
+        "recordings are .csv, .txt, .tsv, .parquet, .xml or .json; `lanesweep tracks FILE` says more of one",
+    ))
 }
 
 fn unknown(path: &Path) -> Error {

@@ -263,13 +263,15 @@ fn track(
             let [s, v, a] = savitzky_golay(&s_m, window, rate_hz);
             let [d, vd, _] = savitzky_golay(&d_m, window, rate_hz);
             (s_m, d_m) = (s, d);
-            (about.derived_speeds, about.derived_lateral, about.derived_accelerations) = (true, true, true);
+            for count in [&mut about.derived_speeds, &mut about.derived_lateral, &mut about.derived_accelerations] {
+                *count += 1;
+            }
             (v, vd, a)
         }
         None => {
-            about.derived_speeds |= given_s.is_none();
-            about.derived_lateral |= given_d.is_none();
-            about.derived_accelerations |= given_a.is_none();
+            about.derived_speeds += u64::from(given_s.is_none());
+            about.derived_lateral += u64::from(given_d.is_none());
+            about.derived_accelerations += u64::from(given_a.is_none());
             let v_s = given_s.unwrap_or_else(|| central(&s_m, rate_hz));
             let v_d = given_d.unwrap_or_else(|| central(&d_m, rate_hz));
             let a_s = given_a.unwrap_or_else(|| central(&v_s, rate_hz));

@@ -23,7 +23,8 @@ const UNITS: [(&str, &str); 10] = [
     ("rad", "rad"),
 ];
 
-/// The text of a preset with the columns that could be guessed, and the others as comments.
+/// The text of a preset with the columns whose names tell what they are. What no name tells is a question, `"?"`, that has to
+/// be answered before the preset can be used.
 ///
 /// # Errors
 /// Those of the file; [`Error::Input`] for a file whose format is unknown.
@@ -35,9 +36,9 @@ pub fn draft(path: &Path) -> Result<String> {
     let rows = Rows::open(path, format, None, None)?;
     let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
     let mut text = format!(
-        "# A first preset for {}. Check every line; the chapter on tracks explains the keys.\n\
+        "# A first preset for {}. Answer each \"?\" and check every line; the chapter on tracks explains the keys.\n\
          name = {:?}\ntitle = {:?}\nformat = {:?}\n\
-         # Point that x and y describe: centre, front, rear, corner.\nreference = \"centre\"\n",
+         # Point that x and y describe: centre, front, rear, corner.\nreference = \"?\"\n",
         path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
         stem,
         format!("tracks like {stem}"),
@@ -69,10 +70,12 @@ pub fn draft(path: &Path) -> Result<String> {
         }
     }
     if columns.contains("frame =") && !columns.contains("time =") {
-        text.push_str("# Frames per second, because frames have no time.\nframe_rate_hz = 25.0\n");
+        text.push_str(
+            "# Frames per second: frames have no time, and nothing in the file tells it.\nframe_rate_hz = \"?\"\n",
+        );
     }
     text.push_str("# Texts that stand for no value, in any column.\nnone = [\"\", \"NA\"]\n");
-    text.push_str("\n[axes]\n# Side of +x on which +y lies: left, or right in images.\ny = \"left\"\n");
+    text.push_str("\n[axes]\n# Side of +x on which +y lies: left, or right in images.\ny = \"?\"\n");
     let _ = write!(text, "\n[columns]\n{columns}");
     let has_time = columns.contains("time =") || columns.contains("frame =");
     for key in ["vehicle", "time", "x", "y"] {

@@ -256,11 +256,16 @@ impl Understanding {
                 self.exclude(recording.tracks[*shorter].id, Exclusion::Overlap);
             }
         }
-        if let Some(slope) = edge_slope(recording).filter(|slope| slope.abs() > 0.6) {
-            self.find(true, format!(
+        match edge_slope(recording) {
+            Some((slope, error)) if slope.abs() > 0.6 && slope.abs() > 4.0 * error => self.find(true, format!(
                 "wide vehicles are beside the middle of their lanes by {} of half their width: the position is that of an edge or a corner; see `reference`",
                 significant(slope.abs(), 2)
-            ));
+            )),
+            Some((slope, _)) if slope.abs() > 0.6 => self.find(
+                false,
+                "too few vehicles to tell whether the position is that of an edge or a corner; see `reference`",
+            ),
+            _ => {}
         }
         if self.assumed_sizes > 0 {
             self.find(
@@ -356,9 +361,9 @@ impl Understanding {
     }
 }
 
-/// Slope of the mean offset from the lane's middle over half the width, of the carriageway where it is steepest; ±1 if
-/// positions are those of an edge.
-fn edge_slope(recording: &Recording) -> Option<f64> {
+/// Slope of the mean offset from the lane's middle over half the width, with its standard error, of the carriageway where it
+/// is most certain; ±1 if positions are those of an edge.
+fn edge_slope(recording: &Recording) -> Option<(f64, f64)> {
     let of = |carriageway: usize| {
         let mut pairs: Vec<(f64, f64, u16)> = Vec::new();
         for track in recording.tracks.iter().filter(|track| track.carriageway == carriageway) {
@@ -371,21 +376,26 @@ fn edge_slope(recording: &Recording) -> Option<f64> {
         }
         slope_within(&mut pairs)
     };
-    (0..recording.carriageways.len()).filter_map(of).max_by(|a, b| a.abs().total_cmp(&b.abs()))
+    (0..recording.carriageways.len()).filter_map(of).max_by(|a, b| (a.0 / a.1).abs().total_cmp(&(b.0 / b.1).abs()))
 }
 
-/// Slope within groups, so that the middles of the lanes do not matter; `None` if the widths hardly vary.
-fn slope_within(pairs: &mut [(f64, f64, u16)]) -> Option<f64> {
+/// Slope within groups, so that the middles of the lanes do not matter, and its standard error; `None` if the widths hardly
+/// vary.
+fn slope_within(pairs: &mut [(f64, f64, u16)]) -> Option<(f64, f64)> {
     pairs.sort_by(|a, b| a.2.cmp(&b.2).then(a.0.total_cmp(&b.0)).then(a.1.total_cmp(&b.1)));
-    let (mut xx, mut xy, mut n) = (0.0, 0.0, 0);
+    let (mut xx, mut xy, mut yy, mut n, mut groups) = (0.0, 0.0, 0.0, 0, 0);
     for group in pairs.chunk_by(|a, b| a.2 == b.2).filter(|group| group.len() >= MIN_VEHICLES) {
         let of = |value: fn(&(f64, f64, u16)) -> f64| group.iter().map(value).sum::<f64>() / group.len() as f64;
         let (x, y) = (of(|p| p.0), of(|p| p.1));
         for (half, offset, _) in group.iter() {
             xx += (half - x) * (half - x);
             xy += (half - x) * (offset - y);
+            yy += (offset - y) * (offset - y);
         }
         n += group.len();
+        groups += 1;
     }
-    (n >= 20 && xx / n as f64 > 0.08 * 0.08).then(|| xy / xx)
+    let slope = xy / xx;
+    let residual = (yy - slope * xy).max(0.0) / (n as f64 - f64::from(groups) - 1.0);
+    (n >= 20 && xx / n as f64 > 0.08 * 0.08).then(|| (slope, (residual / xx).sqrt()))
 }

@@ -70,6 +70,13 @@ pub(super) fn may_hold_tracks(path: &Path) -> bool {
     format_of(path).is_some()
 }
 
+/// Whether a file is a compressed one of a format of tracks.
+pub(super) fn is_compressed(path: &Path) -> bool {
+    let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
+    let packed = ending.is_some_and(|ending| ["gz", "zip", "zst", "bz2", "xz", "lz4"].contains(&ending.as_str()));
+    packed && path.file_stem().is_some_and(|stem| may_hold_tracks(Path::new(stem)))
+}
+
 /// The shipped preset that fits a file; `None` if none fits.
 ///
 /// # Errors
@@ -80,6 +87,7 @@ pub fn detect(path: &Path) -> Result<Option<Preset>> {
     let mut best: Vec<(usize, Preset)> = Vec::new();
     // By what opens the file: the element or list of rows, the delimiter.
     type HowOpened = (Option<String>, Option<char>);
+    let generic_preset = Preset::load("generic")?;
     let mut headers: Vec<(HowOpened, Result<Vec<String>>)> = Vec::new();
     for preset in Preset::shipped()? {
         if preset.is_generic() || preset.recording_of(&name).is_none() {
@@ -95,7 +103,8 @@ pub fn detect(path: &Path) -> Result<Option<Preset>> {
                 headers.push((how, Rows::of_preset(path, &preset).map(|rows| rows.header().to_vec())));
                 headers.len() - 1
             });
-            headers[at].1.as_ref().map_or(0, |header| fitting(&preset, header))
+            let is_whole = |header: &&Vec<String>| unread(&preset, &generic_preset, header).next().is_none();
+            headers[at].1.as_ref().ok().filter(is_whole).map_or(0, |header| fitting(&preset, header))
         } else {
             0
         };
@@ -130,6 +139,12 @@ fn fitting(preset: &Preset, header: &[String]) -> usize {
     // Two thirds of the columns at least, so that two formats that share the names of positions are told apart.
     let found = preset.columns.keys().filter(|role| has(**role)).count();
     if is_needed && (preset.is_generic() || 3 * found >= 2 * preset.columns.len()) { found } else { 0 }
+}
+
+/// Sizes and class that a table has by their usual names, and a preset would leave unread: the table is of another program.
+fn unread<'a>(preset: &'a Preset, usual: &Preset, header: &[String]) -> impl Iterator<Item = Role> + use<'a> {
+    let (own, usual) = (Columns::of(&preset.columns, header, &[]), Columns::of(&usual.columns, header, &[]));
+    [Role::Length, Role::Width, Role::Class].into_iter().filter(move |role| usual.has(*role) && !own.has(*role))
 }
 
 fn is_commonroad(path: &Path) -> Result<bool> {
@@ -180,7 +195,7 @@ fn is_format(path: &Path, preset: &Preset) -> bool {
 }
 
 /// Whether a file name is that of a preset's other files.
-fn is_meta(name: &str, preset: &Preset) -> bool {
+pub(super) fn is_meta(name: &str, preset: &Preset) -> bool {
     let fits = |pattern: &str| {
         let (before, after) = pattern.split_once('*').unwrap_or((pattern, ""));
         name.starts_with(before) && name.ends_with(after) && (pattern.contains('*') || name == pattern)

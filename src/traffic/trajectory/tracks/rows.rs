@@ -2,7 +2,7 @@
 //! whose cells are lists.
 
 use std::borrow::Cow;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
@@ -134,7 +134,14 @@ impl Rows {
                 return Err(Error::Internal(format!("{} is not a table of rows", path.display())));
             }
         };
-        Ok(Rows { path: path.to_path_buf(), header, source })
+        let rows = Rows { path: path.to_path_buf(), header, source };
+        let mut seen = HashSet::new();
+        // Unnamed columns are never read.
+        if let Some(twice) = rows.header.iter().find(|name| !name.is_empty() && !seen.insert(name.as_str())) {
+            let problem = format!("two columns are named `{twice}`: nothing tells which one is meant");
+            return Err(Error::input(rows.header_place(), problem, "rename one of them, or remove it"));
+        }
+        Ok(rows)
     }
 
     /// Opens the track file of a preset.

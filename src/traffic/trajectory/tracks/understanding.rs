@@ -103,12 +103,12 @@ pub struct Understanding {
     pub wander_m: f64,
     /// The directions of travel.
     pub carriageways: Vec<UnderstoodCarriageway>,
-    /// Speeds follow from positions.
-    pub derived_speeds: bool,
-    /// Lateral speeds follow from positions.
-    pub derived_lateral: bool,
-    /// Accelerations follow from speeds.
-    pub derived_accelerations: bool,
+    /// Tracks whose speeds follow from positions: where one sample has none.
+    pub derived_speeds: u64,
+    /// Tracks whose lateral speeds follow from positions.
+    pub derived_lateral: u64,
+    /// Tracks whose accelerations follow from speeds.
+    pub derived_accelerations: u64,
     /// Standard deviation of the noise of speeds, m/s.
     pub speed_noise_mps: f64,
     /// Positions over integrated speeds; 1 if they fit together.
@@ -382,7 +382,12 @@ impl Understanding {
                 ),
             ));
         }
-        let from = |derived: bool| if derived { "from positions" } else { "as given" };
+        let tracks: u64 = self.carriageways.iter().map(|of| of.tracks as u64).sum();
+        let from = |derived: u64, what: &str| match derived {
+            0 => "as given".to_owned(),
+            some if some < tracks => format!("as given, in {} of {} tracks from {what}", count(some), count(tracks)),
+            _ => format!("from {what}"),
+        };
         let fit = self.positions_over_speeds.map_or(String::new(), |ratio| {
             let percent = (100.0 * (ratio - 1.0).abs()).max(0.1);
             format!("; positions and speeds agree within {} %", significant(percent, 2))
@@ -391,9 +396,9 @@ impl Understanding {
             "speeds",
             format!(
                 "{}, lateral ones {}, accelerations {}; noise {} m/s{fit}",
-                from(self.derived_speeds),
-                from(self.derived_lateral),
-                if self.derived_accelerations { "from speeds" } else { "as given" },
+                from(self.derived_speeds, "positions"),
+                from(self.derived_lateral, "positions"),
+                from(self.derived_accelerations, "speeds"),
                 significant(self.speed_noise_mps, 2)
             ),
         ));

@@ -1,0 +1,164 @@
+//! Tables and folders of others: every file is read or named, no preset takes a table that it would read in part, and what
+//! nothing tells is asked.
+
+use std::fs;
+use std::path::Path;
+
+use lanesweep::traffic::trajectory::Inputs;
+use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
+use lanesweep::traffic::trajectory::tracks::{self, Preset, TrackFile, Understanding};
+
+use crate::common::exid::Plain;
+
+fn table() -> Plain {
+    let options = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
+    Plain::of(&generate_one(&options, 0).unwrap(), 5)
+}
+
+fn understood(table: &Plain) -> lanesweep::Result<Understanding> {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("own.csv");
+    fs::write(&path, table.text()).unwrap();
+    let preset = Preset::load("generic").unwrap();
+    let mut all = tracks::read_tracks(&TrackFile { path, id: "own".to_owned() }, &preset)?;
+    Ok(all.remove(0).understanding)
+}
+
+/// Files that are read, and the names of those that are not, of a folder.
+fn read_and_named(folder: &Path) -> (usize, Vec<String>) {
+    let (files, problems) = Inputs::of(folder, None).unwrap().files();
+    let names = |problem: &lanesweep::Error| {
+        let text = problem.to_string();
+        let of_folder = fs::read_dir(folder).unwrap().map(|file| file.unwrap().file_name().into_string().unwrap());
+        of_folder.filter(|name| text.contains(name.as_str())).max_by_key(String::len).unwrap_or(text)
+    };
+    let mut named: Vec<String> = problems.iter().map(names).collect();
+    named.sort();
+    (files.len(), named)
+}
+
+#[test]
+fn every_file_of_a_folder_is_read_or_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| fs::write(dir.path().join(name), text).unwrap();
+    let text = table().text();
+    write("a.csv", &text);
+    write("b.csv", &text.replacen(",x,", ",ort,", 1));
+    write("c.csv.gz", "packed");
+    // What is no table of tracks is not named.
+    write("README.txt", "Traffic of a bridge, in May, by us, with thanks\n");
+    write("settings.toml", "a = 1\n");
+    write("classes.csv", "class,meaning\n1,car\n");
+    assert_eq!(read_and_named(dir.path()), (1, vec!["b.csv".to_owned(), "c.csv.gz".to_owned()]));
+}
+
+#[test]
+fn an_xml_file_that_ends_early_is_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| fs::write(dir.path().join(name), text).unwrap();
+    let vehicle =
+        r#"<vehicle id="a" x="1.0" y="2.0" angle="90.0" type="car" speed="20.0" pos="1.0" lane="e_0" slope="0.0"/>"#;
+    let whole = format!("<fcd-export><timestep time=\"0.00\">{vehicle}</timestep></fcd-export>\n");
+    write("fcd.xml", &whole);
+    write("cut.xml", &whole[..whole.len() - 30]);
+    write("demo.rou.xml", "<routes><vType id=\"car\" length=\"4.5\"/></routes>\n");
+    assert_eq!(read_and_named(dir.path()), (1, vec!["cut.xml".to_owned()]));
+}
+
+#[test]
+fn a_folder_of_foreign_files_says_what_was_tried() {
+    let dir = tempfile::tempdir().unwrap();
+    fs::write(dir.path().join("a.csv"), "one,two\n1,2\n").unwrap();
+    fs::write(dir.path().join("b.csv.gz"), "packed").unwrap();
+    fs::write(dir.path().join("c.pdf"), "page").unwrap();
+    let error = Inputs::of(dir.path(), None).unwrap_err().to_string();
+    for words in ["a.csv: no preset fits", "b.csv.gz: compressed", "c.pdf: no format of tracks"] {
+        assert!(error.contains(words), "{error}");
+    }
+    assert!(!error.contains("tracksMeta"), "{error}");
+}
+
+/// SUMO's table has neither sizes nor classes: with them, it is the table of another program.
+#[test]
+fn a_table_with_sizes_is_not_taken_for_one_without() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("table.csv");
+    for (header, preset) in [
+        ("id,time,x,y,speed,lane,angle,type", "sumo-fcd"),
+        ("id,time,x,y,speed,lane,length,width,class", "generic"),
+        ("id,time,x,y,speed,lane,angle,type,length,width", "generic"),
+    ] {
+        fs::write(&path, format!("{header}\n")).unwrap();
+        let found = tracks::detect(&path).unwrap().map(|preset| preset.name);
+        assert_eq!(found.as_deref(), Some(preset), "{header}");
+    }
+}
+
+#[test]
+fn two_columns_of_one_name_are_refused() {
+    let mut twice = table();
+    let at = twice.at("y");
+    twice.header[at] = "x".to_owned();
+    let error = understood(&twice).unwrap_err();
+    assert!(error.to_string().contains("two columns are named `x`"), "{error}");
+    // Columns without a name are never read.
+    let mut unnamed = table();
+    unnamed.header.extend([String::new(), String::new()]);
+    unnamed.rows.iter_mut().for_each(|row| row.extend([String::new(), String::new()]));
+    assert!(understood(&unnamed).unwrap().is_usable());
+}
+
+#[test]
+fn a_draft_asks_what_no_name_tells() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("frames.csv");
+    let mut frames = table();
+    let at = frames.at("t");
+    frames.map("t", |t, _| (t * 30.0).round());
+    frames.header[at] = "frame".to_owned();
+    fs::write(&path, frames.text()).unwrap();
+    let draft = tracks::draft(&path).unwrap();
+    for question in ["frame_rate_hz = \"?\"", "reference = \"?\"", "y = \"?\""] {
+        assert!(draft.contains(question), "{draft}");
+    }
+    // It cannot be used before it is answered.
+    let own = dir.path().join("own.toml");
+    fs::write(&own, &draft).unwrap();
+    let error = Preset::load(&own.to_string_lossy()).unwrap_err().to_string();
+    assert!(error.contains("own.toml") && error.contains('?'), "{error}");
+    let answered = draft
+        .replace("frame_rate_hz = \"?\"", "frame_rate_hz = 30.0")
+        .replace("reference = \"?\"", "reference = \"centre\"");
+    fs::write(&own, answered.replace("y = \"?\"", "y = \"left\"")).unwrap();
+    let preset = Preset::load(&own.to_string_lossy()).unwrap();
+    let about =
+        tracks::read_tracks(&TrackFile { path, id: "own".to_owned() }, &preset).unwrap().remove(0).understanding;
+    assert_eq!(about.rate_hz, 30.0);
+}
+
+#[test]
+fn one_empty_speed_costs_one_track_its_speeds_and_no_other() {
+    let mut table = table();
+    let vx = table.at("vx");
+    table.rows[7][vx] = String::new();
+    let about = understood(&table).unwrap();
+    let speed = table.without(&["speed"]);
+    let without = understood(&speed).unwrap();
+    // The speed without direction takes its place where there is one.
+    assert_eq!((about.derived_speeds, without.derived_speeds), (0, 1));
+    assert_eq!(without.derived_lateral, 1);
+}
+
+/// In five seconds, where a vehicle keeps within its lane says little about the point that is given.
+#[test]
+fn short_recordings_are_not_refused_for_where_their_vehicles_keep_in_the_lane() {
+    let whole = table();
+    let t = whole.at("t");
+    for start in (0..200).step_by(20) {
+        let inside = |row: &Vec<String>| (start..start + 5).contains(&(row[t].parse::<f64>().unwrap() as i32));
+        let window = Plain { rows: whole.rows.iter().filter(|row| inside(row)).cloned().collect(), ..whole.clone() };
+        let about = understood(&window).unwrap();
+        let refused = about.findings.iter().find(|finding| finding.is_grave);
+        assert!(refused.is_none(), "{start} s: {refused:?}");
+    }
+}
