@@ -136,6 +136,11 @@ fn every_example_of_the_help_runs() {
             if verb == "search" && !dir.join("others").exists() {
                 run(dir, "lanesweep synth others --synth-recordings 4 --config generator.seed=2");
             }
+            // A draft asks.
+            if let Ok(draft) = std::fs::read_to_string(dir.join("own.toml")) {
+                let answered = draft.replace("reference = \"?\"", "reference = \"front\"");
+                std::fs::write(dir.join("own.toml"), answered.replace("y = \"?\"", "y = \"left\"")).unwrap();
+            }
             let output = run(dir, &smaller(&example));
             // Without a GPU `verify` says so.
             let is_without_device = verb == "verify" && output.status.code() == Some(7);
