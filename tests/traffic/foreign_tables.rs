@@ -62,6 +62,10 @@ fn an_xml_file_that_ends_early_is_named() {
     write("fcd.xml", &whole);
     write("cut.xml", &whole[..whole.len() - 30]);
     write("demo.rou.xml", "<routes><vType id=\"car\" length=\"4.5\"/></routes>\n");
+    write(
+        "demo.net.xml",
+        "<net><edge id=\"e\"><lane id=\"e_0\" index=\"0\" speed=\"30\" length=\"900\"/></edge></net>\n",
+    );
     assert_eq!(read_and_named(dir.path()), (1, vec!["cut.xml".to_owned()]));
 }
 
@@ -133,7 +137,8 @@ fn a_draft_asks_what_no_name_tells() {
     let preset = Preset::load(&own.to_string_lossy()).unwrap();
     let about =
         tracks::read_tracks(&TrackFile { path, id: "own".to_owned() }, &preset).unwrap().remove(0).understanding;
-    assert_eq!(about.rate_hz, 30.0);
+    // A row per sixth frame.
+    assert_eq!(about.rate_hz, 5.0);
 }
 
 #[test]

@@ -75,11 +75,9 @@ impl Inputs {
     /// with the ending of the files that are read which do not fit or cannot be read.
     fn with_others(mut self, folder: &Path) -> Result<Inputs> {
         let own = self.preset().map(|preset| (preset.name.clone(), preset.format));
-        let endings: Vec<_> = match &self {
-            Inputs::Highd(_) => vec![Some(OsString::from("csv"))],
-            Inputs::Tracks { files, .. } => files.iter().map(|track| track.path.extension().map(Into::into)).collect(),
-        };
         let mut others: Vec<Error> = Vec::new();
+        let mut endings = vec![own.is_none().then(|| OsString::from("csv"))];
+        let mut foreign = Vec::new();
         for file in files_of(folder)? {
             let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
             if tracks::is_compressed(&file) {
@@ -87,22 +85,25 @@ impl Inputs {
                 others.push(Error::input(Place::file(&file), "it may hold tracks, and is compressed", help));
             }
             let is_highd = own.is_none() && HIGHD_FILES.iter().any(|ending| name.ends_with(ending));
-            let is_meta = self.preset().is_some_and(|preset| tracks::is_meta(&name, preset)) || is_of_sumo(&name);
+            let is_meta = self.preset().is_some_and(|preset| tracks::is_meta(&name, preset));
             if is_highd || is_meta || !tracks::may_hold_tracks(&file) {
                 continue;
             }
             let found = tracks::detect(&file);
-            let is_own = found
-                .as_ref()
-                .is_ok_and(|found| found.as_ref().map(|preset| (preset.name.clone(), preset.format)) == own);
-            if is_own && own.is_some() {
-                continue;
+            let fits = |found: &Option<Preset>| found.as_ref().map(|of| (of.name.clone(), of.format)) == own;
+            if own.is_some() && found.as_ref().is_ok_and(fits) {
+                endings.push(file.extension().map(Into::into));
+            } else {
+                foreign.push((file, found));
             }
+        }
+        for (file, found) in foreign {
             if let Inputs::Tracks { files, .. } = &mut self {
                 files.retain(|track| track.path != file);
             }
             let has_ending = endings.contains(&file.extension().map(Into::into));
             match found {
+                _ if is_of_sumo(&file) => {}
                 Ok(Some(other)) => {
                     let problem = format!("it fits preset {}, the other files here do not", other.name);
                     others.push(Error::input(Place::file(&file), problem, "put it into a folder of its own"));
@@ -219,7 +220,8 @@ fn has_columns(path: &Path) -> bool {
 }
 
 /// Whether a file is one of SUMO's beside its traffic: `demo.rou.xml`.
-fn is_of_sumo(name: &str) -> bool {
+fn is_of_sumo(path: &Path) -> bool {
+    let name = path.to_string_lossy();
     [".rou.xml", ".net.xml", ".add.xml", ".poly.xml", ".trips.xml", ".sumo.xml"]
         .iter()
         .any(|ending| name.ends_with(ending))
