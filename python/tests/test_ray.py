@@ -12,15 +12,9 @@ import lanesweep
 import pytest
 from lanesweep import parts
 
-# Not a test of Ray: without it this file is left out.
 ray = pytest.importorskip("ray")
 from lanesweep import ray as on_ray  # noqa: E402
-
-FILES = ["estimates.csv", "worst.csv", "convergence.csv", "convergence.svg"]
-
-
-def contents(result: lanesweep.Result) -> dict[str, bytes]:
-    return {name: (Path(result) / name).read_bytes() for name in FILES}
+from test_parts import FILES, contents  # noqa: E402
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -56,7 +50,7 @@ def test_a_run_on_ray_whose_worker_is_killed_has_the_bytes_of_the_whole(density)
     result = on_ray.sample(density, **options, shards=8)
     thread.join()
     assert killed or not Path("/proc").is_dir()
-    assert contents(result) == contents(whole)
+    assert contents(result, FILES) == contents(whole, FILES)
 
 
 def test_a_limit_state_on_ray_is_the_limit_state(density) -> None:

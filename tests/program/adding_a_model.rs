@@ -1,7 +1,7 @@
 //! Adding a driver model touches one Rust file, one WGSL file and one line of the registry: the example of
 //! `examples/adding-a-driver-model` is built in a copy of the sources and runs on the CPU and on a device.
 //!
-//! Ignored, because it compiles the crate a second time (about a minute):
+//! Ignored, because it compiles our crates a second time (minutes):
 //! `cargo test --release --test program adding_a_model:: -- --ignored`
 
 use std::collections::BTreeMap;

@@ -622,7 +622,7 @@ fn a_cell_without_a_conflict_is_a_case_without_one() {
                 let map = swept(&GridPlan::new(grid.clone(), &profile, &models).unwrap());
                 for (at, &model) in models.iter().enumerate() {
                     // A prime number of cells apart: all panels, gaps and speeds.
-                    for cell in (0..grid.cell_count()).step_by(797) {
+                    for cell in (0..grid.cell_count()).step_by(499) {
                         let point = grid.point(cell);
                         let plain = point.plain_case(category, &profile).unwrap();
                         let headway = Headway::GapM(grid.gap_m(cell, model, &profile));
@@ -645,7 +645,7 @@ fn a_cell_without_a_conflict_is_a_case_without_one() {
             }
         }
     }
-    assert!(compared.iter().all(|cases| *cases > 30), "{compared:?}");
+    assert!(compared.iter().all(|cases| *cases > 50), "{compared:?}");
 }
 
 /// Terminal, `map.json`, the sheet's legend and `cells.csv` count the same cells with the same words, for every preset.

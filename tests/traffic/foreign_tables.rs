@@ -5,23 +5,13 @@ use std::fs;
 use std::path::Path;
 
 use lanesweep::traffic::trajectory::Inputs;
-use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
-use lanesweep::traffic::trajectory::tracks::{self, Preset, TrackFile, Understanding};
+use lanesweep::traffic::trajectory::tracks::{self, Preset, TrackFile};
 
 use crate::common::exid::Plain;
+use crate::tracks::{generated, understood};
 
 fn table() -> Plain {
-    let options = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
-    Plain::of(&generate_one(&options, 0).unwrap(), 5)
-}
-
-fn understood(table: &Plain) -> lanesweep::Result<Understanding> {
-    let dir = tempfile::tempdir().unwrap();
-    let path = dir.path().join("own.csv");
-    fs::write(&path, table.text()).unwrap();
-    let preset = Preset::load("generic").unwrap();
-    let mut all = tracks::read_tracks(&TrackFile { path, id: "own".to_owned() }, &preset)?;
-    Ok(all.remove(0).understanding)
+    Plain::of(&generated(), 5)
 }
 
 /// Files that are read, and the names of those that are not, of a folder.
@@ -103,13 +93,13 @@ fn two_columns_of_one_name_are_refused() {
     let mut twice = table();
     let at = twice.at("y");
     twice.header[at] = "x".to_owned();
-    let error = understood(&twice).unwrap_err();
+    let error = understood(&twice, &|_| ()).unwrap_err();
     assert!(error.to_string().contains("two columns are named `x`"), "{error}");
     // Columns without a name are never read.
     let mut unnamed = table();
     unnamed.header.extend([String::new(), String::new()]);
     unnamed.rows.iter_mut().for_each(|row| row.extend([String::new(), String::new()]));
-    assert!(understood(&unnamed).unwrap().is_usable());
+    assert!(understood(&unnamed, &|_| ()).unwrap().is_usable());
 }
 
 #[test]
@@ -146,23 +136,23 @@ fn one_empty_speed_costs_one_track_its_speeds_and_no_other() {
     let mut table = table();
     let vx = table.at("vx");
     table.rows[7][vx] = String::new();
-    let about = understood(&table).unwrap();
+    let about = understood(&table, &|_| ()).unwrap();
     let speed = table.without(&["speed"]);
-    let without = understood(&speed).unwrap();
+    let without = understood(&speed, &|_| ()).unwrap();
     // The speed without direction takes its place where there is one.
     assert_eq!((about.derived_speeds, without.derived_speeds), (0, 1));
     assert_eq!(without.derived_lateral, 1);
 }
 
-/// In five seconds, where a vehicle keeps within its lane says little about the point that is given.
+/// In five seconds, the places of vehicles within their lanes say little about the point that is given.
 #[test]
-fn short_recordings_are_not_refused_for_where_their_vehicles_keep_in_the_lane() {
+fn short_recordings_are_not_refused_for_the_places_of_vehicles_within_their_lanes() {
     let whole = table();
     let t = whole.at("t");
     for start in (0..200).step_by(20) {
         let inside = |row: &Vec<String>| (start..start + 5).contains(&(row[t].parse::<f64>().unwrap() as i32));
         let window = Plain { rows: whole.rows.iter().filter(|row| inside(row)).cloned().collect(), ..whole.clone() };
-        let about = understood(&window).unwrap();
+        let about = understood(&window, &|_| ()).unwrap();
         let refused = about.findings.iter().find(|finding| finding.is_grave);
         assert!(refused.is_none(), "{start} s: {refused:?}");
     }

@@ -15,7 +15,7 @@ use lanesweep::traffic::trajectory::{Carriageway, Inputs, Loaded, NO_LANE, Recor
 
 use crate::common::exid::{self, Plain};
 
-fn generated() -> Recording {
+pub fn generated() -> Recording {
     let options = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
     generate_one(&options, 0).unwrap()
 }
@@ -130,7 +130,7 @@ fn merging_from_an_on_ramp_of_a_curved_road_is_a_cut_in() {
 }
 
 /// What is understood of a table under the generic preset, changed.
-fn understood(table: &Plain, change: &dyn Fn(&mut Preset)) -> lanesweep::Result<Understanding> {
+pub fn understood(table: &Plain, change: &dyn Fn(&mut Preset)) -> lanesweep::Result<Understanding> {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("own.csv");
     std::fs::write(&path, table.text()).unwrap();

@@ -71,12 +71,12 @@ impl Inputs {
         inputs?.with_others(path)
     }
 
-    /// Leaves out files of a folder that are no tracks, and names those that could be: of other formats, compressed, and those
-    /// with the ending of the files that are read which do not fit or cannot be read.
+    /// Leaves out files of a folder that are no tracks. Names those that could be tracks: files of another preset, compressed
+    /// files, and files that do not fit or cannot be opened although they have the ending of those that are read.
     fn with_others(mut self, folder: &Path) -> Result<Inputs> {
         let own = self.preset().map(|preset| (preset.name.clone(), preset.format));
         let mut others: Vec<Error> = Vec::new();
-        let mut endings = vec![own.is_none().then(|| OsString::from("csv"))];
+        let mut endings: Vec<OsString> = own.is_none().then(|| "csv".into()).into_iter().collect();
         let mut foreign = Vec::new();
         for file in files_of(folder)? {
             let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
@@ -84,7 +84,7 @@ impl Inputs {
                 let help = "unpack it; compressed files are not read";
                 others.push(Error::input(Place::file(&file), "it may hold tracks, and is compressed", help));
             }
-            let is_highd = own.is_none() && HIGHD_FILES.iter().any(|ending| name.ends_with(ending));
+            let is_highd = own.is_none() && is_of_highd(&file);
             let is_meta = self.preset().is_some_and(|preset| tracks::is_meta(&name, preset));
             if is_highd || is_meta || !tracks::may_hold_tracks(&file) {
                 continue;
@@ -92,7 +92,7 @@ impl Inputs {
             let found = tracks::detect(&file);
             let fits = |found: &Option<Preset>| found.as_ref().map(|of| (of.name.clone(), of.format)) == own;
             if own.is_some() && found.as_ref().is_ok_and(fits) {
-                endings.push(file.extension().map(Into::into));
+                endings.extend(file.extension().map(Into::into));
             } else {
                 foreign.push((file, found));
             }
@@ -101,7 +101,7 @@ impl Inputs {
             if let Inputs::Tracks { files, .. } = &mut self {
                 files.retain(|track| track.path != file);
             }
-            let has_ending = endings.contains(&file.extension().map(Into::into));
+            let has_ending = file.extension().is_some_and(|ending| endings.iter().any(|known| known == ending));
             match found {
                 _ if is_of_sumo(&file) => {}
                 Ok(Some(other)) => {
@@ -221,17 +221,23 @@ fn has_columns(path: &Path) -> bool {
 
 /// Whether a file is one of SUMO's beside its traffic: `demo.rou.xml`.
 fn is_of_sumo(path: &Path) -> bool {
-    let name = path.to_string_lossy();
-    [".rou.xml", ".net.xml", ".add.xml", ".poly.xml", ".trips.xml", ".sumo.xml"]
-        .iter()
-        .any(|ending| name.ends_with(ending))
+    ends_with_any(path, &[".rou.xml", ".net.xml", ".add.xml", ".poly.xml", ".trips.xml"])
 }
 
-/// A folder without a file that fits: says what was tried.
+/// Whether a file has a name of highD's format.
+fn is_of_highd(path: &Path) -> bool {
+    ends_with_any(path, &HIGHD_FILES)
+}
+
+fn ends_with_any(path: &Path, endings: &[&str]) -> bool {
+    let name = path.to_string_lossy();
+    endings.iter().any(|ending| name.ends_with(ending))
+}
+
+/// The error about a folder without a file that fits: it says what was tried.
 fn nothing_in(folder: &Path) -> Result<Inputs> {
     let files = files_of(folder)?;
-    let is_highd = |path: &PathBuf| HIGHD_FILES.iter().any(|ending| path.to_string_lossy().ends_with(ending));
-    if files.is_empty() || files.iter().any(is_highd) {
+    if files.is_empty() || files.iter().any(|path| is_of_highd(path)) {
         return highd_inputs(folder);
     }
     let tried = |path: &PathBuf| {

@@ -23,8 +23,8 @@ const UNITS: [(&str, &str); 10] = [
     ("rad", "rad"),
 ];
 
-/// The text of a preset with the columns whose names tell what they are. What no name tells is a question, `"?"`, that has to
-/// be answered before the preset can be used.
+/// The text of a preset with the columns whose names tell what they are. What no name tells is a question, `"?"`: its user
+/// answers it before the preset can be read.
 ///
 /// # Errors
 /// Those of the file; [`Error::Input`] for a file whose format is unknown.

@@ -87,12 +87,9 @@ pub fn detect(path: &Path) -> Result<Option<Preset>> {
     let mut best: Vec<(usize, Preset)> = Vec::new();
     // By what opens the file: the element or list of rows, the delimiter.
     type HowOpened = (Option<String>, Option<char>);
-    let generic_preset = Preset::load("generic")?;
     let mut headers: Vec<(HowOpened, Result<Vec<String>>)> = Vec::new();
-    for preset in Preset::shipped()? {
-        if preset.is_generic() || preset.recording_of(&name).is_none() {
-            continue;
-        }
+    let (usual, shipped): (Vec<Preset>, Vec<Preset>) = Preset::shipped()?.into_iter().partition(Preset::is_generic);
+    for preset in shipped.into_iter().filter(|preset| preset.recording_of(&name).is_some()) {
         let score = if preset.format == FileFormat::Commonroad {
             usize::from(format == FileFormat::Xml && is_commonroad(path)?) * 100
         } else if preset.format == format {
@@ -103,7 +100,8 @@ pub fn detect(path: &Path) -> Result<Option<Preset>> {
                 headers.push((how, Rows::of_preset(path, &preset).map(|rows| rows.header().to_vec())));
                 headers.len() - 1
             });
-            let is_whole = |header: &&Vec<String>| unread(&preset, &generic_preset, header).next().is_none();
+            let is_whole =
+                |header: &&Vec<String>| usual.iter().all(|usual| reads_sizes_and_class(&preset, usual, header));
             headers[at].1.as_ref().ok().filter(is_whole).map_or(0, |header| fitting(&preset, header))
         } else {
             0
@@ -141,10 +139,11 @@ fn fitting(preset: &Preset, header: &[String]) -> usize {
     if is_needed && (preset.is_generic() || 3 * found >= 2 * preset.columns.len()) { found } else { 0 }
 }
 
-/// Sizes and class that a table has by their usual names, and a preset would leave unread: the table is of another program.
-fn unread<'a>(preset: &'a Preset, usual: &Preset, header: &[String]) -> impl Iterator<Item = Role> + use<'a> {
+/// Whether a preset reads the sizes and the class that a table has under their usual names. If not, another program wrote the
+/// table.
+fn reads_sizes_and_class(preset: &Preset, usual: &Preset, header: &[String]) -> bool {
     let (own, usual) = (Columns::of(&preset.columns, header, &[]), Columns::of(&usual.columns, header, &[]));
-    [Role::Length, Role::Width, Role::Class].into_iter().filter(move |role| usual.has(*role) && !own.has(*role))
+    [Role::Length, Role::Width, Role::Class].into_iter().all(|role| own.has(role) || !usual.has(role))
 }
 
 fn is_commonroad(path: &Path) -> Result<bool> {
