@@ -1,5 +1,6 @@
 //! `lanesweep tracks`: what is in a track file? Reads it, checks it against itself, draws and converts it.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use clap::Args;
@@ -9,10 +10,10 @@ use super::configured::Configured;
 use super::format::FormatFlag;
 use crate::report::tracks::{TrackReport, across, space_time};
 use crate::support::files::{check_folder, write_atomically};
-use crate::support::run_dir::OutputDir;
+use crate::support::run_dir::{OutputDir, unfinished};
 use crate::support::table::{Table, TableMetadata};
 use crate::traffic::mining::{CategoryCount, counts, mine};
-use crate::traffic::trajectory::highd::{self, HighdFiles, RecordingInfo};
+use crate::traffic::trajectory::highd::{self, HighdFiles, RecordingInfo, SYNTHETIC_MARKER};
 use crate::traffic::trajectory::tracks::{LoadedTracks, Preset, SYNTHETIC, Understanding, draft, read_tracks};
 use crate::traffic::trajectory::{InputFile, Inputs, NO_LANE, Recording, Track, VehicleClass};
 use crate::{Error, Place, Result};
@@ -89,7 +90,7 @@ impl Tracks {
             write_figures(out, &reports, &recordings)?;
         }
         if let Some(to) = &self.convert {
-            convert(to, &recordings)?;
+            convert(to, &reports, &recordings)?;
         }
         let json = || {
             serde_json::to_string_pretty(&reports).map_err(|error| Error::Internal(format!("tracks as JSON: {error}")))
@@ -171,27 +172,16 @@ fn write_figures(out: &Path, reports: &[TrackReport], recordings: &[Recording]) 
 }
 
 /// Writes recordings in highD's format, or as one table.
-fn convert(to: &Path, recordings: &[Recording]) -> Result<()> {
-    let is_table = to.extension().is_some();
-    let name = |at: usize, recording: &Recording| {
-        // Numbers as highD has them, unless the names are such.
-        let is_number = recording.id.parse::<u32>().is_ok();
-        if is_number { recording.id.clone() } else { format!("{:02}", at + 1) }
-    };
-    let files = recordings.iter().enumerate().map(|(at, recording)| HighdFiles::named(to, &name(at, recording)).tracks);
-    let taken =
-        if is_table { Some(to.to_path_buf()) } else { None }.into_iter().chain(files).find(|file| file.exists());
-    if let Some(file) = taken {
-        let problem = "it exists, and would be replaced";
-        return Err(Error::usage(Place::file(file), problem, "choose another name, or remove it"));
+fn convert(to: &Path, reports: &[TrackReport], recordings: &[Recording]) -> Result<()> {
+    if to.extension().is_none() {
+        return convert_to_highd(to, reports, recordings);
     }
-    if !is_table {
-        for (at, recording) in recordings.iter().enumerate() {
-            let id = name(at, recording);
-            highd::write(to, &Recording { id, ..recording.clone() }, &RecordingInfo::default())?;
-        }
-        tracing::info!("{} recordings written to {}", recordings.len(), to.display());
-        return Ok(());
+    if to.exists() {
+        return Err(Error::usage(
+            Place::file(to),
+            "it exists, and would be replaced",
+            "choose another name, or remove it",
+        ));
     }
     // In one plane: x along the forward carriageway, y to its left.
     let way = |recording: &Recording, track: &Track| {
@@ -227,4 +217,55 @@ fn convert(to: &Path, recordings: &[Recording]) -> Result<()> {
         .save(to, &TableMetadata { table: "tracks", profile: None, plan_sha256: None, synthetic })?;
     tracing::info!("table written to {}", to.display());
     Ok(())
+}
+
+/// Record of a conversion: which recording became which.
+const CONVERTED: &str = "converted.json";
+
+/// Writes recordings in highD's format: all of them, or none.
+fn convert_to_highd(to: &Path, reports: &[TrackReport], recordings: &[Recording]) -> Result<()> {
+    let folder = OutputDir::open(to, CONVERTED)?;
+    let unfinished = unfinished(to).unwrap_or_default();
+    let names = names(recordings);
+    let is_foreign = |file: &PathBuf| file.exists() && !unfinished.iter().any(|name| file.ends_with(name));
+    let files = names.iter().flat_map(|id| InputFile::Highd(HighdFiles::named(to, id)).paths());
+    if let Some(file) = files.into_iter().find(is_foreign) {
+        let name = file.file_name().unwrap_or_default().to_string_lossy();
+        let problem = format!("it already holds `{name}`, which would be overwritten");
+        return Err(Error::usage(Place::file(to), problem, "choose an empty folder"));
+    }
+    let mut results = folder.results()?;
+    for (recording, id) in recordings.iter().zip(&names) {
+        let staged = highd::stage(to, &Recording { id: id.clone(), ..recording.clone() }, &RecordingInfo::default())?;
+        staged.into_iter().for_each(|file| results.join(file.closed()));
+    }
+    if recordings.iter().any(|recording| recording.synthetic) {
+        results.add(SYNTHETIC_MARKER, b"SYNTHETIC DATA: converted from generated recordings\n")?;
+    }
+    let converted = recordings.iter().zip(&names).zip(reports).map(|((recording, id), report)| {
+        serde_json::json!({"recording": id, "of": recording.id, "file": report.file, "vehicles_renumbered": report.understanding.renumbered})
+    });
+    let record = serde_json::json!({
+        "program": format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
+        "files": results.names(),
+        "recordings": converted.collect::<Vec<_>>(),
+    });
+    let record =
+        serde_json::to_vec_pretty(&record).map_err(|error| Error::Internal(format!("{CONVERTED}: {error}")))?;
+    results.publish(&record)?;
+    tracing::info!("{} recordings written to {}; {CONVERTED} has their former names", recordings.len(), to.display());
+    Ok(())
+}
+
+/// Numbers as highD's recordings have them: those that recordings have already, once each, and free ones for the others.
+fn names(recordings: &[Recording]) -> Vec<String> {
+    let number = |recording: &Recording| recording.id.parse::<u32>().ok();
+    let mut taken = BTreeSet::new();
+    let is_own: Vec<bool> = recordings.iter().map(|of| number(of).is_some_and(|number| taken.insert(number))).collect();
+    let mut free = (1..).filter(|number| !taken.contains(number));
+    let named = recordings.iter().zip(is_own).map(|(recording, is_own)| match is_own {
+        true => recording.id.clone(),
+        false => format!("{:02}", free.next().unwrap_or_default()),
+    });
+    named.collect()
 }

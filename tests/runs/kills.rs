@@ -34,9 +34,15 @@ const fn verb(
     Verb { name, record, older, run }
 }
 
+impl Verb {
+    fn makes_recordings(&self) -> bool {
+        ["synth", "tracks --convert"].contains(&self.name)
+    }
+}
+
 const SAMPLE: &str = "sample d.json --thw 0.6 --models RSS --samples 3000 --worst 3 --out out";
 
-const VERBS: [Verb; 16] = [
+const VERBS: [Verb; 17] = [
     verb(
         "study",
         Some("run.json"),
@@ -123,6 +129,7 @@ const VERBS: [Verb; 16] = [
         "fit --synth-recordings 3 --categories cut-in --no-comparison --config fit.valid_draws=1000 --out out",
     ),
     verb("synth", Some("SYNTHETIC.txt"), None, "synth out --synth-recordings 3 --config generator.duration_s=30"),
+    verb("tracks --convert", Some("converted.json"), None, "tracks recordings --convert out"),
     verb(
         "export",
         Some("index.csv"),
@@ -188,6 +195,7 @@ fn furnish(dir: &Path) {
     done(dir, "study --plan plan/plan.json --shard 1/2 --out parts");
     done(dir, "sample d.json --estimator is --samples 100 --out pilot --thw 0.6 --models RSS");
     done(dir, "study --synth-recordings 1 --config generator.duration_s=200 --categories cut-in --out old-study");
+    done(dir, "synth recordings --synth-recordings 2 --config generator.duration_s=60");
     let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/examples");
     std::fs::copy(examples.join("cut-in-stochastic.xosc"), dir.join("d.xosc")).unwrap();
 }
@@ -269,7 +277,9 @@ fn a_killed_run_of_any_verb_leaves_one_runs_files_and_ends_as_if_undisturbed() {
                 }
             }
         }
-        if verb.name == "synth" && !out.join("SYNTHETIC.txt").exists() {
+        // Recordings are read by other verbs: all of them, or none.
+        let is_whole = verb.record.is_some_and(|record| out.join(record).exists());
+        if verb.makes_recordings() && !is_whole {
             for reader in ["mine out", "study out --out elsewhere"] {
                 let (code, said) = ended(start(dir, reader));
                 let said = flat(&said);
@@ -277,7 +287,7 @@ fn a_killed_run_of_any_verb_leaves_one_runs_files_and_ends_as_if_undisturbed() {
                 assert!(said.contains("synth") || said.contains("no recording"), "{what}: {said}");
             }
         }
-        let is_whole_data = verb.name == "synth" && out.join("SYNTHETIC.txt").exists();
+        let is_whole_data = verb.makes_recordings() && is_whole;
         if !is_whole_data {
             done(dir, verb.run);
         }

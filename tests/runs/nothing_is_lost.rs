@@ -414,3 +414,38 @@ fn a_file_of_recorded_and_made_up_scenarios_is_made_up_and_one_of_recorded_ones_
         assert_eq!(String::from_utf8_lossy(&study.stdout).contains("SYNTHETIC DATA"), is_made_up);
     }
 }
+
+#[test]
+fn converted_recordings_of_one_name_stay_apart_and_made_up_and_replace_no_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    let (first, second, out) = (at("v1"), at("v2"), at("out"));
+    for (folder, seed) in [(&first, "generator.seed=1"), (&second, "generator.seed=2")] {
+        let small = ["--synth-recordings", "2", "--config", "generator.duration_s=60", "--config", seed];
+        assert!(lanesweep(&[&["-q", "synth", text(folder)], &small[..]].concat()).status.success());
+    }
+    let convert = ["-q", "tracks", text(&first), text(&second), "--convert", text(&out)];
+    // A file of the user's with the name of one of them.
+    std::fs::create_dir(&out).unwrap();
+    std::fs::write(out.join("03_tracksMeta.csv"), "mine").unwrap();
+    refused(&convert, "already holds `03_tracksMeta.csv`");
+    assert_eq!(std::fs::read_to_string(out.join("03_tracksMeta.csv")).unwrap(), "mine");
+    std::fs::remove_file(out.join("03_tracksMeta.csv")).unwrap();
+    assert!(lanesweep(&convert).status.success());
+    let record: serde_json::Value =
+        serde_json::from_slice(&std::fs::read(out.join("converted.json")).unwrap()).unwrap();
+    let names = record["recordings"].as_array().unwrap().iter().map(|of| (of["recording"].clone(), of["of"].clone()));
+    let pairs = [("01", "01"), ("02", "02"), ("03", "01"), ("04", "02")];
+    assert!(names.eq(pairs.map(|(name, of)| (name.into(), of.into()))), "{record}");
+    // The scenarios of all four are found, and said to be made up.
+    let mined = |folder: &Path| {
+        let file = at("mined.jsonl");
+        let ran = lanesweep(&["-q", "mine", text(folder), "--out", text(&file)]);
+        assert!(ran.status.success(), "{ran:?}");
+        std::fs::read_to_string(file).unwrap().lines().count()
+    };
+    assert_eq!(mined(&out), mined(&first) + mined(&second));
+    let mined = std::fs::read_to_string(at("mined.jsonl")).unwrap();
+    assert!(mined.lines().all(|line| is_synthetic(line.as_bytes())));
+    refused(&convert, "already holds");
+}
