@@ -9,7 +9,7 @@ use super::raw::{NO_LABEL, RawRecording, RawSample, RawVehicle};
 use super::road::{OnRoad, Path, RoadLine, cross, dot, median};
 use super::roles::Role;
 use super::smooth::{central, savitzky_golay};
-use super::understanding::{Exclusion, Understanding, UnderstoodCarriageway};
+use super::understanding::{Comparison, Exclusion, Understanding, UnderstoodCarriageway};
 use crate::support::plausibility::NOISE_MPS;
 use crate::traffic::trajectory::{Carriageway, NO_LANE, Recording, Track};
 use crate::{Error, Place, Result};
@@ -325,11 +325,11 @@ fn label_mismatch(placed: &[Placed], carriageways: &[Carriageway], index: [usize
     (all > 0).then(|| 1.0 - fitting as f64 / all as f64)
 }
 
-/// Median cosine between headings and motion, and the sign with which headings follow lateral motion.
-fn heading_facts(placed: &[Placed], rate_hz: f64) -> Option<(f64, f64)> {
+/// Median cosine between headings and motion, and how headings follow the motion across the road.
+fn heading_facts(placed: &[Placed], rate_hz: f64) -> Option<(f64, Comparison)> {
     let stride = rate_hz.round().max(1.0) as usize;
     let mut cosines = Vec::new();
-    let (mut product, mut of_motion, mut of_heading) = (0.0, 0.0, 0.0);
+    let mut across = Comparison::default();
     for of in placed {
         for k in (stride..of.on.len()).step_by(stride) {
             let (before, now) = (&of.piece.samples[k - stride], &of.piece.samples[k]);
@@ -342,10 +342,8 @@ fn heading_facts(placed: &[Placed], rate_hz: f64) -> Option<(f64, f64)> {
             let motion = [motion[0] / size, motion[1] / size];
             cosines.push(dot(motion, middle.heading));
             let tangent = of.on[k - stride / 2].tangent;
-            let (a, b) = (cross(tangent, motion), cross(tangent, middle.heading));
-            (product, of_motion, of_heading) = (product + a * b, of_motion + a * a, of_heading + b * b);
+            across.add(cross(tangent, middle.heading), cross(tangent, motion));
         }
     }
-    let strength = (of_motion * of_heading).sqrt();
-    (cosines.len() >= 20).then(|| (median(&mut cosines), if strength > 0.0 { product / strength } else { 0.0 }))
+    (cosines.len() >= 20).then(|| (median(&mut cosines), across))
 }

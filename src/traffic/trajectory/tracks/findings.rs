@@ -17,6 +17,8 @@ const JUMP_ACROSS_M: f64 = 0.8;
 const MAX_OVERLAPPING: f64 = 0.1;
 /// Fraction of vehicles that cross the road from which on it is no motorway.
 const MAX_ACROSS: f64 = 0.15;
+/// Samples of lorries, and of cars, from which on their lanes are compared.
+const MIN_SAMPLES: usize = 500;
 /// Fewer vehicles prove nothing.
 const MIN_VEHICLES: usize = 5;
 
@@ -56,17 +58,15 @@ impl Understanding {
                 );
             }
         }
-        let [product, of_told, of_change] = self.acceleration_sums;
-        let seconds = f64::from(self.acceleration_seconds);
+        let told = self.acceleration;
         // Below 0.1 m/s in a second there is nothing to compare.
-        if seconds > 50.0 && of_told.max(of_change) > 0.01 * seconds {
-            let slope = product / of_told.max(1e-12);
-            let size = libm::sqrt(of_told / of_change.max(1e-12));
-            if product < 0.0 || !(0.4..=2.5).contains(&size) {
+        if told.count > 50.0 && told.of_given.max(told.of_derived) > 0.01 * told.count {
+            let size = libm::sqrt(told.of_given / told.of_derived.max(1e-12));
+            if told.is_opposite() || !(0.4..=2.5).contains(&size) {
                 self.find(true, format!(
                     "accelerations do not fit the changes of speed (they are {} times as large, {}): check their unit and sign",
                     significant(size, 2),
-                    if slope < 0.0 { "of the other sign" } else { "of the same sign" }
+                    if told.product < 0.0 { "of the other sign" } else { "of the same sign" }
                 ));
             }
         }
@@ -150,9 +150,7 @@ impl Understanding {
     }
 
     pub(super) fn check_axes(&mut self, recording: &Recording, preset: &Preset) {
-        let [product, of_change, of_given] = self.lateral_sums;
-        let strength = (of_change * of_given).sqrt();
-        if strength > 0.0 && product < -0.5 * strength && recording.tracks.len() >= MIN_VEHICLES {
+        if self.lateral.correlation() < -0.5 && self.lateral.is_opposite() && recording.tracks.len() >= MIN_VEHICLES {
             self.find(true, "vehicles move across the road against their lateral speeds: y, or the lateral speed, is mirrored; see `axes.y`");
         }
         if let Some((cosine, lateral)) = self.heading_facts {
@@ -161,7 +159,7 @@ impl Understanding {
                     "headings and motion differ (median cosine {}): check the unit of the heading, and `axes.heading` (from-x or from-north)",
                     significant(cosine, 2)
                 ));
-            } else if lateral < -0.3 {
+            } else if lateral.slope() < -0.3 && lateral.correlation() < -0.3 && lateral.is_opposite() {
                 self.find(
                     true,
                     "headings turn against the motion across the road: y, or the heading, is mirrored; see `axes.y`",
@@ -209,16 +207,28 @@ impl Understanding {
 
     /// Lorries drive on the slow side.
     fn check_slow_side(&mut self, recording: &Recording, preset: &Preset, keeps: &str) {
+        // Mean over the vehicles, and the square of its standard error.
         let mean_lane = |class: VehicleClass| {
-            let of = recording.tracks.iter().filter(|track| track.class == class);
-            let lanes: Vec<f64> = of
-                .flat_map(|track| {
-                    track.lane.iter().step_by(25).filter(|lane| **lane != NO_LANE).map(|lane| f64::from(*lane))
-                })
-                .collect();
-            (lanes.len() >= 20).then(|| lanes.iter().sum::<f64>() / lanes.len() as f64)
+            let known = |track: &&Track| track.class == class && track.lane.iter().any(|lane| *lane != NO_LANE);
+            let of_vehicle = |track: &Track| {
+                let lanes = track.lane.iter().filter(|lane| **lane != NO_LANE);
+                lanes.clone().map(|lane| f64::from(*lane)).sum::<f64>() / lanes.count() as f64
+            };
+            let tracks: Vec<&Track> = recording.tracks.iter().filter(known).collect();
+            let lanes: Vec<f64> = tracks.iter().map(|track| of_vehicle(track)).collect();
+            let mean = lanes.iter().sum::<f64>() / lanes.len() as f64;
+            let spread = lanes.iter().map(|lane| (lane - mean) * (lane - mean)).sum::<f64>();
+            let samples = tracks.iter().map(|track| track.len()).sum::<usize>();
+            let error = if lanes.len() < MIN_VEHICLES {
+                f64::INFINITY
+            } else {
+                spread / (lanes.len() * (lanes.len() - 1)) as f64
+            };
+            (samples >= MIN_SAMPLES).then_some((mean, error))
         };
-        let (Some(cars), Some(trucks)) = (mean_lane(VehicleClass::Car), mean_lane(VehicleClass::Truck)) else {
+        let (Some((cars, of_cars)), Some((trucks, of_trucks))) =
+            (mean_lane(VehicleClass::Car), mean_lane(VehicleClass::Truck))
+        else {
             if self.carriageways.iter().any(|of| of.lanes > 1) {
                 self.find(false, "one direction of travel and few lorries: nothing tells whether y is mirrored");
             }
@@ -226,10 +236,14 @@ impl Understanding {
         };
         // Lane 0 is the leftmost.
         let slow_is_right = trucks > cars;
-        if (trucks - cars).abs() > 0.15 && slow_is_right == (preset.traffic == Side::Left) {
-            self.find(true, format!(
-                "lorries drive in the lanes on the {}, which does not fit traffic on the {keeps}: y is mirrored (`axes.y`), or set `traffic`",
-                if slow_is_right { "right" } else { "left" }
+        let by = (trucks - cars).abs();
+        if by > 0.15 && slow_is_right == (preset.traffic == Side::Left) {
+            let is_certain = by > 4.0 * (of_cars + of_trucks).sqrt();
+            self.find(is_certain, format!(
+                "{} drive in the lanes on the {}, which does not fit traffic on the {keeps}: y is mirrored (`axes.y`), or set `traffic`{}",
+                if is_certain { "lorries" } else { "few lorries" },
+                if slow_is_right { "right" } else { "left" },
+                if is_certain { "" } else { ", or this is chance" }
             ));
         }
     }
@@ -257,7 +271,7 @@ impl Understanding {
             }
         }
         match edge_slope(recording) {
-            Some((slope, error)) if slope.abs() > 0.6 && slope.abs() > 4.0 * error => self.find(true, format!(
+            Some((slope, error)) if (0.6..1.6).contains(&slope.abs()) && slope.abs() > 4.0 * error => self.find(true, format!(
                 "wide vehicles are beside the middle of their lanes by {} of half their width: the position is that of an edge or a corner; see `reference`",
                 significant(slope.abs(), 2)
             )),

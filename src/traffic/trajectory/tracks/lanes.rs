@@ -6,6 +6,8 @@ use super::road::median;
 
 /// Lanes are at least so far apart, m.
 const MIN_SPACING_M: f64 = 2.2;
+/// The middles of neighbouring lanes are at most so far apart, m.
+const MAX_SPACING_M: f64 = 6.0;
 /// Width of a lane if nothing tells it, m.
 const USUAL_WIDTH_M: f64 = 3.6;
 /// A lane has at least this fraction of the samples.
@@ -49,11 +51,23 @@ pub(super) fn lane_lines(samples: &[Lateral], width_m: Option<f64>) -> Option<(V
     Some((lines_around(&centres), source))
 }
 
+/// The centres, with those of lanes between them that no vehicle uses: of few vehicles, none may be in neighbouring lanes.
+fn with_empty_lanes(centres: &[f64]) -> Vec<f64> {
+    let mut all = vec![centres[0]];
+    for pair in centres.windows(2) {
+        let lanes = ((pair[0] - pair[1]) / USUAL_WIDTH_M).round().clamp(1.0, MAX_LANES as f64);
+        all.extend((1..=lanes as usize).map(|lane| pair[0] + (pair[1] - pair[0]) * lane as f64 / lanes));
+    }
+    all
+}
+
 /// Lines midway between the centres, and beyond the outer ones.
 fn lines_around(centres: &[f64]) -> Vec<f64> {
+    let is_sparse = centres.windows(2).all(|pair| pair[0] - pair[1] > MAX_SPACING_M);
+    let centres = if is_sparse { &with_empty_lanes(centres) } else { centres };
     let mut spacings: Vec<f64> = centres.windows(2).map(|pair| pair[0] - pair[1]).collect();
     let usual = if spacings.is_empty() { USUAL_WIDTH_M } else { median(&mut spacings) };
-    let half = usual.clamp(MIN_SPACING_M, 6.0) / 2.0;
+    let half = usual.clamp(MIN_SPACING_M, MAX_SPACING_M) / 2.0;
     let mut lines = vec![centres[0] + half];
     lines.extend(centres.windows(2).map(|pair| 0.5 * (pair[0] + pair[1])));
     lines.push(centres[centres.len() - 1] - half);
@@ -186,5 +200,8 @@ mod tests {
         }
         let (lines, source) = lane_lines(&driven(&[-1.83, -5.49], false), Some(3.6576)).unwrap();
         assert_eq!((lines, source), (vec![0.0, -3.6576, -7.3152], LaneSource::Bands));
+        // Nobody in the middle lane.
+        let (lines, _) = lane_lines(&driven(&[-1.8, -9.1], true), None).unwrap();
+        assert!(lines.len() == 4 && (lines[1] - -3.6).abs() < 0.25, "{lines:?}");
     }
 }

@@ -148,7 +148,7 @@ pub struct Understanding {
     #[serde(skip)]
     pub(super) across_fraction: f64,
     #[serde(skip)]
-    pub(super) heading_facts: Option<(f64, f64)>,
+    pub(super) heading_facts: Option<(f64, Comparison)>,
     /// Lateral position of the oncoming traffic seen from the forward one, m.
     #[serde(skip)]
     pub(super) oncoming_left_m: Option<f64>,
@@ -156,14 +156,48 @@ pub struct Understanding {
     pub(super) exclusions: Vec<(u32, Exclusion)>,
     #[serde(skip)]
     pub(super) ratios: Vec<f64>,
-    /// Σ of given times derived lateral speed, and of the squares of both.
+    /// Given lateral speeds over derived ones.
     #[serde(skip)]
-    pub(super) lateral_sums: [f64; 3],
-    /// Σ of given accelerations over a second times the change of speed, and of the squares of both.
+    pub(super) lateral: Comparison,
+    /// Given accelerations over a second over the changes of speed.
     #[serde(skip)]
-    pub(super) acceleration_sums: [f64; 3],
-    #[serde(skip)]
-    pub(super) acceleration_seconds: u32,
+    pub(super) acceleration: Comparison,
+}
+
+/// Pairs of what should be equal: Σ of the products and of the squares.
+#[derive(Debug, Clone, Copy, Default)]
+pub(super) struct Comparison {
+    pub product: f64,
+    pub of_given: f64,
+    pub of_derived: f64,
+    pub count: f64,
+}
+
+impl Comparison {
+    pub fn add(&mut self, given: f64, derived: f64) {
+        self.product += given * derived;
+        self.of_given += given * given;
+        self.of_derived += derived * derived;
+        self.count += 1.0;
+    }
+
+    /// Whether the given values have the other sign: their slope over the derived ones is below 0 by four standard errors.
+    pub fn is_opposite(&self) -> bool {
+        let slope = self.product / self.of_derived;
+        let residual = (self.of_given - slope * self.product).max(0.0) / (self.count - 1.0);
+        self.count > 1.0 && slope < -4.0 * (residual / self.of_derived).sqrt()
+    }
+
+    /// Slope of the given values over the derived ones: 1 if they are equal, -1 if one is mirrored, 0 if one is noise.
+    pub fn slope(&self) -> f64 {
+        if self.of_derived > 0.0 { self.product / self.of_derived } else { 0.0 }
+    }
+
+    /// Correlation about 0.
+    pub fn correlation(&self) -> f64 {
+        let strength = (self.of_given * self.of_derived).sqrt();
+        if strength > 0.0 { self.product / strength } else { 0.0 }
+    }
 }
 
 impl Understanding {
@@ -177,10 +211,7 @@ impl Understanding {
         for k in (reach..v_mps.len()).step_by(reach) {
             let told: f64 = a_mps2[k - reach..k].iter().sum::<f64>() / rate_hz;
             let change = v_mps[k] - v_mps[k - reach];
-            self.acceleration_sums[0] += told * change;
-            self.acceleration_sums[1] += told * told;
-            self.acceleration_sums[2] += change * change;
-            self.acceleration_seconds += 1;
+            self.acceleration.add(told, change);
         }
     }
 
@@ -270,9 +301,7 @@ impl Understanding {
             let reach = (rate_hz / 5.0).round().max(1.0) as usize;
             for k in (reach..d_m.len().saturating_sub(reach)).step_by(reach) {
                 let change = (d_m[k + reach] - d_m[k - reach]) * rate_hz / (2 * reach) as f64;
-                self.lateral_sums[0] += change * given[k];
-                self.lateral_sums[1] += change * change;
-                self.lateral_sums[2] += given[k] * given[k];
+                self.lateral.add(given[k], change);
             }
         }
     }
