@@ -157,6 +157,42 @@ fn one_empty_speed_costs_one_track_its_speeds_and_no_other() {
     assert_eq!(without.derived_lateral, 1);
 }
 
+/// A plain table whose speeds are only along and across the road.
+fn with_speeds() -> Plain {
+    table().without(&["heading", "speed"])
+}
+
+#[test]
+fn one_speed_that_cannot_be_is_refused_by_vehicle_and_frame() {
+    for wrong in [0.0, -999.0, 3.0] {
+        let mut table = with_speeds();
+        let (vx, t) = (table.at("vx"), table.at("t"));
+        let forward =
+            |row: &&mut Vec<String>| row[vx].parse::<f64>().unwrap() > 20.0 && row[t].parse::<f64>().unwrap() > 9.0;
+        let row = table.rows.iter_mut().find(forward).unwrap();
+        let (vehicle, frame) = (row[0].clone(), (5.0 * row[t].parse::<f64>().unwrap()).round());
+        row[vx] = wrong.to_string();
+        let about = understood(&table).unwrap();
+        let grave = about.findings.iter().find(|finding| finding.is_grave).map_or("", |finding| &finding.text);
+        assert!(grave.contains(&format!("vehicle {vehicle} at frame {frame}: its speed is {wrong} m/s")), "{grave}");
+    }
+}
+
+/// A small error of one speed is no contradiction to the positions, but the braking that it tells is none of a vehicle.
+#[test]
+fn a_peak_of_one_sample_beyond_what_is_physical_is_refused() {
+    let options = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
+    let mut recording = generate_one(&options, 0).unwrap();
+    recording.tracks.truncate(60);
+    let mut table = Plain::of(&recording, 1).without(&["heading", "speed"]);
+    let (vx, row) = (table.at("vx"), 300);
+    let speed: f64 = table.rows[row][vx].parse().unwrap();
+    table.rows[row][vx] = format!("{:.4}", speed - 4.0 * speed.signum());
+    let about = understood(&table).unwrap();
+    let grave = about.findings.iter().find(|finding| finding.is_grave).map_or("", |finding| &finding.text);
+    assert!(grave.contains("beyond what is physical for an acceleration"), "{grave}");
+}
+
 /// In five seconds, or of eight vehicles, where they keep in their lanes and how their headings turn says little.
 #[test]
 fn recordings_that_are_short_or_have_few_vehicles_are_not_refused_for_that() {

@@ -8,6 +8,7 @@ mod csv_table;
 pub mod generator;
 pub mod highd;
 mod inputs;
+mod motion;
 mod number;
 mod overlap;
 mod recording;

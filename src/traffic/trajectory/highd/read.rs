@@ -9,6 +9,7 @@ use super::meta::{self, RecordingMeta, VehicleMeta};
 use crate::support::plausibility::{Doubts, HELP, Implausible, Quantity};
 use crate::traffic::trajectory::Loaded;
 use crate::traffic::trajectory::csv_table::{CsvColumn, CsvTable};
+use crate::traffic::trajectory::motion::{Impossible, impossible};
 use crate::traffic::trajectory::{NO_LANE, Recording, Track};
 use crate::{Error, Place, Result};
 
@@ -48,7 +49,19 @@ pub fn read_checked(files: &HighdFiles, implausible: Implausible) -> Result<Load
         tracks,
         synthetic: recording_meta.synthetic || made_up(folder_of(&files.recording_meta)).is_some(),
     };
-    notes.extend(geometry::check(&recording, &Place::file(&files.tracks), implausible)?);
+    let place = Place::file(&files.tracks);
+    notes.extend(geometry::check(&recording, &place, implausible)?);
+    if let Some(Impossible { first: (vehicle, frame), is_speed, problem, .. }) = impossible(&recording) {
+        let problem = format!("vehicle {vehicle} at frame {frame}: {problem}");
+        if implausible == Implausible::Refused {
+            return Err(Error::input(
+                place.column(if is_speed { "xVelocity" } else { "xAcceleration" }),
+                problem,
+                HELP,
+            ));
+        }
+        notes.push(problem);
+    }
     let bytes = checksum_sha256.iter().map(|file| file.bytes).sum();
     Ok(Loaded { recording, checksum_sha256, rows, bytes, notes })
 }

@@ -9,8 +9,7 @@ use super::raw::{NO_LABEL, RawRecording, RawSample, RawVehicle};
 use super::road::{OnRoad, Path, RoadLine, cross, dot, median};
 use super::roles::Role;
 use super::smooth::{central, savitzky_golay};
-use super::understanding::{Comparison, Exclusion, Understanding, UnderstoodCarriageway};
-use crate::support::plausibility::NOISE_MPS;
+use super::understanding::{Comparison, Understanding, UnderstoodCarriageway};
 use crate::traffic::trajectory::{Carriageway, NO_LANE, Recording, Track};
 use crate::{Error, Place, Result};
 
@@ -257,7 +256,7 @@ fn track(
         about.note_accelerations(v, a, rate_hz);
     }
     about.note_speeds(&s_m, given_s.as_deref(), &d_m, given_d.as_deref(), rate_hz);
-    let (mut v_s_mps, v_d_mps, a_s_mps2) = match smoothing_s {
+    let (v_s_mps, v_d_mps, a_s_mps2) = match smoothing_s {
         Some(window_s) => {
             let window = (window_s * rate_hz).round() as usize;
             let [s, v, a] = savitzky_golay(&s_m, window, rate_hz);
@@ -278,13 +277,6 @@ fn track(
             (v_s, v_d, a_s)
         }
     };
-    let slow = v_s_mps.iter().filter(|v| **v < 0.0).count() as u64;
-    let backwards = v_s_mps.iter().filter(|v| **v < NOISE_MPS).count();
-    about.noise_speeds += slow - backwards as u64;
-    if 20 * backwards > v_s_mps.len() {
-        about.exclude(id, Exclusion::Backwards);
-    }
-    v_s_mps.iter_mut().for_each(|v| *v = v.max(0.0));
     let lane = d_m.iter().map(|d| lanes.lane_at(*d).map_or(NO_LANE, |lane| lane as u16)).collect();
     Track {
         id,

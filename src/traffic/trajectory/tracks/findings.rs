@@ -3,16 +3,14 @@
 use super::preset::{Preset, Side};
 use super::road::median;
 use super::understanding::{Exclusion, Finding, TIMES, Understanding};
-use crate::support::plausibility::{Doubts, Implausible, Quantity};
+use crate::support::plausibility::{Doubts, Implausible, NOISE_MPS, Quantity};
 use crate::support::readable::{count, significant};
+use crate::traffic::trajectory::motion::{Impossible, JUMP_ACROSS_M, JUMP_ALONG_M, impossible, jumps};
 use crate::traffic::trajectory::overlap::overlaps;
 use crate::traffic::trajectory::{NO_LANE, Recording, Track, VehicleClass};
 
 /// Positions and speeds that differ by more than this fraction do not belong together.
 const MAX_SPEED_DIFFERENCE: f64 = 0.05;
-/// A step along or across the road that is so much longer than the speed tells is a jump, m.
-const JUMP_ALONG_M: f64 = 2.0;
-const JUMP_ACROSS_M: f64 = 0.8;
 /// Fraction of vehicles that overlap from which on sizes or reference point are wrong.
 const MAX_OVERLAPPING: f64 = 0.1;
 /// Fraction of vehicles that cross the road from which on it is no motorway.
@@ -70,6 +68,7 @@ impl Understanding {
                 ));
             }
         }
+        let mean = |track: &Track| track.v_s_mps.iter().map(|v| v.max(0.0)).sum::<f64>() / track.len() as f64;
         // Refused: what is beyond the physical range is grave.
         let mut doubts = Doubts::new(Implausible::Refused);
         let mut grave: Vec<String> = Vec::new();
@@ -79,8 +78,7 @@ impl Understanding {
             }
         };
         for track in &recording.tracks {
-            let mean = track.v_s_mps.iter().sum::<f64>() / track.len() as f64;
-            check(Quantity::Speed, mean, format!("vehicle {}, mean speed", track.id));
+            check(Quantity::Speed, mean(track), format!("vehicle {}, mean speed", track.id));
             check(Quantity::Length, track.length_m, format!("vehicle {}", track.id));
             check(Quantity::Width, track.width_m, format!("vehicle {}", track.id));
         }
@@ -105,7 +103,6 @@ impl Understanding {
                 )
             })
         };
-        let mean = |track: &Track| track.v_s_mps.iter().sum::<f64>() / track.len() as f64;
         let general: Vec<String> = [
             general(&mean, Quantity::Speed),
             general(&|track| track.length_m, Quantity::Length),
@@ -146,6 +143,36 @@ impl Understanding {
                 false,
                 format!("only {} m of road are in view: check the unit of x and y", significant(self.length_m, 3)),
             );
+        }
+    }
+
+    /// Finds vehicles that drive backwards; the others' speeds below 0 are noise.
+    pub(super) fn note_backwards(&mut self, recording: &Recording) {
+        for track in &recording.tracks {
+            let backwards = track.v_s_mps.iter().filter(|v| **v < NOISE_MPS).count();
+            if 20 * backwards > track.len() {
+                self.exclude(track.id, Exclusion::Backwards);
+                continue;
+            }
+            let below = track.v_s_mps.iter().filter(|v| **v < 0.0);
+            self.noise_speeds += below.clone().count() as u64;
+            self.lowest_noise_mps = below.fold(self.lowest_noise_mps, |lowest, v| lowest.min(*v));
+        }
+    }
+
+    pub(super) fn check_motion(&mut self, recording: &Recording) {
+        // A wrong ratio names the unit already.
+        if self.positions_over_speeds.is_some_and(|ratio| (ratio - 1.0).abs() > MAX_SPEED_DIFFERENCE) {
+            return;
+        }
+        if let Some(Impossible { vehicles, first: (vehicle, frame), is_speed, problem }) = impossible(recording) {
+            let help = match is_speed {
+                true => "name the text that stands for no value in `none`, or leave out the column of speeds",
+                false => "correct the values, or derive them from smoothed positions (`smoothing_s`)",
+            };
+            self.find(true, format!(
+                "{vehicles} vehicle(s) have samples that cannot be, the first is vehicle {vehicle} at frame {frame}: {problem}; {help}"
+            ));
         }
     }
 
@@ -302,14 +329,8 @@ impl Understanding {
     }
 
     pub(super) fn check_quality(&mut self, recording: &Recording) {
-        let jumps = |track: &Track| {
-            (1..track.len()).any(|k| {
-                let by_m = track.s_m[k] - track.s_m[k - 1];
-                let told_m = 0.5 * (track.v_s_mps[k] + track.v_s_mps[k - 1]) / recording.frame_rate_hz;
-                (by_m - told_m).abs() > JUMP_ALONG_M || (track.d_m[k] - track.d_m[k - 1]).abs() > JUMP_ACROSS_M
-            })
-        };
-        let jumping: Vec<u32> = recording.tracks.iter().filter(|track| jumps(track)).map(|track| track.id).collect();
+        let is_jumping = |track: &&Track| jumps(track, recording.frame_rate_hz);
+        let jumping: Vec<u32> = recording.tracks.iter().filter(is_jumping).map(|track| track.id).collect();
         if let Some(first) = jumping.first() {
             self.find(false, format!(
                 "{} tracks jump by more than {JUMP_ALONG_M} m along or {JUMP_ACROSS_M} m across the road, the first is vehicle {first}",
@@ -343,12 +364,15 @@ impl Understanding {
             (self.incomplete, "rows have no position and are left out"),
             (self.duplicates, "rows repeat vehicle and time of another row and are left out"),
             (self.short_pieces, "piece(s) of tracks are too short to be used"),
-            (self.noise_speeds, "speeds between -0.5 m/s and 0 count as 0"),
         ];
         for (number, what) in notes {
             if number > 0 {
                 self.find(false, format!("{} {what}", count(number)));
             }
+        }
+        if self.noise_speeds > 0 {
+            let (number, lowest) = (count(self.noise_speeds), significant(self.lowest_noise_mps, 2));
+            self.find(false, format!("{number} speeds below 0 count as 0; the lowest is {lowest} m/s"));
         }
         if self.conflicts > 0 {
             let text = format!(

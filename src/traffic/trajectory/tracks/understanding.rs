@@ -131,8 +131,10 @@ pub struct Understanding {
     pub split_tracks: u64,
     /// Samples that were interpolated.
     pub interpolated: u64,
-    /// Speeds between −0.5 m/s and 0, counted as 0.
+    /// Speeds below 0, counted as 0.
     pub noise_speeds: u64,
+    /// The lowest of them, m/s.
+    pub lowest_noise_mps: f64,
     /// Vehicles have other numbers than in the file.
     pub renumbered: bool,
     /// Vehicles left out as doubtful.
@@ -308,7 +310,9 @@ impl Understanding {
 
     /// Checks the recording against itself, and leaves out what the preset wants left out.
     pub(super) fn judge(&mut self, mut recording: Recording, preset: &Preset) -> (Recording, u64) {
+        self.note_backwards(&recording);
         self.check_units(&recording);
+        self.check_motion(&recording);
         self.check_axes(&recording, preset);
         self.check_boxes(&recording);
         self.check_quality(&recording);
@@ -318,6 +322,7 @@ impl Understanding {
             why.into_iter().any(|(_, why)| preset.exclude_doubtful || *why == Exclusion::Backwards)
         };
         recording.tracks.retain(|track| !is_out(track));
+        recording.tracks.iter_mut().flat_map(|track| &mut track.v_s_mps).for_each(|v| *v = v.max(0.0));
         let excluded = (before - recording.tracks.len()) as u64;
         self.cars = recording.tracks.iter().filter(|track| track.class == VehicleClass::Car).count() as u64;
         self.trucks = recording.tracks.len() as u64 - self.cars;

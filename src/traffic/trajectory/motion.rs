@@ -1,0 +1,82 @@
+//! Single samples that cannot be: one test for every reader. One wrong sample among thousands moves no mean, and yet it is the
+//! peak deceleration of a scenario.
+
+use super::recording::{Recording, Track};
+use crate::support::plausibility::{Doubts, Quantity};
+use crate::support::readable::{significant, value};
+
+/// A speed that differs so much from what the positions around it tell contradicts them, m/s.
+const MAX_DIFFERENCE_MPS: f64 = 5.0;
+/// Time before and after a sample over which positions tell its speed, s.
+const REACH_S: f64 = 0.5;
+/// Acceleration that may change the speed until then, m/s².
+const ACCELERATION_MPS2: f64 = 12.0;
+/// A step along or across the road that is so much longer than the speed tells is a jump, m.
+pub(super) const JUMP_ALONG_M: f64 = 2.0;
+pub(super) const JUMP_ACROSS_M: f64 = 0.8;
+
+/// Vehicles with samples that cannot be.
+pub(super) struct Impossible {
+    /// How many.
+    pub vehicles: usize,
+    /// The first of them, and its frame.
+    pub first: (u32, i64),
+    /// Its speed contradicts its positions; else its acceleration is beyond what is physical.
+    pub is_speed: bool,
+    /// What cannot be.
+    pub problem: String,
+}
+
+/// The samples whose speed contradicts the positions, or whose acceleration is beyond what is physical; `None` without any.
+pub(super) fn impossible(recording: &Recording) -> Option<Impossible> {
+    let rate_hz = recording.frame_rate_hz;
+    let of_track = |track: &Track| {
+        let speed = contradicting_speed(track, rate_hz).map(|(k, problem)| (k, true, problem));
+        speed.or_else(|| unphysical_acceleration(track, rate_hz).map(|(k, problem)| (k, false, problem)))
+    };
+    let mut found = recording.tracks.iter().filter_map(|track| Some((track, of_track(track)?)));
+    let (track, (k, is_speed, problem)) = found.next()?;
+    let first = (track.id, track.first_frame + k as i64);
+    Some(Impossible { vehicles: 1 + found.count(), first, is_speed, problem })
+}
+
+fn contradicting_speed(track: &Track, rate_hz: f64) -> Option<(usize, String)> {
+    let last = track.len() - 1;
+    let reach = (REACH_S * rate_hz).round().max(1.0) as usize;
+    (0..=last).find_map(|k| {
+        let (from, to) = (k.saturating_sub(reach), (k + reach).min(last));
+        // Positions too close in time are too noisy.
+        if to < from + reach {
+            return None;
+        }
+        let told_mps = (track.s_m[to] - track.s_m[from]) * rate_hz / (to - from) as f64;
+        let off_s = ((from + to) as f64 / 2.0 - k as f64).abs() / rate_hz;
+        let difference_mps = (track.v_s_mps[k] - told_mps).abs();
+        (difference_mps > MAX_DIFFERENCE_MPS + ACCELERATION_MPS2 * off_s).then(|| {
+            let (given, told) = (value(track.v_s_mps[k]), significant(told_mps, 3));
+            (k, format!("its speed is {given} m/s, but it moves by {told} m/s"))
+        })
+    })
+}
+
+/// The acceleration of a sample, and the one that the speeds beside it tell.
+fn unphysical_acceleration(track: &Track, rate_hz: f64) -> Option<(usize, String)> {
+    let mut doubts = Doubts::default();
+    (0..track.len()).find_map(|k| {
+        let (from, to) = (k.saturating_sub(1), (k + 1).min(track.len() - 1));
+        let told = (track.v_s_mps[to] - track.v_s_mps[from]) * rate_hz / (to - from).max(1) as f64;
+        let problem = [track.a_s_mps2[k], told]
+            .into_iter()
+            .find_map(|value| doubts.check(Quantity::Acceleration, value, String::new).err());
+        problem.map(|problem| (k, problem))
+    })
+}
+
+/// Whether a track has a step that its speeds do not tell.
+pub(super) fn jumps(track: &Track, rate_hz: f64) -> bool {
+    (1..track.len()).any(|k| {
+        let by_m = track.s_m[k] - track.s_m[k - 1];
+        let told_m = 0.5 * (track.v_s_mps[k] + track.v_s_mps[k - 1]) / rate_hz;
+        (by_m - told_m).abs() > JUMP_ALONG_M || (track.d_m[k] - track.d_m[k - 1]).abs() > JUMP_ACROSS_M
+    })
+}
