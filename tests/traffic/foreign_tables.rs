@@ -1,11 +1,14 @@
 //! Tables and folders of others: every file is read or named, no preset takes a table that it would read in part, and what
 //! nothing tells is asked.
 
+use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use lanesweep::traffic::mining::{MiningOptions, mine};
 use lanesweep::traffic::trajectory::Inputs;
-use lanesweep::traffic::trajectory::tracks::{self, Preset, TrackFile};
+use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
+use lanesweep::traffic::trajectory::tracks::{self, Finding, LoadedTracks, Preset, TrackFile, Understanding};
 
 use crate::common::exid::Plain;
 
@@ -19,12 +22,16 @@ fn table_of(seed: u64) -> Plain {
 }
 
 fn understood(table: &Plain) -> lanesweep::Result<Understanding> {
+    read(table).map(|read| read.understanding)
+}
+
+fn read(table: &Plain) -> lanesweep::Result<LoadedTracks> {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("own.csv");
     fs::write(&path, table.text()).unwrap();
     let preset = Preset::load("generic").unwrap();
     let mut all = tracks::read_tracks(&TrackFile { path, id: "own".to_owned() }, &preset)?;
-    Ok(all.remove(0).understanding)
+    Ok(all.remove(0))
 }
 
 /// Files that are read, and the names of those that are not, of a folder.
@@ -191,6 +198,74 @@ fn a_peak_of_one_sample_beyond_what_is_physical_is_refused() {
     let about = understood(&table).unwrap();
     let grave = about.findings.iter().find(|finding| finding.is_grave).map_or("", |finding| &finding.text);
     assert!(grave.contains("beyond what is physical for an acceleration"), "{grave}");
+}
+
+/// The rows of each vehicle, in the order of time.
+fn rows_by_vehicle(table: &Plain) -> BTreeMap<u32, Vec<usize>> {
+    let mut rows: BTreeMap<u32, Vec<usize>> = BTreeMap::new();
+    (0..table.rows.len()).for_each(|at| rows.entry(table.rows[at][0].parse().unwrap()).or_default().push(at));
+    rows
+}
+
+#[test]
+fn a_step_that_no_vehicle_makes_gives_two_tracks_and_is_said() {
+    for by_m in [8.0, -60.0] {
+        let mut table = with_speeds();
+        let tracks = read(&table).unwrap().loaded.recording.tracks.len();
+        let x = table.at("x");
+        let rows = rows_by_vehicle(&table);
+        let (vehicle, own) = rows.iter().find(|(_, rows)| rows.len() > 60).unwrap();
+        for at in &own[30..] {
+            table.rows[*at][x] = (table.rows[*at][x].parse::<f64>().unwrap() + by_m).to_string();
+        }
+        let read = read(&table).unwrap();
+        assert_eq!((read.understanding.jumps, read.loaded.recording.tracks.len()), (1, tracks + 1), "{by_m}");
+        let said = |finding: &Finding| {
+            finding.text.contains(&format!("split tracks, the first is that of vehicle {vehicle} "))
+        };
+        assert!(read.understanding.findings.iter().any(said), "{by_m}: {:?}", read.understanding.findings);
+    }
+}
+
+#[test]
+fn a_number_used_again_within_a_gap_that_is_filled_is_another_vehicle_with_its_own_size() {
+    let mut table = with_speeds();
+    let all = read(&table).unwrap().loaded.recording.tracks.len();
+    let (t, length) = (table.at("t"), table.at("length"));
+    let rows = rows_by_vehicle(&table);
+    let number = |row: usize, column: usize| table.rows[row][column].parse::<f64>().unwrap();
+    let follows = |(a, b): &(&Vec<usize>, &Vec<usize>)| {
+        let gap_s = number(b[0], t) - number(a[a.len() - 1], t);
+        gap_s > 0.1 && gap_s < 0.3 && number(a[0], length) != number(b[0], length)
+    };
+    let pairs = rows.values().flat_map(|a| rows.values().map(move |b| (a, b)));
+    let (first, second) = pairs.into_iter().find(follows).unwrap();
+    let lengths = [number(first[0], length), number(second[0], length)];
+    let key = table.rows[first[0]][0].clone();
+    second.iter().for_each(|at| table.rows[*at][0].clone_from(&key));
+    let read = read(&table).unwrap();
+    let tracks = &read.loaded.recording.tracks;
+    assert_eq!((read.understanding.jumps, tracks.len()), (1, all));
+    let of_new = tracks.last().map(|track| track.length_m);
+    assert_eq!(
+        (read.loaded.recording.track(key.parse().unwrap()).map(|track| track.length_m), of_new),
+        (Some(lengths[0]), Some(lengths[1]))
+    );
+    let mined = mine(&read.loaded.recording, &MiningOptions::default());
+    assert!(mined.scenarios.iter().filter(|found| found.kept).all(|found| found.gap0 > Some(0.0)));
+}
+
+/// Simulators change lanes in one step.
+#[test]
+fn a_lane_change_in_one_step_does_not_split_a_track() {
+    let mut table = with_speeds();
+    let y = table.at("y");
+    let rows = rows_by_vehicle(&table);
+    let own = rows.values().find(|rows| rows.len() > 60).unwrap();
+    for at in &own[30..] {
+        table.rows[*at][y] = (table.rows[*at][y].parse::<f64>().unwrap() + 3.5).to_string();
+    }
+    assert_eq!(understood(&table).unwrap().jumps, 0);
 }
 
 /// In five seconds, or of eight vehicles, where they keep in their lanes and how their headings turn says little.

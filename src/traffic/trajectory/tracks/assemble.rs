@@ -16,6 +16,7 @@ use crate::{Error, Place, Result};
 /// A piece on its carriageway.
 pub(super) struct Placed {
     pub piece: Piece,
+    pub sized: Sized,
     pub is_forward: bool,
     pub on: Vec<OnRoad>,
 }
@@ -37,14 +38,14 @@ pub(super) fn assemble(
     raw.vehicles.retain(|vehicle| !is_ignored(vehicle, preset));
     about.ignored = (before - raw.vehicles.len()) as u64;
     let (rate_hz, pieces) = pieces(&mut raw, preset, &mut about, place)?;
-    let boxes: Vec<Sized> = raw.vehicles.iter().map(|vehicle| sized(vehicle, preset)).collect();
+    let boxes: Vec<Sized> = pieces.iter().map(|piece| sized(piece, &raw.vehicles[piece.vehicle], preset)).collect();
     about.assumed_sizes = boxes.iter().filter(|of| of.is_assumed).count() as u64;
     about.changing_sizes = boxes.iter().filter(|of| of.changes).count() as u64;
     let has_heading = roles.iter().any(|(role, _)| *role == Role::Heading);
     let y_sign = if preset.axes.y == Side::Right { -1.0 } else { 1.0 };
     let mut pieces = pieces;
-    for piece in &mut pieces {
-        centre(piece, &boxes[piece.vehicle], preset.reference, has_heading, y_sign);
+    for (piece, of) in pieces.iter_mut().zip(&boxes) {
+        centre(piece, of, preset.reference, has_heading, y_sign);
     }
     let (lines, forward) = road(&pieces, &raw, preset, rate_hz).ok_or_else(|| {
         Error::input(place.clone(), "no vehicle moves, so the road is unknown", "check x and y and their units")
@@ -56,13 +57,14 @@ pub(super) fn assemble(
     };
     let mut placed: Vec<Placed> = pieces
         .into_iter()
+        .zip(boxes)
         .zip(forward)
-        .map(|(piece, is_forward)| {
+        .map(|((piece, sized), is_forward)| {
             let path: Path = piece.samples.iter().map(|sample| sample.xy_m).collect();
             let mut on = lines[usize::from(is_forward)].as_ref().map_or(Vec::new(), |line| line.project_all(&path));
-            let by_m = shift_along * boxes[piece.vehicle].length_m;
+            let by_m = shift_along * sized.length_m;
             on.iter_mut().for_each(|p| p.s_m += by_m);
-            Placed { piece, is_forward, on }
+            Placed { piece, sized, is_forward, on }
         })
         // A direction in which nothing moves has no line.
         .filter(|of| !of.on.is_empty())
@@ -99,10 +101,9 @@ pub(super) fn assemble(
     about.renumbered = ids.iter().zip(&placed).any(|(id, of)| raw.vehicles[of.piece.vehicle].key != id.to_string());
     let mut tracks: Vec<Track> = Vec::with_capacity(placed.len());
     for (of, id) in placed.iter().zip(ids) {
-        let vehicle = &boxes[of.piece.vehicle];
         let carriageway = index[usize::from(of.is_forward)];
         let Some(lanes) = carriageways.get(carriageway) else { continue };
-        tracks.push(track(of, id, vehicle, carriageway, lanes, (rate_hz, preset.smoothing_s), &mut about));
+        tracks.push(track(of, id, carriageway, lanes, (rate_hz, preset.smoothing_s), &mut about));
     }
     tracks.sort_by_key(|track| track.id);
     about.label_mismatch = label_mismatch(&placed, &carriageways, index);
@@ -230,7 +231,6 @@ fn whole(samples: &[RawSample], of: impl Fn(&RawSample) -> f64) -> Option<Vec<f6
 fn track(
     of: &Placed,
     id: u32,
-    vehicle: &Sized,
     carriageway: usize,
     lanes: &Carriageway,
     (rate_hz, smoothing_s): (f64, Option<f64>),
@@ -280,9 +280,9 @@ fn track(
     let lane = d_m.iter().map(|d| lanes.lane_at(*d).map_or(NO_LANE, |lane| lane as u16)).collect();
     Track {
         id,
-        class: vehicle.class,
-        length_m: vehicle.length_m,
-        width_m: vehicle.width_m,
+        class: of.sized.class,
+        length_m: of.sized.length_m,
+        width_m: of.sized.width_m,
         carriageway,
         first_frame: of.piece.first_frame,
         s_m,

@@ -32,13 +32,22 @@ pub(super) struct Sized {
     pub changes: bool,
 }
 
-pub(super) fn sized(vehicle: &RawVehicle, preset: &Preset) -> Sized {
+/// The box of a piece of a vehicle's track.
+pub(super) fn sized(piece: &Piece, vehicle: &RawVehicle, preset: &Preset) -> Sized {
+    let (first, last) = (piece.samples[0].at, piece.samples[piece.samples.len() - 1].at);
+    let here = |sizes: &[(f64, f64)]| -> Vec<f64> {
+        let is_here = |k: usize| sizes[k].0 <= last && sizes.get(k + 1).is_none_or(|(next, _)| *next > first);
+        let here: Vec<f64> = (0..sizes.len()).filter(|k| is_here(*k)).map(|k| sizes[k].1).collect();
+        // Rows that are not in the order of time.
+        if here.is_empty() { sizes.iter().map(|(_, size)| *size).collect() } else { here }
+    };
+    let (lengths_m, widths_m) = (here(&vehicle.lengths_m), here(&vehicle.widths_m));
     let class = vehicle.class.as_deref().unwrap_or_default();
     let of = |sizes: &[f64]| {
         let value = median(&mut sizes.to_vec());
         (!value.is_nan()).then_some(value)
     };
-    let (length_m, width_m) = (of(&vehicle.lengths_m), of(&vehicle.widths_m));
+    let (length_m, width_m) = (of(&lengths_m), of(&widths_m));
     let is_named_truck = begins_so(class, &preset.classes.truck);
     let truck_from_m = preset.classes.truck_from_m;
     let is_long = |from_m: f64| length_m.is_some_and(|length_m| length_m >= from_m);
@@ -58,7 +67,7 @@ pub(super) fn sized(vehicle: &RawVehicle, preset: &Preset) -> Sized {
         width_m: width_m.unwrap_or(usual[1]),
         class: if is_truck { VehicleClass::Truck } else { VehicleClass::Car },
         is_assumed: length_m.is_none() || width_m.is_none(),
-        changes: varies(&vehicle.lengths_m) || varies(&vehicle.widths_m),
+        changes: varies(&lengths_m) || varies(&widths_m),
     }
 }
 

@@ -6,7 +6,7 @@ use quick_xml::XmlVersion;
 use quick_xml::events::Event;
 use quick_xml::reader::Reader;
 
-use super::raw::{NO_LABEL, RawFile, RawRecording, RawSample, RawVehicle};
+use super::raw::{NO_LABEL, RawFile, RawRecording, RawSample, RawVehicle, always};
 use super::roles::Role;
 use crate::support::input_file;
 use crate::support::plain_text::sha256;
@@ -144,8 +144,8 @@ impl Scene {
         }
         match (parent.as_str(), element.as_str()) {
             ("dynamicObstacle", "type") => self.vehicle.class = Some(words.to_owned()),
-            ("rectangle", "length") => self.vehicle.lengths_m = vec![number()?],
-            ("rectangle", "width") => self.vehicle.widths_m = vec![number()?],
+            ("rectangle", "length") => self.vehicle.lengths_m = vec![always(number()?)],
+            ("rectangle", "width") => self.vehicle.widths_m = vec![always(number()?)],
             _ if inside("initialState") || inside("state") => {
                 let sample = self.sample.get_or_insert(NAN_SAMPLE);
                 match (parent.as_str(), element.as_str()) {

@@ -394,7 +394,7 @@ impl Understanding {
             );
         }
         if self.renumbered {
-            self.find(false, "vehicles have other numbers than in the file: their ids are no small whole numbers, or a track was split at a gap");
+            self.find(false, "vehicles have other numbers than in the file: their ids are no small whole numbers, or a track was split");
         }
     }
 }

@@ -2,8 +2,9 @@
 
 use super::preset::Preset;
 use super::raw::{RawRecording, RawSample};
-use super::road::median;
+use super::road::{cross, dot, median, unit};
 use super::understanding::{TIMES, Understanding};
+use crate::support::readable::significant;
 use crate::{Error, Place, Result};
 
 /// A sample this far off the raster of times, in frames, is interpolated.
@@ -12,6 +13,14 @@ const OFF_RASTER: f64 = 0.02;
 const SAME_PLACE_M: f64 = 0.1;
 /// Pieces of a track with fewer samples tell nothing.
 const MIN_PIECE: usize = 3;
+/// A step that differs by more from those before and after it, along the way, is none that a vehicle makes, m.
+const JUMP_M: f64 = 2.0;
+/// The same to the side: simulators change lanes in one step.
+const JUMP_ASIDE_M: f64 = 8.0;
+/// A jump is so many times longer than the usual difference of two steps, which noise makes.
+const JUMP_OVER_NOISE: f64 = 10.0;
+/// Acceleration that may lie between two steps, m/s².
+const ACCELERATION_MPS2: f64 = 15.0;
 /// Maximum number of samples that one row of a file becomes by interpolation, beyond [`FREE_SAMPLES`] for all.
 const SAMPLES_PER_ROW: f64 = 200.0;
 const FREE_SAMPLES: f64 = 1e5;
@@ -76,15 +85,26 @@ pub(super) fn pieces(
     about.rate_hz = rate_hz;
     let frame = |at: f64| first.round() * factor + (at - origin) * scale * factor;
     let max_gap = (preset.max_gap_s * rate_hz).max(1.0) + 0.5 + factor;
+    // How much each step differs from the two beside it, m, by vehicle.
+    let differences: Vec<Vec<f64>> =
+        raw.vehicles.iter().map(|of| step_differences_m(&of.samples, |at| frame(at) / rate_hz)).collect();
+    let usual = median(&mut differences.iter().flatten().copied().collect::<Vec<_>>());
+    let jump_m = JUMP_M.max(JUMP_OVER_NOISE * usual);
     let rows: usize = raw.vehicles.iter().map(|vehicle| vehicle.samples.len()).sum();
     let mut pieces = Vec::new();
     let mut total = 0.0;
+    let mut first_jump = None;
     for (vehicle, of) in raw.vehicles.iter().enumerate() {
         let samples = &of.samples;
         let mut from = 0;
         for to in 1..=samples.len() {
             if to < samples.len() && frame(samples[to].at) - frame(samples[to - 1].at) <= max_gap {
-                continue;
+                let by_m = differences[vehicle][to - 1];
+                if by_m <= jump_m {
+                    continue;
+                }
+                about.jumps += 1;
+                first_jump.get_or_insert((of.key.clone(), frame(samples[to].at).round(), by_m));
             }
             let piece = &samples[from..to];
             from = to;
@@ -102,7 +122,7 @@ pub(super) fn pieces(
             }
         }
     }
-    about.split_tracks = (pieces.len() as u64).saturating_sub(raw.vehicles.len() as u64);
+    about.split_tracks = (pieces.len() as u64).saturating_sub(raw.vehicles.len() as u64 + about.jumps);
     if about.split_tracks > 0 {
         let text = format!(
             "gaps longer than {} s split the tracks of {} vehicles into {}: see `max_gap_s`",
@@ -112,10 +132,44 @@ pub(super) fn pieces(
         );
         about.find(about.split_tracks > raw.vehicles.len() as u64, text);
     }
+    if let Some((vehicle, frame, by_m)) = first_jump {
+        let text = format!(
+            "{} step(s) that no vehicle makes split tracks, the first is that of vehicle {vehicle} to frame {frame}, by {} m: a number \
+             used again, or wrong positions",
+            about.jumps,
+            significant(by_m, 3)
+        );
+        about.find(about.jumps > raw.vehicles.len() as u64, text);
+    }
     if pieces.is_empty() {
         return Err(bad("no vehicle is in view for three samples", "check the columns for vehicle and time"));
     }
     Ok((rate_hz, pieces))
+}
+
+/// By how much each step of a vehicle differs from what the step before it and the one after it tell, whichever is closer, less
+/// what an acceleration explains, m. What lies to the side counts for less.
+fn step_differences_m(samples: &[RawSample], time_s: impl Fn(f64) -> f64) -> Vec<f64> {
+    let (Some(first), Some(last)) = (samples.first(), samples.last()) else { return Vec::new() };
+    let minus = |a: [f64; 2], b: [f64; 2]| [a[0] - b[0], a[1] - b[1]];
+    let steps: Vec<([f64; 2], f64)> = samples
+        .windows(2)
+        .map(|pair| (minus(pair[1].xy_m, pair[0].xy_m), time_s(pair[1].at) - time_s(pair[0].at)))
+        .collect();
+    let overall = unit(minus(last.xy_m, first.xy_m));
+    let difference_m = |k: usize, beside: usize| {
+        let ((by, dt_s), (other, other_s)) = (steps[k], steps[beside]);
+        let scale = dt_s / other_s;
+        let off = minus(by, [scale * other[0], scale * other[1]]);
+        // A slow step has no direction.
+        let is_slow = libm::hypot(other[0], other[1]) < other_s;
+        let along = unit(other).filter(|_| !is_slow).or(overall).unwrap_or([1.0, 0.0]);
+        let explained_m = ACCELERATION_MPS2 * dt_s * (dt_s + other_s) / 2.0;
+        (dot(along, off).abs() - explained_m).max(cross(along, off).abs() * JUMP_M / JUMP_ASIDE_M)
+    };
+    let beside = |k: usize| [k.checked_sub(1), Some(k + 1).filter(|next| *next < steps.len())];
+    let closest = |k: usize| beside(k).into_iter().flatten().map(|other| difference_m(k, other)).reduce(f64::min);
+    (0..steps.len()).map(|k| closest(k).unwrap_or(0.0).max(0.0)).collect()
 }
 
 /// Steps over time of all vehicles, because a rounded step is not exact, and vehicles may have times of their own.

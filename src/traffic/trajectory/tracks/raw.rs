@@ -46,9 +46,9 @@ pub(super) struct RawVehicle {
     /// Its id in the file.
     pub key: String,
     pub class: Option<String>,
-    /// The lengths and widths that it has, m; each change is one more.
-    pub lengths_m: Vec<f64>,
-    pub widths_m: Vec<f64>,
+    /// The lengths and widths that it has, m, each with the sample (`at`) from which on: a number used again has another box.
+    pub lengths_m: Vec<(f64, f64)>,
+    pub widths_m: Vec<(f64, f64)>,
     /// Sign of the travel along the road.
     pub direction: Option<f64>,
     pub samples: Vec<RawSample>,
@@ -63,6 +63,11 @@ impl RawVehicle {
             }
         }
     }
+}
+
+/// A size that holds from the first sample on.
+pub(super) fn always(size_m: f64) -> (f64, f64) {
+    (f64::NEG_INFINITY, size_m)
 }
 
 /// One recording.
@@ -227,9 +232,9 @@ impl<'a> Collecting<'a> {
         if self.has_sizes {
             for (role, sizes) in [(Role::Length, &mut of.lengths_m), (Role::Width, &mut of.widths_m)] {
                 if let Some(size) = row.number(role)?.filter(|size| *size > 0.0)
-                    && sizes.last() != Some(&size)
+                    && sizes.last().is_none_or(|(_, last)| *last != size)
                 {
-                    sizes.push(size);
+                    sizes.push((at, size));
                 }
             }
         }
@@ -309,8 +314,9 @@ fn add_vehicle_facts(
     let mut facts: HashMap<String, RawVehicle> = HashMap::new();
     let (checksum, _) = rows.each(&columns, &mut |row| {
         let Some(key) = row.text(Role::Vehicle)? else { return Ok(()) };
-        let sizes =
-            |role| -> Result<Vec<f64>> { Ok(row.number(role)?.filter(|size| *size > 0.0).into_iter().collect()) };
+        let sizes = |role| -> Result<Vec<(f64, f64)>> {
+            Ok(row.number(role)?.filter(|size| *size > 0.0).map(always).into_iter().collect())
+        };
         let vehicle = RawVehicle {
             key: key.to_string(),
             class: row.text(Role::Class)?.map(|class| class.into_owned()),
@@ -377,8 +383,8 @@ fn add_types(path: &Path, id: &str, pattern: &str, recordings: &mut [RawRecordin
             let vehicle = RawVehicle {
                 key: key.to_string(),
                 class: row.text(Role::Class)?.map(|class| class.into_owned()),
-                lengths_m: row.number(Role::Length)?.into_iter().collect(),
-                widths_m: row.number(Role::Width)?.into_iter().collect(),
+                lengths_m: row.number(Role::Length)?.map(always).into_iter().collect(),
+                widths_m: row.number(Role::Width)?.map(always).into_iter().collect(),
                 ..RawVehicle::default()
             };
             types.insert(vehicle.key.clone(), vehicle);

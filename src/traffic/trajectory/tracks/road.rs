@@ -58,7 +58,7 @@ fn length(a: [f64; 2]) -> f64 {
     libm::hypot(a[0], a[1])
 }
 
-fn unit(a: [f64; 2]) -> Option<[f64; 2]> {
+pub(super) fn unit(a: [f64; 2]) -> Option<[f64; 2]> {
     let length = length(a);
     (length > 1e-9).then(|| [a[0] / length, a[1] / length])
 }

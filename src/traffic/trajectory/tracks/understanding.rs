@@ -129,6 +129,8 @@ pub struct Understanding {
     pub short_pieces: u64,
     /// Tracks beyond one per vehicle, because of gaps.
     pub split_tracks: u64,
+    /// Steps that no vehicle makes, where tracks were split.
+    pub jumps: u64,
     /// Samples that were interpolated.
     pub interpolated: u64,
     /// Speeds below 0, counted as 0.
