@@ -12,7 +12,7 @@ use crate::report::tracks::{TrackReport, across, space_time};
 use crate::support::files::{check_folder, write_atomically};
 use crate::support::run_dir::{OutputDir, unfinished};
 use crate::support::table::{Table, TableMetadata};
-use crate::traffic::mining::{CategoryCount, counts, mine};
+use crate::traffic::mining::{CategoryCount, counts, mine, noise_notes};
 use crate::traffic::trajectory::highd::{self, HighdFiles, RecordingInfo, SYNTHETIC_MARKER};
 use crate::traffic::trajectory::tracks::{LoadedTracks, Preset, SYNTHETIC, Understanding, draft, read_tracks};
 use crate::traffic::trajectory::{InputFile, Inputs, NO_LANE, Recording, Track, VehicleClass};
@@ -120,15 +120,19 @@ impl Tracks {
     }
 
     fn of_file(&self, file: &InputFile, configured: &Configured) -> Result<Vec<(TrackReport, Recording)>> {
-        let mined_of = |recording: &Recording| -> Vec<CategoryCount> {
-            counts(&mine(recording, &configured.settings.mining).scenarios).to_vec()
+        // Found and kept scenarios, and what noise may do to them.
+        let mined_of = |recording: &Recording| -> (Vec<CategoryCount>, Vec<String>) {
+            let options = &configured.settings.mining;
+            let scenarios = mine(recording, options).scenarios;
+            (counts(&scenarios).to_vec(), noise_notes(recording, &scenarios, options))
         };
         let is_detected = self.preset.is_none();
         match file {
             InputFile::Highd(files) => {
                 let loaded = highd::read(files)?;
-                let (understanding, recording) = Understanding::of_recording(loaded.recording, loaded.notes);
-                let mined = mined_of(&recording);
+                let (mut understanding, recording) = Understanding::of_recording(loaded.recording, loaded.notes);
+                let (mined, notes) = mined_of(&recording);
+                understanding.note(notes);
                 let file = files.tracks.display().to_string();
                 let preset = "highd".to_owned();
                 let report =
@@ -139,15 +143,17 @@ impl Tracks {
                 let without = preset.smoothing_s.map(|_| Preset { smoothing_s: None, ..(**preset).clone() });
                 let rough = without.map(|preset| read_tracks(file, &preset)).transpose()?;
                 let mut rough = rough.map(Vec::into_iter);
-                let found = read_tracks(file, preset)?.into_iter().map(|LoadedTracks { loaded, understanding }| {
+                let found = read_tracks(file, preset)?.into_iter().map(|LoadedTracks { loaded, mut understanding }| {
                     let rough = rough.as_mut().and_then(Iterator::next);
+                    let (mined, notes) = mined_of(&loaded.recording);
+                    understanding.note(notes);
                     let report = TrackReport {
                         file: file.path.display().to_string(),
                         preset: preset.name.clone(),
                         is_detected,
                         understanding,
-                        mined: mined_of(&loaded.recording),
-                        mined_without_smoothing: rough.map(|rough| mined_of(&rough.loaded.recording)),
+                        mined,
+                        mined_without_smoothing: rough.map(|rough| mined_of(&rough.loaded.recording).0),
                     };
                     (report, loaded.recording)
                 });

@@ -118,11 +118,16 @@ pub struct Plain {
 impl Plain {
     /// Every `stride`-th sample of a recording in one plane: track_id, t, x, y, heading, speed, vx, vy, length, width, class.
     pub fn of(recording: &Recording, stride: usize) -> Plain {
+        Plain::on_bend(recording, stride, f64::INFINITY)
+    }
+
+    /// The same on a bend.
+    pub fn on_bend(recording: &Recording, stride: usize, radius_m: f64) -> Plain {
         let names = ["track_id", "t", "x", "y", "heading", "speed", "vx", "vy", "length", "width", "class"];
         let mut rows = Vec::new();
         for track in &recording.tracks {
             for k in (0..track.len()).filter(|k| (track.first_frame + *k as i64) % stride as i64 == 0) {
-                let at = in_plane(recording, track, k, f64::INFINITY);
+                let at = in_plane(recording, track, k, radius_m);
                 let time = (track.first_frame + k as i64) as f64 / recording.frame_rate_hz;
                 let speed = libm::hypot(at.velocity[0], at.velocity[1]);
                 let class = if track.class == VehicleClass::Truck { "truck" } else { "car" };

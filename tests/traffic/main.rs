@@ -13,4 +13,5 @@ mod highd_turned;
 mod mining_activities;
 mod mining_claims;
 mod mining_recordings;
+mod noise;
 mod tracks;

@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::miner::{CategoryCount, Mined, mine};
+use super::noise::noise_notes;
 use super::options::MiningOptions;
 use crate::scenario::{Category, Scenario};
 use crate::support::plausibility::Implausible;
@@ -124,7 +125,8 @@ pub fn mine_inputs(
         let mut summary = summary(&loaded.recording, &mined, options, loaded.checksum_sha256);
         summary.preset.clone_from(&preset);
         let name = |note: String| format!("recording {}: {note}", loaded.recording.id);
-        let notes = loaded.notes.into_iter().map(name).collect();
+        let of_noise = noise_notes(&loaded.recording, &mined.scenarios, options);
+        let notes = loaded.notes.into_iter().chain(of_noise).map(name).collect();
         MinedPart { mined, summary, notes, synthetic: loaded.recording.synthetic }
     };
     // The outer error ends the work; an inner one leaves out a file.

@@ -22,6 +22,7 @@ pub mod lateral;
 pub mod longitudinal;
 pub mod lvd;
 mod miner;
+mod noise;
 mod options;
 pub mod tags;
 
@@ -29,6 +30,7 @@ pub use collection::{
     Collection, RecordingSummary, count, counts, counts_text, mine_folder, mine_generated, mine_inputs,
 };
 pub use miner::{CategoryCount, Mined, mine};
+pub use noise::noise_notes;
 pub use options::{
     CutInOptions, CutOutOptions, LaneChangeEnd, LateralOptions, LongitudinalOptions, LvdOptions, MiningOptions,
 };

@@ -9,6 +9,7 @@ pub mod generator;
 pub mod highd;
 mod inputs;
 mod motion;
+mod noise;
 mod number;
 mod overlap;
 mod recording;
@@ -16,6 +17,7 @@ pub mod tracks;
 
 pub use csv_table::FileChecksum;
 pub use inputs::{InputFile, Inputs};
+pub use noise::{Noise, SUSTAINED_S, running_median};
 pub use number::Precision;
 pub use recording::{
     Carriageway, EgoViewOptions, LIMIT_TOLERANCE_M, Lane, Loaded, NO_LANE, Recording, Track, VehicleClass,

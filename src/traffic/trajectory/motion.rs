@@ -1,6 +1,7 @@
 //! Single samples that cannot be: one test for every reader. One wrong sample among thousands moves no mean, and yet it is the
 //! peak deceleration of a scenario.
 
+use super::noise::Noise;
 use super::recording::{Recording, Track};
 use crate::support::plausibility::{Doubts, Quantity};
 use crate::support::readable::{significant, value};
@@ -11,6 +12,8 @@ const MAX_DIFFERENCE_MPS: f64 = 5.0;
 const REACH_S: f64 = 0.5;
 /// Acceleration that may change the speed until then, m/s².
 const ACCELERATION_MPS2: f64 = 12.0;
+/// An acceleration within so many standard deviations of the noise is no single error: mining says what noise does.
+const OVER_NOISE: f64 = 8.0;
 /// A step along or across the road that is so much longer than the speed tells is a jump, m.
 pub(super) const JUMP_ALONG_M: f64 = 2.0;
 pub(super) const JUMP_ACROSS_M: f64 = 0.8;
@@ -30,9 +33,15 @@ pub(super) struct Impossible {
 /// The samples whose speed contradicts the positions, or whose acceleration is beyond what is physical; `None` without any.
 pub(super) fn impossible(recording: &Recording) -> Option<Impossible> {
     let rate_hz = recording.frame_rate_hz;
+    // Once, and only where it is needed.
+    let noise_mps2 = std::cell::OnceCell::new();
+    let is_noise = |value: f64| {
+        let noise_mps2 = noise_mps2.get_or_init(|| Noise::of(recording).acceleration_mps2);
+        value.abs() <= OVER_NOISE * noise_mps2
+    };
     let of_track = |track: &Track| {
         let speed = contradicting_speed(track, rate_hz).map(|(k, problem)| (k, true, problem));
-        speed.or_else(|| unphysical_acceleration(track, rate_hz).map(|(k, problem)| (k, false, problem)))
+        speed.or_else(|| unphysical_acceleration(track, rate_hz, is_noise).map(|(k, problem)| (k, false, problem)))
     };
     let mut found = recording.tracks.iter().filter_map(|track| Some((track, of_track(track)?)));
     let (track, (k, is_speed, problem)) = found.next()?;
@@ -59,15 +68,17 @@ fn contradicting_speed(track: &Track, rate_hz: f64) -> Option<(usize, String)> {
     })
 }
 
-/// The acceleration of a sample, and the one that the speeds beside it tell.
-fn unphysical_acceleration(track: &Track, rate_hz: f64) -> Option<(usize, String)> {
+/// The acceleration of a sample, and the one that the speeds beside it tell; of a track of a second and longer.
+fn unphysical_acceleration(track: &Track, rate_hz: f64, is_noise: impl Fn(f64) -> bool) -> Option<(usize, String)> {
     let mut doubts = Doubts::default();
-    (0..track.len()).find_map(|k| {
+    // The ends of a short track are all noise.
+    let samples = if track.len() as f64 > 2.0 * REACH_S * rate_hz { track.len() } else { 0 };
+    (0..samples).find_map(|k| {
         let (from, to) = (k.saturating_sub(1), (k + 1).min(track.len() - 1));
         let told = (track.v_s_mps[to] - track.v_s_mps[from]) * rate_hz / (to - from).max(1) as f64;
-        let problem = [track.a_s_mps2[k], told]
-            .into_iter()
-            .find_map(|value| doubts.check(Quantity::Acceleration, value, String::new).err());
+        let problem = [track.a_s_mps2[k], told].into_iter().find_map(|value| {
+            doubts.check(Quantity::Acceleration, value, String::new).err().filter(|_| !is_noise(value))
+        });
         problem.map(|problem| (k, problem))
     })
 }

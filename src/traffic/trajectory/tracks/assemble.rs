@@ -252,6 +252,12 @@ fn track(
         whole(samples, |sample| sample.along_mps[1]).or_else(|| component(|sample| sample.velocity_mps, cross));
     let given_a = whole(samples, |sample| sample.acceleration_mps2)
         .or_else(|| component(|sample| sample.acceleration_xy_mps2, dot));
+    // On a curve, the points of the line are metres apart: derivatives of the positions in the plane are smoother.
+    let is_straight = tangents.windows(2).all(|pair| pair[0] == pair[1]);
+    let in_plane = |derive: &dyn Fn(&[f64]) -> Vec<f64>| -> Vec<f64> {
+        let of_axis = |axis: usize| derive(&samples.iter().map(|sample| sample.xy_m[axis]).collect::<Vec<f64>>());
+        tangents.iter().zip(of_axis(0).into_iter().zip(of_axis(1))).map(|(t, (x, y))| dot(*t, [x, y])).collect()
+    };
     if let (Some(v), Some(a), None) = (&given_s, &given_a, smoothing_s) {
         about.note_accelerations(v, a, rate_hz);
     }
@@ -259,7 +265,10 @@ fn track(
     let (v_s_mps, v_d_mps, a_s_mps2) = match smoothing_s {
         Some(window_s) => {
             let window = (window_s * rate_hz).round() as usize;
-            let [s, v, a] = savitzky_golay(&s_m, window, rate_hz);
+            let [s, mut v, mut a] = savitzky_golay(&s_m, window, rate_hz);
+            if !is_straight {
+                [v, a] = [1, 2].map(|order| in_plane(&|x| savitzky_golay(x, window, rate_hz)[order].clone()));
+            }
             let [d, vd, _] = savitzky_golay(&d_m, window, rate_hz);
             (s_m, d_m) = (s, d);
             for count in [&mut about.derived_speeds, &mut about.derived_lateral, &mut about.derived_accelerations] {
@@ -271,7 +280,10 @@ fn track(
             about.derived_speeds += u64::from(given_s.is_none());
             about.derived_lateral += u64::from(given_d.is_none());
             about.derived_accelerations += u64::from(given_a.is_none());
-            let v_s = given_s.unwrap_or_else(|| central(&s_m, rate_hz));
+            let v_s = given_s.unwrap_or_else(|| match is_straight {
+                true => central(&s_m, rate_hz),
+                false => in_plane(&|x| central(x, rate_hz)),
+            });
             let v_d = given_d.unwrap_or_else(|| central(&d_m, rate_hz));
             let a_s = given_a.unwrap_or_else(|| central(&v_s, rate_hz));
             (v_s, v_d, a_s)

@@ -11,6 +11,8 @@ use crate::traffic::trajectory::{NO_LANE, Recording, Track, VehicleClass};
 
 /// Positions and speeds that differ by more than this fraction do not belong together.
 const MAX_SPEED_DIFFERENCE: f64 = 0.05;
+/// A speed that positions tell to vary by more is not constant, m/s.
+const MAX_RANGE_MPS: f64 = 2.0;
 /// Fraction of vehicles that overlap from which on sizes or reference point are wrong.
 const MAX_OVERLAPPING: f64 = 0.1;
 /// Fraction of vehicles that cross the road from which on it is no motorway.
@@ -163,6 +165,17 @@ impl Understanding {
     pub(super) fn check_motion(&mut self, recording: &Recording) {
         // A wrong ratio names the unit already.
         if self.positions_over_speeds.is_some_and(|ratio| (ratio - 1.0).abs() > MAX_SPEED_DIFFERENCE) {
+            return;
+        }
+        let constant = |track: &&Track| track.v_s_mps.iter().all(|v| (v - track.v_s_mps[0]).abs() < 1e-9);
+        let constant: Vec<&Track> = recording.tracks.iter().filter(constant).collect();
+        let contradicted = constant.iter().filter(|track| speed_range_mps(track, self.rate_hz) > MAX_RANGE_MPS).count();
+        if contradicted > 0 && 20 * contradicted >= constant.len() && 10 * constant.len() >= 9 * recording.tracks.len()
+        {
+            self.find(true, format!(
+                "the speed of a vehicle does not change, although {contradicted} move at speeds that differ by more than \
+                 {MAX_RANGE_MPS} m/s: it is one speed per vehicle; leave out the column, so that speeds follow from positions"
+            ));
             return;
         }
         if let Some(Impossible { vehicles, first: (vehicle, frame), is_speed, problem }) = impossible(recording) {
@@ -397,6 +410,14 @@ impl Understanding {
             self.find(false, "vehicles have other numbers than in the file: their ids are no small whole numbers, or a track was split");
         }
     }
+}
+
+/// By how much the mean speeds over a second differ along a track, by its positions, m/s.
+fn speed_range_mps(track: &Track, rate_hz: f64) -> f64 {
+    let second = rate_hz.round().max(1.0) as usize;
+    let speeds = (second..track.len()).map(|k| (track.s_m[k] - track.s_m[k - second]) * rate_hz / second as f64);
+    let (low, high) = speeds.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    high - low
 }
 
 /// Slope of the mean offset from the lane's middle over half the width, with its standard error, of the carriageway where it

@@ -7,7 +7,7 @@ use super::preset::{Preset, Reference};
 use super::raw::RawRecording;
 use super::road::median;
 use crate::support::readable::{count, significant, value};
-use crate::traffic::trajectory::{Recording, Track, VehicleClass};
+use crate::traffic::trajectory::{Noise, Recording, Track, VehicleClass};
 
 /// The source of a frame rate that times gave.
 pub(super) const TIMES: &str = "times";
@@ -109,8 +109,10 @@ pub struct Understanding {
     pub derived_lateral: u64,
     /// Tracks whose accelerations follow from speeds.
     pub derived_accelerations: u64,
-    /// Standard deviation of the noise of speeds, m/s.
+    /// Standard deviation of the noise of speeds while they change, m/s.
     pub speed_noise_mps: f64,
+    /// The same of accelerations, m/s².
+    pub acceleration_noise_mps2: f64,
     /// Positions over integrated speeds; 1 if they fit together.
     pub positions_over_speeds: Option<f64>,
     /// Vehicles left out because of their class.
@@ -332,7 +334,8 @@ impl Understanding {
         self.hours = self.samples as f64 / recording.frame_rate_hz / 3600.0;
         let moved = |track: &Track| track.s_m[track.len() - 1] - track.s_m[0];
         self.km = recording.tracks.iter().map(moved).sum::<f64>() / 1000.0;
-        self.speed_noise_mps = speed_noise_mps(&recording);
+        let noise = Noise::of(&recording);
+        (self.speed_noise_mps, self.acceleration_noise_mps2) = (noise.speed_mps, noise.acceleration_mps2);
         (recording, excluded)
     }
 
@@ -431,11 +434,12 @@ impl Understanding {
         lines.push((
             "speeds",
             format!(
-                "{}, lateral ones {}, accelerations {}; noise {} m/s{fit}",
+                "{}, lateral ones {}, accelerations {}; noise {} m/s and {} m/s²{fit}",
                 from(self.derived_speeds, "positions"),
                 from(self.derived_lateral, "positions"),
                 from(self.derived_accelerations, "speeds"),
-                significant(self.speed_noise_mps, 2)
+                significant(self.speed_noise_mps, 2),
+                significant(self.acceleration_noise_mps2, 2)
             ),
         ));
         if self.ignored > 0 || self.excluded > 0 {
@@ -444,17 +448,15 @@ impl Understanding {
         lines
     }
 
+    /// Adds notes on tracks that can be used; what is wrong comes first.
+    pub fn note(&mut self, notes: Vec<String>) {
+        if self.is_usable() {
+            notes.into_iter().for_each(|text| self.find(false, text));
+        }
+    }
+
     /// Whether the tracks can be used.
     pub fn is_usable(&self) -> bool {
         self.findings.iter().all(|finding| !finding.is_grave)
     }
-}
-
-/// Standard deviation of the noise of speeds: of their second differences, which smooth driving makes small.
-fn speed_noise_mps(recording: &Recording) -> f64 {
-    let second =
-        |track: &Track| -> Vec<f64> { track.v_s_mps.windows(3).map(|v| (v[0] - 2.0 * v[1] + v[2]).abs()).collect() };
-    let mut all: Vec<f64> =
-        recording.tracks.iter().step_by(recording.tracks.len().div_ceil(300).max(1)).flat_map(second).collect();
-    if all.is_empty() { 0.0 } else { 1.4826 * median(&mut all) / libm::sqrt(6.0) }
 }

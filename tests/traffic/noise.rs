@@ -1,0 +1,134 @@
+//! Noise decides nothing in silence: rounded positions, rounded speeds and one speed per vehicle are said, and good tracks are not doubted.
+
+use std::fs;
+
+use lanesweep::scenario::Category;
+use lanesweep::support::plausibility::Implausible;
+use lanesweep::traffic::mining::{MiningOptions, count, mine, mine_inputs, noise_notes};
+use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
+use lanesweep::traffic::trajectory::tracks::{self, Preset, TrackFile};
+use lanesweep::traffic::trajectory::{Inputs, Recording};
+
+use crate::common::exid::Plain;
+
+/// Generated traffic, whose positions are the integrals of its speeds.
+fn recording() -> Recording {
+    let options = GeneratorOptions { recordings: 1, duration_s: 120.0, ..GeneratorOptions::default() };
+    let mut recording = generate_one(&options, 0).unwrap();
+    for track in &mut recording.tracks {
+        for k in 1..track.len() {
+            track.s_m[k] = track.s_m[k - 1] + 0.5 * (track.v_s_mps[k - 1] + track.v_s_mps[k]) / 25.0;
+        }
+    }
+    recording
+}
+
+/// Its table on a bend of this radius, without speeds.
+fn without_speeds(radius_m: f64) -> Plain {
+    Plain::on_bend(&recording(), 1, radius_m).without(&["heading", "speed", "vx", "vy"])
+}
+
+fn rounded(mut table: Plain, columns: &[&str], step: f64) -> Plain {
+    columns.iter().for_each(|column| table.map(column, |value, _| (value / step).round() * step));
+    table
+}
+
+/// Kept leader decelerations of a table, and the notes on noise.
+fn mined(table: &Plain, smoothing_s: Option<f64>) -> (u64, Vec<String>) {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("own.csv");
+    fs::write(&path, table.text()).unwrap();
+    let preset = Preset { smoothing_s, ..Preset::load("generic").unwrap() };
+    let read = tracks::read_tracks(&TrackFile { path, id: "own".to_owned() }, &preset).unwrap().remove(0);
+    let graves: Vec<_> = read.understanding.findings.iter().filter(|finding| finding.is_grave).collect();
+    assert!(graves.is_empty(), "{graves:?}");
+    let options = MiningOptions::default();
+    let scenarios = mine(&read.loaded.recording, &options).scenarios;
+    (count(&scenarios, Category::Lvd).kept, noise_notes(&read.loaded.recording, &scenarios, &options))
+}
+
+/// Kept leader decelerations by the exact speeds.
+fn right() -> u64 {
+    let kept = count(&mine(&recording(), &MiningOptions::default()).scenarios, Category::Lvd).kept;
+    assert!(kept > 3);
+    kept
+}
+
+#[test]
+fn good_tracks_have_no_note_of_noise() {
+    let options = MiningOptions::default();
+    let exact = recording();
+    assert_eq!(noise_notes(&exact, &mine(&exact, &options).scenarios, &options), Vec::<String>::new());
+    let with_speeds = Plain::of(&exact, 1).without(&["heading", "speed"]);
+    for table in [rounded(with_speeds, &["x", "y", "vx", "vy"], 0.01), without_speeds(f64::INFINITY)] {
+        assert_eq!(mined(&table, None), (right(), Vec::new()));
+    }
+}
+
+#[test]
+fn speeds_from_positions_on_a_bend_are_those_of_the_straight_road() {
+    for smoothing_s in [None, Some(1.0)] {
+        let (kept, notes) = mined(&without_speeds(600.0), smoothing_s);
+        assert!(notes.is_empty(), "{notes:?}");
+        assert!(kept.abs_diff(right()) <= 1, "{smoothing_s:?}: {kept} of {}", right());
+    }
+}
+
+#[test]
+fn rounded_values_that_decide_are_said_and_the_proposed_smoothing_repairs_them() {
+    let positions = ["x", "y"];
+    let with_speed = || Plain::of(&recording(), 1).without(&["heading", "vx", "vy"]);
+    for (what, table, smoothing_s) in [
+        ("positions in cm", rounded(without_speeds(f64::INFINITY), &positions, 0.01), 1.0),
+        ("positions in dm", rounded(without_speeds(f64::INFINITY), &positions, 0.1), 1.5),
+        ("whole km/h", rounded(with_speed(), &["speed"], 1.0 / 3.6), 1.0),
+    ] {
+        let (kept, notes) = mined(&table, None);
+        assert!(kept > 2 * right(), "{what}: {kept}");
+        let [note] = &notes[..] else { panic!("{what}: {notes:?}") };
+        assert!(
+            note.contains("noise can decide") && note.contains(&format!("smoothing_s = {smoothing_s:?}")),
+            "{what}: {note}"
+        );
+        let (kept, notes) = mined(&table, Some(smoothing_s));
+        assert!(notes.is_empty() && kept.abs_diff(right()) <= 2, "{what}: {kept} of {}, {notes:?}", right());
+    }
+}
+
+#[test]
+fn runs_carry_the_note_of_noise() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("own.csv");
+    fs::write(&path, rounded(without_speeds(f64::INFINITY), &["x", "y"], 0.01).text()).unwrap();
+    let collection =
+        mine_inputs(Inputs::of(&path, None).unwrap(), &MiningOptions::default(), Implausible::Refused, || Ok(()))
+            .unwrap();
+    assert!(
+        collection.notes.iter().any(|note| note.starts_with("recording own: noise can decide")),
+        "{:?}",
+        collection.notes
+    );
+}
+
+#[test]
+fn one_speed_per_vehicle_is_refused() {
+    let mut recording = recording();
+    for track in &mut recording.tracks {
+        let mean = track.v_s_mps.iter().sum::<f64>() / track.len() as f64;
+        track.v_s_mps.fill(mean);
+        track.v_d_mps.fill(0.0);
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("own.csv");
+    fs::write(&path, Plain::of(&recording, 5).without(&["heading", "vx", "vy"]).text()).unwrap();
+    let preset = Preset::load("generic").unwrap();
+    let read = tracks::read_tracks(&TrackFile { path, id: "own".to_owned() }, &preset).unwrap().remove(0);
+    assert!(
+        read.understanding
+            .findings
+            .iter()
+            .any(|finding| finding.is_grave && finding.text.contains("one speed per vehicle")),
+        "{:?}",
+        read.understanding.findings
+    );
+}
