@@ -248,6 +248,10 @@ fn a_speed_that_contradicts_the_positions_and_a_jump_are_refused_unless_accepted
         let accepted = highd::read(&files).unwrap();
         assert!(accepted.notes.iter().any(|note| note.contains("its speed is")), "{:?}", accepted.notes);
     }
+    // A small jump is said.
+    recording.tracks[0].s_m[30..].iter_mut().for_each(|s| *s += 3.0);
+    let loaded = Texts::of(&recording).read().unwrap();
+    assert!(loaded.notes.iter().any(|note| note.contains("jump by more than 2 m")), "{:?}", loaded.notes);
 }
 
 #[test]

@@ -8,7 +8,7 @@ pub const SUSTAINED_S: f64 = 0.5;
 /// A vehicle that changes its speed by less in a second keeps it, m/s.
 const KEPT_MPS: f64 = 0.1;
 /// Maximum number of tracks that are looked at.
-const MAX_TRACKS: usize = 300;
+const MAX_TRACKS: usize = 100;
 /// Windows of smoothing that are proposed, s, and their step.
 const SMOOTHING_S: [f64; 2] = [1.0, 3.0];
 const SMOOTHING_STEP_S: f64 = 0.5;

@@ -9,7 +9,7 @@ use super::meta::{self, RecordingMeta, VehicleMeta};
 use crate::support::plausibility::{Doubts, HELP, Implausible, Quantity};
 use crate::traffic::trajectory::Loaded;
 use crate::traffic::trajectory::csv_table::{CsvColumn, CsvTable};
-use crate::traffic::trajectory::motion::{Impossible, impossible};
+use crate::traffic::trajectory::motion::{Impossible, JUMP_ACROSS_M, JUMP_ALONG_M, impossible, jumps};
 use crate::traffic::trajectory::{NO_LANE, Recording, Track};
 use crate::{Error, Place, Result};
 
@@ -38,7 +38,7 @@ pub fn read_checked(files: &HighdFiles, implausible: Implausible) -> Result<Load
     let reserve = can_hold(&files.tracks, &vehicles);
     let empty = vehicles.iter().map(|vehicle| empty_track(vehicle, reserve)).collect();
     let tracks = read_tracks(&mut table, &columns, &recording_meta, &vehicles, empty, &mut doubts)?;
-    let mut notes = notes(&columns, &vehicles, &tracks);
+    let mut notes = notes(&columns, &vehicles, &tracks, recording_meta.frame_rate_hz);
     notes.extend(doubts.sentences());
     let rows = table.rows();
     let checksum_sha256 = vec![table.finish(), tracks_meta_checksum, recording_meta.checksum];
@@ -346,7 +346,7 @@ fn check_counts(table: &CsvTable, vehicles: &[VehicleMeta], tracks: &[Track]) ->
 }
 
 /// Warnings about usable data.
-fn notes(columns: &TrackColumns, vehicles: &[VehicleMeta], tracks: &[Track]) -> Vec<String> {
+fn notes(columns: &TrackColumns, vehicles: &[VehicleMeta], tracks: &[Track], rate_hz: f64) -> Vec<String> {
     let mut notes = Vec::new();
     if columns.lane.is_none() {
         notes.push("the column `laneId` is absent: lanes follow from positions and lane lines".to_owned());
@@ -363,6 +363,8 @@ fn notes(columns: &TrackColumns, vehicles: &[VehicleMeta], tracks: &[Track]) -> 
     note("move against their drivingDirection", &|track| {
         track.s_m.last().zip(track.s_m.first()).is_some_and(|(last, first)| last - first < -BACKWARDS_M)
     });
+    let jump = format!("jump by more than {JUMP_ALONG_M} m along or {JUMP_ACROSS_M} m across the road");
+    note(&jump, &|track| jumps(track, rate_hz));
     note("are in no lane of their carriageway at any time", &|track| track.lane.iter().all(|&lane| lane == NO_LANE));
     notes
 }

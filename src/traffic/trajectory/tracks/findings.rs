@@ -17,8 +17,8 @@ const MAX_RANGE_MPS: f64 = 2.0;
 const MAX_OVERLAPPING: f64 = 0.1;
 /// Fraction of vehicles that cross the road from which on it is no motorway.
 const MAX_ACROSS: f64 = 0.15;
-/// Samples of lorries, and of cars, from which on their lanes are compared.
-const MIN_SAMPLES: usize = 500;
+/// Every 25th sample of lorries, and of cars: from so many on, their lanes are compared.
+const MIN_SAMPLES: usize = 20;
 /// Fewer vehicles prove nothing.
 const MIN_VEHICLES: usize = 5;
 
@@ -258,7 +258,7 @@ impl Understanding {
             let lanes: Vec<f64> = tracks.iter().map(|track| of_vehicle(track)).collect();
             let mean = lanes.iter().sum::<f64>() / lanes.len() as f64;
             let spread = lanes.iter().map(|lane| (lane - mean) * (lane - mean)).sum::<f64>();
-            let samples = tracks.iter().map(|track| track.len()).sum::<usize>();
+            let samples = tracks.iter().map(|track| track.len().div_ceil(25)).sum::<usize>();
             let error = if lanes.len() < MIN_VEHICLES {
                 f64::INFINITY
             } else {

@@ -258,7 +258,13 @@ impl Understanding {
         }
         let (recording, excluded) = about.judge(recording, &Preset::default());
         about.excluded = excluded;
-        notes.into_iter().filter(|note| !note.contains("overlap")).for_each(|note| about.find(false, note));
+        for note in notes {
+            // The checks above say these too.
+            let is_said = about.findings.iter().any(|finding| finding.text.contains(&note));
+            if !is_said && !note.contains("overlap") && !note.contains("jump by") {
+                about.find(false, note);
+            }
+        }
         (about, recording)
     }
 
@@ -427,6 +433,8 @@ impl Understanding {
             some if some < tracks => format!("as given, in {} of {} tracks from {what}", count(some), count(tracks)),
             _ => format!("from {what}"),
         };
+        // The rounding of arithmetic is no noise.
+        let noise = |deviation: f64| significant(if deviation < 1e-6 { 0.0 } else { deviation }, 2);
         let fit = self.positions_over_speeds.map_or(String::new(), |ratio| {
             let percent = (100.0 * (ratio - 1.0).abs()).max(0.1);
             format!("; positions and speeds agree within {} %", significant(percent, 2))
@@ -438,8 +446,8 @@ impl Understanding {
                 from(self.derived_speeds, "positions"),
                 from(self.derived_lateral, "positions"),
                 from(self.derived_accelerations, "speeds"),
-                significant(self.speed_noise_mps, 2),
-                significant(self.acceleration_noise_mps2, 2)
+                noise(self.speed_noise_mps),
+                noise(self.acceleration_noise_mps2)
             ),
         ));
         if self.ignored > 0 || self.excluded > 0 {
