@@ -141,8 +141,11 @@ impl Tracks {
             }
             InputFile::Tracks(file, preset) => {
                 let without = preset.smoothing_s.map(|_| Preset { smoothing_s: None, ..(**preset).clone() });
-                let rough = without.map(|preset| read_tracks(file, &preset)).transpose()?;
-                let mut rough = rough.map(Vec::into_iter);
+                // Before the recordings are read that are kept.
+                let rough = |preset| -> Result<Vec<_>> {
+                    Ok(read_tracks(file, &preset)?.iter().map(|rough| mined_of(&rough.loaded.recording).0).collect())
+                };
+                let mut rough = without.map(rough).transpose()?.map(Vec::into_iter);
                 let found = read_tracks(file, preset)?.into_iter().map(|LoadedTracks { loaded, mut understanding }| {
                     let rough = rough.as_mut().and_then(Iterator::next);
                     let (mined, notes) = mined_of(&loaded.recording);
@@ -153,7 +156,7 @@ impl Tracks {
                         is_detected,
                         understanding,
                         mined,
-                        mined_without_smoothing: rough.map(|rough| mined_of(&rough.loaded.recording).0),
+                        mined_without_smoothing: rough,
                     };
                     (report, loaded.recording)
                 });

@@ -21,6 +21,17 @@ pub(super) struct Placed {
     pub on: Vec<OnRoad>,
 }
 
+impl Placed {
+    /// Directions of the road at its samples. They are computed again, because memory would hold two numbers a sample.
+    fn tangents(&self, lines: &[Option<RoadLine>; 2]) -> Vec<[f64; 2]> {
+        lines[usize::from(self.is_forward)].as_ref().map_or(Vec::new(), |line| line.directions(&path(&self.piece)))
+    }
+}
+
+fn path(piece: &Piece) -> Path {
+    (0..piece.samples.len()).map(|k| piece.samples.xy_m(k)).collect()
+}
+
 /// The recording, and what was understood.
 pub(super) fn assemble(
     mut raw: RawRecording,
@@ -41,7 +52,8 @@ pub(super) fn assemble(
     let boxes: Vec<Sized> = pieces.iter().map(|piece| sized(piece, &raw.vehicles[piece.vehicle], preset)).collect();
     about.assumed_sizes = boxes.iter().filter(|of| of.is_assumed).count() as u64;
     about.changing_sizes = boxes.iter().filter(|of| of.changes).count() as u64;
-    let has_heading = roles.iter().any(|(role, _)| *role == Role::Heading);
+    let has = |wanted: Role| roles.iter().any(|(role, _)| *role == wanted);
+    let has_heading = has(Role::Heading);
     let y_sign = if preset.axes.y == Side::Right { -1.0 } else { 1.0 };
     let mut pieces = pieces;
     for (piece, of) in pieces.iter_mut().zip(&boxes) {
@@ -60,8 +72,8 @@ pub(super) fn assemble(
         .zip(boxes)
         .zip(forward)
         .map(|((piece, sized), is_forward)| {
-            let path: Path = piece.samples.iter().map(|sample| sample.xy_m).collect();
-            let mut on = lines[usize::from(is_forward)].as_ref().map_or(Vec::new(), |line| line.project_all(&path));
+            let mut on =
+                lines[usize::from(is_forward)].as_ref().map_or(Vec::new(), |line| line.project_all(&path(&piece)));
             let by_m = shift_along * sized.length_m;
             on.iter_mut().for_each(|p| p.s_m += by_m);
             Placed { piece, sized, is_forward, on }
@@ -78,9 +90,7 @@ pub(super) fn assemble(
         let tracks = here().count();
         let stride = rate_hz.round().max(1.0) as usize;
         let laterals: Vec<Lateral> = here()
-            .flat_map(|of| {
-                of.on.iter().zip(&of.piece.samples).step_by(stride).map(|(on, sample)| (on.d_m, sample.lane))
-            })
+            .flat_map(|of| (0..of.on.len()).step_by(stride).map(|k| (of.on[k].d_m, of.piece.samples.lane(k))))
             .collect();
         let of_map = lines[side].as_ref().map(|line| map_lines(line, &raw.boundaries)).unwrap_or_default();
         let found = match of_map.len() {
@@ -88,7 +98,7 @@ pub(super) fn assemble(
             _ => lane_lines(&laterals, preset.lanes.width_m),
         };
         let Some((lane_lines_m, source)) = found else { continue };
-        if source == LaneSource::Names {
+        if source == LaneSource::Names && has(Role::LaneOffset) {
             about.lane_offset_error_m =
                 place_by_offset(&mut placed, side == 1, &lane_lines_m).or(about.lane_offset_error_m);
         }
@@ -100,14 +110,16 @@ pub(super) fn assemble(
     let ids = ids(&placed, &raw.vehicles);
     about.renumbered = ids.iter().zip(&placed).any(|(id, of)| raw.vehicles[of.piece.vehicle].key != id.to_string());
     let mut tracks: Vec<Track> = Vec::with_capacity(placed.len());
-    for (of, id) in placed.iter().zip(ids) {
+    about.label_mismatch = label_mismatch(&placed, &carriageways, index);
+    about.heading_facts = if has_heading { heading_facts(&placed, &lines, rate_hz) } else { None };
+    // Each gives its memory to its track.
+    for (of, id) in placed.into_iter().zip(ids) {
         let carriageway = index[usize::from(of.is_forward)];
         let Some(lanes) = carriageways.get(carriageway) else { continue };
+        let of = (of.tangents(&lines), of);
         tracks.push(track(of, id, carriageway, lanes, (rate_hz, preset.smoothing_s), &mut about));
     }
     tracks.sort_by_key(|track| track.id);
-    about.label_mismatch = label_mismatch(&placed, &carriageways, index);
-    about.heading_facts = heading_facts(&placed, rate_hz);
     let recording = Recording { id: raw.id, frame_rate_hz: rate_hz, carriageways, tracks, synthetic: raw.synthetic };
     let (recording, excluded) = about.judge(recording, preset);
     about.excluded = excluded;
@@ -141,7 +153,7 @@ fn place_by_offset(placed: &mut [Placed], is_forward: bool, lines_m: &[f64]) -> 
     let mut laterals: Vec<Lateral> = placed
         .iter()
         .filter(|of| of.is_forward == is_forward)
-        .flat_map(|of| of.on.iter().zip(&of.piece.samples).map(|(on, sample)| (on.d_m, sample.lane)))
+        .flat_map(|of| of.on.iter().zip(of.piece.samples.iter()).map(|(on, sample)| (on.d_m, sample.lane)))
         .filter(|(_, label)| *label != NO_LABEL)
         .collect();
     laterals.sort_by(|a, b| a.1.cmp(&b.1).then(a.0.total_cmp(&b.0)));
@@ -152,13 +164,13 @@ fn place_by_offset(placed: &mut [Placed], is_forward: bool, lines_m: &[f64]) -> 
             Some((group[0].1, lane.centre_m()))
         })
         .collect();
-    let offset = |on: &OnRoad, sample: &RawSample| {
+    let offset = |on: &OnRoad, sample: RawSample| {
         let middle = middles.get(&sample.lane).filter(|_| sample.lane_offset_m.is_finite())?;
         Some((middle, on.d_m - middle))
     };
     // The side on which offsets are positive follows from the positions.
     let here = || placed.iter().filter(|of| of.is_forward == is_forward);
-    let pairs = || here().flat_map(|of| of.on.iter().zip(&of.piece.samples));
+    let pairs = || here().flat_map(|of| of.on.iter().zip(of.piece.samples.iter()));
     let product: f64 = pairs().filter_map(|(on, sample)| Some(offset(on, sample)?.1 * sample.lane_offset_m)).sum();
     let sign = if product < 0.0 { -1.0 } else { 1.0 };
     let differences =
@@ -173,7 +185,7 @@ fn place_by_offset(placed: &mut [Placed], is_forward: bool, lines_m: &[f64]) -> 
         let all: Option<Vec<f64>> = of
             .on
             .iter()
-            .zip(&of.piece.samples)
+            .zip(of.piece.samples.iter())
             .map(|(on, sample)| offset(on, sample).map(|(middle, _)| middle + sign * sample.lane_offset_m))
             .collect();
         let steady = |d: &Vec<f64>| d.windows(2).all(|pair| (pair[1] - pair[0]).abs() < 0.5);
@@ -229,15 +241,14 @@ fn whole(samples: &[RawSample], of: impl Fn(&RawSample) -> f64) -> Option<Vec<f6
 }
 
 fn track(
-    of: &Placed,
+    (tangents, of): (Vec<[f64; 2]>, Placed),
     id: u32,
     carriageway: usize,
     lanes: &Carriageway,
     (rate_hz, smoothing_s): (f64, Option<f64>),
     about: &mut Understanding,
 ) -> Track {
-    let samples = &of.piece.samples;
-    let tangents: Vec<[f64; 2]> = of.on.iter().map(|p| p.tangent).collect();
+    let samples = of.piece.samples.to_vec();
     let component = |value: fn(&RawSample) -> [f64; 2], part: fn([f64; 2], [f64; 2]) -> f64| {
         let values = samples.iter().zip(&tangents).map(|(sample, tangent)| part(*tangent, value(sample)));
         let values: Vec<f64> = values.collect();
@@ -245,12 +256,12 @@ fn track(
     };
     let mut s_m: Vec<f64> = of.on.iter().map(|p| p.s_m).collect();
     let mut d_m: Vec<f64> = of.on.iter().map(|p| p.d_m).collect();
-    let given_s = whole(samples, |sample| sample.along_mps[0])
+    let given_s = whole(&samples, |sample| sample.along_mps[0])
         .or_else(|| component(|sample| sample.velocity_mps, dot))
-        .or_else(|| whole(samples, |sample| sample.speed_mps));
+        .or_else(|| whole(&samples, |sample| sample.speed_mps));
     let given_d =
-        whole(samples, |sample| sample.along_mps[1]).or_else(|| component(|sample| sample.velocity_mps, cross));
-    let given_a = whole(samples, |sample| sample.acceleration_mps2)
+        whole(&samples, |sample| sample.along_mps[1]).or_else(|| component(|sample| sample.velocity_mps, cross));
+    let given_a = whole(&samples, |sample| sample.acceleration_mps2)
         .or_else(|| component(|sample| sample.acceleration_xy_mps2, dot));
     // On a curve, the points of the line are metres apart: derivatives of the positions in the plane are smoother.
     let is_straight = tangents.windows(2).all(|pair| pair[0] == pair[1]);
@@ -313,12 +324,10 @@ fn label_mismatch(placed: &[Placed], carriageways: &[Carriageway], index: [usize
     let mut counts: BTreeMap<(usize, u32), BTreeMap<Option<usize>, u64>> = BTreeMap::new();
     for of in placed {
         let Some(lanes) = carriageways.get(index[usize::from(of.is_forward)]) else { continue };
-        for (on, sample) in of.on.iter().zip(&of.piece.samples).filter(|(_, sample)| sample.lane != NO_LABEL) {
-            *counts
-                .entry((usize::from(of.is_forward), sample.lane))
-                .or_default()
-                .entry(lanes.lane_at(on.d_m))
-                .or_default() += 1;
+        let named = |k: usize| (&of.on[k], of.piece.samples.lane(k));
+        for (on, lane) in (0..of.on.len()).map(named).filter(|(_, lane)| *lane != NO_LABEL) {
+            *counts.entry((usize::from(of.is_forward), lane)).or_default().entry(lanes.lane_at(on.d_m)).or_default() +=
+                1;
         }
     }
     let (mut all, mut fitting) = (0, 0);
@@ -330,22 +339,23 @@ fn label_mismatch(placed: &[Placed], carriageways: &[Carriageway], index: [usize
 }
 
 /// Median cosine between headings and motion, and how headings follow the motion across the road.
-fn heading_facts(placed: &[Placed], rate_hz: f64) -> Option<(f64, Comparison)> {
+fn heading_facts(placed: &[Placed], lines: &[Option<RoadLine>; 2], rate_hz: f64) -> Option<(f64, Comparison)> {
     let stride = rate_hz.round().max(1.0) as usize;
     let mut cosines = Vec::new();
     let mut across = Comparison::default();
     for of in placed {
+        let (samples, tangents) = (&of.piece.samples, of.tangents(lines));
         for k in (stride..of.on.len()).step_by(stride) {
-            let (before, now) = (&of.piece.samples[k - stride], &of.piece.samples[k]);
-            let motion = [now.xy_m[0] - before.xy_m[0], now.xy_m[1] - before.xy_m[1]];
+            let (before, now) = (samples.xy_m(k - stride), samples.xy_m(k));
+            let motion = [now[0] - before[0], now[1] - before[1]];
             let size = libm::hypot(motion[0], motion[1]);
-            let middle = &of.piece.samples[k - stride / 2];
+            let middle = samples.get(k - stride / 2);
             if size < 3.0 || !middle.heading[0].is_finite() {
                 continue;
             }
             let motion = [motion[0] / size, motion[1] / size];
             cosines.push(dot(motion, middle.heading));
-            let tangent = of.on[k - stride / 2].tangent;
+            let tangent = tangents[k - stride / 2];
             across.add(cross(tangent, middle.heading), cross(tangent, motion));
         }
     }

@@ -34,7 +34,7 @@ pub(super) struct Sized {
 
 /// The box of a piece of a vehicle's track.
 pub(super) fn sized(piece: &Piece, vehicle: &RawVehicle, preset: &Preset) -> Sized {
-    let (first, last) = (piece.samples[0].at, piece.samples[piece.samples.len() - 1].at);
+    let (first, last) = (piece.samples.at(0), piece.samples.at(piece.samples.len() - 1));
     let here = |sizes: &[(f64, f64)]| -> Vec<f64> {
         let is_here = |k: usize| sizes[k].0 <= last && sizes.get(k + 1).is_none_or(|(next, _)| *next > first);
         let here: Vec<f64> = (0..sizes.len()).filter(|k| is_here(*k)).map(|k| sizes[k].1).collect();
@@ -76,9 +76,10 @@ pub(super) fn centre(piece: &mut Piece, of: &Sized, reference: Reference, has_he
     if reference == Reference::Centre || (reference != Reference::Corner && !has_heading) {
         return;
     }
-    let (first, last) = (piece.samples[0].xy_m, piece.samples[piece.samples.len() - 1].xy_m);
+    let (first, last) = (piece.samples.xy_m(0), piece.samples.xy_m(piece.samples.len() - 1));
     let travel = [last[0] - first[0], last[1] - first[1]];
-    for sample in &mut piece.samples {
+    let mut samples = piece.samples.to_vec();
+    for sample in &mut samples {
         let heading = if sample.heading[0].is_nan() { travel } else { sample.heading };
         let norm = libm::hypot(heading[0], heading[1]);
         if norm > 0.0 {
@@ -86,6 +87,7 @@ pub(super) fn centre(piece: &mut Piece, of: &Sized, reference: Reference, has_he
             sample.xy_m = [sample.xy_m[0] + by[0], sample.xy_m[1] + by[1]];
         }
     }
+    piece.samples = samples.iter().collect();
 }
 
 /// The vector from the reference point to the centre of the box, m, of a vehicle that faces along a unit vector.

@@ -173,7 +173,7 @@ impl Scene {
             "initialState" | "state" => {
                 if let Some(sample) = self.sample.take() {
                     if sample.at.is_finite() && sample.xy_m.iter().all(|value| value.is_finite()) {
-                        self.vehicle.samples.push(sample);
+                        self.vehicle.samples.push(&sample);
                     } else {
                         self.recording.incomplete += 1;
                     }

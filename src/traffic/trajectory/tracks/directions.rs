@@ -20,7 +20,7 @@ pub(super) fn road(
     rate_hz: f64,
 ) -> Option<([Option<RoadLine>; 2], Vec<bool>)> {
     let displacement = |piece: &Piece| {
-        let (a, b) = (piece.samples[0].xy_m, piece.samples[piece.samples.len() - 1].xy_m);
+        let (a, b) = (piece.samples.xy_m(0), piece.samples.xy_m(piece.samples.len() - 1));
         [b[0] - a[0], b[1] - a[1]]
     };
     let given = |piece: &Piece| raw.vehicles[piece.vehicle].direction;
@@ -37,7 +37,7 @@ pub(super) fn road(
     let stride = (FITTED_STEP_S * rate_hz).round().max(1.0) as usize;
     let path = |piece: &Piece| -> Path {
         let last = piece.samples.len() - 1;
-        (0..=last).filter(|k| k % stride == 0 || *k == last).map(|k| piece.samples[k].xy_m).collect()
+        (0..=last).filter(|k| k % stride == 0 || *k == last).map(|k| piece.samples.xy_m(k)).collect()
     };
     let size = |piece: &Piece| libm::hypot(displacement(piece)[0], displacement(piece)[1]);
     let longest = pieces.iter().max_by(|a, b| size(a).total_cmp(&size(b)))?;
@@ -46,8 +46,8 @@ pub(super) fn road(
     }
     let first = RoadLine::fit(&[path(longest)])?;
     let gain = |piece: &Piece| {
-        let (a, b) = (piece.samples[0].xy_m, piece.samples[piece.samples.len() - 1].xy_m);
-        first.project(b, None).s_m - first.project(a, None).s_m
+        let (a, b) = (piece.samples.xy_m(0), piece.samples.xy_m(piece.samples.len() - 1));
+        first.project(b).s_m - first.project(a).s_m
     };
     let mut forward: Vec<bool> =
         pieces.iter().map(|piece| given(piece).unwrap_or_else(|| gain(piece)) >= 0.0).collect();
@@ -65,7 +65,7 @@ pub(super) fn road(
         let of_map = |boundary: &&Path| {
             let ends = boundary.first().zip(boundary.last());
             ends.is_some_and(|(a, b)| {
-                (first.project(*b, None).s_m > first.project(*a, None).s_m) == (is_forward == longest_is_forward)
+                (first.project(*b).s_m > first.project(*a).s_m) == (is_forward == longest_is_forward)
             })
         };
         let boundaries: Vec<Path> = raw.boundaries.iter().filter(of_map).map(|boundary| dense(boundary)).collect();
@@ -124,7 +124,7 @@ pub(super) fn describe_road(about: &mut Understanding, lines: &[Option<RoadLine>
 /// How far to the left of the forward vehicles the oncoming ones are, m; `None` without both.
 pub(super) fn oncoming_left_m(lines: &[Option<RoadLine>; 2], placed: &[Placed]) -> Option<f64> {
     let line = lines[1].as_ref()?;
-    let middle = |of: &Placed| line.project(of.piece.samples[of.piece.samples.len() / 2].xy_m, None).d_m;
+    let middle = |of: &Placed| line.project(of.piece.samples.xy_m(of.piece.samples.len() / 2)).d_m;
     let of_side = |is_forward: bool| {
         let mut d: Vec<f64> = placed.iter().filter(|of| of.is_forward == is_forward).take(500).map(middle).collect();
         (d.len() >= 3).then(|| median(&mut d))

@@ -1,6 +1,6 @@
 //! Tracks in any format: a [`Preset`] says what the columns of a file mean, this module makes [recordings](super::Recording) of them.
 //!
-//! The stages: rows of a file (`rows`, `markup`), vehicles in SI units (`raw`, `commonroad`), gapless pieces (`pieces`,
+//! The stages: rows of a file (`rows`, `markup`), vehicles in SI units (`raw`, `samples`, `commonroad`), gapless pieces (`pieces`,
 //! `boxes`), the lines of the road (`road`, `directions`), lanes (`lanes`), the recording (`assemble`), and what contradicts
 //! itself (`understanding`, `findings`). highD files have their own reader.
 
@@ -18,6 +18,7 @@ mod raw;
 mod road;
 mod roles;
 mod rows;
+mod samples;
 mod smooth;
 mod understanding;
 

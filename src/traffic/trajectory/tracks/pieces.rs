@@ -1,8 +1,11 @@
 //! The time base of a recording: its frame rate, and gapless pieces of tracks at its frames.
 
+use std::borrow::Cow;
+
 use super::preset::Preset;
 use super::raw::{RawRecording, RawSample};
 use super::road::{cross, dot, median, unit};
+use super::samples::Samples;
 use super::understanding::{TIMES, Understanding};
 use crate::support::readable::significant;
 use crate::{Error, Place, Result};
@@ -29,7 +32,7 @@ const FREE_SAMPLES: f64 = 1e5;
 pub(super) struct Piece {
     pub vehicle: usize,
     pub first_frame: i64,
-    pub samples: Vec<RawSample>,
+    pub samples: Samples,
 }
 
 /// The frame rate, and the tracks in gapless pieces at its frames.
@@ -40,24 +43,28 @@ pub(super) fn pieces(
     place: &Place,
 ) -> Result<(f64, Vec<Piece>)> {
     for vehicle in &mut raw.vehicles {
-        vehicle.samples.sort_by(|a, b| a.at.total_cmp(&b.at));
-        let count = vehicle.samples.len();
-        vehicle.samples.dedup_by(|later, first| {
+        if vehicle.samples.steps().all(|step| step > 0.0) {
+            continue;
+        }
+        let mut samples = vehicle.samples.to_vec();
+        samples.sort_by(|a, b| a.at.total_cmp(&b.at));
+        let count = samples.len();
+        samples.dedup_by(|later, first| {
             let is_repeated = later.at == first.at;
             let apart_m = |axis: usize| (later.xy_m[axis] - first.xy_m[axis]).abs();
             about.conflicts += u64::from(is_repeated && apart_m(0).max(apart_m(1)) > SAME_PLACE_M);
             is_repeated
         });
-        about.duplicates += (count - vehicle.samples.len()) as u64;
+        about.duplicates += (count - samples.len()) as u64;
+        vehicle.samples = samples.iter().collect();
     }
     let bad = |problem: &str, help: &str| Error::input(place.clone(), problem, help);
-    let mut steps: Vec<f64> =
-        raw.vehicles.iter().flat_map(|vehicle| vehicle.samples.windows(2).map(|w| w[1].at - w[0].at)).collect();
+    let mut steps: Vec<f64> = raw.vehicles.iter().flat_map(|vehicle| vehicle.samples.steps()).collect();
     if steps.is_empty() {
         return Err(bad("no vehicle has two samples", "check the columns for vehicle and time"));
     }
     let step = median(&mut steps);
-    let origin = raw.vehicles.iter().map(|vehicle| vehicle.samples[0].at).fold(f64::INFINITY, f64::min);
+    let origin = raw.vehicles.iter().map(|vehicle| vehicle.samples.at(0)).fold(f64::INFINITY, f64::min);
     // (frames of the recording per unit of `at`, frame at the origin)
     let (rate_hz, scale, first) = if raw.has_frames {
         let rate_hz = raw.frame_rate_hz.or(preset.frame_rate_hz).ok_or_else(|| {
@@ -85,21 +92,24 @@ pub(super) fn pieces(
     about.rate_hz = rate_hz;
     let frame = |at: f64| first.round() * factor + (at - origin) * scale * factor;
     let max_gap = (preset.max_gap_s * rate_hz).max(1.0) + 0.5 + factor;
-    // How much each step differs from the two beside it, m, by vehicle.
-    let differences: Vec<Vec<f64>> =
-        raw.vehicles.iter().map(|of| step_differences_m(&of.samples, |at| frame(at) / rate_hz)).collect();
-    let usual = median(&mut differences.iter().flatten().copied().collect::<Vec<_>>());
-    let jump_m = JUMP_M.max(JUMP_OVER_NOISE * usual);
+    let time_s = |at: f64| frame(at) / rate_hz;
+    let mut differences_m: Vec<f64> =
+        raw.vehicles.iter().flat_map(|of| step_differences_m(&of.samples.to_vec(), time_s)).collect();
+    let jump_m = JUMP_M.max(JUMP_OVER_NOISE * median(&mut differences_m));
+    drop(differences_m);
     let rows: usize = raw.vehicles.iter().map(|vehicle| vehicle.samples.len()).sum();
     let mut pieces = Vec::new();
     let mut total = 0.0;
     let mut first_jump = None;
-    for (vehicle, of) in raw.vehicles.iter().enumerate() {
-        let samples = &of.samples;
+    for (vehicle, of) in raw.vehicles.iter_mut().enumerate() {
+        // From here on, pieces hold them.
+        let mut stored = std::mem::take(&mut of.samples);
+        let samples = stored.to_vec();
+        let differences_m = step_differences_m(&samples, time_s);
         let mut from = 0;
         for to in 1..=samples.len() {
             if to < samples.len() && frame(samples[to].at) - frame(samples[to - 1].at) <= max_gap {
-                let by_m = differences[vehicle][to - 1];
+                let by_m = differences_m[to - 1];
                 if by_m <= jump_m {
                     continue;
                 }
@@ -116,7 +126,9 @@ pub(super) fn pieces(
             }
             let (at_frames, first_frame) = at_frames(piece, &frames, about);
             if at_frames.len() >= MIN_PIECE {
-                pieces.push(Piece { vehicle, first_frame, samples: at_frames });
+                let is_whole = matches!(at_frames, Cow::Borrowed(_)) && piece.len() == samples.len();
+                let samples = if is_whole { std::mem::take(&mut stored) } else { at_frames.iter().collect() };
+                pieces.push(Piece { vehicle, first_frame, samples });
             } else {
                 about.short_pieces += 1;
             }
@@ -175,8 +187,7 @@ fn step_differences_m(samples: &[RawSample], time_s: impl Fn(f64) -> f64) -> Vec
 /// Steps over time of all vehicles, because a rounded step is not exact, and vehicles may have times of their own.
 fn rate_of_times(raw: &RawRecording, step: f64) -> f64 {
     let (mut steps, mut span) = (0.0, 0.0);
-    for pair in raw.vehicles.iter().flat_map(|vehicle| vehicle.samples.windows(2)) {
-        let by = pair[1].at - pair[0].at;
+    for by in raw.vehicles.iter().flat_map(|vehicle| vehicle.samples.steps()) {
         // A gap tells less about the step.
         if by < 5.5 * step {
             steps += (by / step).round();
@@ -189,11 +200,11 @@ fn rate_of_times(raw: &RawRecording, step: f64) -> f64 {
 }
 
 /// The samples at whole frames: as they are, or by linear interpolation.
-fn at_frames(piece: &[RawSample], frames: &[f64], about: &mut Understanding) -> (Vec<RawSample>, i64) {
+fn at_frames<'a>(piece: &'a [RawSample], frames: &[f64], about: &mut Understanding) -> (Cow<'a, [RawSample]>, i64) {
     let first = frames[0].round();
     let is_on = |(k, frame): (usize, &f64)| (frame - first - k as f64).abs() <= OFF_RASTER;
     if frames.iter().enumerate().all(is_on) {
-        return (piece.to_vec(), first as i64);
+        return (piece.into(), first as i64);
     }
     let first = (frames[0] - OFF_RASTER).ceil();
     let last = (frames[frames.len() - 1] + OFF_RASTER).floor();
@@ -212,7 +223,7 @@ fn at_frames(piece: &[RawSample], frames: &[f64], about: &mut Understanding) -> 
     let off = |frame: &f64| (frame - frame.round()).abs();
     about.interpolated += samples.len() as u64;
     about.off_raster_frames = frames.iter().map(off).fold(about.off_raster_frames, f64::max);
-    (samples, first as i64)
+    (samples.into(), first as i64)
 }
 
 fn mix(a: &RawSample, b: &RawSample, part: f64) -> RawSample {

@@ -6,6 +6,7 @@ use std::path::Path;
 use super::preset::{HeadingOrigin, MetaFile, Preset, Side};
 use super::roles::{ColumnName, Role};
 use super::rows::{Columns, Rows, SampleRow};
+use super::samples::Samples;
 use crate::support::plain_text::nearest;
 use crate::traffic::trajectory::csv_table::FileChecksum;
 use crate::{Error, Place, Result};
@@ -51,7 +52,7 @@ pub(super) struct RawVehicle {
     pub widths_m: Vec<(f64, f64)>,
     /// Sign of the travel along the road.
     pub direction: Option<f64>,
-    pub samples: Vec<RawSample>,
+    pub samples: Samples,
 }
 
 impl RawVehicle {
@@ -117,6 +118,7 @@ pub(super) fn read_table(path: &Path, id: &str, preset: &Preset) -> Result<RawFi
     let mut file = Collecting::new(id, preset, &columns);
     let (checksum, count) = rows.each(&columns, &mut |row| file.add(row))?;
     let mut recordings = file.recordings;
+    recordings.iter_mut().flat_map(|of| &mut of.vehicles).for_each(|vehicle| vehicle.samples.shrink());
     let mut checksums = vec![checksum];
     if let Some(meta) = &preset.vehicles {
         checksums.extend(add_vehicle_facts(path, id, meta, preset, &mut recordings)?);
@@ -242,7 +244,7 @@ impl<'a> Collecting<'a> {
             of.class = row.text(Role::Class)?.map(|class| class.into_owned());
             of.direction = row.number(Role::Direction)?;
         }
-        of.samples.push(sample);
+        of.samples.push(&sample);
         Ok(())
     }
 
@@ -323,7 +325,7 @@ fn add_vehicle_facts(
             lengths_m: sizes(Role::Length)?,
             widths_m: sizes(Role::Width)?,
             direction: row.number(Role::Direction)?,
-            samples: Vec::new(),
+            samples: Samples::default(),
         };
         facts.insert(vehicle.key.clone(), vehicle);
         Ok(())

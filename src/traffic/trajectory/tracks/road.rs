@@ -27,10 +27,6 @@ pub(super) type Path = Vec<[f64; 2]>;
 pub(super) struct OnRoad {
     pub s_m: f64,
     pub d_m: f64,
-    /// Direction of the road there.
-    pub tangent: [f64; 2],
-    /// Segment of the line, to begin the next search with.
-    pub at: usize,
 }
 
 /// A line with a direction.
@@ -134,12 +130,17 @@ impl RoadLine {
         if sharpest > 0.0 { 1.0 / sharpest } else { f64::INFINITY }
     }
 
+    /// A point on the road.
+    pub fn project(&self, point: [f64; 2]) -> OnRoad {
+        self.project_near(point, None).0
+    }
+
     /// Projects a point: the nearest segment around `near`, or of all. Between two points of the line the direction turns
-    /// evenly, so that s and d do not jump.
-    pub fn project(&self, point: [f64; 2], near: Option<usize>) -> OnRoad {
+    /// evenly, so that s and d do not jump. Returns also the direction of the road there, and the segment.
+    fn project_near(&self, point: [f64; 2], near: Option<usize>) -> (OnRoad, [f64; 2], usize) {
         if self.is_straight() {
             let (tangent, off) = (self.tangents[0], minus(point, self.points[0]));
-            return OnRoad { s_m: dot(off, tangent), d_m: cross(tangent, off), tangent, at: 0 };
+            return (OnRoad { s_m: dot(off, tangent), d_m: cross(tangent, off) }, tangent, 0);
         }
         let segments = self.points.len() - 1;
         let ahead = |i: usize| dot(minus(point, self.points[i]), self.tangents[i]);
@@ -162,19 +163,26 @@ impl RoadLine {
         let foot = mix(self.points[at], self.points[at + 1]);
         let off = minus(point, foot);
         let s_m = self.s_m[at] + clamped * (self.s_m[at + 1] - self.s_m[at]) + dot(off, tangent);
-        OnRoad { s_m, d_m: cross(tangent, off), tangent, at }
+        (OnRoad { s_m, d_m: cross(tangent, off) }, tangent, at)
     }
 
     /// A path on the road.
     pub fn project_all(&self, path: &[[f64; 2]]) -> Vec<OnRoad> {
+        self.along_path(path).map(|(on, _)| on).collect()
+    }
+
+    /// Directions of the road at the points of a path.
+    pub fn directions(&self, path: &[[f64; 2]]) -> Vec<[f64; 2]> {
+        self.along_path(path).map(|(_, tangent)| tangent).collect()
+    }
+
+    fn along_path(&self, path: &[[f64; 2]]) -> impl Iterator<Item = (OnRoad, [f64; 2])> {
         let mut near = None;
-        path.iter()
-            .map(|point| {
-                let on = self.project(*point, near);
-                near = Some(on.at);
-                on
-            })
-            .collect()
+        path.iter().map(move |point| {
+            let (on, tangent, at) = self.project_near(*point, near);
+            near = Some(at);
+            (on, tangent)
+        })
     }
 
     /// Median over the tracks of the range of their d, m: lane keeping, and the error of the line.
@@ -306,9 +314,9 @@ fn extend(line: &mut RoadLine, paths: &[Path]) -> Option<()> {
         let moved: Vec<[f64; 2]> = raw.points.iter().zip(&raw.tangents).map(moved).collect();
         let inner = &line.points[steps..line.points.len() - steps];
         let joined: Vec<[f64; 2]> = if at_end {
-            inner.iter().copied().chain(moved.into_iter().filter(|p| line.project(*p, None).s_m > to)).collect()
+            inner.iter().copied().chain(moved.into_iter().filter(|p| line.project(*p).s_m > to)).collect()
         } else {
-            moved.into_iter().filter(|p| line.project(*p, None).s_m < from).chain(inner.iter().copied()).collect()
+            moved.into_iter().filter(|p| line.project(*p).s_m < from).chain(inner.iter().copied()).collect()
         };
         *line = resampled(&joined)?;
     }
@@ -347,14 +355,14 @@ fn medians(mut by_bin: Vec<Vec<f64>>) -> Vec<f64> {
 fn turned(line: &RoadLine, paths: &[Path]) -> Option<RoadLine> {
     let mut turns: Vec<Vec<f64>> = vec![Vec::new(); bins(line)];
     for path in paths {
-        let on = line.project_all(path);
+        let on: Vec<(OnRoad, [f64; 2])> = line.along_path(path).collect();
         // Steps of a few metres, because positions are noisy.
         let mut from = 0;
         for k in 1..path.len() {
             let step = minus(path[k], path[from]);
             if length(step) >= STEP_M {
-                let tangent = on[usize::midpoint(from, k)].tangent;
-                turns[bin(line, on[k].s_m)].push(libm::atan2(cross(tangent, step), dot(tangent, step)));
+                let tangent = on[usize::midpoint(from, k)].1;
+                turns[bin(line, on[k].0.s_m)].push(libm::atan2(cross(tangent, step), dot(tangent, step)));
                 from = k;
             }
         }
@@ -461,9 +469,9 @@ mod tests {
             |d: f64| (0..200).map(|k| [2.0 * f64::from(k), d + 0.1 * libm::sin(f64::from(k) / 9.0 + d)]).collect();
         let line = RoadLine::fit(&[path(0.0), path(3.5), path(7.0), path(3.6), path(0.2), path(7.3)]).unwrap();
         assert!(line.is_straight());
-        let on = line.project([123.0, 4.5], None);
+        let on = line.project([123.0, 4.5]);
         assert_eq!((on.s_m, on.d_m), (123.0, 4.5));
-        let back = line.reversed().project([123.0, 4.5], None);
+        let back = line.reversed().project([123.0, 4.5]);
         assert_eq!((back.s_m, back.d_m), (-123.0, -4.5));
     }
 }
