@@ -185,6 +185,6 @@ pub fn refuse_overwriting(output: &Path, others: &[PathBuf], flag: &str) -> Resu
 pub fn refuse_recording(output: &Path, dir: &Path, preset: Option<&str>, flag: &str) -> Result<()> {
     // The reader reports a folder that cannot be listed.
     let Ok(inputs) = Inputs::of(dir, preset) else { return Ok(()) };
-    let files: Vec<PathBuf> = inputs.files().0.into_iter().flat_map(InputFile::paths).collect();
+    let files: Vec<PathBuf> = inputs.files().0.iter().flat_map(InputFile::paths).collect();
     refuse_overwriting(output, &files, flag)
 }

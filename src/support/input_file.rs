@@ -1,12 +1,13 @@
 //! Opens files that a user names: regular files only, up to the maximum size of their kind.
 //!
 //! Opening a pipe without a writer would block forever, and a device such as `/dev/zero` never ends. All TOML settings
-//! use one reader, so that every error names its line.
+//! use one reader, so that every error names its line. Texts of other programs may be compressed or in UTF-16.
 
 use std::fs::File;
-use std::io::{Read, Seek, SeekFrom};
+use std::io::{BufReader, Cursor, Read, Seek, SeekFrom};
 use std::path::Path;
 
+use flate2::read::MultiGzDecoder;
 use serde::de::DeserializeOwned;
 use sha2::{Digest, Sha256};
 
@@ -43,12 +44,105 @@ pub fn open(path: &Path) -> Result<File> {
     File::open(path).map_err(io)
 }
 
+/// Opens a text file as UTF-8, piece by piece: unpacked if gzip compressed it, converted if it begins with the mark of
+/// UTF-16.
+///
+/// # Errors
+/// As [`open`]; [`Error::Input`] for another file with gzip's ending.
+pub fn open_text(path: &Path) -> Result<Box<dyn Read + Send>> {
+    let io = |e| Error::io(path, "read", e);
+    let begin = |reader: &mut dyn Read| -> std::io::Result<Vec<u8>> {
+        let mut begin = Vec::new();
+        reader.take(2).read_to_end(&mut begin)?;
+        Ok(begin)
+    };
+    let mut file = open(path)?;
+    let is_packed = begin(&mut file).map_err(io)? == [0x1f, 0x8b];
+    let name = path.to_string_lossy();
+    if !is_packed && unpacked(&name) != name {
+        let problem = "its name ends in .gz, but gzip did not compress it";
+        return Err(Error::input(Place::file(path), problem, "copy it again, or rename it"));
+    }
+    file.rewind().map_err(io)?;
+    let mut reader: Box<dyn Read + Send> = Box::new(file);
+    if is_packed {
+        reader = Box::new(MultiGzDecoder::new(BufReader::with_capacity(1 << 16, reader)));
+    }
+    let mark = begin(&mut reader).map_err(io)?;
+    Ok(match mark[..] {
+        [0xff, 0xfe] => {
+            Box::new(Utf16 { inner: reader, unit: u16::from_le_bytes, rest: Vec::new(), ready: Cursor::default() })
+        }
+        [0xfe, 0xff] => {
+            Box::new(Utf16 { inner: reader, unit: u16::from_be_bytes, rest: Vec::new(), ready: Cursor::default() })
+        }
+        _ => Box::new(Cursor::new(mark).chain(reader)),
+    })
+}
+
+/// The name of a file that gzip compressed, without its ending; other names as they are.
+pub fn unpacked(name: &str) -> &str {
+    name.strip_suffix(".gz").or_else(|| name.strip_suffix(".GZ")).unwrap_or(name)
+}
+
+/// Whether [`open_text`] gives the bytes of the file as they are.
+///
+/// # Errors
+/// As [`open`].
+pub fn is_plain(path: &Path) -> Result<bool> {
+    let (begin, _) = ends(&mut open(path)?).map_err(|e| Error::io(path, "read", e))?;
+    Ok(![[0x1f, 0x8b], [0xff, 0xfe], [0xfe, 0xff]].iter().any(|mark| begin.starts_with(mark)))
+}
+
+/// Text in UTF-16 as UTF-8.
+struct Utf16<R> {
+    inner: R,
+    unit: fn([u8; 2]) -> u16,
+    /// Bytes of a character that goes on in the next piece.
+    rest: Vec<u8>,
+    ready: Cursor<Vec<u8>>,
+}
+
+impl<R: Read> Read for Utf16<R> {
+    fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
+        const PIECE: u64 = 1 << 16;
+        while self.ready.position() == self.ready.get_ref().len() as u64 {
+            let is_end = self.inner.by_ref().take(PIECE).read_to_end(&mut self.rest)? == 0;
+            if is_end && self.rest.is_empty() {
+                return Ok(0);
+            }
+            let mut units: Vec<u16> = self.rest.as_chunks::<2>().0.iter().map(|pair| (self.unit)(*pair)).collect();
+            if !is_end && units.last().is_some_and(|unit| (0xd800..0xdc00).contains(unit)) {
+                units.pop();
+            }
+            self.rest.drain(..2 * units.len());
+            let mut text = String::from_utf16_lossy(&units);
+            if is_end && !std::mem::take(&mut self.rest).is_empty() {
+                text.push(char::REPLACEMENT_CHARACTER);
+            }
+            self.ready = Cursor::new(text.into_bytes());
+        }
+        self.ready.read(bytes)
+    }
+}
+
 /// The content of a regular file of at most `largest` bytes.
 ///
 /// # Errors
 /// As [`open`]; [`Error::Input`] for a larger file.
 pub fn read(path: &Path, largest: u64) -> Result<Vec<u8>> {
-    let file = open(path)?;
+    read_from(path, open(path)?, largest)
+}
+
+/// As [`read`], of the text that [`open_text`] gives.
+///
+/// # Errors
+/// As [`read`].
+pub fn read_unpacked(path: &Path, largest: u64) -> Result<Vec<u8>> {
+    read_from(path, open_text(path)?, largest)
+}
+
+fn read_from(path: &Path, file: impl Read, largest: u64) -> Result<Vec<u8>> {
     let mut content = Vec::new();
     // The reported size may be wrong or change, so the bytes read are limited.
     file.take(largest + 1).read_to_end(&mut content).map_err(|e| Error::io(path, "read", e))?;
@@ -214,6 +308,35 @@ mod tests {
             std::fs::write(&path, &content).unwrap();
             assert_eq!(sha256(&path).unwrap(), hex(&Sha256::digest(&content)), "{size}");
         }
+    }
+
+    #[test]
+    fn utf_16_and_gzip_give_the_text_also_where_pieces_end_within_a_character() {
+        use std::io::Write;
+        let dir = tempfile::tempdir().unwrap();
+        let path = dir.path().join("file");
+        // Each 𝛥 has two units, and the odd ones lie across the ends of pieces.
+        let text = format!("a{}", "x,𝛥é\n".repeat(20_000));
+        let read = || String::from_utf8(read_unpacked(&path, 1 << 20).unwrap()).unwrap();
+        for unit in [u16::to_le_bytes, u16::to_be_bytes] {
+            let units = std::iter::once(0xfeff).chain(text.encode_utf16());
+            std::fs::write(&path, units.flat_map(unit).collect::<Vec<u8>>()).unwrap();
+            assert!(read() == text && !is_plain(&path).unwrap());
+        }
+        // Two members, as `cat a.gz b.gz` makes them.
+        let mut packed = Vec::new();
+        for half in [&text[..11], &text[11..]] {
+            let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+            encoder.write_all(half.as_bytes()).unwrap();
+            packed.extend(encoder.finish().unwrap());
+        }
+        std::fs::write(&path, &packed).unwrap();
+        assert!(read() == text && !is_plain(&path).unwrap());
+        std::fs::write(&path, &packed[..packed.len() - 9]).unwrap();
+        assert!(read_unpacked(&path, 1 << 20).is_err());
+        std::fs::write(&path, &text).unwrap();
+        assert!(read() == text && is_plain(&path).unwrap());
+        assert!(matches!(read_unpacked(&path, 99), Err(Error::Input { .. })));
     }
 
     #[derive(Debug, serde::Deserialize)]

@@ -54,12 +54,13 @@ fn every_file_of_a_folder_is_read_or_named() {
     let text = table().text();
     write("a.csv", &text);
     write("b.csv", &text.replacen(",x,", ",ort,", 1));
-    write("c.csv.gz", "packed");
+    write("c.csv.gz", "not packed");
+    write("d.csv.zip", "packed");
     // What is no table of tracks is not named.
     write("README.txt", "Traffic of a bridge, in May, by us, with thanks\n");
     write("settings.toml", "a = 1\n");
     write("classes.csv", "class,meaning\n1,car\n");
-    assert_eq!(read_and_named(dir.path()), (1, vec!["b.csv".to_owned(), "c.csv.gz".to_owned()]));
+    assert_eq!(read_and_named(dir.path()), (1, ["b.csv", "c.csv.gz", "d.csv.zip"].map(str::to_owned).to_vec()));
 }
 
 #[test]
@@ -83,10 +84,10 @@ fn an_xml_file_that_ends_early_is_named() {
 fn a_folder_of_foreign_files_says_what_was_tried() {
     let dir = tempfile::tempdir().unwrap();
     fs::write(dir.path().join("a.csv"), "one,two\n1,2\n").unwrap();
-    fs::write(dir.path().join("b.csv.gz"), "packed").unwrap();
+    fs::write(dir.path().join("b.csv.zip"), "packed").unwrap();
     fs::write(dir.path().join("c.pdf"), "page").unwrap();
     let error = Inputs::of(dir.path(), None).unwrap_err().to_string();
-    for words in ["a.csv: no preset fits", "b.csv.gz: compressed", "c.pdf: no format of tracks"] {
+    for words in ["a.csv: no preset fits", "b.csv.zip: compressed", "c.pdf: no format of tracks"] {
         assert!(error.contains(words), "{error}");
     }
     assert!(!error.contains("tracksMeta"), "{error}");

@@ -5,6 +5,7 @@ mod common;
 
 mod bad_geometry;
 mod bad_recordings;
+mod foreign_encodings;
 mod foreign_tables;
 mod generator_calibration;
 mod generator_physics;

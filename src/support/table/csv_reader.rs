@@ -70,9 +70,20 @@ impl CsvRows {
         self.wanted = columns.to_vec();
     }
 
-    pub(super) fn next_row(&mut self) -> Result<Option<Row>> {
+    pub(super) fn step(&mut self) -> Result<bool> {
         self.ration.set(MAX_ROW_BYTES);
-        if !self.reader.read_record(&mut self.record).map_err(|e| csv_error(&self.path, e))? {
+        self.reader.read_record(&mut self.record).map_err(|e| csv_error(&self.path, e))
+    }
+
+    pub(super) fn cell(&self, wanted: usize) -> super::Cell<'_> {
+        match self.record.get(self.wanted[wanted]) {
+            None | Some("") => super::Cell::Null,
+            Some(text) => super::Cell::text(text_of_cell(text)),
+        }
+    }
+
+    pub(super) fn next_row(&mut self) -> Result<Option<Row>> {
+        if !self.step()? {
             return Ok(None);
         }
         let number = self.record.position().map_or(0, csv::Position::line);

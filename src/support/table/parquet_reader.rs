@@ -9,10 +9,11 @@ use std::path::{Path, PathBuf};
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
     Decimal128Type, Decimal256Type, Float16Type, Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type,
-    UInt8Type, UInt16Type, UInt32Type, UInt64Type,
+    TimestampMicrosecondType, TimestampMillisecondType, TimestampNanosecondType, TimestampSecondType, UInt8Type,
+    UInt16Type, UInt32Type, UInt64Type,
 };
 use arrow_array::{Array, ArrayRef, RecordBatch, StructArray};
-use arrow_schema::{DataType, Field};
+use arrow_schema::{DataType, Field, TimeUnit};
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
     ArrowReaderMetadata, ArrowReaderOptions, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder,
@@ -20,12 +21,12 @@ use parquet::arrow::arrow_reader::{
 use parquet::basic::Compression;
 use serde_json::Value;
 
-use super::Row;
+use super::{Cell as TableCell, Row};
 use crate::support::input_file;
 use crate::{Error, Place, Result};
 
-/// Rows decoded together.
-const BATCH_ROWS: usize = 64;
+/// Rows decoded together, with and without lists.
+const BATCH_ROWS: [usize; 2] = [64, 4096];
 /// Maximum length of a series: eleven hours at 25 Hz.
 const MAX_SERIES: usize = 1 << 20;
 /// Maximum length of a text, bytes: every row may repeat it.
@@ -51,6 +52,51 @@ pub(super) struct ParquetRows {
 struct Leaf {
     record: Option<ArrayRef>,
     values: ArrayRef,
+    /// The values of common types; null is NaN.
+    plain: Plain,
+}
+
+/// Values of a column without nulls, or of real numbers with them, so that no value asks for its type.
+enum Plain {
+    Reals(Vec<f64>),
+    Wholes(Vec<i64>),
+    Other,
+}
+
+impl Leaf {
+    fn new(record: Option<ArrayRef>, values: ArrayRef) -> Leaf {
+        let mut leaf = Leaf { record, values, plain: Plain::Other };
+        let rows = 0..leaf.values.len();
+        let of = leaf.values.data_type();
+        if leaf.record.is_none() && leaf.values.null_count() == 0 {
+            // The usual ones at once.
+            match of {
+                DataType::Float64 => {
+                    leaf.plain = Plain::Reals(leaf.values.as_primitive::<Float64Type>().values().to_vec());
+                    return leaf;
+                }
+                DataType::Int64 => {
+                    leaf.plain = Plain::Wholes(leaf.values.as_primitive::<Int64Type>().values().to_vec());
+                    return leaf;
+                }
+                _ => {}
+            }
+        }
+        if of.is_floating() || matches!(of, DataType::Timestamp(..)) {
+            let real = |at| if let TableCell::Number(value) = cell(&leaf, at) { value } else { f64::NAN };
+            leaf.plain = Plain::Reals(rows.map(real).collect());
+        } else if of.is_integer() {
+            let whole = |at| if let TableCell::Whole(value) = cell(&leaf, at) { Some(value) } else { None };
+            leaf.plain = rows.map(whole).collect::<Option<_>>().map_or(Plain::Other, Plain::Wholes);
+        }
+        leaf
+    }
+}
+
+impl Leaf {
+    fn is_null(&self, at: usize) -> bool {
+        self.record.as_ref().is_some_and(|record| record.is_null(at)) || self.values.is_null(at)
+    }
 }
 
 thread_local! {
@@ -135,15 +181,16 @@ impl ParquetRows {
             parquet.row_groups().iter().flat_map(move |group| group.columns().iter().enumerate().filter_map(included))
         };
         let codec = |chunk: &&parquet::file::metadata::ColumnChunkMetaData| {
-            !matches!(chunk.compression(), Compression::UNCOMPRESSED | Compression::SNAPPY | Compression::ZSTD(_))
+            use Compression::{GZIP, LZ4, LZ4_RAW, SNAPPY, UNCOMPRESSED, ZSTD};
+            !matches!(chunk.compression(), UNCOMPRESSED | SNAPPY | ZSTD(_) | GZIP(_) | LZ4 | LZ4_RAW)
         };
         if let Some(chunk) = chunks().find(codec) {
-            let problem = format!("compressed with {}; expected zstd, snappy or none", chunk.compression());
+            let problem = format!("compressed with {}; expected zstd, snappy, gzip, lz4 or none", chunk.compression());
             return Err(Error::input(Place::file(&self.path), problem, "write it again with compression=\"zstd\""));
         }
         let file = self.file.try_clone().map_err(|e| Error::io(&self.path, "read", e))?;
         let builder = ParquetRecordBatchReaderBuilder::new_with_metadata(file, self.metadata.clone());
-        let builder = builder.with_projection(mask).with_batch_size(BATCH_ROWS);
+        let builder = builder.with_projection(mask).with_batch_size(BATCH_ROWS[usize::from(!self.has_lists())]);
         self.reader = Some(guarded(&self.path, || builder.build())?);
         Ok(())
     }
@@ -157,19 +204,43 @@ impl ParquetRows {
         }
     }
 
-    pub(super) fn next_row(&mut self) -> Result<Option<Row>> {
+    pub(super) fn has_lists(&self) -> bool {
+        self.wanted.iter().any(|&column| matches!(self.data_type(column), DataType::List(_)))
+    }
+
+    pub(super) fn has_instants(&self, column: usize) -> bool {
+        matches!(self.data_type(column), DataType::Timestamp(..))
+    }
+
+    pub(super) fn step(&mut self) -> Result<bool> {
         while self.at == self.batch_rows {
-            let Some(reader) = &mut self.reader else { return Ok(None) };
+            let Some(reader) = &mut self.reader else { return Ok(false) };
             let next = guarded(&self.path, || reader.next().transpose())?;
-            let Some(batch) = next else { return Ok(None) };
+            let Some(batch) = next else { return Ok(false) };
             self.batch = guarded(&self.path, || self.leaves_of(&batch))?;
             (self.batch_rows, self.at) = (batch.num_rows(), 0);
         }
-        let at = self.at;
-        let batch = &self.batch;
-        let values = guarded(&self.path, || batch.iter().map(|leaf| value(leaf, at)).collect())?;
         self.at += 1;
         self.number += 1;
+        Ok(true)
+    }
+
+    /// A value of the present row that is no list.
+    pub(super) fn cell(&self, wanted: usize) -> TableCell<'_> {
+        let (leaf, at) = (&self.batch[wanted], self.at - 1);
+        match &leaf.plain {
+            Plain::Reals(values) => TableCell::Number(values[at]),
+            Plain::Wholes(values) => TableCell::Whole(values[at]),
+            Plain::Other => cell(leaf, at),
+        }
+    }
+
+    pub(super) fn next_row(&mut self) -> Result<Option<Row>> {
+        if !self.step()? {
+            return Ok(None);
+        }
+        let (batch, at) = (&self.batch, self.at - 1);
+        let values = guarded(&self.path, || batch.iter().map(|leaf| value(leaf, at)).collect())?;
         Ok(Some(Row { number: self.number, values }))
     }
 
@@ -193,7 +264,7 @@ impl ParquetRows {
             if !is_readable(values.data_type()) {
                 return Err("a column changes its type".to_owned());
             }
-            Ok(Leaf { record, values })
+            Ok(Leaf::new(record, values))
         };
         self.wanted.iter().map(leaf).collect()
     }
@@ -207,7 +278,7 @@ fn is_number(of: &DataType) -> bool {
 /// Arrow metadata is skipped.
 fn is_readable(of: &DataType) -> bool {
     match of {
-        DataType::Utf8 | DataType::Boolean | DataType::Null => true,
+        DataType::Utf8 | DataType::Boolean | DataType::Null | DataType::Timestamp(..) => true,
         DataType::List(item) => item.data_type() == &DataType::Null || is_number(item.data_type()),
         other => is_number(other),
     }
@@ -215,52 +286,80 @@ fn is_readable(of: &DataType) -> bool {
 
 /// A value of a leaf; NaN and infinity become null, because JSON lacks them.
 fn value(leaf: &Leaf, at: usize) -> std::result::Result<Value, String> {
-    let array = &leaf.values;
-    if leaf.record.as_ref().is_some_and(|record| record.is_null(at)) || array.is_null(at) {
-        return Ok(Value::Null);
+    if let DataType::List(_) = leaf.values.data_type()
+        && !leaf.is_null(at)
+    {
+        let items = leaf.values.as_list::<i32>().value(at);
+        if items.len() > MAX_SERIES {
+            return Err(format!("a series has {} values; at most {MAX_SERIES} can be read", items.len()));
+        }
+        let items = Leaf { record: None, values: items, plain: Plain::Other };
+        return Ok(Value::Array(
+            (0..items.values.len()).map(|at| value(&items, at)).collect::<std::result::Result<_, _>>()?,
+        ));
     }
-    macro_rules! number {
-        ($of:ident as $to:ty) => {
-            Value::from(<$to>::from(array.as_primitive::<$of>().value(at)))
+    Ok(match cell(leaf, at) {
+        TableCell::Text(text) if text.len() > MAX_TEXT => {
+            return Err(format!("a text has {} bytes; at most {MAX_TEXT} can be read", text.len()));
+        }
+        TableCell::Text(text) => Value::from(text),
+        TableCell::Flag(value) => Value::from(value),
+        TableCell::Whole(value) => Value::from(value),
+        TableCell::Number(value) => Value::from(value),
+        _ => Value::Null,
+    })
+}
+
+/// A value of a leaf that has no lists.
+fn cell(leaf: &Leaf, at: usize) -> TableCell<'_> {
+    let array = &leaf.values;
+    if leaf.is_null(at) {
+        return TableCell::Null;
+    }
+    macro_rules! whole {
+        ($of:ident) => {
+            TableCell::Whole(i64::from(array.as_primitive::<$of>().value(at)))
         };
     }
-    Ok(match array.data_type() {
-        DataType::Utf8 => match array.as_string::<i32>().value(at) {
-            text if text.len() > MAX_TEXT => {
-                return Err(format!("a text has {} bytes; at most {MAX_TEXT} can be read", text.len()));
-            }
-            text => Value::from(text),
-        },
-        DataType::Boolean => Value::from(array.as_boolean().value(at)),
-        DataType::Int8 => number!(Int8Type as i64),
-        DataType::Int16 => number!(Int16Type as i64),
-        DataType::Int32 => number!(Int32Type as i64),
-        DataType::Int64 => number!(Int64Type as i64),
-        DataType::UInt8 => number!(UInt8Type as i64),
-        DataType::UInt16 => number!(UInt16Type as i64),
-        DataType::UInt32 => number!(UInt32Type as i64),
+    macro_rules! number {
+        ($of:ident) => {
+            TableCell::Number(f64::from(array.as_primitive::<$of>().value(at)))
+        };
+    }
+    macro_rules! instant {
+        ($of:ident, $per_s:literal) => {
+            TableCell::Number(array.as_primitive::<$of>().value(at) as f64 / $per_s)
+        };
+    }
+    match array.data_type() {
+        DataType::Utf8 => TableCell::Text(array.as_string::<i32>().value(at).into()),
+        DataType::Boolean => TableCell::Flag(array.as_boolean().value(at)),
+        DataType::Int8 => whole!(Int8Type),
+        DataType::Int16 => whole!(Int16Type),
+        DataType::Int32 => whole!(Int32Type),
+        DataType::Int64 => whole!(Int64Type),
+        DataType::UInt8 => whole!(UInt8Type),
+        DataType::UInt16 => whole!(UInt16Type),
+        DataType::UInt32 => whole!(UInt32Type),
         DataType::UInt64 => {
-            i64::try_from(array.as_primitive::<UInt64Type>().value(at)).map_or(Value::Null, Value::from)
+            i64::try_from(array.as_primitive::<UInt64Type>().value(at)).map_or(TableCell::Null, TableCell::Whole)
         }
-        DataType::Float16 => number!(Float16Type as f64),
-        DataType::Float32 => number!(Float32Type as f64),
-        DataType::Float64 => number!(Float64Type as f64),
+        DataType::Float16 => number!(Float16Type),
+        DataType::Float32 => number!(Float32Type),
+        DataType::Float64 => number!(Float64Type),
+        DataType::Timestamp(TimeUnit::Second, _) => instant!(TimestampSecondType, 1.0),
+        DataType::Timestamp(TimeUnit::Millisecond, _) => instant!(TimestampMillisecondType, 1e3),
+        DataType::Timestamp(TimeUnit::Microsecond, _) => instant!(TimestampMicrosecondType, 1e6),
+        DataType::Timestamp(TimeUnit::Nanosecond, _) => instant!(TimestampNanosecondType, 1e9),
         DataType::Decimal128(_, scale) => {
-            Value::from(array.as_primitive::<Decimal128Type>().value(at) as f64 / 10f64.powi(i32::from(*scale)))
+            let value = array.as_primitive::<Decimal128Type>().value(at) as f64;
+            TableCell::Number(value / 10f64.powi(i32::from(*scale)))
         }
         DataType::Decimal256(_, scale) => {
             let digits = array.as_primitive::<Decimal256Type>().value(at).to_string();
-            let value = digits.parse::<f64>().map_err(|e| e.to_string())?;
-            Value::from(value / 10f64.powi(i32::from(*scale)))
+            let value = digits.parse::<f64>().unwrap_or(f64::NAN);
+            TableCell::Number(value / 10f64.powi(i32::from(*scale)))
         }
-        DataType::List(_) => {
-            let items = array.as_list::<i32>().value(at);
-            if items.len() > MAX_SERIES {
-                return Err(format!("a series has {} values; at most {MAX_SERIES} can be read", items.len()));
-            }
-            let items = Leaf { record: None, values: items };
-            Value::Array((0..items.values.len()).map(|at| value(&items, at)).collect::<std::result::Result<_, _>>()?)
-        }
-        _ => Value::Null,
-    })
+        _ => TableCell::Null,
+    }
 }

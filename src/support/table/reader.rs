@@ -2,7 +2,7 @@
 
 use std::path::{Path, PathBuf};
 
-use super::Row;
+use super::{Cell, Row};
 
 use super::TableFormat;
 use super::csv_reader::CsvRows;
@@ -73,6 +73,45 @@ impl TableReader {
             Rows::Csv(rows) => rows.next_row(),
             #[cfg(feature = "parquet")]
             Rows::Parquet(rows) => rows.next_row(),
+        }
+    }
+
+    /// Advances to the next row, whose values [`TableReader::cell`] gives; false after the last.
+    ///
+    /// # Errors
+    /// As [`TableReader::next_row`].
+    pub fn step(&mut self) -> Result<bool> {
+        match &mut self.rows {
+            Rows::Csv(rows) => rows.step(),
+            #[cfg(feature = "parquet")]
+            Rows::Parquet(rows) => rows.step(),
+        }
+    }
+
+    /// The value of a selected column, by its position in the selection, after [`TableReader::step`]; null for a list.
+    pub fn cell(&self, wanted: usize) -> Cell<'_> {
+        match &self.rows {
+            Rows::Csv(rows) => rows.cell(wanted),
+            #[cfg(feature = "parquet")]
+            Rows::Parquet(rows) => rows.cell(wanted),
+        }
+    }
+
+    /// Whether a selected column has lists.
+    pub fn has_lists(&self) -> bool {
+        match &self.rows {
+            Rows::Csv(_) => false,
+            #[cfg(feature = "parquet")]
+            Rows::Parquet(rows) => rows.has_lists(),
+        }
+    }
+
+    /// Whether a column has instants, which are numbers in seconds since 1970.
+    pub fn has_instants(&self, column: usize) -> bool {
+        match &self.rows {
+            Rows::Csv(_) => false,
+            #[cfg(feature = "parquet")]
+            Rows::Parquet(rows) => rows.has_instants(column),
         }
     }
 

@@ -1,7 +1,8 @@
-//! Many recordings at once: read and mined in parallel, one recording per thread in memory at a time, the
-//! result in the recordings' order. A recording that cannot be read is reported; the others are used.
+//! Many recordings at once: read and mined in parallel, one file per thread in memory at a time and as many as memory may
+//! hold, the result in the recordings' order. A recording that cannot be read is reported; the others are used.
 
 use std::path::Path;
+use std::sync::{Condvar, Mutex, PoisonError};
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -13,7 +14,7 @@ use crate::scenario::{Category, Scenario};
 use crate::support::plausibility::Implausible;
 use crate::support::readable;
 use crate::traffic::trajectory::generator::{GeneratorOptions, generate_one};
-use crate::traffic::trajectory::{FileChecksum, Inputs, Loaded, Recording};
+use crate::traffic::trajectory::{FileChecksum, InputFile, Inputs, Loaded, Recording};
 use crate::{Error, Result};
 
 /// Results of one recording.
@@ -86,6 +87,56 @@ pub fn counts_text(counts: &[CategoryCount]) -> String {
     format!("kept: {}", Category::ALL.into_iter().zip(counts).map(part).collect::<Vec<_>>().join(", "))
 }
 
+/// Maximum size of the files that are read at a time, bytes, unless one is larger: a recording takes about as much memory as
+/// its file has bytes.
+const MAX_BYTES_AT_A_TIME: u64 = 4 << 30;
+/// A file that gzip compressed has about this many times its size.
+const UNPACKED: u64 = 8;
+
+/// Bytes of files that may still be read.
+struct Turns {
+    left: Mutex<u64>,
+    freed: Condvar,
+}
+
+impl Default for Turns {
+    fn default() -> Self {
+        Turns { left: Mutex::new(MAX_BYTES_AT_A_TIME), freed: Condvar::new() }
+    }
+}
+
+impl Turns {
+    /// Waits until a file may be read; its turn ends with the returned value.
+    fn of(&self, file: &InputFile) -> Turn<'_> {
+        let size = |path: &std::path::PathBuf| {
+            let bytes = std::fs::metadata(path).map_or(0, |file| file.len());
+            if path.extension().is_some_and(|ending| ending == "gz") { UNPACKED * bytes } else { bytes }
+        };
+        let bytes = file.paths().iter().map(size).sum();
+        self.of_bytes(bytes)
+    }
+
+    fn of_bytes(&self, bytes: u64) -> Turn<'_> {
+        let bytes = bytes.min(MAX_BYTES_AT_A_TIME);
+        let left = self.left.lock().unwrap_or_else(PoisonError::into_inner);
+        let mut left = self.freed.wait_while(left, |left| *left < bytes).unwrap_or_else(PoisonError::into_inner);
+        *left -= bytes;
+        Turn { turns: self, bytes }
+    }
+}
+
+struct Turn<'a> {
+    turns: &'a Turns,
+    bytes: u64,
+}
+
+impl Drop for Turn<'_> {
+    fn drop(&mut self) {
+        *self.turns.left.lock().unwrap_or_else(PoisonError::into_inner) += self.bytes;
+        self.turns.freed.notify_all();
+    }
+}
+
 struct MinedPart {
     mined: Mined,
     summary: RecordingSummary,
@@ -129,11 +180,13 @@ pub fn mine_inputs(
         let notes = loaded.notes.into_iter().chain(of_noise).map(name).collect();
         MinedPart { mined, summary, notes, synthetic: loaded.recording.synthetic }
     };
+    let turns = Turns::default();
     // The outer error ends the work; an inner one leaves out a file.
     let parts: Result<Vec<Result<Vec<MinedPart>>>> = files
         .par_iter()
         .with_max_len(1)
         .map(|file| {
+            let _turn = turns.of(file);
             let parts = file.read(implausible).map(|all| all.into_iter().map(part).collect());
             done()?;
             Ok(parts)
@@ -209,4 +262,27 @@ fn driven(recording: &Recording, options: &MiningOptions) -> [f64; 2] {
         sum[1] += ego.s_m[last] - ego.s_m[0];
     }
     sum
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::atomic::{AtomicBool, Ordering};
+
+    use super::*;
+
+    #[test]
+    fn a_file_of_any_size_is_read_and_others_wait_for_it() {
+        let (turns, has_begun) = (Turns::default(), AtomicBool::new(false));
+        let first = turns.of_bytes(u64::MAX);
+        std::thread::scope(|threads| {
+            threads.spawn(|| {
+                let _second = turns.of_bytes(1);
+                has_begun.store(true, Ordering::SeqCst);
+            });
+            std::thread::sleep(std::time::Duration::from_millis(20));
+            assert!(!has_begun.load(Ordering::SeqCst));
+            drop(first);
+        });
+        assert!(has_begun.load(Ordering::SeqCst));
+    }
 }

@@ -2,11 +2,10 @@
 //! and column. Independent of traffic.
 //!
 //! Accepted, because they change no value: Windows line ends, a byte order mark, blank lines, quotes, blanks around a
-//! field, columns in another order, additional columns.
+//! field, columns in another order, additional columns, UTF-16, compression by gzip.
 
 use crate::support::plain_text::hex;
-use std::fs::File;
-use std::io::{self, Read, Seek};
+use std::io::{self, Cursor, Read};
 use std::path::{Path, PathBuf};
 
 use csv::{ByteRecord, Reader, ReaderBuilder, Terminator};
@@ -28,6 +27,15 @@ pub struct FileChecksum {
     pub sha256: String,
 }
 
+impl FileChecksum {
+    /// That of a file, which is read for it.
+    pub(super) fn of(path: &Path) -> Result<FileChecksum> {
+        let bytes = std::fs::metadata(path).map_err(|e| Error::io(path, "read", e))?.len();
+        let file = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        Ok(FileChecksum { file, bytes, sha256: input_file::sha256(path)? })
+    }
+}
+
 /// A column that the header has, by index.
 #[derive(Debug, Clone, Copy)]
 pub(super) struct CsvColumn(usize);
@@ -45,7 +53,7 @@ pub(super) struct CsvFormat<'a> {
 /// An open table, positioned on one of its lines.
 pub(super) struct CsvTable {
     path: PathBuf,
-    reader: Reader<HashingReader<File>>,
+    reader: Reader<HashingReader<Box<dyn Read + Send>>>,
     format: String,
     known: Vec<String>,
     header: Vec<String>,
@@ -54,6 +62,8 @@ pub(super) struct CsvTable {
     /// Line on which the last record ended.
     last_line: u64,
     rows: u64,
+    decimal_commas: bool,
+    is_plain: bool,
 }
 
 /// Size of one read from the file, bytes: the disk, not the call, limits the speed.
@@ -69,11 +79,14 @@ impl CsvTable {
     /// # Errors
     /// If it cannot be read, is empty, or has no delimited header in UTF-8.
     pub fn open(path: &Path, format: &CsvFormat) -> Result<Self> {
-        let mut file = input_file::open(path)?;
-        let delimiter = match format.delimiter {
-            Some(delimiter) => delimiter,
-            None => delimiter_of(&mut file).map_err(|error| Error::io(path, "read", error))?,
-        };
+        let mut file = input_file::open_text(path)?;
+        let mut start = Vec::new();
+        if format.delimiter != Some(b',') {
+            file.by_ref().take(MAX_LINE_BYTES).read_to_end(&mut start).map_err(|e| Error::io(path, "read", e))?;
+        }
+        let delimiter = format.delimiter.unwrap_or_else(|| delimiter_of(&start));
+        let decimal_commas = delimiter != b',' && has_decimal_commas(&start, delimiter);
+        let file: Box<dyn Read + Send> = Box::new(Cursor::new(start).chain(file));
         let reader = ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
@@ -92,6 +105,8 @@ impl CsvTable {
             line: 0,
             last_line: 0,
             rows: 0,
+            decimal_commas,
+            is_plain: input_file::is_plain(path)?,
         };
         if !table.read_line()? {
             return Err(Error::input(
@@ -128,6 +143,11 @@ impl CsvTable {
     /// Number of data lines so far.
     pub fn rows(&self) -> u64 {
         self.rows
+    }
+
+    /// Whether numbers have commas in place of points.
+    pub fn has_decimal_commas(&self) -> bool {
+        self.decimal_commas
     }
 
     /// The column with this name.
@@ -260,10 +280,16 @@ impl CsvTable {
     }
 
     /// Closes the file; the checksum covers the bytes read, which is the whole file after the last row.
-    pub fn finish(self) -> FileChecksum {
+    ///
+    /// # Errors
+    /// If a file that was unpacked or converted cannot be read again.
+    pub fn finish(self) -> Result<FileChecksum> {
+        if !self.is_plain {
+            return FileChecksum::of(&self.path);
+        }
         let file = self.path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
         let hashing = self.reader.into_inner();
-        FileChecksum { file, bytes: hashing.bytes, sha256: hex(&hashing.hash.finalize()) }
+        Ok(FileChecksum { file, bytes: hashing.bytes, sha256: hex(&hashing.hash.finalize()) })
     }
 
     /// Steps to the next line that is not blank.
@@ -389,13 +415,25 @@ impl CsvTable {
 }
 
 /// The delimiter that the first line has most of; a comma if it has none.
-fn delimiter_of(file: &mut File) -> io::Result<u8> {
-    let mut start = Vec::new();
-    file.take(MAX_LINE_BYTES).read_to_end(&mut start)?;
-    file.rewind()?;
+fn delimiter_of(start: &[u8]) -> u8 {
     let line = start.split(|&byte| byte == b'\n').next().unwrap_or_default();
     let count = |delimiter: &u8| line.iter().filter(|&byte| byte == delimiter).count();
-    Ok([b'|', b'\t', b';', b','].into_iter().max_by_key(count).unwrap_or(b','))
+    [b'|', b'\t', b';', b','].into_iter().max_by_key(count).unwrap_or(b',')
+}
+
+/// Whether numbers of the first lines have decimal commas, and none has a decimal point.
+fn has_decimal_commas(start: &[u8], delimiter: u8) -> bool {
+    let is_decimal = |field: &[u8], mark: u8| {
+        let field = field.trim_ascii();
+        let digits = field.strip_prefix(b"-").unwrap_or(field);
+        let is_number = digits.iter().all(|byte| byte.is_ascii_digit() || *byte == mark);
+        is_number && digits.iter().filter(|byte| **byte == mark).count() == 1 && digits.len() > 1
+    };
+    let mut fields = start.split(|byte| *byte == b'\n' || *byte == delimiter).map(|field| {
+        let field = field.trim_ascii();
+        field.strip_prefix(b"\"").and_then(|inner| inner.strip_suffix(b"\"")).unwrap_or(field)
+    });
+    fields.clone().any(|field| is_decimal(field, b',')) && !fields.any(|field| is_decimal(field, b'.'))
 }
 
 /// A header field as a column name.

@@ -1,11 +1,11 @@
 //! The recordings that a user names: a folder or a file, in highD's format or in that of a preset.
 
-use std::ffi::OsString;
 use std::path::{Path, PathBuf};
 
 use super::highd::{self, HighdFiles};
 use super::recording::Loaded;
 use super::tracks::{self, HIGHD, Preset, TrackFile};
+use crate::support::input_file::unpacked;
 use crate::support::plausibility::Implausible;
 use crate::{Error, Place, Result};
 
@@ -76,13 +76,18 @@ impl Inputs {
     fn with_others(mut self, folder: &Path) -> Result<Inputs> {
         let own = self.preset().map(|preset| (preset.name.clone(), preset.format));
         let mut others: Vec<Error> = Vec::new();
-        let mut endings: Vec<OsString> = own.is_none().then(|| "csv".into()).into_iter().collect();
+        let mut endings: Vec<String> = own.is_none().then(|| "csv".to_owned()).into_iter().collect();
         let mut foreign = Vec::new();
         for file in files_of(folder)? {
             let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
             if tracks::is_compressed(&file) {
-                let help = "unpack it; compressed files are not read";
+                let help = "unpack it, or compress text with gzip (.gz), which is read";
                 others.push(Error::input(Place::file(&file), "it may hold tracks, and is compressed", help));
+            }
+            if tracks::is_second(&file) && tracks::may_hold_tracks(&file) {
+                let problem = "the same file lies beside it, not compressed";
+                others.push(Error::input(Place::file(&file), problem, "remove one of the two"));
+                continue;
             }
             let is_highd = own.is_none() && is_of_highd(&file);
             let is_meta = self.preset().is_some_and(|preset| tracks::is_meta(&name, preset));
@@ -92,7 +97,7 @@ impl Inputs {
             let found = tracks::detect(&file);
             let fits = |found: &Option<Preset>| found.as_ref().map(|of| (of.name.clone(), of.format)) == own;
             if own.is_some() && found.as_ref().is_ok_and(fits) {
-                endings.extend(file.extension().map(Into::into));
+                endings.extend(ending_of(&file));
             } else {
                 foreign.push((file, found));
             }
@@ -101,7 +106,7 @@ impl Inputs {
             if let Inputs::Tracks { files, .. } = &mut self {
                 files.retain(|track| track.path != file);
             }
-            let has_ending = file.extension().is_some_and(|ending| endings.iter().any(|known| known == ending));
+            let has_ending = ending_of(&file).is_some_and(|ending| endings.contains(&ending));
             match found {
                 _ if is_of_sumo(&file) => {}
                 Ok(Some(other)) => {
@@ -163,10 +168,12 @@ impl InputFile {
     }
 
     /// The files that are read.
-    pub fn paths(self) -> Vec<PathBuf> {
+    pub fn paths(&self) -> Vec<PathBuf> {
         match self {
-            InputFile::Highd(files) => vec![files.tracks, files.tracks_meta, files.recording_meta],
-            InputFile::Tracks(file, _) => vec![file.path],
+            InputFile::Highd(files) => {
+                [&files.tracks, &files.tracks_meta, &files.recording_meta].map(PathBuf::clone).to_vec()
+            }
+            InputFile::Tracks(file, _) => vec![file.path.clone()],
         }
     }
 }
@@ -180,7 +187,13 @@ const HIGHD_ENDING: &str = "_tracks.csv";
 const MAX_TRIED: usize = 5;
 
 fn is_highd_name(path: &Path) -> bool {
-    path.file_name().is_some_and(|name| name.to_string_lossy().ends_with(HIGHD_ENDING))
+    path.file_name().is_some_and(|name| unpacked(&name.to_string_lossy()).ends_with(HIGHD_ENDING))
+}
+
+/// The ending of a file's name, before that of gzip.
+fn ending_of(path: &Path) -> Option<String> {
+    let name = path.file_name()?.to_string_lossy().into_owned();
+    Some(unpacked(&name).rsplit_once('.')?.1.to_owned())
 }
 
 fn highd_inputs(path: &Path) -> Result<Inputs> {
@@ -188,9 +201,9 @@ fn highd_inputs(path: &Path) -> Result<Inputs> {
         return highd::inventory(path).map(Inputs::Highd);
     }
     let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let id = name.strip_suffix(HIGHD_ENDING).unwrap_or(&name);
+    let id = unpacked(&name).strip_suffix(HIGHD_ENDING).unwrap_or(&name);
     let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let recordings = vec![HighdFiles::named(folder, id)];
+    let recordings = vec![HighdFiles::found(folder, id)];
     Ok(Inputs::Highd(highd::Inventory { recordings, problems: Vec::new() }))
 }
 
@@ -231,7 +244,7 @@ fn is_of_highd(path: &Path) -> bool {
 
 fn ends_with_any(path: &Path, endings: &[&str]) -> bool {
     let name = path.to_string_lossy();
-    endings.iter().any(|ending| name.ends_with(ending))
+    endings.iter().any(|ending| unpacked(&name).ends_with(ending))
 }
 
 /// The error about a folder without a file that fits: it says what was tried.
@@ -255,7 +268,7 @@ fn nothing_in(folder: &Path) -> Result<Inputs> {
     Err(Error::input(
         Place::file(folder),
         format!("no file here is a recording ({}{more})", tried.join("; ")),
-        "recordings are .csv, .txt, .tsv, .parquet, .xml or .json; `lanesweep tracks FILE` says more of one",
+        "recordings are .csv, .txt, .tsv, .xml, .json (also .gz) or .parquet; `lanesweep tracks FILE` says more of one",
     ))
 }
 
@@ -266,6 +279,12 @@ fn unknown(path: &Path) -> Error {
     }
     let columns = match tracks::columns_of(path) {
         Ok(columns) => {
+            let geographic = columns.iter().filter(|name| tracks::is_geographic(name));
+            let geographic: Vec<String> = geographic.map(|name| format!("`{name}`")).collect();
+            if geographic.len() >= 2 {
+                let problem = format!("positions are longitudes and latitudes ({})", geographic.join(", "));
+                return Error::input(Place::file(path), problem, tracks::PROJECT);
+            }
             let names: Vec<String> = columns.iter().take(30).map(|name| format!("`{name}`")).collect();
             format!("; its columns are {}", names.join(", "))
         }

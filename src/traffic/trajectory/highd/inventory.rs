@@ -26,6 +26,18 @@ impl HighdFiles {
         let [tracks, tracks_meta, recording_meta] = SUFFIXES.map(|suffix| dir.join(format!("{id}{suffix}")));
         HighdFiles { id: id.to_owned(), tracks, tracks_meta, recording_meta }
     }
+
+    /// The same; files that only gzip's ending tells from these names take their places.
+    pub(in crate::traffic::trajectory) fn found(dir: &Path, id: &str) -> Self {
+        let mut files = HighdFiles::named(dir, id);
+        for file in [&mut files.tracks, &mut files.tracks_meta, &mut files.recording_meta] {
+            let packed = PathBuf::from(format!("{}.gz", file.display()));
+            if !file.exists() && packed.exists() {
+                *file = packed;
+            }
+        }
+        files
+    }
 }
 
 /// The recordings of a folder.
@@ -57,7 +69,7 @@ pub fn inventory(dir: &Path) -> Result<Inventory> {
         let missing: Vec<String> =
             (0..3).filter(|&file| !present[file]).map(|file| format!("{id}{}", SUFFIXES[file])).collect();
         if missing.is_empty() {
-            inventory.recordings.push(HighdFiles::named(dir, &id));
+            inventory.recordings.push(HighdFiles::found(dir, &id));
         } else {
             inventory.problems.push(Error::input(
                 Place::file(dir).of(format!("recording `{id}`")),
@@ -114,7 +126,7 @@ fn prefixes(dir: &Path) -> Result<BTreeMap<String, [bool; 3]>> {
             continue;
         }
         for (file, suffix) in SUFFIXES.iter().enumerate() {
-            if let Some(prefix) = name.strip_suffix(suffix)
+            if let Some(prefix) = input_file::unpacked(&name).strip_suffix(suffix)
                 && !prefix.is_empty()
             {
                 found.entry(prefix.to_owned()).or_default()[file] = true;

@@ -96,7 +96,7 @@ pub(super) fn read_recording_meta(files: &HighdFiles, doubts: &mut Doubts) -> Re
         .filter(|(_, lines)| !lines.is_empty())
         .map(|(direction, lines)| carriageway(direction, &lines))
         .collect();
-    Ok(RecordingMeta { frame_rate_hz, lane_numbers, carriageways, synthetic, checksum: table.finish(), place })
+    Ok(RecordingMeta { frame_rate_hz, lane_numbers, carriageways, synthetic, checksum: table.finish()?, place })
 }
 
 fn check_plausible(
@@ -201,7 +201,7 @@ pub(super) fn read_tracks_meta(
             "remove the surplus line, or give the vehicle its own id in both files",
         ));
     }
-    Ok((vehicles.into_iter().map(|(vehicle, _)| vehicle).collect(), table.finish()))
+    Ok((vehicles.into_iter().map(|(vehicle, _)| vehicle).collect(), table.finish()?))
 }
 
 struct MetaColumns {

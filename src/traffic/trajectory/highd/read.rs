@@ -41,7 +41,7 @@ pub fn read_checked(files: &HighdFiles, implausible: Implausible) -> Result<Load
     let mut notes = notes(&columns, &vehicles, &tracks, recording_meta.frame_rate_hz);
     notes.extend(doubts.sentences());
     let rows = table.rows();
-    let checksum_sha256 = vec![table.finish(), tracks_meta_checksum, recording_meta.checksum];
+    let checksum_sha256 = vec![table.finish()?, tracks_meta_checksum, recording_meta.checksum];
     let recording = Recording {
         id: files.id.clone(),
         frame_rate_hz: recording_meta.frame_rate_hz,

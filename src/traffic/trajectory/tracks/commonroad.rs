@@ -9,13 +9,13 @@ use quick_xml::reader::Reader;
 use super::raw::{NO_LABEL, RawFile, RawRecording, RawSample, RawVehicle, always};
 use super::roles::Role;
 use crate::support::input_file;
-use crate::support::plain_text::sha256;
 use crate::traffic::trajectory::csv_table::FileChecksum;
 use crate::traffic::trajectory::number;
 use crate::{Error, Place, Result};
 
 /// Maximum size of a file, bytes: it is held in memory.
 const MAX_BYTES: u64 = 256 << 20;
+const HELP: &str = "give CommonRoad 2020a (XML); CommonRoad's own tools convert older files";
 /// Maximum nesting of elements.
 const DEEPEST: usize = 32;
 
@@ -37,7 +37,8 @@ const NAN_SAMPLE: RawSample = RawSample {
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] for a file that is not well-formed or has another time step than a number.
 pub(super) fn read(path: &Path, id: &str) -> Result<RawFile> {
-    let text = input_file::read_text(path, MAX_BYTES)?;
+    let not_text = |_| Error::input(Place::file(path), "not UTF-8 text", "save the file as UTF-8");
+    let text = String::from_utf8(input_file::read_unpacked(path, MAX_BYTES)?).map_err(not_text)?;
     let mut scene = Scene {
         recording: RawRecording { id: id.to_owned(), has_frames: true, ..RawRecording::default() },
         ..Scene::default()
@@ -48,7 +49,7 @@ pub(super) fn read(path: &Path, id: &str) -> Result<RawFile> {
         let at = reader.buffer_position();
         let bad = |problem: String| {
             let row = 1 + text.bytes().take(at as usize).filter(|byte| *byte == b'\n').count() as u64;
-            Error::input(Place::file(path).row(row), problem, "give a CommonRoad file (XML, 2020a)")
+            Error::input(Place::file(path).row(row), problem, HELP)
         };
         match reader.read_event().map_err(|error| bad(format!("not well-formed XML: {error}")))? {
             Event::Start(start) => {
@@ -80,10 +81,9 @@ pub(super) fn read(path: &Path, id: &str) -> Result<RawFile> {
     }
     if scene.recording.frame_rate_hz.is_none() {
         let problem = "the root has no `timeStepSize`";
-        return Err(Error::input(Place::file(path), problem, "give a CommonRoad file (XML, 2020a)"));
+        return Err(Error::input(Place::file(path), problem, HELP));
     }
-    let file = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-    let checksum = FileChecksum { file, bytes: text.len() as u64, sha256: sha256(&text) };
+    let checksum = FileChecksum::of(path)?;
     let rows = scene.recording.vehicles.iter().map(|vehicle| vehicle.samples.len() as u64).sum();
     let elements = [
         (Role::Vehicle, "dynamicObstacle"),
@@ -113,6 +113,9 @@ struct Scene {
 impl Scene {
     fn attribute(&mut self, element: &str, name: &str, value: &str) -> std::result::Result<(), String> {
         match (element, name) {
+            ("commonRoad", "commonRoadVersion") if ["2017", "2018"].iter().any(|year| value.starts_with(year)) => {
+                return Err(format!("the format is CommonRoad {value}, whose obstacles and lanes have other elements"));
+            }
             ("commonRoad", "timeStepSize") => {
                 let step_s = value.parse::<f64>().ok().filter(|step| (1e-4..=10.0).contains(step));
                 let step_s = step_s.ok_or_else(|| format!("`timeStepSize` {value} is no time step"))?;

@@ -7,10 +7,11 @@ use super::preset::Preset;
 use super::roles::Role;
 use super::rows::{Rows, is_same_name};
 use super::{FileFormat, format_of};
+use crate::support::input_file::unpacked;
 use crate::{Error, Place, Result};
 
 /// Units in the names of columns.
-const UNITS: [(&str, &str); 10] = [
+const UNITS: [(&str, &str); 16] = [
     ("km/h", "km/h"),
     ("kmh", "km/h"),
     ("kph", "km/h"),
@@ -19,6 +20,12 @@ const UNITS: [(&str, &str); 10] = [
     ("feet", "ft"),
     ("_ft", "ft"),
     ("[ft]", "ft"),
+    ("_cm", "cm"),
+    ("[cm]", "cm"),
+    ("(cm)", "cm"),
+    ("_mm", "mm"),
+    ("[mm]", "mm"),
+    ("(mm)", "mm"),
     ("_ms", "ms"),
     ("rad", "rad"),
 ];
@@ -34,12 +41,13 @@ pub fn draft(path: &Path) -> Result<String> {
     })?;
     let generic = Preset::load("generic")?;
     let rows = Rows::open(path, format, None, None)?;
-    let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let stem = unpacked(&name).rsplit_once('.').map_or(name.as_str(), |(stem, _)| stem);
     let mut text = format!(
         "# A first preset for {}. Answer each \"?\" and check every line; the chapter on tracks explains the keys.\n\
          name = {:?}\ntitle = {:?}\nformat = {:?}\n\
          # Point that x and y describe: centre, front, rear, corner.\nreference = \"?\"\n",
-        path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default(),
+        name,
         stem,
         format!("tracks like {stem}"),
         match format {
@@ -98,7 +106,7 @@ pub fn draft(path: &Path) -> Result<String> {
     let _ = writeln!(text, "# Other roles: {}", others.join(", "));
     let _ = writeln!(
         text,
-        "# With a unit: speed = {{ name = \"Speed\", unit = \"km/h\" }}; m, ft, cm; m/s, km/h, mph; deg, rad; s, ms, ns, date"
+        "# With a unit: speed = {{ name = \"Speed\", unit = \"km/h\" }}; m, ft, cm, mm; m/s, km/h, mph; deg, rad; s, ms, ns, date"
     );
     let words = |list: &[String]| list.iter().map(|word| format!("{word:?}")).collect::<Vec<_>>().join(", ");
     let _ = write!(
@@ -114,7 +122,7 @@ pub fn draft(path: &Path) -> Result<String> {
 fn fits(role: Role, unit: &str) -> bool {
     use super::roles::Dimension as D;
     match role.dimension() {
-        D::Length => unit == "ft",
+        D::Length => matches!(unit, "ft" | "cm" | "mm"),
         D::Speed => matches!(unit, "km/h" | "mph" | "ft/s"),
         D::Time => unit == "ms",
         D::Angle => unit == "rad",
@@ -130,7 +138,7 @@ fn is_guess(header: &str, name: &str) -> bool {
     let bare = header.split(['[', '(']).next().unwrap_or(header).trim();
     let without_unit = |text: &str| {
         let lower = text.to_lowercase();
-        let units = ["_kmh", "_mps", "_kph", "_mph", "_deg", "_rad", "_ms", "_ft", "_m", "_s"];
+        let units = ["_kmh", "_mps", "_kph", "_mph", "_deg", "_rad", "_ms", "_ft", "_cm", "_mm", "_m", "_s"];
         units.iter().find_map(|unit| lower.strip_suffix(unit).map(str::to_owned)).unwrap_or(lower)
     };
     is_same_name(bare, name) || is_same_name(&without_unit(bare), name)

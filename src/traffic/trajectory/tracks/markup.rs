@@ -24,7 +24,7 @@ pub(super) fn each_element(
     row: &str,
     each: &mut dyn FnMut(&[(String, String)], &dyn Fn() -> Place) -> Result<bool>,
 ) -> Result<()> {
-    let file = BufReader::with_capacity(1 << 18, LimitedLine::new(input_file::open(path)?));
+    let file = BufReader::with_capacity(1 << 18, LimitedLine::new(input_file::open_text(path)?));
     let mut reader = Reader::from_reader(file);
     let mut buffer = Vec::new();
     let mut around: Vec<Vec<(String, String)>> = Vec::new();
@@ -105,7 +105,7 @@ fn attributes(start: &BytesStart) -> std::result::Result<Vec<(String, String)>, 
 
 /// The objects of a JSON file: of the list under a key, or of the list that the file is, or one per line.
 pub(super) fn json_rows(path: &Path, key: Option<&str>) -> Result<Vec<serde_json::Map<String, Value>>> {
-    let text = input_file::read(path, MAX_JSON_BYTES)?;
+    let text = input_file::read_unpacked(path, MAX_JSON_BYTES)?;
     let wrong = |problem: String| Error::input(Place::file(path), problem, "export the file again");
     let mut values = serde_json::Deserializer::from_slice(&text).into_iter::<Value>();
     let first = values.next().ok_or_else(|| wrong("the file is empty".to_owned()))?;

@@ -31,10 +31,13 @@ pub use preset::{
 pub use roles::{ColumnName, OneOrMany, Role};
 pub use understanding::{Exclusion, Finding, Understanding, UnderstoodCarriageway};
 
+pub(super) use raw::{PROJECT, is_geographic};
+
 use rows::{Columns, Rows};
 
 use super::Loaded;
 use super::highd::made_up;
+use crate::support::input_file::{open_text, unpacked};
 use crate::support::plausibility::Implausible;
 use crate::{Error, Place, Result};
 
@@ -61,9 +64,13 @@ const ENDINGS: [(&str, FileFormat); 7] = [
     ("jsonl", FileFormat::Json),
 ];
 
+/// The format of a file by the ending of its name; texts may be compressed with gzip.
 fn format_of(path: &Path) -> Option<FileFormat> {
-    let ending = path.extension()?.to_str()?.to_lowercase();
-    ENDINGS.iter().find(|(known, _)| *known == ending).map(|(_, format)| *format)
+    let name = path.file_name()?.to_str()?;
+    let bare = unpacked(name);
+    let ending = bare.rsplit_once('.')?.1.to_lowercase();
+    let format = ENDINGS.iter().find(|(known, _)| *known == ending).map(|(_, format)| *format)?;
+    (bare == name || format != FileFormat::Parquet).then_some(format)
 }
 
 /// Whether the ending of a file's name is that of a format of tracks.
@@ -71,11 +78,11 @@ pub(super) fn may_hold_tracks(path: &Path) -> bool {
     format_of(path).is_some()
 }
 
-/// Whether a file is a compressed one of a format of tracks.
+/// Whether a file is one of a format of tracks that is compressed in a way that is not read.
 pub(super) fn is_compressed(path: &Path) -> bool {
     let ending = path.extension().map(|ending| ending.to_string_lossy().to_lowercase());
     let packed = ending.is_some_and(|ending| ["gz", "zip", "zst", "bz2", "xz", "lz4"].contains(&ending.as_str()));
-    packed && path.file_stem().is_some_and(|stem| may_hold_tracks(Path::new(stem)))
+    packed && !may_hold_tracks(path) && path.file_stem().is_some_and(|stem| may_hold_tracks(Path::new(stem)))
 }
 
 /// The shipped preset that fits a file; `None` if none fits.
@@ -90,7 +97,7 @@ pub fn detect(path: &Path) -> Result<Option<Preset>> {
     type HowOpened = (Option<String>, Option<char>);
     let mut headers: Vec<(HowOpened, Result<Vec<String>>)> = Vec::new();
     let (usual, shipped): (Vec<Preset>, Vec<Preset>) = Preset::shipped()?.into_iter().partition(Preset::is_generic);
-    for preset in shipped.into_iter().filter(|preset| preset.recording_of(&name).is_some()) {
+    for preset in shipped.into_iter().filter(|preset| preset.recording_of(unpacked(&name)).is_some()) {
         let score = if preset.format == FileFormat::Commonroad {
             usize::from(format == FileFormat::Xml && is_commonroad(path)?) * 100
         } else if preset.format == format {
@@ -150,7 +157,7 @@ fn reads_sizes_and_class(preset: &Preset, usual: &Preset, header: &[String]) -> 
 fn is_commonroad(path: &Path) -> Result<bool> {
     use std::io::Read;
     let mut start = Vec::new();
-    let file = crate::support::input_file::open(path)?;
+    let file = open_text(path)?;
     file.take(4096).read_to_end(&mut start).map_err(|e| Error::io(path, "read", e))?;
     Ok(start.windows(11).any(|window| window == b"<commonRoad"))
 }
@@ -161,9 +168,9 @@ fn is_commonroad(path: &Path) -> Result<bool> {
 /// [`Error::Io`]; [`Error::Input`] if there is none.
 pub fn track_files(path: &Path, preset: &Preset) -> Result<Vec<TrackFile>> {
     let of = |path: PathBuf| {
-        let name = path.file_name()?.to_str()?.to_owned();
-        let stem = || path.file_stem().map(|stem| stem.to_string_lossy().into_owned());
-        let id = preset.recording_of(&name).map(str::to_owned).or_else(|| if path.is_dir() { None } else { stem() })?;
+        let name = unpacked(path.file_name()?.to_str()?);
+        let stem = || Path::new(name).file_stem().map(|stem| stem.to_string_lossy().into_owned());
+        let id = preset.recording_of(name).map(str::to_owned).or_else(|| if path.is_dir() { None } else { stem() })?;
         Some(TrackFile { id, path })
     };
     if !path.is_dir() {
@@ -176,8 +183,8 @@ pub fn track_files(path: &Path, preset: &Preset) -> Result<Vec<TrackFile>> {
     for entry in listed {
         let file = entry.map_err(|e| Error::io(path, "list", e))?.path();
         let name = file.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        let is_ours = preset.recording_of(&name).is_some() && is_format(&file, preset);
-        if file.is_file() && is_ours && !name.starts_with('.') && !is_meta(&name, preset) {
+        let is_ours = preset.recording_of(unpacked(&name)).is_some() && is_format(&file, preset);
+        if file.is_file() && is_ours && !name.starts_with('.') && !is_meta(&name, preset) && !is_second(&file) {
             files.extend(of(file));
         }
     }
@@ -189,6 +196,12 @@ pub fn track_files(path: &Path, preset: &Preset) -> Result<Vec<TrackFile>> {
     Ok(files)
 }
 
+/// Whether the file that gzip compressed lies beside this one.
+pub(super) fn is_second(path: &Path) -> bool {
+    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    unpacked(&name) != name && path.with_file_name(unpacked(&name)).exists()
+}
+
 fn is_format(path: &Path, preset: &Preset) -> bool {
     let format = if preset.format == FileFormat::Commonroad { FileFormat::Xml } else { preset.format };
     format_of(path) == Some(format)
@@ -196,6 +209,7 @@ fn is_format(path: &Path, preset: &Preset) -> bool {
 
 /// Whether a file name is that of a preset's other files.
 pub(super) fn is_meta(name: &str, preset: &Preset) -> bool {
+    let name = unpacked(name);
     let fits = |pattern: &str| {
         let (before, after) = pattern.split_once('*').unwrap_or((pattern, ""));
         name.starts_with(before) && name.ends_with(after) && (pattern.contains('*') || name == pattern)

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::preset::{HeadingOrigin, MetaFile, Preset, Side};
 use super::roles::{ColumnName, Role};
-use super::rows::{Columns, Rows, SampleRow};
+use super::rows::{Columns, FoundTime, Rows, SampleRow};
 use super::samples::Samples;
 use crate::support::plain_text::nearest;
 use crate::traffic::trajectory::csv_table::FileChecksum;
@@ -15,6 +15,8 @@ use crate::{Error, Place, Result};
 pub(super) const NO_LABEL: u32 = u32::MAX;
 /// Maximum number of lane names of a file; more are no names of lanes.
 const MAX_LABELS: usize = 65_536;
+/// Times of day that fall by more begin again at midnight, s.
+const HALF_A_DAY_S: f64 = 43_200.0;
 
 /// One sample. NaN: not in the file.
 #[derive(Debug, Clone, Copy)]
@@ -108,7 +110,7 @@ pub(super) fn read_table(path: &Path, id: &str, preset: &Preset) -> Result<RawFi
     let rows = Rows::of_preset(path, preset)?;
     let columns = Columns::of(&preset.columns, rows.header(), &preset.none);
     check_columns(&rows, &columns, preset)?;
-    let roles: Vec<(Role, String)> = Role::ALL
+    let mut roles: Vec<(Role, String)> = Role::ALL
         .into_iter()
         .filter(|role| columns.has(*role))
         .map(|role| (role, columns.name(role).to_owned()))
@@ -118,6 +120,12 @@ pub(super) fn read_table(path: &Path, id: &str, preset: &Preset) -> Result<RawFi
     let mut file = Collecting::new(id, preset, &columns);
     let (checksum, count) = rows.each(&columns, &mut |row| file.add(row))?;
     let mut recordings = file.recordings;
+    if let Some(found) = columns.found_time() {
+        roles
+            .iter_mut()
+            .filter(|(role, _)| *role == Role::Time)
+            .for_each(|(_, name)| *name += &format!(" ({})", found.text()));
+    }
     recordings.iter_mut().flat_map(|of| &mut of.vehicles).for_each(|vehicle| vehicle.samples.shrink());
     let mut checksums = vec![checksum];
     if let Some(meta) = &preset.vehicles {
@@ -133,6 +141,12 @@ pub(super) fn read_table(path: &Path, id: &str, preset: &Preset) -> Result<RawFi
 }
 
 fn check_columns(rows: &Rows, columns: &Columns, preset: &Preset) -> Result<()> {
+    if let Some(role) =
+        [Role::X, Role::Y].into_iter().find(|role| columns.has(*role) && is_geographic(columns.name(*role)))
+    {
+        let problem = "the column is a longitude or latitude; positions are in metres in a plane";
+        return Err(Error::input(rows.header_place().column(columns.name(role)), problem, PROJECT));
+    }
     let is_needed = |role: Role, column: &ColumnName| match role {
         Role::Vehicle | Role::X | Role::Y => true,
         Role::Frame => !columns.has(Role::Time),
@@ -160,6 +174,7 @@ fn check_columns(rows: &Rows, columns: &Columns, preset: &Preset) -> Result<()> 
 
 struct Collecting<'a> {
     preset: &'a Preset,
+    columns: &'a Columns,
     id: &'a str,
     recordings: Vec<RawRecording>,
     /// By the name of the recording in the file.
@@ -167,6 +182,8 @@ struct Collecting<'a> {
     vehicles: HashMap<(usize, String), usize>,
     labels: HashMap<(usize, String), u32>,
     last: (usize, usize),
+    /// By recording, the vehicle that came after each vehicle: it often does so again at the next time.
+    next: Vec<Vec<usize>>,
     has_frames: bool,
     has_recordings: bool,
     has_sizes: bool,
@@ -174,15 +191,17 @@ struct Collecting<'a> {
 }
 
 impl<'a> Collecting<'a> {
-    fn new(id: &'a str, preset: &'a Preset, columns: &Columns) -> Self {
+    fn new(id: &'a str, preset: &'a Preset, columns: &'a Columns) -> Self {
         Collecting {
             preset,
+            columns,
             id,
             recordings: Vec::new(),
             of_name: HashMap::new(),
             vehicles: HashMap::new(),
             labels: HashMap::new(),
             last: (usize::MAX, usize::MAX),
+            next: Vec::new(),
             // Times tell the rate too.
             has_frames: columns.has(Role::Frame)
                 && (preset.frame_rate_hz.is_some() || preset.recording.is_some() || !columns.has(Role::Time)),
@@ -195,8 +214,10 @@ impl<'a> Collecting<'a> {
     fn add(&mut self, row: &dyn SampleRow) -> Result<()> {
         let missing = |role: Role| Error::input(row.place(role), "there is no value", "fill it in, or remove the row");
         let recording = self.recording(row)?;
-        let key = row.text(Role::Vehicle)?.ok_or_else(|| missing(Role::Vehicle))?;
-        let vehicle = self.vehicle(recording, &key);
+        let vehicle = match self.expected_vehicle(recording, row)? {
+            Some(vehicle) => vehicle,
+            None => self.vehicle(recording, &row.text(Role::Vehicle)?.ok_or_else(|| missing(Role::Vehicle))?),
+        };
         let time = if self.has_frames { Role::Frame } else { Role::Time };
         let at = row.number(time)?.ok_or_else(|| missing(time))?;
         let number = |role| row.number(role).map(|value| value.unwrap_or(f64::NAN));
@@ -227,10 +248,23 @@ impl<'a> Collecting<'a> {
             lane: NO_LABEL,
             lane_offset_m: number(Role::LaneOffset)?,
         };
-        if let Some(lane) = row.text(Role::Lane)? {
+        let of = &self.recordings[recording];
+        let before = &of.vehicles[vehicle].samples;
+        let lane_before = before.len().checked_sub(1).map_or(NO_LABEL, |last| before.lane(last));
+        if lane_before != NO_LABEL && row.is_text(Role::Lane, &of.lanes[lane_before as usize])? {
+            sample.lane = lane_before;
+        } else if let Some(lane) = row.text(Role::Lane)? {
             sample.lane = self.label(recording, &lane);
         }
         let of = &mut self.recordings[recording].vehicles[vehicle];
+        if let Some(last) = of.samples.len().checked_sub(1)
+            && self.columns.found_time() == Some(FoundTime::Clock)
+            && of.samples.at(last) - at > HALF_A_DAY_S
+        {
+            let problem = "the times of day of this vehicle begin again: the recording goes past midnight";
+            let help = "write dates (2024-10-07 00:00:00.05), or seconds";
+            return Err(Error::input(row.place(time).of(format!("vehicle {}", of.key)), problem, help));
+        }
         if self.has_sizes {
             for (role, sizes) in [(Role::Length, &mut of.lengths_m), (Role::Width, &mut of.widths_m)] {
                 if let Some(size) = row.number(role)?.filter(|size| *size > 0.0)
@@ -256,19 +290,37 @@ impl<'a> Collecting<'a> {
         let id = if name.is_empty() { self.id.to_owned() } else { format!("{}-{name}", self.id) };
         let id = id.replace(['/', '\\', ' '], "-");
         self.recordings.push(RawRecording { id, has_frames: self.has_frames, ..RawRecording::default() });
+        self.next.push(Vec::new());
         self.of_name.insert(name.into_owned(), self.recordings.len() - 1);
         Ok(self.recordings.len() - 1)
     }
 
-    fn vehicle(&mut self, recording: usize, key: &str) -> usize {
-        if self.last.0 == recording && self.recordings[recording].vehicles[self.last.1].key == key {
-            return self.last.1;
+    /// The vehicle of a row, if it is that of the last row or the one that came after it before.
+    fn expected_vehicle(&mut self, recording: usize, row: &dyn SampleRow) -> Result<Option<usize>> {
+        if self.last.0 != recording {
+            return Ok(None);
         }
+        let vehicles = &self.recordings[recording].vehicles;
+        for vehicle in [self.last.1, self.next[recording][self.last.1]] {
+            if row.is_text(Role::Vehicle, &vehicles[vehicle].key)? {
+                self.last.1 = vehicle;
+                return Ok(Some(vehicle));
+            }
+        }
+        Ok(None)
+    }
+
+    fn vehicle(&mut self, recording: usize, key: &str) -> usize {
         let of = &mut self.recordings[recording];
+        let next = &mut self.next[recording];
         let at = *self.vehicles.entry((recording, key.to_owned())).or_insert_with(|| {
             of.vehicles.push(RawVehicle { key: key.to_owned(), ..RawVehicle::default() });
+            next.push(of.vehicles.len() - 1);
             of.vehicles.len() - 1
         });
+        if self.last.0 == recording {
+            next[self.last.1] = at;
+        }
         self.last = (recording, at);
         at
     }
@@ -292,9 +344,25 @@ impl<'a> Collecting<'a> {
     }
 }
 
+/// What to do with geographic coordinates.
+pub(in crate::traffic::trajectory) const PROJECT: &str =
+    "project the positions to metres (UTM, for instance) and name the columns x and y";
+
+/// Whether a name is that of a column of longitudes or latitudes.
+pub(in crate::traffic::trajectory) fn is_geographic(name: &str) -> bool {
+    let bare = name.split(['(', '[']).next().unwrap_or(name);
+    let letters: String = bare.chars().filter(|c| c.is_alphabetic()).flat_map(char::to_lowercase).collect();
+    let letters = letters.trim_start_matches("gps").trim_end_matches("deg");
+    ["lon", "lng", "long", "longitude", "lat", "latitude"].contains(&letters)
+}
+
 /// The meta file beside a track file, if it is there.
 fn meta_rows(path: &Path, id: &str, meta: &MetaFile, preset: &Preset) -> Result<Option<(Rows, Columns)>> {
-    let beside = path.with_file_name(meta.file.replace('*', id));
+    let mut beside = path.with_file_name(meta.file.replace('*', id));
+    let packed = path.with_file_name(format!("{}.gz", meta.file.replace('*', id)));
+    if !beside.exists() && packed.exists() {
+        beside = packed;
+    }
     if !beside.exists() {
         let problem = format!("preset {} names this file, which is not there", preset.name);
         let missing = || Error::input(Place::file(&beside), problem, "add it, or remove its table from the preset");

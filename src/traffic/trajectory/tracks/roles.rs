@@ -180,7 +180,7 @@ pub(super) fn units(dimension: Dimension) -> &'static [(&'static str, f64)] {
         Dimension::Text | Dimension::Number => &[("", 1.0)],
         // Dates have the factor 1: they are parsed to seconds.
         Dimension::Time => &[("s", 1.0), ("ms", 1e-3), ("us", 1e-6), ("ns", 1e-9), ("date", 1.0)],
-        Dimension::Length => &[("m", 1.0), ("ft", FOOT_M), ("cm", 0.01), ("km", 1000.0)],
+        Dimension::Length => &[("m", 1.0), ("ft", FOOT_M), ("cm", 0.01), ("mm", 0.001), ("km", 1000.0)],
         Dimension::Speed => &[("m/s", 1.0), ("km/h", 1.0 / 3.6), ("mph", 0.44704), ("ft/s", FOOT_M)],
         Dimension::Acceleration => &[("m/s2", 1.0), ("m/s²", 1.0), ("ft/s2", FOOT_M), ("g", 9.80665)],
         Dimension::Angle => &[("deg", std::f64::consts::PI / 180.0), ("rad", 1.0)],

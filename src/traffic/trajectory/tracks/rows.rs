@@ -2,6 +2,7 @@
 //! whose cells are lists.
 
 use std::borrow::Cow;
+use std::cell::Cell;
 use std::collections::{BTreeMap, HashSet};
 use std::path::{Path, PathBuf};
 
@@ -10,8 +11,7 @@ use serde_json::Value;
 use super::markup::{each_element, json_rows};
 use super::preset::{FileFormat, Preset};
 use super::roles::{ColumnName, Role};
-use crate::support::input_file;
-use crate::support::table::{TableFormat, TableReader};
+use crate::support::table::{Cell as TableCell, TableFormat, TableReader};
 use crate::traffic::trajectory::csv_table::{CsvFormat, CsvTable, FileChecksum};
 use crate::traffic::trajectory::number;
 use crate::{Error, Place, Result};
@@ -23,24 +23,119 @@ const XML_HEADER_ROWS: usize = 1000;
 pub(super) struct Columns {
     at: [Option<(usize, f64)>; Role::ALL.len()],
     names: Vec<String>,
-    /// Times are dates.
-    has_dates: bool,
+    /// The preset names a unit of times that is a number: no text is a time.
+    has_time_unit: bool,
+    /// What times were found to be, where no unit tells.
+    found_time: Cell<Option<FoundTime>>,
     none: Vec<String>,
+    /// Those that are numbers, so that few numbers need be compared as texts.
+    none_numbers: Vec<f64>,
+}
+
+/// What times without a unit are, by their size or their text.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum FoundTime {
+    Milliseconds,
+    Microseconds,
+    Nanoseconds,
+    Date,
+    /// `08:15:30.25`: it begins again at midnight.
+    Clock,
+    /// SUMO's `0:08:15:30.25`, with days.
+    Days,
+}
+
+impl FoundTime {
+    /// In words, after the name of the column.
+    pub fn text(self) -> &'static str {
+        match self {
+            FoundTime::Milliseconds => "ms since 1970",
+            FoundTime::Microseconds => "µs since 1970",
+            FoundTime::Nanoseconds => "ns since 1970",
+            FoundTime::Date => "dates",
+            FoundTime::Clock => "time of day",
+            FoundTime::Days => "days:hours:minutes:seconds",
+        }
+    }
+
+    /// What a number of this size is; `None` for seconds. No recording is from the year 5138 or later.
+    fn of_number(value: f64) -> Option<(FoundTime, f64)> {
+        match value.abs() {
+            0.0..1e11 => None,
+            1e11..1e14 => Some((FoundTime::Milliseconds, 1e-3)),
+            1e14..1e17 => Some((FoundTime::Microseconds, 1e-6)),
+            1e17..1e19 => Some((FoundTime::Nanoseconds, 1e-9)),
+            _ => None,
+        }
+    }
+
+    /// Seconds of a text.
+    fn of_text(text: &str) -> Option<(FoundTime, f64)> {
+        let text = text.replace(',', ".");
+        if let Some(seconds) = seconds_of_date(&text) {
+            return Some((FoundTime::Date, seconds));
+        }
+        let parts: Option<Vec<f64>> =
+            text.split(':').map(|part| part.parse().ok().filter(|value: &f64| *value >= 0.0)).collect();
+        let (days, [hours, minutes, seconds]) = match parts?[..] {
+            [hours, minutes, seconds] => (None, [hours, minutes, seconds]),
+            [days, hours, minutes, seconds] => (Some(days), [hours, minutes, seconds]),
+            _ => return None,
+        };
+        let is_usual =
+            hours.fract() == 0.0 && minutes.fract() == 0.0 && hours < 24.0 && minutes < 60.0 && seconds < 61.0;
+        let of_day = 3600.0 * hours + 60.0 * minutes + seconds;
+        is_usual.then_some(match days {
+            None => (FoundTime::Clock, of_day),
+            Some(days) => (FoundTime::Days, 86_400.0 * days + of_day),
+        })
+    }
 }
 
 impl Columns {
     /// Finds the columns in a header; absent ones are left out.
     pub fn of(named: &BTreeMap<Role, ColumnName>, header: &[String], none: &[String]) -> Columns {
         let mut at = [None; Role::ALL.len()];
-        let mut has_dates = false;
+        let mut has_time_unit = false;
         for (role, column) in named {
             let position = |name: &String| header.iter().position(|column| is_same_name(column, name));
             let place = column.names().iter().find_map(position);
             at[*role as usize] = place.zip(column.factor(*role));
-            has_dates |= *role == Role::Time
-                && matches!(column, ColumnName::WithUnit { unit: Some(unit), .. } if unit == "date");
+            has_time_unit |= *role == Role::Time
+                && (column.unit().is_some_and(|unit| unit != "date") || column.factor(*role) != Some(1.0));
         }
-        Columns { at, names: header.to_vec(), has_dates, none: none.to_vec() }
+        let none_numbers = none.iter().filter_map(|text| text.parse().ok()).collect();
+        let found_time = Cell::new(None);
+        Columns { at, names: header.to_vec(), has_time_unit, found_time, none: none.to_vec(), none_numbers }
+    }
+
+    /// What times without a unit were found to be.
+    pub fn found_time(&self) -> Option<FoundTime> {
+        self.found_time.get()
+    }
+
+    /// Whether a number with this text stands for no value: `-1.0` is a number where `-1` does.
+    fn is_none_number(&self, value: f64, text: impl FnOnce() -> String) -> bool {
+        self.none_numbers.contains(&value) && self.is_none(&text())
+    }
+
+    /// A number of the file in SI units.
+    fn si(&self, value: f64, role: Role, place: &dyn Fn() -> Place) -> Result<Option<f64>> {
+        let Some((_, factor)) = self.at[role as usize] else { return Ok(None) };
+        if value.is_nan() {
+            return Ok(None);
+        }
+        let found = if role == Role::Time && !self.has_time_unit { FoundTime::of_number(value) } else { None };
+        if let Some((found, _)) = found {
+            self.found_time.set(Some(found));
+        }
+        let scaled = value * found.map_or(factor, |(_, factor)| factor);
+        // Derived values stay finite in this range.
+        if scaled.abs() <= number::REAL_LIMIT {
+            Ok(Some(scaled))
+        } else {
+            Err(bad(place(), &value.to_string(), "a number below 10¹² in SI units"))
+        }
     }
 
     pub fn has(&self, role: Role) -> bool {
@@ -71,6 +166,10 @@ pub(super) trait SampleRow {
     fn number(&self, role: Role) -> Result<Option<f64>>;
     /// The text of a column.
     fn text(&self, role: Role) -> Result<Option<Cow<'_, str>>>;
+    /// Whether it is this one, which an earlier row has.
+    fn is_text(&self, role: Role, known: &str) -> Result<bool> {
+        Ok(self.text(role)?.is_some_and(|text| text == known))
+    }
     /// The place of a value.
     fn place(&self, role: Role) -> Place;
 }
@@ -178,7 +277,7 @@ impl Rows {
                     each(&CsvRow { table: &table, columns })?;
                 }
                 rows = table.rows();
-                return Ok((table.finish(), rows));
+                return Ok((table.finish()?, rows));
             }
             RowSource::Parquet(mut reader) => {
                 // Roles share no column, but two may name the same one.
@@ -186,6 +285,23 @@ impl Rows {
                 wanted.sort_unstable();
                 wanted.dedup();
                 reader.want(&wanted)?;
+                let mut columns = Cow::Borrowed(columns);
+                if let Some((at, _)) = columns.at[Role::Time as usize]
+                    && reader.has_instants(at)
+                {
+                    columns.found_time.set(Some(FoundTime::Date));
+                    columns.to_mut().at[Role::Time as usize] = Some((at, 1.0));
+                }
+                let columns = columns.as_ref();
+                if !reader.has_lists() {
+                    let mut order = vec![0; self.header.len()];
+                    wanted.iter().enumerate().for_each(|(position, at)| order[*at] = position);
+                    while reader.step()? {
+                        rows += 1;
+                        each(&TableRow { reader: &reader, row: rows, columns, order: &order })?;
+                    }
+                }
+                // Without lists, this is behind the last row.
                 while let Some(row) = reader.next_row()? {
                     rows += 1;
                     let mut cells = vec![&Value::Null; self.header.len()];
@@ -194,7 +310,7 @@ impl Rows {
                 }
             }
             RowSource::Json(list) => {
-                for row in &list {
+                for row in list {
                     rows += 1;
                     let cells: Vec<&Value> =
                         self.header.iter().map(|name| row.get(name).unwrap_or(&Value::Null)).collect();
@@ -218,9 +334,7 @@ impl Rows {
                 })?;
             }
         }
-        let size = std::fs::metadata(&self.path).map_err(|e| Error::io(&self.path, "read", e))?.len();
-        let file = self.path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
-        Ok((FileChecksum { file, bytes: size, sha256: input_file::sha256(&self.path)? }, rows))
+        Ok((FileChecksum::of(&self.path)?, rows))
     }
 }
 
@@ -240,40 +354,31 @@ fn parquet(path: &Path) -> Result<TableFormat> {
 
 /// A number in SI units of a text; `;` joins several values, of which the first counts.
 fn number_of(text: &[u8], role: Role, columns: &Columns, place: &dyn Fn() -> Place) -> Result<Option<f64>> {
-    let Some((_, factor)) = columns.at[role as usize] else { return Ok(None) };
     let first = text.split(|&byte| byte == b';').next().unwrap_or_default().trim_ascii();
-    let value = match number::real(first) {
-        Some(value) if value.is_finite() => value,
-        found => {
-            let shown = String::from_utf8_lossy(first);
-            if columns.is_none(&shown) || found.is_some_and(f64::is_nan) {
-                return Ok(None);
-            }
-            if role == Role::Time && columns.has_dates {
-                let parsed = seconds_of_date(&shown);
-                return parsed.map(Some).ok_or_else(|| bad(place(), &shown, "a date such as 2024-10-07 06:00:00.05"));
-            }
-            let is_time = role == Role::Time;
-            let expected = if is_time { "a finite number (dates need `unit = \"date\"`)" } else { "a finite number" };
-            return Err(bad(place(), &shown, expected));
-        }
-    };
-    if !columns.none.is_empty() && columns.is_none(&String::from_utf8_lossy(first)) {
+    let found = number::real(first);
+    if let Some(value) = found.filter(|value| value.is_finite()) {
+        let is_none = columns.is_none_number(value, || String::from_utf8_lossy(first).into_owned());
+        return if is_none { Ok(None) } else { columns.si(value, role, place) };
+    }
+    let shown = String::from_utf8_lossy(first);
+    if columns.is_none(&shown) || found.is_some_and(f64::is_nan) {
         return Ok(None);
     }
-    scaled(value, factor, place).map(Some)
+    if role == Role::Time && !columns.has_time_unit {
+        let (found, seconds) = FoundTime::of_text(&shown).ok_or_else(|| bad(place(), &shown, A_TIME))?;
+        columns.found_time.set(Some(found));
+        return Ok(Some(seconds));
+    }
+    let expected = match shown.contains(',') {
+        true => {
+            "a finite number with a decimal point (decimal commas are read if no number has a point and semicolons or tabs separate)"
+        }
+        false => "a finite number",
+    };
+    Err(bad(place(), &shown, expected))
 }
 
-/// A value times its factor, within the range in which derived values stay finite.
-fn scaled(value: f64, factor: f64, place: &dyn Fn() -> Place) -> Result<f64> {
-    let scaled = value * factor;
-    // Nanoseconds since 1970 are in this range as seconds.
-    if scaled.abs() <= number::REAL_LIMIT {
-        Ok(scaled)
-    } else {
-        Err(bad(place(), &value.to_string(), "a number below 10¹² in SI units"))
-    }
-}
+const A_TIME: &str = "a time: seconds, or a text such as 2024-10-07 06:00:00.05, 06:00:00.05 or 0:06:00:00.05";
 
 fn bad(place: Place, found: &str, expected: &str) -> Error {
     let shown: String = found.chars().take(40).flat_map(char::escape_debug).collect();
@@ -295,6 +400,18 @@ impl SampleRow for CsvRow<'_> {
     #[inline]
     fn number(&self, role: Role) -> Result<Option<f64>> {
         let Some(bytes) = self.bytes(role) else { return Ok(None) };
+        if self.table.has_decimal_commas() && !bytes.contains(&b':') {
+            let shown = String::from_utf8_lossy(bytes);
+            // It separates thousands, or another program wrote this number.
+            if shown.contains('.') && !self.columns.is_none(shown.trim()) {
+                return Err(bad(
+                    self.place(role),
+                    &shown,
+                    "a number with a decimal comma, as others of this file have",
+                ));
+            }
+            return number_of(shown.replace(',', ".").as_bytes(), role, self.columns, &|| self.place(role));
+        }
         number_of(bytes, role, self.columns, &|| self.place(role))
     }
 
@@ -331,6 +448,62 @@ impl SampleRow for TextRow<'_> {
     }
 }
 
+/// A row of a table with a type for every column.
+struct TableRow<'a> {
+    reader: &'a TableReader,
+    row: u64,
+    columns: &'a Columns,
+    /// Position of each column in the selection.
+    order: &'a [usize],
+}
+
+impl TableRow<'_> {
+    fn cell(&self, role: Role) -> TableCell<'_> {
+        self.columns.at[role as usize].map_or(TableCell::Null, |(at, _)| self.reader.cell(self.order[at]))
+    }
+}
+
+impl SampleRow for TableRow<'_> {
+    fn number(&self, role: Role) -> Result<Option<f64>> {
+        let place = || self.place(role);
+        match self.cell(role) {
+            TableCell::Number(value) if self.columns.is_none_number(value, || Value::from(value).to_string()) => {
+                Ok(None)
+            }
+            TableCell::Whole(value) if self.columns.is_none_number(value as f64, || value.to_string()) => Ok(None),
+            TableCell::Number(value) => self.columns.si(value, role, &place),
+            TableCell::Whole(value) => self.columns.si(value as f64, role, &place),
+            TableCell::Text(text) => number_of(text.as_bytes(), role, self.columns, &place),
+            TableCell::Flag(value) => Ok(Some(f64::from(u8::from(value)))),
+            _ => Ok(None),
+        }
+    }
+
+    fn text(&self, role: Role) -> Result<Option<Cow<'_, str>>> {
+        let text = match self.cell(role) {
+            TableCell::Text(Cow::Borrowed(text)) => Cow::Borrowed(text.trim()),
+            TableCell::Text(text) => text,
+            TableCell::Whole(value) => Cow::Owned(value.to_string()),
+            TableCell::Number(value) if !value.is_nan() => Cow::Owned(Value::from(value).to_string()),
+            TableCell::Flag(value) => Cow::Owned(value.to_string()),
+            _ => return Ok(None),
+        };
+        Ok(Some(text).filter(|text| !self.columns.is_none(text)))
+    }
+
+    fn is_text(&self, role: Role, known: &str) -> Result<bool> {
+        // Without a new text for each row.
+        match self.cell(role) {
+            TableCell::Whole(value) => Ok(known.parse() == Ok(value)),
+            _ => Ok(self.text(role)?.is_some_and(|text| text == known)),
+        }
+    }
+
+    fn place(&self, role: Role) -> Place {
+        self.reader.place(self.row, None).column(self.columns.name(role))
+    }
+}
+
 /// A sample of a row whose cells may be lists.
 struct CellRow<'a> {
     cells: &'a [&'a Value],
@@ -340,36 +513,35 @@ struct CellRow<'a> {
 }
 
 impl CellRow<'_> {
-    fn value(&self, role: Role) -> Option<(&Value, f64)> {
-        let (at, factor) = self.columns.at[role as usize]?;
-        let value = match self.cells[at] {
-            Value::Array(list) => list.get(self.sample)?,
-            value => value,
-        };
-        Some((value, factor))
+    fn value(&self, role: Role) -> Option<&Value> {
+        let (at, _) = self.columns.at[role as usize]?;
+        match self.cells[at] {
+            Value::Array(list) => list.get(self.sample),
+            value => Some(value),
+        }
     }
 }
 
 impl SampleRow for CellRow<'_> {
     fn number(&self, role: Role) -> Result<Option<f64>> {
         match self.value(role) {
-            None | Some((Value::Null, _)) => Ok(None),
-            Some((Value::Number(number), factor)) => {
+            None | Some(Value::Null) => Ok(None),
+            Some(Value::Number(number)) => {
                 let value = number.as_f64().unwrap_or(f64::NAN);
-                let is_none = !self.columns.none.is_empty() && self.columns.is_none(&number.to_string());
-                if is_none || value.is_nan() { Ok(None) } else { scaled(value, factor, &|| self.place(role)).map(Some) }
+                let is_none = self.columns.is_none_number(value, || number.to_string());
+                if is_none { Ok(None) } else { self.columns.si(value, role, &|| self.place(role)) }
             }
-            Some((Value::String(text), _)) => number_of(text.as_bytes(), role, self.columns, &|| self.place(role)),
-            Some((Value::Bool(value), _)) => Ok(Some(f64::from(u8::from(*value)))),
-            Some((other, _)) => Err(bad(self.place(role), &other.to_string(), "a number")),
+            Some(Value::String(text)) => number_of(text.as_bytes(), role, self.columns, &|| self.place(role)),
+            Some(Value::Bool(value)) => Ok(Some(f64::from(u8::from(*value)))),
+            Some(other) => Err(bad(self.place(role), &other.to_string(), "a number")),
         }
     }
 
     fn text(&self, role: Role) -> Result<Option<Cow<'_, str>>> {
         let text = match self.value(role) {
-            None | Some((Value::Null, _)) => return Ok(None),
-            Some((Value::String(text), _)) => Cow::Borrowed(text.trim()),
-            Some((other, _)) => Cow::Owned(other.to_string()),
+            None | Some(Value::Null) => return Ok(None),
+            Some(Value::String(text)) => Cow::Borrowed(text.trim()),
+            Some(other) => Cow::Owned(other.to_string()),
         };
         Ok(Some(text).filter(|text| !self.columns.is_none(text)))
     }

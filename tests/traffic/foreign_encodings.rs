@@ -1,0 +1,282 @@
+//! The same tracks as other programs write them: compressed, in other characters, with other numbers and times.
+
+use std::fs;
+use std::io::Write;
+use std::path::Path;
+
+use lanesweep::support::plausibility::Implausible;
+use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
+use lanesweep::traffic::trajectory::highd::{self, RecordingInfo};
+use lanesweep::traffic::trajectory::tracks::{self, Preset, TrackFile};
+use lanesweep::traffic::trajectory::{Inputs, Recording};
+
+use crate::common::exid::Plain;
+
+fn generated() -> Recording {
+    let options = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
+    generate_one(&options, 0).unwrap()
+}
+
+fn table() -> Plain {
+    Plain::of(&generated(), 5)
+}
+
+/// What a file of this name and content is read as.
+fn read(name: &str, content: &[u8]) -> lanesweep::Result<Recording> {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join(name);
+    fs::write(&path, content).unwrap();
+    let (files, problems) = Inputs::of(&path, None)?.files();
+    assert!(problems.is_empty(), "{problems:?}");
+    Ok(files[0].read(Implausible::Accepted)?.remove(0).recording)
+}
+
+fn packed(text: &str) -> Vec<u8> {
+    let mut encoder = flate2::write::GzEncoder::new(Vec::new(), flate2::Compression::fast());
+    encoder.write_all(text.as_bytes()).unwrap();
+    encoder.finish().unwrap()
+}
+
+/// The recording with frames that begin at 0.
+fn from_frame_0(mut recording: Recording) -> Recording {
+    let first = recording.tracks.iter().map(|track| track.first_frame).min().unwrap();
+    recording.tracks.iter_mut().for_each(|track| track.first_frame -= first);
+    recording
+}
+
+/// The table with other texts in the column of times.
+fn with_times(text: impl Fn(f64) -> String) -> Plain {
+    let mut table = table();
+    let t = table.at("t");
+    table.rows.iter_mut().for_each(|row| row[t] = text(row[t].parse().unwrap()));
+    table
+}
+
+#[test]
+fn a_table_with_decimal_commas_is_the_one_with_points() {
+    let right = read("own.csv", table().text().as_bytes()).unwrap();
+    for delimiter in [";", "\t"] {
+        let german = table().text().replace(',', delimiter).replace('.', ",");
+        assert!(read("own.csv", german.as_bytes()).unwrap() == right);
+    }
+}
+
+/// A comma that separates thousands would otherwise be read as a decimal one, and the other way round.
+#[test]
+fn a_table_with_decimal_points_and_commas_is_refused() {
+    let x = table().at("x");
+    for (own, other) in [(".", ","), (",", ".")] {
+        let mut both = table();
+        both.rows.iter_mut().flatten().for_each(|field| *field = field.replace('.', own));
+        let last = both.rows.len() - 1;
+        both.rows[last][x] = both.rows[last][x].replace(own, other);
+        let lines = std::iter::once(&both.header).chain(&both.rows).map(|row| row.join(";") + "\n");
+        let error = read("own.csv", lines.collect::<String>().as_bytes()).unwrap_err().to_string();
+        assert!(error.contains("line ") && error.contains("decimal"), "{error}");
+    }
+}
+
+#[test]
+fn compressed_and_utf_16_texts_are_read() {
+    let text = table().text();
+    let right = read("own.csv", text.as_bytes()).unwrap();
+    assert!(read("own.csv.gz", &packed(&text)).unwrap() == right);
+    for unit in [u16::to_le_bytes, u16::to_be_bytes] {
+        let units = std::iter::once(0xfeff).chain(text.encode_utf16());
+        assert!(read("own.csv", &units.flat_map(unit).collect::<Vec<u8>>()).unwrap() == right);
+    }
+    let cut = packed(&text);
+    assert!(read("own.csv.gz", &cut[..cut.len() / 2]).is_err());
+}
+
+#[test]
+fn a_compressed_file_beside_itself_is_read_once() {
+    let dir = tempfile::tempdir().unwrap();
+    let text = table().text();
+    fs::write(dir.path().join("a.csv"), &text).unwrap();
+    fs::write(dir.path().join("a.csv.gz"), packed(&text)).unwrap();
+    fs::write(dir.path().join("b.csv.gz"), packed(&text)).unwrap();
+    let (files, problems) = Inputs::of(dir.path(), None).unwrap().files();
+    assert_eq!((files.len(), problems.len()), (2, 1));
+    assert!(problems[0].to_string().contains("a.csv.gz: the same file lies beside it"), "{}", problems[0]);
+}
+
+#[test]
+fn compressed_highd_files_are_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let recording = Recording { id: "01".to_owned(), ..generated() };
+    highd::write(dir.path(), &recording, &RecordingInfo::default()).unwrap();
+    let of = |dir: &Path| {
+        let (files, problems) = Inputs::of(dir, None).unwrap().files();
+        assert!(problems.is_empty(), "{problems:?}");
+        files[0].read(Implausible::Refused).unwrap().remove(0)
+    };
+    let right = of(dir.path());
+    for name in ["01_tracks.csv", "01_tracksMeta.csv"] {
+        let path = dir.path().join(name);
+        fs::write(dir.path().join(format!("{name}.gz")), packed(&fs::read_to_string(&path).unwrap())).unwrap();
+        fs::remove_file(&path).unwrap();
+    }
+    let found = of(dir.path());
+    assert!(found.recording == right.recording);
+    // The checksum is that of the file as it lies there.
+    let bytes = fs::metadata(dir.path().join("01_tracks.csv.gz")).unwrap().len();
+    assert_eq!((found.checksum_sha256[0].file.as_str(), found.checksum_sha256[0].bytes), ("01_tracks.csv.gz", bytes));
+}
+
+#[test]
+fn times_in_any_notation_are_the_same_times() {
+    let right = from_frame_0(read("own.csv", table().text().as_bytes()).unwrap());
+    let clock = |t: f64| format!("{:02}:{:02}:{:05.2}", 8 + (t / 3600.0) as u32, (t / 60.0) as u32 % 60, t % 60.0);
+    let notations: [(&str, &dyn Fn(f64) -> String); 6] = [
+        ("milliseconds", &|t| format!("{:.0}", 1_740_823_200_000.0 + 1000.0 * t)),
+        ("microseconds", &|t| format!("{:.0}", 1_740_823_200_000_000.0 + 1e6 * t)),
+        ("nanoseconds", &|t| format!("{}00", 17_408_232_000_000_000 + (1e7 * t).round() as u64)),
+        ("times of day", &clock),
+        ("SUMO's", &|t| format!("1:{}", clock(t))),
+        ("dates", &|t| format!("2025-03-01T{}Z", clock(t))),
+    ];
+    for (name, notation) in notations {
+        let found = from_frame_0(read("own.csv", with_times(notation).text().as_bytes()).unwrap());
+        assert_eq!(found.frame_rate_hz, right.frame_rate_hz, "{name}");
+        assert!(found == right, "{name}");
+    }
+}
+
+#[test]
+fn what_a_time_without_a_unit_is_taken_for_is_said() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("own.csv");
+    fs::write(&path, with_times(|t| format!("{:.0}", 1_740_823_200_000.0 + 1000.0 * t)).text()).unwrap();
+    let generic = Preset::load("generic").unwrap();
+    let about =
+        tracks::read_tracks(&TrackFile { path, id: "own".to_owned() }, &generic).unwrap().remove(0).understanding;
+    assert!(about.columns.contains(&("time", "t (ms since 1970)".to_owned())), "{:?}", about.columns);
+}
+
+#[test]
+fn times_of_day_that_pass_midnight_are_refused() {
+    let evening = |t: f64| {
+        let of_day = (t + 86_390.0) % 86_400.0;
+        format!("{:02}:{:02}:{:05.2}", (of_day / 3600.0) as u32, (of_day / 60.0) as u32 % 60, of_day % 60.0)
+    };
+    let error = read("own.csv", with_times(evening).text().as_bytes()).unwrap_err().to_string();
+    assert!(error.contains("midnight") && error.contains("line "), "{error}");
+}
+
+#[test]
+fn positions_in_millimetres_are_read_by_a_preset() {
+    let dir = tempfile::tempdir().unwrap();
+    let (path, preset) = (dir.path().join("own.csv"), dir.path().join("own.toml"));
+    let mut in_mm = table();
+    for (column, name) in [("x", "x_mm"), ("y", "y_mm")] {
+        in_mm.map(column, |metres, _| 1000.0 * metres);
+        let at = in_mm.at(column);
+        in_mm.header[at] = name.to_owned();
+    }
+    fs::write(&path, in_mm.text()).unwrap();
+    let draft = tracks::draft(&path).unwrap();
+    assert!(draft.contains("x = { name = \"x_mm\", unit = \"mm\" }"), "{draft}");
+    fs::write(
+        &preset,
+        draft.replace("reference = \"?\"", "reference = \"centre\"").replace("y = \"?\"", "y = \"left\""),
+    )
+    .unwrap();
+    let preset = Preset::load(&preset.to_string_lossy()).unwrap();
+    let found = tracks::read_usable(&TrackFile { path, id: "own".to_owned() }, &preset, Implausible::Refused).unwrap();
+    let right = read("own.csv", table().text().as_bytes()).unwrap();
+    let pairs = found[0].recording.tracks.iter().zip(&right.tracks);
+    assert!(pairs.flat_map(|(a, b)| a.s_m.iter().zip(&b.s_m)).all(|(a, b)| (a - b).abs() < 1e-9));
+}
+
+#[test]
+fn geographic_coordinates_are_named_as_such() {
+    let mut table = table();
+    for (column, name) in [("x", "longitude"), ("y", "Latitude")] {
+        let at = table.at(column);
+        table.header[at] = name.to_owned();
+    }
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("own.csv");
+    fs::write(&path, table.text()).unwrap();
+    let error = Inputs::of(&path, None).unwrap_err();
+    assert!(error.to_string().contains("longitudes and latitudes (`longitude`, `Latitude`)"), "{error}");
+    assert!(error.help().unwrap().contains("project"), "{error:?}");
+    // A preset cannot take degrees for metres.
+    let draft = tracks::draft(&path).unwrap().replace("reference = \"?\"", "reference = \"centre\"");
+    let own = draft.replace("\ny = \"?\"\n", "\ny = \"left\"\n").replace("x = \"?\"", "x = \"longitude\"");
+    let preset = dir.path().join("own.toml");
+    fs::write(&preset, own.replace("y = \"?\"", "y = \"Latitude\"")).unwrap();
+    let preset = Preset::load(&preset.to_string_lossy()).unwrap();
+    let error = tracks::read_tracks(&TrackFile { path, id: "own".to_owned() }, &preset).unwrap_err().to_string();
+    assert!(error.contains("longitude or latitude"), "{error}");
+}
+
+#[test]
+fn an_older_commonroad_file_is_named_as_such() {
+    let older = r#"<commonRoad commonRoadVersion="2018b" timeStepSize="0.1"><obstacle id="1"><role>dynamic</role></obstacle></commonRoad>"#;
+    let error = read("scene.xml", older.as_bytes()).unwrap_err();
+    assert!(error.to_string().contains("CommonRoad 2018b") && error.help().unwrap().contains("2020a"), "{error:?}");
+}
+
+#[test]
+fn sumos_times_for_people_are_times() {
+    let fcd = |times: &dyn Fn(u32) -> String| {
+        let step = |k: u32| {
+            let x = 100.0 + 30.0 * f64::from(k) / 10.0;
+            let vehicle = |id: &str, x: f64, y: f64, lane: u32| {
+                format!(
+                    "<vehicle id=\"{id}\" x=\"{x:.2}\" y=\"{y:.2}\" angle=\"90.00\" type=\"car\" speed=\"30.00\" pos=\"{x:.2}\" lane=\"e_{lane}\" slope=\"0.00\"/>"
+                )
+            };
+            let cars = vehicle("a", x, -4.8, 0) + &vehicle("b", x + 40.0, -1.6, 1) + &vehicle("c", x - 50.0, -4.8, 0);
+            format!("<timestep time=\"{}\">{cars}</timestep>\n", times(k))
+        };
+        format!("<fcd-export>\n{}</fcd-export>\n", (0..150).map(step).collect::<String>())
+    };
+    let seconds = fcd(&|k| format!("{:.2}", 60.0 + f64::from(k) / 10.0));
+    let for_people = fcd(&|k| format!("0:00:{:02}:{:05.2}", 1 + k / 600, f64::from(k % 600) / 10.0));
+    let right = read("fcd.xml", seconds.as_bytes()).unwrap();
+    assert_eq!((right.frame_rate_hz, right.tracks.len()), (10.0, 3));
+    assert!(read("fcd.xml", for_people.as_bytes()).unwrap() == right);
+    assert!(read("fcd.xml.gz", &packed(&for_people)).unwrap() == right);
+}
+
+/// Without a preset that names another unit; every codec of the usual programs.
+#[cfg(feature = "parquet")]
+#[test]
+fn parquet_with_gzip_or_lz4_and_instants_is_the_table() {
+    use std::sync::Arc;
+
+    use arrow_array::{ArrayRef, Float64Array, RecordBatch, StringArray, TimestampMicrosecondArray};
+    use parquet::arrow::ArrowWriter;
+    use parquet::basic::{Compression, GzipLevel};
+    use parquet::file::properties::WriterProperties;
+
+    let table = table();
+    let right = from_frame_0(read("own.csv", table.text().as_bytes()).unwrap());
+    let column = |name: &String| {
+        let at = table.at(name);
+        let texts = || table.rows.iter().map(move |row| row[at].as_str());
+        let numbers = || texts().map(|text| text.parse::<f64>().unwrap());
+        let array: ArrayRef = match name.as_str() {
+            "class" | "track_id" => Arc::new(StringArray::from_iter_values(texts())),
+            "t" => {
+                let instants = numbers().map(|t| 1_740_823_200_000_000 + (1e6 * t).round() as i64);
+                Arc::new(TimestampMicrosecondArray::from_iter_values(instants))
+            }
+            _ => Arc::new(Float64Array::from_iter_values(numbers())),
+        };
+        (name.clone(), array)
+    };
+    let batch = RecordBatch::try_from_iter(table.header.iter().map(column)).unwrap();
+    for codec in [Compression::GZIP(GzipLevel::default()), Compression::LZ4, Compression::LZ4_RAW, Compression::SNAPPY]
+    {
+        let mut bytes = Vec::new();
+        let properties = WriterProperties::builder().set_compression(codec).build();
+        let mut writer = ArrowWriter::try_new(&mut bytes, batch.schema(), Some(properties)).unwrap();
+        writer.write(&batch).unwrap();
+        writer.close().unwrap();
+        assert!(from_frame_0(read("own.parquet", &bytes).unwrap()) == right, "{codec:?}");
+    }
+}
