@@ -455,7 +455,8 @@ def sample(
     category : Value
         With --distribution: kind of scenario: cut-in, cut-out, lvd.
     rename : Values
-        With --distribution: map a parameter of the file to one of lanesweep, times a factor; repeatable.
+        With --distribution: map a parameter of the file to one of lanesweep, times a factor, or to `none`;
+        repeatable.
     set : Values
         With --distribution: constant parameter; repeatable.
     models : Models
@@ -970,7 +971,8 @@ def map(
     preset : Value
         Predefined grids with their models: jrc, r157.
     rename : Values
-        With --distribution: map a parameter of the file to one of lanesweep, times a factor; repeatable.
+        With --distribution: map a parameter of the file to one of lanesweep, times a factor, or to `none`;
+        repeatable.
     x : Value
         Parameter of the x axis: NAME=FROM..TO/STEP or NAME=A,B,C. With --distribution also a NAME of the file.
     y : Value

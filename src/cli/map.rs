@@ -45,7 +45,7 @@ pub struct Map {
     /// the panels.
     #[arg(long, value_name = "FILE", conflicts_with = "preset", help_heading = "Data")]
     distribution: Option<PathBuf>,
-    /// With --distribution: map a parameter of the file to one of lanesweep, times a factor; repeatable
+    /// With --distribution: map a parameter of the file to one of lanesweep, times a factor, or to `none`; repeatable
     #[arg(long, value_name = "THEIRS=OURS[*FACTOR]", requires = "distribution", help_heading = "Scenario")]
     rename: Vec<Rename>,
     /// Parameter of the x axis: NAME=FROM..TO/STEP or NAME=A,B,C
@@ -182,7 +182,10 @@ impl Map {
             },
             None => {
                 let read = |path: &PathBuf| {
-                    variations(&read_distribution(path)?, &Names { category, renames: &self.rename, path })
+                    let names = Names { category, renames: &self.rename, path };
+                    let file = read_distribution(path)?;
+                    names.ignored_texts(&file)?.iter().for_each(|ignored| tracing::warn!("{ignored}"));
+                    variations(&file, &names)
                 };
                 let text = GridText {
                     x: self.x.clone(),

@@ -55,7 +55,7 @@ pub struct Sample {
     /// With --distribution: kind of scenario: cut-in, cut-out, lvd
     #[arg(long, value_name = "NAME", requires = "distribution", help_heading = "Scenario", hide_short_help = true)]
     pub(super) category: Option<String>,
-    /// With --distribution: map a parameter of the file to one of lanesweep, times a factor; repeatable
+    /// With --distribution: map a parameter of the file to one of lanesweep, times a factor, or to `none`; repeatable
     #[arg(
         long,
         value_name = "THEIRS=OURS[*FACTOR]",

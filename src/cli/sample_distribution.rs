@@ -24,6 +24,12 @@ use crate::support::readable;
 use crate::support::run_dir::{ESTIMATE_RECORD, OutputDir};
 use crate::{Error, Place, Result};
 
+/// A smaller fraction is shown as 0.
+const NOTHING: f64 = 5e-6;
+
+/// A range that keeps less of its distribution is rather a mistake.
+const FEW: f64 = 1e-3;
+
 /// Samples the distributions of a file.
 pub(super) fn run(
     flags: &Sample,
@@ -51,8 +57,16 @@ pub(super) fn run(
     })?;
     let sampled = SampledFile::read(path, category, &flags.rename, &flags.set)?;
     let samples = sampled.samples()?;
+    samples.ignored_texts.iter().for_each(|ignored| tracing::warn!("{ignored}"));
+    for p in samples.parameters.iter().filter(|p| p.range_fraction < FEW) {
+        tracing::warn!(
+            "the Range of {} keeps {} of its distribution: check the units of both",
+            p.parameter.key,
+            readable::value(p.range_fraction)
+        );
+    }
     check_plausible(&samples, Doubts::new(flags.plausibility.policy()))?;
-    for p in samples.parameters.iter().filter(|p| p.kept_fraction < 1.0) {
+    for p in samples.parameters.iter().filter(|p| 1.0 - p.kept_fraction > NOTHING) {
         tracing::warn!(
             "{:.3} % of the distribution of {} are outside {} … {} {} and are not drawn",
             100.0 * (1.0 - p.kept_fraction),

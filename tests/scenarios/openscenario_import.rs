@@ -218,7 +218,7 @@ fn what_is_not_understood_is_named_with_line_and_element() {
     changed("weight=\"0.3\"", "weight=\"many\"", "line 29", "write a number");
     changed("\"Other_Speed_kph\"", "\"Ego_Speed_kph\"", "line 12", "has a distribution already, in line 7");
     changed("numberOfTestRuns=\"20000\"", "numberOfTestRuns=\"0\"", "line 6", "whole number of at least 1");
-    changed("randomSeed=\"157\"", "randomSeed=\"0.5\"", "line 6", "whole number");
+    changed("randomSeed=\"157\"", "randomSeed=\"often\"", "line 6", "write a number");
     changed("revMinor=\"2\"", "revMinor=\"9\"", "line 3", "revision 1.9");
     changed("revMajor=\"1\"", "revMajor=\"2\"", "line 3", "revision 2.2");
     changed(
@@ -311,4 +311,235 @@ fn hostile_xml_is_refused_at_once() {
     // Entities of its own would be declared here.
     let bomb = "<!DOCTYPE l [<!ENTITY a \"aaaaaaaaaa\"><!ENTITY b \"&a;&a;&a;&a;\">]><OpenSCENARIO x=\"&b;\"/>";
     refused(bomb, "document type");
+}
+
+/// A deterministic file with the values of each parameter: numbers or texts.
+fn deterministic(parameters: &[(&str, &str)]) -> String {
+    let set = |(name, values): &(&str, &str)| {
+        let values: String = values.split(',').map(|value| format!("<Element value=\"{value}\"/>")).collect();
+        format!(
+            "<DeterministicSingleParameterDistribution parameterName=\"{name}\"><DistributionSet>{values}\
+             </DistributionSet></DeterministicSingleParameterDistribution>\n"
+        )
+    };
+    in_file(&format!("<Deterministic>\n{}</Deterministic>", parameters.iter().map(set).collect::<String>()))
+}
+
+/// A stochastic file.
+fn stochastic(attributes: &str, parameters: &[(&str, &str)]) -> String {
+    let one = |(name, inner): &(&str, &str)| {
+        format!("<StochasticDistribution parameterName=\"{name}\">{inner}</StochasticDistribution>\n")
+    };
+    let all: String = parameters.iter().map(one).collect();
+    in_file(&format!("<Stochastic {attributes}>\n{all}</Stochastic>"))
+}
+
+fn in_file(content: &str) -> String {
+    format!(
+        "\u{feff}<OpenSCENARIO><FileHeader revMajor=\"1\" revMinor=\"3\"/><ParameterValueDistribution><ScenarioFile \
+         filepath=\"\"/>\n{content}</ParameterValueDistribution></OpenSCENARIO>"
+    )
+}
+
+fn warned(dir: &Path, args: &[&str]) -> String {
+    let output = lanesweep(dir, args);
+    let text = String::from_utf8(output.stderr).unwrap();
+    assert_eq!(output.status.code(), Some(0), "{args:?}: {text}");
+    text
+}
+
+fn cells(dir: &Path, out: &str) -> Vec<String> {
+    let cells = std::fs::read_to_string(dir.join(out).join("cells.csv")).unwrap();
+    cells.lines().skip(1).map(str::to_owned).collect()
+}
+
+#[test]
+fn texts_that_no_parameter_takes_are_ignored_by_name_and_the_grid_is_that_of_the_numbers() {
+    let dir = tempfile::tempdir().unwrap();
+    let root = dir.path();
+    let numbers = [("ego_speed_kmh", "20,40,60"), ("deceleration_mps2", "4,6"), ("thw_s", "2")];
+    let texts = [("Road", "straight.xodr,left.xodr"), ("Model", "car,1")];
+    std::fs::write(root.join("numbers.xosc"), deterministic(&numbers)).unwrap();
+    std::fs::write(root.join("texts.xosc"), deterministic(&[&texts[..], &numbers].concat())).unwrap();
+    let map = |file, more: &[&str]| {
+        let args = ["map", "lvd", "--distribution", file, "--models", "FSM", "--backend", "cpu", "--out", "o"];
+        (warned(root, &[&args[..], more].concat()), cells(root, "o"))
+    };
+    let (quiet, expected) = map("numbers.xosc", &[]);
+    assert!(!quiet.contains("ignored") && expected.len() == 6, "{quiet}");
+    let (said_of, found) = map("texts.xosc", &[]);
+    assert!(said_of.contains("texts.xosc: texts are ignored, and nothing varies with them: Road, Model"), "{said_of}");
+    assert_eq!(found, expected);
+    // Whoever names them is not told.
+    let named = map("texts.xosc", &["--rename", "Road=none", "--rename", "Model=none"]);
+    assert!(!named.0.contains("ignored") && named.1 == expected, "{}", named.0);
+    // A text in place of a number that a parameter needs is no such text.
+    std::fs::write(root.join("wrong.xosc"), deterministic(&[("ego_speed_kmh", "20,fast"), numbers[1], numbers[2]]))
+        .unwrap();
+    let refused = said(root, &["map", "lvd", "--distribution", "wrong.xosc"]);
+    assert!(refused.contains("`fast` is not a number, and `ego_speed_kmh` is one"), "{refused}");
+    // Sets that differ in texts alone are one set, and a set of texts is none.
+    let path = Path::new("x.xosc");
+    let sets = |rows: &[[(&str, &str); 2]]| {
+        let assigned =
+            |(name, value): &(&str, &str)| format!("<ParameterAssignment parameterRef=\"{name}\" value=\"{value}\"/>");
+        let row = |row: &[(&str, &str); 2]| {
+            format!("<ParameterValueSet>{}</ParameterValueSet>", row.iter().map(assigned).collect::<String>())
+        };
+        let text = in_file(&format!(
+            "<Deterministic><DeterministicMultiParameterDistribution><ValueSetDistribution>{}</ValueSetDistribution>\
+             </DeterministicMultiParameterDistribution></Deterministic>",
+            rows.iter().map(row).collect::<String>()
+        ));
+        let file = parse_distribution(&text, path).unwrap();
+        variations(&file, &Names { category: Category::Lvd, renames: &[], path }).unwrap()
+    };
+    let of_both = sets(&[
+        [("Host", "blue"), ("thw_s", "1")],
+        [("Host", "red"), ("thw_s", "1")],
+        [("Host", "red"), ("thw_s", "2")],
+    ]);
+    assert_eq!(of_both.set_rows, [[1.0], [2.0]]);
+    let of_texts = sets(&[[("Host", "blue"), ("Target", "red")], [("Host", "red"), ("Target", "blue")]]);
+    assert!(of_texts.set_axes.is_empty() && of_texts.set_rows == [Vec::<f64>::new()]);
+}
+
+#[test]
+fn a_relative_speed_gives_the_cases_of_the_other_vehicles_speed() {
+    let dir = tempfile::tempdir().unwrap();
+    let root = dir.path();
+    let grid = |speed: &str| {
+        let axes =
+            ["map", "cut-in", "--x", "gap_m=5,10,20", "--y", "lateral_speed_mps=0.5,1", "--set", "ego_speed_kmh=60"];
+        warned(root, &[&axes[..], &["--panel", speed, "--backend", "cpu", "--out", "o"]].concat());
+        cells(root, "o")
+            .iter()
+            .map(|row| row.rsplitn(4, ',').take(3).map(str::to_owned).collect::<Vec<_>>())
+            .collect::<Vec<_>>()
+    };
+    assert_eq!(grid("relative_speed_kmh=-40,-20"), grid("other_speed_kmh=20,40"));
+    let twice = said(
+        root,
+        &[
+            "map",
+            "cut-in",
+            "--x",
+            "gap_m=5,10",
+            "--y",
+            "relative_speed_kmh=-20,-10",
+            "--set",
+            "ego_speed_kmh=60",
+            "--set",
+            "other_speed_mps=5",
+            "--set",
+            "lateral_speed_mps=1",
+        ],
+    );
+    assert!(twice.contains("say the same twice"), "{twice}");
+    // As in a file of closing speeds, whose panels without a case are left out by name.
+    let values =
+        [("Ego", "20,40"), ("Closing", "10,30"), ("gap_m", "5,10"), ("lateral_speed_mps", "0.5,1"), ("Lane", "1,-1")];
+    std::fs::write(root.join("f.xosc"), deterministic(&values)).unwrap();
+    let renames =
+        ["--rename", "Ego=ego_speed_kmh", "--rename", "Closing=relative_speed_kmh*-1", "--rename", "Lane=none"];
+    let map = ["map", "cut-in", "--distribution", "f.xosc", "--models", "FSM", "--backend", "cpu", "--out", "p"];
+    let text = warned(root, &[&map[..], &renames].concat());
+    let left = "1 of 4 panels are left out: the other vehicle would drive backwards, first at ego_speed_kmh=20, \
+                relative_speed_kmh=-30";
+    assert!(text.contains(left), "{text}");
+    assert_eq!(cells(root, "p").len(), 3 * 4);
+    let as_axes = [&map[..], &renames, &["--x", "ego_speed_kmh", "--y", "relative_speed_kmh"]].concat();
+    let refused = said(root, &as_axes);
+    assert!(refused.contains("drive backwards") && refused.contains("--x and --y"), "{refused}");
+}
+
+#[test]
+fn a_seed_is_any_number_and_each_gives_its_own_draws() {
+    let path = Path::new("x.xosc");
+    let of = |seed: &str| {
+        let text = stochastic(
+            &format!("numberOfTestRuns=\"3\" randomSeed=\"{seed}\""),
+            &[
+                ("ego_speed_mps", "<NormalDistribution expectedValue=\"25\" variance=\"9\"/>"),
+                ("deceleration_mps2", "<NormalDistribution expectedValue=\"3\" variance=\"0\"/>"),
+                (
+                    "Model",
+                    "<ProbabilityDistributionSet><Element value=\"car\" weight=\"1\"/></ProbabilityDistributionSet>",
+                ),
+            ],
+        );
+        let file = parse_distribution(&text, path).unwrap();
+        let samples =
+            DistributionSamples::of(&file, &Names { category: Category::Lvd, renames: &[], path }, Vec::new());
+        let samples = samples.unwrap();
+        assert!(samples.ignored_texts.as_ref().unwrap().ends_with(": Model"));
+        let seed = samples.seed.unwrap();
+        (seed, samples.draw(seed, 0, &Profile::load("paper").unwrap()).unwrap().values)
+    };
+    assert_eq!(of("157").0, 157);
+    assert_eq!(of("0.5").0, 0.5_f64.to_bits());
+    let drawn: Vec<Vec<f64>> = ["157", "0.5", "-7", "7", "0"].map(|seed| of(seed).1).to_vec();
+    assert!((1..5).all(|at| !drawn[..at].contains(&drawn[at])), "{drawn:?}");
+    assert_eq!(of("-7").1, drawn[2]);
+}
+
+#[test]
+fn a_log_normal_distribution_has_the_moments_of_its_logarithm() {
+    let path = Path::new("x.xosc");
+    let text = |inner: &str| {
+        stochastic(
+            "numberOfTestRuns=\"3\"",
+            &[
+                ("ego_speed_mps", inner),
+                ("deceleration_mps2", "<NormalDistribution expectedValue=\"3\" variance=\"0\"/>"),
+            ],
+        )
+    };
+    let user = |kind: &str, content: &str| {
+        text(&format!("<UserDefinedDistribution type=\"{kind}\">{content}</UserDefinedDistribution>"))
+    };
+    let file = parse_distribution(&user("log-normal", "\n mu=3.2, sigma=0.3\n"), path).unwrap();
+    let samples =
+        DistributionSamples::of(&file, &Names { category: Category::Lvd, renames: &[], path }, Vec::new()).unwrap();
+    let profile = Profile::load("paper").unwrap();
+    let n = 20_000;
+    let logs: Vec<f64> = (0..n).map(|index| samples.draw(1, index, &profile).unwrap().values[0].ln()).collect();
+    let mean = logs.iter().sum::<f64>() / n as f64;
+    let deviation = (logs.iter().map(|log| (log - mean).powi(2)).sum::<f64>() / n as f64).sqrt();
+    assert!((mean - 3.2).abs() < 0.01 && (deviation - 0.3).abs() < 0.01, "{mean} {deviation}");
+    for (text, says) in [
+        (user("lognormal", "mu=3.2 sigma=0.3"), "type `lognormal` is not known"),
+        (user("log-normal", "mu=3.2"), "does not give mu and sigma"),
+        (user("log-normal", "mu=3.2 sigma=-1"), "does not give mu and sigma"),
+        (user("log-normal", "mu=3.2 sigma=0.3 min=1"), "does not give mu and sigma"),
+        (text("<LogNormalDistribution expectedValue=\"24\" variance=\"9\"/>"), "read as moments by some programs"),
+    ] {
+        let error = parse_distribution(&text, path).unwrap_err();
+        assert!(error.to_string().contains(says), "{error}");
+        assert!(error.help().unwrap().contains("mu=3.2 sigma=0.4"));
+    }
+}
+
+#[test]
+fn a_range_that_keeps_nearly_nothing_of_its_distribution_is_named() {
+    let dir = tempfile::tempdir().unwrap();
+    let root = dir.path();
+    let sample = |range: &str| {
+        let normal = |inner: &str| {
+            format!("<NormalDistribution expectedValue=\"90\" variance=\"25\">{inner}</NormalDistribution>")
+        };
+        let fixed = "<NormalDistribution expectedValue=\"3\" variance=\"0\"/>";
+        let text =
+            stochastic("numberOfTestRuns=\"200\"", &[("ego_speed_kmh", &normal(range)), ("deceleration_mps2", fixed)]);
+        std::fs::write(root.join("f.xosc"), text).unwrap();
+        warned(root, &["sample", "--distribution", "f.xosc", "--category", "lvd", "--models", "FSM", "--thw", "1"])
+    };
+    // 90 km/h with a range in m/s keeps 10⁻²³.
+    let text = sample("<Range lowerLimit=\"20\" upperLimit=\"40\"/>");
+    assert!(text.contains("the Range of ego_speed_kmh keeps") && text.contains("check the units"), "{text}");
+    for range in ["", "<Range lowerLimit=\"80\" upperLimit=\"130\"/>", "<Range lowerLimit=\"100\" upperLimit=\"130\"/>"]
+    {
+        let text = sample(range);
+        assert!(!text.contains("keeps"), "{text}");
+    }
 }

@@ -42,6 +42,13 @@ pub enum Distribution {
         /// Range of the truncation.
         range: Range,
     },
+    /// Log-normal.
+    LogNormal {
+        /// Mean of the logarithm.
+        mu: f64,
+        /// Standard deviation of the logarithm, ≥ 0.
+        sigma: f64,
+    },
     /// Poisson, truncated to a range.
     Poisson {
         /// Mean before truncation, 0 … [`MAX_POISSON`].
@@ -78,6 +85,8 @@ pub enum Draw {
         /// Whether probabilities are counted from above, where they are small; this keeps precision in the tail.
         is_mirrored: bool,
     },
+    /// e to the power of another draw.
+    Exponential(Box<Draw>),
     /// Intervals with the cumulative probability at the end of each; a single value is an interval of zero width.
     Steps {
         /// Intervals.
@@ -98,6 +107,12 @@ impl Distribution {
                 Some((Draw::Uniform(both), if width > 0.0 { (both.high - both.low) / width } else { 1.0 }))
             }
             Distribution::Normal { mean, deviation, range } => normal(*mean, *deviation, range.and(within)?, *range),
+            Distribution::LogNormal { mu, sigma } => {
+                let logarithm = |x: f64| if x > 0.0 { libm::log(x) } else { f64::NEG_INFINITY };
+                let range = Range { low: logarithm(within.low), high: logarithm(within.high) };
+                let (draw, kept) = normal(*mu, *sigma, range, Range::ALL)?;
+                Some((Draw::Exponential(Box::new(draw)), kept))
+            }
             Distribution::Poisson { mean, range } => {
                 let whole = poisson(*mean, *range);
                 let all: f64 = whole.iter().map(|(_, p)| p).sum();
@@ -114,6 +129,21 @@ impl Distribution {
     }
 }
 
+impl Distribution {
+    /// Fraction of its probability that its own range keeps.
+    pub fn range_fraction(&self) -> f64 {
+        match self {
+            Distribution::Normal { mean, deviation, range } => normal(*mean, *deviation, *range, Range::ALL),
+            Distribution::Poisson { mean, range } => {
+                let point = |(k, p)| (Range { low: k, high: k }, p);
+                steps(poisson(*mean, *range).into_iter().map(point), Range::ALL, 1.0)
+            }
+            _ => return 1.0,
+        }
+        .map_or(0.0, |(_, kept)| kept)
+    }
+}
+
 impl Draw {
     /// The value of a uniform number in (0, 1).
     pub fn value(&self, uniform: f64) -> f64 {
@@ -125,6 +155,7 @@ impl Draw {
                 let value = if *is_mirrored { mean - deviation * z } else { mean + deviation * z };
                 value.clamp(range.low, range.high)
             }
+            Draw::Exponential(draw) => libm::exp(draw.value(uniform)),
             Draw::Steps { steps, until } => {
                 let at = until.partition_point(|end| *end <= uniform).min(steps.len() - 1);
                 let from = if at == 0 { 0.0 } else { until[at - 1] };

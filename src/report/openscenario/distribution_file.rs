@@ -1,8 +1,10 @@
 //! The reader of `ParameterValueDistribution` files, ASAM OpenSCENARIO XML 1.1 to 1.3.
 //!
 //! Only elements and attributes that the standard allows are accepted; any other one is an error with its line, so that
-//! nothing is ignored silently. The scenario that the file names is not read.
+//! nothing is ignored silently. Parameters whose values are texts (a road, a model of a vehicle) are kept by name alone. The
+//! scenario that the file names is not read.
 
+use std::collections::BTreeSet;
 use std::path::{Path, PathBuf};
 
 use super::distribution::{Distribution, MAX_POISSON, Range};
@@ -16,8 +18,21 @@ use crate::{Error, Place, Result};
 pub struct DistributionFile {
     /// The file, for messages.
     pub path: PathBuf,
-    /// The distributions.
+    /// The distributions of numbers.
     pub distributions: Distributions,
+    /// The parameters with other values than numbers.
+    pub texts: Vec<TextParameter>,
+}
+
+/// A parameter whose values are not all numbers.
+#[derive(Debug, Clone, PartialEq)]
+pub struct TextParameter {
+    /// Name in the file.
+    pub name: String,
+    /// Line of the first value that is not a number.
+    pub line: u64,
+    /// That value.
+    pub text: String,
 }
 
 /// The two kinds of distributions.
@@ -103,20 +118,21 @@ pub fn parse_distribution(text: &str, path: &Path) -> Result<DistributionFile> {
         let help = "give one of `Deterministic` and `Stochastic`";
         return Err(content.wrong(format!("it has {} kinds of distributions", kinds.len()), help));
     };
+    let mut texts = Vec::new();
     let distributions = if kind.name() == "Deterministic" {
-        Distributions::Deterministic(deterministic(kind)?)
+        Distributions::Deterministic(deterministic(kind, &mut texts)?)
     } else {
-        Distributions::Stochastic(stochastic(kind)?)
+        Distributions::Stochastic(stochastic(kind, &mut texts)?)
     };
-    let file = DistributionFile { path: path.to_path_buf(), distributions };
+    let file = DistributionFile { path: path.to_path_buf(), distributions, texts };
     file.check_names()?;
     Ok(file)
 }
 
 impl DistributionFile {
-    /// Names and lines of all parameters, in order.
+    /// Names and lines of all parameters: in order, then those with texts.
     pub fn names(&self) -> Vec<(&str, u64)> {
-        match &self.distributions {
+        let mut names: Vec<(&str, u64)> = match &self.distributions {
             Distributions::Deterministic(list) => list
                 .iter()
                 .flat_map(|one| match one {
@@ -125,7 +141,9 @@ impl DistributionFile {
                 })
                 .collect(),
             Distributions::Stochastic(all) => all.parameters.iter().map(|(n, line, _)| (n.as_str(), *line)).collect(),
-        }
+        };
+        names.extend(self.texts.iter().map(|text| (text.name.as_str(), text.line)));
+        names
     }
 
     fn check_names(&self) -> Result<()> {
@@ -140,33 +158,50 @@ impl DistributionFile {
     }
 }
 
-fn deterministic(at: At) -> Result<Vec<Deterministic>> {
+/// The values of an attribute of some elements; `None` if one is not a number, and then the parameter is among the texts.
+fn values(name: &str, of: &[At], attribute: &str, texts: &mut Vec<TextParameter>) -> Result<Option<Vec<f64>>> {
+    let mut numbers = Vec::new();
+    for one in of {
+        match one.value(attribute) {
+            // A missing attribute is an error, a text is not.
+            Some(text) if one.number(attribute).is_err() => {
+                texts.push(TextParameter { name: name.to_owned(), line: one.line(), text: text.to_owned() });
+                return Ok(None);
+            }
+            _ => numbers.push(one.number(attribute)?),
+        }
+    }
+    Ok(Some(numbers))
+}
+
+fn deterministic(at: At, texts: &mut Vec<TextParameter>) -> Result<Vec<Deterministic>> {
     const SINGLE: &str = "DeterministicSingleParameterDistribution";
     const MULTI: &str = "DeterministicMultiParameterDistribution";
     at.attributes(&[])?;
     at.children(&[SINGLE, MULTI])?;
     let mut list = Vec::new();
     for one in at.all() {
-        list.push(if one.name() == SINGLE { single(one)? } else { multi(one)? });
+        list.extend(if one.name() == SINGLE { single(one, texts)? } else { multi(one, texts)? });
     }
-    if list.is_empty() {
+    if list.is_empty() && texts.is_empty() {
         return Err(at.wrong("there is no distribution in it", format!("add a `{SINGLE}`")));
     }
     Ok(list)
 }
 
-fn single(at: At) -> Result<Deterministic> {
+fn single(at: At, texts: &mut Vec<TextParameter>) -> Result<Option<Deterministic>> {
     at.attributes(&["parameterName"])?;
     let name = at.text("parameterName")?.to_owned();
     let inner = at.choice(&["DistributionSet", "DistributionRange"])?;
     let values = if inner.name() == "DistributionSet" {
         inner.attributes(&[])?;
-        let each = |element: At| {
+        let elements = inner.some("Element")?;
+        for element in &elements {
             element.attributes(&["value"])?;
             element.children(&[])?;
-            element.number("value")
-        };
-        inner.some("Element")?.into_iter().map(each).collect::<Result<Vec<_>>>()?
+        }
+        let Some(values) = values(&name, &elements, "value", texts)? else { return Ok(None) };
+        values
     } else {
         inner.attributes(&["stepWidth"])?;
         inner.children(&["Range"])?;
@@ -177,72 +212,102 @@ fn single(at: At) -> Result<Deterministic> {
     if values.len() > MAX_VALUES {
         return Err(inner.wrong(format!("{} values", values.len()), format!("give {MAX_VALUES} at most")));
     }
-    Ok(Deterministic::Values { name, line: at.line(), values })
+    Ok(Some(Deterministic::Values { name, line: at.line(), values }))
 }
 
-fn multi(at: At) -> Result<Deterministic> {
+fn multi(at: At, texts: &mut Vec<TextParameter>) -> Result<Option<Deterministic>> {
     at.attributes(&[])?;
     let inner = at.choice(&["ValueSetDistribution"])?;
     inner.attributes(&[])?;
-    let mut known: Option<Vec<String>> = None;
-    let mut rows = Vec::new();
-    for set in inner.some("ParameterValueSet")? {
+    let mut names: Vec<&str> = Vec::new();
+    // By parameter, in the order of the first set.
+    let mut columns: Vec<Vec<At>> = Vec::new();
+    for (row, set) in inner.some("ParameterValueSet")?.into_iter().enumerate() {
         set.attributes(&[])?;
-        let mut values: Vec<(String, f64)> = Vec::new();
         for assignment in set.some("ParameterAssignment")? {
             assignment.attributes(&["parameterRef", "value"])?;
             assignment.children(&[])?;
             let name = assignment.text("parameterRef")?;
-            if values.iter().any(|(before, _)| before == name) {
-                return Err(
-                    assignment.wrong(format!("`{name}` has a value in this set already"), "keep one of the two")
-                );
+            if row == 0 && !names.contains(&name) {
+                names.push(name);
+                columns.push(Vec::new());
             }
-            values.push((name.to_owned(), assignment.number("value")?));
+            match names.iter().position(|known| *known == name).map(|at| &mut columns[at]) {
+                Some(column) if column.len() == row => column.push(assignment),
+                Some(column) if column.len() > row => {
+                    let problem = format!("`{name}` has a value in this set already");
+                    return Err(assignment.wrong(problem, "keep one of the two"));
+                }
+                _ => return Err(other_parameters(set, &names)),
+            }
         }
-        let names = known.get_or_insert_with(|| values.iter().map(|(name, _)| name.clone()).collect());
-        let value = |name: &String| values.iter().find(|(n, _)| n == name).map(|(_, value)| *value);
-        let row: Option<Vec<f64>> = names.iter().map(value).collect();
-        match row.filter(|row| row.len() == values.len()) {
-            Some(row) => rows.push(row),
-            None => {
-                let problem =
-                    format!("this set does not assign the same parameters as the first ({})", names.join(", "));
-                return Err(set.wrong(problem, "assign the same parameters in every set"));
-            }
+        if columns.iter().any(|column| column.len() <= row) {
+            return Err(other_parameters(set, &names));
         }
     }
-    Ok(Deterministic::Sets { names: known.unwrap_or_default(), line: at.line(), rows })
+    let (mut numeric, mut rows) = (Vec::new(), vec![Vec::new(); columns.first().map_or(0, Vec::len)]);
+    for (name, column) in names.iter().zip(&columns) {
+        if let Some(values) = values(name, column, "value", texts)? {
+            numeric.push((*name).to_owned());
+            rows.iter_mut().zip(values).for_each(|(row, value): (&mut Vec<f64>, f64)| row.push(value));
+        }
+    }
+    // Sets that differ in texts alone are one.
+    if numeric.len() < names.len() {
+        keep_distinct(&mut rows);
+    }
+    Ok((!numeric.is_empty()).then(|| Deterministic::Sets { names: numeric, line: at.line(), rows }))
 }
 
-fn stochastic(at: At) -> Result<Stochastic> {
+/// Keeps the first of equal rows.
+pub(super) fn keep_distinct(rows: &mut Vec<Vec<f64>>) {
+    let mut known = BTreeSet::new();
+    rows.retain(|row| known.insert(row.iter().map(|value| value.to_bits()).collect::<Vec<u64>>()));
+}
+
+fn other_parameters(set: At, names: &[&str]) -> Error {
+    let problem = format!("this set does not assign the same parameters as the first ({})", names.join(", "));
+    set.wrong(problem, "assign the same parameters in every set")
+}
+
+fn stochastic(at: At, texts: &mut Vec<TextParameter>) -> Result<Stochastic> {
     at.attributes(&["numberOfTestRuns", "randomSeed"])?;
     at.children(&["StochasticDistribution"])?;
-    // Seeds are doubles in the standard; below 2^53 a double represents every integer.
-    let whole = |name: &str, min: f64| {
-        let value = at.number(name)?;
-        if value.fract() == 0.0 && (min..9_007_199_254_740_992.0).contains(&value) {
-            return Ok(value as u64);
-        }
-        let problem = format!("the attribute `{name}` is {value}");
-        Err(at.wrong(problem, format!("write a whole number of at least {min} and below 2^53")))
-    };
-    let seed = at.has("randomSeed").then(|| whole("randomSeed", 0.0)).transpose()?;
+    // Below 2^53 a double represents every integer.
+    let is_whole = |value: f64| value.fract() == 0.0 && (0.0..9_007_199_254_740_992.0).contains(&value);
+    let runs = at.number("numberOfTestRuns")?;
+    if !is_whole(runs) || runs < 1.0 {
+        let problem = format!("the attribute `numberOfTestRuns` is {runs}");
+        return Err(at.wrong(problem, "write a whole number of at least 1 and below 2^53"));
+    }
+    // Seeds are doubles in the standard. One that is no such integer is the seed of its bits.
+    let seed = |value: f64| if is_whole(value) { value as u64 } else { value.to_bits() };
+    let seed = at.has("randomSeed").then(|| at.number("randomSeed").map(seed)).transpose()?;
     let mut parameters = Vec::new();
     for one in at.some("StochasticDistribution")? {
         one.attributes(&["parameterName"])?;
-        parameters.push((one.text("parameterName")?.to_owned(), one.line(), distribution(one)?));
+        let name = one.text("parameterName")?;
+        if let Some(found) = distribution(one, name, texts)? {
+            parameters.push((name.to_owned(), one.line(), found));
+        }
     }
-    Ok(Stochastic { runs: whole("numberOfTestRuns", 1.0)?, seed, parameters })
+    Ok(Stochastic { runs: runs as u64, seed, parameters })
 }
 
-fn distribution(at: At) -> Result<Distribution> {
+/// The type of a `UserDefinedDistribution` that is read, and its form.
+const LOG_NORMAL: (&str, &str) =
+    ("log-normal", "<UserDefinedDistribution type=\"log-normal\">mu=3.2 sigma=0.4</UserDefinedDistribution>");
+
+/// The distribution; `None` for a set of texts.
+fn distribution(at: At, name: &str, texts: &mut Vec<TextParameter>) -> Result<Option<Distribution>> {
     let inner = at.choice(&[
         "ProbabilityDistributionSet",
         "NormalDistribution",
         "UniformDistribution",
         "PoissonDistribution",
         "Histogram",
+        "UserDefinedDistribution",
+        "LogNormalDistribution",
     ])?;
     let within = || match inner.all().next() {
         Some(_) => {
@@ -293,20 +358,49 @@ fn distribution(at: At) -> Result<Distribution> {
             }
             Distribution::Histogram(bins)
         }
+        "UserDefinedDistribution" => log_normal(inner)?,
+        "LogNormalDistribution" => {
+            let problem =
+                "its attributes are read as moments by some programs, and as those of the logarithm by others";
+            return Err(inner.wrong(problem, format!("write {}, with the moments of the logarithm", LOG_NORMAL.1)));
+        }
         _ => {
             inner.attributes(&[])?;
-            let mut values = Vec::new();
-            for element in inner.some("Element")? {
+            let elements = inner.some("Element")?;
+            let mut weights = Vec::new();
+            for element in &elements {
                 element.attributes(&["value", "weight"])?;
                 element.children(&[])?;
-                values.push((element.number("value")?, at_least_zero(element, "weight")?));
+                weights.push(at_least_zero(*element, "weight")?);
             }
-            Distribution::Set(values)
+            let Some(values) = values(name, &elements, "value", texts)? else { return Ok(None) };
+            Distribution::Set(values.into_iter().zip(weights).collect())
         }
     };
     if found.within(Range::ALL).is_none() {
         let help = "give a range that holds some of the distribution, and a weight above 0";
         return Err(inner.wrong("no value of it is possible", help));
     }
-    Ok(found)
+    Ok(Some(found))
+}
+
+/// A `UserDefinedDistribution` of the type `log-normal`: its text gives mean and standard deviation of the logarithm.
+fn log_normal(at: At) -> Result<Distribution> {
+    at.children(&[])?;
+    let wrong =
+        |problem: String| at.wrong(problem, format!("of this kind, a log-normal one is read: {}", LOG_NORMAL.1));
+    if at.text("type")? != LOG_NORMAL.0 {
+        return Err(wrong(format!("the type `{}` is not known", at.text("type")?)));
+    }
+    let content = at.node.text().unwrap_or_default();
+    let mut words: Vec<&str> = content.split(|c: char| c.is_whitespace() || ",;".contains(c)).collect();
+    words.retain(|word| !word.is_empty());
+    let number = |key: &str| {
+        let given = words.iter().filter_map(|word| word.split_once('=')).find(|(known, _)| *known == key);
+        given.and_then(|(_, text)| text.parse::<f64>().ok()).filter(|value| value.abs() <= 100.0)
+    };
+    match (number("mu"), number("sigma"), words.len()) {
+        (Some(mu), Some(sigma), 2) if sigma >= 0.0 => Ok(Distribution::LogNormal { mu, sigma }),
+        _ => Err(wrong(format!("`{}` does not give mu and sigma, each at most 100", content.trim()))),
+    }
 }

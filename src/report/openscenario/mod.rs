@@ -19,7 +19,7 @@ mod xml_at;
 pub use concrete::{Concrete, EgoMotion, PlayedVehicle, Vertex, paths};
 pub use distribution::{Distribution, Draw, MAX_POISSON, Range};
 pub use distribution_file::{
-    Deterministic, DistributionFile, Distributions, Stochastic, parse_distribution, read_distribution,
+    Deterministic, DistributionFile, Distributions, Stochastic, TextParameter, parse_distribution, read_distribution,
 };
 pub use lanes::{PlayOptions, concrete_case, concrete_lanes};
 pub use parameters::{Names, Rename, variations};

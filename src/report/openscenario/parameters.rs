@@ -3,20 +3,23 @@
 
 use std::path::Path;
 
-use super::distribution_file::{Deterministic, DistributionFile, Distributions};
+use super::distribution_file::{Deterministic, DistributionFile, Distributions, TextParameter, keep_distinct};
 use crate::run::grid::{GridAxis, MAX_PANELS, MapParameter, Variations};
 use crate::scenario::Category;
 use crate::support::ranges::{GIVE_ONCE, repeated};
 use crate::{Error, Place, Result};
 
-/// `THEIRS=OURS` or `THEIRS=OURS*FACTOR`: our value is theirs times the factor.
+/// The name of ours that ignores a parameter of a file.
+const NONE: &str = "none";
+
+/// `THEIRS=OURS` or `THEIRS=OURS*FACTOR`: our value is theirs times the factor. `THEIRS=none` ignores theirs.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Rename {
     /// Name in the file.
     pub theirs: String,
     /// Name of one of our parameters.
     pub ours: String,
-    /// Number of our units in one of theirs, > 0.
+    /// Number of our units in one of theirs; below 0 for the opposite sign.
     pub factor: f64,
 }
 
@@ -29,8 +32,8 @@ impl std::str::FromStr for Rename {
         let (ours, factor) = match rest.split_once('*') {
             None => (rest, 1.0),
             Some((ours, factor)) => {
-                let factor = factor.trim().parse::<f64>().ok().filter(|f| (1e-9..=1e9).contains(f));
-                (ours, factor.ok_or("the factor must be a number above 0")?)
+                let factor = factor.trim().parse::<f64>().ok().filter(|f| (1e-9..=1e9).contains(&f.abs()));
+                (ours, factor.ok_or("the factor must be a number that is not 0")?)
             }
         };
         if theirs.trim().is_empty() || ours.trim().is_empty() {
@@ -51,18 +54,24 @@ pub struct Names<'a> {
 }
 
 impl Names<'_> {
-    /// Finds the parameter of a name, and the factor to its unit.
+    /// Finds the parameter of a name, and the factor to its unit; `None` for one that the user ignores.
     ///
     /// # Errors
     /// [`Error::Input`] for an unknown name without `--rename`; [`Error::Usage`] for a `--rename` to an unknown
     /// parameter.
-    pub fn find(&self, name: &str, line: u64) -> Result<(&'static MapParameter, f64)> {
+    pub fn find(&self, name: &str, line: u64) -> Result<Option<(&'static MapParameter, f64)>> {
         if let Some(rename) = self.renames.iter().find(|rename| rename.theirs == name) {
-            return Ok((MapParameter::find(self.category, &rename.ours, "option `rename`")?, rename.factor));
+            if rename.ours == NONE {
+                return Ok(None);
+            }
+            return Ok(Some((MapParameter::find(self.category, &rename.ours, "option `rename`")?, rename.factor)));
         }
-        MapParameter::find(self.category, name, "").map(|parameter| (parameter, 1.0)).map_err(|error| {
+        MapParameter::find(self.category, name, "").map(|parameter| Some((parameter, 1.0))).map_err(|error| {
             let Error::Usage { problem, help, .. } = error else { return error };
-            let help = format!("name it by option `rename` {name}=OURS or option `rename` {name}=OURS*FACTOR; {help}");
+            let help = format!(
+                "name it by option `rename` {name}=OURS or option `rename` {name}=OURS*FACTOR, or ignore it by option \
+                 `rename` {name}={NONE}; {help}"
+            );
             Error::input(Place::file(self.path).row(line).of(format!("parameter `{name}`")), problem, help)
         })
     }
@@ -77,6 +86,30 @@ impl Names<'_> {
             let place = Place::file(self.path).row(line).of(format!("parameter `{}`", parameter.key));
             Error::input(place, format!("{ours} cannot be used"), error.help().unwrap_or_default())
         })
+    }
+
+    /// The names of texts that no parameter takes, in one sentence; `None` without any.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for a text where a parameter needs a number; [`Error::Usage`] for a `--rename` to an unknown one.
+    pub fn ignored_texts(&self, file: &DistributionFile) -> Result<Option<String>> {
+        let mut ignored = Vec::new();
+        for TextParameter { name, line, text } in &file.texts {
+            let is_renamed = self.renames.iter().any(|rename| rename.theirs == *name);
+            match self.find(name, *line) {
+                Ok(None) => {}
+                Ok(Some((parameter, _))) => {
+                    let place = Place::file(self.path).row(*line).of(format!("parameter `{name}`"));
+                    let problem = format!("`{text}` is not a number, and `{}` is one", parameter.key);
+                    let help = "write a number: parameters and expressions are not evaluated";
+                    return Err(Error::input(place, problem, help));
+                }
+                Err(error) if is_renamed => return Err(error),
+                Err(_) => ignored.push(name.as_str()),
+            }
+        }
+        let (of, list) = (file.path.display(), ignored.join(", "));
+        Ok((!ignored.is_empty()).then(|| format!("{of}: texts are ignored, and nothing varies with them: {list}")))
     }
 
     /// Checks that every `--rename` names a parameter of the file, once.
@@ -106,6 +139,7 @@ impl Names<'_> {
 /// value, and for too many combinations of sets.
 pub fn variations(file: &DistributionFile, names: &Names) -> Result<Variations> {
     names.check_renames(&file.names())?;
+    names.ignored_texts(file)?;
     let Distributions::Deterministic(list) = &file.distributions else {
         let problem = format!("{} holds random parameters", file.path.display());
         let help = "draw from them by `sample`, with option `distribution` and option `category`";
@@ -115,7 +149,7 @@ pub fn variations(file: &DistributionFile, names: &Names) -> Result<Variations> 
     for one in list {
         match one {
             Deterministic::Values { name, line, values } => {
-                let found = names.find(name, *line)?;
+                let Some(found) = names.find(name, *line)? else { continue };
                 let values = values.iter().map(|v| names.value(found, *v, *line)).collect::<Result<Vec<_>>>()?;
                 if let Some(problem) = repeated(values.iter().map(|v| (v.to_bits(), v))) {
                     let place = Place::file(&file.path).row(*line).of(format!("parameter `{name}`"));
@@ -124,12 +158,18 @@ pub fn variations(file: &DistributionFile, names: &Names) -> Result<Variations> 
                 all.axes.push(GridAxis { parameter: found.0, values: rising(&values) });
             }
             Deterministic::Sets { names: of_set, line, rows } => {
-                let found: Vec<(&'static MapParameter, f64)> =
+                let all_found: Vec<Option<(&'static MapParameter, f64)>> =
                     of_set.iter().map(|name| names.find(name, *line)).collect::<Result<_>>()?;
                 let row = |row: &Vec<f64>| {
-                    found.iter().zip(row).map(|(f, v)| names.value(*f, *v, *line)).collect::<Result<Vec<f64>>>()
+                    let found = all_found.iter().zip(row).filter_map(|(found, value)| Some(((*found)?, value)));
+                    found.map(|(f, v)| names.value(f, *v, *line)).collect::<Result<Vec<f64>>>()
                 };
-                let rows = rows.iter().map(row).collect::<Result<Vec<_>>>()?;
+                let mut rows = rows.iter().map(row).collect::<Result<Vec<_>>>()?;
+                let found: Vec<(&'static MapParameter, f64)> = all_found.iter().copied().flatten().collect();
+                if found.len() < all_found.len() {
+                    // Rows that differ in what is ignored alone are one.
+                    keep_distinct(&mut rows);
+                }
                 let text = |row: &Vec<f64>| row.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
                 if let Some(problem) = repeated(rows.iter().map(text).map(|row| (row.clone(), row))) {
                     let place = Place::file(&file.path).row(*line).of("value sets");

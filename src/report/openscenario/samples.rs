@@ -39,6 +39,8 @@ pub struct SampledParameter {
     pub factor: f64,
     /// Fraction of the distribution within the parameter's physical range.
     pub kept_fraction: f64,
+    /// Fraction of the distribution before truncation that its own range keeps.
+    pub range_fraction: f64,
 }
 
 /// Random parameters of a category, and constant values.
@@ -54,6 +56,8 @@ pub struct DistributionSamples {
     pub runs: u64,
     /// `randomSeed` of the file.
     pub seed: Option<u64>,
+    /// What [`Names::ignored_texts`] says of the file.
+    pub ignored_texts: Option<String>,
 }
 
 /// A sample's point: values in the units of the parameters, and the number of draws.
@@ -99,20 +103,22 @@ impl DistributionSamples {
         };
         let mut parameters: Vec<SampledParameter> = Vec::new();
         for (name, line, distribution) in of_file {
-            let (parameter, factor) = names.find(name, *line)?;
-            let within = Range { low: parameter.min / factor, high: parameter.max / factor };
+            let Some((parameter, factor)) = names.find(name, *line)? else { continue };
+            let ends = (parameter.min / factor, parameter.max / factor);
+            let within = Range { low: ends.0.min(ends.1), high: ends.0.max(ends.1) };
             let (draw, kept_fraction) = distribution.within(within).ok_or_else(|| {
                 let place = Place::file(names.path).row(*line).of(format!("parameter `{name}`"));
                 let problem =
                     format!("none of its values lies in {} … {} {}", parameter.min, parameter.max, parameter.unit);
                 Error::input(place, problem, "correct the distribution, or its unit with option `rename`")
             })?;
-            parameters.push(SampledParameter { parameter, draw, factor, kept_fraction });
+            let range_fraction = distribution.range_fraction();
+            parameters.push(SampledParameter { parameter, draw, factor, kept_fraction, range_fraction });
         }
         let given: Vec<&MapParameter> =
             parameters.iter().map(|p| p.parameter).chain(fixed.iter().map(|(p, _)| *p)).collect();
         for (at, parameter) in given.iter().enumerate() {
-            if let Some(before) = given[..at].iter().find(|p| p.quantity == parameter.quantity) {
+            if let Some(before) = given[..at].iter().find(|p| p.says_the_same(parameter)) {
                 let problem = format!("`{}` and `{}` say the same twice", before.key, parameter.key);
                 return Err(Error::usage(Place::item(parameter.key), problem, "keep one of them"));
             }
@@ -128,7 +134,8 @@ impl DistributionSamples {
             &has,
             ("a sample", "give it a distribution, or a value by option `set`"),
         )?;
-        Ok(DistributionSamples { category: names.category, parameters, fixed, runs: *runs, seed: *seed })
+        let ignored_texts = names.ignored_texts(file)?;
+        Ok(DistributionSamples { category: names.category, parameters, fixed, runs: *runs, seed: *seed, ignored_texts })
     }
 
     /// Whether the initial distance is one of the parameters.

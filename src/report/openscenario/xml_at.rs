@@ -135,12 +135,6 @@ impl<'a> At<'a> {
 
     /// The only child, with one of these names.
     pub fn choice(self, names: &[&str]) -> Result<At<'a>> {
-        if let Some(child) =
-            self.all().find(|c| matches!(c.name(), "UserDefinedDistribution" | "LogNormalDistribution"))
-        {
-            let help = format!("what it means is not told here: write one of {}", names.join(", "));
-            return Err(child.wrong("this kind of distribution is not read", help));
-        }
         self.children(names)?;
         let found: Vec<At> = self.all().collect();
         match found[..] {
@@ -151,7 +145,7 @@ impl<'a> At<'a> {
     }
 
     /// The value of an attribute without a namespace.
-    fn value(&self, name: &str) -> Option<&'a str> {
+    pub fn value(&self, name: &str) -> Option<&'a str> {
         let mut own = self.node.attributes().filter(|attribute| attribute.namespace().is_none());
         own.find(|attribute| attribute.name() == name).map(|attribute| attribute.value())
     }

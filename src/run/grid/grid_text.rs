@@ -64,7 +64,14 @@ impl GridText {
                     })
                 }
                 None => {
-                    let several = left.iter().position(|axis| axis.len() > 1);
+                    // Panels can leave out relative speeds that are none, axes cannot.
+                    let has_relative = left.iter().any(|axis| axis.parameter.quantity == MapQuantity::RelativeSpeed);
+                    let is_speed = |axis: &GridAxis| {
+                        has_relative
+                            && matches!(axis.parameter.quantity, MapQuantity::EgoSpeed | MapQuantity::RelativeSpeed)
+                    };
+                    let several = left.iter().position(|axis| axis.len() > 1 && !is_speed(axis));
+                    let several = several.or_else(|| left.iter().position(|axis| axis.len() > 1));
                     let at = several.or(if left.is_empty() { None } else { Some(0) });
                     at.map(|at| left.remove(at)).ok_or_else(|| {
                         let problem = "the file has fewer than two parameters with separate distributions";

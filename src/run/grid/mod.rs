@@ -101,7 +101,7 @@ impl Grid {
         let axes = || [&x, &y].into_iter().chain(&panel_axes);
         let given: Vec<&MapParameter> = axes().map(|a| a.parameter).chain(fixed.iter().map(|(p, _)| *p)).collect();
         for (at, parameter) in given.iter().enumerate() {
-            if let Some(before) = given[..at].iter().find(|p| p.quantity == parameter.quantity) {
+            if let Some(before) = given[..at].iter().find(|p| p.says_the_same(parameter)) {
                 let problem = format!("`{}` and `{}` say the same twice", before.key, parameter.key);
                 return Err(Error::usage(Place::item(parameter.key), problem, "keep one of them"));
             }
@@ -122,10 +122,28 @@ impl Grid {
             return Err(Error::usage(Place::item(name), problem, help));
         }
         let mut grid = Grid { name, category, x, y, panel_axes, panels, fixed, style, native_gap, perturbation: None };
+        grid.leave_out_backwards();
         if closing_only {
             grid.leave_out_receding()?;
         }
         Ok(grid)
+    }
+
+    /// Leaves out the panels whose relative speed makes the other vehicle drive backwards. If all do, their cases are
+    /// refused later.
+    fn leave_out_backwards(&mut self) {
+        let other_mps = |panel: &Vec<f64>| self.panel_point(panel).get(MapQuantity::OtherSpeed);
+        let (left, kept): (Vec<_>, Vec<_>) =
+            self.panels.iter().cloned().partition(|panel| other_mps(panel).is_some_and(|mps| mps < 0.0));
+        let Some(first) = left.first().filter(|_| !kept.is_empty()) else { return };
+        let values = self.panel_axes.iter().zip(first).map(|(axis, value)| format!("{}={value}", axis.parameter.key));
+        tracing::warn!(
+            "{} of {} panels are left out: the other vehicle would drive backwards, first at {}",
+            left.len(),
+            self.panels.len(),
+            values.collect::<Vec<_>>().join(", ")
+        );
+        self.panels = kept;
     }
 
     fn leave_out_receding(&mut self) -> Result<()> {

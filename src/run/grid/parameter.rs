@@ -13,6 +13,8 @@ pub enum MapQuantity {
     EgoSpeed,
     /// Initial speed of the vehicle that cuts in, cuts out or leads.
     OtherSpeed,
+    /// That speed minus the ego's.
+    RelativeSpeed,
     /// Initial gap to it, bumper to bumper.
     Gap,
     /// The initial gap as a time headway.
@@ -43,7 +45,7 @@ pub enum MapQuantity {
 
 impl MapQuantity {
     /// Number of quantities.
-    pub const COUNT: usize = 15;
+    pub const COUNT: usize = 16;
 }
 
 /// A parameter as named in flags, tables and files.
@@ -85,7 +87,7 @@ const fn parameter(
 }
 
 /// All, in the order of help texts.
-pub const PARAMETERS: [MapParameter; 19] = [
+pub const PARAMETERS: [MapParameter; 21] = [
     parameter("ego_speed_mps", "Speed of the ego", "m/s", MapQuantity::EgoSpeed, 1.0, (0.0, 150.0), EVERY),
     parameter("ego_speed_kmh", "Speed of the ego", "km/h", MapQuantity::EgoSpeed, KMH, (0.0, 540.0), EVERY),
     parameter(
@@ -104,6 +106,24 @@ pub const PARAMETERS: [MapParameter; 19] = [
         MapQuantity::OtherSpeed,
         KMH,
         (0.0, 540.0),
+        EVERY,
+    ),
+    parameter(
+        "relative_speed_mps",
+        "Speed of the other vehicle minus that of the ego",
+        "m/s",
+        MapQuantity::RelativeSpeed,
+        1.0,
+        (-150.0, 150.0),
+        EVERY,
+    ),
+    parameter(
+        "relative_speed_kmh",
+        "Speed of the other vehicle minus that of the ego",
+        "km/h",
+        MapQuantity::RelativeSpeed,
+        KMH,
+        (-540.0, 540.0),
         EVERY,
     ),
     parameter("gap_m", "Initial gap", "m", MapQuantity::Gap, 1.0, (0.0, 1e4), EVERY),
@@ -192,6 +212,15 @@ impl MapParameter {
         Err(Error::usage(Place::item(flag), problem, help))
     }
 
+    /// Whether both set one quantity; a relative speed sets the speed of the other vehicle.
+    pub fn says_the_same(&self, other: &MapParameter) -> bool {
+        let of = |parameter: &MapParameter| match parameter.quantity {
+            MapQuantity::RelativeSpeed => MapQuantity::OtherSpeed,
+            quantity => quantity,
+        };
+        of(self) == of(other)
+    }
+
     /// A value in SI units.
     pub fn si(&self, value: f64) -> f64 {
         value / self.per_si
@@ -206,9 +235,11 @@ impl MapParameter {
     fn plausible(&self) -> (plausibility::Quantity, f64) {
         use plausibility::Quantity as Of;
         match self.quantity {
-            MapQuantity::EgoSpeed | MapQuantity::OtherSpeed | MapQuantity::EndSpeed | MapQuantity::AheadSpeed => {
-                (Of::Speed, 1.0)
-            }
+            MapQuantity::EgoSpeed
+            | MapQuantity::OtherSpeed
+            | MapQuantity::RelativeSpeed
+            | MapQuantity::EndSpeed
+            | MapQuantity::AheadSpeed => (Of::Speed, 1.0),
             MapQuantity::Gap | MapQuantity::AheadGap => (Of::Gap, 1.0),
             MapQuantity::Thw => (Of::Headway, 1.0),
             MapQuantity::LateralSpeed => (Of::LateralSpeed, 1.0),
@@ -226,7 +257,9 @@ impl MapParameter {
     /// [`Error::Usage`] for a value beyond the physical range, unless such values are accepted.
     pub fn check_plausible(&self, value: f64, doubts: &mut Doubts) -> Result<()> {
         let (quantity, sign) = self.plausible();
-        let judged = doubts.check(quantity, sign * self.si(value), || self.key.to_owned());
+        let is_relative = self.quantity == MapQuantity::RelativeSpeed;
+        let si = if is_relative { self.si(value).abs() } else { sign * self.si(value) };
+        let judged = doubts.check(quantity, si, || self.key.to_owned());
         judged.map_err(|problem| Error::usage(Place::item(self.key), problem, plausibility::HELP))
     }
 
@@ -237,6 +270,7 @@ impl MapParameter {
     pub fn check(&self, value: f64, flag: &str) -> Result<f64> {
         let mut doubts = Doubts::default();
         let is_still = self.plausible().0 == plausibility::Quantity::Speed
+            && self.quantity != MapQuantity::RelativeSpeed
             && doubts.speed(self.si(value), || format!("{} = {value}", self.key)) != self.si(value);
         doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
         let value = if is_still { 0.0 } else { value };
@@ -266,9 +300,15 @@ impl Point {
         self
     }
 
-    /// The value of a quantity; `None` if not set.
+    /// The value of a quantity; `None` if not set. A relative speed sets the other vehicle's.
     pub fn get(&self, quantity: MapQuantity) -> Option<f64> {
-        self.0[quantity as usize]
+        self.0[quantity as usize].or_else(|| {
+            let relative_mps =
+                self.0[MapQuantity::RelativeSpeed as usize].filter(|_| quantity == MapQuantity::OtherSpeed)?;
+            let other_mps = self.0[MapQuantity::EgoSpeed as usize]? + relative_mps;
+            // Different units leave a rounding error of a standstill.
+            Some(if other_mps.abs() < 1e-9 { 0.0 } else { other_mps })
+        })
     }
 
     /// The value of a quantity that a case has; one that is not set follows from others: the other vehicle is as fast
@@ -294,13 +334,20 @@ impl Point {
         let ego_speed_mps = value(MapQuantity::EgoSpeed, 0.0);
         let deceleration = value(MapQuantity::Deceleration, 0.0);
         check_headway(ego_speed_mps, self.get(MapQuantity::Thw))?;
+        let speed_mps = value(MapQuantity::OtherSpeed, ego_speed_mps);
+        if speed_mps < 0.0 {
+            let problem = format!("the other vehicle would drive backwards, at {speed_mps} m/s");
+            let help = "give relative speeds of at least minus the ego's speed; a map leaves such panels out, where both \
+                        speeds belong to the panels (name other axes by option `x` and option `y`)";
+            return Err(Error::usage(Place::item("relative_speed"), problem, help));
+        }
         let length_m = value(MapQuantity::Length, profile.frame.default_length_m);
         let width_m = value(MapQuantity::Width, profile.frame.default_width_m);
         let lane_width_m = value(MapQuantity::LaneWidth, LANE_WIDTH_M);
         Ok(PlainCase {
             category,
             ego_speed_mps,
-            speed_mps: value(MapQuantity::OtherSpeed, ego_speed_mps),
+            speed_mps,
             // Avoids a negative zero.
             acceleration_mps2: if deceleration > 0.0 { -deceleration } else { 0.0 },
             end_speed_mps: self.get(MapQuantity::EndSpeed),
