@@ -28,10 +28,9 @@ pub struct Shard {
     pub of: u64,
 }
 
-/// Environment of a Kubernetes Indexed Job.
-const KUBERNETES: &str = "JOB_COMPLETION_INDEX";
-/// Environment of a Slurm job array: index of the task, smallest index of the array.
-const SLURM: [&str; 2] = ["SLURM_ARRAY_TASK_ID", "SLURM_ARRAY_TASK_MIN"];
+/// Indices in the environment of a Kubernetes Indexed Job and of a Slurm job array. Each is the shard's index itself, so
+/// that a task that is submitted again alone (`--array=3,7`) computes the same shard.
+const INDICES: [&str; 2] = ["JOB_COMPLETION_INDEX", "SLURM_ARRAY_TASK_ID"];
 
 impl Shard {
     /// Maximum number of shards: more than any cluster runs at once.
@@ -65,29 +64,24 @@ impl Shard {
         let (index, of) = text.split_once('/').ok_or(form)?;
         let number = |text: &str| text.trim().parse::<u64>().map_err(|_| form.to_owned());
         let of = number(of)?;
-        let index = if index.trim() == "auto" { from_environment(environment)? } else { number(index)? };
+        let is_auto = index.trim() == "auto";
+        let index = if is_auto { from_environment(environment)? } else { number(index)? };
         if of == 0 || of > Self::MAX_SHARDS {
             return Err(format!("there can be 1 to {} shards", Self::MAX_SHARDS));
         }
         if index >= of {
-            return Err(format!("there is no shard {index} of {of}: they count from 0 to {}", of - 1));
+            let last = of - 1;
+            let array = if is_auto { ", and so must a Slurm array" } else { "" };
+            return Err(format!("there is no shard {index} of {of}: they count from 0 to {last}{array}"));
         }
         Ok(Shard { index, of })
     }
 }
 
 fn from_environment(environment: impl Fn(&str) -> Option<String>) -> Result<u64, String> {
-    let value = |name: &str| match environment(name) {
-        None => Ok(None),
-        Some(text) => text.trim().parse::<u64>().map(Some).map_err(|_| format!("{name} is `{text}`, not an index")),
-    };
-    if let Some(index) = value(KUBERNETES)? {
-        return Ok(index);
-    }
-    let [id, first] = SLURM;
-    let index = value(id)?.ok_or_else(|| format!("auto needs {KUBERNETES} or {id} in the environment"))?;
-    let first = value(first)?.unwrap_or(0);
-    index.checked_sub(first).ok_or_else(|| format!("{id} is {index}, below the array's first index {first}"))
+    let found = INDICES.into_iter().find_map(|name| Some((name, environment(name)?)));
+    let (name, text) = found.ok_or_else(|| format!("auto needs {} in the environment", INDICES.join(" or ")))?;
+    text.trim().parse().map_err(|_| format!("{name} is `{text}`, not an index"))
 }
 
 impl FromStr for Shard {
@@ -134,12 +128,17 @@ mod tests {
         let kubernetes = |name: &str| (name == "JOB_COMPLETION_INDEX").then(|| "4".to_owned());
         assert_eq!(Shard::parse("auto/5", kubernetes), Ok(Shard { index: 4, of: 5 }));
         let slurm = |name: &str| match name {
-            "SLURM_ARRAY_TASK_ID" => Some("12".to_owned()),
-            "SLURM_ARRAY_TASK_MIN" => Some("10".to_owned()),
+            "SLURM_ARRAY_TASK_ID" => Some("3".to_owned()),
+            "SLURM_ARRAY_TASK_MIN" => Some("3".to_owned()),
             _ => None,
         };
-        assert_eq!(Shard::parse("auto/5", slurm), Ok(Shard { index: 2, of: 5 }));
-        assert!(Shard::parse("auto/2", slurm).unwrap_err().contains("no shard 2 of 2"));
+        // A part of an array (--array=3,7) computes the shards that the whole array computed under these numbers.
+        assert_eq!(Shard::parse("auto/20", slurm), Ok(Shard { index: 3, of: 20 }));
+        let error = Shard::parse("auto/3", slurm).unwrap_err();
+        assert!(
+            error.contains("no shard 3 of 3") && error.contains("from 0 to 2, and so must a Slurm array"),
+            "{error}"
+        );
     }
 
     #[test]
