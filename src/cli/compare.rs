@@ -117,8 +117,12 @@ impl Compare {
         let complete = collection.problems.is_empty() && left_out.is_empty();
 
         let left_out = collection.problems.iter().chain(&failed).map(Error::to_string).collect();
-        let mut file =
-            CompareFile::of(&compare, categories, left_out, HostRecord::of(&opened, swept.rechecked_lanes, started));
+        let mut file = CompareFile::of(
+            &compare,
+            categories,
+            left_out,
+            HostRecord::of(&opened, swept.rechecked_lanes, started, configured.record(false)),
+        );
         file.write(folder.results()?)?;
         self.format.print_results(|| file.text(), || file.json(), &self.out)?;
         Ok(if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete })

@@ -1,6 +1,7 @@
 //! From the command line to a configuration: which flag sets which key. Verbs read the values of these flags from the
 //! settings. `--backend` and `--device` determine the opened backend.
 
+use std::collections::BTreeSet;
 use std::path::PathBuf;
 
 use clap::builder::{PossibleValue, PossibleValuesParser};
@@ -15,6 +16,7 @@ use crate::cli::settings::{Assignment, FILE_VARIABLE, Key, KeyKind, Layers, Orig
 use crate::engine::{BackendChoice, DeviceName, OpenBackend};
 use crate::model::profile::Profile;
 use crate::report::run_record::SettingRecord;
+use crate::support::plain_text::nearest;
 use crate::{Error, Place, Result};
 
 /// The configuration of a run.
@@ -67,8 +69,8 @@ pub(super) const FLAGS: [KeyFlag; 27] = [
 ];
 
 /// Tables and keys that determine a plan's lanes; a plan file already contains them.
-const OF_THE_PLAN: [&str; 7] =
-    ["generator.", "mining.", "parameterization.", "score.", "sample.", "run.profile", "run.dt_s"];
+const OF_THE_PLAN: [&str; 8] =
+    ["generator.", "mining.", "parameterization.", "score.", "sample.", "search.folds", "run.profile", "run.dt_s"];
 
 /// Flags of earlier versions, with the keys that replaced them.
 const REMOVED: [(&str, &str); 2] =
@@ -206,7 +208,10 @@ impl Configured {
             return Err(Error::usage(Place::item("--config"), problem, help));
         }
         let mut layers = match reads_configuration(&path) {
-            true => Layers::read(&typed, std::env::var_os(FILE_VARIABLE).as_deref())?,
+            true => {
+                check_variables(&Key::all())?;
+                Layers::read(&typed, std::env::var_os(FILE_VARIABLE).as_deref())?
+            }
             false => Layers::defaults(),
         };
         let verb = path.last().unwrap_or(&"");
@@ -276,14 +281,14 @@ impl Configured {
         self.layers.files()
     }
 
-    /// The settings that were set, for the record of a run.
-    pub fn record(&self) -> Vec<SettingRecord> {
+    /// All settings, for the record of a run; without those that a plan file decides, if one was given.
+    pub fn record(&self, has_plan: bool) -> Vec<SettingRecord> {
         let record = |setting: Setting| SettingRecord {
             key: setting.key.name.clone(),
             value: setting.value.cloned().unwrap_or_default(),
             source: setting.origin.to_string(),
         };
-        self.layers.given().map(record).collect()
+        self.layers.list().filter(|setting| !(has_plan && is_of_plan(&setting.key.name))).map(record).collect()
     }
 
     /// Refuses flags about lanes together with a plan file, which would ignore them. A file that the environment names is
@@ -318,6 +323,25 @@ impl Configured {
             }
         }
     }
+}
+
+/// Looks for variables that would be ignored silently: those of keys, which earlier versions read, and misspellings of
+/// [`FILE_VARIABLE`].
+///
+/// # Errors
+/// [`Error::Usage`] for a misspelling.
+fn check_variables(keys: &[Key]) -> Result<()> {
+    let names: BTreeSet<String> = std::env::vars_os().filter_map(|(name, _)| name.into_string().ok()).collect();
+    for name in names.iter().filter(|name| *name != FILE_VARIABLE) {
+        let Some(rest) = name.strip_prefix("LANESWEEP_") else { continue };
+        if let Some(key) = keys.iter().find(|key| key.name.replace('.', "_").eq_ignore_ascii_case(rest)) {
+            tracing::warn!("the variable {name} is not read: write --config {}=VALUE, or a file", key.name);
+        } else if nearest(rest, FILE_VARIABLE.strip_prefix("LANESWEEP_"), 0.85).is_some() {
+            let help = format!("did you mean `{FILE_VARIABLE}`, which names a configuration file?");
+            return Err(Error::usage(Place::item(name.clone()), "there is no such variable", help));
+        }
+    }
+    Ok(())
 }
 
 /// Whether a verb reads the configuration.

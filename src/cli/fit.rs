@@ -13,6 +13,7 @@ use super::source::{self, SourceFlags};
 use crate::cli::settings::BandwidthInterval;
 use crate::report::density;
 use crate::report::records;
+use crate::report::run_record::SettingRecord;
 use crate::scenario::DataProvenance;
 use crate::scenario::parameterization::Parameterization;
 use crate::stats::density::{BandwidthRule, DensityModel, FitOptions, write_density};
@@ -116,7 +117,7 @@ impl Fit {
         }
         console::warn(&failed);
         write(&fitted, folder.as_ref())?;
-        self.format.print(|| text(&facts, &fitted), || document(&facts, &fitted))?;
+        self.format.print(|| text(&facts, &fitted), || document(&facts, &fitted, &configured.record(false)))?;
         tracing::info!("{} written to {}", counted(fitted.len(), "density file"), self.out.display());
         Ok(if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete })
     }
@@ -187,7 +188,7 @@ fn text(facts: &DataProvenance, fitted: &[(PathBuf, DensityModel)]) -> String {
     text
 }
 
-fn document(facts: &DataProvenance, fitted: &[(PathBuf, DensityModel)]) -> Result<String> {
+fn document(facts: &DataProvenance, fitted: &[(PathBuf, DensityModel)], settings: &[SettingRecord]) -> Result<String> {
     let densities = fitted.iter().map(|(path, model)| {
         let mut record = density::record(model);
         record["file"] = path.display().to_string().into();
@@ -197,6 +198,8 @@ fn document(facts: &DataProvenance, fitted: &[(PathBuf, DensityModel)]) -> Resul
         "program": format!("lanesweep {}", env!("CARGO_PKG_VERSION")),
         "data": facts.data,
         "synthetic": facts.synthetic,
+        "scenarios_sha256": facts.scenarios_sha256,
+        "settings": settings,
         "driven": facts.driven,
         "densities": densities.collect::<Vec<_>>(),
     }))

@@ -117,7 +117,7 @@ impl Justify {
             author: self.author.clone(),
             date: self.date.clone(),
             command: console::command_line(),
-            host: HostRecord::of(&opened, dossier.summary.rechecked_lanes, started),
+            host: HostRecord::of(&opened, dossier.summary.rechecked_lanes, started, configured.record(false)),
         };
         let files = report.write(folder.results()?)?;
         self.format.print_results(|| report.text(), || report.json(&files), &self.out)?;

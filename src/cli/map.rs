@@ -151,6 +151,7 @@ impl Map {
             threads: rayon::current_num_threads(),
             plan_s,
             sweep_s: started.elapsed().as_secs_f64(),
+            settings: configured.record(false),
         };
         let report = MapReport { grids, criterion, against, profile, preset: self.preset.clone(), host };
         let written = report.write(folder.results()?)?;

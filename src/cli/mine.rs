@@ -71,7 +71,7 @@ impl Mine {
                     scenarios_sha256: input_file::sha256(path)?,
                     driven: collection.driven(),
                 }
-                .write_beside(path)?;
+                .write_beside(path, serde_json::json!(configured.record(false)))?;
                 tracing::info!("{} written to {}", counted(collection.scenarios.len(), "scenario"), path.display());
             }
             None => {

@@ -112,7 +112,7 @@ pub(super) fn run(
         Ok(())
     })?;
     bar.finish_and_clear();
-    let host = HostRecord::of(&opened, crude.summary.rechecked_lanes, started);
+    let host = HostRecord::of(&opened, crude.summary.rechecked_lanes, started, configured.record(false));
     let record = record(&sampled, &samples);
     let mut file = EstimateFile::of(record, samples.has_distance(), (&profile, &options), crude.rows.clone(), host);
     file.plan_headways = plan.headways.clone();

@@ -42,7 +42,7 @@ impl Sample {
                 }
                 guard(rows, &self.out, std::iter::once(path))?;
             }
-            return self.run_sample(sample, (&configured.open()?, None), started, verbosity);
+            return self.run_sample(sample, (&configured.open()?, None), configured, started, verbosity);
         }
         if let Some(path) = &self.distribution {
             return sample_distribution::run(self, configured, path, started, verbosity);
@@ -52,7 +52,7 @@ impl Sample {
         let opened = configured.open()?;
         tracing::info!("{data}");
         let sample = if self.is_refined() { self.chosen(sample, &opened)? } else { sample };
-        self.run_sample(sample, (&opened, other.as_ref()), started, verbosity)
+        self.run_sample(sample, (&opened, other.as_ref()), configured, started, verbosity)
     }
 
     /// The run of crude Monte Carlo with as many samples as are cheaper than importance sampling.
@@ -105,6 +105,7 @@ impl Sample {
         &self,
         sample: sampling::Sample,
         (opened, other): (&OpenBackend, Option<&Profile>),
+        configured: &Configured,
         started: Instant,
         verbosity: Verbosity,
     ) -> Result<Exit> {
@@ -133,7 +134,7 @@ impl Sample {
             self.format.print_plan(sample.lane_count(), &self.out.join(PLAN_FILE))?;
             return Ok(Exit::Ok);
         }
-        self.run_split(&sample, (opened, other), &executor, started, verbosity)
+        self.run_split(&sample, (opened, other), &executor, configured, started, verbosity)
     }
 
     /// Executes a run that can be split and resumed.
@@ -142,6 +143,7 @@ impl Sample {
         sample: &sampling::Sample,
         (opened, other): (&OpenBackend, Option<&Profile>),
         executor: &Executor,
+        configured: &Configured,
         started: Instant,
         verbosity: Verbosity,
     ) -> Result<Exit> {
@@ -202,7 +204,8 @@ impl Sample {
                 );
             }
         }
-        let host = HostRecord::of(opened, result.rechecked_lanes, started);
+        let settings = configured.record(self.shards.plan.is_some());
+        let host = HostRecord::of(opened, result.rechecked_lanes, started, settings);
         let mut results = run.results()?;
         rows.into_iter().for_each(|table| results.join(table));
         let exit = write(sample, &result, host, results, self.format)?;

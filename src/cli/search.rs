@@ -96,6 +96,7 @@ impl Search {
         let data = self.data.source(configured);
         let collection = self.data.report_and_load(configured, verbosity)?;
         let held_out = self.held_out(configured, category, verbosity)?;
+        let sha256 = data.scenarios_sha256(&collection)?;
         if config.search.studies < config.search.min_studies() {
             tracing::warn!(
                 "no weights are tuned: that takes {} studies for descriptions of up to {} parameters",
@@ -113,7 +114,7 @@ impl Search {
         let executor = opened.executor().with_recheck(config.score.seed);
         let bar = console::progress(verbosity, config.search.studies as u64, "searching");
         let result = search.run(
-            held_out.as_ref().map(|(scenarios, _)| scenarios.as_slice()),
+            held_out.as_ref().map(|(scenarios, ..)| scenarios.as_slice()),
             (Some(folder.dir()), self.shard),
             &executor,
             &|studies| bar.set_position(studies as u64),
@@ -136,34 +137,35 @@ impl Search {
                 .map_or(Ok(Vec::new()), |basis| basis.mode_shapes(&kept))?,
             result: &result,
             data: data.describe(collection.synthetic),
-            held_out: held_out.as_ref().map(|(_, data)| data.clone()),
+            held_out: held_out.as_ref().map(|(_, data, _)| data.clone()),
+            scenarios_sha256: [sha256].into_iter().chain(held_out.map(|(.., sha256)| sha256)).collect(),
             synthetic: collection.synthetic,
             profile: &profile,
             command: console::command_line(),
-            host: HostRecord::of(&opened, 0, started),
+            host: HostRecord::of(&opened, 0, started, configured.record(false)),
         };
-        report.write(folder.results()?)?;
-        self.format.print_results(|| report.text(), || report.json(), &self.out)?;
+        let files = report.write(folder.results()?)?;
+        self.format.print_results(|| report.text(), || report.json(&files), &self.out)?;
         Ok(if collection.problems.is_empty() { Exit::Ok } else { Exit::Incomplete })
     }
 
-    /// The scenarios that the search does not read, and their description.
+    /// The scenarios that the search does not read, their description, and their checksum.
     fn held_out(
         &self,
         configured: &Configured,
         category: Category,
         verbosity: Verbosity,
-    ) -> Result<Option<(Vec<Scenario>, String)>> {
+    ) -> Result<Option<(Vec<Scenario>, String, String)>> {
         let Some(path) = &self.held_out else { return Ok(None) };
         let source = match path.is_dir() {
             true => Source::Recordings { path: path.clone(), preset: self.data.preset.preset.clone() },
             false => Source::Scenarios(path.clone()),
         };
         let collection = source::load(&source, &configured.settings.mining, self.data.policy(), verbosity)?;
-        let data = source.describe(collection.synthetic);
+        let (data, sha256) = (source.describe(collection.synthetic), source.scenarios_sha256(&collection)?);
         let mut scenarios = collection.scenarios;
         scenarios.retain(|scenario| scenario.category == category);
-        Ok(Some((scenarios, data)))
+        Ok(Some((scenarios, data, sha256)))
     }
 }
 

@@ -239,7 +239,7 @@ impl Study {
             device: opened.device().cloned(),
             swept,
             timings,
-            settings: configured.record(),
+            settings: configured.record(self.shards.plan.is_some()),
         };
         self.leave_plan(study, &mut results)?;
         let report = StudyReport::of(study, &counts, comparison, host)?;

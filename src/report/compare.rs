@@ -8,11 +8,13 @@ use super::dots::{DotRow, Dots, dots};
 use super::html::{Page, PageFigure, Section};
 use super::plot::{AxisScale, Figure, INK, Look, PlotAxis, Series, Symbol, Value, logarithmic_reach};
 use super::records::PROGRAM;
+use super::run_record::SettingRecord;
 use super::sampling::HostRecord;
 use super::tables::{WIDTH, wrap};
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
 use crate::run::compare::Compare;
 use crate::run::sampling::{
     CategoryComparison, ComparedCell, ComparedParameterization, RateRecord, RecordedCell, RiskRate, Uncertainty,
@@ -41,8 +43,8 @@ pub struct CompareFile {
     pub scenarios_sha256: String,
     /// Driven time and distance, if known.
     pub driven: Option<Driven>,
-    /// Profile.
-    pub profile: String,
+    /// Profile, with its time step.
+    pub profile: Profile,
     /// Models.
     pub models: Vec<ModelId>,
     /// Headways.
@@ -61,6 +63,8 @@ pub struct CompareFile {
     pub left_out: Vec<String>,
     /// Per category.
     pub categories: Vec<CategoryComparison>,
+    /// Options of the command, with their sources.
+    pub settings: Vec<SettingRecord>,
     /// Files beside this one.
     pub files: Vec<String>,
     /// The machine.
@@ -83,7 +87,7 @@ impl CompareFile {
             synthetic: provenance.synthetic,
             scenarios_sha256: provenance.scenarios_sha256,
             driven: provenance.driven,
-            profile: plan.profile.name.clone(),
+            profile: plan.profile.clone(),
             models: plan.models.clone(),
             headways: plan.headways.iter().map(Headway::to_string).collect(),
             samples: options.samples,
@@ -93,6 +97,7 @@ impl CompareFile {
             study_plan_sha256: plan.hash().to_owned(),
             left_out,
             categories,
+            settings: host.settings.clone(),
             files: Vec::new(),
             host,
         }
@@ -263,7 +268,7 @@ impl CompareFile {
         let rates = Section { text: self.text(), is_folded: true, ..Section::new("rates", "Rates and their ratios") };
         let facts = [
             ("program", self.program.clone()),
-            ("profile", self.profile.clone()),
+            ("profile", self.profile.name.clone()),
             ("seed", self.seed.to_string()),
             ("samples of each density", readable::count(self.samples)),
             ("SHA-256 of the scenarios", self.scenarios_sha256.clone()),

@@ -267,6 +267,7 @@ impl DossierReport<'_> {
             "density_sha256": dossier.density_sha256,
             "left_out": dossier.left_out.iter().map(ToString::to_string).collect::<Vec<_>>(),
             "command": self.command,
+            "settings": self.host.settings,
             "files": files,
             "host": self.host,
         }))

@@ -4,7 +4,7 @@ use serde::Serialize;
 
 use super::html::PageFigure;
 use super::map_sheet::{MapSheet, agreement, outcome};
-use super::run_record::SweepRecord;
+use super::run_record::{SettingRecord, SweepRecord};
 use crate::Result;
 use crate::engine::DeviceRecord;
 use crate::model::criterion::Criterion;
@@ -44,6 +44,9 @@ pub struct MapHost {
     pub plan_s: f64,
     /// Duration of the lanes, s.
     pub sweep_s: f64,
+    /// Options of the command; the record has them as `settings`.
+    #[serde(skip)]
+    pub settings: Vec<SettingRecord>,
 }
 
 /// A difference between two verdicts, for every cell of a grid.

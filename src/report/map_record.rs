@@ -6,6 +6,7 @@ use serde::Serialize;
 
 use super::map::{Difference, MapHost, MapReport};
 use super::records::PROGRAM;
+use super::run_record::SettingRecord;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -32,6 +33,7 @@ impl MapReport {
                 Some(Against::Profile(profile)) => Some(profile),
                 _ => None,
             },
+            settings: &self.host.settings,
             files,
             host: &self.host,
         };
@@ -52,6 +54,7 @@ struct MapRecord<'a> {
     differences: Vec<DifferenceRecord>,
     profile: &'a Profile,
     other_profile: Option<&'a Profile>,
+    settings: &'a [SettingRecord],
     /// Names of the other files.
     files: Vec<String>,
     host: &'a MapHost,

@@ -31,6 +31,9 @@ pub struct CategoryRecord {
     pub undefined_f1: u64,
     /// Cumulative explained variance of the decomposition's first coefficients, if there is one.
     pub svd_explained: Vec<f64>,
+    /// Number of folds, with cross-validation.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub folds: Option<usize>,
 }
 
 /// Durations of the parts of a run, s.
@@ -59,14 +62,14 @@ pub struct SweepRecord {
     pub device_s: Option<f64>,
 }
 
-/// An option that was set.
+/// An option.
 #[derive(Debug, Clone, Serialize)]
 pub struct SettingRecord {
     /// Key, as shown by `lanesweep config show`.
     pub key: String,
     /// Value.
     pub value: serde_json::Value,
-    /// Source: line of a file, variable or flag.
+    /// Source: line of a file, flag, or `default`.
     pub source: String,
 }
 
@@ -109,8 +112,8 @@ pub struct RunRecord {
     pub parameterization: ParameterizationOptions,
     /// Options of the scoring.
     pub score: ScoreOptions,
-    /// Options set for this command, with their sources. Like the backend's, they belong to the command and not to the
-    /// result: a merge has none, because its parts had their own.
+    /// Options of this command, with their sources. Like the backend's, they belong to the command and not to the result:
+    /// a merge has none, because its parts had their own.
     pub settings: Vec<SettingRecord>,
     /// Files beside this one.
     pub files: Vec<String>,
@@ -128,7 +131,7 @@ pub struct StudyHost {
     pub swept: SweepSummary,
     /// Durations of the parts of the run.
     pub timings: Timings,
-    /// Options that were set.
+    /// Options of the command.
     pub settings: Vec<SettingRecord>,
 }
 
@@ -202,6 +205,7 @@ fn category_records(study: &Study, scores: &ScoreTable) -> Vec<CategoryRecord> {
             capped_lanes: scored.map_or(0, |c| c.capped.iter().sum()),
             undefined_f1: cells().filter(|c| f1(&c.counts).is_none()).count() as u64,
             svd_explained: of.svd_explained.clone(),
+            folds: of.folds.iter().map(|(_, fold)| fold + 1).max(),
         }
     };
     plan.blocks.iter().zip(&study.facts().categories).map(record).collect()

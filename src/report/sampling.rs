@@ -7,6 +7,7 @@ use serde::Serialize;
 
 use super::close_following::{CloseRow, close_following};
 use super::records::PROGRAM;
+use super::run_record::SettingRecord;
 use super::tables::{WIDTH, wrap};
 use crate::engine::generated::ATTEMPTS;
 use crate::engine::{DeviceRecord, ENGINE_VERSION, Headway, LanePlan, OpenBackend};
@@ -109,17 +110,21 @@ pub struct HostRecord {
     pub seconds: f64,
     /// Threads.
     pub threads: usize,
+    /// Options of the command; records have them as `settings`.
+    #[serde(skip)]
+    pub settings: Vec<SettingRecord>,
 }
 
 impl HostRecord {
     /// For a run that started at `started`.
-    pub fn of(opened: &OpenBackend, rechecked_lanes: u64, started: Instant) -> Self {
+    pub fn of(opened: &OpenBackend, rechecked_lanes: u64, started: Instant, settings: Vec<SettingRecord>) -> Self {
         HostRecord {
             backend: opened.backend().describe(),
             device: opened.device().cloned(),
             rechecked_lanes,
             seconds: started.elapsed().as_secs_f64(),
             threads: rayon::current_num_threads(),
+            settings,
         }
     }
 
@@ -132,6 +137,7 @@ impl HostRecord {
             rechecked_lanes,
             seconds: 0.0,
             threads,
+            settings: Vec::new(),
         }
     }
 }
@@ -171,6 +177,10 @@ pub struct EstimateFile {
     pub plan_sha256: Option<String>,
     /// Draws; only for crude Monte Carlo.
     pub draws: Option<DrawRecord>,
+    /// Options, as in the plan.
+    pub options: SampleOptions,
+    /// Options of the command, with their sources; a merge has none, because its parts had their own.
+    pub settings: Vec<SettingRecord>,
     /// Why the run ended.
     pub stopped: StopReason,
     /// Whether the same flags give the same numbers on every machine.
@@ -225,6 +235,8 @@ impl EstimateFile {
             given: options.given.clone(),
             plan_sha256: None,
             draws: None,
+            options: options.clone(),
+            settings: host.settings.clone(),
             stopped: stopped.unwrap_or(StopReason::Samples),
             reproducible: estimates.iter().all(|r| r.estimate.stopped.is_reproducible()),
             estimates,

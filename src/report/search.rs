@@ -42,6 +42,8 @@ pub struct SearchReport<'a> {
     pub data: String,
     /// The data that the search did not read.
     pub held_out: Option<String>,
+    /// SHA-256 of the scenarios, and of the held-out ones, as scenario files.
+    pub scenarios_sha256: Vec<String>,
     /// The data are synthetic.
     pub synthetic: bool,
     /// Profile.
@@ -382,22 +384,26 @@ impl SearchReport<'_> {
             .build()
     }
 
-    fn record(&self) -> Result<Json> {
+    fn record(&self, files: &[String]) -> Result<Json> {
         let internal = |error| Error::Internal(format!("a search as JSON: {error}"));
         let result = self.result;
         let winner = result.fronts.first().and_then(|front| Some(&front.points[front.winner?]));
         Ok(json!({
             "program": PROGRAM,
+            "search_sha256": result.sha256,
             "command": self.command,
             "data": self.data,
+            "scenarios_sha256": self.scenarios_sha256[0],
             "held_out": self.held_out,
+            "held_out_sha256": self.scenarios_sha256.get(1),
             "synthetic": self.synthetic,
-            "profile": self.profile.name,
+            "profile": self.profile,
             "category": result.category.key(),
             "models": result.options.models.iter().map(|model| model.name()).collect::<Vec<_>>(),
             "criterion": result.options.criterion.key(),
             "objective": result.options.objective.name(),
             "shuffled": result.options.shuffled,
+            "headways": result.options.headways.iter().map(ToString::to_string).collect::<Vec<_>>(),
             "limits": serde_json::to_value(&result.options.limits).map_err(internal)?,
             "scenarios": result.scenarios[0],
             "held_out_scenarios": result.scenarios[1],
@@ -415,16 +421,18 @@ impl SearchReport<'_> {
             })),
             "folds_are_recordings": result.is_by_recording,
             "fronts": self.front_csv().records(),
+            "settings": self.host.settings,
+            "files": files,
             "host": serde_json::to_value(&self.host).map_err(internal)?,
         }))
     }
 
-    /// The record as JSON.
+    /// The record as JSON; `files` are in the same folder.
     ///
     /// # Errors
     /// [`Error::Internal`] for a defect of this program.
-    pub fn json(&self) -> Result<String> {
-        super::records::document(&self.record()?)
+    pub fn json(&self, files: &[String]) -> Result<String> {
+        super::records::document(&self.record(files)?)
     }
 
     fn page(&self, figures: &[(&str, Figure)]) -> Result<String> {
@@ -487,11 +495,11 @@ impl SearchReport<'_> {
         page.html()
     }
 
-    /// Writes all files.
+    /// Writes all files, the record last; returns the names of the others.
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn write(&self, mut results: Results) -> Result<()> {
+    pub fn write(&self, mut results: Results) -> Result<Vec<String>> {
         let mut figures = vec![("front", self.front_figure()), ("error", self.error_figure())];
         if !self.modes.is_empty() {
             let figure = Figure {
@@ -515,6 +523,8 @@ impl SearchReport<'_> {
         }
         results.add("report.txt", self.text().as_bytes())?;
         results.add("report.html", self.page(&figures)?.as_bytes())?;
-        results.publish(self.json()?.as_bytes())
+        let files = results.names();
+        results.publish(self.json(&files)?.as_bytes())?;
+        Ok(files)
     }
 }

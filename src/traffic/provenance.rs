@@ -91,28 +91,33 @@ impl Source {
         let mut provenance = DataProvenance {
             data: self.describe(collection.synthetic),
             synthetic: collection.synthetic,
-            scenarios_sha256: String::new(),
+            scenarios_sha256: self.scenarios_sha256(collection)?,
             driven: collection.driven(),
         };
-        match self {
-            Source::Scenarios(path) => {
-                provenance.scenarios_sha256 = input_file::sha256(path)?;
-                if let Some(beside) = DataProvenance::read_beside(path, &provenance.scenarios_sha256)? {
-                    provenance.driven = beside.driven;
-                    if beside.synthetic {
-                        (provenance.synthetic, provenance.data) = (true, beside.data);
-                    }
-                }
-            }
-            Source::Recordings { .. } | Source::Generated(_) => {
-                // The checksum of the file that `mine` would write: the same scenarios have the same checksum.
-                let mut hash = Hashing(Sha256::new());
-                write_scenarios_to(&mut hash, &collection.scenarios)?;
-                provenance.scenarios_sha256 = hex(&hash.0.finalize());
+        if let Source::Scenarios(path) = self
+            && let Some(beside) = DataProvenance::read_beside(path, &provenance.scenarios_sha256)?
+        {
+            provenance.driven = beside.driven;
+            if beside.synthetic {
+                (provenance.synthetic, provenance.data) = (true, beside.data);
             }
         }
         provenance.driven = given.known().or(provenance.driven);
         Ok(provenance)
+    }
+
+    /// SHA-256 of the scenarios loaded from here: that of their file, or of the file that `mine` would write. The same
+    /// scenarios have the same checksum.
+    ///
+    /// # Errors
+    /// [`Error::Io`](crate::support::error::Error::Io).
+    pub fn scenarios_sha256(&self, collection: &Collection) -> Result<String> {
+        if let Source::Scenarios(path) = self {
+            return input_file::sha256(path);
+        }
+        let mut hash = Hashing(Sha256::new());
+        write_scenarios_to(&mut hash, &collection.scenarios)?;
+        Ok(hex(&hash.0.finalize()))
     }
 }
 

@@ -5,6 +5,7 @@ use std::collections::BTreeSet;
 use std::path::Path;
 use std::process::{Command, Output};
 
+use lanesweep::cli::settings::{Key, KeyKind};
 use serde_json::Value;
 
 /// Runs the program with nothing configured but what the test configures.
@@ -104,6 +105,115 @@ fn every_verb_takes_its_values_from_all_layers() {
     assert_eq!(of("score.min_failures")["source"], "file a.toml, line 8");
     assert_eq!(record["score"]["min_failures"], 20);
     assert!(record["data"].as_str().unwrap().contains("2 generated recordings of 100 s"));
+}
+
+#[test]
+fn a_variable_that_would_be_ignored_is_named_and_a_misspelt_one_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let show = ["config", "show"];
+    for (name, said) in [
+        ("LANESWEEP_RUN_DT_S", "the variable LANESWEEP_RUN_DT_S is not read: write --config run.dt_s=VALUE"),
+        ("LANESWEEP_MINING_CUT_IN_MAX_THW_S", "--config mining.cut_in.max_thw_s=VALUE"),
+    ] {
+        let output = run(dir.path(), &[(name, "0.05")], &show);
+        let text = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert!(output.status.success() && text.contains(said), "{text}");
+    }
+    for name in ["LANESWEEP_CONIFG", "LANESWEEP_CONFIG_FILE"] {
+        let text = refused(dir.path(), &[(name, "a.toml")], &show);
+        assert!(text.contains("did you mean `LANESWEEP_CONFIG`"), "{text}");
+    }
+    // Variables of others, and of this program's tests, are none of them.
+    let output =
+        run(dir.path(), &[("LANESWEEP_SHARED", "x"), ("LANESWEEP_CHIPS", "1"), ("LANESWEEP_NODE", "7")], &show);
+    assert!(output.status.success() && output.stderr.is_empty(), "{output:?}");
+}
+
+/// Another valid value of a key, near its default.
+fn changed(key: &Key) -> Value {
+    let default = key.default.clone().unwrap_or_default();
+    match (&key.kind, key.name.as_str()) {
+        (_, "run.backend") => "cpu".into(),
+        (_, "run.profile") => "paper-fit".into(),
+        (_, "run.dt_s") => 0.05.into(),
+        (_, "generator.recordings" | "run.threads") => 2.into(),
+        (_, "generator.duration_s") => 100.0.into(),
+        (_, "sample.samples" | "compare.samples") => 2000.into(),
+        (_, "sample.estimator") => "mc".into(),
+        (_, "fit.valid_draws") => 1000.into(),
+        (_, "search.studies") => 24.into(),
+        (_, "search.folds" | "search.max_parameters" | "score.min_failures") => 3.into(),
+        (KeyKind::Boolean, _) => (!default.as_bool().unwrap()).into(),
+        (KeyKind::Choice(words), _) => words.iter().find(|word| default != *word.word).unwrap().word.clone().into(),
+        (KeyKind::Number(range), _) if range.is_whole => (default.as_u64().unwrap() + 1).into(),
+        (KeyKind::Number(_), _) => (default.as_f64().unwrap() * 0.99).into(),
+        (KeyKind::Text, name) => panic!("{name}"),
+    }
+}
+
+#[test]
+fn every_record_names_every_setting_with_its_source() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    // A device needs another backend; a width and a time decide how many samples are drawn.
+    let unset = ["run.device", "sample.half_width", "sample.time_limit_s"];
+    let keys: Vec<Key> = Key::all().into_iter().filter(|key| !unset.contains(&key.name.as_str())).collect();
+    let line = |key: &Key| format!("{} = {}\n", key.name, changed(key));
+    std::fs::write(dir.join("all.toml"), keys.iter().map(line).collect::<String>()).unwrap();
+    let run = |args: &[&str]| good(dir, &[], &[&["-q", "--config", "all.toml"], args].concat());
+    let printed = |args: &[&str]| serde_json::from_str::<Value>(&run(args)).unwrap();
+    let recorded = |record: &str, args: &[&str]| {
+        run(args);
+        json(&dir.join(record))
+    };
+    let fit = ["fit", "--parameterizations", "i", "--no-comparison", "--out", "i.json", "--format", "json"];
+    let compare = ["compare", "--parameterizations", "i", "--models", "FSM", "--thw", "1"];
+    let map = ["map", "lvd", "--x", "deceleration_mps2=5,6", "--y", "ego_speed_kmh=60,70", "--set", "thw_s=1"];
+    let justify = ["justify", "--parameterization", "i", "--models", "FSM", "--format", "json"];
+    let output = |args: &[&str]| self::run(dir, &[], &[&["-q", "--config", "all.toml"], args].concat());
+    let records = [
+        ("study", recorded("lanesweep-out/run.json", &["study", "--categories", "lvd"])),
+        ("mine", {
+            run(&["synth", "data"]);
+            recorded("s.exposure.json", &["mine", "data", "--out", "s.jsonl"])
+        }),
+        ("fit", printed(&fit)),
+        ("sample", recorded("lanesweep-sample/estimate.json", &["sample", "i.json", "--models", "FSM", "--thw", "1"])),
+        ("compare", recorded("lanesweep-compare/compare.json", &compare)),
+        ("map", recorded("lanesweep-map/map.json", &map)),
+        ("search", recorded("lanesweep-search/search.json", &["search", "--category", "lvd", "--criterion", "ttc"])),
+        // Its status is the answer.
+        ("justify", serde_json::from_slice(&output(&justify).stdout).unwrap()),
+    ];
+    for (verb, record) in records {
+        let settings = record["settings"].as_array().unwrap_or_else(|| panic!("{verb}"));
+        assert_eq!(settings.len(), Key::all().len(), "{verb}");
+        for (row, key) in (1..).zip(&keys) {
+            let of =
+                settings.iter().find(|of| of["key"] == *key.name).unwrap_or_else(|| panic!("{verb}: {}", key.name));
+            assert_eq!(of["value"], changed(key), "{verb}: {}", key.name);
+            assert_eq!(of["source"], format!("file all.toml, line {row}"), "{verb}: {}", key.name);
+        }
+        assert!(verb == "mine" || verb == "fit" || record["profile"]["frame"]["dt_s"] == 0.05, "{verb}");
+    }
+}
+
+#[test]
+fn the_estimate_of_a_plan_names_the_options_of_the_plan_and_not_those_of_the_command() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let config = ["--config", "generator.recordings=2", "--config", "generator.duration_s=100"];
+    let fit = ["-q", "fit", "--parameterizations", "i", "--no-comparison", "--out", "i.json"];
+    good(dir, &[], &[&fit, &config[..]].concat());
+    let is = ["--estimator", "is", "--samples", "2000", "--models", "FSM", "--thw", "0.6"];
+    let weight = ["--config", "sample.defensive_weight=0.3", "--plan-only", "--out", "plan"];
+    good(dir, &[], &[&["-q", "sample", "i.json"], &is[..], &weight].concat());
+    good(dir, &[], &["-q", "sample", "--plan", "plan/plan.json", "--out", "out"]);
+    let record = json(&dir.join("out/estimate.json"));
+    assert!(record["options"].to_string().contains("\"defence\":0.3"), "{}", record["options"]);
+    let settings = record["settings"].as_array().unwrap();
+    let of = |key: &str| settings.iter().any(|of| of["key"] == key);
+    assert_eq!([of("run.threads"), of("sample.defensive_weight"), of("run.profile")], [true, false, false]);
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use std::path::{Path, PathBuf};
 
 use serde::{Deserialize, Serialize};
+use serde_json::Value;
 
 use crate::support::files::write_atomically;
 use crate::support::input_file;
@@ -64,6 +65,9 @@ struct ProvenanceFile {
     data: String,
     synthetic: bool,
     driven: Driven,
+    /// Options of the command that mined the scenarios, for readers; files of earlier versions have none.
+    #[serde(default, skip_serializing_if = "Value::is_null")]
+    settings: Value,
 }
 
 impl DataProvenance {
@@ -89,11 +93,12 @@ impl DataProvenance {
         }
     }
 
-    /// Writes the provenance file of a scenario file atomically; nothing if time and distance are unknown.
+    /// Writes the provenance file of a scenario file atomically, with the options of the command; nothing if time and
+    /// distance are unknown.
     ///
     /// # Errors
     /// [`Error::Io`] if the folder cannot be written to.
-    pub fn write_beside(&self, scenarios: &Path) -> Result<()> {
+    pub fn write_beside(&self, scenarios: &Path, settings: Value) -> Result<()> {
         let Some(driven) = self.driven else { return Ok(()) };
         let file = ProvenanceFile {
             lanesweep_exposure: VERSION,
@@ -101,6 +106,7 @@ impl DataProvenance {
             data: self.data.clone(),
             synthetic: self.synthetic,
             driven,
+            settings,
         };
         let text = serde_json::to_string_pretty(&file);
         let text = text.map_err(|e| Error::Internal(format!("cannot be written as JSON: {e}")))?;

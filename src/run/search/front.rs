@@ -115,6 +115,8 @@ pub struct RmseAgainstScore {
 /// The result of a search.
 #[derive(Debug)]
 pub struct SearchResult {
+    /// Hash of data, options and engine, as in the journals.
+    pub sha256: String,
     /// Kind of scenario.
     pub category: Category,
     /// Options, with the models that were scored.
@@ -254,6 +256,7 @@ pub(super) fn conclude(
     let unkept = unkept(&all, &cross_validated, search);
     let rmse_against_score = rmse_against_score(&evaluated, options);
     Ok(SearchResult {
+        sha256: search.sha256.clone(),
         category,
         options: options.clone(),
         left_out: search.left_out.clone(),

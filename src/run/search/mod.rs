@@ -264,6 +264,8 @@ pub struct Search<'a> {
     options: SearchOptions,
     /// Models left out, with the number of scenarios in which S fails.
     left_out: Vec<(ModelId, u64)>,
+    /// Names data, options and engine.
+    sha256: String,
 }
 
 impl<'a> Search<'a> {
@@ -281,11 +283,12 @@ impl<'a> Search<'a> {
             return Err(Error::input(Place::item("scenarios"), problem, "use more recordings: 10 scenarios at least"));
         }
         folds(&scenarios, options.limits.folds)?;
-        Ok(Search { scenarios, profile, options, left_out: Vec::new() })
+        let mut search = Search { scenarios, profile, options, left_out: Vec::new(), sha256: String::new() };
+        search.sha256 = search.hash()?;
+        Ok(search)
     }
 
-    /// Names data, options and engine.
-    fn sha256(&self) -> Result<String> {
+    fn hash(&self) -> Result<String> {
         let SearchOptions { category, criterion, objective, headways, limits, parameterization, shuffled, .. } =
             &self.options;
         let models: Vec<&str> = self.options.models.iter().map(|model| model.name()).collect();
@@ -337,7 +340,6 @@ impl<'a> Search<'a> {
         if let Some(held_out) = held_out {
             self.refuse_searched(held_out)?;
         }
-        let sha256 = self.sha256()?;
         let all = self.options.clone();
         let evaluator = Evaluator::new(category, self.scenarios.clone(), profile, &all, executor)?;
         let failing = |model: &ModelId| evaluator.failing_scenarios(*model, all.criterion);
@@ -353,7 +355,7 @@ impl<'a> Search<'a> {
         let options = &self.options;
         let of_folds = folds(&self.scenarios, options.limits.folds)?;
         let training = Training::Folds(of_folds, options.limits.folds);
-        let mut results = Results::open(folder, shard, &sha256)?;
+        let mut results = Results::open(folder, shard, &self.sha256)?;
         let mut evaluate = |candidates: &[Candidate]| -> Result<Vec<Option<Evaluated>>> {
             let mut unknown: Vec<Candidate> = Vec::new();
             for candidate in candidates {

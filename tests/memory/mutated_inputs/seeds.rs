@@ -319,7 +319,7 @@ impl Seeds {
             scenario_tables: vec![INSTANTS.into(), CASES.into()],
             exposures: vec![{
                 let dir = tempfile::tempdir().unwrap();
-                exposure.write_beside(&dir.path().join("s.jsonl")).unwrap();
+                exposure.write_beside(&dir.path().join("s.jsonl"), serde_json::Value::Null).unwrap();
                 std::fs::read(dir.path().join("s.exposure.json")).unwrap()
             }],
             profiles: ["paper", "jrc-2021"]
