@@ -6,10 +6,10 @@ use std::ffi::OsString;
 use std::fmt;
 use std::io::{self, IsTerminal, Write};
 use std::sync::{Mutex, MutexGuard, PoisonError};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 use clap::error::ContextValue;
-use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle};
+use indicatif::{HumanDuration, ProgressBar, ProgressDrawTarget, ProgressState, ProgressStyle, WeakProgressBar};
 use tracing::{Level, Metadata};
 use tracing_subscriber::fmt::MakeWriter;
 use tracing_subscriber::fmt::format::debug_fn;
@@ -17,6 +17,7 @@ use tracing_subscriber::fmt::format::debug_fn;
 use super::Exit;
 use crate::report::tables::WIDTH;
 use crate::support::plain_text::{cut, cut_names, quoted_word, shown, shown_in_line, shown_json};
+use crate::support::readable::count;
 use crate::{Error, Result};
 
 /// Name of standard output in errors.
@@ -171,7 +172,7 @@ pub fn inc(bar: &ProgressBar) -> impl Fn(u64) + Send + Sync + 'static {
     move |units| bar.inc(units)
 }
 
-/// A progress bar on stderr; silent unless stderr is a terminal. Its remaining time follows from the units per time.
+/// A progress bar on stderr, or a line now and then if stderr is no terminal. Its remaining time follows from the units per time.
 pub fn progress(verbosity: Verbosity, length: u64, what: &str) -> ProgressBar {
     bar_of(verbosity, length, what, "about")
 }
@@ -183,7 +184,8 @@ pub fn progress_to_maximum(verbosity: Verbosity, length: u64, what: &str) -> Pro
 
 fn bar_of(verbosity: Verbosity, length: u64, what: &str, bound: &'static str) -> ProgressBar {
     let bar = ProgressBar::new(length);
-    if verbosity == Verbosity::Quiet || !io::stderr().is_terminal() {
+    let is_terminal = io::stderr().is_terminal();
+    if verbosity == Verbosity::Quiet || !is_terminal {
         bar.set_draw_target(ProgressDrawTarget::hidden());
     }
     if let Ok(style) = ProgressStyle::with_template("{msg:24} {wide_bar} {pos}/{len} {elapsed}{left}") {
@@ -197,8 +199,45 @@ fn bar_of(verbosity: Verbosity, length: u64, what: &str, bound: &'static str) ->
     if let Some(captured) = captured().as_mut() {
         bar.set_draw_target(ProgressDrawTarget::hidden());
         captured.bar = Some(bar.clone());
+    } else if verbosity != Verbosity::Quiet && !is_terminal {
+        let weak = bar.downgrade();
+        std::thread::spawn(move || tell_at_intervals(&weak, bound, BETWEEN_LINES, |line| tracing::info!("{line}")));
     }
     bar
+}
+
+/// Time between two lines about a run whose stderr is no terminal.
+const BETWEEN_LINES: Duration = Duration::from_secs(60);
+
+/// Tells the state of a bar at intervals until it is finished or dropped.
+fn tell_at_intervals(bar: &WeakProgressBar, bound: &str, interval: Duration, tell: impl Fn(String)) {
+    let mut due = Instant::now() + interval;
+    loop {
+        // Short naps: the thread ends soon after its bar.
+        std::thread::sleep(interval.min(Duration::from_secs(1)));
+        let Some(bar) = bar.upgrade().filter(|bar| !bar.is_finished()) else { return };
+        if Instant::now() >= due {
+            due += interval;
+            tell(line_of(&bar, bound));
+        }
+    }
+}
+
+/// `sweeping: 1,200 of 9,600 (12 %) in 2 minutes, about 15 minutes left`.
+fn line_of(bar: &ProgressBar, bound: &str) -> String {
+    let (done, all, elapsed) = (bar.position(), bar.length().unwrap_or_default(), bar.elapsed());
+    let parts = done as f64 / all.max(1) as f64;
+    // At the mean speed so far.
+    let left = if done > 0 { elapsed.mul_f64((1.0 / parts - 1.0).max(0.0)) } else { Duration::ZERO };
+    format!(
+        "{}: {} of {} ({:.0} %) in {:#}{}",
+        bar.message(),
+        count(done),
+        count(all),
+        100.0 * parts,
+        HumanDuration(elapsed),
+        remaining(bound, elapsed, left)
+    )
 }
 
 /// Measured work before the remaining time is told: first units are slower, and few tell little.
@@ -303,8 +342,29 @@ impl miette::Diagnostic for Diagnostic {
 
 #[cfg(test)]
 mod tests {
-    use super::{flag_of, remaining, with_flags};
+    use super::{flag_of, remaining, tell_at_intervals, with_flags};
+    use indicatif::{ProgressBar, ProgressDrawTarget};
+    use std::sync::mpsc;
     use std::time::Duration;
+
+    #[test]
+    fn a_run_without_a_terminal_tells_what_is_done_of_how_much_until_it_ends() {
+        let bar = ProgressBar::with_draw_target(Some(9600), ProgressDrawTarget::hidden());
+        bar.set_message("sweeping");
+        bar.set_elapsed(Duration::from_secs(120));
+        bar.inc(1200);
+        let (sender, lines) = mpsc::channel();
+        let weak = bar.downgrade();
+        let teller = std::thread::spawn(move || {
+            tell_at_intervals(&weak, "about", Duration::from_millis(5), |line| sender.send(line).unwrap());
+        });
+        for _ in 0..2 {
+            let line = lines.recv_timeout(Duration::from_secs(10)).unwrap();
+            assert_eq!(line, "sweeping: 1,200 of 9,600 (12 %) in 2m, about 14m left");
+        }
+        bar.finish_and_clear();
+        teller.join().unwrap();
+    }
 
     #[test]
     fn the_remaining_time_is_told_once_some_seconds_are_measured() {
