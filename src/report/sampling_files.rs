@@ -47,7 +47,7 @@ impl EstimateFile {
         }
         if matches!(sample.options.estimator, Estimator::Given { .. }) {
             // A proposal in this folder may be an input of the run.
-            results.keep(|name| name == "proposal.json")?;
+            results.keep(|name| name == "proposal.json");
         }
         if let Some(proposal) = &result.proposal {
             results.add("proposal.json", proposal_text(density, proposal)?.as_bytes())?;

@@ -3,12 +3,11 @@
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
-use sha2::{Digest, Sha256};
 
 use crate::support::files::write_inside;
 use crate::support::input_file;
-use crate::support::plain_text::hex;
-use crate::{Error, Place, Result};
+use crate::support::run_dir::RECORDS;
+use crate::{Error, Result};
 
 /// Lists the files of the runs in a folder.
 pub(super) const LIST: &str = "lanesweep-files.json";
@@ -29,54 +28,45 @@ pub(super) struct RunFiles {
 
 /// The content of [`LIST`].
 #[derive(Debug, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
 pub(super) struct FileList {
     lanesweep_files: u64,
     pub(super) runs: Vec<RunFiles>,
-    /// SHA-256 of the runs' text. It identifies lists of this program; it is not a signature.
-    sha256: String,
+}
+
+/// The part of a run's record that names its files.
+#[derive(Deserialize)]
+struct RecordFiles {
+    program: String,
+    files: Vec<String>,
 }
 
 impl FileList {
-    /// A list of these runs; the checksum is computed when it is written.
+    /// A list of these runs.
     pub(super) fn of(runs: Vec<RunFiles>) -> FileList {
-        FileList { lanesweep_files: VERSION, runs, sha256: String::new() }
+        FileList { lanesweep_files: VERSION, runs }
     }
 
-    /// Reads the list of a folder; empty if there is none.
-    ///
-    /// # Errors
-    /// [`Error::Input`] for a damaged list; [`Error::Io`].
-    pub(super) fn read(dir: &Path) -> Result<FileList> {
-        let path = dir.join(LIST);
-        if path.symlink_metadata().is_err() {
-            return Ok(FileList::of(Vec::new()));
-        }
-        let text = input_file::read(&path, input_file::MAX_TABLE_BYTES)?;
-        let is_plain = |name: &String| Path::new(name).file_name().is_some_and(|file| file == name.as_str());
-        let list = serde_json::from_slice::<FileList>(&text).ok().filter(|list| {
-            let mut names = list.runs.iter().flat_map(|run| run.files.iter().chain(&run.record));
-            let is_ours = list.lanesweep_files == VERSION && list.checksum().is_ok_and(|sum| sum == list.sha256);
-            is_ours && names.all(|name| is_plain(name) && !name.starts_with('.'))
+    /// Reads the list of a folder. Without a readable list (results that were copied without it), the records of the runs
+    /// tell their files.
+    pub(super) fn read(dir: &Path) -> FileList {
+        let read = |name: &str| input_file::read(&dir.join(name), input_file::MAX_TABLE_BYTES).ok();
+        let is_plain = |name: &String| {
+            Path::new(name).file_name().is_some_and(|file| file == name.as_str()) && !name.starts_with('.')
+        };
+        let list = read(LIST).and_then(|text| serde_json::from_slice::<FileList>(&text).ok()).filter(|list| {
+            list.lanesweep_files == VERSION
+                && list.runs.iter().flat_map(|run| run.files.iter().chain(&run.record)).all(is_plain)
         });
-        list.ok_or_else(|| {
-            let problem = "this is no whole list of the files that lanesweep wrote here";
-            Error::input(
-                Place::file(path),
-                problem,
-                "move it away with the results beside it, or give another option `out`",
-            )
-        })
-    }
-
-    fn checksum(&self) -> Result<String> {
-        let text = serde_json::to_vec(&self.runs).map_err(|e| Error::Internal(format!("{LIST}: {e}")))?;
-        Ok(hex(&Sha256::digest(text)))
+        let of_record = |name: &&str| {
+            let record: RecordFiles = serde_json::from_slice(&read(name)?).ok()?;
+            let is_ours = record.program.starts_with("lanesweep ") && record.files.iter().all(is_plain);
+            is_ours.then(|| RunFiles { record: Some((*name).to_owned()), files: record.files, is_complete: true })
+        };
+        list.unwrap_or_else(|| FileList::of(RECORDS.iter().filter_map(of_record).collect()))
     }
 
     pub(super) fn write(mut self, dir: &Path) -> Result<()> {
         self.runs.sort_by(|a, b| a.record.cmp(&b.record));
-        self.sha256 = self.checksum()?;
         let text = serde_json::to_vec(&self).map_err(|e| Error::Internal(format!("{LIST}: {e}")))?;
         write_inside(&dir.join(LIST), |file| file.write_all(&text))
     }
@@ -98,17 +88,14 @@ mod tests {
     use super::*;
 
     #[test]
-    fn even_with_a_checksum_a_list_leads_to_plain_names_in_the_folder_only() {
+    fn a_list_leads_to_plain_names_in_the_folder_only() {
         let dir = tempfile::tempdir().unwrap();
         let list = |name: &str| {
             let run = RunFiles { record: None, files: vec![name.to_owned()], is_complete: true };
             FileList::of(vec![run]).write(dir.path()).unwrap();
-            FileList::read(dir.path())
+            FileList::read(dir.path()).holds(name)
         };
-        assert!(list("a.csv").unwrap().holds("a.csv"));
-        for name in ["../a.csv", "inner/a.csv", ".a.csv", ""] {
-            let error = list(name).unwrap_err();
-            assert!(matches!(error, Error::Input { .. }) && error.to_string().contains(LIST), "{name}: {error}");
-        }
+        assert!(list("a.csv"));
+        assert!(!["../a.csv", "inner/a.csv", ".a.csv", ""].into_iter().any(list));
     }
 }

@@ -1,7 +1,7 @@
 //! A run directory: one run at a time writes it, and its record belongs to the files of exactly one run.
 //!
-//! `lanesweep-files.json` lists the files of every run in the folder, with a checksum. Files that it does not list are
-//! neither removed nor replaced. Results are written under hidden names. Once all are on disk, the list holds the
+//! `lanesweep-files.json` lists the files of every run in the folder; without it, the runs' records do. Files that are not
+//! listed are neither removed nor replaced. Results are written under hidden names. Once all are on disk, the list holds the
 //! former and the new files as incomplete, and the former record is removed. Then the results are renamed, the new
 //! record is renamed last, and the list is complete. After a kill in between, the next run removes the listed files
 //! that it does not write itself. Readers of independent files (recordings) refuse an incomplete folder.
@@ -33,7 +33,8 @@ pub const SEARCH_RECORD: &str = "search.json";
 pub const DOSSIER_RECORD: &str = "dossier.json";
 
 /// Records of runs that write files with the same names, such as `report.html`: a folder holds one of them.
-const RECORDS: [&str; 6] = [STUDY_RECORD, ESTIMATE_RECORD, MAP_RECORD, COMPARE_RECORD, SEARCH_RECORD, DOSSIER_RECORD];
+pub(super) const RECORDS: [&str; 6] =
+    [STUDY_RECORD, ESTIMATE_RECORD, MAP_RECORD, COMPARE_RECORD, SEARCH_RECORD, DOSSIER_RECORD];
 
 /// The lock of the whole folder.
 const LOCK: &str = "run.lock";
@@ -68,8 +69,7 @@ impl OutputDir {
     ///
     /// # Errors
     /// [`Error::Busy`] if another process writes it; [`Error::Usage`] if it holds another verb's run, or unlisted files
-    /// with the names of this run's; [`Error::Input`] for a link in the place of lock or record, or a damaged list;
-    /// [`Error::Io`].
+    /// with the names of this run's; [`Error::Input`] for a link in the place of lock or record; [`Error::Io`].
     pub fn open(dir: &Path, record: &'static str) -> Result<OutputDir> {
         let mut folder = OutputDir::take(dir, Some(record), FolderLock::acquire)?;
         folder.enter_lock();
@@ -133,7 +133,7 @@ impl OutputDir {
             let other = run.record.as_deref().unwrap_or_default();
             RECORDS.contains(&record) && RECORDS.contains(&other) && other != record
         };
-        if let Some(run) = FileList::read(&self.dir)?.runs.iter().find(of_another) {
+        if let Some(run) = FileList::read(&self.dir).runs.iter().find(of_another) {
             let other = run.record.as_deref().unwrap_or_default();
             let problem = format!("it holds the results of another verb, those of {other}");
             let help = "give another option `out`: both would write files of the same names";
@@ -144,7 +144,7 @@ impl OutputDir {
 
     /// Refuses to replace files that no run in this folder wrote.
     fn refuse_foreign<'n>(&self, names: impl Iterator<Item = &'n str>) -> Result<()> {
-        let list = FileList::read(&self.dir)?;
+        let list = FileList::read(&self.dir);
         let is_foreign = |name: &&str| !list.holds(name) && self.dir.join(name).symlink_metadata().is_ok();
         let Some(name) = { names }.find(is_foreign) else { return Ok(()) };
         refuse_link(&self.dir.join(name))?;
@@ -154,13 +154,13 @@ impl OutputDir {
     }
 
     /// The files that the former run left, including those of a run that ended during renaming.
-    fn former(&self) -> Result<BTreeSet<String>> {
-        Ok(FileList::read(&self.dir)?.take(self.record).files.into_iter().collect())
+    fn former(&self) -> BTreeSet<String> {
+        FileList::read(&self.dir).take(self.record).files.into_iter().collect()
     }
 
     /// Writes the list of this folder's run.
     fn list(&self, files: BTreeSet<String>, is_complete: bool) -> Result<()> {
-        let mut list = FileList::read(&self.dir)?;
+        let mut list = FileList::read(&self.dir);
         list.take(self.record);
         let record = self.record.map(str::to_owned);
         list.runs.push(RunFiles { record, files: files.into_iter().collect(), is_complete });
@@ -232,13 +232,9 @@ impl Results<'_> {
     }
 
     /// Keeps the former run's files of these names as files of this run.
-    ///
-    /// # Errors
-    /// [`Error::Input`] for a damaged list of files.
-    pub fn keep(&mut self, is_kept: impl Fn(&str) -> bool) -> Result<()> {
+    pub fn keep(&mut self, is_kept: impl Fn(&str) -> bool) {
         let is_there = |name: &String| is_kept(name) && self.folder.dir.join(name).is_file();
-        self.kept = self.folder.former()?.into_iter().filter(is_there).collect();
-        Ok(())
+        self.kept = self.folder.former().into_iter().filter(is_there).collect();
     }
 
     /// The sorted names of all files in the folder, for the record.
@@ -266,7 +262,7 @@ impl Results<'_> {
         let mut last = AtomicFile::create_inside(&dir.join(name))?;
         last.append(record)?;
         let last = last.stage()?;
-        let stale: Vec<String> = folder.former()?.into_iter().filter(|file| !names.contains(file)).collect();
+        let stale: Vec<String> = folder.former().into_iter().filter(|file| !names.contains(file)).collect();
         folder.list(names.iter().chain(&stale).cloned().collect(), false)?;
         remove(&dir.join(name))?;
         sync_folder(dir);
@@ -285,7 +281,7 @@ impl Results<'_> {
     pub fn publish_each(self) -> Result<()> {
         self.refuse_foreign([])?;
         let folder = self.folder;
-        let mut files = folder.former()?;
+        let mut files = folder.former();
         files.extend(self.names());
         folder.list(files, true)?;
         self.staged.into_iter().try_for_each(|(_, file)| file.place())?;
@@ -308,13 +304,13 @@ fn remove(path: &Path) -> Result<()> {
 
 /// Whether this is a result of a run in the folder, or its record.
 pub fn is_listed(dir: &Path, name: &str) -> bool {
-    FileList::read(dir).is_ok_and(|list| list.holds(name))
+    FileList::read(dir).holds(name)
 }
 
 /// The files of runs that ended during renaming; `None` if all runs are complete.
 pub fn unfinished(dir: &Path) -> Option<Vec<String>> {
     let is_cut = |run: &RunFiles| !run.is_complete && run.record.as_ref().is_some_and(|name| !dir.join(name).exists());
-    let cut: Vec<RunFiles> = FileList::read(dir).ok()?.runs.into_iter().filter(is_cut).collect();
+    let cut: Vec<RunFiles> = FileList::read(dir).runs.into_iter().filter(is_cut).collect();
     (!cut.is_empty()).then(|| cut.into_iter().flat_map(|run| run.files).collect())
 }
 
@@ -365,13 +361,10 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path();
         fs::write(out.join("a.csv"), "mine").unwrap();
-        for foreign in
-            [r#"{"program":"QGIS 3","files":["a.csv"]}"#, r#"{"program":"lanesweep 0.1.0","files":["a.csv"]}"#]
-        {
-            fs::write(out.join(MAP_RECORD), foreign).unwrap();
-            assert!(refusal(OutputDir::open(out, MAP_RECORD)).contains(MAP_RECORD));
-            assert_eq!(fs::read_to_string(out.join(MAP_RECORD)).unwrap(), foreign);
-        }
+        let foreign = r#"{"program":"QGIS 3","files":["a.csv"]}"#;
+        fs::write(out.join(MAP_RECORD), foreign).unwrap();
+        assert!(refusal(OutputDir::open(out, MAP_RECORD)).contains(MAP_RECORD));
+        assert_eq!(fs::read_to_string(out.join(MAP_RECORD)).unwrap(), foreign);
         fs::remove_file(out.join(MAP_RECORD)).unwrap();
         fs::write(out.join("report.html"), "mine").unwrap();
         assert!(refusal(OutputDir::open(out, MAP_RECORD)).contains("report.html"), "before the work starts");
@@ -386,22 +379,20 @@ mod tests {
     }
 
     #[test]
-    fn a_list_that_is_not_ours_or_damaged_removes_nothing() {
+    fn without_a_readable_list_the_record_tells_which_files_are_the_runs() {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path();
         publish(&folder(out), &["a.csv", "b.csv"], "first");
+        fs::write(out.join("mine.csv"), "mine").unwrap();
         let whole = fs::read_to_string(out.join(LIST)).unwrap();
-        for changed in
-            ["{}".to_owned(), whole.replace("a.csv", "c.csv"), whole.replace(":1,", ":2,"), whole[..40].to_owned()]
-        {
-            fs::write(out.join(LIST), &changed).unwrap();
-            assert!(refusal(OutputDir::open(out, MAP_RECORD)).contains(LIST), "{changed}");
-            assert!(!is_listed(out, "a.csv") && unfinished(out).is_none());
-            assert_eq!(fs::read_to_string(out.join(LIST)).unwrap(), changed);
+        for changed in [None, Some("{}"), Some("mine"), Some(&whole[..40]), Some(&whole.replace("a.csv", "../a.csv"))] {
+            let _ = changed.map_or_else(|| fs::remove_file(out.join(LIST)), |text| fs::write(out.join(LIST), text));
+            assert!(is_listed(out, "a.csv") && !is_listed(out, "mine.csv"), "{changed:?}");
+            publish(&folder(out), &["a.csv", "b.csv"], "second");
         }
-        fs::write(out.join(LIST), whole).unwrap();
-        publish(&folder(out), &["b.csv"], "second");
-        assert_eq!(names(out), ["b.csv", LIST, "map.json"]);
+        fs::remove_file(out.join(LIST)).unwrap();
+        publish(&folder(out), &["b.csv"], "third");
+        assert_eq!(names(out), ["b.csv", LIST, "map.json", "mine.csv"]);
     }
 
     #[test]

@@ -261,6 +261,75 @@ fn a_folder_from_somebody_else_makes_no_run_write_elsewhere() {
     }
 }
 
+#[cfg(unix)]
+#[test]
+fn a_journal_replaces_no_file_of_the_users_follows_no_link_and_has_one_writer() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    let (density, scenarios, precious) = (at("d.json"), at("s.jsonl"), at("precious"));
+    let ran = |args: &[&str]| {
+        let output = lanesweep(&[&["-q"], args].concat());
+        assert!(output.status.success(), "{args:?}: {output:?}");
+    };
+    ran(&["synth", text(&at("data")), "--synth-recordings", "2"]);
+    ran(&["mine", text(&at("data")), "--out", text(&scenarios)]);
+    let fit = ["fit", "--scenarios", text(&scenarios), "--categories", "cut-in", "--parameterizations", "2"];
+    ran(&[&fit[..], &["--no-comparison", "--out", text(&density)]].concat());
+    std::fs::write(&precious, "mine").unwrap();
+    let (data, shard) = (["--scenarios", text(&scenarios)], ["--shard", "0/2"]);
+    let search =
+        [&["-q", "search", "--category", "cut-in", "--studies", "24", "--max-parameters", "4"], &data[..]].concat();
+    let study = [&["-q", "study", "--categories", "lvd"], &data[..], &shard].concat();
+    let sample = [&["-q", "sample", text(&density), "--samples", "1000"][..], &shard].concat();
+    let runs: [(&[&str], &str, &str); 4] = [
+        (&search, "search.journal", "run.lock"),
+        (&[&search[..], &shard].concat(), "search-0-of-2.journal", "search-0-of-2.lock"),
+        (&study, "part-00000-of-00002.journal", "part-00000-of-00002.lock"),
+        (&sample, "part-00000-of-00002.journal", "part-00000-of-00002.lock"),
+    ];
+    for (run, journal, lock) in runs {
+        let out = at("out");
+        let run = [run, &["--out", text(&out)]].concat();
+        std::fs::create_dir(&out).unwrap();
+        std::fs::write(out.join(journal), "my notes\n").unwrap();
+        refused_with(3, &run, "this is no journal of lanesweep");
+        assert_eq!(std::fs::read_to_string(out.join(journal)).unwrap(), "my notes\n", "{run:?}");
+        std::fs::remove_file(out.join(journal)).unwrap();
+        std::os::unix::fs::symlink(&precious, out.join(journal)).unwrap();
+        refused_with(3, &run, "this is a link");
+        assert_eq!(std::fs::read_to_string(&precious).unwrap(), "mine", "{run:?}");
+        std::fs::remove_file(out.join(journal)).unwrap();
+        let held = lanesweep::support::lock::FolderLock::acquire(&out.join(lock)).unwrap();
+        refused_with(75, &run, "another lanesweep process");
+        drop(held);
+        ran(&run[1..]);
+        std::fs::remove_dir_all(&out).unwrap();
+    }
+}
+
+#[test]
+fn results_copied_without_the_list_and_a_finished_searchs_folder_are_used_again() {
+    let dir = tempfile::tempdir().unwrap();
+    let at = |name: &str| dir.path().join(name);
+    let ran = |args: &[&str]| {
+        let output = lanesweep(&[&["-q"], args].concat());
+        assert!(output.status.success(), "{args:?}: {output:?}");
+    };
+    ran(&["synth", text(&at("data")), "--synth-recordings", "2"]);
+    ran(&["mine", text(&at("data")), "--out", text(&at("s.jsonl"))]);
+    let (scenarios, out) = (at("s.jsonl"), at("out"));
+    let fixed = ["search", "--category", "cut-in", "--studies", "24", "--max-parameters", "4"];
+    let search = [&fixed[..], &["--scenarios", text(&scenarios), "--out", text(&out), "--criterion"]].concat();
+    ran(&[&search[..], &["collision"]].concat());
+    let first = std::fs::read(out.join("candidates.csv")).unwrap();
+    std::fs::remove_file(out.join("lanesweep-files.json")).unwrap();
+    ran(&[&search[..], &["btn"]].concat());
+    assert!(std::fs::read(out.join("candidates.csv")).unwrap() != first);
+    // The journal of a search that is not finished is kept.
+    std::fs::remove_file(out.join("search.json")).unwrap();
+    refused_with(3, &[&search[..], &["ttc"]].concat(), "belongs to another run");
+}
+
 #[test]
 fn a_folder_holds_the_run_of_one_verb() {
     let dir = tempfile::tempdir().unwrap();

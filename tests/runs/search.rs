@@ -250,13 +250,13 @@ fn a_winner_is_studied_fitted_sampled_and_justified_and_external_s_prime_is_judg
     {
         assert!(of("found").join(name).exists(), "{name}");
     }
-    // S itself as S' of another program.
-    std::fs::copy(of("scenarios.jsonl"), of("same.jsonl")).unwrap();
-    let external = ["--cross-validate", "--external", "same.jsonl", "--external", "found/winner.json"];
+    // S itself as S' of another program, in a file whose name is no key.
+    std::fs::copy(of("scenarios.jsonl"), of("my same.v2.jsonl")).unwrap();
+    let external = ["--cross-validate", "--external", "my same.v2.jsonl", "--external", "found/winner.json"];
     run(&[&["-q", "study", "--categories", "cut-in", "--out", "study"], &data[..], &external[..]].concat());
     let variants = std::fs::read_to_string(of("study/variants.csv")).unwrap();
     let row = |name: &str| variants.lines().find(|line| line.starts_with(&format!("cut-in,{name},"))).unwrap();
-    assert_eq!(row("same"), "cut-in,same,0,1,1,1", "{variants}");
+    assert_eq!(row("my-same-v2"), "cut-in,my-same-v2,0,1,1,1", "{variants}");
     for name in ["5-cv", "winner", "winner-cv"] {
         row(name);
     }

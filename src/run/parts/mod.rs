@@ -11,7 +11,7 @@ mod run_dir;
 mod sealed;
 
 pub use folder::{Found, Part, collect, read_part, read_parts, write_part};
-pub use journal::{Journal, Records};
+pub use journal::{Journal, Records, run_of_journal};
 pub use ledger::{Counted, CountsJournal, Ledger, MergeableCounts};
 pub use run_dir::{PLAN_FILE, RUN_PLAN_FILE, RunDir, RunState, leave_plan, units_of};
 pub use sealed::{kind_of, read_sealed, read_sealed_line, seal, unseal};

@@ -7,8 +7,10 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 
 use super::{Candidate, Evaluated};
-use crate::run::parts::{Journal, Shard};
+use crate::run::parts::{Journal, Shard, run_of_journal};
+use crate::support::input_file;
 use crate::support::lock::FolderLock;
+use crate::support::run_dir::SEARCH_RECORD;
 use crate::{Error, Result};
 
 /// A record: a candidate and its result, `None` for one that cannot be fitted.
@@ -47,9 +49,17 @@ impl Results {
             let listed = listed.flatten().filter_map(|entry| entry.file_name().into_string().ok());
             names.extend(listed.filter(|name| name.starts_with("search-") && name.ends_with(".journal")));
         }
+        let finished = finished_search(folder);
         for name in names {
+            let path = folder.join(&name);
+            // The record has what a finished search found; an unfinished one may continue.
+            if finished.as_deref().is_some_and(|finished| finished != search_sha256)
+                && run_of_journal(&path) == finished
+            {
+                std::fs::remove_file(&path).map_err(|e| Error::io(&path, "remove", e))?;
+            }
             // A result names its candidate; there are no units.
-            let (journal, found) = Journal::open(&folder.join(&name), search_sha256, 0..0)?;
+            let (journal, found) = Journal::open(&path, search_sha256, 0..0)?;
             if found.torn {
                 tracing::warn!("{}: the last record is not whole; it is computed again", journal.path().display());
             }
@@ -97,6 +107,16 @@ impl Results {
     pub fn len(&self) -> usize {
         self.asked.len()
     }
+}
+
+/// Hash of the search whose record is in the folder.
+fn finished_search(folder: &Path) -> Option<String> {
+    #[derive(Deserialize)]
+    struct Record {
+        search_sha256: String,
+    }
+    let text = input_file::read(&folder.join(SEARCH_RECORD), input_file::MAX_TABLE_BYTES).ok()?;
+    serde_json::from_slice::<Record>(&text).ok().map(|record| record.search_sha256)
 }
 
 fn key_of(candidate: &Candidate) -> Result<String> {

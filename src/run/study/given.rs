@@ -26,7 +26,7 @@ pub struct GivenReplay {
 
 impl GivenReplay {
     /// S' of a scenario file of another program: the ids of S, any sample rate and length. The variants have the name of
-    /// the file.
+    /// the file, with - for other characters than letters, digits, - and _.
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Input`] for a damaged file, an unknown or missing id, or a name that is none.
@@ -41,12 +41,15 @@ impl GivenReplay {
         if !problems.is_empty() {
             return Err(problems.swap_remove(0));
         }
-        let key = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
-        let is_plain = |c: char| c.is_ascii_alphanumeric() || c == '-' || c == '_';
+        let stem = path.file_stem().map(|stem| stem.to_string_lossy().into_owned()).unwrap_or_default();
+        // Keys of lanes and names of files have letters, digits, - and _.
+        let key = stem.replace(|c: char| !(c.is_ascii_alphanumeric() || c == '-' || c == '_'), "-");
         let is_taken = Category::ALL.iter().any(|category| Parameterization::find(*category, &key).is_some());
-        if key.is_empty() || key == "S" || key.ends_with(CROSS_VALIDATED) || is_taken || !key.chars().all(is_plain) {
+        if key.is_empty() || key == "S" || key.ends_with(CROSS_VALIDATED) || is_taken {
             let problem = format!("`{key}` cannot name the S' of this file");
-            let help = "name the file with letters, digits, - and _, and not as a parameterization of the paper";
+            let help = format!(
+                "name the file not as S, a parameterization of the paper, or with {CROSS_VALIDATED} at its end"
+            );
             return Err(Error::input(place(), problem, help));
         }
         let known: BTreeMap<&str, &Scenario> = scenarios.iter().map(|s| (s.id.as_str(), s)).collect();
