@@ -5,10 +5,11 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use lanesweep::support::plausibility::Implausible;
 use lanesweep::traffic::mining::{MiningOptions, mine};
-use lanesweep::traffic::trajectory::Inputs;
 use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
 use lanesweep::traffic::trajectory::tracks::{self, Finding, LoadedTracks, Preset, TrackFile, Understanding};
+use lanesweep::traffic::trajectory::{Inputs, Loaded};
 
 use crate::common::exid::Plain;
 
@@ -289,4 +290,71 @@ fn recordings_that_are_short_or_have_few_vehicles_are_not_refused_for_that() {
             is_usable(&format!("vehicle {first}"), &|row| (first..first + 8).contains(&row[0].parse::<i32>().unwrap()));
         }
     }
+}
+
+fn load(path: &Path) -> Vec<Loaded> {
+    let (files, problems) = Inputs::of(path, None).unwrap().files();
+    assert!(problems.is_empty(), "{problems:?}");
+    files.iter().flat_map(|file| file.read(Implausible::Refused).unwrap()).collect()
+}
+
+#[test]
+fn documents_of_json_one_after_the_other_are_all_read() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("t.json");
+    let vehicle = |id: usize| {
+        let x: Vec<String> = (0..40).map(|k| (30 * id + 2 * k).to_string()).collect();
+        let t: Vec<String> = (0..40).map(|k| format!("{:.1}", 0.1 * f64::from(k))).collect();
+        format!(
+            "{{\"id\":{id},\"time\":[{}],\"x\":[{}],\"y\":{},\"length\":4.5}}",
+            t.join(","),
+            x.join(","),
+            4 * (id % 2)
+        )
+    };
+    let list = |ids: std::ops::Range<usize>| format!("[{}]", ids.map(vehicle).collect::<Vec<_>>().join(","));
+    for text in
+        [list(1..10), format!("{}\n{}", list(1..5), list(5..10)), (1..10).map(vehicle).collect::<Vec<_>>().join("\n")]
+    {
+        fs::write(&path, text).unwrap();
+        assert_eq!(load(&path)[0].recording.tracks.len(), 9);
+    }
+    fs::write(&path, format!("{}\n[{}", list(1..5), vehicle(7))).unwrap();
+    let error = Inputs::of(&path, None).unwrap_err();
+    assert!(error.to_string().contains("not JSON"), "{error}");
+}
+
+#[test]
+fn a_draft_is_toml_whatever_the_header_holds() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("own.csv");
+    fs::write(&path, "id,time,x\u{a0}[m],y [m],Spur\u{a0}links,\"a\"\"b\"\n1,0,1,2,3,4\n").unwrap();
+    let draft = tracks::draft(&path).unwrap();
+    let parsed: toml::Table = draft.parse().unwrap();
+    assert_eq!(parsed["columns"]["x"].as_str(), Some("x\u{a0}[m]"), "{draft}");
+}
+
+#[test]
+fn a_hundred_thousand_columns_are_read_and_a_repeated_attribute_is_refused() {
+    let dir = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: String| {
+        let path = dir.path().join(name);
+        fs::write(&path, text).unwrap();
+        path
+    };
+    let of = |one: &dyn Fn(usize) -> String, joint: &str| (0..100_000).map(one).collect::<Vec<_>>().join(joint);
+    let files = [
+        write("a.csv", format!("id,time,x,y,{}\n", of(&|at| format!("c{at}"), ","))),
+        write(
+            "a.xml",
+            format!("<f><timestep time=\"0\"><vehicle {}/></timestep></f>", of(&|at| format!("c{at}=\"1\""), " ")),
+        ),
+        write("a.json", format!("[{{{}}}]", of(&|at| format!("\"c{at}\":1"), ","))),
+    ];
+    for file in &files {
+        let _ = tracks::detect(file);
+        tracks::draft(file).unwrap();
+    }
+    let twice = write("b.xml", "<f><vehicle id=\"1\" id=\"2\"/></f>".to_owned());
+    assert!(tracks::draft(&twice).unwrap_err().to_string().contains("`id` is there twice"));
 }

@@ -5,7 +5,7 @@ use std::path::Path;
 
 use super::preset::Preset;
 use super::roles::Role;
-use super::rows::{Rows, is_same_name};
+use super::rows::{Rows, letters};
 use super::{FileFormat, format_of};
 use crate::support::input_file::unpacked;
 use crate::{Error, Place, Result};
@@ -45,11 +45,11 @@ pub fn draft(path: &Path) -> Result<String> {
     let stem = unpacked(&name).rsplit_once('.').map_or(name.as_str(), |(stem, _)| stem);
     let mut text = format!(
         "# A first preset for {}. Answer each \"?\" and check every line; the chapter on tracks explains the keys.\n\
-         name = {:?}\ntitle = {:?}\nformat = {:?}\n\
+         name = {}\ntitle = {}\nformat = {:?}\n\
          # Point that x and y describe: centre, front, rear, corner.\nreference = \"?\"\n",
-        name,
-        stem,
-        format!("tracks like {stem}"),
+        quoted(&name),
+        quoted(stem),
+        quoted(&format!("tracks like {stem}")),
         match format {
             FileFormat::Csv => "csv",
             FileFormat::Parquet => "parquet",
@@ -58,20 +58,25 @@ pub fn draft(path: &Path) -> Result<String> {
             FileFormat::Commonroad => "commonroad",
         }
     );
+    let guesses: Vec<[String; 3]> = rows.header().iter().map(|header| guesses(header)).collect();
     let mut used: Vec<&str> = Vec::new();
     let mut columns = String::new();
     let mut missing: Vec<&str> = Vec::new();
     for role in Role::ALL {
         let Some(column) = generic.columns.get(&role) else { continue };
-        let find = |name: &String| rows.header().iter().find(|header| is_guess(header, name));
+        let find = |name: &String| {
+            let name = letters(name);
+            guesses.iter().position(|guesses| guesses.contains(&name)).map(|at| &rows.header()[at])
+        };
         match column.names().iter().find_map(find) {
             Some(header) if !used.contains(&header.as_str()) => {
                 used.push(header);
                 let lower = header.to_lowercase();
                 let unit = UNITS.iter().find(|(sign, unit)| lower.contains(sign) && fits(role, unit));
+                let name = quoted(header);
                 let _ = match unit {
-                    Some((_, unit)) => writeln!(columns, "{} = {{ name = {header:?}, unit = {unit:?} }}", role.key()),
-                    None => writeln!(columns, "{} = {header:?}", role.key()),
+                    Some((_, unit)) => writeln!(columns, "{} = {{ name = {name}, unit = {unit:?} }}", role.key()),
+                    None => writeln!(columns, "{} = {name}", role.key()),
                 };
             }
             _ => missing.push(role.key()),
@@ -92,12 +97,8 @@ pub fn draft(path: &Path) -> Result<String> {
             let _ = writeln!(text, "{key} = \"?\"  # no usual name was recognized: name the column{or}");
         }
     }
-    let unused: Vec<String> = rows
-        .header()
-        .iter()
-        .filter(|header| !used.contains(&header.as_str()))
-        .map(|name| format!("{name:?}"))
-        .collect();
+    let unused: Vec<String> =
+        rows.header().iter().filter(|header| !used.contains(&header.as_str())).map(|name| quoted(name)).collect();
     if !unused.is_empty() {
         let _ = writeln!(text, "# Not used: {}", unused.join(", "));
     }
@@ -130,16 +131,16 @@ fn fits(role: Role, unit: &str) -> bool {
     }
 }
 
-/// Whether a column looks like a name: equal, or with a unit in brackets or after a mark.
-fn is_guess(header: &str, name: &str) -> bool {
-    if is_same_name(header, name) {
-        return true;
-    }
+/// A text between quotation marks as TOML has it, on one line: as JSON, which leaves one character that TOML forbids.
+fn quoted(text: &str) -> String {
+    serde_json::Value::from(text).to_string().replace('\u{7f}', "\\u007f")
+}
+
+/// What a column may be named: its name, without a unit in brackets, without one after a mark.
+fn guesses(header: &str) -> [String; 3] {
     let bare = header.split(['[', '(']).next().unwrap_or(header).trim();
-    let without_unit = |text: &str| {
-        let lower = text.to_lowercase();
-        let units = ["_kmh", "_mps", "_kph", "_mph", "_deg", "_rad", "_ms", "_ft", "_cm", "_mm", "_m", "_s"];
-        units.iter().find_map(|unit| lower.strip_suffix(unit).map(str::to_owned)).unwrap_or(lower)
-    };
-    is_same_name(bare, name) || is_same_name(&without_unit(bare), name)
+    let lower = bare.to_lowercase();
+    let units = ["_kmh", "_mps", "_kph", "_mph", "_deg", "_rad", "_ms", "_ft", "_cm", "_mm", "_m", "_s"];
+    let without_unit = units.iter().find_map(|unit| lower.strip_suffix(unit)).unwrap_or(&lower);
+    [letters(header), letters(bare), letters(without_unit)]
 }

@@ -1,5 +1,6 @@
 //! Rows of XML and JSON files: the attributes of elements, the objects of a list.
 
+use std::collections::HashSet;
 use std::io::{BufReader, Read};
 use std::path::Path;
 
@@ -95,35 +96,42 @@ impl<R: Read> Read for LimitedLine<R> {
 
 fn attributes(start: &BytesStart) -> std::result::Result<Vec<(String, String)>, String> {
     let mut found = Vec::new();
-    for attribute in start.attributes() {
+    let mut names = HashSet::new();
+    // Its own check of repeated names compares each with each.
+    for attribute in start.attributes().with_checks(false) {
         let attribute = attribute.map_err(|error| error.to_string())?;
         let value = attribute.normalized_value(XmlVersion::Implicit1_0).map_err(|error| error.to_string())?;
-        found.push((attribute.key.as_ref().to_owned(), value.into_owned()));
+        let name = attribute.key.as_ref().to_owned();
+        if !names.insert(name.clone()) {
+            return Err(format!("the attribute `{name}` is there twice"));
+        }
+        found.push((name, value.into_owned()));
     }
     Ok(found)
 }
 
-/// The objects of a JSON file: of the list under a key, or of the list that the file is, or one per line.
+/// The objects of a JSON file: of the list under a key, or of the list that the file is, or one per line; of every document, where
+/// several stand one after the other.
 pub(super) fn json_rows(path: &Path, key: Option<&str>) -> Result<Vec<serde_json::Map<String, Value>>> {
     let text = input_file::read_unpacked(path, MAX_JSON_BYTES)?;
     let wrong = |problem: String| Error::input(Place::file(path), problem, "export the file again");
-    let mut values = serde_json::Deserializer::from_slice(&text).into_iter::<Value>();
-    let first = values.next().ok_or_else(|| wrong("the file is empty".to_owned()))?;
-    let first = first.map_err(|error| wrong(format!("not JSON: {error}")))?;
-    let list = match first {
-        Value::Array(list) => list,
-        Value::Object(mut object) => match key.and_then(|key| object.remove(key)) {
-            Some(Value::Array(list)) => list,
-            Some(_) => return Err(wrong(format!("`{}` is no list", key.unwrap_or_default()))),
-            None => {
-                let rest: std::result::Result<Vec<Value>, _> = values.collect();
-                let mut list = vec![Value::Object(object)];
-                list.extend(rest.map_err(|error| wrong(format!("not JSON: {error}")))?);
-                list
-            }
-        },
-        _ => return Err(wrong("expected a list of vehicles".to_owned())),
-    };
+    let mut list = Vec::new();
+    let mut is_empty = true;
+    for document in serde_json::Deserializer::from_slice(&text).into_iter::<Value>() {
+        is_empty = false;
+        match document.map_err(|error| wrong(format!("not JSON: {error}")))? {
+            Value::Array(vehicles) => list.extend(vehicles),
+            Value::Object(mut object) => match key.and_then(|key| object.remove(key)) {
+                Some(Value::Array(vehicles)) => list.extend(vehicles),
+                Some(_) => return Err(wrong(format!("`{}` is no list", key.unwrap_or_default()))),
+                None => list.push(Value::Object(object)),
+            },
+            _ => return Err(wrong("expected a list of vehicles".to_owned())),
+        }
+    }
+    if is_empty {
+        return Err(wrong("the file is empty".to_owned()));
+    }
     let object = |value| match value {
         Value::Object(object) => Ok(object),
         _ => Err(wrong("a vehicle is not an object".to_owned())),

@@ -3,7 +3,7 @@
 
 use std::borrow::Cow;
 use std::cell::Cell;
-use std::collections::{BTreeMap, HashSet};
+use std::collections::{BTreeMap, HashMap, HashSet};
 use std::path::{Path, PathBuf};
 
 use serde_json::Value;
@@ -97,9 +97,18 @@ impl Columns {
     pub fn of(named: &BTreeMap<Role, ColumnName>, header: &[String], none: &[String]) -> Columns {
         let mut at = [None; Role::ALL.len()];
         let mut has_time_unit = false;
+        let names = named.values().flat_map(ColumnName::names);
+        let mut by_letters: HashMap<String, Option<usize>> = names.map(|name| (letters(name), None)).collect();
+        let mut column_letters = String::new();
+        for (at, column) in header.iter().enumerate() {
+            column_letters.clear();
+            column_letters.extend(each_letter(column));
+            if let Some(position @ None) = by_letters.get_mut(&column_letters) {
+                *position = Some(at);
+            }
+        }
         for (role, column) in named {
-            let position = |name: &String| header.iter().position(|column| is_same_name(column, name));
-            let place = column.names().iter().find_map(position);
+            let place = column.names().iter().find_map(|name| by_letters[&letters(name)]);
             at[*role as usize] = place.zip(column.factor(*role));
             has_time_unit |= *role == Role::Time
                 && (column.unit().is_some_and(|unit| unit != "date") || column.factor(*role) != Some(1.0));
@@ -152,12 +161,13 @@ impl Columns {
     }
 }
 
-/// Whether a column has this name; case, blanks, `_` and `-` do not count.
-pub(super) fn is_same_name(column: &str, name: &str) -> bool {
-    let letters = |text: &str| -> Vec<char> {
-        text.chars().filter(|c| !matches!(c, ' ' | '_' | '-')).flat_map(char::to_lowercase).collect()
-    };
-    column == name || letters(column) == letters(name)
+/// A name without what does not count in it: case, blanks, `_` and `-`.
+pub(super) fn letters(text: &str) -> String {
+    each_letter(text).collect()
+}
+
+fn each_letter(text: &str) -> impl Iterator<Item = char> {
+    text.chars().filter(|c| !matches!(c, ' ' | '_' | '-')).flat_map(char::to_lowercase)
 }
 
 /// One sample of one vehicle.
@@ -206,14 +216,11 @@ impl Rows {
             }
             FileFormat::Xml => {
                 let row = rows.unwrap_or("vehicle").to_owned();
-                let mut header: Vec<String> = Vec::new();
+                let (mut header, mut known) = (Vec::new(), HashSet::new());
                 let mut seen = 0;
                 each_element(path, &row, &mut |names, _| {
-                    for (name, _) in names {
-                        if !header.contains(name) {
-                            header.push(name.clone());
-                        }
-                    }
+                    let new = names.iter().filter(|(name, _)| known.insert(name.clone()));
+                    header.extend(new.map(|(name, _)| name.clone()));
                     seen += 1;
                     Ok(seen < XML_HEADER_ROWS)
                 })?;
@@ -221,12 +228,9 @@ impl Rows {
             }
             FileFormat::Json => {
                 let list = json_rows(path, rows)?;
-                let mut header: Vec<String> = Vec::new();
-                for name in list.iter().take(100).flat_map(|row| row.keys()) {
-                    if !header.contains(name) {
-                        header.push(name.clone());
-                    }
-                }
+                let mut known = HashSet::new();
+                let names = list.iter().take(100).flat_map(|row| row.keys());
+                let header = names.filter(|name| known.insert(name.as_str())).cloned().collect();
                 (header, RowSource::Json(list))
             }
             FileFormat::Commonroad => {
@@ -620,7 +624,7 @@ mod tests {
 
     #[test]
     fn names_are_compared_without_case_and_marks() {
-        assert!(is_same_name("Vehicle-ID", "vehicle_id") && is_same_name("xloc_kf", "XLoc KF"));
-        assert!(!is_same_name("vehicle_idx", "vehicle_id"));
+        assert!(letters("Vehicle-ID") == letters("vehicle_id") && letters("xloc_kf") == letters("XLoc KF"));
+        assert!(letters("vehicle_idx") != letters("vehicle_id"));
     }
 }
