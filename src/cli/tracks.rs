@@ -9,7 +9,9 @@ use super::Exit;
 use super::configured::Configured;
 use super::format::FormatFlag;
 use crate::report::tracks::{TrackReport, across, space_time};
+use crate::scenario::usable;
 use crate::support::files::{check_folder, write_atomically};
+use crate::support::plausibility::Implausible;
 use crate::support::run_dir::{OutputDir, unfinished};
 use crate::support::table::{Table, TableMetadata};
 use crate::traffic::mining::{CategoryCount, counts, mine, noise_notes};
@@ -123,7 +125,7 @@ impl Tracks {
         // Found and kept scenarios, and what noise may do to them.
         let mined_of = |recording: &Recording| -> (Vec<CategoryCount>, Vec<String>) {
             let options = &configured.settings.mining;
-            let scenarios = mine(recording, options).scenarios;
+            let scenarios = usable(mine(recording, options).scenarios, Implausible::Refused).scenarios;
             (counts(&scenarios).to_vec(), noise_notes(recording, &scenarios, options))
         };
         let is_detected = self.preset.is_none();
@@ -252,7 +254,7 @@ fn convert_to_highd(to: &Path, reports: &[TrackReport], recordings: &[Recording]
         results.add(SYNTHETIC_MARKER, b"SYNTHETIC DATA: converted from generated recordings\n")?;
     }
     let converted = recordings.iter().zip(&names).zip(reports).map(|((recording, id), report)| {
-        serde_json::json!({"recording": id, "of": recording.id, "file": report.file, "vehicles_renumbered": report.understanding.renumbered})
+        serde_json::json!({"recording": id, "of": recording.id, "file": report.file, "vehicle_names": report.understanding.vehicle_names})
     });
     let record = serde_json::json!({
         "program": format!("lanesweep {}", env!("CARGO_PKG_VERSION")),

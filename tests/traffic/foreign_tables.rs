@@ -6,12 +6,12 @@ use std::fs;
 use std::path::Path;
 
 use lanesweep::support::plausibility::Implausible;
-use lanesweep::traffic::mining::{MiningOptions, mine};
+use lanesweep::traffic::mining::{MiningOptions, mine, mine_folder};
 use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
 use lanesweep::traffic::trajectory::tracks::{self, Finding, LoadedTracks, Preset, TrackFile, Understanding};
-use lanesweep::traffic::trajectory::{Inputs, Loaded};
+use lanesweep::traffic::trajectory::{Inputs, Loaded, VehicleClass};
 
-use crate::common::exid::Plain;
+use crate::common::exid::{self, Plain};
 
 fn table() -> Plain {
     table_of(GeneratorOptions::default().seed)
@@ -115,13 +115,13 @@ fn two_columns_of_one_name_are_refused() {
     let mut twice = table();
     let at = twice.at("y");
     twice.header[at] = "x".to_owned();
-    let error = understood(&twice, &|_| ()).unwrap_err();
+    let error = understood(&twice).unwrap_err();
     assert!(error.to_string().contains("two columns are named `x`"), "{error}");
     // Columns without a name are never read.
     let mut unnamed = table();
     unnamed.header.extend([String::new(), String::new()]);
     unnamed.rows.iter_mut().for_each(|row| row.extend([String::new(), String::new()]));
-    assert!(understood(&unnamed, &|_| ()).unwrap().is_usable());
+    assert!(understood(&unnamed).unwrap().is_usable());
 }
 
 #[test]
@@ -158,9 +158,9 @@ fn one_empty_speed_costs_one_track_its_speeds_and_no_other() {
     let mut table = table();
     let vx = table.at("vx");
     table.rows[7][vx] = String::new();
-    let about = understood(&table, &|_| ()).unwrap();
+    let about = understood(&table).unwrap();
     let speed = table.without(&["speed"]);
-    let without = understood(&speed, &|_| ()).unwrap();
+    let without = understood(&speed).unwrap();
     // The speed without direction takes its place where there is one.
     assert_eq!((about.derived_speeds, without.derived_speeds), (0, 1));
     assert_eq!(without.derived_lateral, 1);
@@ -299,6 +299,33 @@ fn load(path: &Path) -> Vec<Loaded> {
 }
 
 #[test]
+fn a_meta_file_names_a_vehicle_as_a_number_however_it_is_written() {
+    let dir = tempfile::tempdir().unwrap();
+    let options = GeneratorOptions { recordings: 1, ..GeneratorOptions::default() };
+    let mut recording = generate_one(&options, 0).unwrap();
+    recording.tracks.truncate(60);
+    exid::write(dir.path(), &recording, f64::INFINITY);
+    let file = dir.path().join(format!("{}_tracksMeta.csv", recording.id));
+    let meta = fs::read_to_string(&file).unwrap();
+    let lorries = recording.tracks.iter().filter(|track| track.class == VehicleClass::Truck).count();
+    assert!(lorries > 0);
+    let read = |meta: &str| {
+        fs::write(&file, meta).unwrap();
+        let loaded = load(dir.path()).remove(0);
+        let lorries = loaded.recording.tracks.iter().filter(|track| track.class == VehicleClass::Truck).count();
+        (lorries, loaded.notes.into_iter().find(|note| note.contains("tracksMeta")))
+    };
+    assert_eq!(read(&meta), (lorries, None));
+    assert_eq!(read(&meta.replace("\n0,", "\n0,0000")), (lorries, None));
+    let (_, note) = read(&meta.lines().take(31).collect::<Vec<_>>().join("\n"));
+    assert!(note.unwrap().starts_with("30 vehicles have no row in"));
+    fs::remove_file(&file).unwrap();
+    let without = load(dir.path()).remove(0);
+    let note = without.notes.iter().find(|note| note.contains("tracksMeta")).unwrap();
+    assert!(note.contains("class") && note.contains("not beside the tracks"), "{note}");
+}
+
+#[test]
 fn documents_of_json_one_after_the_other_are_all_read() {
     let dir = tempfile::tempdir().unwrap();
     let path = dir.path().join("t.json");
@@ -322,6 +349,39 @@ fn documents_of_json_one_after_the_other_are_all_read() {
     fs::write(&path, format!("{}\n[{}", list(1..5), vehicle(7))).unwrap();
     let error = Inputs::of(&path, None).unwrap_err();
     assert!(error.to_string().contains("not JSON"), "{error}");
+}
+
+#[test]
+fn recordings_with_names_that_differ_little_stay_apart() {
+    let dir = tempfile::tempdir().unwrap();
+    let text = table().text();
+    fs::write(dir.path().join("a.csv"), &text).unwrap();
+    fs::write(dir.path().join("a.txt"), &text).unwrap();
+    let ids = |path: &Path| load(path).into_iter().map(|of| of.recording.id).collect::<Vec<_>>();
+    assert_eq!(ids(dir.path()), ["a.csv", "a.txt"]);
+    // A text beside the tracks takes no name from them.
+    fs::write(dir.path().join("a.txt"), "Traffic of a bridge, in May, by us\n").unwrap();
+    assert_eq!(ids(dir.path()), ["a"]);
+    let mut names = table();
+    names.header.push("recording".to_owned());
+    let half = names.rows.len() / 2;
+    let mut named = |of: [&str; 2]| {
+        for (at, row) in names.rows.iter_mut().enumerate() {
+            row.truncate(names.header.len() - 1);
+            row.push(of[usize::from(at >= half)].to_owned());
+        }
+        names.text()
+    };
+    let path = dir.path().join("b.csv");
+    fs::write(&path, named(["x y", "x/y"])).unwrap();
+    assert_eq!(ids(&path), ["b-x-y", "b-x-y-2"]);
+    // Two files with one name for a recording: the second is left out and named.
+    fs::remove_file(dir.path().join("a.csv")).unwrap();
+    fs::write(&path, named(["c-d", "e"])).unwrap();
+    fs::write(dir.path().join("b-c.csv"), named(["d", "f"])).unwrap();
+    let mined = mine_folder(dir.path(), &MiningOptions::default(), Implausible::Refused, || Ok(())).unwrap();
+    assert_eq!((mined.recordings.len(), mined.problems.len()), (3, 1));
+    assert!(mined.problems[0].to_string().contains("b-c-d"), "{:?}", mined.problems);
 }
 
 #[test]

@@ -15,4 +15,5 @@ mod mining_activities;
 mod mining_claims;
 mod mining_recordings;
 mod noise;
+mod sumo_and_ngsim;
 mod tracks;

@@ -2,7 +2,7 @@
 
 use std::collections::{HashMap, HashSet};
 
-use super::check::{Problem, admit};
+use super::check::{Problem, admit, name};
 use super::{Category, Scenario};
 use crate::support::error::{Error, Place, Result};
 use crate::support::plausibility::{Doubts, Implausible};
@@ -133,6 +133,19 @@ impl ScenariosRead {
         notes.extend(lateral_notes(&self.scenarios));
         Ok(ScenarioFile { scenarios: self.scenarios, problems: self.problems, notes })
     }
+}
+
+/// Mined scenarios by the rules for those of files: usable ones, errors of the others, and doubts.
+pub fn usable(scenarios: Vec<Scenario>, implausible: Implausible) -> ScenarioFile {
+    let mut read = ScenariosRead::new(implausible, "give every recording a name of its own");
+    for (row, scenario) in scenarios.into_iter().enumerate() {
+        let of = Place::item(name(&scenario.id));
+        read.take(scenario, row as u64 + 1, "scenario", |field| of.clone().column(field));
+    }
+    read.scenarios.retain(|scenario| !read.doubled.contains(&scenario.id));
+    let mut notes = read.doubts.sentences();
+    notes.extend(lateral_notes(&read.scenarios));
+    ScenarioFile { scenarios: read.scenarios, problems: read.problems, notes }
 }
 
 /// Maximum lateral motion that is not counted as a contradiction, m.

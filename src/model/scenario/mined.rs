@@ -4,6 +4,8 @@
 //! over [frame0, frame1]. `y` is relative to the centre of the ego's lane, and positive on the side the principal
 //! vehicle comes from (cut-in) or leaves to (cut-out).
 
+use std::fmt::Display;
+
 use serde::{Deserialize, Serialize};
 
 use super::parameterization::ReducedScenario;
@@ -54,10 +56,15 @@ pub struct Other {
     pub y: Vec<f64>,
 }
 
+/// The id of a mined scenario: `{recording}_{category}_{ego}_{target}_{frame0}`.
+pub fn mined_id(recording: &str, category: Category, ego: &dyn Display, target: &dyn Display, frame0: i64) -> String {
+    format!("{recording}_{}_{ego}_{target}_{frame0}", category.key())
+}
+
 /// One mined scenario. Unknown fields of a file are ignored; optional ones may be absent.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Scenario {
-    /// Stable key: `{recording}_{category}_{ego}_{target}_{frame0}`.
+    /// Stable key: [`mined_id`].
     pub id: String,
     /// Kind of scenario.
     pub category: Category,

@@ -27,8 +27,8 @@ pub use check::problem_of;
 pub use file::{
     check_scenario_file, read_scenario_file, read_scenarios, scenario_columns, write_scenarios, write_scenarios_to,
 };
-pub use found::ScenarioFile;
-pub use mined::{Ego, Other, Scenario, Side};
+pub use found::{ScenarioFile, usable};
+pub use mined::{Ego, Other, Scenario, Side, mined_id};
 pub use parameter_table::{CaseRow, ParameterRows, RowPlace};
 pub use provenance::{DataProvenance, Driven};
 pub use units::{Unusable, Written, si};

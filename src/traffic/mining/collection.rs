@@ -1,6 +1,7 @@
 //! Many recordings at once: read and mined in parallel, one file per thread in memory at a time and as many as memory may
 //! hold, the result in the recordings' order. A recording that cannot be read is reported; the others are used.
 
+use std::collections::HashSet;
 use std::path::Path;
 use std::sync::{Condvar, Mutex, PoisonError};
 
@@ -10,12 +11,12 @@ use serde::{Deserialize, Serialize};
 use super::miner::{CategoryCount, Mined, mine};
 use super::noise::noise_notes;
 use super::options::MiningOptions;
-use crate::scenario::{Category, Scenario};
+use crate::scenario::{Category, Scenario, ScenarioFile, mined_id, usable};
 use crate::support::plausibility::Implausible;
 use crate::support::readable;
 use crate::traffic::trajectory::generator::{GeneratorOptions, generate_one};
 use crate::traffic::trajectory::{FileChecksum, InputFile, Inputs, Loaded, Recording};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 /// Results of one recording.
 #[derive(Debug, Clone, Serialize, Deserialize)]
@@ -58,6 +59,7 @@ pub struct Collection {
 
 impl Collection {
     fn add(&mut self, part: MinedPart) {
+        self.problems.extend(part.problems);
         self.notes.extend(part.notes);
         self.synthetic |= part.synthetic;
         self.scenarios.extend(part.mined.scenarios);
@@ -86,6 +88,9 @@ pub fn counts_text(counts: &[CategoryCount]) -> String {
     };
     format!("kept: {}", Category::ALL.into_iter().zip(counts).map(part).collect::<Vec<_>>().join(", "))
 }
+
+/// Names of vehicles that are longer have their number in ids.
+const MAX_NAME_BYTES: usize = 64;
 
 /// Maximum size of the files that are read at a time, bytes, unless one is larger: a recording takes about as much memory as
 /// its file has bytes.
@@ -140,6 +145,7 @@ impl Drop for Turn<'_> {
 struct MinedPart {
     mined: Mined,
     summary: RecordingSummary,
+    problems: Vec<Error>,
     notes: Vec<String>,
     synthetic: bool,
 }
@@ -172,13 +178,16 @@ pub fn mine_inputs(
     let preset = inputs.preset().map(|preset| format!("{} (sha256 {})", preset.name, preset.sha256));
     let (files, problems) = inputs.files();
     let part = |loaded: Loaded| {
-        let mined = mine(&loaded.recording, options);
+        let mut mined = mine(&loaded.recording, options);
+        mined.scenarios.iter_mut().for_each(|scenario| name_as_in_file(scenario, &loaded));
+        let ScenarioFile { scenarios, problems, notes: doubts } = usable(mined.scenarios, implausible);
+        mined.scenarios = scenarios;
         let mut summary = summary(&loaded.recording, &mined, options, loaded.checksum_sha256);
         summary.preset.clone_from(&preset);
         let name = |note: String| format!("recording {}: {note}", loaded.recording.id);
         let of_noise = noise_notes(&loaded.recording, &mined.scenarios, options);
-        let notes = loaded.notes.into_iter().chain(of_noise).map(name).collect();
-        MinedPart { mined, summary, notes, synthetic: loaded.recording.synthetic }
+        let notes = loaded.notes.into_iter().chain(doubts).chain(of_noise).map(name).collect();
+        MinedPart { mined, summary, problems, notes, synthetic: loaded.recording.synthetic }
     };
     let turns = Turns::default();
     // The outer error ends the work; an inner one leaves out a file.
@@ -193,9 +202,20 @@ pub fn mine_inputs(
         })
         .collect();
     let mut collection = Collection { problems, ..Collection::default() };
+    let mut names = HashSet::new();
     for parts in parts? {
         match parts {
-            Ok(parts) => parts.into_iter().for_each(|part| collection.add(part)),
+            Ok(parts) => {
+                for part in parts {
+                    if names.insert(part.summary.id.clone()) {
+                        collection.add(part);
+                        continue;
+                    }
+                    let place = Place::item(format!("recording {}", part.summary.id));
+                    let problem = "another file has a recording of this name";
+                    collection.problems.push(Error::input(place, problem, "rename one of the files"));
+                }
+            }
             Err(error) => collection.problems.push(error),
         }
     }
@@ -203,6 +223,23 @@ pub fn mine_inputs(
         return Err(collection.problems.swap_remove(0));
     }
     Ok(collection)
+}
+
+/// Gives a scenario the frames of its file, and an id with the names of its vehicles there.
+fn name_as_in_file(scenario: &mut Scenario, loaded: &Loaded) {
+    if let Some([zero, step]) = loaded.file_frames {
+        let frames = [&mut scenario.frame0, &mut scenario.frame1].into_iter().chain(&mut scenario.frame_switch);
+        frames.chain(scenario.tag_frames.iter_mut().flatten()).for_each(|frame| *frame = zero + step * *frame);
+    }
+    let name = |id: u32| match loaded.vehicle_names.get(&id) {
+        // A slash separates the parts of a lane's key.
+        Some(name) if name.len() <= MAX_NAME_BYTES => {
+            name.replace(|c: char| c == '/' || c == '\\' || c.is_whitespace() || c.is_control(), "-")
+        }
+        _ => id.to_string(),
+    };
+    let (ego, target) = (name(scenario.ego_id), name(scenario.target_id));
+    scenario.id = mined_id(&scenario.recording, scenario.category, &ego, &target, scenario.frame0);
 }
 
 /// Generates and mines synthetic recordings. `done` is called after each one, from any thread; its error ends the work.
@@ -223,7 +260,8 @@ pub fn mine_generated(
             let mined = mine(&recording, options);
             let summary = summary(&recording, &mined, options, Vec::new());
             done()?;
-            Ok(MinedPart { mined, summary, notes: Vec::new(), synthetic: recording.synthetic })
+            let (problems, notes) = (Vec::new(), Vec::new());
+            Ok(MinedPart { mined, summary, problems, notes, synthetic: recording.synthetic })
         })
         .collect::<Result<_>>()?;
     let mut collection = Collection::default();

@@ -6,7 +6,7 @@
 
 use super::options::{MiningOptions, TOLERANCE};
 use super::tags::{Activities, Tags};
-use crate::scenario::{Category, Ego, Other, Scenario, Side};
+use crate::scenario::{Category, Ego, Other, Scenario, Side, mined_id};
 use crate::traffic::trajectory::{Carriageway, Lane, NO_LANE, Recording, Track};
 
 /// A recording with its activities and neighbours, which are computed once.
@@ -194,9 +194,9 @@ impl FoundScenario<'_> {
         let v0 = speed(ego.v_s_mps[self.start]);
         let gap0 = micrometres(self.set.gap_m(self.start, self.target, first));
         let frame0 = self.frame(self.start);
-        let (recording, key) = (&recording_tags.recording.id, self.category.key());
+        let recording = &recording_tags.recording.id;
         Some(Scenario {
-            id: format!("{recording}_{key}_{}_{}_{frame0}", ego.id, self.target.id),
+            id: mined_id(recording, self.category, &ego.id, &self.target.id, frame0),
             category: self.category,
             recording: recording.clone(),
             ego_id: ego.id,

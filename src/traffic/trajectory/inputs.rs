@@ -148,7 +148,8 @@ impl Inputs {
             Inputs::Highd(inventory) => {
                 (inventory.recordings.into_iter().map(InputFile::Highd).collect(), inventory.problems)
             }
-            Inputs::Tracks { files, problems, preset } => {
+            Inputs::Tracks { mut files, problems, preset } => {
+                tracks::keep_apart(&mut files);
                 (files.into_iter().map(|file| InputFile::Tracks(file, preset.clone())).collect(), problems)
             }
         }

@@ -6,6 +6,8 @@
 //! In the ego-centric view of a recording every vehicle is ego once and sees the vehicles around it on its
 //! carriageway, up to a fixed distance before its final position.
 
+use std::collections::BTreeMap;
+
 use super::csv_table::FileChecksum;
 
 /// One recording: a stretch of road over a period of time.
@@ -36,6 +38,10 @@ pub struct Loaded {
     pub bytes: u64,
     /// Warnings about the data, as sentences.
     pub notes: Vec<String>,
+    /// Names in the file of the vehicles that have another number.
+    pub vehicle_names: BTreeMap<u32, String>,
+    /// The frame of the file at frame 0 of the recording, and frames of the file per frame; `None` if they are the same.
+    pub file_frames: Option<[i64; 2]>,
 }
 
 /// One direction of travel with its lanes.

@@ -1,5 +1,6 @@
 //! Reads one recording's three files into the internal model, in one pass, from the needed columns only.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
 use super::format::{FRAME_LIMIT, TRACKS_COLUMNS, csv_format};
@@ -63,7 +64,7 @@ pub fn read_checked(files: &HighdFiles, implausible: Implausible) -> Result<Load
         notes.push(problem);
     }
     let bytes = checksum_sha256.iter().map(|file| file.bytes).sum();
-    Ok(Loaded { recording, checksum_sha256, rows, bytes, notes })
+    Ok(Loaded { recording, checksum_sha256, rows, bytes, notes, vehicle_names: BTreeMap::new(), file_frames: None })
 }
 
 struct TrackColumns {

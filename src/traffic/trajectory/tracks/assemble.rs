@@ -1,5 +1,7 @@
 //! From what a file says to a [`Recording`]: pieces on the road, lanes, speeds.
 
+use std::collections::{BTreeMap, HashSet};
+
 use super::boxes::{Sized, centre, is_ignored, sized};
 use super::directions::{describe_road, oncoming_left_m, road};
 use super::lanes::{LaneSource, Lateral, lane_lines, lines_of_map};
@@ -8,6 +10,7 @@ use super::preset::{Preset, Reference, Side};
 use super::raw::{NO_LABEL, RawRecording, RawSample, RawVehicle};
 use super::road::{OnRoad, Path, RoadLine, cross, dot, median};
 use super::roles::Role;
+use super::samples::Samples;
 use super::smooth::{central, savitzky_golay};
 use super::understanding::{Comparison, Understanding, UnderstoodCarriageway};
 use crate::traffic::trajectory::{Carriageway, NO_LANE, Recording, Track};
@@ -45,6 +48,7 @@ pub(super) fn assemble(
     about.unused = unused.to_vec();
     about.reference = preset.reference;
     about.note_classes(&raw, preset);
+    std::mem::take(&mut raw.notes).into_iter().for_each(|note| about.find(false, note));
     let before = raw.vehicles.len();
     raw.vehicles.retain(|vehicle| !is_ignored(vehicle, preset));
     about.ignored = (before - raw.vehicles.len()) as u64;
@@ -108,7 +112,8 @@ pub(super) fn assemble(
     }
     order_sideways(&mut carriageways, &mut placed);
     let ids = ids(&placed, &raw.vehicles);
-    about.renumbered = ids.iter().zip(&placed).any(|(id, of)| raw.vehicles[of.piece.vehicle].key != id.to_string());
+    about.vehicle_names = names_in_file(&ids, &placed, &raw.vehicles);
+    about.file_frames = file_frames(&placed, raw.has_frames);
     let mut tracks: Vec<Track> = Vec::with_capacity(placed.len());
     about.label_mismatch = label_mismatch(&placed, &carriageways, index);
     about.heading_facts = if has_heading { heading_facts(&placed, &lines, rate_hz) } else { None };
@@ -217,21 +222,41 @@ fn ids(placed: &[Placed], vehicles: &[RawVehicle]) -> Vec<u32> {
     let own = |key: &str| key.parse::<u32>().ok().filter(|id| *id < u32::MAX / 2 && id.to_string() == key);
     let all_numbers = vehicles.iter().all(|vehicle| own(&vehicle.key).is_some());
     let mut next = if all_numbers { vehicles.iter().filter_map(|v| own(&v.key)).max().unwrap_or(0) } else { 0 };
-    let mut seen = vec![false; vehicles.len()];
+    let mut seen = HashSet::new();
     let mut fresh = || {
         next += 1;
         next
     };
     placed
         .iter()
-        .map(|of| {
-            let is_first = !std::mem::replace(&mut seen[of.piece.vehicle], true);
-            match own(&vehicles[of.piece.vehicle].key) {
-                Some(id) if all_numbers && is_first => id,
-                _ => fresh(),
-            }
+        .map(|of| match own(&vehicles[of.piece.vehicle].key) {
+            Some(id) if all_numbers && seen.insert(id) => id,
+            _ => fresh(),
         })
         .collect()
+}
+
+/// The names of vehicles that the file names otherwise, by their numbers.
+fn names_in_file(ids: &[u32], placed: &[Placed], vehicles: &[RawVehicle]) -> BTreeMap<u32, String> {
+    let key = |of: &Placed| vehicles[of.piece.vehicle].key.clone();
+    ids.iter().zip(placed).map(|(id, of)| (*id, key(of))).filter(|(id, key)| *key != id.to_string()).collect()
+}
+
+/// Frames of the file as those of the recording: that of its frame 0, and frames per frame. `None` if the file has no frames, or
+/// they do not fit its times.
+fn file_frames(placed: &[Placed], has_frames: bool) -> Option<[i64; 2]> {
+    let of = |samples: &Samples, k: usize| if has_frames { samples.at(k) } else { samples.other_clock(k) };
+    let longest = &placed.iter().max_by_key(|of| of.piece.samples.len())?.piece;
+    let last = longest.samples.len().checked_sub(1)?;
+    let first = of(&longest.samples, 0);
+    let per_frame = ((of(&longest.samples, last) - first) / last as f64).round();
+    let zero = (first - per_frame * longest.first_frame as f64).round();
+    let fits = |of_track: &Placed| {
+        let piece = &of_track.piece;
+        let expected = |k: usize| zero + per_frame * (piece.first_frame + k as i64) as f64;
+        (0..piece.samples.len()).all(|k| (of(&piece.samples, k) - expected(k)).abs() <= 0.5)
+    };
+    (per_frame >= 1.0 && placed.iter().all(fits)).then_some([zero as i64, per_frame as i64])
 }
 
 /// Whether every sample has the value.
@@ -319,7 +344,6 @@ fn track(
 
 /// Fraction of the samples whose named lane is not the one that their position is in.
 fn label_mismatch(placed: &[Placed], carriageways: &[Carriageway], index: [usize; 2]) -> Option<f64> {
-    use std::collections::BTreeMap;
     // Which lane a name usually is.
     let mut counts: BTreeMap<(usize, u32), BTreeMap<Option<usize>, u64>> = BTreeMap::new();
     for of in placed {

@@ -34,14 +34,7 @@ pub(super) struct Sized {
 
 /// The box of a piece of a vehicle's track.
 pub(super) fn sized(piece: &Piece, vehicle: &RawVehicle, preset: &Preset) -> Sized {
-    let (first, last) = (piece.samples.at(0), piece.samples.at(piece.samples.len() - 1));
-    let here = |sizes: &[(f64, f64)]| -> Vec<f64> {
-        let is_here = |k: usize| sizes[k].0 <= last && sizes.get(k + 1).is_none_or(|(next, _)| *next > first);
-        let here: Vec<f64> = (0..sizes.len()).filter(|k| is_here(*k)).map(|k| sizes[k].1).collect();
-        // Rows that are not in the order of time.
-        if here.is_empty() { sizes.iter().map(|(_, size)| *size).collect() } else { here }
-    };
-    let (lengths_m, widths_m) = (here(&vehicle.lengths_m), here(&vehicle.widths_m));
+    let [lengths_m, widths_m] = vehicle.sizes_m(&piece.samples);
     let class = vehicle.class.as_deref().unwrap_or_default();
     let of = |sizes: &[f64]| {
         let value = median(&mut sizes.to_vec());
@@ -56,8 +49,7 @@ pub(super) fn sized(piece: &Piece, vehicle: &RawVehicle, preset: &Preset) -> Siz
         None if preset.classes.truck.is_empty() || class.is_empty() => is_long(TRUCK_FROM_M),
         None => is_named_truck,
     };
-    let usual = preset.sizes.get(class).or_else(|| preset.sizes.get("default")).copied();
-    let usual = usual.unwrap_or(if is_truck { USUAL_TRUCK_M } else { USUAL_CAR_M });
+    let usual = usual_size_m(class, preset).unwrap_or(if is_truck { USUAL_TRUCK_M } else { USUAL_CAR_M });
     let varies = |sizes: &[f64]| {
         let (low, high) = sizes.iter().fold((f64::INFINITY, 0.0_f64), |(l, h), v| (l.min(*v), h.max(*v)));
         sizes.len() > 1 && high > 1.1 * low
@@ -69,6 +61,13 @@ pub(super) fn sized(piece: &Piece, vehicle: &RawVehicle, preset: &Preset) -> Siz
         is_assumed: length_m.is_none() || width_m.is_none(),
         changes: varies(&lengths_m) || varies(&widths_m),
     }
+}
+
+/// Length and width in the preset of a class, or of the longest name there that its text begins with, m.
+pub(super) fn usual_size_m(class: &str, preset: &Preset) -> Option<[f64; 2]> {
+    let begins = |name: &&String| begins_so(class, std::slice::from_ref(name));
+    let of_name = || preset.sizes.keys().filter(begins).max_by_key(|name| name.len());
+    preset.sizes.get(class).or_else(|| preset.sizes.get(of_name()?)).or_else(|| preset.sizes.get("default")).copied()
 }
 
 /// Moves the positions from the reference point to the middle of the box.

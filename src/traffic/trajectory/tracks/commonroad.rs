@@ -6,7 +6,7 @@ use quick_xml::XmlVersion;
 use quick_xml::events::Event;
 use quick_xml::reader::Reader;
 
-use super::raw::{NO_LABEL, RawFile, RawRecording, RawSample, RawVehicle, always};
+use super::raw::{NO_LABEL, RawFile, RawRecording, RawSample, RawVehicle};
 use super::roles::Role;
 use crate::support::input_file;
 use crate::traffic::trajectory::csv_table::FileChecksum;
@@ -30,6 +30,8 @@ const NAN_SAMPLE: RawSample = RawSample {
     acceleration_xy_mps2: [f64::NAN; 2],
     lane: NO_LABEL,
     lane_offset_m: f64::NAN,
+    other_clock: f64::NAN,
+    facts: [0; 4],
 };
 
 /// Reads the obstacles of a scene as one recording.
@@ -57,7 +59,7 @@ pub(super) fn read(path: &Path, id: &str) -> Result<RawFile> {
                 if around.len() >= DEEPEST {
                     return Err(bad(format!("more than {DEEPEST} elements within one another")));
                 }
-                for attribute in start.attributes().flatten() {
+                for attribute in start.attributes().with_checks(false).flatten() {
                     let value = attribute.normalized_value(XmlVersion::Implicit1_0).map_err(|e| bad(e.to_string()))?;
                     scene.attribute(&name, attribute.key.as_ref(), &value).map_err(&bad)?;
                 }
@@ -147,8 +149,8 @@ impl Scene {
         }
         match (parent.as_str(), element.as_str()) {
             ("dynamicObstacle", "type") => self.vehicle.class = Some(words.to_owned()),
-            ("rectangle", "length") => self.vehicle.lengths_m = vec![always(number()?)],
-            ("rectangle", "width") => self.vehicle.widths_m = vec![always(number()?)],
+            ("rectangle", "length") => self.vehicle.lengths_m = vec![number()?],
+            ("rectangle", "width") => self.vehicle.widths_m = vec![number()?],
             _ if inside("initialState") || inside("state") => {
                 let sample = self.sample.get_or_insert(NAN_SAMPLE);
                 match (parent.as_str(), element.as_str()) {

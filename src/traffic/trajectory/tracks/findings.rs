@@ -406,8 +406,8 @@ impl Understanding {
                 format!("{} samples are of tracks that were interpolated: {why}", count(self.interpolated)),
             );
         }
-        if self.renumbered {
-            self.find(false, "vehicles have other numbers than in the file: their ids are no small whole numbers, or a track was split");
+        if !self.vehicle_names.is_empty() {
+            self.find(false, "vehicles have other numbers than in the file: their ids are no small whole numbers, or a track was split; the ids of scenarios keep the file's");
         }
     }
 }

@@ -1,9 +1,10 @@
 //! Tracks in any format: a [`Preset`] says what the columns of a file mean, this module makes [recordings](super::Recording) of them.
 //!
-//! The stages: rows of a file (`rows`, `markup`), vehicles in SI units (`raw`, `samples`, `commonroad`), gapless pieces (`pieces`,
+//! The stages: rows of a file (`rows`, `markup`), vehicles in SI units (`raw`, `samples`, `apart`, `sumo`, `commonroad`), gapless pieces (`pieces`,
 //! `boxes`), the lines of the road (`road`, `directions`), lanes (`lanes`), the recording (`assemble`), and what contradicts
 //! itself (`understanding`, `findings`). highD files have their own reader.
 
+mod apart;
 mod assemble;
 mod boxes;
 mod commonroad;
@@ -20,8 +21,10 @@ mod roles;
 mod rows;
 mod samples;
 mod smooth;
+mod sumo;
 mod understanding;
 
+use std::collections::HashMap;
 use std::path::{Path, PathBuf};
 
 pub use draft::draft;
@@ -202,6 +205,15 @@ pub(super) fn is_second(path: &Path) -> bool {
     unpacked(&name) != name && path.with_file_name(unpacked(&name)).exists()
 }
 
+/// Names recordings of files that differ in their ending only with it: `a.csv` and `a.txt`.
+pub(super) fn keep_apart(files: &mut [TrackFile]) {
+    let mut counts: HashMap<String, usize> = HashMap::new();
+    files.iter().for_each(|file| *counts.entry(file.id.clone()).or_default() += 1);
+    for file in files.iter_mut().filter(|file| counts[&file.id] > 1) {
+        file.id = file.path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    }
+}
+
 fn is_format(path: &Path, preset: &Preset) -> bool {
     let format = if preset.format == FileFormat::Commonroad { FileFormat::Xml } else { preset.format };
     format_of(path) == Some(format)
@@ -215,7 +227,8 @@ pub(super) fn is_meta(name: &str, preset: &Preset) -> bool {
         name.starts_with(before) && name.ends_with(after) && (pattern.contains('*') || name == pattern)
     };
     let metas = preset.vehicles.iter().chain(&preset.recording).map(|meta| meta.file.as_str());
-    metas.chain(preset.types_file.as_deref()).any(fits)
+    let types = preset.types_file.iter().flat_map(OneOrMany::names).map(String::as_str);
+    metas.chain(types).any(fits)
 }
 
 /// A recording of a track file, and what was understood.
@@ -247,8 +260,15 @@ pub fn read_tracks(file: &TrackFile, preset: &Preset) -> Result<Vec<LoadedTracks
         recording.synthetic = synthetic || recording.id.contains(SYNTHETIC);
         let place = place.clone().of(format!("recording {}", recording.id));
         let (recording, understanding) = assemble::assemble(recording, preset, (&raw.roles, &raw.unused), &place)?;
-        let loaded =
-            Loaded { recording, checksum_sha256: raw.checksums.clone(), rows: raw.rows, bytes, notes: Vec::new() };
+        let loaded = Loaded {
+            recording,
+            checksum_sha256: raw.checksums.clone(),
+            rows: raw.rows,
+            bytes,
+            notes: Vec::new(),
+            vehicle_names: understanding.vehicle_names.clone(),
+            file_frames: understanding.file_frames,
+        };
         all.push(LoadedTracks { loaded, understanding });
     }
     Ok(all)

@@ -248,5 +248,7 @@ fn mix(a: &RawSample, b: &RawSample, part: f64) -> RawSample {
         acceleration_xy_mps2: two(a.acceleration_xy_mps2, b.acceleration_xy_mps2),
         lane: if part < 0.5 { a.lane } else { b.lane },
         lane_offset_m: if part < 0.5 { a.lane_offset_m } else { b.lane_offset_m },
+        other_clock: one(a.other_clock, b.other_clock),
+        facts: if part < 0.5 { a.facts } else { b.facts },
     }
 }

@@ -6,7 +6,7 @@ use std::path::Path;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use super::roles::{ColumnName, Role, units};
+use super::roles::{ColumnName, OneOrMany, Role, units};
 use crate::support::input_file;
 use crate::support::plain_text::{nearest, sha256};
 use crate::{Error, Place, Result};
@@ -57,7 +57,8 @@ pub struct Preset {
     /// Classes of vehicles.
     #[serde(default)]
     pub classes: Classes,
-    /// Length and width in metres by class, where the file has none; `default` is for all others.
+    /// Length and width in metres by class, where the file has none; `default` is for all others. SUMO's types without a size
+    /// have these.
     #[serde(default)]
     pub sizes: BTreeMap<String, [f64; 2]>,
     /// Longest gap in a track that is filled, s; beyond it, the vehicle gets another id.
@@ -77,9 +78,9 @@ pub struct Preset {
     /// A file with one row about the recording.
     #[serde(default)]
     pub recording: Option<MetaFile>,
-    /// File with `vType` elements (SUMO) beside the tracks; `*` as in `files`, or any name.
+    /// Files with `vType` elements (SUMO) beside the tracks; `*` as in `files`, or any name.
     #[serde(default)]
-    pub types_file: Option<String>,
+    pub types_file: Option<OneOrMany>,
     /// It is from a user's file: every column that it names must be there.
     #[serde(skip)]
     pub is_own: bool,

@@ -3,10 +3,12 @@
 use std::collections::HashMap;
 use std::path::Path;
 
+use super::apart::apart;
 use super::preset::{HeadingOrigin, MetaFile, Preset, Side};
 use super::roles::{ColumnName, Role};
 use super::rows::{Columns, FoundTime, Rows, SampleRow};
 use super::samples::Samples;
+use super::sumo;
 use crate::support::plain_text::nearest;
 use crate::traffic::trajectory::csv_table::FileChecksum;
 use crate::{Error, Place, Result};
@@ -41,6 +43,10 @@ pub(super) struct RawSample {
     pub lane: u32,
     /// Distance from the middle of the lane, m.
     pub lane_offset_m: f64,
+    /// The time, s, where `at` counts frames; the frame where it is a time.
+    pub other_clock: f64,
+    /// Length, width, class and direction in its row: index in the lists of the vehicle + 1, or 0.
+    pub facts: [u16; 4],
 }
 
 /// One vehicle.
@@ -49,28 +55,65 @@ pub(super) struct RawVehicle {
     /// Its id in the file.
     pub key: String,
     pub class: Option<String>,
-    /// The lengths and widths that it has, m, each with the sample (`at`) from which on: a number used again has another box.
-    pub lengths_m: Vec<(f64, f64)>,
-    pub widths_m: Vec<(f64, f64)>,
+    /// The classes in its rows; each change is one more.
+    pub classes: Vec<String>,
+    /// The lengths and widths that it has, m; each change is one more.
+    pub lengths_m: Vec<f64>,
+    pub widths_m: Vec<f64>,
     /// Sign of the travel along the road.
     pub direction: Option<f64>,
     pub samples: Samples,
 }
 
+/// Adds a value to a list of changes; returns its index + 1.
+fn changed<T, V: PartialEq<T> + Into<T>>(list: &mut Vec<T>, value: V) -> u16 {
+    if list.last().is_none_or(|last| value != *last) {
+        list.push(value.into());
+    }
+    u16::try_from(list.len()).unwrap_or(u16::MAX)
+}
+
+/// The value of a list of changes that a row has.
+fn in_row<T: Clone>(list: &[T], fact: u16) -> Option<T> {
+    list.get(usize::from(fact).checked_sub(1)?).cloned()
+}
+
 impl RawVehicle {
+    /// Lengths and widths of some of its samples, m; all of them if these have none in their rows.
+    pub fn sizes_m(&self, samples: &Samples) -> [Vec<f64>; 2] {
+        let of = |fact: usize, list: &[f64]| {
+            let in_rows = || (0..samples.len()).filter_map(|k| in_row(list, samples.fact(fact, k)));
+            let mut sizes: Vec<f64> = if list.len() > 1 { in_rows().collect() } else { Vec::new() };
+            sizes.dedup();
+            if sizes.is_empty() { list.to_vec() } else { sizes }
+        };
+        [of(0, &self.lengths_m), of(1, &self.widths_m)]
+    }
+
+    /// Some of its samples as a vehicle of their own, with the sizes, class and direction in their rows.
+    pub fn part(&self, samples: Samples) -> RawVehicle {
+        let [lengths_m, widths_m] = self.sizes_m(&samples);
+        let fact = |fact: usize| if samples.is_empty() { 0 } else { samples.fact(fact, 0) };
+        let (class, direction) = (in_row(&self.classes, fact(2)), in_row(&[-1.0, 1.0], fact(3)));
+        RawVehicle {
+            key: self.key.clone(),
+            class,
+            classes: self.classes.clone(),
+            lengths_m,
+            widths_m,
+            direction,
+            samples,
+        }
+    }
+
     /// Takes the sizes that it lacks from another source.
-    fn complete_sizes(&mut self, known: &RawVehicle) {
+    pub fn complete_sizes(&mut self, known: &RawVehicle) {
         for (own, known) in [(&mut self.lengths_m, &known.lengths_m), (&mut self.widths_m, &known.widths_m)] {
             if own.is_empty() {
                 own.clone_from(known);
             }
         }
     }
-}
-
-/// A size that holds from the first sample on.
-pub(super) fn always(size_m: f64) -> (f64, f64) {
-    (f64::NEG_INFINITY, size_m)
 }
 
 /// One recording.
@@ -88,6 +131,8 @@ pub(super) struct RawRecording {
     /// Lines of the lanes, from a map: points in the axes of the file, by boundary.
     pub boundaries: Vec<Vec<[f64; 2]>>,
     pub synthetic: bool,
+    /// What was assumed of it.
+    pub notes: Vec<String>,
 }
 
 /// The recordings of a file.
@@ -120,6 +165,7 @@ pub(super) fn read_table(path: &Path, id: &str, preset: &Preset) -> Result<RawFi
     let mut file = Collecting::new(id, preset, &columns);
     let (checksum, count) = rows.each(&columns, &mut |row| file.add(row))?;
     let mut recordings = file.recordings;
+    recordings.retain(|recording| !recording.vehicles.is_empty());
     if let Some(found) = columns.found_time() {
         roles
             .iter_mut()
@@ -128,14 +174,15 @@ pub(super) fn read_table(path: &Path, id: &str, preset: &Preset) -> Result<RawFi
     }
     recordings.iter_mut().flat_map(|of| &mut of.vehicles).for_each(|vehicle| vehicle.samples.shrink());
     let mut checksums = vec![checksum];
-    if let Some(meta) = &preset.vehicles {
-        checksums.extend(add_vehicle_facts(path, id, meta, preset, &mut recordings)?);
-    }
     if let Some(meta) = &preset.recording {
         checksums.extend(add_frame_rate(path, id, meta, preset, &mut recordings)?);
     }
-    if let Some(types) = &preset.types_file {
-        add_types(path, id, types, &mut recordings)?;
+    let mut recordings = apart(recordings, preset);
+    if let Some(meta) = &preset.vehicles {
+        checksums.extend(add_vehicle_facts(path, id, meta, preset, &mut recordings)?);
+    }
+    if let Some(patterns) = &preset.types_file {
+        checksums.extend(sumo::add_facts(path, id, patterns.names(), preset, &mut recordings)?);
     }
     Ok(RawFile { recordings, checksums, rows: count, roles, unused })
 }
@@ -185,6 +232,7 @@ struct Collecting<'a> {
     /// By recording, the vehicle that came after each vehicle: it often does so again at the next time.
     next: Vec<Vec<usize>>,
     has_frames: bool,
+    other_clock: Role,
     has_recordings: bool,
     has_sizes: bool,
     y_sign: f64,
@@ -192,6 +240,9 @@ struct Collecting<'a> {
 
 impl<'a> Collecting<'a> {
     fn new(id: &'a str, preset: &'a Preset, columns: &'a Columns) -> Self {
+        // Times tell the rate too.
+        let has_frames = columns.has(Role::Frame)
+            && (preset.frame_rate_hz.is_some() || preset.recording.is_some() || !columns.has(Role::Time));
         Collecting {
             preset,
             columns,
@@ -202,9 +253,8 @@ impl<'a> Collecting<'a> {
             labels: HashMap::new(),
             last: (usize::MAX, usize::MAX),
             next: Vec::new(),
-            // Times tell the rate too.
-            has_frames: columns.has(Role::Frame)
-                && (preset.frame_rate_hz.is_some() || preset.recording.is_some() || !columns.has(Role::Time)),
+            has_frames,
+            other_clock: if has_frames { Role::Time } else { Role::Frame },
             has_recordings: columns.has(Role::Recording),
             has_sizes: columns.has(Role::Length) || columns.has(Role::Width),
             y_sign: if preset.axes.y == Side::Right { -1.0 } else { 1.0 },
@@ -216,7 +266,12 @@ impl<'a> Collecting<'a> {
         let recording = self.recording(row)?;
         let vehicle = match self.expected_vehicle(recording, row)? {
             Some(vehicle) => vehicle,
-            None => self.vehicle(recording, &row.text(Role::Vehicle)?.ok_or_else(|| missing(Role::Vehicle))?),
+            None => match row.text(Role::Vehicle)? {
+                Some(key) => self.vehicle(recording, &key),
+                // Tables of time steps have a row for a step without vehicles.
+                None if row.number(Role::X)?.is_none() && row.number(Role::Y)?.is_none() => return Ok(()),
+                None => return Err(missing(Role::Vehicle)),
+            },
         };
         let time = if self.has_frames { Role::Frame } else { Role::Time };
         let at = row.number(time)?.ok_or_else(|| missing(time))?;
@@ -247,6 +302,9 @@ impl<'a> Collecting<'a> {
             acceleration_xy_mps2: [number(Role::XAcceleration)?, self.y_sign * number(Role::YAcceleration)?],
             lane: NO_LABEL,
             lane_offset_m: number(Role::LaneOffset)?,
+            // It only names instants: a text that is no number names none.
+            other_clock: row.number(self.other_clock).ok().flatten().unwrap_or(f64::NAN),
+            facts: [0; 4],
         };
         let of = &self.recordings[recording];
         let before = &of.vehicles[vehicle].samples;
@@ -266,17 +324,22 @@ impl<'a> Collecting<'a> {
             return Err(Error::input(row.place(time).of(format!("vehicle {}", of.key)), problem, help));
         }
         if self.has_sizes {
-            for (role, sizes) in [(Role::Length, &mut of.lengths_m), (Role::Width, &mut of.widths_m)] {
-                if let Some(size) = row.number(role)?.filter(|size| *size > 0.0)
-                    && sizes.last().is_none_or(|(_, last)| *last != size)
-                {
-                    sizes.push((at, size));
+            for (fact, role, sizes) in [(0, Role::Length, &mut of.lengths_m), (1, Role::Width, &mut of.widths_m)] {
+                if let Some(size) = row.number(role)?.filter(|size| *size > 0.0) {
+                    sample.facts[fact] = changed(sizes, size);
                 }
             }
         }
+        let is_same_class = of.classes.last().map(|class| row.is_text(Role::Class, class)).transpose()?;
+        sample.facts[2] = match is_same_class {
+            Some(true) => u16::try_from(of.classes.len()).unwrap_or(u16::MAX),
+            _ => row.text(Role::Class)?.map_or(0, |class| changed(&mut of.classes, class.as_ref())),
+        };
+        let direction = row.number(Role::Direction)?;
+        sample.facts[3] = direction.map_or(0, |sign| 1 + u16::from(sign >= 0.0));
         if of.samples.is_empty() {
-            of.class = row.text(Role::Class)?.map(|class| class.into_owned());
-            of.direction = row.number(Role::Direction)?;
+            of.class = in_row(&of.classes, sample.facts[2]);
+            of.direction = direction;
         }
         of.samples.push(&sample);
         Ok(())
@@ -288,7 +351,11 @@ impl<'a> Collecting<'a> {
             return Ok(at);
         }
         let id = if name.is_empty() { self.id.to_owned() } else { format!("{}-{name}", self.id) };
-        let id = id.replace(['/', '\\', ' '], "-");
+        let plain = id.replace(['/', '\\', ' '], "-");
+        let is_new = |id: &String| self.recordings.iter().all(|other| other.id != *id);
+        // `a b` and `a/b` stay apart.
+        let numbered = (2..).map(|number| format!("{plain}-{number}"));
+        let id = std::iter::once(plain.clone()).chain(numbered).find(is_new).unwrap_or_default();
         self.recordings.push(RawRecording { id, has_frames: self.has_frames, ..RawRecording::default() });
         self.next.push(Vec::new());
         self.of_name.insert(name.into_owned(), self.recordings.len() - 1);
@@ -380,29 +447,50 @@ fn add_vehicle_facts(
     preset: &Preset,
     recordings: &mut [RawRecording],
 ) -> Result<Option<FileChecksum>> {
-    let Some((rows, columns)) = meta_rows(path, id, meta, preset)? else { return Ok(None) };
+    let Some((rows, columns)) = meta_rows(path, id, meta, preset)? else {
+        let facts: Vec<&str> =
+            meta.columns.keys().filter(|role| **role != Role::Vehicle).map(|role| role.key()).collect();
+        let file = meta.file.replace('*', id);
+        let note =
+            format!("{file} is not beside the tracks: {} of the vehicles are not read from it", facts.join(", "));
+        recordings.iter_mut().for_each(|recording| recording.notes.push(note.clone()));
+        return Ok(None);
+    };
     let mut facts: HashMap<String, RawVehicle> = HashMap::new();
     let (checksum, _) = rows.each(&columns, &mut |row| {
         let Some(key) = row.text(Role::Vehicle)? else { return Ok(()) };
-        let sizes = |role| -> Result<Vec<(f64, f64)>> {
-            Ok(row.number(role)?.filter(|size| *size > 0.0).map(always).into_iter().collect())
-        };
+        let sizes =
+            |role| -> Result<Vec<f64>> { Ok(row.number(role)?.filter(|size| *size > 0.0).into_iter().collect()) };
         let vehicle = RawVehicle {
             key: key.to_string(),
             class: row.text(Role::Class)?.map(|class| class.into_owned()),
             lengths_m: sizes(Role::Length)?,
             widths_m: sizes(Role::Width)?,
             direction: row.number(Role::Direction)?,
-            samples: Samples::default(),
+            ..RawVehicle::default()
         };
         facts.insert(vehicle.key.clone(), vehicle);
         Ok(())
     })?;
-    for vehicle in recordings.iter_mut().flat_map(|recording| &mut recording.vehicles) {
-        let Some(known) = facts.get(&vehicle.key) else { continue };
-        vehicle.class = vehicle.class.take().or_else(|| known.class.clone());
-        vehicle.direction = vehicle.direction.or(known.direction);
-        vehicle.complete_sizes(known);
+    // Programs write `00001`, `1` and `1.0` for one number.
+    let number = |key: &str| key.parse::<f64>().ok().filter(|number| number.fract() == 0.0).map(f64::to_bits);
+    let by_number: HashMap<u64, &RawVehicle> = facts.iter().filter_map(|(key, of)| Some((number(key)?, of))).collect();
+    for recording in recordings {
+        let mut unknown: Vec<&str> = Vec::new();
+        for vehicle in &mut recording.vehicles {
+            let known = facts.get(&vehicle.key).or_else(|| by_number.get(&number(&vehicle.key)?).copied());
+            let Some(known) = known else {
+                unknown.push(&vehicle.key);
+                continue;
+            };
+            vehicle.class = vehicle.class.take().or_else(|| known.class.clone());
+            vehicle.direction = vehicle.direction.or(known.direction);
+            vehicle.complete_sizes(known);
+        }
+        if let Some(first) = unknown.first() {
+            let (number, file) = (unknown.len(), &checksum.file);
+            recording.notes.push(format!("{number} vehicles have no row in {file}, the first is vehicle {first}"));
+        }
     }
     Ok(Some(checksum))
 }
@@ -428,49 +516,6 @@ fn add_frame_rate(
     })?;
     recordings.iter_mut().for_each(|recording| recording.frame_rate_hz = rate);
     Ok(Some(checksum))
-}
-
-/// Sizes and classes of SUMO's vehicle types, from files with `vType` elements beside the tracks.
-fn add_types(path: &Path, id: &str, pattern: &str, recordings: &mut [RawRecording]) -> Result<()> {
-    let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let ending = pattern.rsplit('*').next().unwrap_or(pattern);
-    let own = folder.join(pattern.replace('*', id));
-    let mut files = if own.exists() { vec![own] } else { Vec::new() };
-    if files.is_empty() {
-        let listed = std::fs::read_dir(folder).map_err(|e| Error::io(folder, "list", e))?;
-        files
-            .extend(listed.flatten().map(|entry| entry.path()).filter(|file| file.to_string_lossy().ends_with(ending)));
-        files.sort();
-    }
-    let mut types: HashMap<String, RawVehicle> = HashMap::new();
-    for file in files {
-        let rows = Rows::open(&file, super::preset::FileFormat::Xml, Some("vType"), None)?;
-        let named = [(Role::Vehicle, "id"), (Role::Length, "length"), (Role::Width, "width"), (Role::Class, "vClass")];
-        let named = named.map(|(role, name)| (role, ColumnName::Name(name.to_owned())));
-        let columns = Columns::of(&named.into_iter().collect(), rows.header(), &[]);
-        rows.each(&columns, &mut |row| {
-            let Some(key) = row.text(Role::Vehicle)? else { return Ok(()) };
-            let vehicle = RawVehicle {
-                key: key.to_string(),
-                class: row.text(Role::Class)?.map(|class| class.into_owned()),
-                lengths_m: row.number(Role::Length)?.map(always).into_iter().collect(),
-                widths_m: row.number(Role::Width)?.map(always).into_iter().collect(),
-                ..RawVehicle::default()
-            };
-            types.insert(vehicle.key.clone(), vehicle);
-            Ok(())
-        })?;
-    }
-    for vehicle in recordings.iter_mut().flat_map(|recording| &mut recording.vehicles) {
-        // SUMO writes `type@distribution` for a type of a distribution.
-        let class = vehicle.class.as_deref().unwrap_or_default();
-        let Some(known) = types.get(class).or_else(|| types.get(class.split('@').next().unwrap_or_default())) else {
-            continue;
-        };
-        vehicle.complete_sizes(known);
-        vehicle.class = known.class.clone().or_else(|| vehicle.class.take());
-    }
-    Ok(())
 }
 
 /// The error for a file without vehicles.

@@ -143,14 +143,23 @@ pub enum OneOrMany {
     Many(Vec<String>),
 }
 
+impl OneOrMany {
+    /// The texts, in the order of the file.
+    pub fn names(&self) -> &[String] {
+        match self {
+            OneOrMany::One(name) => std::slice::from_ref(name),
+            OneOrMany::Many(names) => names,
+        }
+    }
+}
+
 impl ColumnName {
     /// The names, in the order of preference.
     pub fn names(&self) -> &[String] {
         match self {
-            ColumnName::Name(name) | ColumnName::WithUnit { name: OneOrMany::One(name), .. } => {
-                std::slice::from_ref(name)
-            }
-            ColumnName::Names(names) | ColumnName::WithUnit { name: OneOrMany::Many(names), .. } => names,
+            ColumnName::Name(name) => std::slice::from_ref(name),
+            ColumnName::Names(names) => names,
+            ColumnName::WithUnit { name, .. } => name.names(),
         }
     }
 

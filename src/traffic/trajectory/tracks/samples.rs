@@ -4,7 +4,7 @@
 use super::raw::RawSample;
 
 /// Columns of a sample.
-const COLUMNS: usize = 15;
+const COLUMNS: usize = 20;
 /// Maximum number of decimals of a column of [`Column::Decimals`].
 const MAX_DECIMALS: usize = 6;
 const POWERS: [f64; MAX_DECIMALS + 1] = [1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6];
@@ -50,7 +50,7 @@ impl Samples {
 
     /// Sample `k`, below [`Samples::len`].
     pub fn get(&self, k: usize) -> RawSample {
-        let [at, x, y, heading_x, heading_y, speed, vx, vy, forward, leftward, a, ax, ay, _, offset] =
+        let [at, x, y, heading_x, heading_y, speed, vx, vy, forward, leftward, a, ax, ay, _, offset, other_clock] =
             std::array::from_fn(|column| self.columns[column].get(k));
         RawSample {
             at,
@@ -63,6 +63,8 @@ impl Samples {
             acceleration_xy_mps2: [ax, ay],
             lane: self.lane(k),
             lane_offset_m: offset,
+            other_clock,
+            facts: std::array::from_fn(|fact| self.fact(fact, k)),
         }
     }
 
@@ -79,6 +81,16 @@ impl Samples {
     /// Index of the name of the lane of sample `k`, or `NO_LABEL`.
     pub fn lane(&self, k: usize) -> u32 {
         self.columns[13].get(k) as i32 as u32
+    }
+
+    /// The time of sample `k` where `at` counts frames, else its frame.
+    pub fn other_clock(&self, k: usize) -> f64 {
+        self.columns[15].get(k)
+    }
+
+    /// One of the facts of sample `k`.
+    pub fn fact(&self, fact: usize, k: usize) -> u16 {
+        self.columns[16 + fact].get(k) as u16
     }
 
     pub fn iter(&self) -> impl Iterator<Item = RawSample> {
@@ -134,6 +146,11 @@ fn values(of: &RawSample) -> [f64; COLUMNS] {
         // `NO_LABEL` becomes −1.
         f64::from(of.lane as i32),
         of.lane_offset_m,
+        of.other_clock,
+        f64::from(of.facts[0]),
+        f64::from(of.facts[1]),
+        f64::from(of.facts[2]),
+        f64::from(of.facts[3]),
     ]
 }
 
@@ -221,6 +238,8 @@ mod tests {
             acceleration_xy_mps2: [other, value],
             lane,
             lane_offset_m: f64::from(lane),
+            other_clock: value / 25.0,
+            facts: [lane as u16, 1, 0, u16::MAX],
         }
     }
 

@@ -1,5 +1,7 @@
 //! What the reader understood of a file, and what contradicts itself in it.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 use super::lanes::LaneSource;
@@ -49,6 +51,11 @@ pub struct UnderstoodCarriageway {
 }
 
 impl UnderstoodCarriageway {
+    /// The direction of travel in words.
+    pub fn way(&self) -> &'static str {
+        if self.name == "2" { "forward" } else { "backward" }
+    }
+
     pub(super) fn of(name: &str, lines_m: &[f64], source: LaneSource, tracks: usize) -> Self {
         let widths = || lines_m.windows(2).map(|pair| pair[0] - pair[1]);
         UnderstoodCarriageway {
@@ -139,8 +146,10 @@ pub struct Understanding {
     pub noise_speeds: u64,
     /// The lowest of them, m/s.
     pub lowest_noise_mps: f64,
-    /// Vehicles have other numbers than in the file.
-    pub renumbered: bool,
+    /// Names in the file of the vehicles that have another number.
+    pub vehicle_names: BTreeMap<u32, String>,
+    /// The frame of the file at frame 0 of the recording, and frames of the file per frame; null if it has none that fit its times.
+    pub file_frames: Option<[i64; 2]>,
     /// Vehicles left out as doubtful.
     pub excluded: u64,
     /// What is strange.
@@ -270,7 +279,7 @@ impl Understanding {
 
     /// Counts the classes, and finds words of the preset that no class begins with.
     pub(super) fn note_classes(&mut self, raw: &RawRecording, preset: &Preset) {
-        let mut classes: std::collections::BTreeMap<&str, u64> = std::collections::BTreeMap::new();
+        let mut classes: BTreeMap<&str, u64> = BTreeMap::new();
         for class in raw.vehicles.iter().filter_map(|vehicle| vehicle.class.as_deref()) {
             *classes.entry(class).or_default() += 1;
         }
@@ -415,12 +424,12 @@ impl Understanding {
             } else {
                 format!("{} to {} m", significant(low, 3), significant(high, 3))
             };
-            let way = if of.name == "2" { "forward" } else { "backward" };
             let lanes = if of.lanes == 1 { "lane" } else { "lanes" };
             lines.push((
                 "lanes",
                 format!(
-                    "{way}: {} {lanes} of {width} from {}; {} tracks",
+                    "{}: {} {lanes} of {width} from {}; {} tracks",
+                    of.way(),
                     of.lanes,
                     of.source,
                     count(of.tracks as u64)

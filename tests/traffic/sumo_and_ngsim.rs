@@ -1,0 +1,313 @@
+//! What only some programs write: SUMO's types, persons and lane changes of one step, and NGSIM's periods in one table.
+
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+use lanesweep::scenario::{Category, read_scenario_file, write_scenarios};
+use lanesweep::support::plausibility::Implausible;
+use lanesweep::traffic::mining::{Collection, MiningOptions, mine_folder};
+use lanesweep::traffic::trajectory::{Inputs, Loaded, Recording, Track, VehicleClass};
+
+const LANE_WIDTH_M: f64 = 3.5;
+const RATE_HZ: f64 = 10.0;
+
+/// A vehicle: name, type, lane from the right, front bumper at 0 s, m, speed, m/s, and the time of its change to lane 1, s.
+type Driven = (&'static str, &'static str, usize, f64, f64, Option<f64>);
+
+/// An ego, a vehicle that cuts in, and others that mark the lanes.
+const CUT_IN: [Driven; 6] = [
+    ("f.1", "car", 1, 62.0, 30.0, None),
+    ("f.2", "car", 0, 112.0, 25.0, Some(4.0)),
+    ("f.3", "car", 2, 122.0, 34.0, None),
+    ("f.4", "car", 2, 80.0, 34.0, None),
+    ("f.5", "lorry", 0, 40.0, 22.0, None),
+    ("f.6", "lorry", 0, 180.0, 23.0, None),
+];
+
+/// Front bumper, m, distance to the left, m, and lane at a time; a lane change takes some seconds.
+fn place((_, _, lane, front_m, speed, change): Driven, time_s: f64, change_s: f64) -> (f64, f64, usize) {
+    let part = change.map_or(0.0, |begin| ((time_s - begin + 1e-9) / change_s).clamp(0.0, 1.0));
+    let part = part - libm::sin(2.0 * std::f64::consts::PI * part) / (2.0 * std::f64::consts::PI);
+    let y_m = (lane as f64 + 0.5 + part * (1.0 - lane as f64)) * LANE_WIDTH_M;
+    (front_m + speed * time_s, y_m, (y_m / LANE_WIDTH_M) as usize)
+}
+
+fn times(seconds: usize) -> impl Iterator<Item = f64> {
+    (0..seconds * RATE_HZ as usize).map(|k| k as f64 / RATE_HZ)
+}
+
+fn fcd_xml(vehicles: &[Driven], change_s: f64) -> String {
+    let mut text = "<fcd-export>\n".to_owned();
+    for time in times(14) {
+        let _ = writeln!(text, "<timestep time=\"{time:.2}\">");
+        for vehicle in vehicles {
+            let (name, kind, .., speed, _) = *vehicle;
+            let (x, y, lane) = place(*vehicle, time, change_s);
+            let _ = writeln!(
+                text,
+                "<vehicle id=\"{name}\" x=\"{x:.2}\" y=\"{y:.2}\" angle=\"90.00\" type=\"{kind}\" speed=\"{speed:.2}\" \
+                 pos=\"{x:.2}\" lane=\"E0_{lane}\" slope=\"0.00\"/>"
+            );
+        }
+        text += "</timestep>\n";
+    }
+    text + "</fcd-export>\n"
+}
+
+fn load(path: &Path) -> lanesweep::Result<Vec<Loaded>> {
+    let (files, problems) = Inputs::of(path, None)?.files();
+    assert!(problems.is_empty(), "{problems:?}");
+    let read: lanesweep::Result<Vec<Vec<Loaded>>> = files.iter().map(|file| file.read(Implausible::Refused)).collect();
+    Ok(read?.into_iter().flatten().collect())
+}
+
+fn sizes(recording: &Recording) -> Vec<[f64; 2]> {
+    recording.tracks.iter().map(|track| [track.length_m, track.width_m]).collect()
+}
+
+fn gap_m(ego: &Track, lead: &Track) -> f64 {
+    lead.s_m[0] - ego.s_m[0] - 0.5 * (ego.length_m + lead.length_m)
+}
+
+#[test]
+fn a_vehicle_type_without_a_size_has_that_of_its_class() {
+    let dir = tempfile::tempdir().unwrap();
+    let vehicles: Vec<Driven> = [("a", "P"), ("b", "L"), ("c", "S"), ("d", "N"), ("e", "D@mixed"), ("f", "W")]
+        .into_iter()
+        .enumerate()
+        .map(|(at, (name, kind))| (name, kind, at % 3, 60.0 + 43.0 * (at / 3 * 3 + at % 3) as f64, 30.0, None))
+        .collect();
+    fs::write(dir.path().join("fcd.xml"), fcd_xml(&vehicles, 4.0)).unwrap();
+    let types = "<vType id=\"P\" vClass=\"passenger\"/><vType id=\"L\" vClass=\"truck\"/><vType id=\"S\" vClass=\"trailer\"/>\
+                 <vType id=\"N\" guiShape=\"bus\"/><vType id=\"W\" vClass=\"coach\" width=\"2.4\"/>\
+                 <vTypeDistribution id=\"mixed\"><vType id=\"D\" vClass=\"delivery\"/></vTypeDistribution>";
+    // Types may stand in a route file or in an additional one.
+    for (root, name) in [("routes", "demo.rou.xml"), ("additional", "types.add.xml"), ("routes", "fcd.trips.xml")] {
+        let file = dir.path().join(name);
+        fs::write(&file, format!("<{root}>{types}</{root}>")).unwrap();
+        let loaded = load(dir.path()).unwrap().remove(0);
+        let expected = [[5.0, 1.8], [7.1, 2.4], [16.5, 2.55], [5.0, 1.8], [6.5, 2.16], [14.0, 2.4]];
+        assert_eq!(sizes(&loaded.recording), expected, "{name}");
+        assert!(!loaded.notes.iter().any(|note| note.contains("size")), "{name}: {:?}", loaded.notes);
+        assert!(loaded.checksum_sha256.iter().any(|of| of.file == name));
+        fs::remove_file(file).unwrap();
+    }
+    // Without the file, the sizes are assumed, and the note names the types.
+    let loaded = load(dir.path()).unwrap().remove(0);
+    assert!(loaded.notes.iter().any(|note| note.contains("`S`") && note.contains("*.add.xml")), "{:?}", loaded.notes);
+}
+
+#[test]
+fn the_gap_behind_a_truck_of_sumo_is_measured_from_its_documented_length() {
+    let dir = tempfile::tempdir().unwrap();
+    let vehicles: [Driven; 2] = [("t", "L", 0, 143.0, 24.0, None), ("c", "P", 0, 100.0, 24.0, None)];
+    fs::write(dir.path().join("fcd.xml"), fcd_xml(&vehicles, 4.0)).unwrap();
+    let types = "<routes><vType id=\"P\"/><vType id=\"L\" vClass=\"truck\"/></routes>";
+    fs::write(dir.path().join("demo.rou.xml"), types).unwrap();
+    let recording = load(dir.path()).unwrap().remove(0).recording;
+    let [truck, car] = &recording.tracks[..] else { panic!("{:?}", recording.tracks.len()) };
+    assert_eq!(truck.class, VehicleClass::Truck);
+    assert!((gap_m(car, truck) - 35.9).abs() < 1e-9, "{}", gap_m(car, truck));
+}
+
+#[test]
+fn two_sizes_of_one_type_are_refused_unless_a_file_is_named_like_the_tracks() {
+    let dir = tempfile::tempdir().unwrap();
+    let write = |name: &str, text: &str| fs::write(dir.path().join(name), text).unwrap();
+    write("run1.fcd.xml", &fcd_xml(&CUT_IN, 4.0));
+    let types = |length: &str| {
+        format!("<routes><vType id=\"car\" length=\"{length}\"/><vType id=\"lorry\" vClass=\"truck\"/></routes>")
+    };
+    write("a.rou.xml", &types("4.2"));
+    write("b.rou.xml", &types("4.2"));
+    assert_eq!(sizes(&load(dir.path()).unwrap()[0].recording)[0], [4.2, 1.8]);
+    write("b.rou.xml", &types("4.9"));
+    let error = load(dir.path()).unwrap_err();
+    assert!(error.to_string().contains("`car`") && error.to_string().contains("a.rou.xml and b.rou.xml"), "{error}");
+    write("run1.rou.xml", &types("4.6"));
+    assert_eq!(sizes(&load(dir.path()).unwrap()[0].recording)[0], [4.6, 1.8]);
+}
+
+#[test]
+fn persons_and_steps_without_vehicles_are_no_vehicles() {
+    let dir = tempfile::tempdir().unwrap();
+    let mut text =
+        "timestep_time;vehicle_id;vehicle_x;vehicle_y;vehicle_angle;vehicle_type;vehicle_speed;vehicle_lane\n\
+                    0.00;;;;;;;\n"
+            .to_owned();
+    for time in times(12) {
+        for vehicle in CUT_IN {
+            let (x, y, lane) = place(vehicle, time, 4.0);
+            let _ =
+                writeln!(text, "{time:.2};{};{x:.2};{y:.2};90.00;{};{:.2};E0_{lane}", vehicle.0, vehicle.1, vehicle.4);
+        }
+        let x = 1.3 * time;
+        let _ = writeln!(text, "{time:.2};p0;{x:.2};-2.88;90.00;DEFAULT_PEDTYPE;1.30;");
+        let _ = writeln!(text, "{time:.2};p1;{x:.2};-3.88;90.00;walker;1.30;");
+    }
+    let path = dir.path().join("fcd.csv");
+    fs::write(&path, &text).unwrap();
+    let loaded = load(&path).unwrap().remove(0);
+    assert_eq!(loaded.recording.tracks.len(), CUT_IN.len());
+    assert!(loaded.notes.iter().any(|note| note.starts_with("1 are left out as persons")), "{:?}", loaded.notes);
+    // A vehicle without a name is no empty step.
+    fs::write(&path, text.replacen("f.1;", ";", 1)).unwrap();
+    assert!(load(&path).unwrap_err().to_string().contains("there is no value"));
+}
+
+#[test]
+fn a_lane_change_of_one_step_is_refused_from_recordings_and_from_files_alike() {
+    let dir = tempfile::tempdir().unwrap();
+    let types = "<routes><vType id=\"car\"/><vType id=\"lorry\" vClass=\"truck\"/></routes>";
+    fs::write(dir.path().join("demo.rou.xml"), types).unwrap();
+    let mined = |change_s: f64, implausible| -> Collection {
+        fs::write(dir.path().join("fcd.xml"), fcd_xml(&CUT_IN, change_s)).unwrap();
+        mine_folder(dir.path(), &MiningOptions::default(), implausible, || Ok(())).unwrap()
+    };
+    let cut_ins = |of: &Collection| of.scenarios.iter().filter(|s| s.category == Category::CutIn).count();
+    let slow = mined(4.0, Implausible::Refused);
+    assert_eq!((cut_ins(&slow), slow.problems.len()), (1, 0), "{:?}", slow.problems);
+    assert!(!slow.notes.iter().any(|note| note.contains("one step")), "{:?}", slow.notes);
+    let instant = mined(0.05, Implausible::Refused);
+    assert_eq!((cut_ins(&instant), instant.problems.len()), (0, 1), "{:?}", instant.notes);
+    assert!(instant.problems[0].to_string().contains("lateral jump"), "{:?}", instant.problems);
+    assert!(instant.notes.iter().any(|note| note.contains("--lanechange.duration")), "{:?}", instant.notes);
+    // The file of the same scenario is refused for the same reason.
+    let accepted = mined(0.05, Implausible::Accepted);
+    assert_eq!(cut_ins(&accepted), 1);
+    let file = dir.path().join("mined.jsonl");
+    write_scenarios(&file, &accepted.scenarios).unwrap();
+    assert!(read_scenario_file(&file, Implausible::Refused).unwrap_err().to_string().contains("lateral jump"));
+}
+
+/// Rows of NGSIM's table in three periods: frames and vehicles begin again at 1, and vehicle 5 is a lorry in the second period only.
+fn three_periods() -> Vec<String> {
+    let foot = 0.3048;
+    let mut rows = Vec::new();
+    for period in 0..3_u64 {
+        for (frame, time) in times(14).enumerate() {
+            for (at, vehicle) in CUT_IN.into_iter().enumerate() {
+                let (x, y, _) = place(vehicle, time, 4.0);
+                let is_lorry = vehicle.1 == "lorry" && (at != 4 || period == 1);
+                let (length, width, class) = if is_lorry { (54.1, 8.2, 3) } else { (15.1, 5.9, 2) };
+                rows.push(format!(
+                    "{},{},{},{:.3},{:.3},{length},{width},{class},{:.3},0,{},us-101",
+                    at + 1,
+                    frame + 1,
+                    1_118_846_979_700 + 900_000 * period + 100 * frame as u64,
+                    -y / foot,
+                    x / foot,
+                    vehicle.4 / foot,
+                    3 - (y / LANE_WIDTH_M) as usize
+                ));
+            }
+        }
+    }
+    rows
+}
+
+#[test]
+fn frames_that_begin_again_at_another_time_are_those_of_another_recording() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("us-101.csv");
+    let mined = |rows: &[String]| -> Collection {
+        let header =
+            "Vehicle_ID,Frame_ID,Global_Time,Local_X,Local_Y,v_length,v_Width,v_Class,v_Vel,v_Acc,Lane_ID,Location";
+        fs::write(&path, format!("{header}\n{}\n", rows.join("\n"))).unwrap();
+        mine_folder(&path, &MiningOptions::default(), Implausible::Refused, || Ok(())).unwrap()
+    };
+    let mut rows = three_periods();
+    let by_time = mined(&rows);
+    let ids: Vec<&str> = by_time.recordings.iter().map(|of| of.id.as_str()).collect();
+    assert_eq!(ids, ["us-101-us-101-1", "us-101-us-101-2", "us-101-us-101-3"]);
+    assert_eq!(by_time.recordings.iter().map(|of| of.vehicles).collect::<Vec<_>>(), [6, 6, 6]);
+    let cut_ins: Vec<&str> =
+        by_time.scenarios.iter().filter(|s| s.category == Category::CutIn).map(|s| s.id.as_str()).collect();
+    assert_eq!(cut_ins.len(), 3, "{cut_ins:?}");
+    // Vehicles keep their numbers and sizes.
+    for (loaded, lorries) in load(&path).unwrap().iter().zip([1, 2, 1]) {
+        let tracks = &loaded.recording.tracks;
+        assert_eq!(tracks.iter().map(|track| track.id).collect::<Vec<_>>(), [1, 2, 3, 4, 5, 6]);
+        assert_eq!(tracks.iter().filter(|track| track.class == VehicleClass::Truck).count(), lorries);
+        assert!((tracks[4].length_m > 10.0) == (lorries == 2), "{}", tracks[4].length_m);
+    }
+    // The order of the rows does not matter: here by vehicle, with the periods side by side.
+    rows.sort();
+    assert_eq!(mined(&rows).scenarios, by_time.scenarios);
+    // One wrong time makes no recording of its own.
+    rows[5] = rows[5].replacen(",1118", ",2118", 1);
+    let stray = mined(&rows);
+    assert_eq!(stray.recordings.len(), 3);
+    assert!(stray.notes.iter().any(|note| note.contains("1 rows have a time that does not fit")), "{:?}", stray.notes);
+    // Times of another unit do not decide where frames begin again.
+    let with_times = |row: &String| {
+        let mut cells: Vec<String> = row.split(',').map(str::to_owned).collect();
+        cells[2] = format!("{}000", 100 * cells[1].parse::<u64>().unwrap());
+        cells.join(",")
+    };
+    let first: Vec<String> = three_periods().iter().take(14 * 60).map(with_times).collect();
+    let microseconds = mined(&first);
+    assert_eq!((microseconds.recordings.len(), microseconds.recordings[0].vehicles), (1, 6));
+    let contradicts =
+        |note: &String| note.contains("frames and times contradict one another: 10 frames per second, 0.0100");
+    assert!(microseconds.notes.iter().any(contradicts), "{:?}", microseconds.notes);
+}
+
+#[test]
+fn a_number_that_comes_back_after_a_pause_is_another_vehicle() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("t.csv");
+    let mut text = "id,time,x,y,speed,length,width,class\n".to_owned();
+    for time in times(12) {
+        for (at, vehicle) in CUT_IN.into_iter().enumerate() {
+            let (x, y, _) = place(vehicle, time, 4.0);
+            let _ = writeln!(text, "{at},{time:.2},{x:.2},{y:.2},{},4.5,1.8,car", vehicle.4);
+        }
+    }
+    // Number 2 again, of a lorry.
+    for time in times(12) {
+        let (x, y, _) = place(CUT_IN[4], time, 4.0);
+        let _ = writeln!(text, "2,{:.2},{x:.2},{y:.2},22.0,16.5,2.5,truck", time + 30.0);
+    }
+    fs::write(&path, text).unwrap();
+    let loaded = load(&path).unwrap().remove(0);
+    let again: Vec<&Track> = loaded.recording.tracks.iter().filter(|track| track.first_frame > 200).collect();
+    let [lorry] = again[..] else { panic!("{} tracks", again.len()) };
+    assert_eq!((lorry.length_m, lorry.class), (16.5, VehicleClass::Truck));
+    assert_eq!(loaded.vehicle_names.get(&lorry.id).map(String::as_str), Some("2"));
+    let first = loaded.recording.track(2).unwrap();
+    assert_eq!((first.length_m, first.class), (4.5, VehicleClass::Car));
+    assert!(loaded.notes.iter().any(|note| note.contains("comes back")), "{:?}", loaded.notes);
+}
+
+/// frame-step: 30 frames per second, of which every third is in the file.
+#[test]
+fn scenarios_have_the_frames_and_the_names_of_vehicles_of_their_file() {
+    let dir = tempfile::tempdir().unwrap();
+    let path = dir.path().join("t.csv");
+    let table = |first: usize, step: usize| {
+        let mut text = "id,frame,time,x,y,speed,length,width,class\n".to_owned();
+        for (k, time) in times(14).enumerate() {
+            for vehicle in CUT_IN {
+                let (x, y, _) = place(vehicle, time, 4.0);
+                let frame = first + step * k;
+                let _ = writeln!(text, "{},{frame},{time:.2},{x:.2},{y:.2},{},4.5,1.8,car", vehicle.0, vehicle.4);
+            }
+        }
+        text
+    };
+    let cut_in = || {
+        let mined = mine_folder(&path, &MiningOptions::default(), Implausible::Refused, || Ok(())).unwrap();
+        mined.scenarios.into_iter().find(|s| s.category == Category::CutIn).unwrap()
+    };
+    fs::write(&path, table(0, 1)).unwrap();
+    let plain = cut_in();
+    fs::write(&path, table(1000, 3)).unwrap();
+    let stepped = cut_in();
+    assert_eq!(stepped.frame0, 1000 + 3 * plain.frame0);
+    assert_eq!(stepped.frame1, 1000 + 3 * plain.frame1);
+    assert_eq!(stepped.frame_switch, plain.frame_switch.map(|frame| 1000 + 3 * frame));
+    assert_eq!(stepped.id, format!("t_cut_in_f.1_f.2_{}", stepped.frame0));
+    assert_eq!((stepped.fps, &stepped.target), (plain.fps, &plain.target));
+}
