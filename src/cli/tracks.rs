@@ -8,7 +8,7 @@ use clap::Args;
 use super::Exit;
 use super::configured::Configured;
 use super::format::FormatFlag;
-use crate::report::tracks::{TrackReport, across, space_time};
+use crate::report::tracks::{TrackReport, across, report_text, space_time};
 use crate::scenario::usable;
 use crate::support::files::{check_folder, write_atomically};
 use crate::support::plausibility::Implausible;
@@ -97,7 +97,7 @@ impl Tracks {
         let json = || {
             serde_json::to_string_pretty(&reports).map_err(|error| Error::Internal(format!("tracks as JSON: {error}")))
         };
-        let text = || reports.iter().map(TrackReport::text).collect::<Vec<_>>().join("\n");
+        let text = || report_text(&reports);
         self.format.print(text, json)?;
         Ok(if is_complete { Exit::Ok } else { Exit::Incomplete })
     }

@@ -1,13 +1,15 @@
 //! What a reader of tracks understood: its text, and figures of the tracks in time and across the road.
 
+use std::collections::BTreeMap;
+
 use serde::Serialize;
 
 use super::plot::{Figure, Layer, Plot, PlotAxis, Rule};
 use super::tables::wrap;
-use crate::support::readable::count_of;
+use crate::support::readable::{count, count_of, significant};
 use crate::support::table::WIDTH;
 use crate::traffic::mining::{CategoryCount, counts_text};
-use crate::traffic::trajectory::tracks::Understanding;
+use crate::traffic::trajectory::tracks::{Understanding, UnderstoodCarriageway};
 use crate::traffic::trajectory::{Recording, Track, VehicleClass};
 
 /// Maximum number of tracks of a figure; beyond it, every n-th is drawn.
@@ -38,9 +40,13 @@ pub struct TrackReport {
 }
 
 impl TrackReport {
+    fn how(&self) -> &'static str {
+        if self.is_detected { "detected by its columns" } else { "as named" }
+    }
+
     /// The report as text.
     pub fn text(&self) -> String {
-        let how = if self.is_detected { "detected by its columns" } else { "as named" };
+        let how = self.how();
         let mut text = format!(
             "{}\n  {:<10} {}\n  {:<10} {} ({how})\n",
             self.file, "recording", self.understanding.recording, "preset", self.preset
@@ -64,6 +70,139 @@ impl TrackReport {
         }
         text
     }
+}
+
+/// Recordings that are told one by one; of more, what they have in common and what differs.
+const MAX_TOLD: usize = 5;
+/// Recordings that a line names.
+const MAX_NAMED: usize = 5;
+
+/// What was understood of recordings, as text.
+pub fn report_text(reports: &[TrackReport]) -> String {
+    if reports.len() <= MAX_TOLD {
+        return reports.iter().map(TrackReport::text).collect::<Vec<_>>().join("\n");
+    }
+    let mut text = format!("{} recordings; JSON output tells each of them\n", count_of(reports.len()));
+    let mut line = |name: &str, words: &str| text += &hanging(&format!("  {name:<10} "), words);
+    let of_all =
+        |value: &dyn Fn(&Understanding) -> f64| reports.iter().map(|report| value(&report.understanding)).sum::<f64>();
+    let range = |value: &dyn Fn(&Understanding) -> f64| {
+        let values = reports.iter().map(|report| value(&report.understanding));
+        let (low, high) = values.fold((f64::INFINITY, 0.0_f64), |(low, high), value| (low.min(value), high.max(value)));
+        format!("{} to {}", significant(low, 3), significant(high, 3))
+    };
+    let each = |name: &'static str, line: &mut dyn FnMut(&str, &str)| {
+        let words = |report: &TrackReport| {
+            let lines = report.understanding.lines();
+            lines.into_iter().find(|(of, _)| *of == name).map(|(_, words)| words).unwrap_or_default()
+        };
+        variants(reports, &words).iter().filter(|words| !words.is_empty()).for_each(|words| line(name, words));
+    };
+    variants(reports, &|report| format!("{} ({})", report.preset, report.how()))
+        .iter()
+        .for_each(|words| line("preset", words));
+    each("rate", &mut line);
+    let total = |value: fn(&Understanding) -> u64| {
+        count(reports.iter().map(|report| value(&report.understanding)).sum::<u64>())
+    };
+    line(
+        "vehicles",
+        &format!(
+            "{} cars, {} lorries; {} samples, {} h, {} km",
+            total(|of| of.cars),
+            total(|of| of.trucks),
+            total(|of| of.samples),
+            significant(of_all(&|of| of.hours), 3),
+            significant(of_all(&|of| of.km), 4)
+        ),
+    );
+    each("columns", &mut line);
+    each("reference", &mut line);
+    let mut classes: BTreeMap<&str, u64> = BTreeMap::new();
+    for (class, number) in reports.iter().flat_map(|report| &report.understanding.classes) {
+        *classes.entry(class).or_default() += number;
+    }
+    if !classes.is_empty() {
+        let words: Vec<String> =
+            classes.iter().take(12).map(|(class, number)| format!("{} {class}", count(*number))).collect();
+        line("classes", &words.join(", "));
+    }
+    let straight = |of: &TrackReport| if of.understanding.is_straight { "straight" } else { "curved" }.to_owned();
+    variants(reports, &straight).iter().for_each(|words| line("road", words));
+    line(
+        "",
+        &format!(
+            "{} m in view; vehicles wander by {} m around its line",
+            range(&|of| of.length_m),
+            range(&|of| of.wander_m)
+        ),
+    );
+    let lanes = |report: &TrackReport| {
+        let of = |of: &UnderstoodCarriageway| format!("{} lanes {} from {}", of.lanes, of.way(), of.source);
+        report.understanding.carriageways.iter().map(of).collect::<Vec<_>>().join("; ")
+    };
+    variants(reports, &lanes).iter().for_each(|words| line("lanes", words));
+    let speeds = |report: &TrackReport| {
+        let of = &report.understanding;
+        let from = |number: u64, what: &str| if number == 0 { "as given".to_owned() } else { format!("from {what}") };
+        let (along, across) = (from(of.derived_speeds, "positions"), from(of.derived_lateral, "positions"));
+        format!("{along}, lateral ones {across}, accelerations {}", from(of.derived_accelerations, "speeds"))
+    };
+    variants(reports, &speeds).iter().for_each(|words| line("speeds", words));
+    let sum = |mined: &dyn Fn(&TrackReport) -> Option<Vec<CategoryCount>>| {
+        reports.iter().filter_map(mined).reduce(|sum, mined| {
+            let add = |(a, b): (&CategoryCount, CategoryCount)| CategoryCount {
+                found: a.found + b.found,
+                kept: a.kept + b.kept,
+            };
+            sum.iter().zip(mined).map(add).collect()
+        })
+    };
+    line("scenarios", &counts_text(&sum(&|report| Some(report.mined.clone())).unwrap_or_default()));
+    if let Some(without) = sum(&|report| report.mined_without_smoothing.clone()) {
+        line("", &format!("without smoothing {}", counts_text(&without)));
+    }
+    // Findings that differ in their numbers are one kind.
+    let kind = |text: &str| text.replace(|c: char| c.is_ascii_digit() || ".,".contains(c), "");
+    let mut kinds: BTreeMap<(bool, String), (&str, Vec<&TrackReport>)> = BTreeMap::new();
+    for report in reports {
+        for finding in &report.understanding.findings {
+            kinds.entry((!finding.is_grave, kind(&finding.text))).or_insert((&finding.text, Vec::new())).1.push(report);
+        }
+    }
+    for ((is_note, _), (first, of)) in &kinds {
+        let named = if of.len() == reports.len() { "all".to_owned() } else { names(of) };
+        text += &hanging(if *is_note { "  note       " } else { "  WRONG      " }, &format!("{named}: {first}"));
+    }
+    let calm = reports.iter().filter(|report| report.understanding.findings.is_empty()).count();
+    if calm > 0 {
+        text += &format!("  nothing contradicts itself in {}\n", count_of(calm));
+    }
+    text
+}
+
+/// The words of each recording once, those of most recordings first; others with the recordings that have them.
+fn variants(reports: &[TrackReport], words: &dyn Fn(&TrackReport) -> String) -> Vec<String> {
+    let mut found: BTreeMap<String, Vec<&TrackReport>> = BTreeMap::new();
+    reports.iter().for_each(|report| found.entry(words(report)).or_default().push(report));
+    let mut found: Vec<(String, Vec<&TrackReport>)> = found.into_iter().collect();
+    found.sort_by_key(|(_, of)| std::cmp::Reverse(of.len()));
+    let is_one = found.len() == 1;
+    let told = |(at, (words, of)): (usize, (String, Vec<&TrackReport>))| match at {
+        _ if is_one || words.is_empty() => words,
+        0 => format!("{words} ({} recordings)", count_of(of.len())),
+        _ => format!("{words} ({})", names(&of)),
+    };
+    found.into_iter().enumerate().map(told).collect()
+}
+
+/// The files of some recordings.
+fn names(reports: &[&TrackReport]) -> String {
+    let first: Vec<&str> =
+        reports.iter().take(MAX_NAMED).map(|report| report.understanding.recording.as_str()).collect();
+    let more = reports.len().saturating_sub(MAX_NAMED);
+    let more = if more > 0 { format!(" and {} more", count_of(more)) } else { String::new() };
+    format!("{} recordings: {}{more}", count_of(reports.len()), first.join(", "))
 }
 
 /// Words after a name, wrapped below one another.

@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
 
+use lanesweep::report::tracks::{TrackReport, report_text};
 use lanesweep::support::plausibility::Implausible;
 use lanesweep::traffic::mining::{MiningOptions, mine, mine_folder};
 use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
@@ -417,4 +418,30 @@ fn a_hundred_thousand_columns_are_read_and_a_repeated_attribute_is_refused() {
     }
     let twice = write("b.xml", "<f><vehicle id=\"1\" id=\"2\"/></f>".to_owned());
     assert!(tracks::draft(&twice).unwrap_err().to_string().contains("`id` is there twice"));
+}
+
+#[test]
+fn many_recordings_are_told_by_what_they_share_and_what_differs() {
+    let mut every_fifth = table();
+    let of = |table: &Plain, name: &str| {
+        let mut understanding = understood(table).unwrap();
+        understanding.recording = name.to_owned();
+        let (file, preset) = (format!("{name}.csv"), "generic".to_owned());
+        TrackReport { file, preset, is_detected: true, understanding, mined: Vec::new(), mined_without_smoothing: None }
+    };
+    let mut reports: Vec<TrackReport> = (0..30).map(|_| of(&every_fifth, "usual")).collect();
+    every_fifth.map("t", |t, _| 2.0 * t);
+    every_fifth.map("speed", |v, _| 0.5 * v);
+    every_fifth.map("vx", |v, _| 0.5 * v);
+    every_fifth.map("vy", |v, _| 0.5 * v);
+    reports.push(of(&every_fifth, "slow"));
+    let text = report_text(&reports);
+    assert!(text.lines().count() < 30, "{text}");
+    for words in
+        ["31 recordings", "5 Hz, from the times (30 recordings)", "2.5 Hz, from the times (1 recordings: slow)"]
+    {
+        assert!(text.contains(words), "{words} in\n{text}");
+    }
+    // A few are told one by one.
+    assert_eq!(report_text(&reports[..2]), [reports[0].text(), reports[1].text()].join("\n"));
 }
