@@ -6,7 +6,7 @@ use std::path::Path;
 
 use lanesweep::scenario::{Category, read_scenario_file, write_scenarios};
 use lanesweep::support::plausibility::Implausible;
-use lanesweep::traffic::mining::{Collection, MiningOptions, mine_folder};
+use lanesweep::traffic::mining::{Collection, MiningOptions, mine_folder, mine_inputs};
 use lanesweep::traffic::trajectory::{Inputs, Loaded, Recording, Track, VehicleClass};
 
 const LANE_WIDTH_M: f64 = 3.5;
@@ -151,6 +151,11 @@ fn persons_and_steps_without_vehicles_are_no_vehicles() {
     let loaded = load(&path).unwrap().remove(0);
     assert_eq!(loaded.recording.tracks.len(), CUT_IN.len());
     assert!(loaded.notes.iter().any(|note| note.starts_with("1 are left out as persons")), "{:?}", loaded.notes);
+    // In XML they are elements of their own.
+    let person = "<person id=\"p0\" x=\"0.00\" y=\"-2.88\" angle=\"90.00\" speed=\"1.30\" pos=\"0.00\" edge=\"W0\"/>";
+    let xml = dir.path().join("fcd.xml");
+    fs::write(&xml, fcd_xml(&CUT_IN, 4.0).replace("</timestep>", &format!("{person}</timestep>"))).unwrap();
+    assert_eq!(load(&xml).unwrap()[0].recording.tracks.len(), CUT_IN.len());
     // A vehicle without a name is no empty step.
     fs::write(&path, text.replacen("f.1;", ";", 1)).unwrap();
     assert!(load(&path).unwrap_err().to_string().contains("there is no value"));
@@ -297,10 +302,12 @@ fn scenarios_have_the_frames_and_the_names_of_vehicles_of_their_file() {
         }
         text
     };
-    let cut_in = || {
-        let mined = mine_folder(&path, &MiningOptions::default(), Implausible::Refused, || Ok(())).unwrap();
+    let cut_in_by = |preset: Option<&str>| {
+        let inputs = Inputs::of(&path, preset).unwrap();
+        let mined = mine_inputs(inputs, &MiningOptions::default(), Implausible::Refused, || Ok(())).unwrap();
         mined.scenarios.into_iter().find(|s| s.category == Category::CutIn).unwrap()
     };
+    let cut_in = || cut_in_by(None);
     fs::write(&path, table(0, 1)).unwrap();
     let plain = cut_in();
     fs::write(&path, table(1000, 3)).unwrap();
@@ -310,4 +317,12 @@ fn scenarios_have_the_frames_and_the_names_of_vehicles_of_their_file() {
     assert_eq!(stepped.frame_switch, plain.frame_switch.map(|frame| 1000 + 3 * frame));
     assert_eq!(stepped.id, format!("t_cut_in_f.1_f.2_{}", stepped.frame0));
     assert_eq!((stepped.fps, &stepped.target), (plain.fps, &plain.target));
+    // The same where the preset has the rate, and no time is needed.
+    let generic = Path::new(env!("CARGO_MANIFEST_DIR")).join("configs/presets/generic.toml");
+    let own = dir.path().join("own.toml");
+    let with_rate = fs::read_to_string(generic).unwrap().replacen("[classes]", "frame_rate_hz = 30.0\n\n[classes]", 1);
+    fs::write(&own, with_rate).unwrap();
+    fs::write(&path, table(1000, 3).replace("id,frame,time", "id,frame,ignored")).unwrap();
+    let frames = cut_in_by(own.to_str());
+    assert_eq!((frames.id, frames.frame1, frames.fps), (stepped.id, stepped.frame1, stepped.fps));
 }

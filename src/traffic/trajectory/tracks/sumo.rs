@@ -110,8 +110,8 @@ impl Types {
                     self.0.insert(vehicle.key.clone(), Type { vehicle, is_own, files });
                 }
                 Some(known) => {
-                    let facts = |of: &RawVehicle| (of.lengths_m.clone(), of.widths_m.clone(), of.class.clone());
-                    if known.is_own == is_own && facts(&known.vehicle) != facts(&vehicle) {
+                    let size = |of: &RawVehicle| [of.lengths_m.first().copied(), of.widths_m.first().copied()];
+                    if known.is_own == is_own && size(&known.vehicle) != size(&vehicle) {
                         known.files.push(name.clone());
                     }
                 }
