@@ -179,13 +179,13 @@ pub fn mine_inputs(
     let (files, problems) = inputs.files();
     let part = |loaded: Loaded| {
         let mut mined = mine(&loaded.recording, options);
+        let of_noise = noise_notes(&loaded.recording, &mined.scenarios, options);
         mined.scenarios.iter_mut().for_each(|scenario| name_as_in_file(scenario, &loaded));
         let ScenarioFile { scenarios, problems, notes: doubts } = usable(mined.scenarios, implausible);
         mined.scenarios = scenarios;
         let mut summary = summary(&loaded.recording, &mined, options, loaded.checksum_sha256);
         summary.preset.clone_from(&preset);
         let name = |note: String| format!("recording {}: {note}", loaded.recording.id);
-        let of_noise = noise_notes(&loaded.recording, &mined.scenarios, options);
         let notes = loaded.notes.into_iter().chain(doubts).chain(of_noise).map(name).collect();
         MinedPart { mined, summary, problems, notes, synthetic: loaded.recording.synthetic }
     };
