@@ -10,7 +10,7 @@ use lanesweep::support::plausibility::Implausible;
 use lanesweep::traffic::mining::{MiningOptions, mine, mine_folder};
 use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
 use lanesweep::traffic::trajectory::tracks::{self, Finding, LoadedTracks, Preset, TrackFile, Understanding};
-use lanesweep::traffic::trajectory::{Inputs, Loaded, VehicleClass};
+use lanesweep::traffic::trajectory::{Inputs, Loaded, Track, VehicleClass};
 
 use crate::common::exid::{self, Plain};
 
@@ -231,29 +231,30 @@ fn a_step_that_no_vehicle_makes_gives_two_tracks_and_is_said() {
 }
 
 #[test]
-fn a_number_used_again_within_a_gap_that_is_filled_is_another_vehicle_with_its_own_size() {
+fn a_number_used_again_within_a_gap_that_is_filled_is_another_vehicle_with_its_own_size_and_class() {
     let mut table = with_speeds();
     let all = read(&table).unwrap().loaded.recording.tracks.len();
-    let (t, length) = (table.at("t"), table.at("length"));
+    let (t, length, class) = (table.at("t"), table.at("length"), table.at("class"));
     let rows = rows_by_vehicle(&table);
     let number = |row: usize, column: usize| table.rows[row][column].parse::<f64>().unwrap();
     let follows = |(a, b): &(&Vec<usize>, &Vec<usize>)| {
         let gap_s = number(b[0], t) - number(a[a.len() - 1], t);
-        gap_s > 0.1 && gap_s < 0.3 && number(a[0], length) != number(b[0], length)
+        gap_s > 0.1 && gap_s < 0.3 && table.rows[a[0]][class] != table.rows[b[0]][class]
     };
     let pairs = rows.values().flat_map(|a| rows.values().map(move |b| (a, b)));
     let (first, second) = pairs.into_iter().find(follows).unwrap();
-    let lengths = [number(first[0], length), number(second[0], length)];
+    let vehicles = [first[0], second[0]].map(|row| {
+        let class = if table.rows[row][class] == "truck" { VehicleClass::Truck } else { VehicleClass::Car };
+        Some((number(row, length), class))
+    });
     let key = table.rows[first[0]][0].clone();
     second.iter().for_each(|at| table.rows[*at][0].clone_from(&key));
     let read = read(&table).unwrap();
     let tracks = &read.loaded.recording.tracks;
     assert_eq!((read.understanding.jumps, tracks.len()), (1, all));
-    let of_new = tracks.last().map(|track| track.length_m);
-    assert_eq!(
-        (read.loaded.recording.track(key.parse().unwrap()).map(|track| track.length_m), of_new),
-        (Some(lengths[0]), Some(lengths[1]))
-    );
+    let facts = |track: &Track| (track.length_m, track.class);
+    let of_first = read.loaded.recording.track(key.parse().unwrap()).map(facts);
+    assert_eq!([of_first, tracks.last().map(facts)], vehicles);
     let mined = mine(&read.loaded.recording, &MiningOptions::default());
     assert!(mined.scenarios.iter().filter(|found| found.kept).all(|found| found.gap0 > Some(0.0)));
 }

@@ -3,8 +3,8 @@
 
 use super::preset::Preset;
 use super::raw::RawRecording;
-use super::samples::Samples;
 use super::road::median;
+use super::samples::Samples;
 use crate::support::readable::significant;
 
 /// Times of a frame that are farther apart belong to two recordings, s.

@@ -35,7 +35,8 @@ pub(super) struct Sized {
 /// The box of a piece of a vehicle's track.
 pub(super) fn sized(piece: &Piece, vehicle: &RawVehicle, preset: &Preset) -> Sized {
     let [lengths_m, widths_m] = vehicle.sizes_m(&piece.samples);
-    let class = vehicle.class.as_deref().unwrap_or_default();
+    let class = vehicle.class_of(&piece.samples).unwrap_or_default();
+    let class = class.as_str();
     let of = |sizes: &[f64]| {
         let value = median(&mut sizes.to_vec());
         (!value.is_nan()).then_some(value)

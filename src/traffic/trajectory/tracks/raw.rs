@@ -90,11 +90,20 @@ impl RawVehicle {
         [of(0, &self.lengths_m), of(1, &self.widths_m)]
     }
 
+    /// Class of some of its samples: that in the row of the first, unless a type or a meta file gives another name.
+    pub fn class_of(&self, samples: &Samples) -> Option<String> {
+        let in_rows = self.classes.len() > 1
+            && !samples.is_empty()
+            && self.classes.iter().any(|of| Some(of) == self.class.as_ref());
+        let class = if in_rows { in_row(&self.classes, samples.fact(2, 0)) } else { None };
+        class.or_else(|| self.class.clone())
+    }
+
     /// Some of its samples as a vehicle of their own, with the sizes, class and direction in their rows.
     pub fn part(&self, samples: Samples) -> RawVehicle {
         let [lengths_m, widths_m] = self.sizes_m(&samples);
-        let fact = |fact: usize| if samples.is_empty() { 0 } else { samples.fact(fact, 0) };
-        let (class, direction) = (in_row(&self.classes, fact(2)), in_row(&[-1.0, 1.0], fact(3)));
+        let first = |fact: usize| if samples.is_empty() { 0 } else { samples.fact(fact, 0) };
+        let (class, direction) = (in_row(&self.classes, first(2)), in_row(&[-1.0, 1.0], first(3)));
         RawVehicle {
             key: self.key.clone(),
             class,
