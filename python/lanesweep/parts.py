@@ -1,5 +1,5 @@
 """Runs in parts, for any executor: plan once, run the parts anywhere, join them. Tables, figures and estimates have the bytes of
-the whole run; only what the record says of the host (seconds, backend) differs.
+the whole run; only what the record says of the host (seconds, backend) and of settings differs.
 
     plan = parts.plan(lanesweep.sample, "cut-in-2.json", samples=10**8, thw=1.2)
     done = [parts.run(plan, shard) for shard in range(plan.shards)]  # joblib, Dask, Ray, …

@@ -27,11 +27,11 @@ fn ended(mut run: Child) -> (i32, String) {
     program::ended(run)
 }
 
-/// Estimates of a folder, without what belongs to the machine.
+/// Estimates of a folder, without what belongs to the machine and the command.
 fn estimates(dir: &Path) -> serde_json::Value {
     let text = std::fs::read(dir.join("estimate.json")).unwrap();
     let mut file: serde_json::Value = serde_json::from_slice(&text).unwrap();
-    file.as_object_mut().unwrap().remove("host").unwrap();
+    ["host", "settings"].map(|of_command| file.as_object_mut().unwrap().remove(of_command).unwrap());
     file
 }
 
