@@ -26,7 +26,7 @@ use crate::support::input_file;
 use crate::{Error, Place, Result};
 
 /// Rows decoded together, with and without lists.
-const BATCH_ROWS: [usize; 2] = [64, 4096];
+const BATCH_ROWS: [usize; 2] = [64, 256];
 /// Maximum length of a series: eleven hours at 25 Hz.
 const MAX_SERIES: usize = 1 << 20;
 /// Maximum length of a text, bytes: every row may repeat it.

@@ -165,7 +165,7 @@ fn decimal(value: f64, decimals: usize) -> Option<i32> {
     }
     let whole = (value * POWERS[decimals]).round();
     // Minus zero and numbers of more digits are others.
-    (whole.abs() <= f64::from(i32::MAX) && is_same(whole / POWERS[decimals], value)).then_some(whole as i32)
+    (whole.abs() <= f64::from(i32::MAX) && is_same(number(whole as i32, decimals as u8), value)).then_some(whole as i32)
 }
 
 fn number(whole: i32, decimals: u8) -> f64 {
