@@ -25,7 +25,7 @@ use super::{Cell as TableCell, Row};
 use crate::support::input_file;
 use crate::{Error, Place, Result};
 
-/// Rows decoded together, with and without lists.
+/// Rows decoded together, with and without lists; each may repeat a text of [`MAX_TEXT`].
 const BATCH_ROWS: [usize; 2] = [64, 256];
 /// Maximum length of a series: eleven hours at 25 Hz.
 const MAX_SERIES: usize = 1 << 20;
