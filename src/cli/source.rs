@@ -38,7 +38,9 @@ pub fn load(
     }
     if let Some(preset) = collection.recordings.first().and_then(|recording| recording.preset.as_deref()) {
         let name = preset.split(' ').next().unwrap_or(preset);
-        tracing::info!("read by preset {name}; `lanesweep tracks` says how");
+        let assumed =
+            if name == "generic" { ", which takes positions for centres and numbers for SI units" } else { "" };
+        tracing::info!("read by preset {name}{assumed}; `lanesweep tracks` says how");
     }
     tracing::info!("{}", counts_text(&counts(&collection.scenarios)));
     Ok(collection)

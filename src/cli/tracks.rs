@@ -9,7 +9,7 @@ use super::Exit;
 use super::configured::Configured;
 use super::format::FormatFlag;
 use crate::report::tracks::{TrackReport, across, report_text, space_time};
-use crate::scenario::usable;
+use crate::scenario::{ScenarioFile, usable};
 use crate::support::files::{check_folder, write_atomically};
 use crate::support::plausibility::Implausible;
 use crate::support::run_dir::{OutputDir, unfinished};
@@ -122,11 +122,16 @@ impl Tracks {
     }
 
     fn of_file(&self, file: &InputFile, configured: &Configured) -> Result<Vec<(TrackReport, Recording)>> {
-        // Found and kept scenarios, and what noise may do to them.
+        // Found and kept scenarios, what noise may do to them, and those that runs leave out.
         let mined_of = |recording: &Recording| -> (Vec<CategoryCount>, Vec<String>) {
             let options = &configured.settings.mining;
-            let scenarios = usable(mine(recording, options).scenarios, Implausible::Refused).scenarios;
-            (counts(&scenarios).to_vec(), noise_notes(recording, &scenarios, options))
+            let ScenarioFile { scenarios, problems, .. } =
+                usable(mine(recording, options).scenarios, Implausible::Refused);
+            let mut notes = noise_notes(recording, &scenarios, options);
+            if let Some(first) = problems.first() {
+                notes.push(format!("{} more scenarios are left out, the first: {first}", problems.len()));
+            }
+            (counts(&scenarios).to_vec(), notes)
         };
         let is_detected = self.preset.is_none();
         match file {

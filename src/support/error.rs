@@ -208,6 +208,7 @@ impl Error {
                 std::io::ErrorKind::PermissionDenied => {
                     format!("you have no permission to {action} here: change the permissions or choose another path")
                 }
+                std::io::ErrorKind::UnexpectedEof => "the file is truncated: copy it again".to_owned(),
                 std::io::ErrorKind::InvalidData => "save the file as UTF-8 text".to_owned(),
                 std::io::ErrorKind::IsADirectory => "this is a folder; give the path of a file".to_owned(),
                 std::io::ErrorKind::NotADirectory | std::io::ErrorKind::AlreadyExists => {

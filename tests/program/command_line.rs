@@ -554,7 +554,7 @@ fn a_study_of_some_headways_and_models_computes_no_claim_that_needs_all() {
 
 #[test]
 fn a_recording_with_speeds_that_no_scenario_holds_is_bad_data_and_no_defect() {
-    // Left out as implausible, or, where that is accepted, refused as what no scenario file holds.
+    // The recording is left out as implausible, or, where that is accepted, each scenario as what no file may hold.
     let data = recordings();
     let tracks = data.path().join("01_tracks.csv");
     let table = std::fs::read_to_string(&tracks).unwrap();
@@ -572,6 +572,6 @@ fn a_recording_with_speeds_that_no_scenario_holds_is_bad_data_and_no_defect() {
     assert_eq!(code(&mined), 4, "{}", stderr(&mined));
     assert!(stderr(&mined).contains("line 2, column `xVelocity`"), "{}", stderr(&mined));
     let mined = lanesweep(&["-q", "mine", text(data.path()), "--out", text(&out), "--accept-implausible"]);
-    assert_eq!(code(&mined), 3, "{}", stderr(&mined));
+    assert_eq!(code(&mined), 4, "{}", stderr(&mined));
     assert!(stderr(&mined).contains("`ego.v0`") && stderr(&mined).contains("at most 1e6"), "{}", stderr(&mined));
 }

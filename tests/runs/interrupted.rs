@@ -31,7 +31,9 @@ fn ended(mut run: Child) -> (i32, String) {
 fn estimates(dir: &Path) -> serde_json::Value {
     let text = std::fs::read(dir.join("estimate.json")).unwrap();
     let mut file: serde_json::Value = serde_json::from_slice(&text).unwrap();
-    ["host", "settings"].map(|of_command| file.as_object_mut().unwrap().remove(of_command).unwrap());
+    for of_command in ["host", "settings"] {
+        file.as_object_mut().unwrap().remove(of_command).unwrap();
+    }
     file
 }
 

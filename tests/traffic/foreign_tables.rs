@@ -259,6 +259,51 @@ fn a_number_used_again_within_a_gap_that_is_filled_is_another_vehicle_with_its_o
     assert!(mined.scenarios.iter().filter(|found| found.kept).all(|found| found.gap0 > Some(0.0)));
 }
 
+/// A table whose column of accelerations is the change of speed along x, times a factor, plus an offset.
+fn with_accelerations(factor: f64, offset_mps2: f64) -> Plain {
+    let mut table = with_speeds();
+    let (vx, t) = (table.at("vx"), table.at("t"));
+    let rows = rows_by_vehicle(&table);
+    table.header.push("acceleration".to_owned());
+    let number = |table: &Plain, row: usize, column: usize| table.rows[row][column].parse::<f64>().unwrap();
+    for own in rows.values() {
+        let told = |k: usize| {
+            let (a, b) = (own[k.saturating_sub(1)], own[(k + 1).min(own.len() - 1)]);
+            let change = number(&table, b, vx).abs() - number(&table, a, vx).abs();
+            change / (number(&table, b, t) - number(&table, a, t)).max(1e-3)
+        };
+        let accelerations: Vec<f64> = (0..own.len()).map(|k| factor * told(k) + offset_mps2).collect();
+        own.iter().zip(accelerations).for_each(|(row, a)| table.rows[*row].push(format!("{a:.4}")));
+    }
+    table
+}
+
+#[test]
+fn numbers_that_fit_one_another_badly_are_said() {
+    let scaled = |columns: &[&str], factor: f64| {
+        let mut table = with_speeds();
+        for column in columns.iter().map(|name| table.at(name)).collect::<Vec<_>>() {
+            let by = |row: &mut Vec<String>| row[column] = (factor * row[column].parse::<f64>().unwrap()).to_string();
+            table.rows.iter_mut().for_each(by);
+        }
+        table
+    };
+    for (table, said) in [
+        (scaled(&["vx", "vy"], 1.04), "times as far as their speeds tell"),
+        (scaled(&["length"], 0.5), "half of the cars are shorter than"),
+        (scaled(&["y", "vy"], 0.7), "m are narrow"),
+        (with_accelerations(0.6, 0.0), "accelerations are 0.60 times the changes of speed"),
+        (with_accelerations(1.0, -0.4), "accelerations are 0.40 m/s² below the changes of speed"),
+    ] {
+        let about = understood(&table).unwrap();
+        assert!(about.findings.iter().any(|one| one.text.contains(said)), "{said}: {:?}", about.findings);
+    }
+    for good in [with_speeds(), with_accelerations(1.0, 0.0)] {
+        let about = understood(&good).unwrap();
+        assert!(!about.findings.iter().any(|one| one.text.contains("times")), "{:?}", about.findings);
+    }
+}
+
 /// Simulators change lanes in one step.
 #[test]
 fn a_lane_change_in_one_step_does_not_split_a_track() {

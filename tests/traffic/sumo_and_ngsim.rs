@@ -177,7 +177,7 @@ fn a_lane_change_of_one_step_is_refused_from_recordings_and_from_files_alike() {
     let instant = mined(0.05, Implausible::Refused);
     assert_eq!((cut_ins(&instant), instant.problems.len()), (0, 1), "{:?}", instant.notes);
     assert!(instant.problems[0].to_string().contains("lateral jump"), "{:?}", instant.problems);
-    assert!(instant.notes.iter().any(|note| note.contains("--lanechange.duration")), "{:?}", instant.notes);
+    assert!(instant.notes.iter().any(|note| note.contains("`lanechange.duration`")), "{:?}", instant.notes);
     // The file of the same scenario is refused for the same reason.
     let accepted = mined(0.05, Implausible::Accepted);
     assert_eq!(cut_ins(&accepted), 1);

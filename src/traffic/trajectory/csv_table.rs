@@ -421,7 +421,7 @@ fn delimiter_of(start: &[u8]) -> u8 {
     [b'|', b'\t', b';', b','].into_iter().max_by_key(count).unwrap_or(b',')
 }
 
-/// Whether numbers of the first lines have decimal commas, and none has a decimal point.
+/// Whether more fields of the first lines look like numbers with a decimal comma than with a point, as names of lanes may (`1.2`).
 fn has_decimal_commas(start: &[u8], delimiter: u8) -> bool {
     let is_decimal = |field: &[u8], mark: u8| {
         let field = field.trim_ascii();
@@ -429,11 +429,12 @@ fn has_decimal_commas(start: &[u8], delimiter: u8) -> bool {
         let is_number = digits.iter().all(|byte| byte.is_ascii_digit() || *byte == mark);
         is_number && digits.iter().filter(|byte| **byte == mark).count() == 1 && digits.len() > 1
     };
-    let mut fields = start.split(|byte| *byte == b'\n' || *byte == delimiter).map(|field| {
+    let fields = start.split(|byte| *byte == b'\n' || *byte == delimiter).map(|field| {
         let field = field.trim_ascii();
         field.strip_prefix(b"\"").and_then(|inner| inner.strip_suffix(b"\"")).unwrap_or(field)
     });
-    fields.clone().any(|field| is_decimal(field, b',')) && !fields.any(|field| is_decimal(field, b'.'))
+    let count = |mark| fields.clone().filter(|field| is_decimal(field, mark)).count();
+    count(b',') > count(b'.')
 }
 
 /// A header field as a column name.

@@ -60,21 +60,67 @@ fn a_disk_that_fills_up_is_told_and_the_same_command_ends_well_once_there_is_spa
 #[test]
 fn recordings_that_do_not_fit_leave_no_folder_that_looks_whole() {
     let bench = Bench::new();
-    let synth = ["-q", "synth", "--synth-recordings", "2", "--config", "generator.duration_s=20"];
-    done(bench.path(), &[&synth[..], &["whole"]].concat());
-    let size = |name: &str| std::fs::metadata(bench.path().join("whole").join(name)).unwrap().len();
-    // The first fits, the second only to its half.
-    let size = format!("{}k", (size("01_tracks.csv") + size("02_tracks.csv") / 2) / 1024 + 32);
-    let script = "\
-        \"$0\" \"$@\" \"$DISK/out\"; echo full $?; ls -A \"$DISK/out\"\n\
-        mount -o remount,size=64m \"$DISK\"\n\
-        \"$0\" \"$@\" \"$DISK/out\"; echo freed $?\n\
-        cp -r \"$DISK/out\" copy";
-    let Some(output) = on_a_disk(&bench, &size, script, &synth) else { return };
-    let said = unbroken(&output.stderr);
-    assert_eq!(lines(&output), ["full 6", "freed 0"], "{said}");
-    assert!(said.contains("02_tracks.csv") && said.contains("the disk is full"), "{said}");
-    same(&bench.path().join("copy"), &bench.path().join("whole"), "recordings");
+    let synth: &[&str] = &["-q", "synth", "--synth-recordings", "2", "--config", "generator.duration_s=20"];
+    let convert: &[&str] = &["-q", "tracks", "synth", "--convert"];
+    for (name, run) in [("synth", synth), ("converted", convert)] {
+        done(bench.path(), &[run, &[name]].concat());
+        let size = |file: &str| std::fs::metadata(bench.path().join(name).join(file)).unwrap().len();
+        // The first fits, the second only to its half.
+        let size = format!("{}k", (size("01_tracks.csv") + size("02_tracks.csv") / 2) / 1024 + 32);
+        let script = "\
+            \"$0\" \"$@\" \"$DISK/out\" >/dev/null; echo full $?; ls -A \"$DISK/out\"\n\
+            mount -o remount,size=64m \"$DISK\"\n\
+            \"$0\" \"$@\" \"$DISK/out\" >/dev/null; echo freed $?\n\
+            cp -r \"$DISK/out\" copy";
+        let Some(output) = on_a_disk(&bench, &size, script, run) else { return };
+        let said = unbroken(&output.stderr);
+        assert_eq!(lines(&output), ["full 6", "freed 0"], "{name}: {said}");
+        assert!(said.contains("02_tracks.csv") && said.contains("the disk is full"), "{name}: {said}");
+        same(&bench.path().join("copy"), &bench.path().join(name), name);
+        std::fs::remove_dir_all(bench.path().join("copy")).unwrap();
+    }
+}
+
+#[test]
+fn a_search_and_mined_scenarios_that_do_not_fit_end_well_once_there_is_space() {
+    let bench = Bench::new();
+    let search: &[&str] = &[
+        "-q",
+        "search",
+        "--scenarios",
+        "more.jsonl",
+        "--category",
+        "cut-in",
+        "--studies",
+        "24",
+        "--max-parameters",
+        "4",
+    ];
+    done(bench.path(), &["-q", "synth", "recordings", "--synth-recordings", "6"]);
+    done(bench.path(), &["-q", "mine", "recordings", "--out", "more.jsonl"]);
+    let mine: &[&str] = &["-q", "mine", "recordings"];
+    for (name, run, out) in [("search", search, "out"), ("mine", mine, "out/s.jsonl")] {
+        std::fs::create_dir_all(bench.path().join(name)).unwrap();
+        done(bench.path(), &[run, &["--out", &format!("{name}{}", &out[3..])]].concat());
+        // Its lines are in the order in which threads ended.
+        let _ = std::fs::remove_file(bench.path().join(name).join("search.journal"));
+        let script = format!(
+            "mkdir -p \"$DISK/out\"\n\
+            \"$0\" \"$@\" --out \"$DISK/{out}\" >/dev/null; echo full $?\n\
+            ls \"$DISK/out\" | grep -c 'json'\n\
+            mount -o remount,size=64m \"$DISK\"\n\
+            \"$0\" \"$@\" --out \"$DISK/{out}\" >/dev/null; echo freed $?\n\
+            cp -r \"$DISK/out\" copy; rm -f copy/search.journal"
+        );
+        for size in ["8k", "24k"] {
+            let Some(output) = on_a_disk(&bench, size, &script, run) else { return };
+            let said = unbroken(&output.stderr);
+            assert_eq!(lines(&output), ["full 6", "0", "freed 0"], "{name}, {size}: {said}");
+            assert!(said.contains("the disk is full"), "{name}, {size}: {said}");
+            same(&bench.path().join("copy"), &bench.path().join(name), &format!("{name}, {size}"));
+            std::fs::remove_dir_all(bench.path().join("copy")).unwrap();
+        }
+    }
 }
 
 #[test]

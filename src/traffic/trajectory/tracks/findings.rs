@@ -4,13 +4,21 @@ use super::preset::{Preset, Side};
 use super::road::median;
 use super::understanding::{Exclusion, Finding, TIMES, Understanding};
 use crate::support::plausibility::{Doubts, Implausible, NOISE_MPS, Quantity};
-use crate::support::readable::{count, significant};
+use crate::support::readable::{count, significant, value};
 use crate::traffic::trajectory::motion::{Impossible, JUMP_ACROSS_M, JUMP_ALONG_M, impossible, jumps};
 use crate::traffic::trajectory::overlap::overlaps;
 use crate::traffic::trajectory::{NO_LANE, Recording, Track, VehicleClass};
 
 /// Positions and speeds that differ by more than this fraction do not belong together.
 const MAX_SPEED_DIFFERENCE: f64 = 0.05;
+/// Good data differ by less.
+const USUAL_SPEED_DIFFERENCE: f64 = 0.02;
+/// Accelerations that differ from the changes of speed by more, as a fraction and on average (m/s²), decide what is mined.
+const USUAL_ACCELERATION_DIFFERENCE: f64 = 0.25;
+const USUAL_ACCELERATION_OFFSET_MPS2: f64 = 0.2;
+/// Cars whose median is shorter, and lanes that are narrower, are rather a mistake, m.
+const SHORT_CAR_M: f64 = 3.3;
+const NARROW_LANE_M: f64 = 2.6;
 /// A speed that positions tell to vary by more is not constant, m/s.
 const MAX_RANGE_MPS: f64 = 2.0;
 /// Fraction of vehicles that overlap from which on sizes or reference point are wrong.
@@ -56,6 +64,14 @@ impl Understanding {
                     true,
                     format!("vehicles move {} times as far as their speeds tell: {why}", significant(ratio, 3)),
                 );
+            } else if (ratio - 1.0).abs() > USUAL_SPEED_DIFFERENCE {
+                self.find(
+                    false,
+                    format!(
+                        "vehicles move {} times as far as their speeds tell: one of both is wrong by as much",
+                        significant(ratio, 3)
+                    ),
+                );
             }
         }
         let told = self.acceleration;
@@ -67,6 +83,19 @@ impl Understanding {
                     "accelerations do not fit the changes of speed (they are {} times as large, {}): check their unit and sign",
                     significant(size, 2),
                     if told.product < 0.0 { "of the other sign" } else { "of the same sign" }
+                ));
+            } else if (told.slope() - 1.0).abs() > USUAL_ACCELERATION_DIFFERENCE + 4.0 * told.slope_error() {
+                self.find(false, format!(
+                    "accelerations are {} times the changes of speed: peaks of braking, and what is kept for them, are wrong by as much",
+                    significant(told.slope(), 2)
+                ));
+            }
+            let offset_mps2 = told.difference / told.count;
+            if offset_mps2.abs() > USUAL_ACCELERATION_OFFSET_MPS2 {
+                self.find(false, format!(
+                    "accelerations are {} m/s² {} the changes of speed on average: peaks of braking are wrong by as much",
+                    significant(offset_mps2.abs(), 2),
+                    if offset_mps2 < 0.0 { "below" } else { "above" }
                 ));
             }
         }
@@ -134,6 +163,20 @@ impl Understanding {
         if 2 * outside > samples {
             self.find(true, "vehicles are mostly in no lane: check the axes, and the lanes in the file");
         }
+        let mut cars_m: Vec<f64> =
+            recording.tracks.iter().filter(|of| of.class == VehicleClass::Car).map(|of| of.length_m).collect();
+        let car_m = median(&mut cars_m);
+        if car_m < SHORT_CAR_M {
+            self.find(
+                false,
+                format!("half of the cars are shorter than {} m: check `length` and its unit", significant(car_m, 3)),
+            );
+        }
+        let widths = self.carriageways.iter().flat_map(|of| of.lane_width_m);
+        let narrowest = widths.fold(f64::INFINITY, f64::min);
+        if !narrow && narrowest < NARROW_LANE_M {
+            self.find(false, format!("lanes of {} m are narrow: check the unit of y", significant(narrowest, 3)));
+        }
         let long =
             recording.tracks.iter().filter(|track| track.class == VehicleClass::Car && track.length_m >= 9.0).count();
         if long > 0 && !self.classes.is_empty() {
@@ -180,6 +223,9 @@ impl Understanding {
         }
         if let Some(Impossible { vehicles, first: (vehicle, frame), is_speed, problem }) = impossible(recording) {
             let help = match is_speed {
+                true if self.derived_speeds == recording.tracks.len() as u64 => {
+                    "correct the positions, or smooth them (`smoothing_s`)"
+                }
                 true => "name the text that stands for no value in `none`, or leave out the column of speeds",
                 false => "correct the values, or derive them from smoothed positions (`smoothing_s`)",
             };
@@ -384,7 +430,7 @@ impl Understanding {
             }
         }
         if self.noise_speeds > 0 {
-            let (number, lowest) = (count(self.noise_speeds), significant(self.lowest_noise_mps, 2));
+            let (number, lowest) = (count(self.noise_speeds), value(self.lowest_noise_mps));
             self.find(false, format!("{number} speeds below 0 count as 0; the lowest is {lowest} m/s"));
         }
         if self.conflicts > 0 {

@@ -72,6 +72,12 @@ pub(super) fn pieces(
         })?;
         about.rate_source = if raw.frame_rate_hz.is_some() { "meta file" } else { "preset" }.to_owned();
         let stride = step.round().max(1.0);
+        if stride > 1.0 {
+            about.find(
+                false,
+                format!("frames come in steps of {stride}, {rate_hz} of them per second by the {}", about.rate_source),
+            );
+        }
         (rate_hz / stride, 1.0 / stride, origin / stride)
     } else {
         let rate_hz = rate_of_times(raw, step);

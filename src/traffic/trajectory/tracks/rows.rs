@@ -375,7 +375,7 @@ fn number_of(text: &[u8], role: Role, columns: &Columns, place: &dyn Fn() -> Pla
     }
     let expected = match shown.contains(',') {
         true => {
-            "a finite number with a decimal point (decimal commas are read if no number has a point and semicolons or tabs separate)"
+            "a finite number with a decimal point (decimal commas are read if most numbers have them, and semicolons or tabs separate)"
         }
         false => "a finite number",
     };

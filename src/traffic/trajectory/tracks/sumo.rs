@@ -177,7 +177,7 @@ fn find_instant_lane_changes(recording: &mut RawRecording) {
     let instant: usize = recording.vehicles.iter().map(changes).sum();
     if instant > 0 {
         recording.notes.push(format!(
-            "{instant} lane changes take one step, as SUMO's default lane-change model makes them: simulate with `--lanechange.duration`, or with the sublane model"
+            "{instant} lane changes take one step, as SUMO's default lane-change model makes them: simulate with SUMO's `lanechange.duration`, or with the sublane model"
         ));
     }
 }

@@ -185,6 +185,8 @@ pub(super) struct Comparison {
     pub product: f64,
     pub of_given: f64,
     pub of_derived: f64,
+    /// Σ of the given values minus the derived ones.
+    pub difference: f64,
     pub count: f64,
 }
 
@@ -193,14 +195,19 @@ impl Comparison {
         self.product += given * derived;
         self.of_given += given * given;
         self.of_derived += derived * derived;
+        self.difference += given - derived;
         self.count += 1.0;
+    }
+
+    /// Standard error of the slope.
+    pub fn slope_error(&self) -> f64 {
+        let residual = (self.of_given - self.slope() * self.product).max(0.0) / (self.count - 1.0).max(1.0);
+        (residual / self.of_derived).sqrt()
     }
 
     /// Whether the given values have the other sign: their slope over the derived ones is below 0 by four standard errors.
     pub fn is_opposite(&self) -> bool {
-        let slope = self.product / self.of_derived;
-        let residual = (self.of_given - slope * self.product).max(0.0) / (self.count - 1.0);
-        self.count > 1.0 && slope < -4.0 * (residual / self.of_derived).sqrt()
+        self.count > 1.0 && self.slope() < -4.0 * self.slope_error()
     }
 
     /// Slope of the given values over the derived ones: 1 if they are equal, -1 if one is mirrored, 0 if one is noise.
