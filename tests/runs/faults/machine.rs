@@ -81,6 +81,9 @@ fn recordings_that_do_not_fit_leave_no_folder_that_looks_whole() {
     }
 }
 
+/// Files of a search with the command in them, or with lines in the order in which threads ended.
+const OF_THE_COMMAND: &str = "report.html search.json search.journal";
+
 #[test]
 fn a_search_and_mined_scenarios_that_do_not_fit_end_well_once_there_is_space() {
     let bench = Bench::new();
@@ -102,15 +105,16 @@ fn a_search_and_mined_scenarios_that_do_not_fit_end_well_once_there_is_space() {
     for (name, run, out) in [("search", search, "out"), ("mine", mine, "out/s.jsonl")] {
         std::fs::create_dir_all(bench.path().join(name)).unwrap();
         done(bench.path(), &[run, &["--out", &format!("{name}{}", &out[3..])]].concat());
-        // Its lines are in the order in which threads ended.
-        let _ = std::fs::remove_file(bench.path().join(name).join("search.journal"));
+        for file in OF_THE_COMMAND.split(' ') {
+            let _ = std::fs::remove_file(bench.path().join(name).join(file));
+        }
         let script = format!(
             "mkdir -p \"$DISK/out\"\n\
             \"$0\" \"$@\" --out \"$DISK/{out}\" >/dev/null; echo full $?\n\
             ls \"$DISK/out\" | grep -c 'json'\n\
             mount -o remount,size=64m \"$DISK\"\n\
             \"$0\" \"$@\" --out \"$DISK/{out}\" >/dev/null; echo freed $?\n\
-            cp -r \"$DISK/out\" copy; rm -f copy/search.journal"
+            cp -r \"$DISK/out\" copy; cd copy; rm -f {OF_THE_COMMAND}"
         );
         for size in ["8k", "24k"] {
             let Some(output) = on_a_disk(&bench, size, &script, run) else { return };

@@ -60,7 +60,7 @@ pub fn inventory(dir: &Path) -> Result<Inventory> {
     let found = prefixes(dir)?;
     let unfinished = crate::support::run_dir::unfinished(dir).unwrap_or_default();
     if unfinished.iter().any(|name| name.ends_with(SUFFIXES[0])) {
-        let problem = "`synth` or `tracks --convert` did not finish here, so recordings are missing";
+        let problem = "`synth`, or a conversion by `tracks`, did not finish here, so recordings are missing";
         let help = "repeat that command, which completes the folder, or remove the folder";
         return Err(Error::input(Place::file(dir), problem, help));
     }
