@@ -512,7 +512,10 @@ fn a_log_normal_distribution_has_the_moments_of_its_logarithm() {
         (user("log-normal", "mu=3.2"), "does not give mu and sigma"),
         (user("log-normal", "mu=3.2 sigma=-1"), "does not give mu and sigma"),
         (user("log-normal", "mu=3.2 sigma=0.3 min=1"), "does not give mu and sigma"),
-        (text("<LogNormalDistribution expectedValue=\"24\" variance=\"9\"/>"), "read as moments by some programs"),
+        (
+            text("<LogNormalDistribution expectedValue=\"24\" variance=\"9\"/>"),
+            "moments of the value or of its logarithm",
+        ),
     ] {
         let error = parse_distribution(&text, path).unwrap_err();
         assert!(error.to_string().contains(says), "{error}");

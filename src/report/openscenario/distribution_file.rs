@@ -360,8 +360,7 @@ fn distribution(at: At, name: &str, texts: &mut Vec<TextParameter>) -> Result<Op
         }
         "UserDefinedDistribution" => log_normal(inner)?,
         "LogNormalDistribution" => {
-            let problem =
-                "its attributes are read as moments by some programs, and as those of the logarithm by others";
+            let problem = "its attributes may be moments of the value or of its logarithm, and nothing tells which";
             return Err(inner.wrong(problem, format!("write {}, with the moments of the logarithm", LOG_NORMAL.1)));
         }
         _ => {
