@@ -48,7 +48,7 @@ impl GivenReplay {
         if key.is_empty() || key == "S" || key.ends_with(CROSS_VALIDATED) || is_taken {
             let problem = format!("`{key}` cannot name the S' of this file");
             let help = format!(
-                "name the file not as S, a parameterization of the paper, or with {CROSS_VALIDATED} at its end"
+                "give the file another name than S or that of a parameterization, and one that does not end in {CROSS_VALIDATED}"
             );
             return Err(Error::input(place(), problem, help));
         }

@@ -98,7 +98,8 @@ const MAX_BYTES_AT_A_TIME: u64 = 4 << 30;
 /// A file that gzip compressed has about this many times its size.
 const UNPACKED: u64 = 8;
 
-/// Bytes of files that may still be read.
+/// Bytes of files that may still be read. Reading and mining a file start no work on other threads, else a thread could wait for
+/// another turn within its own.
 struct Turns {
     left: Mutex<u64>,
     freed: Condvar,

@@ -28,15 +28,21 @@ pub fn noise_notes(recording: &Recording, scenarios: &[Scenario], options: &Mini
             Some(window_s) => format!("smooth the positions by `smoothing_s = {window_s:?}` in a preset"),
             None => "no smoothing repairs this".to_owned(),
         };
+        let brief = match brief {
+            0 => String::new(),
+            _ => format!(
+                "{} of {} kept ones exceed it only in peaks of less than {} s; ",
+                count_of(brief),
+                count_of(kept.count()),
+                value(SUSTAINED_S / 2.0)
+            ),
+        };
         notes.push(format!(
             "noise can decide which leader decelerations are found and kept: accelerations have a noise of {} m/s² (speeds of {} m/s\
-             {steps}), the threshold of the peak is {} m/s²; {} of {} kept ones exceed it only in peaks of less than {} s; {what_to_do}",
+             {steps}), the threshold of the peak is {} m/s²; {brief}{what_to_do}",
             significant(noise.acceleration_mps2, 2),
             significant(noise.speed_mps, 2),
-            value(threshold),
-            count_of(brief),
-            count_of(kept.count()),
-            value(SUSTAINED_S / 2.0)
+            value(threshold)
         ));
     }
     let calm_m = options.lateral.quiescent_speed_mps * options.lateral.window_s;

@@ -68,7 +68,7 @@ impl Understanding {
                 self.find(
                     false,
                     format!(
-                        "vehicles move {} times as far as their speeds tell: one of both is wrong by as much",
+                        "vehicles move {} times as far as their speeds tell: distances or speeds are wrong",
                         significant(ratio, 3)
                     ),
                 );
@@ -86,14 +86,14 @@ impl Understanding {
                 ));
             } else if (told.slope() - 1.0).abs() > USUAL_ACCELERATION_DIFFERENCE + 4.0 * told.slope_error() {
                 self.find(false, format!(
-                    "accelerations are {} times the changes of speed: peaks of braking, and what is kept for them, are wrong by as much",
+                    "accelerations are {} times the changes of speed; leader decelerations are kept for the peaks of the former",
                     significant(told.slope(), 2)
                 ));
             }
             let offset_mps2 = told.difference / told.count;
             if offset_mps2.abs() > USUAL_ACCELERATION_OFFSET_MPS2 {
                 self.find(false, format!(
-                    "accelerations are {} m/s² {} the changes of speed on average: peaks of braking are wrong by as much",
+                    "accelerations are {} m/s² {} the changes of speed on average; leader decelerations are kept for the peaks of the former",
                     significant(offset_mps2.abs(), 2),
                     if offset_mps2 < 0.0 { "below" } else { "above" }
                 ));

@@ -73,10 +73,11 @@ pub(super) fn pieces(
         about.rate_source = if raw.frame_rate_hz.is_some() { "meta file" } else { "preset" }.to_owned();
         let stride = step.round().max(1.0);
         if stride > 1.0 {
-            about.find(
-                false,
-                format!("frames come in steps of {stride}, {rate_hz} of them per second by the {}", about.rate_source),
+            let (source, apart_s) = (&about.rate_source, significant(stride / rate_hz, 3));
+            let text = format!(
+                "frame numbers rise by {stride} from row to row; at {rate_hz} frames per second ({source}), rows are {apart_s} s apart"
             );
+            about.find(false, text);
         }
         (rate_hz / stride, 1.0 / stride, origin / stride)
     } else {

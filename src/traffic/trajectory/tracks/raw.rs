@@ -311,7 +311,7 @@ impl<'a> Collecting<'a> {
             acceleration_xy_mps2: [number(Role::XAcceleration)?, self.y_sign * number(Role::YAcceleration)?],
             lane: NO_LABEL,
             lane_offset_m: number(Role::LaneOffset)?,
-            // It only names instants: a text that is no number names none.
+            // Only numbers of the file are compared with one another: a text counts as no value.
             other_clock: row.number(self.other_clock).ok().flatten().unwrap_or(f64::NAN),
             facts: [0; 4],
         };
