@@ -166,29 +166,32 @@ fn truths(path: &str) -> BTreeMap<String, f64> {
     sums.into_iter().map(|(name, [lanes, failures])| (name, failures / lanes)).collect()
 }
 
-const HEADING: &str = "case,truth,seed,probability,low,high,coefficient_of_variation,runs,rounds,depth,verdict,seconds";
+const HEADING: &str = "case,truth,seed,probability,low,high,coefficient_of_variation,runs,rounds,effective_failures,crude_fraction,verdict,seconds";
 
 fn repeats(name: &str, truth: f64, nominal: &dyn Density, limit_state: &dyn LimitState, seeds: Range<u64>) {
-    let goal = Goal { half_width: 0.2, max_draws: 1_000_000 };
+    let crude = std::env::var("LANESWEEP_CRUDE").map_or(100_000_000, |text| text.parse().expect("a number"));
+    let goal = Goal { half_width: 0.1, max_draws: 10_000_000, max_crude: crude };
+    let options = Search { crude, ..Search::default() };
     let (mut held, mut errors, mut runs) = (0, Vec::new(), Vec::new());
     for seed in seeds {
         let started = Instant::now();
-        let run = adaptive(nominal, limit_state, &Search::default(), &goal, seed, 0.95).expect("an estimate");
+        let run = adaptive(nominal, limit_state, &options, &goal, seed, 0.95).expect("an estimate");
         let estimate = &run.estimates[0];
         let interval = estimate.interval;
         held += u64::from(interval.holds(truth));
         errors.push((estimate.probability / truth - 1.0).abs());
         runs.push(estimate.runs);
         println!(
-            "{name},{truth:e},{seed},{:e},{:e},{:e},{:.4},{},{},{:e},{},{:.3}",
+            "{name},{truth:e},{seed},{:e},{:e},{:e},{:.4},{},{},{:.1},{:.3},{},{:.3}",
             estimate.probability,
             interval.low,
             interval.high,
             estimate.coefficient_of_variation,
             estimate.runs,
             run.search.rounds.len(),
-            run.search.questions[0].depth,
-            estimate.trust.verdict(),
+            estimate.weights.map_or(0.0, |weights| weights.effective_failures),
+            estimate.weights.map_or(0.0, |weights| weights.crude_fraction),
+            estimate.trust.draws(),
             started.elapsed().as_secs_f64()
         );
     }

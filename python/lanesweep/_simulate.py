@@ -159,6 +159,8 @@ class LimitState(_core.LimitState):
     points : list of list of float
         The recorded scenarios, and `kernel_deviations` of the kernels around them: together they are a density of form
         ``kernel``. `log_density(points)` evaluates a density of any form within its valid region (`is_valid(points)`).
+    valid_share : float
+        Fraction of the density before its truncation that lies in the valid region.
     """
 
     def __new__(
@@ -200,6 +202,15 @@ class LimitState(_core.LimitState):
         array = self._array(points)
         self._check_driver()
         return super().__call__(array) if len(array) else np.empty(0)
+
+    def from_standard_normal(self, u: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Map independent standard normal numbers, shape (n, d), to points of the density before its truncation.
+
+        The map is Rosenblatt's, smooth and increasing in each parameter, so that subset simulation, importance sampling and
+        FORM of other libraries can work in the standard normal space. Invalid points do not fail (the value is infinite), so
+        the probability of failure of the density is that in the standard normal space divided by `valid_share`.
+        """
+        return super().from_standard_normal(self._array(u))
 
     def is_valid(self, points: npt.ArrayLike) -> npt.NDArray[np.bool_]:
         return super().is_valid(self._array(points))
@@ -253,8 +264,8 @@ class LimitState(_core.LimitState):
         Returns
         -------
         dict
-            ``probability``, ``low``, ``high``, ``level``, ``points``, ``valid``, ``failures``, ``effective_size`` (of the
-            failures) and ``mean_weight`` (both None without `log_density`), ``verdict`` and ``warnings``.
+            ``probability``, ``low``, ``high``, ``level``, ``points``, ``valid``, ``failures``, ``effective_failures``
+            and ``mean_weight`` (both None without `log_density`), ``verdict`` and ``warnings``.
         """
         self._check_driver()
         logs = None if log_density is None else np.ascontiguousarray(log_density, dtype=np.float64).reshape(-1)

@@ -17,6 +17,7 @@ use lanesweep::stats::random::Stream;
 use lanesweep::{Error, Place, Result};
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1, PyReadonlyArray2};
 use pyo3::prelude::*;
+use rayon::prelude::*;
 
 use crate::cases::headway_of;
 use crate::error::exception;
@@ -143,6 +144,29 @@ impl LimitState {
         self.0.density.kde.spread()
     }
 
+    /// Fraction of the density before its truncation that lies in the valid region.
+    #[getter]
+    fn valid_share(&self) -> f64 {
+        self.0.density.valid.estimate
+    }
+
+    /// The points of standard normal numbers, before truncation.
+    fn from_standard_normal<'py>(
+        &self,
+        py: Python<'py>,
+        u: PyReadonlyArray2<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let rows = self.rows(py, &u)?;
+        let density = &self.0.density;
+        let points = py.detach(|| {
+            let mixture = density.mixture()?;
+            let of = |u: &Vec<f64>| density.values(&mixture.from_standard_normal(u));
+            Ok(rows.par_iter().map(of).collect::<Vec<_>>())
+        });
+        let points = points.map_err(|error: Error| exception(py, &error))?;
+        Ok(PyArray2::from_vec2(py, &points)?)
+    }
+
     /// Whether each point is valid: the density is 0 elsewhere.
     fn is_valid<'py>(
         &self,
@@ -219,10 +243,12 @@ impl LimitState {
                 opened.values_or_infinite(points.clone())?.iter().map(|value| *value <= 0.0).collect();
             let is_valid = |point: &&Vec<f64>| opened.density.space.is_valid(point);
             let valid = points.iter().filter(is_valid).count() as u64;
+            let mut mean_weight = None;
             let estimate = match logs {
                 Some(logs) => {
                     let ratios: Vec<f64> =
                         opened.log_densities(&points)?.iter().zip(logs).map(|(f, g)| f - g).collect();
+                    mean_weight = Some(ratios.iter().map(|ratio| ratio.exp()).sum::<f64>() / ratios.len() as f64);
                     importance_of_points(&ratios, &fails, level)
                 }
                 None => {
@@ -242,9 +268,9 @@ impl LimitState {
                 "points": points.len(),
                 "valid": valid,
                 "failures": estimate.failures,
-                "effective_size": estimate.weights.map(|weights| weights.effective_size_failures),
-                "mean_weight": estimate.weights.map(|weights| weights.mean_weight),
-                "verdict": estimate.trust.verdict(),
+                "effective_failures": estimate.weights.map(|weights| weights.effective_failures),
+                "mean_weight": mean_weight,
+                "verdict": estimate.trust.draws(),
                 "warnings": warnings,
             });
             Ok(record.to_string())

@@ -8,7 +8,7 @@ use super::source::file_of;
 use crate::cli::settings::{EstimatorKind, IntervalKind, PointKind};
 use crate::model::driver::ModelId;
 use crate::report::lanes::table_format;
-use crate::run::sampling::{Estimator, MapAxes, SampleOptions, SampleSource, read_proposal};
+use crate::run::sampling::{Estimator, MapAxes, SampleHeadways, SampleOptions, SampleSource, read_proposal};
 use crate::stats::density::{DensityModel, Mixture};
 use crate::stats::estimate::{BinomialInterval, Checkpoints, Search, StopRule};
 use crate::support::plausibility::{Doubts, HELP};
@@ -72,27 +72,36 @@ impl Sample {
         Ok(())
     }
 
-    /// The search of importance sampling. The lanes of a driver outside the registry are thousands of times as slow, so
-    /// that crude draws are fewer: the estimate says how deep the search has looked.
-    pub(super) fn search(&self, models: &[ModelId]) -> Search {
-        let search = Search { defence: self.settings.defensive_weight, ..Search::default() };
-        match models.iter().any(|model| model.foreign().is_some()) {
-            true => Search { crude: DRIVER_CRUDE, ..search },
-            false => search,
-        }
+    /// The search of importance sampling over so many lanes per draw. The lanes of a driver outside the registry are
+    /// thousands of times as slow, so that there are fewer: the interval says what they may have missed.
+    pub(super) fn search(&self, models: &[ModelId], headways: &SampleHeadways) -> Search {
+        let lanes = match headways {
+            SampleHeadways::Each(list) => models.len() * list.len(),
+            SampleHeadways::Sampled => models.len(),
+        };
+        let crude = self.settings.crude_lanes.div_ceil(lanes.max(1) as u64);
+        let is_slow = models.iter().any(|model| model.foreign().is_some());
+        Search { crude: if is_slow { crude.min(DRIVER_CRUDE) } else { crude }, ..Search::default() }
     }
 
     fn estimator(&self, density: &DensityModel) -> Result<Estimator> {
         let settings = &self.settings;
         Ok(match settings.estimator {
             EstimatorKind::Auto | EstimatorKind::Mc => Estimator::Crude { interval: self.interval() },
-            EstimatorKind::Is if self.proposal.is_empty() => Estimator::Search(self.search(&self.models()?)),
+            EstimatorKind::Is if self.proposal.is_empty() => {
+                Estimator::Search(self.search(&self.models()?, &self.headways(density)?))
+            }
             EstimatorKind::Is => {
                 let read = |path: &PathBuf| read_proposal(path, density);
                 let proposals: Vec<Mixture> = self.proposal.iter().map(read).collect::<Result<_>>()?;
                 let share = 1.0 / proposals.len() as f64;
                 let equal: Vec<(f64, &Mixture)> = proposals.iter().map(|proposal| (share, proposal)).collect();
-                Estimator::Given { proposal: Some(Mixture::join(&equal)?), defence: settings.defensive_weight }
+                let draws = settings.samples.unwrap_or(DEFAULT_SAMPLES);
+                let crude = self.search(&self.models()?, &self.headways(density)?).crude / draws.max(1);
+                Estimator::Given {
+                    proposal: Some(Mixture::join(&equal)?),
+                    crude_per_draw: crude.clamp(1, CRUDE_PER_DRAW),
+                }
             }
         })
     }
@@ -124,6 +133,8 @@ impl Sample {
 
 /// Number of samples if none is given.
 const DEFAULT_SAMPLES: u64 = 100_000;
+/// Maximum number of draws of the density for each draw of a given proposal.
+const CRUDE_PER_DRAW: u64 = 100;
 /// Maximum number of crude draws of a search with a driver outside the registry.
 const DRIVER_CRUDE: u64 = 1 << 15;
 /// Half-width of importance sampling if neither it nor a number of samples is given.

@@ -182,7 +182,7 @@ impl Sample {
         let mut result = run.take_result()?;
         if let Some(half_width) = self.settings.half_width.filter(|_| self.is_refined()) {
             tracing::info!("importance sampling of what is rare");
-            let search = self.search(&sample.options.models);
+            let search = self.search(&sample.options.models, &sample.options.headways);
             let (searching, bar) = searching(sample, &search, executor, verbosity);
             let refined = sample.refined(result, &search, half_width, &searching);
             bar.finish_and_clear();

@@ -17,7 +17,7 @@ use crate::run::close_following::CloseFollowing;
 use crate::run::sampling::{EstimateRow, RiskRate, Sample, SampleOptions, SampleTally};
 use crate::scenario::Category;
 use crate::stats::density::{DensityKind, DensityModel, Provenance};
-use crate::stats::estimate::{IntervalKind, Ratio, SearchRound, StopReason};
+use crate::stats::estimate::{IntervalKind, Ratio, SearchRound, StopReason, Warning};
 use crate::support::readable::{count, count_of, counted, significant, value};
 use crate::support::table::{Column, Digits, NumberText, Table};
 use crate::{Error, Result};
@@ -310,14 +310,8 @@ impl EstimateFile {
             text.push_str("Rare failures, by importance sampling:\n");
             text.push_str(&self.table(|row| row.is_rare_beside(&self.estimates)).text());
         }
-        let shown = |row: &&EstimateRow| row.is_overall(&self.estimates) || row.is_rare_beside(&self.estimates);
-        for row in self.estimates.iter().filter(shown) {
-            for warning in &row.estimate.trust.warnings {
-                let _ = writeln!(text, "{} {} {}: {warning}", row.model.name(), row.criterion.label(), row.headway);
-            }
-        }
-        for (row, remark) in self.costlier_than_crude() {
-            let _ = writeln!(text, "{} {} {}: {remark}", row.model.name(), row.criterion.label(), row.headway);
+        for (of, remark) in self.remarks() {
+            let _ = writeln!(text, "{of}: {remark}");
         }
         if self.estimates.iter().any(|r| r.estimate.weights.is_some()) {
             text.push_str(&self.weights_text());
@@ -399,7 +393,7 @@ impl EstimateFile {
         if estimates.iter().any(|row| sampled(row).is_some()) {
             table = table.column(Column::from("P/S").null("–"), ratio);
         }
-        table.column("verdict", |row| row.estimate.trust.verdict().to_string()).build()
+        table.column(VERDICTS, verdicts).build()
     }
 
     /// What the importance weights indicate.
@@ -410,23 +404,56 @@ impl EstimateFile {
             .column("criterion", |(row, _)| row.criterion.label())
             .column("THW", |(row, _)| self.headway_cell(row))
             .column(three_digits("variance reduction"), |(row, _)| row.estimate.variance_reduction)
-            .column("ESS", |(_, w)| w.effective_size)
-            .column("ESS of failures", |(_, w)| w.effective_size_failures)
-            .column("largest share", |(_, w)| NumberText(format!("{:.2} %", 100.0 * w.largest_share_failures)))
-            .column("mean weight", |(_, w)| format!("{} ± {}", value(w.mean_weight), short(w.mean_weight_error)));
+            .column("effective failures", |(_, w)| w.effective_failures)
+            .column("largest weight", |(_, w)| NumberText(format!("{:.2} %", 100.0 * w.largest_fraction)))
+            .column("from the density", |(_, w)| NumberText(format!("{:.1} %", 100.0 * w.crude_fraction)));
         table.build().text()
     }
 }
 
+/// Heading of [`verdicts`].
+pub(super) const VERDICTS: &str = "draws, density, data";
+
+/// Of a row, a word each for what it is uncertain about.
+pub(super) fn verdicts(row: &EstimateRow) -> String {
+    let trust = &row.estimate.trust;
+    format!("{}, {}, {}", trust.draws(), trust.density(), trust.data())
+}
+
 impl EstimateFile {
-    /// The rows for which crude Monte Carlo needs fewer lanes for the same interval, with a sentence stating it.
-    pub(super) fn costlier_than_crude(&self) -> impl Iterator<Item = (&EstimateRow, String)> {
-        let is_costlier = |row: &&EstimateRow| row.estimate.variance_reduction < 1.0;
-        let rows = self.estimates.iter().filter(|row| row.estimate.weights.is_some()).filter(is_costlier);
-        rows.map(|row| {
-            let ratio = short(1.0 / row.estimate.variance_reduction);
-            (row, format!("this estimator used {ratio} times the lanes that crude Monte Carlo (`mc`) needs for the same interval"))
-        })
+    /// What is said about the shown rows, each time with what it is said about. Too few scenarios are said once.
+    pub(super) fn remarks(&self) -> Vec<(String, String)> {
+        let name = |row: &EstimateRow| format!("{} {} {}", row.model.name(), row.criterion.label(), row.headway);
+        let is_shown = |row: &&EstimateRow| row.is_overall(&self.estimates) || row.is_rare_beside(&self.estimates);
+        let (mut remarks, mut few) = (Vec::new(), Vec::new());
+        for row in self.estimates.iter().filter(is_shown) {
+            for warning in &row.estimate.trust.warnings {
+                match warning {
+                    Warning::FewScenarios { scenarios } => few.push(*scenarios),
+                    _ => remarks.push((name(row), warning.to_string())),
+                }
+            }
+            let reduction = row.estimate.variance_reduction;
+            if row.estimate.weights.is_some() && reduction < 1.0 {
+                let times = short(1.0 / reduction);
+                let remark = "times the lanes that crude Monte Carlo (`mc`) needs for the same interval";
+                remarks.push((name(row), format!("this estimator used {times} {remark}")));
+            }
+        }
+        let (low, high) = few.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), few| (low.min(*few), high.max(*few)));
+        if !few.is_empty() {
+            let (low, high) = (format!("{low:.1}"), format!("{high:.1}"));
+            let range = if low == high { low } else { format!("{low} to {high}") };
+            remarks.push((
+                counted(few.len(), "row"),
+                format!(
+                    "the failures come from effectively {range} scenarios; with fewer than {} other recordings would give \
+                     another probability, and nothing tells how much so",
+                    Warning::MIN_SCENARIOS
+                ),
+            ));
+        }
+        remarks
     }
 }
 

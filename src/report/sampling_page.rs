@@ -2,7 +2,7 @@
 
 use super::html::{Page, PageFigure, Section};
 use super::plot::{AxisScale, Figure, Layer, Mark, Plot, PlotAxis, Series, Value, is_few};
-use super::sampling::{EstimateFile, interval_text, rate_text, ratio_text, short, three_digits};
+use super::sampling::{EstimateFile, VERDICTS, interval_text, rate_text, ratio_text, short, three_digits, verdicts};
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -86,7 +86,7 @@ impl EstimateFile {
             .column("per hour", |row| rate_text(row.risk.per_hour))
             .column("per 1000 km", |row| rate_text(row.risk.per_1000_km))
             .column("P/S", |row| ratio_text(row.recorded.and_then(|recorded| recorded.sampled)))
-            .column("verdict", |row| row.estimate.trust.verdict().to_string())
+            .column(VERDICTS, |row| verdicts(row))
             .build();
         let mut tables = vec![estimates.captioned(format!(
             "Probability of failure, and risk where the exposure is known. Intervals at {} %{}",
@@ -99,25 +99,21 @@ impl EstimateFile {
             .column("criterion", |(row, _)| row.criterion.label())
             .column("THW", |(row, _)| self.headway_cell(row))
             .column(three_digits("variance reduction"), |(row, _)| row.estimate.variance_reduction)
-            .column("effective sample size", |(_, w)| w.effective_size)
-            .column("of the failures", |(_, w)| w.effective_size_failures)
-            .column(Column::from("largest weight's share in %").digits(Digits::Fixed(2)), |(_, w)| {
-                100.0 * w.largest_share_failures
+            .column("effective failures", |(_, w)| w.effective_failures)
+            .column(Column::from("largest weight in %").digits(Digits::Fixed(2)), |(_, w)| 100.0 * w.largest_fraction)
+            .column(Column::from("from draws of the density in %").digits(Digits::Fixed(1)), |(_, w)| {
+                100.0 * w.crude_fraction
             })
-            .column("mean weight", |(_, w)| format!("{} ± {}", value(w.mean_weight), short(w.mean_weight_error)))
             .build();
         if !weights.rows.is_empty() {
             tables.push(weights.captioned("Weights: how much of the sample counts"));
         }
-        let name = |row: &EstimateRow| format!("{}, {}, {}", row.model.name(), row.criterion.label(), row.headway);
-        let said = overall
-            .iter()
-            .flat_map(|row| row.estimate.trust.warnings.iter().map(move |warning| (name(row), warning.to_string())));
-        let said = said.chain(self.costlier_than_crude().map(|(row, remark)| (name(row), remark)));
+        let said = self.remarks().into_iter();
         Section {
             intro: format!(
-                "The verdict says whether the interval is to be believed; ≤ bounds from above where nothing failed. \
-                 {}{}",
+                "Draws are sound where the interval of the draws holds P of this density as often as its level says; the \
+                 density agrees with recorded scenarios, differs, or it is open; enough scenarios fail, or few. ≤ bounds from \
+                 above where nothing failed. {}{}",
                 match self.density.kernels {
                     0 => String::new(),
                     kernels => format!(

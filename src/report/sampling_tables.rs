@@ -14,11 +14,10 @@ impl EstimateFile {
     /// `estimates.csv`.
     pub fn csv(&self) -> String {
         type Weight = fn(&WeightFigures) -> f64;
-        let weights: [(&str, Weight); 4] = [
-            ("ess", |w| w.effective_size),
-            ("ess_failures", |w| w.effective_size_failures),
-            ("largest_weight_share", |w| w.largest_share_failures),
-            ("mean_weight", |w| w.mean_weight),
+        let weights: [(&str, Weight); 3] = [
+            ("ess_failures", |w| w.effective_failures),
+            ("largest_weight_fraction", |w| w.largest_fraction),
+            ("crude_fraction", |w| w.crude_fraction),
         ];
         type Pick = fn(RiskRate) -> f64;
         let risks: [(&str, Pick); 4] =
@@ -80,7 +79,9 @@ impl EstimateFile {
                 |(name, _)| name,
                 |row, (_, of)| row.uncertainty.and_then(|uncertainty| of(&uncertainty)).and_then(known),
             )
-            .column("verdict", |row| row.estimate.trust.verdict().to_string())
+            .column("draws", |row| row.estimate.trust.draws().to_string())
+            .column("density", |row| row.estimate.trust.density())
+            .column("scenarios", |row| row.estimate.trust.data())
             .column("data", |_| self.density.provenance.data.as_str())
             .build()
             .csv()
@@ -171,6 +172,7 @@ fn kind_name(kind: IntervalKind) -> &'static str {
         IntervalKind::ClopperPearson => "clopper_pearson",
         IntervalKind::RuleOfThree => "rule_of_three",
         IntervalKind::LogStudent => "log_student",
+        IntervalKind::Gamma => "gamma",
         IntervalKind::Clusters => "clusters",
         IntervalKind::Nothing => "nothing",
     }
@@ -242,8 +244,8 @@ impl EstimateFile {
     pub(super) fn recorded_rule(&self) -> Option<&'static str> {
         self.estimates.iter().any(|row| row.recorded.is_some_and(|of| of.sampled.is_some())).then_some(
             "P/S: rate of the samples over that of the recorded scenarios (S), from the same headways; = agrees, > too \
-             high, < too low, ? undecided (intervals: estimates.csv). Sound: no warning, and S' (the same scenarios under this parameterization) and \
-             the samples both fail as often as S to within a quarter: the intervals of S'/S and P/S lie within 0.80 to 1.25. \
+             high, < too low, ? undecided (intervals: estimates.csv). The density agrees if S' (the same scenarios under this parameterization) and the \
+             samples both fail as often as S to within a quarter: the intervals of S'/S and P/S lie within 0.80 to 1.25. \
              P's interval does not hold that difference",
         )
     }

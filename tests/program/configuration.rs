@@ -206,14 +206,14 @@ fn the_estimate_of_a_plan_names_the_options_of_the_plan_and_not_those_of_the_com
     let fit = ["-q", "fit", "--parameterizations", "i", "--no-comparison", "--out", "i.json"];
     good(dir, &[], &[&fit, &config[..]].concat());
     let is = ["--estimator", "is", "--samples", "2000", "--models", "FSM", "--thw", "0.6"];
-    let weight = ["--config", "sample.defensive_weight=0.3", "--plan-only", "--out", "plan"];
+    let weight = ["--config", "sample.crude_lanes=300000", "--plan-only", "--out", "plan"];
     good(dir, &[], &[&["-q", "sample", "i.json"], &is[..], &weight].concat());
     good(dir, &[], &["-q", "sample", "--plan", "plan/plan.json", "--out", "out"]);
     let record = json(&dir.join("out/estimate.json"));
-    assert!(record["options"].to_string().contains("\"defence\":0.3"), "{}", record["options"]);
+    assert!(record["options"].to_string().contains("\"crude\":300000"), "{}", record["options"]);
     let settings = record["settings"].as_array().unwrap();
     let of = |key: &str| settings.iter().any(|of| of["key"] == key);
-    assert_eq!([of("run.threads"), of("sample.defensive_weight"), of("run.profile")], [true, false, false]);
+    assert_eq!([of("run.threads"), of("sample.crude_lanes"), of("run.profile")], [true, false, false]);
 }
 
 #[test]

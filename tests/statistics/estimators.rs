@@ -3,17 +3,19 @@
 
 use lanesweep::stats::density::{Mixture, normal_cdf};
 use lanesweep::stats::estimate::{
-    AdaptiveRun, BlockSums, Density, Enough, Goal, Importance, LimitState, Search, StandardNormal, Truncated, Verdict,
-    Warning, WeightSums, WeightedDraw, adaptive, defended, from_weight_sums, importance, importance_sums,
-    weighted_ratio,
+    AdaptiveRun, BlockSums, Density, Enough, Estimate, Goal, Importance, LimitState, Search, StandardNormal, Truncated,
+    Verdict, Warning, WeightSums, adaptive, from_weight_sums, importance, importance_sums, weighted_ratio,
 };
 
 use crate::common::reliability::{four_branch, four_branch_probability, linear, tail, two_sided, unit_mixture};
 
+/// At most so many draws of the density, in the search and again beside the final draws.
+const CRUDE: u64 = 1_000_000;
+
 /// The default search, ± 20 % at 95 %.
 fn found(density: &dyn Density, limit_state: &dyn LimitState, seed: u64) -> AdaptiveRun {
-    let goal = Goal { half_width: 0.2, max_draws: 100_000 };
-    adaptive(density, limit_state, &Search::default(), &goal, seed, 0.95).unwrap()
+    let goal = Goal { half_width: 0.2, max_draws: 100_000, max_crude: CRUDE };
+    adaptive(density, limit_state, &Search { crude: CRUDE, ..Search::default() }, &goal, seed, 0.95).unwrap()
 }
 
 fn close(got: f64, expected: f64) -> bool {
@@ -33,8 +35,11 @@ fn the_author_s_estimates_are_reproduced() {
         let tries = column(table, 1);
         let leaves: Vec<WeightSums> = (0..tries.len())
             .map(|i| {
-                let (weight, response, tries) = (ratio(i), response(i), tries[i] as u32);
-                WeightedDraw { weight, response, tries, is_void: false, is_thin: false }.into()
+                let mut sums = WeightSums { draws: tries[i] as u64, ..WeightSums::default() };
+                if response(i) > 0.0 {
+                    sums.add_failure(ratio(i) * response(i), false);
+                }
+                sums
             })
             .collect();
         BlockSums::of_leaves(0, &leaves).total().expect("sums")
@@ -46,28 +51,28 @@ fn the_author_s_estimates_are_reproduced() {
     let ratio = |i: usize| f[i] / g[i] / validity;
     let (result, injury) = (column("is_", 0), column("is_", 4));
     // Σ (x − mean)² / N² over the N valid draws: the proposal's share of valid points is taken as known.
+    let valid = f.len() as f64;
     let author_sigma = |sums: &WeightSums| {
-        let p = sums.unbiased();
-        (sums.failing_squared / (sums.tries as f64).powi(2) - p * p / sums.draws as f64).sqrt()
+        let p = sums.probability();
+        (sums.failing_squared / (sums.draws as f64).powi(2) - p * p / valid).sqrt()
     };
     let collision = of("is_", &ratio, &|i| f64::from(u8::from(result[i] < 0.0)));
-    assert!(close(collision.unbiased(), number("/is_collision/estimate")));
+    assert!(close(collision.probability(), number("/is_collision/estimate")));
     assert!(close(author_sigma(&collision), number("/is_collision/sigma")));
-    assert!(close(collision.figures().self_normalised, number("/extra_self_normalised")));
-    assert!(close(collision.figures().effective_size, number("/extra_ess")));
-    assert!(close(collision.figures().effective_size_failures, number("/extra_ess_failures")));
+    assert!(close(collision.figures().effective_failures, number("/extra_ess_failures")));
     let injured = of("is_", &ratio, &|i| injury[i]);
-    assert!(close(injured.unbiased(), number("/is_injury/estimate")));
+    assert!(close(injured.probability(), number("/is_injury/estimate")));
     assert!(close(author_sigma(&injured), number("/is_injury/sigma")));
-    let factor = collision.draws as f64 / collision.tries as f64 / validity;
+    let factor = valid / collision.draws as f64 / validity;
     assert!(close(factor, number("/truncation_factor")));
 }
 
 #[test]
 fn sums_of_a_proposal_are_the_same_bits_in_any_division_of_the_indices() {
     let density = StandardNormal { dimensions: 2 };
-    let proposal = defended(Mixture::of_kernels(vec![vec![2.0, 2.0]], &[0.7, 0.7]).unwrap(), &density, 0.1).unwrap();
-    let of = |range| importance_sums(&density, &proposal, &linear(3.0), 9, range, &[]).unwrap().remove(0);
+    let proposal = Mixture::of_kernels(vec![vec![2.0, 2.0]], &[0.7, 0.7]).unwrap();
+    let options = Importance { seed: 9, draws: 20_000, crude_per_draw: 3 };
+    let of = |range| importance_sums(&density, &proposal, &linear(3.0), &options, range, &[]).unwrap().remove(0);
     let whole = of(0..20_000);
     let mut parts = of(7001..20_000);
     parts.merge(of(0..123)).unwrap();
@@ -83,8 +88,10 @@ fn a_search_finds_the_linear_limit_s_probability_in_any_dimension() {
         let run = found(&StandardNormal { dimensions }, &linear(beta), 3);
         let estimate = &run.estimates[0];
         assert!((estimate.probability / tail(beta) - 1.0).abs() < 0.15, "{estimate:?}");
-        assert_eq!(estimate.trust.verdict(), Verdict::Sound, "{estimate:?}");
-        assert!(estimate.runs < 50_000, "{estimate:?}");
+        // A million draws of the density do not exclude other failures of a probability below 3.7e-6.
+        let is_bounded = tail(beta) > 7.4e-6;
+        assert_eq!(estimate.trust.draws() == Verdict::Sound, is_bounded, "{estimate:?}");
+        assert!(is_bounded || estimate.interval.high > 3e-6, "{estimate:?}");
     }
 }
 
@@ -149,7 +156,7 @@ fn one_search_answers_several_questions_with_the_same_draws() {
     let run = found(&StandardNormal { dimensions: 2 }, &Halves, 5);
     for (estimate, beta) in run.estimates.iter().zip([2.5, 4.0, 4.5]) {
         assert!((estimate.probability / tail(beta) - 1.0).abs() < 0.25, "{beta}: {estimate:?}");
-        assert_eq!(estimate.trust.verdict(), Verdict::Sound, "{beta}: {estimate:?}");
+        assert_eq!(estimate.trust.draws() == Verdict::Sound, beta < 4.5, "{beta}: {estimate:?}");
         assert_eq!(estimate.runs, run.estimates[0].runs);
     }
 }
@@ -176,37 +183,38 @@ fn a_truncated_density_is_searched_within_its_valid_region() {
 }
 
 #[test]
-fn a_proposal_that_misses_a_way_to_fail_is_called_unusable() {
+fn a_proposal_that_misses_a_way_to_fail_makes_the_interval_wider_but_not_wrong() {
     let density = StandardNormal { dimensions: 2 };
     let one_side = || Mixture::of_kernels(vec![vec![2.7, 0.0]], &[0.6, 1.0]).unwrap();
-    let of = |proposal: &dyn Density| {
-        importance(&density, proposal, &two_sided(2.5), &Importance::new(4, 10_000)).unwrap().remove(0)
-    };
-    // With a defensive share the other side is met, rarely, by draws that the proposal hardly covers.
-    let estimate = of(&defended(one_side(), &density, 0.1).unwrap());
-    assert!(estimate.trust.warnings.iter().any(|w| matches!(w, Warning::ModeMissed { .. })), "{estimate:?}");
-    assert_eq!(estimate.trust.verdict(), Verdict::Unusable);
-    // Without it only the mean weight tells.
-    let estimate = of(&one_side());
-    assert!(estimate.trust.warnings.iter().any(|w| matches!(w, Warning::MeanWeightOff { .. })), "{estimate:?}");
-    // Both sides: nothing to warn of.
     let other = Mixture::of_kernels(vec![vec![-2.7, 0.0]], &[0.6, 1.0]).unwrap();
     let both = Mixture::join(&[(0.5, &one_side()), (0.5, &other)]).unwrap();
-    let estimate = of(&defended(both, &density, 0.3).unwrap());
-    assert_eq!(estimate.trust.verdict(), Verdict::Sound, "{estimate:?}");
-    assert!(estimate.interval.holds(2.0 * tail(2.5)));
+    let truth = 2.0 * tail(2.5);
+    let repeats = 200;
+    let of = |proposal: &Mixture, crude_per_draw| -> Vec<Estimate> {
+        let options = |seed| Importance { seed, draws: 2000, crude_per_draw };
+        let run = |seed| importance(&density, proposal, &two_sided(2.5), &options(seed), 0.95).unwrap().remove(0);
+        (0..repeats).map(run).collect()
+    };
+    let held = |all: &[Estimate]| all.iter().filter(|estimate| estimate.interval.holds(truth)).count();
+    let width = |all: &[Estimate]| all.iter().map(|e| e.relative_half_width).sum::<f64>() / repeats as f64;
+    // Half of the failures are met by one or two draws of the density, by ten, by none of a good proposal's concern.
+    let [few, some, good] = [of(&one_side(), 1), of(&one_side(), 10), of(&both, 1)];
+    for (name, all) in [("few", &few), ("some", &some), ("good", &good)] {
+        assert!(held(all) >= 184, "{name}: {} of {repeats} intervals hold {truth}", held(all));
+    }
+    assert!(width(&good) < width(&some) && width(&some) < width(&few));
+    // Without draws of the density nothing tells what is missed: half of the probability, in every run.
+    assert!(held(&of(&one_side(), 0)) < 20);
 }
 
 #[test]
-fn a_search_without_failures_says_how_deep_it_looked_and_gives_no_probability() {
+fn a_search_without_failures_is_followed_by_draws_of_the_density_that_bound_the_probability() {
     let never = |points: &[Vec<f64>]| Ok(vec![1.0; points.len()]);
     let run = found(&StandardNormal { dimensions: 2 }, &never, 1);
     let estimate = &run.estimates[0];
-    assert_eq!((estimate.probability, estimate.trust.verdict()), (0.0, Verdict::Unusable));
-    assert_eq!(estimate.interval.high, 1.0);
-    let depth = run.search.questions[0].depth;
-    assert!(depth < 2e-6, "{depth}");
-    assert!(estimate.trust.warnings.contains(&Warning::NothingFound { depth }));
+    assert_eq!((estimate.probability, estimate.trust.draws()), (0.0, Verdict::Doubtful));
+    assert!((3.6e-6..3.8e-6).contains(&estimate.interval.high), "{estimate:?}");
+    assert!(estimate.trust.warnings.contains(&Warning::NoFailures));
 }
 
 /// Two questions about the same points: x_0 > 3 and x_0 > 3.2.
@@ -226,17 +234,17 @@ impl LimitState for TwoLevels {
 fn the_ratio_of_two_questions_about_the_same_draws_is_known_better_than_either() {
     let density = StandardNormal { dimensions: 2 };
     let proposal = Mixture::of_kernels(vec![vec![3.2, 0.0]], &[1.0, 1.0]).unwrap();
-    let proposal = defended(proposal, &density, 0.1).unwrap();
     let truth = normal_cdf(-3.2) / normal_cdf(-3.0);
     let (repeats, mut held, mut narrower) = (300, 0, 0);
     for seed in 0..repeats {
-        let sums = importance_sums(&density, &proposal, &TwoLevels, seed, 0..2000, &[[1, 0]]).unwrap();
+        let options = Importance { seed, draws: 2000, crude_per_draw: 1 };
+        let sums = importance_sums(&density, &proposal, &TwoLevels, &options, 0..2000, &[[1, 0]]).unwrap();
         let [near, far, both] = [0, 1, 2].map(|at| sums[at].total().unwrap());
         let ratio = weighted_ratio([&far, &near, &both], Enough::default(), 0.95);
         let (low, high) = ratio.interval().unwrap();
         held += u64::from((low..=high).contains(&truth));
         let width = |sums: &WeightSums| {
-            let interval = from_weight_sums(sums, false, 0.95).interval;
+            let interval = from_weight_sums(sums, 0.95).interval;
             (interval.high / interval.low).ln()
         };
         narrower += u64::from((high / low).ln() < width(&far).hypot(width(&near)));

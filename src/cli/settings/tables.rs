@@ -154,9 +154,10 @@ pub struct SampleSettings {
     pub time_limit_s: Option<f64>,
     /// Worst lanes to list per model; 0 runs faster.
     pub worst: usize,
-    /// Defensive mixture weight: the weight of the density in the proposal of `is` and of the rare rows of `auto`.
-    #[schemars(extend("minimum" = 0.0, "exclusiveMaximum" = 1.0))]
-    pub defensive_weight: f64,
+    /// Maximum number of lanes of the density itself, in the search of `is` and of the rare rows of `auto` and again beside
+    /// its final draws. They meet the failures that the proposal misses, or bound them.
+    #[schemars(range(min = 1))]
+    pub crude_lanes: u64,
     /// Seed of the draws.
     pub seed: u64,
 }
@@ -173,7 +174,7 @@ impl Default for SampleSettings {
             half_width: None,
             time_limit_s: None,
             worst: 20,
-            defensive_weight: 0.1,
+            crude_lanes: 100_000_000,
             seed: 157,
         }
     }

@@ -83,7 +83,7 @@ impl Points {
     pub fn draw(&self, index: u64, is_valid: impl Fn(&[f32]) -> bool) -> DrawnPoint {
         let attempts = if matches!(self.source, PointSource::Random(_)) { ATTEMPTS } else { 1 };
         for attempt in 0..attempts {
-            let values = self.candidate(index, attempt);
+            let values = self.attempt(index, attempt);
             if is_valid(&values[..self.dimensions]) {
                 return DrawnPoint { values, tries: attempt + 1 };
             }
@@ -117,7 +117,7 @@ impl Points {
 
     /// Draw `attempt` of an index, valid or not. Words 0 and 1 select the component, the others are normal deviates.
     #[inline]
-    fn candidate(&self, index: u64, attempt: u32) -> [f32; MAX_PARAMETERS] {
+    pub fn attempt(&self, index: u64, attempt: u32) -> [f32; MAX_PARAMETERS] {
         let d = self.dimensions;
         let mut words = [0_u32; 4 * BLOCKS as usize];
         match &self.source {

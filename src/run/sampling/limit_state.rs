@@ -1,16 +1,19 @@
 //! The limit state of a lane: one number that is ≤ 0 exactly if a criterion failed, and decreases towards failure. Also
 //! evaluates points as lanes for the estimators.
 
+use std::ops::Range;
+
 use serde::{Deserialize, Serialize};
 
-use super::plan::{SampleHeadways, plan_points};
+use super::plan::{SampleHeadways, plan_draws, plan_points};
 use crate::Result;
 use crate::engine::{Executor, Marks, Outcome, Wanted};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
+use crate::random::Stream;
 use crate::stats::density::{DensityKind, DensityModel, Mixture};
-use crate::stats::estimate::{KernelShares, LimitState, Truncated, defended, kernel_shares};
+use crate::stats::estimate::{Density, Failure, KernelShares, LimitState, Truncated, kernel_shares};
 
 /// Value far from any failure: the ego never closed in.
 const FAR: f64 = 1e3;
@@ -127,6 +130,34 @@ impl LimitState for LaneLimitState<'_> {
         })?;
         Ok(values)
     }
+
+    /// Draws where the lanes run, and computes verdicts alone.
+    fn failures(&self, _density: &dyn Density, stream: Stream, indices: Range<u64>) -> Result<Vec<Failure>> {
+        let plan = plan_draws(self.density, stream, self.profile, indices.end, &self.models, &self.headways)?;
+        let lanes = self.models.len() * plan.headways.len();
+        let Some(generator) = plan.generator() else { return Ok(Vec::new()) };
+        // The points before their transformation, over which the density is a mixture.
+        let mut latent = generator.points.clone();
+        latent.knots.clear();
+        let mut failures = Vec::new();
+        self.executor.sweep(&plan, indices, Wanted::Verdicts, |chunk| {
+            for (index, verdicts) in chunk.units.clone().zip(chunk.verdicts.chunks(lanes)) {
+                let failed = |(lane, criterion): &(usize, Criterion)| verdicts[*lane].failed(*criterion);
+                if !self.questions.iter().any(failed) {
+                    continue;
+                }
+                let drawn = generator.draw(index);
+                if drawn.is_void() {
+                    continue;
+                }
+                let values = latent.attempt(index, drawn.tries - 1);
+                let point = values[..latent.dimensions].iter().map(|value| f64::from(*value)).collect();
+                failures.push(Failure { index, point, fails: self.questions.iter().map(failed).collect() });
+            }
+            Ok(())
+        })?;
+        Ok(failures)
+    }
 }
 
 /// The density of a density file, truncated to its valid region, over the points of its [mixture](DensityModel::mixture).
@@ -138,23 +169,17 @@ pub fn truncated(density: &DensityModel) -> Result<Truncated<impl Fn(&[f64]) -> 
     Truncated::with_validity(density.mixture()?, is_valid, density.valid.estimate)
 }
 
-/// Determines which scenarios failures come from, by draws of a proposal with the defensive mixture weight `defence`.
-/// `None` for a question without failing draws, and if the density is not over kernels.
+/// Determines which scenarios failures come from, by draws of a proposal and of the density. `None` for a question without
+/// failing draws, and if the density is not over kernels.
 ///
 /// # Errors
 /// Those of the lanes.
-pub fn scenario_shares(
-    lanes: &LaneLimitState,
-    proposal: &Mixture,
-    defence: f64,
-    seed: u64,
-) -> Result<Vec<Option<KernelShares>>> {
+pub fn scenario_shares(lanes: &LaneLimitState, proposal: &Mixture, seed: u64) -> Result<Vec<Option<KernelShares>>> {
     if lanes.density.kind() != DensityKind::Kernel {
         return Ok(vec![None; lanes.questions()]);
     }
     let nominal = truncated(lanes.density)?;
-    let proposal = defended(proposal.clone(), &nominal, defence)?;
-    kernel_shares(nominal.kernels(), &nominal, &proposal, lanes, seed)
+    kernel_shares(nominal.kernels(), &nominal, proposal.clone(), lanes, seed)
 }
 
 /// The marks of lanes with a smaller [limit state](limit_state()) than the last one of a list. Also the criterion whose

@@ -53,7 +53,7 @@ use crate::engine::{Executor, LanePlan};
 use crate::model::profile::Profile;
 use crate::run::parts::{PLAN_FILE, leave_plan};
 use crate::stats::density::{DensityModel, Exposure, Mixture};
-use crate::stats::estimate::{Search, SearchRun};
+use crate::stats::estimate::{Importance, Search, SearchRun};
 use crate::{Error, Result};
 
 /// A planned sampling run: whole, or one shard of it if its samples are independent.
@@ -122,10 +122,10 @@ pub enum SampleKind {
 /// Importance sampling of a known proposal.
 #[derive(Debug, Clone)]
 pub struct Weighted {
-    /// The proposal of all questions, without its defensive part.
+    /// The proposal of all questions.
     pub proposal: Mixture,
-    /// Number of draws.
-    pub draws: u64,
+    /// Draws of the proposal and of the density.
+    pub draws: Importance,
     /// The search that found it; `None` for a given proposal.
     pub search: Option<SearchRun>,
 }
@@ -142,8 +142,9 @@ impl Sample {
                 SampleKind::Crude(Box::new(plan_samples(&density, &mixture, profile, options)?))
             }
             Estimator::Search(search) => SampleKind::Search(*search),
-            Estimator::Given { proposal: Some(proposal), .. } => {
-                let (proposal, draws) = (proposal.clone(), options.stop.samples);
+            Estimator::Given { proposal: Some(proposal), crude_per_draw } => {
+                let (proposal, crude_per_draw) = (proposal.clone(), *crude_per_draw);
+                let draws = Importance { seed: options.seed, draws: options.stop.samples, crude_per_draw };
                 SampleKind::Weighted(Box::new(Weighted { proposal, draws, search: None }))
             }
             Estimator::Given { proposal: None, .. } => {
@@ -204,14 +205,18 @@ impl Sample {
     /// Number of samples; before a search, and with a stop rule, the maximum.
     pub fn samples(&self) -> u64 {
         match &self.kind {
-            SampleKind::Weighted(weighted) => weighted.draws,
+            SampleKind::Weighted(weighted) => weighted.draws.draws,
             _ => self.options.stop.samples,
         }
     }
 
     /// Number of lanes of a run with a fixed number of samples.
     pub fn lane_count(&self) -> u64 {
-        let weighted = || self.samples().saturating_mul(self.lanes_per_sample());
+        let drawn = match &self.kind {
+            SampleKind::Weighted(weighted) => weighted.draws.draws.saturating_mul(1 + weighted.draws.crude_per_draw),
+            _ => self.samples(),
+        };
+        let weighted = || drawn.saturating_mul(self.lanes_per_sample());
         self.lane_plan().map_or_else(weighted, LanePlan::lane_count)
     }
 

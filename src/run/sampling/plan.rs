@@ -4,19 +4,19 @@
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
-use crate::engine::generated::Generator;
+use crate::engine::generated::{Generator, PointSource};
 use crate::engine::{Block, CaseSource, Headway, LaneCase, LanePlan, Units};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::model::scalar::Real;
-use crate::random::SOBOL_POINTS;
+use crate::random::{SOBOL_POINTS, Stream};
 use crate::scenario::Tables;
 use crate::stats::density::{DensityKind, DensityModel, Mixture};
 use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
 use super::generator::{SampleSource, generator_of, generator_of_points};
-use super::sample_options::SampleOptions;
+use super::sample_options::{Estimator, SampleOptions};
 
 /// Initial headways of sampled lanes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -66,11 +66,43 @@ pub fn plan_samples(
         let problem = format!("{samples} Sobol points are asked for, {SOBOL_POINTS} there are");
         return Err(Error::usage(place(), problem, "use independent random points beyond"));
     }
+    let generator = generator(density, proposal, profile, options)?;
+    plan(density, profile, generator, samples, &options.models, &options.headways)
+}
+
+/// The plan whose unit `i` is draw `i` of the density in a stream.
+///
+/// # Errors
+/// As [`plan_samples`].
+pub(super) fn plan_draws(
+    density: &DensityModel,
+    stream: Stream,
+    profile: &Profile,
+    draws: u64,
+    models: &[ModelId],
+    headways: &SampleHeadways,
+) -> Result<LanePlan> {
+    let options = SampleOptions {
+        models: models.to_vec(),
+        seed: stream.seed,
+        ..SampleOptions::new(Estimator::CRUDE, draws, headways.clone())
+    };
+    let mut generator = generator(density, &density.mixture()?, profile, &options)?;
+    generator.points.source = PointSource::Random(stream);
+    plan(density, profile, generator, draws, models, headways)
+}
+
+fn generator(
+    density: &DensityModel,
+    proposal: &Mixture,
+    profile: &Profile,
+    options: &SampleOptions,
+) -> Result<Generator> {
     let mut generator = generator_of(&density.space, proposal, &density.sizes, profile, options.source, options.seed)?;
     if let Some(of) = &density.transformed {
         generator.points.knots = of.transformation.table().map(f32::from_f64).collect();
     }
-    plan(density, profile, generator, samples, &options.models, &options.headways)
+    Ok(generator)
 }
 
 /// The plan whose unit `i` is point `i`.

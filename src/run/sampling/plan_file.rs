@@ -12,7 +12,7 @@ use super::{Sample, SampleKind, Weighted};
 use crate::model::profile::Profile;
 use crate::run::parts::{kind_of, read_sealed, seal};
 use crate::stats::density::DensityModel;
-use crate::stats::estimate::SearchRun;
+use crate::stats::estimate::{Importance, SearchRun};
 use crate::support::atomic_file::refuse_link;
 use crate::support::files::{make_folder, write_inside};
 use crate::{Error, Place, Result};
@@ -34,8 +34,8 @@ struct PlanFile {
     options: SampleOptions,
     /// The proposal file's text, for importance sampling.
     proposal: Option<String>,
-    /// Number of draws of the proposal.
-    draws: u64,
+    /// Draws of importance sampling.
+    draws: Option<Importance>,
     /// The search that found the proposal, unless it was given.
     search: Option<SearchRun>,
     /// Hash of the lanes of crude Monte Carlo.
@@ -58,7 +58,7 @@ impl Sample {
             profile: self.profile.clone(),
             options: self.options.clone(),
             proposal: weighted.map(|weighted| proposal_text(&self.density, &weighted.proposal)).transpose()?,
-            draws: weighted.map_or(0, |weighted| weighted.draws),
+            draws: weighted.map(|weighted| weighted.draws),
             search: weighted.and_then(|weighted| weighted.search.clone()),
             plan_sha256: self.lane_plan().map(|plan| plan.hash().to_owned()),
         };
@@ -94,10 +94,10 @@ impl Sample {
                 }
                 SampleKind::Crude(Box::new(plan))
             }
-            _ => match proposal {
-                Some(proposal)
+            _ => match proposal.zip(draws) {
+                Some((proposal, draws))
                     if fits
-                        && (1..1 << 63).contains(&draws)
+                        && (1..1 << 63).contains(&draws.draws)
                         && search.is_some() == matches!(options.estimator, Estimator::Search(_)) =>
                 {
                     SampleKind::Weighted(Box::new(Weighted { proposal, draws, search }))
@@ -124,7 +124,8 @@ impl Sample {
         let Ok(kept) = Sample::read(path) else { return Ok(None) };
         let SampleKind::Weighted(weighted) = &kept.kind else { return Ok(None) };
         // The accuracy that is asked for is in the number of draws alone.
-        let draws = weighted.search.as_ref().map(|search| self.draws_after(search));
+        let Estimator::Search(options) = &self.options.estimator else { return Ok(None) };
+        let draws = weighted.search.as_ref().map(|search| self.draws_after(&search.questions, options));
         let is_same = kept.plan_file_over(None)?.1 == self.plan_file()?.1 && draws == Some(weighted.draws);
         Ok(is_same.then_some(kept))
     }

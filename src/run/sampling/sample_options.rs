@@ -28,8 +28,8 @@ pub enum Estimator {
         /// The proposal. A plan file stores it separately.
         #[serde(skip)]
         proposal: Option<Mixture>,
-        /// Defensive mixture weight: the weight of the density in the proposal.
-        defence: f64,
+        /// Draws of the density for each draw of the proposal.
+        crude_per_draw: u64,
     },
 }
 
@@ -50,14 +50,6 @@ impl Estimator {
         match self {
             Estimator::Crude { interval } => *interval,
             _ => BinomialInterval::Wilson,
-        }
-    }
-
-    /// Defensive mixture weight: the weight of the density in the proposal.
-    pub fn defence(&self) -> f64 {
-        match self {
-            Estimator::Crude { .. } => 0.0,
-            Estimator::Search(Search { defence, .. }) | Estimator::Given { defence, .. } => *defence,
         }
     }
 }
@@ -148,9 +140,10 @@ impl SampleOptions {
         all.filter(is_pair).collect()
     }
 
-    /// The accuracy that importance sampling aims at after its search; `None` if the number of draws is fixed.
-    pub(super) fn goal(&self) -> Option<Goal> {
-        self.stop.relative_half_width.map(|half_width| Goal { half_width, max_draws: self.stop.samples })
+    /// The accuracy that importance sampling aims at after a search with at most `max_crude` draws of the density.
+    pub(super) fn goal(&self, max_crude: u64) -> Goal {
+        let half_width = self.stop.relative_half_width.unwrap_or(Goal::HALF_WIDTH);
+        Goal { half_width, max_draws: self.stop.samples, max_crude }
     }
 
     /// Headways; empty if the density draws them.

@@ -9,12 +9,11 @@ use super::limit_state::{LaneLimitState, Question, scenario_shares, truncated};
 use super::model_ratios::ModelRatio;
 use super::rows::EstimateRow;
 use super::sample_run::SampleResult;
-use super::{Estimator, Sample, Weighted};
+use super::{Sample, Weighted};
 use crate::engine::{CpuBackend, Executor, lanes_within_seconds};
 use crate::run::parts::{Ledger, MergeableCounts};
 use crate::stats::estimate::{
-    BlockSums, Enough, Search, SearchRun, WeightSums, after_search, defended, from_weight_sums, importance_sums,
-    search, weighted_ratio,
+    BlockSums, Enough, Found, Importance, Search, WeightSums, from_weight_sums, importance_sums, search, weighted_ratio,
 };
 use crate::support::cancel::Cancel;
 use crate::{Error, Place, Result};
@@ -38,9 +37,9 @@ fn chunk_samples(step_cap: u32, lanes: u64, kernels: u64) -> u64 {
 
 impl Sample {
     /// Number of samples between two updates of the journal.
-    pub(crate) fn chunk_samples(&self) -> u64 {
+    pub(crate) fn chunk_samples(&self, crude_per_draw: u64) -> u64 {
         let kernels = self.density.components();
-        chunk_samples(self.profile.step_cap(), self.lanes_per_sample(), kernels as u64)
+        chunk_samples(self.profile.step_cap(), self.lanes_per_sample() * (1 + crude_per_draw), kernels as u64)
     }
 
     /// Number of lanes of a sample of importance sampling.
@@ -62,13 +61,18 @@ impl Sample {
         tracing::info!("search on {}", executor.backend.describe());
         let nominal = truncated(&self.density)?;
         let run = search(&nominal, &self.limit_state(executor.clone()), options, self.options.seed)?;
-        let proposal = run.proposal.clone().map_or_else(|| self.density.mixture(), Ok)?;
-        Ok(Weighted { proposal, draws: self.draws_after(&run), search: Some(run) })
+        let draws = self.draws_after(&run.questions, options);
+        Ok(Weighted { proposal: run.proposal_or(&nominal)?, draws, search: Some(run) })
     }
 
-    /// Number of draws after a search.
-    pub(super) fn draws_after(&self, search: &SearchRun) -> u64 {
-        self.options.goal().map_or(self.options.stop.samples, |goal| goal.draws(&search.questions, self.options.level))
+    /// The final draws after a search.
+    pub(super) fn draws_after(&self, found: &[Found], search: &Search) -> Importance {
+        let options = &self.options;
+        let draws = options.goal(search.crude).draws(found, options.seed, options.level);
+        match options.stop.relative_half_width {
+            Some(_) => draws,
+            None => draws.with_draws(options.stop.samples),
+        }
     }
 
     /// Draws, evaluates and weights the samples that the ledger does not hold.
@@ -80,8 +84,7 @@ impl Sample {
         mut progress: impl FnMut(u64),
     ) -> Result<()> {
         let nominal = truncated(&self.density)?;
-        let proposal = defended(weighted.proposal.clone(), &nominal, self.options.estimator.defence())?;
-        let (units, chunk) = (ledger.units(), self.chunk_samples());
+        let (units, chunk) = (ledger.units(), self.chunk_samples(weighted.draws.crude_per_draw));
         // The samples of a chunk are drawn, evaluated and weighted together, so a chunk cannot be cancelled.
         let whole = executor.clone().with_cancel(Cancel::default());
         let lanes = self.limit_state(whole);
@@ -90,7 +93,8 @@ impl Sample {
             while at < missing.end {
                 let next = (at / chunk + 1).saturating_mul(chunk).min(missing.end);
                 let (asked, pairs) = (self.options.asked(), self.options.pairs());
-                let mut sums = importance_sums(&nominal, &proposal, &lanes, self.options.seed, at..next, &pairs)?;
+                let mut sums =
+                    importance_sums(&nominal, &weighted.proposal, &lanes, &weighted.draws, at..next, &pairs)?;
                 let pairs = sums.split_off(asked.len());
                 ledger.add(WeightedTally { sums: asked.into_iter().zip(sums).collect(), pairs }, [0; 2])?;
                 progress(next - at);
@@ -120,13 +124,11 @@ impl Sample {
         // Some more lanes, on the CPU: a merge has no other backend, and all backends give the same bits.
         let cpu = CpuBackend::lane_arithmetic();
         let lanes = self.limit_state(Executor::new(&cpu));
-        let shares = scenario_shares(&lanes, &weighted.proposal, options.estimator.defence(), options.seed)?;
+        let shares = scenario_shares(&lanes, &weighted.proposal, options.seed)?;
         let mut rows = Vec::new();
-        for (at, ((question, sums), shares)) in tally.sums.iter().zip(&shares).enumerate() {
-            let mut estimate = from_weight_sums(&sums.total().unwrap_or_default(), false, options.level);
-            if let (Some(run), Estimator::Search(search)) = (&weighted.search, &options.estimator) {
-                estimate = after_search(estimate, &run.questions[at], run.points, search);
-            }
+        let searched = weighted.search.as_ref().map_or(0, |search| search.points);
+        for ((question, sums), shares) in tally.sums.iter().zip(&shares) {
+            let estimate = from_weight_sums(&sums.total().unwrap_or_default(), options.level).after_search(searched);
             let headway = options.headway_name(question.headway);
             let row = EstimateRow::of_draws(question.model, question.criterion, headway, estimate, exposure);
             rows.push(row.with_data(shares.as_ref(), exposure));
@@ -191,7 +193,6 @@ mod tests {
     use super::*;
     use crate::model::criterion::Criterion;
     use crate::model::driver::ModelId;
-    use crate::stats::estimate::WeightedDraw;
 
     /// Cancellation is checked after a bounded number of lane-steps and of weighted kernels, for every time step.
     #[test]
@@ -209,9 +210,12 @@ mod tests {
     fn tally(models: &[ModelId], range: Range<u64>) -> WeightedTally {
         let question = |model: &ModelId| Question { model: *model, criterion: Criterion::Collision, headway: 0 };
         let leaf = |i: u64| {
-            let response = f64::from(u8::from(i.is_multiple_of(3)));
-            let weight = libm::exp(((i * 2_654_435_761) % 97) as f64 / 9.0 - 5.0);
-            WeightSums::from(WeightedDraw { weight, response, tries: 1, is_void: false, is_thin: false })
+            let mut sums = WeightSums { draws: 1, crude: 7, ..WeightSums::default() };
+            if i.is_multiple_of(3) {
+                let weight = libm::exp(((i * 2_654_435_761) % 97) as f64 / 9.0 - 5.0);
+                sums.add_failure(weight, i.is_multiple_of(6));
+            }
+            sums
         };
         let sums = || BlockSums::of_leaves(range.start, &range.clone().map(leaf).collect::<Vec<_>>());
         WeightedTally { sums: models.iter().map(|model| (question(model), sums())).collect(), pairs: vec![sums()] }

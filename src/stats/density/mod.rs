@@ -17,6 +17,7 @@ pub(crate) mod moments;
 pub(crate) mod normal;
 mod parameters;
 mod representativeness;
+mod rosenblatt;
 mod transformed;
 mod transport;
 mod valid;

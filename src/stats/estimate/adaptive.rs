@@ -2,13 +2,10 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::importance::{Importance, defended, importance};
-use super::interval::Interval;
+use super::importance::{Importance, importance};
 use super::problem::{Density, LimitState};
 use super::search::{Found, Search, SearchRun, search};
-use super::stop::StopReason;
 use super::summary::Estimate;
-use super::trust::Warning;
 use crate::Result;
 use crate::stats::density::normal_quantile;
 
@@ -16,6 +13,13 @@ use crate::stats::density::normal_quantile;
 const RESERVE: f64 = 1.2;
 /// Minimum number of final draws: fewer save nothing after a search.
 const MIN_DRAWS: u64 = 4000;
+/// Fraction of the half-width that the draws of the proposal may take; the rest is for what they may have missed.
+const OF_PROPOSAL: f64 = 0.8;
+/// Failures that the draws of the density are expected to hold at a half-width of 1: one failure more or less moves the end
+/// of the interval by a quarter of the half-width.
+const CRUDE_FAILURES: f64 = 4.0;
+/// Draws of the density for a question of which no failure was found.
+const CRUDE_WITHOUT_FAILURE: f64 = (1 << 21) as f64;
 
 /// The accuracy that is asked for.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -23,17 +27,28 @@ const MIN_DRAWS: u64 = 4000;
 pub struct Goal {
     /// Half the interval's width over the probability.
     pub half_width: f64,
-    /// Maximum number of final draws.
+    /// Maximum number of final draws of the proposal.
     pub max_draws: u64,
+    /// Maximum number of final draws of the density.
+    pub max_crude: u64,
 }
 
 impl Goal {
-    /// The number of final draws after a search, for all questions together: the worst one decides.
-    pub fn draws(&self, found: &[Found], level: f64) -> u64 {
+    /// Half-width if none is asked for.
+    pub const HALF_WIDTH: f64 = 0.1;
+
+    /// The final draws after a search, for all questions together: the worst one decides.
+    pub fn draws(&self, found: &[Found], seed: u64, level: f64) -> Importance {
         let z = normal_quantile(0.5 + 0.5 * level);
-        let of = |found: &Found| found.relative_variance.unwrap_or(0.0) * (z / self.half_width).powi(2);
+        let of = |found: &Found| found.relative_variance.unwrap_or(0.0) * (z / (OF_PROPOSAL * self.half_width)).powi(2);
         let most = found.iter().map(of).fold(0.0, f64::max);
-        ((RESERVE * most).ceil() as u64).max(MIN_DRAWS).min(self.max_draws)
+        let draws = ((RESERVE * most).ceil() as u64).max(MIN_DRAWS).min(self.max_draws);
+        let crude = |found: &Found| match found.probability > 0.0 {
+            true => CRUDE_FAILURES / (self.half_width * found.probability),
+            false => CRUDE_WITHOUT_FAILURE,
+        };
+        let crude = found.iter().map(crude).fold(0.0, f64::max).min(self.max_crude as f64);
+        Importance { seed, draws, crude_per_draw: ((crude / draws as f64).ceil() as u64).max(1) }
     }
 }
 
@@ -46,7 +61,8 @@ pub struct AdaptiveRun {
     pub search: SearchRun,
 }
 
-/// Searches a proposal, then samples it. The final sample is independent of the search, so the estimate is unbiased.
+/// Searches a proposal, then samples it beside the density. The final sample is independent of the search and its size is
+/// fixed before it, so the estimate is unbiased, and nothing stops it where it looks good.
 ///
 /// # Errors
 /// Those of the limit state; [`crate::Error::Usage`] if the density has no valid point.
@@ -59,40 +75,9 @@ pub fn adaptive(
     level: f64,
 ) -> Result<AdaptiveRun> {
     let run = search(nominal, limit_state, options, seed)?;
-    let estimates = match &run.proposal {
-        Some(proposal) => {
-            let samples = goal.draws(&run.questions, level);
-            let proposal = defended(proposal.clone(), nominal, options.defence)?;
-            importance(nominal, &proposal, limit_state, &Importance { level, ..Importance::new(seed, samples) })?
-        }
-        None => run.questions.iter().map(|_| nothing_found(level)).collect(),
-    };
-    let after = |(estimate, found): (Estimate, &Found)| after_search(estimate, found, run.points, options);
-    let estimates = estimates.into_iter().zip(&run.questions).map(after).collect();
+    let draws = goal.draws(&run.questions, seed, level);
+    let proposal = run.proposal_or(nominal)?;
+    let estimates = importance(nominal, &proposal, limit_state, &draws, level)?;
+    let estimates = estimates.into_iter().map(|estimate| estimate.after_search(run.points)).collect();
     Ok(AdaptiveRun { estimates, search: run })
-}
-
-/// The estimate of a question of which the search found no failure: nothing but the bound 1 is known.
-fn nothing_found(level: f64) -> Estimate {
-    Estimate::new("importance", 0.0, 0.0, Interval::nothing(level), 0, 0, 0, StopReason::Samples)
-}
-
-/// Adds the points of the search to an estimate, and what the search says against it.
-pub fn after_search(mut estimate: Estimate, found: &Found, points: u64, options: &Search) -> Estimate {
-    let draws = estimate.runs;
-    estimate.set_runs(draws + points);
-    let Some(variance) = found.relative_variance else {
-        estimate.trust.warn_if(true, Warning::NothingFound { depth: found.depth });
-        return estimate;
-    };
-    let p = estimate.probability;
-    let shallow = found.depth > Warning::DEPTH * p;
-    estimate.trust.warn_if(shallow, Warning::Shallow { depth: found.depth, probability: p });
-    if p > 0.0 {
-        let error = (variance / options.test as f64 + estimate.coefficient_of_variation.powi(2)).sqrt();
-        let errors = libm::fabs(libm::log(p / found.probability)) / error;
-        let disagrees = Warning::DisagreesWithSearch { search: found.probability, errors };
-        estimate.trust.warn_if(errors > Warning::SEARCH_ERRORS, disagrees);
-    }
-    estimate
 }

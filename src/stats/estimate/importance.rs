@@ -1,25 +1,28 @@
-//! Importance sampling: draws of a proposal g with weights f/g, for one question or several about the same draws.
+//! Importance sampling: draws of a proposal g beside draws of the density f, for one question or several about the same
+//! draws.
 //!
-//! The defensive mixture gives f the weight δ in the proposal. This bounds the weights by 1/δ.
+//! A draw of f costs a lane and nothing else, because its weight matters only if it fails. So there are many of them, and
+//! they meet what the proposal misses: no method excludes failures of probability p with much fewer than 3/p draws of f,
+//! unless it assumes something about where failures lie.
 
 use std::ops::Range;
 
 use rayon::prelude::*;
+use serde::{Deserialize, Serialize};
 
 use super::blocks::BlockSums;
-use super::interval::{Interval, log_normal};
-use super::problem::{Density, Draw, LimitState, batches, draw, evaluate_checked, purpose};
+use super::problem::{ATTEMPTS, Density, Failure, LimitState, batches, evaluate_checked, purpose};
 use super::stop::StopReason;
 use super::summary::Estimate;
 use super::trust::Warning;
-use super::weights::{WeightSums, WeightedDraw};
+use super::weights::WeightSums;
 use crate::random::Stream;
 use crate::stats::density::Mixture;
 use crate::stats::density::normal::uniform;
 use crate::{Error, Place, Result};
 
 /// (1 − δ) g + δ f, truncated like f. Every attempt selects g or f anew, so the mixture is truncated as a whole.
-pub struct Defended<'a> {
+pub(super) struct Defended<'a> {
     nominal: &'a dyn Density,
     proposal: Mixture,
     weight: f64,
@@ -29,7 +32,7 @@ pub struct Defended<'a> {
 ///
 /// # Errors
 /// [`Error::Usage`] if the weight is outside [0, 1] or the numbers of parameters differ.
-pub fn defended(proposal: Mixture, nominal: &dyn Density, weight: f64) -> Result<Defended<'_>> {
+pub(super) fn defended(proposal: Mixture, nominal: &dyn Density, weight: f64) -> Result<Defended<'_>> {
     if !(0.0..=1.0).contains(&weight) || proposal.dimensions() != nominal.dimensions() {
         return Err(Error::usage(
             Place::item("defensive mixture"),
@@ -43,14 +46,6 @@ pub fn defended(proposal: Mixture, nominal: &dyn Density, weight: f64) -> Result
     }
     Ok(Defended { nominal, proposal, weight })
 }
-
-impl Defended<'_> {
-    /// The proposal alone.
-    pub fn proposal(&self) -> &Mixture {
-        &self.proposal
-    }
-}
-
 impl Density for Defended<'_> {
     fn dimensions(&self) -> usize {
         self.proposal.dimensions()
@@ -83,137 +78,127 @@ impl Density for Defended<'_> {
     }
 }
 
-/// Options for sampling a proposal.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Draws of a proposal and of the density, as one sample.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
 pub struct Importance {
     /// Seed.
     pub seed: u64,
-    /// Level of the interval.
-    pub level: f64,
-    /// Number of draws, ≥ 1.
-    pub samples: u64,
-    /// Divides by the sum of the weights instead of the number of draws. The bias is of order 1/n, and the variance is
-    /// lower only if many draws fail. Required if a density is known only up to a constant.
-    pub self_normalised: bool,
+    /// Number of draws of the proposal, ≥ 1. An invalid one is a draw that does not fail.
+    pub draws: u64,
+    /// Draws of the density for each draw of the proposal.
+    pub crude_per_draw: u64,
 }
 
 impl Importance {
-    /// `samples` samples, unbiased, level 95 %.
-    pub fn new(seed: u64, samples: u64) -> Importance {
-        Importance { seed, level: 0.95, samples, self_normalised: false }
+    /// The same draws of the density beside another number of draws of the proposal.
+    pub fn with_draws(self, draws: u64) -> Importance {
+        let crude = self.crude_per_draw.saturating_mul(self.draws);
+        Importance { draws, crude_per_draw: crude.div_ceil(draws.max(1)).max(1), ..self }
     }
 }
 
-/// Draws, evaluates and weights a range of indices; returns the sums of every question, then those of every pair of
-/// questions, over the draws that fail both. Sums of disjoint ranges merge to those of their union, bit for bit.
+/// Draws, evaluates and weights a range of draws of the proposal, and the draws of the density that belong to them. Returns
+/// the sums of every question, then those of every pair of questions, over the draws that fail both. Sums of disjoint
+/// ranges merge to those of their union, bit for bit.
 ///
 /// # Errors
 /// Those of the limit state.
 pub fn importance_sums(
     nominal: &dyn Density,
-    proposal: &dyn Density,
+    proposal: &Mixture,
     limit_state: &dyn LimitState,
-    seed: u64,
+    options: &Importance,
     indices: Range<u64>,
     pairs: &[[usize; 2]],
 ) -> Result<Vec<BlockSums<WeightSums>>> {
-    let stream = Stream { seed, purpose: purpose::PROPOSAL };
+    let stream = |purpose| Stream { seed: options.seed, purpose };
     let (questions, guides) = (limit_state.questions(), limit_state.guides());
     let asked: Vec<[usize; 2]> = (0..questions).map(|question| [question; 2]).chain(pairs.iter().copied()).collect();
+    let crude = options.crude_per_draw;
+    let validity = nominal.validity_fraction();
+    // An index of the density whose attempts are all invalid is a draw that does not fail.
+    let is_drawn = 1.0 - (1.0 - validity).powi(ATTEMPTS as i32);
+    let weight = |point: &[f64]| {
+        let ratio = libm::exp(proposal.log_density(point) - nominal.log_density(point)) * validity;
+        1.0 / (crude as f64 * is_drawn + ratio)
+    };
     let mut sums: Vec<BlockSums<WeightSums>> = vec![BlockSums::default(); asked.len()];
     for batch in batches(indices) {
-        let mut draws = draw(proposal, stream, batch.clone());
-        let points: Vec<Vec<f64>> = draws.iter_mut().flatten().map(|drawn| std::mem::take(&mut drawn.point)).collect();
+        let attempt = |index| Mixture::draw(proposal, &stream(purpose::PROPOSAL), index, 0);
+        let points: Vec<(u64, Vec<f64>)> = batch.clone().into_par_iter().map(|index| (index, attempt(index))).collect();
+        let (indices, points): (Vec<u64>, Vec<Vec<f64>>) =
+            points.into_iter().filter(|(_, point)| nominal.is_valid(point)).unzip();
         let values = evaluate_checked(limit_state, &points)?;
-        let ratio = |point: &Vec<f64>| libm::exp(nominal.log_density(point) - proposal.log_density(point));
-        let ratios: Vec<f64> = points.par_iter().map(ratio).collect();
+        let mut failures: Vec<(u64, bool, Failure)> = Vec::new();
+        for ((index, point), values) in indices.into_iter().zip(points).zip(values.chunks(questions * guides)) {
+            let fails: Vec<bool> = values.iter().step_by(guides).map(|value| *value <= 0.0).collect();
+            if fails.contains(&true) {
+                failures.push((index, false, Failure { index, point, fails }));
+            }
+        }
+        if crude > 0 {
+            let range = batch.start * crude..batch.end * crude;
+            let found = limit_state.failures(nominal, stream(purpose::BESIDE_PROPOSAL), range)?;
+            failures.extend(found.into_iter().map(|failure| (failure.index / crude, true, failure)));
+        }
+        let weights: Vec<f64> = failures.par_iter().map(|(_, _, failure)| weight(&failure.point)).collect();
         for (of, sums) in asked.iter().zip(&mut sums) {
-            let mut valid = 0;
-            let leaf = |drawn: &Option<Draw>| {
-                let Some(drawn) = drawn else { return WeightedDraw::void().into() };
-                let value = |question: &usize| values[(valid * questions + question) * guides];
-                let (ratio, fails) = (ratios[valid], of.iter().all(|question| value(question) <= 0.0));
-                valid += 1;
-                WeightedDraw {
-                    weight: ratio / nominal.validity_fraction(),
-                    response: f64::from(u8::from(fails)),
-                    tries: drawn.tries,
-                    is_void: false,
-                    is_thin: ratio > Warning::THIN_RATIO,
+            let mut leaves =
+                vec![WeightSums { draws: 1, crude, ..WeightSums::default() }; (batch.end - batch.start) as usize];
+            for ((index, is_crude, failure), weight) in failures.iter().zip(&weights) {
+                if of.iter().all(|question| failure.fails[*question]) {
+                    leaves[(index - batch.start) as usize].add_failure(*weight, *is_crude);
                 }
-                .into()
-            };
-            let leaves: Vec<WeightSums> = draws.iter().map(leaf).collect();
+            }
             sums.merge(BlockSums::of_leaves(batch.start, &leaves))?;
         }
     }
     Ok(sums)
 }
 
-/// Student's interval on the scale of ln P; the degrees of freedom are the effective number of failures minus one.
-fn weighted_interval(probability: f64, variance: f64, effective_failures: f64, level: f64) -> Interval {
-    if probability <= 0.0 || variance <= 0.0 {
-        return Interval::nothing(level);
-    }
-    log_normal(probability, variance.sqrt() / probability, effective_failures - 1.0, level)
-}
-
 /// The estimate from sums.
-pub fn from_weight_sums(sums: &WeightSums, self_normalised: bool, level: f64) -> Estimate {
-    let figures = sums.figures();
-    let (method, probability, variance) = if self_normalised {
-        ("importance_self_normalised", figures.self_normalised, figures.self_normalised_variance)
-    } else {
-        ("importance", sums.unbiased(), sums.unbiased_variance())
-    };
-    let probability = probability.min(1.0);
-    let interval = weighted_interval(probability, variance, figures.effective_size_failures, level);
-    let mut estimate = Estimate::new(
-        method,
-        probability,
-        variance,
-        interval,
-        sums.draws,
-        sums.failures,
-        sums.voids,
-        StopReason::Samples,
-    );
-    estimate.trust.about_voids(sums.voids, sums.draws + sums.voids);
-    estimate.trust.about_weights(&figures, sums.failures);
-    estimate.weights = Some(figures);
+pub fn from_weight_sums(sums: &WeightSums, level: f64) -> Estimate {
+    let runs = sums.draws + sums.crude;
+    let (probability, variance) = (sums.probability().min(1.0), sums.variance());
+    let reason = StopReason::Samples;
+    let mut estimate =
+        Estimate::new("importance", probability, variance, sums.interval(level), runs, sums.failures, 0, reason);
+    estimate.trust.about_weights(sums);
+    estimate.weights = Some(sums.figures());
     estimate
 }
 
-/// Samples the proposal; returns the estimate of every question. The proposal must be valid wherever the density is. If
-/// g = 0 where f > 0 and failure is possible, the estimate is too small without any warning.
+/// Samples the proposal and the density; returns the estimate of every question. The proposal decides how wide the
+/// intervals are, never what they hold: failures that it misses are met by the draws of the density, or bounded.
 ///
 /// # Errors
 /// Those of the limit state.
 pub fn importance(
     nominal: &dyn Density,
-    proposal: &dyn Density,
+    proposal: &Mixture,
     limit_state: &dyn LimitState,
     options: &Importance,
+    level: f64,
 ) -> Result<Vec<Estimate>> {
-    let sums = importance_sums(nominal, proposal, limit_state, options.seed, 0..options.samples, &[])?;
-    let of = |sums: &BlockSums<WeightSums>| {
-        let total = sums.total().unwrap_or_default();
-        from_weight_sums(&total, options.self_normalised, options.level)
-    };
-    Ok(sums.iter().map(of).collect())
+    let sums = importance_sums(nominal, proposal, limit_state, options, 0..options.draws, &[])?;
+    Ok(sums.iter().map(|sums| from_weight_sums(&sums.total().unwrap_or_default(), level)).collect())
 }
 
 /// The estimate from points that another program drew. `log_ratios` holds ln f − ln g of each: f is the density of the
-/// question, normalized over its valid region (−∞ outside), g the density that the points were drawn from.
+/// question, normalized over its valid region (−∞ outside), g the density that the points were drawn from. Where g is
+/// small and failures are possible, nothing bounds what was missed.
 pub fn importance_of_points(log_ratios: &[f64], fails: &[bool], level: f64) -> Estimate {
     let leaf = |(log_ratio, fails): (&f64, &bool)| {
-        let weight = libm::exp(*log_ratio);
-        let response = f64::from(u8::from(*fails && weight > 0.0));
-        // No defensive part is known, so no weight tells where the proposal is thin.
-        WeightedDraw { weight, response, tries: 1, is_void: false, is_thin: false }.into()
+        let mut sums = WeightSums { draws: 1, ..WeightSums::default() };
+        if *fails && *log_ratio > f64::NEG_INFINITY {
+            sums.add_failure(libm::exp(*log_ratio), false);
+        }
+        sums
     };
     let leaves: Vec<WeightSums> = log_ratios.iter().zip(fails).map(leaf).collect();
-    let mut estimate = from_weight_sums(&BlockSums::of_leaves(0, &leaves).total().unwrap_or_default(), false, level);
+    let mut estimate = from_weight_sums(&BlockSums::of_leaves(0, &leaves).total().unwrap_or_default(), level);
+    estimate.trust.about_mean_weight(log_ratios);
     estimate.trust.warn_if(true, Warning::DataLeftOut);
     estimate
 }

@@ -3,8 +3,10 @@
 
 use rayon::prelude::*;
 
+use super::importance::defended;
 use super::interval::log_normal;
 use super::problem::{Density, LimitState, draw, evaluate_checked, purpose};
+use super::search::DEFENCE;
 use super::summary::Estimate;
 use super::trust::Warning;
 use crate::Result;
@@ -35,10 +37,11 @@ pub struct KernelShares {
 pub fn kernel_shares(
     kernels: &Mixture,
     nominal: &dyn Density,
-    proposal: &dyn Density,
+    proposal: Mixture,
     limit_state: &dyn LimitState,
     seed: u64,
 ) -> Result<Vec<Option<KernelShares>>> {
+    let proposal = &defended(proposal, nominal, DEFENCE)?;
     let drawn = draw(proposal, Stream { seed, purpose: purpose::SHARES }, 0..DRAWS);
     let points: Vec<Vec<f64>> = drawn.into_iter().flatten().map(|drawn| drawn.point).collect();
     let values = evaluate_checked(limit_state, &points)?;
@@ -106,7 +109,7 @@ impl Estimate {
         if p > 0.0 {
             self.variance += p * p * shares.relative_variance;
             self.coefficient_of_variation = self.variance.sqrt() / p;
-            let failures = self.weights.map_or(f64::INFINITY, |w| w.effective_size_failures);
+            let failures = self.weights.map_or(f64::INFINITY, |w| w.effective_failures);
             let freedom = failures.min(scenarios) - 1.0;
             self.interval = log_normal(p, self.coefficient_of_variation, freedom, own.level);
             self.interval.low = self.interval.low.min(own.low);
@@ -120,7 +123,6 @@ impl Estimate {
 
 #[cfg(test)]
 mod tests {
-    use super::super::defended;
     use super::*;
 
     #[test]
@@ -129,12 +131,12 @@ mod tests {
         let points: Vec<Vec<f64>> = (0..40).map(|k| vec![if k % 4 == 0 { 3.0 } else { 0.0 }]).collect();
         let kernels = Mixture::of_kernels(points, &[0.3]).unwrap();
         let beyond = |points: &[Vec<f64>]| Ok(points.iter().map(|x| 3.0 - x[0]).collect());
-        let proposal = defended(Mixture::of_kernels(vec![vec![3.2]], &[0.4]).unwrap(), &kernels, 0.1).unwrap();
-        let shares = kernel_shares(&kernels, &kernels, &proposal, &beyond, 5).unwrap()[0].unwrap();
+        let proposal = || Mixture::of_kernels(vec![vec![3.2]], &[0.4]).unwrap();
+        let shares = kernel_shares(&kernels, &kernels, proposal(), &beyond, 5).unwrap()[0].unwrap();
         // Ten of 40 have a share of 0.1 each: Σ s² = 0.1.
         assert!((shares.effective_failing / 10.0 - 1.0).abs() < 0.01, "{shares:?}");
         assert!((shares.relative_variance / (40.0 / 39.0 * 0.075) - 1.0).abs() < 0.01, "{shares:?}");
         let never = |points: &[Vec<f64>]| Ok(vec![1.0; points.len()]);
-        assert_eq!(kernel_shares(&kernels, &kernels, &proposal, &never, 5).unwrap(), [None]);
+        assert_eq!(kernel_shares(&kernels, &kernels, proposal(), &never, 5).unwrap(), [None]);
     }
 }

@@ -21,21 +21,18 @@ mod summary;
 mod trust;
 mod weights;
 
-pub use adaptive::after_search;
 pub use adaptive::{AdaptiveRun, Goal, adaptive};
 pub use blocks::{BLOCK, BlockSums, Join};
-pub use importance::{
-    Defended, Importance, defended, from_weight_sums, importance, importance_of_points, importance_sums,
-};
-pub use interval::{Interval, IntervalKind, clopper_pearson, log_normal, rule_of_three, wilson};
+pub use importance::{Importance, from_weight_sums, importance, importance_of_points, importance_sums};
+pub use interval::{Interval, IntervalKind, clopper_pearson, gamma, log_normal, rule_of_three, wilson};
 pub use kernels::{KernelShares, kernel_shares};
 pub use monte_carlo::{BinomialInterval, Counts, from_clusters, from_counts};
-pub use problem::{ATTEMPTS, Density, Draw, LimitState, StandardNormal, Truncated};
+pub use problem::{ATTEMPTS, Density, Draw, Failure, LimitState, StandardNormal, Truncated};
 pub use ratio::{
     ClusterRate, Clusters, Enough, Ratio, RatioMethod, RatioVerdict, cluster_rate, paired_ratio, weighted_ratio,
 };
 pub use search::{Found, Search, SearchRound, SearchRun, search};
 pub use stop::{Checkpoints, StopReason, StopRule};
 pub use summary::{Estimate, WeightFigures};
-pub use trust::{Trust, Verdict, Warning};
-pub use weights::{WeightSums, WeightedDraw};
+pub use trust::{Trust, Uncertain, Verdict, Warning};
+pub use weights::WeightSums;

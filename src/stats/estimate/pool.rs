@@ -32,8 +32,8 @@ pub(super) struct Pool<'a> {
     pub sources: Vec<Source>,
     /// Draws of the density whose points are all kept.
     nominal_draws: f64,
-    /// Draws of the density of which only failures are kept.
-    pub crude_draws: f64,
+    /// Attempts at draws of the density of which only failures are kept.
+    crude_draws: f64,
     /// Number of evaluated points.
     pub evaluated: u64,
 }
@@ -71,7 +71,7 @@ impl<'a> Pool<'a> {
         }
     }
 
-    /// Number of draws of the density, which no guide has influenced.
+    /// Number of attempts at draws of the density, which no guide has influenced.
     pub fn density_draws(&self) -> f64 {
         self.nominal_draws + self.crude_draws
     }
@@ -117,14 +117,19 @@ impl<'a> Pool<'a> {
     }
 
     /// Draws from the density and keeps only failures.
-    pub fn add_crude(&mut self, stream: Stream, draws: u64) -> Result<()> {
-        let from = self.crude_draws as u64;
-        self.crude_draws += draws as f64;
-        for start in (from..from + draws).step_by(BATCH as usize) {
-            let points = self.attempts(self.nominal, stream, start..(start + BATCH).min(from + draws));
-            self.add(points, true)?;
-        }
-        Ok(())
+    pub fn add_crude(&mut self, stream: Stream, indices: std::ops::Range<u64>) -> Result<()> {
+        let draws = indices.end - indices.start;
+        // Valid draws, each as good as several attempts.
+        self.crude_draws += draws as f64 / self.nominal.validity_fraction();
+        self.evaluated += draws;
+        let failures = self.limit_state.failures(self.nominal, stream, indices)?;
+        let points: Vec<Vec<f64>> = failures.into_iter().map(|failure| failure.point).collect();
+        self.add(points, true)
+    }
+
+    /// The failures among these draws.
+    pub fn crude_failures(&self) -> impl Iterator<Item = usize> + '_ {
+        (0..self.points.len()).filter(|point| self.is_crude[*point])
     }
 
     /// Draws from a mixture; returns the indices of the new points.
@@ -170,15 +175,13 @@ impl<'a> Pool<'a> {
     }
 
     fn add(&mut self, points: Vec<Vec<f64>>, is_crude: bool) -> Result<()> {
-        self.evaluated += points.len() as u64;
+        self.evaluated += if is_crude { 0 } else { points.len() as u64 };
         let per_point = self.limit_state.questions() * self.limit_state.guides();
         for batch in points.chunks(BATCH as usize) {
             let values = evaluate_checked(self.limit_state, batch)?;
             let of = |at: usize| &values[at * per_point..(at + 1) * per_point];
-            let fails = |at: usize| of(at).chunks(self.limit_state.guides()).any(|guides| guides[0] <= 0.0);
-            let kept: Vec<usize> = (0..batch.len()).filter(|at| !is_crude || fails(*at)).collect();
-            let logs: Vec<[f64; 2]> = kept.par_iter().map(|at| self.logs(&batch[*at])).collect();
-            for (at, [log_f, log_sources]) in kept.into_iter().zip(logs) {
+            let logs: Vec<[f64; 2]> = batch.par_iter().map(|point| self.logs(point)).collect();
+            for (at, [log_f, log_sources]) in logs.into_iter().enumerate() {
                 self.points.push(batch[at].clone());
                 self.values.extend_from_slice(of(at));
                 self.log_f.push(log_f);

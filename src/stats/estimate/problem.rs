@@ -23,6 +23,8 @@ pub(crate) mod purpose {
     pub const CHOICE: u32 = 0x1000_0000;
     /// Final draws of a proposal.
     pub const PROPOSAL: u32 = 0x4553_0002;
+    /// Draws of the density beside these.
+    pub const BESIDE_PROPOSAL: u32 = 0x4553_0005;
     /// Draws of a search: 64 times the round and the number of the mixture within the round are added.
     pub const SEARCH: u32 = 0x4553_4000;
     /// Draws that determine which kernels failures come from.
@@ -212,6 +214,40 @@ pub trait LimitState: Sync {
     /// # Errors
     /// Any error that prevents the evaluation.
     fn evaluate(&self, points: &[Vec<f64>]) -> Result<Vec<f64>>;
+
+    /// The draws of the density with these indices that fail any question, in order. An implementation may draw where it
+    /// evaluates, but as a pure function of stream and index.
+    ///
+    /// # Errors
+    /// Those of the evaluation.
+    fn failures(&self, density: &dyn Density, stream: Stream, indices: Range<u64>) -> Result<Vec<Failure>> {
+        let (questions, guides) = (self.questions(), self.guides());
+        let mut failures = Vec::new();
+        for batch in batches(indices) {
+            let drawn = draw(density, stream, batch.clone());
+            let (indices, points): (Vec<u64>, Vec<Vec<f64>>) =
+                batch.zip(drawn).filter_map(|(index, drawn)| Some((index, drawn?.point))).unzip();
+            let values = evaluate_checked(self, &points)?;
+            for ((index, point), values) in indices.into_iter().zip(points).zip(values.chunks(questions * guides)) {
+                let fails: Vec<bool> = values.iter().step_by(guides).map(|value| *value <= 0.0).collect();
+                if fails.contains(&true) {
+                    failures.push(Failure { index, point, fails });
+                }
+            }
+        }
+        Ok(failures)
+    }
+}
+
+/// A draw of the density that fails at least one question.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Failure {
+    /// Index of the draw.
+    pub index: u64,
+    /// Its point.
+    pub point: Vec<f64>,
+    /// Question by question, whether it fails.
+    pub fails: Vec<bool>,
 }
 
 impl<F: Fn(&[Vec<f64>]) -> Result<Vec<f64>> + Sync> LimitState for F {
@@ -221,7 +257,7 @@ impl<F: Fn(&[Vec<f64>]) -> Result<Vec<f64>> + Sync> LimitState for F {
 }
 
 /// The values of a batch, checked: all are there, none of them NaN.
-pub(crate) fn evaluate_checked(limit_state: &dyn LimitState, points: &[Vec<f64>]) -> Result<Vec<f64>> {
+pub(crate) fn evaluate_checked<L: LimitState + ?Sized>(limit_state: &L, points: &[Vec<f64>]) -> Result<Vec<f64>> {
     if points.is_empty() {
         return Ok(Vec::new());
     }

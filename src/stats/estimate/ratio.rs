@@ -240,16 +240,16 @@ pub fn paired_ratio(numerator: Clusters, denominator: Clusters, enough: Enough, 
 /// The ratio of two probabilities from the same weighted draws (common random numbers); `both` has the sums over the
 /// draws that fail both questions. Delta method on the logarithm.
 pub fn weighted_ratio([numerator, denominator, both]: [&WeightSums; 3], enough: Enough, level: f64) -> Ratio {
-    let (p, s, tries) = (numerator.unbiased(), denominator.unbiased(), numerator.tries as f64);
+    let (p, s) = (numerator.probability(), denominator.probability());
     if p <= 0.0 || s <= 0.0 {
         let ratio = (s > 0.0).then_some(0.0);
         let (method, verdict) = (RatioMethod::Draws, RatioVerdict::Undecided);
         return Ratio { ratio, low: None, high: None, method, verdict };
     }
-    let covariance = both.failing_squared / (tries * tries) - p * s / tries;
-    let own = numerator.unbiased_variance() / (p * p) + denominator.unbiased_variance() / (s * s);
+    let covariance = WeightSums::covariance(numerator, denominator, both);
+    let own = numerator.variance() / (p * p) + denominator.variance() / (s * s);
     let sigma = (own - 2.0 * covariance / (p * s)).max(0.0).sqrt();
-    let effective = |sums: &WeightSums| sums.figures().effective_size_failures;
+    let effective = |sums: &WeightSums| sums.figures().effective_failures;
     let freedom = effective(numerator).min(effective(denominator)) - 1.0;
     Ratio::of_logarithm(p / s, sigma, freedom, RatioMethod::Draws, enough, level)
 }

@@ -4,19 +4,21 @@
 //! around the failures ([`shapes`](super::shapes)), and, as long as they may hide elsewhere, around the points that a
 //! *guide* says are nearest to failure, level by level. All points of all rounds stay in one weighted pool. Guides
 //! can mislead; they decide where points are drawn, never what an estimate is. If they lead nowhere, crude draws of the
-//! density take their place. A proposal is accepted if a fresh sample of it shows no failure of large weight.
+//! density take their place. A proposal is accepted if a fresh sample of it shows no failure of large weight, and crude
+//! draws of the density show none where it is thin.
 
 use nalgebra::DMatrix;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::importance::{defended, no_valid_point};
 use super::pool::{Pool, effective_size};
 use super::problem::{Density, LimitState, purpose};
 use super::shapes::{designs, fitted};
-use crate::Result;
 use crate::random::Stream;
 use crate::stats::density::Mixture;
 use crate::stats::density::moments::{factor_or_diagonal, moments};
+use crate::{Error, Result};
 
 /// Variances of the wider copies of the density in the first round, relative to its own.
 const WIDER: [f64; 2] = [4.0, 9.0];
@@ -26,6 +28,16 @@ const MAX_FIRST: u64 = 8000;
 const PATIENCE: usize = 12;
 /// Crude draws of the first round that has any; each further one has twice as many.
 const CRUDE: u64 = 50_000;
+/// Maximum number of crude draws where guides lead nowhere.
+const MAX_CRUDE: u64 = 1 << 21;
+/// Failures that crude draws are expected to hold before a proposal is accepted: a way to fail that carries a fifth of the
+/// probability is then missed once in seven times, one that carries a third once in thirty.
+const CHECKED: f64 = 10.0;
+/// A crude failure of one question counts as missed if the proposal over the density is below this fraction of the
+/// reciprocal of its probability …
+const THIN: f64 = 0.02;
+/// … and a proposal is refused if such failures carry more than this fraction of an estimate.
+const MAX_THIN: f64 = 0.07;
 /// A guide descends in one round to no less than this fraction of the probability of its last level. Else failures that were
 /// found far away in the tails would end its way, although more likely ones lie between.
 const DESCENT: f64 = 0.05;
@@ -35,6 +47,8 @@ const ACTIVE: usize = 4;
 const LADDER: usize = 12;
 /// Weight of these.
 const LADDER_WEIGHT: f64 = 0.1;
+/// Weight of the density in the sample that tests a proposal.
+pub(super) const DEFENCE: f64 = 0.1;
 /// A fresh sample of a proposal is refused if one failure carries more than this fraction of an estimate …
 const MAX_FRACTION: f64 = 0.03;
 /// … or if the relative variance of a draw is larger than this, because the sample itself makes the next fit better …
@@ -58,13 +72,11 @@ pub struct Search {
     pub crude: u64,
     /// Draws of the sample that tests a proposal.
     pub test: u64,
-    /// Defensive mixture weight: the weight of the density in the proposal.
-    pub defence: f64,
 }
 
 impl Default for Search {
     fn default() -> Self {
-        Search { batch: 2000, elite: 200.0, rounds: 50, crude: 1 << 21, test: 4000, defence: 0.1 }
+        Search { batch: 2000, elite: 200.0, rounds: 50, crude: 100_000_000, test: 4000 }
     }
 }
 
@@ -74,10 +86,10 @@ impl Search {
         self.rounds * (1 + questions.div_ceil(ACTIVE))
     }
 
-    /// Maximum number of evaluated points.
+    /// Maximum number of evaluated points, unless crude draws test the proposal of a rarer question.
     pub fn most_points(&self, questions: usize) -> u64 {
         let rounds = self.batch.max(self.test).saturating_mul(self.most_rounds(questions) as u64);
-        rounds.saturating_add(self.crude).saturating_add(2 * self.batch.max(MAX_FIRST))
+        rounds.saturating_add(self.crude.min(MAX_CRUDE)).saturating_add(2 * self.batch.max(MAX_FIRST))
     }
 }
 
@@ -89,9 +101,6 @@ pub struct Found {
     pub probability: f64,
     /// Variance of one weighted draw of the proposal, divided by the squared probability; `None` without a proposal.
     pub relative_variance: Option<f64>,
-    /// Everything more likely than this was searched: the level that the best guide reached, or three over the number of
-    /// crude draws. Failures of a smaller probability may have escaped.
-    pub depth: f64,
 }
 
 /// One round.
@@ -110,7 +119,7 @@ pub struct SearchRound {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct SearchRun {
-    /// The proposal without its defensive part; `None` if no failure was found. Files store it separately.
+    /// The proposal; `None` if no failure was found. Files store it separately.
     #[serde(skip)]
     pub proposal: Option<Mixture>,
     /// Question by question.
@@ -122,6 +131,15 @@ pub struct SearchRun {
 }
 
 impl SearchRun {
+    /// The proposal, or the density in its place.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] for a density without kernels.
+    pub fn proposal_or(&self, nominal: &dyn Density) -> Result<Mixture> {
+        let none = || Error::Internal("a density without kernels cannot replace a proposal".to_owned());
+        self.proposal.clone().or_else(|| nominal.mixture()).ok_or_else(none)
+    }
+
     /// Whether there is a proposal.
     pub fn has_found(&self) -> bool {
         self.questions.iter().any(|found| found.relative_variance.is_some())
@@ -224,7 +242,7 @@ impl<'a> Searching<'a> {
             refusals: 0,
         };
         let questions = (0..limit_state.questions()).map(|_| question()).collect();
-        let found = vec![Found { probability: 0.0, relative_variance: None, depth: 1.0 }; limit_state.questions()];
+        let found = vec![Found { probability: 0.0, relative_variance: None }; limit_state.questions()];
         Ok(Searching { nominal, options, seed, pool, kernels, questions, found, proposal: None, rounds: 0, crude: 0 })
     }
 
@@ -244,10 +262,7 @@ impl<'a> Searching<'a> {
     }
 
     fn finish(self, rounds: Vec<SearchRound>) -> SearchRun {
-        let depth = |question: &Question| question.depth.min(3.0 / self.pool.density_draws());
-        let of = |(found, question): (&Found, &Question)| Found { depth: depth(question), ..*found };
-        let questions = self.found.iter().zip(&self.questions).map(of).collect();
-        SearchRun { proposal: self.proposal, questions, rounds, points: self.pool.evaluated }
+        SearchRun { proposal: self.proposal, questions: self.found, rounds, points: self.pool.evaluated }
     }
 
     /// One round; `false` if nothing is left to do.
@@ -267,11 +282,9 @@ impl<'a> Searching<'a> {
         if self.questions.iter().all(|question| !question.is_open()) {
             return self.test();
         }
-        if is_stuck && self.crude < self.options.crude {
-            let draws = if self.crude == 0 { CRUDE } else { self.crude }.min(self.options.crude - self.crude);
-            self.crude += draws;
-            let stream = Stream { seed: self.seed, purpose: purpose::NOMINAL };
-            self.pool.add_crude(stream, draws)?;
+        if is_stuck && self.crude < self.max_crude() {
+            let draws = if self.crude == 0 { CRUDE } else { self.crude }.min(self.max_crude() - self.crude);
+            self.add_crude(draws)?;
         }
         let draws = (self.options.batch / next.len().max(1) as u64).max(100);
         for (at, (mixture, around_designs)) in next.into_iter().enumerate() {
@@ -285,8 +298,20 @@ impl<'a> Searching<'a> {
         Ok(true)
     }
 
+    /// Maximum number of crude draws where guides lead nowhere.
+    fn max_crude(&self) -> u64 {
+        self.options.crude.min(MAX_CRUDE)
+    }
+
+    fn add_crude(&mut self, draws: u64) -> Result<()> {
+        let indices = self.crude..self.crude + draws;
+        self.crude = indices.end;
+        self.pool.add_crude(Stream { seed: self.seed, purpose: purpose::NOMINAL }, indices)
+    }
+
     /// Adds the mixtures to draw from for one question, or settles it. Returns whether the guides are stuck.
     fn follow(&mut self, at: usize, next: &mut Vec<(Mixture, Option<usize>)>) -> Result<bool> {
+        let has_crude_left = self.crude < self.max_crude();
         let pool = &self.pool;
         let (elite, seed) = (self.options.elite, self.seed.wrapping_add(self.rounds as u64));
         let failures = pool.failures(at);
@@ -333,7 +358,7 @@ impl<'a> Searching<'a> {
         let is_deep = question.depth <= 2.0 * probability;
         let is_known = effective >= elite;
         question.waited += usize::from(is_known && !is_deep);
-        let has_crude_left = self.crude < self.options.crude;
+
         if is_known && (is_deep || (question.waited > PATIENCE && !has_crude_left)) {
             question.is_settled = true;
         } else if question.rounds >= self.options.rounds {
@@ -366,17 +391,16 @@ impl<'a> Searching<'a> {
         let all: Vec<(f64, &Mixture)> =
             all.into_iter().chain(ladder.map(|mixture| (LADDER_WEIGHT / rungs as f64, mixture))).collect();
         let candidate = Mixture::join(&all)?;
-        let defence = self.options.defence;
-        let proposal = defended(candidate.clone(), self.nominal, defence)?;
+        let proposal = defended(candidate.clone(), self.nominal, DEFENCE)?;
         let draws = self.options.test;
         let stream = self.stream(0);
-        let new = self.pool.add_defended(candidate.clone(), &proposal, defence, stream, draws)?;
+        let new = self.pool.add_defended(candidate.clone(), &proposal, DEFENCE, stream, draws)?;
         let validity = self.nominal.validity_fraction();
         let log_f = &self.pool.log_f;
         let weight = |point: usize| libm::exp(log_f[point] - proposal.log_density(&self.pool.points[point])) / validity;
         let weights: Vec<f64> = new.clone().map(weight).collect();
         let mut goes_on = false;
-        for at in settled {
+        for &at in &settled {
             let failing = new.clone().zip(&weights).filter(|(point, _)| self.pool.fails(*point, at));
             let (mut sum, mut squares, mut largest) = (0.0, 0.0, 0.0_f64);
             for (_, weight) in failing {
@@ -387,11 +411,8 @@ impl<'a> Searching<'a> {
             let probability = sum / draws as f64;
             let variance = squares / draws as f64 / (probability * probability) - 1.0;
             let question = &mut self.questions[at];
-            self.found[at] = Found {
-                probability,
-                relative_variance: Some(variance).filter(|variance| variance.is_finite()),
-                depth: question.depth,
-            };
+            self.found[at] =
+                Found { probability, relative_variance: Some(variance).filter(|variance| variance.is_finite()) };
             let is_coarse = variance > GOOD_VARIANCE && question.refusals < MAX_REFINEMENTS;
             let is_refused = sum <= 0.0 || largest > MAX_FRACTION * sum || is_coarse;
             if is_refused && question.refusals < MAX_REFUSALS {
@@ -400,7 +421,35 @@ impl<'a> Searching<'a> {
                 goes_on = true;
             }
         }
+        let goes_on = goes_on || self.misses(&candidate, &settled)?;
         self.proposal = Some(candidate);
+        Ok(goes_on)
+    }
+
+    /// Whether crude draws fail where a tested proposal is thin; the search then goes on from these.
+    fn misses(&mut self, proposal: &Mixture, settled: &[usize]) -> Result<bool> {
+        let least =
+            settled.iter().map(|at| self.found[*at].probability).filter(|p| *p > 0.0).fold(f64::INFINITY, f64::min);
+        let wanted = ((CHECKED / least).ceil() as u64).min(self.options.crude);
+        if wanted > self.crude {
+            self.add_crude(wanted - self.crude)?;
+        }
+        let crude: Vec<usize> = self.pool.crude_failures().collect();
+        let log_ratio = |point: &usize| proposal.log_density(&self.pool.points[*point]) - self.pool.log_f[*point];
+        let log_ratios: Vec<f64> = crude.par_iter().map(log_ratio).collect();
+        let mut goes_on = false;
+        for &at in settled {
+            let probability = self.found[at].probability;
+            let thin = libm::log(THIN / (settled.len() as f64 * probability * self.nominal.validity_fraction()));
+            let is_missed = |(point, log_ratio): &(&usize, &f64)| self.pool.fails(**point, at) && **log_ratio < thin;
+            let missed = crude.iter().zip(&log_ratios).filter(is_missed).count() as f64 / self.crude.max(1) as f64;
+            let question = &mut self.questions[at];
+            if missed > MAX_THIN * probability && question.refusals < MAX_REFUSALS {
+                question.refusals += 1;
+                question.is_settled = false;
+                goes_on = true;
+            }
+        }
         Ok(goes_on)
     }
 }

@@ -10,7 +10,7 @@ use super::trust::{Trust, Warning};
 /// A probability of failure with measures of its accuracy.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
-    /// Estimator: `monte_carlo`, `importance`, `importance_self_normalised`.
+    /// Estimator: `monte_carlo`, `importance`.
     pub method: String,
     /// The estimate, in [0, 1].
     pub probability: f64,
@@ -41,26 +41,12 @@ pub struct Estimate {
 /// Figures about the weights of a sample.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 pub struct WeightFigures {
-    /// Effective sample size (Σw)²/Σw².
-    pub effective_size: f64,
-    /// The same for the failures.
-    pub effective_size_failures: f64,
-    /// Maximum weight over the sum of all weights.
-    pub largest_share: f64,
+    /// Effective number of failures, (Σw)²/Σw².
+    pub effective_failures: f64,
     /// Fraction of the estimate from the failure with the largest weight.
-    pub largest_share_failures: f64,
-    /// Mean weight; its expectation is 1.
-    pub mean_weight: f64,
-    /// Standard error of the mean weight.
-    pub mean_weight_error: f64,
-    /// Fraction of the estimate from failures where density over proposal exceeds [`super::Warning::THIN_RATIO`].
-    pub thin_share: f64,
-    /// Number of these failures.
-    pub thin_failures: u64,
-    /// Σ over failures w / Σ w.
-    pub self_normalised: f64,
-    /// Its variance, by the delta method.
-    pub self_normalised_variance: f64,
+    pub largest_fraction: f64,
+    /// Fraction of the estimate from draws of the density itself.
+    pub crude_fraction: f64,
 }
 
 impl Estimate {
@@ -116,8 +102,13 @@ impl Estimate {
         self
     }
 
-    /// Sets the number of runs, including those before the final sample.
-    pub(crate) fn set_runs(&mut self, runs: u64) {
+    /// Adds the runs before the final sample.
+    pub fn after_search(mut self, runs: u64) -> Estimate {
+        self.set_runs(self.runs + runs);
+        self
+    }
+
+    fn set_runs(&mut self, runs: u64) {
         self.runs = runs;
         let crude = self.probability * (1.0 - self.probability) / runs as f64;
         self.variance_reduction = if self.variance > 0.0 { crude / self.variance } else { f64::NAN };

@@ -59,33 +59,10 @@ pub enum Warning {
         /// |mean − 1| over its standard error.
         standard_errors: f64,
     },
-    /// Failures where the proposal is thin (below a fifth of the density) carry more than
-    /// [`Warning::MAX_THIN_FRACTION`] of the estimate: the proposal misses a way to fail.
-    ModeMissed {
-        /// Their fraction of the estimate.
-        share: f64,
-        /// Number of these failures.
-        failures: u64,
-    },
-    /// The sample with which the search tested its proposal differs by more than [`Warning::SEARCH_ERRORS`] standard
-    /// errors.
-    DisagreesWithSearch {
-        /// Its probability.
-        search: f64,
-        /// Distance of the logarithms in standard errors.
-        errors: f64,
-    },
-    /// The search came less deep than [`Warning::DEPTH`] times the probability: as much may have escaped.
-    Shallow {
-        /// Everything more likely than this was searched.
-        depth: f64,
-        /// The estimate.
-        probability: f64,
-    },
-    /// The search found too few failures for a proposal: there may be none.
-    NothingFound {
-        /// Everything more likely than this was searched.
-        depth: f64,
+    /// More than [`Warning::MAX_MISSED`] of the estimate may have been missed: there are too few draws of the density.
+    Missed {
+        /// Upper end of the interval of what no draw of the density met.
+        bound: f64,
     },
     /// More than [`Warning::MAX_VOID_FRACTION`] of the indices gave no valid point.
     VoidDraws {
@@ -109,29 +86,26 @@ impl Warning {
     pub const MEAN_WEIGHT_ERRORS: f64 = 4.0;
     /// Distance from 1 above which [`Warning::MeanWeightOff`] is raised.
     pub const MEAN_WEIGHT_OFF: f64 = 0.2;
-    /// Density over proposal above which a point counts as thinly covered. With a defensive mixture weight of 0.1, such
-    /// a point was more likely drawn from the defensive part.
-    pub const THIN_RATIO: f64 = 5.0;
-    /// Fraction of the estimate above which [`Warning::ModeMissed`] is raised.
-    pub const MAX_THIN_FRACTION: f64 = 0.1;
-    /// Standard errors above which [`Warning::DisagreesWithSearch`] is raised.
-    pub const SEARCH_ERRORS: f64 = 4.0;
-    /// Depth over the probability above which [`Warning::Shallow`] is raised.
-    pub const DEPTH: f64 = 3.0;
+    /// Fraction of the estimate above which [`Warning::Missed`] is raised.
+    pub const MAX_MISSED: f64 = 0.5;
     /// Fraction of void indices above which [`Warning::VoidDraws`] is raised.
     pub const MAX_VOID_FRACTION: f64 = 0.001;
 
     /// Whether the estimate must not be used at all.
     pub fn is_grave(&self) -> bool {
         match self {
-            Warning::MeanWeightOff { .. }
-            | Warning::ModeMissed { .. }
-            | Warning::DisagreesWithSearch { .. }
-            | Warning::NothingFound { .. } => true,
-            Warning::Shallow { depth, probability } => *depth > 10.0 * Warning::DEPTH * probability,
+            Warning::MeanWeightOff { .. } => true,
             Warning::OneWeightDominates { share } => *share > 0.5,
-            Warning::LowEffectiveSize { effective_size } => *effective_size < 5.0,
             _ => false,
+        }
+    }
+
+    /// Which uncertainty the warning is about.
+    pub fn about(&self) -> Uncertain {
+        match self {
+            Warning::FewScenarios { .. } | Warning::DataLeftOut => Uncertain::Data,
+            Warning::NotCompared | Warning::AgainstRecorded { .. } => Uncertain::Density,
+            _ => Uncertain::Draws,
         }
     }
 }
@@ -178,25 +152,10 @@ impl fmt::Display for Warning {
                 f,
                 "the mean weight is {mean:.3} ({standard_errors:.1} standard errors from 1): part of the density was not sampled"
             ),
-            Warning::ModeMissed { share, failures } => write!(
+            Warning::Missed { bound } => write!(
                 f,
-                "{failures} failures where the proposal is thin carry {:.0} % of the estimate: it misses a way to fail",
-                100.0 * share
-            ),
-            Warning::DisagreesWithSearch { search, errors } => write!(
-                f,
-                "the test sample of the search gave {}, {errors:.1} standard errors away",
-                significant(*search, 3)
-            ),
-            Warning::Shallow { depth, .. } => write!(
-                f,
-                "the search saw only what is more likely than {}: as many failures may have escaped it",
-                significant(*depth, 2)
-            ),
-            Warning::NothingFound { depth } => write!(
-                f,
-                "the search found too few failures for an estimate; it saw what is more likely than {}",
-                significant(*depth, 2)
+                "failures of a probability up to {} may have been missed: more draws of the density would tell",
+                significant(*bound, 2)
             ),
             Warning::VoidDraws { share } => {
                 write!(f, "{:.2} % of the draws gave no valid point", 100.0 * share)
@@ -206,11 +165,23 @@ impl fmt::Display for Warning {
     }
 }
 
-/// The verdict in one word.
+/// What an estimate is uncertain about. More lanes settle the first, a comparison with recorded scenarios shows the second,
+/// more recordings settle the third.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Uncertain {
+    /// P of the density, from finitely many draws.
+    Draws,
+    /// The density, and the parameterization below it, in place of traffic.
+    Density,
+    /// The recorded scenarios in place of all.
+    Data,
+}
+
+/// The verdict on the draws in one word.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Verdict {
-    /// No warning.
+    /// No warning: the interval of the draws holds P of the density as often as its level says.
     Sound,
     /// Warnings, none of them grave.
     Doubtful,
@@ -228,7 +199,7 @@ impl fmt::Display for Verdict {
     }
 }
 
-/// All warnings of an estimate. An empty list is no proof: a failure mode without a draw causes no warning.
+/// All warnings of an estimate.
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
 pub struct Trust {
     /// Warnings, in the order of their discovery.
@@ -236,15 +207,37 @@ pub struct Trust {
 }
 
 impl Trust {
-    /// The verdict.
-    pub fn verdict(&self) -> Verdict {
-        if self.warnings.iter().any(Warning::is_grave) {
+    /// The verdict on the draws.
+    pub fn draws(&self) -> Verdict {
+        if self.of(Uncertain::Draws).any(Warning::is_grave) {
             Verdict::Unusable
-        } else if self.warnings.is_empty() {
-            Verdict::Sound
-        } else {
+        } else if self.of(Uncertain::Draws).next().is_some() {
             Verdict::Doubtful
+        } else {
+            Verdict::Sound
         }
+    }
+
+    /// The verdict on the density: `agrees` with recorded scenarios, `differs`, or `open`.
+    pub fn density(&self) -> &'static str {
+        match self.of(Uncertain::Density).any(|of| matches!(of, Warning::AgainstRecorded { is_decided: true, .. })) {
+            true => "differs",
+            false if self.of(Uncertain::Density).next().is_some() => "open",
+            false => "agrees",
+        }
+    }
+
+    /// The verdict on the data: `enough` scenarios fail, `few` do, or they are `left out` of the interval.
+    pub fn data(&self) -> &'static str {
+        match self.of(Uncertain::Data).next() {
+            None => "enough",
+            Some(Warning::DataLeftOut) => "left out",
+            Some(_) => "few",
+        }
+    }
+
+    fn of(&self, about: Uncertain) -> impl Iterator<Item = &Warning> {
+        self.warnings.iter().filter(move |warning| warning.about() == about)
     }
 
     /// Adds a warning if its condition holds.
@@ -265,6 +258,20 @@ impl Trust {
         let share = voids as f64 / draws.max(1) as f64;
         self.warn_if(share > Warning::MAX_VOID_FRACTION, Warning::VoidDraws { share });
     }
+
+    /// The warning about the mean of f/g over all draws of g, given as logarithms; its expectation is 1.
+    pub(crate) fn about_mean_weight(&mut self, log_ratios: &[f64]) {
+        let n = log_ratios.len().max(1) as f64;
+        let mean = log_ratios.iter().map(|log| libm::exp(*log)).sum::<f64>() / n;
+        let square = log_ratios.iter().map(|log| libm::exp(2.0 * log)).sum::<f64>() / n;
+        let error = ((square - mean * mean).max(0.0) / n).sqrt();
+        let off = (mean - 1.0).abs();
+        let standard_errors = if error > 0.0 { off / error } else { f64::INFINITY };
+        self.warn_if(
+            off > Warning::MEAN_WEIGHT_OFF || (off > 1e-9 && standard_errors > Warning::MEAN_WEIGHT_ERRORS),
+            Warning::MeanWeightOff { mean, standard_errors },
+        );
+    }
 }
 
 #[cfg(test)]
@@ -272,13 +279,17 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_verdict_follows_the_gravest_warning() {
-        let of = |warnings: Vec<Warning>| Trust { warnings }.verdict();
-        assert_eq!(of(vec![]), Verdict::Sound);
-        assert_eq!(of(vec![Warning::FewFailures { failures: 3 }]), Verdict::Doubtful);
-        let missed = Warning::ModeMissed { share: 0.4, failures: 2 };
-        assert_eq!(of(vec![Warning::NoFailures, missed]), Verdict::Unusable);
-        assert_eq!(of(vec![Warning::OneWeightDominates { share: 0.3 }]), Verdict::Doubtful);
-        assert_eq!(of(vec![Warning::OneWeightDominates { share: 0.7 }]), Verdict::Unusable);
+    fn each_uncertainty_has_its_own_word() {
+        let of = |warnings: Vec<Warning>| Trust { warnings };
+        let none = of(vec![]);
+        assert_eq!((none.draws(), none.density(), none.data()), (Verdict::Sound, "agrees", "enough"));
+        let few = of(vec![Warning::FewScenarios { scenarios: 2.0 }, Warning::NotCompared]);
+        assert_eq!((few.draws(), few.density(), few.data()), (Verdict::Sound, "open", "few"));
+        assert_eq!(of(vec![Warning::FewFailures { failures: 3 }]).draws(), Verdict::Doubtful);
+        assert_eq!(of(vec![Warning::OneWeightDominates { share: 0.3 }]).draws(), Verdict::Doubtful);
+        assert_eq!(
+            of(vec![Warning::NoFailures, Warning::OneWeightDominates { share: 0.7 }]).draws(),
+            Verdict::Unusable
+        );
     }
 }

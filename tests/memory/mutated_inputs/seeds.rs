@@ -287,7 +287,7 @@ impl Seeds {
             })
         });
         let parts = parts.map(|(_, part)| written(|path| write_part(path, &part).unwrap()));
-        let sums = |k: u64| WeightSums { draws: k, weight: 0.5, ..WeightSums::default() };
+        let sums = |k: u64| WeightSums { draws: k, failing: 0.5, ..WeightSums::default() };
         let leaves: Vec<WeightSums> = (0..9).map(sums).collect();
         let question = |model| Question { model, criterion: CRITERION, headway: 0 };
         let sums = ModelId::ALL.into_iter().map(|m| (question(m), BlockSums::of_leaves(5, &leaves))).collect();

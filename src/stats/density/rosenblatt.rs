@@ -1,0 +1,126 @@
+//! Independent standard normal numbers → a point of a mixture (Rosenblatt, "Remarks on a multivariate transformation",
+//! Annals of Mathematical Statistics 23, 1952): what libraries of structural reliability work in.
+
+use super::Mixture;
+use super::normal::normal_cdf;
+
+/// Newton's steps, each within the bracket that bisection keeps; more than are ever taken.
+const STEPS: usize = 200;
+
+impl Mixture {
+    /// The point whose distribution function, parameter by parameter given those before, is Φ(u). The map is smooth and
+    /// increasing in each parameter, and independent standard normal numbers become draws of the mixture.
+    ///
+    /// # Panics
+    /// If `u` has another length than the mixture has parameters.
+    pub fn from_standard_normal(&self, u: &[f64]) -> Vec<f64> {
+        assert_eq!(u.len(), self.dimensions(), "a number for every parameter");
+        let kernels = self.weights().len();
+        // ln of the weight of each component given the parameters so far, and its standardized parameters.
+        let mut log_weights: Vec<f64> = self.weights().iter().map(|weight| libm::log(*weight)).collect();
+        let mut z = vec![vec![0.0; self.dimensions()]; kernels];
+        let mut point = Vec::with_capacity(u.len());
+        for (j, &u) in u.iter().enumerate() {
+            let top = log_weights.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+            let parts: Vec<[f64; 3]> = (0..kernels)
+                .map(|k| {
+                    let factor = self.factor(k);
+                    let shift: f64 = (0..j).map(|i| factor[(j, i)] * z[k][i]).sum();
+                    [libm::exp(log_weights[k] - top), self.mean(k)[j] + shift, factor[(j, j)]]
+                })
+                .collect();
+            let x = quantile(&parts, u);
+            for (k, [_, mean, deviation]) in parts.iter().enumerate() {
+                z[k][j] = (x - mean) / deviation;
+                log_weights[k] -= 0.5 * z[k][j] * z[k][j] + libm::log(*deviation);
+            }
+            point.push(x);
+        }
+        point
+    }
+}
+
+/// x with Σ w Φ((x − mean)/deviation) = Φ(u) Σ w, from the tail in which u lies, so that far tails keep their digits.
+fn quantile(parts: &[[f64; 3]], u: f64) -> f64 {
+    let total: f64 = parts.iter().map(|[weight, ..]| weight).sum();
+    let side = if u > 0.0 { -1.0 } else { 1.0 };
+    let wanted = libm::log(normal_cdf(side * u));
+    let kept = || parts.iter().filter(|[weight, ..]| *weight > 0.0);
+    let ends = kept().map(|[_, mean, deviation]| mean + u * deviation);
+    let (mut low, mut high) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+    let mut x = 0.5 * (low + high);
+    for _ in 0..STEPS {
+        let (mut tail, mut slope) = (0.0, 0.0);
+        for [weight, mean, deviation] in kept() {
+            let z = (x - mean) / deviation;
+            tail += weight * normal_cdf(side * z);
+            slope += weight * libm::exp(-0.5 * z * z) / deviation;
+        }
+        // ln of the tail is nearly linear where the tail is far.
+        let off = libm::log(tail / total) - wanted;
+        if off == 0.0 || high - low <= 4.0 * f64::EPSILON * x.abs().max(high.abs()) {
+            return x;
+        }
+        if (off < 0.0) == (side > 0.0) {
+            low = x
+        } else {
+            high = x
+        }
+        let derivative = side * slope / ((2.0 * std::f64::consts::PI).sqrt() * tail);
+        let next = x - off / derivative;
+        let next = if next > low && next < high { next } else { 0.5 * (low + high) };
+        if (next - x).abs() <= 2.0 * f64::EPSILON * x.abs() {
+            return next;
+        }
+        x = next;
+    }
+    x
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use nalgebra::DMatrix;
+
+    #[test]
+    fn the_map_is_the_factor_of_a_gaussian_and_the_inverse_of_a_mixtures_distribution_function() {
+        let factor = DMatrix::from_row_slice(2, 2, &[2.0, 0.0, -0.6, 0.5]);
+        let one = Mixture::new(vec![1.0], vec![vec![3.0, -1.0]], vec![factor], vec![0]).unwrap();
+        for u in [[0.0, 0.0], [1.3, -0.2], [-6.0, 7.5]] {
+            let x = one.from_standard_normal(&u);
+            assert!((x[0] - 3.0 - 2.0 * u[0]).abs() < 1e-12 && (x[1] + 1.0 + 0.6 * u[0] - 0.5 * u[1]).abs() < 1e-12);
+        }
+        // Of two heaps the distribution function is known, far into both tails.
+        let heaps = Mixture::of_kernels(vec![vec![0.0], vec![10.0], vec![10.5]], &[0.5]).unwrap();
+        let mut last = f64::NEG_INFINITY;
+        for u in (-80..=80).map(|u| f64::from(u) / 10.0) {
+            let x = heaps.from_standard_normal(&[u])[0];
+            let side = if u > 0.0 { -1.0 } else { 1.0 };
+            let tail: f64 = [0.0, 10.0, 10.5].iter().map(|mean| normal_cdf(side * (x - mean) / 0.5) / 3.0).sum();
+            assert!((tail / normal_cdf(side * u) - 1.0).abs() < 1e-9, "{u}: {x}");
+            assert!(x > last, "increasing at {u}");
+            last = x;
+        }
+    }
+
+    #[test]
+    fn standard_normal_numbers_become_draws_of_the_mixture() {
+        // Correlated within and between kernels: moments of 20,000 points against those of the mixture.
+        let factor = DMatrix::from_row_slice(2, 2, &[0.5, 0.0, 0.3, 0.2]);
+        let means = vec![vec![0.0, 0.0], vec![2.0, 3.0], vec![4.0, -1.0]];
+        let mixture = Mixture::new(vec![0.5, 0.3, 0.2], means.clone(), vec![factor.clone()], vec![0; 3]).unwrap();
+        let stream = crate::random::Stream { seed: 3, purpose: 1 };
+        let n = 20_000;
+        let normals = |index| {
+            let mut draws = super::super::Draws::new(stream, index);
+            [draws.normal(), draws.normal()]
+        };
+        let drawn: Vec<Vec<f64>> = (0..n).map(|index| mixture.from_standard_normal(&normals(index))).collect();
+        let mean = |of: &dyn Fn(&Vec<f64>) -> f64| drawn.iter().map(of).sum::<f64>() / n as f64;
+        let expected: f64 = [0.5, 0.3, 0.2].iter().zip(&means).map(|(w, m)| w * (m[0] * m[1] + 0.15)).sum();
+        assert!((mean(&|x| x[0] * x[1]) - expected).abs() < 0.05, "{} beside {expected}", mean(&|x| x[0] * x[1]));
+        assert!(
+            (mean(&|x| f64::from(u8::from(x[0] > 3.0))) - 0.2 * normal_cdf(2.0) - 0.3 * normal_cdf(-2.0)).abs() < 0.01
+        );
+    }
+}
