@@ -134,7 +134,7 @@ impl Sample {
 /// Number of samples if none is given.
 const DEFAULT_SAMPLES: u64 = 100_000;
 /// Maximum number of draws of the density for each draw of a given proposal.
-const CRUDE_PER_DRAW: u64 = 100;
+const CRUDE_PER_DRAW: u64 = 10;
 /// Maximum number of crude draws of a search with a driver outside the registry.
 const DRIVER_CRUDE: u64 = 1 << 15;
 /// Half-width of importance sampling if neither it nor a number of samples is given.

@@ -169,17 +169,21 @@ pub fn truncated(density: &DensityModel) -> Result<Truncated<impl Fn(&[f64]) -> 
     Truncated::with_validity(density.mixture()?, is_valid, density.valid.estimate)
 }
 
-/// Determines which scenarios failures come from, by draws of a proposal and of the density. `None` for a question without
+/// Determines which scenarios failures come from, by draws of a proposal and about `crude` draws of the density. `None` for a question without
 /// failing draws, and if the density is not over kernels.
 ///
 /// # Errors
 /// Those of the lanes.
-pub fn scenario_shares(lanes: &LaneLimitState, proposal: &Mixture, seed: u64) -> Result<Vec<Option<KernelShares>>> {
+pub fn scenario_shares(
+    lanes: &LaneLimitState,
+    proposal: &Mixture,
+    (seed, crude): (u64, u64),
+) -> Result<Vec<Option<KernelShares>>> {
     if lanes.density.kind() != DensityKind::Kernel {
         return Ok(vec![None; lanes.questions()]);
     }
     let nominal = truncated(lanes.density)?;
-    kernel_shares(nominal.kernels(), &nominal, proposal.clone(), lanes, seed)
+    kernel_shares(nominal.kernels(), &nominal, proposal, lanes, (seed, crude))
 }
 
 /// The marks of lanes with a smaller [limit state](limit_state()) than the last one of a list. Also the criterion whose

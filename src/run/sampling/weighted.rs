@@ -13,13 +13,17 @@ use super::{Sample, Weighted};
 use crate::engine::{CpuBackend, Executor, lanes_within_seconds};
 use crate::run::parts::{Ledger, MergeableCounts};
 use crate::stats::estimate::{
-    BlockSums, Enough, Found, Importance, Search, WeightSums, from_weight_sums, importance_sums, search, weighted_ratio,
+    BlockSums, Enough, Estimate, Found, Importance, Search, WeightSums, from_weight_sums, importance_sums, search,
+    weighted_ratio,
 };
 use crate::support::cancel::Cancel;
 use crate::{Error, Place, Result};
 
 /// Maximum number of samples evaluated between two journal updates.
 const CHUNK: u64 = 1 << 16;
+
+/// Crude failures that tell which scenarios they come from.
+const SHARED_FAILURES: f64 = 10.0;
 
 /// Number of kernels in the density for which weighting `CHUNK` samples takes about one second. The time is
 /// proportional to the number of kernels, so a density with more kernels has smaller chunks.
@@ -124,11 +128,19 @@ impl Sample {
         // Some more lanes, on the CPU: a merge has no other backend, and all backends give the same bits.
         let cpu = CpuBackend::lane_arithmetic();
         let lanes = self.limit_state(Executor::new(&cpu));
-        let shares = scenario_shares(&lanes, &weighted.proposal, options.seed)?;
+        let estimates: Vec<Estimate> = tally
+            .sums
+            .iter()
+            .map(|(_, sums)| from_weight_sums(&sums.total().unwrap_or_default(), options.level))
+            .collect();
+        // Enough for a scenario that carries a fifth of the rarest failures to be among them.
+        let rarest = estimates.iter().map(|of| of.probability).filter(|p| *p > 0.0).fold(f64::INFINITY, f64::min);
+        let crude = ((SHARED_FAILURES / rarest) as u64).min(weighted.draws.draws * weighted.draws.crude_per_draw);
+        let shares = scenario_shares(&lanes, &weighted.proposal, (options.seed, crude))?;
         let mut rows = Vec::new();
         let searched = weighted.search.as_ref().map_or(0, |search| search.points);
-        for ((question, sums), shares) in tally.sums.iter().zip(&shares) {
-            let estimate = from_weight_sums(&sums.total().unwrap_or_default(), options.level).after_search(searched);
+        for (((question, _), estimate), shares) in tally.sums.iter().zip(estimates).zip(&shares) {
+            let estimate = estimate.after_search(searched);
             let headway = options.headway_name(question.headway);
             let row = EstimateRow::of_draws(question.model, question.criterion, headway, estimate, exposure);
             rows.push(row.with_data(shares.as_ref(), exposure));

@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::blocks::BlockSums;
-use super::problem::{ATTEMPTS, Density, Failure, LimitState, batches, evaluate_checked, purpose};
+use super::problem::{ATTEMPTS, Density, LimitState, batches, evaluate_checked, purpose};
 use super::stop::StopReason;
 use super::summary::Estimate;
 use super::trust::Warning;
@@ -98,6 +98,59 @@ impl Importance {
     }
 }
 
+/// A failing draw of the proposal or of the density.
+pub(super) struct WeightedFailure {
+    /// Index of the draw of the proposal that it belongs to.
+    pub index: u64,
+    pub is_crude: bool,
+    pub point: Vec<f64>,
+    /// Question by question, whether it fails.
+    pub fails: Vec<bool>,
+    /// 1/(m + g/f).
+    pub weight: f64,
+}
+
+/// The failures among a range of draws of the proposal, and then among the draws of the density that belong to them. The
+/// purposes are those of the draws of both.
+pub(super) fn weighted_failures(
+    nominal: &dyn Density,
+    proposal: &Mixture,
+    limit_state: &dyn LimitState,
+    options: &Importance,
+    purposes: [u32; 2],
+    range: Range<u64>,
+) -> Result<Vec<WeightedFailure>> {
+    let [of_proposal, of_density] = purposes.map(|purpose| Stream { seed: options.seed, purpose });
+    let (guides, crude) = (limit_state.guides(), options.crude_per_draw);
+    let validity = nominal.validity_fraction();
+    // An index of the density whose attempts are all invalid is a draw that does not fail.
+    let is_drawn = 1.0 - (1.0 - validity).powi(ATTEMPTS as i32);
+    let weighted = |index: u64, is_crude: bool, point: Vec<f64>, fails: Vec<bool>| {
+        let ratio = libm::exp(proposal.log_density(&point) - nominal.log_density(&point)) * validity;
+        WeightedFailure { index, is_crude, point, fails, weight: 1.0 / (crude as f64 * is_drawn + ratio) }
+    };
+    let attempt = |index| Some((index, proposal.draw(&of_proposal, index, 0))).filter(|at| nominal.is_valid(&at.1));
+    let attempts: Vec<Option<(u64, Vec<f64>)>> = range.clone().into_par_iter().map(attempt).collect();
+    let (indices, points): (Vec<u64>, Vec<Vec<f64>>) = attempts.into_iter().flatten().unzip();
+    let values = evaluate_checked(limit_state, &points)?;
+    let mut failures: Vec<(u64, bool, Vec<f64>, Vec<bool>)> = Vec::new();
+    for ((index, point), values) in indices.into_iter().zip(points).zip(values.chunks(limit_state.questions() * guides))
+    {
+        let fails: Vec<bool> = values.iter().step_by(guides).map(|value| *value <= 0.0).collect();
+        if fails.contains(&true) {
+            failures.push((index, false, point, fails));
+        }
+    }
+    if crude > 0 {
+        let found = limit_state.failures(nominal, of_density, range.start * crude..range.end * crude)?;
+        failures.extend(found.into_iter().map(|of| (of.index / crude, true, of.point, of.fails)));
+    }
+    Ok(failures
+        .into_par_iter()
+        .map(|(index, is_crude, point, fails)| weighted(index, is_crude, point, fails))
+        .collect())
+}
+
 /// Draws, evaluates and weights a range of draws of the proposal, and the draws of the density that belong to them. Returns
 /// the sums of every question, then those of every pair of questions, over the draws that fail both. Sums of disjoint
 /// ranges merge to those of their union, bit for bit.
@@ -112,44 +165,17 @@ pub fn importance_sums(
     indices: Range<u64>,
     pairs: &[[usize; 2]],
 ) -> Result<Vec<BlockSums<WeightSums>>> {
-    let stream = |purpose| Stream { seed: options.seed, purpose };
-    let (questions, guides) = (limit_state.questions(), limit_state.guides());
-    let asked: Vec<[usize; 2]> = (0..questions).map(|question| [question; 2]).chain(pairs.iter().copied()).collect();
-    let crude = options.crude_per_draw;
-    let validity = nominal.validity_fraction();
-    // An index of the density whose attempts are all invalid is a draw that does not fail.
-    let is_drawn = 1.0 - (1.0 - validity).powi(ATTEMPTS as i32);
-    let weight = |point: &[f64]| {
-        let ratio = libm::exp(proposal.log_density(point) - nominal.log_density(point)) * validity;
-        1.0 / (crude as f64 * is_drawn + ratio)
-    };
+    let each = (0..limit_state.questions()).map(|question| [question; 2]);
+    let asked: Vec<[usize; 2]> = each.chain(pairs.iter().copied()).collect();
+    let purposes = [purpose::PROPOSAL, purpose::BESIDE_PROPOSAL];
+    let unfailed = WeightSums { draws: 1, crude: options.crude_per_draw, ..WeightSums::default() };
     let mut sums: Vec<BlockSums<WeightSums>> = vec![BlockSums::default(); asked.len()];
     for batch in batches(indices) {
-        let attempt = |index| Mixture::draw(proposal, &stream(purpose::PROPOSAL), index, 0);
-        let points: Vec<(u64, Vec<f64>)> = batch.clone().into_par_iter().map(|index| (index, attempt(index))).collect();
-        let (indices, points): (Vec<u64>, Vec<Vec<f64>>) =
-            points.into_iter().filter(|(_, point)| nominal.is_valid(point)).unzip();
-        let values = evaluate_checked(limit_state, &points)?;
-        let mut failures: Vec<(u64, bool, Failure)> = Vec::new();
-        for ((index, point), values) in indices.into_iter().zip(points).zip(values.chunks(questions * guides)) {
-            let fails: Vec<bool> = values.iter().step_by(guides).map(|value| *value <= 0.0).collect();
-            if fails.contains(&true) {
-                failures.push((index, false, Failure { index, point, fails }));
-            }
-        }
-        if crude > 0 {
-            let range = batch.start * crude..batch.end * crude;
-            let found = limit_state.failures(nominal, stream(purpose::BESIDE_PROPOSAL), range)?;
-            failures.extend(found.into_iter().map(|failure| (failure.index / crude, true, failure)));
-        }
-        let weights: Vec<f64> = failures.par_iter().map(|(_, _, failure)| weight(&failure.point)).collect();
+        let failures = weighted_failures(nominal, proposal, limit_state, options, purposes, batch.clone())?;
         for (of, sums) in asked.iter().zip(&mut sums) {
-            let mut leaves =
-                vec![WeightSums { draws: 1, crude, ..WeightSums::default() }; (batch.end - batch.start) as usize];
-            for ((index, is_crude, failure), weight) in failures.iter().zip(&weights) {
-                if of.iter().all(|question| failure.fails[*question]) {
-                    leaves[(index - batch.start) as usize].add_failure(*weight, *is_crude);
-                }
+            let mut leaves = vec![unfailed; (batch.end - batch.start) as usize];
+            for failure in failures.iter().filter(|failure| of.iter().all(|question| failure.fails[*question])) {
+                leaves[(failure.index - batch.start) as usize].add_failure(failure.weight, failure.is_crude);
             }
             sums.merge(BlockSums::of_leaves(batch.start, &leaves))?;
         }

@@ -3,14 +3,12 @@
 
 use rayon::prelude::*;
 
-use super::importance::defended;
+use super::importance::{Importance, weighted_failures};
 use super::interval::log_normal;
-use super::problem::{Density, LimitState, draw, evaluate_checked, purpose};
-use super::search::DEFENCE;
+use super::problem::{Density, LimitState, purpose};
 use super::summary::Estimate;
 use super::trust::Warning;
 use crate::Result;
-use crate::random::Stream;
 use crate::stats::density::Mixture;
 
 /// Number of draws of the proposal for counting the fractions.
@@ -28,44 +26,36 @@ pub struct KernelShares {
     pub effective_failing: f64,
 }
 
-/// Counts the fractions of every question over draws of a proposal. Each failing draw has the weight f/g, divided among
-/// the kernels by their responsibilities. Σ s_j² is corrected for the bias from the draws' noise. `None` for a question
-/// without failing draws, or if there is only one kernel.
+/// Counts the fractions of every question over draws of a proposal and about `crude` draws of the density beside them. Each
+/// failing draw has its weight, divided among the kernels by their responsibilities. Σ s_j² is corrected for the bias from the
+/// draws' noise. `None` for a question without failing draws, or if there is only one kernel.
 ///
 /// # Errors
 /// Those of the limit state.
 pub fn kernel_shares(
     kernels: &Mixture,
     nominal: &dyn Density,
-    proposal: Mixture,
+    proposal: &Mixture,
     limit_state: &dyn LimitState,
-    seed: u64,
+    (seed, crude): (u64, u64),
 ) -> Result<Vec<Option<KernelShares>>> {
-    let proposal = &defended(proposal, nominal, DEFENCE)?;
-    let drawn = draw(proposal, Stream { seed, purpose: purpose::SHARES }, 0..DRAWS);
-    let points: Vec<Vec<f64>> = drawn.into_iter().flatten().map(|drawn| drawn.point).collect();
-    let values = evaluate_checked(limit_state, &points)?;
-    let (questions, guides) = (limit_state.questions(), limit_state.guides());
-    let n = kernels.weights().len();
-    let mut counts: Vec<Counts> = (0..questions).map(|_| Counts::new(n)).collect();
-    let fails = |at: usize, question: usize| values[(at * questions + question) * guides] <= 0.0;
-    let failing: Vec<usize> = (0..points.len()).filter(|at| (0..questions).any(|q| fails(*at, q))).collect();
+    let options = Importance { seed, draws: DRAWS, crude_per_draw: crude.div_ceil(DRAWS).max(1) };
+    let purposes = [purpose::SHARES, purpose::BESIDE_SHARES];
+    let failing = weighted_failures(nominal, proposal, limit_state, &options, purposes, 0..DRAWS)?;
+    let mut counts = vec![Counts::new(kernels.weights().len()); limit_state.questions()];
     for chunk in failing.chunks(AT_ONCE) {
-        let explained = |at: &usize| {
-            let point = &points[*at];
-            let ratio = libm::exp(nominal.log_density(point) - proposal.log_density(point));
-            (ratio, kernels.responsibilities(point))
-        };
-        let all: Vec<(f64, Vec<f64>)> = chunk.par_iter().map(explained).collect();
+        let explained: Vec<Vec<f64>> = chunk.par_iter().map(|of| kernels.responsibilities(&of.point)).collect();
         // In the order of the indices, so that the bits do not depend on the number of threads.
-        for (at, (weight, shares)) in chunk.iter().zip(&all) {
-            (0..questions).filter(|q| fails(*at, *q)).for_each(|q| counts[q].add(*weight, shares));
+        for (of, shares) in chunk.iter().zip(&explained) {
+            let asked = counts.iter_mut().zip(&of.fails).filter(|(_, fails)| **fails);
+            asked.for_each(|(counts, _)| counts.add(of.weight, shares));
         }
     }
     Ok(counts.iter().map(Counts::shares).collect())
 }
 
 /// Sums over the failing draws of one question.
+#[derive(Clone)]
 struct Counts {
     /// Kernel by kernel: Σ w s and Σ (w s)².
     sums: Vec<[f64; 2]>,
@@ -131,12 +121,12 @@ mod tests {
         let points: Vec<Vec<f64>> = (0..40).map(|k| vec![if k % 4 == 0 { 3.0 } else { 0.0 }]).collect();
         let kernels = Mixture::of_kernels(points, &[0.3]).unwrap();
         let beyond = |points: &[Vec<f64>]| Ok(points.iter().map(|x| 3.0 - x[0]).collect());
-        let proposal = || Mixture::of_kernels(vec![vec![3.2]], &[0.4]).unwrap();
-        let shares = kernel_shares(&kernels, &kernels, proposal(), &beyond, 5).unwrap()[0].unwrap();
+        let proposal = Mixture::of_kernels(vec![vec![3.2]], &[0.4]).unwrap();
+        let shares = kernel_shares(&kernels, &kernels, &proposal, &beyond, (5, 400)).unwrap()[0].unwrap();
         // Ten of 40 have a share of 0.1 each: Σ s² = 0.1.
         assert!((shares.effective_failing / 10.0 - 1.0).abs() < 0.01, "{shares:?}");
         assert!((shares.relative_variance / (40.0 / 39.0 * 0.075) - 1.0).abs() < 0.01, "{shares:?}");
         let never = |points: &[Vec<f64>]| Ok(vec![1.0; points.len()]);
-        assert_eq!(kernel_shares(&kernels, &kernels, proposal(), &never, 5).unwrap(), [None]);
+        assert_eq!(kernel_shares(&kernels, &kernels, &proposal, &never, (5, 400)).unwrap(), [None]);
     }
 }

@@ -29,6 +29,8 @@ pub(crate) mod purpose {
     pub const SEARCH: u32 = 0x4553_4000;
     /// Draws that determine which kernels failures come from.
     pub const SHARES: u32 = 0x4553_0004;
+    /// Draws of the density beside these.
+    pub const BESIDE_SHARES: u32 = 0x4553_0006;
     /// The estimate of a valid fraction.
     pub const VALIDITY: u32 = 0x4553_0003;
 }

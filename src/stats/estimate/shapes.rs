@@ -19,9 +19,11 @@ const COMPONENTS: usize = 16;
 /// Maximum number of failures among which design points are looked for.
 const CANDIDATES: usize = 4000;
 /// Maximum number of design points.
-const DESIGNS: usize = 300;
-/// Design points whose weight is below e⁻¹⁴ of the largest are left out.
-const NEGLIGIBLE: f64 = 14.0;
+const DESIGNS: usize = 100;
+/// Design points whose weight is below e⁻⁸ of the largest are left out …
+const NEGLIGIBLE: f64 = 8.0;
+/// … and those of a kernel that are further by this square of a distance than its nearest failure.
+const FAR: f64 = 14.0;
 
 /// A mixture fitted to points with weights; the number of components is chosen by held-out likelihood.
 pub(super) fn fitted(pool: &Pool, points: &[usize], weights: &[f64], seed: u64) -> Result<Mixture> {
@@ -86,7 +88,7 @@ pub(super) fn designs(kernels: &Mixture, pool: &Pool, failures: &[usize], heat: 
         };
         let squares: Vec<f64> = points.iter().map(|z| away(z, z)).collect();
         let nearest = squares.iter().copied().fold(f64::INFINITY, f64::min);
-        let near = |at: &(f64, usize)| at.0 <= nearest + NEGLIGIBLE;
+        let near = |at: &(f64, usize)| at.0 <= nearest + FAR;
         let mut order: Vec<(f64, usize)> = squares.into_iter().zip(0..).filter(near).collect();
         order.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)));
         let mut taken: Vec<(f64, Vec<usize>)> = Vec::new();
