@@ -45,7 +45,7 @@ const PROFILES: [&str; 6] = ["un-r157", "eu-2022-1426", "eu-2022-1426-standing",
                   --sheet case.html\n  \
                   lanesweep check cases.csv --row 2\n  \
                   lanesweep check scenarios.jsonl --scenario 01_cut_in_97_91_957 --thw 1.2")]
-pub struct Check {
+pub(super) struct Check {
     /// TOML file, table (.csv, .parquet) or scenario file (.jsonl) with the case
     #[arg(value_name = "FILE", help_heading = "Data")]
     file: Option<PathBuf>,

@@ -12,7 +12,7 @@ use crate::Result;
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  lanesweep study --shard 0/2 --out result\n  lanesweep study --shard 1/2 --out \
                         result\n  lanesweep cluster merge result")]
-pub struct Cluster {
+pub(super) struct Cluster {
     #[command(subcommand)]
     verb: ClusterVerb,
 }

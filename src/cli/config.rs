@@ -24,7 +24,7 @@ use crate::{Error, Place, Result};
     after_help = "Examples:\n  lanesweep config init\n  lanesweep config show --config lanesweep.toml\n  lanesweep \
                         study --config lanesweep.toml --config mining.leader_max_thw_s=2.5"
 )]
-pub struct Config {
+pub(super) struct Config {
     #[command(subcommand)]
     verb: ConfigVerb,
 }

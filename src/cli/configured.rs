@@ -245,7 +245,7 @@ impl Configured {
     ///
     /// # Errors
     /// As [`Profile::load`] and [`Profile::with_dt`].
-    pub fn profile(&self) -> Result<Profile> {
+    pub(super) fn profile(&self) -> Result<Profile> {
         self.profile_of(&self.settings.run.profile).map_err(|error| self.at_origin("run.profile", "profile", error))
     }
 
@@ -253,14 +253,14 @@ impl Configured {
     ///
     /// # Errors
     /// As [`Configured::profile`].
-    pub fn profile_of(&self, name: &str) -> Result<Profile> {
+    pub(super) fn profile_of(&self, name: &str) -> Result<Profile> {
         let profile = Profile::load(name)?;
         let Some(dt_s) = self.settings.run.dt_s else { return Ok(profile) };
         profile.with_dt(dt_s).map_err(|error| self.at_origin("run.dt_s", "dt", error))
     }
 
     /// Adds the file or assignment that sets the key to an error about an option.
-    pub fn at_origin(&self, key: &str, option: &'static str, error: Error) -> Error {
+    fn at_origin(&self, key: &str, option: &'static str, error: Error) -> Error {
         let origin = self.layers.get(key).map(|setting| setting.origin);
         match (error, origin) {
             (error, None | Some(Origin::Default | Origin::Flag(_))) => error,
@@ -272,12 +272,12 @@ impl Configured {
     }
 
     /// Whether a key was set.
-    pub fn is_set(&self, key: &str) -> bool {
+    pub(super) fn is_set(&self, key: &str) -> bool {
         self.layers.given().any(|setting| setting.key.name == key)
     }
 
     /// The configuration files; no result may overwrite them.
-    pub fn files(&self) -> &[PathBuf] {
+    pub(super) fn files(&self) -> &[PathBuf] {
         self.layers.files()
     }
 
@@ -296,7 +296,7 @@ impl Configured {
     ///
     /// # Errors
     /// [`Error::Usage`].
-    pub fn refuse_with_plan(&self) -> Result<()> {
+    pub(super) fn refuse_with_plan(&self) -> Result<()> {
         let are_files_typed = std::env::var_os(FILE_VARIABLE).is_none();
         self.refuse_lane_keys(are_files_typed, "is decided by the plan (--plan)", "leave it out, or make another plan")
     }
@@ -306,7 +306,7 @@ impl Configured {
     ///
     /// # Errors
     /// [`Error::Usage`].
-    pub fn refuse_assigned(&self, why: &str, help: &str) -> Result<()> {
+    pub(super) fn refuse_assigned(&self, why: &str, help: &str) -> Result<()> {
         self.refuse_lane_keys(false, why, help)
     }
 
@@ -392,7 +392,7 @@ impl Configured {
     ///
     /// # Errors
     /// As [`Configured::backend`] and [`OpenBackend::open_to_verify`].
-    pub fn open_to_verify(&self) -> Result<OpenBackend> {
+    pub(super) fn open_to_verify(&self) -> Result<OpenBackend> {
         let (backend, device) = self.backend()?;
         OpenBackend::open_to_verify(backend, device.as_ref())
     }
@@ -401,7 +401,7 @@ impl Configured {
     ///
     /// # Errors
     /// [`Error::Usage`] if another backend or a device is requested.
-    pub fn open_reference(&self) -> Result<OpenBackend> {
+    pub(super) fn open_reference(&self) -> Result<OpenBackend> {
         let run = &self.settings.run;
         if run.backend == BackendChoice::Gpu || run.device.is_some() {
             let problem = "it computes in binary64 on the CPU; a device computes in binary32".to_owned();

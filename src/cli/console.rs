@@ -25,7 +25,7 @@ const STDOUT: &str = "standard output";
 
 /// Verbosity on stderr.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Verbosity {
+pub(super) enum Verbosity {
     /// Errors only.
     Quiet,
     /// Progress and warnings.
@@ -91,7 +91,7 @@ impl MakeWriter<'_> for Log {
 }
 
 /// Starts the log. Colours only on a terminal and without `NO_COLOR`.
-pub fn start_log(verbosity: Verbosity) {
+pub(super) fn start_log(verbosity: Verbosity) {
     let level = match verbosity {
         Verbosity::Quiet => Level::ERROR,
         Verbosity::Normal => Level::INFO,
@@ -117,19 +117,19 @@ pub fn start_log(verbosity: Verbosity) {
 }
 
 /// Width of tables on stdout, in columns: `COLUMNS` if set, else the terminal's, else 120.
-pub fn width() -> usize {
+pub(super) fn width() -> usize {
     let set = std::env::var("COLUMNS").ok().and_then(|columns| columns.parse().ok());
     let terminal = || Some(usize::from(terminal_size::terminal_size_of(io::stdout())?.0.0));
     set.filter(|width| *width > 0).or_else(terminal).unwrap_or(WIDTH)
 }
 
 /// Writes a text to stdout.
-pub fn print(text: &str) -> Result<()> {
+pub(super) fn print(text: &str) -> Result<()> {
     write_out(&shown(text))
 }
 
 /// Writes JSON or JSON Lines to stdout.
-pub fn print_json(json: &str) -> Result<()> {
+pub(super) fn print_json(json: &str) -> Result<()> {
     write_out(&shown_json(json))
 }
 
@@ -146,7 +146,7 @@ fn write_out(text: &str) -> Result<()> {
 }
 
 /// Writes a text to stderr verbatim: messages of a result besides its data.
-pub fn say(text: &str) {
+pub(super) fn say(text: &str) {
     if capture(Level::INFO, text) {
         return;
     }
@@ -160,14 +160,14 @@ pub(super) fn set_command_line(words: &[OsString]) {
 }
 
 /// The command line as typed, for repeating the run.
-pub fn command_line() -> String {
+pub(super) fn command_line() -> String {
     let words = COMMAND_LINE.lock().unwrap_or_else(PoisonError::into_inner);
     let words = words.iter().map(|word| quoted_word(&word.to_string_lossy()));
     format!("lanesweep {}", words.collect::<Vec<_>>().join(" "))
 }
 
 /// Returns a callback that advances a bar.
-pub fn inc(bar: &ProgressBar) -> impl Fn(u64) + Send + Sync + 'static {
+pub(super) fn inc(bar: &ProgressBar) -> impl Fn(u64) + Send + Sync + 'static {
     let bar = bar.clone();
     move |units| bar.inc(units)
 }
@@ -178,7 +178,7 @@ pub fn progress(verbosity: Verbosity, length: u64, what: &str) -> ProgressBar {
 }
 
 /// The same for work that may end before its last unit.
-pub fn progress_to_maximum(verbosity: Verbosity, length: u64, what: &str) -> ProgressBar {
+pub(super) fn progress_to_maximum(verbosity: Verbosity, length: u64, what: &str) -> ProgressBar {
     bar_of(verbosity, length, what, "at most about")
 }
 
@@ -262,7 +262,7 @@ fn flag_of(field: &str) -> String {
 
 /// Replaces marked fields in a text of the library by their flags: `--dt` for option `dt`, `--backend cpu` for option
 /// `backend = cpu`.
-pub fn with_flags(text: &str) -> String {
+fn with_flags(text: &str) -> String {
     let (mut out, mut rest) = (String::with_capacity(text.len()), text);
     while let Some((before, marked)) = rest.split_once("option `") {
         let (option, after) = marked.split_once('`').unwrap_or(("", marked));
@@ -283,12 +283,12 @@ pub fn with_flags(text: &str) -> String {
 }
 
 /// Warns about skipped input, with help.
-pub fn warn<'a>(errors: impl IntoIterator<Item = &'a Error>) {
+pub(super) fn warn<'a>(errors: impl IntoIterator<Item = &'a Error>) {
     errors.into_iter().for_each(|error| tracing::warn!("{error}; {}", error.help().unwrap_or_default()));
 }
 
 /// Prints an error with its help on stderr.
-pub fn complain(error: &Error) {
+pub(super) fn complain(error: &Error) {
     if captured().is_some() {
         // In the words of the library.
         capture(Level::ERROR, &format!("{error}; {}", error.help().unwrap_or_default()));
@@ -305,7 +305,7 @@ pub fn complain(error: &Error) {
 ///
 /// # Errors
 /// [`Error::Io`] if the help cannot be written to standard output.
-pub fn refuse(error: &clap::Error) -> Result<Exit> {
+pub(super) fn refuse(error: &clap::Error) -> Result<Exit> {
     if !error.use_stderr() {
         return match error.print().and_then(|()| io::stdout().flush()) {
             Err(error) if error.kind() != io::ErrorKind::BrokenPipe => Err(Error::io(STDOUT, "write", error)),

@@ -16,7 +16,7 @@ use crate::{Error, Result};
 ///
 /// # Errors
 /// If the environment cannot be parsed.
-pub fn print(format: &FormatFlag, no_self_check: bool) -> Result<Exit> {
+pub(super) fn print(format: &FormatFlag, no_self_check: bool) -> Result<Exit> {
     let adapters = Adapters::enumerate();
     let seen = Seen::new(adapters.cards(), visible_here());
     let self_check = |index: usize| if no_self_check { "-".to_owned() } else { check(&adapters, index) };

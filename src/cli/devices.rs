@@ -12,7 +12,7 @@ use crate::Result;
 /// Slurm's GPU list are respected.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  lanesweep verify devices --format json")]
-pub struct Devices {
+pub(super) struct Devices {
     #[command(flatten)]
     format: FormatFlag,
     /// Leave out the self-check, which opens every device

@@ -84,7 +84,7 @@ impl Exit {
     }
 
     /// Exit statuses after a signal, 128 + the signal's number, with their meanings.
-    pub const BY_SIGNAL: [(u8, &str); 3] = [
+    const BY_SIGNAL: [(u8, &str); 3] = [
         (129, "ended at once by SIGHUP; a run with a journal ends with 75 instead, and can resume"),
         (130, "the same by SIGINT (Ctrl-C)"),
         (143, "the same by SIGTERM"),

@@ -25,7 +25,7 @@ use crate::{Error, Place, Result};
 #[command(after_help = "Example:\n  \
                   lanesweep export xosc --category cut-in --models FSM --ego-speed 30m/s --speed 20m/s --thw 1.2 \\\n      \
                   --lateral-speed 1.0 --out played")]
-pub struct Export {
+pub(super) struct Export {
     #[command(subcommand)]
     format: Format,
 }
@@ -56,7 +56,7 @@ impl Export {
                   lanesweep export xosc --scenarios scenarios.jsonl --lane 01_cut_in_97_91_957/S/1.2s/RSS\n  \
                   lanesweep export xosc --category cut-in --models FSM --ego-speed 30m/s --speed 20m/s --thw 1.2 \\\n      \
                   --lateral-speed 1.0 --out played")]
-pub struct Xosc {
+struct Xosc {
     #[command(flatten)]
     case: CaseFlags,
     #[command(flatten)]

@@ -34,7 +34,7 @@ use crate::{Error, Place, Result};
 #[command(after_help = "Examples:\n  lanesweep fit recordings --out densities\n  lanesweep fit --scenarios \
                         scenarios.jsonl --hours 44.5 --km 4450\n  lanesweep fit recordings --parameterizations 2 \
                         --with-thw --out cut-in-2.json")]
-pub struct Fit {
+pub(super) struct Fit {
     #[command(flatten)]
     data: SourceFlags,
     /// Folder of density files, or one file.json for one density

@@ -29,12 +29,12 @@ pub(super) struct FormatFlag {
 }
 
 impl FormatFlag {
-    pub fn is_json(self) -> bool {
+    pub(super) fn is_json(self) -> bool {
         self.format == Format::Json
     }
 
     /// Prints one of the two; only that one is built.
-    pub fn print(self, text: impl FnOnce() -> String, json: impl FnOnce() -> Result<String>) -> Result<()> {
+    pub(super) fn print(self, text: impl FnOnce() -> String, json: impl FnOnce() -> Result<String>) -> Result<()> {
         if console::captured().is_none() {
             return match self.format {
                 Format::Text => console::print(&text()),
@@ -53,7 +53,7 @@ impl FormatFlag {
     }
 
     /// Like [`FormatFlag::print`], for results in a folder.
-    pub fn print_results(
+    pub(super) fn print_results(
         self,
         text: impl FnOnce() -> String,
         json: impl FnOnce() -> Result<String>,
@@ -65,7 +65,7 @@ impl FormatFlag {
     }
 
     /// Reports the plan that `--plan-only` wrote.
-    pub fn print_plan(self, lanes: u64, path: &std::path::Path) -> Result<()> {
+    pub(super) fn print_plan(self, lanes: u64, path: &std::path::Path) -> Result<()> {
         let text = || format!("{} lanes planned in {}\n", count(lanes), path.display());
         self.print(text, || {
             crate::report::records::document(&serde_json::json!({"lanes": lanes, "plan": path.display().to_string()}))

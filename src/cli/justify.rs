@@ -37,7 +37,7 @@ use crate::{Error, Place, Result};
                   lanesweep justify --parameterization 2 --models FSM\n  \
                   lanesweep justify recordings --parameterization iii --models CCHDM --criterion ttc --out dossier\n  \
                   lanesweep justify --scenarios scenarios.jsonl --parameterization 6 --models Reg157")]
-pub struct Justify {
+pub(super) struct Justify {
     #[command(flatten)]
     data: SourceFlags,
     /// Parameterization: 1…7 (cut-in), a…g (cut-out), i…v (LVD), or a file of `search`

@@ -17,7 +17,7 @@ use crate::{Error, Place, Result};
 ///
 /// # Errors
 /// What to write, if the text is not an integer or is out of range.
-pub fn whole<T: TryFrom<u64>>(text: &str) -> std::result::Result<T, String> {
+pub(super) fn whole<T: TryFrom<u64>>(text: &str) -> std::result::Result<T, String> {
     let plain = text.replace('_', "");
     let of_power = || {
         // Above 2^53 a floating-point number no longer identifies one integer.
@@ -30,7 +30,7 @@ pub fn whole<T: TryFrom<u64>>(text: &str) -> std::result::Result<T, String> {
 
 /// `--categories`.
 #[derive(Debug, Clone, Args)]
-pub struct CategoriesFlag {
+pub(super) struct CategoriesFlag {
     /// Kinds of scenario: cut-in, cut-out, lvd [default: all]
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Scenario")]
     categories: Vec<String>,
@@ -41,13 +41,13 @@ impl CategoriesFlag {
     ///
     /// # Errors
     /// [`Error::Usage`] for an unknown category.
-    pub fn list(&self) -> Result<Vec<Category>> {
+    pub(super) fn list(&self) -> Result<Vec<Category>> {
         source::categories(&self.categories, "--categories")
     }
 }
 
 /// Whether the name of a parameterization is that of a file.
-pub fn is_file(name: &str) -> bool {
+pub(super) fn is_file(name: &str) -> bool {
     name.trim().ends_with(".json")
 }
 
@@ -55,7 +55,7 @@ pub fn is_file(name: &str) -> bool {
 ///
 /// # Errors
 /// As [`Parameterization::read`]; [`Error::Usage`] for another category.
-pub fn of_file(name: &str, categories: &[Category]) -> Result<Parameterization> {
+pub(super) fn of_file(name: &str, categories: &[Category]) -> Result<Parameterization> {
     let id = Parameterization::read(name.trim().as_ref())?;
     if categories.contains(&id.category) {
         return Ok(id);
@@ -66,7 +66,7 @@ pub fn of_file(name: &str, categories: &[Category]) -> Result<Parameterization> 
 
 /// `--parameterizations`.
 #[derive(Debug, Clone, Args)]
-pub struct ParameterizationsFlag {
+pub(super) struct ParameterizationsFlag {
     /// Parameterizations: 1…7, a…g, i…v, files of `search` [default: all]
     ///
     /// 1…7 are for cut-ins, a…g for cut-outs, i…v for leader decelerations. A name that ends in .json is a file.
@@ -79,7 +79,7 @@ impl ParameterizationsFlag {
     ///
     /// # Errors
     /// As [`parameterizations`].
-    pub fn list(&self, categories: &[Category]) -> Result<Vec<Parameterization>> {
+    pub(super) fn list(&self, categories: &[Category]) -> Result<Vec<Parameterization>> {
         let (files, keys): (Vec<&String>, Vec<&String>) = self.parameterizations.iter().partition(|name| is_file(name));
         let keys: Vec<String> = keys.into_iter().cloned().collect();
         // Files alone are meant alone.
@@ -101,7 +101,7 @@ impl ParameterizationsFlag {
 
 /// `--models`.
 #[derive(Debug, Clone, Args)]
-pub struct ModelsFlag {
+pub(super) struct ModelsFlag {
     #[arg(long, value_name = "LIST", value_delimiter = ',', help = models_help(), help_heading = "Models and criteria")]
     models: Vec<String>,
 }
@@ -111,7 +111,7 @@ impl ModelsFlag {
     ///
     /// # Errors
     /// [`Error::Usage`] for an unknown model.
-    pub fn list(&self) -> Result<Vec<ModelId>> {
+    pub(super) fn list(&self) -> Result<Vec<ModelId>> {
         let mut list = models(self.models.iter().map(String::as_str), "--models")?;
         list.sort();
         Ok(list)
@@ -121,14 +121,14 @@ impl ModelsFlag {
     ///
     /// # Errors
     /// As [`ModelsFlag::list`].
-    pub fn named(&self) -> Result<Option<Vec<ModelId>>> {
+    pub(super) fn named(&self) -> Result<Option<Vec<ModelId>>> {
         (!self.models.is_empty()).then(|| self.list()).transpose()
     }
 }
 
 /// `--thw` of a verb that replays scenarios.
 #[derive(Debug, Clone, Args)]
-pub struct HeadwaysFlag {
+pub(super) struct HeadwaysFlag {
     /// Time headways, s; paper: 2.0, 1.8, … 0.2; r157; observed: the recorded gaps
     ///
     /// The paper's claims need all of its headways. r157: the minimum following distance of UN R157, 5.2.3.3, for the
@@ -143,7 +143,7 @@ impl HeadwaysFlag {
     ///
     /// # Errors
     /// As [`headways`].
-    pub fn list(&self) -> Result<Vec<Headway>> {
+    pub(super) fn list(&self) -> Result<Vec<Headway>> {
         match self.thw.trim() {
             "paper" => Ok(Headway::paper()),
             text if Headway::parse(text) == Some(Headway::Observed) => Ok(vec![Headway::Observed]),
@@ -153,13 +153,13 @@ impl HeadwaysFlag {
 }
 
 /// Help of `--models`.
-pub fn models_help() -> String {
+pub(super) fn models_help() -> String {
     format!("Driver models: {} [default: all]", ModelId::names())
 }
 
 /// `--criterion`.
 #[derive(Debug, Clone, Args)]
-pub struct CriterionFlag {
+pub(super) struct CriterionFlag {
     /// Criterion to map, rank or estimate
     ///
     /// For worst lanes, failure maps, fractions, stop rules and the adaptive estimators.
@@ -181,7 +181,7 @@ impl CriterionFlag {
 ///
 /// # Errors
 /// [`Error::Usage`] for an unknown criterion.
-pub fn criterion(name: &str) -> Result<Criterion> {
+pub(super) fn criterion(name: &str) -> Result<Criterion> {
     Criterion::parse(name.trim()).ok_or_else(|| {
         let problem = format!("there is no criterion `{name}`");
         Error::usage(Place::item("--criterion"), problem, "use collision, ttc or btn")
@@ -190,7 +190,7 @@ pub fn criterion(name: &str) -> Result<Criterion> {
 
 /// `--hours` and `--km`.
 #[derive(Debug, Clone, Args)]
-pub struct ExposureFlags {
+pub(super) struct ExposureFlags {
     /// Driven time of all egos [default: from the recordings]
     #[arg(long, value_name = "h", help_heading = "Data")]
     hours: Option<f64>,
@@ -204,7 +204,7 @@ impl ExposureFlags {
     ///
     /// # Errors
     /// As [`Driven::validate`].
-    pub fn driven(&self) -> Result<Driven> {
+    pub(super) fn driven(&self) -> Result<Driven> {
         let driven = Driven { hours: self.hours, kilometres: self.km };
         driven.validate()?;
         Ok(driven)
@@ -215,7 +215,7 @@ impl ExposureFlags {
 ///
 /// # Errors
 /// [`Error::Usage`] for an unknown or repeated model.
-pub fn models<'a>(list: impl IntoIterator<Item = &'a str>, flag: &str) -> Result<Vec<ModelId>> {
+pub(super) fn models<'a>(list: impl IntoIterator<Item = &'a str>, flag: &str) -> Result<Vec<ModelId>> {
     let mut named: Vec<(ModelId, &str)> = Vec::new();
     for text in list.into_iter().map(str::trim) {
         match ModelId::parse(text) {
@@ -239,7 +239,7 @@ pub fn models<'a>(list: impl IntoIterator<Item = &'a str>, flag: &str) -> Result
 ///
 /// # Errors
 /// [`Error::Usage`] for a value that is not above 0, or a repeated value.
-pub fn headways(list: &str, words: &str) -> Result<Vec<Headway>> {
+pub(super) fn headways(list: &str, words: &str) -> Result<Vec<Headway>> {
     let parse = |text: &str| {
         if Headway::parse(text.trim()) == Some(Headway::MinFollowing) {
             return Ok(Headway::MinFollowing);

@@ -32,7 +32,7 @@ const RECHECK_SEED: u64 = 1;
 /// (SVG), cells.csv, differences.csv and map.json. The percentages of cells with a failure go to stdout.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES, after_long_help = after_long_help())]
-pub struct Map {
+pub(super) struct Map {
     /// Kind of scenario: cut-in, cut-out, lvd
     #[arg(value_name = "CATEGORY", help_heading = "Scenario")]
     category: String,

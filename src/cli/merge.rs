@@ -22,7 +22,7 @@ use crate::support::plain_text::quoted_word;
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  lanesweep study --shard 0/2 --out result\n  lanesweep study --shard 1/2 --out \
                         result\n  lanesweep cluster merge result")]
-pub struct Merge {
+pub(super) struct Merge {
     /// The run's folder
     #[arg(value_name = "DIR", help_heading = "Data")]
     dir: PathBuf,

@@ -23,7 +23,7 @@ use crate::traffic::Source;
 /// FILE.exposure.json beside it, so that `fit --scenarios FILE` can compute events per hour.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  lanesweep mine recordings --out scenarios.jsonl")]
-pub struct Mine {
+pub(super) struct Mine {
     /// Folder of recordings, or a track file
     #[arg(value_name = "DIR", help_heading = "Data")]
     dir: PathBuf,

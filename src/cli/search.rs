@@ -30,7 +30,7 @@ use crate::{Error, Place, Result};
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  lanesweep search --category lvd --criterion ttc\n  \
                         lanesweep search recordings --category cut-in --held-out others --out found")]
-pub struct Search {
+pub(super) struct Search {
     #[command(flatten)]
     data: SourceFlags,
     /// Data that the search does not read, to judge its front

@@ -10,7 +10,7 @@ use crate::{Error, Place, Result};
 
 /// Flags of every verb that can be split.
 #[derive(Debug, Clone, Args)]
-pub struct ShardFlags {
+pub(super) struct ShardFlags {
     /// Compute shard I of N (from 0); `cluster merge` merges them
     ///
     /// The part is written to --out. `auto/N` takes I from a Kubernetes Indexed Job or a Slurm array.
@@ -43,7 +43,7 @@ impl ShardFlags {
     }
 
     /// Whether this is a part of a run, to be merged with others.
-    pub fn is_part(&self) -> bool {
+    pub(super) fn is_part(&self) -> bool {
         self.shard.is_some()
     }
 }

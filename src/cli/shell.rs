@@ -17,7 +17,7 @@ use crate::{Error, Result};
 /// ~/.config/fish/completions, zsh in a folder of its $fpath (there the file is called _lanesweep).
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  lanesweep config completions bash")]
-pub struct Completions {
+pub(super) struct Completions {
     /// The shell
     #[arg(value_name = "SHELL", help_heading = "Data")]
     shell: Shell,
@@ -46,7 +46,7 @@ fn collect(name: String, command: &clap::Command, pages: &mut Vec<(String, clap:
 /// One page for the program and one per verb: lanesweep.1, lanesweep-study.1, lanesweep-cluster-merge.1, …
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  lanesweep config man man1")]
-pub struct Man {
+pub(super) struct Man {
     /// Folder of the pages
     #[arg(value_name = "DIR", help_heading = "Data")]
     dir: PathBuf,

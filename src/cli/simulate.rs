@@ -30,7 +30,7 @@ use crate::{Error, Place, Result};
                   --plot case.svg\n  \
                   lanesweep simulate --from lanesweep-out --lane 01_cut_in_97_91_957/2/1.2s/RSS --compare S\n  \
                   lanesweep simulate --scenarios scenarios.jsonl --lane 01_cut_in_97_91_957/S/1.2s/RSS")]
-pub struct Simulate {
+pub(super) struct Simulate {
     #[command(flatten)]
     case: CaseFlags,
     /// TOML file with the case

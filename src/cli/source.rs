@@ -21,7 +21,7 @@ use crate::{Error, Place, Result};
 ///
 /// # Errors
 /// As [`Source::load`].
-pub fn load(
+pub(super) fn load(
     source: &Source,
     mining: &MiningOptions,
     implausible: Implausible,
@@ -47,7 +47,7 @@ pub fn load(
 }
 
 /// Advances a bar over recordings, unless the owner of the process has asked for the end of the work.
-pub fn advance(bar: &ProgressBar) -> Result<()> {
+pub(super) fn advance(bar: &ProgressBar) -> Result<()> {
     bar.inc(1);
     CANCEL.check()
 }
@@ -56,7 +56,7 @@ pub fn advance(bar: &ProgressBar) -> Result<()> {
 const MAX_LISTED: usize = 20;
 
 /// Reports skipped input and doubts.
-pub fn complain_of(problems: &[Error], notes: &[String]) {
+pub(super) fn complain_of(problems: &[Error], notes: &[String]) {
     problems.iter().take(MAX_LISTED).for_each(console::complain);
     if problems.len() > MAX_LISTED {
         tracing::error!("{} more are left out", problems.len() - MAX_LISTED);
@@ -66,7 +66,7 @@ pub fn complain_of(problems: &[Error], notes: &[String]) {
 
 /// Policy for implausible input.
 #[derive(Debug, Clone, Copy, Args)]
-pub struct PlausibilityFlag {
+pub(super) struct PlausibilityFlag {
     /// Use physically impossible values (a speed of 108 m/s) with a warning
     #[arg(long, help_heading = "Data", hide_short_help = true)]
     accept_implausible: bool,
@@ -74,14 +74,14 @@ pub struct PlausibilityFlag {
 
 impl PlausibilityFlag {
     /// The policy for readers.
-    pub fn policy(self) -> Implausible {
+    pub(super) fn policy(self) -> Implausible {
         if self.accept_implausible { Implausible::Accepted } else { Implausible::Refused }
     }
 }
 
 /// Format of recordings.
 #[derive(Debug, Clone, Args)]
-pub struct PresetFlag {
+pub(super) struct PresetFlag {
     /// Format of the recordings: exid, sumo-fcd, … or a TOML file [default: detected]
     #[arg(long, value_name = "NAME|FILE", requires = "dir", help_heading = "Data", hide_short_help = true)]
     pub preset: Option<String>,
@@ -89,7 +89,7 @@ pub struct PresetFlag {
 
 /// Where a verb's data come from.
 #[derive(Debug, Clone, Args)]
-pub struct SourceFlags {
+pub(super) struct SourceFlags {
     /// Folder of recordings, or a track file [default: synthetic recordings]
     ///
     /// highD's format, or that of a preset, which the names of the columns tell; see `lanesweep tracks`.
@@ -106,7 +106,7 @@ pub struct SourceFlags {
 
 impl SourceFlags {
     /// The named source; the generator if none is named.
-    pub fn source(&self, configured: &Configured) -> Source {
+    pub(super) fn source(&self, configured: &Configured) -> Source {
         match (&self.dir, &self.scenarios) {
             (Some(dir), _) => Source::Recordings { path: dir.clone(), preset: self.preset.preset.clone() },
             (None, Some(path)) => Source::Scenarios(path.clone()),
@@ -115,37 +115,37 @@ impl SourceFlags {
     }
 
     /// The policy for implausible input.
-    pub fn policy(&self) -> Implausible {
+    pub(super) fn policy(&self) -> Implausible {
         self.plausibility.policy()
     }
 
     /// Like [`load`].
-    pub fn load(&self, configured: &Configured, verbosity: Verbosity) -> Result<Collection> {
+    pub(super) fn load(&self, configured: &Configured, verbosity: Verbosity) -> Result<Collection> {
         load(&self.source(configured), &configured.settings.mining, self.plausibility.policy(), verbosity)
     }
 
     /// Like [`load`], but first reports the source of the data.
-    pub fn report_and_load(&self, configured: &Configured, verbosity: Verbosity) -> Result<Collection> {
+    pub(super) fn report_and_load(&self, configured: &Configured, verbosity: Verbosity) -> Result<Collection> {
         tracing::info!("{}", self.source(configured).describe(false));
         self.load(configured, verbosity)
     }
 
     /// Refuses a result that would replace an input of the run.
-    pub fn refuse_overwriting(&self, output: &Path, configured: &Configured, flag: &str) -> Result<()> {
+    pub(super) fn refuse_overwriting(&self, output: &Path, configured: &Configured, flag: &str) -> Result<()> {
         let inputs: Vec<PathBuf> = self.scenarios.iter().chain(configured.files()).cloned().collect();
         refuse_overwriting(output, &inputs, flag)
     }
 }
 
 /// The scenarios of a file for selecting one, and whether some were skipped; reports what was wrong.
-pub fn scenarios_of(path: &Path, implausible: Implausible) -> Result<(Vec<Scenario>, bool)> {
+pub(super) fn scenarios_of(path: &Path, implausible: Implausible) -> Result<(Vec<Scenario>, bool)> {
     let ScenarioFile { scenarios, problems, notes } = read_scenario_file(path, implausible)?;
     complain_of(&problems, &notes);
     Ok((scenarios, !problems.is_empty()))
 }
 
 /// Parses the categories of a flag, in the order of every table; all if the list is empty.
-pub fn categories(list: &[String], flag: &str) -> Result<Vec<Category>> {
+pub(super) fn categories(list: &[String], flag: &str) -> Result<Vec<Category>> {
     if list.is_empty() {
         return Ok(Category::ALL.to_vec());
     }
@@ -162,7 +162,7 @@ pub fn categories(list: &[String], flag: &str) -> Result<Vec<Category>> {
 }
 
 /// The canonical path of a file, however it is written.
-pub fn file_of(path: &Path) -> PathBuf {
+pub(super) fn file_of(path: &Path) -> PathBuf {
     // If the file does not exist yet, its folder is resolved.
     let of_folder = || {
         let parent = path.parent().filter(|p| !p.as_os_str().is_empty()).unwrap_or(Path::new("."));
@@ -172,7 +172,7 @@ pub fn file_of(path: &Path) -> PathBuf {
 }
 
 /// Refuses an output that is one of these files.
-pub fn refuse_overwriting(output: &Path, others: &[PathBuf], flag: &str) -> Result<()> {
+pub(super) fn refuse_overwriting(output: &Path, others: &[PathBuf], flag: &str) -> Result<()> {
     match others.iter().find(|other| file_of(other) == file_of(output)) {
         Some(other) => Err(Error::usage(
             Place::item(flag),
@@ -184,7 +184,7 @@ pub fn refuse_overwriting(output: &Path, others: &[PathBuf], flag: &str) -> Resu
 }
 
 /// Refuses an output that is one of a folder's recordings.
-pub fn refuse_recording(output: &Path, dir: &Path, preset: Option<&str>, flag: &str) -> Result<()> {
+pub(super) fn refuse_recording(output: &Path, dir: &Path, preset: Option<&str>, flag: &str) -> Result<()> {
     // The reader reports a folder that cannot be listed.
     let Ok(inputs) = Inputs::of(dir, preset) else { return Ok(()) };
     let files: Vec<PathBuf> = inputs.files().0.iter().flat_map(InputFile::paths).collect();

@@ -20,7 +20,7 @@ use crate::{Error, Place, Result};
 /// The files have the format of highD; `study DIR` on them gives the same result as `study` without data.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  lanesweep synth recordings")]
-pub struct Synth {
+pub(super) struct Synth {
     /// Folder for the recordings; created if it does not exist
     #[arg(value_name = "DIR", help_heading = "Data")]
     dir: PathBuf,

@@ -30,7 +30,7 @@ use crate::{Error, Place, Result};
     lanesweep tracks fcd.csv\n  \
     lanesweep tracks own.csv --write-preset own.toml\n  \
     lanesweep tracks own.csv --preset own.toml --out figures --convert converted")]
-pub struct Tracks {
+pub(super) struct Tracks {
     /// Track files, or folders of them
     #[arg(value_name = "PATH", required = true, help_heading = "Data")]
     paths: Vec<PathBuf>,

@@ -29,7 +29,7 @@ use crate::{Error, Place, Result};
     after_help = "Examples:\n  lanesweep verify\n  lanesweep verify --device llvmpipe --random-lanes 20000\n  lanesweep \
                         verify --device 0 --lane random-cut-in-seed157-0000123/S/1.2s/FSM"
 )]
-pub struct Verify {
+pub(super) struct Verify {
     #[command(subcommand)]
     verb: Option<VerifyVerb>,
     #[command(flatten)]

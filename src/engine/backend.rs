@@ -63,7 +63,7 @@ impl Chunk {
     ///
     /// # Errors
     /// [`Error::Internal`] if it does not.
-    pub fn check_requested(&self, plan: &LanePlan, units: &Range<u64>, wanted: Wanted) -> Result<()> {
+    pub(super) fn check_requested(&self, plan: &LanePlan, units: &Range<u64>, wanted: Wanted) -> Result<()> {
         let complete = wanted != Wanted::Outcomes || self.outcomes.len() == self.verdicts.len();
         if self.units == *units && complete {
             self.check(plan)

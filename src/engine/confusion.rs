@@ -46,11 +46,6 @@ impl Confusion<u32> {
             (false, false) => self.tn += 1,
         }
     }
-
-    /// The largest of the four counts.
-    pub fn largest(&self) -> u32 {
-        self.tp.max(self.fn_).max(self.fp).max(self.tn)
-    }
 }
 
 impl<N: From<u32> + AddAssign> Confusion<N> {
@@ -82,7 +77,7 @@ pub(super) mod packed {
         Numbers(Vec<Confusion<u32>>),
     }
 
-    pub fn serialize<S: Serializer>(cells: &[Confusion<u32>], serializer: S) -> Result<S::Ok, S::Error> {
+    pub(crate) fn serialize<S: Serializer>(cells: &[Confusion<u32>], serializer: S) -> Result<S::Ok, S::Error> {
         let counts = || cells.iter().flat_map(|cell| <[u32; 4]>::from(*cell));
         let text: Option<String> =
             counts().map(|count| DIGITS.get(count as usize).map(|&digit| digit as char)).collect();
@@ -92,7 +87,7 @@ pub(super) mod packed {
         }
     }
 
-    pub fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Confusion<u32>>, D::Error> {
+    pub(crate) fn deserialize<'de, D: Deserializer<'de>>(deserializer: D) -> Result<Vec<Confusion<u32>>, D::Error> {
         let text = match Packed::deserialize(deserializer)? {
             Packed::Numbers(cells) => return Ok(cells),
             Packed::Text(text) => text,

@@ -110,7 +110,7 @@ impl BackendChoice {
 ///
 /// Accepts what tools print: `65:00.0`, `0000:65:00.0`, `00000000:65:00.0`, with or without `pci:` and the function.
 /// `None` if the text is not a PCI bus id.
-pub fn pci_bus_id(text: &str) -> Option<String> {
+pub(super) fn pci_bus_id(text: &str) -> Option<String> {
     let text = text.trim();
     let text = match text.get(..4) {
         Some(prefix) if prefix.eq_ignore_ascii_case("pci:") => &text[4..],

@@ -38,7 +38,7 @@ impl<R: Real> Frame<R> {
     }
 
     /// The constants by their names in the shaders; flags are 0 or 1.
-    pub fn shader_constants(&self) -> Vec<(&'static str, f64)> {
+    pub(super) fn shader_constants(&self) -> Vec<(&'static str, f64)> {
         vec![
             ("frame_dt", self.dt.to_f64()),
             ("frame_inverse_dt", self.inverse_dt.to_f64()),
@@ -87,7 +87,7 @@ fn min_following_gap<R: Real>(v: R) -> R {
 
 /// The constants that all lanes of one model have in common.
 #[derive(Debug, Clone, Copy)]
-pub struct Simulation<'a, R, M> {
+pub(super) struct Simulation<'a, R, M> {
     /// Time and end rules.
     pub frame: &'a Frame<R>,
     /// Criteria.

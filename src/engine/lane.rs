@@ -45,7 +45,7 @@ impl<R, F: FnMut(&Step<R>)> Observer<R> for F {
 
 /// Runs one lane.
 #[inline(always)]
-pub fn run_lane<R: Real, M: DriverModel<R>>(
+pub(super) fn run_lane<R: Real, M: DriverModel<R>>(
     simulation: &Simulation<R, M>,
     case: &LaneCase<R>,
     tables: &Tables<R>,

@@ -21,7 +21,7 @@ use super::scene::Scene;
 
 /// Constants of another vehicle within a lane.
 #[derive(Debug, Clone, Copy)]
-pub struct OtherConstants<R> {
+pub(crate) struct OtherConstants<R> {
     /// (L_e + L_o)/2, m.
     pub half_lengths: R,
     /// (W_e + W_o)/2, m.
@@ -38,7 +38,7 @@ pub struct OtherConstants<R> {
 
 /// Constants of a lane.
 #[derive(Debug, Clone, Copy)]
-pub struct LaneConstants<R> {
+pub(crate) struct LaneConstants<R> {
     /// Principal vehicle, then the one ahead of it.
     pub others: [OtherConstants<R>; 2],
     /// Width of the ego, m.
@@ -74,7 +74,7 @@ impl<R: Real> LaneConstants<R> {
 
 /// State of another vehicle at one step.
 #[derive(Debug, Clone, Copy)]
-pub struct OtherState<R> {
+pub(crate) struct OtherState<R> {
     /// Speed, m/s.
     pub speed: R,
     /// Lateral position, m.
@@ -107,7 +107,7 @@ pub struct Seen<R> {
 
 /// Minima and maxima over the steps so far.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Record<R> {
+pub(crate) struct Record<R> {
     /// Minimum time to collision.
     pub ttc: TtcMinimum<R>,
     /// Maximum Brake Threat Number.
@@ -118,7 +118,7 @@ pub struct Record<R> {
 
 /// A lane between two steps.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct LaneState<R> {
+pub(crate) struct LaneState<R> {
     /// Index of the next step.
     pub index: u32,
     /// Speed of the ego at the next step, m/s.
@@ -158,7 +158,7 @@ impl<R: Real> LaneState<R> {
 
 /// Result of one step.
 #[derive(Debug, Clone, Copy)]
-pub struct Moved<R> {
+pub(super) struct Moved<R> {
     /// State of the lane after the step.
     pub state: LaneState<R>,
     /// The other vehicles as the ego sees them; without a second vehicle, both are the first.
@@ -170,7 +170,7 @@ pub struct Moved<R> {
 /// Makes one step; `places` are the other vehicles at `state.index`. The lane is over if its state says so, or if the
 /// next index reaches the step cap. A lane that is over stays unchanged (see [`LaneState::over`]).
 #[inline(always)]
-pub fn advance<R: Real, M: DriverModel<R>>(
+pub(super) fn advance<R: Real, M: DriverModel<R>>(
     simulation: &Simulation<R, M>,
     lane: &LaneConstants<R>,
     state: &LaneState<R>,

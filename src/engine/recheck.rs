@@ -13,7 +13,7 @@ use super::plan::{LaneKey, LanePlan};
 use crate::{Error, Result};
 
 /// Default sampling rate: one lane in 1000 is rechecked.
-pub const ONE_IN: u64 = 1000;
+const ONE_IN: u64 = 1000;
 
 /// One in this many of the lanes rechecked in batches is also rechecked as a single lane. A single lane costs about
 /// forty times a lane of batches that skip steps, and four to ten times a lane of other batches.

@@ -7,7 +7,7 @@ use super::lane_case::{LaneCase, LaneOther, NEVER};
 
 /// Properties that all lanes of a stream share.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct Scene {
+pub(super) struct Scene {
     /// Two other vehicles are evaluated.
     pub is_pair: bool,
     /// The principal vehicle is present from the first step to the last, and evaluated by the criteria.
@@ -22,7 +22,7 @@ pub struct Scene {
 
 impl Scene {
     /// One or two other vehicles without common properties.
-    pub fn unknown(is_pair: bool) -> Scene {
+    pub(super) fn unknown(is_pair: bool) -> Scene {
         Scene { is_pair, always_there: false, in_lane: false, is_steady: false, may_cross: true }
     }
 

@@ -89,7 +89,7 @@ impl Canonical {
     }
 
     /// The series that cases index.
-    pub fn tables(&mut self, tables: &Tables<f64>) {
+    pub(super) fn tables(&mut self, tables: &Tables<f64>) {
         for list in [&tables.speed[..], tables.lateral.as_flattened()] {
             self.word(list.len() as u64);
             list.iter().for_each(|value| self.0.update(value.to_bits().to_le_bytes()));

@@ -189,7 +189,7 @@ impl PlainCase {
     ///
     /// # Errors
     /// As [`PlainCase::case`].
-    pub fn last_speed_mps(&self, time_cap_s: f64) -> Result<f64> {
+    pub(crate) fn last_speed_mps(&self, time_cap_s: f64) -> Result<f64> {
         let until_s = self.acceleration_until_s(time_cap_s)?.min(time_cap_s);
         Ok((self.speed_mps + self.acceleration_mps2 * until_s).max(0.0))
     }

@@ -62,7 +62,7 @@ pub fn standard_normal(word: u32) -> f32 {
 ///
 /// It uses Newton's method on ln Q. This function is concave and decreasing, so the iteration converges from every
 /// start at or above the solution. The start is there, because Q(z) ≤ ½·exp(−z²/2).
-pub fn inverse_normal_tail(tail: f64) -> f64 {
+fn inverse_normal_tail(tail: f64) -> f64 {
     const ROOT_TAU: f64 = 2.506_628_274_631_000_7;
     let goal = libm::log(tail);
     let mut z = libm::sqrt(-2.0 * libm::log(2.0 * tail));

@@ -19,7 +19,7 @@ use super::philox::Stream;
 use crate::{Error, Place, Result};
 
 /// Number of available dimensions.
-pub const SOBOL_DIMENSIONS: u32 = 32;
+const SOBOL_DIMENSIONS: u32 = 32;
 /// Number of available points; indices are smaller.
 pub const SOBOL_POINTS: u64 = 1 << 32;
 /// Number of words of a dimension in the device's table.

@@ -108,7 +108,7 @@ impl CaseSheet<'_> {
 
     /// What limits the answer: the changes that *robust* refers to, a Brake Threat Number above 1 of a driver that avoids,
     /// and vehicles that drive through one another.
-    pub fn cautions(&self) -> Vec<String> {
+    pub(super) fn cautions(&self) -> Vec<String> {
         let first = self.first();
         let above = |judged: &&Judged| !judged.collides() && !judged.touches && judged.trace.outcome.max_btn > 1.0;
         let above: Vec<&str> = first.models.iter().filter(above).map(|judged| judged.trace.model.name()).collect();
@@ -126,7 +126,7 @@ impl CaseSheet<'_> {
     }
 
     /// Readings for which the regulation is silent and another choice changes the answer.
-    pub fn silent(&self) -> Vec<String> {
+    pub(super) fn silent(&self) -> Vec<String> {
         self.first()
             .silent
             .iter()
@@ -136,7 +136,7 @@ impl CaseSheet<'_> {
 
     /// What the cut-in clauses demand of the system, each clause once, and where the first profile's clause and the
     /// drivers disagree.
-    pub fn demand(&self) -> Vec<String> {
+    pub(super) fn demand(&self) -> Vec<String> {
         let mut sentences = self.demand_of_first();
         let mut clauses = vec![&self.first().clause];
         for judgement in &self.judgements[1..] {

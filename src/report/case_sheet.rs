@@ -52,7 +52,7 @@ impl CaseSheet<'_> {
     }
 
     /// The numbers of the case: name, value with unit.
-    pub fn numbers(&self) -> Vec<(String, String)> {
+    fn numbers(&self) -> Vec<(String, String)> {
         let point = self.subject.point();
         let mut list: Vec<(String, String)> = Vec::new();
         let shown = [

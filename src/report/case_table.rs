@@ -15,7 +15,7 @@ use crate::support::table::{Column, Table, TableOf};
 
 /// All verdicts, the worst first: those without a driver of Annex 3 that avoids the collision, then those with one, then
 /// those without a collision.
-pub const WORST_FIRST: [Verdict; 6] = [
+const WORST_FIRST: [Verdict; 6] = [
     Verdict::Answer(Answer::NotPreventable),
     Verdict::Undecided,
     Verdict::OutsideAnnex,

@@ -554,7 +554,7 @@ fn legend_name(of: &ComparedParameterization) -> String {
 
 /// Shares of failed lanes for one criterion of one category: a row per driver model; the recorded scenarios, then every
 /// density.
-pub fn rates(file: &CompareFile, comparison: &CategoryComparison, criterion: Criterion) -> Figure {
+fn rates(file: &CompareFile, comparison: &CategoryComparison, criterion: Criterion) -> Figure {
     let (recorded, rows) = rows(comparison, criterion);
     // A logarithmic axis cannot show a rate of 0, but it can show the bound above it.
     let value = |rate: &RateRecord| {
@@ -596,7 +596,7 @@ pub fn rates(file: &CompareFile, comparison: &CategoryComparison, criterion: Cri
 }
 
 /// Ratios of the shares of failed lanes to those of S: of S', replayed, and of the density, drawn.
-pub fn ratios(file: &CompareFile, comparison: &CategoryComparison, criterion: Criterion) -> Figure {
+fn ratios(file: &CompareFile, comparison: &CategoryComparison, criterion: Criterion) -> Figure {
     type Pick = fn(&ComparedCell) -> &Ratio;
     let sides: [(&str, Pick); 2] =
         [("S', replayed", |cell| &cell.replayed.ratio), ("density, drawn", |cell| &cell.sampled.ratio)];

@@ -18,7 +18,7 @@ pub(super) fn sampled(density: &DensityModel) -> String {
 }
 
 /// Failure probability over the samples of a sampling run, at this confidence level.
-pub fn convergence(density: &DensityModel, checkpoints: &[Checkpoint], level: f64) -> Figure {
+pub(super) fn convergence(density: &DensityModel, checkpoints: &[Checkpoint], level: f64) -> Figure {
     let rows = || checkpoints.iter().flat_map(|checkpoint| checkpoint.rows.iter().map(move |row| (checkpoint, row)));
     let widest = |[low, high]: [f64; 2], outer: Option<[f64; 2]>| {
         outer.map_or((low, high), |outer| (outer[0].min(low), outer[1].max(high)))

@@ -137,7 +137,7 @@ impl DossierReport<'_> {
     }
 
     /// The figure of the most severe hidden failure.
-    pub fn example(&self) -> Option<String> {
+    pub(super) fn example(&self) -> Option<String> {
         let ([recorded, parameterized], hidden) = (self.dossier.example.as_ref()?, self.dossier.hidden.first()?);
         let key = &self.dossier.parameterization.key;
         let series = vec![
@@ -177,7 +177,7 @@ impl DossierReport<'_> {
     }
 
     /// All hidden failures as CSV.
-    pub fn hidden_csv(&self) -> String {
+    fn hidden_csv(&self) -> String {
         Table::of(&self.dossier.hidden)
             .column("scenario", |hidden| hidden.scenario.as_str())
             .column("headway", |hidden| hidden.headway.as_str())

@@ -14,7 +14,7 @@ use crate::support::readable::count;
 use crate::support::table::Table;
 
 /// The failure maps of a sampling run.
-pub struct FailureMaps<'a> {
+pub(super) struct FailureMaps<'a> {
     /// What was sampled.
     pub density: &'a DensityModel,
     /// Its headways and models.

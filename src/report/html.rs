@@ -37,7 +37,7 @@ impl PageFigure {
 
 /// A chapter of the page.
 #[derive(Debug, Clone, Default, Serialize)]
-pub struct Section {
+pub(super) struct Section {
     /// Anchor: lower-case letters and dashes.
     pub id: String,
     /// Heading.
@@ -62,7 +62,7 @@ pub struct Section {
 
 /// The page.
 #[derive(Debug, Clone, Default, Serialize)]
-pub struct Page {
+pub(super) struct Page {
     /// Heading.
     pub title: String,
     /// What was run on which data, in one sentence.
@@ -82,7 +82,7 @@ impl Section {
     }
 
     /// A long text that opens on a click.
-    pub fn folded(title: impl Into<String>, text: String) -> Section {
+    pub(super) fn folded(title: impl Into<String>, text: String) -> Section {
         Section { title: title.into(), text, ..Section::default() }
     }
 }

@@ -116,7 +116,7 @@ pub fn columns(digits: Digits) -> Vec<Column> {
 ///
 /// # Errors
 /// As [`TableWriter::row`].
-pub fn write_chunk(table: &mut TableWriter, plan: &LanePlan, chunk: &Chunk) -> Result<()> {
+fn write_chunk(table: &mut TableWriter, plan: &LanePlan, chunk: &Chunk) -> Result<()> {
     let dt = plan.profile.frame.dt_s;
     let robust = robust_lanes(plan, chunk);
     for (at, outcome) in chunk.outcomes.iter().enumerate() {
@@ -221,7 +221,7 @@ pub fn case_row<'a>(case: u64, headway: Headway, model: &'a str, outcome: &Outco
 
 /// The columns, in their order: units are in the names, parameters come last.
 #[rustfmt::skip] // a table: one line per column
-pub fn sampled_columns(density: &DensityModel) -> Vec<Column> {
+fn sampled_columns(density: &DensityModel) -> Vec<Column> {
     let c = Column::new;
     let mut columns = vec![
         c("sample", ColumnKind::Whole, "1", "Index of the sample: with the seed it decides the point."),

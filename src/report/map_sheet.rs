@@ -9,7 +9,7 @@ use crate::run::check::Answer;
 use crate::run::grid::{Agreement, CellOutcome, Grid, boundary, runs};
 
 /// A sheet.
-pub struct MapSheet<'a> {
+pub(super) struct MapSheet<'a> {
     /// Heading; wrapped when long.
     pub title: String,
     /// Line below the heading; wrapped when long.
@@ -45,7 +45,7 @@ pub fn outcome(outcome: CellOutcome) -> (String, &'static str) {
 }
 
 /// Name and colour of an agreement of two verdicts.
-pub fn agreement(agreement: Agreement, first: &str, second: &str) -> (String, &'static str) {
+pub(super) fn agreement(agreement: Agreement, first: &str, second: &str) -> (String, &'static str) {
     let label = agreement.label().to_owned();
     match agreement {
         Agreement::BothPass => (label, "#f3dfa2"),

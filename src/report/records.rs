@@ -3,7 +3,7 @@
 use serde_json::Value;
 
 /// Program and version.
-pub const PROGRAM: &str = concat!("lanesweep ", env!("CARGO_PKG_VERSION"));
+pub(super) const PROGRAM: &str = concat!("lanesweep ", env!("CARGO_PKG_VERSION"));
 
 use crate::engine::{NO_STEP, Outcome};
 use crate::model::criterion::Criterion;

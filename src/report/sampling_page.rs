@@ -136,7 +136,7 @@ impl EstimateFile {
     }
 
     /// Probability over the headway, a panel per model; `None` for a single headway.
-    pub fn headways_figure(&self) -> Option<Figure> {
+    pub(super) fn headways_figure(&self) -> Option<Figure> {
         let thw_s = |row: &EstimateRow| {
             let of = self.plan_headways.iter().find(|headway| headway.to_string() == row.headway);
             of.filter(|headway| matches!(headway, Headway::ThwS(_)))?.value()

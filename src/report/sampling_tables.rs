@@ -107,13 +107,13 @@ pub fn convergence_csv(checkpoints: &[Checkpoint]) -> String {
 
 /// `models.csv`: the rates of two driver models on the same samples. They are equal if the interval of their ratio lies
 /// within a quarter of 1.
-pub fn model_ratios_csv(ratios: &[ModelRatio]) -> String {
+pub(super) fn model_ratios_csv(ratios: &[ModelRatio]) -> String {
     let sides = Table::of(ratios).column("model", |row| row.model.name()).column("other", |row| row.other.name());
     ratio_columns(sides).build().csv()
 }
 
 /// `profiles.csv`: the same for a model under the profile of the run and under another one.
-pub fn profile_ratios_csv(profile: &str, of: &ProfileRatios) -> String {
+pub(super) fn profile_ratios_csv(profile: &str, of: &ProfileRatios) -> String {
     let sides = Table::of(&of.ratios).column("model", |row| row.model.name());
     let sides = sides.column("profile", |_| profile).column("other", |_| of.other.as_str());
     ratio_columns(sides).build().csv()
@@ -140,7 +140,7 @@ fn ratio_columns(sides: TableOf<&ModelRatio>) -> TableOf<&ModelRatio> {
 }
 
 /// `worst.csv`: the lanes with the smallest limit state of `criterion`, rerunnable by key.
-pub fn worst_csv(rows: &[WorstLane], parameters: &[String], criterion: Criterion) -> String {
+pub(super) fn worst_csv(rows: &[WorstLane], parameters: &[String], criterion: Criterion) -> String {
     let at_contact = |row: &WorstLane, v: f64| (row.outcome.contact_step != NO_STEP).then_some(v);
     Table::of(rows)
         .column("model", |row| row.model.name())

@@ -20,7 +20,7 @@ use crate::stats::estimate::wilson;
 
 /// Fraction of the scenarios that fail, over the headway: S with its interval, beside it every S'; a panel per model
 /// and criterion. `None` with fewer than two headways that are the same for all scenarios.
-pub fn headways(of: &HeadwayFailures, scores: &CategoryScores, confidence: f64, data: &str) -> Option<Figure> {
+pub(super) fn headways(of: &HeadwayFailures, scores: &CategoryScores, confidence: f64, data: &str) -> Option<Figure> {
     if of.headways.iter().filter_map(Headway::value).count() < 2 {
         return None;
     }
@@ -121,7 +121,7 @@ fn ends(interval: Option<ScoreInterval>) -> Option<(f64, f64)> {
 }
 
 /// F1 of every parameterization with its interval, a row per driver model and criterion.
-pub fn f1_intervals(scores: &CategoryScores, confidence: f64, data: &str) -> Figure {
+pub(super) fn f1_intervals(scores: &CategoryScores, confidence: f64, data: &str) -> Figure {
     let cells = cells(scores);
     let row = |cell: &(ModelId, Criterion)| DotRow {
         name: cell_name(cell),
@@ -157,7 +157,7 @@ pub fn f1_intervals(scores: &CategoryScores, confidence: f64, data: &str) -> Fig
 
 /// The radar chart of the paper: F1 per model and criterion (spokes), one polygon per parameterization. The line of a
 /// parameterization is broken where its F1 is undefined (0/0): a number would be a false measurement.
-pub fn radar(scores: &CategoryScores, data: &str) -> Figure {
+pub(super) fn radar(scores: &CategoryScores, data: &str) -> Figure {
     let cells = cells(scores);
     let score = |variant: usize, &(model, criterion): &(ModelId, Criterion)| {
         scores.index(variant, model, criterion).and_then(|at| f1(&scores.cells[at].counts))
@@ -207,7 +207,7 @@ pub fn radar(scores: &CategoryScores, data: &str) -> Figure {
 }
 
 /// Recall and precision of every parameterization, a panel per driver model and criterion, each around its values.
-pub fn recall_and_precision(scores: &CategoryScores, confidence: f64, data: &str) -> Figure {
+pub(super) fn recall_and_precision(scores: &CategoryScores, confidence: f64, data: &str) -> Figure {
     let panel = |&(model, criterion): &(ModelId, Criterion)| {
         let failing = scores.failing_scenarios(model, criterion);
         let value = |variant: usize| {
@@ -278,7 +278,7 @@ fn few(failing_scenarios: u64) -> String {
 
 /// F1 against the number of parameters: the mean over the cells that every parameterization defines, over all criteria
 /// and for each. Also the front of parameterizations that no other beats with at most as many parameters.
-pub fn f1_by_parameters(scores: &CategoryScores, means: &[MeanF1], confidence: f64, data: &str) -> Figure {
+pub(super) fn f1_by_parameters(scores: &CategoryScores, means: &[MeanF1], confidence: f64, data: &str) -> Figure {
     // With the place of each among the means: a given or cross-validated variant has no number of parameters.
     let found = scores.variants.iter().skip(1).map(|key| Parameterization::find(scores.category, key)).enumerate();
     let ids: Vec<(usize, Parameterization)> = found.filter_map(|(at, id)| Some((at, id?))).collect();
@@ -337,7 +337,7 @@ pub fn f1_by_parameters(scores: &CategoryScores, means: &[MeanF1], confidence: f
 
 /// The mean scenario between nine tenths of all, the scenarios along the first directions of a decomposition, and what
 /// the directions leave unexplained.
-pub fn modes(category: Category, shapes: &[ModeShape], explained: &[f64], data: &str) -> Figure {
+pub(super) fn modes(category: Category, shapes: &[ModeShape], explained: &[f64], data: &str) -> Figure {
     let panel = |shape: &ModeShape| {
         let last = shape.mean.len().saturating_sub(1).max(1) as f64;
         let at = move |(k, v): (usize, &f64)| Value::from((k as f64 / last, *v));
@@ -391,7 +391,7 @@ pub fn modes(category: Category, shapes: &[ModeShape], explained: &[f64], data: 
 }
 
 /// The histograms of the parameters of mined scenarios.
-pub fn distributions(category: Category, histograms: &[ParameterHistogram], data: &str) -> Figure {
+pub(super) fn distributions(category: Category, histograms: &[ParameterHistogram], data: &str) -> Figure {
     let scenarios: u64 = histograms.first().map_or(0, |histogram| histogram.counts.iter().sum());
     let plot = |histogram: &ParameterHistogram| {
         let middle = |k: usize| histogram.low + (k as f64 + 0.5) * histogram.width;

@@ -146,7 +146,7 @@ pub(super) fn claim_table(results: &[ClaimResult], width: usize) -> Table {
 ///
 /// # Errors
 /// [`Error::Internal`] if there are fewer counts of capped lanes than cells.
-pub fn failure_records(scores: &ScoreTable, data: &str) -> Result<Table> {
+pub(super) fn failure_records(scores: &ScoreTable, data: &str) -> Result<Table> {
     let mut rows = Vec::new();
     for category in &scores.categories {
         for (at, cell) in category.cells.iter().enumerate() {
@@ -172,7 +172,7 @@ pub fn failure_records(scores: &ScoreTable, data: &str) -> Result<Table> {
 }
 
 /// Scores: one row per category, parameterization, model and criterion.
-pub fn f1_records(scores: &ScoreTable, data: &str) -> Table {
+pub(super) fn f1_records(scores: &ScoreTable, data: &str) -> Table {
     let rows = scores.categories.iter().flat_map(|category| {
         let cells = category.cells.iter().filter(|cell| cell.variant > 0);
         cells.map(|cell| (category.category, category.variants[cell.variant].as_str(), cell))
@@ -210,7 +210,7 @@ fn no_interval(cell: &ScoreCell) -> &'static str {
 }
 
 /// Claims: per claim one row over all cells (`model` and `criterion` empty), then one per cell.
-pub fn claim_records(results: &[ClaimResult], data: &str) -> Table {
+pub(super) fn claim_records(results: &[ClaimResult], data: &str) -> Table {
     let rows = results.iter().flat_map(|of| {
         let all = (&of.claim, None, of.failing_scenarios, of.mean, None, of.verdict);
         let cells = of

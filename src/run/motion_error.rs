@@ -56,7 +56,7 @@ impl MotionError {
     }
 
     /// The error, over the series of the category.
-    pub fn root(&self, category: Category, spread: &MotionSpread) -> f64 {
+    pub(super) fn root(&self, category: Category, spread: &MotionSpread) -> f64 {
         let used: &[usize] = match category {
             Category::CutIn => &[0, 1],
             Category::CutOut => &[0, 1, 2],

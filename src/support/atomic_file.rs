@@ -24,7 +24,7 @@ const LONGEST: usize = 200;
 
 /// Removes from `dir` the hidden files of killed processes, of one target or of all. A process locks the hidden files
 /// that it writes, and the lock ends with the process. Files that cannot be removed are harmless and stay.
-pub fn clear_stale(dir: &Path, target: Option<&Path>) {
+pub(super) fn clear_stale(dir: &Path, target: Option<&Path>) {
     let Ok(entries) = std::fs::read_dir(dir) else { return };
     let wanted = target.map(|target| target.file_name().and_then(|name| name.to_str()));
     for entry in entries.flatten() {
@@ -132,7 +132,7 @@ fn failed(target: &Path, source: std::io::Error) -> Error {
 }
 
 /// Makes a rename in `folder` survive a power loss, if the system supports it.
-pub fn sync_folder(folder: &Path) {
+pub(super) fn sync_folder(folder: &Path) {
     #[cfg(unix)]
     if let Ok(folder) = std::fs::File::open(folder) {
         // Some file systems refuse to sync folders; the file's content is already on disk.
@@ -285,7 +285,7 @@ impl StagedFile {
     }
 
     /// The final path.
-    pub fn target(&self) -> &Path {
+    pub(super) fn target(&self) -> &Path {
         &self.target
     }
 }
@@ -299,11 +299,11 @@ fn live() -> MutexGuard<'static, BTreeSet<PathBuf>> {
 
 /// An entry in the registry of hidden files; dropping it removes the entry.
 #[derive(Debug)]
-pub struct Live(PathBuf);
+pub(super) struct Live(PathBuf);
 
 impl Live {
     /// Registers a lock file, or a folder to be removed if it is empty.
-    pub fn enter(path: PathBuf) -> Live {
+    pub(super) fn enter(path: PathBuf) -> Live {
         live().insert(path.clone());
         Live(path)
     }

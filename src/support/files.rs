@@ -70,7 +70,7 @@ pub fn write_atomically(path: &Path, content: &[u8]) -> Result<()> {
 }
 
 /// Like [`write_atomically`], for content that is streamed.
-pub fn write_atomically_with(path: &Path, produce: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
+fn write_atomically_with(path: &Path, produce: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
     let mut file = AtomicFile::create(path)?;
     produce(&mut file).map_err(|e| Error::io(path, "write", e))?;
     file.stage()?.publish()

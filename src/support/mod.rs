@@ -6,7 +6,7 @@
 pub mod atomic_file;
 pub mod cancel;
 pub mod error;
-pub mod file_list;
+mod file_list;
 pub mod files;
 pub mod input_file;
 pub mod lock;

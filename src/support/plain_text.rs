@@ -14,9 +14,9 @@ pub fn acts(c: char) -> bool {
 }
 
 /// Maximum characters of a name in a message: an id, a key, a value.
-pub const MAX_NAME: usize = 80;
+const MAX_NAME: usize = 80;
 /// Maximum characters of a word in a message that may be a path; the limit of systems.
-pub const MAX_PATH: usize = 4096;
+pub(super) const MAX_PATH: usize = 4096;
 /// Maximum characters of a message.
 const MAX_MESSAGE: usize = 16_384;
 

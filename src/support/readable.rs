@@ -15,7 +15,7 @@ pub fn count_of(length: usize) -> String {
 }
 
 /// Like [`count`], for a signed number.
-pub fn whole(number: i64) -> String {
+pub(super) fn whole(number: i64) -> String {
     grouped(&number.to_string())
 }
 

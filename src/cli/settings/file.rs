@@ -121,4 +121,4 @@ pub(super) fn unknown(place: Place, name: &str, is_table: bool, keys: &[Key]) ->
 }
 
 /// Variable that names the configuration file if `--config` names none.
-pub const FILE_VARIABLE: &str = "LANESWEEP_CONFIG";
+pub(crate) const FILE_VARIABLE: &str = "LANESWEEP_CONFIG";

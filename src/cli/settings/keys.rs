@@ -59,7 +59,7 @@ impl Key {
     }
 
     /// The valid values in words: `a number above 0 and at most 1000000`.
-    pub fn expected(&self) -> String {
+    fn expected(&self) -> String {
         match &self.kind {
             KeyKind::Boolean => "true or false".to_owned(),
             KeyKind::Text => "a text in quotes".to_owned(),
@@ -163,7 +163,7 @@ pub(super) fn from_word(key: &Key, word: &str, place: Place) -> Result<Value> {
 }
 
 /// Formats a value as TOML.
-pub fn text_of(value: &Value) -> String {
+pub(crate) fn text_of(value: &Value) -> String {
     match value {
         Value::String(text) => toml::Value::String(text.clone()).to_string(),
         Value::Number(number) => match number.as_f64().filter(|_| number.is_f64()) {
@@ -212,10 +212,10 @@ fn shown(value: &DeValue) -> String {
 }
 
 /// The default configuration: every key with its default; keys without a default are in comments.
-pub const DEFAULT_FILE: &str = include_str!("../../../configs/default.toml");
+pub(crate) const DEFAULT_FILE: &str = include_str!("../../../configs/default.toml");
 
 /// Default file name of `lanesweep config init`.
-pub const DEFAULT_FILE_NAME: &str = "lanesweep.toml";
+pub(crate) const DEFAULT_FILE_NAME: &str = "lanesweep.toml";
 
 /// All keys in the order of the default file, which is chosen for readers.
 pub(super) fn keys_in_order() -> Vec<Key> {

@@ -13,7 +13,7 @@ use crate::{Error, Place, Result};
 
 /// Source of a value; a later one overrides an earlier one.
 #[derive(Debug, Clone, PartialEq, Eq, PartialOrd, Ord)]
-pub enum Origin {
+pub(crate) enum Origin {
     /// Built-in default.
     Default,
     /// A line of a file.
@@ -41,7 +41,7 @@ impl Origin {
     }
 
     /// Position among the layers, from 0.
-    pub fn layer(&self) -> usize {
+    pub(crate) fn layer(&self) -> usize {
         match self {
             Origin::Default => 0,
             Origin::File { .. } => 1,
@@ -64,7 +64,7 @@ impl fmt::Display for Origin {
 
 /// Value of `--config`: a file or an assignment.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub enum Assignment {
+pub(crate) enum Assignment {
     /// A file to read.
     File(PathBuf),
     /// `KEY=VALUE`.
@@ -83,7 +83,7 @@ impl Assignment {
 
 /// A key with its value and source.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Setting<'a> {
+pub(crate) struct Setting<'a> {
     /// The key.
     pub key: &'a Key,
     /// Its value; `None` where it is not set.
@@ -94,7 +94,7 @@ pub struct Setting<'a> {
 
 /// The combined layers of a configuration.
 #[derive(Debug, Clone)]
-pub struct Layers {
+pub(crate) struct Layers {
     keys: Vec<Key>,
     values: BTreeMap<String, (Option<Value>, Origin)>,
     files: Vec<PathBuf>,
@@ -108,7 +108,7 @@ impl Default for Layers {
 
 impl Layers {
     /// The defaults alone.
-    pub fn defaults() -> Layers {
+    pub(crate) fn defaults() -> Layers {
         let keys = keys_in_order();
         let values = keys.iter().map(|key| (key.name.clone(), (key.default.clone(), Origin::Default))).collect();
         Layers { keys, values, files: Vec::new() }
@@ -148,7 +148,7 @@ impl Layers {
     ///
     /// # Errors
     /// [`Error::Usage`] for an unknown key or an invalid value.
-    pub fn assign(&mut self, text: &str) -> Result<()> {
+    pub(super) fn assign(&mut self, text: &str) -> Result<()> {
         let (name, word) = text.split_once('=').unwrap_or((text, ""));
         let name = name.trim();
         let Some(key) = Key::find(&self.keys, name).cloned() else {
@@ -167,7 +167,7 @@ impl Layers {
     ///
     /// # Errors
     /// [`Error::Usage`] for an invalid value.
-    pub fn flag(&mut self, name: &str, flag: &str, word: &str) -> Result<()> {
+    pub(crate) fn flag(&mut self, name: &str, flag: &str, word: &str) -> Result<()> {
         let Some(key) = Key::find(&self.keys, name).cloned() else { return Ok(()) };
         let word = if matches!(key.kind, KeyKind::Choice(_)) { word.to_ascii_lowercase() } else { word.to_owned() };
         self.set_word(&key, &word, Origin::Flag(flag.to_owned()))
@@ -184,7 +184,7 @@ impl Layers {
     }
 
     /// All keys with their values, in the order of the default file.
-    pub fn list(&self) -> impl Iterator<Item = Setting<'_>> {
+    pub(crate) fn list(&self) -> impl Iterator<Item = Setting<'_>> {
         self.keys.iter().filter_map(|key| {
             let (value, origin) = self.values.get(&key.name)?;
             Some(Setting { key, value: value.as_ref(), origin })
@@ -192,7 +192,7 @@ impl Layers {
     }
 
     /// The values that were set, including those equal to the default.
-    pub fn given(&self) -> impl Iterator<Item = Setting<'_>> {
+    pub(crate) fn given(&self) -> impl Iterator<Item = Setting<'_>> {
         self.list().filter(|setting| *setting.origin != Origin::Default)
     }
 
@@ -202,12 +202,12 @@ impl Layers {
     }
 
     /// The files that were read.
-    pub fn files(&self) -> &[PathBuf] {
+    pub(crate) fn files(&self) -> &[PathBuf] {
         &self.files
     }
 
     /// The values as a tree of tables.
-    pub fn tree(&self) -> Value {
+    fn tree(&self) -> Value {
         let mut root = Map::new();
         for Setting { key, value, .. } in self.list() {
             if let Some(value) = value {
@@ -221,7 +221,7 @@ impl Layers {
     ///
     /// # Errors
     /// [`Error::Internal`] if the types refuse what the checks accepted.
-    pub fn settings(&self) -> Result<Settings> {
+    pub(crate) fn settings(&self) -> Result<Settings> {
         let refused = |e: serde_json::Error| Error::Internal(format!("a checked configuration is refused: {e}"));
         serde_json::from_value(self.tree()).map_err(refused)
     }

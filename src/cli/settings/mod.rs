@@ -10,11 +10,9 @@ mod layers;
 mod schema;
 mod tables;
 
-pub use file::FILE_VARIABLE;
-pub use keys::{Choice, DEFAULT_FILE, DEFAULT_FILE_NAME, Key, KeyKind, text_of};
-pub use layers::{Assignment, Layers, Origin, Setting};
-pub use schema::{profile_schema, settings_schema};
-pub use tables::{
-    BandwidthInterval, CompareSettings, EstimatorKind, FitSettings, IntervalKind, PointKind, RunSettings,
-    SampleSettings, Settings,
-};
+pub(crate) use file::FILE_VARIABLE;
+pub use keys::{Choice, Key, KeyKind};
+pub(crate) use keys::{DEFAULT_FILE, DEFAULT_FILE_NAME, text_of};
+pub(crate) use layers::{Assignment, Layers, Origin, Setting};
+pub(crate) use schema::{profile_schema, settings_schema};
+pub(crate) use tables::{BandwidthInterval, EstimatorKind, IntervalKind, PointKind, SampleSettings, Settings};

@@ -10,7 +10,7 @@ use crate::support::ranges;
 use crate::{Error, Result};
 
 /// JSON Schema (draft 2020-12) of a configuration file.
-pub fn settings_schema() -> Value {
+pub(crate) fn settings_schema() -> Value {
     let mut schema = ranges::schema_of::<Settings>();
     for_toml(&mut schema);
     // The defaults of the tables are those of their keys.
@@ -62,7 +62,7 @@ fn without_table_defaults(table: &mut Value) {
 ///
 /// # Errors
 /// None for the shipped profiles.
-pub fn profile_schema() -> Result<Value> {
+pub(crate) fn profile_schema() -> Result<Value> {
     let profiles = Profile::names().map(Profile::load).collect::<Result<Vec<_>>>()?;
     let bounds: Vec<(String, Bound)> =
         profiles.iter().flat_map(Profile::bounds).map(|(key, _, bound)| (key, bound)).collect();

@@ -16,7 +16,7 @@ use crate::traffic::trajectory::generator::GeneratorOptions;
 #[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 #[schemars(title = "lanesweep configuration")]
-pub struct Settings {
+pub(crate) struct Settings {
     /// Options of every verb: threads, backend, profile.
     pub run: RunSettings,
     /// The synthetic recordings that verbs run on without data.
@@ -41,7 +41,7 @@ pub struct Settings {
 
 impl Settings {
     /// Options of the parameterizations of densities, and of the replays compared with them.
-    pub fn of_densities(&self) -> ParameterizationOptions {
+    pub(crate) fn of_densities(&self) -> ParameterizationOptions {
         ParameterizationOptions { svd_lateral: self.fit.svd_lateral, ..self.parameterization.clone() }
     }
 }
@@ -49,7 +49,7 @@ impl Settings {
 /// Options of every verb.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct RunSettings {
+pub(crate) struct RunSettings {
     /// Threads; results do not depend on it. Without it: all cores.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 4096))]
@@ -84,7 +84,7 @@ impl Default for RunSettings {
 /// `lanesweep fit`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct FitSettings {
+pub(crate) struct FitSettings {
     /// Form of the density. Intervals of a mixture or copula cover the draws alone, and they have no ratio to recorded
     /// scenarios.
     pub density: DensityKind,
@@ -115,7 +115,7 @@ impl Default for FitSettings {
 /// Interval that a bandwidth is searched in.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum BandwidthInterval {
+pub(crate) enum BandwidthInterval {
     /// From 0.2 times Silverman's bandwidth to Silverman's, as for the reduction of scenarios
     #[default]
     Reduction,
@@ -126,7 +126,7 @@ pub enum BandwidthInterval {
 /// `lanesweep sample`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct SampleSettings {
+pub(crate) struct SampleSettings {
     /// Crude, importance, or the cheaper one. Importance sampling searches the failures, then draws
     /// around them; `auto` chooses for each model and headway, and is `mc` without a half-width.
     pub estimator: EstimatorKind,
@@ -183,7 +183,7 @@ impl Default for SampleSettings {
 /// Estimator of a probability of failure.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum EstimatorKind {
+pub(crate) enum EstimatorKind {
     #[default]
     #[allow(missing_docs)]
     Auto,
@@ -193,21 +193,10 @@ pub enum EstimatorKind {
     Is,
 }
 
-impl EstimatorKind {
-    /// Name in flags and files.
-    pub fn key(self) -> &'static str {
-        match self {
-            EstimatorKind::Auto => "auto",
-            EstimatorKind::Mc => "mc",
-            EstimatorKind::Is => "is",
-        }
-    }
-}
-
 /// Points of crude Monte Carlo.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum PointKind {
+pub(crate) enum PointKind {
     /// Independent draws
     #[default]
     Random,
@@ -218,7 +207,7 @@ pub enum PointKind {
 /// Interval of crude Monte Carlo.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum IntervalKind {
+pub(crate) enum IntervalKind {
     #[default]
     #[allow(missing_docs)]
     Wilson,
@@ -229,7 +218,7 @@ pub enum IntervalKind {
 /// `lanesweep compare`.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-pub struct CompareSettings {
+pub(crate) struct CompareSettings {
     /// Samples of each density; each runs from every headway.
     #[schemars(range(min = 1, max = 281_474_976_710_655_u64))]
     pub samples: u64,

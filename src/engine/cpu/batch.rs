@@ -91,7 +91,7 @@ impl Batch {
 
     /// A lane after its last step, and the other vehicles at that step.
     #[inline(always)]
-    pub fn last_step(&self, k: usize) -> (LaneConstants<f32>, LaneState<f32>, [OtherState<f32>; 2]) {
+    pub(super) fn last_step(&self, k: usize) -> (LaneConstants<f32>, LaneState<f32>, [OtherState<f32>; 2]) {
         let state = self.lanes.state.at(k);
         let row = (state.index - 1 - self.from[k]) as usize;
         (self.lanes.fixed.at(k), state, places(&self.windows, row, k))
@@ -146,7 +146,7 @@ impl Batch {
     }
 
     /// Skips quiescent steps of a lane where that pays; otherwise examines the lane again later.
-    pub fn jump_ahead<M: DriverModel<f32>>(&mut self, simulation: &Simulation<f32, M>, k: usize) {
+    pub(super) fn jump_ahead<M: DriverModel<f32>>(&mut self, simulation: &Simulation<f32, M>, k: usize) {
         let (constants, state, places) = self.last_step(k);
         let LaneArrays { fixed, state: arrays } = &mut self.lanes;
         let eventful_until = &mut fixed.ego.eventful_until[k];
@@ -169,12 +169,12 @@ impl Batch {
     }
 
     /// Frees the slots whose lanes have finished.
-    pub fn free_finished(&mut self) {
+    pub(super) fn free_finished(&mut self) {
         self.free |= self.finished;
     }
 
     /// Moves lanes out that continue with the second vehicle only.
-    pub fn set_apart_lead_only(&mut self, apart: &mut Pending) {
+    pub(super) fn set_apart_lead_only(&mut self, apart: &mut Pending) {
         while self.leaving != 0 && apart.has_room(1) {
             let k = self.leaving.trailing_zeros() as usize;
             self.leaving &= self.leaving - 1;
@@ -184,7 +184,7 @@ impl Batch {
     }
 
     /// Moves out lanes with enough steady-following steps; the others are examined again later.
-    pub fn set_apart_steady_following<M: DriverModel<f32>>(
+    pub(super) fn set_apart_steady_following<M: DriverModel<f32>>(
         &mut self,
         simulation: &Simulation<f32, M>,
         apart: &mut Pending,
@@ -208,7 +208,7 @@ impl Batch {
     }
 
     /// Returns lanes whose steady-following steps are used up.
-    pub fn set_back<M: DriverModel<f32>>(&mut self, simulation: &Simulation<f32, M>, back: &mut Pending) {
+    pub(super) fn set_back<M: DriverModel<f32>>(&mut self, simulation: &Simulation<f32, M>, back: &mut Pending) {
         let ego = &self.lanes.fixed.ego;
         let mut used_up = 0;
         for k in 0..LANES {

@@ -144,7 +144,7 @@ made_of_rows! { EgoArrays OtherArrays TrackArrays MovingArrays AheadArrays Value
 
 impl<const N: usize> LaneArrays<N> {
     /// No lanes: all slots are over.
-    pub fn idle() -> Self {
+    pub(super) fn idle() -> Self {
         let moving = MovingArrays { over: [Flag::TRUE.to_bits(); N], ..Zeroable::zeroed() };
         let state = StateArrays { moving, ahead: Zeroable::zeroed(), values: Zeroable::zeroed() };
         LaneArrays { fixed: FixedArrays { ego: Zeroable::zeroed(), others: Zeroable::zeroed() }, state }
@@ -162,7 +162,7 @@ impl<const N: usize> LaneArrays<N> {
 
     /// Mutable version of `parts`.
     #[inline(always)]
-    pub fn parts_mut(&mut self, is_pair: bool, values: bool) -> [&mut [[u32; N]]; PARTS] {
+    pub(super) fn parts_mut(&mut self, is_pair: bool, values: bool) -> [&mut [[u32; N]]; PARTS] {
         let FixedArrays { ego, others: [principal, second] } = &mut self.fixed;
         let StateArrays { moving, ahead, values: gathered } = &mut self.state;
         let (second, ahead): (&mut [_], &mut [_]) =
@@ -174,7 +174,7 @@ impl<const N: usize> LaneArrays<N> {
     /// Writes one case into [`LANES`] lanes. Only the gaps in `state` may differ between them; [`LaneArrays::start`]
     /// sets these.
     #[inline(always)]
-    pub fn fill(
+    pub(super) fn fill(
         &mut self,
         from: usize,
         constants: &LaneConstants<f32>,
@@ -224,7 +224,14 @@ impl<const N: usize> LaneArrays<N> {
 
     /// Copies one of these lanes to place `to`, where it continues with one of its vehicles. For verdicts only.
     #[inline]
-    pub fn set_single(&mut self, to: usize, lanes: &LaneArrays<LANES>, k: usize, vehicle: usize, leaves_from: u32) {
+    pub(super) fn set_single(
+        &mut self,
+        to: usize,
+        lanes: &LaneArrays<LANES>,
+        k: usize,
+        vehicle: usize,
+        leaves_from: u32,
+    ) {
         let (fixed, state) = (&lanes.fixed, &lanes.state);
         copy(self.fixed.ego.rows_mut(), to, fixed.ego.rows(), k);
         copy(self.fixed.others[0].rows_mut(), to, fixed.others[vehicle].rows(), k);
@@ -239,7 +246,7 @@ impl<const N: usize> LaneArrays<N> {
 
     /// The step from which on a vehicle keeps speed and lateral position.
     #[inline]
-    pub fn steady_from(&self, k: usize, vehicle: usize) -> u32 {
+    pub(super) fn steady_from(&self, k: usize, vehicle: usize) -> u32 {
         let [speed, position, towards] = &self.fixed.others[vehicle].tracks;
         speed.last[k].max(position.last[k]).max(towards.last[k])
     }
@@ -256,7 +263,7 @@ impl<const N: usize> LaneArrays<N> {
 impl<const N: usize> FixedArrays<N> {
     /// The constants of a lane.
     #[inline(always)]
-    pub fn at(&self, k: usize) -> LaneConstants<f32> {
+    pub(super) fn at(&self, k: usize) -> LaneConstants<f32> {
         let other = |vehicle: usize| {
             let other = &self.others[vehicle];
             OtherConstants {
@@ -285,7 +292,7 @@ pub(in crate::engine) fn steady_from(tracks: &[VehicleTracks]) -> u32 {
 impl<const N: usize> StateArrays<N> {
     /// Sets the state of one lane.
     #[inline(always)]
-    pub fn at(&self, k: usize) -> LaneState<f32> {
+    pub(super) fn at(&self, k: usize) -> LaneState<f32> {
         let StateArrays { moving, ahead, values } = self;
         LaneState {
             index: moving.index[k],
@@ -314,7 +321,7 @@ impl<const N: usize> StateArrays<N> {
     /// State of a steadily following lane: the fields that its steps read. These steps are not the first, the reaction
     /// time is over, and no criterion is evaluated.
     #[inline(always)]
-    pub fn is_steady(&self, k: usize) -> LaneState<f32> {
+    pub(super) fn is_steady(&self, k: usize) -> LaneState<f32> {
         let moving = &self.moving;
         let record = Record { ttc: TtcMinimum::new(), btn: BrakeThreatMaximum::new(), min_gap: f32::INFINITY };
         LaneState {
@@ -331,7 +338,7 @@ impl<const N: usize> StateArrays<N> {
 
     /// Copies the fields that a steady-following step changes.
     #[inline(always)]
-    pub fn set_steady_following<M: DriverModel<f32>>(&mut self, k: usize, lane: &LaneState<f32>) {
+    pub(super) fn set_steady_following<M: DriverModel<f32>>(&mut self, k: usize, lane: &LaneState<f32>) {
         self.moving.v_ego[k] = lane.v_ego;
         self.moving.gap[k] = lane.gaps[0];
         if M::KEEPS_DECELERATION {

@@ -10,7 +10,7 @@ use crate::engine::lane_step::{
 use crate::engine::outcome::{EndReason, NO_STEP, Outcome, Verdicts};
 
 /// The result that a sweep returns per lane: an outcome or only verdicts.
-pub trait Ending: From<Outcome<f32>> {
+pub(crate) trait Ending: From<Outcome<f32>> {
     /// The result has minima and maxima, which the steps must accumulate.
     const HAS_VALUES: bool;
 
@@ -60,7 +60,7 @@ impl Ending for Outcome<f32> {
 /// Verdicts of a lane after its last step. Verdict-only batches know the ego's final speed only after a contact, which
 /// keeps it. Therefore no speed may decide a verdict.
 #[inline(always)]
-pub fn verdicts<R: Real, M>(
+fn verdicts<R: Real, M>(
     simulation: &Simulation<R, M>,
     lane: &LaneConstants<R>,
     state: &LaneState<R>,
@@ -90,7 +90,7 @@ pub fn verdicts<R: Real, M>(
 
 /// Outcome of a lane after its last step.
 #[inline(always)]
-pub fn conclude<R: Real, M>(
+pub(crate) fn conclude<R: Real, M>(
     simulation: &Simulation<R, M>,
     lane: &LaneConstants<R>,
     state: &LaneState<R>,

@@ -100,7 +100,7 @@ impl Pending {
     ///
     /// `sets_apart`: the series, if lanes that continue with the second vehicle only move out.
     #[inline]
-    pub fn have<M: DriverModel<f32>>(
+    pub(super) fn have<M: DriverModel<f32>>(
         &mut self,
         min_count: usize,
         simulation: &Simulation<f32, M>,
@@ -118,18 +118,18 @@ impl Pending {
 
     /// Number of lanes that still fit.
     #[inline(always)]
-    pub fn has_room(&self, count: usize) -> bool {
+    pub(super) fn has_room(&self, count: usize) -> bool {
         self.count() + count <= MAX_PENDING
     }
 
     /// Adds a lane that continues with the second vehicle only.
-    pub fn add_lead_only(&mut self, lanes: &LaneArrays<LANES>, k: usize) {
+    pub(super) fn add_lead_only(&mut self, lanes: &LaneArrays<LANES>, k: usize) {
         let leaves_from = if self.asks_steady { lanes.steady_from(k, 1) + 1 } else { NEVER_LEAVES };
         self.add_single(lanes, k, 1, leaves_from);
     }
 
     /// Adds a lane with a single vehicle, unchanged.
-    pub fn add_lane(&mut self, lanes: &LaneArrays<LANES>, k: usize, leaves_from: u32) {
+    pub(super) fn add_lane(&mut self, lanes: &LaneArrays<LANES>, k: usize, leaves_from: u32) {
         self.add_single(lanes, k, 0, leaves_from);
     }
 

@@ -116,7 +116,7 @@ impl<'p, R: Real> LaneRunner<'p, R> {
 
     /// Runs all lanes of one unit in the plan's order, except those of drivers outside the registry; passes position
     /// within the unit and outcome.
-    pub fn run_unit(&self, block: usize, unit: u64, mut each: impl FnMut(usize, Outcome<R>)) {
+    pub(super) fn run_unit(&self, block: usize, unit: u64, mut each: impl FnMut(usize, Outcome<R>)) {
         let mut at = 0;
         for variant in 0..self.plan.blocks[block].variants.len() {
             let (case, tables) = self.case(block, unit, variant);
@@ -153,7 +153,7 @@ impl<'p, R: Real> LaneRunner<'p, R> {
 impl LaneRunner<'_, f32> {
     /// Runs all lanes of some units of a block in batches, except those of drivers outside the registry; passes the position, counted from the first unit, and the
     /// result. The order is unspecified. Verdicts show the marks of a watch.
-    pub fn run_units<E: Ending>(
+    pub(super) fn run_units<E: Ending>(
         &self,
         instructions: Instructions,
         block: usize,

@@ -49,18 +49,18 @@ pub(in crate::engine) fn max_entries(step_cap: u32) -> u64 {
 
 impl Series {
     /// Empties the pool but keeps its memory.
-    pub fn clear(&mut self) {
+    pub(super) fn clear(&mut self) {
         self.entries.clear();
     }
 
     /// All entries.
-    pub fn entries(&self) -> &[f32] {
+    pub(crate) fn entries(&self) -> &[f32] {
         &self.entries
     }
 
     /// Unrolls the motions of a case, up to the step cap: principal vehicle, then the one ahead of it. A case without
     /// the latter has the principal's tracks twice.
-    pub fn unroll(&mut self, case: &LaneCase<f32>, tables: &Tables<f32>, step_cap: u32) -> [VehicleTracks; 2] {
+    pub(crate) fn unroll(&mut self, case: &LaneCase<f32>, tables: &Tables<f32>, step_cap: u32) -> [VehicleTracks; 2] {
         let principal = self.vehicle(&case.others[0].motion, tables, step_cap);
         let ahead = if case.pair != 0 { self.vehicle(&case.others[1].motion, tables, step_cap) } else { principal };
         [principal, ahead]
@@ -138,7 +138,7 @@ impl Window {
 
     /// Copies the rows from the series entry by entry; portable.
     #[inline(always)]
-    pub fn turn(&mut self, tracks: &TrackArrays<LANES>, steps: &Words, entries: &[f32]) {
+    pub(super) fn turn(&mut self, tracks: &TrackArrays<LANES>, steps: &Words, entries: &[f32]) {
         let places = places(tracks, steps);
         for (k, &from) in places.iter().enumerate() {
             let ahead = &entries[from as usize..from as usize + ROWS];

@@ -248,7 +248,7 @@ impl Instructions {
     ///
     /// # Errors
     /// [`Error::Usage`] if it does not.
-    pub fn checked(self) -> Result<Instructions> {
+    pub(super) fn checked(self) -> Result<Instructions> {
         if self.is_available() {
             return Ok(self);
         }

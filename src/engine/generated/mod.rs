@@ -41,12 +41,12 @@ impl Generator {
     }
 
     /// The case of a valid point; its series are appended to `tables`.
-    pub fn decode<R: Real>(&self, point: &[f32], tables: &mut Tables<R>) -> LaneCase<R> {
+    fn decode<R: Real>(&self, point: &[f32], tables: &mut Tables<R>) -> LaneCase<R> {
         decode::case(&self.recipe, &self.basis, point, tables)
     }
 
     /// Maximum number of table entries of one case: speeds, lateral states.
-    pub fn table_entries(&self) -> [u32; 2] {
+    pub(super) fn table_entries(&self) -> [u32; 2] {
         let entries = self.recipe.longest_series();
         match self.recipe.path() {
             CasePath::Kinematic => [0, 0],

@@ -178,7 +178,7 @@ unsafe impl Pod for Recipe {}
 
 impl Recipe {
     /// How the motions follow from a point.
-    pub fn path(&self) -> CasePath {
+    pub(super) fn path(&self) -> CasePath {
         match self.path {
             0 => CasePath::Kinematic,
             1 => CasePath::Sinusoid,
@@ -187,7 +187,7 @@ impl Recipe {
     }
 
     /// Number of entries of the longest series of a valid point.
-    pub fn longest_series(&self) -> u32 {
+    pub(super) fn longest_series(&self) -> u32 {
         let steps = (f64::from(self.longest_duration) * f64::from(self.inverse_dt)).ceil() as u32;
         steps.min(self.step_cap) + 1
     }

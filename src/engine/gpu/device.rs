@@ -151,7 +151,7 @@ impl Device {
     ///
     /// # Errors
     /// [`Error::Internal`] for a shader that does not compile, [`Error::Device`] where the driver refuses it.
-    pub fn pipeline(&mut self, spec: &PipelineSpec) -> Result<wgpu::ComputePipeline> {
+    pub(super) fn pipeline(&mut self, spec: &PipelineSpec) -> Result<wgpu::ComputePipeline> {
         if let Some((_, pipeline)) = self.pipelines.iter().find(|(known, _)| known == spec) {
             return Ok(pipeline.clone());
         }
@@ -228,7 +228,7 @@ impl Device {
     }
 
     /// A buffer of at least one element.
-    pub fn buffer(&self, label: &str, bytes: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
+    pub(super) fn buffer(&self, label: &str, bytes: u64, usage: wgpu::BufferUsages) -> wgpu::Buffer {
         let size = bytes.max(64).next_multiple_of(4);
         self.device.create_buffer(&wgpu::BufferDescriptor {
             label: Some(label),
@@ -239,7 +239,7 @@ impl Device {
     }
 
     /// A storage buffer with the given content.
-    pub fn upload<T: bytemuck::Pod>(&self, label: &str, content: &[T]) -> Result<wgpu::Buffer> {
+    pub(super) fn upload<T: bytemuck::Pod>(&self, label: &str, content: &[T]) -> Result<wgpu::Buffer> {
         let bytes: &[u8] = bytemuck::cast_slice(content);
         let limits = self.device.limits();
         let max_bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
@@ -255,7 +255,7 @@ impl Device {
     }
 
     /// Maximum number of lanes per model of a job, limited by the size of the result buffers.
-    pub fn max_lanes(&self, models: u64, bytes_per_lane: f64) -> u64 {
+    pub(super) fn max_lanes(&self, models: u64, bytes_per_lane: f64) -> u64 {
         let limits = self.device.limits();
         // The read-back buffer also holds counts and times.
         let room = limits.max_buffer_size.saturating_sub(SMALL_RESULT_BYTES);
@@ -264,7 +264,7 @@ impl Device {
     }
 
     /// Workgroups of a dispatch in two dimensions, because one dimension is limited to 65,535.
-    pub fn grid(&self, groups: u32) -> (u32, u32) {
+    pub(super) fn grid(&self, groups: u32) -> (u32, u32) {
         let groups = groups.max(1);
         let max_groups = self.device.limits().max_compute_workgroups_per_dimension.max(1);
         let rows = groups.div_ceil(max_groups);
@@ -272,14 +272,14 @@ impl Device {
     }
 
     /// Average number of lanes per invocation, chosen so that all multiprocessors are busy.
-    pub fn lanes_per_invocation(&self, lanes: u32) -> u32 {
+    pub(super) fn lanes_per_invocation(&self, lanes: u32) -> u32 {
         let busy = || (lanes / (WORKGROUP * BUSY_WORKGROUPS)).clamp(1, MAX_LANES_PER_INVOCATION);
         self.options.lanes_per_invocation.unwrap_or_else(busy)
     }
 
     /// # Errors
     /// [`Error::Device`] if an error occurred since the last call.
-    pub fn untroubled(&self) -> Result<()> {
+    pub(super) fn untroubled(&self) -> Result<()> {
         let trouble = self.trouble.lock().unwrap_or_else(PoisonError::into_inner).clone();
         match trouble {
             None => Ok(()),

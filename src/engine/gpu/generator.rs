@@ -82,13 +82,13 @@ impl GeneratorSetup {
     }
 
     /// Bytes of one sample in cases and tables.
-    pub fn sample_bytes(&self) -> u64 {
+    pub(super) fn sample_bytes(&self) -> u64 {
         let tables = 4 * u64::from(self.generation.speed_stride) + 8 * u64::from(self.generation.lateral_stride);
         size_of::<LaneCase<f32>>() as u64 + tables
     }
 
     /// Copies all inputs to the device.
-    pub fn upload(&self, device: &mut Device) -> Result<GeneratorInputs> {
+    pub(super) fn upload(&self, device: &mut Device) -> Result<GeneratorInputs> {
         device.generator()?;
         use wgpu::BufferUsages as Use;
         Ok(GeneratorInputs {

@@ -23,4 +23,4 @@ pub use records::Generation;
 pub use records::{Launch, OutcomeRecord, StartRecord};
 pub use session::GpuBackend;
 pub use spirv::exact_spirv;
-pub use visible::{visible, visible_here};
+pub use visible::visible_here;

@@ -112,7 +112,7 @@ pub(super) struct Flight {
 
 impl Slot {
     /// Submits a job to the device.
-    pub fn submit(&mut self, device: &mut Device, inputs: &Inputs, job: Job) -> Result<Flight> {
+    pub(super) fn submit(&mut self, device: &mut Device, inputs: &Inputs, job: Job) -> Result<Flight> {
         let models = job.pipelines.len();
         let parts = ResultSizes::of(&job, models);
         self.grow(device, &parts, models);

@@ -370,7 +370,7 @@ impl Pacer {
     }
 
     /// Takes a job into account: lanes per model and the time of its slowest dispatch, s.
-    pub fn observe(&mut self, lanes: u64, slowest_s: f64) {
+    fn observe(&mut self, lanes: u64, slowest_s: f64) {
         if lanes == 0 || !slowest_s.is_finite() || slowest_s <= 0.0 {
             return;
         }

@@ -9,14 +9,14 @@ use crate::{Error, Result};
 
 /// SPIR-V opcodes that this file uses.
 mod op {
-    pub const DECORATE: u32 = 71;
-    pub const MEMBER_DECORATE: u32 = 72;
+    pub(super) const DECORATE: u32 = 71;
+    pub(super) const MEMBER_DECORATE: u32 = 72;
     /// Arithmetic with float results: FNegate, FAdd, FSub, FMul, FDiv, FRem, FMod, VectorTimesScalar, Dot.
-    pub const FLOAT: [u32; 9] = [127, 129, 131, 133, 136, 140, 141, 142, 148];
+    pub(super) const FLOAT: [u32; 9] = [127, 129, 131, 133, 136, 140, 141, 142, 148];
     /// The decoration `NoContraction`.
-    pub const NO_CONTRACTION: u32 = 42;
+    pub(super) const NO_CONTRACTION: u32 = 42;
     /// Words before the first instruction.
-    pub const HEADER: usize = 5;
+    pub(super) const HEADER: usize = 5;
 }
 
 /// Compiles the entry point of a pipeline's source with its constants. Indices are clamped and divisors tested, so that

@@ -51,7 +51,7 @@ pub fn visible_here() -> Result<Option<Vec<String>>> {
 /// # Errors
 /// [`Error::Usage`] for an entry that is unknown, ambiguous, named twice or a MIG instance. CUDA hides that entry and
 /// all after it silently; this returns an error.
-pub fn visible(env: &dyn Fn(&str) -> Option<String>, root: &Path) -> Result<Option<Vec<String>>> {
+fn visible(env: &dyn Fn(&str) -> Option<String>, root: &Path) -> Result<Option<Vec<String>>> {
     let Some((variable, value)) = VARIABLES.iter().find_map(|&v| Some((v, env(v)?))) else { return Ok(None) };
     let mut gpus = nvidia_gpus(root);
     if gpus.is_empty() {

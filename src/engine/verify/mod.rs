@@ -76,17 +76,17 @@ impl CaseRandom {
     }
 
     /// Uniform in [low, high).
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+    fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.uniform()
     }
 
     /// True with this probability.
-    pub fn chance(&mut self, probability: f64) -> bool {
+    fn chance(&mut self, probability: f64) -> bool {
         self.uniform() < probability
     }
 
     /// An index below `count`; 0 if `count` is 0.
-    pub fn below(&mut self, count: usize) -> usize {
+    fn below(&mut self, count: usize) -> usize {
         ((u128::from(self.0.next_u64()) * count as u128) >> 64) as usize
     }
 

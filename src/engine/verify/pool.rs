@@ -77,7 +77,7 @@ impl Pool {
     }
 
     /// A part of a random lateral series.
-    pub fn lateral(&self, draw: &mut CaseRandom, across: LateralRole) -> (Lateral, Slice) {
+    pub(super) fn lateral(&self, draw: &mut CaseRandom, across: LateralRole) -> (Lateral, Slice) {
         let series = &self.across[across as usize];
         let slice = part(draw, series);
         let (position_m, towards_mps) = slice.of(&self.tables.lateral).iter().map(|&[y, w]| (y, w)).unzip();

@@ -68,7 +68,7 @@ impl ThresholdSeries {
     }
 
     /// A motion of a kind ([`Motion::kind`]).
-    pub fn motion(&self, draw: &mut CaseRandom, kind: u32, across: LateralStart) -> Motion<f64> {
+    pub(super) fn motion(&self, draw: &mut CaseRandom, kind: u32, across: LateralStart) -> Motion<f64> {
         let (y, w) = place(draw, across);
         let lateral = if across == LateralStart::Ahead && draw.chance(0.5) {
             Lateral::Centred
@@ -96,14 +96,14 @@ impl ThresholdSeries {
     }
 
     /// The same motion beside the ego with lateral speed 0, −2⁻³² or 2⁻³².
-    pub fn still(&self, mut motion: Motion<f64>, side: usize) -> Motion<f64> {
+    pub(super) fn still(&self, mut motion: Motion<f64>, side: usize) -> Motion<f64> {
         motion.lateral_offset += motion.lateral_len * side as u32;
         motion.lateral_towards = f64::from([0.0, -TINY, TINY][side]);
         motion
     }
 
     /// The same motion with another kinematic speed along the road.
-    pub fn with_speed(
+    pub(super) fn with_speed(
         &self,
         motion: Motion<f64>,
         initial_mps: f32,
@@ -123,7 +123,7 @@ impl ThresholdSeries {
     }
 
     /// The same motion with another kinematic motion across the road.
-    pub fn with_lateral(&self, motion: Motion<f64>, lateral: &Lateral) -> Motion<f64> {
+    pub(super) fn with_lateral(&self, motion: Motion<f64>, lateral: &Lateral) -> Motion<f64> {
         let other = Motion::encode(&Speed::constant(0.0), lateral, self.dt_s, &mut Tables::default());
         Motion {
             kind: motion.kind & SPEED_SAMPLED,

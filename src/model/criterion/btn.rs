@@ -137,7 +137,7 @@ impl<R: Real> BrakeThreat<R> {
     }
 
     /// The constants by their names in the shaders; the form is numbered from 0.
-    pub fn shader_constants(&self) -> Vec<(&'static str, f64)> {
+    pub(super) fn shader_constants(&self) -> Vec<(&'static str, f64)> {
         vec![
             ("btn_form", f64::from(self.form as u32)),
             ("btn_threshold", self.threshold.to_f64()),

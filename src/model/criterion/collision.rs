@@ -32,7 +32,7 @@ impl Contact {
 
 /// Whether the boxes overlap at one step. Strict: h < 0 and |x_o − x_e| < (L_e + L_o)/2, with the signed gap `gap`.
 #[inline(always)]
-pub fn overlaps<R: Real>(gap: R, half_lengths: R, lateral_gap: R) -> Flag {
+fn overlaps<R: Real>(gap: R, half_lengths: R, lateral_gap: R) -> Flag {
     lateral_gap.is_negative() & overlaps_along(gap, half_lengths)
 }
 

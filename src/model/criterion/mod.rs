@@ -11,7 +11,7 @@ mod collision;
 mod ttc;
 
 pub use btn::{BrakeThreat, BrakeThreatMaximum, BtnContact, BtnForm};
-pub use collision::{Contact, contact, held_in_contact, overlaps, overlaps_along};
+pub use collision::{Contact, contact, held_in_contact, overlaps_along};
 pub use ttc::{TimeToCollision, TtcMinimum};
 
 use schemars::JsonSchema;

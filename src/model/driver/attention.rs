@@ -13,17 +13,17 @@ use super::delay_steps;
 pub const NEVER: u32 = u32::MAX;
 
 /// [`AttentionRule::kind`]: from the first step on.
-pub const ALWAYS: u32 = 0;
+const ALWAYS: u32 = 0;
 /// [`AttentionRule::kind`]: once lateral movement has been visible for the required time.
-pub const VISIBLE_MOVEMENT: u32 = 1;
+const VISIBLE_MOVEMENT: u32 = 1;
 /// [`AttentionRule::kind`]: once a vehicle beside the ego's path has deviated from the centre of its lane for the
 /// required time.
-pub const CUTTING_IN: u32 = 2;
+const CUTTING_IN: u32 = 2;
 /// [`AttentionRule::kind`]: once the vehicle in the ego's path has deviated from the centre of the ego's lane for the
 /// required time; the vehicle ahead of it becomes visible at the same step.
-pub const CUTTING_OUT: u32 = 3;
+const CUTTING_OUT: u32 = 3;
 /// [`AttentionRule::kind`]: once the vehicle decelerates; the vehicle ahead of it becomes visible at the same step.
-pub const DECELERATION: u32 = 4;
+const DECELERATION: u32 = 4;
 
 /// Minimum lateral movement per step that counts as movement, m: larger than rounding.
 const MOVEMENT_M: f64 = 1e-9;
@@ -82,13 +82,13 @@ pub fn lane_centre<R: Real>(start: R, lane_width: R) -> R {
 
 impl AttentionRule<f64> {
     /// From the first step on.
-    pub fn always() -> Self {
+    pub(super) fn always() -> Self {
         AttentionRule { kind: ALWAYS, delay_steps: 0, below_trigger: 0, threshold: 0.0 }
     }
 
     /// Once lateral movement has been visible for `visible_s`. At once for a vehicle that starts after its lane
     /// intrusion, because its movement before the start is unknown; also in LVD, which has no lateral movement.
-    pub fn after_visible_movement(visible_s: f64, lane_intrusion_m: f64, dt_s: f64, category: Category) -> Self {
+    pub(super) fn after_visible_movement(visible_s: f64, lane_intrusion_m: f64, dt_s: f64, category: Category) -> Self {
         if visible_s <= 0.0 || category == Category::Lvd {
             return Self::always();
         }
@@ -99,12 +99,12 @@ impl AttentionRule<f64> {
     /// Once a vehicle that cuts in has deviated from the centre of its lane towards the ego by more than `wandering_m`
     /// for the perception time (Annex 3). A vehicle that starts in the ego's path is perceived at once. For one from
     /// beyond the neighbouring lane, the deviation is that from its start.
-    pub fn cutting_in(wandering_m: f64, perception_s: f64, dt_s: f64) -> Self {
+    pub(super) fn cutting_in(wandering_m: f64, perception_s: f64, dt_s: f64) -> Self {
         Self::deviation(CUTTING_IN, wandering_m, perception_s, dt_s)
     }
 
     /// The same for a vehicle that cuts out. If it starts outside the ego's path, the vehicle ahead is visible at once.
-    pub fn cutting_out(wandering_m: f64, perception_s: f64, dt_s: f64) -> Self {
+    pub(super) fn cutting_out(wandering_m: f64, perception_s: f64, dt_s: f64) -> Self {
         Self::deviation(CUTTING_OUT, wandering_m, perception_s, dt_s)
     }
 
@@ -117,7 +117,7 @@ impl AttentionRule<f64> {
     }
 
     /// Once the perception time has passed after the vehicle decelerated more than the trigger.
-    pub fn after_deceleration(trigger_mps2: f64, perception_s: f64, below: BelowTrigger, dt_s: f64) -> Self {
+    pub(super) fn after_deceleration(trigger_mps2: f64, perception_s: f64, below: BelowTrigger, dt_s: f64) -> Self {
         if trigger_mps2 <= 0.0 || below == BelowTrigger::AtOnce {
             return Self::always();
         }

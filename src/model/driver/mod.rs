@@ -16,12 +16,10 @@ mod attention;
 mod foreign;
 mod profile;
 
-pub use attention::{
-    ALWAYS, AttentionRule, BelowTrigger, CUTTING_IN, CUTTING_OUT, DECELERATION, LaneGeometry, NEVER, VISIBLE_MOVEMENT,
-    lane_centre,
-};
+pub use attention::{AttentionRule, BelowTrigger, LaneGeometry, NEVER, lane_centre};
 pub use foreign::{Accelerations, ForeignId, LaneColumns, MAX_ACCELERATION_MPS2, VectorDriver, VehicleColumns};
-pub use profile::{Bound, DriverProfile, SHORT_STEP_S, delay_bound_s};
+pub use profile::{Bound, DriverProfile};
+pub(crate) use profile::{SHORT_STEP_S, delay_bound_s};
 
 use crate::model::scalar::{Flag, Real};
 

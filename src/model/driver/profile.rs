@@ -22,29 +22,29 @@ pub struct Bound {
 
 impl Bound {
     /// A deceleration, m/s².
-    pub const DECELERATION: Bound = Bound::new("m/s²", 0.001, 100.0);
+    pub(crate) const DECELERATION: Bound = Bound::new("m/s²", 0.001, 100.0);
     /// An acceleration or deceleration, or 0, m/s².
-    pub const ACCELERATION: Bound = Bound::DECELERATION.or_zero();
+    pub(super) const ACCELERATION: Bound = Bound::DECELERATION.or_zero();
     /// A jerk, m/s³.
-    pub const JERK: Bound = Bound::new("m/s³", 0.001, 1e6);
+    pub(crate) const JERK: Bound = Bound::new("m/s³", 0.001, 1e6);
     /// A time, s.
-    pub const TIME: Bound = Bound::new("s", 0.001, 1000.0);
+    pub(crate) const TIME: Bound = Bound::new("s", 0.001, 1000.0);
     /// A delay, or 0, s.
-    pub const DELAY: Bound = Bound::TIME.or_zero();
+    pub(super) const DELAY: Bound = Bound::TIME.or_zero();
     /// A time step, s.
     pub const TIME_STEP: Bound = Bound::new("s", 1e-6, 1.0);
     /// Maximum duration of a run, s: one hour; encounters last seconds.
-    pub const TIME_CAP: Bound = Bound::new("s", 0.001, 3600.0);
+    pub(crate) const TIME_CAP: Bound = Bound::new("s", 0.001, 3600.0);
     /// A length or width of a vehicle, m.
-    pub const SIZE: Bound = Bound::new("m", 0.1, 100.0);
+    pub(crate) const SIZE: Bound = Bound::new("m", 0.1, 100.0);
     /// A distance, or 0, m.
-    pub const DISTANCE: Bound = Bound::new("m", 0.001, 100.0).or_zero();
+    pub(crate) const DISTANCE: Bound = Bound::new("m", 0.001, 100.0).or_zero();
     /// A signed distance, m.
-    pub const SIGNED_DISTANCE: Bound = Bound { has_negative: true, ..Bound::DISTANCE };
+    pub(super) const SIGNED_DISTANCE: Bound = Bound { has_negative: true, ..Bound::DISTANCE };
     /// A number of time steps, or 0.
-    pub const STEPS: Bound = Bound::new("steps", 1.0, 1000.0).or_zero();
+    pub(super) const STEPS: Bound = Bound::new("steps", 1.0, 1000.0).or_zero();
     /// A ratio.
-    pub const RATIO: Bound = Bound::new("", 0.001, 1000.0);
+    pub(crate) const RATIO: Bound = Bound::new("", 0.001, 1000.0);
 
     /// From a minimum magnitude above 0 and a maximum.
     pub const fn new(unit: &'static str, smallest: f64, largest: f64) -> Bound {
@@ -82,10 +82,10 @@ impl std::fmt::Display for Bound {
 const DELAY_STEPS: f64 = 3.0;
 
 /// Time step up to which delays set no bound, s: that of the simulators the models come from.
-pub const SHORT_STEP_S: f64 = 0.1;
+pub(crate) const SHORT_STEP_S: f64 = 0.1;
 
 /// Maximum time step for a delay, s; unbounded for a delay of 0.
-pub fn delay_bound_s(delay_s: f64) -> f64 {
+pub(crate) fn delay_bound_s(delay_s: f64) -> f64 {
     if delay_s > 0.0 { rounded_down_s(delay_s / DELAY_STEPS).max(SHORT_STEP_S) } else { f64::INFINITY }
 }
 

@@ -70,7 +70,7 @@ pub(crate) const NUMBERS: [CaseNumber; 16] = [
 
 impl CaseNumber {
     /// Its SI unit.
-    pub fn unit(&self) -> &'static str {
+    fn unit(&self) -> &'static str {
         self.quantity.map_or("s", |quantity| quantity.limits().unit)
     }
 
@@ -163,7 +163,7 @@ impl CaseParameters {
     }
 
     /// Sets speeds that are noise of a standing vehicle to 0 and counts them; `place` returns the place of a key.
-    pub fn settle(&mut self, doubts: &mut Doubts, place: impl Fn(&str) -> String) {
+    pub(super) fn settle(&mut self, doubts: &mut Doubts, place: impl Fn(&str) -> String) {
         let speeds = [
             ("ego_speed", &mut self.ego_speed),
             ("speed", &mut self.speed),

@@ -92,7 +92,7 @@ impl Leaf {
     }
 
     /// Sets the leaf's value in the JSON of a scenario; null is skipped.
-    pub fn put(&self, scenario: &mut Map<String, Value>, value: Value) {
+    pub(super) fn put(&self, scenario: &mut Map<String, Value>, value: Value) {
         if value.is_null() {
             return;
         }
@@ -107,7 +107,7 @@ impl Leaf {
     }
 
     /// Whether there is one value per sample.
-    pub fn is_series(&self) -> bool {
+    pub(super) fn is_series(&self) -> bool {
         matches!(self.field.content, Content::Series)
     }
 
@@ -116,7 +116,7 @@ impl Leaf {
     ///
     /// # Errors
     /// A number that lacks a unit.
-    pub fn typed(&self, value: Value, unit: NameUnit) -> std::result::Result<Value, Unusable> {
+    pub(super) fn typed(&self, value: Value, unit: NameUnit) -> std::result::Result<Value, Unusable> {
         let number = |value| number(value, self.field.unit, unit);
         Ok(match self.field.content {
             Content::Number => number(value)?,

@@ -78,7 +78,7 @@ pub fn check_scenario_file(path: &Path) -> Result<TableFormat> {
 }
 
 /// The columns of a table of scenarios.
-pub fn scenario_columns() -> Vec<Column> {
+fn scenario_columns() -> Vec<Column> {
     leaves().iter().map(Leaf::column).collect()
 }
 

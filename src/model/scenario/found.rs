@@ -61,12 +61,12 @@ impl ScenariosRead {
     }
 
     /// Starts the doubts about the next scenario.
-    pub fn doubts(&self) -> Doubts {
+    pub(super) fn doubts(&self) -> Doubts {
         self.doubts.another()
     }
 
     /// Adds doubts found before the scenario was built.
-    pub fn add_doubts(&mut self, doubts: Doubts) {
+    pub(super) fn add_doubts(&mut self, doubts: Doubts) {
         self.doubts.add(doubts);
     }
 
@@ -95,7 +95,7 @@ impl ScenariosRead {
     }
 
     /// Skips a scenario.
-    pub fn refuse(&mut self, error: Error) {
+    pub(super) fn refuse(&mut self, error: Error) {
         if self.problems.len() < MAX_KEPT { self.problems.push(error) } else { self.more += 1 }
     }
 

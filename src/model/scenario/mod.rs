@@ -24,9 +24,7 @@ pub use crate::model::motion::{LATERAL_SAMPLED, Lateral, LateralState, Motion, S
 pub use case_file::CaseFile;
 pub use case_parameters::{CaseParameters, NamedNumber};
 pub use check::problem_of;
-pub use file::{
-    check_scenario_file, read_scenario_file, read_scenarios, scenario_columns, write_scenarios, write_scenarios_to,
-};
+pub use file::{check_scenario_file, read_scenario_file, read_scenarios, write_scenarios, write_scenarios_to};
 pub use found::{ScenarioFile, usable};
 pub use mined::{Ego, Other, Scenario, Side, mined_id};
 pub use parameter_table::{CaseRow, ParameterRows, RowPlace};

@@ -36,7 +36,7 @@ pub struct Unusable {
 
 impl Unusable {
     /// What to do where the value has a name.
-    pub fn help(&self, name: &str) -> String {
+    pub(super) fn help(&self, name: &str) -> String {
         let Unusable { write, .. } = self;
         match self.lacks_unit {
             true => format!("call it `{name}_kmh` or `{name}_mps`, or write {write}"),

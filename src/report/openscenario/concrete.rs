@@ -36,12 +36,12 @@ const REAR_AXLE_FRACTION: f64 = 0.3;
 impl PlayedVehicle {
     /// Distance from the centre of the rear axle, the reference point of OpenSCENARIO, forward to the centre of the
     /// box, m, rounded to millimetres.
-    pub fn centre_offset_m(&self) -> f64 {
+    pub(super) fn centre_offset_m(&self) -> f64 {
         (REAR_AXLE_FRACTION * self.length_m * 1e3).round() / 1e3
     }
 
     /// Distance of the axles, m; they are symmetric about the centre.
-    pub fn wheelbase_m(&self) -> f64 {
+    pub(super) fn wheelbase_m(&self) -> f64 {
         2.0 * self.centre_offset_m()
     }
 }
@@ -70,17 +70,17 @@ pub struct Concrete {
 }
 
 /// Maximum number of vertices of a vehicle: a file of about 200 MB.
-pub const MAX_VERTICES: usize = 1_000_000;
+const MAX_VERTICES: usize = 1_000_000;
 
 impl Concrete {
     /// End of the scenario, s.
-    pub fn end_s(&self) -> f64 {
+    pub(super) fn end_s(&self) -> f64 {
         self.vehicles.iter().filter_map(|vehicle| vehicle.path.last()).map(|v| v.time_s).fold(0.0, f64::max)
     }
 
     /// Time of the first overlap between two vehicles other than the ego, s. In a cut-out the cutting-out vehicle may
     /// drive through the one ahead of it.
-    pub fn others_overlap_s(&self) -> Option<f64> {
+    pub(super) fn others_overlap_s(&self) -> Option<f64> {
         let [_, other, ahead] = &self.vehicles[..] else { return None };
         let (length_m, width_m) = ((other.length_m + ahead.length_m) / 2.0, (other.width_m + ahead.width_m) / 2.0);
         let overlap = |(a, b): &(&Vertex, &Vertex)| (a.x_m - b.x_m).abs() < length_m && (a.y_m - b.y_m).abs() < width_m;
@@ -88,7 +88,7 @@ impl Concrete {
     }
 
     /// A lateral position in world coordinates, m: left is positive.
-    pub fn world_y_m(&self, y_m: f64) -> f64 {
+    pub(super) fn world_y_m(&self, y_m: f64) -> f64 {
         // + 0.0 avoids a negative zero.
         self.side.sign() * y_m + 0.0
     }
@@ -135,7 +135,12 @@ pub struct Vertex {
 ///
 /// Up to the trace's last step they equal the trace, bit for bit. After it the others follow the motion of the case, as
 /// the lane would have moved them (the last speed and lateral position are held). The ego keeps its last speed.
-pub fn paths<R: Real>(trace: &Trace, case: &LaneCase<R>, tables: &Tables<R>, last_step: u32) -> Vec<Vec<Vertex>> {
+pub(crate) fn paths<R: Real>(
+    trace: &Trace,
+    case: &LaneCase<R>,
+    tables: &Tables<R>,
+    last_step: u32,
+) -> Vec<Vec<Vertex>> {
     let dt_s = trace.dt_s;
     let traced = trace.steps.iter().take(last_step as usize + 1);
     let mut all: Vec<Vec<Vertex>> = vec![Vec::with_capacity(last_step as usize + 1); 1 + trace.vehicles];

@@ -17,7 +17,7 @@ impl Range {
     pub const ALL: Range = Range { low: f64::NEG_INFINITY, high: f64::INFINITY };
 
     /// The intersection; `None` if it is empty.
-    pub fn and(self, other: Range) -> Option<Range> {
+    fn and(self, other: Range) -> Option<Range> {
         let both = Range { low: self.low.max(other.low), high: self.high.min(other.high) };
         (both.low <= both.high).then_some(both)
     }
@@ -63,7 +63,7 @@ pub enum Distribution {
 }
 
 /// Maximum mean of a Poisson distribution, whose probabilities are tabulated.
-pub const MAX_POISSON: f64 = 1e6;
+pub(super) const MAX_POISSON: f64 = 1e6;
 
 /// A distribution truncated to a range, ready for sampling.
 #[derive(Debug, Clone, PartialEq)]
@@ -99,7 +99,7 @@ pub enum Draw {
 impl Distribution {
     /// The distribution truncated to `within`, and the fraction of its probability that remains; `None` if none
     /// remains.
-    pub fn within(&self, within: Range) -> Option<(Draw, f64)> {
+    pub(super) fn within(&self, within: Range) -> Option<(Draw, f64)> {
         match self {
             Distribution::Uniform(range) => {
                 let both = range.and(within)?;
@@ -131,7 +131,7 @@ impl Distribution {
 
 impl Distribution {
     /// Fraction of its probability that its own range keeps.
-    pub fn range_fraction(&self) -> f64 {
+    pub(super) fn range_fraction(&self) -> f64 {
         match self {
             Distribution::Normal { mean, deviation, range } => normal(*mean, *deviation, *range, Range::ALL),
             Distribution::Poisson { mean, range } => {

@@ -50,7 +50,7 @@ impl Elements {
     }
 
     /// Adds elements on one line, each inside the previous one; the last is empty.
-    pub fn nested(&mut self, chain: &[Element]) -> Result<()> {
+    pub(super) fn nested(&mut self, chain: &[Element]) -> Result<()> {
         self.indent()?;
         let Some(((last, attributes), outer)) = chain.split_last() else { return Ok(()) };
         for (name, attributes) in outer {

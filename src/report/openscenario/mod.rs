@@ -16,17 +16,17 @@ mod samples;
 mod scenario_file;
 mod xml_at;
 
-pub use concrete::{Concrete, EgoMotion, PlayedVehicle, Vertex, paths};
-pub use distribution::{Distribution, Draw, MAX_POISSON, Range};
+pub(crate) use concrete::paths;
+pub use concrete::{Concrete, EgoMotion, PlayedVehicle, Vertex};
+pub use distribution::{Distribution, Draw, Range};
 pub use distribution_file::{
     Deterministic, DistributionFile, Distributions, Stochastic, TextParameter, parse_distribution, read_distribution,
 };
 pub use lanes::{PlayOptions, concrete_case, concrete_lanes};
 pub use parameters::{Names, Rename, variations};
-pub use road::{Road, road_file};
 pub use sampled_file::{SampledFile, reopen};
-pub use samples::{ATTEMPTS, DISTRIBUTION_PURPOSE, DistributionSamples, MAX_SAMPLES, Sampled, SampledParameter};
-pub use scenario_file::{IndexRow, export_folder, scenario_file};
+pub use samples::{ATTEMPTS, DistributionSamples, Sampled, SampledParameter};
+pub use scenario_file::{IndexRow, export_folder};
 
 /// Author of every file.
 pub(crate) const AUTHOR: &str = concat!("lanesweep ", env!("CARGO_PKG_VERSION"));

@@ -59,7 +59,7 @@ impl Names<'_> {
     /// # Errors
     /// [`Error::Input`] for an unknown name without `--rename`; [`Error::Usage`] for a `--rename` to an unknown
     /// parameter.
-    pub fn find(&self, name: &str, line: u64) -> Result<Option<(&'static MapParameter, f64)>> {
+    pub(super) fn find(&self, name: &str, line: u64) -> Result<Option<(&'static MapParameter, f64)>> {
         if let Some(rename) = self.renames.iter().find(|rename| rename.theirs == name) {
             if rename.ours == NONE {
                 return Ok(None);
@@ -116,7 +116,7 @@ impl Names<'_> {
     ///
     /// # Errors
     /// [`Error::Usage`].
-    pub fn check_renames(&self, names: &[(&str, u64)]) -> Result<()> {
+    pub(super) fn check_renames(&self, names: &[(&str, u64)]) -> Result<()> {
         for (at, rename) in self.renames.iter().enumerate() {
             if !names.iter().any(|(name, _)| *name == rename.theirs) {
                 let known: Vec<&str> = names.iter().map(|(name, _)| *name).collect();

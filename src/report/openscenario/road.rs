@@ -8,7 +8,7 @@ use crate::Result;
 
 /// A straight road along x. The middle of the ego's lane is y = 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Road {
+pub(super) struct Road {
     /// Start, m.
     pub start_m: f64,
     /// Length, m.
@@ -32,7 +32,7 @@ const MAX_LANES: u32 = 20;
 
 impl Road {
     /// The road that contains every vertex of every vehicle.
-    pub fn around(scenario: &Concrete) -> Road {
+    pub(super) fn around(scenario: &Concrete) -> Road {
         let (mut first, mut last, mut left, mut right) = (0.0_f64, 0.0_f64, 0.0_f64, 0.0_f64);
         for vehicle in &scenario.vehicles {
             for vertex in &vehicle.path {
@@ -57,7 +57,7 @@ impl Road {
     }
 
     /// Lateral position of the reference line, m: the left edge.
-    pub fn reference_y_m(&self) -> f64 {
+    fn reference_y_m(&self) -> f64 {
         (f64::from(self.left_lanes) + 0.5) * self.lane_width_m
     }
 }
@@ -66,7 +66,7 @@ impl Road {
 ///
 /// # Errors
 /// None for finite numbers.
-pub fn road_file(road: &Road) -> Result<Vec<u8>> {
+pub(super) fn road_file(road: &Road) -> Result<Vec<u8>> {
     let text = |text: &str| text.to_owned();
     let mut xml = Elements::new()?;
     let lanes = road.left_lanes + 1 + road.right_lanes;

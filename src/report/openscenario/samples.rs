@@ -17,10 +17,10 @@ use crate::stats::density::Draws;
 use crate::{Error, Place, Result};
 
 /// Purpose of this random stream.
-pub const DISTRIBUTION_PURPOSE: u32 = 0x4f53_4344;
+const DISTRIBUTION_PURPOSE: u32 = 0x4f53_4344;
 
 /// Maximum number of samples: their cases are a table in memory, about 400 bytes each.
-pub const MAX_SAMPLES: u64 = 1_000_000;
+const MAX_SAMPLES: u64 = 1_000_000;
 
 /// Maximum number of points drawn for one sample.
 pub const ATTEMPTS: u32 = 64;

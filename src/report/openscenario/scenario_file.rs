@@ -29,7 +29,7 @@ const HEIGHT_M: f64 = 1.5;
 ///
 /// # Errors
 /// As [`Concrete::check`].
-pub fn scenario_file(scenario: &Concrete, road: &str) -> Result<Vec<u8>> {
+fn scenario_file(scenario: &Concrete, road: &str) -> Result<Vec<u8>> {
     scenario.check()?;
     let mut xml = Elements::new()?;
     xml.open("OpenSCENARIO", vec![])?;
@@ -232,7 +232,7 @@ fn identifier(name: &str) -> String {
 }
 
 /// File name of the index.
-pub const INDEX: &str = "index.csv";
+const INDEX: &str = "index.csv";
 
 /// One line of the index.
 #[derive(Debug, Clone, PartialEq)]

@@ -60,17 +60,17 @@ impl<'a> At<'a> {
     }
 
     /// Line of its start, from 1.
-    pub fn line(&self) -> u64 {
+    pub(super) fn line(&self) -> u64 {
         u64::from(self.node.document().text_pos_at(self.node.range().start).row)
     }
 
-    pub fn wrong(&self, problem: impl Into<String>, help: impl Into<String>) -> Error {
+    pub(super) fn wrong(&self, problem: impl Into<String>, help: impl Into<String>) -> Error {
         let place = Place::file(self.path).row(self.line()).of(format!("element `{}`", self.name()));
         Error::input(place, problem, help)
     }
 
     /// Adds this place to another check's error.
-    pub fn because(&self, error: &Error) -> Error {
+    pub(super) fn because(&self, error: &Error) -> Error {
         self.wrong(error.to_string(), error.help().unwrap_or_default())
     }
 
@@ -79,7 +79,7 @@ impl<'a> At<'a> {
     }
 
     /// Checks that there are only these attributes (except those for schemas), and no text.
-    pub fn attributes(&self, known: &[&str]) -> Result<()> {
+    pub(super) fn attributes(&self, known: &[&str]) -> Result<()> {
         let is_known = |a: &Attribute| match a.namespace() {
             None => known.contains(&a.name()),
             Some(namespace) => namespace == XSI,
@@ -100,7 +100,7 @@ impl<'a> At<'a> {
     }
 
     /// Checks that there are only these child elements.
-    pub fn children(&self, known: &[&str]) -> Result<()> {
+    pub(super) fn children(&self, known: &[&str]) -> Result<()> {
         match self.all().find(|child| !known.contains(&child.name())) {
             None => Ok(()),
             Some(child) => {
@@ -115,7 +115,7 @@ impl<'a> At<'a> {
     }
 
     /// The only child of this name.
-    pub fn only(self, name: &str) -> Result<At<'a>> {
+    pub(super) fn only(self, name: &str) -> Result<At<'a>> {
         let found: Vec<At> = self.all().filter(|child| child.name() == name).collect();
         match found[..] {
             [one] => Ok(one),
@@ -124,7 +124,7 @@ impl<'a> At<'a> {
     }
 
     /// The children, all of this name; at least one.
-    pub fn some(self, name: &str) -> Result<Vec<At<'a>>> {
+    pub(super) fn some(self, name: &str) -> Result<Vec<At<'a>>> {
         self.children(&[name])?;
         let found: Vec<At> = self.all().collect();
         if found.is_empty() {
@@ -134,7 +134,7 @@ impl<'a> At<'a> {
     }
 
     /// The only child, with one of these names.
-    pub fn choice(self, names: &[&str]) -> Result<At<'a>> {
+    pub(super) fn choice(self, names: &[&str]) -> Result<At<'a>> {
         self.children(names)?;
         let found: Vec<At> = self.all().collect();
         match found[..] {
@@ -150,7 +150,7 @@ impl<'a> At<'a> {
         own.find(|attribute| attribute.name() == name).map(|attribute| attribute.value())
     }
 
-    pub fn has(&self, name: &str) -> bool {
+    pub(super) fn has(&self, name: &str) -> bool {
         self.value(name).is_some()
     }
 
@@ -165,7 +165,7 @@ impl<'a> At<'a> {
         Ok(value)
     }
 
-    pub fn number(&self, name: &str) -> Result<f64> {
+    pub(super) fn number(&self, name: &str) -> Result<f64> {
         let text = self.text(name)?;
         text.trim().parse::<f64>().ok().filter(|value| value.abs() <= 1e15).ok_or_else(|| {
             let problem = format!("the attribute `{name}` is `{text}`");
@@ -174,7 +174,7 @@ impl<'a> At<'a> {
     }
 
     /// Range from `lowerLimit` to `upperLimit`.
-    pub fn range(&self) -> Result<Range> {
+    pub(super) fn range(&self) -> Result<Range> {
         self.attributes(&["lowerLimit", "upperLimit"])?;
         self.children(&[])?;
         let range = Range { low: self.number("lowerLimit")?, high: self.number("upperLimit")? };

@@ -58,7 +58,7 @@ pub(in crate::report) struct Tick {
 impl Axis {
     /// The axis for all `values` that it can show, its ends rounded outwards. `None` without such a value. If all are
     /// equal, the axis extends a little to both sides.
-    pub fn around(scale: AxisScale, values: &[f64], (from_px, to_px): (f64, f64)) -> Option<Self> {
+    pub(super) fn around(scale: AxisScale, values: &[f64], (from_px, to_px): (f64, f64)) -> Option<Self> {
         let shown = || values.iter().copied().filter(|v| scale.shows(*v));
         let (min, max) = (shown().reduce(f64::min)?, shown().reduce(f64::max)?);
         let (low, high) = match scale {
@@ -92,7 +92,7 @@ impl Axis {
     }
 
     /// The linear axis that ends exactly at `low` and `high` (finite, `low < high`).
-    pub fn exactly((low, high): (f64, f64), (from_px, to_px): (f64, f64)) -> Self {
+    pub(super) fn exactly((low, high): (f64, f64), (from_px, to_px): (f64, f64)) -> Self {
         Self { scale: AxisScale::Linear, low, high, from_px, to_px, is_count: false }
     }
 
@@ -102,7 +102,7 @@ impl Axis {
     }
 
     /// Its ends on the page, the smaller first.
-    pub fn ends_px(&self) -> (f64, f64) {
+    pub(super) fn ends_px(&self) -> (f64, f64) {
         (self.from_px.min(self.to_px), self.from_px.max(self.to_px))
     }
 
@@ -110,23 +110,23 @@ impl Axis {
         (self.ends_px().0..=self.ends_px().1).contains(&px)
     }
 
-    pub fn length_px(&self) -> f64 {
+    pub(super) fn length_px(&self) -> f64 {
         (self.to_px - self.from_px).abs()
     }
 
     /// How many numbers fit above one another without crowding.
-    pub fn vertical_numbers(&self) -> usize {
+    pub(super) fn vertical_numbers(&self) -> usize {
         let max = if self.scale == AxisScale::Logarithmic { 8.0 } else { 6.0 };
         (self.length_px() / 18.0).clamp(2.0, max) as usize
     }
 
     /// Whether the axis can show `value`.
-    pub fn shows(&self, value: f64) -> bool {
+    fn shows(&self, value: f64) -> bool {
         self.scale.shows(value)
     }
 
     /// Position of `value`, px; the nearer end if the axis cannot show it.
-    pub fn at(&self, value: f64) -> f64 {
+    pub(super) fn at(&self, value: f64) -> f64 {
         let place = match self.scale {
             AxisScale::Logarithmic if value <= 0.0 => self.low,
             scale => scale.place(value).clamp(self.low, self.high),
@@ -136,7 +136,7 @@ impl Axis {
     }
 
     /// The ticks, with at most about `max_ticks` numbers.
-    pub fn ticks(&self, max_ticks: usize) -> Vec<Tick> {
+    pub(super) fn ticks(&self, max_ticks: usize) -> Vec<Tick> {
         match self.scale {
             AxisScale::Linear => self.linear_ticks(max_ticks),
             AxisScale::Logarithmic => self.decade_ticks(max_ticks),
@@ -283,17 +283,17 @@ pub(super) struct Axes {
 }
 
 impl Axes {
-    pub fn at(&self, (x, y): (f64, f64)) -> Position {
+    pub(super) fn at(&self, (x, y): (f64, f64)) -> Position {
         let place = (self.x.at(x), self.y.at(y));
         self.centre.map_or(place, |centre| on_circle(centre, place.1, place.0))
     }
 
-    pub fn shows(&self, (x, y): (f64, f64)) -> bool {
+    pub(super) fn shows(&self, (x, y): (f64, f64)) -> bool {
         self.x.shows(x) && self.y.shows(y)
     }
 
     /// Whether a position on the page lies in the plot.
-    pub fn is_inside(&self, (x, y): Position) -> bool {
+    pub(super) fn is_inside(&self, (x, y): Position) -> bool {
         self.centre.is_some() || (self.x.reaches(x) && self.y.reaches(y))
     }
 }

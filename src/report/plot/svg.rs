@@ -29,11 +29,11 @@ pub(in crate::report) struct Paint<'a> {
 }
 
 impl<'a> Paint<'a> {
-    pub fn fill(colour: &'a str) -> Self {
+    pub(super) fn fill(colour: &'a str) -> Self {
         Paint { fill: Some(colour), ..Paint::default() }
     }
 
-    pub fn line(colour: &'a str, width_px: f64) -> Self {
+    pub(super) fn line(colour: &'a str, width_px: f64) -> Self {
         Paint { stroke: Some((colour, width_px)), ..Paint::default() }
     }
 }
@@ -51,7 +51,7 @@ pub(in crate::report) const fn set(size_px: u32, bold: bool, colour: &'static st
 }
 
 impl Type {
-    pub fn line_px(self) -> f64 {
+    pub(crate) fn line_px(self) -> f64 {
         f64::from(self.size_px) * 1.3
     }
 
@@ -67,7 +67,7 @@ impl Type {
         em * f64::from(self.size_px) * if self.bold { 1.13 } else { 1.0 }
     }
 
-    pub fn text_px(self, text: &str) -> f64 {
+    pub(crate) fn text_px(self, text: &str) -> f64 {
         text.chars().map(|c| self.char_px(c)).sum()
     }
 
@@ -97,7 +97,7 @@ impl Type {
     }
 
     /// Height of `text` wrapped to `width_px`.
-    pub fn height_px(self, text: &str, width_px: f64) -> f64 {
+    pub(super) fn height_px(self, text: &str, width_px: f64) -> f64 {
         self.wrap(text, width_px).len() as f64 * self.line_px()
     }
 }
@@ -151,18 +151,18 @@ impl Canvas {
     }
 
     /// Draws a rectangle between two corners, in either order.
-    pub fn rect(&mut self, (x1, y1): Position, (x2, y2): Position, paint: Paint) {
+    pub(super) fn rect(&mut self, (x1, y1): Position, (x2, y2): Position, paint: Paint) {
         let (x, y, width, height) =
             (Number(x1.min(x2)), Number(y1.min(y2)), Number((x2 - x1).abs()), Number((y2 - y1).abs()));
         self.shape(format!("<rect x=\"{x}\" y=\"{y}\" width=\"{width}\" height=\"{height}\""), paint);
     }
 
-    pub fn circle(&mut self, (x, y): Position, radius_px: f64, paint: Paint) {
+    pub(super) fn circle(&mut self, (x, y): Position, radius_px: f64, paint: Paint) {
         self.shape(format!("<circle cx=\"{}\" cy=\"{}\" r=\"{}\"", Number(x), Number(y), Number(radius_px)), paint);
     }
 
     /// Draws polylines as one path.
-    pub fn path(&mut self, runs: &[Vec<Position>], is_closed: bool, paint: Paint) {
+    pub(crate) fn path(&mut self, runs: &[Vec<Position>], is_closed: bool, paint: Paint) {
         let run = |points: &Vec<Position>| {
             let corners: Vec<String> = points.iter().map(|(x, y)| format!("{},{}", Number(*x), Number(*y))).collect();
             format!("M{}{}", corners.join(" L"), if is_closed { " Z" } else { "" })
@@ -173,7 +173,7 @@ impl Canvas {
         }
     }
 
-    pub fn line(&mut self, from: Position, to: Position, colour: &str, width_px: f64) {
+    pub(super) fn line(&mut self, from: Position, to: Position, colour: &str, width_px: f64) {
         self.path(&[vec![from, to]], false, Paint::line(colour, width_px));
     }
 
@@ -192,7 +192,7 @@ impl Canvas {
     }
 
     /// Draws a wrapped text with its top at `y`; returns the y below it.
-    pub fn block(&mut self, (x, y): Position, words: &str, set: Type, width_px: f64, anchor: Anchor) -> f64 {
+    pub(super) fn block(&mut self, (x, y): Position, words: &str, set: Type, width_px: f64, anchor: Anchor) -> f64 {
         let lines = set.wrap(words, width_px);
         for (k, line) in lines.iter().enumerate() {
             self.text((x, y + k as f64 * set.line_px() + f64::from(set.size_px)), line, set, anchor);
@@ -200,12 +200,12 @@ impl Canvas {
         y + lines.len() as f64 * set.line_px()
     }
 
-    pub fn paragraph(&mut self, at: Position, words: &str, set: Type, width_px: f64) -> f64 {
+    pub(crate) fn paragraph(&mut self, at: Position, words: &str, set: Type, width_px: f64) -> f64 {
         self.block(at, words, set, width_px, Anchor::Start)
     }
 
     /// Groups what `draw` draws. `attributes` are written verbatim; `tip` is the group's tooltip in browsers.
-    pub fn group(&mut self, attributes: &str, tip: &str, draw: impl FnOnce(&mut Self)) {
+    pub(crate) fn group(&mut self, attributes: &str, tip: &str, draw: impl FnOnce(&mut Self)) {
         self.element(&format!("<g {attributes}>"));
         self.depth += 1;
         if !tip.is_empty() {

@@ -102,7 +102,7 @@ impl<'a> Shown<'a> {
     }
 
     /// The panels row by row, and how many are in a row: one, or one per other vehicle where there are two.
-    pub fn panels(&self, which: TracePanels) -> (usize, Vec<Plot>) {
+    pub(super) fn panels(&self, which: TracePanels) -> (usize, Vec<Plot>) {
         let vehicles = self.series.iter().map(|s| s.trace.vehicles).max().unwrap_or(1);
         let of = |vehicle: usize| {
             let name = match (vehicles, vehicle) {
@@ -142,7 +142,7 @@ impl<'a> Shown<'a> {
     }
 
     /// Whether a step is shown at which the criteria ignore a vehicle that is present.
-    pub fn has_unjudged(&self) -> bool {
+    pub(super) fn has_unjudged(&self) -> bool {
         let unjudged = |trace: &Trace, step: &TracedStep| {
             step.others[..trace.vehicles].iter().any(|other| other.is_present && !other.is_judged)
         };
@@ -184,7 +184,7 @@ impl<'a> Shown<'a> {
     }
 
     /// Times of the lines through all panels; only for a single lane, because more would be confusing.
-    pub fn mark_lines(&self) -> Vec<(StepMark, f64)> {
+    fn mark_lines(&self) -> Vec<(StepMark, f64)> {
         let [series] = self.series else { return Vec::new() };
         let time = |mark: StepMark| Some((mark, series.trace.time_s(series.trace.step_of(mark)?)));
         StepMark::ALL.into_iter().filter_map(time).filter(|mark| mark.1 <= self.until_s).collect()

@@ -48,7 +48,7 @@ type Row = (String, [Option<Corners>; 3]);
 
 impl TraceFigure<'_> {
     /// The vehicles at the start and, for every lane, at its contact or smallest gap; a row each.
-    pub fn positions(&self) -> Figure {
+    pub(crate) fn positions(&self) -> Figure {
         let start = self.series.first().and_then(|s| {
             let name = format!("start: gap {} m", number(s.trace.initial_gap_m));
             Some((s.trace, s.trace.steps.first()?, name))

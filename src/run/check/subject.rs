@@ -126,7 +126,7 @@ impl Subject {
     ///
     /// # Errors
     /// As [`Subject::lane`].
-    pub fn case(&self, profile: &Profile, point: &Point) -> Result<Case> {
+    pub(super) fn case(&self, profile: &Profile, point: &Point) -> Result<Case> {
         match self {
             Subject::Plain(case, _) => plain(case, point, profile),
             Subject::Recorded(scenario, recorded) => {
@@ -216,12 +216,12 @@ impl Lane {
     }
 
     /// The same with every step.
-    pub fn trace(&self, profile: &Profile, category: Category, model: ModelId) -> Trace {
+    pub(super) fn trace(&self, profile: &Profile, category: Category, model: ModelId) -> Trace {
         Trace::record(profile, category, &self.case, &self.tables, self.headway, model)
     }
 
     /// Every step of an ego that never reacts.
-    pub fn unreacting(&self, profile: &Profile, category: Category) -> Trace {
+    pub(super) fn unreacting(&self, profile: &Profile, category: Category) -> Trace {
         self.trace(&without_reaction(profile), category, ModelId::Reg157)
     }
 }

@@ -8,24 +8,21 @@ use crate::model::profile::Profile;
 use crate::scenario::{Ahead, Case, Category, LANE_WIDTH_M, Lateral, Participant, Speed};
 
 /// Length of a vehicle, m.
-pub const LENGTH_M: f64 = 4.3;
+pub(super) const LENGTH_M: f64 = 4.3;
 /// Width of a vehicle, m.
-pub const WIDTH_M: f64 = 1.9;
+pub(super) const WIDTH_M: f64 = 1.9;
 /// Length of a stationary vehicle ahead of a cutting-out one, m.
-pub const STANDING_LENGTH_M: f64 = 5.0;
+pub(super) const STANDING_LENGTH_M: f64 = 5.0;
 /// Lateral distance that a cut-in covers, m.
-pub const CUT_IN_LATERAL_M: f64 = 3.5;
+pub(super) const CUT_IN_LATERAL_M: f64 = 3.5;
 /// Lateral distance that a cut-out covers, m.
-pub const CUT_OUT_LATERAL_M: f64 = 4.0;
-/// Minimum lateral speed of a lane change that has a series, m/s: such a lane change takes longer than any run.
-pub const MIN_LATERAL_MPS: f64 = 1e-3;
+pub(super) const CUT_OUT_LATERAL_M: f64 = 4.0;
 /// Time headway at which a following Reg157 or CCHDM starts, s.
 pub const NATIVE_THW_S: f64 = 2.0;
 /// Lateral acceleration of the run-up, m/s².
 const RUN_UP_MPS2: f64 = 1.5;
 
-/// A cut-in at constant speeds; `lateral_mps` is 0 or at least [`MIN_LATERAL_MPS`], `run_up` is the number of steps
-/// before the nominal start.
+/// A cut-in at constant speeds; `run_up` is the number of steps before the nominal start.
 pub fn cut_in(ego_mps: f64, cutter_mps: f64, lateral_mps: f64, run_up: u32, dt_s: f64) -> Case {
     Case {
         category: Category::CutIn,
@@ -52,7 +49,7 @@ pub fn gap_before_run_up(gap_m: f64, ego_mps: f64, cutter_mps: f64, run_up: u32,
 
 /// Number of steps of the comparison sweep's run-up: lateral speeds that increase from 0 to below the full speed (0,
 /// 0.15, 0.30, … m/s at 0.1 s), then one step at the full speed.
-pub fn run_up_steps(lateral_mps: f64, dt_s: f64) -> u32 {
+pub(super) fn run_up_steps(lateral_mps: f64, dt_s: f64) -> u32 {
     // Rounding may put the quotient of 0.3 and 0.15 above 2.
     (lateral_mps / run_up_step_mps(dt_s) - 1e-9).ceil().max(0.0) as u32 + 1
 }
@@ -144,7 +141,7 @@ pub fn native_distance_rss(profile: &Profile, v: f64) -> f64 {
 }
 
 /// The initial distance of a following model in the JRC's simulator, m; both vehicles have `speed_mps`.
-pub fn native_distance(profile: &Profile, model: ModelId, speed_mps: f64) -> f64 {
+pub(super) fn native_distance(profile: &Profile, model: ModelId, speed_mps: f64) -> f64 {
     match model {
         ModelId::Fsm => native_distance_fsm(profile, speed_mps),
         ModelId::Rss => native_distance_rss(profile, speed_mps),

@@ -123,7 +123,7 @@ impl GridMap {
     }
 
     /// Marks the cells whose outcome changes in a perturbed sweep of the same grid.
-    pub fn mark_undecided(&mut self, perturbed: &GridMap) {
+    pub(super) fn mark_undecided(&mut self, perturbed: &GridMap) {
         let cells = self.cell_count();
         let mut undecided = std::mem::take(&mut self.undecided);
         undecided.resize_with(self.models.len(), || std::array::from_fn(|_| vec![false; cells]));

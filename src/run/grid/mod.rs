@@ -21,7 +21,8 @@ use jrc_case::Front;
 pub use map::{Agreement, CellOutcome, GridMap, boundary, count, runs};
 pub use parameter::{MapParameter, MapQuantity, PARAMETERS, Point};
 pub use plan::{GridPart, GridPlan};
-pub use robustness::{GAP_M, Perturbation, SPEED_MPS, VARIED, without_reaction};
+pub(crate) use robustness::{GAP_M, SPEED_MPS, without_reaction};
+pub use robustness::{Perturbation, VARIED};
 pub use run::{Against, Map, MapGrids, MapOptions, MapResult, MappedGrid};
 
 pub use crate::scenario::{LANE_WIDTH_M, PlainCase};
@@ -33,7 +34,7 @@ use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
 /// Maximum number of cells of a grid.
-pub const MAX_CELLS: usize = 1_000_000;
+const MAX_CELLS: usize = 1_000_000;
 
 /// Maximum number of panels of a grid: a sheet shows every one.
 pub const MAX_PANELS: usize = 1000;

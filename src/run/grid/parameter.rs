@@ -45,7 +45,7 @@ pub enum MapQuantity {
 
 impl MapQuantity {
     /// Number of quantities.
-    pub const COUNT: usize = 16;
+    const COUNT: usize = 16;
 }
 
 /// A parameter as named in flags, tables and files.

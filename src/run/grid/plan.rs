@@ -96,7 +96,7 @@ impl GridPlan {
     ///
     /// # Errors
     /// As [`GridPlan::new`].
-    pub fn perturbed(&self, profile: &Profile, perturbation: Perturbation) -> Result<GridPlan> {
+    pub(super) fn perturbed(&self, profile: &Profile, perturbation: Perturbation) -> Result<GridPlan> {
         GridPlan::new(self.grid.perturbed(perturbation, profile), &perturbation.profile(profile)?, &self.models)
     }
 
@@ -104,7 +104,7 @@ impl GridPlan {
     ///
     /// # Errors
     /// As [`Grid::case`].
-    pub fn drives_through(&self) -> Result<Vec<bool>> {
+    pub(super) fn drives_through(&self) -> Result<Vec<bool>> {
         let Some(part) = self.parts.first() else { return Ok(Vec::new()) };
         let profile = &part.plan.profile;
         (0..self.grid.cell_count())

@@ -7,9 +7,9 @@ use crate::model::profile::{MAX_STEPS, Profile};
 use crate::scenario::Category;
 
 /// Change of a gap, a lateral distance, a width or a length, m.
-pub const GAP_M: f64 = 0.01;
+pub(crate) const GAP_M: f64 = 0.01;
 /// Change of a speed along the road, m/s: 0.1 km/h.
-pub const SPEED_MPS: f64 = 0.1 / 3.6;
+pub(crate) const SPEED_MPS: f64 = 0.1 / 3.6;
 /// Change of a lateral speed, m/s.
 const LATERAL_SPEED_MPS: f64 = 0.01;
 /// Change of a deceleration, m/s².
@@ -117,13 +117,13 @@ impl Perturbation {
     }
 
     /// Whether the perturbed case is computed in binary64, independent of the sweep's arithmetic.
-    pub fn is_binary64(self) -> bool {
+    pub(super) fn is_binary64(self) -> bool {
         self == Perturbation::FinerStep
     }
 
     /// The same point with another value of an input, except the gap. An input that the point does not have, and a
     /// value that would make the case contradictory, stay as they are.
-    pub fn of_inputs(self, mut point: Point) -> Point {
+    pub(super) fn of_inputs(self, mut point: Point) -> Point {
         let Some((quantity, by)) = self.change().filter(|(quantity, _)| *quantity != MapQuantity::Gap) else {
             return point;
         };
@@ -149,7 +149,7 @@ impl Perturbation {
     }
 
     /// The same with another gap too; a time headway is changed by the time equivalent of 1 cm.
-    pub fn of_point(self, point: Point) -> Point {
+    pub(crate) fn of_point(self, point: Point) -> Point {
         let point = self.of_inputs(point);
         let ego_mps = point.get(MapQuantity::EgoSpeed).unwrap_or(0.0);
         match (point.get(MapQuantity::Gap), point.get(MapQuantity::Thw)) {
@@ -163,7 +163,7 @@ impl Perturbation {
 }
 
 /// The profile under which Reg157 never reacts: the ego keeps its speed. A collision there is a conflict.
-pub fn without_reaction(profile: &Profile) -> Profile {
+pub(crate) fn without_reaction(profile: &Profile) -> Profile {
     let mut without = profile.clone();
     without.reg157.always_unsafe.clear();
     // No lateral gap is below this.

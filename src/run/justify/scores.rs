@@ -66,12 +66,7 @@ impl Labels<'_> {
             let mut counts = Confusion::<u32>::default();
             for headway in (0..self.headways).filter(|&headway| holds(unit, headway)) {
                 let [s, parameterized] = [0, variant].map(|variant| (self.failed)(unit, variant, headway));
-                match (s, parameterized) {
-                    (true, true) => counts.tp += 1,
-                    (true, false) => counts.fn_ += 1,
-                    (false, true) => counts.fp += 1,
-                    (false, false) => counts.tn += 1,
-                }
+                counts.count(s, parameterized);
             }
             counts
         };
@@ -100,7 +95,7 @@ impl Labels<'_> {
     }
 
     /// Scores by headway, by thirds of the ego's speed, and by thirds of the severity of the failures of S.
-    pub fn groups(
+    pub(super) fn groups(
         &self,
         variant: usize,
         headways: &[String],
@@ -197,7 +192,7 @@ impl<'a> Replay<'a> {
     ///
     /// # Errors
     /// [`Error::Input`] for one that is impossible with this data.
-    pub fn variant(&self, id: &Parameterization) -> Result<usize> {
+    pub(super) fn variant(&self, id: &Parameterization) -> Result<usize> {
         let variants = &self.plan().blocks[0].variants;
         let held_out = format!("{}{CROSS_VALIDATED}", id.key);
         // A basis that has seen the scenario flatters itself.
@@ -217,7 +212,7 @@ impl<'a> Replay<'a> {
     }
 
     /// Labels by a function that says whether a lane failed.
-    pub fn labels<'f>(&self, failed: &'f dyn Fn(usize, usize, usize) -> bool) -> Labels<'f> {
+    pub(super) fn labels<'f>(&self, failed: &'f dyn Fn(usize, usize, usize) -> bool) -> Labels<'f> {
         let plan = self.plan();
         Labels { units: plan.blocks[0].units.len() as usize, headways: plan.headways.len(), failed }
     }

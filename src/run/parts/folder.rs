@@ -14,7 +14,7 @@ use crate::{Error, Place, Result};
 
 /// Part files of a folder, identified by their names.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Found {
+struct Found {
     /// Shards with their files, in the order of their units.
     pub parts: Vec<(Shard, PathBuf)>,
 }
@@ -27,7 +27,7 @@ const NAMED: usize = 10;
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] with the missing or duplicate parts and the commands that make them.
-pub fn collect(dir: &Path, units: u64, again: impl Fn(Shard) -> String) -> Result<Found> {
+fn collect(dir: &Path, units: u64, again: impl Fn(Shard) -> String) -> Result<Found> {
     let io = |e| Error::io(dir, "list", e);
     let mut parts: Vec<(Shard, PathBuf)> = Vec::new();
     for entry in std::fs::read_dir(dir).map_err(io)? {
@@ -61,7 +61,7 @@ pub fn collect(dir: &Path, units: u64, again: impl Fn(Shard) -> String) -> Resul
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] with the missing, duplicate, foreign or damaged parts, and the command from `again`.
-pub fn read_parts<T: MergeableCounts>(
+pub(crate) fn read_parts<T: MergeableCounts>(
     dir: &Path,
     run_sha256: &str,
     units: u64,

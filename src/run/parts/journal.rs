@@ -136,7 +136,7 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
     }
 
     /// Whether the next record is due.
-    pub fn is_due(&self) -> bool {
+    pub(super) fn is_due(&self) -> bool {
         Instant::now() >= self.due
     }
 
@@ -210,13 +210,13 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
     }
 
     /// The path of the file.
-    pub fn path(&self) -> &Path {
+    pub(crate) fn path(&self) -> &Path {
         &self.path
     }
 }
 
 /// The run that a journal belongs to; `None` for another kind of file, and without a complete first line.
-pub fn run_of_journal(path: &Path) -> Option<String> {
+pub(crate) fn run_of_journal(path: &Path) -> Option<String> {
     refuse_link(path).ok()?;
     let line = json_line(&mut BufReader::new(File::open(path).ok()?), MAX_HEAD_BYTES).ok()??;
     serde_json::from_slice::<Head>(checked(&line)?).ok().map(|head| head.run_sha256)

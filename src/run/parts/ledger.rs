@@ -31,7 +31,7 @@ pub struct Counted<T> {
 }
 
 /// The journal of a ledger.
-pub type CountsJournal<T> = Journal<Counted<T>>;
+type CountsJournal<T> = Journal<Counted<T>>;
 
 /// Finished counts of an interval of units. If the interval has cuts (the checkpoints of a sampling run), counts on the
 /// two sides of a cut are kept apart.
@@ -140,7 +140,7 @@ impl<T: MergeableCounts> Ledger<T> {
     ///
     /// # Errors
     /// Those of the sweep and of the journal.
-    pub fn kept<R>(&mut self, swept: Result<R>) -> Result<R> {
+    pub(crate) fn kept<R>(&mut self, swept: Result<R>) -> Result<R> {
         match swept {
             Err(Error::Interrupted { .. }) if self.journal.is_some() => {
                 self.flush()?;
@@ -176,7 +176,7 @@ impl<T: MergeableCounts> Ledger<T> {
     }
 
     /// Lanes of all counts, of this process and of earlier ones: those computed by the fallback, and those rechecked.
-    pub fn redone_and_rechecked(&self) -> [u64; 2] {
+    pub(crate) fn redone_and_rechecked(&self) -> [u64; 2] {
         let mut sum = self.redone_and_rechecked;
         self.pending.iter().for_each(|pending| add(&mut sum, pending.redone_and_rechecked));
         sum

@@ -10,11 +10,15 @@ mod ledger;
 mod run_dir;
 mod sealed;
 
-pub use folder::{Found, Part, collect, read_part, read_parts, write_part};
-pub use journal::{Journal, Records, run_of_journal};
-pub use ledger::{Counted, CountsJournal, Ledger, MergeableCounts};
-pub use run_dir::{PLAN_FILE, RUN_PLAN_FILE, RunDir, RunState, leave_plan, units_of};
-pub use sealed::{kind_of, read_sealed, read_sealed_line, seal, unseal};
+pub(crate) use folder::read_parts;
+pub use folder::{Part, read_part, write_part};
+pub(crate) use journal::run_of_journal;
+pub use journal::{Journal, Records};
+pub use ledger::{Counted, Ledger, MergeableCounts};
+pub use run_dir::{PLAN_FILE, RUN_PLAN_FILE};
+pub(crate) use run_dir::{RunDir, RunState, leave_plan, units_of};
+pub(crate) use sealed::{kind_of, read_sealed};
+pub use sealed::{read_sealed_line, seal, unseal};
 
 use std::ops::Range;
 use std::str::FromStr;
@@ -34,7 +38,7 @@ const INDICES: [&str; 2] = ["JOB_COMPLETION_INDEX", "SLURM_ARRAY_TASK_ID"];
 
 impl Shard {
     /// Maximum number of shards: more than any cluster runs at once.
-    pub const MAX_SHARDS: u64 = 100_000;
+    const MAX_SHARDS: u64 = 100_000;
 
     /// The units of this shard, out of `count`.
     pub fn units(&self, count: u64) -> Range<u64> {
@@ -44,12 +48,12 @@ impl Shard {
     }
 
     /// File name of its files without the extension: `part-00003-of-00020`.
-    pub fn stem(&self) -> String {
+    fn stem(&self) -> String {
         format!("part-{:05}-of-{:05}", self.index, self.of)
     }
 
     /// The shard at the beginning of a file name.
-    pub fn of_stem(stem: &str) -> Option<Shard> {
+    fn of_stem(stem: &str) -> Option<Shard> {
         let (index, of) = stem.strip_prefix("part-")?.split_once("-of-")?;
         let shard = Shard { index: index.parse().ok()?, of: of.parse().ok()? };
         (shard.stem() == stem).then_some(shard)
@@ -59,7 +63,7 @@ impl Shard {
     ///
     /// # Errors
     /// A sentence that says what is wrong and what to write.
-    pub fn parse(text: &str, environment: impl Fn(&str) -> Option<String>) -> Result<Shard, String> {
+    fn parse(text: &str, environment: impl Fn(&str) -> Option<String>) -> Result<Shard, String> {
         let form = "write i/n with i from 0 to n - 1, such as 0/20, or auto/n in a Slurm array or an Indexed Job";
         let (index, of) = text.split_once('/').ok_or(form)?;
         let number = |text: &str| text.trim().parse::<u64>().map_err(|_| form.to_owned());

@@ -77,7 +77,12 @@ pub fn unseal<T: DeserializeOwned>(kind: &str, text: &[u8], place: &Place, again
 /// # Errors
 /// [`Error::Io`]; as [`unseal`].
 /// [`Error::Io`]; as [`unseal`].
-pub fn read_sealed<T: DeserializeOwned>(kind: &str, path: &Path, max_bytes: u64, again: &str) -> Result<(T, String)> {
+pub(crate) fn read_sealed<T: DeserializeOwned>(
+    kind: &str,
+    path: &Path,
+    max_bytes: u64,
+    again: &str,
+) -> Result<(T, String)> {
     let (begin, end) = ends(&mut open(path)?).map_err(|e| Error::io(path, "read", e))?;
     let wrong = |problem: String| Error::input(Place::file(path), problem, again);
     check_begin(kind, &begin).map_err(wrong)?;
@@ -181,7 +186,7 @@ pub(super) fn json_line(file: &mut impl BufRead, max_bytes: u64) -> std::io::Res
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] for a file that is not sealed.
-pub fn kind_of(path: &Path) -> Result<String> {
+pub(crate) fn kind_of(path: &Path) -> Result<String> {
     let mut text = Vec::new();
     let file = open(path)?;
     file.take(MAX_HEAD as u64).read_to_end(&mut text).map_err(|e| Error::io(path, "read", e))?;

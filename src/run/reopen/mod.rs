@@ -216,7 +216,7 @@ impl Reopened {
     ///
     /// # Errors
     /// [`Error::Usage`] for a model that is not in the plan.
-    pub fn model(&self, id: ModelId) -> Result<usize> {
+    fn model(&self, id: ModelId) -> Result<usize> {
         let models = &self.plan().models;
         models.iter().position(|m| *m == id).ok_or_else(|| {
             let names: Vec<&str> = models.iter().map(|m| m.name()).collect();

@@ -19,7 +19,6 @@ pub use claims::{Claim, ClaimResult, ClaimRow, ClaimVerdict, check_claims};
 pub use difference::{Contrast, ScenarioRate, ScoreInterval, min_contrast};
 pub use headways::HeadwayFailures;
 pub use mean::{MeanF1, equal_f1, pareto_front};
-pub use paper_claims::paper_claims;
 pub use published::{Misfit, PublishedFailures, published_failures, published_lvd_f1};
 pub use statistic::Statistic;
 

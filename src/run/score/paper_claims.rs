@@ -12,7 +12,7 @@ fn cells(models: &[ModelId], criteria: &[Criterion]) -> Vec<(ModelId, Criterion)
 }
 
 /// The claims of the paper.
-pub fn paper_claims() -> Vec<Claim> {
+pub(super) fn paper_claims() -> Vec<Claim> {
     use Category::{CutIn, CutOut, Lvd};
     use Criterion::{Btn, Collision, Ttc};
     use ModelId::{Cchdm, Fsm, Reg157, Rss};

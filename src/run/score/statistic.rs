@@ -69,7 +69,7 @@ impl<'a> Scenarios<'a> {
     }
 
     /// Number of scenarios in which S fails in one of these cells.
-    pub fn failing(self, cells: &[(ModelId, Criterion)]) -> u64 {
+    pub(super) fn failing(self, cells: &[(ModelId, Criterion)]) -> u64 {
         let places: Vec<usize> = cells.iter().filter_map(|&(m, c)| self.scores.index(0, m, c)).collect();
         let fails = |unit: &&UnitCounts| places.iter().any(|&at| unit.cells.get(at).is_some_and(|c| c.tp > 0));
         self.units.iter().filter(fails).count() as u64
@@ -125,7 +125,7 @@ impl Statistic {
     }
 
     /// The compared models other than the cell's own.
-    pub fn models(&self) -> Vec<ModelId> {
+    pub(super) fn models(&self) -> Vec<ModelId> {
         match *self {
             Statistic::FailsMoreOften(often, seldom) => [often, seldom].concat(),
             _ => Vec::new(),
@@ -133,7 +133,7 @@ impl Statistic {
     }
 
     /// The required variants.
-    pub fn variants(&self) -> Vec<&'static str> {
+    pub(super) fn variants(&self) -> Vec<&'static str> {
         match *self {
             Statistic::F1Above(a, b) => [a, b].concat(),
             Statistic::F1Below(v, _) => vec![v],

@@ -131,7 +131,7 @@ impl CmaEs {
     }
 
     /// Whether the search cannot get on: its largest standard deviation is below `min_step`, or C is degenerate.
-    pub fn has_ended(&self, min_step: f64) -> bool {
+    pub(super) fn has_ended(&self, min_step: f64) -> bool {
         let (longest, shortest) = (self.lengths.max(), self.lengths.min());
         let goes_on = self.step * longest >= min_step && longest <= MAX_AXIS_RATIO * shortest;
         !(goes_on && self.step.is_finite())

@@ -39,7 +39,7 @@ pub(super) enum Training<'a> {
 
 /// How a description did.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Evaluation {
+pub(super) struct Evaluation {
     /// Counts per scenario: model-major, criterion-minor.
     pub units: Vec<Vec<Confusion<u32>>>,
     /// Root mean square error of the motions, in standard deviations of each series.
@@ -48,7 +48,7 @@ pub struct Evaluation {
 
 impl Evaluation {
     /// The counts of a model and criterion over all scenarios.
-    pub fn totals(&self) -> Vec<Confusion> {
+    pub(super) fn totals(&self) -> Vec<Confusion> {
         let mut totals = vec![Confusion::default(); self.units.first().map_or(0, Vec::len)];
         self.units.iter().for_each(|unit| totals.iter_mut().zip(unit).for_each(|(total, cell)| total.add(cell)));
         totals
@@ -137,7 +137,7 @@ impl<'a> Evaluator<'a> {
 
     /// F1 of an S' that fails from the same headways in every scenario, those that suit best; the mean over the models.
     /// `None` for other objectives, and if S never fails.
-    pub fn headway_only(&self, scope: Scope, options: &SearchOptions) -> Option<f64> {
+    pub(super) fn headway_only(&self, scope: Scope, options: &SearchOptions) -> Option<f64> {
         let (models, scenarios) = (ModelId::ALL.len(), self.scenarios.len() as f64);
         let headways = options.headways.len();
         let of_model = |model: ModelId| {

@@ -6,7 +6,7 @@ use crate::scenario::Scenario;
 use crate::{Error, Place, Result};
 
 /// Whether there are enough recordings, so that each stays whole.
-pub fn is_by_recording(scenarios: &[&Scenario], count: usize) -> bool {
+pub(crate) fn is_by_recording(scenarios: &[&Scenario], count: usize) -> bool {
     scenarios.iter().map(|scenario| &scenario.recording).collect::<BTreeSet<_>>().len() >= count
 }
 

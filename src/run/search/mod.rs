@@ -18,8 +18,8 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 pub use cma_es::CmaEs;
-pub use evaluation::Evaluation;
-pub use folds::{folds, is_by_recording};
+pub use folds::folds;
+pub(crate) use folds::is_by_recording;
 pub use front::{Front, FrontPoint, Judged, RmseAgainstScore, Scored, SearchResult, Unkept};
 
 use candidates::Task;
@@ -156,7 +156,7 @@ pub enum Candidate {
 
 impl Candidate {
     /// Number of parameters that a point has; the duration counts where it is needed.
-    pub fn parameter_count(&self, category: Category) -> usize {
+    fn parameter_count(&self, category: Category) -> usize {
         use crate::scenario::parameterization::Parameterization;
         match self {
             Candidate::Paper(key) => Parameterization::find(category, key)
@@ -303,7 +303,7 @@ impl<'a> Search<'a> {
     }
 
     /// Whether the folds are whole recordings.
-    pub fn is_by_recording(&self) -> bool {
+    fn is_by_recording(&self) -> bool {
         is_by_recording(&self.scenarios, self.options.limits.folds)
     }
 

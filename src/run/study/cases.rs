@@ -50,7 +50,7 @@ impl CaseSource for CaseTable {
 }
 
 /// Number of scenarios whose cases are held at once, about 25 kB each.
-pub const WINDOW: u64 = 2048;
+pub(crate) const WINDOW: u64 = 2048;
 /// The same for a device, which needs many lanes at once.
 const DEVICE_WINDOW: u64 = 16_384;
 
@@ -132,7 +132,7 @@ impl StudyCases {
     ///
     /// # Errors
     /// Those of `each`, and as [`StudyCases::window`].
-    pub fn in_windows(
+    pub(crate) fn in_windows(
         &self,
         units: Range<u64>,
         max_units: u64,

@@ -167,7 +167,7 @@ pub struct ParameterHistogram {
 ///
 /// # Errors
 /// Those of a scenario that lacks these parameters.
-pub fn parameter_histograms(
+fn parameter_histograms(
     category: Category,
     scenarios: &[&Scenario],
     options: &ParameterizationOptions,

@@ -13,10 +13,10 @@ mod robustness;
 mod run;
 
 pub use cases::StudyCases;
-pub use cases::WINDOW;
+pub(crate) use cases::WINDOW;
 pub use evaluation::{CategoryNumbers, StudyEvaluation};
 use facts::category_facts;
-pub use facts::{CategoryProvenance, ParameterHistogram, StudyProvenance, parameter_histograms};
+pub use facts::{CategoryProvenance, ParameterHistogram, StudyProvenance};
 pub use given::GivenReplay;
 pub use plan::{StudyOptions, outline_study, plan_study};
 pub use plan_file::StudyHead;
@@ -183,7 +183,7 @@ impl StudyBuilder<'_> {
 
 impl Study {
     /// Kind of the sealed plan file.
-    pub const KIND: &str = "study plan";
+    pub(super) const KIND: &str = "study plan";
 
     /// Begins a study of the kept scenarios.
     pub fn builder(collection: &Collection, profile: Profile) -> StudyBuilder<'_> {

@@ -17,7 +17,7 @@ pub enum BandwidthRule {
 
 impl BandwidthRule {
     /// The interval for N points in d dimensions.
-    pub fn interval(self, points: usize, dimensions: usize) -> [f64; 2] {
+    fn interval(self, points: usize, dimensions: usize) -> [f64; 2] {
         let silverman = silverman(points, dimensions);
         let upper = match self {
             BandwidthRule::Reduction => silverman,
@@ -65,7 +65,7 @@ pub struct Bandwidth {
 const TOLERANCE: f64 = 1e-5;
 
 /// h_S = (4/(d + 2))^{1/(d + 4)} N^{−1/(d + 4)}.
-pub fn silverman(points: usize, dimensions: usize) -> f64 {
+fn silverman(points: usize, dimensions: usize) -> f64 {
     let d = dimensions as f64;
     libm::pow(4.0 / (d + 2.0) / points as f64, 1.0 / (d + 4.0))
 }
@@ -120,7 +120,7 @@ impl LeaveOneOut {
     }
 
     /// The best bandwidth in the rule's interval.
-    pub fn search(&self, rule: BandwidthRule) -> Bandwidth {
+    pub(super) fn search(&self, rule: BandwidthRule) -> Bandwidth {
         let n = self.nearest.len();
         let [lower, upper] = rule.interval(n, self.columns.len());
         let inverse_golden = (5.0_f64.sqrt() - 1.0) / 2.0;

@@ -12,7 +12,7 @@ use crate::{Error, Place, Result};
 const BLOCKS_PER_ATTEMPT: u32 = 8;
 
 /// Maximum number of parameters of a mixture: one attempt uses 32 words, the first of which selects the component.
-pub const MAX_DIMENSIONS: usize = 4 * BLOCKS_PER_ATTEMPT as usize - 1;
+const MAX_DIMENSIONS: usize = 4 * BLOCKS_PER_ATTEMPT as usize - 1;
 
 /// Sums skip components further than this below the largest, in ln: each is less than 3e-20 of it.
 const NEGLIGIBLE: f64 = 45.0;
@@ -222,7 +222,7 @@ impl Mixture {
     ///
     /// # Errors
     /// As [`Mixture::new`].
-    pub fn scaled(&self, factor: f64) -> Result<Mixture> {
+    pub(crate) fn scaled(&self, factor: f64) -> Result<Mixture> {
         let factors = self.factors.iter().map(|own| own * factor.sqrt()).collect();
         Mixture::new(self.weights.clone(), self.means.clone(), factors, self.factor_of.clone())
     }
@@ -232,7 +232,7 @@ impl Mixture {
     ///
     /// # Errors
     /// [`Error::Usage`] if the sum has no triangular factor.
-    pub fn widened(&self, covariance: &DMatrix<f64>, fraction: f64) -> Result<Mixture> {
+    fn widened(&self, covariance: &DMatrix<f64>, fraction: f64) -> Result<Mixture> {
         let widen = |factor: &DMatrix<f64>| {
             Cholesky::new(covariance * fraction + factor * factor.transpose()).map(Cholesky::unpack)
         };

@@ -60,7 +60,7 @@ pub fn standard_deviation(values: &[f64]) -> f64 {
 }
 
 /// Quantile of values in rising order, at least one.
-pub fn quantile(sorted: &[f64], probability: f64) -> f64 {
+fn quantile(sorted: &[f64], probability: f64) -> f64 {
     let position = probability.clamp(0.0, 1.0) * (sorted.len() - 1) as f64;
     let below = position as usize;
     let above = (below + 1).min(sorted.len() - 1);

@@ -242,7 +242,7 @@ impl ParameterSpace {
     }
 
     /// Returns the first bound of the valid region that a draw violates.
-    pub fn check_draw(&self, point: &[f64]) -> std::result::Result<(), Invalid> {
+    pub(super) fn check_draw(&self, point: &[f64]) -> std::result::Result<(), Invalid> {
         self.check(point)?;
         self.drawn.iter().zip(point).try_for_each(|(parameter, value)| in_bounds(parameter, *value))?;
         let Some(reduction) = &self.reduction else { return Ok(()) };

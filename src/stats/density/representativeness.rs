@@ -29,13 +29,13 @@ use crate::scenario::Scenario;
 use crate::{Error, Place, Result};
 
 /// β of the metric.
-pub const BETA: f64 = 0.25;
+const BETA: f64 = 0.25;
 /// Maximum number of points of a set; larger sets are subsampled.
-pub const MAX_SET: usize = 256;
+const MAX_SET: usize = 256;
 /// ε of the Sinkhorn divergence, as a fraction of the mean distance between training and test scenarios.
 const SINKHORN_EPSILON: f64 = 0.05;
 /// Random splits.
-pub const REPETITIONS: usize = 5;
+const REPETITIONS: usize = 5;
 /// Maximum number of draws per required valid scenario before a split fails.
 const MAX_TRIES: u64 = 1000;
 /// [`Stream::purpose`] of splits and draws; the repetition is added.
@@ -91,7 +91,7 @@ impl Representativeness {
     /// # Errors
     /// [`Error::Input`] if a training part is too small or too uniform to be fitted, or its density hardly ever gives a
     /// valid scenario.
-    pub fn estimate(
+    pub(super) fn estimate(
         space: &ParameterSpace,
         scenarios: &[&Scenario],
         options: &FitOptions,

@@ -35,7 +35,7 @@ const PRECISION: f64 = 1e-6;
 /// Sinkhorn divergence between two sets of points with equal weights and Euclidean distance: the transport with entropic
 /// regularization ε > 0, less half of that of each set to itself. It is 0 for equal sets, and W for ε → 0 (Feydy et al.,
 /// "Interpolating between optimal transport and MMD using Sinkhorn divergences", AISTATS 2019).
-pub fn sinkhorn(a: &[Vec<f64>], b: &[Vec<f64>], epsilon: f64) -> f64 {
+pub(super) fn sinkhorn(a: &[Vec<f64>], b: &[Vec<f64>], epsilon: f64) -> f64 {
     regularized(a, b, epsilon) - 0.5 * (regularized(a, a, epsilon) + regularized(b, b, epsilon))
 }
 

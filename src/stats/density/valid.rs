@@ -11,10 +11,10 @@ use crate::random::Stream;
 use crate::{Error, Place, Result};
 
 /// [`Stream::purpose`] of these draws.
-pub const VALID_FRACTION_PURPOSE: u32 = 0x7661_6c64;
+const VALID_FRACTION_PURPOSE: u32 = 0x7661_6c64;
 
 /// Default number of draws: the standard error is at most 0.0016.
-pub const VALID_FRACTION_DRAWS: u64 = 100_000;
+pub(super) const VALID_FRACTION_DRAWS: u64 = 100_000;
 
 /// Number of draws that violate one bound first.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -158,7 +158,7 @@ fn begins_formula(text: &str) -> bool {
 
 /// Protects a text so that a spreadsheet shows it and does not compute it: `=1+1` becomes `'=1+1`. Numbers are
 /// unchanged.
-pub fn cell_text(text: &str) -> Cow<'_, str> {
+fn cell_text(text: &str) -> Cow<'_, str> {
     match begins_formula(text) && text.parse::<f64>().is_err() {
         true => Cow::Owned(format!("'{text}")),
         false => Cow::Borrowed(text),

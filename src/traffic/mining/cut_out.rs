@@ -18,7 +18,7 @@ use crate::scenario::{Category, Scenario, Side};
 use crate::traffic::trajectory::Track;
 
 /// The items, in order.
-pub const ITEMS: [Item<'static, Tags>; 2] =
+pub(super) const ITEMS: [Item<'static, Tags>; 2] =
     [&|t: &Tags| t.has(Tags::CHANGES_OUT | Tags::EGO_KEEPS_LANE | Tags::LEADER), &|t: &Tags| {
         t.has(Tags::CHANGES_OUT | Tags::EGO_KEEPS_LANE) && !t.has(Tags::LEADER)
     }];

@@ -63,7 +63,7 @@ impl<'a> DataSet<'a> {
     }
 
     /// All vehicles that lead at some sample, in the order of their first leading sample.
-    pub fn leaders(&self) -> Vec<usize> {
+    pub(super) fn leaders(&self) -> Vec<usize> {
         let mut leaders: Vec<usize> = Vec::new();
         let mut last = None;
         for leader in self.leader.iter().flatten().map(|&l| l as usize) {
@@ -77,12 +77,12 @@ impl<'a> DataSet<'a> {
 
     /// The vehicle with track `other` is within range (along the road, centre to centre) at the ego's sample `k`, the other's sample
     /// `j`.
-    pub fn in_range(&self, k: usize, other: &Track, j: usize) -> bool {
+    pub(super) fn in_range(&self, k: usize, other: &Track, j: usize) -> bool {
         (other.s_m[j] - self.ego.s_m[k]).abs() <= self.recording_tags.options.ego_view.range_m + TOLERANCE
     }
 
     /// The lateral position `d_m` is in `lane`.
-    pub fn in_lane(&self, lane: u16, d_m: f64) -> bool {
+    pub(super) fn in_lane(&self, lane: u16, d_m: f64) -> bool {
         self.carriageway
             .lane(usize::from(lane))
             .is_some_and(|lane| lane.left_m - d_m >= -TOLERANCE && lane.right_m - d_m <= TOLERANCE)
@@ -95,7 +95,7 @@ impl<'a> DataSet<'a> {
 
     /// Vehicles ahead of `s_m` in the ego's lane and in range at the ego's sample `k`, nearest first:
     /// index of the track, its sample.
-    pub fn ahead_in_lane(&self, k: usize, s_m: f64) -> impl Iterator<Item = (usize, usize)> {
+    pub(super) fn ahead_in_lane(&self, k: usize, s_m: f64) -> impl Iterator<Item = (usize, usize)> {
         let options = self.recording_tags.options;
         let lane = self.ego.lane[k];
         let horizon = self.ego.s_m[k] + options.ego_view.range_m + TOLERANCE;
@@ -118,7 +118,7 @@ impl<'a> DataSet<'a> {
     }
 
     /// The tags of the ego and the target with index `target`, where the target is in the data set.
-    pub fn stretches(&self, target_index: usize) -> Vec<Stretch> {
+    pub(super) fn stretches(&self, target_index: usize) -> Vec<Stretch> {
         let target = &self.recording_tags.recording.tracks[target_index];
         let offset = self.ego.first_frame - target.first_frame; // target's sample = ego's sample + offset
         let first = (-offset).max(0);
@@ -170,12 +170,12 @@ pub(super) struct FoundScenario<'a> {
 
 impl FoundScenario<'_> {
     /// Sample of `other` at the ego's sample `k`; `None` where it is not in view.
-    pub fn sample_of(&self, other: &Track, k: usize) -> Option<usize> {
+    pub(super) fn sample_of(&self, other: &Track, k: usize) -> Option<usize> {
         other.index_of(self.frame(k))
     }
 
     /// Frame of the ego's sample `k`.
-    pub fn frame(&self, k: usize) -> i64 {
+    pub(super) fn frame(&self, k: usize) -> i64 {
         self.set.ego.first_frame + k as i64
     }
 
@@ -187,7 +187,7 @@ impl FoundScenario<'_> {
 
     /// The scenario with `y > 0` on `side`, not kept, without what only some categories have. `None` if the target is
     /// not always in view or the ego is in no lane, which cannot occur in a match.
-    pub fn scenario(&self, side: Side) -> Option<Scenario> {
+    pub(super) fn scenario(&self, side: Side) -> Option<Scenario> {
         let DataSet { ego, recording_tags, .. } = self.set;
         let lane = self.lane()?;
         let (first, last) = (self.sample_of(self.target, self.start)?, self.sample_of(self.target, self.end)?);
@@ -226,7 +226,7 @@ impl FoundScenario<'_> {
     }
 
     /// Sizes and series of another vehicle, `y > 0` on `side`; `None` if it is not always in view.
-    pub fn other(&self, other: &Track, side: Side) -> Option<Other> {
+    pub(super) fn other(&self, other: &Track, side: Side) -> Option<Other> {
         let centre_m = self.lane()?.centre_m();
         let (first, last) = (self.sample_of(other, self.start)?, self.sample_of(other, self.end)?);
         Some(Other {
@@ -322,7 +322,7 @@ impl FrameIndex {
 
     /// All vehicles on the carriageway at sample `k` of the track with index `track`, that vehicle included, whose
     /// centre is ahead of `s_m` and at most at `s_max_m`; nearest first.
-    pub fn ahead(&self, track: usize, k: usize, s_m: f64, s_max_m: f64) -> impl Iterator<Item = &VehicleAtFrame> {
+    fn ahead(&self, track: usize, k: usize, s_m: f64, s_max_m: f64) -> impl Iterator<Item = &VehicleAtFrame> {
         let slot = self.base[track] + k;
         let entries = &self.entries[self.begin[slot]..self.begin[slot + 1]];
         let from = entries.partition_point(|n| n.s_m <= s_m);

@@ -74,7 +74,7 @@ pub fn lane_changes(d_m: &[f64], lane: Lane, frame_rate_hz: f64, options: &Later
 }
 
 /// The lane change in progress at sample `k`, if any.
-pub fn lane_change_at(changes: &[LaneChange], k: usize) -> Option<&LaneChange> {
+pub(super) fn lane_change_at(changes: &[LaneChange], k: usize) -> Option<&LaneChange> {
     changes.iter().find(|c| c.start <= k && k < c.end)
 }
 

@@ -16,7 +16,7 @@
 
 mod collection;
 pub mod cut_in;
-pub mod cut_out;
+mod cut_out;
 mod data_set;
 pub mod lateral;
 pub mod longitudinal;

@@ -46,7 +46,7 @@ impl std::ops::BitOr for Tags {
 
 /// Activities of a vehicle over its whole track; computed once for all egos.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Activities {
+pub(super) struct Activities {
     /// Accelerating, decelerating, cruising.
     pub longitudinal: Vec<LongitudinalEvent>,
     /// Lane changes relative to each lane of the carriageway; empty if the vehicle reaches no line.
@@ -72,22 +72,22 @@ impl Activities {
     }
 
     /// Changes lane somewhere.
-    pub fn changes_lane(&self) -> bool {
+    pub(super) fn changes_lane(&self) -> bool {
         self.lane_changes.iter().any(|changes| !changes.is_empty())
     }
 
     /// Decelerates somewhere.
-    pub fn decelerates(&self) -> bool {
+    pub(super) fn decelerates(&self) -> bool {
         self.longitudinal.iter().any(|e| e.activity == Longitudinal::Decelerating)
     }
 
     /// The lane change relative to `lane` in progress at sample `k`.
-    pub fn lane_change(&self, lane: u16, k: usize) -> Option<&LaneChange> {
+    pub(super) fn lane_change(&self, lane: u16, k: usize) -> Option<&LaneChange> {
         lane_change_at(self.lane_changes.get(usize::from(lane))?, k)
     }
 
     /// The longitudinal activity at sample `k`.
-    pub fn longitudinal_at(&self, k: usize) -> Option<Longitudinal> {
+    pub(super) fn longitudinal_at(&self, k: usize) -> Option<Longitudinal> {
         let after = self.longitudinal.partition_point(|e| e.start <= k);
         Some(self.longitudinal.get(after.checked_sub(1)?)?.activity)
     }

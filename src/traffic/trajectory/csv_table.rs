@@ -146,7 +146,7 @@ impl CsvTable {
     }
 
     /// Whether numbers have commas in place of points.
-    pub fn has_decimal_commas(&self) -> bool {
+    pub(super) fn has_decimal_commas(&self) -> bool {
         self.decimal_commas
     }
 
@@ -169,7 +169,7 @@ impl CsvTable {
     ///
     /// # Errors
     /// If the header has it twice.
-    pub fn optional_column(&self, name: &str) -> Result<Option<CsvColumn>> {
+    pub(super) fn optional_column(&self, name: &str) -> Result<Option<CsvColumn>> {
         let mut found = self.header.iter().enumerate().filter(|(_, header)| *header == name);
         let first = found.next().map(|(index, _)| CsvColumn(index));
         if found.next().is_some() {
@@ -183,17 +183,17 @@ impl CsvTable {
     }
 
     /// A header name that looks like a spelling of `name` (`lane_id` for `laneId`).
-    pub fn similar_name(&self, name: &str) -> Option<&str> {
+    pub(super) fn similar_name(&self, name: &str) -> Option<&str> {
         nearest(name, self.strange_names(), 0.75)
     }
 
     /// The bytes of a field.
-    pub fn bytes(&self, column: CsvColumn) -> &[u8] {
+    fn bytes(&self, column: CsvColumn) -> &[u8] {
         self.bytes_at(column.0)
     }
 
     /// The bytes of the field at a position of the header.
-    pub fn bytes_at(&self, at: usize) -> &[u8] {
+    pub(super) fn bytes_at(&self, at: usize) -> &[u8] {
         // Every line has as many fields as the header, so the field exists.
         let field = self.record.get(at).unwrap_or_default();
         // Windows line ends leave this in the last field.
@@ -219,7 +219,7 @@ impl CsvTable {
     ///
     /// # Errors
     /// If it is not a number, infinite, NaN or out of range.
-    pub fn real(&self, column: CsvColumn) -> Result<f64> {
+    pub(super) fn real(&self, column: CsvColumn) -> Result<f64> {
         match number::real(self.bytes(column)) {
             Some(value) if value.abs() <= number::REAL_LIMIT => Ok(value),
             Some(value) if value.is_finite() => {
@@ -238,7 +238,7 @@ impl CsvTable {
     ///
     /// # Errors
     /// If it is not such a number.
-    pub fn positive(&self, column: CsvColumn) -> Result<f64> {
+    pub(super) fn positive(&self, column: CsvColumn) -> Result<f64> {
         let value = self.real(column)?;
         if value > 0.0 {
             return Ok(value);
@@ -250,17 +250,17 @@ impl CsvTable {
     ///
     /// # Errors
     /// If it is not a whole number.
-    pub fn integer(&self, column: CsvColumn) -> Result<i64> {
+    pub(super) fn integer(&self, column: CsvColumn) -> Result<i64> {
         number::integer(self.bytes(column)).ok_or_else(|| self.not_a_number(column, "a whole number"))
     }
 
     /// The error for a field of the present line.
-    pub fn bad(&self, column: CsvColumn, problem: impl Into<String>, help: impl Into<String>) -> Error {
+    pub(super) fn bad(&self, column: CsvColumn, problem: impl Into<String>, help: impl Into<String>) -> Error {
         Error::input(self.field(column), problem, help)
     }
 
     /// The place of a field of the present line.
-    pub fn field(&self, column: CsvColumn) -> Place {
+    pub(super) fn field(&self, column: CsvColumn) -> Place {
         self.place().column(&self.header[column.0])
     }
 
@@ -270,7 +270,7 @@ impl CsvTable {
     }
 
     /// The place of the whole file.
-    pub fn file_place(&self) -> Place {
+    pub(super) fn file_place(&self) -> Place {
         Place::file(&self.path)
     }
 

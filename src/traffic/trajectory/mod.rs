@@ -17,8 +17,7 @@ pub mod tracks;
 
 pub use csv_table::FileChecksum;
 pub use inputs::{InputFile, Inputs};
-pub use noise::{Noise, SUSTAINED_S, running_median};
+pub(crate) use noise::{Noise, SUSTAINED_S, running_median};
 pub use number::Precision;
-pub use recording::{
-    Carriageway, EgoViewOptions, LIMIT_TOLERANCE_M, Lane, Loaded, NO_LANE, Recording, Track, VehicleClass,
-};
+pub(crate) use recording::LIMIT_TOLERANCE_M;
+pub use recording::{Carriageway, EgoViewOptions, Lane, Loaded, NO_LANE, Recording, Track, VehicleClass};

@@ -4,7 +4,7 @@
 use super::recording::Recording;
 
 /// Window of the running median, s.
-pub const SUSTAINED_S: f64 = 0.5;
+pub(crate) const SUSTAINED_S: f64 = 0.5;
 /// A vehicle that changes its speed by less in a second keeps it, m/s.
 const KEPT_MPS: f64 = 0.1;
 /// Maximum number of tracks that are looked at.
@@ -15,7 +15,7 @@ const SMOOTHING_STEP_S: f64 = 0.5;
 
 /// Standard deviations of noise along the road, while speeds change; 0 below four samples per second, where nothing tells it.
 #[derive(Debug, Clone, Copy, Default, PartialEq)]
-pub struct Noise {
+pub(crate) struct Noise {
     /// Of the accelerations, m/s².
     pub acceleration_mps2: f64,
     /// Of the speeds, m/s.
@@ -73,7 +73,7 @@ impl Noise {
 
     /// The window of smoothing that leaves so much noise of accelerations, s: that of the second derivative of a cubic fitted to n
     /// positions is √720 σ / (n^2.5 Δt²). `None` if it is too long.
-    pub fn smoothing_s(&self, left_mps2: f64) -> Option<f64> {
+    pub(crate) fn smoothing_s(&self, left_mps2: f64) -> Option<f64> {
         let of_one = 720.0_f64.sqrt() * self.position_m * self.rate_hz * self.rate_hz;
         let needed_s = libm::pow(of_one / left_mps2, 0.4) / self.rate_hz;
         let [min, max] = SMOOTHING_S;
@@ -83,7 +83,7 @@ impl Noise {
 }
 
 /// Median of the values around a sample, of those within [`SUSTAINED_S`].
-pub fn running_median(k: usize, rate_hz: f64, value: impl Fn(usize) -> f64) -> f64 {
+pub(crate) fn running_median(k: usize, rate_hz: f64, value: impl Fn(usize) -> f64) -> f64 {
     let half = (0.5 * SUSTAINED_S * rate_hz) as usize;
     let mut near: Vec<f64> = (k - half..=k + half).map(value).collect();
     *near.select_nth_unstable_by(half, f64::total_cmp).1

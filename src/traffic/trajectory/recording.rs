@@ -169,7 +169,7 @@ impl Recording {
 
 /// Tolerance of geometric limits, m: data have two decimals, and without a tolerance a recording rotated by 180°
 /// would give other scenarios.
-pub const LIMIT_TOLERANCE_M: f64 = 1e-6;
+pub(crate) const LIMIT_TOLERANCE_M: f64 = 1e-6;
 
 /// Extent of an ego-centric view.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
@@ -193,7 +193,7 @@ impl Default for EgoViewOptions {
 impl EgoViewOptions {
     /// Last sample of a vehicle's view, itself in view: the first one that is no more than the cut before the final
     /// position. `None` if the vehicle travels less than `cut_m` from its first to its last sample.
-    pub fn last_sample(&self, ego: &Track) -> Option<usize> {
+    pub(crate) fn last_sample(&self, ego: &Track) -> Option<usize> {
         let (first, last) = (*ego.s_m.first()?, *ego.s_m.last()?);
         if last - first < self.cut_m - LIMIT_TOLERANCE_M {
             return None;

@@ -20,7 +20,7 @@ use crate::support::vector_state::clear_upper_halves;
 use crate::{Error, Place, Result};
 
 /// Maximum number of parameters of a description; the generator of samples takes no more.
-pub const MAX_LINEAR_PARAMETERS: usize = 12;
+const MAX_LINEAR_PARAMETERS: usize = 12;
 
 /// What the decomposition of a series is made of.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize, Deserialize)]

@@ -23,7 +23,7 @@ use std::sync::Arc;
 
 pub use features::Feature;
 pub use kinematic::{Kinematic, LaneChange, SpeedProfile};
-pub use linear::{EMPHASIS_KNOTS, FunctionKind, Linear, LinearFamily, LinearSpec, MAX_LINEAR_PARAMETERS, Signal};
+pub use linear::{EMPHASIS_KNOTS, FunctionKind, Linear, LinearFamily, LinearSpec, Signal};
 pub use options::{
     AfterDuration, LateralSpeed, LateralStart, ParameterizationOptions, SeriesScale, SvdFit, SvdLateral,
 };

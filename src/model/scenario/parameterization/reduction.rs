@@ -320,7 +320,7 @@ impl Reduction {
     ///
     /// # Errors
     /// [`Error::Input`] for a cut-out without the size of the vehicle ahead.
-    pub fn case_of(&self, reduced: &ReducedScenario, sizes: &Sizes, grid: impl Into<TimeGrid>) -> Result<Case> {
+    pub(super) fn case_of(&self, reduced: &ReducedScenario, sizes: &Sizes, grid: impl Into<TimeGrid>) -> Result<Case> {
         reduced.case(self.category, sizes, grid.into())
     }
 

@@ -8,7 +8,7 @@ use crate::model::profile::Profile;
 use crate::scenario::{Case, Category, Lateral, Other, Scenario, Speed};
 
 /// Value of a series of rate `fps`, Hz, at time `t_s`, s: linear between samples; the last sample is held.
-pub fn at(series: &[f64], fps: f64, t_s: f64) -> f64 {
+pub(super) fn at(series: &[f64], fps: f64, t_s: f64) -> f64 {
     let last = series.len() - 1;
     let position = t_s * fps;
     let nearest = position.round();
@@ -51,14 +51,14 @@ pub fn steps_of(duration_s: f64, grid: TimeGrid) -> usize {
 }
 
 /// A speed series on the grid, never below 0.
-pub fn speed_on_grid(series: &[f64], fps: f64, duration_s: f64, grid: TimeGrid) -> Speed {
+fn speed_on_grid(series: &[f64], fps: f64, duration_s: f64, grid: TimeGrid) -> Speed {
     let value = |i: usize| at(series, fps, (i as f64 * grid.dt_s).min(duration_s)).max(0.0);
     Speed::Sampled((0..steps_of(duration_s, grid)).map(value).collect())
 }
 
 /// A lateral series on the grid with its speed towards the ego, w[i] = −(|y[i]| − |y[i−1]|)/dt, w[0] = w[1],
 /// 0 after T.
-pub fn lateral_on_grid(series: &[f64], fps: f64, duration_s: f64, grid: TimeGrid) -> (Vec<f64>, Vec<f64>) {
+fn lateral_on_grid(series: &[f64], fps: f64, duration_s: f64, grid: TimeGrid) -> (Vec<f64>, Vec<f64>) {
     let dt_s = grid.dt_s;
     let time = |i: usize| i as f64 * dt_s;
     let position: Vec<f64> =
@@ -94,7 +94,7 @@ impl SeriesCase<'_> {
     ///
     /// # Errors
     /// [`Error::Input`](crate::Error::Input) for a cut-out without the size of the vehicle ahead.
-    pub fn on(&self, grid: TimeGrid, sizes: &Sizes) -> Result<Case> {
+    pub(super) fn on(&self, grid: TimeGrid, sizes: &Sizes) -> Result<Case> {
         let SeriesCase { category, fps, duration_s, .. } = *self;
         let speed = |series: &[f64]| speed_on_grid(series, fps, duration_s, grid);
         let lateral = if category == Category::Lvd {
@@ -130,7 +130,7 @@ pub fn recorded_case(scenario: &Scenario, grid: impl Into<TimeGrid>) -> Result<C
 
 /// Magnitude of the constant lateral speed, m/s: displacement over time. The alternative reading of the specification,
 /// (|y(0)| − |y(T)|)/T, would shorten the path of a target that ends beyond the lane's middle.
-pub fn lateral_speed(scenario: &Scenario, options: &ParameterizationOptions) -> f64 {
+pub(super) fn lateral_speed(scenario: &Scenario, options: &ParameterizationOptions) -> f64 {
     let y = &scenario.target.y;
     let duration = scenario.duration_s();
     let over = match options.lateral_speed {
@@ -143,13 +143,13 @@ pub fn lateral_speed(scenario: &Scenario, options: &ParameterizationOptions) -> 
 }
 
 /// (v(T) − v(0))/T of a vehicle, m/s²; 0 where T is 0.
-pub fn mean_acceleration(other: &Other, duration_s: f64) -> f64 {
+pub(super) fn mean_acceleration(other: &Other, duration_s: f64) -> f64 {
     let (first, last) = (other.v[0], other.v[other.v.len() - 1]);
     if duration_s > 0.0 { (last - first) / duration_s } else { 0.0 }
 }
 
 /// A speed with constant acceleration from t = 0.
-pub fn accelerated(initial_mps: f64, acceleration_mps2: f64, duration_s: f64, after: AfterDuration) -> Speed {
+pub(super) fn accelerated(initial_mps: f64, acceleration_mps2: f64, duration_s: f64, after: AfterDuration) -> Speed {
     let until_s = match after {
         AfterDuration::Hold => duration_s,
         // A time beyond every run, s.

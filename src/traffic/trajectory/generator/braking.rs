@@ -92,14 +92,14 @@ impl Braking {
     }
 
     /// Commanded acceleration now, ≤ 0, m/s².
-    pub fn acceleration(&self) -> f64 {
+    pub(super) fn acceleration(&self) -> f64 {
         let first = self.first.deceleration(self.elapsed_s);
         let second = self.second.map_or(0.0, |phase| phase.deceleration(self.elapsed_s));
         -first.max(second)
     }
 
     /// The braking has ended.
-    pub fn is_over(&self) -> bool {
+    pub(super) fn is_over(&self) -> bool {
         self.elapsed_s >= self.second.unwrap_or(self.first).end_s()
     }
 }

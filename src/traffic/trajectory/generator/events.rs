@@ -121,10 +121,10 @@ pub(super) struct Hazards {
 
 impl Hazards {
     /// As published.
-    pub const UNRAISED: Hazards = Hazards { brakings: 1.0, lane_changes: 1.0 };
+    const UNRAISED: Hazards = Hazards { brakings: 1.0, lane_changes: 1.0 };
 
     /// The factors that raise both rates by `factor`.
-    pub fn raised(factor: f64) -> Hazards {
+    pub(super) fn raised(factor: f64) -> Hazards {
         // There is no crowding below the published rates.
         let lane_changes = if factor > 1.0 { libm::pow(factor, CROWDING) } else { factor };
         Hazards { brakings: factor, lane_changes }

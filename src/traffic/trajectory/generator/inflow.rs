@@ -91,7 +91,7 @@ impl Inflow {
 
     /// The next vehicle, if it is due and has space behind the last one of its lane (`last`: rear bumper and speed),
     /// at `entrance_m`.
-    pub fn arrive(
+    pub(super) fn arrive(
         &mut self,
         now_s: f64,
         entrance_m: f64,

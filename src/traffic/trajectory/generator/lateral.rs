@@ -61,12 +61,12 @@ impl LaneChangeMotion {
     }
 
     /// Elapsed fraction of the duration, 0 to 1.
-    pub fn phase(&self) -> f64 {
+    pub(super) fn phase(&self) -> f64 {
         (self.elapsed_s / self.duration_s).min(1.0)
     }
 
     /// Lateral position and lateral speed now, m and m/s.
-    pub fn position_and_speed(&self) -> (f64, f64) {
+    pub(super) fn position_and_speed(&self) -> (f64, f64) {
         let t = self.phase();
         let rest = 1.0 - t;
         let warped = t + self.asymmetry * t * t * rest * rest;
@@ -96,7 +96,7 @@ impl Wander {
     const DAMPING: f64 = 0.8;
 
     /// Advances by `dt_s` with one standard normal number.
-    pub fn step(&mut self, dt_s: f64, normal: f64) {
+    pub(super) fn step(&mut self, dt_s: f64, normal: f64) {
         const W: f64 = Wander::FREQUENCY_RADPS;
         let drive = Self::SD_M * (4.0 * Self::DAMPING * W * W * W * dt_s).sqrt();
         let rate = self.rate_mps - (2.0 * Self::DAMPING * W * self.rate_mps + W * W * self.offset_m) * dt_s;

@@ -45,17 +45,17 @@ impl TrafficRandom {
     }
 
     /// Uniform in [low, high).
-    pub fn between(&mut self, low: f64, high: f64) -> f64 {
+    pub(super) fn between(&mut self, low: f64, high: f64) -> f64 {
         low + (high - low) * self.uniform()
     }
 
     /// True with this probability.
-    pub fn chance(&mut self, probability: f64) -> bool {
+    pub(super) fn chance(&mut self, probability: f64) -> bool {
         self.uniform() < probability
     }
 
     /// Standard normal (Box and Muller; both values of a pair are used).
-    pub fn normal(&mut self) -> f64 {
+    pub(super) fn normal(&mut self) -> f64 {
         if let Some(z) = self.spare_normal.take() {
             return z;
         }
@@ -68,17 +68,17 @@ impl TrafficRandom {
 
     /// Normal with this mean and standard deviation, redrawn until inside [low, high], which must have some
     /// probability.
-    pub fn normal_within(&mut self, mean: f64, sd: f64, low: f64, high: f64) -> f64 {
+    pub(super) fn normal_within(&mut self, mean: f64, sd: f64, low: f64, high: f64) -> f64 {
         self.redraw(low, high, |s| mean + sd * s.normal())
     }
 
     /// Lognormal with this median and this spread of the logarithm, redrawn until inside [low, high].
-    pub fn lognormal_within(&mut self, median: f64, sigma: f64, low: f64, high: f64) -> f64 {
+    pub(super) fn lognormal_within(&mut self, median: f64, sigma: f64, low: f64, high: f64) -> f64 {
         self.redraw(low, high, |s| median * libm::exp(sigma * s.normal()))
     }
 
     /// Exponential with this mean, ≥ 0.
-    pub fn exponential(&mut self, mean: f64) -> f64 {
+    pub(super) fn exponential(&mut self, mean: f64) -> f64 {
         -mean * libm::log(1.0 - self.uniform())
     }
 

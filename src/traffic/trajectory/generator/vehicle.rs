@@ -134,17 +134,17 @@ impl Vehicle {
     }
 
     /// Front bumper, m.
-    pub fn front_m(&self) -> f64 {
+    pub(super) fn front_m(&self) -> f64 {
         self.s_m + 0.5 * self.length_m
     }
 
     /// Rear bumper, m.
-    pub fn rear_m(&self) -> f64 {
+    pub(super) fn rear_m(&self) -> f64 {
         self.s_m - 0.5 * self.length_m
     }
 
     /// Occupies or has claimed this lane.
-    pub fn is_in(&self, lane: usize) -> bool {
+    pub(super) fn is_in(&self, lane: usize) -> bool {
         self.occupied & (1 << lane) != 0
     }
 

@@ -14,10 +14,10 @@ pub(super) enum Direction {
 
 impl Direction {
     /// Both, in the order of their numbers.
-    pub const BOTH: [Direction; 2] = [Direction::Upper, Direction::Lower];
+    pub(super) const BOTH: [Direction; 2] = [Direction::Upper, Direction::Lower];
 
     /// From `drivingDirection`.
-    pub fn from_number(number: i64) -> Option<Self> {
+    pub(super) fn from_number(number: i64) -> Option<Self> {
         match number {
             1 => Some(Direction::Upper),
             2 => Some(Direction::Lower),
@@ -34,7 +34,7 @@ impl Direction {
     }
 
     /// Column of `recordingMeta` that holds this half's lane lines.
-    pub fn markings_column(self) -> &'static str {
+    pub(super) fn markings_column(self) -> &'static str {
         match self {
             Direction::Upper => "upperLaneMarkings",
             Direction::Lower => "lowerLaneMarkings",
@@ -50,32 +50,32 @@ impl Direction {
     }
 
     /// Forward component of a velocity or acceleration along x.
-    pub fn forward(self, along_x: f64) -> f64 {
+    pub(super) fn forward(self, along_x: f64) -> f64 {
         self.sign() * along_x
     }
 
     /// Leftward component of a velocity or acceleration along y; also the lateral position of a lane line.
-    pub fn leftward(self, along_y: f64) -> f64 {
+    pub(super) fn leftward(self, along_y: f64) -> f64 {
         -self.sign() * along_y
     }
 
     /// Centre along the road from the left edge of the box, m.
-    pub fn s_of(self, x: f64, length_m: f64) -> f64 {
+    pub(super) fn s_of(self, x: f64, length_m: f64) -> f64 {
         self.forward(x + length_m / 2.0)
     }
 
     /// Centre across the road from the upper edge of the box, m.
-    pub fn d_of(self, y: f64, width_m: f64) -> f64 {
+    pub(super) fn d_of(self, y: f64, width_m: f64) -> f64 {
         self.leftward(y + width_m / 2.0)
     }
 
     /// Left edge of the box, m: the inverse of [`Direction::s_of`] up to rounding.
-    pub fn x_of(self, s_m: f64, length_m: f64) -> f64 {
+    pub(super) fn x_of(self, s_m: f64, length_m: f64) -> f64 {
         self.forward(s_m) - length_m / 2.0
     }
 
     /// Upper edge of the box, m: the inverse of [`Direction::d_of`] up to rounding.
-    pub fn y_of(self, d_m: f64, width_m: f64) -> f64 {
+    pub(super) fn y_of(self, d_m: f64, width_m: f64) -> f64 {
         self.leftward(d_m) - width_m / 2.0
     }
 }
@@ -91,7 +91,7 @@ pub(super) struct LaneNumbers {
 
 impl LaneNumbers {
     /// Lane of the carriageway, 0 leftmost; [`NO_LANE`] where the id is none of its lanes.
-    pub fn lane_of(self, direction: Direction, lane_id: i64) -> u16 {
+    pub(super) fn lane_of(self, direction: Direction, lane_id: i64) -> u16 {
         let lane = match direction {
             // Driving towards −x with y down, the left is the greater y.
             Direction::Upper => (self.upper_lines as i64).saturating_sub(lane_id),
@@ -102,7 +102,7 @@ impl LaneNumbers {
     }
 
     /// The id of a lane; `None` if the carriageway has no such lane.
-    pub fn id_of(self, direction: Direction, lane: u16) -> Option<i64> {
+    pub(super) fn id_of(self, direction: Direction, lane: u16) -> Option<i64> {
         let lanes = self.lines(direction).saturating_sub(1);
         (usize::from(lane) < lanes).then(|| match direction {
             Direction::Upper => self.upper_lines as i64 - i64::from(lane),

@@ -93,7 +93,7 @@ pub fn inventory(dir: &Path) -> Result<Inventory> {
 pub const SYNTHETIC_MARKER: &str = "SYNTHETIC.txt";
 
 /// The text of a folder's marker in one line; `None` without a marker.
-pub fn made_up(dir: &Path) -> Option<String> {
+pub(crate) fn made_up(dir: &Path) -> Option<String> {
     let text = input_file::read_text(&dir.join(SYNTHETIC_MARKER), input_file::MAX_SETTINGS_BYTES).ok()?;
     text.lines().next().filter(|line| line.starts_with("SYNTHETIC DATA")).map(str::to_owned)
 }

@@ -14,7 +14,8 @@ mod read;
 mod writable;
 mod write;
 
-pub use inventory::{HighdFiles, Inventory, SYNTHETIC_MARKER, inventory, made_up};
+pub(crate) use inventory::made_up;
+pub use inventory::{HighdFiles, Inventory, SYNTHETIC_MARKER, inventory};
 pub use read::{read, read_checked};
 pub use writable::quantize;
 pub use write::stage;

@@ -119,7 +119,7 @@ impl ImageLayout {
     }
 
     /// `laneId` of a lane; for [`NO_LANE`] a number that reads as no lane, if possible the number of lines above.
-    pub fn lane_id(&self, direction: Direction, lane: u16, d_m: f64) -> i64 {
+    pub(super) fn lane_id(&self, direction: Direction, lane: u16, d_m: f64) -> i64 {
         self.lane_numbers.id_of(direction, lane).unwrap_or_else(|| {
             let y = direction.leftward(d_m);
             let above = self.upper_y.iter().chain(&self.lower_y).filter(|&&line| line < y).count() as i64;

@@ -32,7 +32,7 @@ pub use preset::{
     Axes, Classes, FileFormat, HIGHD, HeadingOrigin, LaneBands, MetaFile, Preset, Reference, RoadSource, Side,
 };
 pub use roles::{ColumnName, OneOrMany, Role};
-pub use understanding::{Exclusion, Finding, Understanding, UnderstoodCarriageway};
+pub use understanding::{Finding, Understanding, UnderstoodCarriageway};
 
 pub(super) use raw::{PROJECT, is_geographic};
 
@@ -169,7 +169,7 @@ fn is_commonroad(path: &Path) -> Result<bool> {
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] if there is none.
-pub fn track_files(path: &Path, preset: &Preset) -> Result<Vec<TrackFile>> {
+pub(super) fn track_files(path: &Path, preset: &Preset) -> Result<Vec<TrackFile>> {
     let of = |path: PathBuf| {
         let name = unpacked(path.file_name()?.to_str()?);
         let stem = || Path::new(name).file_stem().map(|stem| stem.to_string_lossy().into_owned());
@@ -302,7 +302,7 @@ pub fn read_usable(file: &TrackFile, preset: &Preset, implausible: Implausible) 
 ///
 /// # Errors
 /// Those of the file; [`Error::Input`] for a file whose format is unknown.
-pub fn columns_of(path: &Path) -> Result<Vec<String>> {
+pub(super) fn columns_of(path: &Path) -> Result<Vec<String>> {
     let format = format_of(path).ok_or_else(|| {
         Error::input(Place::file(path), "the format is unknown", "name it .csv, .txt, .parquet, .xml or .json")
     })?;

@@ -345,7 +345,7 @@ impl Preset {
     }
 
     /// Whether it is the preset for tables that no other preset knows.
-    pub fn is_generic(&self) -> bool {
+    pub(crate) fn is_generic(&self) -> bool {
         self.name == "generic"
     }
 }

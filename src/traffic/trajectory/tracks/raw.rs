@@ -80,7 +80,7 @@ fn in_row<T: Clone>(list: &[T], fact: u16) -> Option<T> {
 
 impl RawVehicle {
     /// Lengths and widths of some of its samples, m; all of them if these have none in their rows.
-    pub fn sizes_m(&self, samples: &Samples) -> [Vec<f64>; 2] {
+    pub(super) fn sizes_m(&self, samples: &Samples) -> [Vec<f64>; 2] {
         let of = |fact: usize, list: &[f64]| {
             let in_rows = || (0..samples.len()).filter_map(|k| in_row(list, samples.fact(fact, k)));
             let mut sizes: Vec<f64> = if list.len() > 1 { in_rows().collect() } else { Vec::new() };
@@ -91,7 +91,7 @@ impl RawVehicle {
     }
 
     /// Class of some of its samples: that in the row of the first, unless a type or a meta file gives another name.
-    pub fn class_of(&self, samples: &Samples) -> Option<String> {
+    pub(super) fn class_of(&self, samples: &Samples) -> Option<String> {
         let in_rows = self.classes.len() > 1
             && !samples.is_empty()
             && self.classes.iter().any(|of| Some(of) == self.class.as_ref());
@@ -100,7 +100,7 @@ impl RawVehicle {
     }
 
     /// Some of its samples as a vehicle of their own, with the sizes, class and direction in their rows.
-    pub fn part(&self, samples: Samples) -> RawVehicle {
+    pub(super) fn part(&self, samples: Samples) -> RawVehicle {
         let [lengths_m, widths_m] = self.sizes_m(&samples);
         let first = |fact: usize| if samples.is_empty() { 0 } else { samples.fact(fact, 0) };
         let (class, direction) = (in_row(&self.classes, first(2)), in_row(&[-1.0, 1.0], first(3)));
@@ -116,7 +116,7 @@ impl RawVehicle {
     }
 
     /// Takes the sizes that it lacks from another source.
-    pub fn complete_sizes(&mut self, known: &RawVehicle) {
+    pub(super) fn complete_sizes(&mut self, known: &RawVehicle) {
         for (own, known) in [(&mut self.lengths_m, &known.lengths_m), (&mut self.widths_m, &known.widths_m)] {
             if own.is_empty() {
                 own.clone_from(known);

@@ -74,12 +74,12 @@ pub(super) fn median(values: &mut [f64]) -> f64 {
 
 impl RoadLine {
     /// The straight line through a point.
-    pub fn straight(through: [f64; 2], direction: [f64; 2]) -> RoadLine {
+    pub(super) fn straight(through: [f64; 2], direction: [f64; 2]) -> RoadLine {
         let end = [through[0] + direction[0], through[1] + direction[1]];
         RoadLine { points: vec![through, end], tangents: vec![direction; 2], s_m: vec![0.0, 1.0] }
     }
 
-    pub fn is_straight(&self) -> bool {
+    pub(super) fn is_straight(&self) -> bool {
         self.points.len() == 2
     }
 
@@ -105,7 +105,7 @@ impl RoadLine {
     }
 
     /// The other way round.
-    pub fn reversed(&self) -> RoadLine {
+    pub(super) fn reversed(&self) -> RoadLine {
         let last = self.s_m[self.s_m.len() - 1];
         let mut reversed = self.clone();
         reversed.points.reverse();
@@ -120,7 +120,7 @@ impl RoadLine {
     }
 
     /// Smallest radius of curvature over 50 m; infinite for a straight line.
-    pub fn min_radius_m(&self) -> f64 {
+    pub(super) fn min_radius_m(&self) -> f64 {
         let reach = (50.0 / STEP_M) as usize;
         let turn = |i: usize| {
             let (a, b) = (self.tangents[i], self.tangents[i + reach]);
@@ -131,7 +131,7 @@ impl RoadLine {
     }
 
     /// A point on the road.
-    pub fn project(&self, point: [f64; 2]) -> OnRoad {
+    pub(super) fn project(&self, point: [f64; 2]) -> OnRoad {
         self.project_near(point, None).0
     }
 
@@ -167,12 +167,12 @@ impl RoadLine {
     }
 
     /// A path on the road.
-    pub fn project_all(&self, path: &[[f64; 2]]) -> Vec<OnRoad> {
+    pub(super) fn project_all(&self, path: &[[f64; 2]]) -> Vec<OnRoad> {
         self.along_path(path).map(|(on, _)| on).collect()
     }
 
     /// Directions of the road at the points of a path.
-    pub fn directions(&self, path: &[[f64; 2]]) -> Vec<[f64; 2]> {
+    pub(super) fn directions(&self, path: &[[f64; 2]]) -> Vec<[f64; 2]> {
         self.along_path(path).map(|(_, tangent)| tangent).collect()
     }
 
@@ -186,7 +186,7 @@ impl RoadLine {
     }
 
     /// Median over the tracks of the range of their d, m: lane keeping, and the error of the line.
-    pub fn wander_m(&self, paths: &[Path]) -> f64 {
+    fn wander_m(&self, paths: &[Path]) -> f64 {
         let ranges =
             paths.iter().filter(|path| path_length(path) >= MIN_TRACK_M).map(|path| d_range(&self.project_all(path)));
         median(&mut ranges.collect::<Vec<_>>())

@@ -119,7 +119,7 @@ impl Columns {
     }
 
     /// What times without a unit were found to be.
-    pub fn found_time(&self) -> Option<FoundTime> {
+    pub(super) fn found_time(&self) -> Option<FoundTime> {
         self.found_time.get()
     }
 
@@ -147,7 +147,7 @@ impl Columns {
         }
     }
 
-    pub fn has(&self, role: Role) -> bool {
+    pub(super) fn has(&self, role: Role) -> bool {
         self.at[role as usize].is_some()
     }
 
@@ -248,7 +248,7 @@ impl Rows {
     }
 
     /// Opens the track file of a preset.
-    pub fn of_preset(path: &Path, preset: &Preset) -> Result<Rows> {
+    pub(super) fn of_preset(path: &Path, preset: &Preset) -> Result<Rows> {
         Rows::open(path, preset.format, preset.rows.as_deref(), preset.delimiter)
     }
 
@@ -258,7 +258,7 @@ impl Rows {
     }
 
     /// The place of the header.
-    pub fn header_place(&self) -> Place {
+    pub(super) fn header_place(&self) -> Place {
         match self.source {
             RowSource::Csv(_) => Place::file(&self.path).row(1),
             _ => Place::file(&self.path),
@@ -269,7 +269,7 @@ impl Rows {
     ///
     /// # Errors
     /// Those of the file and of `each`.
-    pub fn each(
+    pub(super) fn each(
         self,
         columns: &Columns,
         each: &mut dyn FnMut(&dyn SampleRow) -> Result<()>,

@@ -38,11 +38,11 @@ impl Samples {
         self.len
     }
 
-    pub fn is_empty(&self) -> bool {
+    pub(super) fn is_empty(&self) -> bool {
         self.len == 0
     }
 
-    pub fn push(&mut self, sample: &RawSample) {
+    pub(super) fn push(&mut self, sample: &RawSample) {
         let len = self.len;
         self.columns.iter_mut().zip(values(sample)).for_each(|(column, value)| column.push(value, len));
         self.len += 1;
@@ -69,12 +69,12 @@ impl Samples {
     }
 
     /// Frame number or time of sample `k`.
-    pub fn at(&self, k: usize) -> f64 {
+    pub(super) fn at(&self, k: usize) -> f64 {
         self.columns[0].get(k)
     }
 
     /// Position of sample `k`, m.
-    pub fn xy_m(&self, k: usize) -> [f64; 2] {
+    pub(super) fn xy_m(&self, k: usize) -> [f64; 2] {
         [self.columns[1].get(k), self.columns[2].get(k)]
     }
 
@@ -84,21 +84,21 @@ impl Samples {
     }
 
     /// The time of sample `k` where `at` counts frames, else its frame.
-    pub fn other_clock(&self, k: usize) -> f64 {
+    pub(super) fn other_clock(&self, k: usize) -> f64 {
         self.columns[15].get(k)
     }
 
     /// One of the facts of sample `k`.
-    pub fn fact(&self, fact: usize, k: usize) -> u16 {
+    pub(super) fn fact(&self, fact: usize, k: usize) -> u16 {
         self.columns[16 + fact].get(k) as u16
     }
 
-    pub fn iter(&self) -> impl Iterator<Item = RawSample> {
+    pub(super) fn iter(&self) -> impl Iterator<Item = RawSample> {
         (0..self.len).map(|k| self.get(k))
     }
 
     /// All of them.
-    pub fn to_vec(&self) -> Vec<RawSample> {
+    pub(super) fn to_vec(&self) -> Vec<RawSample> {
         self.iter().collect()
     }
 
@@ -108,7 +108,7 @@ impl Samples {
     }
 
     /// Gives back the memory that no value needs.
-    pub fn shrink(&mut self) {
+    pub(super) fn shrink(&mut self) {
         for column in &mut self.columns {
             match column {
                 Column::Same(_) => {}

@@ -26,7 +26,7 @@ pub struct Finding {
 /// Why a vehicle is doubtful.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
-pub enum Exclusion {
+pub(super) enum Exclusion {
     /// It drives backwards.
     Backwards,
     /// Its box overlaps that of another vehicle.
@@ -200,23 +200,23 @@ impl Comparison {
     }
 
     /// Standard error of the slope.
-    pub fn slope_error(&self) -> f64 {
+    pub(super) fn slope_error(&self) -> f64 {
         let residual = (self.of_given - self.slope() * self.product).max(0.0) / (self.count - 1.0).max(1.0);
         (residual / self.of_derived).sqrt()
     }
 
     /// Whether the given values have the other sign: their slope over the derived ones is below 0 by four standard errors.
-    pub fn is_opposite(&self) -> bool {
+    pub(super) fn is_opposite(&self) -> bool {
         self.count > 1.0 && self.slope() < -4.0 * self.slope_error()
     }
 
     /// Slope of the given values over the derived ones: 1 if they are equal, -1 if one is mirrored, 0 if one is noise.
-    pub fn slope(&self) -> f64 {
+    pub(super) fn slope(&self) -> f64 {
         if self.of_derived > 0.0 { self.product / self.of_derived } else { 0.0 }
     }
 
     /// Correlation about 0.
-    pub fn correlation(&self) -> f64 {
+    pub(super) fn correlation(&self) -> f64 {
         let strength = (self.of_given * self.of_derived).sqrt();
         if strength > 0.0 { self.product / strength } else { 0.0 }
     }
