@@ -83,7 +83,7 @@ struct CheckRequest {
 }
 
 impl Check {
-    pub fn run(&self, configured: &Configured) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured) -> Result<Exit> {
         configured.refuse_assigned(
             "has no effect on a check",
             "leave it out; --profiles names the profiles, which hold the time step",

@@ -23,7 +23,7 @@ enum ClusterVerb {
 }
 
 impl Cluster {
-    pub fn run(&self) -> Result<Exit> {
+    pub(super) fn run(&self) -> Result<Exit> {
         match &self.verb {
             ClusterVerb::Merge(verb) => verb.run(),
         }

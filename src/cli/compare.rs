@@ -34,7 +34,7 @@ use crate::{Error, Result};
                   lanesweep compare recordings --categories cut-in --samples 1000000\n  \
                   lanesweep compare --scenarios scenarios.jsonl --parameterizations i,iii --models FSM,RSS \\\n      \
                   --thw 0.6,1.0")]
-pub struct Compare {
+pub(super) struct Compare {
     #[command(flatten)]
     data: SourceFlags,
     /// Folder for compare.csv, compare.json and compare.txt
@@ -58,7 +58,7 @@ pub struct Compare {
 }
 
 impl Compare {
-    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         let started = Instant::now();
         let config = &configured.settings;
         let categories = self.categories.list()?;

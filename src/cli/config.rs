@@ -102,7 +102,7 @@ enum SchemaOf {
 }
 
 impl Config {
-    pub fn run(&self, configured: &Configured) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured) -> Result<Exit> {
         match &self.verb {
             ConfigVerb::Init(verb) => verb.run(),
             ConfigVerb::Show(verb) => verb.run(configured),

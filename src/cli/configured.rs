@@ -193,7 +193,7 @@ impl Configured {
     ///
     /// # Errors
     /// As [`Layers::read`] and [`Layers::flag`].
-    pub fn of(matches: &ArgMatches) -> Result<(Cli, Configured)> {
+    pub(super) fn of(matches: &ArgMatches) -> Result<(Cli, Configured)> {
         let unread = |e: clap::Error| Error::Internal(format!("the command line cannot be read: {e}"));
         let mut cli = Cli::from_arg_matches(matches).map_err(unread)?;
         let (path, typed, last) = verb_of(matches);
@@ -282,7 +282,7 @@ impl Configured {
     }
 
     /// All settings, for the record of a run; without those that a plan file decides, if one was given.
-    pub fn record(&self, has_plan: bool) -> Vec<SettingRecord> {
+    pub(super) fn record(&self, has_plan: bool) -> Vec<SettingRecord> {
         let record = |setting: Setting| SettingRecord {
             key: setting.key.name.clone(),
             value: setting.value.cloned().unwrap_or_default(),
@@ -365,7 +365,7 @@ impl Configured {
     ///
     /// # Errors
     /// [`Error::Usage`] for a text that is not a device name, and for a device of the CPU, with the source of both.
-    pub fn backend(&self) -> Result<(BackendChoice, Option<DeviceName>)> {
+    pub(super) fn backend(&self) -> Result<(BackendChoice, Option<DeviceName>)> {
         let run = &self.settings.run;
         let device = run.device.as_deref().map(str::parse).transpose();
         let device: Option<DeviceName> = device.map_err(|error| self.at_origin("run.device", "device", error))?;
@@ -383,7 +383,7 @@ impl Configured {
     ///
     /// # Errors
     /// As [`Configured::backend`] and [`OpenBackend::open`].
-    pub fn open(&self) -> Result<OpenBackend> {
+    pub(super) fn open(&self) -> Result<OpenBackend> {
         let (backend, device) = self.backend()?;
         Ok(OpenBackend::open(backend, device.as_ref())?.with_cancel(CANCEL.clone()))
     }

@@ -173,7 +173,7 @@ pub(super) fn inc(bar: &ProgressBar) -> impl Fn(u64) + Send + Sync + 'static {
 }
 
 /// A progress bar on stderr, or a line now and then if stderr is no terminal. Its remaining time follows from the units per time.
-pub fn progress(verbosity: Verbosity, length: u64, what: &str) -> ProgressBar {
+pub(super) fn progress(verbosity: Verbosity, length: u64, what: &str) -> ProgressBar {
     bar_of(verbosity, length, what, "about")
 }
 

@@ -22,7 +22,7 @@ pub(super) struct Devices {
 
 impl Devices {
     #[cfg(feature = "gpu")]
-    pub fn run(&self) -> Result<Exit> {
+    pub(super) fn run(&self) -> Result<Exit> {
         super::device_list::print(&self.format, self.no_self_check)
     }
 

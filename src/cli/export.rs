@@ -36,7 +36,7 @@ enum Format {
 }
 
 impl Export {
-    pub fn run(&self, configured: &Configured) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured) -> Result<Exit> {
         match &self.format {
             Format::Xosc(xosc) => xosc.run(configured),
         }

@@ -63,7 +63,7 @@ pub(super) struct Fit {
 }
 
 impl Fit {
-    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         let config = &configured.settings;
         let ids = self.ids()?;
         let typed = self.exposure.driven()?;

@@ -86,7 +86,7 @@ impl TablesFlag {
     ///
     /// # Errors
     /// [`Error::Usage`].
-    pub fn check(self, format: FormatFlag) -> Result<()> {
+    pub(super) fn check(self, format: FormatFlag) -> Result<()> {
         match self.tables && format.is_json() {
             true => {
                 let problem = "--format json prints one document, which has the numbers of all tables";
@@ -97,7 +97,7 @@ impl TablesFlag {
     }
 
     /// Writes the files and prints the answer, or all tables.
-    pub fn finish(
+    pub(super) fn finish(
         self,
         mut report: StudyReport,
         results: Results,

@@ -64,7 +64,7 @@ pub(super) struct Justify {
 }
 
 impl Justify {
-    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         let started = Instant::now();
         let config = &configured.settings;
         let id = parameterization(&self.parameterization)?;

@@ -172,7 +172,7 @@ impl CriterionFlag {
     ///
     /// # Errors
     /// [`Error::Usage`] for an unknown criterion.
-    pub fn get(&self) -> Result<Criterion> {
+    pub(super) fn get(&self) -> Result<Criterion> {
         criterion(&self.criterion)
     }
 }

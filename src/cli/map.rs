@@ -114,7 +114,7 @@ fn after_long_help() -> String {
 }
 
 impl Map {
-    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         let category = Category::parse(&self.category).ok_or_else(|| {
             let problem = format!("there is no category `{}`", self.category);
             Error::usage(Place::item("CATEGORY"), problem, "use cut-in, cut-out or lvd")

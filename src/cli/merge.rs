@@ -33,7 +33,7 @@ pub(super) struct Merge {
 }
 
 impl Merge {
-    pub fn run(&self) -> Result<Exit> {
+    pub(super) fn run(&self) -> Result<Exit> {
         self.tables.check(self.format)?;
         let [plan, out] = [&self.dir.join(PLAN_FILE), &self.dir].map(|path| quoted_word(&path.display().to_string()));
         let again = |verb: &str, shard| format!("lanesweep {verb} --plan {plan} --shard {shard} --out {out}");

@@ -46,7 +46,7 @@ fn lock_of(path: &Path) -> Result<FolderLock> {
 }
 
 impl Mine {
-    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         if let Some(path) = &self.out {
             source::refuse_recording(path, &self.dir, self.preset.preset.as_deref(), "--out")?;
             check_scenario_file(path)?;

@@ -66,7 +66,7 @@ pub(super) struct Search {
 }
 
 impl Search {
-    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         let started = Instant::now();
         let config = &configured.settings;
         let [category] = source::categories(std::slice::from_ref(&self.category), "--category")?[..] else {

@@ -32,7 +32,7 @@ impl ShardFlags {
     ///
     /// # Errors
     /// [`Error::Usage`] for an invalid time.
-    pub fn start(&self) -> Result<()> {
+    pub(super) fn start(&self) -> Result<()> {
         let Some(seconds) = self.stop_after else { return Ok(()) };
         if !(seconds > 0.0 && seconds < 1e9) {
             let problem = format!("{seconds} s is out of range");

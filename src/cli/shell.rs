@@ -24,7 +24,7 @@ pub(super) struct Completions {
 }
 
 impl Completions {
-    pub fn run(&self) -> Result<Exit> {
+    pub(super) fn run(&self) -> Result<Exit> {
         let mut text = Vec::new();
         clap_complete::generate(self.shell, &mut command(), "lanesweep", &mut text);
         let text = String::from_utf8(text).map_err(|e| Error::Internal(format!("completions are no text: {e}")))?;
@@ -53,7 +53,7 @@ pub(super) struct Man {
 }
 
 impl Man {
-    pub fn run(&self) -> Result<Exit> {
+    pub(super) fn run(&self) -> Result<Exit> {
         make_folder(&self.dir)?;
         let mut program = command();
         // Adds global flags and versions to the verbs.

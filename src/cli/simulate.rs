@@ -74,7 +74,7 @@ pub(super) struct Simulate {
 }
 
 impl Simulate {
-    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         self.guard_plot()?;
         let (lanes, incomplete) = self.lanes(configured)?;
         let report = TraceReport(&lanes);

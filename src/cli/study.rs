@@ -40,7 +40,7 @@ use crate::traffic::Source;
 }))]
 #[command(after_help = "Examples:\n  lanesweep study\n  lanesweep study recordings --out result\n  lanesweep study \
                         --scenarios scenarios.jsonl --rows lanes.csv")]
-pub struct Study {
+pub(super) struct Study {
     #[command(flatten)]
     data: SourceFlags,
     /// Folder for tables, figures and run.json
@@ -112,7 +112,7 @@ impl KeepPlan {
 }
 
 impl Study {
-    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         self.guard_inputs(configured)?;
         check_folder(&self.out)?;
         self.rows.as_deref().map_or(Ok(()), check_folder_of)?;

@@ -27,7 +27,7 @@ pub(super) struct Synth {
 }
 
 impl Synth {
-    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         let options = &configured.settings.generator;
         check_folder(&self.dir)?;
         let folder = OutputDir::open(&self.dir, SYNTHETIC_MARKER)?;

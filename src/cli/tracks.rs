@@ -51,7 +51,7 @@ pub(super) struct Tracks {
 }
 
 impl Tracks {
-    pub fn run(&self, configured: &Configured) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured) -> Result<Exit> {
         if let Some(path) = &self.write_preset {
             return self.write_draft(path);
         }

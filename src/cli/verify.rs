@@ -59,7 +59,7 @@ enum VerifyVerb {
 const MAX_LANES: u64 = 100_000_000;
 
 impl Verify {
-    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
         match &self.verb {
             Some(VerifyVerb::Devices(verb)) => return verb.run(),
             None => (),

@@ -52,7 +52,7 @@ pub(crate) struct LaneConstants<R> {
 impl<R: Real> LaneConstants<R> {
     /// Constants of a case under a model.
     #[inline(always)]
-    pub fn new<M>(simulation: &Simulation<R, M>, case: &LaneCase<R>) -> Self {
+    pub(super) fn new<M>(simulation: &Simulation<R, M>, case: &LaneCase<R>) -> Self {
         let known = |step: u32| step.min(Flag::LATEST_STEP);
         let of = |other: &LaneOther<R>| OtherConstants {
             half_lengths: other.half_lengths,
@@ -86,7 +86,7 @@ pub(crate) struct OtherState<R> {
 impl<R: Real> OtherState<R> {
     /// Decodes a motion at a step.
     #[inline(always)]
-    pub fn of(motion: &Motion<R>, tables: &Tables<R>, step: u32) -> Self {
+    pub(super) fn of(motion: &Motion<R>, tables: &Tables<R>, step: u32) -> Self {
         let lateral = motion.lateral(tables, step);
         OtherState { speed: motion.speed(tables, step), position: lateral.position, towards: lateral.towards }
     }
@@ -141,7 +141,7 @@ pub(crate) struct LaneState<R> {
 impl<R: Real> LaneState<R> {
     /// State before the first step.
     #[inline(always)]
-    pub fn new<M: DriverModel<R>>(simulation: &Simulation<R, M>, case: &LaneCase<R>, start: Start<R>) -> Self {
+    pub(super) fn new<M: DriverModel<R>>(simulation: &Simulation<R, M>, case: &LaneCase<R>, start: Start<R>) -> Self {
         let gap_start = start.gap(case.ego_speed);
         LaneState {
             index: 0,
@@ -244,7 +244,7 @@ pub(super) struct Ego<R> {
 
 impl<R: Real> Ego<R> {
     #[inline(always)]
-    pub fn of(lane: &LaneConstants<R>, v: R, a: R) -> Self {
+    pub(super) fn of(lane: &LaneConstants<R>, v: R, a: R) -> Self {
         Ego { v, a, width: lane.ego_width, marking_gap: lane.marking_gap }
     }
 }

@@ -66,7 +66,7 @@ impl Recompute for LaneRunner<'_, f32> {
 }
 
 impl<'p> Recheck<'p> {
-    pub fn new(plan: &'p LanePlan, RecheckOptions { seed, one_in }: RecheckOptions) -> Self {
+    pub(super) fn new(plan: &'p LanePlan, RecheckOptions { seed, one_in }: RecheckOptions) -> Self {
         Recheck { plan, recompute: Box::new(LaneRunner::of_few(plan)), seed, one_in: one_in.max(1) }
     }
 
@@ -76,7 +76,7 @@ impl<'p> Recheck<'p> {
     /// # Errors
     /// [`Error::Verification`] with the first lane that differs.
     /// [`Error::Verification`] with the first lane that differs.
-    pub fn check(&self, chunk: &Chunk, wanted: Wanted, backend: &str, by: RecheckBy) -> Result<u64> {
+    pub(super) fn check(&self, chunk: &Chunk, wanted: Wanted, backend: &str, by: RecheckBy) -> Result<u64> {
         if chunk.verdicts.is_empty() || by == RecheckBy::Nothing {
             return Ok(0);
         }

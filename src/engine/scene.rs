@@ -34,7 +34,7 @@ impl Scene {
     /// Common properties of these cases under a model. If a vehicle appears or leaves, the scene counts as a pair, even
     /// if the second vehicle is never present. Lanes that may cross have no further properties, because such time steps
     /// are rare.
-    pub fn of<R: Real>(cases: &[LaneCase<R>], model_index: usize, may_cross: bool) -> Scene {
+    pub(super) fn of<R: Real>(cases: &[LaneCase<R>], model_index: usize, may_cross: bool) -> Scene {
         if may_cross {
             return Scene::unknown(true);
         }

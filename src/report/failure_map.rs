@@ -64,7 +64,7 @@ impl FailureMaps<'_> {
     }
 
     /// The maps of one model, one per headway from short to long.
-    pub fn figure(&self, model: usize) -> Figure {
+    pub(super) fn figure(&self, model: usize) -> Figure {
         let (largest, axes) = (self.largest(), &self.map.axes);
         let (x, y) = (axes.x.edges(), axes.y.edges());
         let axis = |axis: &MapAxis| {
@@ -132,7 +132,7 @@ impl FailureMaps<'_> {
 
     /// The cells of one model as CSV: edges in the axes' units, counts, and the fraction of failures, empty without
     /// samples.
-    pub fn csv(&self, model: usize) -> String {
+    pub(super) fn csv(&self, model: usize) -> String {
         let (x, y) = (self.map.axes.x.edges(), self.map.axes.y.edges());
         let cells = self.map.samples.len();
         let rows = (0..self.plan.headways.len() * cells).map(|at| (at / cells, at % cells));

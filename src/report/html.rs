@@ -77,7 +77,7 @@ pub(super) struct Page {
 
 impl Section {
     /// An empty chapter.
-    pub fn new(id: &str, title: &str) -> Section {
+    pub(super) fn new(id: &str, title: &str) -> Section {
         Section { id: id.to_owned(), title: title.to_owned(), ..Section::default() }
     }
 
@@ -92,7 +92,7 @@ impl Page {
     ///
     /// # Errors
     /// [`Error::Internal`] if the template does not match: a defect of this program.
-    pub fn html(&self) -> Result<String> {
+    pub(super) fn html(&self) -> Result<String> {
         #[derive(Serialize)]
         struct Context<'a> {
             style: &'a str,

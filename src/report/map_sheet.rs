@@ -63,7 +63,7 @@ const UNDECIDED: &str = "#e69f00";
 
 impl MapSheet<'_> {
     /// The sheet as a figure.
-    pub fn figure(&self) -> Figure {
+    pub(super) fn figure(&self) -> Figure {
         let (columns, plots) = self.trellis();
         Figure {
             title: self.title.clone(),

@@ -23,7 +23,7 @@ pub(crate) struct MotionError {
 
 impl MotionSpread {
     /// Adds the motions of a recorded scenario, at every step of its duration.
-    pub fn add(&mut self, recorded: &LaneCase<f64>, tables: &Tables<f64>) {
+    pub(super) fn add(&mut self, recorded: &LaneCase<f64>, tables: &Tables<f64>) {
         for step in 0..=recorded.horizon {
             self.count += 1.0;
             for series in 0..SERIES {
@@ -42,7 +42,7 @@ impl MotionSpread {
 
 impl MotionError {
     /// Adds the difference of a scenario.
-    pub fn add(&mut self, recorded: (&LaneCase<f64>, &Tables<f64>), replayed: (&LaneCase<f64>, &Tables<f64>)) {
+    pub(super) fn add(&mut self, recorded: (&LaneCase<f64>, &Tables<f64>), replayed: (&LaneCase<f64>, &Tables<f64>)) {
         self.scenarios += 1.0;
         let steps = 0..=recorded.0.horizon;
         for series in 0..SERIES {

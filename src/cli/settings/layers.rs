@@ -31,7 +31,7 @@ pub(crate) enum Origin {
 
 impl Origin {
     /// The place in errors.
-    pub fn place(&self, key: &str) -> Place {
+    pub(crate) fn place(&self, key: &str) -> Place {
         match self {
             Origin::File { path, row } => Place::file(path).row(*row).of(format!("`{key}`")),
             Origin::Default => Place::item(format!("`{key}`")),
@@ -73,7 +73,7 @@ pub(crate) enum Assignment {
 
 impl Assignment {
     /// A text with `=` that is not the name of a file is an assignment.
-    pub fn of(text: &str) -> Assignment {
+    pub(crate) fn of(text: &str) -> Assignment {
         match text.contains('=') && !Path::new(text).exists() {
             true => Assignment::Value(text.to_owned()),
             false => Assignment::File(PathBuf::from(text)),
@@ -120,7 +120,7 @@ impl Layers {
     /// # Errors
     /// [`Error::Usage`] naming file and line, or flag: unknown keys, with the most similar known one, and invalid values.
     /// [`Error::Io`] and [`Error::Input`] of the files.
-    pub fn read(typed: &[Assignment], variable: Option<&OsStr>) -> Result<Layers> {
+    pub(crate) fn read(typed: &[Assignment], variable: Option<&OsStr>) -> Result<Layers> {
         let mut layers = Layers::defaults();
         let named = typed.iter().filter_map(|one| match one {
             Assignment::File(path) => Some(path.clone()),
@@ -197,7 +197,7 @@ impl Layers {
     }
 
     /// One key.
-    pub fn get(&self, name: &str) -> Option<Setting<'_>> {
+    pub(crate) fn get(&self, name: &str) -> Option<Setting<'_>> {
         self.list().find(|setting| setting.key.name == name)
     }
 

@@ -60,7 +60,7 @@ pub(in crate::engine) struct Batch {
 
 impl<'c> Fleet<'c> {
     /// All slots are free. `vehicles` are the other vehicles that the batches evaluate.
-    pub fn new(stream: &Lanes<'_>, entries: &'c [f32], vehicles: [usize; 2]) -> Self {
+    pub(super) fn new(stream: &Lanes<'_>, entries: &'c [f32], vehicles: [usize; 2]) -> Self {
         let window = |vehicle: usize, quantity: usize| {
             Window::new(stream.tracks.iter().map(|tracks| tracks[vehicle].all()[quantity]), entries)
         };
@@ -85,7 +85,7 @@ impl<'c> Fleet<'c> {
 impl Batch {
     /// Index of the slot's lane within the stream.
     #[inline(always)]
-    pub fn lane(&self, k: usize) -> u32 {
+    pub(super) fn lane(&self, k: usize) -> u32 {
         self.lanes.fixed.ego.lane[k]
     }
 

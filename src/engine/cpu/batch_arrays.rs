@@ -152,7 +152,7 @@ impl<const N: usize> LaneArrays<N> {
 
     /// All rows that a stream with these properties needs, part by part.
     #[inline(always)]
-    pub fn parts(&self, is_pair: bool, values: bool) -> [&[[u32; N]]; PARTS] {
+    pub(super) fn parts(&self, is_pair: bool, values: bool) -> [&[[u32; N]]; PARTS] {
         let FixedArrays { ego, others: [principal, second] } = &self.fixed;
         let StateArrays { moving, ahead, values: gathered } = &self.state;
         let (second, ahead): (&[_], &[_]) = if is_pair { (second.rows(), ahead.rows()) } else { (&[], &[]) };
@@ -253,7 +253,7 @@ impl<const N: usize> LaneArrays<N> {
 
     /// Sets the lane index of this slot, and its gaps to the other vehicles.
     #[inline(always)]
-    pub fn start(&mut self, k: usize, lane: u32, gaps: [f32; 2]) {
+    pub(super) fn start(&mut self, k: usize, lane: u32, gaps: [f32; 2]) {
         self.fixed.ego.lane[k] = lane;
         self.state.moving.gap[k] = gaps[0];
         self.state.ahead.gap[k] = gaps[1];
@@ -348,7 +348,7 @@ impl<const N: usize> StateArrays<N> {
 
     /// Sets the rows that a step of a model changes under these rules.
     #[inline(always)]
-    pub fn set<M: DriverModel<f32>>(&mut self, k: usize, lane: &LaneState<f32>, rules: Rules) {
+    pub(super) fn set<M: DriverModel<f32>>(&mut self, k: usize, lane: &LaneState<f32>, rules: Rules) {
         let StateArrays { moving, ahead, values } = self;
         moving.index[k] = lane.index;
         moving.v_ego[k] = lane.v_ego;

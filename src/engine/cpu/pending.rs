@@ -63,7 +63,7 @@ pub(in crate::engine) struct Pending {
 
 impl Pending {
     /// State at the start of a stream.
-    pub fn new(values: bool, asks_steady: bool) -> Self {
+    pub(super) fn new(values: bool, asks_steady: bool) -> Self {
         Pending {
             lanes: Box::new(LaneArrays::idle()),
             values,
@@ -78,13 +78,13 @@ impl Pending {
 
     /// Number of pending lanes.
     #[inline(always)]
-    pub fn count(&self) -> usize {
+    pub(super) fn count(&self) -> usize {
         self.end - self.first
     }
 
     /// Takes the next lanes; returns the place of the first.
     #[inline(always)]
-    pub fn take(&mut self, count: usize) -> usize {
+    pub(super) fn take(&mut self, count: usize) -> usize {
         let from = self.first;
         self.first += count;
         from
@@ -92,7 +92,7 @@ impl Pending {
 
     /// All lanes, pending lanes included.
     #[inline(always)]
-    pub fn lanes(&self) -> &LaneArrays<ROOM> {
+    pub(super) fn lanes(&self) -> &LaneArrays<ROOM> {
         &self.lanes
     }
 

@@ -37,7 +37,7 @@ pub(in crate::engine) struct VehicleTracks {
 impl VehicleTracks {
     /// Speed, lateral position, lateral speed.
     #[inline(always)]
-    pub fn all(&self) -> [Track; 3] {
+    pub(super) fn all(&self) -> [Track; 3] {
         [self.speed, self.position, self.towards]
     }
 }
@@ -131,7 +131,7 @@ pub(in crate::engine) struct Window {
 
 impl Window {
     /// Before the first lane of a stream with these series.
-    pub fn new(tracks: impl Iterator<Item = Track>, entries: &[f32]) -> Self {
+    pub(super) fn new(tracks: impl Iterator<Item = Track>, entries: &[f32]) -> Self {
         let value = standing(tracks, entries);
         Window { rows: [[value.unwrap_or(0.0); LANES]; ROWS], moves: false, stands: value.is_some() }
     }

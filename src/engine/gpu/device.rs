@@ -76,7 +76,7 @@ impl Device {
     ///
     /// # Errors
     /// [`Error::Device`] where the driver refuses.
-    pub fn open(
+    pub(super) fn open(
         adapter: &wgpu::Adapter,
         card: &AdapterCard,
         options: GpuOptions,
@@ -170,7 +170,7 @@ impl Device {
     ///
     /// # Errors
     /// As [`Device::pipeline`].
-    pub fn generator(&mut self) -> Result<wgpu::ComputePipeline> {
+    pub(super) fn generator(&mut self) -> Result<wgpu::ComputePipeline> {
         if let Some(pipeline) = &self.generator {
             return Ok(pipeline.clone());
         }
@@ -288,7 +288,7 @@ impl Device {
     }
 
     /// The error of this device.
-    pub fn failed(&self, what: impl Into<String>) -> Error {
+    pub(super) fn failed(&self, what: impl Into<String>) -> Error {
         Error::device(&self.name, what, "the CPU backend computes the same: option `backend = cpu`")
     }
 }

@@ -39,7 +39,7 @@ pub(super) struct GeneratorSetup {
 }
 
 impl GeneratorSetup {
-    pub fn new(generator: &Generator) -> Self {
+    pub(super) fn new(generator: &Generator) -> Self {
         let points = &generator.points;
         let bits = |values: &[f32]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
         let mut numbers = bits(&generator.basis);

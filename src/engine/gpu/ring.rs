@@ -34,7 +34,7 @@ pub(super) struct Job {
 
 impl Job {
     /// Number of lanes per model.
-    pub fn lanes(&self) -> u32 {
+    fn lanes(&self) -> u32 {
         self.cases * self.headways
     }
 
@@ -205,7 +205,12 @@ impl Slot {
     ///
     /// # Errors
     /// The outer error means that the state of the device is unknown; the inner error means that only this job failed.
-    pub fn finish(&mut self, device: &Device, flight: Flight, previous: Option<Instant>) -> Result<Result<Answer>> {
+    pub(super) fn finish(
+        &mut self,
+        device: &Device,
+        flight: Flight,
+        previous: Option<Instant>,
+    ) -> Result<Result<Answer>> {
         let wait = wgpu::PollType::Wait {
             submission_index: Some(flight.submission.clone()),
             timeout: Some(device.options.timeout),

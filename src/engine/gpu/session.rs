@@ -52,7 +52,7 @@ struct Piece {
 }
 
 impl<'p> GpuSession<'p> {
-    pub fn new(plan: &'p LanePlan, device: String, commands: Sender<Command>, options: &GpuOptions) -> Result<Self> {
+    fn new(plan: &'p LanePlan, device: String, commands: Sender<Command>, options: &GpuOptions) -> Result<Self> {
         ModelId::refuse_foreign(&plan.models, "a device")?;
         let queue = options.lanes_per_invocation != Some(1);
         let constants: Vec<Constants<f32>> =
@@ -365,7 +365,7 @@ pub(super) struct Pacer {
 
 impl Pacer {
     /// Starts with `lanes` per model.
-    pub fn new(lanes: u64) -> Pacer {
+    fn new(lanes: u64) -> Pacer {
         Pacer { lanes: lanes.max(1) }
     }
 
@@ -383,12 +383,12 @@ impl Pacer {
     }
 
     /// Units of a job with `lanes_per_unit` lanes per model each: at least one, within `max_lanes`.
-    pub fn units(&self, lanes_per_unit: u64, max_lanes: u64) -> u64 {
+    fn units(&self, lanes_per_unit: u64, max_lanes: u64) -> u64 {
         (self.lanes.min(max_lanes) / lanes_per_unit.max(1)).max(1)
     }
 
     /// Lanes per model of the next job.
-    pub fn lanes(&self) -> u64 {
+    fn lanes(&self) -> u64 {
         self.lanes
     }
 }

@@ -76,7 +76,7 @@ impl CaseSource for ThresholdCases {
 }
 
 impl ThresholdCases {
-    pub fn new(profile: &Profile, seed: u64, categories: &[Category]) -> ThresholdCases {
+    pub(super) fn new(profile: &Profile, seed: u64, categories: &[Category]) -> ThresholdCases {
         ThresholdCases {
             seed,
             profile: profile.clone(),

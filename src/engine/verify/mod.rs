@@ -59,7 +59,7 @@ struct CaseRandom(ChaCha8Rng);
 
 impl CaseRandom {
     /// The stream of one purpose, seed, category, unit and variant.
-    pub fn new(purpose: Purpose, seed: u64, category: Category, unit: u64, variant: usize) -> CaseRandom {
+    fn new(purpose: Purpose, seed: u64, category: Category, unit: u64, variant: usize) -> CaseRandom {
         let mut key = [0_u8; 32];
         key[..8].copy_from_slice(&seed.to_le_bytes());
         key[8..16].copy_from_slice(&unit.to_le_bytes());
@@ -70,7 +70,7 @@ impl CaseRandom {
     }
 
     /// Uniform in [0, 1), 53 bits.
-    pub fn uniform(&mut self) -> f64 {
+    fn uniform(&mut self) -> f64 {
         const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
         (self.0.next_u64() >> 11) as f64 * STEP
     }
@@ -91,7 +91,7 @@ impl CaseRandom {
     }
 
     /// 1 or −1: left or right.
-    pub fn sign(&mut self) -> f64 {
+    fn sign(&mut self) -> f64 {
         if self.chance(0.5) { 1.0 } else { -1.0 }
     }
 }

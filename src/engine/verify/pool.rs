@@ -43,7 +43,7 @@ pub(super) struct Pool {
 
 impl Pool {
     /// The pool of a seed at a time step.
-    pub fn new(seed: u64, dt_s: f64) -> Pool {
+    pub(super) fn new(seed: u64, dt_s: f64) -> Pool {
         let mut tables = Tables::default();
         // Here the category only separates the streams of the kinds.
         let draw = |kind: usize, k: u64| CaseRandom::new(Purpose::Pool, seed, Category::CutIn, k, kind);
@@ -70,7 +70,7 @@ impl Pool {
     }
 
     /// A part of a random speed series.
-    pub fn speed(&self, draw: &mut CaseRandom, braked: bool) -> (Speed, Slice) {
+    pub(super) fn speed(&self, draw: &mut CaseRandom, braked: bool) -> (Speed, Slice) {
         let series = if braked { &self.braked } else { &self.varied };
         let slice = part(draw, series);
         (Speed::Sampled(slice.of(&self.tables.speed).to_vec()), slice)

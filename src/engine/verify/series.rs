@@ -41,7 +41,7 @@ pub(super) fn rounded(x: f64) -> f32 {
 }
 
 impl ThresholdSeries {
-    pub fn new(seed: u64, dt_s: f64) -> ThresholdSeries {
+    pub(super) fn new(seed: u64, dt_s: f64) -> ThresholdSeries {
         let (mut tables, mut speeds, mut across) = (Tables::default(), Vec::new(), [const { Vec::new() }; 3]);
         let draw = |kind, k| CaseRandom::new(Purpose::ThresholdPool, seed, Category::CutIn, k as u64, kind);
         for k in 0..PER_KIND {

@@ -75,7 +75,7 @@ impl CaseNumber {
     }
 
     /// The name that users give it. A speed along the road needs a unit; every other quantity has one customary unit.
-    pub fn named(&self) -> Named {
+    pub(super) fn named(&self) -> Named {
         Named { name: self.key.to_owned(), unit: self.unit(), needs_unit: self.quantity == Some(Quantity::Speed) }
     }
 }

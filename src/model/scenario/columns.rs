@@ -66,7 +66,7 @@ pub(super) fn names(leaves: &[Leaf]) -> Vec<(Named, usize, bool)> {
 
 impl Leaf {
     /// The column as it is written.
-    pub fn column(&self) -> Column {
+    pub(super) fn column(&self) -> Column {
         let kind = match self.field.content {
             Content::Text if self.flat == "id" => ColumnKind::Text,
             Content::Text | Content::OneOf(_) => ColumnKind::Name,
@@ -86,7 +86,7 @@ impl Leaf {
     }
 
     /// The leaf's value in the JSON of a scenario.
-    pub fn of<'a>(&self, scenario: &'a Value) -> &'a Value {
+    pub(super) fn of<'a>(&self, scenario: &'a Value) -> &'a Value {
         let object = self.record.map_or(Some(scenario), |record| scenario.get(record));
         object.and_then(|object| object.get(self.field.name)).unwrap_or(&Value::Null)
     }

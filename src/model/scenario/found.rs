@@ -42,7 +42,7 @@ pub(super) struct ScenariosRead {
 
 impl ScenariosRead {
     /// `help` says what to do about two scenarios with the same id.
-    pub fn new(implausible: Implausible, help: &'static str) -> ScenariosRead {
+    pub(super) fn new(implausible: Implausible, help: &'static str) -> ScenariosRead {
         let doubts = Doubts::new(implausible);
         ScenariosRead {
             scenarios: Vec::new(),
@@ -56,7 +56,7 @@ impl ScenariosRead {
     }
 
     /// Number of scenarios so far, usable or not.
-    pub fn count(&self) -> u64 {
+    pub(super) fn count(&self) -> u64 {
         (self.scenarios.len() - self.doubled.len()) as u64 + self.problems.len() as u64 + self.more
     }
 
@@ -72,7 +72,7 @@ impl ScenariosRead {
 
     /// Adds a usable scenario whose id is new. `place` returns the place of a field, `word` is the unit of counting
     /// rows.
-    pub fn take(&mut self, mut scenario: Scenario, row: u64, word: &str, place: impl Fn(&str) -> Place) {
+    pub(super) fn take(&mut self, mut scenario: Scenario, row: u64, word: &str, place: impl Fn(&str) -> Place) {
         let mut doubts = self.doubts();
         let admitted = admit(&mut scenario, &mut doubts, &|field| place(field).to_string());
         if let Err(Problem { field, problem, help }) = admitted {
@@ -104,7 +104,7 @@ impl ScenariosRead {
     /// # Errors
     /// [`Error::Input`] for a file without scenarios, and if more than one scenario in ten is unusable; it lists the
     /// problems up to a maximum number.
-    pub fn finish(mut self, file: Place, help: &str) -> Result<ScenarioFile> {
+    pub(super) fn finish(mut self, file: Place, help: &str) -> Result<ScenarioFile> {
         self.scenarios.retain(|scenario| !self.doubled.contains(&scenario.id));
         self.doubled.clear();
         let (total, bad) = (self.count(), self.problems.len() as u64 + self.more);

@@ -21,7 +21,7 @@ pub(super) struct Elements {
 
 impl Elements {
     /// Starts a document.
-    pub fn new() -> Result<Elements> {
+    pub(super) fn new() -> Result<Elements> {
         let mut elements = Elements { writer: Writer::new(Vec::new()), open: Vec::new() };
         elements.event(Event::Decl(BytesDecl::new("1.0", Some("UTF-8"), None)))?;
         elements.event(Event::Text(BytesText::from_escaped("\n")))?;
@@ -29,7 +29,7 @@ impl Elements {
     }
 
     /// Opens an element; the following elements are inside it.
-    pub fn open(&mut self, name: &'static str, attributes: Vec<Attribute>) -> Result<()> {
+    pub(super) fn open(&mut self, name: &'static str, attributes: Vec<Attribute>) -> Result<()> {
         self.indent()?;
         self.event(Event::Start(start(name, &attributes)))?;
         self.open.push(name);
@@ -37,7 +37,7 @@ impl Elements {
     }
 
     /// Closes the innermost open element.
-    pub fn close(&mut self) -> Result<()> {
+    pub(super) fn close(&mut self) -> Result<()> {
         let name = self.open.pop().ok_or_else(|| Error::Internal("no element of XML is open".to_owned()))?;
         self.indent()?;
         self.event(Event::End(BytesEnd::new(name)))?;
@@ -45,7 +45,7 @@ impl Elements {
     }
 
     /// Adds an element without content.
-    pub fn empty(&mut self, name: &str, attributes: Vec<Attribute>) -> Result<()> {
+    pub(super) fn empty(&mut self, name: &str, attributes: Vec<Attribute>) -> Result<()> {
         self.nested(&[(name, attributes)])
     }
 
@@ -64,7 +64,7 @@ impl Elements {
     }
 
     /// Returns the document.
-    pub fn finish(mut self) -> Result<Vec<u8>> {
+    pub(super) fn finish(mut self) -> Result<Vec<u8>> {
         while !self.open.is_empty() {
             self.close()?;
         }

@@ -55,7 +55,7 @@ pub(super) struct At<'a> {
 }
 
 impl<'a> At<'a> {
-    pub fn name(&self) -> &'a str {
+    pub(super) fn name(&self) -> &'a str {
         self.node.tag_name().name()
     }
 
@@ -74,7 +74,7 @@ impl<'a> At<'a> {
         self.wrong(error.to_string(), error.help().unwrap_or_default())
     }
 
-    pub fn all(self) -> impl Iterator<Item = At<'a>> {
+    pub(super) fn all(self) -> impl Iterator<Item = At<'a>> {
         self.node.children().filter(Node::is_element).map(move |node| At { node, path: self.path })
     }
 
@@ -145,7 +145,7 @@ impl<'a> At<'a> {
     }
 
     /// The value of an attribute without a namespace.
-    pub fn value(&self, name: &str) -> Option<&'a str> {
+    pub(super) fn value(&self, name: &str) -> Option<&'a str> {
         let mut own = self.node.attributes().filter(|attribute| attribute.namespace().is_none());
         own.find(|attribute| attribute.name() == name).map(|attribute| attribute.value())
     }
@@ -154,7 +154,7 @@ impl<'a> At<'a> {
         self.value(name).is_some()
     }
 
-    pub fn text(&self, name: &str) -> Result<&'a str> {
+    pub(super) fn text(&self, name: &str) -> Result<&'a str> {
         let value = self
             .value(name)
             .ok_or_else(|| self.wrong(format!("the attribute `{name}` is missing"), format!("write {name}=\"…\"")))?;

@@ -97,7 +97,7 @@ impl Axis {
     }
 
     /// Whether `value` is between the ends.
-    pub fn holds(&self, value: f64) -> bool {
+    pub(super) fn holds(&self, value: f64) -> bool {
         self.shows(value) && (self.low - 1e-9..=self.high + 1e-9).contains(&self.scale.place(value))
     }
 

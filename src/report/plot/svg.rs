@@ -72,7 +72,7 @@ impl Type {
     }
 
     /// Wraps `text` to `width_px`: at blanks, and inside a word only if the word alone is too wide.
-    pub fn wrap(self, text: &str, width_px: f64) -> Vec<String> {
+    fn wrap(self, text: &str, width_px: f64) -> Vec<String> {
         let mut lines = Vec::new();
         let mut line = String::new();
         // A no-break space keeps an interval together.
@@ -119,12 +119,12 @@ pub(in crate::report) struct Canvas {
 }
 
 impl Canvas {
-    pub fn new(width_px: f64) -> Self {
+    pub(super) fn new(width_px: f64) -> Self {
         Canvas { width_px, body: String::new(), depth: 1 }
     }
 
     /// The finished document, ending a little below `bottom`.
-    pub fn document(self, bottom: f64) -> String {
+    pub(super) fn document(self, bottom: f64) -> String {
         format!(
             "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\" font-family=\"{FONTS}\" \
              fill=\"{INK}\">\n  <rect width=\"100%\" height=\"100%\" fill=\"white\" />\n{}</svg>\n",
@@ -178,7 +178,7 @@ impl Canvas {
     }
 
     /// Draws one line of text on its base line.
-    pub fn text(&mut self, (x, y): Position, line: &str, set: Type, anchor: Anchor) {
+    pub(crate) fn text(&mut self, (x, y): Position, line: &str, set: Type, anchor: Anchor) {
         let mut text = format!("<text x=\"{}\" y=\"{}\" font-size=\"{}\"", Number(x), Number(y), set.size_px);
         let anchor = match anchor {
             Anchor::Start => None,

@@ -93,7 +93,7 @@ pub(super) struct Shown<'a> {
 
 impl<'a> Shown<'a> {
     /// Up to a given time, or to the last change: lanes may continue long after their last event.
-    pub fn of(series: &'a [TraceSeries<'a>], until_s: Option<f64>) -> Self {
+    pub(super) fn of(series: &'a [TraceSeries<'a>], until_s: Option<f64>) -> Self {
         let end_s = series.iter().filter_map(|s| Some(s.trace.steps.last()?.time_s)).fold(0.0, f64::max);
         let last_s = series.iter().map(|s| s.trace.last_change_s()).fold(0.0, f64::max) + REST_S;
         let until_s = until_s.unwrap_or(if last_s < 0.8 * end_s { last_s } else { end_s });

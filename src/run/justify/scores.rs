@@ -56,7 +56,7 @@ pub(super) struct Labels<'a> {
 }
 
 impl Labels<'_> {
-    pub fn score(&self, variant: usize, options: &ScoreOptions) -> Scored {
+    pub(super) fn score(&self, variant: usize, options: &ScoreOptions) -> Scored {
         self.score_of(variant, options, &|_, _| true)
     }
 
@@ -163,7 +163,7 @@ impl<'a> Replay<'a> {
     ///
     /// # Errors
     /// As [`Compare::plan`] and [`Executor::sweep`].
-    pub fn run(
+    pub(super) fn run(
         scenarios: &'a [Scenario],
         facts: &'a DataProvenance,
         profile: &Profile,
@@ -184,7 +184,7 @@ impl<'a> Replay<'a> {
         Ok(Replay { compare, counts, verdicts, data: &facts.data })
     }
 
-    pub fn plan(&self) -> &LanePlan {
+    pub(super) fn plan(&self) -> &LanePlan {
         self.compare.lane_plan()
     }
 
@@ -206,7 +206,7 @@ impl<'a> Replay<'a> {
     }
 
     /// The verdicts of a lane.
-    pub fn verdicts(&self, unit: usize, variant: usize, headway: usize) -> Verdicts {
+    pub(super) fn verdicts(&self, unit: usize, variant: usize, headway: usize) -> Verdicts {
         let plan = self.plan();
         self.verdicts[(unit * plan.blocks[0].variants.len() + variant) * plan.headways.len() + headway]
     }

@@ -35,7 +35,7 @@ pub(super) enum Task {
 
 impl Task {
     /// All tasks, in the order in which shards take them.
-    pub fn all(options: &SearchOptions) -> Vec<Task> {
+    pub(super) fn all(options: &SearchOptions) -> Vec<Task> {
         let scopes = Scope::all(options);
         let mut tasks = vec![Task::Paper, Task::Families];
         tasks.extend(scopes.iter().map(|scope| Task::Features(*scope)));
@@ -49,7 +49,7 @@ impl Task {
     ///
     /// # Errors
     /// Those of `evaluate`.
-    pub fn run(
+    pub(super) fn run(
         &self,
         category: Category,
         options: &SearchOptions,

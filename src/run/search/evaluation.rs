@@ -90,7 +90,7 @@ impl<'a> Evaluator<'a> {
     ///
     /// # Errors
     /// Those of the cases and of the sweep.
-    pub fn new(
+    pub(super) fn new(
         category: Category,
         scenarios: Vec<&'a Scenario>,
         profile: &'a Profile,
@@ -160,7 +160,7 @@ impl<'a> Evaluator<'a> {
     ///
     /// # Errors
     /// Those of the sweep; [`Error::Interrupted`].
-    pub fn evaluate(&self, candidates: &[Candidate], training: &Training) -> Result<Vec<Option<Evaluation>>> {
+    pub(super) fn evaluate(&self, candidates: &[Candidate], training: &Training) -> Result<Vec<Option<Evaluation>>> {
         let mut all = Vec::with_capacity(candidates.len());
         for batch in candidates.chunks(BATCH) {
             let cases = |candidate| Ok(self.cases(candidate, training)?.filter(|cases| cases.iter().all(is_possible)));
@@ -182,7 +182,7 @@ impl<'a> Evaluator<'a> {
     }
 
     /// Number of scenarios in which S fails from some headway.
-    pub fn failing_scenarios(&self, model: ModelId, criterion: Criterion) -> u64 {
+    pub(super) fn failing_scenarios(&self, model: ModelId, criterion: Criterion) -> u64 {
         let models = ModelId::ALL.len();
         let at = ModelId::ALL.iter().position(|known| *known == model).unwrap_or_default();
         let fails = |unit: &&[Verdicts]| unit.iter().skip(at).step_by(models).any(|lane| lane.failed(criterion));

@@ -36,7 +36,7 @@ impl Results {
     ///
     /// # Errors
     /// Those of [`Journal::open`]; [`Error::Busy`] if another process evaluates the shard.
-    pub fn open(folder: Option<&Path>, shard: Option<Shard>, search_sha256: &str) -> Result<Results> {
+    pub(super) fn open(folder: Option<&Path>, shard: Option<Shard>, search_sha256: &str) -> Result<Results> {
         let mut results = Results { known: HashMap::new(), asked: BTreeSet::new(), journal: None, _shard: None };
         let Some(folder) = folder else { return Ok(results) };
         let stem = shard.map_or("search".to_owned(), |shard| format!("search-{}-of-{}", shard.index, shard.of));
@@ -77,7 +77,7 @@ impl Results {
     ///
     /// # Errors
     /// [`Error::Internal`].
-    pub fn find(&mut self, candidate: &Candidate) -> Result<Option<&Option<Evaluated>>> {
+    pub(super) fn find(&mut self, candidate: &Candidate) -> Result<Option<&Option<Evaluated>>> {
         let key = key_of(candidate)?;
         let found = self.known.get(&key);
         self.asked.insert(key);
@@ -88,7 +88,7 @@ impl Results {
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn add(&mut self, tried: Vec<Tried>) -> Result<()> {
+    pub(super) fn add(&mut self, tried: Vec<Tried>) -> Result<()> {
         if let Some(journal) = self.journal.as_mut().filter(|_| !tried.is_empty()) {
             journal.append(&tried)?;
         }
@@ -99,12 +99,12 @@ impl Results {
     }
 
     /// The results of this run, by the text of their candidates.
-    pub fn all(&self) -> Vec<Evaluated> {
+    pub(super) fn all(&self) -> Vec<Evaluated> {
         self.asked.iter().filter_map(|key| self.known.get(key)?.clone()).collect()
     }
 
     /// Number of candidates of this run, those that could not be fitted included.
-    pub fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.asked.len()
     }
 }

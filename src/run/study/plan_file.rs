@@ -93,7 +93,12 @@ pub(crate) struct BlockHead {
 
 impl BlockHead {
     /// Keeps the part of the decomposition that cases are made with.
-    pub fn new(category: Category, units: u64, reduction: Option<&Reduction>, replays: Vec<String>) -> BlockHead {
+    pub(crate) fn new(
+        category: Category,
+        units: u64,
+        reduction: Option<&Reduction>,
+        replays: Vec<String>,
+    ) -> BlockHead {
         let used = Parameterization::max_coefficients(category);
         let basis = reduction.map(|reduction| {
             let SvdBasis { weights, mean, directions, rows, .. } = reduction.basis.clone();

@@ -20,7 +20,7 @@ pub(super) struct RecordingTags<'a> {
 }
 
 impl<'a> RecordingTags<'a> {
-    pub fn new(recording: &'a Recording, options: &'a MiningOptions) -> Self {
+    pub(super) fn new(recording: &'a Recording, options: &'a MiningOptions) -> Self {
         let activities = recording
             .tracks
             .iter()
@@ -53,7 +53,7 @@ pub(super) struct Stretch {
 
 impl<'a> DataSet<'a> {
     /// The data set of the track with index `ego_index`; `None` if the vehicle travels less than the end cut.
-    pub fn new(recording_tags: &'a RecordingTags<'a>, ego_index: usize) -> Option<Self> {
+    pub(super) fn new(recording_tags: &'a RecordingTags<'a>, ego_index: usize) -> Option<Self> {
         let ego = &recording_tags.recording.tracks[ego_index];
         let samples = recording_tags.options.ego_view.last_sample(ego)? + 1;
         let carriageway = &recording_tags.recording.carriageways[ego.carriageway];
@@ -89,7 +89,7 @@ impl<'a> DataSet<'a> {
     }
 
     /// Gap from the ego to `other`, bumper to bumper, m, at the ego's sample `k` and the other's `j`.
-    pub fn gap_m(&self, k: usize, other: &Track, j: usize) -> f64 {
+    fn gap_m(&self, k: usize, other: &Track, j: usize) -> f64 {
         other.s_m[j] - self.ego.s_m[k] - 0.5 * (self.ego.length_m + other.length_m)
     }
 
@@ -181,7 +181,7 @@ impl FoundScenario<'_> {
 
     /// The ego's lane at t = 0. All series refer to it, so they have no jump if the ego changes lanes (possible in an
     /// LVD only).
-    pub fn lane(&self) -> Option<Lane> {
+    pub(super) fn lane(&self) -> Option<Lane> {
         self.set.carriageway.lane(usize::from(self.set.ego.lane[self.start]))
     }
 
@@ -278,7 +278,7 @@ struct FrameIndex {
 impl FrameIndex {
     /// Sorts the tracks of a carriageway by frame and position. Memory is proportional to the samples, for any
     /// distance of the frame numbers.
-    pub fn new(recording: &Recording, carriageway: usize) -> Self {
+    fn new(recording: &Recording, carriageway: usize) -> Self {
         let tracks = &recording.tracks;
         let mut order: Vec<usize> =
             (0..tracks.len()).filter(|&i| tracks[i].carriageway == carriageway && !tracks[i].is_empty()).collect();

@@ -55,7 +55,7 @@ pub(super) struct Activities {
 
 impl Activities {
     /// Detects all activities of a vehicle.
-    pub fn of(track: &Track, carriageway: &Carriageway, frame_rate_hz: f64, options: &MiningOptions) -> Self {
+    pub(super) fn of(track: &Track, carriageway: &Carriageway, frame_rate_hz: f64, options: &MiningOptions) -> Self {
         let (low, high) = track.d_m.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), &d| (l.min(d), h.max(d)));
         let reaches_a_line =
             carriageway.lane_lines_m.iter().any(|&line| line >= low - TOLERANCE && line <= high + TOLERANCE);

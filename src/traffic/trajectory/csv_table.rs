@@ -78,7 +78,7 @@ impl CsvTable {
     ///
     /// # Errors
     /// If it cannot be read, is empty, or has no delimited header in UTF-8.
-    pub fn open(path: &Path, format: &CsvFormat) -> Result<Self> {
+    pub(super) fn open(path: &Path, format: &CsvFormat) -> Result<Self> {
         let mut file = input_file::open_text(path)?;
         let mut start = Vec::new();
         if format.delimiter != Some(b',') {
@@ -124,7 +124,7 @@ impl CsvTable {
     ///
     /// # Errors
     /// If the file cannot be read or the line has another number of fields than the header.
-    pub fn next_row(&mut self) -> Result<bool> {
+    pub(super) fn next_row(&mut self) -> Result<bool> {
         if !self.read_line()? {
             return Ok(false);
         }
@@ -136,12 +136,12 @@ impl CsvTable {
     }
 
     /// The column names.
-    pub fn header(&self) -> &[String] {
+    pub(super) fn header(&self) -> &[String] {
         &self.header
     }
 
     /// Number of data lines so far.
-    pub fn rows(&self) -> u64 {
+    pub(super) fn rows(&self) -> u64 {
         self.rows
     }
 
@@ -154,7 +154,7 @@ impl CsvTable {
     ///
     /// # Errors
     /// If the header has none, or two; names the most similar column.
-    pub fn column(&self, name: &str) -> Result<CsvColumn> {
+    pub(super) fn column(&self, name: &str) -> Result<CsvColumn> {
         self.optional_column(name)?.ok_or_else(|| {
             let problem = format!("the column is missing{}", self.strange_names_for_message());
             let help = match self.similar_name(name) {
@@ -204,7 +204,7 @@ impl CsvTable {
     ///
     /// # Errors
     /// If it is not UTF-8.
-    pub fn text(&self, column: CsvColumn) -> Result<&str> {
+    pub(super) fn text(&self, column: CsvColumn) -> Result<&str> {
         match std::str::from_utf8(self.bytes(column)) {
             Ok(text) => Ok(text.trim()),
             Err(_) => Err(self.bad(
@@ -265,7 +265,7 @@ impl CsvTable {
     }
 
     /// The present line.
-    pub fn place(&self) -> Place {
+    pub(super) fn place(&self) -> Place {
         Place::file(&self.path).row(self.line)
     }
 
@@ -275,7 +275,7 @@ impl CsvTable {
     }
 
     /// A field as messages show it.
-    pub fn shown(&self, column: CsvColumn) -> String {
+    pub(super) fn shown(&self, column: CsvColumn) -> String {
         excerpt(&String::from_utf8_lossy(self.bytes(column)))
     }
 
@@ -283,7 +283,7 @@ impl CsvTable {
     ///
     /// # Errors
     /// If a file that was unpacked or converted cannot be read again.
-    pub fn finish(self) -> Result<FileChecksum> {
+    pub(super) fn finish(self) -> Result<FileChecksum> {
         if !self.is_plain {
             return FileChecksum::of(&self.path);
         }

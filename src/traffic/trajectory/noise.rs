@@ -31,7 +31,7 @@ pub(crate) struct Noise {
 
 impl Noise {
     /// The noise of a recording.
-    pub fn of(recording: &Recording) -> Noise {
+    pub(crate) fn of(recording: &Recording) -> Noise {
         let rate_hz = recording.frame_rate_hz;
         let reach = (0.5 * rate_hz).round().max(2.0) as usize;
         let (mut accelerations, mut told, mut third) = (0.0, 0.0, 0.0);

@@ -61,7 +61,7 @@ pub(super) struct Braking {
 
 impl Braking {
     /// Draws peak and shape.
-    pub fn draw(behaviour: &Behaviour, stream: &mut TrafficRandom) -> Braking {
+    pub(super) fn draw(behaviour: &Behaviour, stream: &mut TrafficRandom) -> Braking {
         let excess_mps2 = stream.exponential(behaviour.braking_excess_mps2);
         let peak = (WEAKEST_PEAK_MPS2 + excess_mps2).min(HARDEST_PEAK_MPS2);
         let first = Self::phase(behaviour, peak, 0.0, stream);

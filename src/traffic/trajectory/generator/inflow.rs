@@ -77,7 +77,7 @@ pub(super) struct Inflow {
 
 impl Inflow {
     /// The queue of an empty lane.
-    pub fn new(
+    pub(super) fn new(
         demand: LaneDemand,
         lane: usize,
         centre_m: f64,

@@ -81,7 +81,7 @@ pub(super) enum Manner {
 
 impl Manner {
     /// Draws the manner of one decision.
-    pub fn draw(behaviour: &Behaviour, stream: &mut TrafficRandom) -> Manner {
+    pub(super) fn draw(behaviour: &Behaviour, stream: &mut TrafficRandom) -> Manner {
         if stream.chance(behaviour.accelerating_fraction) { Manner::Accelerating } else { Manner::Considerate }
     }
 }

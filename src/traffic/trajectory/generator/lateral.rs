@@ -41,7 +41,7 @@ pub(super) struct LaneChangeMotion {
 
 impl LaneChangeMotion {
     /// Draws duration, shape and acceleration of a change between two lanes and two lateral positions.
-    pub fn draw(
+    pub(super) fn draw(
         lanes: (usize, usize),
         way_m: (f64, f64),
         class: VehicleClass,

@@ -28,7 +28,7 @@ pub(super) struct TrafficRandom {
 
 impl TrafficRandom {
     /// The stream of one purpose in one carriageway of one recording.
-    pub fn new(seed: u64, recording: usize, carriageway: usize, purpose: Purpose) -> TrafficRandom {
+    pub(super) fn new(seed: u64, recording: usize, carriageway: usize, purpose: Purpose) -> TrafficRandom {
         let mut key = [0_u8; 32];
         key[..8].copy_from_slice(&seed.to_le_bytes());
         key[8..16].copy_from_slice(&(recording as u64).to_le_bytes());
@@ -39,7 +39,7 @@ impl TrafficRandom {
     }
 
     /// Uniform in [0, 1), 53 bits.
-    pub fn uniform(&mut self) -> f64 {
+    pub(super) fn uniform(&mut self) -> f64 {
         const STEP: f64 = 1.0 / (1_u64 << 53) as f64;
         (self.rng.next_u64() >> 11) as f64 * STEP
     }

@@ -82,7 +82,7 @@ pub(super) struct Traffic {
 
 impl Traffic {
     /// An empty road. `key` is (seed, recording, carriageway).
-    pub fn new(setting: RoadSetup, demand: Vec<LaneDemand>, key: (u64, usize, usize)) -> Traffic {
+    pub(super) fn new(setting: RoadSetup, demand: Vec<LaneDemand>, key: (u64, usize, usize)) -> Traffic {
         let stream = |purpose| TrafficRandom::new(key.0, key.1, key.2, purpose);
         let mut arrivals = stream(Purpose::Inflow);
         let lanes = demand.len();
@@ -116,7 +116,7 @@ impl Traffic {
 
     /// Runs until the road is full, then for `samples` samples. Returns the camera's samples of each vehicle, in the
     /// order of arrival.
-    pub fn run(mut self, samples: usize) -> Vec<Vehicle> {
+    pub(super) fn run(mut self, samples: usize) -> Vec<Vehicle> {
         // Warm-up: the slowest trucks pass the whole road once.
         let warm_up_s = (UPSTREAM_M + self.setting.window_m + DOWNSTREAM_M) / FILLING_MPS;
         let warm_up = (warm_up_s / self.setting.step_s).ceil() as usize;

@@ -73,7 +73,12 @@ pub(super) struct Vehicle {
 
 impl Vehicle {
     /// Draws size and driver. `lane_speed_mps` is the mean desired speed of cars in this lane.
-    pub fn draw(class: VehicleClass, lane_speed_mps: f64, overreaction: f64, stream: &mut TrafficRandom) -> Vehicle {
+    pub(super) fn draw(
+        class: VehicleClass,
+        lane_speed_mps: f64,
+        overreaction: f64,
+        stream: &mut TrafficRandom,
+    ) -> Vehicle {
         let (length_m, width_m) = match class {
             VehicleClass::Car => (stream.normal_within(4.6, 0.5, 3.4, 6.4), stream.normal_within(1.9, 0.09, 1.6, 2.2)),
             // Articulated and other trucks: two peaks that give the published 12 ± 4.7 m.
@@ -127,7 +132,7 @@ impl Vehicle {
     }
 
     /// Places it in a lane at a random lateral position.
-    pub fn place(&mut self, lane: usize, centre_m: f64, lane_width_m: f64, stream: &mut TrafficRandom) {
+    pub(super) fn place(&mut self, lane: usize, centre_m: f64, lane_width_m: f64, stream: &mut TrafficRandom) {
         self.lane = lane;
         self.occupied = 1 << lane;
         self.line_m = draw_line(centre_m, lane_width_m, self.width_m, stream);
@@ -149,7 +154,7 @@ impl Vehicle {
     }
 
     /// Lateral position and speed of the centre, m and m/s.
-    pub fn lateral(&self) -> (f64, f64) {
+    pub(super) fn lateral(&self) -> (f64, f64) {
         let (line_m, rate_mps) = self.change.map_or((self.line_m, 0.0), |change| change.position_and_speed());
         (line_m + self.wander.offset_m, rate_mps + self.wander.rate_mps)
     }

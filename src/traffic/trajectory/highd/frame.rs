@@ -26,7 +26,7 @@ impl Direction {
     }
 
     /// As `drivingDirection` and as the carriageway's name.
-    pub fn name(self) -> &'static str {
+    pub(super) fn name(self) -> &'static str {
         match self {
             Direction::Upper => "1",
             Direction::Lower => "2",

@@ -64,7 +64,7 @@ impl ImageLayout {
     ///
     /// # Errors
     /// The first reason why it cannot.
-    pub fn of(recording: &Recording, precision: Precision) -> Result<Self> {
+    pub(super) fn of(recording: &Recording, precision: Precision) -> Result<Self> {
         check_frame(recording)?;
         let mut layout = ImageLayout {
             directions: Vec::new(),

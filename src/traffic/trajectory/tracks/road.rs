@@ -193,7 +193,7 @@ impl RoadLine {
     }
 
     /// The line of paths in one direction of travel; `None` if none of them moves.
-    pub fn fit(paths: &[Path]) -> Option<RoadLine> {
+    pub(super) fn fit(paths: &[Path]) -> Option<RoadLine> {
         let straight = straight_fit(paths)?;
         let Some(curved) = curved_fit(paths) else { return Some(straight) };
         let (of_straight, of_curved) = (straight.wander_m(paths), curved.wander_m(paths));

@@ -47,7 +47,7 @@ pub(super) enum FoundTime {
 
 impl FoundTime {
     /// In words, after the name of the column.
-    pub fn text(self) -> &'static str {
+    pub(super) fn text(self) -> &'static str {
         match self {
             FoundTime::Milliseconds => "ms since 1970",
             FoundTime::Microseconds => "µs since 1970",
@@ -94,7 +94,7 @@ impl FoundTime {
 
 impl Columns {
     /// Finds the columns in a header; absent ones are left out.
-    pub fn of(named: &BTreeMap<Role, ColumnName>, header: &[String], none: &[String]) -> Columns {
+    pub(super) fn of(named: &BTreeMap<Role, ColumnName>, header: &[String], none: &[String]) -> Columns {
         let mut at = [None; Role::ALL.len()];
         let mut has_time_unit = false;
         let names = named.values().flat_map(ColumnName::names);
@@ -152,7 +152,7 @@ impl Columns {
     }
 
     /// The name of a role's column.
-    pub fn name(&self, role: Role) -> &str {
+    pub(super) fn name(&self, role: Role) -> &str {
         self.at[role as usize].map_or(role.key(), |(at, _)| &self.names[at])
     }
 
@@ -203,7 +203,7 @@ impl Rows {
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Input`] if it is no file of this format.
-    pub fn open(path: &Path, format: FileFormat, rows: Option<&str>, delimiter: Option<char>) -> Result<Rows> {
+    pub(super) fn open(path: &Path, format: FileFormat, rows: Option<&str>, delimiter: Option<char>) -> Result<Rows> {
         let (header, source) = match format {
             FileFormat::Csv => {
                 let delimiter = delimiter.and_then(|c| u8::try_from(c).ok());
@@ -253,7 +253,7 @@ impl Rows {
     }
 
     /// Column names.
-    pub fn header(&self) -> &[String] {
+    pub(super) fn header(&self) -> &[String] {
         &self.header
     }
 

@@ -34,7 +34,7 @@ impl Default for Column {
 }
 
 impl Samples {
-    pub fn len(&self) -> usize {
+    pub(super) fn len(&self) -> usize {
         self.len
     }
 
@@ -49,7 +49,7 @@ impl Samples {
     }
 
     /// Sample `k`, below [`Samples::len`].
-    pub fn get(&self, k: usize) -> RawSample {
+    pub(super) fn get(&self, k: usize) -> RawSample {
         let [at, x, y, heading_x, heading_y, speed, vx, vy, forward, leftward, a, ax, ay, _, offset, other_clock] =
             std::array::from_fn(|column| self.columns[column].get(k));
         RawSample {
@@ -79,7 +79,7 @@ impl Samples {
     }
 
     /// Index of the name of the lane of sample `k`, or `NO_LABEL`.
-    pub fn lane(&self, k: usize) -> u32 {
+    pub(super) fn lane(&self, k: usize) -> u32 {
         self.columns[13].get(k) as i32 as u32
     }
 
@@ -103,7 +103,7 @@ impl Samples {
     }
 
     /// The times from sample to sample.
-    pub fn steps(&self) -> impl Iterator<Item = f64> {
+    pub(super) fn steps(&self) -> impl Iterator<Item = f64> {
         (1..self.len).map(|k| self.at(k) - self.at(k - 1))
     }
 

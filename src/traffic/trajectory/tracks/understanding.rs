@@ -191,7 +191,7 @@ pub(super) struct Comparison {
 }
 
 impl Comparison {
-    pub fn add(&mut self, given: f64, derived: f64) {
+    pub(super) fn add(&mut self, given: f64, derived: f64) {
         self.product += given * derived;
         self.of_given += given * given;
         self.of_derived += derived * derived;
