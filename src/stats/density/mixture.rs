@@ -2,7 +2,7 @@
 
 use std::ops::Range;
 
-use nalgebra::{Cholesky, DMatrix, DVector};
+use nalgebra::{DMatrix, DVector};
 
 use super::normal::{normal, uniform};
 use crate::random::Stream;
@@ -227,28 +227,6 @@ impl Mixture {
         Mixture::new(self.weights.clone(), self.means.clone(), factors, self.factor_of.clone())
     }
 
-    /// The same mixture with `covariance` times `fraction` added to every component's covariance. It is wider wherever
-    /// the component is narrower than that covariance.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] if the sum has no triangular factor.
-    fn widened(&self, covariance: &DMatrix<f64>, fraction: f64) -> Result<Mixture> {
-        let widen = |factor: &DMatrix<f64>| {
-            Cholesky::new(covariance * fraction + factor * factor.transpose()).map(Cholesky::unpack)
-        };
-        let factors =
-            self.factors.iter().map(widen).collect::<Option<Vec<_>>>().ok_or_else(|| {
-                Error::usage(Place::item("mixture"), "it cannot be widened", "give a covariance, d × d")
-            })?;
-        Ok(Mixture::prepared(
-            self.dimensions,
-            self.weights.clone(),
-            self.means.clone(),
-            factors,
-            self.factor_of.clone(),
-        ))
-    }
-
     /// ln of the density at a point [1 / product of the units]; −∞ where a coordinate is not finite.
     pub fn log_density(&self, point: &[f64]) -> f64 {
         let mut parts = Vec::new();
@@ -414,16 +392,6 @@ mod tests {
             let x = nominal.draw(&STREAM, i, 0);
             assert!(nominal.log_density(&x) - defensive.log_density(&x) <= libm::log(10.0) + 1e-12);
         }
-    }
-
-    #[test]
-    fn a_widened_component_has_the_sum_of_the_covariances() {
-        let wide = two_humps().widened(&dmatrix(2, &[2.0, 0.5, 0.5, 1.0]), 0.5).unwrap();
-        let l = wide.factor(0);
-        // Own covariance: 1, 0.5; 0.5, 4.25.
-        assert!((l[(0, 0)] * l[(0, 0)] - 2.0).abs() < 1e-14 && (l[(0, 0)] * l[(1, 0)] - 0.75).abs() < 1e-14);
-        assert!((l[(1, 0)] * l[(1, 0)] + l[(1, 1)] * l[(1, 1)] - 4.75).abs() < 1e-14);
-        assert!(two_humps().widened(&dmatrix(2, &[-9.0, 0.0, 0.0, -9.0]), 1.0).is_err());
     }
 
     #[test]
