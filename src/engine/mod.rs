@@ -6,6 +6,7 @@
 //! the run. Driver models and criteria are in [`model`](crate::model).
 
 mod backend;
+mod case_table;
 mod confusion;
 pub(crate) mod cpu;
 mod device_choice;
@@ -29,6 +30,7 @@ pub mod verify;
 pub mod version;
 
 pub use backend::{Backend, Chunk, Marks, RecheckBy, Session, Wanted, Watch};
+pub use case_table::{CaseTable, EncodedBlock};
 pub use confusion::Confusion;
 pub use cpu::backend::CpuBackend;
 pub use cpu::backend::lanes_within_seconds;

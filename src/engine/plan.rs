@@ -161,6 +161,13 @@ pub struct Block {
     pub first_lane: u64,
 }
 
+impl Block {
+    /// A block whose plan will set its position.
+    pub fn new(category: Category, units: Units, variants: Vec<String>) -> Block {
+        Block { category, units, variants, first_unit: 0, first_lane: 0 }
+    }
+}
+
 /// The lanes of a sweep.
 pub struct LanePlan {
     /// Profile, with the time step.

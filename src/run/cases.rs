@@ -1,7 +1,7 @@
 //! Concrete cases in bulk: a row of numbers each, run with every headway and model. The columns are those of `simulate`
 //! for a single case; the outcomes are those of its lanes.
 
-use crate::engine::{Block, CaseSource, Executor, Headway, LaneCase, LanePlan, Outcome, Start, Units, Wanted};
+use crate::engine::{Block, CaseTable, Executor, Headway, LaneCase, LanePlan, Outcome, Start, Units, Wanted};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::scenario::{CaseParameters, Category, Tables};
@@ -20,23 +20,6 @@ pub struct Cases {
     pub notes: Vec<String>,
 }
 
-/// The cases of every block, and their series.
-#[derive(Default)]
-struct EncodedCases {
-    blocks: Vec<Vec<LaneCase<f64>>>,
-    tables: Tables<f64>,
-}
-
-impl CaseSource for EncodedCases {
-    fn case(&self, block: usize, unit: u64, _variant: usize) -> LaneCase<f64> {
-        self.blocks[block][unit as usize]
-    }
-
-    fn tables(&self) -> &Tables<f64> {
-        &self.tables
-    }
-}
-
 impl Cases {
     /// Plans rows of parameters. Without headways every row has its own `gap` or `thw`; with headways none has.
     ///
@@ -52,7 +35,7 @@ impl Cases {
         implausible: Implausible,
     ) -> Result<Cases> {
         let mut doubts = Doubts::new(implausible);
-        let mut source = EncodedCases::default();
+        let mut source = CaseTable::new([1; Category::ALL.len()]);
         let mut by_category: Vec<(Category, Vec<usize>)> = Vec::new();
         for (row, parameters) in rows.into_iter().enumerate() {
             let at = first_row + row as u64;
@@ -62,22 +45,17 @@ impl Cases {
                 Some(block) => block,
                 None => {
                     by_category.push((category, Vec::new()));
-                    source.blocks.push(Vec::new());
                     by_category.len() - 1
                 }
             };
             by_category[block].1.push(row);
-            source.blocks[block].push(case);
+            source.blocks[block].cases.push(case);
         }
         if by_category.is_empty() {
             return Err(Error::usage(Place::item("cases"), "there are no rows", "give at least one case"));
         }
-        let block = |(category, rows): &(Category, Vec<usize>)| Block {
-            category: *category,
-            units: Units::Numbered(rows.len() as u64),
-            variants: vec![VARIANT.to_owned()],
-            first_unit: 0,
-            first_lane: 0,
+        let block = |(category, rows): &(Category, Vec<usize>)| {
+            Block::new(*category, Units::Numbered(rows.len() as u64), vec![VARIANT.to_owned()])
         };
         let blocks = by_category.iter().map(block).collect();
         let headways = if headways.is_empty() { vec![Headway::Observed] } else { headways.to_vec() };

@@ -82,12 +82,9 @@ pub fn random_plan(profile: &Profile, options: &RandomOptions) -> Result<LanePla
     }
     let headways = headways();
     let units = options.lanes_per_model_and_category.div_ceil((headways.len() * VARIANTS.len()) as u64);
-    let block = |&category: &Category| Block {
-        category,
-        units: (0..units).map(|unit| RandomUnit { category, seed: options.seed, unit }.to_string()).collect(),
-        variants: VARIANTS.map(str::to_owned).to_vec(),
-        first_unit: 0,
-        first_lane: 0,
+    let block = |&category: &Category| {
+        let name = |unit| RandomUnit { category, seed: options.seed, unit }.to_string();
+        Block::new(category, (0..units).map(name).collect(), VARIANTS.map(str::to_owned).to_vec())
     };
     let blocks = options.categories.iter().map(block).collect();
     let source = RandomCases::new(profile, options);

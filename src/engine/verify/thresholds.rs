@@ -55,13 +55,8 @@ pub fn threshold_plan(profile: &Profile, options: &ThresholdOptions) -> Result<L
         let (threshold, category) = (Threshold::of_unit(unit).name(), category.key().replace('_', "-"));
         format!("threshold-{threshold}-{category}-seed{}-{unit:06}", options.seed)
     };
-    let block = |&category: &Category| Block {
-        category,
-        units: (0..units).map(|unit| key(category, unit)).collect(),
-        variants: SIDES.map(str::to_owned).to_vec(),
-        first_unit: 0,
-        first_lane: 0,
-    };
+    let names = |category| (0..units).map(|unit| key(category, unit)).collect();
+    let block = |&category: &Category| Block::new(category, names(category), SIDES.map(str::to_owned).to_vec());
     let blocks = options.categories.iter().map(block).collect();
     let source = ThresholdCases::new(profile, options.seed, &options.categories);
     LanePlan::new(profile.clone(), options.models.clone(), HEADWAYS.to_vec(), blocks, Box::new(source))

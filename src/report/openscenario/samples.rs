@@ -7,12 +7,12 @@
 use super::distribution::{Draw, Range};
 use super::distribution_file::{DistributionFile, Distributions, Stochastic};
 use super::parameters::Names;
-use crate::engine::{Block, CaseSource, Headway, LaneCase, LanePlan, Units};
+use crate::engine::{Block, CaseTable, Headway, LaneCase, LanePlan, Units};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::random::Stream;
 use crate::run::grid::{MapParameter, MapQuantity, Point, check_complete};
-use crate::scenario::{Case, Category, Tables};
+use crate::scenario::{Case, Category};
 use crate::stats::density::Draws;
 use crate::{Error, Place, Result};
 
@@ -67,21 +67,6 @@ pub struct Sampled {
     pub values: Vec<f64>,
     /// Number of draws, from 1.
     pub tries: u32,
-}
-
-struct SampledCases {
-    cases: Vec<LaneCase<f64>>,
-    tables: Tables<f64>,
-}
-
-impl CaseSource for SampledCases {
-    fn case(&self, _block: usize, unit: u64, _variant: usize) -> LaneCase<f64> {
-        self.cases[unit as usize]
-    }
-
-    fn tables(&self) -> &Tables<f64> {
-        &self.tables
-    }
 }
 
 impl DistributionSamples {
@@ -196,22 +181,16 @@ impl DistributionSamples {
         }
         let own = [Headway::GapM(0.0)];
         let headways = if self.has_distance() { &own[..] } else { headways };
-        let mut source = SampledCases { cases: Vec::with_capacity(samples as usize), tables: Tables::default() };
+        let mut source = CaseTable::new([1]);
         let mut tries = 0;
         for index in 0..samples {
             let (sampled, point, case) = self.drawn(seed, index, profile)?;
             tries += u64::from(sampled.tries);
             let of_headway = point.get(MapQuantity::Thw).map(|thw_s| thw_s * case.ego_speed_mps);
             let gap_m = point.get(MapQuantity::Gap).or(of_headway).unwrap_or(0.0);
-            source.cases.push(LaneCase::encode(&case, profile, &mut source.tables).ahead_by(gap_m));
+            source.blocks[0].cases.push(LaneCase::encode(&case, profile, &mut source.tables).ahead_by(gap_m));
         }
-        let block = Block {
-            category: self.category,
-            units: Units::Numbered(samples),
-            variants: vec![VARIANT.to_owned()],
-            first_unit: 0,
-            first_lane: 0,
-        };
+        let block = Block::new(self.category, Units::Numbered(samples), vec![VARIANT.to_owned()]);
         let plan = LanePlan::new(profile.clone(), models.to_vec(), headways.to_vec(), vec![block], Box::new(source))?;
         Ok((plan, tries))
     }

@@ -4,10 +4,9 @@
 
 use std::sync::Arc;
 
-use crate::engine::{Block, CaseSource, Headway, LaneCase, LanePlan};
+use crate::engine::{Block, CaseTable, Headway, LaneCase, LanePlan};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::scenario::Tables;
 use crate::{Error, Place, Result};
 
 use super::axis::GridAxis;
@@ -46,26 +45,6 @@ enum Layout {
     HeadwaysAcross,
     /// Headways are the vertical axis; a unit is a column of a panel.
     HeadwaysUp,
-}
-
-/// The cases of a plan, made once: a table by unit.
-#[derive(Default)]
-struct GridCases {
-    cases: Vec<LaneCase<f64>>,
-    tables: Tables<f64>,
-}
-
-/// Cases that two plans have in common.
-struct SharedCases(Arc<GridCases>);
-
-impl CaseSource for SharedCases {
-    fn case(&self, _block: usize, unit: u64, _variant: usize) -> LaneCase<f64> {
-        self.0.cases[unit as usize]
-    }
-
-    fn tables(&self) -> &Tables<f64> {
-        &self.0.tables
-    }
 }
 
 impl GridPlan {
@@ -135,7 +114,7 @@ impl GridPart {
             (Layout::Cells, None) => vec![Headway::GapM(0.0)],
         };
         let dt_s = profile.frame.dt_s;
-        let mut source = GridCases::default();
+        let mut source = CaseTable::new([1]);
         let mut names = Vec::new();
         for unit in 0..grid.cell_count() / headways.len() {
             let cell = layout.cell(grid, unit, 0);
@@ -146,23 +125,17 @@ impl GridPart {
             for other in &mut case.others {
                 other.gap_offset += gap_m + grid.added_gap_m(cell, dt_s);
             }
-            source.cases.push(case);
+            source.blocks[0].cases.push(case);
             let varies = |parameter: &MapParameter| layout == Layout::Cells || !is_distance(parameter);
             let values = grid.values(cell).into_iter().filter(|(parameter, _)| varies(parameter));
             names.push(
                 values.map(|(parameter, value)| format!("{}={value}", parameter.key)).collect::<Vec<_>>().join(","),
             );
         }
-        let block = Block {
-            category: grid.category(),
-            units: names.into_iter().collect(),
-            variants: vec![VARIANT.to_owned()],
-            first_unit: 0,
-            first_lane: 0,
-        };
+        let block = Block::new(grid.category(), names.into_iter().collect(), vec![VARIANT.to_owned()]);
         let source = Arc::new(source);
         let plan = |profile: Profile, models, headways, block| {
-            LanePlan::new(profile, models, headways, vec![block], Box::new(SharedCases(source.clone())))
+            LanePlan::new(profile, models, headways, vec![block], Box::new(source.clone()))
         };
         let unreacting = plan(without_reaction(profile), vec![ModelId::Reg157], headways.clone(), block.clone())?;
         Ok(GridPart { plan: plan(profile.clone(), models, headways, block)?, unreacting, layout })

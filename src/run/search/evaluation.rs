@@ -4,7 +4,7 @@ use rayon::prelude::*;
 
 use super::{Candidate, Objective, Scope, SearchOptions};
 use crate::engine::lane_case::LaneCase;
-use crate::engine::{Block, CaseSource, Confusion, Executor, LanePlan, Units, Verdicts, Wanted};
+use crate::engine::{Block, CaseTable, Confusion, Executor, LanePlan, Units, Verdicts, Wanted};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -67,22 +67,6 @@ pub(super) struct Evaluator<'a> {
     motions: Vec<LaneCase<f64>>,
     tables: Tables<f64>,
     spread: MotionSpread,
-}
-
-struct EncodedCases {
-    cases: Vec<LaneCase<f64>>,
-    variants: usize,
-    tables: Tables<f64>,
-}
-
-impl CaseSource for EncodedCases {
-    fn case(&self, _block: usize, unit: u64, variant: usize) -> LaneCase<f64> {
-        self.cases[unit as usize * self.variants + variant]
-    }
-
-    fn tables(&self) -> &Tables<f64> {
-        &self.tables
-    }
 }
 
 impl<'a> Evaluator<'a> {
@@ -240,17 +224,12 @@ impl<'a> Evaluator<'a> {
     /// The verdicts of cases, by variant: scenario, headway, model.
     fn sweep(&self, by_unit: &[Vec<&Case>]) -> Result<Vec<Vec<Verdicts>>> {
         let variants = by_unit.first().map_or(0, Vec::len);
-        let mut source = EncodedCases { cases: Vec::new(), variants, tables: Tables::default() };
+        let mut source = CaseTable::new([variants]);
         for case in by_unit.iter().flatten() {
-            source.cases.push(LaneCase::encode(case, self.profile, &mut source.tables));
+            source.blocks[0].cases.push(LaneCase::encode(case, self.profile, &mut source.tables));
         }
-        let block = Block {
-            category: self.category,
-            units: Units::Numbered(by_unit.len() as u64),
-            variants: (0..variants).map(|variant| variant.to_string()).collect(),
-            first_unit: 0,
-            first_lane: 0,
-        };
+        let names = (0..variants).map(|variant| variant.to_string()).collect();
+        let block = Block::new(self.category, Units::Numbered(by_unit.len() as u64), names);
         let plan = LanePlan::with_hash(
             "search".to_owned(),
             self.profile.clone(),

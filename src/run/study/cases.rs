@@ -7,13 +7,13 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use crate::engine::lane_case::LaneCase;
-use crate::engine::plan::{Block, CaseSource, LanePlan, Units, check_cases};
-use crate::engine::{Chunk, Executor, SweepSummary, Wanted};
+use crate::engine::plan::{Block, LanePlan, Units, check_cases};
+use crate::engine::{CaseTable, Chunk, Executor, SweepSummary, Wanted};
 use crate::run::study::plan_file::StudyHead;
 use crate::scenario::parameterization::{
     Parameterization, ParameterizationOptions, Reduction, Sizes, TimeGrid, recorded_case, steps_of,
 };
-use crate::scenario::{Case, Category, Scenario, Tables};
+use crate::scenario::{Case, Category, Scenario};
 use crate::{Error, Place, Result};
 
 /// The input of a study's cases, or of an interval of its scenarios: about 2 kB per scenario. Cases are ten times as
@@ -27,26 +27,6 @@ pub struct StudyCases {
     pub(crate) first_held: u64,
     pub(crate) held: Vec<Scenario>,
     pub(super) left_out: Vec<Error>,
-}
-
-/// Cases of a window of units.
-struct CaseTable {
-    tables: Tables<f64>,
-    /// Per block: unit-major, variant-minor.
-    cases: Vec<Vec<LaneCase<f64>>>,
-    /// Per block: the unit of the first case.
-    first: Vec<u64>,
-    variants: Vec<usize>,
-}
-
-impl CaseSource for CaseTable {
-    fn case(&self, block: usize, unit: u64, variant: usize) -> LaneCase<f64> {
-        self.cases[block][(unit - self.first[block]) as usize * self.variants[block] + variant]
-    }
-
-    fn tables(&self) -> &Tables<f64> {
-        &self.tables
-    }
 }
 
 /// Number of scenarios whose cases are held at once, about 25 kB each.
@@ -98,18 +78,14 @@ impl StudyCases {
         }
         let none = |block: &Block| Units::Held(block.units.len(), 0, Arc::new([]));
         let mut held: Vec<Units> = plan.blocks.iter().map(none).collect();
-        let mut table = CaseTable {
-            tables: Tables::default(),
-            cases: vec![Vec::new(); held.len()],
-            first: vec![0; held.len()],
-            variants: plan.blocks.iter().map(|block| block.variants.len()).collect(),
-        };
+        let mut table = CaseTable::new(plan.blocks.iter().map(|block| block.variants.len()));
         for (at, inside) in plan.segments(units.clone()) {
             let block = &plan.blocks[at];
             let names: Vec<String> = inside.clone().map(|unit| block.units.name(unit).into_owned()).collect();
             held[at] = Units::Held(block.units.len(), inside.start, names.into());
-            table.first[at] = inside.start;
-            table.cases[at].reserve_exact((inside.end - inside.start) as usize * block.variants.len());
+            let encoded = &mut table.blocks[at];
+            encoded.first_unit = inside.start;
+            encoded.cases.reserve_exact((inside.end - inside.start) as usize * block.variants.len());
             let mut from = inside.start;
             while from < inside.end {
                 let to = inside.end.min(from + ENCODED_AT_ONCE);
@@ -119,7 +95,7 @@ impl StudyCases {
                     (from..to).into_par_iter().map(|unit| self.cases(at, unit)).collect::<Result<_>>()?;
                 for (cases, gap_m) in &cases {
                     let encode = |case| LaneCase::encode(case, profile, &mut table.tables).ahead_by(*gap_m);
-                    table.cases[at].extend(cases.iter().map(encode));
+                    encoded.cases.extend(cases.iter().map(encode));
                 }
                 from = to;
             }
@@ -243,6 +219,7 @@ mod tests {
     use crate::engine::Headway;
     use crate::model::profile::Profile;
     use crate::run::study::plan::{StudyOptions, outline_study};
+    use crate::scenario::Tables;
     use crate::traffic::mining::{MiningOptions, mine_generated};
     use crate::traffic::trajectory::generator::GeneratorOptions;
 
