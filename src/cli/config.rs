@@ -11,6 +11,7 @@ use super::{Exit, console};
 use crate::cli::settings::{
     Assignment, DEFAULT_FILE, DEFAULT_FILE_NAME, Layers, Setting, profile_schema, settings_schema, text_of,
 };
+use crate::report::records::document;
 use crate::support::files::{make_folder_of, write_atomically};
 use crate::support::plain_text::quoted_word;
 use crate::{Error, Place, Result};
@@ -193,9 +194,7 @@ fn json_list(shown: &[Setting]) -> Result<String> {
             "default": setting.key.default,
         })
     };
-    let list: Vec<_> = shown.iter().map(object).collect();
-    let text = serde_json::to_string_pretty(&list);
-    text.map(|text| text + "\n").map_err(|e| Error::Internal(format!("settings cannot be written: {e}")))
+    document(&shown.iter().map(object).collect::<Vec<_>>())
 }
 
 fn toml_file(shown: &[Setting]) -> String {

@@ -3,14 +3,16 @@
 use std::fmt::Write;
 
 use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Table, presets};
+use serde_json::json;
 
 use super::Exit;
 use super::format::FormatFlag;
+use crate::Result;
 use crate::engine::BackendChoice;
 use crate::engine::gpu::{AdapterCard, Adapters, GpuBackend, GpuOptions, choose, visible_here};
 use crate::engine::verify::self_check;
+use crate::report::records::document;
 use crate::report::tables::{WIDTH, wrap};
-use crate::{Error, Result};
 
 /// Prints the list.
 ///
@@ -163,21 +165,19 @@ impl<'a> Seen<'a> {
     }
 
     fn json(&self, self_check: &dyn Fn(usize) -> String) -> Result<String> {
-        let not_written = |e| Error::Internal(format!("the devices cannot be written: {e}"));
         let mut devices = Vec::new();
         for card in self.cards {
-            let mut device = serde_json::to_value(card).map_err(not_written)?;
+            let mut device = json!(card);
             device["hidden"] = self.hides(card).into();
             device["self_check"] = self_check(card.index).into();
             devices.push(device);
         }
-        let seen = serde_json::json!({
+        document(&json!({
             "devices": devices,
             "auto": self.auto,
             "auto_reason": self.verdict(),
             "visible": self.visible.as_ref().ok(),
-        });
-        serde_json::to_string_pretty(&seen).map(|text| text + "\n").map_err(not_written)
+        }))
     }
 }
 
@@ -304,7 +304,7 @@ mod tests {
 
     #[test]
     fn an_environment_that_is_not_understood_still_shows_the_devices() {
-        let error = || Err(Error::usage(Place::item("CUDA_VISIBLE_DEVICES"), "there is no GPU 9", "unset it"));
+        let error = || Err(crate::Error::usage(Place::item("CUDA_VISIBLE_DEVICES"), "there is no GPU 9", "unset it"));
         let text = text(&node(), error());
         assert!(text.contains(A) && text.contains("--backend auto selects no device"), "{text}");
         let nodes = node();

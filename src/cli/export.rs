@@ -136,7 +136,7 @@ impl Xosc {
         let lines: String = rows.iter().map(|row| format!("{}  {}\n", row.file, row.lane)).collect();
         let list = || {
             let rows = rows.iter().map(|row| serde_json::json!({"file": row.file, "lane": row.lane}));
-            document(&rows.collect())
+            document(&rows.collect::<Vec<_>>())
         };
         self.format.print(|| lines, list)?;
         tracing::info!("{} written to {}", counted(rows.len(), "scenario"), self.out.display());

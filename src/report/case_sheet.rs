@@ -7,13 +7,13 @@ use super::html::{Page, PageFigure, Section};
 use super::records::{self, PROGRAM};
 use super::tables::{WIDTH, wrap};
 use super::trace::{TraceFigure, TracePanels, TraceSeries};
+use crate::Result;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::check::{Boundary, Change, Demand, Judged, Judgement, Reading, RunEnd, Subject, Verdict};
 use crate::run::grid::{MapQuantity, PARAMETERS, VARIED};
 use crate::support::readable::value;
 use crate::support::table::{Column, NumberText, Table, json_number};
-use crate::{Error, Result};
 
 /// Kilometres per hour in one metre per second.
 pub(super) const KMH: f64 = 3.6;
@@ -289,7 +289,7 @@ impl CaseSheet<'_> {
     /// The sheet as a page.
     ///
     /// # Errors
-    /// [`Error::Internal`] if the template does not match: a defect of this program.
+    /// [`crate::Error::Internal`] if the template does not match: a defect of this program.
     pub fn html(&self) -> Result<String> {
         let first = self.first();
         let mut warnings = Vec::new();
@@ -337,8 +337,6 @@ impl CaseSheet<'_> {
             }],
             ..Section::new("course", "Course of the case")
         };
-        let constants = serde_json::to_string_pretty(&self.profiles[0])
-            .map_err(|e| Error::Internal(format!("a profile cannot be written: {e}")))?;
         let reproduction = Section {
             facts: vec![
                 ("command".to_owned(), self.command.clone()),
@@ -347,7 +345,7 @@ impl CaseSheet<'_> {
                 ("data".to_owned(), self.origin.clone()),
                 ("arithmetic".to_owned(), format!("binary64, time step {} s", self.profiles[0].frame.dt_s)),
             ],
-            parts: vec![Section::folded(format!("Profile {}", first.profile), constants)],
+            parts: vec![Section::of_profile(format!("Profile {}", first.profile), &self.profiles[0])?],
             ..Section::new("reproduction", "Reproduction")
         };
         let page = Page {

@@ -7,10 +7,11 @@ use super::close_following::{CloseRow, close_following};
 use super::dots::{DotRow, Dots, dots};
 use super::html::{Page, PageFigure, Section};
 use super::plot::{AxisScale, Figure, INK, Look, PlotAxis, Series, Symbol, Value, logarithmic_reach};
-use super::records::PROGRAM;
+use super::records::{PROGRAM, document};
 use super::run_record::SettingRecord;
 use super::sampling::HostRecord;
 use super::tables::{WIDTH, wrap};
+use crate::Result;
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -26,7 +27,6 @@ use crate::stats::estimate::{Enough, Ratio, RatioVerdict};
 use crate::support::readable;
 use crate::support::run_dir::Results;
 use crate::support::table::{Column, Digits, NumberText, Table};
-use crate::{Error, Result};
 
 /// `compare.json`.
 #[derive(Debug, Clone, Serialize)]
@@ -106,7 +106,7 @@ impl CompareFile {
     /// Writes tables, figures and page to their folder, the record last.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`crate::Error::Io`].
     pub fn write(&mut self, mut results: Results) -> Result<()> {
         results.add("compare.csv", self.csv().as_bytes())?;
         results.add("compare.txt", self.text().as_bytes())?;
@@ -133,8 +133,7 @@ impl CompareFile {
     /// # Errors
     /// None for a record of this program.
     pub fn json(&self) -> Result<String> {
-        let text = serde_json::to_string_pretty(self);
-        text.map(|text| text + "\n").map_err(|e| Error::Internal(format!("a comparison cannot be written: {e}")))
+        document(self)
     }
 
     /// `compare.csv`: one row per category, parameterization, model and criterion.

@@ -3,14 +3,14 @@
 use super::dossier::{DossierReport, SHOWN, share};
 use super::html::{Page, PageFigure, Section};
 use super::records::PROGRAM;
+use crate::Result;
 use crate::support::readable::{count, value};
-use crate::{Error, Result};
 
 impl DossierReport<'_> {
     /// The dossier as a page.
     ///
     /// # Errors
-    /// [`Error::Internal`] if the template does not match: a defect of this program.
+    /// [`crate::Error::Internal`] if the template does not match: a defect of this program.
     pub fn html(&self) -> Result<String> {
         let page = Page {
             title: format!("Is {} appropriate under {}?", self.dossier.parameterization.name(), self.profile.name),
@@ -155,8 +155,6 @@ impl DossierReport<'_> {
     }
 
     fn reproduction_section(&self) -> Result<Section> {
-        let profile = serde_json::to_string_pretty(self.profile)
-            .map_err(|e| Error::Internal(format!("a profile cannot be written: {e}")))?;
         let density = self.dossier.density_sha256.clone().unwrap_or_else(|| "–".to_owned());
         Ok(Section {
             facts: vec![
@@ -169,7 +167,7 @@ impl DossierReport<'_> {
                 ("profile".to_owned(), format!("{}, time step {} s", self.profile.name, self.profile.frame.dt_s)),
             ],
             host: vec![("computed by".to_owned(), self.host.backend.clone())],
-            parts: vec![Section::folded(format!("Profile {}", self.profile.name), profile)],
+            parts: vec![Section::of_profile(format!("Profile {}", self.profile.name), self.profile)?],
             ..Section::new("reproduction", "Reproduction")
         })
     }

@@ -8,6 +8,7 @@ use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use super::records::PROGRAM;
+use crate::model::profile::Profile;
 use crate::support::plain_text::shown;
 use crate::support::table::Table;
 use crate::{Error, Result};
@@ -79,6 +80,13 @@ impl Section {
     /// An empty chapter.
     pub(super) fn new(id: &str, title: &str) -> Section {
         Section { id: id.to_owned(), title: title.to_owned(), ..Section::default() }
+    }
+
+    /// A profile that opens on a click.
+    pub(super) fn of_profile(title: impl Into<String>, profile: &Profile) -> Result<Section> {
+        let text = serde_json::to_string_pretty(profile);
+        let text = text.map_err(|e| Error::Internal(format!("a profile cannot be written: {e}")))?;
+        Ok(Section::folded(title, text))
     }
 
     /// A long text that opens on a click.

@@ -3,14 +3,12 @@
 use super::html::{Page, PageFigure, Section};
 use super::map::MapReport;
 use super::records::PROGRAM;
+use crate::Result;
 use crate::support::readable::count;
-use crate::{Error, Result};
 
 impl MapReport {
     /// Renders the run as one page.
     pub(super) fn html(&self, figures: Vec<PageFigure>) -> Result<String> {
-        let profile = serde_json::to_string_pretty(&self.profile)
-            .map_err(|e| Error::Internal(format!("a profile cannot be written: {e}")))?;
         let shares = Section {
             intro: if self.grids.iter().any(|mapped| mapped.known_percent.iter().any(Option::is_some)) {
                 "Known shares are those of the JRC's evidence.".to_owned()
@@ -37,7 +35,7 @@ impl MapReport {
                 .chain(hashes)
                 .collect(),
             host,
-            parts: vec![Section::folded("Profile", profile)],
+            parts: vec![Section::of_profile("Profile", &self.profile)?],
             is_folded: true,
             ..Section::new("reproduction", "Reproduction")
         };

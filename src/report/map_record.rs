@@ -5,13 +5,13 @@ use std::collections::BTreeMap;
 use serde::Serialize;
 
 use super::map::{Difference, MapHost, MapReport};
-use super::records::PROGRAM;
+use super::records::{PROGRAM, document};
 use super::run_record::SettingRecord;
+use crate::Result;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::grid::{Against, CaseStyle, CellOutcome, GridAxis, MappedGrid, count};
-use crate::{Error, Result};
 
 impl MapReport {
     /// `map.json`: fractions, differences and everything needed to reproduce them; `files` are in the same folder.
@@ -37,8 +37,7 @@ impl MapReport {
             files,
             host: &self.host,
         };
-        let text = serde_json::to_string_pretty(&record);
-        text.map(|text| text + "\n").map_err(|e| Error::Internal(format!("map.json cannot be written: {e}")))
+        document(&record)
     }
 }
 

@@ -1,5 +1,6 @@
 //! Records in JSON for `--format json`.
 
+use serde::Serialize;
 use serde_json::Value;
 
 /// Program and version.
@@ -38,11 +39,11 @@ pub(crate) fn smallest_gap_m(outcome: &Outcome<f64>) -> f64 {
     if outcome.contact_step == NO_STEP { outcome.min_gap } else { outcome.min_gap.min(0.0) }
 }
 
-/// A document as text, with a final line break.
+/// A document as text, with a final line break; NaN and infinity become null.
 ///
 /// # Errors
 /// None for a document of this program.
-pub fn document(value: &Value) -> Result<String> {
+pub fn document<T: Serialize + ?Sized>(value: &T) -> Result<String> {
     let text = serde_json::to_string_pretty(value);
     text.map(|text| text + "\n").map_err(|e| Error::Internal(format!("a document cannot be written: {e}")))
 }

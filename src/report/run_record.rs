@@ -2,7 +2,8 @@
 
 use serde::Serialize;
 
-use super::records::PROGRAM;
+use super::records::{PROGRAM, document};
+use crate::Result;
 use crate::engine::{Block, DeviceRecord, ENGINE_VERSION, SweepSummary};
 use crate::model::profile::Profile;
 use crate::run::score::{ScoreOptions, ScoreTable, f1};
@@ -10,7 +11,6 @@ use crate::run::study::{CategoryProvenance, Study, StudyResult};
 use crate::scenario::parameterization::ParameterizationOptions;
 use crate::support::readable::counted;
 use crate::traffic::mining::{MiningOptions, RecordingSummary};
-use crate::{Error, Result};
 
 /// Found and kept scenarios of a category, and counts of their lanes.
 #[derive(Debug, Clone, Serialize)]
@@ -183,11 +183,8 @@ impl RunRecord {
     }
 
     /// As JSON.
-    pub fn to_json(&self) -> Result<Vec<u8>> {
-        let mut text =
-            serde_json::to_vec_pretty(self).map_err(|e| Error::Internal(format!("run.json cannot be written: {e}")))?;
-        text.push(b'\n');
-        Ok(text)
+    pub fn json(&self) -> Result<String> {
+        document(self)
     }
 }
 

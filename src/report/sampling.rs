@@ -6,9 +6,10 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::close_following::{CloseRow, close_following};
-use super::records::PROGRAM;
+use super::records::{PROGRAM, document};
 use super::run_record::SettingRecord;
 use super::tables::{WIDTH, wrap};
+use crate::Result;
 use crate::engine::generated::ATTEMPTS;
 use crate::engine::{DeviceRecord, ENGINE_VERSION, Headway, LanePlan, OpenBackend};
 use crate::model::driver::ModelId;
@@ -20,7 +21,6 @@ use crate::stats::density::{DensityKind, DensityModel, Provenance};
 use crate::stats::estimate::{IntervalKind, Ratio, SearchRound, StopReason, Warning};
 use crate::support::readable::{count, count_of, counted, significant, value};
 use crate::support::table::{Column, Digits, NumberText, Table};
-use crate::{Error, Result};
 
 /// The density of a run.
 #[derive(Debug, Clone, Serialize)]
@@ -252,8 +252,7 @@ impl EstimateFile {
     /// # Errors
     /// None for a record of this program.
     pub fn json(&self) -> Result<String> {
-        let text = serde_json::to_string_pretty(self);
-        text.map(|text| text + "\n").map_err(|e| Error::Internal(format!("an estimate cannot be written: {e}")))
+        document(self)
     }
 
     /// The text for the terminal.

@@ -3,6 +3,7 @@
 use super::html::{Page, PageFigure, Section};
 use super::plot::{AxisScale, Figure, Layer, Mark, Plot, PlotAxis, Series, Value, is_few};
 use super::sampling::{EstimateFile, VERDICTS, interval_text, rate_text, ratio_text, short, three_digits, verdicts};
+use crate::Result;
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -10,7 +11,6 @@ use crate::run::sampling::EstimateRow;
 use crate::scenario::Category;
 use crate::support::readable::{count, count_of, value};
 use crate::support::table::{Column, Digits, NumberText, Table};
-use crate::{Error, Result};
 
 impl EstimateFile {
     /// `report.html`, with the figures of the run.
@@ -219,15 +219,13 @@ impl EstimateFile {
         if self.host.seconds > 0.0 {
             host.push(("seconds".to_owned(), format!("{:.2} on {} threads", self.host.seconds, self.host.threads)));
         }
-        let profile = serde_json::to_string_pretty(&self.profile)
-            .map_err(|e| Error::Internal(format!("a profile cannot be written: {e}")))?;
         Ok(Section {
             intro: "The same density, options and seed give the same numbers, on any machine, whole or in shards. \
                     estimate.json holds all of it; `simulate` reruns a lane from it."
                 .to_owned(),
             facts,
             host,
-            parts: vec![Section::folded("Profile", profile)],
+            parts: vec![Section::of_profile("Profile", &self.profile)?],
             is_folded: true,
             ..Section::new("reproduction", "Reproduction")
         })

@@ -148,7 +148,7 @@ impl StudyReport {
         }
         results.add("report.html", self.html()?.as_bytes())?;
         self.run.files = results.names();
-        results.publish(&self.run.to_json()?)
+        results.publish(self.run.json()?.as_bytes())
     }
 
     /// The figures of a category, with the prefixes of their file names; figures without data are skipped.

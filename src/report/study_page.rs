@@ -196,10 +196,8 @@ impl StudyReport {
             let text = format!("mining {mine_s:.2}, planning {plan_s:.2}, lanes {sweep_s:.2}, scores {score_s:.2}");
             host.push(("seconds".to_owned(), text));
         }
-        let record =
-            String::from_utf8(run.to_json()?).map_err(|e| Error::Internal(format!("run.json is no text: {e}")))?;
         let value: serde_json::Value =
-            serde_json::from_str(&record).map_err(|e| Error::Internal(format!("run.json cannot be read: {e}")))?;
+            serde_json::from_str(&run.json()?).map_err(|e| Error::Internal(format!("run.json cannot be read: {e}")))?;
         let part = |key: &str| serde_json::to_string_pretty(&value[key]).unwrap_or_default();
         Ok(Section {
             intro: "The same input, profile and seed give the same numbers, on any machine. run.json holds all of it; \

@@ -66,17 +66,13 @@ pub fn make_folder_of(file: &Path) -> Result<()> {
 /// Writes a file under a temporary name beside it, syncs, and renames: a reader sees the old or the new content, never
 /// a part.
 pub fn write_atomically(path: &Path, content: &[u8]) -> Result<()> {
-    write_atomically_with(path, |file| file.write_all(content))
-}
-
-/// Like [`write_atomically`], for content that is streamed.
-fn write_atomically_with(path: &Path, produce: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
     let mut file = AtomicFile::create(path)?;
-    produce(&mut file).map_err(|e| Error::io(path, "write", e))?;
+    file.write_all(content).map_err(|e| Error::io(path, "write", e))?;
     file.stage()?.publish()
 }
 
-/// Like [`write_atomically_with`], for a file in a run directory: a link in its place is refused, not followed.
+/// Like [`write_atomically`], for content that is streamed to a file in a run directory: a link in its place is refused,
+/// not followed.
 ///
 /// # Errors
 /// [`Error::Input`] for a link; [`Error::Io`].
@@ -95,7 +91,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let path = dir.path().join("result.csv");
         write_atomically(&path, b"old").unwrap();
-        let error = write_atomically_with(&path, |file| {
+        let error = write_inside(&path, |file| {
             file.write_all(b"half")?;
             Err(std::io::Error::other("disk gone"))
         });
