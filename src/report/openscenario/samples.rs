@@ -102,12 +102,7 @@ impl DistributionSamples {
         }
         let given: Vec<&MapParameter> =
             parameters.iter().map(|p| p.parameter).chain(fixed.iter().map(|(p, _)| *p)).collect();
-        for (at, parameter) in given.iter().enumerate() {
-            if let Some(before) = given[..at].iter().find(|p| p.says_the_same(parameter)) {
-                let problem = format!("`{}` and `{}` say the same twice", before.key, parameter.key);
-                return Err(Error::usage(Place::item(parameter.key), problem, "keep one of them"));
-            }
-        }
+        MapParameter::refuse_repeats(&given)?;
         // If the headway is not a parameter, a flag gives it.
         let has = |quantity| {
             let is_given = given.iter().any(|p| p.quantity == quantity);

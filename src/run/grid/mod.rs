@@ -101,12 +101,7 @@ impl Grid {
         let GridParts { name, category, x, y, panel_axes, fixed, style, native_gap, closing_only, panel_rows } = parts;
         let axes = || [&x, &y].into_iter().chain(&panel_axes);
         let given: Vec<&MapParameter> = axes().map(|a| a.parameter).chain(fixed.iter().map(|(p, _)| *p)).collect();
-        for (at, parameter) in given.iter().enumerate() {
-            if let Some(before) = given[..at].iter().find(|p| p.says_the_same(parameter)) {
-                let problem = format!("`{}` and `{}` say the same twice", before.key, parameter.key);
-                return Err(Error::usage(Place::item(parameter.key), problem, "keep one of them"));
-            }
-        }
+        MapParameter::refuse_repeats(&given)?;
         for axis in axes() {
             refuse_repeats(|| Place::item(axis.parameter.key), axis.values.iter().map(|v| (v.to_bits(), v)))?;
         }

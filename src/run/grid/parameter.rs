@@ -212,8 +212,22 @@ impl MapParameter {
         Err(Error::usage(Place::item(flag), problem, help))
     }
 
+    /// Refuses two parameters that set one quantity.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] that names both.
+    pub fn refuse_repeats(given: &[&MapParameter]) -> Result<()> {
+        for (at, parameter) in given.iter().enumerate() {
+            if let Some(before) = given[..at].iter().find(|p| p.says_the_same(parameter)) {
+                let problem = format!("`{}` and `{}` say the same twice", before.key, parameter.key);
+                return Err(Error::usage(Place::item(parameter.key), problem, "keep one of them"));
+            }
+        }
+        Ok(())
+    }
+
     /// Whether both set one quantity; a relative speed sets the speed of the other vehicle.
-    pub fn says_the_same(&self, other: &MapParameter) -> bool {
+    fn says_the_same(&self, other: &MapParameter) -> bool {
         let of = |parameter: &MapParameter| match parameter.quantity {
             MapQuantity::RelativeSpeed => MapQuantity::OtherSpeed,
             quantity => quantity,
