@@ -186,8 +186,8 @@ fn concrete<R: Real>(
         width_m: size.width_m,
         path: all.next().unwrap_or_default(),
     };
-    let mut vehicles = vec![vehicle("Ego", sizes.sizes.ego), vehicle("Other", sizes.sizes.target)];
-    if let Some(lead) = sizes.sizes.lead.filter(|_| trace.vehicles == 2) {
+    let mut vehicles = vec![vehicle("Ego", sizes.ego), vehicle("Other", sizes.target)];
+    if let Some(lead) = sizes.lead.filter(|_| trace.vehicles == 2) {
         vehicles.push(vehicle("Ahead", lead));
     }
     let scenario = facts.scenario;
@@ -203,7 +203,7 @@ fn concrete<R: Real>(
             .clamp(1.0, 20.0),
         vehicles,
         parameters: parameters(trace, wide, facts),
-        properties: properties(trace, facts, options, sizes.are_lengths_known),
+        properties: properties(trace, facts, options),
         is_synthetic: facts.is_synthetic,
     })
 }
@@ -243,12 +243,7 @@ fn parameters(trace: &Trace, case: &LaneCase<f64>, facts: &LaneFacts) -> Vec<(St
 }
 
 /// Facts about the lane and its end. Times in s; empty if the event did not happen.
-fn properties(
-    trace: &Trace,
-    facts: &LaneFacts,
-    options: &PlayOptions,
-    are_lengths_known: bool,
-) -> Vec<(String, String)> {
+fn properties(trace: &Trace, facts: &LaneFacts, options: &PlayOptions) -> Vec<(String, String)> {
     let outcome = &trace.outcome;
     let time = |step: u32| if step == NO_STEP { String::new() } else { trace.time_s(step).to_string() };
     let value = |v: f64| v.to_string();
@@ -273,7 +268,7 @@ fn properties(
         ("arithmetic", facts.arithmetic.to_owned()),
         ("data", facts.data.to_owned()),
         ("ego", ego.to_owned()),
-        ("lengths", if are_lengths_known { "known" } else { "sums" }.to_owned()),
+        ("lengths", if facts.sizes.is_some() { "known" } else { "sums" }.to_owned()),
         ("initial_gap_m", value(trace.initial_gap_m)),
         ("collision", verdict(Criterion::Collision)),
         ("ttc", verdict(Criterion::Ttc)),
@@ -291,24 +286,15 @@ fn properties(
     list.into_iter().map(|(name, value)| (format!("lanesweep.{name}"), value)).collect()
 }
 
-/// Sizes of a lane's vehicles, and their source.
-#[derive(Debug, Clone, Copy, PartialEq)]
-struct KnownSizes {
-    /// The sizes.
-    sizes: Sizes,
-    /// Whether the lengths are those of the scenario; otherwise only their sums are correct.
-    are_lengths_known: bool,
-}
-
 /// Maximum difference between given sizes and the lane's, m: the rounding of binary32.
 const TOLERANCE_M: f64 = 1e-3;
 
 /// The sizes of a case's vehicles: the given ones if they match the lane; otherwise an ego of `ego_length_m`, or
-/// shorter if the sums require it.
+/// shorter if the sums require it. Then only the sums of lengths are correct.
 ///
 /// # Errors
 /// [`Error::Input`] if the given sizes do not match the lane.
-fn sizes_of_case(lane: &str, case: &LaneCase<f64>, known: Option<&Sizes>, ego_length_m: f64) -> Result<KnownSizes> {
+fn sizes_of_case(lane: &str, case: &LaneCase<f64>, known: Option<&Sizes>, ego_length_m: f64) -> Result<Sizes> {
     let is_pair = case.pair != 0;
     let sums = |of: fn(&crate::engine::LaneOther<f64>) -> f64| case.others.each_ref().map(|o| 2.0 * of(o));
     let (lengths, widths) = (sums(|o| o.half_lengths), sums(|o| o.half_widths));
@@ -317,13 +303,12 @@ fn sizes_of_case(lane: &str, case: &LaneCase<f64>, known: Option<&Sizes>, ego_le
         // Every vehicle has a length above 0.
         let ego = ego_length_m.min(shortest / 2.0);
         let size = |at: usize| VehicleSize { length_m: lengths[at] - ego, width_m: widths[at] - case.ego_width };
-        let sizes = Sizes {
+        return Ok(Sizes {
             ego: VehicleSize { length_m: ego, width_m: case.ego_width },
             target: size(0),
             lead: is_pair.then(|| size(1)),
             lane_width_m: case.lane_width,
-        };
-        return Ok(KnownSizes { sizes, are_lengths_known: false });
+        });
     };
     let others = [Some(known.target), known.lead.filter(|_| is_pair)];
     let mut pairs = vec![("width of the ego", known.ego.width_m, case.ego_width)];
@@ -341,5 +326,5 @@ fn sizes_of_case(lane: &str, case: &LaneCase<f64>, known: Option<&Sizes>, ego_le
         let help = "give the scenario file of the run (option `scenarios`), or leave it out";
         return Err(Error::input(Place::item(format!("lane {lane}")), "the vehicle ahead has no size", help));
     }
-    Ok(KnownSizes { sizes: *known, are_lengths_known: true })
+    Ok(*known)
 }
