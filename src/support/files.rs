@@ -55,6 +55,11 @@ pub fn make_folder(dir: &Path) -> Result<()> {
     std::fs::create_dir_all(dir).map_err(|e| Error::io(dir, "create the folder", e))
 }
 
+/// The last part of a path; empty if it has none.
+pub fn file_name(path: &Path) -> String {
+    path.file_name().unwrap_or_default().to_string_lossy().into_owned()
+}
+
 /// Like [`make_folder`], for the folder of a file.
 ///
 /// # Errors

@@ -4,6 +4,7 @@
 //! Accepted, because they change no value: Windows line ends, a byte order mark, blank lines, quotes, blanks around a
 //! field, columns in another order, additional columns, UTF-16, compression by gzip.
 
+use crate::support::files::file_name;
 use crate::support::plain_text::hex;
 use std::io::{self, Cursor, Read};
 use std::path::{Path, PathBuf};
@@ -31,7 +32,7 @@ impl FileChecksum {
     /// That of a file, which is read for it.
     pub(super) fn of(path: &Path) -> Result<FileChecksum> {
         let bytes = std::fs::metadata(path).map_err(|e| Error::io(path, "read", e))?.len();
-        let file = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let file = file_name(path);
         Ok(FileChecksum { file, bytes, sha256: input_file::sha256(path)? })
     }
 }
@@ -287,7 +288,7 @@ impl CsvTable {
         if !self.is_plain {
             return FileChecksum::of(&self.path);
         }
-        let file = self.path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let file = file_name(&self.path);
         let hashing = self.reader.into_inner();
         Ok(FileChecksum { file, bytes: hashing.bytes, sha256: hex(&hashing.hash.finalize()) })
     }

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use super::highd::{self, HighdFiles};
 use super::recording::Loaded;
 use super::tracks::{self, HIGHD, Preset, TrackFile};
+use crate::support::files::file_name;
 use crate::support::input_file::unpacked;
 use crate::support::plausibility::Implausible;
 use crate::{Error, Place, Result};
@@ -79,7 +80,7 @@ impl Inputs {
         let mut endings: Vec<String> = own.is_none().then(|| "csv".to_owned()).into_iter().collect();
         let mut foreign = Vec::new();
         for file in files_of(folder)? {
-            let name = file.file_name().unwrap_or_default().to_string_lossy().into_owned();
+            let name = file_name(&file);
             if tracks::is_compressed(&file) {
                 let help = "unpack it, or compress text with gzip (.gz), which is read";
                 others.push(Error::input(Place::file(&file), "it may hold tracks, and is compressed", help));
@@ -201,7 +202,7 @@ fn highd_inputs(path: &Path) -> Result<Inputs> {
     if path.is_dir() || !is_highd_name(path) {
         return highd::inventory(path).map(Inputs::Highd);
     }
-    let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+    let name = file_name(path);
     let id = unpacked(&name).strip_suffix(HIGHD_ENDING).unwrap_or(&name);
     let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
     let recordings = vec![HighdFiles::found(folder, id)];
@@ -230,7 +231,7 @@ fn first_track_file(folder: &Path) -> Result<Option<PathBuf>> {
 }
 
 fn has_columns(path: &Path) -> bool {
-    tracks::columns_of(path).is_ok_and(|columns| columns.len() >= MIN_COLUMNS)
+    tracks::columns_of(path).is_ok_and(|(columns, _)| columns.len() >= MIN_COLUMNS)
 }
 
 /// Whether a file is one of SUMO's beside its traffic: `demo.rou.xml`.
@@ -255,7 +256,7 @@ fn nothing_in(folder: &Path) -> Result<Inputs> {
         return highd_inputs(folder);
     }
     let tried = |path: &PathBuf| {
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let name = file_name(path);
         let why = match tracks::detect(path) {
             _ if tracks::is_compressed(path) => "compressed".to_owned(),
             _ if !tracks::may_hold_tracks(path) => "no format of tracks".to_owned(),
@@ -279,7 +280,7 @@ fn unknown(path: &Path) -> Error {
         return Error::input(Place::file(path), "an OpenSCENARIO file is no recording", help);
     }
     let columns = match tracks::columns_of(path) {
-        Ok(columns) => {
+        Ok((columns, _)) => {
             let geographic = columns.iter().filter(|name| tracks::is_geographic(name));
             let geographic: Vec<String> = geographic.map(|name| format!("`{name}`")).collect();
             if geographic.len() >= 2 {

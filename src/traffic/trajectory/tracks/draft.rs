@@ -5,10 +5,11 @@ use std::path::Path;
 
 use super::preset::Preset;
 use super::roles::Role;
-use super::rows::{Rows, letters};
-use super::{FileFormat, format_of};
+use super::rows::letters;
+use super::{FileFormat, columns_of};
+use crate::Result;
+use crate::support::files::file_name;
 use crate::support::input_file::unpacked;
-use crate::{Error, Place, Result};
 
 /// Units in the names of columns.
 const UNITS: [(&str, &str); 16] = [
@@ -36,12 +37,9 @@ const UNITS: [(&str, &str); 16] = [
 /// # Errors
 /// Those of the file; [`Error::Input`] for a file whose format is unknown.
 pub fn draft(path: &Path) -> Result<String> {
-    let format = format_of(path).ok_or_else(|| {
-        Error::input(Place::file(path), "the format is unknown", "name it .csv, .txt, .parquet, .xml or .json")
-    })?;
+    let (header, format) = columns_of(path)?;
     let generic = Preset::load("generic")?;
-    let rows = Rows::open(path, format, None, None)?;
-    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = file_name(path);
     let stem = unpacked(&name).rsplit_once('.').map_or(name.as_str(), |(stem, _)| stem);
     let mut text = format!(
         "# A first preset for {}. Answer each \"?\" and check every line; the chapter on tracks explains the keys.\n\
@@ -58,7 +56,7 @@ pub fn draft(path: &Path) -> Result<String> {
             FileFormat::Commonroad => "commonroad",
         }
     );
-    let guesses: Vec<[String; 3]> = rows.header().iter().map(|header| guesses(header)).collect();
+    let guesses: Vec<[String; 3]> = header.iter().map(|header| guesses(header)).collect();
     let mut used: Vec<&str> = Vec::new();
     let mut columns = String::new();
     let mut missing: Vec<&str> = Vec::new();
@@ -66,7 +64,7 @@ pub fn draft(path: &Path) -> Result<String> {
         let Some(column) = generic.columns.get(&role) else { continue };
         let find = |name: &String| {
             let name = letters(name);
-            guesses.iter().position(|guesses| guesses.contains(&name)).map(|at| &rows.header()[at])
+            guesses.iter().position(|guesses| guesses.contains(&name)).map(|at| &header[at])
         };
         match column.names().iter().find_map(find) {
             Some(header) if !used.contains(&header.as_str()) => {
@@ -98,7 +96,7 @@ pub fn draft(path: &Path) -> Result<String> {
         }
     }
     let unused: Vec<String> =
-        rows.header().iter().filter(|header| !used.contains(&header.as_str())).map(|name| quoted(name)).collect();
+        header.iter().filter(|header| !used.contains(&header.as_str())).map(|name| quoted(name)).collect();
     if !unused.is_empty() {
         let _ = writeln!(text, "# Not used: {}", unused.join(", "));
     }

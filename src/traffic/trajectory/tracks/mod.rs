@@ -40,6 +40,7 @@ use rows::{Columns, Rows};
 
 use super::Loaded;
 use super::highd::made_up;
+use crate::support::files::file_name;
 use crate::support::input_file::{open_text, unpacked};
 use crate::support::plausibility::Implausible;
 use crate::{Error, Place, Result};
@@ -94,7 +95,7 @@ pub(super) fn is_compressed(path: &Path) -> bool {
 /// Those of the file; [`Error::Input`] if several presets fit equally well.
 pub fn detect(path: &Path) -> Result<Option<Preset>> {
     let Some(format) = format_of(path) else { return Ok(None) };
-    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = file_name(path);
     let mut best: Vec<(usize, Preset)> = Vec::new();
     // By what opens the file: the element or list of rows, the delimiter.
     type HowOpened = (Option<String>, Option<char>);
@@ -185,7 +186,7 @@ pub(super) fn track_files(path: &Path, preset: &Preset) -> Result<Vec<TrackFile>
     let mut files: Vec<TrackFile> = Vec::new();
     for entry in listed {
         let file = entry.map_err(|e| Error::io(path, "list", e))?.path();
-        let name = file.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let name = file_name(&file);
         let is_ours = preset.recording_of(unpacked(&name)).is_some() && is_format(&file, preset);
         if file.is_file() && is_ours && !name.starts_with('.') && !is_meta(&name, preset) && !is_second(&file) {
             files.extend(of(file));
@@ -201,7 +202,7 @@ pub(super) fn track_files(path: &Path, preset: &Preset) -> Result<Vec<TrackFile>
 
 /// Whether the file that gzip compressed lies beside this one.
 pub(super) fn is_second(path: &Path) -> bool {
-    let name = path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+    let name = file_name(path);
     unpacked(&name) != name && path.with_file_name(unpacked(&name)).exists()
 }
 
@@ -210,7 +211,7 @@ pub(super) fn keep_apart(files: &mut [TrackFile]) {
     let mut counts: HashMap<String, usize> = HashMap::new();
     files.iter().for_each(|file| *counts.entry(file.id.clone()).or_default() += 1);
     for file in files.iter_mut().filter(|file| counts[&file.id] > 1) {
-        file.id = file.path.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        file.id = file_name(&file.path);
     }
 }
 
@@ -298,13 +299,13 @@ pub fn read_usable(file: &TrackFile, preset: &Preset, implausible: Implausible) 
     Ok(usable)
 }
 
-/// The names of a file's columns.
+/// The names of a file's columns, and its format.
 ///
 /// # Errors
 /// Those of the file; [`Error::Input`] for a file whose format is unknown.
-pub(super) fn columns_of(path: &Path) -> Result<Vec<String>> {
+pub(super) fn columns_of(path: &Path) -> Result<(Vec<String>, FileFormat)> {
     let format = format_of(path).ok_or_else(|| {
         Error::input(Place::file(path), "the format is unknown", "name it .csv, .txt, .parquet, .xml or .json")
     })?;
-    Ok(Rows::open(path, format, None, None)?.header().to_vec())
+    Ok((Rows::open(path, format, None, None)?.header().to_vec(), format))
 }

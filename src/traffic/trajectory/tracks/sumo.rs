@@ -10,6 +10,7 @@ use super::raw::{NO_LABEL, RawRecording, RawSample, RawVehicle};
 use super::road::cross;
 use super::roles::{ColumnName, Role};
 use super::rows::{Columns, Rows};
+use crate::support::files::file_name;
 use crate::traffic::trajectory::csv_table::FileChecksum;
 use crate::{Error, Place, Result};
 
@@ -92,7 +93,7 @@ impl Types {
         let named = [(Role::Vehicle, "id"), (Role::Length, "length"), (Role::Width, "width"), (Role::Class, "vClass")];
         let named = named.map(|(role, name)| (role, ColumnName::Name(name.to_owned())));
         let columns = Columns::of(&named.into_iter().collect(), rows.header(), &[]);
-        let name = file.file_name().map(|name| name.to_string_lossy().into_owned()).unwrap_or_default();
+        let name = file_name(file);
         let (checksum, _) = rows.each(&columns, &mut |row| {
             let Some(key) = row.text(Role::Vehicle)? else { return Ok(()) };
             let class = row.text(Role::Class)?.map(|class| class.into_owned());
