@@ -70,13 +70,7 @@ impl Compare {
         self.guard_inputs(configured)?;
         check_folder(&self.out)?;
         let opened = configured.open()?;
-        let collection = self.data.report_and_load(configured, verbosity)?;
-        let facts = self.data.source(configured).provenance(&collection, typed)?;
-        if facts.driven.is_none() {
-            tracing::warn!(
-                "exposure is unknown, because the scenarios have no driven time and distance; give --hours and --km"
-            );
-        }
+        let (collection, facts) = self.data.load_with_exposure(configured, verbosity, typed)?;
 
         let options = CompareOptions {
             study: StudyOptions {

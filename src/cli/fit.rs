@@ -80,13 +80,7 @@ impl Fit {
             representativeness: !self.no_comparison,
         };
         let files = self.files(&ids, configured)?;
-        let collection = self.data.report_and_load(configured, verbosity)?;
-        let facts = self.data.source(configured).provenance(&collection, typed)?;
-        if facts.driven.is_none() {
-            tracing::warn!(
-                "exposure is unknown, because the scenarios have no driven time and distance; give --hours and --km"
-            );
-        }
+        let (collection, facts) = self.data.load_with_exposure(configured, verbosity, typed)?;
 
         // A single file needs no folder.
         let folder = (!self.is_single()).then(|| OutputDir::open_without_record(&self.out)).transpose()?;

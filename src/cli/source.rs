@@ -8,7 +8,7 @@ use indicatif::ProgressBar;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::signals::CANCEL;
-use crate::scenario::{Category, Scenario, ScenarioFile, read_scenario_file};
+use crate::scenario::{Category, DataProvenance, Driven, Scenario, ScenarioFile, read_scenario_file};
 use crate::support::plausibility::Implausible;
 use crate::support::ranges::refuse_repeats;
 use crate::traffic::Source;
@@ -128,6 +128,23 @@ impl SourceFlags {
     pub(super) fn report_and_load(&self, configured: &Configured, verbosity: Verbosity) -> Result<Collection> {
         tracing::info!("{}", self.source(configured).describe(false));
         self.load(configured, verbosity)
+    }
+
+    /// Like [`SourceFlags::report_and_load`], with the provenance; `given` are the flags of the exposure.
+    pub(super) fn load_with_exposure(
+        &self,
+        configured: &Configured,
+        verbosity: Verbosity,
+        given: Driven,
+    ) -> Result<(Collection, DataProvenance)> {
+        let collection = self.report_and_load(configured, verbosity)?;
+        let provenance = self.source(configured).provenance(&collection, given)?;
+        if provenance.driven.is_none() {
+            tracing::warn!(
+                "exposure is unknown, because the scenarios have no driven time and distance; give --hours and --km"
+            );
+        }
+        Ok((collection, provenance))
     }
 
     /// Refuses a result that would replace an input of the run.
