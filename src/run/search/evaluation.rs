@@ -210,12 +210,9 @@ impl<'a> Evaluator<'a> {
                     });
                 cases.collect()
             }
-            Training::On(train) => {
+            Training::On(_) | Training::InSample => {
+                let train = if let Training::On(train) = training { train } else { &*self.scenarios };
                 let Some(fitted) = fit(train)? else { return Ok(None) };
-                self.scenarios.iter().map(|scenario| case(&fitted, scenario)).collect::<Result<Vec<_>>>().map(Some)
-            }
-            Training::InSample => {
-                let Some(fitted) = fit(&self.scenarios)? else { return Ok(None) };
                 self.scenarios.iter().map(|scenario| case(&fitted, scenario)).collect::<Result<Vec<_>>>().map(Some)
             }
         }

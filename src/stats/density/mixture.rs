@@ -104,17 +104,6 @@ impl Mixture {
         // Scaled weights sum to 1 up to rounding and are kept, so that a mixture read from a file is unchanged.
         let is_scaled = (total - 1.0).abs() <= 2.0 * weights.len() as f64 * f64::EPSILON;
         let weights = if is_scaled { weights } else { weights.iter().map(|w| w / total).collect() };
-        Ok(Mixture::prepared(dimensions, weights, means, factors, factor_of))
-    }
-
-    /// Computes the data for drawing and evaluating.
-    fn prepared(
-        dimensions: usize,
-        weights: Vec<f64>,
-        means: Vec<Vec<f64>>,
-        factors: Vec<DMatrix<f64>>,
-        factor_of: Vec<usize>,
-    ) -> Mixture {
         let n = weights.len();
         let mut cumulative = Vec::with_capacity(n);
         let mut sum = 0.0;
@@ -145,7 +134,7 @@ impl Mixture {
                 _ => runs.push(k..k + 1),
             }
         }
-        Mixture {
+        Ok(Mixture {
             dimensions,
             weights,
             means,
@@ -156,7 +145,7 @@ impl Mixture {
             whitened_means,
             log_heights,
             runs,
-        }
+        })
     }
 
     /// Combines several mixtures: Σ weight · mixture, with the weights scaled to sum 1; mixtures of weight 0 are
