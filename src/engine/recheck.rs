@@ -75,7 +75,6 @@ impl<'p> Recheck<'p> {
     ///
     /// # Errors
     /// [`Error::Verification`] with the first lane that differs.
-    /// [`Error::Verification`] with the first lane that differs.
     pub(super) fn check(&self, chunk: &Chunk, wanted: Wanted, backend: &str, by: RecheckBy) -> Result<u64> {
         if chunk.verdicts.is_empty() || by == RecheckBy::Nothing {
             return Ok(0);

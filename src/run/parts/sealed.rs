@@ -76,7 +76,6 @@ pub fn unseal<T: DeserializeOwned>(kind: &str, text: &[u8], place: &Place, again
 ///
 /// # Errors
 /// [`Error::Io`]; as [`unseal`].
-/// [`Error::Io`]; as [`unseal`].
 pub(crate) fn read_sealed<T: DeserializeOwned>(
     kind: &str,
     path: &Path,

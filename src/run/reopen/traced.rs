@@ -88,7 +88,6 @@ impl Reopened {
     ///
     /// # Errors
     /// [`Error::Usage`] for a lane, variant or model that does not exist.
-    /// [`Error::Usage`] for a lane, variant or model that is not there.
     pub fn traced(&self, key: &str, models: Option<&[ModelId]>, compare: &[String]) -> Result<TracedLanes> {
         let key = self.find(key)?;
         let variants = variants(self.plan(), &key, compare)?;
