@@ -14,7 +14,7 @@ mod series;
 mod thresholds;
 
 pub use decision::Threshold;
-pub use random::{RandomOptions, RandomUnit, VARIANTS, random_plan};
+pub use random::{RandomOptions, VARIANTS, random_plan};
 pub use thresholds::{SIDES, ThresholdOptions, threshold_plan};
 
 use std::ops::Range;

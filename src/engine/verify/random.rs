@@ -36,33 +36,6 @@ impl Default for RandomOptions {
     }
 }
 
-/// A unit's key, from which its cases can be regenerated.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub struct RandomUnit {
-    /// Kind of scenario.
-    pub category: Category,
-    /// Seed of the set.
-    pub seed: u64,
-    /// Unit within its category.
-    pub unit: u64,
-}
-
-impl RandomUnit {
-    /// Parses the text form of [`RandomUnit`]: `random-cut-in-seed157-0000123`.
-    pub fn parse(key: &str) -> Option<RandomUnit> {
-        let (rest, unit) = key.strip_prefix("random-")?.rsplit_once('-')?;
-        let (category, seed) = rest.rsplit_once("-seed")?;
-        let category = Category::parse(category)?;
-        Some(RandomUnit { category, seed: seed.parse().ok()?, unit: unit.parse().ok()? })
-    }
-}
-
-impl std::fmt::Display for RandomUnit {
-    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "random-{}-seed{}-{:07}", self.category.key().replace('_', "-"), self.seed, self.unit)
-    }
-}
-
 /// Ten starts by time and by distance: far, near, touching, overlapping along the road, and behind.
 fn headways() -> Vec<Headway> {
     let by_time = [2.0, 1.2, 0.7, 0.3].map(Headway::ThwS);
@@ -70,7 +43,7 @@ fn headways() -> Vec<Headway> {
     by_time.into_iter().chain(by_distance).collect()
 }
 
-/// Plans the random set of a seed.
+/// Plans the random set of a seed. Keys are `random-cut-in-seed157-0000123`; the number is that of the unit.
 ///
 /// # Errors
 /// [`Error::Usage`] without lanes, categories or models, or if a category is named twice.
@@ -83,7 +56,7 @@ pub fn random_plan(profile: &Profile, options: &RandomOptions) -> Result<LanePla
     let headways = headways();
     let units = options.lanes_per_model_and_category.div_ceil((headways.len() * VARIANTS.len()) as u64);
     let block = |&category: &Category| {
-        let name = |unit| RandomUnit { category, seed: options.seed, unit }.to_string();
+        let name = |unit| format!("random-{}-seed{}-{unit:07}", category.key().replace('_', "-"), options.seed);
         Block::new(category, (0..units).map(name).collect(), VARIANTS.map(str::to_owned).to_vec())
     };
     let blocks = options.categories.iter().map(block).collect();
