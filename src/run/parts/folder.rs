@@ -12,22 +12,15 @@ use super::sealed::{read_sealed, seal};
 use crate::support::files::write_inside;
 use crate::{Error, Place, Result};
 
-/// Part files of a folder, identified by their names.
-#[derive(Debug, Clone, PartialEq)]
-struct Found {
-    /// Shards with their files, in the order of their units.
-    pub parts: Vec<(Shard, PathBuf)>,
-}
-
 /// Maximum number of parts listed by name in an error.
 const NAMED: usize = 10;
 
-/// Finds the parts in a folder, which must cover `units` units exactly once. `again` returns the command that makes a
-/// shard.
+/// Finds the parts in a folder by their names, in the order of their units. They must cover `units` units exactly once.
+/// `again` returns the command that makes a shard.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] with the missing or duplicate parts and the commands that make them.
-fn collect(dir: &Path, units: u64, again: impl Fn(Shard) -> String) -> Result<Found> {
+fn collect(dir: &Path, units: u64, again: impl Fn(Shard) -> String) -> Result<Vec<(Shard, PathBuf)>> {
     let io = |e| Error::io(dir, "list", e);
     let mut parts: Vec<(Shard, PathBuf)> = Vec::new();
     for entry in std::fs::read_dir(dir).map_err(io)? {
@@ -54,7 +47,7 @@ fn collect(dir: &Path, units: u64, again: impl Fn(Shard) -> String) -> Result<Fo
     }
     parts.sort_by_key(|(shard, _)| (shard.units(units).start, shard.units(units).end, shard.of));
     check_cover(dir, units, &parts, again)?;
-    Ok(Found { parts })
+    Ok(parts)
 }
 
 /// Reads all parts of a folder and checks that they belong to this run and together have all units, each once.
@@ -67,9 +60,8 @@ pub(crate) fn read_parts<T: MergeableCounts>(
     units: u64,
     again: &dyn Fn(Shard) -> String,
 ) -> Result<Vec<Part<T>>> {
-    let found = collect(dir, units, again)?;
     let read = |(shard, path): &(Shard, PathBuf)| read_part(path, run_sha256, &shard.units(units), &again(*shard));
-    found.parts.iter().map(read).collect()
+    collect(dir, units, again)?.iter().map(read).collect()
 }
 
 fn check_cover(dir: &Path, units: u64, parts: &[(Shard, PathBuf)], again: impl Fn(Shard) -> String) -> Result<()> {
@@ -206,7 +198,7 @@ mod tests {
     fn parts_of_different_numbers_of_shards_may_make_a_whole() {
         let dir = folder(&["part-00000-of-00002.json", "part-00002-of-00004.json", "part-00003-of-00004.json"]);
         let found = collect(dir.path(), 8, |_| String::new()).unwrap();
-        assert_eq!(found.parts.len(), 3);
+        assert_eq!(found.len(), 3);
         // More shards than units: the empty ones may be missing.
         let dir = folder(&["part-00001-of-00002.json"]);
         assert!(collect(dir.path(), 1, |_| String::new()).is_ok());
