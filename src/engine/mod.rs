@@ -45,7 +45,7 @@ pub use lane_case::attention_rules;
 pub use lane_case::{LaneCase, LaneOther, check_time_step};
 pub use lane_step::Seen;
 #[cfg(not(feature = "gpu"))]
-pub(crate) use open::no_gpu;
+pub use open::no_gpu;
 pub use open::{DeviceRecord, OpenBackend};
 pub use outcome::{EndReason, NO_STEP, Outcome, Verdicts};
 pub use partial::{Partial, UnitCounts};

@@ -154,7 +154,7 @@ fn nothing_to_verify() -> Error {
 
 /// The error of a program without GPU support if a GPU is required.
 #[cfg(not(feature = "gpu"))]
-pub(crate) fn no_gpu(requested: &str) -> Error {
+pub fn no_gpu(requested: &str) -> Error {
     let help = "use option `backend = cpu`, or build it with the feature `gpu`";
     Error::device(requested, "this program was built without the feature `gpu`", help)
 }
