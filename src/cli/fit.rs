@@ -10,13 +10,12 @@ use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::lists;
 use super::source::{self, SourceFlags};
-use crate::cli::settings::BandwidthInterval;
 use crate::report::density;
 use crate::report::records;
 use crate::report::run_record::SettingRecord;
 use crate::scenario::DataProvenance;
 use crate::scenario::parameterization::Parameterization;
-use crate::stats::density::{BandwidthRule, DensityModel, FitOptions, write_density};
+use crate::stats::density::{DensityModel, FitOptions, write_density};
 use crate::support::error::push_once;
 use crate::support::files::{check_folder_of, make_folder_of};
 use crate::support::readable::counted;
@@ -71,10 +70,7 @@ impl Fit {
             parameterization: config.of_densities(),
             with_thw: self.with_thw,
             kind: config.fit.density,
-            rule: match config.fit.bandwidth_rule {
-                BandwidthInterval::Reduction => BandwidthRule::Reduction,
-                BandwidthInterval::Wide => BandwidthRule::Wide,
-            },
+            rule: config.fit.bandwidth_rule,
             valid_draws: config.fit.valid_draws,
             seed: config.fit.seed,
             representativeness: !self.no_comparison,

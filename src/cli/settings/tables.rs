@@ -8,7 +8,7 @@ use crate::model::criterion::Criterion;
 use crate::model::driver::Bound;
 use crate::run::score::ScoreOptions;
 use crate::scenario::parameterization::{ParameterizationOptions, SvdLateral};
-use crate::stats::density::DensityKind;
+use crate::stats::density::{BandwidthRule, DensityKind};
 use crate::traffic::mining::MiningOptions;
 use crate::traffic::trajectory::generator::GeneratorOptions;
 
@@ -89,7 +89,7 @@ pub(crate) struct FitSettings {
     /// scenarios.
     pub density: DensityKind,
     /// Search interval of the bandwidth.
-    pub bandwidth_rule: BandwidthInterval,
+    pub bandwidth_rule: BandwidthRule,
     /// Sign of the lateral series of densities and of the replays that `compare` and `justify` compare with them.
     pub svd_lateral: SvdLateral,
     /// Seed of P_valid and of the splits for M.
@@ -104,23 +104,12 @@ impl Default for FitSettings {
         let options = crate::stats::density::FitOptions::default();
         FitSettings {
             density: options.kind,
-            bandwidth_rule: BandwidthInterval::default(),
+            bandwidth_rule: options.rule,
             svd_lateral: options.parameterization.svd_lateral,
             seed: options.seed,
             valid_draws: options.valid_draws,
         }
     }
-}
-
-/// Interval that a bandwidth is searched in.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub(crate) enum BandwidthInterval {
-    /// From 0.2 times Silverman's bandwidth to Silverman's, as for the reduction of scenarios
-    #[default]
-    Reduction,
-    /// From 0.2 to 5 times Silverman's bandwidth; the upper end is at least 1
-    Wide,
 }
 
 /// `lanesweep sample`.

@@ -4,19 +4,19 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-/// The published search interval.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+/// Interval that a bandwidth is searched in.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, schemars::JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum BandwidthRule {
-    /// [max(0.001, 0.2 h_S), h_S], as with the reduction of scenarios.
+    /// From 0.2 times Silverman's bandwidth to Silverman's, as for the reduction of scenarios
     #[default]
     Reduction,
-    /// [max(0.001, 0.2 h_S), max(1, 5 h_S)].
+    /// From 0.2 to 5 times Silverman's bandwidth; the upper end is at least 1
     Wide,
 }
 
 impl BandwidthRule {
-    /// The interval for N points in d dimensions.
+    /// The interval for N points in d dimensions; it begins at 0.001 or above.
     fn interval(self, points: usize, dimensions: usize) -> [f64; 2] {
         let silverman = silverman(points, dimensions);
         let upper = match self {
