@@ -84,7 +84,7 @@ impl<'a> Executor<'a> {
         Executor { cancel, ..self }
     }
 
-    /// Rechecks one lane in [`ONE_IN`](super::ONE_IN); the seed selects which.
+    /// Rechecks one lane in `ONE_IN`; the seed selects which.
     pub fn with_recheck(self, seed: u64) -> Self {
         Executor { recheck: Some(RecheckOptions::of_seed(seed)), ..self }
     }

@@ -38,7 +38,7 @@ impl<R: Real> Frame<R> {
     }
 
     /// The constants by their names in the shaders; flags are 0 or 1.
-    pub(super) fn shader_constants(&self) -> Vec<(&'static str, f64)> {
+    pub fn shader_constants(&self) -> Vec<(&'static str, f64)> {
         vec![
             ("frame_dt", self.dt.to_f64()),
             ("frame_inverse_dt", self.inverse_dt.to_f64()),

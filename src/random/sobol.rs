@@ -42,7 +42,7 @@ impl Sobol {
     /// The first `dimensions` coordinates of the sequence under a seed.
     ///
     /// # Errors
-    /// [`Error::Usage`] for more than [`SOBOL_DIMENSIONS`].
+    /// [`Error::Usage`] for more than `SOBOL_DIMENSIONS`.
     pub fn new(seed: u64, dimensions: u32) -> Result<Sobol> {
         if dimensions > SOBOL_DIMENSIONS {
             return Err(Error::usage(

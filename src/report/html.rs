@@ -1,5 +1,5 @@
 //! One self-contained page: texts, tables and figures of a run in one file, without external resources. The caller fills
-//! a [`Page`] with content; `templates` define its look and the one script, which sorts tables and shows values.
+//! a `Page` with content; `templates` define its look and the one script, which sorts tables and shows values.
 
 use base64::prelude::{BASE64_STANDARD, Engine};
 use minijinja::value::{Serde, Value};

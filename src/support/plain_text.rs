@@ -20,7 +20,7 @@ pub(super) const MAX_PATH: usize = 4096;
 /// Maximum characters of a message.
 const MAX_MESSAGE: usize = 16_384;
 
-/// Shortens a name to [`MAX_NAME`] characters by keeping its beginning and end.
+/// Shortens a name to `MAX_NAME` characters by keeping its beginning and end.
 pub fn cut(name: &str) -> Cow<'_, str> {
     cut_to(name, MAX_NAME)
 }

@@ -1,8 +1,8 @@
 //! All settings of a configuration: one tree of tables, from which the file format, its JSON Schema and the checks
 //! follow.
 //!
-//! A value is the default, or comes from a file or a flag; the later source wins ([`Layers`]), and each value keeps its
-//! [`Origin`]. Only named files are read, because a run must not depend on other files in a folder.
+//! A value is the default, or comes from a file or a flag; the later source wins (`Layers`), and each value keeps its
+//! `Origin`. Only named files are read, because a run must not depend on other files in a folder.
 
 mod file;
 mod keys;

@@ -46,7 +46,7 @@ impl Generator {
     }
 
     /// Maximum number of table entries of one case: speeds, lateral states.
-    pub(super) fn table_entries(&self) -> [u32; 2] {
+    pub fn table_entries(&self) -> [u32; 2] {
         let entries = self.recipe.longest_series();
         match self.recipe.path() {
             CasePath::Kinematic => [0, 0],

@@ -31,12 +31,12 @@ struct NvidiaGpu {
     minor: Option<u32>,
 }
 
-/// [`visible()`] of this process and this machine.
+/// `visible()` of this process and this machine.
 ///
 /// Call it after listing the devices: opening the driver's device files is fast only while they are already open.
 ///
 /// # Errors
-/// As [`visible()`].
+/// As `visible()`.
 pub fn visible_here() -> Result<Option<Vec<String>>> {
     let env = |name: &str| std::env::var_os(name).map(|value| value.to_string_lossy().into_owned());
     visible(&env, Path::new("/"))

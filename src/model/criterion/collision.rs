@@ -36,7 +36,7 @@ fn overlaps<R: Real>(gap: R, half_lengths: R, lateral_gap: R) -> Flag {
     lateral_gap.is_negative() & overlaps_along(gap, half_lengths)
 }
 
-/// The longitudinal part of [`overlaps`].
+/// The longitudinal part of `overlaps`.
 #[inline(always)]
 pub fn overlaps_along<R: Real>(gap: R, half_lengths: R) -> Flag {
     gap.is_negative() & (gap + half_lengths + half_lengths).is_positive()

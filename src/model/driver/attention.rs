@@ -50,7 +50,7 @@ pub enum BelowTrigger {
 #[repr(C)]
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct AttentionRule<R> {
-    /// [`ALWAYS`], [`VISIBLE_MOVEMENT`], [`CUTTING_IN`], [`CUTTING_OUT`] or [`DECELERATION`].
+    /// `ALWAYS`, `VISIBLE_MOVEMENT`, `CUTTING_IN`, `CUTTING_OUT` or `DECELERATION`.
     pub kind: u32,
     /// Steps from the event to the reaction.
     pub delay_steps: u32,

@@ -106,7 +106,7 @@ pub trait DriverProfile {
     /// Every numeric constant: key, value, range.
     fn bounds(&self) -> Vec<(&'static str, f64, Bound)>;
 
-    /// Bounds of the time step `dt_s`: key, maximum step, s. [`delay_bound_s`] gives the bound of a delay. Derivation:
+    /// Bounds of the time step `dt_s`: key, maximum step, s. `delay_bound_s` gives the bound of a delay. Derivation:
     /// docs/src/methods/lane.md, time step.
     fn time_step_bounds(&self, _dt_s: f64) -> Vec<(&'static str, f64)> {
         Vec::new()

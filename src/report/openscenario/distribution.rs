@@ -51,7 +51,7 @@ pub enum Distribution {
     },
     /// Poisson, truncated to a range.
     Poisson {
-        /// Mean before truncation, 0 … [`MAX_POISSON`].
+        /// Mean before truncation, 0 … `MAX_POISSON`.
         mean: f64,
         /// Range of the truncation.
         range: Range,

@@ -135,7 +135,7 @@ impl Names<'_> {
 /// The variations of a file.
 ///
 /// # Errors
-/// [`Error::Usage`] for a stochastic file; as [`Names::find`] and [`Names::value`]; [`Error::Input`] for a repeated
+/// [`Error::Usage`] for a stochastic file; as `Names::find` and [`Names::value`]; [`Error::Input`] for a repeated
 /// value, and for too many combinations of sets.
 pub fn variations(file: &DistributionFile, names: &Names) -> Result<Variations> {
     names.check_renames(&file.names())?;

@@ -73,7 +73,7 @@ impl DistributionSamples {
     /// The random parameters of a file.
     ///
     /// # Errors
-    /// [`Error::Usage`] for a deterministic file, and for missing or repeated parameters; as [`Names::find`];
+    /// [`Error::Usage`] for a deterministic file, and for missing or repeated parameters; as `Names::find`;
     /// [`Error::Input`] if a parameter's range contains nothing of its distribution.
     pub fn of(
         file: &DistributionFile,
@@ -160,7 +160,7 @@ impl DistributionSamples {
     /// parameter.
     ///
     /// # Errors
-    /// As [`DistributionSamples::draw`]; [`Error::Usage`] for no samples or more than [`MAX_SAMPLES`], and for headways
+    /// As [`DistributionSamples::draw`]; [`Error::Usage`] for no samples or more than `MAX_SAMPLES`, and for headways
     /// together with a distance parameter.
     pub fn plan(
         &self,

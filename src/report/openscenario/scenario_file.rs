@@ -248,7 +248,7 @@ pub struct IndexRow {
 /// Writes every scenario with its road, and the index, to a folder; replaces an earlier export.
 ///
 /// # Errors
-/// As [`scenario_file`]; [`crate::Error::Io`].
+/// As `scenario_file`; [`crate::Error::Io`].
 pub fn export_folder(dir: &Path, scenarios: &[Concrete]) -> Result<Vec<IndexRow>> {
     // Everything is built before the first file is written, so that an error leaves the folder unchanged.
     let mut made = Vec::new();

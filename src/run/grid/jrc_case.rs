@@ -90,9 +90,9 @@ pub fn lvd(initial_mps: f64, end_mps: f64, deceleration_mps2: f64) -> Case {
 pub struct Front {
     /// Speed, m/s.
     pub speed_mps: f64,
-    /// Length, m: [`STANDING_LENGTH_M`] if it is stationary.
+    /// Length, m: `STANDING_LENGTH_M` if it is stationary.
     pub length_m: f64,
-    /// Distance to it, m: between centres minus [`LENGTH_M`], independent of its own length.
+    /// Distance to it, m: between centres minus `LENGTH_M`, independent of its own length.
     pub distance_m: f64,
 }
 

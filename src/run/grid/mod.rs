@@ -84,7 +84,7 @@ pub struct GridParts {
     pub fixed: Vec<(&'static MapParameter, f64)>,
     /// How a point becomes a case.
     pub style: CaseStyle,
-    /// Each model starts at its own distance ([`jrc_case::native_distance`]) instead of a gap or headway.
+    /// Each model starts at its own distance (`jrc_case::native_distance`) instead of a gap or headway.
     pub native_gap: bool,
     /// Skips panels in which the ego is not faster than the other vehicle.
     pub closing_only: bool,

@@ -28,7 +28,7 @@ use std::str::FromStr;
 pub struct Shard {
     /// From 0, below [`Shard::of`].
     pub index: u64,
-    /// Number of shards, 1 to [`Shard::MAX_SHARDS`].
+    /// Number of shards, 1 to `Shard::MAX_SHARDS`.
     pub of: u64,
 }
 

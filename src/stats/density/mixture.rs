@@ -62,7 +62,7 @@ impl Mixture {
     /// Checks shapes and scales the weights to sum 1, unless they do so up to rounding.
     ///
     /// # Errors
-    /// [`Error::Usage`] if there is no component, shapes differ, there are more than [`MAX_DIMENSIONS`] parameters, a
+    /// [`Error::Usage`] if there is no component, shapes differ, there are more than `MAX_DIMENSIONS` parameters, a
     /// weight is negative or not finite, or a diagonal element is not positive.
     pub fn new(
         weights: Vec<f64>,

@@ -2,7 +2,7 @@
 //!
 //! This module has the detectors of activities ([`longitudinal`], [`lateral`]), and the tags of an ego and a target
 //! with the search for sequences of items ([`tags`]). Each category has a file with its items, its trimming and the
-//! filters of the paper ([`cut_in`], [`cut_out`], [`lvd`]). [`MiningOptions`] has every threshold; [`mine`] runs over a
+//! filters of the paper ([`cut_in`], `cut_out`, [`lvd`]). [`MiningOptions`] has every threshold; [`mine`] runs over a
 //! recording. Mining depends neither on file formats nor on the use of scenarios. Data comes from
 //! [`crate::traffic::trajectory`] and goes, as [`Scenario`](crate::scenario::Scenario)s, to
 //! [`crate::scenario::parameterization`].

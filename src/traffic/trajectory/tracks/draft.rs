@@ -35,7 +35,7 @@ const UNITS: [(&str, &str); 16] = [
 /// answers it before the preset can be read.
 ///
 /// # Errors
-/// Those of the file; [`Error::Input`] for a file whose format is unknown.
+/// Those of the file; [`crate::Error::Input`] for a file whose format is unknown.
 pub fn draft(path: &Path) -> Result<String> {
     let (header, format) = columns_of(path)?;
     let generic = Preset::load("generic")?;
