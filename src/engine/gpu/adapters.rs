@@ -167,7 +167,7 @@ impl AdapterCard {
         matches!(self.kind, DeviceKind::Discrete | DeviceKind::Virtual | DeviceKind::Integrated)
     }
 
-    /// Whether the environment hides it (`super::visible()`). It hides GPUs that are not in the list of allowed PCI
+    /// Whether the environment hides it (`visible()`). It hides GPUs that are not in the list of allowed PCI
     /// bus ids or have no id, but never software rasterizers.
     pub fn is_hidden_by(&self, visible: Option<&[String]>) -> bool {
         let Some(visible) = visible else { return false };

@@ -9,7 +9,7 @@ use crate::{Error, Place, Result};
 /// The index of the device to use, or `None` for the CPU.
 ///
 /// `cards` have the order of [`super::Adapters`]. `visible` has the PCI bus ids that the environment allows
-/// (`super::visible()`), in order of preference; it hides every other GPU. Without it the order is discrete,
+/// (`visible()`), in order of preference; it hides every other GPU. Without it the order is discrete,
 /// virtual, integrated. Software rasterizers and devices of unknown kind must be named.
 ///
 /// # Errors
