@@ -76,6 +76,46 @@ def test_points_of_a_foreign_model_give_its_risk_and_with_their_density_that_of_
         limit_state.estimate(drawn, logs[1:])
 
 
+def test_standard_normal_numbers_become_the_density_and_its_probability_is_theirs_over_the_valid_share(density) -> None:
+    limit_state = lanesweep.LimitState(density, model="RSS", criterion="ttc", thw=0.4)
+    u = np.random.default_rng(3).standard_normal((20_000, len(limit_state.parameters)))
+    points = limit_state.from_standard_normal(u)
+    assert points.shape == u.shape and np.isfinite(points).all()
+    valid = limit_state.is_valid(points)
+    assert valid.mean() == pytest.approx(limit_state.valid_share, abs=0.015)
+    drawn = limit_state.draw(20_000, rng=4)
+    assert points[valid].mean(axis=0) == pytest.approx(drawn.mean(axis=0), abs=5 * drawn.std(axis=0).max() / 100)
+    probability = (limit_state(points) <= 0).mean() / limit_state.valid_share
+    assert probability == pytest.approx((limit_state(drawn) <= 0).mean(), abs=0.015)
+    # Increasing in the first parameter, whatever the others are.
+    line = np.zeros((50, u.shape[1]))
+    line[:, 0] = np.linspace(-5, 5, 50)
+    assert (np.diff(limit_state.from_standard_normal(line)[:, 0]) > 0).all()
+    with pytest.raises(lanesweep.InputError, match="give"):
+        limit_state.from_standard_normal(u[:, 1:])
+
+
+def test_subset_simulation_of_another_library_gives_our_probability(density) -> None:
+    ot = pytest.importorskip("openturns")
+    limit_state = lanesweep.LimitState(density, model="RSS", criterion="ttc", thw=0.8)
+    dimension = len(limit_state.parameters)
+    truth = (limit_state(limit_state.draw(40_000, rng=4)) <= 0).mean()
+
+    def values(u: object) -> np.ndarray:
+        return np.minimum(limit_state(limit_state.from_standard_normal(np.asarray(u))), 1e3)[:, np.newaxis]
+
+    function = ot.PythonFunction(dimension, 1, func_sample=values)
+    vector = ot.CompositeRandomVector(function, ot.RandomVector(ot.Normal(dimension)))
+    event = ot.ThresholdEvent(vector, ot.LessOrEqual(), 0.0)
+    for algorithm in (ot.SubsetSampling(event), ot.NAIS(event, 0.1)):
+        ot.RandomGenerator.SetSeed(1)
+        algorithm.setMaximumOuterSampling(2000)
+        algorithm.setBlockSize(1)
+        algorithm.run()
+        found = algorithm.getResult().getProbabilityEstimate() / limit_state.valid_share
+        assert found == pytest.approx(truth, rel=0.35), (algorithm.getClassName(), found, truth)
+
+
 def test_a_mixture_is_a_density_as_kernels_are(scenarios, tmp_path) -> None:
     for form in ("mixture", "copula"):
         fitted = tmp_path / f"{form}.json"
