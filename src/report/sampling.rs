@@ -309,6 +309,7 @@ impl EstimateFile {
             text.push_str("Rare failures, by importance sampling:\n");
             text.push_str(&self.table(|row| row.is_rare_beside(&self.estimates)).text());
         }
+        text.push_str("Verdicts: on the draws, on the density (against recorded scenarios), on the data.\n");
         for (of, remark) in self.remarks() {
             let _ = writeln!(text, "{of}: {remark}");
         }
@@ -411,7 +412,7 @@ impl EstimateFile {
 }
 
 /// Heading of [`verdicts`].
-pub(super) const VERDICTS: &str = "draws, density, data";
+pub(super) const VERDICTS: &str = "verdicts";
 
 /// Of a row, a word each for what it is uncertain about.
 pub(super) fn verdicts(row: &EstimateRow) -> String {

@@ -126,7 +126,7 @@ fn sampling_runs_maps_and_comparisons_have_their_page() {
     }
     let is = ["--estimator", "is", "--thw", "0.2", "--models", "RSS", "--out", "is"];
     lanesweep(dir, &[&sample[..], &is].concat());
-    assert!(page(&dir.join("is")).contains("effective sample size"));
+    assert!(page(&dir.join("is")).contains("effective failures"));
     // The page of an earlier run does not stay beside the results of a later one.
     lanesweep(dir, &[&sample[..], &["--thw", "1", "--out", "mc"]].concat());
     assert!(!dir.join("mc/headways.csv").exists());

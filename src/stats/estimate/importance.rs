@@ -16,67 +16,9 @@ use super::stop::StopReason;
 use super::summary::Estimate;
 use super::trust::Warning;
 use super::weights::WeightSums;
+use crate::Result;
 use crate::random::Stream;
 use crate::stats::density::Mixture;
-use crate::stats::density::normal::uniform;
-use crate::{Error, Place, Result};
-
-/// (1 − δ) g + δ f, truncated like f. Every attempt selects g or f anew, so the mixture is truncated as a whole.
-pub(super) struct Defended<'a> {
-    nominal: &'a dyn Density,
-    proposal: Mixture,
-    weight: f64,
-}
-
-/// Mixes the density into a proposal with weight δ in [0, 1]; with 0 only the validity rule is adopted.
-///
-/// # Errors
-/// [`Error::Usage`] if the weight is outside [0, 1] or the numbers of parameters differ.
-pub(super) fn defended(proposal: Mixture, nominal: &dyn Density, weight: f64) -> Result<Defended<'_>> {
-    if !(0.0..=1.0).contains(&weight) || proposal.dimensions() != nominal.dimensions() {
-        return Err(Error::usage(
-            Place::item("defensive mixture"),
-            format!(
-                "a share of {weight}, {} parameters of the proposal and {} of the density do not fit together",
-                proposal.dimensions(),
-                nominal.dimensions()
-            ),
-            "give a share from 0 to 1 and two densities over the same parameters",
-        ));
-    }
-    Ok(Defended { nominal, proposal, weight })
-}
-impl Density for Defended<'_> {
-    fn dimensions(&self) -> usize {
-        self.proposal.dimensions()
-    }
-
-    fn log_density(&self, point: &[f64]) -> f64 {
-        if !self.nominal.is_valid(point) {
-            return f64::NEG_INFINITY;
-        }
-        let of = |weight: f64, log: &dyn Fn() -> f64| {
-            if weight > 0.0 { libm::log(weight) + log() } else { f64::NEG_INFINITY }
-        };
-        let a = of(1.0 - self.weight, &|| self.proposal.log_density(point));
-        let b = of(self.weight, &|| self.nominal.log_density(point));
-        let top = a.max(b);
-        if top == f64::NEG_INFINITY { top } else { top + libm::log(libm::exp(a - top) + libm::exp(b - top)) }
-    }
-
-    fn attempt(&self, stream: &Stream, index: u64, attempt: u32) -> Vec<f64> {
-        let choice = Stream { purpose: stream.purpose.wrapping_add(purpose::CHOICE), ..*stream };
-        if uniform(choice.words(index, attempt)[0]) < self.weight {
-            self.nominal.attempt(stream, index, attempt)
-        } else {
-            self.proposal.draw(stream, index, attempt)
-        }
-    }
-
-    fn is_valid(&self, point: &[f64]) -> bool {
-        self.nominal.is_valid(point)
-    }
-}
 
 /// Draws of a proposal and of the density, as one sample.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
@@ -227,13 +169,4 @@ pub fn importance_of_points(log_ratios: &[f64], fails: &[bool], level: f64) -> E
     estimate.trust.about_mean_weight(log_ratios);
     estimate.trust.warn_if(true, Warning::DataLeftOut);
     estimate
-}
-
-/// The error if no draw is valid.
-pub(crate) fn no_valid_point(of: &str) -> Error {
-    Error::usage(
-        Place::item(of),
-        "no draw of the density is valid",
-        "check the bounds of the parameters: they must leave something of the density",
-    )
 }

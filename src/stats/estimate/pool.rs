@@ -141,25 +141,6 @@ impl<'a> Pool<'a> {
         Ok(from..self.points.len())
     }
 
-    /// Draws from a proposal in which the density has the weight `defence`; returns the indices of the new points.
-    pub fn add_defended(
-        &mut self,
-        mixture: Mixture,
-        defended: &dyn Density,
-        defence: f64,
-        stream: Stream,
-        draws: u64,
-    ) -> Result<std::ops::Range<usize>> {
-        let from = self.points.len();
-        let points = self.attempts(defended, stream, 0..draws);
-        self.register(mixture, (1.0 - defence) * draws as f64);
-        let nominal = defence * draws as f64;
-        self.log_sources.iter_mut().zip(&self.log_f).for_each(|(sum, f)| *sum = log_add(*sum, libm::log(nominal) + f));
-        self.nominal_draws += nominal;
-        self.add(points, false)?;
-        Ok(from..self.points.len())
-    }
-
     /// Adds a source to the weights of all points.
     fn register(&mut self, mixture: Mixture, draws: f64) {
         let more = libm::log(draws);

@@ -19,8 +19,6 @@ pub const ATTEMPTS: u32 = 64;
 pub(crate) mod purpose {
     /// Draws of the density itself.
     pub const NOMINAL: u32 = 0x4553_0001;
-    /// The choice between the parts of a proposal: added to the purpose of its draws.
-    pub const CHOICE: u32 = 0x1000_0000;
     /// Final draws of a proposal.
     pub const PROPOSAL: u32 = 0x4553_0002;
     /// Draws of the density beside these.

@@ -11,14 +11,13 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::importance::{defended, no_valid_point};
 use super::pool::{Pool, effective_size};
 use super::problem::{Density, LimitState, purpose};
 use super::shapes::{designs, fitted};
 use crate::random::Stream;
 use crate::stats::density::Mixture;
 use crate::stats::density::moments::{factor_or_diagonal, moments};
-use crate::{Error, Result};
+use crate::{Error, Place, Result};
 
 /// Variances of the wider copies of the density in the first round, relative to its own.
 const WIDER: [f64; 2] = [4.0, 9.0];
@@ -47,8 +46,8 @@ const ACTIVE: usize = 4;
 const LADDER: usize = 12;
 /// Weight of these.
 const LADDER_WEIGHT: f64 = 0.1;
-/// Weight of the density in the sample that tests a proposal.
-pub(super) const DEFENCE: f64 = 0.1;
+/// Fraction of draws of the density in the sample that tests a proposal.
+const OF_DENSITY: f64 = 0.1;
 /// A fresh sample of a proposal is refused if one failure carries more than this fraction of an estimate …
 const MAX_FRACTION: f64 = 0.03;
 /// … or if the relative variance of a draw is larger than this, because the sample itself makes the next fit better …
@@ -86,10 +85,10 @@ impl Search {
         self.rounds * (1 + questions.div_ceil(ACTIVE))
     }
 
-    /// Maximum number of evaluated points, unless crude draws test the proposal of a rarer question.
+    /// Maximum number of evaluated points.
     pub fn most_points(&self, questions: usize) -> u64 {
         let rounds = self.batch.max(self.test).saturating_mul(self.most_rounds(questions) as u64);
-        rounds.saturating_add(self.crude.min(MAX_CRUDE)).saturating_add(2 * self.batch.max(MAX_FIRST))
+        rounds.saturating_add(self.crude).saturating_add(2 * self.batch.max(MAX_FIRST))
     }
 }
 
@@ -215,7 +214,8 @@ impl<'a> Searching<'a> {
         let stream = |at: u32| Stream { seed, purpose: purpose::SEARCH + at };
         pool.add_nominal(stream(0), first)?;
         if pool.points.is_empty() {
-            return Err(no_valid_point("search"));
+            let help = "check the bounds of the parameters: they must leave something of the density";
+            return Err(Error::usage(Place::item("search"), "no draw of the density is valid", help));
         }
         let kernels = match kernels {
             Some(kernels) => kernels,
@@ -391,14 +391,17 @@ impl<'a> Searching<'a> {
         let all: Vec<(f64, &Mixture)> =
             all.into_iter().chain(ladder.map(|mixture| (LADDER_WEIGHT / rungs as f64, mixture))).collect();
         let candidate = Mixture::join(&all)?;
-        let proposal = defended(candidate.clone(), self.nominal, DEFENCE)?;
         let draws = self.options.test;
-        let stream = self.stream(0);
-        let new = self.pool.add_defended(candidate.clone(), &proposal, DEFENCE, stream, draws)?;
+        let of_density = (OF_DENSITY * draws as f64) as u64;
+        let from = self.pool.add_source(candidate.clone(), self.stream(0), draws - of_density)?.start;
+        self.pool.add_nominal(self.stream(1), of_density)?;
+        let new = from..self.pool.points.len();
         let validity = self.nominal.validity_fraction();
-        let log_f = &self.pool.log_f;
-        let weight = |point: usize| libm::exp(log_f[point] - proposal.log_density(&self.pool.points[point])) / validity;
-        let weights: Vec<f64> = new.clone().map(weight).collect();
+        let weight = |point: usize| {
+            let ratio = libm::exp(candidate.log_density(&self.pool.points[point]) - self.pool.log_f[point]);
+            1.0 / ((OF_DENSITY + (1.0 - OF_DENSITY) * ratio) * validity)
+        };
+        let weights: Vec<f64> = new.clone().into_par_iter().map(weight).collect();
         let mut goes_on = false;
         for &at in &settled {
             let failing = new.clone().zip(&weights).filter(|(point, _)| self.pool.fails(*point, at));
