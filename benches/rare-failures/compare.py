@@ -4,6 +4,8 @@
     pip install numpy openturns UQpy            # UQpy needs NumPy 1; one that is not installed is left out, with a line
     python benches/rare-failures/compare.py ours.csv 50 20000 > table.csv
 
+With a name that ends with .svg in place of 50, it draws the estimates of lanesweep over the truth instead, a row per case.
+
 The other libraries get so many calls of the limit state: a first run, which is not counted, tells how many samples per level that
 takes. `lanesweep` has no such limit: its calls are those of its draws of the density too. Prints a row per case and method: calls and
 error as medians over the repeats, the fraction of repeats with a relative error above one half, the mean over the truth, coverage of
@@ -168,11 +170,48 @@ def others(case: Case, repeats: int, calls: int) -> None:
             show(case, case.probability, method, made, estimates)
 
 
-def main(ours: Path, repeats: int, calls: int) -> None:
+def figure(by_case: dict[str, list[dict[str, str]]]) -> str:
+    """Estimates over the truth on a logarithmic axis: a dot per seed, dark where the 95 % interval does not hold the truth."""
+    rows = [case for case in by_case]
+    left, width, height, line = 215, 540, 34 + 16 * len(rows), 16
+
+    def x(ratio: float) -> float:
+        return left + (width - left - 62) * (math.log(min(max(ratio, 0.5), 2.0)) / math.log(4) + 0.5)
+
+    style = "font-family:sans-serif;font-size:10px;fill:#222"
+    parts = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {width} {height}" role="img" style="{style}">']
+    parts.append("<title>Estimates of rare failures over their truths, a dot per seed</title>")
+    parts.append('<rect width="100%" height="100%" fill="#fff"/>')
+    for ratio in (0.5, 0.7, 1.0, 1.4, 2.0):
+        dashes = "" if ratio == 1.0 else ' stroke-dasharray="2 3"'
+        parts.append(f'<line x1="{x(ratio):.1f}" x2="{x(ratio):.1f}" y1="4" y2="{height - 28}" stroke="#999"{dashes}/>')
+        parts.append(f'<text x="{x(ratio):.1f}" y="{height - 16}" text-anchor="middle">{ratio:g}</text>')
+    parts.append(f'<text x="{x(1.0):.1f}" y="{height - 3}" text-anchor="middle">estimate over truth</text>')
+    parts.append(f'<text x="{width - 4}" y="{height - 16}" text-anchor="end">held</text>')
+    for at, name in enumerate(rows):
+        y = 12 + line * at
+        lines = by_case[name]
+        truth = float(lines[0]["truth"])
+        parts.append(f'<text x="4" y="{y + 3}">{name}, {truth:.0e}</text>')
+        held = 0
+        for row in lines:
+            is_held = float(row["low"]) <= truth <= float(row["high"])
+            held += is_held
+            look = 'fill="#4477aa" fill-opacity="0.35"' if is_held else 'fill="#aa3311"'
+            parts.append(f'<circle cx="{x(float(row["probability"]) / truth):.1f}" cy="{y}" r="2.2" {look}/>')
+        parts.append(f'<text x="{width - 4}" y="{y + 3}" text-anchor="end">{held} of {len(lines)}</text>')
+    return "\n".join([*parts, "</svg>", ""])
+
+
+def main(ours: Path, what: str, calls: int) -> None:
     by_case: dict[str, list[dict[str, str]]] = defaultdict(list)
     with ours.open(encoding="utf-8") as file:
         for line in csv.DictReader(file):
             by_case[line["case"]].append(line)
+    if what.endswith(".svg"):
+        Path(what).write_text(figure(by_case), encoding="utf-8")
+        return
+    repeats = int(what)
     print("case,truth,method,repeats,calls,median_error,off_by_half,mean_over_truth,coverage,misses_second", flush=True)
     for case in cases():
         lines = by_case.get(case.name, [])
@@ -190,4 +229,4 @@ FIRST = 1000
 
 
 if __name__ == "__main__":
-    main(Path(sys.argv[1]), int(sys.argv[2]), int(sys.argv[3]) if len(sys.argv) > 3 else 20_000)
+    main(Path(sys.argv[1]), sys.argv[2], int(sys.argv[3]) if len(sys.argv) > 3 else 20_000)
