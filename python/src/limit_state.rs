@@ -151,7 +151,8 @@ impl LimitState {
     }
 
     /// The points of standard normal numbers, before truncation.
-    fn from_standard_normal<'py>(
+    #[pyo3(name = "from_standard_normal")]
+    fn of_standard_normal<'py>(
         &self,
         py: Python<'py>,
         u: PyReadonlyArray2<'py, f64>,

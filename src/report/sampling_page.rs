@@ -86,7 +86,7 @@ impl EstimateFile {
             .column("per hour", |row| rate_text(row.risk.per_hour))
             .column("per 1000 km", |row| rate_text(row.risk.per_1000_km))
             .column("P/S", |row| ratio_text(row.recorded.and_then(|recorded| recorded.sampled)))
-            .column(VERDICTS, |row| verdicts(row))
+            .column(VERDICTS, verdicts)
             .build();
         let mut tables = vec![estimates.captioned(format!(
             "Probability of failure, and risk where the exposure is known. Intervals at {} %{}",
