@@ -4,7 +4,8 @@
     pip install numpy openturns UQpy            # UQpy needs NumPy 1; one that is not installed is left out, with a line
     python benches/rare-failures/compare.py ours.csv 50 20000 > table.csv
 
-With a name that ends with .svg in place of 50, it draws the estimates of lanesweep over the truth instead, a row per case.
+With a name in place of 50 it makes the table (.md) or the figure (.svg) of the book instead, from the rows of lanesweep alone; a file
+crude.csv beside them has crude lanes of the cases.
 
 The other libraries get so many calls of the limit state: a first run, which is not counted, tells how many samples per level that
 takes. `lanesweep` has no such limit: its calls are those of its draws of the density too. Prints a row per case and method: calls and
@@ -204,13 +205,51 @@ def figure(by_case: dict[str, list[dict[str, str]]]) -> str:
     return "\n".join([*parts, "</svg>", ""])
 
 
+def table(by_case: dict[str, list[dict[str, str]]], crude: dict[str, dict[str, str]]) -> str:
+    """The table of the book, in Markdown."""
+    heads = "case,truth,crude,kernels; second,held,median error,half-width,lanes,seconds,misses second,doubtful".split(",")
+    rows = ["| " + " | ".join(heads) + " |", "|" + "---|" * len(heads)]
+    with (Path(__file__).parent / "cases.csv").open(encoding="utf-8") as file:
+        cases_of_file = {row["case"]: row for row in csv.DictReader(file)}
+    for name, lines in by_case.items():
+        case, counted = cases_of_file[name], crude.get(name)
+        truth, error, second = float(case["truth"]), float(case["relative_error"]), float(case["second_share"] or 0)
+        estimates = [float(line["probability"]) for line in lines]
+        ends = [(float(line["low"]), float(line["high"])) for line in lines]
+        has_enough = counted is not None and float(counted["draws"]) >= 1e7
+        widths = [(high - low) / 2 / p for p, (low, high) in zip(estimates, ends, strict=True)]
+        cells = [
+            name,
+            f"{truth:.2e}" + (f" ± {100 * error:.1f} %" if error else ""),
+            f"{float(counted['probability']):.2e} ± {100 / float(counted['failures']) ** 0.5:.1f} %" if has_enough else "–",
+            f"{case['failing_kernels']}; {100 * second:.0f} %" if case["failing_kernels"] else "–",
+            f"{sum(low <= truth <= high for low, high in ends)} of {len(lines)}",
+            f"{100 * statistics.median(abs(p / truth - 1) for p in estimates):.1f} %",
+            f"{100 * statistics.fmean(widths):.0f} %",
+            f"{statistics.median(int(line['runs']) for line in lines):,.0f}",
+            f"{statistics.median(float(line['seconds']) for line in lines):.1f}",
+            "–" if second < SECOND else str(sum(p < truth * (1 - second / 2) for p in estimates)),
+            str(sum(line["verdict"] != "sound" for line in lines)),
+        ]
+        rows.append("| " + " | ".join(cells) + " |")
+    return "\n".join(rows) + "\n"
+
+
 def main(ours: Path, what: str, calls: int) -> None:
     by_case: dict[str, list[dict[str, str]]] = defaultdict(list)
     with ours.open(encoding="utf-8") as file:
         for line in csv.DictReader(file):
             by_case[line["case"]].append(line)
-    if what.endswith(".svg"):
-        Path(what).write_text(figure(by_case), encoding="utf-8")
+    if what.endswith((".svg", ".md")):
+        counted: dict[str, dict[str, str]] = {}
+        if (ours.parent / "crude.csv").is_file():
+            with (ours.parent / "crude.csv").open(encoding="utf-8") as file:
+                for line in csv.DictReader(file):
+                    known = counted.get(line["case"])
+                    if known is None or float(known["draws"]) < float(line["draws"]):
+                        counted[line["case"]] = line
+        text = figure(by_case) if what.endswith(".svg") else table(by_case, counted)
+        Path(what).write_text(text, encoding="utf-8")
         return
     repeats = int(what)
     print("case,truth,method,repeats,calls,median_error,off_by_half,mean_over_truth,coverage,misses_second", flush=True)
