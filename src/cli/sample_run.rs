@@ -198,8 +198,8 @@ impl Sample {
             let wider = rows.iter().filter(|row| row.draws_half_width() > asked).count();
             if wider > 0 {
                 tracing::warn!(
-                    "{wider} of {} did not reach the half-width of {asked}: its weights vary more than the search foresaw, or \
-                     the maximum number of samples ended it",
+                    "{wider} of {} did not reach the half-width of {asked}: its weights vary more than the search foresaw, \
+                     draws of the density met failures that it had missed, or the maximum number of samples ended it",
                     counted(rows.len(), "row")
                 );
             }
