@@ -9,7 +9,7 @@ use lanesweep::run::score::{ScoreOptions, f1, f1_interval};
 use lanesweep::stats::density::{Mixture, normal_quantile};
 use lanesweep::stats::estimate::{
     BinomialInterval, Clusters, Counts, Density, Estimate, Goal, LimitState, Search, StandardNormal, StopReason,
-    Truncated, Verdict, adaptive, cluster_rate, from_counts,
+    StopRule, Truncated, Verdict, adaptive, cluster_rate, from_counts,
 };
 use lanesweep::stats::random::Stream;
 use rand_chacha::ChaCha8Rng;
@@ -115,6 +115,34 @@ fn binomial_intervals_hold() {
                 BinomialInterval::ClopperPearson => misses.want(row.coverage >= 0.95, &row, "95 %"),
             }
         }
+    }
+}
+
+/// A rule that ends where the interval is narrow looks at the sample; looks are few, and a run ends by its failures.
+#[test]
+#[ignore = "long: cargo test --release --test statistics estimator_coverage:: -- --ignored --nocapture"]
+fn binomial_intervals_hold_where_the_half_width_ends_the_sample() {
+    heading();
+    let mut misses = Misses::default();
+    for (truth, half_width) in [(0.03, 0.5), (0.03, 0.1), (0.003, 0.5), (0.003, 0.2), (0.001, 0.3)] {
+        let row = repeat(&format!("Wilson, until ± {half_width}"), truth, REPEATS, |seed| {
+            let mut random = ChaCha8Rng::seed_from_u64(seed);
+            let limit = (truth * 2.0_f64.powi(64)) as u64;
+            let rule = StopRule { relative_half_width: Some(half_width), ..StopRule::samples(1 << 30) };
+            let (mut runs, mut failures) = (0, 0);
+            let started = std::time::Instant::now();
+            loop {
+                let next = if runs == 0 { 4096 } else { 2 * runs };
+                failures += (runs..next).filter(|_| random.next_u64() < limit).count() as u64;
+                runs = next;
+                let counts = Counts { runs, failures, voids: 0, tries: runs };
+                let estimate = from_counts(&counts, BinomialInterval::Wilson, 0.95, StopReason::Samples);
+                if rule.at(runs, failures, estimate.relative_half_width, started).is_some() {
+                    return estimate;
+                }
+            }
+        });
+        misses.want((0.925..=0.975).contains(&row.coverage), &row, "92.5-97.5 %");
     }
 }
 
