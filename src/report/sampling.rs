@@ -8,6 +8,7 @@ use serde::Serialize;
 use super::close_following::{CloseRow, close_following};
 use super::records::{PROGRAM, document};
 use super::run_record::SettingRecord;
+use super::sampling_tables::{VERDICTS, verdicts};
 use super::tables::{WIDTH, wrap};
 use crate::Result;
 use crate::engine::generated::ATTEMPTS;
@@ -18,7 +19,7 @@ use crate::run::close_following::CloseFollowing;
 use crate::run::sampling::{EstimateRow, RiskRate, Sample, SampleOptions, SampleTally};
 use crate::scenario::Category;
 use crate::stats::density::{DensityKind, DensityModel, Provenance};
-use crate::stats::estimate::{IntervalKind, Ratio, SearchRound, StopReason, Warning};
+use crate::stats::estimate::{IntervalKind, Ratio, SearchRound, StopReason};
 use crate::support::readable::{count, count_of, counted, significant, value};
 use crate::support::table::{Column, Digits, NumberText, Table};
 
@@ -408,52 +409,6 @@ impl EstimateFile {
             .column("largest weight", |(_, w)| NumberText(format!("{:.2} %", 100.0 * w.largest_fraction)))
             .column("from the density", |(_, w)| NumberText(format!("{:.1} %", 100.0 * w.crude_fraction)));
         table.build().text()
-    }
-}
-
-/// Heading of [`verdicts`].
-pub(super) const VERDICTS: &str = "verdicts";
-
-/// Of a row, a word each for what it is uncertain about.
-pub(super) fn verdicts(row: &EstimateRow) -> String {
-    let trust = &row.estimate.trust;
-    format!("{}, {}, {}", trust.draws(), trust.density(), trust.data())
-}
-
-impl EstimateFile {
-    /// What is said about the shown rows, each time with what it is said about. Too few scenarios are said once.
-    pub(super) fn remarks(&self) -> Vec<(String, String)> {
-        let name = |row: &EstimateRow| format!("{} {} {}", row.model.name(), row.criterion.label(), row.headway);
-        let is_shown = |row: &&EstimateRow| row.is_overall(&self.estimates) || row.is_rare_beside(&self.estimates);
-        let (mut remarks, mut few) = (Vec::new(), Vec::new());
-        for row in self.estimates.iter().filter(is_shown) {
-            for warning in &row.estimate.trust.warnings {
-                match warning {
-                    Warning::FewScenarios { scenarios } => few.push(*scenarios),
-                    _ => remarks.push((name(row), warning.to_string())),
-                }
-            }
-            let reduction = row.estimate.variance_reduction;
-            if row.estimate.weights.is_some() && reduction < 1.0 {
-                let times = short(1.0 / reduction);
-                let remark = "times the lanes that crude Monte Carlo (`mc`) needs for the same interval";
-                remarks.push((name(row), format!("this estimator used {times} {remark}")));
-            }
-        }
-        let (low, high) = few.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), few| (low.min(*few), high.max(*few)));
-        if !few.is_empty() {
-            let (low, high) = (format!("{low:.1}"), format!("{high:.1}"));
-            let range = if low == high { low } else { format!("{low} to {high}") };
-            remarks.push((
-                counted(few.len(), "row"),
-                format!(
-                    "the failures come from effectively {range} scenarios; with fewer than {} other recordings would give \
-                     another probability, and nothing tells how much so",
-                    Warning::MIN_SCENARIOS
-                ),
-            ));
-        }
-        remarks
     }
 }
 

@@ -2,7 +2,8 @@
 
 use super::html::{Page, PageFigure, Section};
 use super::plot::{AxisScale, Figure, Layer, Mark, Plot, PlotAxis, Series, Value, is_few};
-use super::sampling::{EstimateFile, VERDICTS, interval_text, rate_text, ratio_text, short, three_digits, verdicts};
+use super::sampling::{EstimateFile, interval_text, rate_text, ratio_text, short, three_digits};
+use super::sampling_tables::{VERDICTS, verdicts};
 use crate::Result;
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
@@ -111,9 +112,9 @@ impl EstimateFile {
         let said = self.remarks().into_iter();
         Section {
             intro: format!(
-                "Draws are sound where the interval of the draws holds P of this density as often as its level says; the \
-                 density agrees with recorded scenarios, differs, or it is open; enough scenarios fail, or few. ≤ bounds from \
-                 above where nothing failed. {}{}",
+                "Verdicts: on the draws, on the density, on the data. Draws are sound where their interval holds P of this \
+                 density as often as its level says. The density agrees with recorded scenarios, differs from them, or the \
+                 question is open. Enough scenarios fail, or few. ≤ bounds from above where nothing failed. {}{}",
                 match self.density.kernels {
                     0 => String::new(),
                     kernels => format!(

@@ -2,12 +2,12 @@
 //! explain them on the terminal and the page.
 
 use super::records::smallest_gap_m;
-use super::sampling::EstimateFile;
+use super::sampling::{EstimateFile, short};
 use crate::engine::NO_STEP;
 use crate::model::criterion::Criterion;
 use crate::run::sampling::{Checkpoint, EstimateRow, ModelRatio, ProfileRatios, RiskRate, Uncertainty, WorstLane};
-use crate::stats::estimate::{IntervalKind, Ratio, RatioMethod, RatioVerdict, WeightFigures};
-use crate::support::readable::{significant, value};
+use crate::stats::estimate::{IntervalKind, Ratio, RatioMethod, RatioVerdict, Warning, WeightFigures};
+use crate::support::readable::{counted, significant, value};
 use crate::support::table::{Table, TableOf};
 
 impl EstimateFile {
@@ -175,6 +175,52 @@ fn kind_name(kind: IntervalKind) -> &'static str {
         IntervalKind::Gamma => "gamma",
         IntervalKind::Clusters => "clusters",
         IntervalKind::Nothing => "nothing",
+    }
+}
+
+/// Heading of [`verdicts`].
+pub(super) const VERDICTS: &str = "verdicts";
+
+/// One word for each uncertainty of a row: draws, density, data.
+pub(super) fn verdicts(row: &EstimateRow) -> String {
+    let trust = &row.estimate.trust;
+    format!("{}, {}, {}", trust.draws(), trust.density(), trust.data())
+}
+
+impl EstimateFile {
+    /// What is said about the shown rows, each time with what it is said about. Too few scenarios are said once.
+    pub(super) fn remarks(&self) -> Vec<(String, String)> {
+        let name = |row: &EstimateRow| format!("{} {} {}", row.model.name(), row.criterion.label(), row.headway);
+        let is_shown = |row: &&EstimateRow| row.is_overall(&self.estimates) || row.is_rare_beside(&self.estimates);
+        let (mut remarks, mut few) = (Vec::new(), Vec::new());
+        for row in self.estimates.iter().filter(is_shown) {
+            for warning in &row.estimate.trust.warnings {
+                match warning {
+                    Warning::FewScenarios { scenarios } => few.push(*scenarios),
+                    _ => remarks.push((name(row), warning.to_string())),
+                }
+            }
+            let reduction = row.estimate.variance_reduction;
+            if row.estimate.weights.is_some() && reduction < 1.0 {
+                let times = short(1.0 / reduction);
+                let remark = "times the lanes that crude Monte Carlo (`mc`) needs for the same interval";
+                remarks.push((name(row), format!("this estimator used {times} {remark}")));
+            }
+        }
+        let (low, high) = few.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), few| (low.min(*few), high.max(*few)));
+        if !few.is_empty() {
+            let (low, high) = (format!("{low:.1}"), format!("{high:.1}"));
+            let range = if low == high { low } else { format!("{low} to {high}") };
+            remarks.push((
+                counted(few.len(), "row"),
+                format!(
+                    "the failures come from effectively {range} scenarios; with fewer than {}, other recordings would give \
+                     another probability, and nothing tells how much so",
+                    Warning::MIN_SCENARIOS
+                ),
+            ));
+        }
+        remarks
     }
 }
 

@@ -372,7 +372,7 @@ fn few_scenarios_are_said_once_and_their_interval_is_that_of_other_data_too() {
         assert!(text.contains("all 2") && text.contains("P is the mean over 1s, 0.4s"), "{text}");
         // Not in place of the draws, which are sound.
         assert!(text.contains("sound"), "{text}");
-        let said = text.matches("with fewer than 10 other recordings").count();
+        let said = text.matches("with fewer than 10, other recordings").count();
         assert_eq!(said, usize::from(!is_sound), "{text}");
     }
 }

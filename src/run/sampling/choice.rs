@@ -11,7 +11,7 @@ use crate::Result;
 use crate::engine::Executor;
 use crate::model::driver::ModelId;
 use crate::stats::density::normal_quantile;
-use crate::stats::estimate::{Search, StopRule};
+use crate::stats::estimate::{Goal, Search, StopRule};
 
 /// Samples of the pilot.
 const PILOT: u64 = 10_000;
@@ -27,9 +27,6 @@ const POINT: f64 = 200.0;
 const DRAW: f64 = 50.0;
 /// Relative variance of a weighted draw for one question.
 const VARIANCE: f64 = 3.0;
-/// Failures that the crude samples of importance sampling are expected to hold: in the search, and times the half-width
-/// beside the final draws.
-const CRUDE_FAILURES: [f64; 2] = [10.0, 4.0];
 /// Factor on the number of crude samples, because the pilot knows the probability only roughly.
 const RESERVE: f64 = 1.1;
 /// Maximum number of final draws of importance sampling.
@@ -83,7 +80,8 @@ impl Sample {
             }
             // Of the rarest question; where the pilot does not know it, no division costs less.
             let rarest = Some(needs[all - 1] / (RESERVE * (z / half_width).powi(2))).filter(|odds| odds.is_finite());
-            let crude = rarest.unwrap_or(0.0) * (CRUDE_FAILURES[0] + CRUDE_FAILURES[1] / half_width) * left.min(lanes);
+            let crude =
+                rarest.unwrap_or(0.0) * (Search::CRUDE_FAILURES + Goal::CRUDE_FAILURES / half_width) * left.min(lanes);
             let of_point = valued * left.min(lanes);
             let points = SEARCH_POINTS[0] + SEARCH_POINTS[1] * (left - 1.0);
             let draws = VARIANCE * left.sqrt() * (z / half_width).powi(2);

@@ -169,8 +169,8 @@ pub fn truncated(density: &DensityModel) -> Result<Truncated<impl Fn(&[f64]) -> 
     Truncated::with_validity(density.mixture()?, is_valid, density.valid.estimate)
 }
 
-/// Determines which scenarios failures come from, by draws of a proposal and about `crude` draws of the density. `None` for a question without
-/// failing draws, and if the density is not over kernels.
+/// Determines which scenarios failures come from, by draws of a proposal and about `crude` draws of the density. `None`
+/// for a question without failing draws, and if the density is not over kernels.
 ///
 /// # Errors
 /// Those of the lanes.

@@ -16,7 +16,7 @@ use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
 use super::generator::{SampleSource, generator_of, generator_of_points};
-use super::sample_options::{Estimator, SampleOptions};
+use super::sample_options::SampleOptions;
 
 /// Initial headways of sampled lanes.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -66,7 +66,7 @@ pub fn plan_samples(
         let problem = format!("{samples} Sobol points are asked for, {SOBOL_POINTS} there are");
         return Err(Error::usage(place(), problem, "use independent random points beyond"));
     }
-    let generator = generator(density, proposal, profile, options)?;
+    let generator = generator(density, proposal, profile, (options.source, options.seed))?;
     plan(density, profile, generator, samples, &options.models, &options.headways)
 }
 
@@ -82,12 +82,7 @@ pub(super) fn plan_draws(
     models: &[ModelId],
     headways: &SampleHeadways,
 ) -> Result<LanePlan> {
-    let options = SampleOptions {
-        models: models.to_vec(),
-        seed: stream.seed,
-        ..SampleOptions::new(Estimator::CRUDE, draws, headways.clone())
-    };
-    let mut generator = generator(density, &density.mixture()?, profile, &options)?;
+    let mut generator = generator(density, &density.mixture()?, profile, (SampleSource::Random, stream.seed))?;
     generator.points.source = PointSource::Random(stream);
     plan(density, profile, generator, draws, models, headways)
 }
@@ -96,9 +91,9 @@ fn generator(
     density: &DensityModel,
     proposal: &Mixture,
     profile: &Profile,
-    options: &SampleOptions,
+    (source, seed): (SampleSource, u64),
 ) -> Result<Generator> {
-    let mut generator = generator_of(&density.space, proposal, &density.sizes, profile, options.source, options.seed)?;
+    let mut generator = generator_of(&density.space, proposal, &density.sizes, profile, source, seed)?;
     if let Some(of) = &density.transformed {
         generator.points.knots = of.transformation.table().map(f32::from_f64).collect();
     }

@@ -22,9 +22,6 @@ use crate::{Error, Place, Result};
 /// Maximum number of samples evaluated between two journal updates.
 const CHUNK: u64 = 1 << 16;
 
-/// Crude failures that tell which scenarios they come from.
-const SHARED_FAILURES: f64 = 10.0;
-
 /// Number of kernels in the density for which weighting `CHUNK` samples takes about one second. The time is
 /// proportional to the number of kernels, so a density with more kernels has smaller chunks.
 const KERNELS: u64 = 1 << 10;
@@ -135,7 +132,8 @@ impl Sample {
             .collect();
         // Enough for a scenario that carries a fifth of the rarest failures to be among them.
         let rarest = estimates.iter().map(|of| of.probability).filter(|p| *p > 0.0).fold(f64::INFINITY, f64::min);
-        let crude = ((SHARED_FAILURES / rarest) as u64).min(weighted.draws.draws * weighted.draws.crude_per_draw);
+        let crude =
+            ((Search::CRUDE_FAILURES / rarest) as u64).min(weighted.draws.draws * weighted.draws.crude_per_draw);
         let shares = scenario_shares(&lanes, &weighted.proposal, (options.seed, crude))?;
         let mut rows = Vec::new();
         let searched = weighted.search.as_ref().map_or(0, |search| search.points);

@@ -15,9 +15,6 @@ const RESERVE: f64 = 1.2;
 const MIN_DRAWS: u64 = 4000;
 /// Fraction of the half-width that the draws of the proposal may take; the rest is for what they may have missed.
 const OF_PROPOSAL: f64 = 0.8;
-/// Failures that the draws of the density are expected to hold at a half-width of 1: one failure more or less moves the end
-/// of the interval by a quarter of the half-width.
-const CRUDE_FAILURES: f64 = 4.0;
 /// Draws of the density for a question of which no failure was found.
 const CRUDE_WITHOUT_FAILURE: f64 = (1 << 21) as f64;
 
@@ -36,6 +33,9 @@ pub struct Goal {
 impl Goal {
     /// Half-width if none is asked for.
     pub const HALF_WIDTH: f64 = 0.1;
+    /// Failures, times the half-width, that the final draws of the density are expected to hold: one failure more or less
+    /// moves the end of the interval by a quarter of the half-width.
+    pub const CRUDE_FAILURES: f64 = 4.0;
 
     /// The final draws after a search, for all questions together: the worst one decides.
     pub fn draws(&self, found: &[Found], seed: u64, level: f64) -> Importance {
@@ -44,7 +44,7 @@ impl Goal {
         let most = found.iter().map(of).fold(0.0, f64::max);
         let draws = ((RESERVE * most).ceil() as u64).max(MIN_DRAWS).min(self.max_draws);
         let crude = |found: &Found| match found.probability > 0.0 {
-            true => CRUDE_FAILURES / (self.half_width * found.probability),
+            true => Goal::CRUDE_FAILURES / (self.half_width * found.probability),
             false => CRUDE_WITHOUT_FAILURE,
         };
         let crude = found.iter().map(crude).fold(0.0, f64::max).min(self.max_crude as f64);

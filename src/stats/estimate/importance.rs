@@ -11,7 +11,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::blocks::BlockSums;
-use super::problem::{ATTEMPTS, Density, LimitState, batches, evaluate_checked, purpose};
+use super::problem::{ATTEMPTS, Density, Failure, LimitState, batches, failing, purpose};
 use super::stop::StopReason;
 use super::summary::Estimate;
 use super::trust::Warning;
@@ -42,18 +42,14 @@ impl Importance {
 
 /// A failing draw of the proposal or of the density.
 pub(super) struct WeightedFailure {
-    /// Index of the draw of the proposal that it belongs to.
-    pub index: u64,
+    pub of: Failure,
     pub is_crude: bool,
-    pub point: Vec<f64>,
-    /// Question by question, whether it fails.
-    pub fails: Vec<bool>,
     /// 1/(m + g/f).
     pub weight: f64,
 }
 
-/// The failures among a range of draws of the proposal, and then among the draws of the density that belong to them. The
-/// purposes are those of the draws of both.
+/// The failures among a range of draws of the proposal, and then among the draws of the density that belong to them, with the
+/// index of the draw of the proposal. The purposes are those of the draws of both.
 pub(super) fn weighted_failures(
     nominal: &dyn Density,
     proposal: &Mixture,
@@ -63,34 +59,24 @@ pub(super) fn weighted_failures(
     range: Range<u64>,
 ) -> Result<Vec<WeightedFailure>> {
     let [of_proposal, of_density] = purposes.map(|purpose| Stream { seed: options.seed, purpose });
-    let (guides, crude) = (limit_state.guides(), options.crude_per_draw);
+    let crude = options.crude_per_draw;
     let validity = nominal.validity_fraction();
     // An index of the density whose attempts are all invalid is a draw that does not fail.
     let is_drawn = 1.0 - (1.0 - validity).powi(ATTEMPTS as i32);
-    let weighted = |index: u64, is_crude: bool, point: Vec<f64>, fails: Vec<bool>| {
-        let ratio = libm::exp(proposal.log_density(&point) - nominal.log_density(&point)) * validity;
-        WeightedFailure { index, is_crude, point, fails, weight: 1.0 / (crude as f64 * is_drawn + ratio) }
+    let weighted = |(is_crude, of): (bool, Failure)| {
+        let ratio = libm::exp(proposal.log_density(&of.point) - nominal.log_density(&of.point)) * validity;
+        WeightedFailure { of, is_crude, weight: 1.0 / (crude as f64 * is_drawn + ratio) }
     };
     let attempt = |index| Some((index, proposal.draw(&of_proposal, index, 0))).filter(|at| nominal.is_valid(&at.1));
     let attempts: Vec<Option<(u64, Vec<f64>)>> = range.clone().into_par_iter().map(attempt).collect();
-    let (indices, points): (Vec<u64>, Vec<Vec<f64>>) = attempts.into_iter().flatten().unzip();
-    let values = evaluate_checked(limit_state, &points)?;
-    let mut failures: Vec<(u64, bool, Vec<f64>, Vec<bool>)> = Vec::new();
-    for ((index, point), values) in indices.into_iter().zip(points).zip(values.chunks(limit_state.questions() * guides))
-    {
-        let fails: Vec<bool> = values.iter().step_by(guides).map(|value| *value <= 0.0).collect();
-        if fails.contains(&true) {
-            failures.push((index, false, point, fails));
-        }
-    }
+    let (indices, points) = attempts.into_iter().flatten().unzip();
+    let mut failures: Vec<(bool, Failure)> =
+        failing(limit_state, indices, points)?.into_iter().map(|of| (false, of)).collect();
     if crude > 0 {
         let found = limit_state.failures(nominal, of_density, range.start * crude..range.end * crude)?;
-        failures.extend(found.into_iter().map(|of| (of.index / crude, true, of.point, of.fails)));
+        failures.extend(found.into_iter().map(|of| (true, Failure { index: of.index / crude, ..of })));
     }
-    Ok(failures
-        .into_par_iter()
-        .map(|(index, is_crude, point, fails)| weighted(index, is_crude, point, fails))
-        .collect())
+    Ok(failures.into_par_iter().map(weighted).collect())
 }
 
 /// Draws, evaluates and weights a range of draws of the proposal, and the draws of the density that belong to them. Returns
@@ -116,8 +102,8 @@ pub fn importance_sums(
         let failures = weighted_failures(nominal, proposal, limit_state, options, purposes, batch.clone())?;
         for (of, sums) in asked.iter().zip(&mut sums) {
             let mut leaves = vec![unfailed; (batch.end - batch.start) as usize];
-            for failure in failures.iter().filter(|failure| of.iter().all(|question| failure.fails[*question])) {
-                leaves[(failure.index - batch.start) as usize].add_failure(failure.weight, failure.is_crude);
+            for failure in failures.iter().filter(|failure| of.iter().all(|question| failure.of.fails[*question])) {
+                leaves[(failure.of.index - batch.start) as usize].add_failure(failure.weight, failure.is_crude);
             }
             sums.merge(BlockSums::of_leaves(batch.start, &leaves))?;
         }

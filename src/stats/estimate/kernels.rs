@@ -44,11 +44,12 @@ pub fn kernel_shares(
     let failing = weighted_failures(nominal, proposal, limit_state, &options, purposes, 0..DRAWS)?;
     let mut counts = vec![Counts::new(kernels.weights().len()); limit_state.questions()];
     for chunk in failing.chunks(AT_ONCE) {
-        let explained: Vec<Vec<f64>> = chunk.par_iter().map(|of| kernels.responsibilities(&of.point)).collect();
+        let explained: Vec<Vec<f64>> =
+            chunk.par_iter().map(|failing| kernels.responsibilities(&failing.of.point)).collect();
         // In the order of the indices, so that the bits do not depend on the number of threads.
-        for (of, shares) in chunk.iter().zip(&explained) {
-            let asked = counts.iter_mut().zip(&of.fails).filter(|(_, fails)| **fails);
-            asked.for_each(|(counts, _)| counts.add(of.weight, shares));
+        for (failing, shares) in chunk.iter().zip(&explained) {
+            let asked = counts.iter_mut().zip(&failing.of.fails).filter(|(_, fails)| **fails);
+            asked.for_each(|(counts, _)| counts.add(failing.weight, shares));
         }
     }
     Ok(counts.iter().map(Counts::shares).collect())

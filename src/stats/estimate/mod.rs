@@ -34,5 +34,5 @@ pub use ratio::{
 pub use search::{Found, Search, SearchRound, SearchRun, search};
 pub use stop::{Checkpoints, StopReason, StopRule};
 pub use summary::{Estimate, WeightFigures};
-pub use trust::{Trust, Uncertain, Verdict, Warning};
+pub use trust::{Trust, Verdict, Warning};
 pub use weights::WeightSums;

@@ -221,19 +221,11 @@ pub trait LimitState: Sync {
     /// # Errors
     /// Those of the evaluation.
     fn failures(&self, density: &dyn Density, stream: Stream, indices: Range<u64>) -> Result<Vec<Failure>> {
-        let (questions, guides) = (self.questions(), self.guides());
         let mut failures = Vec::new();
         for batch in batches(indices) {
             let drawn = draw(density, stream, batch.clone());
-            let (indices, points): (Vec<u64>, Vec<Vec<f64>>) =
-                batch.zip(drawn).filter_map(|(index, drawn)| Some((index, drawn?.point))).unzip();
-            let values = evaluate_checked(self, &points)?;
-            for ((index, point), values) in indices.into_iter().zip(points).zip(values.chunks(questions * guides)) {
-                let fails: Vec<bool> = values.iter().step_by(guides).map(|value| *value <= 0.0).collect();
-                if fails.contains(&true) {
-                    failures.push(Failure { index, point, fails });
-                }
-            }
+            let (indices, points) = batch.zip(drawn).filter_map(|(index, drawn)| Some((index, drawn?.point))).unzip();
+            failures.extend(failing(self, indices, points)?);
         }
         Ok(failures)
     }
@@ -270,6 +262,20 @@ pub(crate) fn evaluate_checked<L: LimitState + ?Sized>(limit_state: &L, points: 
         Some(at) => Err(Error::Internal(format!("the limit state of {:?} is not a number", points[at / per_point]))),
         None => Ok(values),
     }
+}
+
+/// The points that fail any question, with their indices.
+pub(super) fn failing<L: LimitState + ?Sized>(
+    limit_state: &L,
+    indices: Vec<u64>,
+    points: Vec<Vec<f64>>,
+) -> Result<Vec<Failure>> {
+    let values = evaluate_checked(limit_state, &points)?;
+    let (questions, guides) = (limit_state.questions(), limit_state.guides());
+    let fails = |values: &[f64]| values.iter().step_by(guides).map(|value| *value <= 0.0).collect::<Vec<bool>>();
+    let all = indices.into_iter().zip(points).zip(values.chunks(questions * guides));
+    let failures = all.map(|((index, point), values)| Failure { index, point, fails: fails(values) });
+    Ok(failures.filter(|failure| failure.fails.contains(&true)).collect())
 }
 
 /// Maximum number of points drawn and evaluated at a time: bounds the memory of any sample.

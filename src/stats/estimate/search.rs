@@ -29,9 +29,6 @@ const PATIENCE: usize = 12;
 const CRUDE: u64 = 50_000;
 /// Maximum number of crude draws where guides lead nowhere.
 const MAX_CRUDE: u64 = 1 << 21;
-/// Failures that crude draws are expected to hold before a proposal is accepted: a way to fail that carries a fifth of the
-/// probability is then missed once in seven times, one that carries a third once in thirty.
-const CHECKED: f64 = 10.0;
 /// A crude failure of one question counts as missed if the proposal over the density is below this fraction of the
 /// reciprocal of its probability …
 const THIN: f64 = 0.02;
@@ -80,6 +77,10 @@ impl Default for Search {
 }
 
 impl Search {
+    /// Failures that crude draws are expected to hold before a proposal is accepted: a way to fail that carries a fifth of the
+    /// probability is then missed once in seven times, one that carries a third once in thirty.
+    pub const CRUDE_FAILURES: f64 = 10.0;
+
     /// Maximum number of rounds.
     fn most_rounds(&self, questions: usize) -> usize {
         self.rounds * (1 + questions.div_ceil(ACTIVE))
@@ -433,7 +434,7 @@ impl<'a> Searching<'a> {
     fn misses(&mut self, proposal: &Mixture, settled: &[usize]) -> Result<bool> {
         let least =
             settled.iter().map(|at| self.found[*at].probability).filter(|p| *p > 0.0).fold(f64::INFINITY, f64::min);
-        let wanted = ((CHECKED / least).ceil() as u64).min(self.options.crude);
+        let wanted = ((Search::CRUDE_FAILURES / least).ceil() as u64).min(self.options.crude);
         if wanted > self.crude {
             self.add_crude(wanted - self.crude)?;
         }

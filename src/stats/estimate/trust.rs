@@ -101,7 +101,7 @@ impl Warning {
     }
 
     /// Which uncertainty the warning is about.
-    pub fn about(&self) -> Uncertain {
+    fn about(&self) -> Uncertain {
         match self {
             Warning::FewScenarios { .. } | Warning::DataLeftOut => Uncertain::Data,
             Warning::NotCompared | Warning::AgainstRecorded { .. } => Uncertain::Density,
@@ -168,7 +168,7 @@ impl fmt::Display for Warning {
 /// What an estimate is uncertain about. More lanes settle the first, a comparison with recorded scenarios shows the second,
 /// more recordings settle the third.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Uncertain {
+enum Uncertain {
     /// P of the density, from finitely many draws.
     Draws,
     /// The density, and the parameterization below it, in place of traffic.

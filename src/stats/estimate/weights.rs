@@ -8,7 +8,7 @@ use super::summary::WeightFigures;
 use super::trust::{Trust, Warning};
 
 /// Sums over draws of a proposal and of the density, for one question. A failing draw has the weight 1/(m + g/f): m draws
-/// of the density f belong to every draw of the proposal g, and a point counts the same from whichever it came (balance
+/// of the density f belong to every draw of the proposal g, and a point has the same weight whichever it came from (balance
 /// heuristic; Veach and Guibas, SIGGRAPH 1995). Without draws of the density the weight is f/g.
 #[derive(Debug, Clone, Copy, Default, PartialEq, Serialize, Deserialize)]
 pub struct WeightSums {
