@@ -31,11 +31,14 @@ impl EstimateFile {
         }
         let mut sections = vec![self.estimates_section()];
         sections.extend((!figures.is_empty()).then(|| Section { figures, ..Section::new("figures", "Figures") }));
+        // Importance sampling seldom needs the maximum that it may draw; its runs include the search.
+        let runs = self.estimates.iter().map(|row| row.estimate.runs).max();
+        let drawn = self.draws.as_ref().map(|draws| draws.samples).or(runs).unwrap_or(self.samples);
         let page = Page {
             title: format!("Probability of failure: {}", self.name()),
             lead: format!(
                 "{} samples of {}, estimator {}, profile {}. {}",
-                count(self.samples),
+                count(drawn),
                 match density.kernels {
                     0 => format!("distributions of {}", density.parameters.join(", ")),
                     kernels => format!("a density over {} mined scenarios", count_of(kernels)),
