@@ -15,7 +15,7 @@ import os as _os
 # Mesa's layer that chooses devices reports a missing XDG_RUNTIME_DIR on stderr, and reorders the devices, whose order is ours.
 _os.environ.setdefault("NODEVICE_SELECT", "1")
 
-from . import _core, drivers  # noqa: E402
+from . import _core, drivers, options  # noqa: E402
 from ._core import (
     BusyError,
     DeviceError,
@@ -34,7 +34,6 @@ from ._core import (
 )
 from ._driver import Driver
 from ._result import Figure, Result
-from ._run import command
 from ._simulate import LimitState, simulate
 from ._verbs import *  # noqa: F403
 from ._verbs import __all__ as _functions
@@ -57,8 +56,8 @@ __all__ = [
     "VerificationError",
     "View",
     "__version__",
-    "command",
     "drivers",
+    "options",
     "profile",
     "simulate",
     *_functions,

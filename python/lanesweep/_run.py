@@ -1,19 +1,18 @@
-"""Runs verbs: keyword arguments become words of a command line."""
+"""Runs verbs: keyword arguments become values that the compiled module takes."""
 
 from __future__ import annotations
 
-import functools
 import importlib
-import json
-import keyword
 import logging
 import numbers
 import os
 import sys
 import warnings
-from collections.abc import Callable, KeysView, Mapping, Sequence, Set, ValuesView
+from collections.abc import Callable, Iterator, KeysView, Mapping, Sequence, Set, ValuesView
 from pathlib import Path
 from typing import Any
+
+import numpy as np
 
 from . import _core
 from ._driver import names_of, refresh
@@ -60,122 +59,97 @@ def progress() -> tuple[Callable[[str, int, int], None] | None, Callable[[], Non
     return move, close
 
 
-def word(value: Any) -> str:
-    """Write a value as on the command line."""
-    if isinstance(value, bool):
-        return str(value).lower()
+#: Parameters that hold further arguments.
+_GROUPS = ("options", "case")
+
+
+def plain(value: Any, name: str) -> Any:
+    """Return the value of an argument as a number or text, or a list or dictionary of these."""
+    value = _of_array(value)
+    if isinstance(value, Mapping):
+        return {str(key): _list_or_scalar(one, name) for key, one in value.items()}
+    return _list_or_scalar(value, name)
+
+
+def _of_array(value: Any) -> Any:
+    """Values of NumPy and pandas as those of Python."""
+    if not hasattr(value, "tolist"):
+        return value
+    # A text has the digits of its arithmetic: 0.6 of binary32, not 0.6000000238418579.
+    is_short = str(getattr(value, "dtype", "")) == "float32"
+    return np.asarray(value).astype(str).tolist() if is_short else value.tolist()
+
+
+def _list_or_scalar(value: Any, name: str) -> Any:
+    value = _of_array(value)
+    if isinstance(value, (Sequence, Set, KeysView, ValuesView)) and not isinstance(value, (str, bytes, bytearray)):
+        if not len(value):
+            raise ValueError(f"`{name}` is empty; give at least one value, or leave it out")
+        return [_scalar(one, name) for one in value]
+    return _scalar(value, name)
+
+
+def _scalar(value: Any, name: str) -> Any:
+    value = _of_array(value)
+    if isinstance(value, (bool, str)):
+        return value
     if isinstance(value, os.PathLike):
-        return str(os.fspath(value))
-    return str(value)
+        return path_of(value, name)
+    if isinstance(value, numbers.Integral):
+        return int(value)
+    if isinstance(value, numbers.Real):
+        return float(value)
+    if isinstance(value, numbers.Number):
+        return str(value)
+    raise TypeError(f"`{name}` has the value {value!r:.80}; give a number, a text, a path, or several of these")
 
 
 def path_of(value: Any, name: str) -> str:
     """Write the path of an argument."""
     try:
-        return str(os.fspath(value))
+        return os.fsdecode(value)
     except TypeError as error:
         raise TypeError(f"`{name}`: {error}") from None
 
 
-def words_of(value: Any, name: str, *, is_list: bool) -> list[str]:
-    """Write the value of an argument, or several values, as on the command line."""
-    if hasattr(value, "tolist"):
-        # Of NumPy and pandas. A text has the digits of its arithmetic: 0.6 of binary32, not 0.6000000238418579.
-        value = [str(one) for one in value] if str(getattr(value, "dtype", "")) == "float32" else value.tolist()
-    if isinstance(value, (Set, range, KeysView, ValuesView)):
-        value = list(value)
-    is_several = isinstance(value, (Mapping, Sequence)) and not isinstance(value, (str, bytes))
-    several = list(value) if is_several else [value]
-    if not several:
-        raise ValueError(f"`{name}` is empty; give at least one value, or leave it out")
-    for one in value.values() if isinstance(value, Mapping) else several:
-        if not isinstance(one, (str, bool, numbers.Number, os.PathLike)):
-            wants = "give a number, a text or a path" + (", or a list of these" if one is value else "")
-            raise TypeError(f"`{name}` {'holds' if is_several else 'is'} {one!r:.80}; {wants}")
-    if isinstance(value, Mapping):
-        several = [f"{key}={word(one)}" for key, one in value.items()]
-    words = [word(one) for one in several]
-    return [",".join(words)] if is_list else words
+def _texts(value: Any) -> Iterator[str]:
+    """The texts in a value."""
+    if isinstance(value, str):
+        yield value
+    elif isinstance(value, (list, dict)):
+        for one in value.values() if isinstance(value, dict) else value:
+            yield from _texts(one)
 
 
-@functools.lru_cache(maxsize=1)
-def _definition() -> dict[str, list[dict[str, Any]]]:
-    """The arguments of every verb."""
-    return {str(verb["verb"]): verb["arguments"] for verb in json.loads(_core.definition())}
+def run(function: str, arguments: Mapping[str, Any], *, default_out: str | None = None, path: Any = None) -> Result:
+    """Run a verb by the name of its function.
 
-
-def name_of(verb: str, flag: str | None) -> str:
-    """The name of an argument; that of a position is not known by its flag."""
-    if flag is None:
-        flag = next(str(one["id"]) for one in _definition()[verb] if one["flag"] is None)
-        flag = ("folder" if verb in ("synth", "cluster merge") else "recordings") if flag == "dir" else flag
-    name = flag.replace("-", "_")
-    return name + "_" if keyword.iskeyword(name) else name
-
-
-def command(words: Sequence[Any]) -> tuple[int, str]:
-    """Run a command line inside this process: the words after ``lanesweep``.
-
-    Returns
-    -------
-    tuple of int and str
-        Exit code, and what the program prints. An error is an exception.
+    The files of the result are in the argument `out`, in a temporary `default_out`, or in `path`, which is an argument.
     """
-    code, text, _, _ = _run(words)
-    return code, text
-
-
-def _run(words: Sequence[Any]) -> tuple[int, str, str, list[str]]:
-    """Run a command line; return exit code, text, document, and the lines of the log."""
-    move, close = progress()
-    messages: list[str] = []
-
-    def keep(level: str, line: str) -> None:
-        messages.append(line)
-        on_message(level, line)
-
-    refresh(map(word, words))
-    try:
-        return *_core.run([word(one) for one in words], move, keep), messages
-    finally:
-        close()
-
-
-def run(
-    verb: str,
-    arguments: list[tuple[str | None, Any, bool]],
-    *,
-    out: Any = None,
-    default_out: str | None = None,
-    path: Any = None,
-) -> Result:
-    """Run a verb with arguments: flag (None for a position), value, whether it is a comma-separated list.
-
-    The files of the result are in `out`, in a temporary `default_out`, or in `path`, which is an argument.
-    """
-    words: list[str] = verb.split()
-    positions: list[str] = []
-    for flag, value, is_list in arguments:
-        value = value.item() if hasattr(value, "item") and getattr(value, "ndim", None) == 0 else value
-        if value is False and any(one["takes_value"] for one in _definition()[verb] if one["flag"] == flag):
-            raise TypeError(f"`{name_of(verb, flag)}` is False; give a value, or leave it out")
-        if value is None or value is False:
-            continue
-        if flag is None:
-            positions += words_of(value, name_of(verb, flag), is_list=False)
-        elif value is True:
-            words.append(f"--{flag}")
-        else:
-            given = names_of(value) if flag == "models" else value
-            words += [f"--{flag}={one}" for one in words_of(given, name_of(verb, flag), is_list=is_list)]
+    given = {name: value for name, value in arguments.items() if name not in _GROUPS}
+    for group in _GROUPS:
+        given |= arguments.get(group, {})
+    if given.get("models") is not None:
+        given["models"] = names_of(given["models"])
+    values = {name.rstrip("_"): plain(value, name) for name, value in given.items() if value is not None and name != "out"}
     keep = None
+    out = given.get("out")
     if out is None and default_out is not None:
         keep = temporary()
         out = Path(keep.name) / default_out
     if out is not None:
         path = out
-        words.append(f"--out={path_of(out, 'out')}")
-    if positions:
-        words += ["--", *positions]
-    code, text, document, messages = _run(words)
-    return Result(verb, code, text, document, messages, None if path is None else Path(os.fspath(path)), keep)
+        values["out"] = path_of(out, "out")
+    messages: list[str] = []
+
+    def on_line(level: str, line: str) -> None:
+        messages.append(line)
+        on_message(level, line)
+
+    move, close = progress()
+    refresh(_texts(values))
+    try:
+        code, text, document = _core.run(function, values, move, on_line)
+    finally:
+        close()
+    return Result(function, code, text, document, messages, None if path is None else Path(os.fspath(path)), keep)

@@ -14,10 +14,10 @@ import numpy.typing as npt
 from . import _core
 from ._core import Frame
 from ._driver import Driver, name_of, names_of, register
-from ._run import on_message, path_of, word, words_of
+from ._run import on_message, path_of, plain
 
 if TYPE_CHECKING:
-    from ._verbs import Models, Path, Values
+    from .options import Headways, Models, Path
 
 
 def _column(name: str, values: Any) -> Any:
@@ -59,7 +59,7 @@ def simulate(
     *,
     category: str | None = None,
     models: Models | None = None,
-    thw: Values | None = None,
+    thw: Headways | None = None,
     profile: Path = "paper",
     dt: float | None = None,
     backend: str = "auto",
@@ -114,11 +114,12 @@ def simulate(
     elif library == "polars" and hasattr(cases, "schema"):
         # Columns without any value have no type, and nothing to say.
         cases = cases.select([name for name, kind in cases.schema.items() if str(kind) != "Null"])
+    headways = [] if thw is None else plain(thw, "thw")
     frame, notes = _core.simulate(
         cases,
         category=category,
         models=names_of(models),
-        thw=[] if thw is None else words_of(thw, "thw", is_list=False),
+        thw=[str(one) for one in (headways if isinstance(headways, list) else [headways])],
         profile=path_of(profile, "profile"),
         dt=dt,
         backend=backend,
@@ -182,7 +183,7 @@ class LimitState(_core.LimitState):
             path_of(density, "density"),
             model=known_as,
             criterion=criterion,
-            thw=None if thw is None else word(thw),
+            thw=None if thw is None else str(thw),
             profile=path_of(profile, "profile"),
             backend=backend,
             device=device,

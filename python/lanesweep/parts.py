@@ -17,7 +17,7 @@ from typing import Any
 from ._core import InputError
 from ._driver import Driver, models_of, register
 from ._result import Result, temporary
-from ._run import command
+from ._run import run as verb
 from ._verbs import merge
 
 __all__ = ["Plan", "join", "plan", "run"]
@@ -93,8 +93,8 @@ def run(plan: Plan, shard: int, *, backend: str = "cpu", threads: int | None = N
     with temporary() as folder:
         path = Path(folder) / "plan.json"
         path.write_bytes(plan.content)
-        words = [plan.verb, f"--plan={path}", f"--shard={shard}/{plan.shards}", f"--out={folder}", f"--backend={backend}"]
-        command(words + ([] if threads is None else [f"--threads={threads}"]))
+        part = {"plan": path, "shard": f"{shard}/{plan.shards}", "out": folder, "backend": backend, "threads": threads}
+        verb(plan.verb, part)
         return {part.name: part.read_bytes() for part in Path(folder).glob("part-*")}
 
 

@@ -20,7 +20,7 @@ fn _core(module: &Bound<'_, PyModule>) -> PyResult<()> {
     module.add_class::<driver::Vehicle>()?;
     module.add_function(wrap_pyfunction!(verb::run, module)?)?;
     module.add_function(wrap_pyfunction!(verb::main, module)?)?;
-    module.add_function(wrap_pyfunction!(verb::definition, module)?)?;
+    module.add_function(wrap_pyfunction!(verb::arguments, module)?)?;
     module.add_function(wrap_pyfunction!(verb::profile, module)?)?;
     module.add_function(wrap_pyfunction!(frame::frame_of_records, module)?)?;
     module.add_function(wrap_pyfunction!(frame::frame_of_columns, module)?)?;

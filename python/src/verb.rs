@@ -6,10 +6,11 @@ use std::sync::Mutex;
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::Duration;
 
-use lanesweep::cli::embedded;
+use lanesweep::cli::embedded::{self, Value};
 use lanesweep::{Error, Result};
 use pyo3::exceptions::{PyException, PyKeyboardInterrupt};
 use pyo3::prelude::*;
+use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList};
 
 use crate::driver;
 use crate::error::{exception, in_arguments};
@@ -91,16 +92,43 @@ fn pass_on(
     py.check_signals()
 }
 
-/// Runs a verb: the words that follow the program's name on a command line.
+/// The value of an argument.
+fn value(given: &Bound<'_, PyAny>) -> PyResult<Value> {
+    if given.is_instance_of::<PyBool>() {
+        return Ok(Value::Boolean(given.extract()?));
+    }
+    if given.is_instance_of::<PyInt>() {
+        return Ok(given.extract().map_or_else(|_| Value::Number(f64::INFINITY), Value::Whole));
+    }
+    if given.is_instance_of::<PyFloat>() {
+        return Ok(Value::Number(given.extract()?));
+    }
+    if let Ok(rows) = given.cast::<PyDict>() {
+        return rows
+            .iter()
+            .map(|(name, one)| Ok((name.extract()?, value(&one)?)))
+            .collect::<PyResult<_>>()
+            .map(Value::Table);
+    }
+    if let Ok(list) = given.cast::<PyList>() {
+        return list.iter().map(|one| value(&one)).collect::<PyResult<_>>().map(Value::List);
+    }
+    Ok(Value::Text(given.extract()?))
+}
+
+/// Runs a verb by the name of its function, with named values: numbers, texts, and lists and dictionaries of them.
 #[pyfunction]
-#[pyo3(signature = (words, on_progress=None, on_message=None))]
+#[pyo3(signature = (function, arguments, on_progress=None, on_message=None))]
 pub fn run(
     py: Python<'_>,
-    words: Vec<OsString>,
+    function: String,
+    arguments: &Bound<'_, PyDict>,
     on_progress: Option<&Bound<'_, PyAny>>,
     on_message: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<(u8, String, String)> {
-    let answer = watched(py, on_progress, on_message, move || embedded::run(&words))?;
+    let values = arguments.iter().map(|(name, one)| Ok((name.extract()?, value(&one)?)));
+    let values = values.collect::<PyResult<Vec<(String, Value)>>>()?;
+    let answer = watched(py, on_progress, on_message, move || embedded::run(&function, values))?;
     Ok((answer.exit.code(), answer.text, answer.document))
 }
 
@@ -124,8 +152,8 @@ pub fn profile<'py>(py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> 
     py.import("json")?.call_method1("loads", (text,))
 }
 
-/// The verbs and their arguments, as JSON.
+/// Names of a function's arguments.
 #[pyfunction]
-pub fn definition() -> String {
-    embedded::definition().to_string()
+pub fn arguments(py: Python<'_>, function: &str) -> PyResult<Vec<String>> {
+    embedded::arguments(function).map_err(|error| exception(py, &error))
 }

@@ -7,8 +7,6 @@ import logging
 import os
 import re
 import signal
-import subprocess
-import sys
 import threading
 import time
 from pathlib import Path
@@ -17,13 +15,20 @@ import lanesweep
 import numpy as np
 import pandas as pd
 import pytest
+from lanesweep import _core, _verbs
 from lanesweep._result import _read_csv
 
-ROOT = Path(__file__).parents[1]
 
 
-def test_the_functions_are_those_of_the_program() -> None:
-    subprocess.run([sys.executable, ROOT / "tools" / "generate.py", "--check"], check=True)
+def test_the_arguments_are_those_of_the_program() -> None:
+    for name in _verbs.__all__:
+        annotations = dict(getattr(_verbs, name).__annotations__)
+        del annotations["return"]
+        groups = [name for name, of in annotations.items() if of.startswith("Unpack[")]
+        for group in groups:
+            options = getattr(_verbs, annotations.pop(group).removeprefix("Unpack[").removesuffix("]"))
+            annotations |= options.__annotations__
+        assert {argument.rstrip("_") for argument in annotations} == set(_core.arguments(name)), name
 
 
 def test_a_study_has_the_bytes_of_the_command_line(program, scenarios, tmp_path) -> None:
@@ -221,10 +226,13 @@ def test_messages_name_arguments_and_no_flags(density) -> None:
         (lambda: lanesweep.sample(density, criterion="speed", thw=1), lanesweep.UsageError, "`criterion`"),
         (lambda: lanesweep.study(synth_recordings=1, thw=[]), ValueError, "`thw` is empty"),
         (lambda: lanesweep.study(synth_recordings=1, models=[]), ValueError, "`models` is empty"),
-        (lambda: lanesweep.study(synth_recordings=1, thw=False), TypeError, "`thw` is False"),
+        (lambda: lanesweep.study(synth_recordings=1, thw=False), lanesweep.UsageError, "`thw`: False is no value of it"),
+        (lambda: lanesweep.study(synth_recordings=1, backnd="cpu"), lanesweep.UsageError, "`backnd`: study has no such argument"),
+        (lambda: lanesweep.study("recordings", scenarios="a.jsonl"), lanesweep.UsageError, "cannot be used with"),
+        (lambda: lanesweep.map("lvd", rename={"a": "gap_m"}), lanesweep.UsageError, "`rename`: it needs `distribution`"),
         (lambda: lanesweep.mine([]), ValueError, "`recordings` is empty"),
-        (lambda: lanesweep.study(synth_recordings=1, categories=object()), TypeError, "`categories` is <object"),
-        (lambda: lanesweep.study(synth_recordings=1, dt=[object()]), TypeError, "`dt` holds <object"),
+        (lambda: lanesweep.study(synth_recordings=1, categories=object()), TypeError, "`categories` has the value <object"),
+        (lambda: lanesweep.study(synth_recordings=1, dt=[object()]), TypeError, "`dt` has the value <object"),
     ]:
         with pytest.raises(kind, match=message) as raised:
             call()

@@ -5,6 +5,7 @@ use std::path::Path;
 
 use clap::Args;
 
+use super::arguments::from_arguments;
 use crate::engine::Headway;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -69,6 +70,27 @@ pub(super) struct CaseFlags {
     #[arg(long, value_name = "m", value_parser = length_m, help_heading = "Scenario", hide_short_help = true)]
     pub(super) lane_width: Option<f64>,
 }
+
+from_arguments!(
+    CaseFlags { category, models }
+    parsed {
+        ego_speed: speed_mps,
+        speed: speed_mps,
+        gap: length_m,
+        thw: time_s,
+        lateral_speed: lateral_speed_mps,
+        lateral_distance: length_m,
+        acceleration: acceleration_mps2,
+        end_speed: speed_mps,
+        ahead_speed: speed_mps,
+        ahead_gap: length_m,
+        length: length_m,
+        width: length_m,
+        ego_length: length_m,
+        ego_width: length_m,
+        lane_width: length_m,
+    }
+);
 
 /// A case as it is given: flags over a file or a row of a table.
 #[derive(Debug, Default)]

@@ -5,13 +5,14 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use rayon::prelude::*;
 
-use super::Exit;
+use super::arguments::from_arguments;
 use super::case_flags::{CaseFlags, CaseTable, GivenCase, from_table, from_toml};
 use super::configured::Configured;
 use super::console;
 use super::format::FormatFlag;
 use super::signals::CANCEL;
 use super::source::{PlausibilityFlag, complain_of, refuse_overwriting, scenarios_of};
+use super::{Answer as Printed, Exit};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::report::case_sheet::CaseSheet;
@@ -55,7 +56,7 @@ pub(super) struct Check {
     /// Scenario of a scenario file, by its id
     ///
     /// It starts with its observed gap, or with --gap or --thw.
-    #[arg(long, value_name = "ID", requires = "file", conflicts_with = "row", help_heading = "Data")]
+    #[arg(long, value_name = "ID", conflicts_with = "row", help_heading = "Data")]
     scenario: Option<String>,
     #[command(flatten)]
     case: CaseFlags,
@@ -74,6 +75,11 @@ pub(super) struct Check {
     format: FormatFlag,
 }
 
+from_arguments!(
+    Check { file, row, scenario, profiles, sheet, series }
+    groups { case, plausibility, format }
+);
+
 /// The checked case, with facts for the reader.
 struct CheckRequest {
     subject: Subject,
@@ -83,7 +89,7 @@ struct CheckRequest {
 }
 
 impl Check {
-    pub(super) fn run(&self, configured: &Configured) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured) -> Result<Printed> {
         configured.refuse_assigned(
             "has no effect on a check",
             "leave it out; --profiles names the profiles, which hold the time step",
@@ -112,7 +118,7 @@ impl Check {
             is_synthetic: request.is_synthetic,
             profiles: &check.profiles,
             judgements: &judgements,
-            command: console::command_line(),
+            command: configured.command.clone(),
         };
         if let Some(path) = &self.sheet {
             write(path, sheet.html()?.as_bytes())?;
@@ -121,9 +127,9 @@ impl Check {
             let named = judgements[0].models.iter().map(|judged| (judged.trace.model.name().to_owned(), &judged.trace));
             write(path, trace::table(&named.collect::<Vec<_>>()).csv().as_bytes())?;
         }
-        self.format.print(|| sheet.text(), || sheet.json())?;
         // If input was skipped the answer is incomplete.
-        Ok(if request.incomplete { Exit::Incomplete } else { status(judgements[0].verdict()) })
+        let exit = if request.incomplete { Exit::Incomplete } else { status(judgements[0].verdict()) };
+        self.format.answer(exit, || sheet.text(), || sheet.json())
     }
 
     /// The table to be judged with all rows.
@@ -154,7 +160,7 @@ impl Check {
     }
 
     /// Judges every row of a table under one profile.
-    fn check_all(&self, path: &Path, profile: &Profile, models: &[ModelId]) -> Result<Exit> {
+    fn check_all(&self, path: &Path, profile: &Profile, models: &[ModelId]) -> Result<Printed> {
         let mut table = CaseTable::open(path)?;
         let mut doubts = Doubts::new(self.plausibility.policy());
         let (mut cases, mut broken, mut is_end) = (Vec::new(), Vec::new(), false);
@@ -201,8 +207,8 @@ impl Check {
         let is_complete = broken.is_empty();
         let origin = path.display().to_string();
         let answers = Answers { origin, profile: profile.name.clone(), cases, broken };
-        self.format.print(|| answers.text(console::width()), || answers.json())?;
-        Ok(if is_complete { status(answers.worst()) } else { Exit::Incomplete })
+        let exit = if is_complete { status(answers.worst()) } else { Exit::Incomplete };
+        self.format.answer(exit, || answers.text(console::width()), || answers.json())
     }
 
     fn request(&self, profile: &Profile) -> Result<CheckRequest> {

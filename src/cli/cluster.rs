@@ -2,7 +2,8 @@
 
 use clap::{Args, Subcommand};
 
-use super::Exit;
+use super::Answer;
+use super::arguments::{Arguments, FromArguments};
 use super::merge::Merge;
 use crate::Result;
 
@@ -22,8 +23,14 @@ enum ClusterVerb {
     Merge(Merge),
 }
 
+impl FromArguments for Cluster {
+    fn from_arguments(arguments: &mut Arguments) -> Result<Cluster> {
+        Ok(Cluster { verb: ClusterVerb::Merge(Merge::from_arguments(arguments)?) })
+    }
+}
+
 impl Cluster {
-    pub(super) fn run(&self) -> Result<Exit> {
+    pub(super) fn run(&self) -> Result<Answer> {
         match &self.verb {
             ClusterVerb::Merge(verb) => verb.run(),
         }

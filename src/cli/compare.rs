@@ -5,11 +5,12 @@ use std::time::Instant;
 
 use clap::Args;
 
+use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::source::SourceFlags;
-use super::{Exit, lists};
+use super::{Answer, Exit, lists};
 use crate::report::compare::CompareFile;
 use crate::report::sampling::HostRecord;
 use crate::run::compare::{self, CompareOptions, CompareResult};
@@ -57,8 +58,13 @@ pub(super) struct Compare {
     format: FormatFlag,
 }
 
+from_arguments!(
+    Compare { out, forms }
+    groups { data, categories, parameterizations, models, headways, exposure, format }
+);
+
 impl Compare {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Answer> {
         let started = Instant::now();
         let config = &configured.settings;
         let categories = self.categories.list()?;
@@ -118,8 +124,9 @@ impl Compare {
             HostRecord::of(&opened, swept.rechecked_lanes, started, configured.record(false)),
         );
         file.write(folder.results()?)?;
-        self.format.print_results(|| file.text(), || file.json(), &self.out)?;
-        Ok(if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete })
+        tracing::info!("results written to {}", self.out.display());
+        let exit = if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete };
+        self.format.answer(exit, || file.text(), || file.json())
     }
 
     /// Results must not replace an input.

@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::configured::Configured;
 use super::shell::{Completions, Man};
-use super::{Exit, console};
+use super::{Answer, Exit};
 use crate::cli::settings::{
     Assignment, DEFAULT_FILE, DEFAULT_FILE_NAME, Layers, Setting, profile_schema, settings_schema, text_of,
 };
@@ -103,7 +103,7 @@ enum SchemaOf {
 }
 
 impl Config {
-    pub(super) fn run(&self, configured: &Configured) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured) -> Result<Answer> {
         match &self.verb {
             ConfigVerb::Init(verb) => verb.run(),
             ConfigVerb::Show(verb) => verb.run(configured),
@@ -116,10 +116,9 @@ impl Config {
 }
 
 impl Init {
-    fn run(&self) -> Result<Exit> {
+    fn run(&self) -> Result<Answer> {
         if self.file == Path::new("-") {
-            console::print(DEFAULT_FILE)?;
-            return Ok(Exit::Ok);
+            return Ok(Answer { text: DEFAULT_FILE.to_owned(), ..Exit::Ok.into() });
         }
         if self.file.exists() {
             let help = "choose another name, or move it away; `lanesweep config init -` prints the file";
@@ -128,13 +127,13 @@ impl Init {
         make_folder_of(&self.file)?;
         write_atomically(&self.file, DEFAULT_FILE.as_bytes())?;
         let file = self.file.display().to_string();
-        console::print(&format!("{file} written; use it with --config {}\n", quoted_word(&file)))?;
-        Ok(Exit::Ok)
+        let text = format!("{file} written; use it with --config {}\n", quoted_word(&file));
+        Ok(Answer { text, ..Exit::Ok.into() })
     }
 }
 
 impl Show {
-    fn run(&self, configured: &Configured) -> Result<Exit> {
+    fn run(&self, configured: &Configured) -> Result<Answer> {
         // Only the profile can check its own time step.
         configured.profile()?;
         configured.backend()?;
@@ -142,33 +141,32 @@ impl Show {
             true => configured.layers.given().collect(),
             false => configured.layers.list().collect(),
         };
-        console::print(&match self.format {
+        let text = match self.format {
             ShowFormat::Text => table(&shown),
             ShowFormat::Json => json_list(&shown)?,
             ShowFormat::Toml => toml_file(&shown),
-        })?;
-        Ok(Exit::Ok)
+        };
+        Ok(Answer { text, ..Exit::Ok.into() })
     }
 }
 
 impl Check {
-    fn run(&self) -> Result<Exit> {
+    fn run(&self) -> Result<Answer> {
         let layers = Layers::read(&[Assignment::File(self.file.clone())], None)?;
         layers.settings()?;
         let count = layers.given().count();
-        console::print(&format!("{}: {count} keys set, all of them known and in range\n", self.file.display()))?;
-        Ok(Exit::Ok)
+        let text = format!("{}: {count} keys set, all of them known and in range\n", self.file.display());
+        Ok(Answer { text, ..Exit::Ok.into() })
     }
 }
 
 impl Schema {
-    fn run(&self) -> Result<Exit> {
+    fn run(&self) -> Result<Answer> {
         let schema = match self.of {
             SchemaOf::Config => settings_schema(),
             SchemaOf::Profile => profile_schema()?,
         };
-        console::print(&format!("{schema:#}\n"))?;
-        Ok(Exit::Ok)
+        Ok(Answer { text: format!("{schema:#}\n"), ..Exit::Ok.into() })
     }
 }
 

@@ -9,6 +9,7 @@ use clap::error::{ContextKind, ContextValue};
 use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, FromArgMatches};
 
+use super::arguments::{Arguments, NEEDS, Value};
 use super::help::{DATA, MODELS, OUTPUT, RUN};
 use super::signals::CANCEL;
 use super::{Cli, Verb};
@@ -26,6 +27,8 @@ pub(super) struct Configured {
     pub settings: Settings,
     /// Values with their sources.
     pub layers: Layers,
+    /// The command line or call, for repeating the run.
+    pub command: String,
 }
 
 /// A flag that sets a key: the key, the flag, the value's name unless the key defines it, its heading, whether only
@@ -115,9 +118,15 @@ fn with_flags(mut command: Command, keys: &[Key]) -> Command {
             arg = arg.conflicts_with("plan");
         }
         if has_data && name == "generator.recordings" {
-            arg = arg.conflicts_with_all(["dir", "scenarios"]);
+            arg = arg.conflicts_with_all(["recordings", "scenarios"]);
         }
         command = command.arg(arg);
+    }
+    for (verbs, name, needed) in NEEDS {
+        // `config check` has the name of another verb.
+        if verbs.contains(&verb.as_str()) && command.get_arguments().any(|arg| arg.get_id() == name) {
+            command = command.mut_arg(name, |arg| arg.requires(needed));
+        }
     }
     command
 }
@@ -193,38 +202,50 @@ impl Configured {
     ///
     /// # Errors
     /// As [`Layers::read`] and [`Layers::flag`].
-    pub(super) fn of(matches: &ArgMatches) -> Result<(Cli, Configured)> {
+    pub(super) fn of(matches: &ArgMatches, command: String) -> Result<(Cli, Configured)> {
         let unread = |e: clap::Error| Error::Internal(format!("the command line cannot be read: {e}"));
         let mut cli = Cli::from_arg_matches(matches).map_err(unread)?;
         let (path, typed, last) = verb_of(matches);
-        // A missing file is named by the system's error if its name says that a file is meant.
-        let is_neither = |one: &&Assignment| match one {
-            Assignment::File(path) => !path.exists() && path.extension().is_none_or(|ending| ending != "toml"),
-            Assignment::Value(_) => false,
-        };
-        if let Some(Assignment::File(path)) = typed.iter().find(is_neither) {
-            let problem = format!("`{}` is neither KEY=VALUE nor an existing file", path.display());
-            let help = "write a key with its value, such as run.dt_s=0.05, or the path of a TOML file";
-            return Err(Error::usage(Place::item("--config"), problem, help));
-        }
-        let mut layers = match reads_configuration(&path) {
-            true => {
-                check_variables(&Key::all())?;
-                Layers::read(&typed, std::env::var_os(FILE_VARIABLE).as_deref())?
-            }
-            false => Layers::defaults(),
-        };
+        let mut layers = if reads_configuration(&path) { layers(&typed)? } else { Layers::defaults() };
         let verb = path.last().unwrap_or(&"");
         for (key, id, ..) in flags_of("lanesweep").chain(flags_of(verb)) {
             if last.value_source(id) == Some(ValueSource::CommandLine)
                 && let Some(word) = last.get_raw(id).and_then(|mut words| words.next())
             {
-                layers.flag(key, &format!("--{}", id.replace('_', "-")), &word.to_string_lossy())?;
+                layers.flag(key, &flag_name(id), Value::Text(word.to_owned()))?;
             }
         }
+        let is_reference = last.try_contains_id("reference").is_ok_and(|known| known) && last.get_flag("reference");
+        let configured = Configured::combined(layers, is_reference, command)?;
+        configured.fill(&mut cli.verb);
+        Ok((cli, configured))
+    }
+
+    /// The same for a verb that is called as a function.
+    ///
+    /// # Errors
+    /// As [`Layers::read`] and [`Layers::flag`].
+    pub(super) fn of_arguments(arguments: &mut Arguments, verb: &str) -> Result<Configured> {
+        let typed: Vec<String> = arguments.take("config")?;
+        let mut layers = layers(&typed.iter().map(|text| Assignment::of(text)).collect::<Vec<_>>())?;
+        for (key, id, ..) in flags_of("lanesweep").chain(flags_of(verb)) {
+            if let Some(value) = arguments.value(id) {
+                layers.flag(key, &flag_name(id), value)?;
+            }
+        }
+        Configured::combined(layers, arguments.is_given("reference"), arguments.call().to_owned())
+    }
+
+    /// Gives a verb its settings.
+    pub(super) fn fill(&self, verb: &mut Verb) {
+        if let Verb::Sample(sample) = verb {
+            sample.settings = self.settings.sample.clone();
+        }
+    }
+
+    fn combined(layers: Layers, is_reference: bool, command: String) -> Result<Configured> {
         let mut settings = layers.settings()?;
         // Like every flag, a flag that allows only one backend overrides a file's backend.
-        let is_reference = last.try_contains_id("reference").is_ok_and(|known| known) && last.get_flag("reference");
         let layer = |key: &str| layers.get(key).map_or(0, |setting| setting.origin.layer());
         let flags = Origin::Flag(String::new()).layer();
         if is_reference && layer("run.backend") < flags {
@@ -235,10 +256,7 @@ impl Configured {
         if is_cpu || (is_reference && layer("run.device") < flags) {
             settings.run.device = None;
         }
-        if let Verb::Sample(sample) = &mut cli.verb {
-            sample.settings = settings.sample.clone();
-        }
-        Ok((cli, Configured { settings, layers }))
+        Ok(Configured { settings, layers, command })
     }
 
     /// The profile with its time step.
@@ -323,6 +341,30 @@ impl Configured {
             }
         }
     }
+}
+
+/// The layers of `--config` and of the variable that names a file.
+///
+/// # Errors
+/// As [`Layers::read`]; [`Error::Usage`] for a text that is neither a file nor an assignment.
+fn layers(typed: &[Assignment]) -> Result<Layers> {
+    // A missing file is named by the system's error if its name says that a file is meant.
+    let is_neither = |one: &&Assignment| match one {
+        Assignment::File(path) => !path.exists() && path.extension().is_none_or(|ending| ending != "toml"),
+        Assignment::Value(_) => false,
+    };
+    if let Some(Assignment::File(path)) = typed.iter().find(is_neither) {
+        let problem = format!("`{}` is neither KEY=VALUE nor an existing file", path.display());
+        let help = "write a key with its value, such as run.dt_s=0.05, or the path of a TOML file";
+        return Err(Error::usage(Place::item("--config"), problem, help));
+    }
+    check_variables(&Key::all())?;
+    Layers::read(typed, std::env::var_os(FILE_VARIABLE).as_deref())
+}
+
+/// The flag of an argument, with its dashes.
+fn flag_name(id: &str) -> String {
+    format!("--{}", id.replace('_', "-"))
 }
 
 /// Looks for variables that would be ignored silently: those of keys, which earlier versions read, and misspellings of
@@ -432,7 +474,7 @@ mod tests {
                 let Some(default) = &key.default else { continue };
                 let [written] = arg.get_default_values() else { panic!("{name}") };
                 let mut layers = Layers::defaults();
-                layers.flag(name, id, written.to_str().unwrap()).unwrap();
+                layers.flag(name, id, Value::Text(written.clone().into())).unwrap();
                 assert_eq!(layers.get(name).unwrap().value, Some(default), "{name}");
             }
         }

@@ -34,13 +34,9 @@ pub(super) enum Verbosity {
     Verbose,
 }
 
-/// What a run inside another program says, until its owner takes it.
+/// What a run inside another program says while it works, until its owner takes it.
 #[derive(Debug, Default)]
 pub(super) struct Captured {
-    /// What the program would print on stdout.
-    pub text: String,
-    /// The same numbers as one JSON document, if the verb has one.
-    pub document: String,
     /// Lines of the log and of stderr.
     pub messages: Vec<(Level, String)>,
     /// The bar of the present work.
@@ -48,7 +44,6 @@ pub(super) struct Captured {
 }
 
 static CAPTURED: Mutex<Option<Captured>> = Mutex::new(None);
-static COMMAND_LINE: Mutex<Vec<OsString>> = Mutex::new(Vec::new());
 
 /// What is captured now; `None` if the program prints.
 pub(super) fn captured() -> MutexGuard<'static, Option<Captured>> {
@@ -134,10 +129,6 @@ pub(super) fn print_json(json: &str) -> Result<()> {
 }
 
 fn write_out(text: &str) -> Result<()> {
-    if let Some(captured) = captured().as_mut() {
-        captured.text += text;
-        return Ok(());
-    }
     let mut stdout = io::stdout().lock();
     match stdout.write_all(text.as_bytes()).and_then(|()| stdout.flush()) {
         Err(error) if error.kind() == io::ErrorKind::BrokenPipe => Ok(()),
@@ -154,14 +145,8 @@ pub(super) fn say(text: &str) {
     let _ = write!(io::stderr().lock(), "{}", shown(text));
 }
 
-/// Sets the words after the program's name.
-pub(super) fn set_command_line(words: &[OsString]) {
-    *COMMAND_LINE.lock().unwrap_or_else(PoisonError::into_inner) = words.to_vec();
-}
-
 /// The command line as typed, for repeating the run.
-pub(super) fn command_line() -> String {
-    let words = COMMAND_LINE.lock().unwrap_or_else(PoisonError::into_inner);
+pub(super) fn command_line(words: &[OsString]) -> String {
     let words = words.iter().map(|word| quoted_word(&word.to_string_lossy()));
     format!("lanesweep {}", words.collect::<Vec<_>>().join(" "))
 }

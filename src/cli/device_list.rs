@@ -5,8 +5,8 @@ use std::fmt::Write;
 use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Table, presets};
 use serde_json::json;
 
-use super::Exit;
 use super::format::FormatFlag;
+use super::{Answer, Exit};
 use crate::Result;
 use crate::engine::BackendChoice;
 use crate::engine::gpu::{AdapterCard, Adapters, GpuBackend, GpuOptions, choose, visible_here};
@@ -14,17 +14,20 @@ use crate::engine::verify::self_check;
 use crate::report::records::document;
 use crate::report::tables::{WIDTH, wrap};
 
-/// Prints the list.
+/// The list.
 ///
 /// # Errors
 /// If the environment cannot be parsed.
-pub(super) fn print(format: &FormatFlag, no_self_check: bool) -> Result<Exit> {
+pub(super) fn list(format: &FormatFlag, no_self_check: bool) -> Result<Answer> {
     let adapters = Adapters::enumerate();
     let seen = Seen::new(adapters.cards(), visible_here());
     let self_check = |index: usize| if no_self_check { "-".to_owned() } else { check(&adapters, index) };
-    format.print(|| seen.text(&self_check), || seen.json(&self_check))?;
+    let answer = format.answer(Exit::Ok, || seen.text(&self_check), || seen.json(&self_check))?;
     // The list helps to correct the environment, so it is printed first.
-    seen.visible.map(|_| Exit::Ok)
+    match seen.visible {
+        Ok(_) => Ok(answer),
+        Err(error) => answer.or_print(false, || error),
+    }
 }
 
 /// Checks some thousand lanes on the device against the CPU; returns the result in a word.

@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::Exit;
+use super::Answer;
 use super::format::FormatFlag;
 use crate::Result;
 
@@ -22,12 +22,12 @@ pub(super) struct Devices {
 
 impl Devices {
     #[cfg(feature = "gpu")]
-    pub(super) fn run(&self) -> Result<Exit> {
-        super::device_list::print(&self.format, self.no_self_check)
+    pub(super) fn run(&self) -> Result<Answer> {
+        super::device_list::list(&self.format, self.no_self_check)
     }
 
     #[cfg(not(feature = "gpu"))]
-    pub fn run(&self) -> Result<Exit> {
+    pub fn run(&self) -> Result<Answer> {
         Err(crate::engine::no_gpu("lanesweep verify devices"))
     }
 }

@@ -1,46 +1,107 @@
-//! The program inside another process, such as a Python interpreter. A verb runs on a thread of the caller and returns
-//! what it would print. It handles no signals; its owner can watch it and end it from another thread.
+//! Verbs inside another process, such as a Python interpreter. A verb is a function of named values; it runs on a thread of the
+//! caller and returns its answer. It handles no signals; its owner can watch it and end it from another thread.
 
-use std::ffi::OsString;
 use std::sync::{Arc, Mutex, PoisonError, TryLockError};
 
-use serde_json::Value;
-
+pub use super::arguments::Value;
+use super::arguments::{self, Arguments, FromArguments};
 use super::configured::{self, Configured};
 use super::console::{self, Verbosity};
 use super::signals::CANCEL;
-use super::{Exit, not_started, pool_of, run as run_verb, with_program_name, without_panic};
+use super::{Answer, Verb, not_started, pool_of, without_panic};
 use crate::support::cancel::Cancel;
 use crate::{Error, Place, Result};
-
-/// How a verb ended, and what it printed on standard output.
-#[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Answer {
-    /// The exit code; never one of an error.
-    pub exit: Exit,
-    /// Text, JSON or CSV.
-    pub text: String,
-    /// The numbers of the text as one JSON document; empty if the verb has none.
-    pub document: String,
-}
 
 /// Stack of the threads that run a verb, bytes.
 pub const STACK_BYTES: usize = 8 << 20;
 
-/// Runs a verb; `words` follow the program's name on a command line. One verb runs at a time in a process.
+/// Verbs by the names of their functions.
+const FUNCTIONS: [(&str, &[&str]); 14] = [
+    ("study", &["study"]),
+    ("tracks", &["tracks"]),
+    ("mine", &["mine"]),
+    ("fit", &["fit"]),
+    ("sample", &["sample"]),
+    ("compare", &["compare"]),
+    ("search", &["search"]),
+    ("justify", &["justify"]),
+    ("map", &["map"]),
+    ("check", &["check"]),
+    ("trace", &["simulate"]),
+    ("export_xosc", &["export", "xosc"]),
+    ("synth", &["synth"]),
+    ("merge", &["cluster", "merge"]),
+];
+
+/// The definition of a function's verb.
+fn definition(function: &str) -> Result<clap::Command> {
+    let path = FUNCTIONS.iter().find(|(name, _)| *name == function).map(|(_, path)| *path);
+    let mut command = configured::command();
+    command.build();
+    for verb in path.unwrap_or_default() {
+        let found = command.find_subcommand(verb).cloned();
+        command = found.ok_or_else(|| Error::Internal(format!("there is no verb {verb}")))?;
+    }
+    match path {
+        Some(_) => Ok(command),
+        None => Err(Error::usage(Place::item(function), "there is no such function", "")),
+    }
+}
+
+/// Names of a function's arguments.
 ///
 /// # Errors
-/// [`Error::Usage`] for a wrong command line; [`Error::Busy`] while another verb runs; those of the verb.
-pub fn run(words: &[OsString]) -> Result<Answer> {
+/// [`Error::Usage`] for an unknown function.
+pub fn arguments(function: &str) -> Result<Vec<String>> {
+    Ok(arguments::names(&definition(function)?).map(str::to_owned).collect())
+}
+
+/// Runs a verb with named values; those of its flags and positions. One verb runs at a time in a process.
+///
+/// # Errors
+/// [`Error::Usage`] for an unknown or unusable argument; [`Error::Busy`] while another verb runs; those of the verb.
+pub fn run(function: &str, values: Vec<(String, Value)>) -> Result<Answer> {
     alone(|| {
-        console::set_command_line(words);
-        let result = without_panic(|| parse_and_run(words));
-        let (text, document) = console::captured().as_mut().map_or_else(Default::default, |captured| {
-            captured.bar = None;
-            (std::mem::take(&mut captured.text), std::mem::take(&mut captured.document))
+        let result = without_panic(|| {
+            let command = definition(function)?;
+            let name = command.get_name().to_owned();
+            let mut arguments = Arguments::new(command, function, values)?;
+            let configured = Configured::of_arguments(&mut arguments, &name)?;
+            let mut verb = Verb::of(&name, &mut arguments)?;
+            configured.fill(&mut verb);
+            let requested = configured.settings.run.threads;
+            let pool = pool_of(requested)?.stack_size(STACK_BYTES);
+            let pool = pool.build().map_err(|error| not_started(requested, &error))?;
+            pool.install(|| verb.run(&configured, Verbosity::Normal))
         });
-        Ok(Answer { exit: result?, text, document })
+        console::captured().iter_mut().for_each(|captured| captured.bar = None);
+        result
     })
+}
+
+impl Verb {
+    fn of(name: &str, arguments: &mut Arguments) -> Result<Verb> {
+        fn options<T: FromArguments>(arguments: &mut Arguments) -> Result<Box<T>> {
+            T::from_arguments(arguments).map(Box::new)
+        }
+        Ok(match name {
+            "study" => Verb::Study(options(arguments)?),
+            "tracks" => Verb::Tracks(*options(arguments)?),
+            "mine" => Verb::Mine(*options(arguments)?),
+            "fit" => Verb::Fit(*options(arguments)?),
+            "sample" => Verb::Sample(options(arguments)?),
+            "compare" => Verb::Compare(options(arguments)?),
+            "search" => Verb::Search(options(arguments)?),
+            "justify" => Verb::Justify(options(arguments)?),
+            "map" => Verb::Map(options(arguments)?),
+            "check" => Verb::Check(*options(arguments)?),
+            "simulate" => Verb::Simulate(*options(arguments)?),
+            "xosc" => Verb::Export(*options(arguments)?),
+            "synth" => Verb::Synth(*options(arguments)?),
+            "merge" => Verb::Cluster(*options(arguments)?),
+            other => return Err(Error::Internal(format!("{other} is no function"))),
+        })
+    }
 }
 
 /// Does other work of the library as [`run`] does a verb: alone in this process, with its own cancellation, and with
@@ -88,74 +149,6 @@ fn pool() -> Result<Arc<rayon::ThreadPool>> {
     let made = Arc::new(made);
     *pool = Some((std::process::id(), made.clone()));
     Ok(made)
-}
-
-fn parse_and_run(words: &[OsString]) -> Result<Exit> {
-    let matches = match configured::command().try_get_matches_from(with_program_name(words)) {
-        Ok(matches) => matches,
-        Err(mut error) if error.use_stderr() => {
-            configured::name_replacement(&mut error);
-            return Err(wrong_words(&error));
-        }
-        Err(error) => {
-            console::print(&error.to_string())?;
-            return Ok(Exit::Ok);
-        }
-    };
-    let (cli, configured) = Configured::of(&matches)?;
-    let requested = configured.settings.run.threads;
-    let pool = pool_of(requested)?.stack_size(STACK_BYTES).build().map_err(|error| not_started(requested, &error))?;
-    pool.install(|| run_verb(&cli, &configured))
-}
-
-/// The first paragraph of clap's message; the rest is help for a terminal.
-fn wrong_words(error: &clap::Error) -> Error {
-    let text = error.to_string();
-    let (problem, rest) = text.split_once("\n\n").unwrap_or((&text, ""));
-    let tip = rest.lines().find_map(|line| line.trim().strip_prefix("tip: ")).unwrap_or_default();
-    Error::usage(Place::item("arguments"), problem.trim_start_matches("error: ").trim(), tip)
-}
-
-/// The command line as data, for programs that make an interface of it: a list of verbs with their arguments, in the
-/// order of their help.
-pub fn definition() -> Value {
-    let mut program = configured::command();
-    program.build();
-    let verbs = program.get_subcommands().filter(|verb| verb.get_name() != "help");
-    Value::Array(verbs.flat_map(|verb| verb_definitions("", verb)).collect())
-}
-
-fn verb_definitions(before: &str, verb: &clap::Command) -> Vec<Value> {
-    let name = format!("{before}{}", verb.get_name());
-    if verb.has_subcommands() {
-        let within = verb.get_subcommands().filter(|verb| verb.get_name() != "help");
-        return within.flat_map(|verb| verb_definitions(&format!("{name} "), verb)).collect();
-    }
-    let text = |styled: Option<&clap::builder::StyledStr>| styled.map(ToString::to_string).unwrap_or_default();
-    let argument = |arg: &clap::Arg| {
-        let defaults = arg.get_default_values().iter().map(|value| value.to_string_lossy());
-        let choices = arg.get_possible_values().into_iter().map(|value| value.get_name().to_owned());
-        let count = arg.get_num_args().map_or(1, |range| range.max_values());
-        serde_json::json!({
-            "id": arg.get_id().as_str(),
-            "flag": arg.get_long(),
-            "takes_value": arg.get_action().takes_values(),
-            "repeats": count > 1 || matches!(arg.get_action(), clap::ArgAction::Append),
-            "is_list": arg.get_value_delimiter().is_some(),
-            "is_required": arg.is_required_set(),
-            "value_name": arg.get_value_names().unwrap_or_default().first().map(ToString::to_string),
-            "default": defaults.collect::<Vec<_>>().join(","),
-            "choices": choices.collect::<Vec<_>>(),
-            "help": text(arg.get_long_help().or(arg.get_help())),
-            "heading": arg.get_help_heading(),
-        })
-    };
-    let arguments = verb.get_arguments().filter(|arg| !["help", "version"].contains(&arg.get_id().as_str()));
-    vec![serde_json::json!({
-        "verb": name,
-        "help": text(verb.get_long_about().or(verb.get_about())),
-        "arguments": arguments.map(argument).collect::<Vec<_>>(),
-    })]
 }
 
 /// Requests the running verb to end in good order: after the present chunk, with its journal on disk.

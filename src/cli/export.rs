@@ -4,12 +4,13 @@ use std::path::PathBuf;
 
 use clap::{Args, Subcommand, ValueEnum};
 
-use super::Exit;
+use super::arguments::{Arguments, FromArguments, choices, from_arguments};
 use super::case_flags::{CaseFlags, from_toml, time_s};
 use super::configured::Configured;
 use super::format::FormatFlag;
 use super::lists;
 use super::source::{PlausibilityFlag, scenarios_of};
+use super::{Answer, Exit};
 use crate::report::openscenario::{
     Concrete, EgoMotion, PlayOptions, concrete_case, concrete_lanes, export_folder, reopen,
 };
@@ -36,7 +37,7 @@ enum Format {
 }
 
 impl Export {
-    pub(super) fn run(&self, configured: &Configured) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured) -> Result<Answer> {
         match &self.format {
             Format::Xosc(xosc) => xosc.run(configured),
         }
@@ -79,22 +80,15 @@ struct Xosc {
     ///
     /// For a sampling run: the lanes of worst.csv. For a study: the scenarios with the smallest margin of --criterion,
     /// each with its worst lane.
-    #[arg(long, value_name = "N", requires = "from", conflicts_with = "lane", help_heading = "Output")]
+    #[arg(long, value_name = "N", conflicts_with = "lane", help_heading = "Output")]
     worst: Option<usize>,
     /// Criterion of --worst [default: collision]
     ///
     /// For a sampling run it must be the criterion of worst.csv.
-    #[arg(long, value_name = "collision|ttc|btn", requires = "worst", help_heading = "Models and criteria")]
+    #[arg(long, value_name = "collision|ttc|btn", help_heading = "Models and criteria")]
     criterion: Option<String>,
     /// Variants of --worst: S, keys of parameterizations [default: all]
-    #[arg(
-        long,
-        value_name = "LIST",
-        requires = "worst",
-        value_delimiter = ',',
-        help_heading = "Scenario",
-        hide_short_help = true
-    )]
+    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Scenario", hide_short_help = true)]
     variant: Vec<String>,
     /// Driver of the ego
     #[arg(long, value_enum, default_value_t, help_heading = "Scenario")]
@@ -110,6 +104,19 @@ struct Xosc {
     out: PathBuf,
     #[command(flatten)]
     plausibility: PlausibilityFlag,
+}
+
+from_arguments!(
+    Xosc { case_file, from, scenarios, lane, worst, criterion, variant, ego, side, out }
+    parsed { duration: time_s }
+    groups { case, format, plausibility }
+);
+choices!(EgoFlag, SideFlag);
+
+impl FromArguments for Export {
+    fn from_arguments(arguments: &mut Arguments) -> Result<Export> {
+        Ok(Export { format: Format::Xosc(Box::new(Xosc::from_arguments(arguments)?)) })
+    }
 }
 
 #[derive(Debug, Clone, Copy, Default, PartialEq, Eq, ValueEnum)]
@@ -128,7 +135,7 @@ enum SideFlag {
 }
 
 impl Xosc {
-    fn run(&self, configured: &Configured) -> Result<Exit> {
+    fn run(&self, configured: &Configured) -> Result<Answer> {
         let options = self.play_options()?;
         check_folder(&self.out)?;
         let (scenarios, incomplete) = self.scenarios(configured, &options)?;
@@ -138,9 +145,8 @@ impl Xosc {
             let rows = rows.iter().map(|row| serde_json::json!({"file": row.file, "lane": row.lane}));
             document(&rows.collect::<Vec<_>>())
         };
-        self.format.print(|| lines, list)?;
         tracing::info!("{} written to {}", counted(rows.len(), "scenario"), self.out.display());
-        Ok(if incomplete { Exit::Incomplete } else { Exit::Ok })
+        self.format.answer(if incomplete { Exit::Incomplete } else { Exit::Ok }, || lines, list)
     }
 
     /// The scenarios, and whether others of the file were skipped.

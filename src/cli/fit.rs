@@ -4,12 +4,13 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::Exit;
+use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::lists;
 use super::source::{self, SourceFlags};
+use super::{Answer, Exit};
 use crate::report::density;
 use crate::report::records;
 use crate::report::run_record::SettingRecord;
@@ -61,8 +62,13 @@ pub(super) struct Fit {
     format: FormatFlag,
 }
 
+from_arguments!(
+    Fit { out, with_thw, no_comparison, without_scenarios }
+    groups { data, categories, parameterizations, exposure, format }
+);
+
 impl Fit {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Answer> {
         let config = &configured.settings;
         let ids = self.ids()?;
         let typed = self.exposure.driven()?;
@@ -107,9 +113,9 @@ impl Fit {
         }
         console::warn(&failed);
         write(&fitted, folder.as_ref())?;
-        self.format.print(|| text(&facts, &fitted), || document(&facts, &fitted, &configured.record(false)))?;
         tracing::info!("{} written to {}", counted(fitted.len(), "density file"), self.out.display());
-        Ok(if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete })
+        let exit = if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete };
+        self.format.answer(exit, || text(&facts, &fitted), || document(&facts, &fitted, &configured.record(false)))
     }
 
     /// The parameterizations to fit, in the registry's order.

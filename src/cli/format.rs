@@ -2,7 +2,8 @@
 
 use clap::{Args, ValueEnum};
 
-use super::{Exit, console};
+use super::arguments::{Arguments, FromArguments, from_arguments};
+use super::{Answer, Exit, console};
 use crate::report::study::StudyReport;
 use crate::report::tables;
 use crate::support::readable::count;
@@ -16,6 +17,9 @@ pub(super) enum Format {
     Text,
     /// One JSON document.
     Json,
+    /// Both, for a program that calls a verb as a function.
+    #[value(skip)]
+    Both,
 }
 
 /// The flag of every verb that prints tables.
@@ -33,43 +37,30 @@ impl FormatFlag {
         self.format == Format::Json
     }
 
-    /// Prints one of the two; only that one is built.
-    pub(super) fn print(self, text: impl FnOnce() -> String, json: impl FnOnce() -> Result<String>) -> Result<()> {
-        if console::captured().is_none() {
-            return match self.format {
-                Format::Text => console::print(&text()),
-                Format::Json => console::print_json(&json()?),
-            };
-        }
-        // The owner of what is captured gets both.
-        let document = json()?;
-        if self.is_json() {
-            console::print_json(&document)?
-        } else {
-            console::print(&text())?
-        }
-        console::captured().iter_mut().for_each(|captured| captured.document.clone_from(&document));
-        Ok(())
-    }
-
-    /// Like [`FormatFlag::print`], for results in a folder.
-    pub(super) fn print_results(
+    /// An answer with what is asked for; only that is built.
+    pub(super) fn answer(
         self,
+        exit: Exit,
         text: impl FnOnce() -> String,
         json: impl FnOnce() -> Result<String>,
-        out: &std::path::Path,
-    ) -> Result<()> {
-        self.print(text, json)?;
-        tracing::info!("results written to {}", out.display());
-        Ok(())
+    ) -> Result<Answer> {
+        let text = if self.format == Format::Json { String::new() } else { text() };
+        let document = if self.format == Format::Text { String::new() } else { json()? };
+        Ok(Answer { exit, text, document })
     }
 
-    /// Reports the plan that `--plan-only` wrote.
-    pub(super) fn print_plan(self, lanes: u64, path: &std::path::Path) -> Result<()> {
+    /// The answer about a plan that `--plan-only` wrote.
+    pub(super) fn planned(self, exit: Exit, lanes: u64, path: &std::path::Path) -> Result<Answer> {
         let text = || format!("{} lanes planned in {}\n", count(lanes), path.display());
-        self.print(text, || {
+        self.answer(exit, text, || {
             crate::report::records::document(&serde_json::json!({"lanes": lanes, "plan": path.display().to_string()}))
         })
+    }
+}
+
+impl FromArguments for FormatFlag {
+    fn from_arguments(_: &mut Arguments) -> Result<FormatFlag> {
+        Ok(FormatFlag { format: Format::Both })
     }
 }
 
@@ -80,6 +71,8 @@ pub(super) struct TablesFlag {
     #[arg(long, help_heading = "Output")]
     pub tables: bool,
 }
+
+from_arguments!(TablesFlag { tables });
 
 impl TablesFlag {
     /// Refuses the flag where it would have no effect.
@@ -96,23 +89,23 @@ impl TablesFlag {
         }
     }
 
-    /// Writes the files and prints the answer, or all tables.
+    /// Writes the files; the text is the answer, or all tables.
     pub(super) fn finish(
         self,
         mut report: StudyReport,
         results: Results,
         is_incomplete: bool,
         format: FormatFlag,
-    ) -> Result<Exit> {
+    ) -> Result<Answer> {
         let out = results.dir().to_path_buf();
         report.write(results)?;
         let width = console::width();
         let claims = if report.evaluation.claims.is_empty() { "" } else { ", claims" };
         let rest = format!("TTC, BTN, every interval{claims}: --tables, or report.html and report.txt.");
         let answer = || format!("{}{}\n", report.answer(width), tables::wrap(&rest, width));
-        format.print(|| if self.tables { report.text(width) } else { answer() }, || report.json())?;
         let page = out.join("report.html");
         tracing::info!("{} files written; start with {}", report.run.files.len() + 1, page.display());
-        Ok(if is_incomplete { Exit::Incomplete } else { Exit::Ok })
+        let exit = if is_incomplete { Exit::Incomplete } else { Exit::Ok };
+        format.answer(exit, || if self.tables { report.text(width) } else { answer() }, || report.json())
     }
 }

@@ -5,11 +5,12 @@ use std::time::Instant;
 
 use clap::Args;
 
+use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::source::SourceFlags;
-use super::{Exit, lists};
+use super::{Answer, Exit, lists};
 use crate::model::driver::ModelId;
 use crate::report::dossier::DossierReport;
 use crate::report::sampling::HostRecord;
@@ -63,8 +64,14 @@ pub(super) struct Justify {
     format: FormatFlag,
 }
 
+from_arguments!(
+    Justify { parameterization, models, author, out }
+    parsed { date: date }
+    groups { data, criterion, headways, format }
+);
+
 impl Justify {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Answer> {
         let started = Instant::now();
         let config = &configured.settings;
         let id = parameterization(&self.parameterization)?;
@@ -116,19 +123,19 @@ impl Justify {
             profile: &profile,
             author: self.author.clone(),
             date: self.date.clone(),
-            command: console::command_line(),
+            command: configured.command.clone(),
             host: HostRecord::of(&opened, dossier.summary.rechecked_lanes, started, configured.record(false)),
         };
         let files = report.write(folder.results()?)?;
-        self.format.print_results(|| report.text(), || report.json(&files), &self.out)?;
-        if !collection.problems.is_empty() || !dossier.left_out.is_empty() {
-            return Ok(Exit::Incomplete);
-        }
-        Ok(match dossier.conclusion {
+        tracing::info!("results written to {}", self.out.display());
+        let is_complete = collection.problems.is_empty() && dossier.left_out.is_empty();
+        let exit = match dossier.conclusion {
+            _ if !is_complete => Exit::Incomplete,
             Conclusion::Appropriate => Exit::Ok,
             Conclusion::NotAppropriate => Exit::NotAppropriate,
             Conclusion::Undecided => Exit::Undecided,
-        })
+        };
+        self.format.answer(exit, || report.text(), || report.json(&files))
     }
 }
 

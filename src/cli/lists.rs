@@ -3,6 +3,7 @@
 
 use clap::Args;
 
+use super::arguments::from_arguments;
 use super::source;
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
@@ -35,6 +36,8 @@ pub(super) struct CategoriesFlag {
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Scenario")]
     categories: Vec<String>,
 }
+
+from_arguments!(CategoriesFlag { categories });
 
 impl CategoriesFlag {
     /// In the order of every table.
@@ -74,6 +77,8 @@ pub(super) struct ParameterizationsFlag {
     parameterizations: Vec<String>,
 }
 
+from_arguments!(ParameterizationsFlag { parameterizations });
+
 impl ParameterizationsFlag {
     /// The parameterizations of the categories, in the registry's order.
     ///
@@ -105,6 +110,8 @@ pub(super) struct ModelsFlag {
     #[arg(long, value_name = "LIST", value_delimiter = ',', help = models_help(), help_heading = "Models and criteria")]
     models: Vec<String>,
 }
+
+from_arguments!(ModelsFlag { models });
 
 impl ModelsFlag {
     /// The models in the order of every table; all if none is named.
@@ -138,6 +145,8 @@ pub(super) struct HeadwaysFlag {
     thw: String,
 }
 
+from_arguments!(HeadwaysFlag { thw });
+
 impl HeadwaysFlag {
     /// The headways in the given order.
     ///
@@ -166,6 +175,8 @@ pub(super) struct CriterionFlag {
     #[arg(long, value_name = "collision|ttc|btn", default_value = "collision", help_heading = "Models and criteria")]
     criterion: String,
 }
+
+from_arguments!(CriterionFlag { criterion });
 
 impl CriterionFlag {
     /// The criterion.
@@ -198,6 +209,8 @@ pub(super) struct ExposureFlags {
     #[arg(long, value_name = "km", help_heading = "Data")]
     km: Option<f64>,
 }
+
+from_arguments!(ExposureFlags { hours, km });
 
 impl ExposureFlags {
     /// The given exposure, checked.

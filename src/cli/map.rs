@@ -5,11 +5,12 @@ use std::time::Instant;
 
 use clap::Args;
 
+use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::source::PlausibilityFlag;
-use super::{Exit, lists};
+use super::{Answer, Exit, lists};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::report::map::{MapHost, MapReport};
@@ -46,7 +47,7 @@ pub(super) struct Map {
     #[arg(long, value_name = "FILE", conflicts_with = "preset", help_heading = "Data")]
     distribution: Option<PathBuf>,
     /// With --distribution: map a parameter of the file to one of lanesweep, times a factor, or to `none`; repeatable
-    #[arg(long, value_name = "THEIRS=OURS[*FACTOR]", requires = "distribution", help_heading = "Scenario")]
+    #[arg(long, value_name = "THEIRS=OURS[*FACTOR]", help_heading = "Scenario")]
     rename: Vec<Rename>,
     /// Parameter of the x axis: NAME=FROM..TO/STEP or NAME=A,B,C
     ///
@@ -94,6 +95,12 @@ pub(super) struct Map {
     out: PathBuf,
 }
 
+from_arguments!(
+    Map { category, preset, distribution, x, y, panel, set, closing, native_gap, against, robust, reference, out }
+    each { rename: str::parse }
+    groups { models, criterion, plausibility, format }
+);
+
 const EXAMPLES: &str = "Examples (--help has the parameters and more):\n  \
                         lanesweep map cut-in --preset jrc --out maps\n  \
                         lanesweep map lvd --x deceleration_mps2=1..9/0.25 --y ego_speed_kmh=30..130/5 --set thw_s=1.2";
@@ -114,7 +121,7 @@ fn after_long_help() -> String {
 }
 
 impl Map {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Answer> {
         let category = Category::parse(&self.category).ok_or_else(|| {
             let problem = format!("there is no category `{}`", self.category);
             Error::usage(Place::item("CATEGORY"), problem, "use cut-in, cut-out or lvd")
@@ -155,11 +162,10 @@ impl Map {
         };
         let report = MapReport { grids, criterion, against, profile, preset: self.preset.clone(), host };
         let written = report.write(folder.results()?)?;
-        self.format.print(|| report.text(), || report.json(written.clone()))?;
         let (simulations, seconds) = (count(report.simulations()), value(report.host.sweep_s));
         tracing::info!("{simulations} simulations in {seconds} s on {}", report.host.backend);
         tracing::info!("{} files written to {}", written.len() + 1, self.out.display());
-        Ok(Exit::Ok)
+        self.format.answer(Exit::Ok, || report.text(), || report.json(written.clone()))
     }
 
     /// The preset's profile, unless another is set.

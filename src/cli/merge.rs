@@ -4,8 +4,9 @@ use std::path::PathBuf;
 
 use clap::Args;
 
-use super::Exit;
+use super::arguments::from_arguments;
 use super::format::{FormatFlag, TablesFlag};
+use super::{Answer, Exit};
 use crate::Result;
 use crate::report::run_record::StudyHost;
 use crate::report::sampling::{EstimateFile, HostRecord};
@@ -25,19 +26,22 @@ use crate::support::plain_text::quoted_word;
 pub(super) struct Merge {
     /// The run's folder
     #[arg(value_name = "DIR", help_heading = "Data")]
-    dir: PathBuf,
+    folder: PathBuf,
     #[command(flatten)]
     tables: TablesFlag,
     #[command(flatten)]
     format: FormatFlag,
 }
 
+from_arguments!(Merge { folder } groups { tables, format });
+
 impl Merge {
-    pub(super) fn run(&self) -> Result<Exit> {
+    pub(super) fn run(&self) -> Result<Answer> {
         self.tables.check(self.format)?;
-        let [plan, out] = [&self.dir.join(PLAN_FILE), &self.dir].map(|path| quoted_word(&path.display().to_string()));
+        let [plan, out] =
+            [&self.folder.join(PLAN_FILE), &self.folder].map(|path| quoted_word(&path.display().to_string()));
         let again = |verb: &str, shard| format!("lanesweep {verb} --plan {plan} --shard {shard} --out {out}");
-        let (folder, merged) = merge(&self.dir, &again)?;
+        let (folder, merged) = merge(&self.folder, &again)?;
         match merged {
             Merged::Study(merged) => {
                 let (study, result) = *merged;
@@ -49,8 +53,8 @@ impl Merge {
                 let host = HostRecord::of_parts(result.parts, result.rechecked_lanes);
                 let mut file = EstimateFile::of_sample(&sample, &result, host)?;
                 file.write(folder.results()?, &sample, &result)?;
-                self.format.print_results(|| file.text(), || file.json(), &self.dir)?;
-                Ok(Exit::Ok)
+                tracing::info!("results written to {}", self.folder.display());
+                self.format.answer(Exit::Ok, || file.text(), || file.json())
             }
         }
     }

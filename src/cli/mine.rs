@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
+use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::console::Verbosity;
 use super::source::{self, PlausibilityFlag, PresetFlag};
-use super::{Exit, console};
+use super::{Answer, Exit};
 use crate::Result;
 use crate::scenario::{DataProvenance, check_scenario_file, write_scenarios, write_scenarios_to};
 use crate::support::atomic_file::AtomicFile;
@@ -26,7 +27,7 @@ use crate::traffic::Source;
 pub(super) struct Mine {
     /// Folder of recordings, or a track file
     #[arg(value_name = "DIR", help_heading = "Data")]
-    dir: PathBuf,
+    recordings: PathBuf,
     #[command(flatten)]
     preset: PresetFlag,
     /// File to write, .jsonl or .parquet [default: standard output, JSON Lines]
@@ -39,6 +40,8 @@ pub(super) struct Mine {
     plausibility: PlausibilityFlag,
 }
 
+from_arguments!(Mine { recordings, out, kept } groups { preset, plausibility });
+
 /// Prevents a second process from writing the same file and its provenance file.
 fn lock_of(path: &Path) -> Result<FolderLock> {
     let name = path.file_name().unwrap_or_default().to_string_lossy();
@@ -46,20 +49,21 @@ fn lock_of(path: &Path) -> Result<FolderLock> {
 }
 
 impl Mine {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Answer> {
         if let Some(path) = &self.out {
-            source::refuse_recording(path, &self.dir, self.preset.preset.as_deref(), "--out")?;
+            source::refuse_recording(path, &self.recordings, self.preset.preset.as_deref(), "--out")?;
             check_scenario_file(path)?;
             source::refuse_overwriting(path, configured.files(), "--out")?;
             // Check before the work that the file can be written.
             AtomicFile::create(path).map(drop)?;
         }
         let _lock = self.out.as_deref().map(lock_of).transpose()?;
-        let from = Source::Recordings { path: self.dir.clone(), preset: self.preset.preset.clone() };
+        let from = Source::Recordings { path: self.recordings.clone(), preset: self.preset.preset.clone() };
         let mut collection = source::load(&from, &configured.settings.mining, self.plausibility.policy(), verbosity)?;
         if self.kept {
             collection.scenarios.retain(|s| s.kept);
         }
+        let exit = if collection.problems.is_empty() { Exit::Ok } else { Exit::Incomplete };
         match &self.out {
             Some(path) => {
                 // The provenance file belongs to this scenario file: remove the old one first, write the new one last.
@@ -73,13 +77,13 @@ impl Mine {
                 }
                 .write_beside(path, serde_json::json!(configured.record(false)))?;
                 tracing::info!("{} written to {}", counted(collection.scenarios.len(), "scenario"), path.display());
+                Ok(exit.into())
             }
             None => {
                 let mut text = Vec::new();
                 write_scenarios_to(&mut text, &collection.scenarios)?;
-                console::print_json(&String::from_utf8_lossy(&text))?;
+                Ok(Answer { document: String::from_utf8_lossy(&text).into_owned(), ..exit.into() })
             }
         }
-        Ok(if collection.problems.is_empty() { Exit::Ok } else { Exit::Incomplete })
     }
 }

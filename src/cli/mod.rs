@@ -1,6 +1,7 @@
 //! The command line: one file per verb. It parses the arguments; the library implements their meaning. Data goes to
 //! stdout, log and progress to stderr.
 
+mod arguments;
 mod case_flags;
 mod check;
 mod cluster;
@@ -109,6 +110,39 @@ enum Verb {
     Config(config::Config),
 }
 
+/// How a verb ended, and its answer.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct Answer {
+    /// The exit code; never one of an error.
+    pub exit: Exit,
+    /// For people; empty if only a document was asked for.
+    pub text: String,
+    /// The numbers of the text as one JSON document, or records as JSON Lines; empty if only the text was asked for.
+    pub document: String,
+}
+
+impl From<Exit> for Answer {
+    fn from(exit: Exit) -> Answer {
+        Answer { exit, text: String::new(), document: String::new() }
+    }
+}
+
+impl Answer {
+    /// Writes the answer to standard output.
+    fn print(&self) -> Result<()> {
+        if self.document.is_empty() { console::print(&self.text) } else { console::print_json(&self.document) }
+    }
+
+    /// The answer, or an error that follows it.
+    fn or_print(self, is_fine: bool, error: impl FnOnce() -> Error) -> Result<Answer> {
+        if is_fine {
+            return Ok(self);
+        }
+        self.print()?;
+        Err(error())
+    }
+}
+
 /// Parses the command line of the process, runs the verb and returns its exit code.
 pub fn main() -> ExitCode {
     main_with(&std::env::args_os().skip(1).collect::<Vec<_>>()).into()
@@ -117,7 +151,6 @@ pub fn main() -> ExitCode {
 /// Like [`main`], with the words after the program's name. For a process that does nothing else: it handles signals and
 /// starts the global thread pool.
 pub fn main_with(words: &[OsString]) -> Exit {
-    console::set_command_line(words);
     let matches = match configured::command().try_get_matches_from(with_program_name(words)) {
         Ok(matches) => matches,
         Err(mut error) => {
@@ -130,10 +163,12 @@ pub fn main_with(words: &[OsString]) -> Exit {
     }
     signals::install();
     run_and_report(|| {
-        let (cli, configured) = Configured::of(&matches)?;
+        let (cli, configured) = Configured::of(&matches, console::command_line(words))?;
         let requested = configured.settings.run.threads;
         pool_of(requested)?.build_global().map_err(|error| not_started(requested, &error))?;
-        run(&cli, &configured)
+        let answer = cli.verb.run(&configured, cli.common.verbosity())?;
+        answer.print()?;
+        Ok(answer.exit)
     })
 }
 
@@ -150,7 +185,7 @@ fn run_and_report(work: impl FnOnce() -> Result<Exit>) -> Exit {
 }
 
 /// Runs the work. A panic in any thread of the work is a defect of the program, not a user's error.
-fn without_panic(work: impl FnOnce() -> Result<Exit>) -> Result<Exit> {
+fn without_panic<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
     std::panic::catch_unwind(std::panic::AssertUnwindSafe(work)).unwrap_or_else(|_| {
         Err(Error::Internal(
             "the program panicked; see the message above. Existing files are complete; \
@@ -160,24 +195,26 @@ fn without_panic(work: impl FnOnce() -> Result<Exit>) -> Result<Exit> {
     })
 }
 
-fn run(cli: &Cli, configured: &Configured) -> Result<Exit> {
-    match &cli.verb {
-        Verb::Study(verb) => verb.run(configured, cli.common.verbosity()),
-        Verb::Tracks(verb) => verb.run(configured),
-        Verb::Mine(verb) => verb.run(configured, cli.common.verbosity()),
-        Verb::Fit(verb) => verb.run(configured, cli.common.verbosity()),
-        Verb::Sample(verb) => verb.run(configured, cli.common.verbosity()),
-        Verb::Search(verb) => verb.run(configured, cli.common.verbosity()),
-        Verb::Compare(verb) => verb.run(configured, cli.common.verbosity()),
-        Verb::Justify(verb) => verb.run(configured, cli.common.verbosity()),
-        Verb::Synth(verb) => verb.run(configured, cli.common.verbosity()),
-        Verb::Map(verb) => verb.run(configured, cli.common.verbosity()),
-        Verb::Simulate(verb) => verb.run(configured, cli.common.verbosity()),
-        Verb::Check(verb) => verb.run(configured),
-        Verb::Export(verb) => verb.run(configured),
-        Verb::Cluster(verb) => verb.run(),
-        Verb::Verify(verb) => verb.run(configured, cli.common.verbosity()),
-        Verb::Config(verb) => verb.run(configured),
+impl Verb {
+    fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Answer> {
+        match self {
+            Verb::Study(verb) => verb.run(configured, verbosity),
+            Verb::Tracks(verb) => verb.run(configured),
+            Verb::Mine(verb) => verb.run(configured, verbosity),
+            Verb::Fit(verb) => verb.run(configured, verbosity),
+            Verb::Sample(verb) => verb.run(configured, verbosity),
+            Verb::Search(verb) => verb.run(configured, verbosity),
+            Verb::Compare(verb) => verb.run(configured, verbosity),
+            Verb::Justify(verb) => verb.run(configured, verbosity),
+            Verb::Synth(verb) => verb.run(configured, verbosity),
+            Verb::Map(verb) => verb.run(configured, verbosity),
+            Verb::Simulate(verb) => verb.run(configured, verbosity),
+            Verb::Check(verb) => verb.run(configured),
+            Verb::Export(verb) => verb.run(configured),
+            Verb::Cluster(verb) => verb.run(),
+            Verb::Verify(verb) => verb.run(configured, verbosity),
+            Verb::Config(verb) => verb.run(configured),
+        }
     }
 }
 

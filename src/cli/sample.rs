@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::arguments::from_arguments;
 use super::format::FormatFlag;
 use super::lists;
 use super::shard_flags::ShardFlags;
@@ -50,22 +51,16 @@ pub struct Sample {
     /// OpenSCENARIO file with stochastic distributions, not a density
     ///
     /// Its numberOfTestRuns and randomSeed are the defaults of --samples and --seed.
-    #[arg(long, value_name = "FILE", requires = "category", conflicts_with_all = ["density", "plan", "given", "proposal", "map", "rows", "shard", "plan_only"], help_heading = "Data")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["density", "plan", "given", "proposal", "map", "rows", "shard", "plan_only"], help_heading = "Data")]
     pub(super) distribution: Option<PathBuf>,
     /// With --distribution: kind of scenario: cut-in, cut-out, lvd
-    #[arg(long, value_name = "NAME", requires = "distribution", help_heading = "Scenario", hide_short_help = true)]
+    #[arg(long, value_name = "NAME", help_heading = "Scenario", hide_short_help = true)]
     pub(super) category: Option<String>,
     /// With --distribution: map a parameter of the file to one of lanesweep, times a factor, or to `none`; repeatable
-    #[arg(
-        long,
-        value_name = "THEIRS=OURS[*FACTOR]",
-        requires = "distribution",
-        help_heading = "Scenario",
-        hide_short_help = true
-    )]
+    #[arg(long, value_name = "THEIRS=OURS[*FACTOR]", help_heading = "Scenario", hide_short_help = true)]
     pub(super) rename: Vec<Rename>,
     /// With --distribution: constant parameter; repeatable
-    #[arg(long, value_name = "NAME=VALUE", requires = "distribution", value_parser = given, help_heading = "Scenario", hide_short_help = true)]
+    #[arg(long, value_name = "NAME=VALUE", value_parser = given, help_heading = "Scenario", hide_short_help = true)]
     pub(super) set: Vec<(String, f64)>,
     #[command(flatten)]
     models: lists::ModelsFlag,
@@ -108,6 +103,13 @@ pub struct Sample {
     #[arg(skip)]
     pub(super) settings: SampleSettings,
 }
+
+from_arguments!(
+    Sample { density, distribution, category, thw, map, rows, proposal, other_profile, simultaneous, out }
+    each { rename: str::parse, set: given, given: given }
+    groups { models, plausibility, format, shards }
+    others { settings: SampleSettings::default() }
+);
 
 impl Sample {
     /// The headways of `--thw`, unless they are sampled.

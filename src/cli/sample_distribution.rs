@@ -4,11 +4,11 @@ use std::fmt::Write;
 use std::path::Path;
 use std::time::Instant;
 
-use super::Exit;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::sample::Sample;
 use super::sample_options::only_crude;
+use super::{Answer, Exit};
 use crate::cli::settings::{EstimatorKind, PointKind};
 use crate::engine::Headway;
 use crate::report::openscenario::{DistributionSamples, SampledFile};
@@ -37,7 +37,7 @@ pub(super) fn run(
     path: &Path,
     started: Instant,
     verbosity: Verbosity,
-) -> Result<Exit> {
+) -> Result<Answer> {
     let settings = &flags.settings;
     if settings.estimator == EstimatorKind::Is {
         return Err(only_crude("--distribution"));
@@ -133,8 +133,8 @@ pub(super) fn run(
     file.add_worst(&mut results, &worst, &options, &names)?;
     results.add(DISTRIBUTION_FILE, &sampled.to_json()?)?;
     file.publish(results, Vec::new())?;
-    flags.format.print_results(|| file.text(), || file.json(), &flags.out)?;
-    Ok(Exit::Ok)
+    tracing::info!("results written to {}", flags.out.display());
+    flags.format.answer(Exit::Ok, || file.text(), || file.json())
 }
 
 /// Checks the fixed values and the quartiles of the distributions; the tails are truncated anyway.

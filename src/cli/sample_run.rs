@@ -9,7 +9,7 @@ use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::sample::Sample;
 use super::sample_options::{guard, only_crude};
-use super::{Exit, sample_distribution};
+use super::{Answer, Exit, sample_distribution};
 use crate::engine::{Chunk, Executor, OpenBackend};
 use crate::model::profile::Profile;
 use crate::report::lanes;
@@ -29,7 +29,7 @@ use crate::{Error, Place, Result};
 const FEW_SCENARIOS: f64 = 5.0;
 
 impl Sample {
-    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
+    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Answer> {
         let started = Instant::now();
         self.check()?;
         self.shards.start()?;
@@ -84,7 +84,7 @@ impl Sample {
         self.check()?;
         let Some(density) = &self.density else {
             return Err(Error::usage(
-                Place::item("DENSITY"),
+                Place::item("`density`"),
                 "there is none",
                 "give a file that `lanesweep fit` wrote",
             ));
@@ -108,7 +108,7 @@ impl Sample {
         configured: &Configured,
         started: Instant,
         verbosity: Verbosity,
-    ) -> Result<Exit> {
+    ) -> Result<Answer> {
         let executor = opened.executor().with_recheck(sample.options.seed);
         let is_split = self.shards.plan_only || self.shards.is_part();
         let sample = match &sample.kind {
@@ -131,8 +131,7 @@ impl Sample {
             sample.write_plan(&self.out)?;
         }
         if self.shards.plan_only {
-            self.format.print_plan(sample.lane_count(), &self.out.join(PLAN_FILE))?;
-            return Ok(Exit::Ok);
+            return self.format.planned(Exit::Ok, sample.lane_count(), &self.out.join(PLAN_FILE));
         }
         self.run_split(&sample, (opened, other), &executor, configured, started, verbosity)
     }
@@ -146,12 +145,12 @@ impl Sample {
         configured: &Configured,
         started: Instant,
         verbosity: Verbosity,
-    ) -> Result<Exit> {
+    ) -> Result<Answer> {
         warn(sample)?;
         // Rows are written during the run, so a run with rows cannot resume.
         let Some(mut run) = sample.open(&self.out, self.shards.shard, self.rows.is_none())? else {
             tracing::info!("this part exists already and is complete");
-            return Ok(Exit::Ok);
+            return Ok(Exit::Ok.into());
         };
         let missing = run.missing()?;
         tracing::info!("{} samples on {}", count(missing), executor.backend.describe());
@@ -177,7 +176,7 @@ impl Sample {
         if self.shards.is_part() {
             rows.map_or(Ok(()), StagedFile::publish)?;
             run.write_part()?;
-            return Ok(Exit::Ok);
+            return Ok(Exit::Ok.into());
         }
         let mut result = run.take_result()?;
         if let Some(half_width) = self.settings.half_width.filter(|_| self.is_refined()) {
@@ -208,9 +207,9 @@ impl Sample {
         let host = HostRecord::of(opened, result.rechecked_lanes, started, settings);
         let mut results = run.results()?;
         rows.into_iter().for_each(|table| results.join(table));
-        let exit = write(sample, &result, host, results, self.format)?;
+        let answer = write(sample, &result, host, results, self.format)?;
         run.close()?;
-        Ok(exit)
+        Ok(answer)
     }
 }
 
@@ -257,17 +256,17 @@ fn warn(sample: &sampling::Sample) -> Result<()> {
     Ok(())
 }
 
-/// Writes and prints the result.
+/// Writes the result.
 fn write(
     sample: &sampling::Sample,
     result: &SampleResult,
     host: HostRecord,
     results: Results,
     format: FormatFlag,
-) -> Result<Exit> {
+) -> Result<Answer> {
     let out = results.dir().to_path_buf();
     let mut file = EstimateFile::of_sample(sample, result, host)?;
     file.write(results, sample, result)?;
-    format.print_results(|| file.text(), || file.json(), &out)?;
-    Ok(Exit::Ok)
+    tracing::info!("results written to {}", out.display());
+    format.answer(Exit::Ok, || file.text(), || file.json())
 }

@@ -5,11 +5,12 @@ use std::time::Instant;
 
 use clap::Args;
 
+use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::source::{self, SourceFlags};
-use super::{Exit, lists};
+use super::{Answer, Exit, lists};
 use crate::report::sampling::HostRecord;
 use crate::report::search::SearchReport;
 use crate::run::parts::Shard;
@@ -65,8 +66,14 @@ pub(super) struct Search {
     format: FormatFlag,
 }
 
+from_arguments!(
+    Search { held_out, category, objective, shuffled, out }
+    parsed { shard: str::parse }
+    groups { data, models, criterion, headways, format }
+);
+
 impl Search {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Answer> {
         let started = Instant::now();
         let config = &configured.settings;
         let [category] = source::categories(std::slice::from_ref(&self.category), "--category")?[..] else {
@@ -122,7 +129,7 @@ impl Search {
         bar.finish_and_clear();
         let Some(result) = result? else {
             tracing::info!("the candidates of this part are in {}", self.out.display());
-            return Ok(Exit::Ok);
+            return Ok(Exit::Ok.into());
         };
         for (model, failing) in &result.left_out {
             tracing::warn!("{} is left out: S fails in {failing} scenarios only", model.name());
@@ -141,12 +148,13 @@ impl Search {
             scenarios_sha256: [sha256].into_iter().chain(held_out.map(|(.., sha256)| sha256)).collect(),
             synthetic: collection.synthetic,
             profile: &profile,
-            command: console::command_line(),
+            command: configured.command.clone(),
             host: HostRecord::of(&opened, 0, started, configured.record(false)),
         };
         let files = report.write(folder.results()?)?;
-        self.format.print_results(|| report.text(), || report.json(&files), &self.out)?;
-        Ok(if collection.problems.is_empty() { Exit::Ok } else { Exit::Incomplete })
+        tracing::info!("results written to {}", self.out.display());
+        let exit = if collection.problems.is_empty() { Exit::Ok } else { Exit::Incomplete };
+        self.format.answer(exit, || report.text(), || report.json(&files))
     }
 
     /// The scenarios that the search does not read, their description, and their checksum.

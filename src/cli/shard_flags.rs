@@ -4,6 +4,7 @@ use std::path::PathBuf;
 
 use clap::Args;
 
+use super::arguments::from_arguments;
 use super::signals::CANCEL;
 use crate::run::parts::Shard;
 use crate::{Error, Place, Result};
@@ -26,6 +27,8 @@ pub(super) struct ShardFlags {
     #[arg(long, value_name = "s", help_heading = "Run", hide_short_help = true)]
     pub stop_after: Option<f64>,
 }
+
+from_arguments!(ShardFlags { plan, plan_only, stop_after } parsed { shard: str::parse });
 
 impl ShardFlags {
     /// Starts the time limit of --stop-after.

@@ -7,7 +7,7 @@ use clap::Args;
 use clap_complete::Shell;
 
 use super::configured::command;
-use super::{Exit, console};
+use super::{Answer, Exit};
 use crate::support::files::{make_folder, write_inside};
 use crate::{Error, Result};
 
@@ -24,12 +24,11 @@ pub(super) struct Completions {
 }
 
 impl Completions {
-    pub(super) fn run(&self) -> Result<Exit> {
+    pub(super) fn run(&self) -> Result<Answer> {
         let mut text = Vec::new();
         clap_complete::generate(self.shell, &mut command(), "lanesweep", &mut text);
         let text = String::from_utf8(text).map_err(|e| Error::Internal(format!("completions are no text: {e}")))?;
-        console::print(&text)?;
-        Ok(Exit::Ok)
+        Ok(Answer { text, ..Exit::Ok.into() })
     }
 }
 
@@ -53,7 +52,7 @@ pub(super) struct Man {
 }
 
 impl Man {
-    pub(super) fn run(&self) -> Result<Exit> {
+    pub(super) fn run(&self) -> Result<Answer> {
         make_folder(&self.dir)?;
         let mut program = command();
         // Adds global flags and versions to the verbs.
@@ -69,6 +68,6 @@ impl Man {
             written += 1;
         }
         tracing::info!("{written} pages written to {}", self.dir.display());
-        Ok(Exit::Ok)
+        Ok(Exit::Ok.into())
     }
 }

@@ -4,12 +4,13 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::Exit;
+use super::arguments::from_arguments;
 use super::case_flags::{CaseFlags, GivenCase, from_table, from_toml, time_s};
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::source::{PlausibilityFlag, refuse_overwriting, scenarios_of};
+use super::{Answer, Exit};
 use crate::report::openscenario::reopen;
 use crate::report::trace::TraceReport;
 use crate::run::reopen::{Reopened, TracedLanes};
@@ -43,13 +44,13 @@ pub(super) struct Simulate {
     #[arg(long, value_name = "N", help_heading = "Data")]
     row: Option<usize>,
     /// Scenario file (.jsonl, .parquet, .csv) for --lane
-    #[arg(long, value_name = "FILE", requires = "lane", help_heading = "Data")]
+    #[arg(long, value_name = "FILE", help_heading = "Data")]
     scenarios: Option<PathBuf>,
     /// Folder (--out) of a study or sample, for --lane
     ///
     /// Repeats that lane with the run's profile and options, bit for bit, and reports whether f64 gives another
     /// outcome.
-    #[arg(long, value_name = "DIR", requires = "lane", conflicts_with_all = ["scenarios", "case_file", "table", "profile", "dt"], help_heading = "Data")]
+    #[arg(long, value_name = "DIR", conflicts_with_all = ["scenarios", "case_file", "table", "profile", "dt"], help_heading = "Data")]
     from: Option<PathBuf>,
     /// Lane key: scenario/variant/headway/model
     #[arg(long, value_name = "KEY", help_heading = "Data")]
@@ -57,7 +58,7 @@ pub(super) struct Simulate {
     /// Also simulate other variants of the lane's scenario
     ///
     /// S (the recorded scenario; the default without a value), keys of parameterizations, or all.
-    #[arg(long, value_name = "VARIANTS", requires = "lane", value_delimiter = ',', num_args = 0..=1, default_missing_value = "S", help_heading = "Scenario")]
+    #[arg(long, value_name = "VARIANTS", value_delimiter = ',', num_args = 0..=1, default_missing_value = "S", help_heading = "Scenario")]
     compare: Vec<String>,
     /// Also draw the time series
     ///
@@ -65,7 +66,7 @@ pub(super) struct Simulate {
     #[arg(long, value_name = "FILE.svg", help_heading = "Output")]
     plot: Option<PathBuf>,
     /// End of the figure's time axis [default: 2 s after the last change]
-    #[arg(long, value_name = "s", value_parser = time_s, requires = "plot", help_heading = "Output", hide_short_help = true)]
+    #[arg(long, value_name = "s", value_parser = time_s, help_heading = "Output", hide_short_help = true)]
     plot_end: Option<f64>,
     #[command(flatten)]
     plausibility: PlausibilityFlag,
@@ -73,8 +74,14 @@ pub(super) struct Simulate {
     format: FormatFlag,
 }
 
+from_arguments!(
+    Simulate { case_file, table, row, scenarios, from, lane, compare, plot }
+    parsed { plot_end: time_s }
+    groups { case, plausibility, format }
+);
+
 impl Simulate {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Answer> {
         self.guard_plot()?;
         let (lanes, incomplete) = self.lanes(configured)?;
         let report = TraceReport(&lanes);
@@ -83,11 +90,12 @@ impl Simulate {
             make_folder_of(path)?;
             write_atomically(path, report.figure(self.plot_end).svg().as_bytes())?;
         }
-        self.format.print(|| report.csv(), || report.json())?;
+        let exit = if incomplete { Exit::Incomplete } else { Exit::Ok };
+        let answer = self.format.answer(exit, || report.csv(), || report.json())?;
         if verbosity != Verbosity::Quiet {
             console::say(&report.text());
         }
-        Ok(if incomplete { Exit::Incomplete } else { Exit::Ok })
+        Ok(answer)
     }
 
     /// The lanes, and whether others of the file were skipped.

@@ -5,6 +5,7 @@ use std::path::{Path, PathBuf};
 use clap::Args;
 use indicatif::ProgressBar;
 
+use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::signals::CANCEL;
@@ -72,6 +73,8 @@ pub(super) struct PlausibilityFlag {
     accept_implausible: bool,
 }
 
+from_arguments!(PlausibilityFlag { accept_implausible });
+
 impl PlausibilityFlag {
     /// The policy for readers.
     pub(super) fn policy(self) -> Implausible {
@@ -83,9 +86,11 @@ impl PlausibilityFlag {
 #[derive(Debug, Clone, Args)]
 pub(super) struct PresetFlag {
     /// Format of the recordings: exid, sumo-fcd, … or a TOML file [default: detected]
-    #[arg(long, value_name = "NAME|FILE", requires = "dir", help_heading = "Data", hide_short_help = true)]
+    #[arg(long, value_name = "NAME|FILE", help_heading = "Data", hide_short_help = true)]
     pub preset: Option<String>,
 }
+
+from_arguments!(PresetFlag { preset });
 
 /// Where a verb's data come from.
 #[derive(Debug, Clone, Args)]
@@ -94,7 +99,7 @@ pub(super) struct SourceFlags {
     ///
     /// highD's format, or that of a preset, which the names of the columns tell; see `lanesweep tracks`.
     #[arg(value_name = "DIR", conflicts_with = "scenarios", help_heading = "Data")]
-    pub dir: Option<PathBuf>,
+    pub recordings: Option<PathBuf>,
     #[command(flatten)]
     pub preset: PresetFlag,
     /// Scenario file (.jsonl, .parquet, .csv) instead of recordings
@@ -104,10 +109,12 @@ pub(super) struct SourceFlags {
     plausibility: PlausibilityFlag,
 }
 
+from_arguments!(SourceFlags { recordings, scenarios } groups { preset, plausibility });
+
 impl SourceFlags {
     /// The named source; the generator if none is named.
     pub(super) fn source(&self, configured: &Configured) -> Source {
-        match (&self.dir, &self.scenarios) {
+        match (&self.recordings, &self.scenarios) {
             (Some(dir), _) => Source::Recordings { path: dir.clone(), preset: self.preset.preset.clone() },
             (None, Some(path)) => Source::Scenarios(path.clone()),
             (None, None) => Source::Generated(configured.settings.generator.clone()),

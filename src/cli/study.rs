@@ -5,12 +5,13 @@ use std::time::Instant;
 
 use clap::Args;
 
+use super::arguments::{choices, from_arguments};
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::{FormatFlag, TablesFlag};
 use super::shard_flags::ShardFlags;
 use super::source::{self, SourceFlags};
-use super::{Exit, lists};
+use super::{Answer, Exit, lists};
 use crate::Result;
 use crate::engine::{Chunk, Headway, LanePlan, OpenBackend};
 use crate::report::lanes::{StudyRows, table_format};
@@ -31,7 +32,7 @@ use crate::traffic::Source;
 /// generated recordings. The answer goes to stdout, tables and figures to --out.
 #[derive(Debug, Args)]
 #[command(mut_args(|arg| match arg.get_id().as_str() {
-    "dir" | "scenarios" | "accept_implausible" | "categories" | "models" | "thw" | "published" | "reference"
+    "recordings" | "scenarios" | "accept_implausible" | "categories" | "models" | "thw" | "published" | "reference"
     | "cross_validate" | "external" => {
         arg.conflicts_with("plan")
     }
@@ -89,6 +90,12 @@ pub(super) struct Study {
     shards: ShardFlags,
 }
 
+from_arguments!(
+    Study { out, rows, published, reference, compare_reference, keep_plan, cross_validate, external }
+    groups { data, categories, models, headways, tables, format, shards }
+);
+choices!(KeepPlan);
+
 /// When a run in one piece leaves its plan.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
 enum KeepPlan {
@@ -112,7 +119,7 @@ impl KeepPlan {
 }
 
 impl Study {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Answer> {
         self.guard_inputs(configured)?;
         check_folder(&self.out)?;
         self.rows.as_deref().map_or(Ok(()), check_folder_of)?;
@@ -132,8 +139,8 @@ impl Study {
             }
             let (study, _) = self.prepare(configured, verbosity)?;
             study.write_plan(&self.out)?;
-            self.format.print_plan(study.plan().lane_count(), &self.out.join(PLAN_FILE))?;
-            return Ok(if study.facts().incomplete { Exit::Incomplete } else { Exit::Ok });
+            let exit = if study.facts().incomplete { Exit::Incomplete } else { Exit::Ok };
+            return self.format.planned(exit, study.plan().lane_count(), &self.out.join(PLAN_FILE));
         }
         // Open before the work, so that a missing device is reported at once.
         let opened = if self.reference { configured.open_reference()? } else { configured.open()? };
@@ -198,7 +205,7 @@ impl Study {
         configured: &Configured,
         mut timings: Timings,
         verbosity: Verbosity,
-    ) -> Result<Exit> {
+    ) -> Result<Answer> {
         let plan = study.plan();
         let backend = opened.backend();
         let executor = opened.executor().with_recheck(study.facts().score.seed);
@@ -208,7 +215,7 @@ impl Study {
         // Open before the work, so that an unwritable folder is reported at once.
         let Some(mut run) = study.open(&self.out, self.shards.shard)? else {
             tracing::info!("this part exists already and is complete");
-            return Ok(Exit::Ok);
+            return Ok(Exit::Ok.into());
         };
         let units = run.units();
         let lanes = plan.first_lane_of(units.end) - plan.first_lane_of(units.start);
@@ -223,7 +230,7 @@ impl Study {
         bar.finish_and_clear();
         if self.shards.is_part() {
             run.write_part()?;
-            return Ok(Exit::Ok);
+            return Ok(Exit::Ok.into());
         }
         let StudyResult { counts, summary: swept, .. } = run.take_result()?;
         let mut results = run.results()?;
@@ -243,9 +250,9 @@ impl Study {
         };
         self.leave_plan(study, &mut results)?;
         let report = StudyReport::of(study, &counts, comparison, host)?;
-        let exit = self.tables.finish(report, results, study.facts().incomplete, self.format)?;
+        let answer = self.tables.finish(report, results, study.facts().incomplete, self.format)?;
         run.close()?;
-        Ok(exit)
+        Ok(answer)
     }
 
     /// Keeps the plan for `simulate --from`.
@@ -276,7 +283,7 @@ impl Study {
         source::refuse_overwriting(lanes, &others, "--rows")?;
         table_format(lanes)?;
         self.data
-            .dir
+            .recordings
             .as_deref()
             .map_or(Ok(()), |dir| source::refuse_recording(lanes, dir, self.data.preset.preset.as_deref(), "--rows"))
     }

@@ -4,10 +4,11 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::Exit;
+use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::source;
+use super::{Answer, Exit};
 use crate::support::files::check_folder;
 use crate::support::run_dir::{OutputDir, unfinished};
 use crate::traffic::Source;
@@ -23,24 +24,26 @@ use crate::{Error, Place, Result};
 pub(super) struct Synth {
     /// Folder for the recordings; created if it does not exist
     #[arg(value_name = "DIR", help_heading = "Data")]
-    dir: PathBuf,
+    folder: PathBuf,
 }
 
+from_arguments!(Synth { folder });
+
 impl Synth {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Answer> {
         let options = &configured.settings.generator;
-        check_folder(&self.dir)?;
-        let folder = OutputDir::open(&self.dir, SYNTHETIC_MARKER)?;
+        check_folder(&self.folder)?;
+        let folder = OutputDir::open(&self.folder, SYNTHETIC_MARKER)?;
         // Files that a killed run was renaming are written anew.
-        let unfinished = unfinished(&self.dir).unwrap_or_default();
+        let unfinished = unfinished(&self.folder).unwrap_or_default();
         let is_unfinished = |tracks: &Path| unfinished.iter().any(|name| tracks.ends_with(name));
         let taken = |id: &str| {
-            let tracks = HighdFiles::named(&self.dir, id).tracks;
+            let tracks = HighdFiles::named(&self.folder, id).tracks;
             tracks.exists() && !is_unfinished(&tracks)
         };
         if let Some(id) = (1..=options.recordings).map(|k| format!("{k:02}")).find(|id| taken(id)) {
             return Err(Error::usage(
-                Place::file(&self.dir),
+                Place::file(&self.folder),
                 format!("it already holds a recording `{id}`, which would be overwritten"),
                 "choose an empty folder",
             ));
@@ -51,7 +54,7 @@ impl Synth {
         let bar = console::progress(verbosity, options.recordings as u64, "writing recordings");
         for index in 0..options.recordings {
             let recording = generate_one(options, index)?;
-            let staged = highd::stage(&self.dir, &recording, &RecordingInfo::default())?;
+            let staged = highd::stage(&self.folder, &recording, &RecordingInfo::default())?;
             staged.into_iter().for_each(|file| results.join(file.closed()));
             source::advance(&bar)?;
         }
@@ -59,7 +62,7 @@ impl Synth {
         // A part of the recordings could be mistaken for all of them, or for real data. All are therefore renamed
         // together, the marker file last.
         results.publish(marker.as_bytes())?;
-        tracing::info!("{} synthetic recordings written to {}", options.recordings, self.dir.display());
-        Ok(Exit::Ok)
+        tracing::info!("{} synthetic recordings written to {}", options.recordings, self.folder.display());
+        Ok(Exit::Ok.into())
     }
 }

@@ -5,9 +5,10 @@ use std::path::{Path, PathBuf};
 
 use clap::Args;
 
-use super::Exit;
+use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::format::FormatFlag;
+use super::{Answer, Exit};
 use crate::report::tracks::{TrackReport, across, report_text, space_time};
 use crate::scenario::{ScenarioFile, usable};
 use crate::support::files::{check_folder, write_atomically};
@@ -50,8 +51,10 @@ pub(super) struct Tracks {
     format: FormatFlag,
 }
 
+from_arguments!(Tracks { paths, preset, write_preset, out, convert } groups { format });
+
 impl Tracks {
-    pub(super) fn run(&self, configured: &Configured) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured) -> Result<Answer> {
         if let Some(path) = &self.write_preset {
             return self.write_draft(path);
         }
@@ -86,7 +89,7 @@ impl Tracks {
             }
         }
         if reports.is_empty() {
-            return Ok(Exit::BadInput);
+            return Ok(Exit::BadInput.into());
         }
         if let Some(out) = &self.out {
             write_figures(out, &reports, &recordings)?;
@@ -98,11 +101,10 @@ impl Tracks {
             serde_json::to_string_pretty(&reports).map_err(|error| Error::Internal(format!("tracks as JSON: {error}")))
         };
         let text = || report_text(&reports);
-        self.format.print(text, json)?;
-        Ok(if is_complete { Exit::Ok } else { Exit::Incomplete })
+        self.format.answer(if is_complete { Exit::Ok } else { Exit::Incomplete }, text, json)
     }
 
-    fn write_draft(&self, path: &Path) -> Result<Exit> {
+    fn write_draft(&self, path: &Path) -> Result<Answer> {
         let [file] = &self.paths[..] else {
             let problem = "one file is needed for a preset";
             return Err(Error::usage(Place::item("--write-preset"), problem, "name one track file"));
@@ -118,7 +120,7 @@ impl Tracks {
             path.display(),
             path.display()
         );
-        Ok(Exit::Ok)
+        Ok(Exit::Ok.into())
     }
 
     fn of_file(&self, file: &InputFile, configured: &Configured) -> Result<Vec<(TrackReport, Recording)>> {

@@ -7,7 +7,7 @@ use super::console::{self, Verbosity};
 use super::devices::Devices;
 use super::format::FormatFlag;
 use super::source::SourceFlags;
-use super::{Exit, lists};
+use super::{Answer, Exit, lists};
 use crate::engine::verify::{RandomOptions, ThresholdOptions, compare, random_plan, threshold_plan};
 use crate::engine::{Backend, LanePlan, LaneRunner, Wanted};
 use crate::model::profile::Profile;
@@ -59,7 +59,7 @@ enum VerifyVerb {
 const MAX_LANES: u64 = 100_000_000;
 
 impl Verify {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Exit> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Answer> {
         match &self.verb {
             Some(VerifyVerb::Devices(verb)) => return verb.run(),
             None => (),
@@ -104,8 +104,8 @@ impl Verify {
         } else {
             format!("{} DIFFER from the CPU's", count(differing))
         };
-        let text = || format!("\n{} lanes, all computed by the backend under test: {found}.\n", count(lanes));
-        self.format.print(text, || {
+        let text = format!("\n{} lanes, all computed by the backend under test: {found}.\n", count(lanes));
+        let json = || {
             records::document(&serde_json::json!({
                 "under_test": tested.describe(),
                 "profile": profile.name,
@@ -115,12 +115,9 @@ impl Verify {
                 "differing": differing,
                 "sets": sets,
             }))
-        })?;
-        if equal {
-            Ok(Exit::Ok)
-        } else {
-            Err(Error::Verification(format!("results of {} differ from the CPU's", tested.describe())))
-        }
+        };
+        let differs = || Error::Verification(format!("results of {} differ from the CPU's", tested.describe()));
+        self.format.answer(Exit::Ok, || text, json)?.or_print(equal, differs)
     }
 
     /// The sets with their names.
@@ -171,7 +168,7 @@ impl Verify {
         profile: &Profile,
         tested: &dyn Backend,
         verbosity: Verbosity,
-    ) -> Result<Exit> {
+    ) -> Result<Answer> {
         // The keys of the generated sets contain their seed; a user's scenario may start with the same prefix.
         let own = |prefix: &str| text.starts_with(prefix) && text.contains(&format!("-seed{}-", self.seed));
         let plan = match () {
@@ -196,7 +193,8 @@ impl Verify {
         let names = ["f64 reference", "CPU, f32", "under test"];
         let is_equal = crate::engine::same_words(&cpu, &theirs);
         let outcomes = [reference, cpu, theirs];
-        self.format.print(
+        let answer = self.format.answer(
+            Exit::Ok,
             || format!("Under test: {}\n{}", tested.describe(), verification::lane(text, names, &outcomes)),
             || {
                 let [reference, cpu, theirs] = outcomes.map(|o| records::outcome(&o, plan.profile.frame.dt_s));
@@ -208,6 +206,6 @@ impl Verify {
                 }))
             },
         )?;
-        if is_equal { Ok(Exit::Ok) } else { Err(Error::Verification(format!("lane {text} differs from the CPU's"))) }
+        answer.or_print(is_equal, || Error::Verification(format!("lane {text} differs from the CPU's")))
     }
 }

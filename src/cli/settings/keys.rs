@@ -6,6 +6,7 @@ use serde_json::{Number, Value};
 use toml::de::DeValue;
 
 use super::schema::settings_schema;
+use crate::cli::arguments::Value as Given;
 use crate::support::plain_text;
 use crate::support::ranges::Range;
 use crate::{Error, Place, Result};
@@ -160,6 +161,20 @@ pub(super) fn from_word(key: &Key, word: &str, place: Place) -> Result<Value> {
         },
     };
     value.and_then(|value| fitted(key, value)).ok_or_else(|| refused(key, &format!("`{word}`"), place))
+}
+
+/// Converts an argument's value to a value of a key.
+///
+/// # Errors
+/// As [`from_toml`].
+pub(super) fn from_value(key: &Key, given: &Given, place: Place) -> Result<Value> {
+    let value = match given {
+        Given::Boolean(is_so) => Some(Value::Bool(*is_so)),
+        Given::Whole(n) => whole(*n),
+        Given::Number(x) => Number::from_f64(*x).map(Value::Number),
+        Given::Text(_) | Given::List(_) | Given::Table(_) => None,
+    };
+    value.and_then(|value| fitted(key, value)).ok_or_else(|| refused(key, &format!("`{given}`"), place))
 }
 
 /// Formats a value as TOML.

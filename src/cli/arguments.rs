@@ -1,0 +1,372 @@
+//! Arguments of a verb as values: what a program gives that calls the verb as a function. Names, defaults and what excludes what are
+//! those of the command line's definition.
+
+use std::collections::BTreeMap;
+use std::ffi::OsString;
+use std::fmt;
+use std::path::PathBuf;
+
+use clap::{Arg, Command, ValueEnum};
+
+use crate::support::plain_text::nearest;
+use crate::{Error, Place, Result};
+
+/// A value. Its [`Display`](fmt::Display) is Python's notation.
+#[derive(Debug, Clone, PartialEq)]
+pub enum Value {
+    /// True or false.
+    Boolean(bool),
+    /// A whole number.
+    Whole(i128),
+    /// A number.
+    Number(f64),
+    /// A text or a path.
+    Text(OsString),
+    /// Several values.
+    List(Vec<Value>),
+    /// Names with their values.
+    Table(Vec<(String, Value)>),
+}
+
+impl Value {
+    /// The value in the notation of the option's texts: `2,3` for a list, `gap_m=15` for a name with its value.
+    fn text(&self) -> std::result::Result<String, String> {
+        Ok(match self {
+            Value::Boolean(is_so) => is_so.to_string(),
+            Value::Whole(n) => n.to_string(),
+            Value::Number(x) => x.to_string(),
+            Value::Text(text) => text.to_str().ok_or("this is not Unicode")?.to_owned(),
+            Value::List(values) => {
+                values.iter().map(Value::text).collect::<std::result::Result<Vec<_>, _>>()?.join(",")
+            }
+            Value::Table(_) => self.texts()?.join(","),
+        })
+    }
+
+    /// One text per value.
+    fn texts(&self) -> std::result::Result<Vec<String>, String> {
+        match self {
+            Value::List(values) => values.iter().map(Value::text).collect(),
+            Value::Table(rows) => rows.iter().map(|(name, value)| Ok(format!("{name}={}", value.text()?))).collect(),
+            one => Ok(vec![one.text()?]),
+        }
+    }
+}
+
+impl fmt::Display for Value {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Value::Boolean(is_so) => f.write_str(if *is_so { "True" } else { "False" }),
+            Value::Whole(n) => write!(f, "{n}"),
+            Value::Number(x) => write!(f, "{x:?}"),
+            Value::Text(text) => write!(f, "{:?}", text.to_string_lossy()),
+            Value::List(values) => {
+                let values: Vec<String> = values.iter().map(Value::to_string).collect();
+                write!(f, "[{}]", values.join(", "))
+            }
+            Value::Table(rows) => {
+                let rows: Vec<String> = rows.iter().map(|(name, value)| format!("{name:?}: {value}")).collect();
+                write!(f, "{{{}}}", rows.join(", "))
+            }
+        }
+    }
+}
+
+/// A type that an argument's value becomes.
+pub(super) trait FromValue: Sized {
+    /// Without the argument; `None` if the definition's default counts, or the argument is required.
+    fn absent() -> Option<Self> {
+        None
+    }
+
+    /// # Errors
+    /// What is expected instead.
+    fn of(value: Value) -> std::result::Result<Self, String>;
+}
+
+impl FromValue for bool {
+    fn absent() -> Option<Self> {
+        Some(false)
+    }
+
+    fn of(value: Value) -> std::result::Result<Self, String> {
+        match value {
+            Value::Boolean(is_so) => Ok(is_so),
+            other => Err(format!("{other} is neither True nor False")),
+        }
+    }
+}
+
+impl FromValue for usize {
+    fn of(value: Value) -> std::result::Result<Self, String> {
+        let whole = match &value {
+            Value::Whole(n) => usize::try_from(*n).ok(),
+            Value::Number(_) | Value::Text(_) => super::lists::whole(&value.text()?).ok(),
+            _ => None,
+        };
+        whole.ok_or_else(|| format!("{value} is not a whole number from 0"))
+    }
+}
+
+impl FromValue for f64 {
+    fn of(value: Value) -> std::result::Result<Self, String> {
+        let number = match &value {
+            Value::Whole(n) => Some(*n as f64),
+            Value::Number(x) => Some(*x),
+            Value::Text(_) => value.text()?.trim().parse().ok(),
+            _ => None,
+        };
+        number.ok_or_else(|| format!("{value} is not a number"))
+    }
+}
+
+impl FromValue for String {
+    fn of(value: Value) -> std::result::Result<Self, String> {
+        value.text()
+    }
+}
+
+impl FromValue for PathBuf {
+    fn of(value: Value) -> std::result::Result<Self, String> {
+        match value {
+            Value::Text(path) => Ok(PathBuf::from(path)),
+            other => Err(format!("{other} is not a path")),
+        }
+    }
+}
+
+impl<T: FromValue> FromValue for Option<T> {
+    fn absent() -> Option<Self> {
+        Some(None)
+    }
+
+    fn of(value: Value) -> std::result::Result<Self, String> {
+        T::of(value).map(Some)
+    }
+}
+
+impl FromValue for Vec<String> {
+    fn absent() -> Option<Self> {
+        Some(Vec::new())
+    }
+
+    fn of(value: Value) -> std::result::Result<Self, String> {
+        value.texts()
+    }
+}
+
+impl FromValue for Vec<PathBuf> {
+    fn absent() -> Option<Self> {
+        Some(Vec::new())
+    }
+
+    fn of(value: Value) -> std::result::Result<Self, String> {
+        match value {
+            Value::List(values) => values.into_iter().map(PathBuf::of).collect(),
+            one => Ok(vec![PathBuf::of(one)?]),
+        }
+    }
+}
+
+/// A word of an enumeration.
+///
+/// # Errors
+/// The words.
+pub(super) fn choice<T: ValueEnum>(value: &Value) -> std::result::Result<T, String> {
+    let text = value.text()?;
+    T::from_str(&text, true).map_err(|_| {
+        let words =
+            T::value_variants().iter().filter_map(|value| Some(value.to_possible_value()?.get_name().to_owned()));
+        format!("there is no `{text}`; use one of {}", words.collect::<Vec<_>>().join(", "))
+    })
+}
+
+/// An argument that means nothing without another one, by verb.
+pub(super) const NEEDS: [(&[&str], &str, &str); 14] = [
+    (&["study", "search", "compare", "justify", "fit", "verify", "mine"], "preset", "recordings"),
+    (&["check"], "scenario", "file"),
+    (&["xosc"], "worst", "from"),
+    (&["xosc"], "criterion", "worst"),
+    (&["xosc"], "variant", "worst"),
+    (&["map"], "rename", "distribution"),
+    (&["sample"], "distribution", "category"),
+    (&["sample"], "category", "distribution"),
+    (&["sample"], "rename", "distribution"),
+    (&["sample"], "set", "distribution"),
+    (&["simulate"], "scenarios", "lane"),
+    (&["simulate"], "from", "lane"),
+    (&["simulate"], "compare", "lane"),
+    (&["simulate"], "plot_end", "plot"),
+];
+
+/// The arguments of one call.
+pub(super) struct Arguments {
+    /// Definition of the verb.
+    command: Command,
+    /// The call in Python's notation.
+    call: String,
+    values: BTreeMap<String, Value>,
+}
+
+impl Arguments {
+    /// Checks the names, and what excludes or needs what.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the argument.
+    pub(super) fn new(command: Command, function: &str, values: Vec<(String, Value)>) -> Result<Arguments> {
+        let is_shown = |(name, value): &&(String, Value)| name != "out" && *value != Value::Boolean(false);
+        let written: Vec<String> =
+            values.iter().filter(is_shown).map(|(name, value)| format!("{name}={value}")).collect();
+        let call = format!("lanesweep.{function}({})", written.join(", "));
+        let values: BTreeMap<String, Value> = values.into_iter().collect();
+        let is_given = |name: &str| values.get(name).is_some_and(|value| *value != Value::Boolean(false));
+        for (name, value) in &values {
+            let refused = |problem: String, help: &str| Error::usage(Place::item(format!("`{name}`")), problem, help);
+            let Some(arg) = of_name(&command, name) else {
+                let names: Vec<&str> = names(&command).collect();
+                let near = nearest(name, names.iter().copied(), 0.7);
+                let help =
+                    near.map_or(format!("there are {}", names.join(", ")), |near| format!("did you mean `{near}`?"));
+                return Err(refused(format!("{function} has no such argument"), &help));
+            };
+            if matches!(value, Value::Boolean(_)) && arg.get_action().takes_values() {
+                return Err(refused(format!("{value} is no value of it"), "give a value, or leave it out"));
+            }
+            if !is_given(name) {
+                continue;
+            }
+            let mut excluded = command.get_arg_conflicts_with(arg).into_iter().map(|other| other.get_id().as_str());
+            if let Some(other) = excluded.find(|other| is_given(other)) {
+                return Err(refused(format!("it cannot be used with `{other}`"), "leave out one of the two"));
+            }
+            let of_verb = |(verbs, one, _): &&(&[&str], &str, &str)| verbs.contains(&command.get_name()) && one == name;
+            if let Some((.., needed)) = NEEDS.iter().find(of_verb).filter(|(.., needed)| !is_given(needed)) {
+                return Err(refused(format!("it needs `{needed}`"), "add it, or leave this out"));
+            }
+        }
+        Ok(Arguments { command, call, values })
+    }
+
+    /// Whether an argument is there, and not False.
+    pub(super) fn is_given(&self, name: &str) -> bool {
+        self.values.get(name).is_some_and(|value| *value != Value::Boolean(false))
+    }
+
+    /// The call, for repeating it.
+    pub(super) fn call(&self) -> &str {
+        &self.call
+    }
+
+    /// Takes an argument.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] if it is required, or its value is none of its type.
+    pub(super) fn take<T: FromValue>(&mut self, name: &'static str) -> Result<T> {
+        let arg = of_name(&self.command, name);
+        let refused = |problem: String| {
+            let help = arg.and_then(Arg::get_help).map(ToString::to_string).unwrap_or_default();
+            Error::usage(Place::option(name), problem, help)
+        };
+        let default = || arg.and_then(|arg| arg.get_default_values().first()).map(|word| Value::Text(word.into()));
+        let value = match (self.values.remove(name), T::absent()) {
+            // A list may be one text with commas.
+            (Some(Value::Text(text)), _) if arg.is_some_and(|arg| arg.get_value_delimiter().is_some()) => {
+                Value::List(text.to_string_lossy().split(',').map(|part| Value::Text(part.trim().into())).collect())
+            }
+            (Some(value), _) => value,
+            (None, Some(absent)) => return Ok(absent),
+            (None, None) => default().ok_or_else(|| refused("it is needed".to_owned()))?,
+        };
+        T::of(value).map_err(refused)
+    }
+
+    /// Takes an argument that a function parses.
+    ///
+    /// # Errors
+    /// As [`Arguments::take`].
+    pub(super) fn parse<T>(
+        &mut self,
+        name: &'static str,
+        parser: impl Fn(&str) -> std::result::Result<T, String>,
+    ) -> Result<Option<T>> {
+        let text: Option<String> = self.take(name)?;
+        let parsed = text.as_deref().map(parser).transpose();
+        parsed.map_err(|problem| Error::usage(Place::option(name), problem, ""))
+    }
+
+    /// Takes an argument with several values, each of which a function parses.
+    ///
+    /// # Errors
+    /// As [`Arguments::take`].
+    pub(super) fn parse_each<T>(
+        &mut self,
+        name: &'static str,
+        parser: impl Fn(&str) -> std::result::Result<T, String>,
+    ) -> Result<Vec<T>> {
+        let texts: Vec<String> = self.take(name)?;
+        let parsed = texts.iter().map(|text| parser(text)).collect::<std::result::Result<_, _>>();
+        parsed.map_err(|problem| Error::usage(Place::option(name), problem, ""))
+    }
+
+    /// Takes the value of an argument as it is.
+    pub(super) fn value(&mut self, name: &str) -> Option<Value> {
+        self.values.remove(name)
+    }
+}
+
+/// Names of a verb's arguments.
+pub(super) fn names(command: &Command) -> impl Iterator<Item = &str> {
+    // Of the command line alone: a function prints nothing.
+    let printing = ["help", "version", "quiet", "verbose", "format", "tables"];
+    command.get_arguments().map(|arg| arg.get_id().as_str()).filter(move |name| !printing.contains(name))
+}
+
+fn of_name<'a>(command: &'a Command, name: &str) -> Option<&'a Arg> {
+    command.get_arguments().find(|arg| arg.get_id() == name)
+}
+
+/// Options of a verb, or a group of them, from arguments.
+pub(super) trait FromArguments: Sized {
+    /// Takes the fields' values.
+    ///
+    /// # Errors
+    /// As [`Arguments::take`].
+    fn from_arguments(arguments: &mut Arguments) -> Result<Self>;
+}
+
+/// Implements [`FromArguments`]: fields that take their values, fields that a function parses, fields with several values that a
+/// function parses each, and groups.
+macro_rules! from_arguments {
+    (
+        $type:ident { $($field:ident),* $(,)? }
+        $(parsed { $($parsed:ident: $parser:expr),* $(,)? })?
+        $(each { $($each:ident: $of_each:expr),* $(,)? })?
+        $(groups { $($group:ident),* $(,)? })?
+        $(others { $($other:ident: $value:expr),* $(,)? })?
+    ) => {
+        impl $crate::cli::arguments::FromArguments for $type {
+            fn from_arguments(arguments: &mut $crate::cli::arguments::Arguments) -> $crate::Result<Self> {
+                Ok($type {
+                    $($field: arguments.take(stringify!($field))?,)*
+                    $($($parsed: arguments.parse(stringify!($parsed), $parser)?,)*)?
+                    $($($each: arguments.parse_each(stringify!($each), $of_each)?,)*)?
+                    $($($group: $crate::cli::arguments::FromArguments::from_arguments(arguments)?,)*)?
+                    $($($other: $value,)*)?
+                })
+            }
+        }
+    };
+}
+
+/// Implements [`FromValue`] for enumerations.
+macro_rules! choices {
+    ($($type:ident),*) => {
+        $(impl $crate::cli::arguments::FromValue for $type {
+            fn of(value: $crate::cli::arguments::Value) -> std::result::Result<Self, String> {
+                $crate::cli::arguments::choice(&value)
+            }
+        })*
+    };
+}
+
+pub(super) use {choices, from_arguments};
