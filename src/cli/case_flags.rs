@@ -3,94 +3,98 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use clap::Args;
+use clap::{Arg, ArgMatches, Args, Command, FromArgMatches};
 
-use super::arguments::from_arguments;
+use super::arguments::{Arguments, FromArguments};
 use crate::engine::Headway;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::reopen::TracedCase;
-use crate::scenario::{CaseFile, CaseParameters, CaseRow, ParameterRows, PlainCase, RowPlace, Written, si};
+use crate::scenario::{
+    CaseFile, CaseNumber, CaseParameters, CaseRow, NUMBERS, ParameterRows, PlainCase, RowPlace, Written, si,
+};
 use crate::support::input_file;
 use crate::support::plausibility::{Doubts, Implausible};
 use crate::support::table::{NameUnit, TableFormat, TableReader};
 use crate::{Error, Place, Result};
 
-/// A case in flags. Speeds in m/s, lengths in m, accelerations in m/s², times in s.
-#[derive(Debug, Clone, Args)]
+/// A case in flags: one per number of a case.
+#[derive(Debug, Clone, Default)]
 pub(super) struct CaseFlags {
-    /// Kind of scenario: cut-in, cut-out, lvd
-    #[arg(long, value_name = "NAME", help_heading = "Scenario")]
-    category: Option<String>,
-    #[arg(long, value_name = "LIST", help = super::lists::models_help(), help_heading = "Models and criteria")]
+    parameters: CaseParameters,
     models: Option<String>,
-    /// Initial speed of the ego, with its unit: 60km/h
-    #[arg(long, value_name = "km/h|m/s", value_parser = speed_mps, allow_hyphen_values = true, help_heading = "Scenario")]
-    ego_speed: Option<f64>,
-    /// Initial speed of the other vehicle, with its unit [default: the ego's]
-    #[arg(long, value_name = "km/h|m/s", value_parser = speed_mps, allow_hyphen_values = true, help_heading = "Scenario")]
-    speed: Option<f64>,
-    /// Initial gap, bumper to bumper
-    #[arg(long, value_name = "m", value_parser = length_m, conflicts_with = "thw", help_heading = "Scenario")]
-    gap: Option<f64>,
-    /// Initial time headway instead of the gap
-    #[arg(long, value_name = "s", value_parser = time_s, help_heading = "Scenario")]
-    thw: Option<f64>,
-    /// Cut-in, cut-out: lateral speed
-    #[arg(long, value_name = "m/s", value_parser = lateral_speed_mps, allow_hyphen_values = true, help_heading = "Scenario")]
-    lateral_speed: Option<f64>,
-    /// Cut-in: lateral distance at the start; cut-out: at the end [default: the lane's width]
-    #[arg(long, value_name = "m", value_parser = length_m, help_heading = "Scenario", hide_short_help = true)]
-    lateral_distance: Option<f64>,
-    /// Acceleration of the other vehicle; an LVD needs one [default: 0]
-    #[arg(long, value_name = "m/s²", value_parser = acceleration_mps2, allow_hyphen_values = true, help_heading = "Scenario")]
-    acceleration: Option<f64>,
-    /// Speed at which the acceleration ends, with its unit [default: standstill, or never]
-    #[arg(long, value_name = "km/h|m/s", value_parser = speed_mps, allow_hyphen_values = true, help_heading = "Scenario", hide_short_help = true)]
-    end_speed: Option<f64>,
-    /// Cut-out: speed of the vehicle ahead of the cutting-out one, with its unit [default: 0]
-    #[arg(long, value_name = "km/h|m/s", value_parser = speed_mps, allow_hyphen_values = true, help_heading = "Scenario", hide_short_help = true)]
-    ahead_speed: Option<f64>,
-    /// Cut-out: gap between the two, bumper to bumper
-    #[arg(long, value_name = "m", value_parser = length_m, help_heading = "Scenario")]
-    ahead_gap: Option<f64>,
-    /// Length of every vehicle [default: the profile's]
-    #[arg(long, value_name = "m", value_parser = length_m, help_heading = "Scenario", hide_short_help = true)]
-    length: Option<f64>,
-    /// Width of every vehicle [default: the profile's]
-    #[arg(long, value_name = "m", value_parser = length_m, help_heading = "Scenario", hide_short_help = true)]
-    width: Option<f64>,
-    /// Length of the ego [default: that of every vehicle]
-    #[arg(long, value_name = "m", value_parser = length_m, help_heading = "Scenario", hide_short_help = true)]
-    ego_length: Option<f64>,
-    /// Width of the ego [default: that of every vehicle]
-    #[arg(long, value_name = "m", value_parser = length_m, help_heading = "Scenario", hide_short_help = true)]
-    ego_width: Option<f64>,
-    /// Width of the lanes [default: the scenario's, else 3.5]
-    #[arg(long, value_name = "m", value_parser = length_m, help_heading = "Scenario", hide_short_help = true)]
-    pub(super) lane_width: Option<f64>,
 }
 
-from_arguments!(
-    CaseFlags { category, models }
-    parsed {
-        ego_speed: speed_mps,
-        speed: speed_mps,
-        gap: length_m,
-        thw: time_s,
-        lateral_speed: lateral_speed_mps,
-        lateral_distance: length_m,
-        acceleration: acceleration_mps2,
-        end_speed: speed_mps,
-        ahead_speed: speed_mps,
-        ahead_gap: length_m,
-        length: length_m,
-        width: length_m,
-        ego_length: length_m,
-        ego_width: length_m,
-        lane_width: length_m,
+/// Numbers that only `--help` shows.
+const SELDOM: [&str; 8] =
+    ["lateral_distance", "end_speed", "ahead_speed", "length", "width", "ego_length", "ego_width", "lane_width"];
+
+/// The numbers that have a flag; a duration is of files only.
+fn numbers() -> impl Iterator<Item = &'static CaseNumber> {
+    NUMBERS.iter().filter(|number| number.key != "duration")
+}
+
+/// Checks a number as it is written.
+fn written(number: &'static CaseNumber) -> impl Fn(&str) -> std::result::Result<String, String> + Clone {
+    move |text| number.set_text(&mut CaseParameters::default(), text).map(|()| text.to_owned())
+}
+
+impl Args for CaseFlags {
+    fn augment_args(command: Command) -> Command {
+        let category = Arg::new("category").value_name("NAME").help("Kind of scenario: cut-in, cut-out, lvd");
+        let models = Arg::new("models").value_name("LIST").help(super::lists::models_help());
+        let command = command
+            .arg(category.long("category").help_heading("Scenario"))
+            .arg(models.long("models").help_heading("Models and criteria"));
+        numbers().fold(command, |command, number| {
+            let arg = Arg::new(number.key)
+                .long(number.key.replace('_', "-"))
+                .value_name(if number.needs_unit() { "km/h|m/s" } else { number.unit() })
+                .value_parser(written(number))
+                // Of what may be negative.
+                .allow_hyphen_values(number.unit().starts_with("m/s"))
+                .help(number.help)
+                .help_heading("Scenario")
+                .hide_short_help(SELDOM.contains(&number.key));
+            command.arg(if number.key == "gap" { arg.conflicts_with("thw") } else { arg })
+        })
     }
-);
+
+    fn augment_args_for_update(command: Command) -> Command {
+        Self::augment_args(command)
+    }
+}
+
+impl CaseFlags {
+    fn of(mut text: impl FnMut(&'static str) -> Result<Option<String>>) -> Result<CaseFlags> {
+        let mut parameters = CaseParameters { category: text("category")?, ..CaseParameters::default() };
+        for number in numbers() {
+            let Some(text) = text(number.key)? else { continue };
+            let set = number.set_text(&mut parameters, &text);
+            set.map_err(|problem| Error::usage(Place::option(number.key), problem, ""))?;
+        }
+        Ok(CaseFlags { parameters, models: text("models")? })
+    }
+}
+
+impl FromArgMatches for CaseFlags {
+    fn from_arg_matches(matches: &ArgMatches) -> std::result::Result<CaseFlags, clap::Error> {
+        let found = CaseFlags::of(|name| Ok(matches.get_one::<String>(name).cloned()));
+        // The parsers have checked the numbers.
+        found.map_err(|error| clap::Error::raw(clap::error::ErrorKind::ValueValidation, error))
+    }
+
+    fn update_from_arg_matches(&mut self, matches: &ArgMatches) -> std::result::Result<(), clap::Error> {
+        *self = CaseFlags::from_arg_matches(matches)?;
+        Ok(())
+    }
+}
+
+impl FromArguments for CaseFlags {
+    fn from_arguments(arguments: &mut Arguments) -> Result<CaseFlags> {
+        CaseFlags::of(|name| arguments.take(name))
+    }
+}
 
 /// A case as it is given: flags over a file or a row of a table.
 #[derive(Debug, Default)]
@@ -104,64 +108,45 @@ pub(super) struct GivenCase {
 }
 
 impl CaseFlags {
+    /// Width of the lanes, m, if given.
+    pub(super) fn lane_width_m(&self) -> Option<f64> {
+        self.parameters.lane_width
+    }
+
     /// Values of `self` where given, otherwise those of a file.
     pub(super) fn over(&self, file: GivenCase) -> GivenCase {
-        let flags = self.parameters();
         GivenCase {
-            row: file.row.map(|row| row.without(&flags.given())),
+            row: file.row.map(|row| row.without(&self.parameters.given())),
             models: self.models.clone().or(file.models),
             id: file.id,
-            parameters: flags.over(&file.parameters),
+            parameters: self.parameters.clone().over(&file.parameters),
         }
     }
 
     /// Whether it gives any value of the case.
     pub(super) fn says_a_case(&self) -> bool {
-        self.parameters() != CaseParameters::default()
+        self.parameters != CaseParameters::default()
     }
 
     /// The initial distance, if given.
     pub(super) fn start(&self) -> Result<Option<Headway>> {
-        let is_given = self.gap.is_some() || self.thw.is_some();
+        let is_given = self.parameters.gap.is_some() || self.parameters.thw.is_some();
         if is_given { self.over(GivenCase::default()).headway().map(Some) } else { Ok(None) }
     }
 
     /// Whether it gives a value of the case other than the width of the lanes.
     pub(super) fn says_more_than_lanes(&self) -> bool {
-        CaseParameters { lane_width: None, ..self.parameters() } != CaseParameters::default()
+        CaseParameters { lane_width: None, ..self.parameters.clone() } != CaseParameters::default()
     }
 
     /// Whether it gives a value of the case other than the ego's start.
     pub(super) fn says_more_than_a_start(&self) -> bool {
-        CaseParameters { gap: None, thw: None, ..self.parameters() } != CaseParameters::default()
+        CaseParameters { gap: None, thw: None, ..self.parameters.clone() } != CaseParameters::default()
     }
 
     /// The named models; `None` if none is named.
     pub(super) fn named_models(&self) -> Result<Option<Vec<ModelId>>> {
         self.models.as_ref().map(|list| super::lists::models(list.split(','), "models")).transpose()
-    }
-
-    fn parameters(&self) -> CaseParameters {
-        CaseParameters {
-            category: self.category.clone(),
-            ego_speed: self.ego_speed,
-            speed: self.speed,
-            gap: self.gap,
-            thw: self.thw,
-            lateral_speed: self.lateral_speed,
-            lateral_distance: self.lateral_distance,
-            acceleration: self.acceleration,
-            end_speed: self.end_speed,
-            ahead_speed: self.ahead_speed,
-            ahead_gap: self.ahead_gap,
-            length: self.length,
-            width: self.width,
-            ego_length: self.ego_length,
-            ego_width: self.ego_width,
-            lane_width: self.lane_width,
-            // Only files have it.
-            duration: None,
-        }
     }
 }
 
@@ -212,38 +197,9 @@ impl GivenCase {
     }
 }
 
-type Parsed = std::result::Result<f64, String>;
-
-fn parse(text: &str, unit: &str, name: NameUnit) -> Parsed {
-    si(Written::Text(text), unit, name).map_err(|unusable| match unusable.lacks_unit {
-        true => format!("{}; write {}", unusable.problem, unusable.write),
-        false => format!("write {}", unusable.write),
-    })
-}
-
-/// A speed along the road with its unit: `60km/h`, `37 mph`, `16.7m/s`.
-fn speed_mps(text: &str) -> Parsed {
-    parse(text, "m/s", NameUnit::Needed)
-}
-
-/// A speed across the road: `1.2`, `1.2m/s`.
-fn lateral_speed_mps(text: &str) -> Parsed {
-    parse(text, "m/s", NameUnit::Customary)
-}
-
-/// A length: `12`, `12m`.
-pub(super) fn length_m(text: &str) -> Parsed {
-    parse(text, "m", NameUnit::Customary)
-}
-
-/// A time: `1.2`, `1.2s`.
-pub(super) fn time_s(text: &str) -> Parsed {
-    parse(text, "s", NameUnit::Customary)
-}
-
-/// An acceleration: `-5`, `-5m/s2`.
-fn acceleration_mps2(text: &str) -> Parsed {
-    parse(text, "m/s²", NameUnit::Customary)
+/// A time in s, with or without its unit: `1.2`, `1.2s`.
+pub(super) fn time_s(text: &str) -> std::result::Result<f64, String> {
+    si(Written::Text(text), "s", NameUnit::Customary).map_err(|unusable| format!("write {}", unusable.write))
 }
 
 /// Reads a case from a TOML file.

@@ -121,7 +121,7 @@ impl Check {
             command: configured.command.clone(),
         };
         if let Some(path) = &self.sheet {
-            write(path, sheet.html()?.as_bytes())?;
+            write(path, sheet.html().as_bytes())?;
         }
         if let Some(path) = &self.series {
             let named = judgements[0].models.iter().map(|judged| (judged.trace.model.name().to_owned(), &judged.trace));

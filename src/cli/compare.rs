@@ -124,9 +124,8 @@ impl Compare {
             HostRecord::of(&opened, swept.rechecked_lanes, started, configured.record(false)),
         );
         file.write(folder.results()?)?;
-        tracing::info!("results written to {}", self.out.display());
         let exit = if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete };
-        self.format.answer(exit, || file.text(), || file.json())
+        self.format.answer_in(&self.out, exit, || file.text(), || file.json())
     }
 
     /// Results must not replace an input.

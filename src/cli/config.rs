@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::configured::Configured;
 use super::shell::{Completions, Man};
-use super::{Answer, Exit};
+use super::{Answer, Exit, console};
 use crate::cli::settings::{
     Assignment, DEFAULT_FILE, DEFAULT_FILE_NAME, Layers, Setting, profile_schema, settings_schema, text_of,
 };
@@ -118,7 +118,8 @@ impl Config {
 impl Init {
     fn run(&self) -> Result<Answer> {
         if self.file == Path::new("-") {
-            return Ok(Answer { text: DEFAULT_FILE.to_owned(), ..Exit::Ok.into() });
+            console::print(DEFAULT_FILE)?;
+            return Ok(Exit::Ok.into());
         }
         if self.file.exists() {
             let help = "choose another name, or move it away; `lanesweep config init -` prints the file";
@@ -128,7 +129,8 @@ impl Init {
         write_atomically(&self.file, DEFAULT_FILE.as_bytes())?;
         let file = self.file.display().to_string();
         let text = format!("{file} written; use it with --config {}\n", quoted_word(&file));
-        Ok(Answer { text, ..Exit::Ok.into() })
+        console::print(&text)?;
+        Ok(Exit::Ok.into())
     }
 }
 
@@ -146,7 +148,8 @@ impl Show {
             ShowFormat::Json => json_list(&shown)?,
             ShowFormat::Toml => toml_file(&shown),
         };
-        Ok(Answer { text, ..Exit::Ok.into() })
+        console::print(&text)?;
+        Ok(Exit::Ok.into())
     }
 }
 
@@ -156,7 +159,8 @@ impl Check {
         layers.settings()?;
         let count = layers.given().count();
         let text = format!("{}: {count} keys set, all of them known and in range\n", self.file.display());
-        Ok(Answer { text, ..Exit::Ok.into() })
+        console::print(&text)?;
+        Ok(Exit::Ok.into())
     }
 }
 
@@ -166,7 +170,8 @@ impl Schema {
             SchemaOf::Config => settings_schema(),
             SchemaOf::Profile => profile_schema()?,
         };
-        Ok(Answer { text: format!("{schema:#}\n"), ..Exit::Ok.into() })
+        console::print(&format!("{schema:#}\n"))?;
+        Ok(Exit::Ok.into())
     }
 }
 

@@ -145,8 +145,10 @@ impl Xosc {
             let rows = rows.iter().map(|row| serde_json::json!({"file": row.file, "lane": row.lane}));
             document(&rows.collect::<Vec<_>>())
         };
+        let exit = if incomplete { Exit::Incomplete } else { Exit::Ok };
+        let answer = self.format.answer(exit, || lines, list)?;
         tracing::info!("{} written to {}", counted(rows.len(), "scenario"), self.out.display());
-        self.format.answer(if incomplete { Exit::Incomplete } else { Exit::Ok }, || lines, list)
+        Ok(answer)
     }
 
     /// The scenarios, and whether others of the file were skipped.
@@ -246,7 +248,7 @@ impl Xosc {
             let problem = format!("{duration} s is out of range");
             return Err(Error::usage(Place::item("--duration"), problem, "give seconds above 0 and at most 3600"));
         }
-        if let Some(width) = self.case.lane_width.filter(|w| !(1.0..=20.0).contains(w)) {
+        if let Some(width) = self.case.lane_width_m().filter(|w| !(1.0..=20.0).contains(w)) {
             let problem = format!("{width} m is not a lane width");
             return Err(Error::usage(Place::item("--lane-width"), problem, "give 1 to 20 m, such as 3.5"));
         }
@@ -254,6 +256,6 @@ impl Xosc {
             SideFlag::Left => Side::Left,
             SideFlag::Right => Side::Right,
         });
-        Ok(PlayOptions { ego, duration_s: self.duration, side, lane_width_m: self.case.lane_width })
+        Ok(PlayOptions { ego, duration_s: self.duration, side, lane_width_m: self.case.lane_width_m() })
     }
 }

@@ -113,9 +113,11 @@ impl Fit {
         }
         console::warn(&failed);
         write(&fitted, folder.as_ref())?;
-        tracing::info!("{} written to {}", counted(fitted.len(), "density file"), self.out.display());
         let exit = if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete };
-        self.format.answer(exit, || text(&facts, &fitted), || document(&facts, &fitted, &configured.record(false)))
+        let json = || document(&facts, &fitted, &configured.record(false));
+        let answer = self.format.answer(exit, || text(&facts, &fitted), json)?;
+        tracing::info!("{} written to {}", counted(fitted.len(), "density file"), self.out.display());
+        Ok(answer)
     }
 
     /// The parameterizations to fit, in the registry's order.

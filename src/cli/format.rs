@@ -37,16 +37,32 @@ impl FormatFlag {
         self.format == Format::Json
     }
 
-    /// An answer with what is asked for; only that is built.
+    /// Prints text or document, whichever is asked for and alone is built; returns both to a program that asks for both.
     pub(super) fn answer(
         self,
         exit: Exit,
         text: impl FnOnce() -> String,
         json: impl FnOnce() -> Result<String>,
     ) -> Result<Answer> {
-        let text = if self.format == Format::Json { String::new() } else { text() };
-        let document = if self.format == Format::Text { String::new() } else { json()? };
-        Ok(Answer { exit, text, document })
+        match self.format {
+            Format::Text => console::print(&text())?,
+            Format::Json => console::print_json(&json()?)?,
+            Format::Both => return Ok(Answer { exit, text: text(), document: json()? }),
+        }
+        Ok(exit.into())
+    }
+
+    /// Like [`FormatFlag::answer`], for results in a folder, which it names.
+    pub(super) fn answer_in(
+        self,
+        out: &std::path::Path,
+        exit: Exit,
+        text: impl FnOnce() -> String,
+        json: impl FnOnce() -> Result<String>,
+    ) -> Result<Answer> {
+        let answer = self.answer(exit, text, json)?;
+        tracing::info!("results written to {}", out.display());
+        Ok(answer)
     }
 
     /// The answer about a plan that `--plan-only` wrote.
@@ -89,7 +105,7 @@ impl TablesFlag {
         }
     }
 
-    /// Writes the files; the text is the answer, or all tables.
+    /// Writes the files and prints the answer, or all tables.
     pub(super) fn finish(
         self,
         mut report: StudyReport,
@@ -103,9 +119,11 @@ impl TablesFlag {
         let claims = if report.evaluation.claims.is_empty() { "" } else { ", claims" };
         let rest = format!("TTC, BTN, every interval{claims}: --tables, or report.html and report.txt.");
         let answer = || format!("{}{}\n", report.answer(width), tables::wrap(&rest, width));
+        let exit = if is_incomplete { Exit::Incomplete } else { Exit::Ok };
+        let shown = || if self.tables { report.text(width) } else { answer() };
+        let printed = format.answer(exit, shown, || report.json())?;
         let page = out.join("report.html");
         tracing::info!("{} files written; start with {}", report.run.files.len() + 1, page.display());
-        let exit = if is_incomplete { Exit::Incomplete } else { Exit::Ok };
-        format.answer(exit, || if self.tables { report.text(width) } else { answer() }, || report.json())
+        Ok(printed)
     }
 }

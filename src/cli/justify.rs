@@ -127,7 +127,6 @@ impl Justify {
             host: HostRecord::of(&opened, dossier.summary.rechecked_lanes, started, configured.record(false)),
         };
         let files = report.write(folder.results()?)?;
-        tracing::info!("results written to {}", self.out.display());
         let is_complete = collection.problems.is_empty() && dossier.left_out.is_empty();
         let exit = match dossier.conclusion {
             _ if !is_complete => Exit::Incomplete,
@@ -135,7 +134,7 @@ impl Justify {
             Conclusion::NotAppropriate => Exit::NotAppropriate,
             Conclusion::Undecided => Exit::Undecided,
         };
-        self.format.answer(exit, || report.text(), || report.json(&files))
+        self.format.answer_in(&self.out, exit, || report.text(), || report.json(&files))
     }
 }
 

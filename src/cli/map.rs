@@ -162,10 +162,11 @@ impl Map {
         };
         let report = MapReport { grids, criterion, against, profile, preset: self.preset.clone(), host };
         let written = report.write(folder.results()?)?;
+        let answer = self.format.answer(Exit::Ok, || report.text(), || report.json(written.clone()))?;
         let (simulations, seconds) = (count(report.simulations()), value(report.host.sweep_s));
         tracing::info!("{simulations} simulations in {seconds} s on {}", report.host.backend);
         tracing::info!("{} files written to {}", written.len() + 1, self.out.display());
-        self.format.answer(Exit::Ok, || report.text(), || report.json(written.clone()))
+        Ok(answer)
     }
 
     /// The preset's profile, unless another is set.

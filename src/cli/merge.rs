@@ -53,8 +53,7 @@ impl Merge {
                 let host = HostRecord::of_parts(result.parts, result.rechecked_lanes);
                 let mut file = EstimateFile::of_sample(&sample, &result, host)?;
                 file.write(folder.results()?, &sample, &result)?;
-                tracing::info!("results written to {}", self.folder.display());
-                self.format.answer(Exit::Ok, || file.text(), || file.json())
+                self.format.answer_in(&self.folder, Exit::Ok, || file.text(), || file.json())
             }
         }
     }

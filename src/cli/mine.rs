@@ -8,7 +8,7 @@ use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::console::Verbosity;
 use super::source::{self, PlausibilityFlag, PresetFlag};
-use super::{Answer, Exit};
+use super::{Answer, Exit, console};
 use crate::Result;
 use crate::scenario::{DataProvenance, check_scenario_file, write_scenarios, write_scenarios_to};
 use crate::support::atomic_file::AtomicFile;
@@ -63,7 +63,6 @@ impl Mine {
         if self.kept {
             collection.scenarios.retain(|s| s.kept);
         }
-        let exit = if collection.problems.is_empty() { Exit::Ok } else { Exit::Incomplete };
         match &self.out {
             Some(path) => {
                 // The provenance file belongs to this scenario file: remove the old one first, write the new one last.
@@ -77,13 +76,14 @@ impl Mine {
                 }
                 .write_beside(path, serde_json::json!(configured.record(false)))?;
                 tracing::info!("{} written to {}", counted(collection.scenarios.len(), "scenario"), path.display());
-                Ok(exit.into())
             }
             None => {
                 let mut text = Vec::new();
                 write_scenarios_to(&mut text, &collection.scenarios)?;
-                Ok(Answer { document: String::from_utf8_lossy(&text).into_owned(), ..exit.into() })
+                console::print_json(&String::from_utf8_lossy(&text))?;
             }
         }
+        let exit = if collection.problems.is_empty() { Exit::Ok } else { Exit::Incomplete };
+        Ok(exit.into())
     }
 }

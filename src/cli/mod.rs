@@ -110,36 +110,20 @@ enum Verb {
     Config(config::Config),
 }
 
-/// How a verb ended, and its answer.
+/// How a verb ended. Texts are empty where the verb has printed its answer itself.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct Answer {
     /// The exit code; never one of an error.
     pub exit: Exit,
-    /// For people; empty if only a document was asked for.
+    /// The answer for people.
     pub text: String,
-    /// The numbers of the text as one JSON document, or records as JSON Lines; empty if only the text was asked for.
+    /// Its numbers as one JSON document.
     pub document: String,
 }
 
 impl From<Exit> for Answer {
     fn from(exit: Exit) -> Answer {
         Answer { exit, text: String::new(), document: String::new() }
-    }
-}
-
-impl Answer {
-    /// Writes the answer to standard output.
-    fn print(&self) -> Result<()> {
-        if self.document.is_empty() { console::print(&self.text) } else { console::print_json(&self.document) }
-    }
-
-    /// The answer, or an error that follows it.
-    fn or_print(self, is_fine: bool, error: impl FnOnce() -> Error) -> Result<Answer> {
-        if is_fine {
-            return Ok(self);
-        }
-        self.print()?;
-        Err(error())
     }
 }
 
@@ -166,9 +150,7 @@ pub fn main_with(words: &[OsString]) -> Exit {
         let (cli, configured) = Configured::of(&matches, console::command_line(words))?;
         let requested = configured.settings.run.threads;
         pool_of(requested)?.build_global().map_err(|error| not_started(requested, &error))?;
-        let answer = cli.verb.run(&configured, cli.common.verbosity())?;
-        answer.print()?;
-        Ok(answer.exit)
+        cli.verb.run(&configured, cli.common.verbosity()).map(|answer| answer.exit)
     })
 }
 

@@ -133,8 +133,7 @@ pub(super) fn run(
     file.add_worst(&mut results, &worst, &options, &names)?;
     results.add(DISTRIBUTION_FILE, &sampled.to_json()?)?;
     file.publish(results, Vec::new())?;
-    tracing::info!("results written to {}", flags.out.display());
-    flags.format.answer(Exit::Ok, || file.text(), || file.json())
+    flags.format.answer_in(&flags.out, Exit::Ok, || file.text(), || file.json())
 }
 
 /// Checks the fixed values and the quartiles of the distributions; the tails are truncated anyway.

@@ -267,6 +267,5 @@ fn write(
     let out = results.dir().to_path_buf();
     let mut file = EstimateFile::of_sample(sample, result, host)?;
     file.write(results, sample, result)?;
-    tracing::info!("results written to {}", out.display());
-    format.answer(Exit::Ok, || file.text(), || file.json())
+    format.answer_in(&out, Exit::Ok, || file.text(), || file.json())
 }

@@ -152,9 +152,8 @@ impl Search {
             host: HostRecord::of(&opened, 0, started, configured.record(false)),
         };
         let files = report.write(folder.results()?)?;
-        tracing::info!("results written to {}", self.out.display());
         let exit = if collection.problems.is_empty() { Exit::Ok } else { Exit::Incomplete };
-        self.format.answer(exit, || report.text(), || report.json(&files))
+        self.format.answer_in(&self.out, exit, || report.text(), || report.json(&files))
     }
 
     /// The scenarios that the search does not read, their description, and their checksum.

@@ -7,7 +7,7 @@ use clap::Args;
 use clap_complete::Shell;
 
 use super::configured::command;
-use super::{Answer, Exit};
+use super::{Answer, Exit, console};
 use crate::support::files::{make_folder, write_inside};
 use crate::{Error, Result};
 
@@ -28,7 +28,8 @@ impl Completions {
         let mut text = Vec::new();
         clap_complete::generate(self.shell, &mut command(), "lanesweep", &mut text);
         let text = String::from_utf8(text).map_err(|e| Error::Internal(format!("completions are no text: {e}")))?;
-        Ok(Answer { text, ..Exit::Ok.into() })
+        console::print(&text)?;
+        Ok(Exit::Ok.into())
     }
 }
 

@@ -116,8 +116,12 @@ impl Verify {
                 "sets": sets,
             }))
         };
-        let differs = || Error::Verification(format!("results of {} differ from the CPU's", tested.describe()));
-        self.format.answer(Exit::Ok, || text, json)?.or_print(equal, differs)
+        let answer = self.format.answer(Exit::Ok, || text, json)?;
+        if equal {
+            Ok(answer)
+        } else {
+            Err(Error::Verification(format!("results of {} differ from the CPU's", tested.describe())))
+        }
     }
 
     /// The sets with their names.
@@ -206,6 +210,6 @@ impl Verify {
                 }))
             },
         )?;
-        answer.or_print(is_equal, || Error::Verification(format!("lane {text} differs from the CPU's")))
+        if is_equal { Ok(answer) } else { Err(Error::Verification(format!("lane {text} differs from the CPU's"))) }
     }
 }

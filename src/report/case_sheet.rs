@@ -287,10 +287,7 @@ impl CaseSheet<'_> {
     }
 
     /// The sheet as a page.
-    ///
-    /// # Errors
-    /// [`crate::Error::Internal`] if the template does not match: a defect of this program.
-    pub fn html(&self) -> Result<String> {
+    pub fn html(&self) -> String {
         let first = self.first();
         let mut warnings = Vec::new();
         if first.verdict() == Verdict::Undecided {
@@ -345,7 +342,7 @@ impl CaseSheet<'_> {
                 ("data".to_owned(), self.origin.clone()),
                 ("arithmetic".to_owned(), format!("binary64, time step {} s", self.profiles[0].frame.dt_s)),
             ],
-            parts: vec![Section::of_profile(format!("Profile {}", first.profile), &self.profiles[0])?],
+            parts: vec![Section::options(format!("Profile {}", first.profile), &self.profiles[0])],
             ..Section::new("reproduction", "Reproduction")
         };
         let page = Page {

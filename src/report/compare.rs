@@ -123,7 +123,7 @@ impl CompareFile {
                 }
             }
         }
-        results.add("report.html", self.html(figures)?.as_bytes())?;
+        results.add("report.html", self.html(figures).as_bytes())?;
         self.files = results.names();
         results.publish(self.json()?.as_bytes())
     }
@@ -244,7 +244,7 @@ impl CompareFile {
     ///
     /// # Errors
     /// None for a page of this program.
-    pub fn html(&self, figures: Vec<PageFigure>) -> Result<String> {
+    pub fn html(&self, figures: Vec<PageFigure>) -> String {
         let mut warnings = Vec::new();
         if !self.left_out.is_empty() {
             warnings.push(format!("{} parts were left out; see the end of Rates.", self.left_out.len()));

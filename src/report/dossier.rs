@@ -51,7 +51,7 @@ impl DossierReport<'_> {
     /// # Errors
     /// [`crate::Error::Io`].
     pub fn write(&self, mut results: Results) -> Result<Vec<String>> {
-        results.add("report.html", self.html()?.as_bytes())?;
+        results.add("report.html", self.html().as_bytes())?;
         results.add("hidden.csv", self.hidden_csv().as_bytes())?;
         if let Some(svg) = self.example() {
             results.add("hidden.svg", svg.as_bytes())?;

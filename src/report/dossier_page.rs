@@ -3,15 +3,11 @@
 use super::dossier::{DossierReport, SHOWN, share};
 use super::html::{Page, PageFigure, Section};
 use super::records::PROGRAM;
-use crate::Result;
 use crate::support::readable::{count, value};
 
 impl DossierReport<'_> {
     /// The dossier as a page.
-    ///
-    /// # Errors
-    /// [`crate::Error::Internal`] if the template does not match: a defect of this program.
-    pub fn html(&self) -> Result<String> {
+    pub fn html(&self) -> String {
         let page = Page {
             title: format!("Is {} appropriate under {}?", self.dossier.parameterization.name(), self.profile.name),
             lead: format!("{}. {} {} {}", self.answer(), self.recall(), self.coverage(), self.provenance.data),
@@ -39,7 +35,7 @@ impl DossierReport<'_> {
                 },
                 self.credibility_section(),
                 Section { facts: self.limits(), ..Section::new("limits", "Limits of use") },
-                self.reproduction_section()?,
+                self.reproduction_section(),
                 Section { facts: self.signature(), ..Section::new("signature", "Signature") },
             ],
         };
@@ -154,9 +150,9 @@ impl DossierReport<'_> {
         }
     }
 
-    fn reproduction_section(&self) -> Result<Section> {
+    fn reproduction_section(&self) -> Section {
         let density = self.dossier.density_sha256.clone().unwrap_or_else(|| "–".to_owned());
-        Ok(Section {
+        Section {
             facts: vec![
                 ("command".to_owned(), self.command.clone()),
                 ("program".to_owned(), format!("{PROGRAM}, engine {}", crate::engine::ENGINE_VERSION)),
@@ -167,8 +163,8 @@ impl DossierReport<'_> {
                 ("profile".to_owned(), format!("{}, time step {} s", self.profile.name, self.profile.frame.dt_s)),
             ],
             host: vec![("computed by".to_owned(), self.host.backend.clone())],
-            parts: vec![Section::of_profile(format!("Profile {}", self.profile.name), self.profile)?],
+            parts: vec![Section::options(format!("Profile {}", self.profile.name), self.profile)],
             ..Section::new("reproduction", "Reproduction")
-        })
+        }
     }
 }

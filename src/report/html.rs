@@ -1,19 +1,16 @@
 //! One self-contained page: texts, tables and figures of a run in one file, without external resources. The caller fills
-//! a `Page` with content; `templates` define its look and the one script, which sorts tables and shows values.
+//! a `Page` with content; `templates` have its style and the one script, which sorts tables and shows values.
+
+use std::fmt;
 
 use base64::prelude::{BASE64_STANDARD, Engine};
-use minijinja::value::{Serde, Value};
-use minijinja::{Environment, escape_formatter};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
 use super::records::PROGRAM;
-use crate::model::profile::Profile;
 use crate::support::plain_text::shown;
 use crate::support::table::Table;
-use crate::{Error, Result};
 
-const TEMPLATE: &str = include_str!("templates/report.html");
 const STYLE: &str = include_str!("templates/style.css");
 const SCRIPT: &str = include_str!("templates/script.js");
 
@@ -21,7 +18,7 @@ const SCRIPT: &str = include_str!("templates/script.js");
 const NARROW_PX: f64 = 700.0;
 
 /// A figure with the names of its files beside the page.
-#[derive(Debug, Clone, Serialize)]
+#[derive(Debug, Clone)]
 pub struct PageFigure {
     svg: String,
     files: Vec<String>,
@@ -37,7 +34,7 @@ impl PageFigure {
 }
 
 /// A chapter of the page.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Section {
     /// Anchor: lower-case letters and dashes.
     pub id: String,
@@ -62,7 +59,7 @@ pub(super) struct Section {
 }
 
 /// The page.
-#[derive(Debug, Clone, Default, Serialize)]
+#[derive(Debug, Clone, Default)]
 pub(super) struct Page {
     /// Heading.
     pub title: String,
@@ -82,11 +79,10 @@ impl Section {
         Section { id: id.to_owned(), title: title.to_owned(), ..Section::default() }
     }
 
-    /// A profile that opens on a click.
-    pub(super) fn of_profile(title: impl Into<String>, profile: &Profile) -> Result<Section> {
-        let text = serde_json::to_string_pretty(profile);
-        let text = text.map_err(|e| Error::Internal(format!("a profile cannot be written: {e}")))?;
-        Ok(Section::folded(title, text))
+    /// A profile or options that open on a click.
+    pub(super) fn options(title: impl Into<String>, options: &impl Serialize) -> Section {
+        // Texts and numbers, which JSON always has.
+        Section::folded(title, serde_json::to_string_pretty(options).unwrap_or_default())
     }
 
     /// A long text that opens on a click.
@@ -95,36 +91,137 @@ impl Section {
     }
 }
 
+/// A text in a page. In addition to HTML's own, characters that reverse or hide text are made visible.
+struct Escaped<'a>(&'a str);
+
+impl fmt::Display for Escaped<'_> {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        shown(self.0).chars().try_for_each(|c| match c {
+            '<' => f.write_str("&lt;"),
+            '>' => f.write_str("&gt;"),
+            '&' => f.write_str("&amp;"),
+            '"' => f.write_str("&quot;"),
+            '\'' => f.write_str("&#x27;"),
+            '/' => f.write_str("&#x2f;"),
+            c => write!(f, "{c}"),
+        })
+    }
+}
+
 impl Page {
     /// The page as a complete HTML document. The same page gives the same bytes.
-    ///
-    /// # Errors
-    /// [`Error::Internal`] if the template does not match: a defect of this program.
-    pub(super) fn html(&self) -> Result<String> {
-        #[derive(Serialize)]
-        struct Context<'a> {
-            style: &'a str,
-            script: &'a str,
-            script_sha256: String,
-            program: &'a str,
-            #[serde(flatten)]
-            page: &'a Page,
-        }
-        let broken = |e: minijinja::Error| Error::Internal(format!("the report's page cannot be made: {e:#}"));
-        let mut environment = Environment::new();
-        // In addition to HTML escapes, which follow from the template's name: characters that reverse or hide text are
-        // made visible.
-        environment.set_formatter(|out, state, value| match value.as_str() {
-            Some(text) if !value.is_safe() => escape_formatter(out, state, &Value::from(shown(text).as_ref())),
-            _ => escape_formatter(out, state, value),
-        });
-        environment.add_template("report.html", TEMPLATE).map_err(broken)?;
-        let template = environment.get_template("report.html").map_err(broken)?;
+    pub(super) fn html(&self) -> String {
+        let title = Escaped(&self.title);
         let script_sha256 = BASE64_STANDARD.encode(Sha256::digest(SCRIPT));
-        template
-            .render(Serde(Context { style: STYLE, script: SCRIPT, script_sha256, program: PROGRAM, page: self }))
-            .map_err(broken)
+        let synthetic = "SYNTHETIC DATA: nothing on this page is a statement about real traffic.";
+        let warnings = self.synthetic.then_some(synthetic).into_iter().chain(self.warnings.iter().map(String::as_str));
+        let warnings: String =
+            warnings.map(|warning| format!("\n<p class=\"warning\">{}</p>", Escaped(warning))).collect();
+        let sections: String = self
+            .sections
+            .iter()
+            .enumerate()
+            .map(|(at, section)| {
+                let contents = if at == 0 { self.contents() } else { String::new() };
+                format!("\n<section id=\"{}\">{}{contents}\n</section>", Escaped(&section.id), section.html())
+            })
+            .collect();
+        format!(
+            "<!doctype html>\n<html lang=\"en\">\n<head>\n<meta charset=\"utf-8\">\n\
+             <meta http-equiv=\"Content-Security-Policy\" content=\"default-src 'none'; style-src 'unsafe-inline'; \
+             script-src 'sha256-{script_sha256}'; img-src data:; base-uri 'none'; form-action 'none'\">\n\
+             <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
+             <meta name=\"generator\" content=\"{program}\">\n<title>{title}</title>\n<link rel=\"icon\" href=\"data:,\">\n\
+             <style>\n{STYLE}\n</style>\n</head>\n<body>\n<header>\n<h1>{title}</h1>\n<p>{lead}</p>{warnings}\n</header>\n\
+             <main>{sections}\n</main>\n<div id=\"tip\" role=\"status\" hidden></div>\n<script>{SCRIPT}</script>\n</body>\n</html>",
+            program = Escaped(PROGRAM),
+            lead = Escaped(&self.lead),
+        )
     }
+
+    /// Links to all chapters but the first.
+    fn contents(&self) -> String {
+        let others = self.sections.get(1..).unwrap_or_default();
+        if others.is_empty() {
+            return String::new();
+        }
+        let link = |of: &Section| format!("\n<li><a href=\"#{}\">{}</a></li>", Escaped(&of.id), Escaped(&of.title));
+        let links: String = others.iter().map(link).collect();
+        format!("\n<nav aria-label=\"Contents\">\n<ul>{links}\n</ul>\n</nav>")
+    }
+}
+
+impl Section {
+    fn html(&self) -> String {
+        let (title, content) = (Escaped(&self.title), self.content());
+        match (self.is_folded, self.title.is_empty()) {
+            (true, _) => format!("\n<details>\n<summary><h2>{title}</h2></summary>{content}\n</details>"),
+            (false, true) => content,
+            (false, false) => format!("\n<h2>{title}</h2>{content}"),
+        }
+    }
+
+    fn content(&self) -> String {
+        let mut html = String::new();
+        if !self.intro.is_empty() {
+            html += &format!("\n<p>{}</p>", Escaped(&self.intro));
+        }
+        if !self.text.is_empty() {
+            html += &format!("\n<pre>{}</pre>", Escaped(&self.text));
+        }
+        html.extend(self.tables.iter().map(table));
+        if !self.figures.is_empty() {
+            let figures: String = self.figures.iter().map(PageFigure::html).collect();
+            html += &format!("\n<div class=\"figures\">{figures}\n</div>");
+        }
+        if !self.facts.is_empty() {
+            html += &format!("\n<dl>{}\n</dl>", facts(&self.facts));
+        }
+        if !self.host.is_empty() {
+            let host = facts(&self.host);
+            html += &format!("\n<dl class=\"host\">\n<!-- host -->{host}\n<!-- end of host -->\n</dl>");
+        }
+        html.extend(self.parts.iter().map(|part| {
+            let (title, content) = (Escaped(&part.title), part.content());
+            format!("\n<details class=\"part\">\n<summary>{title}</summary>{content}\n</details>")
+        }));
+        html
+    }
+}
+
+impl PageFigure {
+    fn html(&self) -> String {
+        let class = if self.is_wide { " class=\"wide\"" } else { "" };
+        let files: Vec<String> = self.files.iter().map(|file| format!("<code>{}</code>", Escaped(file))).collect();
+        let caption = match files.is_empty() {
+            true => String::new(),
+            false => format!("\n<figcaption>Files: {}</figcaption>", files.join(", ")),
+        };
+        format!("\n<figure{class}>\n{}{caption}\n</figure>", self.svg)
+    }
+}
+
+fn table(table: &Table) -> String {
+    let (header, rows) = table.shown();
+    let class = |at: usize| if at < table.words() { " class=\"text\"" } else { "" };
+    let cells = |tag: &str, end: &str, row: &[String]| -> String {
+        let cell = |(at, cell): (usize, &String)| format!("<{tag}{}>{}</{end}>", class(at), Escaped(cell));
+        row.iter().enumerate().map(cell).collect()
+    };
+    let body: String = rows.iter().map(|row| format!("\n<tr>{}</tr>", cells("td", "td", row))).collect();
+    format!(
+        "\n<div class=\"scroll\">\n<table>\n<caption>{}</caption>\n<thead><tr>{}</tr></thead>\n<tbody>{body}\n</tbody>\n\
+         </table>\n</div>",
+        Escaped(&table.caption),
+        cells("th scope=\"col\"", "th", &header),
+    )
+}
+
+fn facts(facts: &[(String, String)]) -> String {
+    let fact = |(name, value): &(String, String)| {
+        format!("\n<div><dt>{}</dt><dd>{}</dd></div>", Escaped(name), Escaped(value))
+    };
+    facts.iter().map(fact).collect()
 }
 
 /// An SVG document as an element that scales with the page, and its width, px: a view box replaces width and height.
@@ -168,7 +265,7 @@ mod tests {
 
     #[test]
     fn texts_are_escaped_and_figures_are_not() {
-        let html = page().html().unwrap();
+        let html = page().html();
         assert_eq!(html.matches("<script").count(), 1, "{html}");
         assert!(html.contains("\\u{202e}\\u{1b}") && !html.contains(['\u{202e}', '\u{1b}']), "{html}");
         assert!(html.contains("&lt;script&gt;") && html.contains("A &amp; B") && html.contains("x &lt; y"));
@@ -176,12 +273,12 @@ mod tests {
             html.contains("viewBox=\"0 0 1000 50\" role=\"img\" fill=\"#000\"><rect width=\"100%\" height=\"100%\"/>")
         );
         assert!(!html.contains("<?xml"));
-        assert_eq!(html, page().html().unwrap());
+        assert_eq!(html, page().html());
     }
 
     #[test]
     fn nothing_is_fetched_from_elsewhere() {
-        let html = page().html().unwrap().replace("http://www.w3.org/2000/svg", "");
+        let html = page().html().replace("http://www.w3.org/2000/svg", "");
         let html: String = html.lines().filter(|line| !line.starts_with("//")).collect();
         for outside in ["http:", "https:", "//", "@import", "url(", "src="] {
             assert!(!html.contains(outside), "{outside}");
@@ -190,7 +287,7 @@ mod tests {
 
     #[test]
     fn the_page_forbids_other_scripts_and_everything_from_elsewhere() {
-        let html = page().html().unwrap();
+        let html = page().html();
         let head = html.split_once("</head>").unwrap().0;
         let policy = head.split_once("http-equiv=\"Content-Security-Policy\" content=\"").unwrap().1;
         let policy = policy.split_once('"').unwrap().0;
@@ -206,7 +303,7 @@ mod tests {
 
     #[test]
     fn what_belongs_to_the_machine_can_be_cut_out() {
-        let html = page().html().unwrap();
+        let html = page().html();
         let (before, after) = html.split_once("<!-- host -->").unwrap();
         let (host, after) = after.split_once("<!-- end of host -->").unwrap();
         let name = "<dt>device<";

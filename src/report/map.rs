@@ -106,7 +106,7 @@ impl MapReport {
             results.add(&name, svg.as_bytes())?;
             figures.push(PageFigure::new(&svg, &[&name, "differences.csv"]));
         }
-        results.add("report.html", self.html(figures)?.as_bytes())?;
+        results.add("report.html", self.html(figures).as_bytes())?;
         results.add_with("cells.csv", |out| self.write_cells(out))?;
         if !differences.is_empty() {
             results.add_with("differences.csv", |out| self.write_differences(&differences, out))?;

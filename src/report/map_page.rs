@@ -3,12 +3,11 @@
 use super::html::{Page, PageFigure, Section};
 use super::map::MapReport;
 use super::records::PROGRAM;
-use crate::Result;
 use crate::support::readable::count;
 
 impl MapReport {
     /// Renders the run as one page.
-    pub(super) fn html(&self, figures: Vec<PageFigure>) -> Result<String> {
+    pub(super) fn html(&self, figures: Vec<PageFigure>) -> String {
         let shares = Section {
             intro: if self.grids.iter().any(|mapped| mapped.known_percent.iter().any(Option::is_some)) {
                 "Known shares are those of the JRC's evidence.".to_owned()
@@ -35,7 +34,7 @@ impl MapReport {
                 .chain(hashes)
                 .collect(),
             host,
-            parts: vec![Section::of_profile("Profile", &self.profile)?],
+            parts: vec![Section::options("Profile", &self.profile)],
             is_folded: true,
             ..Section::new("reproduction", "Reproduction")
         };

@@ -128,7 +128,7 @@ impl EstimateFile {
             figures.insert(0, PageFigure::new(&svg, &["headways.svg", "headways.csv"]));
         }
         results.add("estimates.csv", self.csv().as_bytes())?;
-        results.add("report.html", self.html(figures)?.as_bytes())?;
+        results.add("report.html", self.html(figures).as_bytes())?;
         self.files = results.names();
         results.publish(self.json()?.as_bytes())
     }

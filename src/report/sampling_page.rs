@@ -4,7 +4,6 @@ use super::html::{Page, PageFigure, Section};
 use super::plot::{AxisScale, Figure, Layer, Mark, Plot, PlotAxis, Series, Value, is_few};
 use super::sampling::{EstimateFile, interval_text, rate_text, ratio_text, short, three_digits};
 use super::sampling_tables::{VERDICTS, verdicts};
-use crate::Result;
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -15,10 +14,7 @@ use crate::support::table::{Column, Digits, NumberText, Table};
 
 impl EstimateFile {
     /// `report.html`, with the figures of the run.
-    ///
-    /// # Errors
-    /// None for a page of this program.
-    pub fn html(&self, figures: Vec<PageFigure>) -> Result<String> {
+    pub fn html(&self, figures: Vec<PageFigure>) -> String {
         let density = &self.density;
         let mut warnings = Vec::new();
         if !self.given.is_empty() {
@@ -52,7 +48,7 @@ impl EstimateFile {
             ),
             synthetic: density.provenance.synthetic,
             warnings,
-            sections: sections.into_iter().chain([self.reproduction()?]).collect(),
+            sections: sections.into_iter().chain([self.reproduction()]).collect(),
         };
         page.html()
     }
@@ -188,7 +184,7 @@ impl EstimateFile {
         })
     }
 
-    fn reproduction(&self) -> Result<Section> {
+    fn reproduction(&self) -> Section {
         let mut facts = vec![
             ("program".to_owned(), self.program.clone()),
             ("estimator".to_owned(), self.estimator.to_owned()),
@@ -223,15 +219,15 @@ impl EstimateFile {
         if self.host.seconds > 0.0 {
             host.push(("seconds".to_owned(), format!("{:.2} on {} threads", self.host.seconds, self.host.threads)));
         }
-        Ok(Section {
+        Section {
             intro: "The same density, options and seed give the same numbers, on any machine, whole or in shards. \
                     estimate.json holds all of it; `simulate` reruns a lane from it."
                 .to_owned(),
             facts,
             host,
-            parts: vec![Section::of_profile("Profile", &self.profile)?],
+            parts: vec![Section::options("Profile", &self.profile)],
             is_folded: true,
             ..Section::new("reproduction", "Reproduction")
-        })
+        }
     }
 }

@@ -435,7 +435,7 @@ impl SearchReport<'_> {
         super::records::document(&self.record(files)?)
     }
 
-    fn page(&self, figures: &[(&str, Figure)]) -> Result<String> {
+    fn page(&self, figures: &[(&str, Figure)]) -> String {
         let of = |name: &str| -> Vec<PageFigure> {
             let found = figures.iter().filter(|(file, _)| *file == name);
             found.map(|(file, figure)| PageFigure::new(&figure.svg(), &[&format!("{file}.svg")])).collect()
@@ -522,7 +522,7 @@ impl SearchReport<'_> {
             results.add("winner.json", &winner.to_json(&self.data)?)?;
         }
         results.add("report.txt", self.text().as_bytes())?;
-        results.add("report.html", self.page(&figures)?.as_bytes())?;
+        results.add("report.html", self.page(&figures).as_bytes())?;
         let files = results.names();
         results.publish(self.json(&files)?.as_bytes())?;
         Ok(files)

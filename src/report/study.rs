@@ -146,7 +146,7 @@ impl StudyReport {
         if let Some(comparison) = &self.comparison {
             results.add("reference.csv", reference::table(comparison).csv().as_bytes())?;
         }
-        results.add("report.html", self.html()?.as_bytes())?;
+        results.add("report.html", self.html().as_bytes())?;
         self.run.files = results.names();
         results.publish(self.run.json()?.as_bytes())
     }

@@ -12,17 +12,13 @@ use crate::scenario::parameterization::Parameterization;
 use crate::support::readable::{count, value};
 use crate::support::table::Table;
 use crate::traffic::mining::RecordingSummary;
-use crate::{Error, Result};
 
 /// Maximum number of recordings listed; the rest are in `run.json`.
 const MAX_RECORDINGS: usize = 200;
 
 impl StudyReport {
     /// `report.html`.
-    ///
-    /// # Errors
-    /// None for a page of this program.
-    pub fn html(&self) -> Result<String> {
+    pub fn html(&self) -> String {
         let run = &self.run;
         let mut warnings = Vec::new();
         if !run.left_out.is_empty() {
@@ -50,7 +46,7 @@ impl StudyReport {
             text: reference::text(comparison),
             ..Section::new("reference", "Lane arithmetic against double precision")
         }));
-        sections.extend([self.data(), self.reproduction()?]);
+        sections.extend([self.data(), self.reproduction()]);
         sections.iter_mut().for_each(|section| section.is_folded = true);
         sections.insert(0, answer);
         let page = Page {
@@ -168,7 +164,7 @@ impl StudyReport {
         })
     }
 
-    fn reproduction(&self) -> Result<Section> {
+    fn reproduction(&self) -> Section {
         let run = &self.run;
         let mut facts = vec![
             ("program".to_owned(), run.program.clone()),
@@ -196,22 +192,19 @@ impl StudyReport {
             let text = format!("mining {mine_s:.2}, planning {plan_s:.2}, lanes {sweep_s:.2}, scores {score_s:.2}");
             host.push(("seconds".to_owned(), text));
         }
-        let value: serde_json::Value =
-            serde_json::from_str(&run.json()?).map_err(|e| Error::Internal(format!("run.json cannot be read: {e}")))?;
-        let part = |key: &str| serde_json::to_string_pretty(&value[key]).unwrap_or_default();
-        Ok(Section {
+        Section {
             intro: "The same input, profile and seed give the same numbers, on any machine. run.json holds all of it; \
                     `lanesweep verify` compares a device with the CPU word by word."
                 .to_owned(),
             facts,
             host,
             parts: vec![
-                Section::folded("Profile", part("profile")),
-                Section::folded("Options of the parameterizations", part("parameterization")),
-                Section::folded("Options of the scores", part("score")),
+                Section::options("Profile", &run.profile),
+                Section::options("Options of the parameterizations", &run.parameterization),
+                Section::options("Options of the scores", &run.score),
             ],
             ..Section::new("reproduction", "Reproduction")
-        })
+        }
     }
 }
 

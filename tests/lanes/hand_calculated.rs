@@ -55,7 +55,7 @@ fn judged(case: &PlainCase, headway: Headway) -> Judgement {
         let profile = dt_s.map_or_else(|| profile.clone(), |dt_s| profile.clone().with_dt(dt_s).unwrap());
         let subject = Subject::plain(case, headway);
         let check = Check { subject, profiles: vec![profile], models: ModelId::ALL.to_vec() };
-        check.run().unwrap().remove(0)
+        check.run_without_boundaries().unwrap().remove(0)
     };
     let (coarse, fine) = (of(None), of(Some(0.001)));
     assert_eq!(coarse.verdicts.answer(), fine.verdicts.answer());
@@ -228,7 +228,7 @@ fn every_value_of_the_clauses_is_that_of_its_own_time() {
     let judged = |case: &PlainCase, headway| {
         let profiles = vec![Profile::load("un-r157").unwrap()];
         Check { subject: Subject::plain(case, headway), profiles, models: vec![ModelId::Cchdm] }
-            .run()
+            .run_without_boundaries()
             .unwrap()
             .remove(0)
     };
@@ -292,7 +292,10 @@ fn without_a_collision_of_an_ego_that_never_reacts_there_is_no_conflict() {
 /// The judgement under a profile, at its own time step.
 fn under(profile: Profile, case: &PlainCase, headway: Headway) -> Judgement {
     let subject = Subject::plain(case, headway);
-    Check { subject, profiles: vec![profile], models: ModelId::ALL.to_vec() }.run().unwrap().remove(0)
+    Check { subject, profiles: vec![profile], models: ModelId::ALL.to_vec() }
+        .run_without_boundaries()
+        .unwrap()
+        .remove(0)
 }
 
 fn un_r157(case: &PlainCase, headway: Headway) -> Judgement {

@@ -2,7 +2,7 @@
 //! in the table of contents, every verb is in the book, every flag exists.
 //!
 //! A chapter's ```` ```console ```` blocks run in an empty folder of the chapter's own, in order; what stands in a block
-//! `toml file=NAME` (any language) is a file there. Programs of the system, such as `head`, may be called too. `TRYCMD=overwrite cargo test --release --test program book::commands` writes
+//! `toml file=NAME` (any language) is a file there. Programs of the system, such as `head`, may be called too. `TRYCMD=overwrite cargo test --release --test program book::commands -- --ignored` writes
 //! what the commands print into the chapters.
 #![cfg(unix)]
 
@@ -75,6 +75,7 @@ fn verbs() -> Vec<String> {
 }
 
 #[test]
+#[ignore = "half a minute and more: .ci/run long-tests"]
 fn commands_print_what_the_book_says() {
     let work = tempfile::Builder::new().prefix("book").tempdir_in(env!("CARGO_TARGET_TMPDIR")).unwrap();
     let cases: Vec<(PathBuf, Document)> = chapters()
@@ -303,6 +304,7 @@ fn are_drawn(figures: &[(&str, &str, &str)]) {
 }
 
 #[test]
+#[ignore = "half a minute and more: .ci/run long-tests"]
 fn figures_are_what_their_commands_draw() {
     let mut listed: Vec<&str> = FIGURES.iter().map(|(figure, ..)| *figure).collect();
     listed.sort_unstable();

@@ -107,6 +107,7 @@ fn fcd() -> String {
 }
 
 #[test]
+#[ignore = "half a minute and more: .ci/run long-tests"]
 fn every_example_of_the_help_runs() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();

@@ -597,7 +597,7 @@ fn a_cell_is_undecided_where_the_single_case_is() {
         let gap_m = point.get(MapQuantity::Gap).unwrap();
         let subject = Subject::plain(&point.plain_case(Category::CutIn, &profile).unwrap(), Headway::GapM(gap_m));
         let check = Check { subject, profiles: vec![profile.clone()], models: vec![ModelId::Cchdm] };
-        let judged = &check.run().unwrap()[0];
+        let judged = &check.run_without_boundaries().unwrap()[0];
         let flips = &judged.models[0].flips;
         assert_eq!(judged.verdicts.unreacting == RunEnd::Contact, map.is_conflict(0, cell), "cell {cell}");
         // A perturbation may change the driver's collision, or whether there is a conflict.
@@ -631,7 +631,7 @@ fn a_cell_without_a_conflict_is_a_case_without_one() {
                             profiles: vec![profile.clone()],
                             models: vec![model],
                         };
-                        let judged = check.run().unwrap().remove(0);
+                        let judged = check.run_without_boundaries().unwrap().remove(0);
                         let outcome = map.outcome(at, cell, Criterion::Collision);
                         let is_no_conflict = judged.verdicts.answer() == Answer::NoConflict;
                         let says_so = matches!(outcome, CellOutcome::NoConflict | CellOutcome::FailByReaction);

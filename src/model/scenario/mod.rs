@@ -22,7 +22,7 @@ pub use crate::model::case::{Ahead, Case, Category, LANE_WIDTH_M, Participant, P
 pub use crate::model::case::{check_headway, missing_parameter};
 pub use crate::model::motion::{LATERAL_SAMPLED, Lateral, LateralState, Motion, SPEED_SAMPLED, Speed, Tables};
 pub use case_file::CaseFile;
-pub use case_parameters::{CaseParameters, NamedNumber};
+pub use case_parameters::{CaseNumber, CaseParameters, NUMBERS, NamedNumber};
 pub use check::problem_of;
 pub use file::{check_scenario_file, read_scenario_file, read_scenarios, write_scenarios, write_scenarios_to};
 pub use found::{ScenarioFile, usable};
