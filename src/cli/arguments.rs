@@ -97,26 +97,21 @@ impl FromValue for bool {
     }
 }
 
+/// What a text of an option says, numbers as their texts.
+fn parsed<T>(value: &Value, expected: &str, parse: impl Fn(&str) -> Option<T>) -> std::result::Result<T, String> {
+    let parsed = value.text().ok().and_then(|text| parse(text.trim()));
+    parsed.ok_or_else(|| format!("{value} is not {expected}"))
+}
+
 impl FromValue for usize {
     fn of(value: Value) -> std::result::Result<Self, String> {
-        let whole = match &value {
-            Value::Whole(n) => usize::try_from(*n).ok(),
-            Value::Number(_) | Value::Text(_) => super::lists::whole(&value.text()?).ok(),
-            _ => None,
-        };
-        whole.ok_or_else(|| format!("{value} is not a whole number from 0"))
+        parsed(&value, "a whole number from 0", |text| super::lists::whole(text).ok())
     }
 }
 
 impl FromValue for f64 {
     fn of(value: Value) -> std::result::Result<Self, String> {
-        let number = match &value {
-            Value::Whole(n) => Some(*n as f64),
-            Value::Number(x) => Some(*x),
-            Value::Text(_) => value.text()?.trim().parse().ok(),
-            _ => None,
-        };
-        number.ok_or_else(|| format!("{value} is not a number"))
+        parsed(&value, "a number", |text| text.parse().ok())
     }
 }
 
@@ -332,6 +327,12 @@ pub(super) trait FromArguments: Sized {
     /// # Errors
     /// As [`Arguments::take`].
     fn from_arguments(arguments: &mut Arguments) -> Result<Self>;
+}
+
+impl<T: FromArguments> FromArguments for Box<T> {
+    fn from_arguments(arguments: &mut Arguments) -> Result<Self> {
+        T::from_arguments(arguments).map(Box::new)
+    }
 }
 
 /// Implements [`FromArguments`]: fields that take their values, fields that a function parses, fields with several values that a

@@ -12,7 +12,7 @@ use super::console;
 use super::format::FormatFlag;
 use super::signals::CANCEL;
 use super::source::{PlausibilityFlag, complain_of, refuse_overwriting, scenarios_of};
-use super::{Answer as Printed, Exit};
+use super::{Exit, Output};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::report::case_sheet::CaseSheet;
@@ -89,7 +89,7 @@ struct CheckRequest {
 }
 
 impl Check {
-    pub(super) fn run(&self, configured: &Configured) -> Result<Printed> {
+    pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         configured.refuse_assigned(
             "has no effect on a check",
             "leave it out; --profiles names the profiles, which hold the time step",
@@ -129,7 +129,7 @@ impl Check {
         }
         // If input was skipped the answer is incomplete.
         let exit = if request.incomplete { Exit::Incomplete } else { status(judgements[0].verdict()) };
-        self.format.answer(exit, || sheet.text(), || sheet.json())
+        self.format.output(exit, || sheet.text(), || sheet.json())
     }
 
     /// The table to be judged with all rows.
@@ -160,7 +160,7 @@ impl Check {
     }
 
     /// Judges every row of a table under one profile.
-    fn check_all(&self, path: &Path, profile: &Profile, models: &[ModelId]) -> Result<Printed> {
+    fn check_all(&self, path: &Path, profile: &Profile, models: &[ModelId]) -> Result<Output> {
         let mut table = CaseTable::open(path)?;
         let mut doubts = Doubts::new(self.plausibility.policy());
         let (mut cases, mut broken, mut is_end) = (Vec::new(), Vec::new(), false);
@@ -208,7 +208,7 @@ impl Check {
         let origin = path.display().to_string();
         let answers = Answers { origin, profile: profile.name.clone(), cases, broken };
         let exit = if is_complete { status(answers.worst()) } else { Exit::Incomplete };
-        self.format.answer(exit, || answers.text(console::width()), || answers.json())
+        self.format.output(exit, || answers.text(console::width()), || answers.json())
     }
 
     fn request(&self, profile: &Profile) -> Result<CheckRequest> {

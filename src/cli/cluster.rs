@@ -2,7 +2,7 @@
 
 use clap::{Args, Subcommand};
 
-use super::Answer;
+use super::Output;
 use super::arguments::{Arguments, FromArguments};
 use super::merge::Merge;
 use crate::Result;
@@ -30,7 +30,7 @@ impl FromArguments for Cluster {
 }
 
 impl Cluster {
-    pub(super) fn run(&self) -> Result<Answer> {
+    pub(super) fn run(&self) -> Result<Output> {
         match &self.verb {
             ClusterVerb::Merge(verb) => verb.run(),
         }

@@ -10,7 +10,7 @@ use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::source::SourceFlags;
-use super::{Answer, Exit, lists};
+use super::{Exit, Output, lists};
 use crate::report::compare::CompareFile;
 use crate::report::sampling::HostRecord;
 use crate::run::compare::{self, CompareOptions, CompareResult};
@@ -64,7 +64,7 @@ from_arguments!(
 );
 
 impl Compare {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Answer> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Output> {
         let started = Instant::now();
         let config = &configured.settings;
         let categories = self.categories.list()?;
@@ -125,7 +125,7 @@ impl Compare {
         );
         file.write(folder.results()?)?;
         let exit = if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete };
-        self.format.answer_in(&self.out, exit, || file.text(), || file.json())
+        self.format.output_in(&self.out, exit, || file.text(), || file.json())
     }
 
     /// Results must not replace an input.

@@ -7,7 +7,7 @@ use serde_json::json;
 
 use super::configured::Configured;
 use super::shell::{Completions, Man};
-use super::{Answer, Exit, console};
+use super::{Exit, Output, console};
 use crate::cli::settings::{
     Assignment, DEFAULT_FILE, DEFAULT_FILE_NAME, Layers, Setting, profile_schema, settings_schema, text_of,
 };
@@ -103,7 +103,7 @@ enum SchemaOf {
 }
 
 impl Config {
-    pub(super) fn run(&self, configured: &Configured) -> Result<Answer> {
+    pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         match &self.verb {
             ConfigVerb::Init(verb) => verb.run(),
             ConfigVerb::Show(verb) => verb.run(configured),
@@ -116,7 +116,7 @@ impl Config {
 }
 
 impl Init {
-    fn run(&self) -> Result<Answer> {
+    fn run(&self) -> Result<Output> {
         if self.file == Path::new("-") {
             console::print(DEFAULT_FILE)?;
             return Ok(Exit::Ok.into());
@@ -135,7 +135,7 @@ impl Init {
 }
 
 impl Show {
-    fn run(&self, configured: &Configured) -> Result<Answer> {
+    fn run(&self, configured: &Configured) -> Result<Output> {
         // Only the profile can check its own time step.
         configured.profile()?;
         configured.backend()?;
@@ -154,7 +154,7 @@ impl Show {
 }
 
 impl Check {
-    fn run(&self) -> Result<Answer> {
+    fn run(&self) -> Result<Output> {
         let layers = Layers::read(&[Assignment::File(self.file.clone())], None)?;
         layers.settings()?;
         let count = layers.given().count();
@@ -165,7 +165,7 @@ impl Check {
 }
 
 impl Schema {
-    fn run(&self) -> Result<Answer> {
+    fn run(&self) -> Result<Output> {
         let schema = match self.of {
             SchemaOf::Config => settings_schema(),
             SchemaOf::Profile => profile_schema()?,

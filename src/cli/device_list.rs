@@ -6,7 +6,7 @@ use comfy_table::{CellAlignment, ColumnConstraint, ContentArrangement, Table, pr
 use serde_json::json;
 
 use super::format::FormatFlag;
-use super::{Answer, Exit};
+use super::{Exit, Output};
 use crate::Result;
 use crate::engine::BackendChoice;
 use crate::engine::gpu::{AdapterCard, Adapters, GpuBackend, GpuOptions, choose, visible_here};
@@ -18,13 +18,13 @@ use crate::report::tables::{WIDTH, wrap};
 ///
 /// # Errors
 /// If the environment cannot be parsed.
-pub(super) fn list(format: &FormatFlag, no_self_check: bool) -> Result<Answer> {
+pub(super) fn list(format: &FormatFlag, no_self_check: bool) -> Result<Output> {
     let adapters = Adapters::enumerate();
     let seen = Seen::new(adapters.cards(), visible_here());
     let self_check = |index: usize| if no_self_check { "-".to_owned() } else { check(&adapters, index) };
-    let answer = format.answer(Exit::Ok, || seen.text(&self_check), || seen.json(&self_check))?;
+    let output = format.output(Exit::Ok, || seen.text(&self_check), || seen.json(&self_check))?;
     // The list helps to correct the environment, so it is printed first.
-    seen.visible.map(|_| answer)
+    seen.visible.map(|_| output)
 }
 
 /// Checks some thousand lanes on the device against the CPU; returns the result in a word.

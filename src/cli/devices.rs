@@ -2,7 +2,7 @@
 
 use clap::Args;
 
-use super::Answer;
+use super::Output;
 use super::format::FormatFlag;
 use crate::Result;
 
@@ -22,12 +22,12 @@ pub(super) struct Devices {
 
 impl Devices {
     #[cfg(feature = "gpu")]
-    pub(super) fn run(&self) -> Result<Answer> {
+    pub(super) fn run(&self) -> Result<Output> {
         super::device_list::list(&self.format, self.no_self_check)
     }
 
     #[cfg(not(feature = "gpu"))]
-    pub fn run(&self) -> Result<Answer> {
+    pub fn run(&self) -> Result<Output> {
         Err(crate::engine::no_gpu("lanesweep verify devices"))
     }
 }

@@ -8,44 +8,47 @@ use super::arguments::{self, Arguments, FromArguments};
 use super::configured::{self, Configured};
 use super::console::{self, Verbosity};
 use super::signals::CANCEL;
-use super::{Answer, Verb, not_started, pool_of, without_panic};
+use super::{Output, Verb, not_started, pool_of, without_panic};
 use crate::support::cancel::Cancel;
 use crate::{Error, Place, Result};
 
 /// Stack of the threads that run a verb, bytes.
 pub const STACK_BYTES: usize = 8 << 20;
 
-/// Verbs by the names of their functions.
-const FUNCTIONS: [(&str, &[&str]); 14] = [
-    ("study", &["study"]),
-    ("tracks", &["tracks"]),
-    ("mine", &["mine"]),
-    ("fit", &["fit"]),
-    ("sample", &["sample"]),
-    ("compare", &["compare"]),
-    ("search", &["search"]),
-    ("justify", &["justify"]),
-    ("map", &["map"]),
-    ("check", &["check"]),
-    ("trace", &["simulate"]),
-    ("export_xosc", &["export", "xosc"]),
-    ("synth", &["synth"]),
-    ("merge", &["cluster", "merge"]),
+/// A verb as a function: its name, its words on a command line, and its options.
+type Function = (&'static str, &'static [&'static str], fn(&mut Arguments) -> Result<Verb>);
+
+#[rustfmt::skip] // a table
+const FUNCTIONS: [Function; 14] = [
+    ("study", &["study"], |given| Ok(Verb::Study(of(given)?))),
+    ("tracks", &["tracks"], |given| Ok(Verb::Tracks(of(given)?))),
+    ("mine", &["mine"], |given| Ok(Verb::Mine(of(given)?))),
+    ("fit", &["fit"], |given| Ok(Verb::Fit(of(given)?))),
+    ("sample", &["sample"], |given| Ok(Verb::Sample(of(given)?))),
+    ("compare", &["compare"], |given| Ok(Verb::Compare(of(given)?))),
+    ("search", &["search"], |given| Ok(Verb::Search(of(given)?))),
+    ("justify", &["justify"], |given| Ok(Verb::Justify(of(given)?))),
+    ("map", &["map"], |given| Ok(Verb::Map(of(given)?))),
+    ("check", &["check"], |given| Ok(Verb::Check(of(given)?))),
+    ("trace", &["simulate"], |given| Ok(Verb::Simulate(of(given)?))),
+    ("export_xosc", &["export", "xosc"], |given| Ok(Verb::Export(of(given)?))),
+    ("synth", &["synth"], |given| Ok(Verb::Synth(of(given)?))),
+    ("merge", &["cluster", "merge"], |given| Ok(Verb::Cluster(of(given)?))),
 ];
 
-/// The definition of a function's verb.
-fn definition(function: &str) -> Result<clap::Command> {
-    let path = FUNCTIONS.iter().find(|(name, _)| *name == function).map(|(_, path)| *path);
-    let mut command = configured::command();
-    command.build();
-    for verb in path.unwrap_or_default() {
-        let found = command.find_subcommand(verb).cloned();
-        command = found.ok_or_else(|| Error::Internal(format!("there is no verb {verb}")))?;
-    }
-    match path {
-        Some(_) => Ok(command),
-        None => Err(Error::usage(Place::item(function), "there is no such function", "")),
-    }
+fn of<T: FromArguments>(arguments: &mut Arguments) -> Result<T> {
+    T::from_arguments(arguments)
+}
+
+/// A function with the definition of its verb.
+fn find(function: &str) -> Result<(Function, clap::Command)> {
+    let found = FUNCTIONS.into_iter().find(|(name, ..)| *name == function);
+    let found = found.ok_or_else(|| Error::usage(Place::item(function), "there is no such function", ""))?;
+    let mut program = configured::command();
+    program.build();
+    let verb = found.1.iter().try_fold(&program, |command, word| command.find_subcommand(word));
+    let verb = verb.cloned().ok_or_else(|| Error::Internal(format!("there is no verb of {function}")))?;
+    Ok((found, verb))
 }
 
 /// Names of a function's arguments.
@@ -53,21 +56,21 @@ fn definition(function: &str) -> Result<clap::Command> {
 /// # Errors
 /// [`Error::Usage`] for an unknown function.
 pub fn arguments(function: &str) -> Result<Vec<String>> {
-    Ok(arguments::names(&definition(function)?).map(str::to_owned).collect())
+    Ok(arguments::names(&find(function)?.1).map(str::to_owned).collect())
 }
 
 /// Runs a verb with named values; those of its flags and positions. One verb runs at a time in a process.
 ///
 /// # Errors
 /// [`Error::Usage`] for an unknown or unusable argument; [`Error::Busy`] while another verb runs; those of the verb.
-pub fn run(function: &str, values: Vec<(String, Value)>) -> Result<Answer> {
+pub fn run(function: &str, values: Vec<(String, Value)>) -> Result<Output> {
     alone(|| {
         let result = without_panic(|| {
-            let command = definition(function)?;
+            let ((.., verb), command) = find(function)?;
             let name = command.get_name().to_owned();
             let mut arguments = Arguments::new(command, function, values)?;
             let configured = Configured::of_arguments(&mut arguments, &name)?;
-            let mut verb = Verb::of(&name, &mut arguments)?;
+            let mut verb = verb(&mut arguments)?;
             configured.fill(&mut verb);
             let requested = configured.settings.run.threads;
             let pool = pool_of(requested)?.stack_size(STACK_BYTES);
@@ -77,31 +80,6 @@ pub fn run(function: &str, values: Vec<(String, Value)>) -> Result<Answer> {
         console::captured().iter_mut().for_each(|captured| captured.bar = None);
         result
     })
-}
-
-impl Verb {
-    fn of(name: &str, arguments: &mut Arguments) -> Result<Verb> {
-        fn options<T: FromArguments>(arguments: &mut Arguments) -> Result<Box<T>> {
-            T::from_arguments(arguments).map(Box::new)
-        }
-        Ok(match name {
-            "study" => Verb::Study(options(arguments)?),
-            "tracks" => Verb::Tracks(*options(arguments)?),
-            "mine" => Verb::Mine(*options(arguments)?),
-            "fit" => Verb::Fit(*options(arguments)?),
-            "sample" => Verb::Sample(options(arguments)?),
-            "compare" => Verb::Compare(options(arguments)?),
-            "search" => Verb::Search(options(arguments)?),
-            "justify" => Verb::Justify(options(arguments)?),
-            "map" => Verb::Map(options(arguments)?),
-            "check" => Verb::Check(*options(arguments)?),
-            "simulate" => Verb::Simulate(*options(arguments)?),
-            "xosc" => Verb::Export(*options(arguments)?),
-            "synth" => Verb::Synth(*options(arguments)?),
-            "merge" => Verb::Cluster(*options(arguments)?),
-            other => return Err(Error::Internal(format!("{other} is no function"))),
-        })
-    }
 }
 
 /// Does other work of the library as [`run`] does a verb: alone in this process, with its own cancellation, and with
@@ -171,4 +149,44 @@ pub fn progress() -> Option<(String, u64, u64)> {
 /// Takes the lines of the log and of standard error since the last call, with their levels.
 pub fn take_messages() -> Vec<(tracing::Level, String)> {
     console::captured().as_mut().map(|captured| std::mem::take(&mut captured.messages)).unwrap_or_default()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::cli::arguments::NEEDS;
+
+    fn refusal(function: &str, values: &[(&str, Value)]) -> String {
+        let values = values.iter().map(|(name, value)| ((*name).to_owned(), value.clone())).collect();
+        run(function, values).unwrap_err().to_string()
+    }
+
+    #[test]
+    fn values_exclude_and_need_what_words_do() {
+        let text = |text: &str| Value::Text(text.into());
+        let both = [("recordings", text("a")), ("scenarios", text("b.jsonl"))];
+        assert_eq!(refusal("study", &both), "`recordings`: it cannot be used with `scenarios`");
+        let renamed = [("category", text("lvd")), ("rename", text("a=gap_m"))];
+        assert_eq!(refusal("map", &renamed), "`rename`: it needs `distribution`");
+        assert_eq!(refusal("map", &[]), "option `category`: it is needed");
+        assert_eq!(refusal("study", &[("backnd", text("cpu"))]), "`backnd`: study has no such argument");
+        assert_eq!(refusal("study", &[("thw", Value::Boolean(false))]), "`thw`: False is no value of it");
+        assert_eq!(refusal("check", &[("row", Value::Number(1.5))]), "option `row`: 1.5 is not a whole number from 0");
+        assert!(refusal("study", &[("seed", Value::Number(0.5))]).contains("`0.5` cannot be used"));
+    }
+
+    #[test]
+    fn what_an_argument_needs_is_one_of_its_verb() {
+        for (verbs, name, needed) in NEEDS {
+            let functions =
+                FUNCTIONS.iter().filter(|(_, words, _)| words.last().is_some_and(|verb| verbs.contains(verb)));
+            let mut found = 0;
+            for (function, ..) in functions {
+                let names = arguments(function).unwrap();
+                assert!([name, needed].iter().all(|one| names.iter().any(|known| known == one)), "{function}: {name}");
+                found += 1;
+            }
+            assert!(found > 0, "{name}");
+        }
+    }
 }

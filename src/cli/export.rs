@@ -10,7 +10,7 @@ use super::configured::Configured;
 use super::format::FormatFlag;
 use super::lists;
 use super::source::{PlausibilityFlag, scenarios_of};
-use super::{Answer, Exit};
+use super::{Exit, Output};
 use crate::report::openscenario::{
     Concrete, EgoMotion, PlayOptions, concrete_case, concrete_lanes, export_folder, reopen,
 };
@@ -37,7 +37,7 @@ enum Format {
 }
 
 impl Export {
-    pub(super) fn run(&self, configured: &Configured) -> Result<Answer> {
+    pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         match &self.format {
             Format::Xosc(xosc) => xosc.run(configured),
         }
@@ -135,7 +135,7 @@ enum SideFlag {
 }
 
 impl Xosc {
-    fn run(&self, configured: &Configured) -> Result<Answer> {
+    fn run(&self, configured: &Configured) -> Result<Output> {
         let options = self.play_options()?;
         check_folder(&self.out)?;
         let (scenarios, incomplete) = self.scenarios(configured, &options)?;
@@ -146,9 +146,9 @@ impl Xosc {
             document(&rows.collect::<Vec<_>>())
         };
         let exit = if incomplete { Exit::Incomplete } else { Exit::Ok };
-        let answer = self.format.answer(exit, || lines, list)?;
+        let output = self.format.output(exit, || lines, list)?;
         tracing::info!("{} written to {}", counted(rows.len(), "scenario"), self.out.display());
-        Ok(answer)
+        Ok(output)
     }
 
     /// The scenarios, and whether others of the file were skipped.

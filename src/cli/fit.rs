@@ -10,7 +10,7 @@ use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::lists;
 use super::source::{self, SourceFlags};
-use super::{Answer, Exit};
+use super::{Exit, Output};
 use crate::report::density;
 use crate::report::records;
 use crate::report::run_record::SettingRecord;
@@ -68,7 +68,7 @@ from_arguments!(
 );
 
 impl Fit {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Answer> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Output> {
         let config = &configured.settings;
         let ids = self.ids()?;
         let typed = self.exposure.driven()?;
@@ -115,9 +115,9 @@ impl Fit {
         write(&fitted, folder.as_ref())?;
         let exit = if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete };
         let json = || document(&facts, &fitted, &configured.record(false));
-        let answer = self.format.answer(exit, || text(&facts, &fitted), json)?;
+        let output = self.format.output(exit, || text(&facts, &fitted), json)?;
         tracing::info!("{} written to {}", counted(fitted.len(), "density file"), self.out.display());
-        Ok(answer)
+        Ok(output)
     }
 
     /// The parameterizations to fit, in the registry's order.

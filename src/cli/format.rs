@@ -3,7 +3,7 @@
 use clap::{Args, ValueEnum};
 
 use super::arguments::{Arguments, FromArguments, from_arguments};
-use super::{Answer, Exit, console};
+use super::{Exit, Output, console};
 use crate::report::study::StudyReport;
 use crate::report::tables;
 use crate::support::readable::count;
@@ -38,37 +38,37 @@ impl FormatFlag {
     }
 
     /// Prints text or document, whichever is asked for and alone is built; returns both to a program that asks for both.
-    pub(super) fn answer(
+    pub(super) fn output(
         self,
         exit: Exit,
         text: impl FnOnce() -> String,
         json: impl FnOnce() -> Result<String>,
-    ) -> Result<Answer> {
+    ) -> Result<Output> {
         match self.format {
             Format::Text => console::print(&text())?,
             Format::Json => console::print_json(&json()?)?,
-            Format::Both => return Ok(Answer { exit, text: text(), document: json()? }),
+            Format::Both => return Ok(Output { exit, text: text(), document: json()? }),
         }
         Ok(exit.into())
     }
 
-    /// Like [`FormatFlag::answer`], for results in a folder, which it names.
-    pub(super) fn answer_in(
+    /// Like [`FormatFlag::output`], for results in a folder, which it names.
+    pub(super) fn output_in(
         self,
         out: &std::path::Path,
         exit: Exit,
         text: impl FnOnce() -> String,
         json: impl FnOnce() -> Result<String>,
-    ) -> Result<Answer> {
-        let answer = self.answer(exit, text, json)?;
+    ) -> Result<Output> {
+        let output = self.output(exit, text, json)?;
         tracing::info!("results written to {}", out.display());
-        Ok(answer)
+        Ok(output)
     }
 
     /// The answer about a plan that `--plan-only` wrote.
-    pub(super) fn planned(self, exit: Exit, lanes: u64, path: &std::path::Path) -> Result<Answer> {
+    pub(super) fn planned(self, exit: Exit, lanes: u64, path: &std::path::Path) -> Result<Output> {
         let text = || format!("{} lanes planned in {}\n", count(lanes), path.display());
-        self.answer(exit, text, || {
+        self.output(exit, text, || {
             crate::report::records::document(&serde_json::json!({"lanes": lanes, "plan": path.display().to_string()}))
         })
     }
@@ -112,7 +112,7 @@ impl TablesFlag {
         results: Results,
         is_incomplete: bool,
         format: FormatFlag,
-    ) -> Result<Answer> {
+    ) -> Result<Output> {
         let out = results.dir().to_path_buf();
         report.write(results)?;
         let width = console::width();
@@ -121,7 +121,7 @@ impl TablesFlag {
         let answer = || format!("{}{}\n", report.answer(width), tables::wrap(&rest, width));
         let exit = if is_incomplete { Exit::Incomplete } else { Exit::Ok };
         let shown = || if self.tables { report.text(width) } else { answer() };
-        let printed = format.answer(exit, shown, || report.json())?;
+        let printed = format.output(exit, shown, || report.json())?;
         let page = out.join("report.html");
         tracing::info!("{} files written; start with {}", report.run.files.len() + 1, page.display());
         Ok(printed)

@@ -10,7 +10,7 @@ use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::source::SourceFlags;
-use super::{Answer, Exit, lists};
+use super::{Exit, Output, lists};
 use crate::model::driver::ModelId;
 use crate::report::dossier::DossierReport;
 use crate::report::sampling::HostRecord;
@@ -71,7 +71,7 @@ from_arguments!(
 );
 
 impl Justify {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Answer> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Output> {
         let started = Instant::now();
         let config = &configured.settings;
         let id = parameterization(&self.parameterization)?;
@@ -134,7 +134,7 @@ impl Justify {
             Conclusion::NotAppropriate => Exit::NotAppropriate,
             Conclusion::Undecided => Exit::Undecided,
         };
-        self.format.answer_in(&self.out, exit, || report.text(), || report.json(&files))
+        self.format.output_in(&self.out, exit, || report.text(), || report.json(&files))
     }
 }
 

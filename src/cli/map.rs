@@ -10,7 +10,7 @@ use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::source::PlausibilityFlag;
-use super::{Answer, Exit, lists};
+use super::{Exit, Output, lists};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::report::map::{MapHost, MapReport};
@@ -121,7 +121,7 @@ fn after_long_help() -> String {
 }
 
 impl Map {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Answer> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Output> {
         let category = Category::parse(&self.category).ok_or_else(|| {
             let problem = format!("there is no category `{}`", self.category);
             Error::usage(Place::item("CATEGORY"), problem, "use cut-in, cut-out or lvd")
@@ -162,11 +162,11 @@ impl Map {
         };
         let report = MapReport { grids, criterion, against, profile, preset: self.preset.clone(), host };
         let written = report.write(folder.results()?)?;
-        let answer = self.format.answer(Exit::Ok, || report.text(), || report.json(written.clone()))?;
+        let output = self.format.output(Exit::Ok, || report.text(), || report.json(written.clone()))?;
         let (simulations, seconds) = (count(report.simulations()), value(report.host.sweep_s));
         tracing::info!("{simulations} simulations in {seconds} s on {}", report.host.backend);
         tracing::info!("{} files written to {}", written.len() + 1, self.out.display());
-        Ok(answer)
+        Ok(output)
     }
 
     /// The preset's profile, unless another is set.

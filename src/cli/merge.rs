@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::arguments::from_arguments;
 use super::format::{FormatFlag, TablesFlag};
-use super::{Answer, Exit};
+use super::{Exit, Output};
 use crate::Result;
 use crate::report::run_record::StudyHost;
 use crate::report::sampling::{EstimateFile, HostRecord};
@@ -36,7 +36,7 @@ pub(super) struct Merge {
 from_arguments!(Merge { folder } groups { tables, format });
 
 impl Merge {
-    pub(super) fn run(&self) -> Result<Answer> {
+    pub(super) fn run(&self) -> Result<Output> {
         self.tables.check(self.format)?;
         let [plan, out] =
             [&self.folder.join(PLAN_FILE), &self.folder].map(|path| quoted_word(&path.display().to_string()));
@@ -53,7 +53,7 @@ impl Merge {
                 let host = HostRecord::of_parts(result.parts, result.rechecked_lanes);
                 let mut file = EstimateFile::of_sample(&sample, &result, host)?;
                 file.write(folder.results()?, &sample, &result)?;
-                self.format.answer_in(&self.folder, Exit::Ok, || file.text(), || file.json())
+                self.format.output_in(&self.folder, Exit::Ok, || file.text(), || file.json())
             }
         }
     }

@@ -8,7 +8,7 @@ use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::console::Verbosity;
 use super::source::{self, PlausibilityFlag, PresetFlag};
-use super::{Answer, Exit, console};
+use super::{Exit, Output, console};
 use crate::Result;
 use crate::scenario::{DataProvenance, check_scenario_file, write_scenarios, write_scenarios_to};
 use crate::support::atomic_file::AtomicFile;
@@ -49,7 +49,7 @@ fn lock_of(path: &Path) -> Result<FolderLock> {
 }
 
 impl Mine {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Answer> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Output> {
         if let Some(path) = &self.out {
             source::refuse_recording(path, &self.recordings, self.preset.preset.as_deref(), "--out")?;
             check_scenario_file(path)?;

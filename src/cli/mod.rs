@@ -112,7 +112,7 @@ enum Verb {
 
 /// How a verb ended. Texts are empty where the verb has printed its answer itself.
 #[derive(Debug, Clone, PartialEq, Eq)]
-pub struct Answer {
+pub struct Output {
     /// The exit code; never one of an error.
     pub exit: Exit,
     /// The answer for people.
@@ -121,9 +121,9 @@ pub struct Answer {
     pub document: String,
 }
 
-impl From<Exit> for Answer {
-    fn from(exit: Exit) -> Answer {
-        Answer { exit, text: String::new(), document: String::new() }
+impl From<Exit> for Output {
+    fn from(exit: Exit) -> Output {
+        Output { exit, text: String::new(), document: String::new() }
     }
 }
 
@@ -150,7 +150,7 @@ pub fn main_with(words: &[OsString]) -> Exit {
         let (cli, configured) = Configured::of(&matches, console::command_line(words))?;
         let requested = configured.settings.run.threads;
         pool_of(requested)?.build_global().map_err(|error| not_started(requested, &error))?;
-        cli.verb.run(&configured, cli.common.verbosity()).map(|answer| answer.exit)
+        cli.verb.run(&configured, cli.common.verbosity()).map(|output| output.exit)
     })
 }
 
@@ -178,7 +178,7 @@ fn without_panic<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
 }
 
 impl Verb {
-    fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Answer> {
+    fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Output> {
         match self {
             Verb::Study(verb) => verb.run(configured, verbosity),
             Verb::Tracks(verb) => verb.run(configured),

@@ -8,7 +8,7 @@ use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::sample::Sample;
 use super::sample_options::only_crude;
-use super::{Answer, Exit};
+use super::{Exit, Output};
 use crate::cli::settings::{EstimatorKind, PointKind};
 use crate::engine::Headway;
 use crate::report::openscenario::{DistributionSamples, SampledFile};
@@ -37,7 +37,7 @@ pub(super) fn run(
     path: &Path,
     started: Instant,
     verbosity: Verbosity,
-) -> Result<Answer> {
+) -> Result<Output> {
     let settings = &flags.settings;
     if settings.estimator == EstimatorKind::Is {
         return Err(only_crude("--distribution"));
@@ -133,7 +133,7 @@ pub(super) fn run(
     file.add_worst(&mut results, &worst, &options, &names)?;
     results.add(DISTRIBUTION_FILE, &sampled.to_json()?)?;
     file.publish(results, Vec::new())?;
-    flags.format.answer_in(&flags.out, Exit::Ok, || file.text(), || file.json())
+    flags.format.output_in(&flags.out, Exit::Ok, || file.text(), || file.json())
 }
 
 /// Checks the fixed values and the quartiles of the distributions; the tails are truncated anyway.

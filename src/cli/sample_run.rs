@@ -9,7 +9,7 @@ use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::sample::Sample;
 use super::sample_options::{guard, only_crude};
-use super::{Answer, Exit, sample_distribution};
+use super::{Exit, Output, sample_distribution};
 use crate::engine::{Chunk, Executor, OpenBackend};
 use crate::model::profile::Profile;
 use crate::report::lanes;
@@ -29,7 +29,7 @@ use crate::{Error, Place, Result};
 const FEW_SCENARIOS: f64 = 5.0;
 
 impl Sample {
-    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Answer> {
+    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Output> {
         let started = Instant::now();
         self.check()?;
         self.shards.start()?;
@@ -108,7 +108,7 @@ impl Sample {
         configured: &Configured,
         started: Instant,
         verbosity: Verbosity,
-    ) -> Result<Answer> {
+    ) -> Result<Output> {
         let executor = opened.executor().with_recheck(sample.options.seed);
         let is_split = self.shards.plan_only || self.shards.is_part();
         let sample = match &sample.kind {
@@ -145,7 +145,7 @@ impl Sample {
         configured: &Configured,
         started: Instant,
         verbosity: Verbosity,
-    ) -> Result<Answer> {
+    ) -> Result<Output> {
         warn(sample)?;
         // Rows are written during the run, so a run with rows cannot resume.
         let Some(mut run) = sample.open(&self.out, self.shards.shard, self.rows.is_none())? else {
@@ -207,9 +207,9 @@ impl Sample {
         let host = HostRecord::of(opened, result.rechecked_lanes, started, settings);
         let mut results = run.results()?;
         rows.into_iter().for_each(|table| results.join(table));
-        let answer = write(sample, &result, host, results, self.format)?;
+        let output = write(sample, &result, host, results, self.format)?;
         run.close()?;
-        Ok(answer)
+        Ok(output)
     }
 }
 
@@ -263,9 +263,9 @@ fn write(
     host: HostRecord,
     results: Results,
     format: FormatFlag,
-) -> Result<Answer> {
+) -> Result<Output> {
     let out = results.dir().to_path_buf();
     let mut file = EstimateFile::of_sample(sample, result, host)?;
     file.write(results, sample, result)?;
-    format.answer_in(&out, Exit::Ok, || file.text(), || file.json())
+    format.output_in(&out, Exit::Ok, || file.text(), || file.json())
 }

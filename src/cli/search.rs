@@ -10,7 +10,7 @@ use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::source::{self, SourceFlags};
-use super::{Answer, Exit, lists};
+use super::{Exit, Output, lists};
 use crate::report::sampling::HostRecord;
 use crate::report::search::SearchReport;
 use crate::run::parts::Shard;
@@ -73,7 +73,7 @@ from_arguments!(
 );
 
 impl Search {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Answer> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Output> {
         let started = Instant::now();
         let config = &configured.settings;
         let [category] = source::categories(std::slice::from_ref(&self.category), "--category")?[..] else {
@@ -153,7 +153,7 @@ impl Search {
         };
         let files = report.write(folder.results()?)?;
         let exit = if collection.problems.is_empty() { Exit::Ok } else { Exit::Incomplete };
-        self.format.answer_in(&self.out, exit, || report.text(), || report.json(&files))
+        self.format.output_in(&self.out, exit, || report.text(), || report.json(&files))
     }
 
     /// The scenarios that the search does not read, their description, and their checksum.

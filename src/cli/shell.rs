@@ -7,7 +7,7 @@ use clap::Args;
 use clap_complete::Shell;
 
 use super::configured::command;
-use super::{Answer, Exit, console};
+use super::{Exit, Output, console};
 use crate::support::files::{make_folder, write_inside};
 use crate::{Error, Result};
 
@@ -24,7 +24,7 @@ pub(super) struct Completions {
 }
 
 impl Completions {
-    pub(super) fn run(&self) -> Result<Answer> {
+    pub(super) fn run(&self) -> Result<Output> {
         let mut text = Vec::new();
         clap_complete::generate(self.shell, &mut command(), "lanesweep", &mut text);
         let text = String::from_utf8(text).map_err(|e| Error::Internal(format!("completions are no text: {e}")))?;
@@ -53,7 +53,7 @@ pub(super) struct Man {
 }
 
 impl Man {
-    pub(super) fn run(&self) -> Result<Answer> {
+    pub(super) fn run(&self) -> Result<Output> {
         make_folder(&self.dir)?;
         let mut program = command();
         // Adds global flags and versions to the verbs.

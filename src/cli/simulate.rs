@@ -10,7 +10,7 @@ use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::source::{PlausibilityFlag, refuse_overwriting, scenarios_of};
-use super::{Answer, Exit};
+use super::{Exit, Output};
 use crate::report::openscenario::reopen;
 use crate::report::trace::TraceReport;
 use crate::run::reopen::{Reopened, TracedLanes};
@@ -81,7 +81,7 @@ from_arguments!(
 );
 
 impl Simulate {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Answer> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Output> {
         self.guard_plot()?;
         let (lanes, incomplete) = self.lanes(configured)?;
         let report = TraceReport(&lanes);
@@ -91,11 +91,11 @@ impl Simulate {
             write_atomically(path, report.figure(self.plot_end).svg().as_bytes())?;
         }
         let exit = if incomplete { Exit::Incomplete } else { Exit::Ok };
-        let answer = self.format.answer(exit, || report.csv(), || report.json())?;
+        let output = self.format.output(exit, || report.csv(), || report.json())?;
         if verbosity != Verbosity::Quiet {
             console::say(&report.text());
         }
-        Ok(answer)
+        Ok(output)
     }
 
     /// The lanes, and whether others of the file were skipped.

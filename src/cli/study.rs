@@ -11,7 +11,7 @@ use super::console::{self, Verbosity};
 use super::format::{FormatFlag, TablesFlag};
 use super::shard_flags::ShardFlags;
 use super::source::{self, SourceFlags};
-use super::{Answer, Exit, lists};
+use super::{Exit, Output, lists};
 use crate::Result;
 use crate::engine::{Chunk, Headway, LanePlan, OpenBackend};
 use crate::report::lanes::{StudyRows, table_format};
@@ -119,7 +119,7 @@ impl KeepPlan {
 }
 
 impl Study {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Answer> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Output> {
         self.guard_inputs(configured)?;
         check_folder(&self.out)?;
         self.rows.as_deref().map_or(Ok(()), check_folder_of)?;
@@ -205,7 +205,7 @@ impl Study {
         configured: &Configured,
         mut timings: Timings,
         verbosity: Verbosity,
-    ) -> Result<Answer> {
+    ) -> Result<Output> {
         let plan = study.plan();
         let backend = opened.backend();
         let executor = opened.executor().with_recheck(study.facts().score.seed);
@@ -250,9 +250,9 @@ impl Study {
         };
         self.leave_plan(study, &mut results)?;
         let report = StudyReport::of(study, &counts, comparison, host)?;
-        let answer = self.tables.finish(report, results, study.facts().incomplete, self.format)?;
+        let output = self.tables.finish(report, results, study.facts().incomplete, self.format)?;
         run.close()?;
-        Ok(answer)
+        Ok(output)
     }
 
     /// Keeps the plan for `simulate --from`.

@@ -8,7 +8,7 @@ use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::console::{self, Verbosity};
 use super::source;
-use super::{Answer, Exit};
+use super::{Exit, Output};
 use crate::support::files::check_folder;
 use crate::support::run_dir::{OutputDir, unfinished};
 use crate::traffic::Source;
@@ -30,7 +30,7 @@ pub(super) struct Synth {
 from_arguments!(Synth { folder });
 
 impl Synth {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Answer> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Output> {
         let options = &configured.settings.generator;
         check_folder(&self.folder)?;
         let folder = OutputDir::open(&self.folder, SYNTHETIC_MARKER)?;

@@ -8,7 +8,7 @@ use clap::Args;
 use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::format::FormatFlag;
-use super::{Answer, Exit};
+use super::{Exit, Output};
 use crate::report::tracks::{TrackReport, across, report_text, space_time};
 use crate::scenario::{ScenarioFile, usable};
 use crate::support::files::{check_folder, write_atomically};
@@ -54,7 +54,7 @@ pub(super) struct Tracks {
 from_arguments!(Tracks { paths, preset, write_preset, out, convert } groups { format });
 
 impl Tracks {
-    pub(super) fn run(&self, configured: &Configured) -> Result<Answer> {
+    pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         if let Some(path) = &self.write_preset {
             return self.write_draft(path);
         }
@@ -101,10 +101,10 @@ impl Tracks {
             serde_json::to_string_pretty(&reports).map_err(|error| Error::Internal(format!("tracks as JSON: {error}")))
         };
         let text = || report_text(&reports);
-        self.format.answer(if is_complete { Exit::Ok } else { Exit::Incomplete }, text, json)
+        self.format.output(if is_complete { Exit::Ok } else { Exit::Incomplete }, text, json)
     }
 
-    fn write_draft(&self, path: &Path) -> Result<Answer> {
+    fn write_draft(&self, path: &Path) -> Result<Output> {
         let [file] = &self.paths[..] else {
             let problem = "one file is needed for a preset";
             return Err(Error::usage(Place::item("--write-preset"), problem, "name one track file"));

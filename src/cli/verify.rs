@@ -7,7 +7,7 @@ use super::console::{self, Verbosity};
 use super::devices::Devices;
 use super::format::FormatFlag;
 use super::source::SourceFlags;
-use super::{Answer, Exit, lists};
+use super::{Exit, Output, lists};
 use crate::engine::verify::{RandomOptions, ThresholdOptions, compare, random_plan, threshold_plan};
 use crate::engine::{Backend, LanePlan, LaneRunner, Wanted};
 use crate::model::profile::Profile;
@@ -59,7 +59,7 @@ enum VerifyVerb {
 const MAX_LANES: u64 = 100_000_000;
 
 impl Verify {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Answer> {
+    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Output> {
         match &self.verb {
             Some(VerifyVerb::Devices(verb)) => return verb.run(),
             None => (),
@@ -116,9 +116,9 @@ impl Verify {
                 "sets": sets,
             }))
         };
-        let answer = self.format.answer(Exit::Ok, || text, json)?;
+        let output = self.format.output(Exit::Ok, || text, json)?;
         if equal {
-            Ok(answer)
+            Ok(output)
         } else {
             Err(Error::Verification(format!("results of {} differ from the CPU's", tested.describe())))
         }
@@ -172,7 +172,7 @@ impl Verify {
         profile: &Profile,
         tested: &dyn Backend,
         verbosity: Verbosity,
-    ) -> Result<Answer> {
+    ) -> Result<Output> {
         // The keys of the generated sets contain their seed; a user's scenario may start with the same prefix.
         let own = |prefix: &str| text.starts_with(prefix) && text.contains(&format!("-seed{}-", self.seed));
         let plan = match () {
@@ -197,7 +197,7 @@ impl Verify {
         let names = ["f64 reference", "CPU, f32", "under test"];
         let is_equal = crate::engine::same_words(&cpu, &theirs);
         let outcomes = [reference, cpu, theirs];
-        let answer = self.format.answer(
+        let output = self.format.output(
             Exit::Ok,
             || format!("Under test: {}\n{}", tested.describe(), verification::lane(text, names, &outcomes)),
             || {
@@ -210,6 +210,6 @@ impl Verify {
                 }))
             },
         )?;
-        if is_equal { Ok(answer) } else { Err(Error::Verification(format!("lane {text} differs from the CPU's"))) }
+        if is_equal { Ok(output) } else { Err(Error::Verification(format!("lane {text} differs from the CPU's"))) }
     }
 }
