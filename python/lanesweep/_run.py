@@ -15,10 +15,12 @@ from typing import Any
 import numpy as np
 
 from . import _core
-from ._driver import names_of, refresh
+from ._driver import Driver, names_of, refresh
 from ._result import Result, temporary
 
 _log = logging.getLogger("lanesweep")
+#: Code of a run that found nothing that it could use, each with its message.
+_NOTHING = 3
 _LEVELS = {"ERROR": logging.ERROR, "WARN": logging.WARNING, "INFO": logging.INFO, "DEBUG": logging.DEBUG, "TRACE": logging.DEBUG}
 
 
@@ -61,23 +63,27 @@ def progress() -> tuple[Callable[[str, int, int], None] | None, Callable[[], Non
 
 #: Parameters that hold further arguments.
 _GROUPS = ("options", "case")
+#: Arguments that take names with values.
+_TABLES = ("config", "given", "panel", "rename", "set")
+#: Files of a result that stand for it.
+_FILES = {"plan": "plan.json", "external": "winner.json", "parameterization": "winner.json", "parameterizations": "winner.json"}
 
 
 def plain(value: Any, name: str) -> Any:
-    """Return the value of an argument as a number or text, or a list or dictionary of these."""
-    value = _of_array(value)
-    if isinstance(value, Mapping):
-        return {str(key): _list_or_scalar(one, name) for key, one in value.items()}
-    return _list_or_scalar(value, name)
-
-
-def _of_array(value: Any) -> Any:
-    """Values of NumPy and pandas as those of Python."""
-    if not hasattr(value, "tolist"):
-        return value
-    # A text has the digits of its arithmetic: 0.6 of binary32, not 0.6000000238418579.
-    is_short = str(getattr(value, "dtype", "")) == "float32"
-    return np.asarray(value).astype(str).tolist() if is_short else value.tolist()
+    """Return the value of an argument as a number, text or path, or a list or dictionary of these."""
+    if name in _TABLES and hasattr(value, "to_dict"):
+        # A Series.
+        value = value.to_dict()
+    if not isinstance(value, Mapping):
+        return _list_or_scalar(value, name)
+    if not len(value):
+        raise ValueError(f"`{name}` is empty; give at least one value, or leave it out")
+    rows: dict[str, Any] = {}
+    for key, one in value.items():
+        # Tables of a configuration: {"run": {"dt_s": 0.05}}.
+        inner = {f"{key}.{of}": two for of, two in one.items()} if isinstance(one, Mapping) and name == "config" else {str(key): one}
+        rows |= {of: _list_or_scalar(two, name) for of, two in inner.items()}
+    return rows
 
 
 def _list_or_scalar(value: Any, name: str) -> Any:
@@ -85,8 +91,22 @@ def _list_or_scalar(value: Any, name: str) -> Any:
     if isinstance(value, (Sequence, Set, KeysView, ValuesView)) and not isinstance(value, (str, bytes, bytearray)):
         if not len(value):
             raise ValueError(f"`{name}` is empty; give at least one value, or leave it out")
-        return [_scalar(one, name) for one in value]
+        # A set has no order of its own.
+        several = sorted(value, key=lambda one: (str(type(one)), one)) if isinstance(value, Set) else value
+        return [_scalar(one, name) for one in several]
     return _scalar(value, name)
+
+
+def _of_array(value: Any) -> Any:
+    """Values of NumPy and pandas as those of Python."""
+    if not hasattr(value, "tolist"):
+        return value
+    array = np.asarray(value)
+    is_short = array.dtype.kind == "f" and array.dtype.itemsize < 8
+    if is_short or str(getattr(value, "dtype", "")).lower() in ("float32", "float[pyarrow]"):
+        # The digits of its arithmetic: 0.6 of binary32, not 0.6000000238418579.
+        return np.vectorize(float, otypes=[float])(array.astype(array.dtype if is_short else np.float32).astype(str)).tolist()
+    return value.tolist()
 
 
 def _scalar(value: Any, name: str) -> Any:
@@ -94,14 +114,14 @@ def _scalar(value: Any, name: str) -> Any:
     if isinstance(value, (bool, str)):
         return value
     if isinstance(value, os.PathLike):
-        return path_of(value, name)
+        return Path(path_of(value, name))
     if isinstance(value, numbers.Integral):
         return int(value)
     if isinstance(value, numbers.Real):
         return float(value)
     if isinstance(value, numbers.Number):
         return str(value)
-    raise TypeError(f"`{name}` has the value {value!r:.80}; give a number, a text, a path, or several of these")
+    raise TypeError(f"`{name}` has the value {value!r:.80}; give a number, a text, a path, or a list of these that holds no lists")
 
 
 def path_of(value: Any, name: str) -> str:
@@ -131,15 +151,23 @@ def run(function: str, arguments: Mapping[str, Any], *, default_out: str | None 
         given |= arguments.get(group, {})
     if given.get("models") is not None:
         given["models"] = names_of(given["models"])
-    values = {name.rstrip("_"): plain(value, name) for name, value in given.items() if value is not None and name != "out"}
+    if isinstance(given.get("against"), Driver):
+        (given["against"],) = names_of(given["against"])
+    for name, file in _FILES.items():
+        result = given.get(name)
+        if isinstance(result, Result) and result.folder is not None and (result.folder / file).is_file():
+            given[name] = result.folder / file
+    data = given.get("recordings")
+    if function != "mine" and isinstance(data, (str, os.PathLike)) and path_of(data, "recordings").endswith(".jsonl"):
+        raise _core.UsageError("`recordings`: this is a scenario file\n  help: give it as `scenarios`")
+    named = {"from" if name == "from_" else name: value for name, value in given.items() if value is not None}
+    values = {name: plain(value, name) for name, value in named.items()}
     keep = None
-    out = given.get("out")
-    if out is None and default_out is not None:
+    if "out" not in values and default_out is not None:
         keep = temporary()
-        out = Path(keep.name) / default_out
-    if out is not None:
-        path = out
-        values["out"] = path_of(out, "out")
+        values["out"] = Path(keep.name) / default_out
+    if "out" in values:
+        path = values["out"]
     messages: list[str] = []
 
     def on_line(level: str, line: str) -> None:
@@ -152,4 +180,6 @@ def run(function: str, arguments: Mapping[str, Any], *, default_out: str | None 
         code, text, document = _core.run(function, values, move, on_line)
     finally:
         close()
-    return Result(function, code, text, document, messages, None if path is None else Path(os.fspath(path)), keep)
+    if code == _NOTHING:
+        raise _core.InputError("\n".join(messages) or "there is nothing that can be read")
+    return Result(function, code, text, document, messages, None if path is None else Path(path_of(path, "out")), keep)

@@ -63,7 +63,7 @@ def simulate(
     profile: Path = "paper",
     dt: float | None = None,
     backend: str = "auto",
-    device: str | None = None,
+    device: str | int | None = None,
     accept_implausible: bool = False,
 ) -> Frame:
     """Run concrete cases against driver models.
@@ -123,7 +123,7 @@ def simulate(
         profile=path_of(profile, "profile"),
         dt=dt,
         backend=backend,
-        device=device,
+        device=None if device is None else str(device),
         accept_implausible=accept_implausible,
         on_message=on_message,
     )
@@ -173,7 +173,7 @@ class LimitState(_core.LimitState):
         thw: float | str | None = None,
         profile: Path = "paper",
         backend: str = "cpu",
-        device: str | None = None,
+        device: str | int | None = None,
     ) -> LimitState:
         if not isinstance(model, (str, Driver)):
             raise TypeError(f"`model` is {model!r:.80}; give one model: a name or a Driver")
@@ -186,7 +186,7 @@ class LimitState(_core.LimitState):
             thw=None if thw is None else str(thw),
             profile=path_of(profile, "profile"),
             backend=backend,
-            device=device,
+            device=None if device is None else str(device),
         )
         assert isinstance(made, cls)
         made._arguments = os.fspath(density), model, criterion, thw, profile, backend, device

@@ -2,8 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from typing import TYPE_CHECKING, Literal
 
+import numpy as np
+
+from ._driver import Driver
 from ._result import Result
 from ._run import run
 from .options import (
@@ -12,7 +16,9 @@ from .options import (
     Category,
     Criterion,
     Data,
+    Float,
     Headways,
+    Int,
     Keys,
     Models,
     Number,
@@ -79,7 +85,7 @@ def study(
     compare_reference: bool = False,
     rows: Path | None = None,
     keep_plan: Literal["auto", "always", "never"] | None = None,
-    seed: int | None = None,
+    seed: Int | None = None,
     out: Path | None = None,
     **options: Unpack[_Study],
 ) -> Result:
@@ -152,9 +158,9 @@ def tracks(
     write_preset : path
         Write a first preset for a file that no preset fits.
     convert : path
-        Write the tracks in highD's format into this folder, or as one table: .csv, .parquet.
+        Write the tracks in highD's format into this folder, or as one table: .csv, .parquet, .jsonl.
     out : path, optional
-        Folder for tracks.json and figures; without it they go with the result.
+        Folder for tracks.json and figures. Without it those of a single path go with the result.
     **options
         `Run` of `lanesweep.options`.
 
@@ -162,7 +168,12 @@ def tracks(
     -------
     Result
     """
-    return run("tracks", locals(), default_out=None if write_preset is not None else "tracks")
+    return run("tracks", locals(), default_out=None if _are_several(paths) or write_preset is not None else "tracks")
+
+
+def _are_several(paths: Paths) -> bool:
+    """Whether figures could have the same names."""
+    return isinstance(paths, Collection) and not isinstance(paths, str) and len(paths) > 1
 
 
 def mine(recordings: Path, *, kept: bool = False, out: Path | None = None, **options: Unpack[_Mining]) -> Result:
@@ -195,11 +206,11 @@ def fit(
     with_thw: bool = False,
     density: Literal["kernel", "mixture", "copula"] | None = None,
     bandwidth_rule: Literal["reduction", "wide"] | None = None,
-    hours: float | None = None,
-    km: float | None = None,
+    hours: Float | None = None,
+    km: Float | None = None,
     no_comparison: bool = False,
     without_scenarios: bool = False,
-    seed: int | None = None,
+    seed: Int | None = None,
     out: Path | None = None,
     **options: Unpack[_Fit],
 ) -> Result:
@@ -219,7 +230,7 @@ def fit(
     with_thw : bool
         Add the observed time headway as a parameter (thw_s).
     density : {"kernel", "mixture", "copula"}
-        Form of the density. Intervals of a mixture or copula cover the draws alone, and they have no ratio to recorded scenarios.
+        Form of the density, by default kernel. Intervals of a mixture or copula cover the draws alone, and they have no ratio to recorded scenarios.
     bandwidth_rule : {"reduction", "wide"}
         Search interval of the bandwidth.
     hours, km : float
@@ -249,25 +260,25 @@ def sample(
     models: Models | None = None,
     thw: Headways | None = None,
     criterion: Criterion | None = None,
-    samples: int | None = None,
-    half_width: float | None = None,
+    samples: Int | None = None,
+    half_width: Float | None = None,
     estimator: Literal["auto", "mc", "is"] | None = None,
-    level: float | None = None,
+    level: Float | None = None,
     simultaneous: bool = False,
     interval: Literal["wilson", "clopper-pearson"] | None = None,
     points: Literal["random", "sobol"] | None = None,
     given: Values | None = None,
     proposal: Paths | None = None,
-    time_limit: float | None = None,
+    time_limit: Float | None = None,
     other_profile: Path | None = None,
-    map: str | tuple[str, str] | None = None,
+    map: str | Collection[str] | None = None,
     rows: Path | None = None,
-    worst: int | None = None,
+    worst: Int | None = None,
     distribution: Path | None = None,
     category: Category | None = None,
     rename: Values | None = None,
     set: Values | None = None,
-    seed: int | None = None,
+    seed: Int | None = None,
     out: Path | None = None,
     **options: Unpack[_Sample],
 ) -> Result:
@@ -290,7 +301,7 @@ def sample(
     samples : int
         Number of samples, by default 100,000 or as many as needed; with a half-width the maximum.
     half_width : float
-        Half-width of the interval over the estimate to reach.
+        Half-width of the interval over the estimate to reach; 0.1 by default with ``estimator="is"`` and no `samples`.
     estimator : {"auto", "mc", "is"}
         Crude Monte Carlo, importance sampling, or the cheaper one for each question. ``"auto"`` without a half-width is ``"mc"``.
     level : float
@@ -298,9 +309,9 @@ def sample(
     simultaneous : bool
         Intervals of all rows hold together at this level (Bonferroni).
     interval : {"wilson", "clopper-pearson"}
-        Interval of crude Monte Carlo.
+        Interval of crude Monte Carlo, by default wilson.
     points : {"random", "sobol"}
-        Points of crude Monte Carlo.
+        Points of crude Monte Carlo, by default random.
     given : mapping
         Draw from the density conditional on these values: ``{"v_ego_mps": 30}``.
     proposal : list of paths
@@ -344,11 +355,11 @@ def compare(
     parameterizations: Keys | None = None,
     models: Models | None = None,
     thw: Headways | None = None,
-    samples: int | None = None,
+    samples: Int | None = None,
     forms: bool = False,
-    hours: float | None = None,
-    km: float | None = None,
-    seed: int | None = None,
+    hours: Float | None = None,
+    km: Float | None = None,
+    seed: Int | None = None,
     out: Path | None = None,
     **options: Unpack[_Replays],
 ) -> Result:
@@ -399,12 +410,12 @@ def search(
     objective: Literal["f1", "recall", "risk"] | None = None,
     thw: Headways | None = None,
     held_out: Path | None = None,
-    max_parameters: int | None = None,
-    studies: int | None = None,
-    folds: int | None = None,
+    max_parameters: Int | None = None,
+    studies: Int | None = None,
+    folds: Int | None = None,
     shuffled: bool = False,
     shard: str | None = None,
-    seed: int | None = None,
+    seed: Int | None = None,
     out: Path | None = None,
     **options: Unpack[_Replays],
 ) -> Result:
@@ -425,17 +436,17 @@ def search(
     criterion : {"collision", "ttc", "btn"}
         Criterion, by default collision.
     objective : {"f1", "recall", "risk"}
-        What to keep: F1, recall, or the ratio of failure rates.
+        What to keep: F1, the default, recall, or the ratio of failure rates.
     thw : list of float
         Time headways, s, as in `study`.
     held_out : path
         Recordings or scenario file that the search does not read, to judge its front.
     max_parameters : int
-        Maximum number of parameters, the duration counted.
+        Maximum number of parameters, the duration counted; 8 by default.
     studies : int
-        Studies for the optimiser of the weights.
+        Studies for the optimiser of the weights; 8,000 by default.
     folds : int
-        Folds of the cross-validation.
+        Folds of the cross-validation; 5 by default.
     shuffled : bool
         Give every scenario the outcomes of another one: no gain may be left on held-out data.
     shard : str
@@ -457,7 +468,7 @@ def search(
 def justify(
     recordings: Path | None = None,
     *,
-    parameterization: str | int | Path,
+    parameterization: str | Int | Path,
     models: Models,
     criterion: Criterion | None = None,
     thw: Headways | None = None,
@@ -511,7 +522,7 @@ def map(
     set: Values | None = None,
     models: Models | None = None,
     criterion: Criterion | None = None,
-    against: Path | None = None,
+    against: Path | Driver | None = None,
     robust: bool = False,
     closing: bool = False,
     native_gap: bool = False,
@@ -530,7 +541,7 @@ def map(
     preset : {"jrc", "r157"}
         Grids of the JRC's evidence, or of the regulation's Annex 3 (to 60 and to 130 km/h), with their models.
     x, y : str
-        Parameter of an axis: ``"gap_m=5..40/1"``, ``"gap_m=5,10,20"``; with `distribution` also the name of one of its parameters.
+        Parameter of an axis: ``"gap_m=5..40/1"``, ``"gap_m=5,10,20"``; with `distribution` also the name alone, of one that varies there.
     panel : mapping
         Parameters of the panels: ``{"ego_speed_kmh": [60, 90]}``; several give one panel per combination.
     set : mapping
@@ -540,7 +551,7 @@ def map(
     criterion : {"collision", "ttc", "btn"}
         Criterion, by default collision.
     against : str or path
-        Model or profile to compare with.
+        Model, driver or profile to compare with.
     robust : bool
         Mark cells whose outcome changes with a tenth of the time step, 1 cm or 0.1 km/h: they are undecided.
     closing : bool
@@ -568,7 +579,7 @@ def map(
 def check(
     file: Path | None = None,
     *,
-    row: int | None = None,
+    row: Int | None = None,
     scenario: str | None = None,
     models: Models | None = None,
     profiles: Paths | None = None,
@@ -619,10 +630,10 @@ def trace(
     compare: Keys | bool = False,
     case_file: Path | None = None,
     table: Path | None = None,
-    row: int | None = None,
+    row: Int | None = None,
     models: Models | None = None,
     profile: Path | None = None,
-    dt: float | None = None,
+    dt: Float | None = None,
     plot: Path | None = None,
     plot_end: Number | None = None,
     **case: Unpack[Case],
@@ -663,15 +674,16 @@ def trace(
     Result
         Its text is the series, as CSV.
     """
-    arguments = locals()
-    return run("trace", {**arguments, "compare": "S" if compare is True else compare or None})
+    if isinstance(compare, (bool, np.bool_)):
+        return run("trace", {**locals(), "compare": "S" if compare else None})
+    return run("trace", locals())
 
 
 def export_xosc(
     *,
     from_: Path | None = None,
-    lane: str | list[str] | None = None,
-    worst: int | None = None,
+    lane: str | Collection[str] | None = None,
+    worst: Int | None = None,
     criterion: Criterion | None = None,
     variant: Keys | None = None,
     scenarios: Path | None = None,
@@ -681,7 +693,7 @@ def export_xosc(
     duration: Number | None = None,
     side: Literal["left", "right"] | None = None,
     profile: Path | None = None,
-    dt: float | None = None,
+    dt: Float | None = None,
     out: Path | None = None,
     **case: Unpack[Case],
 ) -> Result:
@@ -730,7 +742,7 @@ def export_xosc(
     return run("export_xosc", locals(), default_out="xosc")
 
 
-def synth(folder: Path, *, synth_recordings: int | None = None, **options: Unpack[Run]) -> Result:
+def synth(folder: Path, *, synth_recordings: Int | None = None, **options: Unpack[Run]) -> Result:
     """Write the generated recordings that `study` uses without data, in highD's format.
 
     Parameters

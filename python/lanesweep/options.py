@@ -6,9 +6,10 @@ A list may be any sequence, a set, a range, or an array of NumPy or pandas.
 from __future__ import annotations
 
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping
 from typing import Any, Literal, TypeAlias, TypedDict
 
+import numpy as np
 import numpy.typing as npt
 
 from ._driver import Driver
@@ -17,22 +18,25 @@ __all__ = ["Case", "Data", "Plausibility", "Run", "Split", "Sweep"]
 
 #: A result stands for its file or folder.
 Path: TypeAlias = "str | os.PathLike[str]"
-Paths: TypeAlias = "Path | Sequence[Path]"
+Paths: TypeAlias = "Path | Collection[Path]"
+Int: TypeAlias = "int | np.integer[Any]"
+Float: TypeAlias = "float | np.floating[Any] | np.integer[Any]"
+#: A number, or a text of one with its unit.
+Number: TypeAlias = "Float | str"
 Category: TypeAlias = Literal["cut-in", "cut-out", "lvd"]
-Categories: TypeAlias = "Category | Sequence[Category]"
+Categories: TypeAlias = "Category | Collection[Category] | npt.NDArray[Any]"
 Criterion: TypeAlias = Literal["collision", "ttc", "btn"]
-Models: TypeAlias = "str | Driver | Sequence[str | Driver]"
+Models: TypeAlias = "str | Driver | Collection[str | Driver] | npt.NDArray[Any]"
 #: Seconds; ``"paper"``, ``"r157"``, ``"observed"``.
-Headways: TypeAlias = "str | float | Sequence[str | float] | npt.NDArray[Any]"
+Headways: TypeAlias = "str | Float | Collection[str | Float] | npt.NDArray[Any]"
 #: Keys of parameterizations, or files of `search`.
-Keys: TypeAlias = "str | int | Path | Sequence[str | int | Path]"
-#: A speed with its unit: ``"60km/h"``, ``"16.7m/s"``.
-Speed: TypeAlias = str
-Number: TypeAlias = "float | str"
+Keys: TypeAlias = "str | Int | Path | Collection[str | Int | Path] | npt.NDArray[Any]"
+#: A speed with its unit: ``"60km/h"``, ``"16.7m/s"``; or 0.
+Speed: TypeAlias = "str | Literal[0]"
 #: A file, or keys with their values: ``{"mining.leader_max_thw_s": 2.5}``.
-Config: TypeAlias = "Path | Sequence[Path] | Mapping[str, str | float | bool]"
+Config: TypeAlias = "Path | Collection[Path] | Mapping[str, Any]"
 #: Names with their values: ``{"ego_speed_kmh": 108}``.
-Values: TypeAlias = "str | Sequence[str] | Mapping[str, Any]"
+Values: TypeAlias = "str | Collection[str] | Mapping[str, Any]"
 
 
 class Run(TypedDict, total=False):
@@ -46,7 +50,7 @@ class Run(TypedDict, total=False):
         Configuration file, or keys of one with their values. Without it, the variable LANESWEEP_CONFIG names the file.
     """
 
-    threads: int
+    threads: Int
     config: Config
 
 
@@ -79,7 +83,7 @@ class Data(Plausibility, total=False):
 
     scenarios: Path
     preset: Path
-    synth_recordings: int
+    synth_recordings: Int
 
 
 class Sweep(Run, total=False):
@@ -102,9 +106,9 @@ class Sweep(Run, total=False):
     """
 
     backend: Literal["auto", "cpu", "gpu"]
-    device: str | int
+    device: str | Int
     profile: Path
-    dt: float
+    dt: Float
 
 
 class Split(Sweep, total=False):
@@ -125,11 +129,11 @@ class Split(Sweep, total=False):
     shard: str
     plan: Path
     plan_only: bool
-    stop_after: float
+    stop_after: Float
 
 
 class Case(Plausibility, Run, total=False):
-    """A concrete case. Speeds along the road are texts with their unit; other numbers are in m, s, m/s, m/s².
+    """A concrete case; those of `Run` and `accept_implausible` too. Speeds along the road are texts with their unit; other numbers are in m, s, m/s, m/s².
 
     Attributes
     ----------

@@ -44,7 +44,7 @@ pub fn add_to(module: &Bound<'_, PyModule>) -> PyResult<()> {
 pub fn in_arguments(text: &str) -> String {
     let of_line = |line: &str| if line.contains("lanesweep ") { line.to_owned() } else { flags_as_arguments(line) };
     let text = text.split('\n').map(of_line).collect::<Vec<_>>().join("\n");
-    text.replace("option `headways`", "`thw`").replace("option `", "`")
+    text.replace("option `headways`", "`thw`").replace("option `", "`").replace("`from`", "`from_`")
 }
 
 fn flags_as_arguments(line: &str) -> String {
@@ -55,7 +55,12 @@ fn flags_as_arguments(line: &str) -> String {
         let name = &flag
             [..flag.find(|c: char| !c.is_ascii_lowercase() && !c.is_ascii_digit() && c != '-').unwrap_or(flag.len())];
         let last = before.chars().next_back();
-        if name.is_empty() || name.starts_with('-') || last.is_some_and(|c| c.is_alphanumeric() || c == '-') {
+        // Within a quoted command, such as `simulate --from`, and in names of files it is none.
+        let quoted = out.matches('`').count() + before.matches('`').count();
+        let is_within = quoted % 2 == 1 && last != Some('`');
+        let is_file = flag[name.len()..].strip_prefix('.').is_some_and(|end| end.starts_with(char::is_alphanumeric));
+        let is_part = last.is_some_and(|c| c.is_alphanumeric() || c == '-');
+        if name.is_empty() || name.starts_with('-') || is_part || is_within || is_file {
             out += &rest[..at + 2];
             rest = flag;
             continue;

@@ -10,7 +10,7 @@ use lanesweep::cli::embedded::{self, Value};
 use lanesweep::{Error, Result};
 use pyo3::exceptions::{PyException, PyKeyboardInterrupt};
 use pyo3::prelude::*;
-use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList};
+use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString};
 
 use crate::driver;
 use crate::error::{exception, in_arguments};
@@ -113,7 +113,10 @@ fn value(given: &Bound<'_, PyAny>) -> PyResult<Value> {
     if let Ok(list) = given.cast::<PyList>() {
         return list.iter().map(|one| value(&one)).collect::<PyResult<_>>().map(Value::List);
     }
-    Ok(Value::Text(given.extract()?))
+    if given.is_instance_of::<PyString>() {
+        return Ok(Value::Text(given.extract()?));
+    }
+    Ok(Value::Path(given.extract()?))
 }
 
 /// Runs a verb by the name of its function, with named values: numbers, texts, and lists and dictionaries of them.

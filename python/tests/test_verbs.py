@@ -237,3 +237,36 @@ def test_messages_name_arguments_and_no_flags(density) -> None:
         with pytest.raises(kind, match=message) as raised:
             call()
         assert not re.search(r"(?<![a-z])--[a-z]", str(raised.value)), raised.value
+
+
+def test_values_keep_their_meaning_and_names_their_letters(density, scenarios, tmp_path) -> None:
+    tiny = {"models": "FSM", "backend": "cpu"}
+    # A path is one path, whatever it holds; a result stands for what a function reads of it.
+    odd = tmp_path / "a,b c.json"
+    odd.write_bytes(density.read_bytes())
+    planned = lanesweep.sample(odd, samples=200, thw=1.2, plan_only=True, out=tmp_path / "plan", **tiny)
+    from_plan = lanesweep.sample(plan=planned, out=tmp_path / "run", backend="cpu")
+    whole = lanesweep.sample(odd, samples=np.int64(200), thw=np.float32(1.2), **tiny)
+    assert from_plan.table("estimates").rows() == whole.table("estimates").rows()
+    headways = [np.array([0.6], dtype="float32"), pd.Series([0.6], dtype="Float32"), {0.6}, (0.6,), np.array(0.6)]
+    studies = [lanesweep.study(scenarios=scenarios, thw=thw, **tiny).table("failures").rows() for thw in headways]
+    assert all(study == studies[0] for study in studies)
+    panels = {"ego_speed_kmh": {90, 60, 120}}
+    options = {"x": "gap_m=5..9/2", "y": "other_speed_kmh=30,40", "set": pd.Series({"lateral_speed_mps": 1.0})}
+    assert lanesweep.map("cut-in", panel=panels, config={"run": {"dt_s": 0.02}}, **options, **tiny).status == "ok"
+    case = {"category": "cut-in", "ego_speed": "60km/h", "speed": "40km/h", "gap": 15, "lateral_speed": 1.0}
+    for call, kind, message in [
+        (lambda: lanesweep.check(**case, gap_=3), lanesweep.UsageError, "`gap_`: check has no such argument"),
+        (lambda: lanesweep.check(**case, quiet=True), lanesweep.UsageError, "`quiet`: check has no such argument"),
+        (lambda: lanesweep.check(**case, row=7), lanesweep.UsageError, "`row`: it needs `file`"),
+        (lambda: lanesweep.trace(from_=tmp_path), lanesweep.UsageError, "`from_`: it needs `lane`"),
+        (lambda: lanesweep.study(scenarios), lanesweep.UsageError, "give it as `scenarios`"),
+        (lambda: lanesweep.study(scenarios=scenarios, out=""), lanesweep.UsageError, "`out`: a path is needed"),
+        (lambda: lanesweep.study(scenarios=tmp_path / "my --models.jsonl"), lanesweep.LanesweepError, "my --models.jsonl"),
+        (lambda: lanesweep.tracks(None), lanesweep.UsageError, "`paths`: it is needed"),
+        (lambda: lanesweep.tracks(scenarios), lanesweep.InputError, "scenarios.jsonl"),
+        (lambda: lanesweep.sample(density, given={}), ValueError, "`given` is empty"),
+        (lambda: lanesweep.study(thw=[[1.0]]), TypeError, "`thw` has the value"),
+    ]:
+        with pytest.raises(kind, match=re.escape(message)):
+            call()

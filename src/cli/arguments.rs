@@ -20,8 +20,10 @@ pub enum Value {
     Whole(i128),
     /// A number.
     Number(f64),
-    /// A text or a path.
+    /// A text.
     Text(OsString),
+    /// A path, which is never several.
+    Path(PathBuf),
     /// Several values.
     List(Vec<Value>),
     /// Names with their values.
@@ -30,12 +32,13 @@ pub enum Value {
 
 impl Value {
     /// The value in the notation of the option's texts: `2,3` for a list, `gap_m=15` for a name with its value.
-    fn text(&self) -> std::result::Result<String, String> {
+    pub(super) fn text(&self) -> std::result::Result<String, String> {
         Ok(match self {
             Value::Boolean(is_so) => is_so.to_string(),
             Value::Whole(n) => n.to_string(),
             Value::Number(x) => x.to_string(),
             Value::Text(text) => text.to_str().ok_or("this is not Unicode")?.to_owned(),
+            Value::Path(path) => path.to_str().ok_or("this is not Unicode")?.to_owned(),
             Value::List(values) => {
                 values.iter().map(Value::text).collect::<std::result::Result<Vec<_>, _>>()?.join(",")
             }
@@ -60,6 +63,7 @@ impl fmt::Display for Value {
             Value::Whole(n) => write!(f, "{n}"),
             Value::Number(x) => write!(f, "{x:?}"),
             Value::Text(text) => write!(f, "{:?}", text.to_string_lossy()),
+            Value::Path(path) => write!(f, "{:?}", path.to_string_lossy()),
             Value::List(values) => {
                 let values: Vec<String> = values.iter().map(Value::to_string).collect();
                 write!(f, "[{}]", values.join(", "))
@@ -124,7 +128,9 @@ impl FromValue for String {
 impl FromValue for PathBuf {
     fn of(value: Value) -> std::result::Result<Self, String> {
         match value {
+            Value::Text(text) if text.is_empty() => Err("a path is needed, and this is empty".to_owned()),
             Value::Text(path) => Ok(PathBuf::from(path)),
+            Value::Path(path) => Ok(path),
             other => Err(format!("{other} is not a path")),
         }
     }
@@ -177,9 +183,11 @@ pub(super) fn choice<T: ValueEnum>(value: &Value) -> std::result::Result<T, Stri
 }
 
 /// An argument that means nothing without another one, by verb.
-pub(super) const NEEDS: [(&[&str], &str, &str); 14] = [
+pub(super) const NEEDS: [(&[&str], &str, &str); 16] = [
     (&["study", "search", "compare", "justify", "fit", "verify", "mine"], "preset", "recordings"),
     (&["check"], "scenario", "file"),
+    (&["check"], "row", "file"),
+    (&["simulate"], "row", "table"),
     (&["xosc"], "worst", "from"),
     (&["xosc"], "criterion", "worst"),
     (&["xosc"], "variant", "worst"),
@@ -217,8 +225,8 @@ impl Arguments {
         let is_given = |name: &str| values.get(name).is_some_and(|value| *value != Value::Boolean(false));
         for (name, value) in &values {
             let refused = |problem: String, help: &str| Error::usage(Place::item(format!("`{name}`")), problem, help);
-            let Some(arg) = of_name(&command, name) else {
-                let names: Vec<&str> = names(&command).collect();
+            let names: Vec<&str> = names(&command).collect();
+            let Some(arg) = of_name(&command, name).filter(|_| names.contains(&name.as_str())) else {
                 let near = nearest(name, names.iter().copied(), 0.7);
                 let help =
                     near.map_or(format!("there are {}", names.join(", ")), |near| format!("did you mean `{near}`?"));
@@ -238,6 +246,11 @@ impl Arguments {
             if let Some((.., needed)) = NEEDS.iter().find(of_verb).filter(|(.., needed)| !is_given(needed)) {
                 return Err(refused(format!("it needs `{needed}`"), "add it, or leave this out"));
             }
+        }
+        let missing = command.get_arguments().find(|arg| arg.is_required_set() && !is_given(arg.get_id().as_str()));
+        if let Some(arg) = missing {
+            let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
+            return Err(Error::usage(Place::item(format!("`{}`", arg.get_id())), "it is needed", help));
         }
         Ok(Arguments { command, call, values })
     }

@@ -168,10 +168,13 @@ mod tests {
         assert_eq!(refusal("study", &both), "`recordings`: it cannot be used with `scenarios`");
         let renamed = [("category", text("lvd")), ("rename", text("a=gap_m"))];
         assert_eq!(refusal("map", &renamed), "`rename`: it needs `distribution`");
-        assert_eq!(refusal("map", &[]), "option `category`: it is needed");
+        assert_eq!(refusal("map", &[]), "`category`: it is needed");
         assert_eq!(refusal("study", &[("backnd", text("cpu"))]), "`backnd`: study has no such argument");
         assert_eq!(refusal("study", &[("thw", Value::Boolean(false))]), "`thw`: False is no value of it");
-        assert_eq!(refusal("check", &[("row", Value::Number(1.5))]), "option `row`: 1.5 is not a whole number from 0");
+        assert_eq!(
+            refusal("check", &[("row", Value::Number(1.5)), ("file", text("a.csv"))]),
+            "option `row`: 1.5 is not a whole number from 0"
+        );
         assert!(refusal("study", &[("seed", Value::Number(0.5))]).contains("`0.5` cannot be used"));
     }
 

@@ -117,7 +117,8 @@ impl TablesFlag {
         report.write(results)?;
         let width = console::width();
         let claims = if report.evaluation.claims.is_empty() { "" } else { ", claims" };
-        let rest = format!("TTC, BTN, every interval{claims}: --tables, or report.html and report.txt.");
+        let all = if format.format == Format::Both { "" } else { "--tables, or " };
+        let rest = format!("TTC, BTN, every interval{claims}: {all}report.html and report.txt.");
         let answer = || format!("{}{}\n", report.answer(width), tables::wrap(&rest, width));
         let exit = if is_incomplete { Exit::Incomplete } else { Exit::Ok };
         let shown = || if self.tables { report.text(width) } else { answer() };

@@ -172,7 +172,12 @@ pub(super) fn from_value(key: &Key, given: &Given, place: Place) -> Result<Value
         Given::Boolean(is_so) => Some(Value::Bool(*is_so)),
         Given::Whole(n) => whole(*n),
         Given::Number(x) => Number::from_f64(*x).map(Value::Number),
-        Given::Text(_) | Given::List(_) | Given::Table(_) => None,
+        Given::Text(_) | Given::Path(_) | Given::List(_) | Given::Table(_) => None,
+    };
+    // Numbers are names too: the device 0.
+    let value = match key.kind {
+        KeyKind::Text => given.text().ok().map(Value::String).filter(|_| !matches!(given, Given::Boolean(_))),
+        _ => value,
     };
     value.and_then(|value| fitted(key, value)).ok_or_else(|| refused(key, &format!("`{given}`"), place))
 }
