@@ -48,17 +48,23 @@ fn features_of(edges: &str, features: &[&str]) -> BTreeMap<String, String> {
     text.lines().filter_map(package).collect()
 }
 
-/// A crate with other features is compiled again, and all that stands on it: the README's second command took as long as
-/// its first.
+/// A crate with other features is compiled again, and all that stands on it: the README's second and third command took as
+/// long as its first.
 #[test]
-fn tests_reuse_the_crates_that_the_program_was_built_with() {
-    let (program, tests) = (features_of("normal,build", &[]), features_of("normal,build,dev", &["--all-features"]));
-    let other: Vec<String> = program
-        .iter()
-        .filter(|(package, features)| tests.get(*package) != Some(*features))
-        .map(|(package, features)| format!("{package}: {features}; with tests {:?}", tests.get(package)))
-        .collect();
-    assert!(program.len() > 100 && other.is_empty(), "ask for these features in tests/workspace-hack: {other:#?}");
+fn tests_and_the_python_module_reuse_the_crates_that_the_program_was_built_with() {
+    let program = features_of("normal,build", &[]);
+    let others = [
+        features_of("normal,build,dev", &["--all-features"]),
+        features_of("normal,build", &["--package", "lanesweep-python"]),
+    ];
+    for of in others {
+        let other: Vec<String> = program
+            .iter()
+            .filter(|(package, features)| of.get(*package) != Some(*features))
+            .map(|(package, features)| format!("{package}: {features}; there {:?}", of.get(package)))
+            .collect();
+        assert!(program.len() > 100 && other.is_empty(), "ask for these features in tests/workspace-hack: {other:#?}");
+    }
 }
 
 /// The Rust files below a folder.
