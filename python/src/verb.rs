@@ -98,7 +98,8 @@ fn value(given: &Bound<'_, PyAny>) -> PyResult<Value> {
         return Ok(Value::Boolean(given.extract()?));
     }
     if given.is_instance_of::<PyInt>() {
-        return Ok(given.extract().map_or_else(|_| Value::Number(f64::INFINITY), Value::Whole));
+        // One with more digits keeps them, for the message that refuses it.
+        return given.extract().map(Value::Whole).or_else(|_| Ok(Value::Text(given.str()?.extract()?)));
     }
     if given.is_instance_of::<PyFloat>() {
         return Ok(Value::Number(given.extract()?));
@@ -131,8 +132,8 @@ pub fn run(
 ) -> PyResult<(u8, String, String)> {
     let values = arguments.iter().map(|(name, one)| Ok((name.extract()?, value(&one)?)));
     let values = values.collect::<PyResult<Vec<(String, Value)>>>()?;
-    let answer = watched(py, on_progress, on_message, move || embedded::run(&function, values))?;
-    Ok((answer.exit.code(), answer.text, answer.document))
+    let output = watched(py, on_progress, on_message, move || embedded::run(&function, values))?;
+    Ok((output.exit.code(), output.text, output.document))
 }
 
 /// The command line itself, with its own handling of signals. For a process that does nothing else.

@@ -226,7 +226,7 @@ def test_messages_name_arguments_and_no_flags(density) -> None:
         (lambda: lanesweep.sample(density, criterion="speed", thw=1), lanesweep.UsageError, "`criterion`"),
         (lambda: lanesweep.study(synth_recordings=1, thw=[]), ValueError, "`thw` is empty"),
         (lambda: lanesweep.study(synth_recordings=1, models=[]), ValueError, "`models` is empty"),
-        (lambda: lanesweep.study(synth_recordings=1, thw=False), lanesweep.UsageError, "`thw`: False is no value of it"),
+        (lambda: lanesweep.study(synth_recordings=1, thw=False), lanesweep.UsageError, "`thw`: False is not a value of it"),
         (lambda: lanesweep.study(synth_recordings=1, backnd="cpu"), lanesweep.UsageError, "`backnd`: study has no such argument"),
         (lambda: lanesweep.study("recordings", scenarios="a.jsonl"), lanesweep.UsageError, "cannot be used with"),
         (lambda: lanesweep.map("lvd", rename={"a": "gap_m"}), lanesweep.UsageError, "`rename`: it needs `distribution`"),

@@ -1,5 +1,5 @@
-//! Arguments of a verb as values: what a program gives that calls the verb as a function. Names, defaults and what excludes what are
-//! those of the command line's definition.
+//! Arguments of a verb as values, from a program that calls the verb as a function. The definition of the command line gives
+//! their names and defaults, and says which of them are required and which exclude one another.
 
 use std::collections::BTreeMap;
 use std::ffi::OsString;
@@ -221,38 +221,43 @@ impl Arguments {
         let written: Vec<String> =
             values.iter().filter(is_shown).map(|(name, value)| format!("{name}={value}")).collect();
         let call = format!("lanesweep.{function}({})", written.join(", "));
-        let values: BTreeMap<String, Value> = values.into_iter().collect();
-        let is_given = |name: &str| values.get(name).is_some_and(|value| *value != Value::Boolean(false));
-        for (name, value) in &values {
-            let refused = |problem: String, help: &str| Error::usage(Place::item(format!("`{name}`")), problem, help);
-            let names: Vec<&str> = names(&command).collect();
-            let Some(arg) = of_name(&command, name).filter(|_| names.contains(&name.as_str())) else {
+        let arguments = Arguments { command, call, values: values.into_iter().collect() };
+        arguments.check(function)?;
+        Ok(arguments)
+    }
+
+    fn check(&self, function: &str) -> Result<()> {
+        let command = &self.command;
+        let refused =
+            |name: &str, problem: String, help: &str| Error::usage(Place::item(format!("`{name}`")), problem, help);
+        let names: Vec<&str> = names(command).collect();
+        for (name, value) in &self.values {
+            let Some(arg) = of_name(command, name).filter(|_| names.contains(&name.as_str())) else {
                 let near = nearest(name, names.iter().copied(), 0.7);
                 let help =
                     near.map_or(format!("there are {}", names.join(", ")), |near| format!("did you mean `{near}`?"));
-                return Err(refused(format!("{function} has no such argument"), &help));
+                return Err(refused(name, format!("{function} has no such argument"), &help));
             };
             if matches!(value, Value::Boolean(_)) && arg.get_action().takes_values() {
-                return Err(refused(format!("{value} is no value of it"), "give a value, or leave it out"));
+                return Err(refused(name, format!("{value} is not a value of it"), "give a value, or leave it out"));
             }
-            if !is_given(name) {
+            if !self.is_given(name) {
                 continue;
             }
             let mut excluded = command.get_arg_conflicts_with(arg).into_iter().map(|other| other.get_id().as_str());
-            if let Some(other) = excluded.find(|other| is_given(other)) {
-                return Err(refused(format!("it cannot be used with `{other}`"), "leave out one of the two"));
+            if let Some(other) = excluded.find(|other| self.is_given(other)) {
+                return Err(refused(name, format!("it cannot be used with `{other}`"), "leave out one of the two"));
             }
             let of_verb = |(verbs, one, _): &&(&[&str], &str, &str)| verbs.contains(&command.get_name()) && one == name;
-            if let Some((.., needed)) = NEEDS.iter().find(of_verb).filter(|(.., needed)| !is_given(needed)) {
-                return Err(refused(format!("it needs `{needed}`"), "add it, or leave this out"));
+            if let Some((.., needed)) = NEEDS.iter().find(of_verb).filter(|(.., needed)| !self.is_given(needed)) {
+                return Err(refused(name, format!("it needs `{needed}`"), "add it, or leave this out"));
             }
         }
-        let missing = command.get_arguments().find(|arg| arg.is_required_set() && !is_given(arg.get_id().as_str()));
-        if let Some(arg) = missing {
-            let help = arg.get_help().map(ToString::to_string).unwrap_or_default();
-            return Err(Error::usage(Place::item(format!("`{}`", arg.get_id())), "it is needed", help));
+        let is_missing = |arg: &&Arg| arg.is_required_set() && !self.is_given(arg.get_id().as_str());
+        match command.get_arguments().find(is_missing) {
+            Some(arg) => Err(refused(arg.get_id().as_str(), "it is needed".to_owned(), &help_of(arg))),
+            None => Ok(()),
         }
-        Ok(Arguments { command, call, values })
     }
 
     /// Whether an argument is there, and not False.
@@ -272,7 +277,7 @@ impl Arguments {
     pub(super) fn take<T: FromValue>(&mut self, name: &'static str) -> Result<T> {
         let arg = of_name(&self.command, name);
         let refused = |problem: String| {
-            let help = arg.and_then(Arg::get_help).map(ToString::to_string).unwrap_or_default();
+            let help = arg.map(help_of).unwrap_or_default();
             Error::usage(Place::option(name), problem, help)
         };
         let default = || arg.and_then(|arg| arg.get_default_values().first()).map(|word| Value::Text(word.into()));
@@ -327,6 +332,10 @@ pub(super) fn names(command: &Command) -> impl Iterator<Item = &str> {
     // Of the command line alone: a function prints nothing.
     let printing = ["help", "version", "quiet", "verbose", "format", "tables"];
     command.get_arguments().map(|arg| arg.get_id().as_str()).filter(move |name| !printing.contains(name))
+}
+
+fn help_of(arg: &Arg) -> String {
+    arg.get_help().map(ToString::to_string).unwrap_or_default()
 }
 
 fn of_name<'a>(command: &'a Command, name: &str) -> Option<&'a Arg> {

@@ -170,7 +170,7 @@ mod tests {
         assert_eq!(refusal("map", &renamed), "`rename`: it needs `distribution`");
         assert_eq!(refusal("map", &[]), "`category`: it is needed");
         assert_eq!(refusal("study", &[("backnd", text("cpu"))]), "`backnd`: study has no such argument");
-        assert_eq!(refusal("study", &[("thw", Value::Boolean(false))]), "`thw`: False is no value of it");
+        assert_eq!(refusal("study", &[("thw", Value::Boolean(false))]), "`thw`: False is not a value of it");
         assert_eq!(
             refusal("check", &[("row", Value::Number(1.5)), ("file", text("a.csv"))]),
             "option `row`: 1.5 is not a whole number from 0"

@@ -168,16 +168,13 @@ pub(super) fn from_word(key: &Key, word: &str, place: Place) -> Result<Value> {
 /// # Errors
 /// As [`from_toml`].
 pub(super) fn from_value(key: &Key, given: &Given, place: Place) -> Result<Value> {
-    let value = match given {
-        Given::Boolean(is_so) => Some(Value::Bool(*is_so)),
-        Given::Whole(n) => whole(*n),
-        Given::Number(x) => Number::from_f64(*x).map(Value::Number),
-        Given::Text(_) | Given::Path(_) | Given::List(_) | Given::Table(_) => None,
-    };
-    // Numbers are names too: the device 0.
-    let value = match key.kind {
-        KeyKind::Text => given.text().ok().map(Value::String).filter(|_| !matches!(given, Given::Boolean(_))),
-        _ => value,
+    let value = match (&key.kind, given) {
+        (_, Given::Boolean(is_so)) => Some(Value::Bool(*is_so)),
+        // A number is a name too: the device 0.
+        (KeyKind::Text, _) => given.text().ok().map(Value::String),
+        (_, Given::Whole(n)) => whole(*n),
+        (_, Given::Number(x)) => Number::from_f64(*x).map(Value::Number),
+        _ => None,
     };
     value.and_then(|value| fitted(key, value)).ok_or_else(|| refused(key, &format!("`{given}`"), place))
 }
