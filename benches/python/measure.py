@@ -159,7 +159,8 @@ def ours(path: Path) -> None:
         start = time.perf_counter()
         found = lanesweep.sample(path, models="FSM", criterion="collision", thw=1.2, estimator="is", seed=seed, backend="cpu")
         one = found.table("estimates").rows()[0]
-        row("lanesweep importance sampling", seed, one["probability"], one["draws_low"], one["draws_high"], one["runs"], round(time.perf_counter() - start, 2))
+        seconds = round(time.perf_counter() - start, 2)
+        row("lanesweep importance sampling", seed, one["probability"], one["draws_low"], one["draws_high"], one["runs"], seconds)
 
 
 class StandardNormal:
