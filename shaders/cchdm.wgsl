@@ -32,14 +32,13 @@ fn initial() -> DriverState {
 
 // Unsafe iff h ≤ gate and |g/dv| ≤ 2.0 s. Where |TTC| of an opening gap counts, the driver keeps braking below the
 // other's speed until that gap exceeds 2 s of |dv|. With a headway: unsafe iff h ≤ gate and g ≤ 2.0 s · v_e.
-fn check(view: View) -> Hazard {
+fn check(view: View) -> bool {
     let dv = closing(view);
     let near = view.lateral_gap <= driver_lateral_gate;
     let near_gap = danger_gap(view.v_ego, dv);
     let moves = (dv > 0.0) | ((dv < 0.0) & !driver_only_while_closing);
     let soon = select(moves & (abs(view.gap) <= near_gap), view.gap <= near_gap, driver_headway > 0.0);
-    let is_unsafe = !is_behind(view) & (driver_always_unsafe | (near & soon));
-    return Hazard(is_unsafe, driver_max_deceleration);
+    return !is_behind(view) & (driver_always_unsafe | (near & soon));
 }
 
 // A reaction that has begun goes on: to standstill in a cut-out, in a cut-in until the ego is no faster.
@@ -50,7 +49,7 @@ fn keeps_braking(state: DriverState, view: View) -> bool {
 }
 
 // Coast at 0.4 m/s² during the delay, then ramp at 12.65 m/s³ up to 0.774 g.
-fn react(state: DriverState, hazard: Hazard, v_ego: f32) -> Reaction {
-    let braking = smaller(state.deceleration + driver_jerk_per_step, hazard.demand);
-    return latched_braking(state, driver_coasting, braking, v_ego);
+fn react(state: DriverState, view: View) -> Reaction {
+    let braking = smaller(state.deceleration + driver_jerk_per_step, driver_max_deceleration);
+    return latched_braking(state, driver_coasting, braking, view.v_ego);
 }

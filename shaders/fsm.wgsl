@@ -26,21 +26,25 @@ override driver_jerk_per_step: f32;
 override driver_max_deceleration: f32;
 override driver_delay_steps: u32;
 
-// 0 beyond the safe distance, 1 below the unsafe one, linear between.
-fn fuzzy(distance: f32, safe: f32, dangerous: f32) -> f32 {
-    var value = 0.0;
-    if distance >= safe {
-        value = 0.0;
-    } else if distance <= dangerous {
-        value = 1.0;
-    } else {
-        value = exact_div(distance - safe, dangerous - safe);
-    }
-    return value;
+// A surrogate as a quotient, 0…1: only a lane that brakes divides.
+struct Surrogate {
+    is_positive: bool,
+    numerator: f32,
+    denominator: f32,
 }
 
-// Proactive fuzzy surrogate of the leader's possible braking, 0…1.
-fn pfs(v_ego: f32, v_other: f32, gap: f32) -> f32 {
+// 0 beyond the safe distance, 1 below the unsafe one, linear between.
+fn fuzzy(distance: f32, safe: f32, dangerous: f32) -> Surrogate {
+    let is_dangerous = distance <= dangerous;
+    return Surrogate(
+        distance < safe,
+        select(distance - safe, 1.0, is_dangerous),
+        select(dangerous - safe, 1.0, is_dangerous),
+    );
+}
+
+// Proactive fuzzy surrogate of the leader's possible braking.
+fn pfs(v_ego: f32, v_other: f32, gap: f32) -> Surrogate {
     let reaction = v_ego * driver_tau;
     let lead_stop = v_other * v_other * driver_half_inverse_lead;
     let d_safe = reaction + v_ego * v_ego * driver_half_inverse_comf - lead_stop + driver_margin;
@@ -48,8 +52,8 @@ fn pfs(v_ego: f32, v_other: f32, gap: f32) -> f32 {
     return fuzzy(gap - driver_margin, d_safe, d_unsafe);
 }
 
-// Critical fuzzy surrogate of the present closing, 0…1.
-fn cfs(v_ego: f32, v_other: f32, gap: f32, a_ego: f32) -> f32 {
+// Critical fuzzy surrogate of the present closing.
+fn cfs(v_ego: f32, v_other: f32, gap: f32, a_ego: f32) -> Surrogate {
     let a_limited = larger(a_ego, -driver_b_comf);
     let v_new = v_ego + driver_tau * a_limited;
     let dv = v_ego - v_other;
@@ -58,16 +62,12 @@ fn cfs(v_ego: f32, v_other: f32, gap: f32, a_ego: f32) -> f32 {
     let d_new = (v_ego + a_limited * driver_half_tau - v_other) * driver_tau;
     let d_safe = d_new + dv_new * dv_new * driver_half_inverse_comf;
     let d_unsafe = d_new + dv_new * dv_new * driver_half_inverse_max;
-    var value = 0.0;
-    if v_ego <= v_other {
-        value = 0.0;
-    } else if v_new < v_other {
-        // g < dv²/(2|a|), multiplied out.
-        let twice = gap + gap;
-        value = select(0.0, 1.0, twice * abs(a_step) < dv * dv);
-    } else {
-        value = fuzzy(gap, d_safe, d_unsafe);
+    var value = fuzzy(gap, d_safe, d_unsafe);
+    if v_new < v_other {
+        // 1 if g < dv²/(2|a|), multiplied out, else 0.
+        value = Surrogate((gap + gap) * abs(a_step) < dv * dv, 1.0, 1.0);
     }
+    value.is_positive = value.is_positive & (v_ego > v_other);
     return value;
 }
 
@@ -82,22 +82,43 @@ fn gate_is_open(view: View) -> bool {
     return (view.lateral_gap <= 0.0) | !closed;
 }
 
+// Distance beyond which CFS is 0 at every deceleration of the ego, rounding aside.
+fn steady_gap(v_ego: f32, v_other: f32) -> f32 {
+    let dv = larger(v_ego - v_other, 0.0);
+    return dv * driver_tau + dv * dv * driver_half_inverse_comf;
+}
+
 fn initial() -> DriverState {
     return DriverState(0.0, driver_delay_steps);
 }
 
-// Unsafe iff the gate is open and CFS + PFS ≠ 0; demand CFS (b_max − b_comf) + b_comf if CFS > 0, else
-// PFS·b_comf.
-fn check(view: View) -> Hazard {
-    let pfs = pfs(view.v_ego, view.v_other, view.gap);
-    let cfs = cfs(view.v_ego, view.v_other, view.gap, view.a_ego);
-    let surrogate = (pfs > 0.0) | (cfs > 0.0);
-    let demand = select(pfs * driver_b_comf, cfs * driver_b_span + driver_b_comf, cfs > 0.0);
-    return Hazard(!is_behind(view) & surrogate & gate_is_open(view), demand);
+// Unsafe iff the gate is open and CFS + PFS ≠ 0.
+fn check(view: View) -> bool {
+    var surrogate = pfs(view.v_ego, view.v_other, view.gap).is_positive;
+    // With more room than any rounding takes, CFS is not computed.
+    if !surrogate & (view.gap <= 1.001 * steady_gap(view.v_ego, view.v_other) + 0.001) {
+        surrogate = cfs(view.v_ego, view.v_other, view.gap, view.a_ego).is_positive;
+    }
+    return !is_behind(view) & surrogate & gate_is_open(view);
+}
+
+// Demand CFS (b_max − b_comf) + b_comf if CFS > 0, else PFS·b_comf.
+fn demand(view: View) -> f32 {
+    var surrogate = pfs(view.v_ego, view.v_other, view.gap);
+    let critical = cfs(view.v_ego, view.v_other, view.gap, view.a_ego);
+    if critical.is_positive {
+        surrogate = critical;
+    }
+    let value = exact_div(surrogate.numerator, surrogate.denominator);
+    return select(value * driver_b_comf, value * driver_b_span + driver_b_comf, critical.is_positive);
 }
 
 // Keep the speed for τ, then apply the demand: increases are limited to 12.65 m/s³, decreases act at once.
-fn react(state: DriverState, hazard: Hazard, v_ego: f32) -> Reaction {
-    let ramp = smaller(state.deceleration + driver_jerk_per_step, driver_max_deceleration);
-    return latched_braking(state, 0.0, smaller(ramp, hazard.demand), v_ego);
+fn react(state: DriverState, view: View) -> Reaction {
+    var braking = 0.0;
+    if state.delay_steps == 0u {
+        let ramp = smaller(state.deceleration + driver_jerk_per_step, driver_max_deceleration);
+        braking = smaller(ramp, demand(view));
+    }
+    return latched_braking(state, 0.0, braking, view.v_ego);
 }

@@ -41,38 +41,44 @@ fn lanes(
         return;
     }
     var at = lane / launch.headways;
-    var lane_case = cases[launch.first_case + at];
+    var lane_case = cases[launch.first_case + at * launch.case_step];
     var state = start_lane(lane_case, starts[lane - at * launch.headways]);
     var done = 0u;
-    // Each turn is one step of the lane that the invocation has.
+    // Each turn is a burst of steps. All lanes of a warp that have ended in it are replaced together.
     for (var turn = 0u; turn < MAX_TURNS; turn++) {
-        state = advance(state, lane_case);
+        for (var step = 0u; step < frame_burst; step++) {
+            let moment = observe(state, lane_case);
+            state.record = moment.record;
+            if moment.ends {
+                state = ended(state, moment);
+                break;
+            }
+            state = advance(state, moment, lane_case);
+        }
         if state.end != END_NOT_YET {
+            write_outcome(at, lane, outcome(state, lane_case));
+            done = done + 1u;
             if !frame_queue {
                 break;
             }
-            write_outcome(lane, outcome(state, lane_case));
-            done = done + 1u;
             lane = atomicAdd(&next_lane, 1u);
             if lane >= end {
                 break;
             }
             at = lane / launch.headways;
-            lane_case = cases[launch.first_case + at];
+            lane_case = cases[launch.first_case + at * launch.case_step];
             state = start_lane(lane_case, starts[lane - at * launch.headways]);
         }
-    }
-    if !frame_queue & (state.end != END_NOT_YET) {
-        write_outcome(lane, outcome(state, lane_case));
-        done = 1u;
     }
     // The host checks this counter: the device must compute every lane to its end.
     atomicAdd(&finished[launch.finished_word], done);
 }
 
-fn write_outcome(lane: u32, record: OutcomeRecord) {
-    pack_verdicts(launch, lane, record);
+// Results are in the order of all cases, also those of other dispatches.
+fn write_outcome(at: u32, lane: u32, record: OutcomeRecord) {
+    let place = launch.first_lane + lane + at * launch.lanes_between;
+    pack_verdicts(launch, place, record);
     if frame_values {
-        outcomes[launch.first_outcome + lane] = record;
+        outcomes[launch.first_outcome + place] = record;
     }
 }

@@ -30,16 +30,15 @@ fn initial() -> DriverState {
 
 // Unsafe iff h ≤ gate and |g/dv| ≤ dv/(2·6) + 0.35 + margin: absolute TTC, signed dv on the right; where a TTC exists
 // only while the gap closes, dv > 0.
-fn check(view: View) -> Hazard {
+fn check(view: View) -> bool {
     let dv = closing(view);
     let near = view.lateral_gap <= intrusion_gap(view.marking_gap);
     let moves = (dv > 0.0) | ((dv < 0.0) & !driver_only_while_closing);
     let soon = moves & (abs(view.gap) <= abs(dv) * ttc_threshold(dv));
-    let is_unsafe = !is_behind(view) & (driver_always_unsafe | (near & soon));
-    return Hazard(is_unsafe, driver_deceleration);
+    return !is_behind(view) & (driver_always_unsafe | (near & soon));
 }
 
 // Hold the speed for 0.35 s, then brake at 6 m/s² at once, without a jerk limit.
-fn react(state: DriverState, hazard: Hazard, v_ego: f32) -> Reaction {
-    return latched_braking(state, 0.0, hazard.demand, v_ego);
+fn react(state: DriverState, view: View) -> Reaction {
+    return latched_braking(state, 0.0, driver_deceleration, view.v_ego);
 }

@@ -45,14 +45,14 @@ fn initial() -> DriverState {
 }
 
 // Unsafe iff g < d_lon and h < d_lat.
-fn check(view: View) -> Hazard {
+fn check(view: View) -> bool {
     let close = view.gap < longitudinal_distance(view.v_ego, view.v_other);
     let beside = view.lateral_gap < lateral_distance(view.lateral_towards);
-    return Hazard(!is_behind(view) & close & beside, driver_max_deceleration);
+    return !is_behind(view) & close & beside;
 }
 
 // Keep the speed for ρ, then ramp from 0 at 12.65 m/s³ up to 0.774 g.
-fn react(state: DriverState, hazard: Hazard, v_ego: f32) -> Reaction {
-    let braking = smaller(state.deceleration + driver_jerk_per_step, hazard.demand);
-    return latched_braking(state, 0.0, braking, v_ego);
+fn react(state: DriverState, view: View) -> Reaction {
+    let braking = smaller(state.deceleration + driver_jerk_per_step, driver_max_deceleration);
+    return latched_braking(state, 0.0, braking, view.v_ego);
 }

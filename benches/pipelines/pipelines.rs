@@ -21,8 +21,8 @@ use std::path::{Path, PathBuf};
 use ash::{khr::pipeline_executable_properties as executables, vk};
 use common::paper_size_scenarios;
 use lanesweep::engine::gpu::{exact_spirv, shader};
-use lanesweep::engine::{Constants, CpuBackend, Executor, Wanted};
-use lanesweep::model::driver::ModelId;
+use lanesweep::engine::{Constants, CpuBackend, DeviceScene, Executor, MotionKind, Wanted};
+use lanesweep::model::driver::{MODELS, ModelId};
 use lanesweep::model::profile::Profile;
 use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::Category;
@@ -80,15 +80,35 @@ fn kernels(profiles: &[&str], values: bool) -> Vec<Kernel> {
         for model in ModelId::ALL {
             for category in Category::ALL {
                 let resolved = Constants::resolve(&profile, category);
-                let specialization =
-                    shader::Specialization { paired: category == Category::CutOut, values, queue: true };
-                let constants = shader::constants(&resolved, model, specialization);
-                let name = format!("{profile_name}.{}.{}", category.label(), model.name());
-                add(name, shader::ENTRY, shader::assemble(model), constants, 8);
+                for (scene_name, scene) in scenes(category) {
+                    let specialization = shader::Specialization { scene, values, watched: false, queue: true };
+                    let constants = shader::constants(&resolved, model, specialization);
+                    let name = format!("{profile_name}.{}.{}.{scene_name}", category.label(), model.name());
+                    add(name, shader::ENTRY, shader::assemble(model), constants, 8);
+                }
             }
         }
     }
     all
+}
+
+/// What lanes of a category share: of kinematic samples, of samples by SVD, and nothing.
+fn scenes(category: Category) -> [(&'static str, DeviceScene); 3] {
+    let is_paired = category == Category::CutOut;
+    let of = |speeds, lateral| DeviceScene {
+        is_all_paired: is_paired,
+        always_there: true,
+        attends: [true; MODELS],
+        may_cross: false,
+        speeds: [speeds; 2],
+        laterals: [if category == Category::Lvd { MotionKind::Centred } else { lateral }, MotionKind::Centred],
+        ..DeviceScene::unknown(is_paired)
+    };
+    [
+        ("kinematic", of(MotionKind::Analytic, MotionKind::Analytic)),
+        ("series", of(MotionKind::Sampled, MotionKind::Sampled)),
+        ("any", DeviceScene::unknown(is_paired)),
+    ]
 }
 
 /// Puts a defect into the kernels, so that a check of what compilers make of them can be seen to fail.

@@ -41,7 +41,7 @@ fn attend_from(rule: AttentionRule, steps: u32, geometry: LaneGeometry, motion: 
     if rule.kind == ATTENTION_ALWAYS || steps == 0u {
         return vec2<u32>(0u, 0u);
     }
-    let start = motion_lateral(motion, 0u).position;
+    let start = motion_lateral(motion, MOTION_MIXED, 0u).position;
     let is_in_path = abs(start) <= geometry.half_widths;
     let has_intruded = abs(start) - geometry.half_widths <= geometry.marking_gap - rule.threshold;
     let is_seen = ((rule.kind == ATTENTION_VISIBLE_MOVEMENT) & has_intruded)
@@ -54,10 +54,10 @@ fn attend_from(rule: AttentionRule, steps: u32, geometry: LaneGeometry, motion: 
     let delay_only = (rule.kind == ATTENTION_DECELERATION) & (rule.below_trigger == BELOW_TRIGGER_DELAY_ONLY);
     var event = NEVER;
     var lateral_before = start;
-    var speed_before = motion_speed(motion, 0u);
+    var speed_before = motion_speed(motion, MOTION_MIXED, 0u);
     for (var step = 0u; step < steps; step++) {
-        let position = motion_lateral(motion, step).position;
-        let v = motion_speed(motion, step);
+        let position = motion_lateral(motion, MOTION_MIXED, step).position;
+        let v = motion_speed(motion, MOTION_MIXED, step);
         var happens = centre - abs(position) > rule.threshold;
         if rule.kind == ATTENTION_VISIBLE_MOVEMENT {
             happens = abs(position - lateral_before) > MOVEMENT;

@@ -69,7 +69,8 @@ fn btn_update(maximum: BrakeThreatMaximum, seen: bool, gap: f32, closing: f32) -
         let hopeless = touches | (room <= 0.0);
         let numerator = closing * closing;
         let denominator = btn_two_a_max * room;
-        let fails = hopeless | (numerator > btn_two_a_limit * room);
+        // dv² is positive: without room this fails too.
+        let fails = numerator > btn_two_a_limit * room;
         raised = btn_raise(maximum, counts, select(numerator, 1.0, hopeless), select(denominator, 0.0, hopeless), fails);
     } else if btn_form == BTN_DISTANCE_RATIO {
         // The quotient of squares: no root in the lane.

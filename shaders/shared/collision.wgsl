@@ -15,9 +15,9 @@ fn held_in_contact(before: f32, after: f32, half_lengths: f32) -> f32 {
     return select(larger(after, -half_lengths), from_behind, before < 0.0);
 }
 
-// Contact at one step, strict: h < 0 and |x_o − x_e| < (L_e + L_o)/2, with the signed gap `gap`.
-fn overlaps(gap: f32, half_lengths: f32, lateral_gap: f32) -> bool {
-    return (lateral_gap < 0.0) & (gap < 0.0) & (gap + half_lengths + half_lengths > 0.0);
+// Contact at one step, strict: h < 0 (`across`) and |x_o − x_e| < (L_e + L_o)/2, with the signed gap `gap`.
+fn overlaps(gap: f32, half_lengths: f32, across: bool) -> bool {
+    return across & (gap < 0.0) & (gap + half_lengths + half_lengths > 0.0);
 }
 
 // What touches what, if the vehicles overlap.

@@ -16,8 +16,9 @@ struct Record {
     min_gap: f32,
 }
 
-// Whether TTC and BTN evaluate a vehicle here: its centre is in front, and it is close enough laterally.
-fn criteria_sees(gap: f32, half_lengths: f32, lateral_gap: f32, lateral_position: f32, ego_width: f32) -> bool {
-    let near = select(lateral_gap < 0.0, abs(lateral_position) <= ego_width, criteria_gate == GATE_EGO_WIDTH);
-    return (gap + half_lengths >= 0.0) & near;
+// Whether TTC and BTN evaluate a vehicle here: its centre is in front, and it is close enough laterally. A `centred`
+// vehicle always is.
+fn criteria_sees(view: View, across: bool, centred: bool, lateral_position: f32, ego_width: f32) -> bool {
+    let near = centred | select(across, abs(lateral_position) <= ego_width, criteria_gate == GATE_EGO_WIDTH);
+    return (view.gap + view.half_lengths >= 0.0) & near;
 }

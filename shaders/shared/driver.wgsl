@@ -1,5 +1,6 @@
-// View, hazard and state of a driver: twin of src/model/driver/mod.rs. A model defines `initial`, `check` and
-// `react`, and its constants as `override driver_…`.
+// View and state of a driver: twin of src/model/driver/mod.rs. A model defines `initial`, `check` and `react`, and its
+// constants as `override driver_…`. Here `check` says only whether the view is unsafe, and `react` computes the demand of
+// that view, because few steps need it.
 
 struct View {
     v_ego: f32,
@@ -10,11 +11,6 @@ struct View {
     lateral_towards: f32,
     half_lengths: f32,
     marking_gap: f32,
-}
-
-struct Hazard {
-    is_unsafe: bool,
-    demand: f32,
 }
 
 struct DriverState {

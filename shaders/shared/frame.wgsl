@@ -1,8 +1,9 @@
 // The frame: the start, one step and the outcome of a lane, with the latched step of all models. Twin of
 // src/engine/lane_step.rs and src/engine/lane.rs.
 //
-// Order inside a step: the gap moves to i (a contact between two steps holds it), the state at i gives the criteria and
-// the contact, then the check, then v[i+1] (semi-implicit Euler). The state is the gap, not the positions.
+// Order inside a step: the state at i gives the criteria and the contact, then the check, then v[i+1] (semi-implicit
+// Euler), then the gap moves to i+1 (a contact between two steps holds it). The twin moves the gap first; the
+// operations of a lane and their order are the same. The state is the gap, not the positions.
 
 // s
 override frame_dt: f32;
@@ -16,12 +17,30 @@ override frame_end_when_settled: bool;
 override frame_abort_above_ttc: f32;
 // Position of the model in the registry.
 override frame_model: u32;
-// At least one case has a second vehicle.
-override frame_paired: bool;
 // The sweep returns continuous values, not only verdicts.
 override frame_values: bool;
+// A watch replaces the threshold of the TTC and marks contacts.
+override frame_watched: bool;
 // An invocation whose lane has ended takes the next one of its workgroup.
 override frame_queue: bool;
+// Steps between two looks for lanes that have ended.
+override frame_burst: u32;
+// What all lanes of a pipeline share: twin of `DeviceScene` in src/engine/scene.rs.
+// Some cases have a second vehicle.
+override scene_paired: bool;
+// All have one.
+override scene_all_paired: bool;
+// Every vehicle is present from the first step to the last, and evaluated by the criteria.
+override scene_always_there: bool;
+// Drivers may react to every vehicle from the first step on.
+override scene_attends: bool;
+// A step may move a vehicle's centre past the ego's, so contacts between two steps are tested.
+override scene_may_cross: bool;
+// MOTION_… of the principal vehicle and of the one ahead.
+override scene_speed_0: u32;
+override scene_speed_1: u32;
+override scene_lateral_0: u32;
+override scene_lateral_1: u32;
 
 const NO_STEP: u32 = 0xffffffffu;
 
@@ -35,6 +54,8 @@ const END_NOT_YET: u32 = 5u;
 // One other vehicle at one step.
 struct Seen {
     view: View,
+    // The vehicles overlap across the road.
+    across: bool,
     present: bool,
     judged: bool,
 }
@@ -48,10 +69,18 @@ struct EgoState {
     marking_gap: f32,
 }
 
-// A lane at the beginning of a step; after its last step, at that step.
+// One other vehicle's motion at one step.
+struct OtherState {
+    speed: f32,
+    lateral: LateralState,
+}
+
+// A lane at a step, before anything happens there; after its last step, at that step.
 struct LaneState {
     gap_0: f32,
     gap_1: f32,
+    other_0: OtherState,
+    other_1: OtherState,
     driver: DriverState,
     v_ego: f32,
     v_before: f32,
@@ -63,6 +92,23 @@ struct LaneState {
     // The vehicle of a contact, and the closing speed at it.
     touched: u32,
     v_closing: f32,
+}
+
+// What happens at a step.
+struct Moment {
+    first: Seen,
+    second: Seen,
+    record: Record,
+    is_unsafe: bool,
+    // The second vehicle determines the reaction.
+    second_decides: bool,
+    touching: bool,
+    touching_second: bool,
+    aborting: bool,
+    // The horizon is reached, and no further event is possible.
+    is_settled: bool,
+    is_standing: bool,
+    ends: bool,
 }
 
 // The initial gap, m, at the ego's initial speed, m/s.
@@ -81,9 +127,11 @@ fn min_following_gap(v: f32) -> f32 {
 
 fn start_lane(lane: LaneCase, start: Start) -> LaneState {
     let gap_start = start_gap(start, lane.ego_speed);
-    return LaneState(
+    var state = LaneState(
         gap_start + lane.others[0].gap_offset,
         gap_start + lane.others[1].gap_offset,
+        other_at(lane.others[0], scene_speed_0, scene_lateral_0, 0u),
+        other_at(lane.others[1], scene_speed_1, scene_lateral_1, 0u),
         initial(),
         lane.ego_speed,
         lane.ego_speed,
@@ -94,85 +142,148 @@ fn start_lane(lane: LaneCase, start: Start) -> LaneState {
         0u,
         0.0,
     );
-}
-
-// One step.
-fn advance(before: LaneState, lane: LaneCase) -> LaneState {
-    var state = before;
-    let index = state.index;
-    let v_ego = state.v_ego;
-    let ego = EgoState(v_ego, (v_ego - state.v_before) * frame_inverse_dt, lane.ego_width,
-        (lane.lane_width - lane.ego_width) * 0.5);
-    let first = see(ego, lane.others[0], state.gap_0, index);
-    state.gap_0 = first.view.gap;
-    state.record = update_record(state.record, first);
-    var hazard = attentive_check(first, lane.others[0], index);
-    var touching = is_touched(first, lane.others[0]);
-    var touching_second = false;
-    var v_closing = closing(first.view);
-    var settled = is_settled(first);
-    var aborting = aborts(first);
-    if frame_paired {
-        if lane.pair != 0u {
-            let second = see(ego, lane.others[1], state.gap_1, index);
-            state.gap_1 = second.view.gap;
-            state.record = update_record(state.record, second);
-            let other_hazard = attentive_check(second, lane.others[1], index);
-            // The nearest unsafe vehicle determines the reaction.
-            let nearer = other_hazard.is_unsafe & (!hazard.is_unsafe | (state.gap_1 < state.gap_0));
-            hazard.is_unsafe = hazard.is_unsafe | nearer;
-            hazard.demand = select(hazard.demand, other_hazard.demand, nearer);
-            touching_second = !touching & is_touched(second, lane.others[1]);
-            v_closing = select(v_closing, closing(second.view), touching_second);
-            touching = touching | touching_second;
-            settled = settled & is_settled(second);
-            aborting = aborting | aborts(second);
-        }
-    }
-
-    hazard.is_unsafe = hazard.is_unsafe | keeps_braking(state.driver, first.view);
-    state.reaction_step = select(state.reaction_step, index, hazard.is_unsafe & (state.reaction_step == NO_STEP));
-    let over = (index >= lane.horizon) & frame_end_when_settled;
-    let is_capped = index + 1u >= frame_step_cap;
-    // The reason for the end is evaluated once, not at every step.
-    if touching | aborting | (over & (settled | (v_ego <= 0.0))) | is_capped {
-        state.end = END_CAP;
-        state.end = select(state.end, END_SETTLED, over & settled);
-        state.end = select(state.end, END_STANDSTILL, over & (v_ego <= 0.0));
-        state.end = select(state.end, END_ABORTED, aborting);
-        state.end = select(state.end, END_CONTACT, touching);
-        state.touched = select(0u, 1u, touching_second);
-        state.v_closing = select(0.0, v_closing, touching);
-    } else {
-        let reaction = react(state.driver, hazard, v_ego);
-        state.v_before = v_ego;
-        state.v_ego = select(v_ego, reaction.v_next, hazard.is_unsafe);
-        state.driver.deceleration = select(state.driver.deceleration, reaction.state.deceleration, hazard.is_unsafe);
-        state.driver.delay_steps = select(state.driver.delay_steps, reaction.state.delay_steps, hazard.is_unsafe);
-        state.index = index + 1u;
+    // Index 0 is the start itself, or one step after it.
+    if frame_start_shift {
+        state = move_gaps(state, lane);
     }
     return state;
 }
 
-// `before`: the gap one step before. Step 0 is the start itself, unless index 0 is one step after it.
-fn see(ego: EgoState, other: LaneOther, before: f32, index: u32) -> Seen {
-    let v_other = motion_speed(other.motion, index);
-    let lateral = motion_lateral(other.motion, index);
-    let lateral_gap = abs(lateral.position) - other.half_widths;
-    let present = (other.used != 0u) & (index >= other.present_from) & (index < other.present_until);
-    let way = (v_other - ego.v) * frame_dt;
-    var after = before + way;
-    // With a smaller change, no centre passes another.
-    if abs(way + way) > other.half_lengths {
-        let stops = present & (other.judged != 0u) & (lateral_gap < 0.0);
-        after = select(after, held_in_contact(before, after, other.half_lengths), stops);
+fn other_at(other: LaneOther, speed: u32, lateral: u32, index: u32) -> OtherState {
+    return OtherState(motion_speed(other.motion, speed, index), motion_lateral(other.motion, lateral, index));
+}
+
+fn is_pair(lane: LaneCase) -> bool {
+    return scene_all_paired | (lane.pair != 0u);
+}
+
+// What happens at the state's step.
+fn observe(state: LaneState, lane: LaneCase) -> Moment {
+    let v_ego = state.v_ego;
+    let ego = EgoState(v_ego, (v_ego - state.v_before) * frame_inverse_dt, lane.ego_width,
+        (lane.lane_width - lane.ego_width) * 0.5);
+    var moment: Moment;
+    moment.first = see(ego, lane.others[0], state.other_0, scene_lateral_0, state.gap_0, state.index);
+    moment.second = moment.first;
+    moment.record = update_record(state.record, moment.first);
+    moment.is_unsafe = attentive_check(moment.first, lane.others[0], state.index);
+    moment.touching = is_touched(moment.first, lane.others[0]);
+    moment.aborting = aborts(moment.first);
+    var settled = is_settled(moment.first);
+    if scene_paired {
+        if is_pair(lane) {
+            let second = see(ego, lane.others[1], state.other_1, scene_lateral_1, state.gap_1, state.index);
+            moment.second = second;
+            moment.record = update_record(moment.record, second);
+            let other_is_unsafe = attentive_check(second, lane.others[1], state.index);
+            // The nearest unsafe vehicle determines the reaction.
+            moment.second_decides = other_is_unsafe & (!moment.is_unsafe | (state.gap_1 < state.gap_0));
+            moment.is_unsafe = moment.is_unsafe | other_is_unsafe;
+            moment.touching_second = !moment.touching & is_touched(second, lane.others[1]);
+            moment.touching = moment.touching | moment.touching_second;
+            moment.aborting = moment.aborting | aborts(second);
+            settled = settled & is_settled(second);
+        }
     }
-    let gap = select(before, after, (index > 0u) | frame_start_shift);
-    let view = View(ego.v, ego.a, v_other, gap, lateral_gap, lateral.towards, other.half_lengths,
+    moment.is_unsafe = moment.is_unsafe | keeps_braking(state.driver, moment.first.view);
+    let over = (state.index >= lane.horizon) & frame_end_when_settled;
+    moment.is_settled = over & settled;
+    moment.is_standing = over & (v_ego <= 0.0);
+    moment.ends = moment.touching | moment.aborting | moment.is_settled | moment.is_standing
+        | (state.index + 1u >= frame_step_cap);
+    return moment;
+}
+
+// The state of a lane that ends at its step. The reason is evaluated once.
+fn ended(before: LaneState, moment: Moment) -> LaneState {
+    var state = before;
+    state.end = END_CAP;
+    state.end = select(state.end, END_SETTLED, moment.is_settled);
+    state.end = select(state.end, END_STANDSTILL, moment.is_standing);
+    state.end = select(state.end, END_ABORTED, moment.aborting);
+    state.end = select(state.end, END_CONTACT, moment.touching);
+    state.touched = select(0u, 1u, moment.touching_second);
+    let v_closing = select(closing(moment.first.view), closing(moment.second.view), moment.touching_second);
+    state.v_closing = select(0.0, v_closing, moment.touching);
+    state.reaction_step = first_reaction(before, moment);
+    return state;
+}
+
+fn first_reaction(state: LaneState, moment: Moment) -> u32 {
+    return select(state.reaction_step, state.index, moment.is_unsafe & (state.reaction_step == NO_STEP));
+}
+
+// The state one step later.
+fn advance(before: LaneState, moment: Moment, lane: LaneCase) -> LaneState {
+    var state = before;
+    state.reaction_step = first_reaction(before, moment);
+    state.v_before = before.v_ego;
+    if moment.is_unsafe {
+        var view = moment.first.view;
+        if scene_paired & moment.second_decides {
+            view = moment.second.view;
+        }
+        let reaction = react(before.driver, view);
+        state.v_ego = reaction.v_next;
+        state.driver = reaction.state;
+    }
+    state.index = before.index + 1u;
+    state.other_0 = other_at(lane.others[0], scene_speed_0, scene_lateral_0, state.index);
+    if scene_paired {
+        state.other_1 = other_at(lane.others[1], scene_speed_1, scene_lateral_1, state.index);
+    }
+    return move_gaps(state, lane);
+}
+
+// The gaps one step after those of the state.
+fn move_gaps(before: LaneState, lane: LaneCase) -> LaneState {
+    var state = before;
+    state.gap_0 = moved_gap(before.v_ego, lane.others[0], before.other_0, scene_lateral_0, before.gap_0, before.index);
+    if scene_paired {
+        if is_pair(lane) {
+            state.gap_1 = moved_gap(before.v_ego, lane.others[1], before.other_1, scene_lateral_1, before.gap_1, before.index);
+        }
+    }
+    return state;
+}
+
+// The gap one step after `before`; a contact between the two steps holds it.
+fn moved_gap(v_ego: f32, other: LaneOther, place: OtherState, lateral: u32, before: f32, index: u32) -> f32 {
+    let way = (v_ego - place.speed) * frame_dt;
+    var after = before - way;
+    if scene_may_cross {
+        // With a smaller change, no centre passes another.
+        if abs(way + way) > other.half_lengths {
+            let across = is_across(abs(place.lateral.position) - other.half_widths, lateral);
+            let stops = is_present(other, index) & is_judged(other) & across;
+            after = select(after, held_in_contact(before, after, other.half_lengths), stops);
+        }
+    }
+    return after;
+}
+
+fn is_present(other: LaneOther, index: u32) -> bool {
+    return scene_always_there
+        | ((other.used != 0u) & (index >= other.present_from) & (index < other.present_until));
+}
+
+fn is_judged(other: LaneOther) -> bool {
+    return scene_always_there | (other.judged != 0u);
+}
+
+fn is_across(lateral_gap: f32, lateral: u32) -> bool {
+    return (lateral == MOTION_CENTRED) | (lateral_gap < 0.0);
+}
+
+// `lateral`: what is known of the vehicle's lateral motion.
+fn see(ego: EgoState, other: LaneOther, place: OtherState, lateral: u32, gap: f32, index: u32) -> Seen {
+    let lateral_gap = abs(place.lateral.position) - other.half_widths;
+    let view = View(ego.v, ego.a, place.speed, gap, lateral_gap, place.lateral.towards, other.half_lengths,
         ego.marking_gap);
-    let judged = present & (other.judged != 0u)
-        & criteria_sees(gap, other.half_lengths, lateral_gap, lateral.position, ego.width);
-    return Seen(view, present, judged);
+    let across = is_across(lateral_gap, lateral);
+    let present = is_present(other, index);
+    let is_seen = criteria_sees(view, across, lateral == MOTION_CENTRED, place.lateral.position, ego.width);
+    return Seen(view, across, present, present & is_judged(other) & is_seen);
 }
 
 fn update_record(record: Record, seen: Seen) -> Record {
@@ -185,25 +296,24 @@ fn update_record(record: Record, seen: Seen) -> Record {
     );
 }
 
-fn attentive_check(seen: Seen, other: LaneOther, index: u32) -> Hazard {
-    let hazard = check(seen.view);
-    let attentive = seen.present & (index >= other.attend_from[frame_model]);
-    return Hazard(hazard.is_unsafe & attentive, hazard.demand);
+fn attentive_check(seen: Seen, other: LaneOther, index: u32) -> bool {
+    let attends = scene_attends | (index >= other.attend_from[frame_model]);
+    return check(seen.view) & seen.present & attends;
 }
 
 fn is_touched(seen: Seen, other: LaneOther) -> bool {
-    let is_overlapping = overlaps(seen.view.gap, other.half_lengths, seen.view.lateral_gap);
-    return is_overlapping & seen.present & (other.judged != 0u);
+    let is_overlapping = overlaps(seen.view.gap, other.half_lengths, seen.across);
+    return is_overlapping & seen.present & is_judged(other);
 }
 
 // No further event is possible with this vehicle: it is behind, out of the lane, or not slower.
 fn is_settled(seen: Seen) -> bool {
-    let in_lane = seen.judged | (seen.present & (seen.view.lateral_gap < 0.0));
+    let in_lane = seen.judged | (seen.present & seen.across);
     return is_behind(seen.view) | !in_lane | (closing(seen.view) <= 0.0);
 }
 
 fn aborts(seen: Seen) -> bool {
-    let overlap = seen.present & (seen.view.lateral_gap < 0.0) & !is_behind(seen.view);
+    let overlap = seen.present & seen.across & !is_behind(seen.view);
     let far = abs(seen.view.gap) > frame_abort_above_ttc * abs(closing(seen.view));
     return (frame_abort_above_ttc > 0.0) & overlap & far;
 }

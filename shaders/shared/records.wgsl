@@ -53,8 +53,12 @@ struct Launch {
     lanes: u32,
     // Headways per case, at least 1.
     headways: u32,
-    // First case in the buffer of cases.
+    // First case in the buffer of cases, and from one to the next.
     first_case: u32,
+    case_step: u32,
+    // Place of the first lane in the results of this dispatch's model, and lanes of other dispatches between two cases.
+    first_lane: u32,
+    lanes_between: u32,
     // First word of this dispatch in the verdicts.
     first_word: u32,
     // First record of this dispatch in the outcomes.

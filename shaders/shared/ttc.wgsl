@@ -1,5 +1,16 @@
 // Time to collision: gap over closing speed, 0 at contact. Twin of src/model/criterion/ttc.rs.
 
+// s
+override criteria_ttc_threshold: f32;
+
+// A TTC below this fails, s: the threshold of the profile or of a watch.
+fn ttc_limit_s() -> f32 {
+    if frame_watched {
+        return launch.ttc_threshold_s;
+    }
+    return criteria_ttc_threshold;
+}
+
 // Minimum TTC so far, as a quotient, so that a step never divides.
 struct TtcMinimum {
     gap: f32,
@@ -21,14 +32,16 @@ fn ttc_value_bits(minimum: TtcMinimum) -> u32 {
     return bits;
 }
 
-// Takes one step of a vehicle that is `seen` into account: fails iff max(g, 0) < threshold·dv, dv > 0.
+// Takes one step of a vehicle that is `seen` into account: fails iff max(g, 0) < threshold·dv, dv > 0. A threshold is
+// not negative, so that the product is positive only if dv is.
 fn ttc_update(minimum: TtcMinimum, seen: bool, signed_gap: f32, closing: f32) -> TtcMinimum {
+    let limit = ttc_limit_s() * closing;
+    let fails = seen & (limit > 0.0) & (signed_gap < limit);
     let gap = larger(signed_gap, 0.0);
-    let counts = seen & (closing > 0.0);
-    let is_smaller = frame_values & counts & (gap * minimum.closing < minimum.gap * closing);
+    let is_smaller = frame_values & seen & (closing > 0.0) & (gap * minimum.closing < minimum.gap * closing);
     return TtcMinimum(
         select(minimum.gap, gap, is_smaller),
         select(minimum.closing, closing, is_smaller),
-        minimum.failed | (counts & (gap < launch.ttc_threshold_s * closing)),
+        minimum.failed | fails,
     );
 }

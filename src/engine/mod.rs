@@ -51,5 +51,6 @@ pub use outcome::{EndReason, NO_STEP, Outcome, Verdicts};
 pub use partial::{Partial, UnitCounts};
 pub use plan::{Block, CLOSE_HEADWAY_S, CaseSource, Headway, LaneKey, LanePlan, Units};
 pub use recheck::{RecheckOptions, same_words, words};
+pub use scene::{DeviceScene, MotionKind};
 pub use trace::{StepMark, Trace, TracedStep, TracedVehicle};
 pub use version::ENGINE_VERSION;

@@ -1,9 +1,10 @@
 //! Properties of the other vehicles that are known before a lane runs, so that its steps need not test them.
 
 use crate::model::scalar::Real;
-use crate::scenario::{LATERAL_SAMPLED, SPEED_SAMPLED, Tables};
+use crate::scenario::{LATERAL_SAMPLED, Motion, SPEED_SAMPLED, Tables};
 
 use super::lane_case::{LaneCase, LaneOther, NEVER};
+use crate::model::driver::MODELS;
 
 /// Properties that all lanes of a stream share.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -51,29 +52,170 @@ impl Scene {
     }
 }
 
+/// What is known of the motions of a vehicle. The numbers are those of `shaders/shared/motion.wgsl`.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[repr(u32)]
+pub enum MotionKind {
+    /// Given by a few numbers.
+    Analytic,
+    /// Entries of a table.
+    Sampled,
+    /// Some of each.
+    Mixed,
+    /// Lateral motion: in the middle of the ego's lane, always.
+    Centred,
+}
+
+impl MotionKind {
+    fn of_speed<R: Real>(motion: &Motion<R>) -> MotionKind {
+        if motion.kind & SPEED_SAMPLED == 0 { MotionKind::Analytic } else { MotionKind::Sampled }
+    }
+
+    fn of_lateral<R: Real>(other: &LaneOther<R>, ego_width: R) -> MotionKind {
+        match is_centred(other, ego_width) {
+            true => MotionKind::Centred,
+            false if other.motion.kind & LATERAL_SAMPLED == 0 => MotionKind::Analytic,
+            false => MotionKind::Sampled,
+        }
+    }
+
+    fn join(self, other: MotionKind) -> MotionKind {
+        use MotionKind::{Analytic, Centred, Mixed};
+        match (self, other) {
+            (a, b) if a == b => a,
+            // A centred motion is analytic.
+            (Analytic, Centred) | (Centred, Analytic) => Analytic,
+            _ => Mixed,
+        }
+    }
+}
+
+/// Properties that all cases of a device's pipeline share: its constants.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct DeviceScene {
+    /// Some cases have a second vehicle.
+    pub is_paired: bool,
+    /// All cases have one.
+    pub is_all_paired: bool,
+    /// Every vehicle is present from the first step to the last, and evaluated by the criteria.
+    pub always_there: bool,
+    /// Drivers may react to every vehicle from the first step on: by model, in the order of the registry.
+    pub attends: [bool; MODELS],
+    /// A step may move a vehicle's centre past the ego's.
+    pub may_cross: bool,
+    /// Speeds of the principal vehicle, and of the one ahead if there is one.
+    pub speeds: [MotionKind; 2],
+    /// Lateral motions of both.
+    pub laterals: [MotionKind; 2],
+}
+
+impl DeviceScene {
+    /// Nothing is known.
+    pub const fn unknown(is_paired: bool) -> DeviceScene {
+        DeviceScene {
+            is_paired,
+            is_all_paired: false,
+            always_there: false,
+            attends: [false; MODELS],
+            may_cross: true,
+            speeds: [MotionKind::Mixed; 2],
+            laterals: [MotionKind::Mixed; 2],
+        }
+    }
+
+    /// The scene of one case; `fastest` is the highest speed of the tables, m/s.
+    pub(super) fn of<R: Real>(case: &LaneCase<R>, fastest: R, dt: R) -> DeviceScene {
+        let is_paired = case.pair != 0;
+        let [first, second] = &case.others;
+        let second = if is_paired { second } else { first };
+        let both = [first, second];
+        let attends = |model: usize| both.iter().all(|other| other.attend_from[model] == 0);
+        DeviceScene {
+            is_paired,
+            is_all_paired: is_paired,
+            always_there: both.iter().all(|other| is_there(other)),
+            attends: std::array::from_fn(attends),
+            may_cross: may_cross(case, |_| fastest, dt),
+            speeds: both.map(|other| MotionKind::of_speed(&other.motion)),
+            laterals: both.map(|other| MotionKind::of_lateral(other, case.ego_width)),
+        }
+    }
+
+    /// What both have in common.
+    pub(super) fn join(self, other: DeviceScene) -> DeviceScene {
+        let joined = |a: [MotionKind; 2], b: [MotionKind; 2]| {
+            let second = match (self.is_paired, other.is_paired) {
+                (true, false) => a[1],
+                (false, true) => b[1],
+                _ => a[1].join(b[1]),
+            };
+            [a[0].join(b[0]), second]
+        };
+        DeviceScene {
+            is_paired: self.is_paired | other.is_paired,
+            is_all_paired: self.is_all_paired & other.is_all_paired,
+            always_there: self.always_there & other.always_there,
+            attends: std::array::from_fn(|model| self.attends[model] & other.attends[model]),
+            may_cross: self.may_cross | other.may_cross,
+            speeds: joined(self.speeds, other.speeds),
+            laterals: joined(self.laterals, other.laterals),
+        }
+    }
+
+    /// The constants of a model's pipeline by their names in the shaders.
+    pub fn shader_constants(&self, model_index: usize) -> Vec<(&'static str, f64)> {
+        let flag = |is_set: bool| f64::from(u8::from(is_set));
+        let kind = |kind: MotionKind| f64::from(kind as u32);
+        vec![
+            ("scene_paired", flag(self.is_paired)),
+            ("scene_all_paired", flag(self.is_all_paired)),
+            ("scene_always_there", flag(self.always_there)),
+            ("scene_attends", flag(self.attends[model_index])),
+            ("scene_may_cross", flag(self.may_cross)),
+            ("scene_speed_0", kind(self.speeds[0])),
+            ("scene_speed_1", kind(self.speeds[1])),
+            ("scene_lateral_0", kind(self.laterals[0])),
+            ("scene_lateral_1", kind(self.laterals[1])),
+        ]
+    }
+}
+
 /// Whether one step of a lane of this case can move a vehicle's centre past the ego's from wholly ahead or behind. No
 /// driver accelerates and no speed is negative, so the faster of the two vehicles bounds the change of the gap.
-pub(super) fn may_cross<R: Real>(case: &LaneCase<R>, tables: &Tables<R>, dt: R) -> bool {
-    // One thousandth less, for rounding.
-    let reach = R::from_f64(0.999);
+/// `fastest_of` gives the highest speed of a sampled motion, m/s, or more.
+pub(super) fn may_cross<R: Real>(case: &LaneCase<R>, fastest_of: impl Fn(&Motion<R>) -> R, dt: R) -> bool {
     case.others.iter().filter(|other| other.used != 0).any(|other| {
         let motion = &other.motion;
-        let fastest = if motion.kind & SPEED_SAMPLED != 0 {
-            let from = motion.speed_offset as usize;
-            let series = &tables.speed[from..from + motion.speed_len as usize];
-            series.iter().fold(R::ZERO, |max, &speed| speed.larger(max))
-        } else {
-            motion.speed_initial.larger(motion.speed_end)
-        };
-        let stays = fastest.larger(case.ego_speed) * dt <= reach * other.half_lengths;
-        !stays
+        let is_sampled = motion.kind & SPEED_SAMPLED != 0;
+        let at_last = motion.speed_initial + R::from_step(motion.speed_until) * motion.speed_per_step;
+        let analytic = motion.speed_initial.larger(motion.speed_end).larger(at_last);
+        let fastest = if is_sampled { fastest_of(motion) } else { analytic };
+        !stays_behind(fastest.larger(case.ego_speed), other.half_lengths, dt)
     })
+}
+
+/// Whether a step at this relative speed, m/s, is shorter than the half lengths: one thousandth less, for rounding.
+pub(super) fn stays_behind<R: Real>(fastest: R, half_lengths: R, dt: R) -> bool {
+    fastest * dt <= R::from_f64(0.999) * half_lengths
+}
+
+/// The highest speed of a sampled motion.
+pub(super) fn fastest_in<R: Real>(tables: &Tables<R>) -> impl Fn(&Motion<R>) -> R {
+    |motion| {
+        let from = motion.speed_offset as usize;
+        let series = &tables.speed[from..from + motion.speed_len as usize];
+        series.iter().fold(R::ZERO, |max, &speed| speed.larger(max))
+    }
+}
+
+/// Whether the vehicle is evaluated, and neither appears nor leaves.
+fn is_there<R: Real>(other: &LaneOther<R>) -> bool {
+    other.used != 0 && other.judged != 0 && other.present_from == 0 && other.present_until == NEVER
 }
 
 /// Whether there is one other vehicle, which neither appears nor leaves.
 fn is_always_there<R: Real>(case: &LaneCase<R>) -> bool {
-    let other = &case.others[0];
-    case.pair == 0 && other.used != 0 && other.judged != 0 && other.present_from == 0 && other.present_until == NEVER
+    case.pair == 0 && is_there(&case.others[0])
 }
 
 /// The same, and it stays in the middle of the ego's lane.
@@ -168,8 +310,8 @@ mod tests {
             let tables = &mut Tables::default();
             let case = case(speed, tables);
             let limit_s = 4.5 / fastest;
-            assert!(!may_cross(&case, tables, 0.99 * limit_s), "{fastest}");
-            assert!(may_cross(&case, tables, limit_s), "{fastest}");
+            assert!(!may_cross(&case, fastest_in(tables), 0.99 * limit_s), "{fastest}");
+            assert!(may_cross(&case, fastest_in(tables), limit_s), "{fastest}");
             assert_eq!(Scene::of(&[case], 0, true), Scene::unknown(true));
         }
     }

@@ -80,7 +80,11 @@ fn a_device_that_does_not_answer_in_time_leaves_complete_numbers() {
 #[test]
 fn a_lane_that_a_device_does_not_run_to_its_end_is_no_result() {
     let plan = plan();
-    let few_turns = || patched("turn < MAX_TURNS; turn++", "turn < 100u; turn++");
+    let few_turns = || {
+        let turns =
+            |turns, steps| format!("turn < {turns}; turn++) {{\n        for (var step = 0u; step < {steps}; step++)");
+        patched(&turns("MAX_TURNS", "frame_burst"), &turns("1u", "100u"))
+    };
     let Some(gpu) = few_turns() else { return };
     for wanted in [Wanted::Verdicts, Wanted::Outcomes] {
         let Some(gpu) = few_turns() else { return };

@@ -13,7 +13,7 @@ use lanesweep::engine::generated::{
 };
 use lanesweep::engine::gpu::shader::{self, GENERATOR, RANDOM, SHARED, Specialization, driver_shader};
 use lanesweep::engine::gpu::{Generation, Launch, OutcomeRecord, StartRecord, exact_spirv};
-use lanesweep::engine::{Constants, EndReason, LaneCase, LaneOther, NO_STEP, Verdicts};
+use lanesweep::engine::{Constants, DeviceScene, EndReason, LaneCase, LaneOther, MotionKind, NO_STEP, Verdicts};
 use lanesweep::model::criterion::{BtnForm, Contact, Criteria, Criterion, LateralGate};
 use lanesweep::model::driver::{AttentionRule, MODELS, ModelId, NEVER};
 use lanesweep::model::profile::Profile;
@@ -57,7 +57,7 @@ fn records() -> Vec<Record> {
         }),
         record!("Start", StartRecord, { kind: u32, value: f32 }),
         record!("Launch", Launch, {
-            lanes: u32, headways: u32, first_case: u32, first_word: u32, first_outcome: u32,
+            lanes: u32, headways: u32, first_case: u32, case_step: u32, first_lane: u32, lanes_between: u32, first_word: u32, first_outcome: u32,
             finished_word: u32, lanes_per_group: u32, ttc_threshold_s: f32, marks_contacts_from: f32,
         }),
         record!("OutcomeRecord", OutcomeRecord, {
@@ -103,6 +103,10 @@ fn resolved() -> Vec<(String, Constants<f32>)> {
     Profile::names().flat_map(|name| Category::ALL.map(|category| of(name, category))).collect()
 }
 
+fn specialization(paired: bool) -> Specialization {
+    Specialization { scene: DeviceScene::unknown(paired), values: paired, watched: paired, queue: !paired }
+}
+
 #[test]
 fn every_pipeline_parses_validates_and_becomes_spirv_under_every_profile() {
     let mut compiled = 0;
@@ -112,8 +116,7 @@ fn every_pipeline_parses_validates_and_becomes_spirv_under_every_profile() {
         parse(&source);
         for (place, constants) in resolved() {
             for paired in [false, true] {
-                let constants =
-                    shader::constants(&constants, model, Specialization { paired, values: paired, queue: !paired });
+                let constants = shader::constants(&constants, model, specialization(paired));
                 let words = exact_spirv(&source, shader::ENTRY, &constants);
                 assert!(words.is_ok_and(|words| !words.is_empty()), "{model:?}, {place}, paired {paired}");
                 compiled += 1;
@@ -203,8 +206,7 @@ fn every_override_gets_a_value_of_its_type_and_no_value_is_left_over() {
         let declared: BTreeSet<&str> = module.overrides.iter().map(|(_, o)| o.name.as_deref().unwrap()).collect();
         for (place, constants) in resolved() {
             for paired in [false, true] {
-                let given =
-                    shader::constants(&constants, model, Specialization { paired, values: paired, queue: !paired });
+                let given = shader::constants(&constants, model, specialization(paired));
                 let names: BTreeSet<&str> = given.iter().map(|(name, _)| *name).collect();
                 assert_eq!(names.len(), given.len(), "{model:?}: a constant is given twice");
                 assert_eq!(names, declared, "{model:?}, {place}");
@@ -247,6 +249,10 @@ fn constants_that_stand_on_both_sides_agree() {
     let expected = [
         ("SPEED_SAMPLED", SPEED_SAMPLED),
         ("LATERAL_SAMPLED", LATERAL_SAMPLED),
+        ("MOTION_ANALYTIC", MotionKind::Analytic as u32),
+        ("MOTION_SAMPLED", MotionKind::Sampled as u32),
+        ("MOTION_MIXED", MotionKind::Mixed as u32),
+        ("MOTION_CENTRED", MotionKind::Centred as u32),
         ("NO_STEP", NO_STEP),
         ("GATE_EGO_WIDTH", LateralGate::EgoWidth as u32),
         ("GATE_OVERLAP", LateralGate::Overlap as u32),
@@ -346,7 +352,6 @@ fn every_model_has_a_shader_with_the_functions_of_its_rust_file_in_their_order()
         "safe_gap",
         "intrusion_gap_m",
         "ignores",
-        "steady_gap",
         "check_steady",
         "shader_constants",
     ];
@@ -356,7 +361,10 @@ fn every_model_has_a_shader_with_the_functions_of_its_rust_file_in_their_order()
         let text = std::fs::read_to_string(&twin).unwrap_or_else(|e| panic!("{}: {e}", twin.display()));
         let mut names = function_names(text.split("#[cfg(test)]").next().unwrap());
         names.retain(|name| !no_twin.contains(&name.as_str()));
-        assert_eq!(names, function_names(shader), "{file} and its twin");
+        // The demand of a view is part of the twin's `check`.
+        let mut in_wgsl = function_names(shader);
+        in_wgsl.retain(|name| name != "demand");
+        assert_eq!(names, in_wgsl, "{file} and its twin");
         assert!(
             ["initial", "check", "react"].iter().all(|&required| names.iter().any(|name| name == required)),
             "{file}"
@@ -456,8 +464,8 @@ fn every_loop_counts_up_to_a_constant_or_an_override() {
         let (module, _) = parse(&shader::assemble(model));
         let (loops, unbounded) = unbounded_loops(&module);
         assert_eq!(unbounded, Vec::<String>::new(), "{model:?}");
-        // exact_div, btn_solve, lanes.
-        assert_eq!(loops, 3, "{model:?}");
+        // exact_div, btn_solve, the turns and the steps of lanes.
+        assert_eq!(loops, 4, "{model:?}");
     }
     for (body, counted) in [
         ("for (var k = 0u; k < 9u; k++) { x = x + 1.0; }", true),

@@ -15,7 +15,7 @@ use crate::engine::lane::Silent;
 use crate::engine::lane_case::LaneCase;
 use crate::engine::outcome::{Outcome, Verdicts};
 use crate::engine::plan::{LaneKey, LanePlan};
-use crate::engine::scene::{Scene, may_cross};
+use crate::engine::scene::{Scene, fastest_in, may_cross};
 use crate::model::driver::ModelId;
 use crate::model::scalar::Real;
 use crate::scenario::Tables;
@@ -120,7 +120,7 @@ impl<'p, R: Real> LaneRunner<'p, R> {
         let mut at = 0;
         for variant in 0..self.plan.blocks[block].variants.len() {
             let (case, tables) = self.case(block, unit, variant);
-            let may_cross = may_cross(&case, &tables, self.dt());
+            let may_cross = may_cross(&case, fastest_in(&tables), self.dt());
             for &start in &self.starts {
                 for &model in &self.plan.models {
                     if model.foreign().is_none() {
@@ -178,7 +178,7 @@ impl LaneRunner<'_, f32> {
         series.clear();
         let unrolled = if in_batches { &cases[..] } else { &[] };
         let tracks: Vec<_> = unrolled.iter().map(|case| series.unroll(case, tables, step_cap)).collect();
-        let may_cross = unrolled.iter().any(|case| may_cross(case, tables, self.dt()));
+        let may_cross = unrolled.iter().any(|case| may_cross(case, fastest_in(tables), self.dt()));
         let (starts, every_step) = (&self.starts[..], self.every_step);
         let stream = Lanes { cases: &cases, tracks: &tracks, starts, one_start_each: false, every_step, may_cross };
         let models = self.plan.models.len();
@@ -221,7 +221,7 @@ impl LaneRunner<'_, f32> {
         let starts: Vec<Start<f32>> = keys.iter().map(|key| self.starts[key.headway]).collect();
         let (mut series, step_cap) = (Series::default(), self.plan.profile.step_cap());
         let tracks: Vec<_> = cases.iter().map(|case| series.unroll(case, &tables, step_cap)).collect();
-        let may_cross = cases.iter().any(|case| may_cross(case, &tables, self.dt()));
+        let may_cross = cases.iter().any(|case| may_cross(case, fastest_in(&tables), self.dt()));
         let (cases, tracks, starts) = (&cases[..], &tracks[..], &starts[..]);
         let stream = Lanes { cases, tracks, starts, one_start_each: true, every_step: true, may_cross };
         let (model, criteria) = (self.plan.models[model], &constants.criteria);
@@ -238,7 +238,7 @@ impl LaneRunner<'_, f32> {
         mut each: impl FnMut(usize, E),
     ) {
         for (at_case, case) in cases.iter().enumerate() {
-            let may_cross = may_cross(case, tables, self.dt());
+            let may_cross = may_cross(case, fastest_in(tables), self.dt());
             for (at_start, &start) in self.starts.iter().enumerate() {
                 let outcome = self.run_case(block, case, tables, may_cross, start, model);
                 each(at_case * self.starts.len() + at_start, outcome.into());

@@ -13,8 +13,10 @@ pub use recipe::{CasePath, ColumnBound, LateralPath, MAX_BOUNDS, NO_SLOT, Recipe
 
 use crate::model::scalar::Real;
 use crate::scenario::Tables;
+use crate::scenario::parameterization::Variable;
 
 use super::lane_case::LaneCase;
+use super::scene::{DeviceScene, MotionKind, stays_behind};
 
 /// A case generator: where points come from and what they mean.
 #[derive(Debug, Clone, PartialEq)]
@@ -43,6 +45,78 @@ impl Generator {
     /// The case of a valid point; its series are appended to `tables`.
     fn decode<R: Real>(&self, point: &[f32], tables: &mut Tables<R>) -> LaneCase<R> {
         decode::case(&self.recipe, &self.basis, point, tables)
+    }
+
+    /// What all lanes of verdict-only sweeps over the samples share. A void sample counts as every other: its ego stands,
+    /// and its lanes end at once without a failure in any scene.
+    pub fn scene(&self) -> DeviceScene {
+        let recipe = &self.recipe;
+        let is_paired = recipe.pair != 0;
+        let speed = if recipe.path() == CasePath::Kinematic { MotionKind::Analytic } else { MotionKind::Sampled };
+        let is_reduced = recipe.path() == CasePath::Reduced;
+        let is_wide = |which: usize| recipe.half_widths[which] > 0.0 && recipe.ego_width > 0.0;
+        let lateral = match is_reduced {
+            true if recipe.columns.lateral != NO_SLOT => MotionKind::Sampled,
+            false if recipe.lateral != LateralPath::Centred as u32 => MotionKind::Analytic,
+            _ if is_wide(0) => MotionKind::Centred,
+            _ => MotionKind::Analytic,
+        };
+        // A target that is in the lane from the start has cut in.
+        let is_in = !is_reduced && lateral == MotionKind::Centred;
+        DeviceScene {
+            is_paired,
+            is_all_paired: is_paired,
+            always_there: recipe.judged != 0,
+            attends: recipe.attention.map(|rule| rule.attends_at_once(is_in)),
+            may_cross: self.may_cross(),
+            speeds: [speed, if is_reduced { speed } else { MotionKind::Analytic }],
+            laterals: [lateral, if is_wide(1) { MotionKind::Centred } else { MotionKind::Analytic }],
+        }
+    }
+
+    /// Whether a step of a sample may move a vehicle's centre past the ego's.
+    fn may_cross(&self) -> bool {
+        let recipe = &self.recipe;
+        let within = |value: f64, slot: usize| value.min(f64::from(recipe.upper[slot])).max(0.0);
+        let highest = |which: Variable| match recipe.slots[which as usize] {
+            NO_SLOT => 0.0,
+            slot => within(self.points.range(slot as usize)[1], slot as usize),
+        };
+        let longest_s = if recipe.unlimited != 0 {
+            f64::from(recipe.step_cap) * f64::from(recipe.dt)
+        } else {
+            f64::from(recipe.longest_duration).min(highest(Variable::Duration).max(f64::from(recipe.min_duration)))
+        };
+        let kinematic = |speed, acceleration| highest(speed) + highest(acceleration) * longest_s;
+        let fastest = match recipe.path() {
+            CasePath::Kinematic | CasePath::Sinusoid => [
+                kinematic(Variable::TargetSpeed, Variable::TargetAcceleration),
+                kinematic(Variable::LeadSpeed, Variable::LeadAcceleration),
+            ]
+            .map(|speed| speed.max(highest(Variable::EgoSpeed))),
+            CasePath::Reduced => {
+                let columns = &recipe.columns;
+                let series = |first: u32| match first {
+                    NO_SLOT => 0.0,
+                    first => (first..first + columns.instants).map(|c| self.highest_of(c)).fold(0.0, f64::max),
+                };
+                [columns.speed, columns.lead_speed].map(|first| series(first).max(self.highest_of(columns.ego_speed)))
+            }
+        };
+        let dt = f64::from(recipe.dt);
+        let stays = |which: usize| stays_behind(fastest[which], f64::from(recipe.half_lengths[which]), dt);
+        !(stays(0) && (recipe.pair == 0 || stays(1)))
+    }
+
+    /// The highest value of a column of a reduction over all draws.
+    fn highest_of(&self, column: u32) -> f64 {
+        let columns = &self.recipe.columns;
+        let basis = |row: u32| f64::from(self.basis[(row * columns.width + column) as usize]);
+        let largest = |k: u32| {
+            let [low, high] = self.points.range(k as usize);
+            (low * basis(k + 1)).max(high * basis(k + 1))
+        };
+        basis(0) + (0..columns.coefficients).map(largest).sum::<f64>()
     }
 
     /// Maximum number of table entries of one case: speeds, lateral states.

@@ -91,6 +91,30 @@ impl Points {
         DrawnPoint { values: [0.0; MAX_PARAMETERS], tries: ATTEMPTS + 1 }
     }
 
+    /// Lowest and highest value of a parameter over all draws, valid or not: no normal deviate exceeds that of the last
+    /// word.
+    pub fn range(&self, parameter: usize) -> [f64; 2] {
+        let d = self.dimensions;
+        let largest = f64::from(standard_normal(u32::MAX));
+        let spread = |component: usize| match self.source {
+            PointSource::Given => 0.0,
+            PointSource::Random(_) | PointSource::Sobol(_) => {
+                let factor = &self.factors[self.factor_of[component] as usize * d * d + parameter * d..][..d];
+                largest * factor.iter().map(|number| f64::from(number.abs())).sum::<f64>()
+            }
+        };
+        let knots = self.knots.chunks_exact(PIECES + 1).nth(parameter);
+        let mut range = [f64::INFINITY, f64::NEG_INFINITY];
+        for component in 0..self.factor_of.len() {
+            let mean = f64::from(self.means[component * d + parameter]);
+            for end in [mean - spread(component), mean + spread(component)] {
+                let value = knots.map_or(end, |knots| f64::from(transformed(knots, end as f32)));
+                range = [range[0].min(value), range[1].max(value)];
+            }
+        }
+        range
+    }
+
     /// The kernel of draw `tries` (from 1) of an index. `None` for given points and for components that are no kernels.
     pub fn component(&self, index: u64, tries: u32) -> Option<u32> {
         if !self.knots.is_empty() {
@@ -195,6 +219,30 @@ mod tests {
         let sobol = points(PointSource::Sobol(Sobol::new(7, 3).unwrap()));
         assert!(!sobol.draw(sobol.count().unwrap() - 1, |_| true).is_void());
         assert_eq!(points(PointSource::Random(Stream { seed: 7, purpose: 0 })).count(), None);
+    }
+
+    #[test]
+    fn no_draw_leaves_the_range_of_its_parameter() {
+        let stream = PointSource::Random(Stream { seed: 7, purpose: 0 });
+        let two = |knots: Vec<f32>| Points {
+            dimensions: 2,
+            means: vec![1.0, -2.0, 3.0, 5.0],
+            factor_of: vec![0, 1],
+            factors: vec![0.5, 0.0, -0.25, 1.0, 2.0, 0.0, 0.0, 0.125],
+            knots,
+            ..points(stream.clone())
+        };
+        let rising: Vec<f32> = (0..2 * (PIECES + 1)).map(|k| (k % (PIECES + 1)) as f32 * 0.01).collect();
+        for points in [two(Vec::new()), two(rising)] {
+            let ranges = [points.range(0), points.range(1)];
+            assert!(ranges.iter().all(|[low, high]| high - low < 30.0), "{ranges:?}");
+            for index in 0..20_000 {
+                let values = points.attempt(index, 0);
+                for (value, [low, high]) in values.iter().zip(ranges) {
+                    assert!(f64::from(*value) >= low - 1e-5 && f64::from(*value) <= high + 1e-5, "{values:?}");
+                }
+            }
+        }
     }
 
     #[test]

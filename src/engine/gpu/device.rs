@@ -7,6 +7,8 @@
 use std::sync::{Arc, Mutex, PoisonError};
 use std::time::Duration;
 
+use rayon::prelude::*;
+
 use super::adapters::AdapterCard;
 use super::shader::{self, ENTRY, GENERATE, WORKGROUP};
 use super::spirv::exact_spirv;
@@ -23,11 +25,19 @@ pub struct GpuOptions {
     /// Average number of lanes per invocation, at least 1. `None` derives it from the number of lanes; on a software
     /// device it is 1.
     pub lanes_per_invocation: Option<u32>,
+    /// Whether the variants of a scenario get a dispatch each if they have different scenes. `None`: not on a software
+    /// device, which compiles slowly.
+    pub split_scenes: Option<bool>,
 }
 
 impl Default for GpuOptions {
     fn default() -> Self {
-        GpuOptions { timeout: Duration::from_secs(60), first_lanes: 1 << 14, lanes_per_invocation: None }
+        GpuOptions {
+            timeout: Duration::from_secs(60),
+            first_lanes: 1 << 14,
+            lanes_per_invocation: None,
+            split_scenes: None,
+        }
     }
 }
 
@@ -147,23 +157,32 @@ impl Device {
         Ok(opened)
     }
 
-    /// The pipeline of a model with its constants; compiled once.
+    /// The pipelines of models with their constants. Each is compiled once; those that are missing are compiled side by
+    /// side.
     ///
     /// # Errors
     /// [`Error::Internal`] for a shader that does not compile, [`Error::Device`] where the driver refuses it.
-    pub(super) fn pipeline(&mut self, spec: &PipelineSpec) -> Result<wgpu::ComputePipeline> {
-        if let Some((_, pipeline)) = self.pipelines.iter().find(|(known, _)| known == spec) {
-            return Ok(pipeline.clone());
+    pub(super) fn pipelines<'a>(
+        &mut self,
+        specs: impl Iterator<Item = &'a PipelineSpec> + Clone,
+    ) -> Result<Vec<wgpu::ComputePipeline>> {
+        let mut missing: Vec<&PipelineSpec> = Vec::new();
+        for spec in specs.clone() {
+            if !missing.contains(&spec) && !self.pipelines.iter().any(|(known, _)| known == spec) {
+                missing.push(spec);
+            }
         }
-        let pipeline = self.compile(
-            spec.model.name(),
-            shader::assemble(spec.model),
-            ENTRY,
-            &spec.constants,
-            &self.pipeline_layout,
-        )?;
-        self.pipelines.push((spec.clone(), pipeline.clone()));
-        Ok(pipeline)
+        let compile = |spec: &&PipelineSpec| {
+            let source = shader::assemble(spec.model);
+            self.compile(spec.model.name(), source, ENTRY, &spec.constants, &self.pipeline_layout)
+        };
+        let compiled = missing.par_iter().map(compile).collect::<Result<Vec<_>>>()?;
+        self.pipelines.extend(missing.into_iter().cloned().zip(compiled));
+        let of = |spec| {
+            let found = self.pipelines.iter().find(|(known, _)| known == spec);
+            found.map(|(_, pipeline)| pipeline.clone()).ok_or_else(|| self.failed("a pipeline is missing"))
+        };
+        specs.map(of).collect()
     }
 
     /// The pipeline of the generator; compiled once.

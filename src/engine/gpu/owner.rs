@@ -24,7 +24,7 @@ pub(super) struct Setup {
     pub generator: Option<GeneratorSetup>,
     /// Models of a job.
     pub models: u64,
-    /// Compiled before the first job, so that errors appear at once.
+    /// Compiled before the first job, if they are known then.
     pub pipelines: Vec<PipelineSpec>,
 }
 
@@ -173,9 +173,7 @@ impl DeviceOwner {
 
     fn prepare(&mut self, setup: &Setup) -> Result<Prepared> {
         self.alive()?;
-        for spec in &setup.pipelines {
-            self.device.pipeline(spec)?;
-        }
+        self.device.pipelines(setup.pipelines.iter())?;
         let generator = setup.generator.as_ref().map(|g| g.upload(&mut self.device)).transpose()?;
         let sample_bytes = setup.generator.as_ref().map_or(size_of::<LaneCase<f32>>() as u64, |g| g.sample_bytes());
         let inputs = Inputs {

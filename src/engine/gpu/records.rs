@@ -56,6 +56,12 @@ pub struct Launch {
     pub headways: u32,
     /// First case in the buffer of cases.
     pub first_case: u32,
+    /// From one case to the next.
+    pub case_step: u32,
+    /// Place of the first lane in the results of the model.
+    pub first_lane: u32,
+    /// Lanes of other dispatches between those of two cases.
+    pub lanes_between: u32,
     /// First word of this dispatch in the verdicts.
     pub first_word: u32,
     /// First record of this dispatch in the outcomes.

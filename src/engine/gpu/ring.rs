@@ -18,24 +18,59 @@ pub(super) const RING: usize = 3;
 /// One job of the device: the lanes of consecutive units of one block, for every model.
 #[derive(Debug, Clone)]
 pub(super) struct Job {
-    /// One pipeline per model of the plan.
-    pub pipelines: Vec<PipelineSpec>,
+    /// Its dispatches: every model with every case.
+    pub dispatches: Vec<Dispatch>,
+    /// Number of models.
+    pub models: usize,
     /// Index of the first case in the buffer of cases.
     pub first_case: u32,
     /// Number of cases: units × variants.
     pub cases: u32,
+    /// Number of variants of each unit.
+    pub variants: u32,
     /// Number of headways of each case.
     pub headways: u32,
     /// Whether the pipelines write outcomes.
     pub has_outcomes: bool,
-    /// The criteria of each model.
-    pub criteria: Vec<Criteria<f32>>,
+}
+
+/// The lanes of one model with all cases of a job, or with those of one variant.
+#[derive(Debug, Clone)]
+pub(super) struct Dispatch {
+    pub pipeline: PipelineSpec,
+    /// Position of the model in the plan.
+    pub model: usize,
+    /// The variant; `None`: all.
+    pub variant: Option<u32>,
+    pub criteria: Criteria<f32>,
 }
 
 impl Job {
     /// Number of lanes per model.
     fn lanes(&self) -> u32 {
         self.cases * self.headways
+    }
+
+    /// The lanes of a dispatch; `at` is its position.
+    fn launch(&self, at: usize) -> Launch {
+        let Dispatch { model, variant, criteria, .. } = &self.dispatches[at];
+        let step = if variant.is_some() { self.variants } else { 1 };
+        let first = variant.unwrap_or(0);
+        Launch {
+            lanes: self.lanes() / step,
+            headways: self.headways,
+            first_case: self.first_case + first,
+            case_step: step,
+            first_lane: first * self.headways,
+            lanes_between: (step - 1) * self.headways,
+            first_word: (model * self.words()) as u32,
+            first_outcome: (model * self.records()) as u32,
+            finished_word: at as u32,
+            lanes_per_group: 0,
+            ttc_threshold_s: criteria.ttc.threshold,
+            // f32::MAX replaces ∞: no closing speed reaches it.
+            marks_contacts_from: criteria.marks_contacts_from.min(f32::MAX),
+        }
     }
 
     fn words(&self) -> usize {
@@ -73,7 +108,7 @@ struct Buffers {
     finished: wgpu::Buffer,
     readback: wgpu::Buffer,
     timing: Option<(wgpu::QuerySet, wgpu::Buffer)>,
-    models: usize,
+    dispatches: usize,
 }
 
 /// Size of each part of a job's results, bytes. The parts are consecutive in the read-back buffer.
@@ -86,12 +121,12 @@ struct ResultSizes {
 }
 
 impl ResultSizes {
-    fn of(job: &Job, models: usize) -> ResultSizes {
+    fn of(job: &Job) -> ResultSizes {
         ResultSizes {
-            verdicts: (models * job.words() * 4) as u64,
-            outcomes: (models * job.records() * size_of::<OutcomeRecord>()) as u64,
-            finished: (models * 4) as u64,
-            times: (models * 16) as u64,
+            verdicts: (job.models * job.words() * 4) as u64,
+            outcomes: (job.models * job.records() * size_of::<OutcomeRecord>()) as u64,
+            finished: (job.dispatches.len() * 4) as u64,
+            times: (job.dispatches.len() * 16) as u64,
         }
     }
 
@@ -113,28 +148,20 @@ pub(super) struct Flight {
 impl Slot {
     /// Submits a job to the device.
     pub(super) fn submit(&mut self, device: &mut Device, inputs: &Inputs, job: Job) -> Result<Flight> {
-        let models = job.pipelines.len();
-        let parts = ResultSizes::of(&job, models);
-        self.grow(device, &parts, models);
+        let dispatches = job.dispatches.len();
+        let parts = ResultSizes::of(&job);
+        self.grow(device, &parts, dispatches);
+        let pipelines = device.pipelines(job.dispatches.iter().map(|dispatch| &dispatch.pipeline))?;
         let buffers = self.buffers.as_ref().ok_or_else(|| device.failed("it has no buffers"))?;
         let stride = launch_stride(device);
-        let lanes_per_group = WORKGROUP * device.lanes_per_invocation(job.lanes());
-        let mut launches = vec![0_u8; stride as usize * models];
-        for model in 0..models {
-            let launch = Launch {
-                lanes: job.lanes(),
-                headways: job.headways,
-                first_case: job.first_case,
-                first_word: (model * job.words()) as u32,
-                first_outcome: (model * job.records()) as u32,
-                finished_word: model as u32,
-                lanes_per_group,
-                ttc_threshold_s: job.criteria[model].ttc.threshold,
-                // f32::MAX replaces ∞: no closing speed reaches it.
-                marks_contacts_from: job.criteria[model].marks_contacts_from.min(f32::MAX),
-            };
-            let at = stride as usize * model;
-            launches[at..at + size_of::<Launch>()].copy_from_slice(bytemuck::bytes_of(&launch));
+        let mut launches = vec![0_u8; stride as usize * dispatches];
+        let mut grids = Vec::new();
+        for at in 0..dispatches {
+            let mut launch = job.launch(at);
+            launch.lanes_per_group = WORKGROUP * device.lanes_per_invocation(launch.lanes);
+            grids.push(device.grid(launch.lanes.div_ceil(launch.lanes_per_group)));
+            let place = stride as usize * at;
+            launches[place..place + size_of::<Launch>()].copy_from_slice(bytemuck::bytes_of(&launch));
         }
         device.queue.write_buffer(&buffers.launches, 0, &launches);
         let binding = |binding, resource| wgpu::BindGroupEntry { binding, resource };
@@ -157,8 +184,6 @@ impl Slot {
                 binding(7, buffers.finished.as_entire_binding()),
             ],
         });
-        let (x, y) = device.grid(job.lanes().div_ceil(lanes_per_group));
-        let pipelines = job.pipelines.iter().map(|spec| device.pipeline(spec)).collect::<Result<Vec<_>>>()?;
         let mut encoder = device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("job") });
         // The kernels add bits and counts to these words, so the words must start at zero.
         let results = [
@@ -169,16 +194,16 @@ impl Slot {
         for (buffer, bytes) in results.into_iter().filter(|(_, bytes)| *bytes > 0) {
             encoder.clear_buffer(buffer, 0, Some(bytes));
         }
-        for (model, pipeline) in pipelines.iter().enumerate() {
+        for (at, (pipeline, (x, y))) in pipelines.iter().zip(grids).enumerate() {
             let timestamp_writes = buffers.timing.as_ref().map(|(set, _)| wgpu::ComputePassTimestampWrites {
                 query_set: set,
-                beginning_of_pass_write_index: Some(2 * model as u32),
-                end_of_pass_write_index: Some(2 * model as u32 + 1),
+                beginning_of_pass_write_index: Some(2 * at as u32),
+                end_of_pass_write_index: Some(2 * at as u32 + 1),
             });
-            let label = Some(job.pipelines[model].model.name());
+            let label = Some(job.dispatches[at].pipeline.model.name());
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label, timestamp_writes });
             pass.set_pipeline(pipeline);
-            pass.set_bind_group(0, &group, &[model as u32 * stride]);
+            pass.set_bind_group(0, &group, &[at as u32 * stride]);
             pass.dispatch_workgroups(x, y, 1);
         }
         let mut at = 0;
@@ -187,7 +212,7 @@ impl Slot {
             at += bytes;
         }
         if let Some((set, resolved)) = &buffers.timing {
-            encoder.resolve_query_set(set, 0..2 * models as u32, resolved, 0);
+            encoder.resolve_query_set(set, 0..2 * dispatches as u32, resolved, 0);
             encoder.copy_buffer_to_buffer(resolved, 0, &buffers.readback, at.next_multiple_of(8), parts.times);
         }
         let (sender, mapped) = mpsc::channel();
@@ -239,10 +264,10 @@ impl Slot {
         Ok(answer)
     }
 
-    fn grow(&mut self, device: &Device, parts: &ResultSizes, models: usize) {
+    fn grow(&mut self, device: &Device, parts: &ResultSizes, dispatches: usize) {
         use wgpu::BufferUsages as Use;
         let enough = self.buffers.as_ref().is_some_and(|b| {
-            b.models == models
+            b.dispatches == dispatches
                 && b.verdicts.size() >= parts.verdicts
                 && b.outcomes.size() >= parts.outcomes
                 && b.finished.size() >= parts.finished
@@ -258,7 +283,7 @@ impl Slot {
         let results = Use::STORAGE | Use::COPY_SRC | Use::COPY_DST;
         let stride = u64::from(launch_stride(device));
         self.buffers = Some(Buffers {
-            launches: device.buffer("launches", stride * models as u64, Use::UNIFORM | Use::COPY_DST),
+            launches: device.buffer("launches", stride * dispatches as u64, Use::UNIFORM | Use::COPY_DST),
             verdicts: device.buffer("verdicts", room(parts.verdicts, max_bytes), results),
             outcomes: device.buffer("outcomes", room(parts.outcomes, max_bytes), results),
             finished: device.buffer("finished", room(parts.finished, max_bytes), results),
@@ -271,12 +296,12 @@ impl Slot {
                 let set = device.device.create_query_set(&wgpu::QuerySetDescriptor {
                     label: Some("times"),
                     ty: wgpu::QueryType::Timestamp,
-                    count: 2 * models as u32,
+                    count: 2 * dispatches as u32,
                 });
-                let resolved = device.buffer("times", 16 * models as u64, Use::QUERY_RESOLVE | Use::COPY_SRC);
+                let resolved = device.buffer("times", 16 * dispatches as u64, Use::QUERY_RESOLVE | Use::COPY_SRC);
                 (set, resolved)
             }),
-            models,
+            dispatches,
         });
     }
 }
@@ -291,14 +316,15 @@ fn launch_stride(device: &Device) -> u32 {
 /// [`Error::Device`] if the device did not complete every lane.
 fn read(device: &Device, flight: &Flight, bytes: &[u8], wall_s: f64) -> Result<Answer> {
     let Flight { job, parts, .. } = flight;
-    let models = job.pipelines.len();
+    let models = job.models;
     let (verdicts, rest) = bytes.split_at(parts.verdicts as usize);
     let (outcomes, rest) = rest.split_at(parts.outcomes as usize);
     let finished: Vec<u32> = bytemuck::pod_collect_to_vec(&rest[..parts.finished as usize]);
     let times = &bytes[(parts.total() - parts.times) as usize..parts.total() as usize];
-    if let Some(model) = finished.iter().position(|&lanes| lanes != job.lanes()) {
-        let (name, lanes) = (job.pipelines[model].model.name(), job.lanes());
-        let problem = format!("it completed {} of {lanes} lanes of {name}", finished[model]);
+    let expected = |at: usize| job.launch(at).lanes;
+    if let Some(at) = (0..finished.len()).find(|&at| finished[at] != expected(at)) {
+        let (name, lanes) = (job.dispatches[at].pipeline.model.name(), expected(at));
+        let problem = format!("it completed {} of {lanes} lanes of {name}", finished[at]);
         let help =
             "use option `backend = cpu`; if lanes have very many steps, a larger time step (option `dt`) may help";
         return Err(Error::device(&device.name, problem, help));

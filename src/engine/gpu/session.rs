@@ -13,11 +13,13 @@ use super::device::{GpuOptions, PipelineSpec, Tampering};
 use super::generator::GeneratorSetup;
 use super::owner::{self, Cases, Command, Prepared, Request, Setup};
 use super::records::StartRecord;
-use super::ring::{Answer, Job, RING};
+use super::ring::{Answer, Dispatch, Job, RING};
 use super::shader::{self, Specialization};
-use crate::engine::{Backend, Chunk, Constants, DeviceRecord, LaneCase, LanePlan, Outcome, Session, Verdicts, Wanted};
+use crate::engine::{
+    Backend, Chunk, Constants, DeviceRecord, DeviceScene, LaneCase, LanePlan, Outcome, Session, Verdicts, Wanted,
+};
 use crate::model::driver::ModelId;
-use crate::scenario::{Category, Tables};
+use crate::scenario::Tables;
 use crate::{Error, Result};
 
 /// Jobs per chunk, so that the ring stays full: about three seconds with four models. Before the first measurement a
@@ -37,8 +39,12 @@ pub(super) struct GpuSession<'p> {
     /// An invocation computes several lanes.
     queue: bool,
     pacer: Pacer,
-    /// The cases on the device: block, its units, and whether one of them has a second vehicle.
-    window: Option<(usize, Range<u64>, bool)>,
+    /// The variants of a scenario get a dispatch each if they have different scenes.
+    split_scenes: bool,
+    /// The highest speed of the tables, m/s.
+    fastest: f32,
+    /// The cases on the device: block, its units, and the scenes of their variants, or one of all.
+    window: Option<(usize, Range<u64>, Vec<DeviceScene>)>,
     /// Time of all dispatches so far, s.
     device_s: f64,
 }
@@ -58,13 +64,13 @@ impl<'p> GpuSession<'p> {
         let constants: Vec<Constants<f32>> =
             plan.blocks.iter().map(|b| Constants::resolve(&plan.profile, b.category)).collect();
         let tables: Tables<f32> = if plan.generator().is_some() { Tables::default() } else { plan.tables().cast() };
+        let fastest = tables.speed.par_iter().copied().reduce(|| 0.0, f32::max);
         let mut pipelines = Vec::new();
-        for (block, resolved) in plan.blocks.iter().zip(&constants) {
-            let paired = block.category == Category::CutOut;
-            pipelines.extend(specs(plan, resolved, Specialization { paired, values: false, queue }));
-        }
-        if pipelines.is_empty() {
-            return Err(Error::Internal("a plan without lanes cannot run on a device".to_owned()));
+        if let Some(generator) = plan.generator() {
+            let scene = generator.scene();
+            for resolved in &constants {
+                pipelines.extend(specs(plan, resolved, Specialization { scene, values: false, watched: false, queue }));
+            }
         }
         let setup = Box::new(Setup {
             starts: plan.headways.iter().map(|h| StartRecord::from(h.start::<f32>())).collect(),
@@ -78,7 +84,21 @@ impl<'p> GpuSession<'p> {
         commands.send(Command::Prepare { setup, reply }).map_err(|_| owner::gone(&device))?;
         let prepared = answer.recv().map_err(|_| owner::gone(&device))??;
         let pacer = Pacer::new(options.first_lanes.min(FIRST_STEPS / u64::from(plan.profile.step_cap().max(1))));
-        Ok(GpuSession { plan, device, commands, prepared, constants, queue, pacer, window: None, device_s: 0.0 })
+        let split_scenes = options.split_scenes.unwrap_or(true);
+        let (window, device_s) = (None, 0.0);
+        Ok(GpuSession {
+            plan,
+            device,
+            commands,
+            prepared,
+            constants,
+            queue,
+            pacer,
+            split_scenes,
+            fastest,
+            window,
+            device_s,
+        })
     }
 
     fn max_lanes(&self, wanted: Wanted) -> u64 {
@@ -103,35 +123,46 @@ impl<'p> GpuSession<'p> {
             let end = (units.start + room).min(plan.blocks[block].units.held().end);
             // Within the requested units, because a generator's samples have no end.
             let end = if plan.generator().is_some() { end.min(units.end) } else { end };
-            let is_cut_out = plan.blocks[block].category == Category::CutOut;
-            let paired = if plan.generator().is_some() {
+            let scenes = if let Some(generator) = plan.generator() {
                 cases = Some(Cases::Made(units.start, (end - units.start) as u32));
-                is_cut_out
+                vec![generator.scene()]
             } else {
                 let upload = cases_of(plan, block, units.start..end);
-                let paired = is_cut_out || upload.iter().any(|c| c.pair != 0);
+                let scenes = self.scenes(&upload, variants as usize);
                 cases = Some(Cases::Given(upload));
-                paired
+                scenes
             };
-            self.window = Some((block, units.start..end, paired));
+            self.window = Some((block, units.start..end, scenes));
         }
-        let Some((_, held, paired)) = &self.window else {
+        let Some((_, held, scenes)) = &self.window else {
             return Err(Error::Internal("no cases are on the device".to_owned()));
         };
         let count = self.pacer.units(per_unit, max_lanes);
         let end = units.end.min(units.start + count).min(held.end);
         let has_outcomes = wanted == Wanted::Outcomes;
-        let specialization = Specialization { paired: *paired, values: has_outcomes, queue: self.queue };
         let constants = &self.constants[block];
-        let criteria = |&model| match wanted.watch() {
-            Some(watch) => watch.criteria(&plan.profile, model, constants.criteria),
-            None => constants.criteria,
-        };
+        let mut dispatches = Vec::new();
+        for (variant, &known) in (0..).zip(scenes) {
+            // A void sample has no vehicle: its values tell.
+            let is_void_told = has_outcomes && plan.generator().is_some();
+            let scene = if is_void_told { DeviceScene::unknown(known.is_paired) } else { known };
+            let watched = wanted.watch().is_some();
+            let specialization = Specialization { scene, values: has_outcomes, watched, queue: self.queue };
+            let variant = (scenes.len() > 1).then_some(variant);
+            for (model, pipeline) in specs(plan, constants, specialization).into_iter().enumerate() {
+                let criteria = match wanted.watch() {
+                    Some(watch) => watch.criteria(&plan.profile, plan.models[model], constants.criteria),
+                    None => constants.criteria,
+                };
+                dispatches.push(Dispatch { pipeline, model, variant, criteria });
+            }
+        }
         let job = Job {
-            pipelines: specs(plan, constants, specialization),
-            criteria: plan.models.iter().map(criteria).collect(),
+            dispatches,
+            models: plan.models.len(),
             first_case: ((units.start - held.start) * variants) as u32,
             cases: ((end - units.start) * variants) as u32,
+            variants: variants as u32,
             headways: plan.headways.len() as u32,
             has_outcomes,
         };
@@ -139,6 +170,20 @@ impl<'p> GpuSession<'p> {
         let request = Box::new(Request { session: self.prepared.session, cases, job, reply });
         self.commands.send(Command::Run(request)).map_err(|_| owner::gone(&self.device))?;
         Ok(Piece { block, units: units.start..end, answer })
+    }
+
+    /// The scenes of cases, by variant if these differ.
+    fn scenes(&self, cases: &[LaneCase<f32>], variants: usize) -> Vec<DeviceScene> {
+        let dt = self.plan.profile.frame.dt_s as f32;
+        let of_variant = |variant: usize| {
+            let cases = cases.iter().skip(variant).step_by(variants);
+            cases.map(|case| DeviceScene::of(case, self.fastest, dt)).reduce(DeviceScene::join)
+        };
+        let mut scenes: Vec<DeviceScene> = (0..variants).into_par_iter().filter_map(of_variant).collect();
+        if !self.split_scenes || scenes.windows(2).all(|two| two[0] == two[1]) {
+            scenes = scenes.into_iter().reduce(DeviceScene::join).into_iter().collect();
+        }
+        scenes
     }
 
     /// Waits for a piece and stores its results.
@@ -296,6 +341,7 @@ impl GpuBackend {
             // A software device has no warps that wait for their longest lane, and llvmpipe limits the turns of an
             // invocation.
             options.lanes_per_invocation.get_or_insert(1);
+            options.split_scenes.get_or_insert(false);
         }
         let (commands, opened, thread) = owner::start(adapter, card.clone(), options.clone(), tampering)?;
         Ok(GpuBackend { card, exact: opened.exact, options, commands, thread: Some(thread) })

@@ -1,6 +1,6 @@
 //! Joins the files in `shaders/` to the source of one model's pipeline, with constants from the profile.
 
-use crate::engine::Constants;
+use crate::engine::{Constants, DeviceScene};
 use crate::model::driver::{MODELS, ModelId};
 
 /// Entry point of every pipeline.
@@ -97,13 +97,20 @@ pub fn assemble_generator() -> String {
 /// Properties that a pipeline is compiled for, in addition to the profile.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Specialization {
-    /// At least one case has a second vehicle; without one the pipeline skips half of the work.
-    pub paired: bool,
+    /// What all lanes share.
+    pub scene: DeviceScene,
     /// The pipeline returns continuous values, not only verdicts.
     pub values: bool,
+    /// A watch replaces the threshold of the TTC and marks contacts.
+    pub watched: bool,
     /// An invocation whose lane has ended takes the next one of its workgroup.
     pub queue: bool,
 }
+
+/// Steps of a burst: ended lanes wait for half of one, and a warp looks for them once in one.
+const BURST: u32 = 16;
+/// A burst in which every lane ends. Twin: `MAX_TURNS` in `shaders/lane.wgsl`.
+const ENDLESS: u32 = 0x7fff_ffff;
 
 /// Values of the `override` constants of a model's pipeline, by name.
 pub fn constants(
@@ -111,12 +118,14 @@ pub fn constants(
     model: ModelId,
     specialization: Specialization,
 ) -> Vec<(&'static str, f64)> {
-    let Specialization { paired, values, queue } = specialization;
+    let Specialization { scene, values, watched, queue } = specialization;
     let mut all = resolved.frames[model.index()].shader_constants();
     all.push(("frame_model", model.index() as f64));
-    for (name, is_set) in [("frame_paired", paired), ("frame_values", values), ("frame_queue", queue)] {
+    for (name, is_set) in [("frame_values", values), ("frame_watched", watched), ("frame_queue", queue)] {
         all.push((name, f64::from(u8::from(is_set))));
     }
+    all.push(("frame_burst", f64::from(if queue { BURST } else { ENDLESS })));
+    all.extend(scene.shader_constants(model.index()));
     all.extend(resolved.criteria.shader_constants());
     all.extend(resolved.driver_shader_constants(model));
     all

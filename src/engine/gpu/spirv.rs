@@ -87,8 +87,8 @@ fn forbid_contraction(words: &[u32]) -> Result<Vec<u32>> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::Constants;
     use crate::engine::gpu::shader;
+    use crate::engine::{Constants, DeviceScene};
     use crate::model::driver::ModelId;
     use crate::model::profile::Profile;
     use crate::scenario::Category;
@@ -105,7 +105,8 @@ mod tests {
 
     #[test]
     fn every_float_operation_of_every_model_may_not_be_contracted() {
-        let every = shader::Specialization { paired: true, values: true, queue: true };
+        let scene = DeviceScene::unknown(true);
+        let every = shader::Specialization { scene, values: true, watched: true, queue: true };
         for name in Profile::names() {
             let profile = Profile::load(name).unwrap();
             for model in ModelId::ALL {

@@ -131,6 +131,7 @@ impl<R: Real> Criteria<R> {
         let mut all = vec![
             ("criteria_gate", f64::from(self.gate as u32)),
             ("criteria_any_contact", f64::from(u8::from(self.btn_contact == BtnContact::Any))),
+            ("criteria_ttc_threshold", self.ttc.threshold.to_f64()),
         ];
         all.extend(self.btn.shader_constants());
         all

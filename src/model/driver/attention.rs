@@ -145,6 +145,12 @@ impl AttentionRule<f32> {
 }
 
 impl<R: Real> AttentionRule<R> {
+    /// Whether the driver may react to a vehicle from the first step on, whatever its speed does: any vehicle, or one that
+    /// stays in the ego's path.
+    pub fn attends_at_once(&self, stays_in_path: bool) -> bool {
+        self.kind == ALWAYS || (self.kind == CUTTING_IN && stays_in_path)
+    }
+
     /// First steps at which the driver may react to the principal vehicle and to the one ahead of it, or [`NEVER`].
     /// `lateral` (m) and `speed` (m/s) give the principal vehicle's motion at steps below `steps`. Nothing after a step
     /// decides whether the driver reacts at that step.
