@@ -1,5 +1,5 @@
-// Entry point of the generator: one invocation makes the case of one sample, with its series, for all later lanes of
-// that sample.
+// Entry point of the generator: one invocation makes the case of one sample, with the instants of its series, for all
+// later lanes of that sample.
 
 struct Generation {
     // First sample index of this dispatch.
@@ -7,25 +7,18 @@ struct Generation {
     index_high: u32,
     // Samples of this dispatch.
     count: u32,
-    // SOURCE_…
-    source: u32,
     seed_low: u32,
     seed_high: u32,
     purpose: u32,
     // Components of the mixture, or number of given points.
     components: u32,
-    // 1 where components have weights.
-    weighted: u32,
     // Offsets in `numbers`; the basis of a reduction begins at 0.
     first_mean: u32,
     first_factor: u32,
     first_factor_of: u32,
     first_knot: u32,
-    // 1 where draws are transformed.
-    transformed: u32,
-    // Entries of each sample in the tables.
-    speed_stride: u32,
-    lateral_stride: u32,
+    // Entries of each sample in the table of instants.
+    stride: u32,
 }
 
 @group(0) @binding(0) var<uniform> generation: Generation;
@@ -36,7 +29,6 @@ struct Generation {
 @group(0) @binding(5) var<storage, read> normal_table: array<vec4<f32>>;
 @group(0) @binding(6) var<storage, read_write> cases: array<LaneCase>;
 @group(0) @binding(7) var<storage, read_write> speed_table: array<f32>;
-@group(0) @binding(8) var<storage, read_write> lateral_table: array<vec2<f32>>;
 
 const WORKGROUP: u32 = 64u;
 
@@ -56,6 +48,11 @@ fn generate(
     if drawn.tries > ATTEMPTS {
         cases[at] = void_case();
     } else {
-        cases[at] = decode_case(drawn.values, at * generation.speed_stride, at * generation.lateral_stride);
+        cases[at] = decode_case(drawn.values, at * generation.stride);
     }
+}
+
+// A sample has no such table.
+fn lateral_sample(at: u32) -> vec2<f32> {
+    return vec2<f32>(0.0, 0.0);
 }

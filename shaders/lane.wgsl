@@ -82,3 +82,7 @@ fn write_outcome(at: u32, lane: u32, record: OutcomeRecord) {
         outcomes[launch.first_outcome + place] = record;
     }
 }
+
+fn lateral_sample(at: u32) -> vec2<f32> {
+    return lateral_table[at];
+}

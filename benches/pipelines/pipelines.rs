@@ -21,11 +21,14 @@ use std::path::{Path, PathBuf};
 use ash::{khr::pipeline_executable_properties as executables, vk};
 use common::paper_size_scenarios;
 use lanesweep::engine::gpu::{exact_spirv, shader};
-use lanesweep::engine::{Constants, CpuBackend, DeviceScene, Executor, MotionKind, Wanted};
-use lanesweep::model::driver::{MODELS, ModelId};
+use lanesweep::engine::{Constants, CpuBackend, DeviceScene, Executor, Headway, LanePlan, Wanted};
+use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
+use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, plan_samples};
 use lanesweep::run::study::{StudyOptions, plan_study};
-use lanesweep::scenario::Category;
+use lanesweep::scenario::parameterization::Parameterization;
+use lanesweep::scenario::{Category, DataProvenance};
+use lanesweep::stats::density::{DensityModel, FitOptions};
 
 /// One kernel with its constants.
 struct Kernel {
@@ -74,13 +77,22 @@ fn kernels(profiles: &[&str], values: bool) -> Vec<Kernel> {
             all.push(Kernel { name, entry, source, constants, bindings, words });
         }
     };
-    add("generator".to_owned(), shader::GENERATE, shader::assemble_generator(), Vec::new(), 9);
+    let plans = sampled_plans();
+    for (id, plan) in &plans {
+        let generator = plan.generator().expect("a plan of samples");
+        let name = format!("generator.{}.{}", id.category.label(), id.key);
+        add(name, shader::GENERATE, shader::assemble_generator(), generator.shader_constants(), 8);
+    }
     for profile_name in profiles {
         let profile = Profile::load(profile_name).expect("a profile");
         for model in ModelId::ALL {
             for category in Category::ALL {
                 let resolved = Constants::resolve(&profile, category);
-                for (scene_name, scene) in scenes(category) {
+                let of_samples = plans.iter().filter(|(id, _)| id.category == category).map(|(id, plan)| {
+                    (id.key.clone(), plan.generator().expect("a plan of samples").scene())
+                });
+                let any = ("any".into(), DeviceScene::unknown(category == Category::CutOut));
+                for (scene_name, scene) in of_samples.chain([any]) {
                     let specialization = shader::Specialization { scene, values, watched: false, queue: true };
                     let constants = shader::constants(&resolved, model, specialization);
                     let name = format!("{profile_name}.{}.{}.{scene_name}", category.label(), model.name());
@@ -92,23 +104,31 @@ fn kernels(profiles: &[&str], values: bool) -> Vec<Kernel> {
     all
 }
 
-/// What lanes of a category share: of kinematic samples, of samples by SVD, and nothing.
-fn scenes(category: Category) -> [(&'static str, DeviceScene); 3] {
-    let is_paired = category == Category::CutOut;
-    let of = |speeds, lateral| DeviceScene {
-        is_all_paired: is_paired,
-        always_there: true,
-        attends: [true; MODELS],
-        may_cross: false,
-        speeds: [speeds; 2],
-        laterals: [if category == Category::Lvd { MotionKind::Centred } else { lateral }, MotionKind::Centred],
-        ..DeviceScene::unknown(is_paired)
+/// Sampled lanes of densities that differ in their generators.
+fn sampled_plans() -> Vec<(Parameterization, LanePlan)> {
+    let scenarios = paper_size_scenarios();
+    let facts =
+        DataProvenance { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+    let fit = FitOptions { representativeness: false, valid_draws: 1000, ..FitOptions::default() };
+    let keys = [
+        (Category::CutIn, "2"),
+        (Category::CutIn, "6"),
+        (Category::CutOut, "b"),
+        (Category::CutOut, "f"),
+        (Category::Lvd, "i"),
+        (Category::Lvd, "ii"),
+        (Category::Lvd, "iv"),
+    ];
+    let plan = |(category, key)| {
+        let id = Parameterization::find(category, key).expect("a parameterization");
+        let density = DensityModel::fit(id.clone(), &scenarios, &facts, &fit).expect("a density").model;
+        let headways = SampleHeadways::Each(vec![Headway::ThwS(1.0)]);
+        let options = SampleOptions::new(Estimator::CRUDE, 1000, headways);
+        let profile = Profile::load("paper").expect("a profile");
+        let mixture = density.mixture().expect("a mixture");
+        (id, plan_samples(&density, &mixture, &profile, &options).expect("a plan"))
     };
-    [
-        ("kinematic", of(MotionKind::Analytic, MotionKind::Analytic)),
-        ("series", of(MotionKind::Sampled, MotionKind::Sampled)),
-        ("any", DeviceScene::unknown(is_paired)),
-    ]
+    keys.into_iter().map(plan).collect()
 }
 
 /// Puts a defect into the kernels, so that a check of what compilers make of them can be seen to fail.

@@ -41,7 +41,8 @@ fn attend_from(rule: AttentionRule, steps: u32, geometry: LaneGeometry, motion: 
     if rule.kind == ATTENTION_ALWAYS || steps == 0u {
         return vec2<u32>(0u, 0u);
     }
-    let start = motion_lateral(motion, MOTION_MIXED, 0u).position;
+    let place_start = series_place(motion, made_speed(), 0u);
+    let start = motion_lateral(motion, made_lateral(), 0u, place_start, 0.0).position;
     let is_in_path = abs(start) <= geometry.half_widths;
     let has_intruded = abs(start) - geometry.half_widths <= geometry.marking_gap - rule.threshold;
     let is_seen = ((rule.kind == ATTENTION_VISIBLE_MOVEMENT) & has_intruded)
@@ -54,10 +55,11 @@ fn attend_from(rule: AttentionRule, steps: u32, geometry: LaneGeometry, motion: 
     let delay_only = (rule.kind == ATTENTION_DECELERATION) & (rule.below_trigger == BELOW_TRIGGER_DELAY_ONLY);
     var event = NEVER;
     var lateral_before = start;
-    var speed_before = motion_speed(motion, MOTION_MIXED, 0u);
+    var speed_before = motion_speed(motion, made_speed(), 0u, place_start);
     for (var step = 0u; step < steps; step++) {
-        let position = motion_lateral(motion, MOTION_MIXED, step).position;
-        let v = motion_speed(motion, MOTION_MIXED, step);
+        let place = series_place(motion, made_speed(), step);
+        let position = motion_lateral(motion, made_lateral(), step, place, 0.0).position;
+        let v = motion_speed(motion, made_speed(), step, place);
         var happens = centre - abs(position) > rule.threshold;
         if rule.kind == ATTENTION_VISIBLE_MOVEMENT {
             happens = abs(position - lateral_before) > MOVEMENT;

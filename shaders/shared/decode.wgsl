@@ -1,27 +1,29 @@
-// Point → validity and case: twin of src/engine/generated/decode.rs. Each sample writes its series to its own part of
-// the tables.
+// Point → validity and case: twin of src/engine/generated/decode.rs. The instants of a reduced
+// sample's series are in its own part of a table.
 
 // An event up to this many steps after a step counts as at that step.
 const STEP_TOLERANCE: f32 = 1e-4f;
 // Latest step of an event.
 const MAX_STEPS: f32 = 1e6f;
 
-// sin(πx/2) on [0, 1] as x·p(x²).
-const SINE_0: f32 = 1.5707963267948966f;
-const SINE_1: f32 = -0.6459640975062463f;
-const SINE_2: f32 = 0.07969262624616705f;
-const SINE_3: f32 = -0.004681754135318688f;
-const SINE_4: f32 = 0.00016044118478735982f;
-const SINE_5: f32 = -3.598843235212085e-6f;
+// What is known of the principal vehicle's motions.
+fn made_speed() -> u32 {
+    return select(select(MOTION_ANALYTIC, MOTION_SINUSOID, recipe_path == PATH_SINUSOID), MOTION_INSTANTS,
+        recipe_path == PATH_REDUCED);
+}
+
+fn made_lateral() -> u32 {
+    return select(MOTION_ANALYTIC, MOTION_INSTANTS, (recipe_path == PATH_REDUCED) & recipe_changes_lane);
+}
 
 // Is the point inside the valid region?
 fn is_valid(point: array<f32, MAX_PARAMETERS>) -> bool {
-    for (var j = 0u; j < recipe.dimensions; j++) {
+    for (var j = 0u; j < recipe_dimensions; j++) {
         if !((point[j] >= recipe.lower[j]) & (point[j] <= recipe.upper[j])) {
             return false;
         }
     }
-    for (var k = 0u; k < recipe.bounded; k++) {
+    for (var k = 0u; k < recipe_bounded; k++) {
         let bound = recipe.bounds[k];
         var value = reduced_column(point, bound.column);
         if bound.is_distance != 0u {
@@ -31,7 +33,7 @@ fn is_valid(point: array<f32, MAX_PARAMETERS>) -> bool {
             return false;
         }
     }
-    if recipe.decelerates != 0u {
+    if recipe_decelerates {
         let initial = quantity(point, TARGET_SPEED);
         let end = quantity(point, FINAL_SPEED);
         if end >= initial {
@@ -43,36 +45,36 @@ fn is_valid(point: array<f32, MAX_PARAMETERS>) -> bool {
     return true;
 }
 
-// The case of a valid point; its series begin at these entries of the tables.
-fn decode_case(point: array<f32, MAX_PARAMETERS>, speed_at: u32, lateral_at: u32) -> LaneCase {
+// The case of a valid point; its instants begin at this entry of the table.
+fn decode_case(point: array<f32, MAX_PARAMETERS>, table_at: u32) -> LaneCase {
     var principal: Motion;
     var ahead: Motion;
     var ego_speed = 0.0;
     var lead_gap = 0.0;
     var horizon = 0u;
-    if recipe.path == PATH_REDUCED {
+    if recipe_path == PATH_REDUCED {
         let duration = reduced_column(point, recipe.columns.duration);
-        reduced_speed(point, recipe.columns.speed, duration, &principal, speed_at);
-        if recipe.columns.lateral != NO_SLOT {
-            reduced_lateral(point, duration, &principal, lateral_at);
+        reduced_speed(point, recipe.columns.speed, duration, &principal, table_at);
+        if recipe_changes_lane {
+            reduced_lateral(point, duration, &principal, table_at + recipe_instants + 1u);
         }
-        if recipe.columns.lead_speed != NO_SLOT {
-            reduced_speed(point, recipe.columns.lead_speed, duration, &ahead, speed_at + principal.speed_len);
+        if recipe_pair {
+            reduced_speed(point, recipe.columns.lead_speed, duration, &ahead, table_at + 2u * (recipe_instants + 1u));
         }
         ego_speed = reduced_column(point, recipe.columns.ego_speed);
-        if recipe.columns.lead_gap != NO_SLOT {
+        if recipe_pair {
             lead_gap = reduced_column(point, recipe.columns.lead_gap);
         }
         horizon = steps_up(duration * recipe.inverse_dt);
     } else {
         let initial = quantity(point, TARGET_SPEED);
         var duration = quantity(point, DURATION);
-        if recipe.decelerates != 0u {
+        if recipe_decelerates {
             let end = quantity(point, FINAL_SPEED);
             let deceleration = quantity(point, MEAN_DECELERATION);
             duration = exact_div(initial - end, deceleration);
-            if recipe.path == PATH_SINUSOID {
-                sinusoidal_speed(initial, end, duration, &principal, speed_at);
+            if recipe_path == PATH_SINUSOID {
+                make_sinusoidal(initial, end, duration, &principal);
             } else {
                 kinematic_speed(initial, -deceleration, duration, &principal);
                 principal.speed_end = end;
@@ -83,7 +85,7 @@ fn decode_case(point: array<f32, MAX_PARAMETERS>, speed_at: u32, lateral_at: u32
         kinematic_speed(quantity(point, LEAD_SPEED), quantity(point, LEAD_ACCELERATION), duration, &ahead);
         let change = kinematic_lateral(quantity(point, LATERAL_SPEED), &principal);
         ego_speed = initial;
-        if recipe.slots[EGO_SPEED] != NO_SLOT {
+        if slot_of(EGO_SPEED) != NO_SLOT {
             ego_speed = quantity(point, EGO_SPEED);
         }
         lead_gap = quantity(point, LEAD_GAP);
@@ -94,7 +96,7 @@ fn decode_case(point: array<f32, MAX_PARAMETERS>, speed_at: u32, lateral_at: u32
     var second = first;
     second.used = 0u;
     second.present_until = 0u;
-    if recipe.pair != 0u {
+    if recipe_pair {
         second = lane_other(ahead, 1u, headway_gap + (recipe.principal_length + lead_gap), 1u);
     }
     let steps = steps_seen(first.motion);
@@ -112,7 +114,7 @@ fn decode_case(point: array<f32, MAX_PARAMETERS>, speed_at: u32, lateral_at: u32
     lane.ego_width = recipe.ego_width;
     lane.lane_width = recipe.lane_width;
     lane.horizon = horizon;
-    lane.pair = recipe.pair;
+    lane.pair = select(0u, 1u, recipe_pair);
     return lane;
 }
 
@@ -131,7 +133,7 @@ fn lane_other(motion: Motion, which: u32, gap_offset: f32, judged: u32) -> LaneO
 // The value of a quantity; 0 if no parameter has it.
 fn quantity(point: array<f32, MAX_PARAMETERS>, which: u32) -> f32 {
     var values = point;
-    let slot = recipe.slots[which];
+    let slot = slot_of(which);
     if slot == NO_SLOT {
         return 0.0;
     }
@@ -142,7 +144,7 @@ fn quantity(point: array<f32, MAX_PARAMETERS>, which: u32) -> f32 {
 fn reduced_column(point: array<f32, MAX_PARAMETERS>, column: u32) -> f32 {
     var coefficients = point;
     var value = number(column);
-    for (var k = 0u; k < recipe.columns.coefficients; k++) {
+    for (var k = 0u; k < recipe_coefficients; k++) {
         value = value + coefficients[k] * number((k + 1u) * recipe.columns.width + column);
     }
     return value;
@@ -173,22 +175,22 @@ fn kinematic_speed(initial: f32, acceleration: f32, duration: f32, motion: ptr<f
     let until_step = less_one(steps_up(duration * recipe.inverse_dt));
     (*motion).speed_initial = initial;
     (*motion).speed_per_step = acceleration * recipe.dt;
-    (*motion).speed_until = select(until_step, recipe.step_cap, recipe.unlimited != 0u);
+    (*motion).speed_until = select(until_step, recipe.step_cap, recipe_unlimited);
     (*motion).speed_end = larger(initial + acceleration * duration, 0.0);
 }
 
 // Lateral motion at constant speed; returns the time of the lane change, s.
 fn kinematic_lateral(lateral_speed: f32, motion: ptr<function, Motion>) -> f32 {
     let way = recipe.lane_change;
-    if recipe.lateral == LATERAL_GONE {
+    if recipe_lateral == LATERAL_GONE {
         (*motion).lateral_initial = way;
         (*motion).lateral_end = way;
     }
-    if recipe.lateral == LATERAL_GONE || recipe.lateral == LATERAL_CENTRED {
+    if recipe_lateral == LATERAL_GONE || recipe_lateral == LATERAL_CENTRED {
         return 0.0;
     }
     let change = exact_div(way, lateral_speed);
-    let enters = recipe.lateral == LATERAL_ENTERING;
+    let enters = recipe_lateral == LATERAL_ENTERING;
     let per_step = lateral_speed * recipe.dt;
     (*motion).lateral_until = less_one(steps_up(change * recipe.inverse_dt));
     (*motion).lateral_initial = select(0.0, way, enters);
@@ -205,112 +207,60 @@ fn entries(duration: f32) -> u32 {
 }
 
 // v0 − Δ·sin²(πt/2T) up to T, then v1 (paper, LVD ii).
-fn sinusoidal_speed(initial: f32, end: f32, duration: f32, motion: ptr<function, Motion>, speed_at: u32) {
-    let count = entries(duration);
-    let phase_per_step = exact_div(recipe.dt, duration);
+fn make_sinusoidal(initial: f32, end: f32, duration: f32, motion: ptr<function, Motion>) {
     (*motion).kind = (*motion).kind | SPEED_SAMPLED;
-    (*motion).speed_offset = speed_at;
-    (*motion).speed_len = count;
-    for (var step = 0u; step < count; step++) {
-        let phase = f32(step) * phase_per_step;
-        let sine = quarter_sine(smaller(phase, 1.0));
-        let speed = larger(initial - (initial - end) * (sine * sine), 0.0);
-        speed_table[speed_at + step] = select(end, speed, phase < 1.0);
-    }
-}
-
-// sin(πx/2) for x in [0, 1].
-fn quarter_sine(x: f32) -> f32 {
-    let square = x * x;
-    var sum = SINE_5;
-    sum = sum * square + SINE_4;
-    sum = sum * square + SINE_3;
-    sum = sum * square + SINE_2;
-    sum = sum * square + SINE_1;
-    sum = sum * square + SINE_0;
-    return x * sum;
-}
-
-// Position of a step between two instants of a reduced series.
-struct Between {
-    below: u32,
-    above: u32,
-    share: f32,
+    (*motion).speed_len = entries(duration);
+    (*motion).speed_initial = initial;
+    (*motion).speed_end = end;
+    (*motion).speed_per_step = exact_div(recipe.dt, duration);
 }
 
 // Instants per step of a series of this duration.
 fn instants_per_step(duration: f32) -> f32 {
-    return exact_div(f32(recipe.columns.instants - 1u) * recipe.dt, duration);
+    return exact_div(f32(recipe_instants - 1u) * recipe.dt, duration);
 }
 
-fn between(step: u32, per_step: f32) -> Between {
-    let last = recipe.columns.instants - 1u;
-    let position = smaller(f32(step) * per_step, f32(last));
-    let below = u32(position);
-    return Between(below, select(last, below + 1u, below + 1u < last), position - f32(below));
-}
-
-// A speed series of the reduction: linear between its instants, never below 0.
+// A speed series of the reduction: its instants, never below 0, the last one twice.
 fn reduced_speed(
     point: array<f32, MAX_PARAMETERS>,
     first: u32,
     duration: f32,
     motion: ptr<function, Motion>,
-    speed_at: u32,
+    table_at: u32,
 ) {
-    let count = entries(duration);
-    let per_step = instants_per_step(duration);
     (*motion).kind = (*motion).kind | SPEED_SAMPLED;
-    (*motion).speed_offset = speed_at;
-    (*motion).speed_len = count;
-    // Neighbouring steps lie between the same instants.
-    var held = NO_SLOT;
-    var below = 0.0;
-    var above = 0.0;
-    for (var step = 0u; step < count; step++) {
-        let place = between(step, per_step);
-        if place.below != held {
-            held = place.below;
-            below = larger(reduced_column(point, first + place.below), 0.0);
-            above = larger(reduced_column(point, first + place.above), 0.0);
-        }
-        speed_table[speed_at + step] = below + (above - below) * place.share;
+    (*motion).speed_offset = table_at;
+    (*motion).speed_len = entries(duration);
+    let per_step = instants_per_step(duration);
+    let last = recipe_instants - 1u;
+    (*motion).speed_per_step = per_step;
+    (*motion).speed_end = smaller(f32((*motion).speed_len - 1u) * per_step, f32(last));
+    for (var instant = 0u; instant < recipe_instants; instant++) {
+        speed_table[table_at + instant] = larger(reduced_column(point, first + instant), 0.0);
     }
+    speed_table[table_at + recipe_instants] = larger(reduced_column(point, first + last), 0.0);
 }
 
-// The lateral series of the reduction with its speed towards the ego, w[i] = (|y[i−1]| − |y[i]|)/dt, w[0] = w[1],
-// 0 after T.
+// The lateral series of the reduction: its instants, the last one twice, and the last step that moves, f32(step)·dt ≤ T.
 fn reduced_lateral(
     point: array<f32, MAX_PARAMETERS>,
     duration: f32,
     motion: ptr<function, Motion>,
-    lateral_at: u32,
+    table_at: u32,
 ) {
     let count = entries(duration);
-    let per_step = instants_per_step(duration);
     (*motion).kind = (*motion).kind | LATERAL_SAMPLED;
-    (*motion).lateral_offset = lateral_at;
+    (*motion).lateral_offset = table_at;
     (*motion).lateral_len = count;
-    var held = NO_SLOT;
-    var below = 0.0;
-    var above = 0.0;
-    var before = 0.0;
-    for (var step = 0u; step < count; step++) {
-        let place = between(step, per_step);
-        if place.below != held {
-            held = place.below;
-            below = reduced_column(point, recipe.columns.lateral + place.below);
-            above = reduced_column(point, recipe.columns.lateral + place.above);
-        }
-        let position = below + (above - below) * place.share;
-        var towards = 0.0;
-        if (step > 0u) & (f32(step) * recipe.dt <= duration) {
-            towards = (abs(before) - abs(position)) * recipe.inverse_dt;
-        }
-        lateral_table[lateral_at + step] = vec2<f32>(position, towards);
-        if step == 1u {
-            lateral_table[lateral_at].y = towards;
-        }
-        before = position;
+    // The last entry is less than two steps after it.
+    var last = count - 1u;
+    for (var k = 0u; k < 2u; k++) {
+        last = select(last, less_one(last), f32(last) * recipe.dt > duration);
     }
+    (*motion).lateral_until = last;
+    let first = recipe.columns.lateral;
+    for (var instant = 0u; instant < recipe_instants; instant++) {
+        speed_table[table_at + instant] = reduced_column(point, first + instant);
+    }
+    speed_table[table_at + recipe_instants] = reduced_column(point, first + recipe_instants - 1u);
 }

@@ -127,11 +127,12 @@ fn min_following_gap(v: f32) -> f32 {
 
 fn start_lane(lane: LaneCase, start: Start) -> LaneState {
     let gap_start = start_gap(start, lane.ego_speed);
+    let places = array<Between, 2>(place_at(lane, 0u), place_at(lane, 1u));
     var state = LaneState(
         gap_start + lane.others[0].gap_offset,
         gap_start + lane.others[1].gap_offset,
-        other_at(lane.others[0], scene_speed_0, scene_lateral_0, 0u),
-        other_at(lane.others[1], scene_speed_1, scene_lateral_1, 0u),
+        other_at_start(lane.others[0], scene_speed_0, scene_lateral_0, places),
+        other_at_start(lane.others[1], scene_speed_1, scene_lateral_1, places),
         initial(),
         lane.ego_speed,
         lane.ego_speed,
@@ -149,8 +150,18 @@ fn start_lane(lane: LaneCase, start: Start) -> LaneState {
     return state;
 }
 
-fn other_at(other: LaneOther, speed: u32, lateral: u32, index: u32) -> OtherState {
-    return OtherState(motion_speed(other.motion, speed, index), motion_lateral(other.motion, lateral, index));
+fn place_at(lane: LaneCase, index: u32) -> Between {
+    return series_place(lane.others[0].motion, scene_speed_0, index);
+}
+
+fn other_at_start(other: LaneOther, speed: u32, lateral: u32, places: array<Between, 2>) -> OtherState {
+    let v = motion_speed(other.motion, speed, 0u, places[0]);
+    return OtherState(v, motion_lateral_start(other.motion, lateral, places));
+}
+
+fn other_at(other: LaneOther, speed: u32, lateral: u32, index: u32, place: Between, before: OtherState) -> OtherState {
+    let v = motion_speed(other.motion, speed, index, place);
+    return OtherState(v, motion_lateral(other.motion, lateral, index, place, before.lateral.position));
 }
 
 fn is_pair(lane: LaneCase) -> bool {
@@ -228,9 +239,10 @@ fn advance(before: LaneState, moment: Moment, lane: LaneCase) -> LaneState {
         state.driver = reaction.state;
     }
     state.index = before.index + 1u;
-    state.other_0 = other_at(lane.others[0], scene_speed_0, scene_lateral_0, state.index);
+    let place = place_at(lane, state.index);
+    state.other_0 = other_at(lane.others[0], scene_speed_0, scene_lateral_0, state.index, place, before.other_0);
     if scene_paired {
-        state.other_1 = other_at(lane.others[1], scene_speed_1, scene_lateral_1, state.index);
+        state.other_1 = other_at(lane.others[1], scene_speed_1, scene_lateral_1, state.index, place, before.other_1);
     }
     return move_gaps(state, lane);
 }

@@ -13,6 +13,13 @@ const SOURCE_RANDOM: u32 = 0u;
 const SOURCE_SOBOL: u32 = 1u;
 const SOURCE_GIVEN: u32 = 2u;
 
+// SOURCE_…
+override points_source: u32;
+// Components have weights.
+override points_weighted: bool;
+// Draws are transformed.
+override points_transformed: bool;
+
 struct Drawn {
     values: array<f32, MAX_PARAMETERS>,
     tries: u32,
@@ -25,7 +32,7 @@ fn number(at: u32) -> f32 {
 
 // The first valid draw of an index.
 fn draw_point(index: vec2<u32>) -> Drawn {
-    let attempts = select(1u, ATTEMPTS, generation.source == SOURCE_RANDOM);
+    let attempts = select(1u, ATTEMPTS, points_source == SOURCE_RANDOM);
     var drawn: Drawn;
     for (var attempt = 0u; attempt < attempts; attempt++) {
         drawn.values = candidate(index, attempt);
@@ -40,19 +47,19 @@ fn draw_point(index: vec2<u32>) -> Drawn {
 
 // Draw `attempt` of an index, valid or not. Words 0 and 1 select the component; the others give normal deviates.
 fn candidate(index: vec2<u32>, attempt: u32) -> array<f32, MAX_PARAMETERS> {
-    let d = recipe.dimensions;
+    let d = recipe_dimensions;
     var words: array<u32, 16>;
-    if generation.source == SOURCE_GIVEN {
+    if points_source == SOURCE_GIVEN {
         var given: array<f32, MAX_PARAMETERS>;
         // A plan has no index beyond the points.
-        for (var j = 0u; j < d; j++) {
+        for (var j = 0u; j < recipe_dimensions; j++) {
             given[j] = number(generation.first_mean + index.x * d + j);
         }
         return given;
     }
-    if generation.source == SOURCE_RANDOM {
+    if points_source == SOURCE_RANDOM {
         let seed = vec2<u32>(generation.seed_low, generation.seed_high);
-        for (var block = 0u; 4u * block < 2u + d; block++) {
+        for (var block = 0u; 4u * block < 2u + recipe_dimensions; block++) {
             let four = stream_words(seed, generation.purpose, index, attempt * BLOCKS + block);
             words[4u * block] = four.x;
             words[4u * block + 1u] = four.y;
@@ -60,30 +67,30 @@ fn candidate(index: vec2<u32>, attempt: u32) -> array<f32, MAX_PARAMETERS> {
             words[4u * block + 3u] = four.w;
         }
     } else {
-        for (var dimension = 0u; dimension < 2u + d; dimension++) {
+        for (var dimension = 0u; dimension < 2u + recipe_dimensions; dimension++) {
             words[dimension] = sobol_word(dimension, index.x);
         }
     }
     var component = choose(words[0], generation.components);
-    if generation.weighted != 0u {
+    if points_weighted {
         component = alias_pick(0u, generation.components, words[0], words[1]);
     }
     let factor = generation.first_factor + numbers[generation.first_factor_of + component] * d * d;
     let mean = generation.first_mean + component * d;
     var deviates: array<f32, MAX_PARAMETERS>;
-    for (var j = 0u; j < d; j++) {
+    for (var j = 0u; j < recipe_dimensions; j++) {
         deviates[j] = standard_normal(words[2u + j]);
     }
     var values: array<f32, MAX_PARAMETERS>;
-    for (var j = 0u; j < d; j++) {
+    for (var j = 0u; j < recipe_dimensions; j++) {
         var value = number(mean + j);
         for (var k = 0u; k <= j; k++) {
             value = value + number(factor + j * d + k) * deviates[k];
         }
         values[j] = value;
     }
-    if generation.transformed != 0u {
-        for (var j = 0u; j < d; j++) {
+    if points_transformed {
+        for (var j = 0u; j < recipe_dimensions; j++) {
             values[j] = transformed(generation.first_knot + j * (PIECES + 1u), values[j]);
         }
     }

@@ -26,6 +26,52 @@ const LATERAL_ENTERING: u32 = 1u;
 const LATERAL_LEAVING: u32 = 2u;
 const LATERAL_GONE: u32 = 3u;
 
+// What is the same for all samples of a density and decides what the generator does: constants of its pipeline.
+override recipe_path: u32;
+override recipe_lateral: u32;
+// Parameters of a point.
+override recipe_dimensions: u32;
+// Coefficients of a reduction; else 0.
+override recipe_coefficients: u32;
+// Instants of a reduced series, at least 2.
+override recipe_instants: u32;
+// Bounded columns.
+override recipe_bounded: u32;
+override recipe_pair: bool;
+// A reduction has a lateral series.
+override recipe_changes_lane: bool;
+override recipe_decelerates: bool;
+override recipe_unlimited: bool;
+// Index of the parameter that gives a quantity, or NO_SLOT.
+override slot_target_speed: u32;
+override slot_lateral_speed: u32;
+override slot_ego_speed: u32;
+override slot_target_acceleration: u32;
+override slot_lead_speed: u32;
+override slot_lead_acceleration: u32;
+override slot_lead_gap: u32;
+override slot_duration: u32;
+override slot_final_speed: u32;
+override slot_mean_deceleration: u32;
+override slot_time_headway: u32;
+
+fn slot_of(which: u32) -> u32 {
+    switch which {
+        case TARGET_SPEED: { return slot_target_speed; }
+        case LATERAL_SPEED: { return slot_lateral_speed; }
+        case EGO_SPEED: { return slot_ego_speed; }
+        case TARGET_ACCELERATION: { return slot_target_acceleration; }
+        case LEAD_SPEED: { return slot_lead_speed; }
+        case LEAD_ACCELERATION: { return slot_lead_acceleration; }
+        case LEAD_GAP: { return slot_lead_gap; }
+        case DURATION: { return slot_duration; }
+        case FINAL_SPEED: { return slot_final_speed; }
+        case MEAN_DECELERATION: { return slot_mean_deceleration; }
+        case TIME_HEADWAY: { return slot_time_headway; }
+        default: { return NO_SLOT; }
+    }
+}
+
 // Columns of a reduction's vector.
 struct ReducedColumns {
     width: u32,

@@ -64,6 +64,10 @@ pub enum MotionKind {
     Mixed,
     /// Lateral motion: in the middle of the ego's lane, always.
     Centred,
+    /// A sample's speed: half a cosine between two speeds. A device evaluates it; the CPU has a table.
+    Sinusoid,
+    /// A sample's series: linear between instants. A device has a table of the instants, the CPU one of the steps.
+    Instants,
 }
 
 impl MotionKind {

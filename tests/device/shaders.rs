@@ -87,9 +87,8 @@ fn generator_records() -> Vec<Record> {
             attention: [AttentionRule<f32>; MODELS],
         }),
         record!("Generation", Generation, {
-            index_low: u32, index_high: u32, count: u32, source: u32, seed_low: u32, seed_high: u32, purpose: u32,
-            components: u32, weighted: u32, first_mean: u32, first_factor: u32, first_factor_of: u32,
-            first_knot: u32, transformed: u32, speed_stride: u32, lateral_stride: u32,
+            index_low: u32, index_high: u32, count: u32, seed_low: u32, seed_high: u32, purpose: u32,
+            components: u32, first_mean: u32, first_factor: u32, first_factor_of: u32, first_knot: u32, stride: u32,
         }),
     ]
 }
@@ -101,6 +100,32 @@ fn resolved() -> Vec<(String, Constants<f32>)> {
         (format!("{name}, {category:?}"), Constants::resolve(&profile, category))
     };
     Profile::names().flat_map(|name| Category::ALL.map(|category| of(name, category))).collect()
+}
+
+/// Constants of a generator: every override gets one.
+fn generator_constants() -> Vec<(&'static str, f64)> {
+    let (module, _) = parse(&shader::assemble_generator());
+    let names = module.overrides.iter().map(|(_, o)| o.name.clone().unwrap());
+    let recipe = Recipe { dimensions: 1, step_cap: 100, inverse_dt: 25.0, ..bytemuck::Zeroable::zeroed() };
+    let (means, factor_of, factors) = (vec![1.0], vec![0], vec![1.0]);
+    let points = generated::Points {
+        source: generated::PointSource::Given,
+        dimensions: 1,
+        weights: None,
+        means,
+        factor_of,
+        factors,
+        knots: Vec::new(),
+    };
+    let generator = generated::Generator { points, recipe, basis: Vec::new() };
+    let given = generator.shader_constants();
+    assert_eq!(names.collect::<BTreeSet<_>>(), given.iter().map(|(name, _)| (*name).to_owned()).collect());
+    given
+}
+
+/// The bits of a number of the sine's polynomial in lane arithmetic.
+fn sine(at: usize) -> u32 {
+    (generated::SINE[at] as f32).to_bits()
 }
 
 fn specialization(paired: bool) -> Specialization {
@@ -177,7 +202,7 @@ fn the_generator_has_the_records_the_numbers_and_the_arithmetic_of_its_rust_twin
     }
     let found = float_operations(&module, &info);
     assert_eq!((found.forbidden, found.divided_in), (Vec::<String>::new(), vec!["exact_div".to_owned()]));
-    let words = exact_spirv(&shader::assemble_generator(), shader::GENERATE, &[]);
+    let words = exact_spirv(&shader::assemble_generator(), shader::GENERATE, &generator_constants());
     assert!(words.is_ok_and(|w| !w.is_empty()));
 }
 
@@ -253,6 +278,14 @@ fn constants_that_stand_on_both_sides_agree() {
         ("MOTION_SAMPLED", MotionKind::Sampled as u32),
         ("MOTION_MIXED", MotionKind::Mixed as u32),
         ("MOTION_CENTRED", MotionKind::Centred as u32),
+        ("MOTION_SINUSOID", MotionKind::Sinusoid as u32),
+        ("MOTION_INSTANTS", MotionKind::Instants as u32),
+        ("SINE_0", sine(0)),
+        ("SINE_1", sine(1)),
+        ("SINE_2", sine(2)),
+        ("SINE_3", sine(3)),
+        ("SINE_4", sine(4)),
+        ("SINE_5", sine(5)),
         ("NO_STEP", NO_STEP),
         ("GATE_EGO_WIDTH", LateralGate::EgoWidth as u32),
         ("GATE_OVERLAP", LateralGate::Overlap as u32),

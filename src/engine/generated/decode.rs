@@ -14,7 +14,7 @@ const STEP_TOLERANCE: f64 = 1e-4;
 const MAX_STEPS: f64 = 1e6;
 
 /// sin(πx/2) on [0, 1] as x·p(x²): the series to degree 11. With binary32's rounding its error is below 2·10⁻⁷.
-const SINE: [f64; 6] = [
+pub const SINE: [f64; 6] = [
     std::f64::consts::FRAC_PI_2,
     -0.645_964_097_506_246_3,
     0.079_692_626_246_167_05,

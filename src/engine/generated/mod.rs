@@ -8,6 +8,7 @@ mod decode;
 mod points;
 mod recipe;
 
+pub use decode::SINE;
 pub use points::{ATTEMPTS, DrawnPoint, MAX_PARAMETERS, PointSource, Points};
 pub use recipe::{CasePath, ColumnBound, LateralPath, MAX_BOUNDS, NO_SLOT, Recipe, ReducedColumns};
 
@@ -52,11 +53,15 @@ impl Generator {
     pub fn scene(&self) -> DeviceScene {
         let recipe = &self.recipe;
         let is_paired = recipe.pair != 0;
-        let speed = if recipe.path() == CasePath::Kinematic { MotionKind::Analytic } else { MotionKind::Sampled };
+        let (speed, lead_speed) = match recipe.path() {
+            CasePath::Kinematic => (MotionKind::Analytic, MotionKind::Analytic),
+            CasePath::Sinusoid => (MotionKind::Sinusoid, MotionKind::Analytic),
+            CasePath::Reduced => (MotionKind::Instants, MotionKind::Instants),
+        };
         let is_reduced = recipe.path() == CasePath::Reduced;
         let is_wide = |which: usize| recipe.half_widths[which] > 0.0 && recipe.ego_width > 0.0;
         let lateral = match is_reduced {
-            true if recipe.columns.lateral != NO_SLOT => MotionKind::Sampled,
+            true if recipe.columns.lateral != NO_SLOT => MotionKind::Instants,
             false if recipe.lateral != LateralPath::Centred as u32 => MotionKind::Analytic,
             _ if is_wide(0) => MotionKind::Centred,
             _ => MotionKind::Analytic,
@@ -69,7 +74,7 @@ impl Generator {
             always_there: recipe.judged != 0,
             attends: recipe.attention.map(|rule| rule.attends_at_once(is_in)),
             may_cross: self.may_cross(),
-            speeds: [speed, if is_reduced { speed } else { MotionKind::Analytic }],
+            speeds: [speed, lead_speed],
             laterals: [lateral, if is_wide(1) { MotionKind::Centred } else { MotionKind::Analytic }],
         }
     }
@@ -119,13 +124,52 @@ impl Generator {
         basis(0) + (0..columns.coefficients).map(largest).sum::<f64>()
     }
 
-    /// Maximum number of table entries of one case: speeds, lateral states.
-    pub fn table_entries(&self) -> [u32; 2] {
-        let entries = self.recipe.longest_series();
-        match self.recipe.path() {
-            CasePath::Kinematic => [0, 0],
-            CasePath::Sinusoid => [entries, 0],
-            CasePath::Reduced => [entries * self.recipe.speed_series(), entries * self.recipe.lateral_series()],
-        }
+    /// Entries of one case in a device's table of instants: the last instant of a series is there twice.
+    pub fn case_instants(&self) -> u32 {
+        let series = if self.recipe.pair != 0 { 3 } else { 2 };
+        if self.recipe.path() == CasePath::Reduced { series * (self.recipe.columns.instants + 1) } else { 0 }
+    }
+
+    /// What is the same for all samples and decides what a device's generator does: constants of its pipeline, by their
+    /// names in the shaders.
+    pub fn shader_constants(&self) -> Vec<(&'static str, f64)> {
+        let (recipe, points) = (&self.recipe, &self.points);
+        let flag = |is_set: bool| f64::from(u8::from(is_set));
+        let source = match points.source {
+            PointSource::Random(_) => 0.0,
+            PointSource::Sobol(_) => 1.0,
+            PointSource::Given => 2.0,
+        };
+        let mut all = vec![
+            ("points_source", source),
+            ("points_weighted", flag(points.weights.is_some())),
+            ("points_transformed", flag(!points.knots.is_empty())),
+            ("recipe_path", f64::from(recipe.path)),
+            ("recipe_lateral", f64::from(recipe.lateral)),
+            ("recipe_dimensions", f64::from(recipe.dimensions)),
+            ("recipe_coefficients", f64::from(recipe.columns.coefficients)),
+            ("recipe_bounded", f64::from(recipe.bounded)),
+            ("recipe_pair", flag(recipe.pair != 0)),
+            ("recipe_changes_lane", flag(recipe.columns.lateral != NO_SLOT)),
+            ("recipe_decelerates", flag(recipe.decelerates != 0)),
+            ("recipe_unlimited", flag(recipe.unlimited != 0)),
+            ("recipe_instants", f64::from(recipe.columns.instants.max(2))),
+            ("motion_inverse_dt", f64::from(recipe.inverse_dt)),
+        ];
+        let names = [
+            "slot_target_speed",
+            "slot_lateral_speed",
+            "slot_ego_speed",
+            "slot_target_acceleration",
+            "slot_lead_speed",
+            "slot_lead_acceleration",
+            "slot_lead_gap",
+            "slot_duration",
+            "slot_final_speed",
+            "slot_mean_deceleration",
+            "slot_time_headway",
+        ];
+        all.extend(names.into_iter().zip(recipe.slots.map(f64::from)));
+        all
     }
 }

@@ -186,22 +186,6 @@ impl Recipe {
         }
     }
 
-    /// Number of entries of the longest series of a valid point.
-    pub(super) fn longest_series(&self) -> u32 {
-        let steps = (f64::from(self.longest_duration) * f64::from(self.inverse_dt)).ceil() as u32;
-        steps.min(self.step_cap) + 1
-    }
-
-    /// Number of speed series of a reduced case.
-    pub(super) fn speed_series(&self) -> u32 {
-        1 + u32::from(self.columns.lead_speed != NO_SLOT)
-    }
-
-    /// Number of lateral series of a reduced case.
-    pub(super) fn lateral_series(&self) -> u32 {
-        u32::from(self.columns.lateral != NO_SLOT)
-    }
-
     /// The case of a void sample: no vehicle is present, and the ego stands. Its lanes end at once and fail no
     /// criterion.
     pub(super) fn void<R: Real>(&self) -> LaneCase<R> {

@@ -77,7 +77,7 @@ pub(super) struct Device {
     pub generator_layout: wgpu::BindGroupLayout,
     pipeline_layout: wgpu::PipelineLayout,
     pipelines: Vec<(PipelineSpec, wgpu::ComputePipeline)>,
-    generator: Option<wgpu::ComputePipeline>,
+    generator: Option<(Vec<(&'static str, f64)>, wgpu::ComputePipeline)>,
     trouble: Arc<Mutex<Option<String>>>,
 }
 
@@ -185,12 +185,14 @@ impl Device {
         specs.map(of).collect()
     }
 
-    /// The pipeline of the generator; compiled once.
+    /// The pipeline of a generator with its constants; the last one is kept.
     ///
     /// # Errors
-    /// As [`Device::pipeline`].
-    pub(super) fn generator(&mut self) -> Result<wgpu::ComputePipeline> {
-        if let Some(pipeline) = &self.generator {
+    /// As [`Device::pipelines`].
+    pub(super) fn generator(&mut self, constants: &[(&'static str, f64)]) -> Result<wgpu::ComputePipeline> {
+        if let Some((known, pipeline)) = &self.generator
+            && known == constants
+        {
             return Ok(pipeline.clone());
         }
         let layout = self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
@@ -198,8 +200,8 @@ impl Device {
             bind_group_layouts: &[Some(&self.generator_layout)],
             immediate_size: 0,
         });
-        let pipeline = self.compile("generator", shader::assemble_generator(), GENERATE, &[], &layout)?;
-        self.generator = Some(pipeline.clone());
+        let pipeline = self.compile("generator", shader::assemble_generator(), GENERATE, constants, &layout)?;
+        self.generator = Some((constants.to_vec(), pipeline.clone()));
         Ok(pipeline)
     }
 
@@ -328,9 +330,9 @@ fn entries() -> Vec<wgpu::BindGroupLayoutEntry> {
     buffer_entries(4, 3, true)
 }
 
-/// The bindings of `shaders/generate.wgsl`, in their order: generation, five inputs, cases and tables.
+/// The bindings of `shaders/generate.wgsl`, in their order: generation, five inputs, cases and instants.
 fn generator_entries() -> Vec<wgpu::BindGroupLayoutEntry> {
-    buffer_entries(5, 3, false)
+    buffer_entries(5, 2, false)
 }
 
 /// A uniform buffer, inputs, results.

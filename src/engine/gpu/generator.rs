@@ -20,6 +20,7 @@ pub(super) struct Inputs {
 
 /// The generator's buffers of one session.
 pub(super) struct GeneratorInputs {
+    pub pipeline: wgpu::ComputePipeline,
     pub template: Generation,
     pub generation: wgpu::Buffer,
     pub recipe: wgpu::Buffer,
@@ -33,6 +34,7 @@ pub(super) struct GeneratorInputs {
 pub(super) struct GeneratorSetup {
     generation: Generation,
     recipe: Recipe,
+    constants: Vec<(&'static str, f64)>,
     numbers: Vec<u32>,
     aliases: Vec<[u32; 2]>,
     sobol: Vec<u32>,
@@ -51,17 +53,13 @@ impl GeneratorSetup {
         numbers.extend(&points.factor_of);
         let first_knot = numbers.len() as u32;
         numbers.extend(bits(&points.knots));
-        let [speed_stride, lateral_stride] = generator.table_entries();
         let mut generation = Generation {
             components: points.components(),
-            weighted: u32::from(points.weights.is_some()),
             first_mean,
             first_factor,
             first_factor_of,
             first_knot,
-            transformed: u32::from(!points.knots.is_empty()),
-            speed_stride,
-            lateral_stride,
+            stride: generator.case_instants(),
             ..Generation::default()
         };
         let mut sobol_words = Vec::new();
@@ -71,27 +69,24 @@ impl GeneratorSetup {
                 generation.seed_high = (stream.seed >> 32) as u32;
                 generation.purpose = stream.purpose;
             }
-            PointSource::Sobol(sobol) => {
-                generation.source = 1;
-                sobol_words = sobol.table().concat();
-            }
-            PointSource::Given => generation.source = 2,
+            PointSource::Sobol(sobol) => sobol_words = sobol.table().concat(),
+            PointSource::Given => (),
         }
         let aliases = points.weights.as_ref().map_or(Vec::new(), |table| table.table().to_vec());
-        GeneratorSetup { generation, recipe: generator.recipe, numbers, aliases, sobol: sobol_words }
+        let (recipe, constants) = (generator.recipe, generator.shader_constants());
+        GeneratorSetup { generation, recipe, constants, numbers, aliases, sobol: sobol_words }
     }
 
-    /// Bytes of one sample in cases and tables.
+    /// Bytes of one sample: case and instants.
     pub(super) fn sample_bytes(&self) -> u64 {
-        let tables = 4 * u64::from(self.generation.speed_stride) + 8 * u64::from(self.generation.lateral_stride);
-        size_of::<LaneCase<f32>>() as u64 + tables
+        size_of::<LaneCase<f32>>() as u64 + 4 * u64::from(self.generation.stride)
     }
 
     /// Copies all inputs to the device.
     pub(super) fn upload(&self, device: &mut Device) -> Result<GeneratorInputs> {
-        device.generator()?;
         use wgpu::BufferUsages as Use;
         Ok(GeneratorInputs {
+            pipeline: device.generator(&self.constants)?,
             template: self.generation,
             generation: device.buffer("generation", size_of::<Generation>() as u64, Use::UNIFORM | Use::COPY_DST),
             recipe: device.upload("recipe", &[self.recipe])?,
@@ -114,11 +109,8 @@ pub(super) fn generate(device: &mut Device, inputs: &mut Inputs, first: u64, cou
     if let Some(bytes) = room(samples * size_of::<LaneCase<f32>>() as u64, &inputs.cases) {
         inputs.cases = device.buffer("cases", bytes, storage);
     }
-    if let Some(bytes) = room(4 * samples * u64::from(template.speed_stride), &inputs.speed) {
-        inputs.speed = device.buffer("speeds", bytes, storage);
-    }
-    if let Some(bytes) = room(8 * samples * u64::from(template.lateral_stride), &inputs.lateral) {
-        inputs.lateral = device.buffer("lateral motions", bytes, storage);
+    if let Some(bytes) = room(4 * samples * u64::from(template.stride), &inputs.speed) {
+        inputs.speed = device.buffer("instants", bytes, storage);
     }
     let generation = Generation { index_low: first as u32, index_high: (first >> 32) as u32, count, ..template };
     device.queue.write_buffer(&made.generation, 0, bytemuck::bytes_of(&generation));
@@ -131,7 +123,6 @@ pub(super) fn generate(device: &mut Device, inputs: &mut Inputs, first: u64, cou
         &made.normal,
         &inputs.cases,
         &inputs.speed,
-        &inputs.lateral,
     ];
     let entries: Vec<wgpu::BindGroupEntry> = buffers
         .iter()
@@ -143,14 +134,13 @@ pub(super) fn generate(device: &mut Device, inputs: &mut Inputs, first: u64, cou
         layout: &device.generator_layout,
         entries: &entries,
     });
-    let pipeline = device.generator()?;
     let (x, y) = device.grid(count.div_ceil(WORKGROUP));
     let mut encoder =
         device.device.create_command_encoder(&wgpu::CommandEncoderDescriptor { label: Some("generator") });
     {
         let descriptor = wgpu::ComputePassDescriptor { label: Some("generator"), timestamp_writes: None };
         let mut pass = encoder.begin_compute_pass(&descriptor);
-        pass.set_pipeline(&pipeline);
+        pass.set_pipeline(&made.pipeline);
         pass.set_bind_group(0, &group, &[]);
         pass.dispatch_workgroups(x, y, 1);
     }

@@ -151,8 +151,6 @@ pub struct Generation {
     pub index_high: u32,
     /// Samples.
     pub count: u32,
-    /// 0 random, 1 Sobol, 2 given.
-    pub source: u32,
     /// Seed, low word.
     pub seed_low: u32,
     /// Its high word.
@@ -161,8 +159,6 @@ pub struct Generation {
     pub purpose: u32,
     /// Components of the mixture, or number of given points.
     pub components: u32,
-    /// 1 if components have weights.
-    pub weighted: u32,
     /// Offset of the first mean in the numbers.
     pub first_mean: u32,
     /// Offset of the first factor.
@@ -171,10 +167,6 @@ pub struct Generation {
     pub first_factor_of: u32,
     /// Offset of the transformation's knots.
     pub first_knot: u32,
-    /// 1 if draws are transformed.
-    pub transformed: u32,
-    /// Entries of each sample in the table of speeds.
-    pub speed_stride: u32,
-    /// Entries of each sample in the table of lateral states.
-    pub lateral_stride: u32,
+    /// Entries of each sample in the table of instants.
+    pub stride: u32,
 }

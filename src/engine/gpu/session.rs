@@ -145,7 +145,8 @@ impl<'p> GpuSession<'p> {
         for (variant, &known) in (0..).zip(scenes) {
             // A void sample has no vehicle: its values tell.
             let is_void_told = has_outcomes && plan.generator().is_some();
-            let scene = if is_void_told { DeviceScene::unknown(known.is_paired) } else { known };
+            let of_values = DeviceScene { is_all_paired: false, always_there: false, ..known };
+            let scene = if is_void_told { of_values } else { known };
             let watched = wanted.watch().is_some();
             let specialization = Specialization { scene, values: has_outcomes, watched, queue: self.queue };
             let variant = (scenes.len() > 1).then_some(variant);

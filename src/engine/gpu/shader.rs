@@ -126,6 +126,7 @@ pub fn constants(
     }
     all.push(("frame_burst", f64::from(if queue { BURST } else { ENDLESS })));
     all.extend(scene.shader_constants(model.index()));
+    all.push(("motion_inverse_dt", f64::from(resolved.frames[model.index()].inverse_dt)));
     all.extend(resolved.criteria.shader_constants());
     all.extend(resolved.driver_shader_constants(model));
     all
