@@ -79,7 +79,7 @@ fn run(part: &str, density: &DensityModel, models: &[ModelId], samples: u64, wor
     let backend = CpuBackend::lane_arithmetic();
     let executor = Executor::new(&backend);
     let start = Instant::now();
-    let run = sample_crude(&plan, 0..samples, &executor, &options, None, |_| Ok(())).unwrap();
+    let run = sample_crude(&plan, 0..samples, &executor, &options, None, None).unwrap();
     let seconds = start.elapsed().as_secs_f64();
     let id = density.space.id();
     let name = format!("{} {}", id.category.key(), id.key);

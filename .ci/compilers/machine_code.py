@@ -206,7 +206,7 @@ def check(rows):
     wrong = []
     for row in rows:
         place = f"{row['device']}, {row['kernel']}"
-        part = "generator" if row["kernel"].startswith("generator") else "cut-out" if ".cut-out." in row["kernel"] else "other"
+        part = "generator" if row["kernel"].startswith(("generator", "tally")) else "cut-out" if ".cut-out." in row["kernel"] else "other"
         if row["spilled"]:
             wrong.append(f"{place}: {row['spilled']} spilled (registers or bytes); none is allowed")
         if row["registers"] > BUDGET[part]:

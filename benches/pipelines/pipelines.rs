@@ -21,10 +21,10 @@ use std::path::{Path, PathBuf};
 use ash::{khr::pipeline_executable_properties as executables, vk};
 use common::paper_size_scenarios;
 use lanesweep::engine::gpu::{exact_spirv, shader};
-use lanesweep::engine::{Constants, CpuBackend, DeviceScene, Executor, Headway, LanePlan, Wanted};
+use lanesweep::engine::{Constants, CountLayout, CpuBackend, DeviceScene, Executor, Headway, LanePlan, Wanted};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
-use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, plan_samples};
+use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, SampleTally, plan_samples};
 use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, DataProvenance};
@@ -81,16 +81,22 @@ fn kernels(profiles: &[&str], values: bool) -> Vec<Kernel> {
     for (id, plan) in &plans {
         let generator = plan.generator().expect("a plan of samples");
         let name = format!("generator.{}.{}", id.category.label(), id.key);
-        add(name, shader::GENERATE, shader::assemble_generator(), generator.shader_constants(), 8);
+        add(name, shader::GENERATE, shader::assemble_generator(), generator.shader_constants(None), 9);
     }
+    let (_, plan) = &plans[0];
+    let options = SampleOptions::new(Estimator::CRUDE, 1000, SampleHeadways::Each(plan.headways.clone()));
+    let counting = SampleTally::counting(plan, &options);
+    let constants = CountLayout::new(plan, &counting).shader_constants(counting.criterion);
+    add("tally".to_owned(), shader::COUNT, shader::assemble_tally(), constants, 5);
     for profile_name in profiles {
         let profile = Profile::load(profile_name).expect("a profile");
         for model in ModelId::ALL {
             for category in Category::ALL {
                 let resolved = Constants::resolve(&profile, category);
-                let of_samples = plans.iter().filter(|(id, _)| id.category == category).map(|(id, plan)| {
-                    (id.key.clone(), plan.generator().expect("a plan of samples").scene())
-                });
+                let of_samples = plans
+                    .iter()
+                    .filter(|(id, _)| id.category == category)
+                    .map(|(id, plan)| (id.key.clone(), plan.generator().expect("a plan of samples").scene()));
                 let any = ("any".into(), DeviceScene::unknown(category == Category::CutOut));
                 for (scene_name, scene) in of_samples.chain([any]) {
                     let specialization = shader::Specialization { scene, values, watched: false, queue: true };

@@ -132,8 +132,12 @@ fn lane_other(motion: Motion, which: u32, gap_offset: f32, judged: u32) -> LaneO
 
 // The value of a quantity; 0 if no parameter has it.
 fn quantity(point: array<f32, MAX_PARAMETERS>, which: u32) -> f32 {
+    return value_of(point, slot_of(which));
+}
+
+// The value of a parameter; 0 if there is none.
+fn value_of(point: array<f32, MAX_PARAMETERS>, slot: u32) -> f32 {
     var values = point;
-    let slot = slot_of(which);
     if slot == NO_SLOT {
         return 0.0;
     }

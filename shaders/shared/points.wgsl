@@ -1,6 +1,5 @@
 // Sample index → point: twin of src/engine/generated/points.rs. `numbers` holds means, factors and knots as bits.
 
-const ATTEMPTS: u32 = 64u;
 // Blocks of four words per draw.
 const BLOCKS: u32 = 4u;
 
@@ -23,6 +22,7 @@ override points_transformed: bool;
 struct Drawn {
     values: array<f32, MAX_PARAMETERS>,
     tries: u32,
+    component: u32,
 }
 
 // The number at an index of the shared table.
@@ -35,8 +35,7 @@ fn draw_point(index: vec2<u32>) -> Drawn {
     let attempts = select(1u, ATTEMPTS, points_source == SOURCE_RANDOM);
     var drawn: Drawn;
     for (var attempt = 0u; attempt < attempts; attempt++) {
-        drawn.values = candidate(index, attempt);
-        drawn.tries = attempt + 1u;
+        drawn = candidate(index, attempt);
         if is_valid(drawn.values) {
             return drawn;
         }
@@ -46,7 +45,7 @@ fn draw_point(index: vec2<u32>) -> Drawn {
 }
 
 // Draw `attempt` of an index, valid or not. Words 0 and 1 select the component; the others give normal deviates.
-fn candidate(index: vec2<u32>, attempt: u32) -> array<f32, MAX_PARAMETERS> {
+fn candidate(index: vec2<u32>, attempt: u32) -> Drawn {
     let d = recipe_dimensions;
     var words: array<u32, 16>;
     if points_source == SOURCE_GIVEN {
@@ -55,7 +54,7 @@ fn candidate(index: vec2<u32>, attempt: u32) -> array<f32, MAX_PARAMETERS> {
         for (var j = 0u; j < recipe_dimensions; j++) {
             given[j] = number(generation.first_mean + index.x * d + j);
         }
-        return given;
+        return Drawn(given, attempt + 1u, 0u);
     }
     if points_source == SOURCE_RANDOM {
         let seed = vec2<u32>(generation.seed_low, generation.seed_high);
@@ -94,7 +93,7 @@ fn candidate(index: vec2<u32>, attempt: u32) -> array<f32, MAX_PARAMETERS> {
             values[j] = transformed(generation.first_knot + j * (PIECES + 1u), values[j]);
         }
     }
-    return values;
+    return Drawn(values, attempt + 1u, component);
 }
 
 // The linear piece between two knots; the outermost pieces continue.

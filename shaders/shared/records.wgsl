@@ -86,3 +86,18 @@ struct OutcomeRecord {
     btn_denominator: f32,
     min_gap_bits: u32,
 }
+
+// Maximum number of draws of a sample. With more it is void.
+const ATTEMPTS: u32 = 64u;
+
+// What is counted of a sample besides its lanes.
+struct DrawnRecord {
+    // Draws; ATTEMPTS + 1 if all were invalid.
+    tries: u32,
+    // Component of the mixture.
+    component: u32,
+    // Cell of the map, row by row from below; a larger number outside.
+    cell: u32,
+    // 1 if the sample draws a headway below the limit of close following.
+    is_close: u32,
+}

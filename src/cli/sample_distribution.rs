@@ -107,10 +107,8 @@ pub(super) fn run(
     tracing::info!("{} samples on {}", readable::count(count), executor.backend.describe());
     let bar = console::progress(verbosity, count, "sampling");
     // The frequency of such scenarios is unknown, so there is no exposure.
-    let crude = sample_crude(&plan, 0..count, &executor, &options, None, |chunk| {
-        bar.inc(chunk.units.end - chunk.units.start);
-        Ok(())
-    })?;
+    let executor = executor.with_progress(console::inc(&bar));
+    let crude = sample_crude(&plan, 0..count, &executor, &options, None, None)?;
     bar.finish_and_clear();
     let host = HostRecord::of(&opened, crude.summary.rechecked_lanes, started, configured.record(false));
     let record = record(&sampled, &samples);

@@ -5,6 +5,7 @@
 
 use std::ops::Range;
 
+use super::counting::{Counted, Counting};
 use super::outcome::{Outcome, Verdicts};
 use super::plan::LanePlan;
 use crate::model::criterion::{Criteria, Criterion};
@@ -43,20 +44,37 @@ pub struct Chunk {
     pub units: Range<u64>,
     /// Index of the first lane.
     pub first_lane: u64,
-    /// One per lane.
+    /// One per lane; none in a counted chunk.
     pub verdicts: Vec<Verdicts>,
     /// One per lane if outcomes were requested, else empty. Values are exact widenings of the lane's values.
     pub outcomes: Vec<Outcome<f64>>,
     /// The lanes that a [watch](Watch) marked, ascending, with their outcomes; `None` without a watch.
     pub valued: Option<Vec<(u64, Outcome<f64>)>>,
+    /// Counts in place of `verdicts`, if a backend [counts](Backend::prepare_counting).
+    pub counted: Option<Counted>,
     /// Lanes computed by the fallback, and lanes recomputed on the CPU with equal results. Set by the executor.
     pub redone_and_rechecked: [u64; 2],
 }
 
 impl Chunk {
-    /// Number of lanes.
+    /// Number of lanes with verdicts.
     pub fn lanes(&self) -> u64 {
         self.verdicts.len() as u64
+    }
+
+    /// Verdicts of a lane, by its place in the chunk.
+    pub fn verdicts_of(&self, at: usize) -> Verdicts {
+        match &self.counted {
+            Some(counted) => counted.verdicts(at),
+            None => self.verdicts[at],
+        }
+    }
+
+    /// The outcome of a marked lane.
+    pub fn valued_lane(&self, lane: u64) -> Option<&Outcome<f64>> {
+        let valued = self.valued.as_ref()?;
+        let at = valued.binary_search_by_key(&lane, |(lane, _)| *lane).ok()?;
+        Some(&valued[at].1)
     }
 
     /// Checks that the chunk holds the requested units and results; see [`Chunk::check`].
@@ -64,7 +82,8 @@ impl Chunk {
     /// # Errors
     /// [`Error::Internal`] if it does not.
     pub(super) fn check_requested(&self, plan: &LanePlan, units: &Range<u64>, wanted: Wanted) -> Result<()> {
-        let complete = wanted != Wanted::Outcomes || self.outcomes.len() == self.verdicts.len();
+        let complete =
+            wanted != Wanted::Outcomes || (self.outcomes.len() == self.verdicts.len() && self.counted.is_none());
         if self.units == *units && complete {
             self.check(plan)
         } else {
@@ -83,7 +102,7 @@ impl Chunk {
             && self.units.end <= plan.unit_count()
             && self.first_lane == first_lane
             && [0, lanes].contains(&self.outcomes.len())
-            && self.verdicts.len() == lanes;
+            && self.verdicts.len() == if self.counted.is_some() { 0 } else { lanes };
         if fits {
             Ok(())
         } else {
@@ -114,6 +133,11 @@ pub trait Backend: Send + Sync {
     fn describe(&self) -> String;
     /// Uploads or converts the plan's data, once.
     fn prepare<'p>(&self, plan: &'p LanePlan) -> Result<Box<dyn Session + 'p>>;
+    /// The same for a sweep that needs counts and no verdicts of single lanes. A backend that cannot count returns
+    /// verdicts.
+    fn prepare_counting<'p>(&self, plan: &'p LanePlan, _counting: &Counting) -> Result<Box<dyn Session + 'p>> {
+        self.prepare(plan)
+    }
 }
 
 impl<B: Backend + ?Sized> Backend for &B {
@@ -126,12 +150,18 @@ impl<B: Backend + ?Sized> Backend for &B {
     fn prepare<'p>(&self, plan: &'p LanePlan) -> Result<Box<dyn Session + 'p>> {
         (**self).prepare(plan)
     }
+    fn prepare_counting<'p>(&self, plan: &'p LanePlan, counting: &Counting) -> Result<Box<dyn Session + 'p>> {
+        (**self).prepare_counting(plan, counting)
+    }
 }
 
 /// A backend with one prepared plan.
 pub trait Session {
     /// Computes all lanes of an interval of units. After an error another session can compute the interval.
     fn run(&mut self, units: Range<u64>, wanted: Wanted) -> Result<Chunk>;
+    /// Announces the units of the call after the next one, so that a device may begin with them before that call returns
+    /// its results.
+    fn announce(&mut self, _units: Range<u64>) {}
     /// Recommended number of lanes per call: enough to keep the backend busy, but few enough to end within seconds,
     /// because a run can be cancelled only between calls. Results do not depend on it.
     fn chunk_lanes(&self, _wanted: Wanted) -> u64;

@@ -7,7 +7,9 @@ use std::sync::Arc;
 use rayon::prelude::*;
 
 use super::backend::{Backend, Chunk, Session, Wanted, Watch};
+use super::counting::Counting;
 use super::cpu::runner::LaneRunner;
+use super::outcome::Verdicts;
 use super::plan::LanePlan;
 use super::recheck::{Recheck, RecheckOptions};
 use crate::support::cancel::Cancel;
@@ -33,6 +35,8 @@ pub struct Executor<'a> {
     pub cancel: Cancel,
     /// Called with the number of units of every finished chunk.
     pub progress: Option<Arc<dyn Fn(u64) + Send + Sync>>,
+    /// The sweep needs counts and no verdicts of single lanes: a chunk may be [`Chunk::counted`].
+    pub counting: Option<Arc<Counting>>,
 }
 
 /// Summary of a sweep.
@@ -71,6 +75,7 @@ impl<'a> Executor<'a> {
             chunk_lanes: None,
             cancel: Cancel::default(),
             progress: None,
+            counting: None,
         }
     }
 
@@ -131,12 +136,16 @@ impl<'a> Executor<'a> {
         recheck: Option<&Recheck>,
         mut each: impl FnMut(Chunk) -> Result<()>,
     ) -> Result<SweepSummary> {
-        let Executor { backend, fallback, chunk_lanes, .. } = self;
+        let Executor { backend, fallback, chunk_lanes, counting, .. } = self;
         let fallback = fallback.as_deref();
         let max_lanes = chunk_lanes.unwrap_or(u64::MAX);
         let mut summary = SweepSummary::default();
         let mut redo: Option<Box<dyn Session + '_>> = None;
-        let mut session = match (backend.prepare(plan), fallback) {
+        let prepared = match counting {
+            Some(counting) if wanted != Wanted::Outcomes => backend.prepare_counting(plan, counting),
+            _ => backend.prepare(plan),
+        };
+        let mut session = match (prepared, fallback) {
             (Ok(session), _) => Some(session),
             (Err(error), Some(fallback)) => {
                 tracing::warn!("{error}; {} computes instead", fallback.describe());
@@ -153,11 +162,12 @@ impl<'a> Executor<'a> {
             let by = computed_by.rechecked_by(wanted);
             let rechecked = recheck.map(|recheck| recheck.check(&chunk, wanted, &computed_by.describe(), by));
             let rechecked = rechecked.transpose()?.unwrap_or(0);
-            chunk.redone_and_rechecked = [redone * chunk.lanes(), rechecked];
+            let lanes = plan.first_lane_of(chunk.units.end) - chunk.first_lane;
+            chunk.redone_and_rechecked = [redone * lanes, rechecked];
             summary.redone_chunks += redone;
-            summary.redone_lanes += redone * chunk.lanes();
+            summary.redone_lanes += redone * lanes;
             summary.rechecked_lanes += rechecked;
-            summary.lanes += chunk.lanes();
+            summary.lanes += lanes;
             let (of_chunk, done) = (chunk.units.end - chunk.units.start, chunk.units.end - units.start);
             each(chunk)?;
             if let Some(progress) = &self.progress {
@@ -166,11 +176,19 @@ impl<'a> Executor<'a> {
             self.check_cancelled(done, units.end - units.start)
         };
         let mut from = units.start;
+        // Units that the backend knows to be next.
+        let mut announced: Option<Range<u64>> = None;
         // The backend computes no units before this one.
         let mut redo_until = if session.is_some() { units.start } else { units.end };
         while from < units.end {
             if let Some(session) = session.as_mut().filter(|_| from >= redo_until) {
-                let range = from..next_cut(plan, from, units.end, session.chunk_lanes(wanted).min(max_lanes));
+                let lanes = session.chunk_lanes(wanted).min(max_lanes);
+                let range = announced.take().unwrap_or_else(|| from..next_cut(plan, from, units.end, lanes));
+                if range.end < units.end {
+                    let next = range.end..next_cut(plan, range.end, units.end, lanes);
+                    session.announce(next.clone());
+                    announced = Some(next);
+                }
                 match (compute(plan, session.as_mut(), &range, wanted), fallback) {
                     (Ok(chunk), _) => {
                         deliver(chunk, &**backend, 0)?;
@@ -183,6 +201,7 @@ impl<'a> Executor<'a> {
                             tracing::warn!("{error}; {name} computes this part, and what else the device cannot");
                         }
                         redo_until = range.end;
+                        announced = None;
                     }
                     (Err(error), None) => return Err(error),
                 }
@@ -217,20 +236,31 @@ fn value_marked(plan: &LanePlan, watch: &Watch, runner: &LaneRunner<'_, f32>, ch
         return;
     }
     let first_lane = chunk.first_lane;
-    let tasks = chunk.verdicts.par_chunks_mut(VALUING_TASK).enumerate();
-    let valued = tasks.flat_map_iter(|(task, lanes)| {
-        let lanes = lanes.iter_mut().zip(first_lane + (task * VALUING_TASK) as u64..);
-        lanes.filter_map(|(verdicts, lane)| {
-            let model = plan.models[plan.model_of(lane)];
-            if !watch.marks(model, *verdicts) {
-                return None;
-            }
-            let outcome = runner.run(&plan.key(lane)?).widen();
-            *verdicts = outcome.verdicts;
-            Some((lane, outcome))
-        })
-    });
-    chunk.valued = Some(valued.collect());
+    let value = |verdicts: Verdicts, lane: u64| {
+        let is_marked = watch.marks(plan.models[plan.model_of(lane)], verdicts);
+        let key = if is_marked { plan.key(lane) } else { None };
+        Some((lane, runner.run(&key?).widen()))
+    };
+    let valued = if let Some(counted) = &chunk.counted {
+        // Every marked lane is one of a sample that was left.
+        let of_unit = |unit: &u64| {
+            let lanes = plan.first_lane_of(*unit)..plan.first_lane_of(*unit + 1);
+            lanes.filter_map(|lane| value(counted.verdicts((lane - first_lane) as usize), lane))
+        };
+        counted.left.par_iter().flat_map_iter(of_unit).collect()
+    } else {
+        let tasks = chunk.verdicts.par_chunks_mut(VALUING_TASK).enumerate();
+        let valued = tasks.flat_map_iter(|(task, lanes)| {
+            let lanes = lanes.iter_mut().zip(first_lane + (task * VALUING_TASK) as u64..);
+            lanes.filter_map(|(verdicts, lane)| {
+                let valued = value(*verdicts, lane)?;
+                *verdicts = valued.1.verdicts;
+                Some(valued)
+            })
+        });
+        valued.collect()
+    };
+    chunk.valued = Some(valued);
 }
 
 /// Splits an interval of units into chunks of about 131,072 lanes, at least one unit each.

@@ -8,6 +8,7 @@
 mod backend;
 mod case_table;
 mod confusion;
+mod counting;
 pub(crate) mod cpu;
 mod device_choice;
 mod drivers;
@@ -32,6 +33,7 @@ pub mod version;
 pub use backend::{Backend, Chunk, Marks, RecheckBy, Session, Wanted, Watch};
 pub use case_table::{CaseTable, EncodedBlock};
 pub use confusion::Confusion;
+pub use counting::{CountLayout, Counted, CountedAxis, Counting, MAP_CELLS};
 pub use cpu::backend::CpuBackend;
 pub use cpu::backend::lanes_within_seconds;
 pub use cpu::runner::LaneRunner;

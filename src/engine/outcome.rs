@@ -16,7 +16,7 @@ impl Verdicts {
     /// The lane ended at the time cap.
     pub const CAPPED: u8 = 1 << 3;
     /// A contact that a [watch](super::Watch) marks: no lane ends both by contact and at the cap.
-    pub(super) const MARKED_CONTACT: u8 = Verdicts::CAPPED | 1 << Criterion::Collision as u8;
+    pub const MARKED_CONTACT: u8 = Verdicts::CAPPED | 1 << Criterion::Collision as u8;
 
     /// Whether this criterion failed.
     pub fn failed(self, criterion: Criterion) -> bool {

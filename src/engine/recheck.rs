@@ -76,10 +76,10 @@ impl<'p> Recheck<'p> {
     /// # Errors
     /// [`Error::Verification`] with the first lane that differs.
     pub(super) fn check(&self, chunk: &Chunk, wanted: Wanted, backend: &str, by: RecheckBy) -> Result<u64> {
-        if chunk.verdicts.is_empty() || by == RecheckBy::Nothing {
+        let end = self.plan.first_lane_of(chunk.units.end);
+        if end == chunk.first_lane || by == RecheckBy::Nothing {
             return Ok(0);
         }
-        let end = chunk.first_lane + chunk.verdicts.len() as u64;
         let mut keys: Vec<LaneKey> =
             self.chosen(chunk.first_lane..end).filter_map(|lane| self.plan.key(lane)).collect();
         // There is no second implementation of a driver outside the registry.
@@ -108,20 +108,29 @@ impl<'p> Recheck<'p> {
             let ours = self.recompute.single(key);
             compare(key, &|at| match chunk.outcomes.get(at) {
                 Some(theirs) => same_words(&ours.widen(), theirs),
-                None => chunk.verdicts[at] == ours.verdicts && !self.misses_mark(chunk, wanted, key, &ours),
+                None => self.verdicts(chunk, at) == ours.verdicts && !self.misses_mark(chunk, wanted, key, &ours),
             });
         }
         if is_batched {
-            self.recompute.batched(keys, &mut |at, ours| compare(&keys[at], &|at| chunk.verdicts[at] == ours));
+            self.recompute.batched(keys, &mut |at, ours| compare(&keys[at], &|at| self.verdicts(chunk, at) == ours));
         }
         first
+    }
+
+    /// A lane's own verdicts: those of a marked lane come with its values.
+    fn verdicts(&self, chunk: &Chunk, at: usize) -> Verdicts {
+        let lane = chunk.first_lane + at as u64;
+        match chunk.valued_lane(lane) {
+            Some(outcome) => outcome.verdicts,
+            None => chunk.verdicts_of(at),
+        }
     }
 
     /// Whether the chunk lacks the values of a lane that should be marked.
     fn misses_mark(&self, chunk: &Chunk, wanted: Wanted, key: &LaneKey, ours: &Outcome<f32>) -> bool {
         let model = self.plan.models[key.model];
         wanted.watch().is_some_and(|watch| watch.means(model, &ours.widen()))
-            && !chunk.valued.iter().flatten().any(|(lane, _)| *lane == self.plan.lane(key))
+            && chunk.valued_lane(self.plan.lane(key)).is_none()
     }
 
     /// Whether a lane that is rechecked in a batch is also rechecked as a single lane.
@@ -354,7 +363,15 @@ mod tests {
             let mut verdicts = vec![Verdicts::default(); keys.len()];
             Instead::run(self, &keys, self.every_step, |at, of| verdicts[at] = of);
             let outcomes = Vec::new();
-            Ok(Chunk { units, first_lane, verdicts, outcomes, valued: None, redone_and_rechecked: [0; 2] })
+            Ok(Chunk {
+                units,
+                first_lane,
+                verdicts,
+                outcomes,
+                valued: None,
+                counted: None,
+                redone_and_rechecked: [0; 2],
+            })
         }
     }
 

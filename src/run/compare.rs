@@ -291,7 +291,7 @@ impl<'a> Compare<'a> {
     ) -> Result<ComparedForm> {
         let options = self.sample_options(density);
         let plan = plan_samples(density, &density.mixture()?, &self.profile, &options)?;
-        let run = sample_crude(&plan, 0..plan.unit_count(), executor, &options, None, |_| Ok(()))?;
+        let run = sample_crude(&plan, 0..plan.unit_count(), executor, &options, None, None)?;
         summary.add(&run.summary);
         ComparedForm::of(density, &run.rows)
     }

@@ -5,6 +5,8 @@
 mod common;
 
 #[cfg(feature = "gpu")]
+mod counting;
+#[cfg(feature = "gpu")]
 mod device_command_line;
 #[cfg(feature = "gpu")]
 mod device_edges;

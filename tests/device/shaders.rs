@@ -11,9 +11,11 @@ use crate::wgsl::{
 use lanesweep::engine::generated::{
     self, ATTEMPTS, ColumnBound, MAX_BOUNDS, MAX_PARAMETERS, NO_SLOT, Recipe, ReducedColumns,
 };
-use lanesweep::engine::gpu::shader::{self, GENERATOR, RANDOM, SHARED, Specialization, driver_shader};
-use lanesweep::engine::gpu::{Generation, Launch, OutcomeRecord, StartRecord, exact_spirv};
-use lanesweep::engine::{Constants, DeviceScene, EndReason, LaneCase, LaneOther, MotionKind, NO_STEP, Verdicts};
+use lanesweep::engine::gpu::shader::{self, GENERATOR, RANDOM, SHARED, Specialization, TALLY, driver_shader};
+use lanesweep::engine::gpu::{DrawnRecord, Generation, Launch, OutcomeRecord, StartRecord, Tally, exact_spirv};
+use lanesweep::engine::{
+    Constants, CountLayout, DeviceScene, EndReason, LaneCase, LaneOther, MAP_CELLS, MotionKind, NO_STEP, Verdicts,
+};
 use lanesweep::model::criterion::{BtnForm, Contact, Criteria, Criterion, LateralGate};
 use lanesweep::model::driver::{AttentionRule, MODELS, ModelId, NEVER};
 use lanesweep::model::profile::Profile;
@@ -86,9 +88,11 @@ fn generator_records() -> Vec<Record> {
             half_lengths: [f32; 2], half_widths: [f32; 2], principal_length: f32, ego_width: f32, lane_width: f32,
             attention: [AttentionRule<f32>; MODELS],
         }),
+        record!("DrawnRecord", DrawnRecord, { tries: u32, component: u32, cell: u32, is_close: u32 }),
         record!("Generation", Generation, {
             index_low: u32, index_high: u32, count: u32, seed_low: u32, seed_high: u32, purpose: u32,
-            components: u32, first_mean: u32, first_factor: u32, first_factor_of: u32, first_knot: u32, stride: u32,
+            components: u32, first_mean: u32, first_factor: u32, first_factor_of: u32, first_knot: u32, first_edge: u32,
+            stride: u32, reserved_0: u32, reserved_1: u32, reserved_2: u32,
         }),
     ]
 }
@@ -118,7 +122,7 @@ fn generator_constants() -> Vec<(&'static str, f64)> {
         knots: Vec::new(),
     };
     let generator = generated::Generator { points, recipe, basis: Vec::new() };
-    let given = generator.shader_constants();
+    let given = generator.shader_constants(None);
     assert_eq!(names.collect::<BTreeSet<_>>(), given.iter().map(|(name, _)| (*name).to_owned()).collect());
     given
 }
@@ -177,6 +181,7 @@ fn the_generator_has_the_records_the_numbers_and_the_arithmetic_of_its_rust_twin
         ("MAX_PARAMETERS", MAX_PARAMETERS as u32),
         ("MAX_BOUNDS", MAX_BOUNDS as u32),
         ("ATTEMPTS", ATTEMPTS),
+        ("MAP_CELLS", MAP_CELLS as u32),
         ("PIECES", lanesweep::stats::random::PIECES as u32),
         ("NO_SLOT", NO_SLOT),
         ("TARGET_SPEED", Variable::TargetSpeed as u32),
@@ -204,6 +209,40 @@ fn the_generator_has_the_records_the_numbers_and_the_arithmetic_of_its_rust_twin
     assert_eq!((found.forbidden, found.divided_in), (Vec::<String>::new(), vec!["exact_div".to_owned()]));
     let words = exact_spirv(&shader::assemble_generator(), shader::GENERATE, &generator_constants());
     assert!(words.is_ok_and(|w| !w.is_empty()));
+}
+
+#[test]
+fn the_counting_has_the_records_and_the_places_of_its_rust_twins() {
+    let source = shader::assemble_tally();
+    let (module, info) = parse(&source);
+    let records = [
+        record!("DrawnRecord", DrawnRecord, { tries: u32, component: u32, cell: u32, is_close: u32 }),
+        record!("Tally", Tally, {
+            samples: u32, first_drawn: u32, words: u32, max_left: u32, close_headways: u32, drawn_headways: u32,
+            marks: u32,
+        }),
+    ];
+    for (name, size, ours) in records {
+        assert_eq!(fields(&module, name), (size, ours), "{name}");
+    }
+    for (name, value) in [
+        ("ATTEMPTS", ATTEMPTS),
+        ("CRITERIA", Criterion::ALL.len() as u32),
+        ("LANES_PER_WORD", u32::BITS / 4),
+        ("CAPPED", Verdicts::CAPPED.into()),
+        ("MARKED_CONTACT", Verdicts::MARKED_CONTACT.into()),
+        ("VOIDS", CountLayout::VOIDS as u32),
+        ("TRIES", CountLayout::TRIES as u32),
+        ("CLOSE_LANES", CountLayout::CLOSE_LANES as u32),
+        ("WORKGROUP", shader::WORKGROUP),
+    ] {
+        assert_eq!(constant(&module, name), value, "{name}");
+    }
+    let found = float_operations(&module, &info);
+    assert_eq!((found.forbidden, found.divided_in), (vec![], vec![]));
+    assert_eq!(unbounded_loops(&module), (5, vec![]));
+    let [entry] = module.entry_points.as_slice() else { panic!("one entry point") };
+    assert_eq!(entry.name, shader::COUNT);
 }
 
 #[test]
@@ -280,6 +319,7 @@ fn constants_that_stand_on_both_sides_agree() {
         ("MOTION_CENTRED", MotionKind::Centred as u32),
         ("MOTION_SINUSOID", MotionKind::Sinusoid as u32),
         ("MOTION_INSTANTS", MotionKind::Instants as u32),
+        ("ATTEMPTS", ATTEMPTS),
         ("SINE_0", sine(0)),
         ("SINE_1", sine(1)),
         ("SINE_2", sine(2)),
@@ -444,7 +484,7 @@ fn the_fragments_of_sampling_do_only_what_devices_agree_on() {
 
 #[test]
 fn every_shader_file_is_part_of_a_pipeline() {
-    let parts = SHARED.into_iter().chain(RANDOM).chain(GENERATOR).chain(ModelId::ALL.map(driver_shader));
+    let parts = SHARED.into_iter().chain(RANDOM).chain(GENERATOR).chain(TALLY).chain(ModelId::ALL.map(driver_shader));
     let known: BTreeSet<String> = parts.map(|(name, _)| name.to_owned()).collect();
     let mut found = BTreeSet::new();
     for folder in ["", "shared/"] {
@@ -458,10 +498,12 @@ fn every_shader_file_is_part_of_a_pipeline() {
 
 #[test]
 fn only_the_entry_has_bindings_and_every_file_stays_short_and_plain() {
-    for (name, text) in SHARED.into_iter().chain(RANDOM).chain(GENERATOR).chain(ModelId::ALL.map(driver_shader)) {
+    for (name, text) in
+        SHARED.into_iter().chain(RANDOM).chain(GENERATOR).chain(TALLY).chain(ModelId::ALL.map(driver_shader))
+    {
         assert!(text.lines().count() <= 600, "{name} is longer than 600 lines");
         let code = without_comments(text);
-        if !["lane.wgsl", "generate.wgsl"].contains(&name) {
+        if !["lane.wgsl", "generate.wgsl", "tally.wgsl"].contains(&name) {
             for word in ["@group", "@binding", "@compute", "var<"] {
                 assert!(!code.contains(word), "{name} has {word}");
             }

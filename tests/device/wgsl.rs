@@ -102,7 +102,7 @@ pub fn float_operations(module: &Module, info: &ModuleInfo) -> FloatOperations {
                 }
                 Expression::Math { fun: MathFunction::Abs, .. } => {}
                 // Of integers, in which devices do not differ.
-                Expression::Math { fun: MathFunction::CountLeadingZeros, .. } => {}
+                Expression::Math { fun: MathFunction::CountLeadingZeros | MathFunction::CountOneBits, .. } => {}
                 Expression::Math { .. } | Expression::Derivative { .. } | Expression::Relational { .. } => {
                     found.forbidden.push(format!("{name}: {expression:?}"));
                 }

@@ -108,12 +108,12 @@ fn a_list_of_worst_lanes_is_the_same_where_only_lanes_that_may_enter_it_are_valu
             let sampled = |backend: &dyn Backend, range: std::ops::Range<u64>| {
                 let executor =
                     Executor { recheck: Some(RecheckOptions { seed: 1, one_in: 10 }), ..Executor::new(backend) };
-                let of_chunk = |chunk: &Chunk| {
+                let mut of_chunk = |chunk: &Chunk| {
                     let few = chunk.valued.as_ref().map(Vec::len);
                     valued.set(valued.get() + few.unwrap_or(chunk.outcomes.len()));
                     Ok(())
                 };
-                sample_crude(&plan, range, &executor, &counting, None, of_chunk).unwrap().tally
+                sample_crude(&plan, range, &executor, &counting, None, Some(&mut of_chunk)).unwrap().tally
             };
             assert!(every_value == sampled(&cpu, 0..samples), "{key}, {criterion:?}");
             // The first samples are valued whole, and from then on about as many again as stand in the lists.
@@ -124,6 +124,10 @@ fn a_list_of_worst_lanes_is_the_same_where_only_lanes_that_may_enter_it_are_valu
             assert!(every_value == last.merge(first).unwrap(), "{key}, {criterion:?}: shards");
             if let Some(device) = device.as_deref().filter(|_| criterion == Criterion::Collision) {
                 assert!(every_value == sampled(device, 0..samples), "{key}, {criterion:?}: device");
+                // Counted where the lanes are.
+                let executor = Executor { chunk_lanes: Some(1 << 16), ..Executor::new(device).with_recheck(1) };
+                let run = sample_crude(&plan, 0..samples, &executor, &counting, None, None).unwrap();
+                assert!(every_value == run.tally, "{key}, {criterion:?}: counted on the device");
             }
         }
     }

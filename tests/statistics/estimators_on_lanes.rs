@@ -42,7 +42,7 @@ fn crude(density: &DensityModel, profile: &Profile, model: ModelId, thw_s: f64, 
     let plan = plan_samples(density, &density.mixture().unwrap(), profile, &options).unwrap();
     let backend = CpuBackend::lane_arithmetic();
     let executor = Executor::new(&backend);
-    let run = sample_crude(&plan, 0..samples, &executor, &options, None, |_| Ok(())).unwrap();
+    let run = sample_crude(&plan, 0..samples, &executor, &options, None, None).unwrap();
     run.rows.into_iter().find(|r| r.criterion == Criterion::Collision).unwrap().estimate
 }
 

@@ -272,6 +272,6 @@ impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
             }
         }
         let redone_and_rechecked = [0; 2];
-        Ok(Chunk { units, first_lane, verdicts, outcomes, valued: None, redone_and_rechecked })
+        Ok(Chunk { units, first_lane, verdicts, outcomes, valued: None, counted: None, redone_and_rechecked })
     }
 }

@@ -16,7 +16,9 @@ use crate::model::scalar::Real;
 use crate::scenario::Tables;
 use crate::scenario::parameterization::Variable;
 
+use super::counting::Counting;
 use super::lane_case::LaneCase;
+use super::plan::CLOSE_HEADWAY_S;
 use super::scene::{DeviceScene, MotionKind, stays_behind};
 
 /// A case generator: where points come from and what they mean.
@@ -28,6 +30,12 @@ pub struct Generator {
     pub recipe: Recipe,
     /// The basis of a reduction: mean, then every direction, each column divided by its weight; else empty.
     pub basis: Vec<f32>,
+}
+
+/// The smallest number of the lane arithmetic that is not below a limit.
+fn at_least(limit: f64) -> f32 {
+    let near = limit as f32;
+    if f64::from(near) < limit { near.next_up() } else { near }
 }
 
 impl Generator {
@@ -132,7 +140,7 @@ impl Generator {
 
     /// What is the same for all samples and decides what a device's generator does: constants of its pipeline, by their
     /// names in the shaders.
-    pub fn shader_constants(&self) -> Vec<(&'static str, f64)> {
+    pub fn shader_constants(&self, counting: Option<&Counting>) -> Vec<(&'static str, f64)> {
         let (recipe, points) = (&self.recipe, &self.points);
         let flag = |is_set: bool| f64::from(u8::from(is_set));
         let source = match points.source {
@@ -140,7 +148,13 @@ impl Generator {
             PointSource::Sobol(_) => 1.0,
             PointSource::Given => 2.0,
         };
+        let [map_x, map_y] = counting
+            .and_then(|counting| counting.map.as_ref())
+            .map_or([NO_SLOT; 2], |axes| axes.each_ref().map(|axis| axis.parameter as u32));
         let mut all = vec![
+            ("map_x", f64::from(map_x)),
+            ("map_y", f64::from(map_y)),
+            ("close_headway", f64::from(at_least(CLOSE_HEADWAY_S))),
             ("points_source", source),
             ("points_weighted", flag(points.weights.is_some())),
             ("points_transformed", flag(!points.knots.is_empty())),

@@ -10,7 +10,7 @@ use std::time::Duration;
 use rayon::prelude::*;
 
 use super::adapters::AdapterCard;
-use super::shader::{self, ENTRY, GENERATE, WORKGROUP};
+use super::shader::{self, COUNT, ENTRY, GENERATE, WORKGROUP};
 use super::spirv::exact_spirv;
 use crate::model::driver::ModelId;
 use crate::{Error, Result};
@@ -75,9 +75,12 @@ pub(super) struct Device {
     pub tampering: Tampering,
     /// Bindings of the generator.
     pub generator_layout: wgpu::BindGroupLayout,
+    /// Bindings of the counting.
+    pub tally_layout: wgpu::BindGroupLayout,
     pipeline_layout: wgpu::PipelineLayout,
     pipelines: Vec<(PipelineSpec, wgpu::ComputePipeline)>,
     generator: Option<(Vec<(&'static str, f64)>, wgpu::ComputePipeline)>,
+    tally: Option<(Vec<(&'static str, f64)>, wgpu::ComputePipeline)>,
     trouble: Arc<Mutex<Option<String>>>,
 }
 
@@ -130,6 +133,10 @@ impl Device {
             label: Some("generator"),
             entries: &generator_entries(),
         });
+        let tally_layout = device.create_bind_group_layout(&wgpu::BindGroupLayoutDescriptor {
+            label: Some("tally"),
+            entries: &tally_entries(),
+        });
         let pipeline_layout = device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
             label: Some("lane"),
             bind_group_layouts: &[Some(&layout)],
@@ -151,6 +158,8 @@ impl Device {
             pipeline_layout,
             pipelines,
             generator: None,
+            tally: None,
+            tally_layout,
             trouble,
         };
         opened.untroubled()?;
@@ -195,14 +204,34 @@ impl Device {
         {
             return Ok(pipeline.clone());
         }
-        let layout = self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
-            label: Some("generator"),
-            bind_group_layouts: &[Some(&self.generator_layout)],
-            immediate_size: 0,
-        });
+        let layout = self.layout_of("generator", &self.generator_layout);
         let pipeline = self.compile("generator", shader::assemble_generator(), GENERATE, constants, &layout)?;
         self.generator = Some((constants.to_vec(), pipeline.clone()));
         Ok(pipeline)
+    }
+
+    /// The pipeline that counts, with its constants; the last one is kept.
+    ///
+    /// # Errors
+    /// As [`Device::pipelines`].
+    pub(super) fn tally(&mut self, constants: &[(&'static str, f64)]) -> Result<wgpu::ComputePipeline> {
+        if let Some((known, pipeline)) = &self.tally
+            && known == constants
+        {
+            return Ok(pipeline.clone());
+        }
+        let layout = self.layout_of("tally", &self.tally_layout);
+        let pipeline = self.compile("tally", shader::assemble_tally(), COUNT, constants, &layout)?;
+        self.tally = Some((constants.to_vec(), pipeline.clone()));
+        Ok(pipeline)
+    }
+
+    fn layout_of(&self, label: &str, bindings: &wgpu::BindGroupLayout) -> wgpu::PipelineLayout {
+        self.device.create_pipeline_layout(&wgpu::PipelineLayoutDescriptor {
+            label: Some(label),
+            bind_group_layouts: &[Some(bindings)],
+            immediate_size: 0,
+        })
     }
 
     fn compile(
@@ -330,9 +359,15 @@ fn entries() -> Vec<wgpu::BindGroupLayoutEntry> {
     buffer_entries(4, 3, true)
 }
 
-/// The bindings of `shaders/generate.wgsl`, in their order: generation, five inputs, cases and instants.
+/// The bindings of `shaders/generate.wgsl`, in their order: generation, five inputs, cases, instants and
+/// what is counted of samples.
 fn generator_entries() -> Vec<wgpu::BindGroupLayoutEntry> {
-    buffer_entries(5, 2, false)
+    buffer_entries(5, 3, false)
+}
+
+/// The bindings of `shaders/tally.wgsl`, in their order: tally, samples and verdicts, counts and samples left.
+fn tally_entries() -> Vec<wgpu::BindGroupLayoutEntry> {
+    buffer_entries(2, 2, false)
 }
 
 /// A uniform buffer, inputs, results.

@@ -1,11 +1,11 @@
 //! The generator on the device: its inputs, and the dispatch that fills a session's cases and tables.
 
 use super::device::Device;
-use super::records::Generation;
+use super::records::{DrawnRecord, Generation};
 use super::shader::WORKGROUP;
 use crate::Result;
-use crate::engine::LaneCase;
 use crate::engine::generated::{Generator, PointSource, Recipe};
+use crate::engine::{Counting, LaneCase};
 use crate::random::normal_table;
 
 /// The tables of a session.
@@ -14,6 +14,8 @@ pub(super) struct Inputs {
     pub speed: wgpu::Buffer,
     pub lateral: wgpu::Buffer,
     pub cases: wgpu::Buffer,
+    /// What is counted of each sample besides its lanes.
+    pub drawn: wgpu::Buffer,
     /// Makes cases and tables, if the host does not.
     pub generator: Option<GeneratorInputs>,
 }
@@ -41,7 +43,7 @@ pub(super) struct GeneratorSetup {
 }
 
 impl GeneratorSetup {
-    pub(super) fn new(generator: &Generator) -> Self {
+    pub(super) fn new(generator: &Generator, counting: Option<&Counting>) -> Self {
         let points = &generator.points;
         let bits = |values: &[f32]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
         let mut numbers = bits(&generator.basis);
@@ -53,12 +55,17 @@ impl GeneratorSetup {
         numbers.extend(&points.factor_of);
         let first_knot = numbers.len() as u32;
         numbers.extend(bits(&points.knots));
+        let first_edge = numbers.len() as u32;
+        for axis in counting.and_then(|counting| counting.map.as_ref()).into_iter().flatten() {
+            numbers.extend(bits(&axis.edges));
+        }
         let mut generation = Generation {
             components: points.components(),
             first_mean,
             first_factor,
             first_factor_of,
             first_knot,
+            first_edge,
             stride: generator.case_instants(),
             ..Generation::default()
         };
@@ -73,13 +80,13 @@ impl GeneratorSetup {
             PointSource::Given => (),
         }
         let aliases = points.weights.as_ref().map_or(Vec::new(), |table| table.table().to_vec());
-        let (recipe, constants) = (generator.recipe, generator.shader_constants());
+        let (recipe, constants) = (generator.recipe, generator.shader_constants(counting));
         GeneratorSetup { generation, recipe, constants, numbers, aliases, sobol: sobol_words }
     }
 
-    /// Bytes of one sample: case and instants.
+    /// Bytes of one sample: case, what is counted, and instants.
     pub(super) fn sample_bytes(&self) -> u64 {
-        size_of::<LaneCase<f32>>() as u64 + 4 * u64::from(self.generation.stride)
+        (size_of::<LaneCase<f32>>() + size_of::<DrawnRecord>()) as u64 + 4 * u64::from(self.generation.stride)
     }
 
     /// Copies all inputs to the device.
@@ -112,6 +119,9 @@ pub(super) fn generate(device: &mut Device, inputs: &mut Inputs, first: u64, cou
     if let Some(bytes) = room(4 * samples * u64::from(template.stride), &inputs.speed) {
         inputs.speed = device.buffer("instants", bytes, storage);
     }
+    if let Some(bytes) = room(samples * size_of::<DrawnRecord>() as u64, &inputs.drawn) {
+        inputs.drawn = device.buffer("drawn samples", bytes, storage);
+    }
     let generation = Generation { index_low: first as u32, index_high: (first >> 32) as u32, count, ..template };
     device.queue.write_buffer(&made.generation, 0, bytemuck::bytes_of(&generation));
     let buffers = [
@@ -123,6 +133,7 @@ pub(super) fn generate(device: &mut Device, inputs: &mut Inputs, first: u64, cou
         &made.normal,
         &inputs.cases,
         &inputs.speed,
+        &inputs.drawn,
     ];
     let entries: Vec<wgpu::BindGroupEntry> = buffers
         .iter()

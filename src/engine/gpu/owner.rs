@@ -181,6 +181,7 @@ impl DeviceOwner {
             speed: self.device.upload("speeds", &setup.speed)?,
             lateral: self.device.upload("lateral motions", &setup.lateral)?,
             cases: self.device.upload::<LaneCase<f32>>("cases", &[])?,
+            drawn: self.device.upload::<u32>("drawn samples", &[])?,
             generator,
         };
         let session = self.next_session;

@@ -167,6 +167,48 @@ pub struct Generation {
     pub first_factor_of: u32,
     /// Offset of the transformation's knots.
     pub first_knot: u32,
+    /// Offset of the edges of the map's cells.
+    pub first_edge: u32,
     /// Entries of each sample in the table of instants.
     pub stride: u32,
+    /// A uniform record is a multiple of 16 bytes.
+    pub reserved_0: u32,
+    /// As above.
+    pub reserved_1: u32,
+    /// As above.
+    pub reserved_2: u32,
+}
+
+/// What is counted of a sample besides its lanes.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
+pub struct DrawnRecord {
+    /// Draws; more than [`ATTEMPTS`](crate::engine::generated::ATTEMPTS) if all were invalid.
+    pub tries: u32,
+    /// Component of the mixture.
+    pub component: u32,
+    /// Cell of the map, row by row from below; a larger number outside.
+    pub cell: u32,
+    /// 1 if the sample draws a close headway.
+    pub is_close: u32,
+}
+
+/// One dispatch of the counting.
+#[repr(C)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Pod, Zeroable)]
+pub struct Tally {
+    /// Samples of the job.
+    pub samples: u32,
+    /// The first of them among the drawn ones.
+    pub first_drawn: u32,
+    /// Verdict words of each model.
+    pub words: u32,
+    /// Samples that the list of those left to the host holds.
+    pub max_left: u32,
+    /// Bit of each headway below the limit of close following.
+    pub close_headways: u32,
+    /// Bit of each headway that the sample draws.
+    pub drawn_headways: u32,
+    /// How verdicts mark lanes: two bits per model.
+    pub marks: u32,
 }

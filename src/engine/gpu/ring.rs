@@ -7,7 +7,7 @@ use bytemuck::Zeroable;
 
 use super::device::{Device, PipelineSpec};
 use super::generator::Inputs;
-use super::records::{Launch, OutcomeRecord};
+use super::records::{Launch, OutcomeRecord, Tally};
 use super::shader::WORKGROUP;
 use crate::model::criterion::Criteria;
 use crate::{Error, Result};
@@ -32,7 +32,23 @@ pub(super) struct Job {
     pub headways: u32,
     /// Whether the pipelines write outcomes.
     pub has_outcomes: bool,
+    /// Counts the lanes after them.
+    pub tally: Option<TallyJob>,
 }
+
+/// The counting of a job.
+#[derive(Debug, Clone)]
+pub(super) struct TallyJob {
+    pub constants: Vec<(&'static str, f64)>,
+    /// Number of counts.
+    pub counts: usize,
+    pub close_headways: u32,
+    pub drawn_headways: u32,
+    pub marks: u32,
+}
+
+/// Samples of a job that may be left to the host; with more, the host counts all of them.
+pub(super) const MAX_LEFT: u32 = 1 << 16;
 
 /// The lanes of one model with all cases of a job, or with those of one variant.
 #[derive(Debug, Clone)]
@@ -89,6 +105,10 @@ pub(super) struct Answer {
     pub words: Vec<Vec<u32>>,
     /// Outcomes of each model, if requested.
     pub outcomes: Vec<Vec<OutcomeRecord>>,
+    /// Counts, if requested.
+    pub counts: Vec<u32>,
+    /// Samples left to the host, counted from the first of the job; `None` if they are too many.
+    pub left: Option<Vec<u32>>,
     /// Time of the slowest dispatch, s.
     pub slowest_s: f64,
     /// Time of all dispatches, s.
@@ -106,6 +126,9 @@ struct Buffers {
     verdicts: wgpu::Buffer,
     outcomes: wgpu::Buffer,
     finished: wgpu::Buffer,
+    tally: wgpu::Buffer,
+    counts: wgpu::Buffer,
+    left: wgpu::Buffer,
     readback: wgpu::Buffer,
     timing: Option<(wgpu::QuerySet, wgpu::Buffer)>,
     dispatches: usize,
@@ -117,6 +140,8 @@ struct ResultSizes {
     verdicts: u64,
     outcomes: u64,
     finished: u64,
+    counts: u64,
+    left: u64,
     times: u64,
 }
 
@@ -126,13 +151,15 @@ impl ResultSizes {
             verdicts: (job.models * job.words() * 4) as u64,
             outcomes: (job.models * job.records() * size_of::<OutcomeRecord>()) as u64,
             finished: (job.dispatches.len() * 4) as u64,
+            counts: job.tally.as_ref().map_or(0, |tally| tally.counts as u64 * 4),
+            left: if job.tally.is_some() { u64::from(MAX_LEFT + 1) * 4 } else { 0 },
             times: (job.dispatches.len() * 16) as u64,
         }
     }
 
     fn total(&self) -> u64 {
         // Times are 64-bit words, so they start at a multiple of 8 bytes.
-        (self.verdicts + self.outcomes + self.finished).next_multiple_of(8) + self.times
+        (self.verdicts + self.outcomes + self.finished + self.counts + self.left).next_multiple_of(8) + self.times
     }
 }
 
@@ -152,6 +179,7 @@ impl Slot {
         let parts = ResultSizes::of(&job);
         self.grow(device, &parts, dispatches);
         let pipelines = device.pipelines(job.dispatches.iter().map(|dispatch| &dispatch.pipeline))?;
+        let tally_pipeline = job.tally.as_ref().map(|tally| device.tally(&tally.constants)).transpose()?;
         let buffers = self.buffers.as_ref().ok_or_else(|| device.failed("it has no buffers"))?;
         let stride = launch_stride(device);
         let mut launches = vec![0_u8; stride as usize * dispatches];
@@ -190,6 +218,8 @@ impl Slot {
             (&buffers.verdicts, parts.verdicts),
             (&buffers.outcomes, parts.outcomes),
             (&buffers.finished, parts.finished),
+            (&buffers.counts, parts.counts),
+            (&buffers.left, parts.left),
         ];
         for (buffer, bytes) in results.into_iter().filter(|(_, bytes)| *bytes > 0) {
             encoder.clear_buffer(buffer, 0, Some(bytes));
@@ -204,6 +234,36 @@ impl Slot {
             let mut pass = encoder.begin_compute_pass(&wgpu::ComputePassDescriptor { label, timestamp_writes });
             pass.set_pipeline(pipeline);
             pass.set_bind_group(0, &group, &[at as u32 * stride]);
+            pass.dispatch_workgroups(x, y, 1);
+        }
+        if let (Some(tally), Some(pipeline)) = (&job.tally, &tally_pipeline) {
+            let samples = job.cases;
+            let record = Tally {
+                samples,
+                first_drawn: job.first_case,
+                words: job.words() as u32,
+                max_left: MAX_LEFT,
+                close_headways: tally.close_headways,
+                drawn_headways: tally.drawn_headways,
+                marks: tally.marks,
+            };
+            device.queue.write_buffer(&buffers.tally, 0, bytemuck::bytes_of(&record));
+            let group = device.device.create_bind_group(&wgpu::BindGroupDescriptor {
+                label: Some("tally"),
+                layout: &device.tally_layout,
+                entries: &[
+                    binding(0, buffers.tally.as_entire_binding()),
+                    binding(1, inputs.drawn.as_entire_binding()),
+                    binding(2, buffers.verdicts.as_entire_binding()),
+                    binding(3, buffers.counts.as_entire_binding()),
+                    binding(4, buffers.left.as_entire_binding()),
+                ],
+            });
+            let (x, y) = device.grid(samples.div_ceil(WORKGROUP));
+            let mut pass = encoder
+                .begin_compute_pass(&wgpu::ComputePassDescriptor { label: Some("tally"), timestamp_writes: None });
+            pass.set_pipeline(pipeline);
+            pass.set_bind_group(0, &group, &[]);
             pass.dispatch_workgroups(x, y, 1);
         }
         let mut at = 0;
@@ -271,6 +331,8 @@ impl Slot {
                 && b.verdicts.size() >= parts.verdicts
                 && b.outcomes.size() >= parts.outcomes
                 && b.finished.size() >= parts.finished
+                && b.counts.size() >= parts.counts
+                && b.left.size() >= parts.left
                 && b.readback.size() >= parts.total()
         });
         if enough {
@@ -287,6 +349,9 @@ impl Slot {
             verdicts: device.buffer("verdicts", room(parts.verdicts, max_bytes), results),
             outcomes: device.buffer("outcomes", room(parts.outcomes, max_bytes), results),
             finished: device.buffer("finished", room(parts.finished, max_bytes), results),
+            tally: device.buffer("tally", size_of::<Tally>() as u64, Use::UNIFORM | Use::COPY_DST),
+            counts: device.buffer("counts", room(parts.counts, max_bytes), results),
+            left: device.buffer("samples left", parts.left, results),
             readback: device.buffer(
                 "results",
                 room(parts.total(), limits.max_buffer_size),
@@ -319,7 +384,14 @@ fn read(device: &Device, flight: &Flight, bytes: &[u8], wall_s: f64) -> Result<A
     let models = job.models;
     let (verdicts, rest) = bytes.split_at(parts.verdicts as usize);
     let (outcomes, rest) = rest.split_at(parts.outcomes as usize);
-    let finished: Vec<u32> = bytemuck::pod_collect_to_vec(&rest[..parts.finished as usize]);
+    let (finished, rest) = rest.split_at(parts.finished as usize);
+    let (counts, rest) = rest.split_at(parts.counts as usize);
+    let finished: Vec<u32> = bytemuck::pod_collect_to_vec(finished);
+    let left: Vec<u32> = bytemuck::pod_collect_to_vec(&rest[..parts.left as usize]);
+    let left = match left.first() {
+        None => Some(Vec::new()),
+        Some(&number) => left.get(1..=number as usize).map(<[u32]>::to_vec),
+    };
     let times = &bytes[(parts.total() - parts.times) as usize..parts.total() as usize];
     let expected = |at: usize| job.launch(at).lanes;
     if let Some(at) = (0..finished.len()).find(|&at| finished[at] != expected(at)) {
@@ -329,10 +401,10 @@ fn read(device: &Device, flight: &Flight, bytes: &[u8], wall_s: f64) -> Result<A
             "use option `backend = cpu`; if lanes have very many steps, a larger time step (option `dt`) may help";
         return Err(Error::device(&device.name, problem, help));
     }
-    let per_model = |part: &[u8], model: usize| {
+    fn per_model(part: &[u8], models: usize, model: usize) -> &[u8] {
         let length = part.len() / models;
-        part[model * length..(model + 1) * length].to_vec()
-    };
+        &part[model * length..(model + 1) * length]
+    }
     let times: Vec<u64> = bytemuck::pod_collect_to_vec(times);
     let period_s = f64::from(device.queue.get_timestamp_period()) * 1e-9;
     let dispatches = times.chunks_exact(2).map(|t| t[1].saturating_sub(t[0]) as f64 * period_s);
@@ -342,15 +414,17 @@ fn read(device: &Device, flight: &Flight, bytes: &[u8], wall_s: f64) -> Result<A
     // If the timestamps do not work, the wall-clock time is used; it is an upper bound.
     let timed = slowest_s > 0.0;
     Ok(Answer {
-        words: (0..models).map(|m| bytemuck::pod_collect_to_vec(&per_model(verdicts, m))).collect(),
+        words: (0..models).map(|m| bytemuck::pod_collect_to_vec(per_model(verdicts, models, m))).collect(),
         outcomes: (0..models)
             .map(|m| {
-                let part = per_model(outcomes, m);
+                let part = per_model(outcomes, models, m);
                 let mut records = vec![OutcomeRecord::zeroed(); part.len() / size_of::<OutcomeRecord>()];
-                bytemuck::cast_slice_mut(&mut records).copy_from_slice(&part);
+                bytemuck::cast_slice_mut(&mut records).copy_from_slice(part);
                 records
             })
             .collect(),
+        counts: bytemuck::pod_collect_to_vec(counts),
+        left,
         slowest_s: if timed { slowest_s } else { wall_s },
         device_s: if timed { device_s } else { wall_s },
     })

@@ -13,10 +13,12 @@ use super::device::{GpuOptions, PipelineSpec, Tampering};
 use super::generator::GeneratorSetup;
 use super::owner::{self, Cases, Command, Prepared, Request, Setup};
 use super::records::StartRecord;
-use super::ring::{Answer, Dispatch, Job, RING};
+use super::ring::{Answer, Dispatch, Job, RING, TallyJob};
 use super::shader::{self, Specialization};
+use crate::engine::counting::{PackedLanes, close_headways, mark_bits};
 use crate::engine::{
-    Backend, Chunk, Constants, DeviceRecord, DeviceScene, LaneCase, LanePlan, Outcome, Session, Verdicts, Wanted,
+    Backend, Chunk, Constants, CountLayout, Counted, Counting, DeviceRecord, DeviceScene, LaneCase, LanePlan, Outcome,
+    Session, Verdicts, Wanted,
 };
 use crate::model::driver::ModelId;
 use crate::scenario::Tables;
@@ -47,7 +49,45 @@ pub(super) struct GpuSession<'p> {
     window: Option<(usize, Range<u64>, Vec<DeviceScene>)>,
     /// Time of all dispatches so far, s.
     device_s: f64,
+    /// Counts lanes on the device.
+    counting: Option<(CountLayout, TallyJob)>,
+    /// Units of the call after the next one.
+    announced: Option<Range<u64>>,
+    /// Jobs of announced units.
+    ahead: Option<Ahead>,
+    /// A job of this call left too many samples.
+    uncounted: bool,
 }
+
+/// Jobs that were sent before their call.
+struct Ahead {
+    wanted: Wanted,
+    /// Plan units, from the first to the last that was sent.
+    units: Range<u64>,
+    pieces: VecDeque<Piece>,
+}
+
+/// Maximum number of samples of a counted job, so that no count of it overflows.
+const MAX_COUNTED: u64 = 1 << 25;
+
+/// The counting of a plan, if a device can do it: few enough counts for a workgroup, and a bit for each headway.
+fn counter(plan: &LanePlan, counting: &Counting) -> Option<(CountLayout, TallyJob)> {
+    let layout = CountLayout::new(plan, counting);
+    let fits = plan.generator().is_some()
+        && plan.blocks.len() == 1
+        && plan.headways.len() < 32
+        && layout.of_every_sample() <= GATHERED
+        && layout.total() <= MAX_COUNTS;
+    let [close_headways, drawn_headways] = close_headways(&plan.headways[..plan.headways.len().min(31)]);
+    let constants = layout.shader_constants(counting.criterion);
+    let tally = TallyJob { constants, counts: layout.total(), close_headways, drawn_headways, marks: 0 };
+    fits.then_some((layout, tally))
+}
+
+/// Counts that a workgroup gathers: the same number is in `shaders/tally.wgsl`.
+const GATHERED: usize = 1024;
+/// Maximum number of counts of a job.
+const MAX_COUNTS: usize = 1 << 20;
 
 /// Part of a run in flight.
 struct Piece {
@@ -58,7 +98,13 @@ struct Piece {
 }
 
 impl<'p> GpuSession<'p> {
-    fn new(plan: &'p LanePlan, device: String, commands: Sender<Command>, options: &GpuOptions) -> Result<Self> {
+    fn new(
+        plan: &'p LanePlan,
+        counting: Option<&Counting>,
+        device: String,
+        commands: Sender<Command>,
+        options: &GpuOptions,
+    ) -> Result<Self> {
         ModelId::refuse_foreign(&plan.models, "a device")?;
         let queue = options.lanes_per_invocation != Some(1);
         let constants: Vec<Constants<f32>> =
@@ -76,7 +122,7 @@ impl<'p> GpuSession<'p> {
             starts: plan.headways.iter().map(|h| StartRecord::from(h.start::<f32>())).collect(),
             speed: tables.speed,
             lateral: tables.lateral,
-            generator: plan.generator().map(GeneratorSetup::new),
+            generator: plan.generator().map(|generator| GeneratorSetup::new(generator, counting)),
             models: plan.models.len() as u64,
             pipelines,
         });
@@ -84,8 +130,9 @@ impl<'p> GpuSession<'p> {
         commands.send(Command::Prepare { setup, reply }).map_err(|_| owner::gone(&device))?;
         let prepared = answer.recv().map_err(|_| owner::gone(&device))??;
         let pacer = Pacer::new(options.first_lanes.min(FIRST_STEPS / u64::from(plan.profile.step_cap().max(1))));
+        let counting = counting.and_then(|counting| counter(plan, counting));
         let split_scenes = options.split_scenes.unwrap_or(true);
-        let (window, device_s) = (None, 0.0);
+        let (window, device_s, announced, ahead) = (None, 0.0, None, None);
         Ok(GpuSession {
             plan,
             device,
@@ -98,6 +145,10 @@ impl<'p> GpuSession<'p> {
             fastest,
             window,
             device_s,
+            counting,
+            announced,
+            ahead,
+            uncounted: false,
         })
     }
 
@@ -137,9 +188,14 @@ impl<'p> GpuSession<'p> {
         let Some((_, held, scenes)) = &self.window else {
             return Err(Error::Internal("no cases are on the device".to_owned()));
         };
-        let count = self.pacer.units(per_unit, max_lanes);
-        let end = units.end.min(units.start + count).min(held.end);
         let has_outcomes = wanted == Wanted::Outcomes;
+        let tally = self
+            .counting
+            .as_ref()
+            .filter(|_| !has_outcomes)
+            .map(|(_, tally)| TallyJob { marks: mark_bits(plan, wanted.watch()), ..tally.clone() });
+        let count = self.pacer.units(per_unit, max_lanes).min(if tally.is_some() { MAX_COUNTED } else { u64::MAX });
+        let end = units.end.min(units.start + count).min(held.end);
         let constants = &self.constants[block];
         let mut dispatches = Vec::new();
         for (variant, &known) in (0..).zip(scenes) {
@@ -166,6 +222,7 @@ impl<'p> GpuSession<'p> {
             variants: variants as u32,
             headways: plan.headways.len() as u32,
             has_outcomes,
+            tally,
         };
         let (reply, answer) = mpsc::channel();
         let request = Box::new(Request { session: self.prepared.session, cases, job, reply });
@@ -175,10 +232,10 @@ impl<'p> GpuSession<'p> {
 
     /// The scenes of cases, by variant if these differ.
     fn scenes(&self, cases: &[LaneCase<f32>], variants: usize) -> Vec<DeviceScene> {
-        let dt = self.plan.profile.frame.dt_s as f32;
+        let (dt, fastest) = (self.plan.profile.frame.dt_s as f32, self.fastest);
         let of_variant = |variant: usize| {
             let cases = cases.iter().skip(variant).step_by(variants);
-            cases.map(|case| DeviceScene::of(case, self.fastest, dt)).reduce(DeviceScene::join)
+            cases.map(|case| DeviceScene::of(case, fastest, dt)).reduce(DeviceScene::join)
         };
         let mut scenes: Vec<DeviceScene> = (0..variants).into_par_iter().filter_map(of_variant).collect();
         if !self.split_scenes || scenes.windows(2).all(|two| two[0] == two[1]) {
@@ -198,6 +255,17 @@ impl<'p> GpuSession<'p> {
         self.pacer.observe(lanes as u64 / models as u64, answer.slowest_s);
         self.device_s += answer.device_s;
         let from = (block.first_lane + piece.units.start * per_unit - chunk.first_lane) as usize;
+        if let Some(counted) = &mut chunk.counted {
+            for (sum, count) in counted.counts.iter_mut().zip(answer.counts) {
+                *sum += u64::from(count);
+            }
+            match answer.left {
+                Some(left) => counted.left.extend(left.iter().map(|sample| piece.units.start + u64::from(*sample))),
+                None => self.uncounted = true,
+            }
+            counted.packed.push(PackedLanes { first: (from / models) as u64, words: answer.words });
+            return Ok(());
+        }
         spread(&answer.words, &mut chunk.verdicts[from..from + lanes]);
         if wanted == Wanted::Outcomes {
             let criteria = &self.constants[piece.block].criteria;
@@ -213,35 +281,97 @@ impl<'p> GpuSession<'p> {
         Ok(())
     }
 
+    /// Sends one job of plan units; returns it and the first unit after it.
+    fn send_next(&mut self, units: Range<u64>, wanted: Wanted) -> Result<Option<(Piece, u64)>> {
+        let Some((block, inside)) = self.plan.segments(units.clone()).into_iter().next() else { return Ok(None) };
+        let piece = self.send(block, inside.clone(), wanted)?;
+        let end = units.start + (piece.units.end - inside.start);
+        Ok(Some((piece, end)))
+    }
+
+    /// The jobs of an interval of units that an announcement has sent; waits for others and drops them.
+    fn take_ahead(&mut self, units: &Range<u64>, wanted: Wanted) -> (VecDeque<Piece>, u64) {
+        match self.ahead.take() {
+            Some(Ahead { wanted: theirs, units: sent, pieces })
+                if theirs == wanted && sent.start == units.start && sent.end <= units.end =>
+            {
+                (pieces, sent.end)
+            }
+            other => {
+                for piece in other.into_iter().flat_map(|ahead| ahead.pieces) {
+                    // Nobody wants its results, nor its error: the next job has it too.
+                    let _ = piece.answer.recv();
+                }
+                (VecDeque::new(), units.start)
+            }
+        }
+    }
+
+    /// Fills the ring with jobs of announced units beside `flying` others.
+    fn send_ahead(&mut self, flying: usize, wanted: Wanted) {
+        let Some(announced) = self.announced.clone() else { return };
+        let start = announced.start;
+        let mut ahead =
+            self.ahead.take().unwrap_or_else(|| Ahead { wanted, units: start..start, pieces: VecDeque::new() });
+        while flying + ahead.pieces.len() < RING {
+            match self.send_next(ahead.units.end..announced.end, wanted) {
+                Ok(Some((piece, end))) => {
+                    ahead.pieces.push_back(piece);
+                    ahead.units.end = end;
+                }
+                Ok(None) => break,
+                Err(_) => {
+                    // The call of these units sends them again and returns the error.
+                    self.announced = None;
+                    break;
+                }
+            }
+        }
+        self.ahead = Some(ahead);
+    }
+
     /// Sends the jobs of an interval of units and collects their results.
     fn run_jobs(&mut self, units: Range<u64>, wanted: Wanted) -> Result<Chunk> {
         let plan = self.plan;
         let first_lane = plan.first_lane_of(units.start);
         let lanes = (plan.first_lane_of(units.end) - first_lane) as usize;
+        let counted = self.counting.as_ref().filter(|_| wanted != Wanted::Outcomes).map(|(layout, _)| Counted {
+            layout: *layout,
+            counts: vec![0; layout.total()],
+            left: Vec::new(),
+            packed: Vec::new(),
+        });
         let mut chunk = Chunk {
             units: units.clone(),
             first_lane,
-            verdicts: vec![Verdicts::default(); lanes],
+            verdicts: vec![Verdicts::default(); if counted.is_some() { 0 } else { lanes }],
             outcomes: Vec::new(),
             valued: None,
+            counted,
             redone_and_rechecked: [0; 2],
         };
-        let mut pending: VecDeque<Piece> = VecDeque::new();
-        for (block, inside) in plan.segments(units) {
-            let mut from = inside.start;
-            while from < inside.end {
-                let piece = self.send(block, from..inside.end, wanted)?;
-                from = piece.units.end;
+        self.uncounted = false;
+        let (mut pending, mut from) = self.take_ahead(&units, wanted);
+        loop {
+            while pending.len() < RING
+                && let Some((piece, end)) = self.send_next(from..units.end, wanted)?
+            {
+                from = end;
                 pending.push_back(piece);
-                if pending.len() == RING
-                    && let Some(oldest) = pending.pop_front()
-                {
-                    self.collect(oldest, &mut chunk, wanted)?;
-                }
             }
+            if from == units.end {
+                self.send_ahead(pending.len(), wanted);
+            }
+            let Some(oldest) = pending.pop_front() else { break };
+            self.collect(oldest, &mut chunk, wanted)?;
         }
-        for piece in pending {
-            self.collect(piece, &mut chunk, wanted)?;
+        if let Some(counted) = &mut chunk.counted {
+            counted.left.sort_unstable();
+            if self.uncounted {
+                // Too many samples were left: the host counts them all.
+                chunk.verdicts = (0..lanes).into_par_iter().map(|at| counted.verdicts(at)).collect();
+                chunk.counted = None;
+            }
         }
         Ok(chunk)
     }
@@ -250,11 +380,17 @@ impl<'p> GpuSession<'p> {
 impl Session for GpuSession<'_> {
     fn run(&mut self, units: Range<u64>, wanted: Wanted) -> Result<Chunk> {
         let chunk = self.run_jobs(units, wanted);
+        self.announced = None;
         if chunk.is_err() {
             // It is unknown whether the failed job copied its cases to the device.
             self.window = None;
+            self.ahead = None;
         }
         chunk
+    }
+
+    fn announce(&mut self, units: Range<u64>) {
+        self.announced = Some(units);
     }
 
     fn chunk_lanes(&self, wanted: Wanted) -> u64 {
@@ -394,7 +530,12 @@ impl Backend for GpuBackend {
 
     fn prepare<'p>(&self, plan: &'p LanePlan) -> Result<Box<dyn Session + 'p>> {
         let commands = self.commands.clone();
-        Ok(Box::new(GpuSession::new(plan, self.card.name.clone(), commands, &self.options)?))
+        Ok(Box::new(GpuSession::new(plan, None, self.card.name.clone(), commands, &self.options)?))
+    }
+
+    fn prepare_counting<'p>(&self, plan: &'p LanePlan, counting: &Counting) -> Result<Box<dyn Session + 'p>> {
+        let commands = self.commands.clone();
+        Ok(Box::new(GpuSession::new(plan, Some(counting), self.card.name.clone(), commands, &self.options)?))
     }
 }
 

@@ -49,6 +49,20 @@ pub const GENERATOR: [(&str, &str); 8] = [
     ("shared/decode.wgsl", include_str!("../../../shaders/shared/decode.wgsl")),
 ];
 
+/// Entry point of the pipeline that counts.
+pub const COUNT: &str = "count_samples";
+
+/// Fragments of the counting, in the order in which they are joined.
+pub const TALLY: [(&str, &str); 2] = [
+    ("shared/records.wgsl", include_str!("../../../shaders/shared/records.wgsl")),
+    ("tally.wgsl", include_str!("../../../shaders/tally.wgsl")),
+];
+
+/// The source of the counting's pipeline.
+pub fn assemble_tally() -> String {
+    TALLY.iter().fold(format!("const MODELS: u32 = {MODELS}u;\n"), |source, (_, text)| source + text + "\n")
+}
+
 /// Defines the list of the models' files from the registry.
 macro_rules! declare_shaders {
     ($($(#[$attribute:meta])* $file:ident, $model:ident, $profile:ident, $name:literal;)+) => {

@@ -2,6 +2,7 @@
 //! samples. After the first samples, values are computed only for lanes that may still be among the worst.
 
 use std::ops::Range;
+use std::sync::Arc;
 use std::time::Instant;
 
 use serde::Serialize;
@@ -57,8 +58,11 @@ pub struct CrudeRun {
     pub summary: SweepSummary,
 }
 
+/// Receives every chunk with its lanes. Without a receiver, a device counts lanes where they are.
+pub type EachChunk<'a> = dyn FnMut(&Chunk) -> Result<()> + 'a;
+
 /// Samples `range` of a plan that generates its own cases; risks follow from the exposure. The stop rules are evaluated
-/// after 4,096·2^k samples. `each` receives every chunk (for rows and progress).
+/// after 4,096·2^k samples. `each` receives every chunk (for rows).
 ///
 /// # Errors
 /// [`Error::Usage`] for stop rules with a partial range, or for an end beyond the plan; those of the backends and of
@@ -69,11 +73,11 @@ pub fn sample_crude(
     executor: &Executor,
     options: &SampleOptions,
     exposure: Option<&Exposure>,
-    each: impl FnMut(&Chunk) -> Result<()>,
+    each: Option<&mut EachChunk<'_>>,
 ) -> Result<CrudeRun> {
     let cuts = cuts(plan.unit_count(), &range);
     let mut ledger = Ledger::new(range, &cuts);
-    sample_into(plan, &mut ledger, executor, options, exposure, false, each)
+    sample_into(plan, &mut ledger, executor, options, exposure, false, &mut |_| (), each)
 }
 
 /// The sample sizes at which a run of `samples` samples is evaluated.
@@ -89,7 +93,7 @@ pub fn cuts(samples: u64, range: &Range<u64>) -> Vec<u64> {
 }
 
 /// The same for samples that the ledger does not hold; its cuts must be those of [`cuts`]. With `every_value`, chunks
-/// passed to `each` have the outcome of every lane.
+/// passed to `each` have the outcome of every lane. `progress` receives the number of samples of every chunk.
 ///
 /// # Errors
 /// As [`sample_crude`], and those of the ledger's journal; [`Error::Interrupted`].
@@ -100,7 +104,8 @@ pub fn sample_into(
     options: &SampleOptions,
     exposure: Option<&Exposure>,
     every_value: bool,
-    mut each: impl FnMut(&Chunk) -> Result<()>,
+    progress: &mut dyn FnMut(u64),
+    mut each: Option<&mut EachChunk<'_>>,
 ) -> Result<CrudeRun> {
     let started = Instant::now();
     let range = ledger.units();
@@ -117,6 +122,8 @@ pub fn sample_into(
         let problem = "a part of a run cannot tell when the whole is good enough";
         return Err(Error::usage(Place::option("shard"), problem, "leave the stop rules out, or option `shard`"));
     }
+    let counting = each.is_none().then(|| Arc::new(SampleTally::counting(plan, options)));
+    let executor = &Executor { counting, ..executor.clone() };
     let mut tally = SampleTally::empty(plan, options);
     let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
     let mut convergence = Vec::new();
@@ -136,8 +143,14 @@ pub fn sample_into(
                     known.map_or(Wanted::Outcomes, |known| wanted(plan, &known, options))
                 }
             };
+            // The first chunk of a sweep is a short one.
+            let mut is_checked = executor.recheck.is_none();
             let part = executor.sweep(plan, missing, wanted, |chunk| {
-                each(&chunk)?;
+                if !std::mem::replace(&mut is_checked, true) {
+                    SampleTally::check_counted(plan, &chunk, options, &executor.backend.describe())?;
+                }
+                progress(chunk.units.end - chunk.units.start);
+                each.as_mut().map_or(Ok(()), |each| each(&chunk))?;
                 ledger.add(SampleTally::of_chunk(plan, &chunk, options)?, chunk.redone_and_rechecked)
             });
             summary.add(&ledger.kept(part)?);

@@ -4,7 +4,7 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::engine::{Chunk, LanePlan};
+use crate::engine::{Chunk, LanePlan, Verdicts};
 use crate::model::criterion::Criterion;
 use crate::stats::estimate::{ClusterRate, Clusters, cluster_rate};
 
@@ -54,6 +54,26 @@ impl KernelCounts {
                 }
             }
         });
+    }
+
+    /// Counts that a backend has made: samples by group, then failures in the order of these.
+    pub(super) fn counted(samples: &[u64], failures: &[u64]) -> KernelCounts {
+        KernelCounts { samples: samples.to_vec(), failures: failures.to_vec() }
+    }
+
+    /// Counts one sample; `verdicts` has one per lane of it.
+    pub(super) fn count_sample(&mut self, kernel: u32, verdicts: &[Verdicts]) {
+        if kernel == NO_KERNEL {
+            return;
+        }
+        let groups = self.samples.len();
+        let group = kernel as usize % groups;
+        self.samples[group] += 1;
+        for (verdicts, counts) in verdicts.iter().zip(self.failures.chunks_mut(Criterion::ALL.len() * groups)) {
+            for criterion in Criterion::ALL {
+                counts[criterion.index() * groups + group] += u64::from(verdicts.failed(criterion));
+            }
+        }
     }
 
     pub(super) fn add(&mut self, other: &KernelCounts) {

@@ -29,7 +29,9 @@ pub use compare::{
     CategoryComparison, ComparedCell, ComparedForm, ComparedParameterization, RateRecord, RecordedCell, ReplayedCell,
     SampledCell, SampledScenarios, ScenarioCounts, compare_cells, kernel_scenarios, recorded_cells, sample_by_scenario,
 };
-pub use crude::{Checkpoint, CheckpointRow, CrudeRun, checkpoints, crude_of_segments, cuts, sample_crude, sample_into};
+pub use crude::{
+    Checkpoint, CheckpointRow, CrudeRun, EachChunk, checkpoints, crude_of_segments, cuts, sample_crude, sample_into,
+};
 pub use generator::{SAMPLE_PURPOSE, SampleSource, generator_of, generator_of_points};
 pub use kernels::KernelCounts;
 pub(crate) use limit_state::marks_of;
@@ -41,7 +43,7 @@ use plan_file::{KIND, SEARCH_FILE};
 pub use proposal_file::{proposal_from_text, proposal_text, read_proposal};
 pub use rows::{EstimateRow, Risk, RiskRate, crude_rows, headway_name};
 pub use sample_options::{Estimator, SampleOptions};
-pub use sample_run::{EachChunk, SampleResult, SampleRun};
+pub use sample_run::{SampleResult, SampleRun};
 pub use tally::{SampleTally, WorstSample};
 pub use uncertainty::Uncertainty;
 pub use weighted::WeightedTally;

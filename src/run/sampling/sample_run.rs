@@ -4,7 +4,7 @@
 use std::ops::Range;
 use std::path::Path;
 
-use super::crude::{CrudeRun, crude_of_segments, cuts, sample_into};
+use super::crude::{CrudeRun, EachChunk, crude_of_segments, cuts, sample_into};
 use super::model_ratios::{ModelRatio, ProfileRatios};
 use super::plan_file::SEARCH_FILE;
 use super::rows::EstimateRow;
@@ -12,15 +12,12 @@ use super::sample_options::Estimator;
 use super::tally::SampleTally;
 use super::weighted::WeightedTally;
 use super::{Sample, SampleKind};
-use crate::engine::{Chunk, Executor};
+use crate::engine::Executor;
 use crate::run::parts::{Ledger, MergeableCounts, PLAN_FILE, RunDir, RunState, Shard, read_parts, units_of};
 use crate::stats::density::Mixture;
 use crate::stats::estimate::SearchRound;
 use crate::support::run_dir::{ESTIMATE_RECORD, Results};
 use crate::{Error, Place, Result};
-
-/// Receives the chunks of crude Monte Carlo.
-pub type EachChunk<'c> = dyn FnMut(&Chunk) -> Result<()> + 'c;
 
 /// A sampling run, or one of its shards, in a folder. It continues from the journal of an earlier process.
 pub struct SampleRun<'s> {
@@ -51,7 +48,7 @@ impl Sample {
             SampleKind::Crude(plan) => {
                 let mut ledger = Ledger::new(units.clone(), &cuts(units.end, &units));
                 let (options, exposure) = (&self.options, self.exposure());
-                let run = sample_into(plan, &mut ledger, executor, options, exposure, false, |_| Ok(()))?;
+                let run = sample_into(plan, &mut ledger, executor, options, exposure, false, &mut |_| (), None)?;
                 Ok(SampleResult::of_crude(run))
             }
             SampleKind::Weighted(weighted) => {
@@ -182,7 +179,7 @@ impl SampleRun<'_> {
         &mut self,
         executor: &Executor,
         progress: &mut dyn FnMut(u64),
-        mut chunks: Option<&mut EachChunk>,
+        chunks: Option<&mut EachChunk<'_>>,
     ) -> Result<()> {
         let _resumable = self.is_journalled.then(|| executor.cancel.resumable());
         match (&mut self.state, &self.sample.kind) {
@@ -192,11 +189,8 @@ impl SampleRun<'_> {
                 }
                 let (options, exposure) = (&self.sample.options, self.sample.exposure());
                 let every_value = chunks.is_some();
-                let each = |chunk: &Chunk| {
-                    progress(chunk.units.end - chunk.units.start);
-                    chunks.as_mut().map_or(Ok(()), |each| each(chunk))
-                };
-                let run = sample_into(plan, &mut state.ledger, executor, options, exposure, every_value, each)?;
+                let ledger = &mut state.ledger;
+                let run = sample_into(plan, ledger, executor, options, exposure, every_value, progress, chunks)?;
                 self.crude = Some(run);
                 Ok(())
             }

@@ -8,10 +8,10 @@ use serde::{Deserialize, Serialize};
 
 use super::kernels::{KernelCounts, NO_KERNEL};
 use super::limit_state::limit_state;
-use super::map::MapCounts;
+use super::map::{MAP_CELLS, MapAxes, MapCounts};
 use super::sample_options::SampleOptions;
 use crate::engine::generated::{ATTEMPTS, DrawnPoint, Generator};
-use crate::engine::{CLOSE_HEADWAY_S, Chunk, Headway, LanePlan};
+use crate::engine::{CLOSE_HEADWAY_S, Chunk, CountLayout, Counted, Counting, Headway, LanePlan, Verdicts};
 use crate::model::criterion::Criterion;
 use crate::run::close_following::CloseFollowing;
 use crate::run::parts::MergeableCounts;
@@ -81,6 +81,78 @@ impl SampleTally {
         }
     }
 
+    /// What a backend must count beside the lanes, for tallies of a plan with these options.
+    pub fn counting(plan: &LanePlan, options: &SampleOptions) -> Counting {
+        Counting {
+            criterion: options.criterion,
+            map: options.map.as_ref().map(MapAxes::counted),
+            groups: KernelCounts::empty(plan).map_or(0, |counts| counts.shape()[0]),
+        }
+    }
+
+    /// Counts a chunk that a backend has counted once more, from its verdicts.
+    ///
+    /// # Errors
+    /// [`Error::Verification`] if the backend's counts are others; as [`SampleTally::of_chunk`].
+    pub fn check_counted(plan: &LanePlan, chunk: &Chunk, options: &SampleOptions, backend: &str) -> Result<()> {
+        if chunk.counted.is_none() {
+            return Ok(());
+        }
+        let counted = SampleTally::of_chunk(plan, chunk, options)?;
+        let lanes = (plan.first_lane_of(chunk.units.end) - chunk.first_lane) as usize;
+        let own = |at: usize| match chunk.valued_lane(chunk.first_lane + at as u64) {
+            Some(outcome) => outcome.verdicts,
+            None => chunk.verdicts_of(at),
+        };
+        let verdicts = (0..lanes).into_par_iter().map(own).collect();
+        let again = SampleTally::of_chunk(plan, &Chunk { verdicts, counted: None, ..chunk.clone() }, options)?;
+        if counted == again {
+            return Ok(());
+        }
+        Err(Error::Verification(format!(
+            "{backend} counted samples {} to {} otherwise than the CPU counts their verdicts; use option `backend = cpu`",
+            chunk.units.start,
+            chunk.units.end - 1
+        )))
+    }
+
+    /// Counts that a backend has made. The samples that it left are counted here.
+    fn of_counted(plan: &LanePlan, chunk: &Chunk, counted: &Counted, options: &SampleOptions) -> SampleTally {
+        let (layout, all) = (&counted.layout, &counted.counts);
+        let mut tally = SampleTally {
+            voids: all[CountLayout::VOIDS],
+            tries: all[CountLayout::TRIES],
+            close_lanes: all[CountLayout::CLOSE_LANES],
+            failures: all[layout.failures()].to_vec(),
+            squares: all[layout.squares()].to_vec(),
+            capped: all[layout.capped()].to_vec(),
+            close_failures: all[layout.close_failures()].to_vec(),
+            ..SampleTally::empty(plan, options)
+        };
+        if let Some(map) = &mut tally.map {
+            map.samples = all[layout.map_samples()].to_vec();
+            let by_lane = all[layout.map_failures()].chunks(MAP_CELLS * MAP_CELLS);
+            map.failures = by_lane.map(<[u64]>::to_vec).collect();
+        }
+        if let Some(counts) = &mut tally.by_kernel {
+            *counts = KernelCounts::counted(&all[layout.kernel_samples()], &all[layout.kernel_failures()]);
+        }
+        let lanes = plan.headways.len() * plan.models.len();
+        for &unit in &counted.left {
+            let first = (unit - chunk.units.start) as usize * lanes;
+            let verdicts = |at: usize| match chunk.valued_lane(chunk.first_lane + at as u64) {
+                Some(outcome) => outcome.verdicts,
+                None => chunk.verdicts_of(at),
+            };
+            let of_sample: Vec<Verdicts> = (first..first + lanes).map(verdicts).collect();
+            let kernel = tally.count(plan, plan.generator(), (chunk, &of_sample), options, unit);
+            if let Some(counts) = &mut tally.by_kernel {
+                counts.count_sample(kernel, &of_sample);
+            }
+        }
+        tally
+    }
+
     /// Counts a chunk of a plan whose units are samples. If the plan holds the cases, every sample is valid at the
     /// first draw, and there is no map.
     ///
@@ -93,16 +165,38 @@ impl SampleTally {
         }
         chunk.check(plan)?;
         let has_values = !chunk.outcomes.is_empty() || chunk.valued.is_some();
-        if chunk.verdicts.is_empty() || (options.worst > 0 && !has_values) {
+        let has_lanes = chunk.counted.is_some() || !chunk.verdicts.is_empty();
+        if !has_lanes || (options.worst > 0 && !has_values) {
             return Err(Error::Internal("a chunk does not have the lanes that are to be counted".to_owned()));
         }
+        let units = chunk.units.clone();
+        let mut tally = match &chunk.counted {
+            Some(counted) => SampleTally::of_counted(plan, chunk, counted, options),
+            None => SampleTally::of_verdicts(plan, chunk, options),
+        };
+        if options.worst > 0 {
+            for (lane, outcome) in chunk.valued.iter().flatten() {
+                let value = limit_state(&plan.profile, options.criterion, outcome);
+                tally.offer(plan.model_of(*lane), WorstSample { value, lane: *lane });
+            }
+        }
+        tally.covered = vec![units];
+        Ok(tally)
+    }
+
+    /// Counts the verdicts of a chunk.
+    fn of_verdicts(plan: &LanePlan, chunk: &Chunk, options: &SampleOptions) -> SampleTally {
+        let generator = plan.generator();
         let empty = || SampleTally { by_kernel: None, ..SampleTally::empty(plan, options) };
         let units = chunk.units.clone();
+        let lanes = plan.headways.len() * plan.models.len();
         let mut kernels = vec![NO_KERNEL; (units.end - units.start) as usize];
         let tasks = kernels.par_chunks_mut(TASK).enumerate();
         let counted = tasks.fold(empty, |mut tally, (task, kernels)| {
             for (unit, kernel) in (units.start + (task * TASK) as u64..).zip(kernels) {
-                *kernel = tally.count(plan, generator, chunk, options, unit);
+                let first = (unit - units.start) as usize * lanes;
+                let of_sample = &chunk.verdicts[first..first + lanes];
+                *kernel = tally.count(plan, generator, (chunk, of_sample), options, unit);
             }
             tally
         });
@@ -111,26 +205,19 @@ impl SampleTally {
             a.add(b);
             a
         });
-        if options.worst > 0 {
-            for (lane, outcome) in chunk.valued.iter().flatten() {
-                let value = limit_state(&plan.profile, options.criterion, outcome);
-                tally.offer(plan.model_of(*lane), WorstSample { value, lane: *lane });
-            }
-        }
-        tally.covered = vec![units];
         tally.by_kernel = KernelCounts::empty(plan);
         if let Some(counts) = &mut tally.by_kernel {
             counts.count(plan, chunk, &kernels);
         }
-        Ok(tally)
+        tally
     }
 
-    /// Counts the lanes of one sample; returns its kernel.
+    /// Counts the lanes of one sample of a chunk; returns its kernel. Twin: `shaders/tally.wgsl`.
     fn count(
         &mut self,
         plan: &LanePlan,
         generator: Option<&Generator>,
-        chunk: &Chunk,
+        (chunk, lanes): (&Chunk, &[Verdicts]),
         options: &SampleOptions,
         unit: u64,
     ) -> u32 {
@@ -143,7 +230,6 @@ impl SampleTally {
         self.tries += drawn.as_ref().map_or(1, |drawn| u64::from(drawn.tries));
         let (headways, models, criteria) = (plan.headways.len(), plan.models.len(), Criterion::ALL.len());
         let first = (unit - chunk.units.start) as usize * headways * models;
-        let lanes = &chunk.verdicts[first..first + headways * models];
         let is_close = |headway: usize| is_close(plan, drawn.as_ref(), unit, headway);
         self.close_lanes += (0..headways).filter(|at| is_close(*at)).count() as u64;
         let cell = self.map.as_ref().zip(drawn.as_ref()).and_then(|(map, drawn)| map.axes.cell(&drawn.values));
