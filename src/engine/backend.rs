@@ -119,7 +119,8 @@ pub enum RecheckBy {
     /// In CPU batches that make every step, some of them also as single lanes. This checks the rules for skipping
     /// steps.
     Batches,
-    /// As single lanes on the CPU, which do not rely on any promise of a driver model.
+    /// On the CPU, without any promise of a driver model: values as single lanes, verdicts in batches that make every
+    /// step, some of them also as single lanes.
     Lanes,
 }
 

@@ -15,9 +15,11 @@ use crate::{Error, Result};
 /// Default sampling rate: one lane in 1000 is rechecked.
 const ONE_IN: u64 = 1000;
 
-/// One in this many of the lanes rechecked in batches is also rechecked as a single lane. A single lane costs about
-/// forty times a lane of batches that skip steps, and four to ten times a lane of other batches.
+/// One in this many of the lanes of CPU batches that are rechecked in batches is also rechecked as a single lane. A
+/// single lane costs about forty times a lane of batches that skip steps, and four to ten times a lane of other batches.
 const SINGLE_ONE_IN: u64 = 4;
+/// The same for lanes of a device, which share no code with either.
+const SINGLE_ONE_IN_OF_DEVICE: u64 = 16;
 
 /// Lanes of one task.
 const TASK: usize = 1024;
@@ -103,8 +105,9 @@ impl<'p> Recheck<'p> {
                 first = Some(first.map_or(lane, |first| first.min(lane)));
             }
         };
-        let is_batched = by == RecheckBy::Batches;
-        for key in keys.iter().filter(|key| !is_batched || self.is_single(key)) {
+        let is_batched = chunk.outcomes.is_empty();
+        let one_in = if by == RecheckBy::Batches { SINGLE_ONE_IN } else { SINGLE_ONE_IN_OF_DEVICE };
+        for key in keys.iter().filter(|key| !is_batched || self.is_single(key, one_in)) {
             let ours = self.recompute.single(key);
             compare(key, &|at| match chunk.outcomes.get(at) {
                 Some(theirs) => same_words(&ours.widen(), theirs),
@@ -134,8 +137,8 @@ impl<'p> Recheck<'p> {
     }
 
     /// Whether a lane that is rechecked in a batch is also rechecked as a single lane.
-    fn is_single(&self, key: &LaneKey) -> bool {
-        mixed(!self.seed, self.plan.lane(key)).is_multiple_of(SINGLE_ONE_IN)
+    fn is_single(&self, key: &LaneKey, one_in: u64) -> bool {
+        mixed(!self.seed, self.plan.lane(key)).is_multiple_of(one_in)
     }
 
     /// The selected lanes of an interval, ascending.
@@ -154,7 +157,7 @@ impl<'p> Recheck<'p> {
         let verdict_bits = |verdicts: Verdicts| format!("verdict bits {:#06b}", verdicts.0);
         let (found, expected) = match chunk.outcomes.get(at) {
             Some(theirs) => (format!("{theirs:?}"), format!("{:?}", ours.widen())),
-            None => (verdict_bits(chunk.verdicts[at]), verdict_bits(ours.verdicts)),
+            None => (verdict_bits(self.verdicts(chunk, at)), verdict_bits(ours.verdicts)),
         };
         let lane = self.plan.key_text(&key);
         let model = self.plan.models[key.model].name();

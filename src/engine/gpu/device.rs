@@ -9,7 +9,7 @@ use std::time::Duration;
 
 use rayon::prelude::*;
 
-use super::adapters::AdapterCard;
+use super::adapters::{AdapterCard, DeviceKind};
 use super::shader::{self, COUNT, ENTRY, GENERATE, WORKGROUP};
 use super::spirv::exact_spirv;
 use crate::model::driver::ModelId;
@@ -22,8 +22,8 @@ pub struct GpuOptions {
     pub timeout: Duration,
     /// Lanes per model of the first job; later jobs follow the device's speed.
     pub first_lanes: u64,
-    /// Average number of lanes per invocation, at least 1. `None` derives it from the number of lanes; on a software
-    /// device it is 1.
+    /// Average number of lanes per invocation, at least 1. `None` times a few of each pipeline and keeps the fastest; on a
+    /// software device it is 1.
     pub lanes_per_invocation: Option<u32>,
     /// Whether the variants of a scenario get a dispatch each if they have different scenes. `None`: not on a software
     /// device, which compiles slowly.
@@ -70,6 +70,8 @@ pub(super) struct Device {
     /// Float operations reach the driver unchanged.
     pub exact: bool,
     pub timestamps: bool,
+    /// Maximum size of the samples that the device makes at a time, bytes.
+    pub max_made_bytes: u64,
     pub layout: wgpu::BindGroupLayout,
     pub options: GpuOptions,
     pub tampering: Tampering,
@@ -81,6 +83,7 @@ pub(super) struct Device {
     pipelines: Vec<(PipelineSpec, wgpu::ComputePipeline)>,
     generator: Option<(Vec<(&'static str, f64)>, wgpu::ComputePipeline)>,
     tally: Option<(Vec<(&'static str, f64)>, wgpu::ComputePipeline)>,
+    tuners: Vec<(PipelineSpec, Tuner)>,
     trouble: Arc<Mutex<Option<String>>>,
 }
 
@@ -151,6 +154,7 @@ impl Device {
             queue,
             exact,
             timestamps,
+            max_made_bytes: if card.kind == DeviceKind::Discrete { 1 << 30 } else { 256 << 20 },
             layout,
             generator_layout,
             options,
@@ -160,6 +164,7 @@ impl Device {
             generator: None,
             tally: None,
             tally_layout,
+            tuners: Vec::new(),
             trouble,
         };
         opened.untroubled()?;
@@ -321,10 +326,23 @@ impl Device {
         (groups.div_ceil(rows), rows)
     }
 
-    /// Average number of lanes per invocation, chosen so that all multiprocessors are busy.
-    pub(super) fn lanes_per_invocation(&self, lanes: u32) -> u32 {
-        let busy = || (lanes / (WORKGROUP * BUSY_WORKGROUPS)).clamp(1, MAX_LANES_PER_INVOCATION);
-        self.options.lanes_per_invocation.unwrap_or_else(busy)
+    /// Average number of lanes per invocation of a dispatch.
+    pub(super) fn lanes_per_invocation(&self, spec: &PipelineSpec, lanes: u32) -> u32 {
+        let busy = (lanes / (WORKGROUP * BUSY_WORKGROUPS)).clamp(1, MAX_LANES_PER_INVOCATION);
+        let tuned = || self.tuners.iter().find(|(known, _)| known == spec).and_then(|(_, tuner)| tuner.choice());
+        self.options.lanes_per_invocation.or_else(tuned).unwrap_or(busy)
+    }
+
+    /// Takes the time of a dispatch into account.
+    pub(super) fn observe(&mut self, spec: &PipelineSpec, lanes: u32, lanes_per_invocation: u32, seconds: f64) {
+        if self.options.lanes_per_invocation.is_some() {
+            return;
+        }
+        let at = self.tuners.iter().position(|(known, _)| known == spec).unwrap_or_else(|| {
+            self.tuners.push((spec.clone(), Tuner::default()));
+            self.tuners.len() - 1
+        });
+        self.tuners[at].1.observe(lanes, lanes_per_invocation, seconds);
     }
 
     /// # Errors
@@ -354,6 +372,47 @@ const BUSY_WORKGROUPS: u32 = 4224;
 /// A larger value hardly increases the use of a warp's lanes, and lengthens the end of a dispatch.
 const MAX_LANES_PER_INVOCATION: u32 = 32;
 
+/// Which number of lanes per invocation is fastest for a pipeline: each is tried once, on dispatches that are long enough to
+/// tell. Results do not depend on it.
+#[derive(Debug, Clone, Default)]
+struct Tuner {
+    /// Lanes per second of each trial.
+    rates: [Option<f64>; Tuner::TRIALS.len()],
+    /// A long dispatch was seen: the trials begin.
+    is_warm: bool,
+}
+
+impl Tuner {
+    /// A warp of lanes that differ much likes many, one of neighbours that are alike one, a long step fewer.
+    const TRIALS: [u32; 4] = [16, 8, 1, 32];
+    /// A shorter dispatch tells nothing, s.
+    const LONG_S: f64 = 0.004;
+
+    /// The number to use: the next trial, or the fastest; `None` before the first long dispatch.
+    fn choice(&self) -> Option<u32> {
+        if !self.is_warm {
+            return None;
+        }
+        if let Some(next) = self.rates.iter().position(Option::is_none) {
+            return Some(Self::TRIALS[next]);
+        }
+        let rates = self.rates.iter().map(|rate| rate.unwrap_or(0.0));
+        let fastest = (0..).zip(rates).max_by(|(_, a), (_, b)| a.total_cmp(b));
+        fastest.map(|(at, _): (usize, f64)| Self::TRIALS[at])
+    }
+
+    fn observe(&mut self, lanes: u32, lanes_per_invocation: u32, seconds: f64) {
+        if seconds < Self::LONG_S || !seconds.is_finite() {
+            return;
+        }
+        let trial = Self::TRIALS.iter().position(|&lanes| lanes == lanes_per_invocation);
+        if let Some(rate) = trial.filter(|_| self.is_warm).map(|at| &mut self.rates[at]) {
+            rate.get_or_insert(f64::from(lanes) / seconds);
+        }
+        self.is_warm = true;
+    }
+}
+
 /// The bindings of `shaders/lane.wgsl`, in their order: launch, four inputs, three results.
 fn entries() -> Vec<wgpu::BindGroupLayoutEntry> {
     buffer_entries(4, 3, true)
@@ -382,4 +441,26 @@ fn buffer_entries(inputs: usize, results: usize, dynamic: bool) -> Vec<wgpu::Bin
         count: None,
     };
     kinds.enumerate().map(entry).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Dispatches of a device on which `best` lanes per invocation are twice as fast as any other number.
+    #[test]
+    fn the_fastest_number_of_lanes_is_found_and_kept() {
+        for best in Tuner::TRIALS {
+            let mut tuner = Tuner::default();
+            tuner.observe(1 << 22, 1, 0.001);
+            assert_eq!(tuner.choice(), None, "a short dispatch tells nothing");
+            let mut lanes_per_invocation = 4;
+            for _ in 0..8 {
+                let seconds = if lanes_per_invocation == best { 0.05 } else { 0.1 };
+                tuner.observe(1 << 22, lanes_per_invocation, seconds);
+                lanes_per_invocation = tuner.choice().unwrap();
+            }
+            assert_eq!(lanes_per_invocation, best);
+        }
+    }
 }

@@ -192,7 +192,8 @@ impl DeviceOwner {
         let max_lanes = [0.5, record + 0.5].map(|bytes| self.device.max_lanes(models, bytes));
         let limits = self.device.device.limits();
         let max_bytes = limits.max_storage_buffer_binding_size.min(limits.max_buffer_size);
-        let max_bytes = max_bytes.min(if setup.generator.is_some() { MAX_MADE_BYTES } else { MAX_CASE_BYTES });
+        let max_bytes =
+            max_bytes.min(if setup.generator.is_some() { self.device.max_made_bytes } else { MAX_CASE_BYTES });
         Ok(Prepared { session, max_lanes, max_cases: (max_bytes / sample_bytes).max(1) })
     }
 
@@ -231,7 +232,7 @@ impl DeviceOwner {
 
     fn finish_oldest(&mut self) {
         let Some((mut slot, flight, reply)) = self.flying.pop_front() else { return };
-        let finished = self.alive().and_then(|()| slot.finish(&self.device, flight, self.last_done));
+        let finished = self.alive().and_then(|()| slot.finish(&mut self.device, flight, self.last_done));
         self.last_done = Some(Instant::now());
         let answer = match finished {
             Ok(answer) => {
@@ -258,5 +259,3 @@ impl DeviceOwner {
 
 /// Maximum size of the cases on the device, bytes.
 const MAX_CASE_BYTES: u64 = 64 << 20;
-/// Maximum size of the cases and tables that the device makes, bytes.
-const MAX_MADE_BYTES: u64 = 512 << 20;

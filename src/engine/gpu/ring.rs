@@ -109,6 +109,8 @@ pub(super) struct Answer {
     pub counts: Vec<u32>,
     /// Samples left to the host, counted from the first of the job; `None` if they are too many.
     pub left: Option<Vec<u32>>,
+    /// Time of each dispatch, s, if the device measures it.
+    pub seconds: Vec<f64>,
     /// Time of the slowest dispatch, s.
     pub slowest_s: f64,
     /// Time of all dispatches, s.
@@ -166,6 +168,8 @@ impl ResultSizes {
 /// A job in flight.
 pub(super) struct Flight {
     job: Job,
+    /// Lanes per invocation of each dispatch.
+    per_invocation: Vec<u32>,
     parts: ResultSizes,
     submission: wgpu::SubmissionIndex,
     mapped: mpsc::Receiver<std::result::Result<(), wgpu::BufferAsyncError>>,
@@ -183,10 +187,12 @@ impl Slot {
         let buffers = self.buffers.as_ref().ok_or_else(|| device.failed("it has no buffers"))?;
         let stride = launch_stride(device);
         let mut launches = vec![0_u8; stride as usize * dispatches];
-        let mut grids = Vec::new();
+        let (mut grids, mut per_invocation) = (Vec::new(), Vec::new());
         for at in 0..dispatches {
             let mut launch = job.launch(at);
-            launch.lanes_per_group = WORKGROUP * device.lanes_per_invocation(launch.lanes);
+            let lanes_per_invocation = device.lanes_per_invocation(&job.dispatches[at].pipeline, launch.lanes);
+            launch.lanes_per_group = WORKGROUP * lanes_per_invocation;
+            per_invocation.push(lanes_per_invocation);
             grids.push(device.grid(launch.lanes.div_ceil(launch.lanes_per_group)));
             let place = stride as usize * at;
             launches[place..place + size_of::<Launch>()].copy_from_slice(bytemuck::bytes_of(&launch));
@@ -283,7 +289,7 @@ impl Slot {
         let since = Instant::now();
         let submission = device.queue.submit([encoder.finish()]);
         device.untroubled()?;
-        Ok(Flight { job, parts, submission, mapped, since })
+        Ok(Flight { job, per_invocation, parts, submission, mapped, since })
     }
 
     /// Waits for a job and reads its results. `previous` is the time at which the previous job ended.
@@ -292,7 +298,7 @@ impl Slot {
     /// The outer error means that the state of the device is unknown; the inner error means that only this job failed.
     pub(super) fn finish(
         &mut self,
-        device: &Device,
+        device: &mut Device,
         flight: Flight,
         previous: Option<Instant>,
     ) -> Result<Result<Answer>> {
@@ -321,6 +327,10 @@ impl Slot {
             read(device, &flight, &view, wall_s)
         };
         buffers.readback.unmap();
+        let seconds = answer.iter().flat_map(|answer| &answer.seconds);
+        for ((at, dispatch), &seconds) in flight.job.dispatches.iter().enumerate().zip(seconds) {
+            device.observe(&dispatch.pipeline, flight.job.launch(at).lanes, flight.per_invocation[at], seconds);
+        }
         Ok(answer)
     }
 
@@ -427,5 +437,6 @@ fn read(device: &Device, flight: &Flight, bytes: &[u8], wall_s: f64) -> Result<A
         left,
         slowest_s: if timed { slowest_s } else { wall_s },
         device_s: if timed { device_s } else { wall_s },
+        seconds: if timed { measured } else { Vec::new() },
     })
 }
