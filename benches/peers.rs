@@ -3,7 +3,7 @@
 //!
 //! `cargo bench --bench peers` computes the lanes with the CPU backend, writes them to a temporary folder for
 //! `benches/peers/run.py`, and makes the virtual environment with the pinned packages it needs. CSV rows go to
-//! stdout, a table to stderr. What is compared and what is not: `benches/README.md`.
+//! stdout, a table to stderr. With `-- --lanes FOLDER` the lanes stay there and no peer runs. What is compared and what is not: `benches/README.md`.
 
 mod common;
 
@@ -33,21 +33,28 @@ fn main() {
     }
     let scenarios = paper_size_scenarios();
     let profile = Profile::load("paper").unwrap();
-    let folder = tempfile::tempdir().unwrap();
+    let temporary = tempfile::tempdir().unwrap();
+    // Lanes for peers elsewhere, which do not run here.
+    let kept = std::env::args().skip_while(|arg| arg != "--lanes").nth(1).map(PathBuf::from);
+    let folder = kept.as_deref().unwrap_or(temporary.path());
+    std::fs::create_dir_all(folder).unwrap();
     println!(
         "peer,category,model,lanes,lane_steps,seconds,lane_steps_per_s,ratio_to_ours,verdicts_differing,ends_differing"
     );
     let one_thread = rayon::ThreadPoolBuilder::new().num_threads(1).build().unwrap();
     for category in CATEGORIES {
-        let folder = folder.path().join(category.key());
+        let folder = folder.join(category.key());
         std::fs::create_dir(&folder).unwrap();
         let of_category: Vec<Scenario> = scenarios.iter().filter(|s| s.category == category).cloned().collect();
         let measure = |model| one_thread.install(|| measure(&of_category, &profile, category, model, &folder));
         let ours: Vec<Measured> = MODELS.into_iter().map(measure).collect();
         write_manifest(&folder, &profile, category, &ours);
     }
+    if kept.is_some() {
+        return;
+    }
     match python_with_packages() {
-        Ok(python) => run_peers(&python, folder.path()),
+        Ok(python) => run_peers(&python, folder),
         Err(reason) => eprintln!("SKIPPED: the peers did not run, only ours did: {reason}"),
     }
 }

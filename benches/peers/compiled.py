@@ -135,12 +135,13 @@ def judge(closing: F, gap: F) -> int:
     return verdicts
 
 
-def make_sweep(driver: Driver, cuts_out: bool) -> Callable[..., None]:
-    """The sweep of one model in one category: both are constants of the compiled function."""
+def make_lane(driver: Driver, cuts_out: bool) -> Callable[..., tuple[int, int]]:
+    """One lane of one model in one category: both are constants of the compiled function."""
     demand_of, looks_at, limited, delay_steps = driver
 
-    @compiled
-    def sweep(
+    @inlined
+    def run_lane(
+        lane: int,
         case: NDArray[np.int32],
         ego_speed: Floats,
         start_gap: Floats,
@@ -153,80 +154,87 @@ def make_sweep(driver: Driver, cuts_out: bool) -> Callable[..., None]:
         cutter_speed: Floats,
         cutter_lateral: Floats,
         cutter_towards: Floats,
-        all_verdicts: NDArray[np.uint8],
-        end_step: NDArray[np.uint32],
-    ) -> None:
-        """All lanes; the last two arrays take the results."""
+    ) -> tuple[int, int]:
+        """Verdict bits and the last step."""
         last = leader_speed.shape[1] - 1
-        for lane in range(len(case)):
-            of = case[lane]
-            speed, before, gap = ego_speed[lane], ego_speed[lane], start_gap[lane]
+        of = case[lane]
+        speed, before, gap = ego_speed[lane], ego_speed[lane], start_gap[lane]
+        if cuts_out:
+            cutter_gap, half_lengths = cutter_start_gap[lane], cutter_half_lengths[lane]
+            half_widths, ego_width = cutter_half_widths[lane], width[lane]
+        verdicts = 0
+        deceleration = C.zero
+        delay = delay_steps
+        step = 0
+        while True:
+            at = min(step, last)
+            leader = leader_speed[of, at]
             if cuts_out:
-                cutter_gap, half_lengths = cutter_start_gap[lane], cutter_half_lengths[lane]
-                half_widths, ego_width = cutter_half_widths[lane], width[lane]
-            verdicts = 0
-            deceleration = C.zero
-            delay = delay_steps
-            step = 0
-            while True:
-                at = min(step, last)
-                leader = leader_speed[of, at]
+                cutter = cutter_speed[of, at]
+            if step > 0:
+                gap += (leader - speed) * C.dt
                 if cuts_out:
-                    cutter = cutter_speed[of, at]
-                if step > 0:
-                    gap += (leader - speed) * C.dt
-                    if cuts_out:
-                        cutter_gap += (cutter - speed) * C.dt
-                closing = speed - leader
-                verdicts |= judge(closing, gap)
-                demand = demand_of(speed, before, leader, gap)
-                touched = gap < C.zero
-                settled = closing <= C.zero
-                if cuts_out:
-                    lateral = cutter_lateral[of, at]
-                    lateral_gap = lateral - half_widths
-                    centres = cutter_gap + half_lengths
-                    passing = centres + half_lengths
-                    # Once the ego has passed the one that cuts out, it looks at it no more.
-                    if centres >= C.zero:
-                        cutter_closing = speed - cutter
-                        if lateral <= ego_width:
-                            verdicts |= judge(cutter_closing, cutter_gap)
-                        if looks_at(lateral_gap, cutter_towards[of, at], cutter_closing, passing):
-                            cutter_demand = demand_of(speed, before, cutter, cutter_gap)
-                            # The nearest unsafe vehicle counts.
-                            if cutter_demand > C.zero and not (demand > C.zero and gap < cutter_gap):
-                                demand = cutter_demand
-                        if lateral <= ego_width or lateral_gap < C.zero:
-                            settled = settled and cutter_closing <= C.zero
-                    touched = touched or (lateral_gap < C.zero and cutter_gap < C.zero and passing > C.zero)
-                if touched:
-                    verdicts |= COLLISION | BTN
-                    break
-                if step >= horizon[lane] and (speed <= C.zero or settled):
-                    break
-                if step + 1 >= STEP_CAP:
-                    verdicts |= CAPPED
-                    break
-                before = speed
-                if demand > C.zero:
-                    if delay > 0:
-                        delay -= 1
-                    else:
-                        deceleration = limited(deceleration, demand)
-                        speed = max(speed - deceleration * C.dt, C.zero)
-                step += 1
-            all_verdicts[lane], end_step[lane] = verdicts, step
+                    cutter_gap += (cutter - speed) * C.dt
+            closing = speed - leader
+            verdicts |= judge(closing, gap)
+            demand = demand_of(speed, before, leader, gap)
+            touched = gap < C.zero
+            settled = closing <= C.zero
+            if cuts_out:
+                lateral = cutter_lateral[of, at]
+                lateral_gap = lateral - half_widths
+                centres = cutter_gap + half_lengths
+                passing = centres + half_lengths
+                # Once the ego has passed the one that cuts out, it looks at it no more.
+                if centres >= C.zero:
+                    cutter_closing = speed - cutter
+                    if lateral <= ego_width:
+                        verdicts |= judge(cutter_closing, cutter_gap)
+                    if looks_at(lateral_gap, cutter_towards[of, at], cutter_closing, passing):
+                        cutter_demand = demand_of(speed, before, cutter, cutter_gap)
+                        # The nearest unsafe vehicle counts.
+                        if cutter_demand > C.zero and not (demand > C.zero and gap < cutter_gap):
+                            demand = cutter_demand
+                    if lateral <= ego_width or lateral_gap < C.zero:
+                        settled = settled and cutter_closing <= C.zero
+                touched = touched or (lateral_gap < C.zero and cutter_gap < C.zero and passing > C.zero)
+            if touched:
+                verdicts |= COLLISION | BTN
+                break
+            if step >= horizon[lane] and (speed <= C.zero or settled):
+                break
+            if step + 1 >= STEP_CAP:
+                verdicts |= CAPPED
+                break
+            before = speed
+            if demand > C.zero:
+                if delay > 0:
+                    delay -= 1
+                else:
+                    deceleration = limited(deceleration, demand)
+                    speed = max(speed - deceleration * C.dt, C.zero)
+            step += 1
+        return verdicts, step
+
+    return run_lane
+
+
+def make_sweep(driver: Driver, cuts_out: bool) -> Callable[..., None]:
+    """The sweep of one model in one category, lane by lane."""
+    run_lane = make_lane(driver, cuts_out)
+
+    @compiled
+    def sweep(all_verdicts: NDArray[np.uint8], end_step: NDArray[np.uint32], *arrays: NDArray[np.generic]) -> None:
+        """All lanes; the first two arrays take the results."""
+        for lane in range(len(all_verdicts)):
+            all_verdicts[lane], end_step[lane] = run_lane(lane, *arrays)
 
     return sweep
 
 
-def prepare(lanes: Lanes, model: str) -> Callable[[], Result]:
-    """The arrays as they are; the first call compiles."""
+def arrays_of(lanes: Lanes) -> tuple[NDArray[np.generic], ...]:
+    """The arguments of a lane. Where nothing cuts out, arrays that nobody looks at."""
     cutters = lanes.cutters
-    sweep = make_sweep(DRIVERS[model], cutters is not None)
-    arrays = (lanes.case, lanes.ego_speed, lanes.gap, lanes.horizon, lanes.leader_speed)
-    # Where nothing cuts out, arrays that nobody looks at.
     unused = (lanes.gap,) * 4 + (lanes.leader_speed,) * 3
     of_cutters = unused if cutters is None else (
         cutters.gap,
@@ -237,10 +245,17 @@ def prepare(lanes: Lanes, model: str) -> Callable[[], Result]:
         cutters.lateral,
         cutters.towards,
     )
+    return (lanes.case, lanes.ego_speed, lanes.gap, lanes.horizon, lanes.leader_speed, *of_cutters)
+
+
+def prepare(lanes: Lanes, model: str) -> Callable[[], Result]:
+    """The arrays as they are; the first call compiles."""
+    sweep = make_sweep(DRIVERS[model], lanes.cutters is not None)
+    arrays = arrays_of(lanes)
 
     def work() -> Result:
         result = Result(np.zeros(len(lanes), np.uint8), np.zeros(len(lanes), np.uint32))
-        sweep(*arrays, *of_cutters, result.verdicts, result.end_step)
+        sweep(result.verdicts, result.end_step, *arrays)
         return result
 
     return work

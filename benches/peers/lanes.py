@@ -110,6 +110,12 @@ class Cutters:
         return Cutters(*(numbers[::stride] for numbers in per_lane), self.speed, self.lateral, self.towards)
 
 
+    def repeated(self, copies: int) -> Cutters:
+        """Every lane so many times in a row."""
+        per_lane = (self.gap, self.half_lengths, self.half_widths, self.ego_width)
+        return Cutters(*(np.repeat(numbers, copies) for numbers in per_lane), self.speed, self.lateral, self.towards)
+
+
 @dataclass(frozen=True)
 class Lanes:
     """Lanes, one entry each, and the cases they share."""
@@ -139,6 +145,18 @@ class Lanes:
             self.horizon[::stride],
             self.leader_speed,
             None if self.cutters is None else self.cutters.every(stride),
+        )
+
+
+    def repeated(self, copies: int) -> Lanes:
+        """Every lane so many times in a row, with the cases as they are: what keeps a GPU busy."""
+        return Lanes(
+            np.repeat(self.case, copies),
+            np.repeat(self.gap, copies),
+            np.repeat(self.ego_speed, copies),
+            np.repeat(self.horizon, copies),
+            self.leader_speed,
+            None if self.cutters is None else self.cutters.repeated(copies),
         )
 
 

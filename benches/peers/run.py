@@ -1,7 +1,8 @@
 """Times the peers on the lanes of `cargo bench --bench peers` and compares their verdicts with ours.
 
 `run.py FOLDER` starts one process per peer and category, so that no library's threads or settings reach another's;
-each is held to one core. CSV rows go to stdout, a table to stderr.
+each is held to one core. CSV rows go to stdout, a table to stderr. Where a CUDA device is found, numba.cuda and JAX compute
+the lanes on it too, each a hundred times.
 """
 
 from __future__ import annotations
@@ -16,8 +17,10 @@ import platform
 import subprocess
 import sys
 import time
+from ctypes.util import find_library
 from dataclasses import asdict, dataclass, field
 from importlib.metadata import version
+from importlib.util import find_spec
 from pathlib import Path
 
 # Read when the libraries are loaded; NumPy's own loops have one thread anyway.
@@ -49,6 +52,8 @@ class Peer:
     # Computes every so many lanes only, by category; all where none is given.
     strides: dict[str, int] = field(default_factory=dict)
     xla_flags: str = XLA_ONE_THREAD
+    # Computes on a CUDA device, each lane so many times.
+    copies: int = 0
 
     def label(self) -> str:
         """Name and version."""
@@ -64,6 +69,16 @@ PEERS = (
     # XLA contracts multiplication and addition where the processor can. AVX alone cannot: this shows what that changes.
     Peer("jax-no-fma", "scanned", "jax", repetitions=5, xla_flags=f"{XLA_ONE_THREAD} --xla_cpu_max_isa=AVX"),
 )
+# Only where a CUDA device is found, with the packages of requirements-cuda.txt.
+ON_CUDA = (
+    Peer("numba.cuda", "on_cuda", "numba-cuda", repetitions=7, copies=100),
+    Peer("jax-cuda", "scanned", "jax", repetitions=3, copies=100, xla_flags=""),
+)
+
+
+def has_cuda() -> bool:
+    """Whether the driver of a CUDA device is there, and the packages for it."""
+    return find_library("cuda") is not None and find_spec("numba_cuda") is not None
 
 
 @dataclass(frozen=True)
@@ -101,7 +116,7 @@ def measure(peer: Peer, folder: Path, category: str) -> list[Measured]:
 
     everything, ours_of = lane_files.read(folder / category)
     stride = peer.strides.get(category, 1)
-    lanes = everything.every(stride)
+    lanes = everything.repeated(peer.copies) if peer.copies else everything.every(stride)
     module = importlib.import_module(peer.module)
     bits = {
         "collision": lane_files.COLLISION,
@@ -121,6 +136,8 @@ def measure(peer: Peer, folder: Path, category: str) -> list[Measured]:
             times.append(time.perf_counter() - start)
         seconds = min(times[1:])
         verdicts, end_step = ours.verdicts[::stride], ours.end_step[::stride]
+        if peer.copies:
+            verdicts, end_step = verdicts.repeat(peer.copies), end_step.repeat(peer.copies)
         # Steps that a lane needs, not those that a peer spends on lanes that have ended.
         steps = int(end_step.sum(dtype="u8")) + len(lanes)
         other_bits = result.verdicts ^ verdicts
@@ -137,7 +154,7 @@ def measure(peer: Peer, folder: Path, category: str) -> list[Measured]:
             ends_differing=int((result.end_step != end_step).sum()),
         )
         differing = {name: int(((other_bits & bit) != 0).sum()) for name, bit in bits.items()}
-        named = [ours.keys[lane * stride] for lane in other_bits.nonzero()[0][:NAMED]]
+        named = [ours.keys[lane * stride // max(1, peer.copies)] for lane in other_bits.nonzero()[0][:NAMED]]
         measured.append(Measured(row, peer.label(), max(0.0, times[0] - seconds), differing, named))
     return measured
 
@@ -149,15 +166,17 @@ def child(peer: Peer, folder: Path, category: str) -> None:
     print(json.dumps([asdict(measured) for measured in measure(peer, folder, category)]))
 
 
-def parent(folder: Path) -> int:
+def parent(folder: Path, peers: tuple[Peer, ...]) -> int:
     """Starts one process per peer and category; gives the number of those that failed."""
     from lanes import CATEGORIES
 
     writer = csv.writer(sys.stdout, lineterminator="\n")
     all_measured: list[Measured] = []
     failed = 0
-    for category, peer in itertools.product(CATEGORIES, PEERS):
+    for category, peer in itertools.product(CATEGORIES, peers):
         environment = os.environ | ONE_THREAD | {"XLA_FLAGS": peer.xla_flags}
+        if peer.copies:
+            environment["JAX_PLATFORMS"] = "cuda"
         command = [sys.executable, __file__, str(folder), "--peer", peer.name, "--category", category]
         done = subprocess.run(command, env=environment, stdout=subprocess.PIPE, text=True, check=False)
         if done.returncode != 0:
@@ -195,12 +214,17 @@ def main() -> int:
     """Exit code 1 where a peer failed."""
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("folder", type=Path, help="the lanes, as `cargo bench --bench peers` writes them")
-    parser.add_argument("--peer", choices=[peer.name for peer in PEERS], help="only this one, in this process")
+    everyone = PEERS + ON_CUDA
+    parser.add_argument("--peer", choices=[peer.name for peer in everyone], help="only this one, in this process")
+    parser.add_argument("--cuda", action="store_true", help="only those on a CUDA device")
     parser.add_argument("--category", default="lvd", help="of a single peer: lvd or cut_out")
     arguments = parser.parse_args()
     if arguments.peer is None:
-        return min(1, parent(arguments.folder))
-    child(next(peer for peer in PEERS if peer.name == arguments.peer), arguments.folder, arguments.category)
+        if not has_cuda():
+            print("SKIPPED: no CUDA device with numba-cuda; only peers on the CPU run", file=sys.stderr)
+        on_cpu = () if arguments.cuda else PEERS
+        return min(1, parent(arguments.folder, on_cpu + (ON_CUDA if has_cuda() else ())))
+    child(next(peer for peer in everyone if peer.name == arguments.peer), arguments.folder, arguments.category)
     return 0
 
 

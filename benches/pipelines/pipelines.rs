@@ -4,7 +4,8 @@
 //! `cargo run --release -p lanesweep-pipelines -- --out FOLDER [--profile NAME]...` writes every kernel as WGSL with
 //! its constants, SPIR-V, HLSL and MSL to FOLDER, and below it the machine code of each device that gives it. CSV rows go to stdout: one per
 //! device, kernel and statistic of the driver. All profiles are compiled unless some are named; a kernel that two
-//! profiles share is compiled once. `--plant fused`, `spill` or `wgsl` puts in a defect that a check must find. `--steps` prints how many steps the lanes of a study and their warps make instead.
+//! profiles share is compiled once. `--plant fused`, `spill` or `wgsl` puts in a defect that a check must find. `--steps` prints how many steps
+//! lanes of a study and of densities and their warps make instead, and how many if quiescent ones were skipped.
 
 // Vulkan's functions are unsafe: every handle comes from this file and outlives its use.
 #![allow(unsafe_code)]
@@ -21,7 +22,7 @@ use std::path::{Path, PathBuf};
 use ash::{khr::pipeline_executable_properties as executables, vk};
 use common::paper_size_scenarios;
 use lanesweep::engine::gpu::{exact_spirv, shader};
-use lanesweep::engine::{Constants, CountLayout, CpuBackend, DeviceScene, Executor, Headway, LanePlan, Wanted};
+use lanesweep::engine::{Constants, CountLayout, DeviceScene, Headway, LanePlan, LaneRunner, Step};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, SampleTally, plan_samples};
@@ -29,6 +30,7 @@ use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, DataProvenance};
 use lanesweep::stats::density::{DensityModel, FitOptions};
+use rayon::prelude::*;
 
 /// One kernel with its constants.
 struct Kernel {
@@ -72,12 +74,12 @@ fn main() {
 fn kernels(profiles: &[&str], values: bool) -> Vec<Kernel> {
     let mut all: Vec<Kernel> = Vec::new();
     let mut add = |name: String, entry, source: String, constants: Vec<(&'static str, f64)>, bindings| {
-        let words = exact_spirv(&source, entry, &constants).expect("SPIR-V");
+        let words = exact_spirv(&source, entry, &constants, true).expect("SPIR-V");
         if !all.iter().any(|known| known.words == words) {
             all.push(Kernel { name, entry, source, constants, bindings, words });
         }
     };
-    let plans = sampled_plans();
+    let plans = sampled_plans(1000);
     for (id, plan) in &plans {
         let generator = plan.generator().expect("a plan of samples");
         let name = format!("generator.{}.{}", id.category.label(), id.key);
@@ -111,7 +113,7 @@ fn kernels(profiles: &[&str], values: bool) -> Vec<Kernel> {
 }
 
 /// Sampled lanes of densities that differ in their generators.
-fn sampled_plans() -> Vec<(Parameterization, LanePlan)> {
+fn sampled_plans(samples: u64) -> Vec<(Parameterization, LanePlan)> {
     let scenarios = paper_size_scenarios();
     let facts =
         DataProvenance { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
@@ -129,7 +131,7 @@ fn sampled_plans() -> Vec<(Parameterization, LanePlan)> {
         let id = Parameterization::find(category, key).expect("a parameterization");
         let density = DensityModel::fit(id.clone(), &scenarios, &facts, &fit).expect("a density").model;
         let headways = SampleHeadways::Each(vec![Headway::ThwS(1.0)]);
-        let options = SampleOptions::new(Estimator::CRUDE, 1000, headways);
+        let options = SampleOptions::new(Estimator::CRUDE, samples, headways);
         let profile = Profile::load("paper").expect("a profile");
         let mixture = density.mixture().expect("a mixture");
         (id, plan_samples(&density, &mixture, &profile, &options).expect("a plan"))
@@ -161,7 +163,7 @@ fn plant(kernels: &mut Vec<Kernel>, defect: &str) {
          @compute @workgroup_size(64) fn lanes(@builtin(local_invocation_index) inside: u32) {{\n\
          let n = inside * count;\n{source}}}\n"
     );
-    let words = exact_spirv(&source, shader::ENTRY, &[]).expect("SPIR-V");
+    let words = exact_spirv(&source, shader::ENTRY, &[], true).expect("SPIR-V");
     let name = format!("planted.{defect}");
     kernels.push(Kernel { name, entry: shader::ENTRY, source, constants: Vec::new(), bindings: 3, words });
 }
@@ -179,45 +181,122 @@ fn contractible(words: &[u32]) -> Vec<u32> {
     kept
 }
 
-/// Steps of the lanes of a study of the paper's size, alone and in warps of 32 and 64, with one lane per invocation and with
-/// several. Prints rows of CSV for `.ci/compilers/machine_code.py --steps`.
+/// Steps of the lanes of a study of the paper's size and of default densities, alone and in warps of 32 and 64, for some
+/// numbers of lanes per invocation; and the same if every quiescent step were skipped. Prints rows of CSV.
 fn print_steps() {
-    println!("kernel,lanes,lane_steps,warp,lanes_per_invocation,warp_steps");
+    println!(
+        "lanes_of,model,lanes,lane_steps,lane_steps_skipping,warp,lanes_per_invocation,warp_steps,warp_steps_skipping,fewer"
+    );
+    let profile = Profile::load("paper").expect("a profile");
     let scenarios = paper_size_scenarios();
-    let cpu = CpuBackend::lane_arithmetic();
     for category in Category::ALL {
         for model in ModelId::ALL {
             let options = StudyOptions { categories: vec![category], models: vec![model], ..StudyOptions::default() };
-            let plan = plan_study(&scenarios, &Profile::load("paper").expect("a profile"), &options).expect("a plan");
-            let mut steps: Vec<u64> = Vec::new();
-            Executor::new(&cpu)
-                .sweep(&plan, 0..plan.unit_count(), Wanted::Outcomes, |chunk| {
-                    steps.extend(chunk.outcomes.iter().map(|outcome| u64::from(outcome.end_step) + 1));
-                    Ok(())
-                })
-                .expect("lanes");
-            let (name, total) = (format!("{}.{}", category.label(), model.name()), steps.iter().sum::<u64>());
-            for warp in [32, 64] {
-                for lanes in [1, 8, 32] {
-                    let spent: u64 = steps.chunks(WORKGROUP * lanes).map(|group| warp_steps(group, warp)).sum();
-                    println!("{name},{},{total},{warp},{lanes},{spent}", steps.len());
-                }
-            }
+            let plan = plan_study(&scenarios, &profile, &options).expect("a plan");
+            print_steps_of(&format!("study {}", category.label()), &plan, 0);
         }
+    }
+    for (id, plan) in sampled_plans(20_000) {
+        for model in 0..plan.models.len() {
+            print_steps_of(&format!("{} {}", id.category.label(), id.key), &plan, model);
+        }
+    }
+}
+
+fn print_steps_of(name: &str, plan: &LanePlan, model: usize) {
+    let runner = LaneRunner::<f32>::new(plan);
+    let constants: Vec<Constants<f32>> =
+        plan.blocks.iter().map(|block| Constants::resolve(&plan.profile, block.category)).collect();
+    let lanes: Vec<[u64; 2]> = (0..plan.lane_count())
+        .into_par_iter()
+        .filter_map(|lane| {
+            let key = plan.key(lane).filter(|key| key.model == model)?;
+            let (case, tables) = runner.case(key.block, key.unit, key.variant);
+            let mut turns = Turns::default();
+            let start = plan.headways[key.headway].start();
+            let observe = &mut |step: &Step<f32>| turns.step(step);
+            constants[key.block].run(plan.models[model], &case, &tables, start, observe);
+            turns.end();
+            Some([turns.all, turns.skipping])
+        })
+        .collect();
+    let [all, skipping] = [0, 1].map(|which| lanes.iter().map(|steps| steps[which]).collect::<Vec<u64>>());
+    let (total, total_skipping) = (all.iter().sum::<u64>(), skipping.iter().sum::<u64>());
+    for warp in [32, 64] {
+        for per_invocation in [1, 8, 16, 32] {
+            let spent = |steps: &[u64]| -> u64 {
+                steps.chunks(WORKGROUP * per_invocation).map(|group| warp_steps(group, warp)).sum()
+            };
+            let (made, left) = (spent(&all), spent(&skipping));
+            let fewer = 1.0 - left as f64 / made as f64;
+            let model = plan.models[model].name();
+            println!(
+                "{name},{model},{},{total},{total_skipping},{warp},{per_invocation},{made},{left},{fewer:.3}",
+                lanes.len()
+            );
+        }
+    }
+}
+
+/// Turns of a lane: each step, and the same if steps in which only the gap changes were skipped. More would not be skipped: near
+/// the driver's or a criterion's limit every step must be made.
+#[derive(Default)]
+struct Turns {
+    all: u64,
+    skipping: u64,
+    /// Steps since something other than the gap changed.
+    quiescent: u64,
+    before: Option<[f32; 6]>,
+}
+
+impl Turns {
+    /// Fewer quiescent steps are cheaper to make than to skip, as on the CPU.
+    const LEAST: u64 = 64;
+    /// Turns for deciding on a jump and making it.
+    const JUMP: u64 = 2;
+
+    fn step(&mut self, step: &Step<f32>) {
+        self.all += 1;
+        let [first, second] = &step.seen;
+        let now = [
+            step.v_ego,
+            first.view.v_other,
+            first.lateral,
+            second.view.v_other,
+            second.lateral,
+            first.view.lateral_towards,
+        ];
+        if self.before == Some(now) && !step.hazard.is_unsafe.holds() {
+            self.quiescent += 1;
+        } else {
+            self.end();
+        }
+        self.before = Some(now);
+        self.skipping += 1;
+    }
+
+    fn end(&mut self) {
+        // One burst remains at the end.
+        if self.quiescent >= Self::LEAST {
+            self.skipping -= self.quiescent - u64::from(shader::BURST) - Self::JUMP;
+        }
+        self.quiescent = 0;
     }
 }
 
 /// Invocations of a workgroup.
 const WORKGROUP: usize = shader::WORKGROUP as usize;
 
-/// Steps that the warps of a workgroup make, times their invocations, if an invocation whose lane has ended takes the next.
+/// Steps that the warps of a workgroup make, times their invocations: an invocation whose lane has ended takes the next at the
+/// end of a burst.
 fn warp_steps(lanes: &[u64], warp: usize) -> u64 {
+    let burst = u64::from(shader::BURST);
     let mut pending = lanes.iter();
     let mut free: BinaryHeap<Reverse<(u64, usize)>> = (0..WORKGROUP).map(|at| Reverse((0, at))).collect();
     let mut ends = vec![0; WORKGROUP / warp];
     while let Some(Reverse((step, at))) = free.pop() {
         match pending.next() {
-            Some(steps) => free.push(Reverse((step + steps, at))),
+            Some(steps) => free.push(Reverse((step + steps.next_multiple_of(burst), at))),
             None => ends[at / warp] = step.max(ends[at / warp]),
         }
     }

@@ -14,16 +14,16 @@ fn initial() -> DriverState {
 
 // Unsafe iff h ≤ 0 and dv > 0 and (g/dv ≤ trigger, multiplied out, or the ego is braking already): an intervention
 // ends with the closing, not with a TTC that braking has just made longer.
-fn check(view: View) -> Hazard {
+fn check(view: View) -> bool {
     let dv = closing(view);
     let in_path = (view.lateral_gap <= 0.0) & (dv > 0.0);
     let soon = view.gap <= driver_trigger_ttc * dv;
     let intervening = view.a_ego < 0.0;
-    return Hazard(!is_behind(view) & in_path & (soon | intervening), driver_max_deceleration);
+    return !is_behind(view) & in_path & (soon | intervening);
 }
 
 // Hold the speed for the delay, then ramp up to the largest deceleration.
-fn react(state: DriverState, hazard: Hazard, v_ego: f32) -> Reaction {
-    let braking = smaller(state.deceleration + driver_jerk_per_step, hazard.demand);
-    return latched_braking(state, 0.0, braking, v_ego);
+fn react(state: DriverState, view: View) -> Reaction {
+    let braking = smaller(state.deceleration + driver_jerk_per_step, driver_max_deceleration);
+    return latched_braking(state, 0.0, braking, view.v_ego);
 }

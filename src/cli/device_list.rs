@@ -242,6 +242,7 @@ mod tests {
             },
             timestamps: true,
             exact_path: index == 0,
+            float_controls: index == 0,
         }
     }
 

@@ -16,6 +16,8 @@ pub struct OperationCount {
     pub divisions: u64,
     /// Comparisons.
     pub comparisons: u64,
+    /// Comparisons of a number that is infinite or none.
+    pub unbounded: u64,
 }
 
 impl OperationCount {
@@ -26,7 +28,7 @@ impl OperationCount {
 }
 
 thread_local! {
-    static COUNT: Cell<OperationCount> = const { Cell::new(OperationCount { additions: 0, multiplications: 0, divisions: 0, comparisons: 0 }) };
+    static COUNT: Cell<OperationCount> = const { Cell::new(OperationCount { additions: 0, multiplications: 0, divisions: 0, comparisons: 0, unbounded: 0 }) };
 }
 
 /// Kinds of operations that are counted.
@@ -51,6 +53,24 @@ fn count(operation: Operation) {
     });
 }
 
+thread_local! {
+    static FLIPS_ZEROS: Cell<bool> = const { Cell::new(false) };
+}
+
+/// A result, or if it is zero and signs of zeros are flipped, −0 after every second operation.
+fn result(value: f64) -> Counting {
+    let is_odd = COUNT.with(|cell| (cell.get().additions + cell.get().multiplications) % 2 == 1);
+    let flips = value == 0.0 && FLIPS_ZEROS.with(Cell::get) && is_odd;
+    Counting(if flips { -0.0 } else { value })
+}
+
+fn compare(a: Counting, b: Counting) {
+    count(Operation::Comparison);
+    if !(a.0.is_finite() && b.0.is_finite()) {
+        COUNT.with(|cell| cell.set(OperationCount { unbounded: cell.get().unbounded + 1, ..cell.get() }));
+    }
+}
+
 /// An f64 that counts what is done with it, per thread.
 #[derive(Debug, Clone, Copy)]
 pub struct Counting(f64);
@@ -62,27 +82,35 @@ impl Counting {
         let result = work();
         (result, COUNT.with(Cell::get))
     }
+
+    /// The same where zeros have any sign.
+    pub fn measure_with_any_zeros<T>(work: impl FnOnce() -> T) -> (T, OperationCount) {
+        FLIPS_ZEROS.with(|cell| cell.set(true));
+        let measured = Counting::measure(work);
+        FLIPS_ZEROS.with(|cell| cell.set(false));
+        measured
+    }
 }
 
 impl Add for Counting {
     type Output = Self;
     fn add(self, other: Self) -> Self {
         count(Operation::Addition);
-        Counting(self.0 + other.0)
+        result(self.0 + other.0)
     }
 }
 impl Sub for Counting {
     type Output = Self;
     fn sub(self, other: Self) -> Self {
         count(Operation::Addition);
-        Counting(self.0 - other.0)
+        result(self.0 - other.0)
     }
 }
 impl Mul for Counting {
     type Output = Self;
     fn mul(self, other: Self) -> Self {
         count(Operation::Multiplication);
-        Counting(self.0 * other.0)
+        result(self.0 * other.0)
     }
 }
 impl Neg for Counting {
@@ -93,13 +121,13 @@ impl Neg for Counting {
 }
 impl PartialEq for Counting {
     fn eq(&self, other: &Self) -> bool {
-        count(Operation::Comparison);
+        compare(*self, *other);
         self.0 == other.0
     }
 }
 impl PartialOrd for Counting {
     fn partial_cmp(&self, other: &Self) -> Option<std::cmp::Ordering> {
-        count(Operation::Comparison);
+        compare(*self, *other);
         self.0.partial_cmp(&other.0)
     }
 }
@@ -107,7 +135,8 @@ impl Real for Counting {
     const ZERO: Self = Counting(0.0);
     const ONE: Self = Counting(1.0);
     const HALF: Self = Counting(0.5);
-    const INFINITY: Self = Counting(f64::INFINITY);
+    /// As in the shaders, which have no infinite number.
+    const INFINITY: Self = Counting(f64::MAX);
 
     fn from_f64(value: f64) -> Self {
         Counting(value)
@@ -144,5 +173,5 @@ fn the_counting_type_sees_every_operation() {
         (a * b + a).exact_div(b).larger(b)
     });
     assert_eq!(value.to_f64(), 4.5);
-    assert_eq!(count, OperationCount { additions: 1, multiplications: 1, divisions: 1, comparisons: 1 });
+    assert_eq!(count, OperationCount { additions: 1, multiplications: 1, divisions: 1, comparisons: 1, unbounded: 0 });
 }

@@ -90,7 +90,7 @@ impl Divider {
         let (device, queue) = pollster::block_on(adapter.request_device(&descriptor)).unwrap();
         let module = match path {
             Path::Exact => {
-                let words = exact_spirv(source, ENTRY, &[]).unwrap();
+                let words = exact_spirv(source, ENTRY, &[], false).unwrap();
                 let entry = wgpu::PassthroughShaderEntryPoint { name: ENTRY.into(), workgroup_size: (WORKGROUP, 1, 1) };
                 // SAFETY: valid SPIR-V of naga, whose bindings are those of `layout`.
                 unsafe {

@@ -6,7 +6,8 @@ use std::mem::offset_of;
 use std::path::{Path, PathBuf};
 
 use crate::wgsl::{
-    Shape, constant, fields, float_operations, function_names, parse, unbounded_loops, without_comments,
+    Shape, constant, fields, float_operations, function_names, parse, unbounded_loops, uninitialized_in_loops,
+    without_comments,
 };
 use lanesweep::engine::generated::{
     self, ATTEMPTS, ColumnBound, MAX_BOUNDS, MAX_PARAMETERS, NO_SLOT, Recipe, ReducedColumns,
@@ -146,7 +147,7 @@ fn every_pipeline_parses_validates_and_becomes_spirv_under_every_profile() {
         for (place, constants) in resolved() {
             for paired in [false, true] {
                 let constants = shader::constants(&constants, model, specialization(paired));
-                let words = exact_spirv(&source, shader::ENTRY, &constants);
+                let words = exact_spirv(&source, shader::ENTRY, &constants, false);
                 assert!(words.is_ok_and(|words| !words.is_empty()), "{model:?}, {place}, paired {paired}");
                 compiled += 1;
             }
@@ -207,7 +208,7 @@ fn the_generator_has_the_records_the_numbers_and_the_arithmetic_of_its_rust_twin
     }
     let found = float_operations(&module, &info);
     assert_eq!((found.forbidden, found.divided_in), (Vec::<String>::new(), vec!["exact_div".to_owned()]));
-    let words = exact_spirv(&shader::assemble_generator(), shader::GENERATE, &generator_constants());
+    let words = exact_spirv(&shader::assemble_generator(), shader::GENERATE, &generator_constants(), false);
     assert!(words.is_ok_and(|w| !w.is_empty()));
 }
 
@@ -407,6 +408,15 @@ fn the_host_reads_from_an_outcome_word_what_a_lane_writes_into_it() {
     assert_eq!(read(1 << 6 | settled).unwrap().contact_with, 1);
 }
 
+#[test]
+fn a_variable_in_a_loop_that_begins_with_nothing_is_found() {
+    let body = |declared: &str| {
+        format!("fn f() {{\n  for (var k = 0u; k < 9u; k++) {{\n    {declared}\n  }}\n  var y: u32;\n}}")
+    };
+    assert_eq!(uninitialized_in_loops(&body("var x: u32;")), ["var x: u32;"]);
+    assert!(uninitialized_in_loops(&body("var x: u32 = 0u;")).is_empty());
+}
+
 fn in_crate(path: &str) -> PathBuf {
     Path::new(env!("CARGO_MANIFEST_DIR")).join(path)
 }
@@ -502,6 +512,7 @@ fn only_the_entry_has_bindings_and_every_file_stays_short_and_plain() {
         SHARED.into_iter().chain(RANDOM).chain(GENERATOR).chain(TALLY).chain(ModelId::ALL.map(driver_shader))
     {
         assert!(text.lines().count() <= 600, "{name} is longer than 600 lines");
+        assert_eq!(uninitialized_in_loops(text), Vec::<String>::new(), "{name}");
         let code = without_comments(text);
         if !["lane.wgsl", "generate.wgsl", "tally.wgsl"].contains(&name) {
             for word in ["@group", "@binding", "@compute", "var<"] {

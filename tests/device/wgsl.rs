@@ -135,6 +135,27 @@ pub fn unbounded_loops(module: &Module) -> (usize, Vec<String>) {
     (loops, unbounded)
 }
 
+/// Lines that declare a variable inside a loop without an initial value. Devices differ on what it holds in the second
+/// round (wgpu 9489).
+pub fn uninitialized_in_loops(text: &str) -> Vec<String> {
+    let (mut open, mut found) = (Vec::new(), Vec::new());
+    for line in without_comments(text).lines() {
+        let words: Vec<&str> = line.split(|c: char| !c.is_ascii_alphanumeric() && c != '_').collect();
+        if open.contains(&true) && words.contains(&"var") && line.trim_end().ends_with(';') && !line.contains('=') {
+            found.push(line.trim().to_owned());
+        }
+        let begins_loop = ["for", "while", "loop"].iter().any(|word| words.contains(word));
+        for c in line.chars() {
+            match c {
+                '{' => open.push(begins_loop),
+                '}' => drop(open.pop()),
+                _ => {}
+            }
+        }
+    }
+    found
+}
+
 /// Calls `look` with every statement, however deep.
 fn walk(block: &Block, look: &mut impl FnMut(&Statement)) {
     for statement in block {

@@ -11,6 +11,7 @@ use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions, TimeGrid, recorded_case};
 use lanesweep::scenario::{Ahead, Case, Category, Ego, Lateral, Other, Participant, Scenario, Side, Speed, Tables};
 
+use crate::common::lane_sets::{forms, random, thresholds};
 use crate::counting::Counting;
 
 fn run_in<R: Real>(profile: &Profile, case: &Case, model: ModelId, thw: f64) -> Outcome<f64> {
@@ -497,6 +498,26 @@ fn a_step_takes_no_more_operations_than_it_should() {
         });
         let per_step = count.total() / u64::from(outcome.end_step + 1);
         assert!(per_step > 10 && per_step <= max, "{model:?}: {per_step} operations per step ({count:?})");
+    }
+}
+
+/// A driver of a GPU that is not told to keep them may assume that there is neither −0 nor an infinite number.
+#[test]
+fn no_lane_depends_on_the_sign_of_a_zero_or_on_an_infinite_number() {
+    let profiles = Profile::names().map(|name| Profile::load(name).unwrap()).chain(forms());
+    for profile in profiles {
+        for plan in [random(&profile, 40), thresholds(&profile, 1)] {
+            let (ours, flipped) = (LaneRunner::<f64>::new(&plan), LaneRunner::<Counting>::new(&plan));
+            for key in (0..plan.lane_count()).step_by(7).map(|lane| plan.key(lane).unwrap()) {
+                let expected = ours.run(&key);
+                let (outcome, count) = Counting::measure_with_any_zeros(|| flipped.run(&key).widen());
+                let place = plan.key_text(&key);
+                assert_eq!(count.unbounded, 0, "{place} compares an infinite number");
+                let bounded = |number: f64| if number == f64::MAX { f64::INFINITY } else { number };
+                let (min_ttc, min_gap) = (bounded(outcome.min_ttc), bounded(outcome.min_gap));
+                assert_eq!(Outcome { min_ttc, min_gap, ..outcome }, expected, "{place}");
+            }
+        }
     }
 }
 

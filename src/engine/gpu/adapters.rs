@@ -133,6 +133,38 @@ pub struct AdapterCard {
     /// The device accepts SPIR-V with `NoContraction`, so that results equal the CPU's (Vulkan with shader
     /// passthrough). Elsewhere equality is not guaranteed.
     pub exact_path: bool,
+    /// The driver can be told to keep signed zeros, infinities and NaN of binary32 (Vulkan's float controls). Lanes do
+    /// not depend on them, but a driver that is not told may assume that there are none.
+    pub float_controls: bool,
+}
+
+/// Whether a Vulkan device can be told to keep signed zeros, infinities and NaN of binary32.
+#[cfg(any(windows, target_os = "linux", target_os = "freebsd", target_os = "android"))]
+// wgpu does not tell; the handles are its own.
+#[allow(unsafe_code)]
+fn has_float_controls(adapter: &wgpu::Adapter) -> bool {
+    use ash::vk;
+    // SAFETY: the handles live as long as the adapter; both structures are those that the call fills.
+    unsafe {
+        let Some(adapter) = adapter.as_hal::<wgpu::hal::api::Vulkan>() else { return false };
+        let (mut core, mut controls) =
+            (vk::PhysicalDeviceProperties2::default(), vk::PhysicalDeviceFloatControlsProperties::default());
+        let instance = adapter.shared_instance();
+        let device = adapter.raw_physical_device();
+        // Both are part of Vulkan 1.2.
+        let version = instance.raw_instance().get_physical_device_properties(device).api_version;
+        if version.min(instance.instance_api_version()) < vk::API_VERSION_1_2 {
+            return false;
+        }
+        core = core.push_next(&mut controls);
+        instance.raw_instance().get_physical_device_properties2(device, &mut core);
+        controls.shader_signed_zero_inf_nan_preserve_float32 == vk::TRUE
+    }
+}
+
+#[cfg(not(any(windows, target_os = "linux", target_os = "freebsd", target_os = "android")))]
+fn has_float_controls(_adapter: &wgpu::Adapter) -> bool {
+    false
 }
 
 impl AdapterCard {
@@ -159,6 +191,7 @@ impl AdapterCard {
             },
             timestamps: features.contains(wgpu::Features::TIMESTAMP_QUERY),
             exact_path: api == Api::Vulkan && features.contains(wgpu::Features::PASSTHROUGH_SHADERS),
+            float_controls: api == Api::Vulkan && has_float_controls(adapter),
         })
     }
 

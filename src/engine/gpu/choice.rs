@@ -159,6 +159,7 @@ mod tests {
             },
             timestamps: true,
             exact_path: api == Api::Vulkan,
+            float_controls: api == Api::Vulkan,
         }
     }
 

@@ -70,6 +70,8 @@ pub(super) struct Device {
     /// Float operations reach the driver unchanged.
     pub exact: bool,
     pub timestamps: bool,
+    /// Shaders may require that signed zeros, infinities and NaN are kept.
+    float_controls: bool,
     /// Maximum size of the samples that the device makes at a time, bytes.
     pub max_made_bytes: u64,
     pub layout: wgpu::BindGroupLayout,
@@ -154,6 +156,7 @@ impl Device {
             queue,
             exact,
             timestamps,
+            float_controls: card.float_controls,
             max_made_bytes: if card.kind == DeviceKind::Discrete { 1 << 30 } else { 256 << 20 },
             layout,
             generator_layout,
@@ -252,7 +255,7 @@ impl Device {
         }
         let label = Some(label);
         let module = if self.exact {
-            let words = exact_spirv(&source, entry, values)?;
+            let words = exact_spirv(&source, entry, values, self.float_controls)?;
             let entry =
                 wgpu::PassthroughShaderEntryPoint { name: entry.to_owned().into(), workgroup_size: (WORKGROUP, 1, 1) };
             // SAFETY: valid SPIR-V from naga, with the bindings of `entries` and decorations added.
@@ -342,7 +345,12 @@ impl Device {
             self.tuners.push((spec.clone(), Tuner::default()));
             self.tuners.len() - 1
         });
-        self.tuners[at].1.observe(lanes, lanes_per_invocation, seconds);
+        let tuner = &mut self.tuners[at].1;
+        let was_tuned = tuner.is_tuned();
+        tuner.observe(lanes, lanes_per_invocation, seconds);
+        if let Some(lanes) = tuner.choice().filter(|_| tuner.is_tuned() && !was_tuned) {
+            tracing::debug!("{}: {lanes} lanes per invocation ({:?} lanes/s)", spec.model.name(), tuner.rates);
+        }
     }
 
     /// # Errors
@@ -399,6 +407,10 @@ impl Tuner {
         let rates = self.rates.iter().map(|rate| rate.unwrap_or(0.0));
         let fastest = (0..).zip(rates).max_by(|(_, a), (_, b)| a.total_cmp(b));
         fastest.map(|(at, _): (usize, f64)| Self::TRIALS[at])
+    }
+
+    fn is_tuned(&self) -> bool {
+        self.rates.iter().all(Option::is_some)
     }
 
     fn observe(&mut self, lanes: u32, lanes_per_invocation: u32, seconds: f64) {

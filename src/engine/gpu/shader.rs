@@ -122,7 +122,7 @@ pub struct Specialization {
 }
 
 /// Steps of a burst: ended lanes wait for half of one, and a warp looks for them once in one.
-const BURST: u32 = 16;
+pub const BURST: u32 = 16;
 /// A burst in which every lane ends. Twin: `MAX_TURNS` in `shaders/lane.wgsl`.
 const ENDLESS: u32 = 0x7fff_ffff;
 
