@@ -25,6 +25,16 @@ fn danger_gap(v_ego: f32, dv: f32) -> f32 {
     return select(driver_ttc * closes, driver_headway * v_ego + driver_headway_tolerance, driver_headway > 0.0);
 }
 
+// Distance beyond which `check` is safe, m.
+fn safe_gap(v_ego: f32, v_other: f32) -> f32 {
+    return select(danger_gap(v_ego, v_ego - v_other), UNBOUNDED, driver_always_unsafe);
+}
+
+// A vehicle beside the ego is safe at every gap.
+fn ignores(lateral_gap: f32, lateral_towards: f32, marking_gap: f32) -> bool {
+    return !driver_always_unsafe & !(lateral_gap <= driver_lateral_gate);
+}
+
 // The ramp starts from the coasting deceleration: the first braking step is 0.4 + jerk·dt.
 fn initial() -> DriverState {
     return DriverState(driver_coasting, driver_delay_steps);

@@ -55,6 +55,9 @@ fn lanes(
             }
             state = advance(state, moment, lane_case);
         }
+        if frame_skip & (state.end == END_NOT_YET) & (state.index >= state.look_from) {
+            state = skip_quiescent(state, lane_case);
+        }
         if state.end != END_NOT_YET {
             write_outcome(at, lane, outcome(state, lane_case));
             done = done + 1u;

@@ -24,6 +24,17 @@ fn ttc_threshold(dv: f32) -> f32 {
     return dv * driver_half_inverse_deceleration + driver_constant;
 }
 
+// Distance beyond which `check` is safe, m.
+fn safe_gap(v_ego: f32, v_other: f32) -> f32 {
+    let dv = v_ego - v_other;
+    return select(abs(dv) * ttc_threshold(dv), UNBOUNDED, driver_always_unsafe);
+}
+
+// A vehicle beside the ego is safe at every gap.
+fn ignores(lateral_gap: f32, lateral_towards: f32, marking_gap: f32) -> bool {
+    return !driver_always_unsafe & !(lateral_gap <= intrusion_gap(marking_gap));
+}
+
 fn initial() -> DriverState {
     return DriverState(0.0, driver_delay_steps);
 }

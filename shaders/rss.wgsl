@@ -40,6 +40,16 @@ fn lateral_distance(lateral_speed: f32) -> f32 {
         + v_response * v_response * driver_half_inverse_lateral;
 }
 
+// Distance beyond which `check` is safe, m.
+fn safe_gap(v_ego: f32, v_other: f32) -> f32 {
+    return longitudinal_distance(v_ego, v_other);
+}
+
+// A vehicle beside the ego is safe at every gap.
+fn ignores(lateral_gap: f32, lateral_towards: f32, marking_gap: f32) -> bool {
+    return !(lateral_gap < lateral_distance(lateral_towards));
+}
+
 fn initial() -> DriverState {
     return DriverState(0.0, driver_delay_steps);
 }

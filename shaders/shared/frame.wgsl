@@ -92,6 +92,8 @@ struct LaneState {
     // The vehicle of a contact, and the closing speed at it.
     touched: u32,
     v_closing: f32,
+    // First step from which steps may be skipped.
+    look_from: u32,
 }
 
 // What happens at a step.
@@ -142,6 +144,7 @@ fn start_lane(lane: LaneCase, start: Start) -> LaneState {
         END_NOT_YET,
         0u,
         0.0,
+        still_from(lane),
     );
     // Index 0 is the start itself, or one step after it.
     if frame_start_shift {

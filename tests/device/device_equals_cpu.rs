@@ -170,6 +170,13 @@ fn one_unit_in_the_last_place_of_a_constant_is_found() {
     }
 }
 
+/// Steps that are skipped down to no gap at all: contacts and reactions are missed.
+#[test]
+fn a_jump_that_goes_too_far_is_found() {
+    let Some(found) = shader_patch("(next < lowest) | (next <= 0.0)", "(next <= 0.0)") else { return };
+    assert!(found.modes_differing + found.tallies.iter().map(|t| t.verdicts_differing).sum::<u64>() > 0, "{found:?}");
+}
+
 #[test]
 fn the_quick_self_check_finds_a_wrong_shader_and_no_other() {
     let Some(gpu) = open(GpuOptions::default()) else { return };

@@ -9,7 +9,7 @@ pub const ENTRY: &str = "lanes";
 pub const WORKGROUP: u32 = 64;
 
 /// Fragments that every model shares, in the order in which they are joined.
-pub const SHARED: [(&str, &str); 11] = [
+pub const SHARED: [(&str, &str); 12] = [
     ("shared/records.wgsl", include_str!("../../../shaders/shared/records.wgsl")),
     ("lane.wgsl", include_str!("../../../shaders/lane.wgsl")),
     ("shared/exact.wgsl", include_str!("../../../shaders/shared/exact.wgsl")),
@@ -20,6 +20,7 @@ pub const SHARED: [(&str, &str); 11] = [
     ("shared/btn.wgsl", include_str!("../../../shaders/shared/btn.wgsl")),
     ("shared/criteria.wgsl", include_str!("../../../shaders/shared/criteria.wgsl")),
     ("shared/frame.wgsl", include_str!("../../../shaders/shared/frame.wgsl")),
+    ("shared/fast_forward.wgsl", include_str!("../../../shaders/shared/fast_forward.wgsl")),
     ("shared/verdicts.wgsl", include_str!("../../../shaders/shared/verdicts.wgsl")),
 ];
 
@@ -84,6 +85,15 @@ crate::for_every_driver_model!(declare_shaders);
 /// Default of models whose shader does not define this function, as in its trait.
 const NO_LATCH: &str = "fn keeps_braking(state: DriverState, view: View) -> bool { return false; }\n";
 
+/// The same of models that promise nothing about where they are safe: their lanes skip no step.
+const NO_PROMISE: &str = "fn safe_gap(v_ego: f32, v_other: f32) -> f32 { return UNBOUNDED; }\n\
+    fn ignores(lateral_gap: f32, lateral_towards: f32, marking_gap: f32) -> bool { return false; }\n";
+
+/// Whether lanes of a model skip quiescent steps: FSM's seldom have any, so its shader promises nothing.
+fn promises(model: ModelId) -> bool {
+    driver_shader(model).1.contains("fn safe_gap(")
+}
+
 /// The source of a model's pipeline: constants of the registry, the shared fragments, the model.
 pub fn assemble(model: ModelId) -> String {
     let (_, driver) = driver_shader(model);
@@ -94,6 +104,9 @@ pub fn assemble(model: ModelId) -> String {
     }
     if !driver.contains("fn keeps_braking(") {
         source.push_str(NO_LATCH);
+    }
+    if !promises(model) {
+        source.push_str(NO_PROMISE);
     }
     source
 }
@@ -123,9 +136,6 @@ pub struct Specialization {
 
 /// Steps of a burst: ended lanes wait for half of one, and a warp looks for them once in one.
 pub const BURST: u32 = 16;
-/// A burst in which every lane ends. Twin: `MAX_TURNS` in `shaders/lane.wgsl`.
-const ENDLESS: u32 = 0x7fff_ffff;
-
 /// Values of the `override` constants of a model's pipeline, by name.
 pub fn constants(
     resolved: &Constants<f32>,
@@ -138,7 +148,9 @@ pub fn constants(
     for (name, is_set) in [("frame_values", values), ("frame_watched", watched), ("frame_queue", queue)] {
         all.push((name, f64::from(u8::from(is_set))));
     }
-    all.push(("frame_burst", f64::from(if queue { BURST } else { ENDLESS })));
+    let frame = &resolved.frames[model.index()];
+    let skips = !values && promises(model) && frame.abort_above_ttc <= 0.0 && resolved.criteria.btn.has_safe_gap();
+    all.extend([("frame_burst", f64::from(BURST)), ("frame_skip", f64::from(u8::from(skips)))]);
     all.extend(scene.shader_constants(model.index()));
     all.push(("motion_inverse_dt", f64::from(resolved.frames[model.index()].inverse_dt)));
     all.extend(resolved.criteria.shader_constants());

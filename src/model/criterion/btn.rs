@@ -150,7 +150,13 @@ impl<R: Real> BrakeThreat<R> {
             ("btn_quartic", self.quartic.to_f64()),
             ("btn_short_ramp", self.short_ramp.to_f64()),
             ("btn_two_jerk", self.two_jerk.to_f64()),
+            ("btn_inverse_two_a_limit", f64::from((1.0 / self.two_a_limit.to_f64()) as f32)),
         ]
+    }
+
+    /// Whether this form has a [safe gap](Self::safe_gap).
+    pub fn has_safe_gap(&self) -> bool {
+        self.form == BtnForm::EquivalentDelay
     }
 
     /// Gap, m, above which the criterion never fails at this closing speed (m/s, > 0), except for rounding. Infinite
