@@ -109,7 +109,7 @@ fn operations(plan: &LanePlan, category: Category, model: ModelId) {
         let lanes = (0..plan.lane_count()).step_by(stride as usize);
         lanes.map(|lane| u64::from(runner.run(&plan.key(lane).unwrap()).end_step) + 1).sum::<u64>()
     });
-    let OperationCount { additions, multiplications, divisions, comparisons } = count;
+    let OperationCount { additions, multiplications, divisions, comparisons, unbounded: _ } = count;
     let per = |n: u64| n as f64 / steps as f64;
     for (kind, n) in [
         ("additions", additions),

@@ -31,6 +31,8 @@ struct bool2 {
 };
 struct uint3 {
     uint x, y, z;
+    uint3() = default;
+    constexpr uint3(uint x, uint y, uint z) : x(x), y(y), z(z) {}
 };
 struct uint4 {
     uint x, y, z, w;
@@ -51,11 +53,13 @@ inline int clamp(int x, int low, int high) { return min(max(x, low), high); }
 inline uint clamp(uint x, uint low, uint high) { return min(max(x, low), high); }
 inline uint min(uint a, uint b) { return ::min(a, b); }
 inline uint clz(uint x) { return __clz(x); }
+inline uint popcount(uint x) { return __popc(x); }
 typedef uint atomic_uint;
 enum memory_order { memory_order_relaxed };
 enum class mem_flags { mem_threadgroup };
 inline void threadgroup_barrier(mem_flags) { __syncthreads(); }
 inline void atomic_store_explicit(uint *at, uint value, memory_order) { *(volatile uint *)at = value; }
+inline uint atomic_load_explicit(uint *at, memory_order) { return *(volatile uint *)at; }
 inline uint atomic_fetch_add_explicit(uint *at, uint by, memory_order) { return atomicAdd(at, by); }
 inline uint atomic_fetch_or_explicit(uint *at, uint by, memory_order) { return atomicOr(at, by); }
 inline uint atomic_fetch_min_explicit(uint *at, uint by, memory_order) { return atomicMin(at, by); }

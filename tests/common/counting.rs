@@ -84,6 +84,7 @@ impl Counting {
     }
 
     /// The same where zeros have any sign.
+    #[allow(dead_code)] // not in benchmarks
     pub fn measure_with_any_zeros<T>(work: impl FnOnce() -> T) -> (T, OperationCount) {
         FLIPS_ZEROS.with(|cell| cell.set(true));
         let measured = Counting::measure(work);

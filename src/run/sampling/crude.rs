@@ -77,7 +77,7 @@ pub fn sample_crude(
 ) -> Result<CrudeRun> {
     let cuts = cuts(plan.unit_count(), &range);
     let mut ledger = Ledger::new(range, &cuts);
-    sample_into(plan, &mut ledger, executor, options, exposure, false, &mut |_| (), each)
+    sample_into(plan, &mut ledger, executor, options, exposure, &mut |_| (), each.map(|each| (false, each)))
 }
 
 /// The sample sizes at which a run of `samples` samples is evaluated.
@@ -92,8 +92,8 @@ pub fn cuts(samples: u64, range: &Range<u64>) -> Vec<u64> {
     checkpoints(samples).into_iter().chain(ends(range)).collect()
 }
 
-/// The same for samples that the ledger does not hold; its cuts must be those of [`cuts`]. With `every_value`, chunks
-/// passed to `each` have the outcome of every lane. `progress` receives the number of samples of every chunk.
+/// The same for samples that the ledger does not hold; its cuts must be those of [`cuts`]. `each` receives every chunk, with the outcome of
+/// every lane if its flag is set. `progress` receives the number of samples of every chunk.
 ///
 /// # Errors
 /// As [`sample_crude`], and those of the ledger's journal; [`Error::Interrupted`].
@@ -103,9 +103,8 @@ pub fn sample_into(
     executor: &Executor,
     options: &SampleOptions,
     exposure: Option<&Exposure>,
-    every_value: bool,
     progress: &mut dyn FnMut(u64),
-    mut each: Option<&mut EachChunk<'_>>,
+    mut each: Option<(bool, &mut EachChunk<'_>)>,
 ) -> Result<CrudeRun> {
     let started = Instant::now();
     let range = ledger.units();
@@ -133,6 +132,7 @@ pub fn sample_into(
         let look = looks[looks.partition_point(|look| *look <= at).min(looks.len() - 1)];
         let next = if is_whole { look } else { range.end };
         for missing in ledger.missing(at..next)? {
+            let every_value = each.as_ref().is_some_and(|(every_value, _)| *every_value);
             let wanted = match (every_value, options.worst) {
                 (true, _) => Wanted::Outcomes,
                 (false, 0) => Wanted::Verdicts,
@@ -150,7 +150,7 @@ pub fn sample_into(
                     SampleTally::check_counted(plan, &chunk, options, &executor.backend.describe())?;
                 }
                 progress(chunk.units.end - chunk.units.start);
-                each.as_mut().map_or(Ok(()), |each| each(&chunk))?;
+                each.as_mut().map_or(Ok(()), |(_, each)| each(&chunk))?;
                 ledger.add(SampleTally::of_chunk(plan, &chunk, options)?, chunk.redone_and_rechecked)
             });
             summary.add(&ledger.kept(part)?);

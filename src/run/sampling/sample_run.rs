@@ -48,7 +48,7 @@ impl Sample {
             SampleKind::Crude(plan) => {
                 let mut ledger = Ledger::new(units.clone(), &cuts(units.end, &units));
                 let (options, exposure) = (&self.options, self.exposure());
-                let run = sample_into(plan, &mut ledger, executor, options, exposure, false, &mut |_| (), None)?;
+                let run = sample_into(plan, &mut ledger, executor, options, exposure, &mut |_| (), None)?;
                 Ok(SampleResult::of_crude(run))
             }
             SampleKind::Weighted(weighted) => {
@@ -188,9 +188,9 @@ impl SampleRun<'_> {
                     return Ok(());
                 }
                 let (options, exposure) = (&self.sample.options, self.sample.exposure());
-                let every_value = chunks.is_some();
+                let chunks = chunks.map(|each| (true, each));
                 let ledger = &mut state.ledger;
-                let run = sample_into(plan, ledger, executor, options, exposure, every_value, progress, chunks)?;
+                let run = sample_into(plan, ledger, executor, options, exposure, progress, chunks)?;
                 self.crude = Some(run);
                 Ok(())
             }
