@@ -83,7 +83,12 @@ class Loop:
         # One comparison with the last step marks a step.
         last = re.compile(rf"\b(?:0x)?(?:{step_cap:x}|{step_cap - 1:x}|{step_cap}|{step_cap - 1})\b")
         compares = ("ISETP", "UISETP", "v_cmp", "s_cmp", "v_cmpx")
-        self.marks = [c.name.startswith(compares) and bool(last.search(c.operands)) for c in code]
+        # Where a comparison takes no constant, a register holds it.
+        held = {c.operands.split(",")[0].strip() for c in code
+                if c.name.startswith(("s_mov", "v_mov")) and last.search(c.operands)}
+        holds = [bool(held.intersection(re.split(r"[,\s]+", c.operands))) for c in code]
+        self.marks = [c.name.startswith(compares) and (bool(last.search(c.operands)) or of)
+                      for c, of in zip(code, holds)]
         self.next = []
         for at, instruction in enumerate(code):
             target = TARGET.search(instruction.operands) if instruction.is_branch() else None
@@ -110,7 +115,9 @@ class Loop:
                     loops[head] |= inside
         stepping = [(len(inside), head) for head, inside in loops.items() if any(self.marks[at] for at in inside)]
         if not stepping:
-            raise SystemExit("no loop compares with the last step")
+            # Then the largest loop counts as one step.
+            stepping = [(-len(inside), head) for head, inside in loops.items()]
+            self.marks = [at == max(stepping, default=(0, 0), key=lambda loop: -loop[0])[1] for at in range(len(code))]
         _, self.head = min(stepping)
         self.inside = loops[self.head]
 
@@ -155,7 +162,7 @@ def fused(code):
             factors = re.findall(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![\w.])", instruction.operands)
             # AMD writes a number that is no operand of its own as bits.
             bits = re.findall(r"\b0x([0-9a-f]{8})\b", instruction.operands)
-            factors += [str(struct.unpack(">f", bytes.fromhex(word))[0]) for word in bits]
+            factors = [str(struct.unpack(">f", bytes.fromhex(word))[0]) for word in bits] + factors
             moves = name.startswith("HFMA2") and "RZ" in instruction.operands
             # A factor that is a power of two makes the product exact, so that the sum is rounded once either way.
             if moves or any(f and float(f) != 0 and math.frexp(abs(float(f)))[0] == 0.5 for f in factors[:1]):
