@@ -159,10 +159,9 @@ def fused(code):
         name = instruction.name
         if re.match(r"(v_(fma|fmac|fmaak|fmamk|pk_fma|dual_fma|fma_mix)|FFMA|HFMA2)", name) and "_u" not in name:
             # HFMA2.MMA and FFMA with zero operands move constants.
-            factors = re.findall(r"(?<![\w.])-?\d+(?:\.\d+)?(?:e[+-]?\d+)?(?![\w.])", instruction.operands)
             # AMD writes a number that is no operand of its own as bits.
-            bits = re.findall(r"\b0x([0-9a-f]{8})\b", instruction.operands)
-            factors = [str(struct.unpack(">f", bytes.fromhex(word))[0]) for word in bits] + factors
+            numbers = re.findall(r"(?<![\w.%:\[])(0x[0-9a-f]{8}|-?\d+(?:\.\d+)?(?:e[+-]?\d+)?)(?![\w.])", instruction.operands)
+            factors = [str(struct.unpack(">f", bytes.fromhex(n[2:]))[0]) if n.startswith("0x") else n for n in numbers]
             moves = name.startswith("HFMA2") and "RZ" in instruction.operands
             # A factor that is a power of two makes the product exact, so that the sum is rounded once either way.
             if moves or any(f and float(f) != 0 and math.frexp(abs(float(f)))[0] == 0.5 for f in factors[:1]):
