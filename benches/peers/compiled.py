@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable
 from typing import NamedTuple
 
@@ -17,8 +18,13 @@ F = np.float32
 # Compile-time constants of the functions below. Literals would be binary64 and make a step binary64.
 C = Constants().rounded()
 
-# error_model="numpy": no test of every divisor. No fastmath: it would change results.
-inlined = numba.njit(error_model="numpy", inline="always")
+# error_model="numpy": no test of every divisor. No fastmath: it would change results. `on_cuda` needs functions of a device.
+if "LANES_ON_CUDA" in os.environ:
+    from numba import cuda
+
+    inlined = cuda.jit(device=True, inline="always", fastmath=False)
+else:
+    inlined = numba.njit(error_model="numpy", inline="always")
 compiled = numba.njit(error_model="numpy", parallel=False)
 
 
@@ -223,11 +229,30 @@ def make_sweep(driver: Driver, cuts_out: bool) -> Callable[..., None]:
     """The sweep of one model in one category, lane by lane."""
     run_lane = make_lane(driver, cuts_out)
 
+    # numba inlines no call with *arguments.
     @compiled
-    def sweep(all_verdicts: NDArray[np.uint8], end_step: NDArray[np.uint32], *arrays: NDArray[np.generic]) -> None:
+    def sweep(
+        all_verdicts: NDArray[np.uint8],
+        end_step: NDArray[np.uint32],
+        case: NDArray[np.int32],
+        ego_speed: Floats,
+        start_gap: Floats,
+        horizon: NDArray[np.int32],
+        leader_speed: Floats,
+        cutter_start_gap: Floats,
+        cutter_half_lengths: Floats,
+        cutter_half_widths: Floats,
+        width: Floats,
+        cutter_speed: Floats,
+        cutter_lateral: Floats,
+        cutter_towards: Floats,
+    ) -> None:
         """All lanes; the first two arrays take the results."""
         for lane in range(len(all_verdicts)):
-            all_verdicts[lane], end_step[lane] = run_lane(lane, *arrays)
+            all_verdicts[lane], end_step[lane] = run_lane(
+                lane, case, ego_speed, start_gap, horizon, leader_speed, cutter_start_gap, cutter_half_lengths,
+                cutter_half_widths, width, cutter_speed, cutter_lateral, cutter_towards,
+            )
 
     return sweep
 
