@@ -9,15 +9,13 @@ mod common;
 
 use std::time::Instant;
 
-use common::peak_memory_bytes;
+use common::{density, peak_memory_bytes};
 use lanesweep::engine::{CpuBackend, Executor, Headway};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, plan_samples, sample_crude};
-use lanesweep::scenario::DataProvenance;
-use lanesweep::scenario::parameterization::Parameterization;
-use lanesweep::scenario::{Category, Scenario};
-use lanesweep::stats::density::{DensityModel, FitOptions};
+use lanesweep::scenario::Category;
+use lanesweep::stats::density::DensityModel;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
@@ -59,13 +57,6 @@ fn main() {
     for samples in [million, 10 * million, 100 * million, 1000 * million].into_iter().take(if large { 4 } else { 3 }) {
         run("memory", &density, &[ModelId::Fsm], samples, 20);
     }
-}
-
-fn density(category: Category, key: &str, scenarios: &[Scenario]) -> DensityModel {
-    let facts =
-        DataProvenance { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
-    let options = FitOptions { representativeness: false, valid_draws: 1000, ..FitOptions::default() };
-    DensityModel::fit(Parameterization::find(category, key).unwrap(), scenarios, &facts, &options).unwrap().model
 }
 
 fn run(part: &str, density: &DensityModel, models: &[ModelId], samples: u64, worst: usize) {

@@ -21,9 +21,6 @@ struct Generation {
     first_edge: u32,
     // Entries of each sample in the table of instants.
     stride: u32,
-    reserved_0: u32,
-    reserved_1: u32,
-    reserved_2: u32,
 }
 
 @group(0) @binding(0) var<uniform> generation: Generation;

@@ -46,7 +46,7 @@ fn lanes(
     var done = 0u;
     // Each turn is a burst of steps. All lanes of a warp that have ended in it are replaced together.
     for (var turn = 0u; turn < MAX_TURNS; turn++) {
-        for (var step = 0u; step < frame_burst; step++) {
+        for (var step = launch.burst_from; step < frame_longest_burst; step++) {
             let moment = observe(state, lane_case);
             state.record = moment.record;
             if moment.ends {

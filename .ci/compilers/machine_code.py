@@ -115,9 +115,7 @@ class Loop:
                     loops[head] |= inside
         stepping = [(len(inside), head) for head, inside in loops.items() if any(self.marks[at] for at in inside)]
         if not stepping:
-            # Then the largest loop counts as one step.
-            stepping = [(-len(inside), head) for head, inside in loops.items()]
-            self.marks = [at == max(stepping, default=(0, 0), key=lambda loop: -loop[0])[1] for at in range(len(code))]
+            raise SystemExit("no loop compares with the last step")
         _, self.head = min(stepping)
         self.inside = loops[self.head]
 
@@ -152,6 +150,24 @@ class Loop:
         return {kind: count / steps for kind, count in counts.items() if kind is not None}
 
 
+def is_power_of_two(operand):
+    """Whether an operand is a number whose products are exact. AMD writes other numbers than the usual ones as bits."""
+    number = re.fullmatch(r"-?(0x[0-9a-f]{8}|\d+(?:\.\d+)?(?:e[+-]?\d+)?)", operand)
+    if not number:
+        return False
+    text = number.group(1)
+    value = struct.unpack(">f", bytes.fromhex(text[2:]))[0] if text.startswith("0x") else float(text)
+    return math.frexp(value)[0] == 0.5
+
+
+def factors(instruction):
+    """The two factors of a fused operation. A listing may leave the result out; a sum is then one operand more."""
+    operands = [operand.strip() for operand in instruction.operands.split(",")]
+    sources = operands[1:] if re.fullmatch(r"[vR]\d+", operands[0].removesuffix(".reuse")) else operands
+    # v_fmamk: factor, number, sum.
+    return sources[:2]
+
+
 def fused(code):
     """Fused multiply-adds that can change a result, harmless ones, and unfused ones in one instruction."""
     harmful, harmless, unfused = [], 0, 0
@@ -159,12 +175,9 @@ def fused(code):
         name = instruction.name
         if re.match(r"(v_(fma|fmac|fmaak|fmamk|pk_fma|dual_fma|fma_mix)|FFMA|HFMA2)", name) and "_u" not in name:
             # HFMA2.MMA and FFMA with zero operands move constants.
-            # AMD writes a number that is no operand of its own as bits.
-            numbers = re.findall(r"(?<![\w.%:\[])(0x[0-9a-f]{8}|-?\d+(?:\.\d+)?(?:e[+-]?\d+)?)(?![\w.])", instruction.operands)
-            factors = [str(struct.unpack(">f", bytes.fromhex(n[2:]))[0]) if n.startswith("0x") else n for n in numbers]
             moves = name.startswith("HFMA2") and "RZ" in instruction.operands
-            # A factor that is a power of two makes the product exact, so that the sum is rounded once either way.
-            if moves or any(f and float(f) != 0 and math.frexp(abs(float(f)))[0] == 0.5 for f in factors[:1]):
+            # An exact product: the sum is rounded once either way.
+            if moves or any(is_power_of_two(factor) for factor in factors(instruction)):
                 harmless += not moves
             else:
                 harmful.append(f"{name} {instruction.operands}")

@@ -5,7 +5,9 @@
 pub mod worker;
 
 use lanesweep::engine::{Backend, Executor, LanePlan, Partial, Wanted};
-use lanesweep::scenario::{Category, Scenario};
+use lanesweep::scenario::parameterization::Parameterization;
+use lanesweep::scenario::{Category, DataProvenance, Scenario};
+use lanesweep::stats::density::{DensityModel, FitOptions};
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
 
@@ -26,6 +28,14 @@ pub fn paper_size_scenarios() -> Vec<Scenario> {
         }
     }
     scenarios
+}
+
+/// A density of synthetic scenarios without the check of its representativeness.
+pub fn density(category: Category, key: &str, scenarios: &[Scenario]) -> DensityModel {
+    let facts =
+        DataProvenance { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
+    let options = FitOptions { representativeness: false, valid_draws: 1000, ..FitOptions::default() };
+    DensityModel::fit(Parameterization::find(category, key).unwrap(), scenarios, &facts, &options).unwrap().model
 }
 
 /// Evaluated steps of all lanes.

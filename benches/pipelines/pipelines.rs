@@ -20,16 +20,15 @@ use std::fs;
 use std::path::{Path, PathBuf};
 
 use ash::{khr::pipeline_executable_properties as executables, vk};
-use common::paper_size_scenarios;
+use common::{density, paper_size_scenarios};
 use lanesweep::engine::gpu::{exact_spirv, shader};
 use lanesweep::engine::{Constants, CountLayout, DeviceScene, Headway, LanePlan, LaneRunner, Step};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, SampleTally, plan_samples};
 use lanesweep::run::study::{StudyOptions, plan_study};
+use lanesweep::scenario::Category;
 use lanesweep::scenario::parameterization::Parameterization;
-use lanesweep::scenario::{Category, DataProvenance};
-use lanesweep::stats::density::{DensityModel, FitOptions};
 use rayon::prelude::*;
 
 /// One kernel with its constants.
@@ -95,10 +94,9 @@ fn kernels(profiles: &[&str], values: bool) -> Vec<Kernel> {
         for model in ModelId::ALL {
             for category in Category::ALL {
                 let resolved = Constants::resolve(&profile, category);
-                // The samples have the profile `paper`; for the others lanes that share nothing are sufficient.
                 let of_samples = plans
                     .iter()
-                    .filter(|(id, _)| id.category == category && *profile_name == "paper")
+                    .filter(|(id, _)| id.category == category)
                     .map(|(id, plan)| (id.key.clone(), plan.generator().expect("a plan of samples").scene()));
                 let any = ("any".into(), DeviceScene::unknown(category == Category::CutOut));
                 for (scene_name, scene) in of_samples.chain([any]) {
@@ -116,9 +114,6 @@ fn kernels(profiles: &[&str], values: bool) -> Vec<Kernel> {
 /// Sampled lanes of densities that differ in their generators.
 fn sampled_plans(samples: u64) -> Vec<(Parameterization, LanePlan)> {
     let scenarios = paper_size_scenarios();
-    let facts =
-        DataProvenance { data: "synthetic".to_owned(), synthetic: true, scenarios_sha256: String::new(), driven: None };
-    let fit = FitOptions { representativeness: false, valid_draws: 1000, ..FitOptions::default() };
     let keys = [
         (Category::CutIn, "2"),
         (Category::CutIn, "6"),
@@ -129,13 +124,12 @@ fn sampled_plans(samples: u64) -> Vec<(Parameterization, LanePlan)> {
         (Category::Lvd, "iv"),
     ];
     let plan = |(category, key)| {
-        let id = Parameterization::find(category, key).expect("a parameterization");
-        let density = DensityModel::fit(id.clone(), &scenarios, &facts, &fit).expect("a density").model;
+        let density = density(category, key, &scenarios);
         let headways = SampleHeadways::Each(vec![Headway::ThwS(1.0)]);
         let options = SampleOptions::new(Estimator::CRUDE, samples, headways);
         let profile = Profile::load("paper").expect("a profile");
         let mixture = density.mixture().expect("a mixture");
-        (id, plan_samples(&density, &mixture, &profile, &options).expect("a plan"))
+        (density.space.id().clone(), plan_samples(&density, &mixture, &profile, &options).expect("a plan"))
     };
     keys.into_iter().map(plan).collect()
 }

@@ -3,8 +3,8 @@
 
 // Fewer steps are cheaper to make than to skip.
 const MIN_SKIPPED: u32 = 64u;
-// One burst remains, so that the lane ends in the regular way.
-const LAST_STEPS: u32 = 16u;
+// The longest burst remains, so that the lane ends in the regular way.
+const LAST_STEPS: u32 = 32u;
 // After a look in vain the next one is later.
 const LOOK_AGAIN: u32 = 64u;
 const BINADE: u32 = 0x800000u;

@@ -23,8 +23,8 @@ override frame_values: bool;
 override frame_watched: bool;
 // An invocation whose lane has ended takes the next one of its workgroup.
 override frame_queue: bool;
-// Steps between two looks for lanes that have ended.
-override frame_burst: u32;
+// Steps between two looks for lanes that have ended, at most.
+override frame_longest_burst: u32;
 // What all lanes of a pipeline share: twin of `DeviceScene` in src/engine/scene.rs.
 // Some cases have a second vehicle.
 override scene_paired: bool;

@@ -67,6 +67,8 @@ struct Launch {
     finished_word: u32,
     // Lanes of a workgroup, at least WORKGROUP.
     lanes_per_group: u32,
+    // A burst begins at this step of the longest one. No compiler knows it, so that none unrolls a burst.
+    burst_from: u32,
     // A TTC below this fails, s: the threshold of the profile or of a watch.
     ttc_threshold_s: f32,
     // Verdicts mark contacts with at least this closing speed, m/s.

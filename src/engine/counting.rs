@@ -48,6 +48,8 @@ impl CountLayout {
     /// Place of the lanes per model from headways below [`CLOSE_HEADWAY_S`].
     pub const CLOSE_LANES: usize = 2;
     const FAILURES: usize = 3;
+    /// Counts of every sample that a device can gather.
+    pub const GATHERED: usize = 1024;
 
     /// The layout of the counts of a plan.
     pub fn new(plan: &LanePlan, counting: &Counting) -> CountLayout {

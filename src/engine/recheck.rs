@@ -216,7 +216,7 @@ mod tests {
     use crate::engine::drivers::Constants;
     use crate::engine::frame::Simulation;
     use crate::engine::lane::{Silent, run_lane};
-    use crate::engine::scene::{Scene, may_cross};
+    use crate::engine::scene::{Scene, fastest_in, may_cross};
     use crate::engine::verify::{RandomOptions, random_plan};
     use crate::engine::{Backend, CpuBackend, Executor, LaneCase, Session, SweepSummary, Wanted};
     use crate::model::driver::{DriverModel, DriverState, Hazard, ModelId, View};
@@ -311,9 +311,8 @@ mod tests {
             let starts: Vec<_> = keys.iter().map(|key| plan.headways[key.headway].start()).collect();
             let (mut series, cap) = (Series::default(), plan.profile.step_cap());
             let tracks: Vec<_> = cases.iter().map(|case| series.unroll(case, &tables, cap)).collect();
-            let may_cross = cases
-                .iter()
-                .any(|case| may_cross(case, crate::engine::scene::fastest_in(&tables), plan.profile.frame.dt_s as f32));
+            let may_cross =
+                cases.iter().any(|case| may_cross(case, fastest_in(&tables), plan.profile.frame.dt_s as f32));
             let scene = Scene::of(&cases, self.id.index(), may_cross);
             let (cases, tracks, starts) = (&cases[..], &tracks[..], &starts[..]);
             let stream = Lanes { cases, tracks, starts, one_start_each: true, every_step, may_cross };

@@ -1,10 +1,10 @@
 //! Properties of the other vehicles that are known before a lane runs, so that its steps need not test them.
 
+use crate::model::driver::MODELS;
 use crate::model::scalar::Real;
 use crate::scenario::{LATERAL_SAMPLED, Motion, SPEED_SAMPLED, Tables};
 
 use super::lane_case::{LaneCase, LaneOther, NEVER};
-use crate::model::driver::MODELS;
 
 /// Properties that all lanes of a stream share.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -81,9 +81,10 @@ fn a_device_that_does_not_answer_in_time_leaves_complete_numbers() {
 fn a_lane_that_a_device_does_not_run_to_its_end_is_no_result() {
     let plan = plan();
     let few_turns = || {
-        let turns =
-            |turns, steps| format!("turn < {turns}; turn++) {{\n        for (var step = 0u; step < {steps}; step++)");
-        patched(&turns("MAX_TURNS", "frame_burst"), &turns("1u", "100u"))
+        let turns = |turns, begin, end| {
+            format!("turn < {turns}; turn++) {{\n        for (var step = {begin}; step < {end}; step++)")
+        };
+        patched(&turns("MAX_TURNS", "launch.burst_from", "frame_longest_burst"), &turns("1u", "0u", "100u"))
     };
     let Some(gpu) = few_turns() else { return };
     for wanted in [Wanted::Verdicts, Wanted::Outcomes] {

@@ -61,7 +61,7 @@ fn records() -> Vec<Record> {
         record!("Start", StartRecord, { kind: u32, value: f32 }),
         record!("Launch", Launch, {
             lanes: u32, headways: u32, first_case: u32, case_step: u32, first_lane: u32, lanes_between: u32, first_word: u32, first_outcome: u32,
-            finished_word: u32, lanes_per_group: u32, ttc_threshold_s: f32, marks_contacts_from: f32,
+            finished_word: u32, lanes_per_group: u32, burst_from: u32, ttc_threshold_s: f32, marks_contacts_from: f32,
         }),
         record!("OutcomeRecord", OutcomeRecord, {
             word: u32, reaction_step: u32, end_step: u32, impact_speed: f32, impact_closing_speed: f32,
@@ -93,7 +93,7 @@ fn generator_records() -> Vec<Record> {
         record!("Generation", Generation, {
             index_low: u32, index_high: u32, count: u32, seed_low: u32, seed_high: u32, purpose: u32,
             components: u32, first_mean: u32, first_factor: u32, first_factor_of: u32, first_knot: u32, first_edge: u32,
-            stride: u32, reserved_0: u32, reserved_1: u32, reserved_2: u32,
+            stride: u32,
         }),
     ]
 }
@@ -235,6 +235,7 @@ fn the_counting_has_the_records_and_the_places_of_its_rust_twins() {
         ("VOIDS", CountLayout::VOIDS as u32),
         ("TRIES", CountLayout::TRIES as u32),
         ("CLOSE_LANES", CountLayout::CLOSE_LANES as u32),
+        ("GATHERED", CountLayout::GATHERED as u32),
         ("WORKGROUP", shader::WORKGROUP),
     ] {
         assert_eq!(constant(&module, name), value, "{name}");
@@ -321,7 +322,7 @@ fn constants_that_stand_on_both_sides_agree() {
         ("MOTION_SINUSOID", MotionKind::Sinusoid as u32),
         ("MOTION_INSTANTS", MotionKind::Instants as u32),
         ("ATTEMPTS", ATTEMPTS),
-        ("LAST_STEPS", shader::BURST),
+        ("LAST_STEPS", shader::LONGEST_BURST),
         ("BINADE", 1 << (f32::MANTISSA_DIGITS - 1)),
         ("SINE_0", sine(0)),
         ("SINE_1", sine(1)),

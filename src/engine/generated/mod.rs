@@ -32,12 +32,6 @@ pub struct Generator {
     pub basis: Vec<f32>,
 }
 
-/// The smallest number of the lane arithmetic that is not below a limit.
-fn at_least(limit: f64) -> f32 {
-    let near = limit as f32;
-    if f64::from(near) < limit { near.next_up() } else { near }
-}
-
 impl Generator {
     /// The point of a sample index.
     #[inline]
@@ -134,7 +128,9 @@ impl Generator {
 
     /// Entries of one case in a device's table of instants: the last instant of a series is there twice.
     pub fn case_instants(&self) -> u32 {
-        let series = if self.recipe.pair != 0 { 3 } else { 2 };
+        let columns = &self.recipe.columns;
+        let others = [columns.lateral, columns.lead_speed].into_iter().filter(|first| *first != NO_SLOT);
+        let series = 1 + others.count() as u32;
         if self.recipe.path() == CasePath::Reduced { series * (self.recipe.columns.instants + 1) } else { 0 }
     }
 
@@ -154,7 +150,7 @@ impl Generator {
         let mut all = vec![
             ("map_x", f64::from(map_x)),
             ("map_y", f64::from(map_y)),
-            ("close_headway", f64::from(at_least(CLOSE_HEADWAY_S))),
+            ("close_headway", CLOSE_HEADWAY_S),
             ("points_source", source),
             ("points_weighted", flag(points.weights.is_some())),
             ("points_transformed", flag(!points.knots.is_empty())),

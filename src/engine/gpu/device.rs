@@ -10,7 +10,8 @@ use std::time::Duration;
 use rayon::prelude::*;
 
 use super::adapters::{AdapterCard, DeviceKind};
-use super::shader::{self, COUNT, ENTRY, GENERATE, WORKGROUP};
+use super::pacing::{Sharing, Tuner};
+use super::shader::{self, BURST, COUNT, ENTRY, GENERATE, WORKGROUP};
 use super::spirv::exact_spirv;
 use crate::model::driver::ModelId;
 use crate::{Error, Result};
@@ -62,6 +63,13 @@ pub(super) struct PipelineSpec {
     pub constants: Vec<(&'static str, f64)>,
 }
 
+/// A model's pipeline.
+struct Compiled {
+    spec: PipelineSpec,
+    pipeline: wgpu::ComputePipeline,
+    tuner: Tuner,
+}
+
 /// The open device.
 pub(super) struct Device {
     pub name: String,
@@ -82,10 +90,9 @@ pub(super) struct Device {
     /// Bindings of the counting.
     pub tally_layout: wgpu::BindGroupLayout,
     pipeline_layout: wgpu::PipelineLayout,
-    pipelines: Vec<(PipelineSpec, wgpu::ComputePipeline)>,
+    pipelines: Vec<Compiled>,
     generator: Option<(Vec<(&'static str, f64)>, wgpu::ComputePipeline)>,
     tally: Option<(Vec<(&'static str, f64)>, wgpu::ComputePipeline)>,
-    tuners: Vec<(PipelineSpec, Tuner)>,
     trouble: Arc<Mutex<Option<String>>>,
 }
 
@@ -167,7 +174,6 @@ impl Device {
             generator: None,
             tally: None,
             tally_layout,
-            tuners: Vec::new(),
             trouble,
         };
         opened.untroubled()?;
@@ -185,7 +191,7 @@ impl Device {
     ) -> Result<Vec<wgpu::ComputePipeline>> {
         let mut missing: Vec<&PipelineSpec> = Vec::new();
         for spec in specs.clone() {
-            if !missing.contains(&spec) && !self.pipelines.iter().any(|(known, _)| known == spec) {
+            if !missing.contains(&spec) && !self.pipelines.iter().any(|known| known.spec == *spec) {
                 missing.push(spec);
             }
         }
@@ -194,10 +200,12 @@ impl Device {
             self.compile(spec.model.name(), source, ENTRY, &spec.constants, &self.pipeline_layout)
         };
         let compiled = missing.par_iter().map(compile).collect::<Result<Vec<_>>>()?;
-        self.pipelines.extend(missing.into_iter().cloned().zip(compiled));
-        let of = |spec| {
-            let found = self.pipelines.iter().find(|(known, _)| known == spec);
-            found.map(|(_, pipeline)| pipeline.clone()).ok_or_else(|| self.failed("a pipeline is missing"))
+        let compiled = missing.into_iter().cloned().zip(compiled);
+        let new = compiled.map(|(spec, pipeline)| Compiled { spec, pipeline, tuner: Tuner::default() });
+        self.pipelines.extend(new);
+        let of = |spec: &PipelineSpec| {
+            let found = self.pipelines.iter().find(|known| known.spec == *spec);
+            found.map(|known| known.pipeline.clone()).ok_or_else(|| self.failed("a pipeline is missing"))
         };
         specs.map(of).collect()
     }
@@ -329,27 +337,22 @@ impl Device {
         (groups.div_ceil(rows), rows)
     }
 
-    /// Average number of lanes per invocation of a dispatch.
-    pub(super) fn lanes_per_invocation(&self, spec: &PipelineSpec, lanes: u32) -> u32 {
+    /// How the invocations of a dispatch share its lanes.
+    pub(super) fn sharing(&self, spec: &PipelineSpec, lanes: u32) -> Sharing {
         let busy = (lanes / (WORKGROUP * BUSY_WORKGROUPS)).clamp(1, MAX_LANES_PER_INVOCATION);
-        let tuned = || self.tuners.iter().find(|(known, _)| known == spec).and_then(|(_, tuner)| tuner.choice());
-        self.options.lanes_per_invocation.or_else(tuned).unwrap_or(busy)
+        let fixed = |lanes| Sharing { lanes, burst: BURST };
+        let tuned = || self.pipelines.iter().find(|known| known.spec == *spec)?.tuner.choice();
+        self.options.lanes_per_invocation.map(fixed).or_else(tuned).unwrap_or(fixed(busy))
     }
 
     /// Takes the time of a dispatch into account.
-    pub(super) fn observe(&mut self, spec: &PipelineSpec, lanes: u32, lanes_per_invocation: u32, seconds: f64) {
-        if self.options.lanes_per_invocation.is_some() {
-            return;
-        }
-        let at = self.tuners.iter().position(|(known, _)| known == spec).unwrap_or_else(|| {
-            self.tuners.push((spec.clone(), Tuner::default()));
-            self.tuners.len() - 1
-        });
-        let tuner = &mut self.tuners[at].1;
-        let was_tuned = tuner.is_tuned();
-        tuner.observe(lanes, lanes_per_invocation, seconds);
-        if let Some(lanes) = tuner.choice().filter(|_| tuner.is_tuned() && !was_tuned) {
-            tracing::debug!("{}: {lanes} lanes per invocation ({:?} lanes/s)", spec.model.name(), tuner.rates);
+    pub(super) fn observe(&mut self, spec: &PipelineSpec, lanes: u32, sharing: Sharing, seconds: f64) {
+        if let Some(known) = self.pipelines.iter_mut().find(|known| known.spec == *spec)
+            && self.options.lanes_per_invocation.is_none()
+            && let Some(found) = known.tuner.observe(lanes, sharing, seconds)
+        {
+            let (model, Sharing { lanes, burst }) = (spec.model.name(), found);
+            tracing::debug!("{model}: {lanes} lanes per invocation, bursts of {burst} steps");
         }
     }
 
@@ -380,51 +383,6 @@ const BUSY_WORKGROUPS: u32 = 4224;
 /// A larger value hardly increases the use of a warp's lanes, and lengthens the end of a dispatch.
 const MAX_LANES_PER_INVOCATION: u32 = 32;
 
-/// Which number of lanes per invocation is fastest for a pipeline: each is tried once, on dispatches that are long enough to
-/// tell. Results do not depend on it.
-#[derive(Debug, Clone, Default)]
-struct Tuner {
-    /// Lanes per second of each trial.
-    rates: [Option<f64>; Tuner::TRIALS.len()],
-    /// A long dispatch was seen: the trials begin.
-    is_warm: bool,
-}
-
-impl Tuner {
-    /// A warp of lanes that differ much likes many, one of neighbours that are alike one, a long step fewer.
-    const TRIALS: [u32; 4] = [16, 8, 1, 32];
-    /// A shorter dispatch tells nothing, s.
-    const LONG_S: f64 = 0.004;
-
-    /// The number to use: the next trial, or the fastest; `None` before the first long dispatch.
-    fn choice(&self) -> Option<u32> {
-        if !self.is_warm {
-            return None;
-        }
-        if let Some(next) = self.rates.iter().position(Option::is_none) {
-            return Some(Self::TRIALS[next]);
-        }
-        let rates = self.rates.iter().map(|rate| rate.unwrap_or(0.0));
-        let fastest = (0..).zip(rates).max_by(|(_, a), (_, b)| a.total_cmp(b));
-        fastest.map(|(at, _): (usize, f64)| Self::TRIALS[at])
-    }
-
-    fn is_tuned(&self) -> bool {
-        self.rates.iter().all(Option::is_some)
-    }
-
-    fn observe(&mut self, lanes: u32, lanes_per_invocation: u32, seconds: f64) {
-        if seconds < Self::LONG_S || !seconds.is_finite() {
-            return;
-        }
-        let trial = Self::TRIALS.iter().position(|&lanes| lanes == lanes_per_invocation);
-        if let Some(rate) = trial.filter(|_| self.is_warm).map(|at| &mut self.rates[at]) {
-            rate.get_or_insert(f64::from(lanes) / seconds);
-        }
-        self.is_warm = true;
-    }
-}
-
 /// The bindings of `shaders/lane.wgsl`, in their order: launch, four inputs, three results.
 fn entries() -> Vec<wgpu::BindGroupLayoutEntry> {
     buffer_entries(4, 3, true)
@@ -453,26 +411,4 @@ fn buffer_entries(inputs: usize, results: usize, dynamic: bool) -> Vec<wgpu::Bin
         count: None,
     };
     kinds.enumerate().map(entry).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// Dispatches of a device on which `best` lanes per invocation are twice as fast as any other number.
-    #[test]
-    fn the_fastest_number_of_lanes_is_found_and_kept() {
-        for best in Tuner::TRIALS {
-            let mut tuner = Tuner::default();
-            tuner.observe(1 << 22, 1, 0.001);
-            assert_eq!(tuner.choice(), None, "a short dispatch tells nothing");
-            let mut lanes_per_invocation = 4;
-            for _ in 0..8 {
-                let seconds = if lanes_per_invocation == best { 0.05 } else { 0.1 };
-                tuner.observe(1 << 22, lanes_per_invocation, seconds);
-                lanes_per_invocation = tuner.choice().unwrap();
-            }
-            assert_eq!(lanes_per_invocation, best);
-        }
-    }
 }

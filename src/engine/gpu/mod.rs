@@ -9,6 +9,7 @@ mod choice;
 mod device;
 mod generator;
 mod owner;
+mod pacing;
 mod records;
 mod ring;
 mod session;

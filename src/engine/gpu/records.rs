@@ -70,6 +70,8 @@ pub struct Launch {
     pub finished_word: u32,
     /// Lanes of a workgroup, at least [`WORKGROUP`](super::shader::WORKGROUP).
     pub lanes_per_group: u32,
+    /// A burst begins at this step of the longest one.
+    pub burst_from: u32,
     /// A TTC below this fails, s: the threshold of the profile or of a watch.
     pub ttc_threshold_s: f32,
     /// Verdicts mark contacts with at least this closing speed, m/s.
@@ -171,12 +173,6 @@ pub struct Generation {
     pub first_edge: u32,
     /// Entries of each sample in the table of instants.
     pub stride: u32,
-    /// A uniform record is a multiple of 16 bytes.
-    pub reserved_0: u32,
-    /// As above.
-    pub reserved_1: u32,
-    /// As above.
-    pub reserved_2: u32,
 }
 
 /// What is counted of a sample besides its lanes.

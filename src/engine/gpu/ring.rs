@@ -7,8 +7,9 @@ use bytemuck::Zeroable;
 
 use super::device::{Device, PipelineSpec};
 use super::generator::Inputs;
+use super::pacing::Sharing;
 use super::records::{Launch, OutcomeRecord, Tally};
-use super::shader::WORKGROUP;
+use super::shader::{LONGEST_BURST, WORKGROUP};
 use crate::model::criterion::Criteria;
 use crate::{Error, Result};
 
@@ -67,7 +68,7 @@ impl Job {
         self.cases * self.headways
     }
 
-    /// The lanes of a dispatch; `at` is its position.
+    /// The lanes of a dispatch; `at` is its position. The device decides how invocations share them.
     fn launch(&self, at: usize) -> Launch {
         let Dispatch { model, variant, criteria, .. } = &self.dispatches[at];
         let step = if variant.is_some() { self.variants } else { 1 };
@@ -82,7 +83,8 @@ impl Job {
             first_word: (model * self.words()) as u32,
             first_outcome: (model * self.records()) as u32,
             finished_word: at as u32,
-            lanes_per_group: 0,
+            lanes_per_group: WORKGROUP,
+            burst_from: 0,
             ttc_threshold_s: criteria.ttc.threshold,
             // f32::MAX replaces ∞: no closing speed reaches it.
             marks_contacts_from: criteria.marks_contacts_from.min(f32::MAX),
@@ -168,8 +170,8 @@ impl ResultSizes {
 /// A job in flight.
 pub(super) struct Flight {
     job: Job,
-    /// Lanes per invocation of each dispatch.
-    per_invocation: Vec<u32>,
+    /// Of each dispatch.
+    sharings: Vec<Sharing>,
     parts: ResultSizes,
     submission: wgpu::SubmissionIndex,
     mapped: mpsc::Receiver<std::result::Result<(), wgpu::BufferAsyncError>>,
@@ -187,12 +189,13 @@ impl Slot {
         let buffers = self.buffers.as_ref().ok_or_else(|| device.failed("it has no buffers"))?;
         let stride = launch_stride(device);
         let mut launches = vec![0_u8; stride as usize * dispatches];
-        let (mut grids, mut per_invocation) = (Vec::new(), Vec::new());
+        let (mut grids, mut sharings) = (Vec::new(), Vec::new());
         for at in 0..dispatches {
             let mut launch = job.launch(at);
-            let lanes_per_invocation = device.lanes_per_invocation(&job.dispatches[at].pipeline, launch.lanes);
-            launch.lanes_per_group = WORKGROUP * lanes_per_invocation;
-            per_invocation.push(lanes_per_invocation);
+            let sharing = device.sharing(&job.dispatches[at].pipeline, launch.lanes);
+            launch.lanes_per_group = WORKGROUP * sharing.lanes;
+            launch.burst_from = LONGEST_BURST - sharing.burst;
+            sharings.push(sharing);
             grids.push(device.grid(launch.lanes.div_ceil(launch.lanes_per_group)));
             let place = stride as usize * at;
             launches[place..place + size_of::<Launch>()].copy_from_slice(bytemuck::bytes_of(&launch));
@@ -289,7 +292,7 @@ impl Slot {
         let since = Instant::now();
         let submission = device.queue.submit([encoder.finish()]);
         device.untroubled()?;
-        Ok(Flight { job, per_invocation, parts, submission, mapped, since })
+        Ok(Flight { job, sharings, parts, submission, mapped, since })
     }
 
     /// Waits for a job and reads its results. `previous` is the time at which the previous job ended.
@@ -329,7 +332,7 @@ impl Slot {
         buffers.readback.unmap();
         let seconds = answer.iter().flat_map(|answer| &answer.seconds);
         for ((at, dispatch), &seconds) in flight.job.dispatches.iter().enumerate().zip(seconds) {
-            device.observe(&dispatch.pipeline, flight.job.launch(at).lanes, flight.per_invocation[at], seconds);
+            device.observe(&dispatch.pipeline, flight.job.launch(at).lanes, flight.sharings[at], seconds);
         }
         Ok(answer)
     }

@@ -12,10 +12,12 @@ use super::adapters::{AdapterCard, Adapters, DeviceKind};
 use super::device::{GpuOptions, PipelineSpec, Tampering};
 use super::generator::GeneratorSetup;
 use super::owner::{self, Cases, Command, Prepared, Request, Setup};
+use super::pacing::Pacer;
 use super::records::StartRecord;
 use super::ring::{Answer, Dispatch, Job, RING, TallyJob};
 use super::shader::{self, Specialization};
 use crate::engine::counting::{PackedLanes, close_headways, mark_bits};
+use crate::engine::generated::Generator;
 use crate::engine::{
     Backend, Chunk, Constants, CountLayout, Counted, Counting, DeviceRecord, DeviceScene, LaneCase, LanePlan, Outcome,
     Session, Verdicts, Wanted,
@@ -45,6 +47,8 @@ pub(super) struct GpuSession<'p> {
     split_scenes: bool,
     /// The highest speed of the tables, m/s.
     fastest: f32,
+    /// The scene of all samples, if the device makes the cases.
+    made_scene: Option<DeviceScene>,
     /// The cases on the device: block, its units, and the scenes of their variants, or one of all.
     window: Option<(usize, Range<u64>, Vec<DeviceScene>)>,
     /// Time of all dispatches so far, s.
@@ -76,7 +80,7 @@ fn counter(plan: &LanePlan, counting: &Counting) -> Option<(CountLayout, TallyJo
     let fits = plan.generator().is_some()
         && plan.blocks.len() == 1
         && plan.headways.len() < 32
-        && layout.of_every_sample() <= GATHERED
+        && layout.of_every_sample() <= CountLayout::GATHERED
         && layout.total() <= MAX_COUNTS;
     let [close_headways, drawn_headways] = close_headways(&plan.headways[..plan.headways.len().min(31)]);
     let constants = layout.shader_constants(counting.criterion);
@@ -84,8 +88,6 @@ fn counter(plan: &LanePlan, counting: &Counting) -> Option<(CountLayout, TallyJo
     fits.then_some((layout, tally))
 }
 
-/// Counts that a workgroup gathers: the same number is in `shaders/tally.wgsl`.
-const GATHERED: usize = 1024;
 /// Maximum number of counts of a job.
 const MAX_COUNTS: usize = 1 << 20;
 
@@ -112,8 +114,8 @@ impl<'p> GpuSession<'p> {
         let tables: Tables<f32> = if plan.generator().is_some() { Tables::default() } else { plan.tables().cast() };
         let fastest = tables.speed.par_iter().copied().reduce(|| 0.0, f32::max);
         let mut pipelines = Vec::new();
-        if let Some(generator) = plan.generator() {
-            let scene = generator.scene();
+        let made_scene = plan.generator().map(Generator::scene);
+        if let Some(scene) = made_scene {
             for resolved in &constants {
                 pipelines.extend(specs(plan, resolved, Specialization { scene, values: false, watched: false, queue }));
             }
@@ -143,6 +145,7 @@ impl<'p> GpuSession<'p> {
             pacer,
             split_scenes,
             fastest,
+            made_scene,
             window,
             device_s,
             counting,
@@ -174,9 +177,9 @@ impl<'p> GpuSession<'p> {
             let end = (units.start + room).min(plan.blocks[block].units.held().end);
             // Within the requested units, because a generator's samples have no end.
             let end = if plan.generator().is_some() { end.min(units.end) } else { end };
-            let scenes = if let Some(generator) = plan.generator() {
+            let scenes = if let Some(scene) = self.made_scene {
                 cases = Some(Cases::Made(units.start, (end - units.start) as u32));
-                vec![generator.scene()]
+                vec![scene]
             } else {
                 let upload = cases_of(plan, block, units.start..end);
                 let scenes = self.scenes(&upload, variants as usize);
@@ -200,7 +203,7 @@ impl<'p> GpuSession<'p> {
         let mut dispatches = Vec::new();
         for (variant, &known) in (0..).zip(scenes) {
             // A void sample has no vehicle: its values tell.
-            let is_void_told = has_outcomes && plan.generator().is_some();
+            let is_void_told = has_outcomes && self.made_scene.is_some();
             let of_values = DeviceScene { is_all_paired: false, always_there: false, ..known };
             let scene = if is_void_told { of_values } else { known };
             let watched = wanted.watch().is_some();
@@ -536,80 +539,5 @@ impl Backend for GpuBackend {
     fn prepare_counting<'p>(&self, plan: &'p LanePlan, counting: &Counting) -> Result<Box<dyn Session + 'p>> {
         let commands = self.commands.clone();
         Ok(Box::new(GpuSession::new(plan, Some(counting), self.card.name.clone(), commands, &self.options)?))
-    }
-}
-
-/// Target time of the longest dispatch of a job, s.
-const TARGET_S: f64 = 0.1;
-/// Maximum factor of one change, so that one outlier has little effect.
-const MAX_CHANGE: f64 = 4.0;
-
-/// The size of the next job, from the time of the last: a dispatch of about a tenth of a second. Longer ones can exceed
-/// the time-outs of desktop drivers; shorter ones wait for the host. Results do not depend on it.
-#[derive(Debug, Clone, Copy)]
-pub(super) struct Pacer {
-    lanes: u64,
-}
-
-impl Pacer {
-    /// Starts with `lanes` per model.
-    fn new(lanes: u64) -> Pacer {
-        Pacer { lanes: lanes.max(1) }
-    }
-
-    /// Takes a job into account: lanes per model and the time of its slowest dispatch, s.
-    fn observe(&mut self, lanes: u64, slowest_s: f64) {
-        if lanes == 0 || !slowest_s.is_finite() || slowest_s <= 0.0 {
-            return;
-        }
-        // A small last piece is not representative, because its start takes as long as that of a large one.
-        let change = (TARGET_S / slowest_s).clamp(1.0 / MAX_CHANGE, MAX_CHANGE);
-        let wanted = lanes as f64 * change;
-        if change < 1.0 || wanted > self.lanes as f64 {
-            self.lanes = (wanted as u64).max(1);
-        }
-    }
-
-    /// Units of a job with `lanes_per_unit` lanes per model each: at least one, within `max_lanes`.
-    fn units(&self, lanes_per_unit: u64, max_lanes: u64) -> u64 {
-        (self.lanes.min(max_lanes) / lanes_per_unit.max(1)).max(1)
-    }
-
-    /// Lanes per model of the next job.
-    fn lanes(&self) -> u64 {
-        self.lanes
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn jobs_grow_to_the_target_and_no_further() {
-        let mut pacer = Pacer::new(1 << 14);
-        for _ in 0..20 {
-            let lanes = pacer.lanes();
-            // A device of a hundred million lanes per second.
-            pacer.observe(lanes, lanes as f64 / 1e8);
-        }
-        assert!((pacer.lanes() as f64 / 1e8 - TARGET_S).abs() < 0.01 * TARGET_S, "{}", pacer.lanes());
-    }
-
-    #[test]
-    fn a_slow_job_makes_the_next_one_smaller_and_a_small_last_piece_does_not() {
-        let mut pacer = Pacer::new(1 << 20);
-        pacer.observe(1 << 20, 10.0);
-        assert_eq!(pacer.lanes(), 1 << 18);
-        pacer.observe(100, 0.05);
-        assert_eq!(pacer.lanes(), 1 << 18);
-    }
-
-    #[test]
-    fn a_job_holds_at_least_one_unit_and_never_more_than_the_device_can() {
-        let pacer = Pacer::new(1000);
-        assert_eq!(pacer.units(5000, u64::MAX), 1);
-        assert_eq!(pacer.units(10, u64::MAX), 100);
-        assert_eq!(pacer.units(10, 50), 5);
     }
 }

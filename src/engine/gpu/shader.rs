@@ -134,8 +134,10 @@ pub struct Specialization {
     pub queue: bool,
 }
 
-/// Steps of a burst: ended lanes wait for half of one, and a warp looks for them once in one.
+/// Steps of a burst before a device is measured: ended lanes wait for half of one, and a warp looks for them once in one.
 pub const BURST: u32 = 16;
+/// Maximum number of steps of a burst.
+pub const LONGEST_BURST: u32 = 32;
 /// Values of the `override` constants of a model's pipeline, by name.
 pub fn constants(
     resolved: &Constants<f32>,
@@ -150,7 +152,7 @@ pub fn constants(
     }
     let frame = &resolved.frames[model.index()];
     let skips = !values && promises(model) && frame.abort_above_ttc <= 0.0 && resolved.criteria.btn.has_safe_gap();
-    all.extend([("frame_burst", f64::from(BURST)), ("frame_skip", f64::from(u8::from(skips)))]);
+    all.extend([("frame_longest_burst", f64::from(LONGEST_BURST)), ("frame_skip", f64::from(u8::from(skips)))]);
     all.extend(scene.shader_constants(model.index()));
     all.push(("motion_inverse_dt", f64::from(resolved.frames[model.index()].inverse_dt)));
     all.extend(resolved.criteria.shader_constants());

@@ -92,8 +92,8 @@ pub fn cuts(samples: u64, range: &Range<u64>) -> Vec<u64> {
     checkpoints(samples).into_iter().chain(ends(range)).collect()
 }
 
-/// The same for samples that the ledger does not hold; its cuts must be those of [`cuts`]. `each` receives every chunk, with the outcome of
-/// every lane if its flag is set. `progress` receives the number of samples of every chunk.
+/// The same for samples that the ledger does not hold; its cuts must be those of [`cuts`]. `each` receives every chunk,
+/// with the outcome of every lane if its flag is set. `progress` receives the number of samples of every chunk.
 ///
 /// # Errors
 /// As [`sample_crude`], and those of the ledger's journal; [`Error::Interrupted`].
