@@ -3,9 +3,8 @@
 
 use std::ops::Range;
 
-use super::backend::{Marks, Watch};
 use super::outcome::Verdicts;
-use super::plan::{CLOSE_HEADWAY_S, Headway, LanePlan};
+use super::plan::LanePlan;
 use crate::model::criterion::Criterion;
 
 /// Cells along each axis of a map.
@@ -45,7 +44,7 @@ impl CountLayout {
     pub const VOIDS: usize = 0;
     /// Place of the number of draws.
     pub const TRIES: usize = 1;
-    /// Place of the lanes per model from headways below [`CLOSE_HEADWAY_S`].
+    /// Place of the lanes per model from headways below [`CLOSE_HEADWAY_S`](super::plan::CLOSE_HEADWAY_S).
     pub const CLOSE_LANES: usize = 2;
     const FAILURES: usize = 3;
     /// Counts of every sample that a device can gather.
@@ -78,7 +77,7 @@ impl CountLayout {
         from..from + self.lanes()
     }
 
-    /// Failed lanes from headways below [`CLOSE_HEADWAY_S`]: model × criterion.
+    /// Failed lanes from headways below [`CLOSE_HEADWAY_S`](super::plan::CLOSE_HEADWAY_S): model × criterion.
     pub fn close_failures(&self) -> Range<usize> {
         let from = self.capped().end;
         from..from + self.models * Criterion::ALL.len()
@@ -128,30 +127,6 @@ impl CountLayout {
             ("tally_criterion", criterion.index() as f64),
         ]
     }
-}
-
-/// Bits of the headways of a plan of samples below [`CLOSE_HEADWAY_S`], and of those that the sample draws.
-pub fn close_headways(headways: &[Headway]) -> [u32; 2] {
-    let bits = |is: &dyn Fn(&Headway) -> bool| {
-        (0..).zip(headways).filter(|(_, headway)| is(headway)).fold(0, |bits, (at, _)| bits | 1 << at)
-    };
-    let fixed = |headway: &Headway| matches!(headway, Headway::ThwS(_));
-    let is_close = |headway: &Headway| matches!(headway, Headway::ThwS(thw_s) if *thw_s < CLOSE_HEADWAY_S);
-    [bits(&is_close), bits(&|headway| !fixed(headway))]
-}
-
-/// The marks of a plan's models, two bits each: 0 nothing, 1 contacts, 2 TTC, 3 BTN.
-pub fn mark_bits(plan: &LanePlan, watch: Option<Watch>) -> u32 {
-    let of = |(at, model): (u32, &crate::model::driver::ModelId)| {
-        let code = match watch.map_or(Marks::Nothing, |watch| watch.0[model.index()]) {
-            Marks::Nothing => 0,
-            Marks::Contacts(_) => 1,
-            Marks::TtcBelow(_) => 2,
-            Marks::BtnFailures => 3,
-        };
-        code << (2 * at)
-    };
-    (0..).zip(&plan.models).map(of).fold(0, |bits, code| bits | code)
 }
 
 /// Verdict words of consecutive samples: four bits per lane, for each model.

@@ -12,9 +12,11 @@ mod owner;
 mod pacing;
 mod records;
 mod ring;
+mod scenes;
 mod session;
 pub mod shader;
 mod spirv;
+mod tally;
 mod visible;
 
 pub use adapters::{AdapterCard, AdapterLimits, Adapters, Api, DeviceKind};

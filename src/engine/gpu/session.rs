@@ -16,7 +16,8 @@ use super::pacing::Pacer;
 use super::records::StartRecord;
 use super::ring::{Answer, Dispatch, Job, RING, TallyJob};
 use super::shader::{self, Specialization};
-use crate::engine::counting::{PackedLanes, close_headways, mark_bits};
+use super::tally::{MAX_COUNTED, counter, mark_bits};
+use crate::engine::counting::PackedLanes;
 use crate::engine::generated::Generator;
 use crate::engine::{
     Backend, Chunk, Constants, CountLayout, Counted, Counting, DeviceRecord, DeviceScene, LaneCase, LanePlan, Outcome,
@@ -70,26 +71,6 @@ struct Ahead {
     units: Range<u64>,
     pieces: VecDeque<Piece>,
 }
-
-/// Maximum number of samples of a counted job, so that no count of it overflows.
-const MAX_COUNTED: u64 = 1 << 25;
-
-/// The counting of a plan, if a device can do it: few enough counts for a workgroup, and a bit for each headway.
-fn counter(plan: &LanePlan, counting: &Counting) -> Option<(CountLayout, TallyJob)> {
-    let layout = CountLayout::new(plan, counting);
-    let fits = plan.generator().is_some()
-        && plan.blocks.len() == 1
-        && plan.headways.len() < 32
-        && layout.of_every_sample() <= CountLayout::GATHERED
-        && layout.total() <= MAX_COUNTS;
-    let [close_headways, drawn_headways] = close_headways(&plan.headways[..plan.headways.len().min(31)]);
-    let constants = layout.shader_constants(counting.criterion);
-    let tally = TallyJob { constants, counts: layout.total(), close_headways, drawn_headways, marks: 0 };
-    fits.then_some((layout, tally))
-}
-
-/// Maximum number of counts of a job.
-const MAX_COUNTS: usize = 1 << 20;
 
 /// Part of a run in flight.
 struct Piece {
