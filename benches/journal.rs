@@ -49,7 +49,7 @@ fn sampling(folder: &Path) {
     let backend = CpuBackend::lane_arithmetic();
     let executor = Executor::new(&backend);
     pairs("sample", folder, plan.unit_count(), &cuts(samples, &(0..samples)), |ledger: &mut Ledger<SampleTally>| {
-        sample_into(&plan, ledger, &executor, &options, None, &mut |_| (), None).unwrap();
+        sample_into(&plan, ledger, &executor, &options, None, None).unwrap();
     });
 }
 

@@ -17,6 +17,7 @@ use std::error::Error;
 
 use lanesweep::engine::{CpuBackend, Executor};
 use lanesweep::model::profile::Profile;
+use lanesweep::run::parts::Job;
 use lanesweep::run::score::{
     CategoryScores, ClaimResult, Misfit, ScoreTable, check_claims, f1, published_failures, published_lvd_f1,
 };

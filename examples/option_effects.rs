@@ -14,6 +14,7 @@ use std::error::Error;
 
 use lanesweep::engine::{Chunk, CpuBackend, Executor, Partial, Wanted};
 use lanesweep::model::profile::Profile;
+use lanesweep::run::parts::Job;
 use lanesweep::run::score::{ClaimResult, Misfit, ScoreTable, check_claims, f1};
 use lanesweep::run::study::{Study, StudyOptions};
 use lanesweep::scenario::parameterization::ParameterizationOptions;

@@ -10,12 +10,14 @@ use super::format::FormatFlag;
 use super::sample::Sample;
 use super::sample_options::{guard, only_crude};
 use super::{Exit, Output, sample_distribution};
-use crate::engine::{Chunk, Executor, OpenBackend};
+use crate::engine::{Chunk, Executor, LanePlan, OpenBackend};
 use crate::model::profile::Profile;
 use crate::report::lanes;
 use crate::report::sampling::{EstimateFile, HostRecord};
-use crate::run::parts::PLAN_FILE;
-use crate::run::sampling::{self, EstimateRow, SampleKind, SampleOptions, SampleResult, SampleSource, conditional};
+use crate::run::parts::{EachChunk, Job, PLAN_FILE};
+use crate::run::sampling::{
+    self, EstimateRow, SampleJob, SampleKind, SampleOptions, SampleResult, SampleSource, conditional,
+};
 use crate::stats::density::read_density;
 use crate::stats::estimate::{Search, StopRule};
 use crate::support::atomic_file::StagedFile;
@@ -133,12 +135,18 @@ impl Sample {
         if self.shards.plan_only {
             return self.format.planned(Exit::Ok, sample.lane_count(), &self.out.join(PLAN_FILE));
         }
-        self.run_split(&sample, (opened, other), &executor, configured, started, verbosity)
+        let (opened, executor) = ((opened, other), &executor);
+        match sample.job()? {
+            SampleJob::Crude(job) => self.run_job(&job, &sample, opened, executor, configured, started, verbosity),
+            SampleJob::Weighted(job) => self.run_job(&job, &sample, opened, executor, configured, started, verbosity),
+        }
     }
 
-    /// Executes a run that can be split and resumed.
-    fn run_split(
+    /// Executes a job, whole or a shard of it.
+    #[expect(clippy::too_many_arguments, reason = "the state of one run")]
+    fn run_job(
         &self,
+        job: &impl Job<Result = SampleResult>,
         sample: &sampling::Sample,
         (opened, other): (&OpenBackend, Option<&Profile>),
         executor: &Executor,
@@ -148,7 +156,7 @@ impl Sample {
     ) -> Result<Output> {
         warn(sample)?;
         // Rows are written during the run, so a run with rows cannot resume.
-        let Some(mut run) = sample.open(&self.out, self.shards.shard, self.rows.is_none())? else {
+        let Some(mut run) = job.open(&self.out, self.shards.shard, self.rows.is_none())? else {
             tracing::info!("this part exists already and is complete");
             return Ok(Exit::Ok.into());
         };
@@ -162,16 +170,13 @@ impl Sample {
             true => console::progress(verbosity, missing, "sampling"),
             false => console::progress_to_maximum(verbosity, missing, "sampling"),
         };
-        let mut progress = |samples| bar.inc(samples);
-        let sampled = match table.as_mut().zip(lane_plan) {
-            Some((table, plan)) => {
-                let mut each = |chunk: &Chunk| lanes::write_sampled_chunk(table, plan, density, chunk);
-                run.sample(executor, &mut progress, Some(&mut each))
-            }
-            None => run.sample(executor, &mut progress, None),
-        };
+        let mut write_chunk = table
+            .as_mut()
+            .map(|table| |plan: &LanePlan, chunk: &Chunk| lanes::write_sampled_chunk(table, plan, density, chunk));
+        let each = write_chunk.as_mut().map(|write| write as &mut EachChunk);
+        let computed = run.compute(&executor.clone().with_progress(console::inc(&bar)), each);
         bar.finish_and_clear();
-        sampled?;
+        computed?;
         let rows = table.map(TableWriter::stage).transpose()?;
         if self.shards.is_part() {
             rows.map_or(Ok(()), StagedFile::publish)?;

@@ -17,8 +17,8 @@ use crate::engine::{Chunk, Headway, LanePlan, OpenBackend};
 use crate::report::lanes::{StudyRows, table_format};
 use crate::report::run_record::{StudyHost, Timings};
 use crate::report::study::StudyReport;
-use crate::run::parts::{PLAN_FILE, RUN_PLAN_FILE};
-use crate::run::study::{self, ChunkSink, GivenReplay, ReferenceComparison, StudyOptions, StudyResult};
+use crate::run::parts::{EachChunk, Job, PLAN_FILE, RUN_PLAN_FILE};
+use crate::run::study::{self, GivenReplay, ReferenceComparison, StudyOptions, StudyResult};
 use crate::support::files::{check_folder, check_folder_of};
 use crate::support::input_file;
 use crate::support::readable;
@@ -213,7 +213,7 @@ impl Study {
             study.write_plan(&self.out)?;
         }
         // Open before the work, so that an unwritable folder is reported at once.
-        let Some(mut run) = study.open(&self.out, self.shards.shard)? else {
+        let Some(mut run) = study.open(&self.out, self.shards.shard, true)? else {
             tracing::info!("this part exists already and is complete");
             return Ok(Exit::Ok.into());
         };
@@ -224,8 +224,8 @@ impl Study {
         let mut rows = self.rows.as_deref().map(|path| StudyRows::create(path, study)).transpose()?;
         let mut write = rows.as_mut().map(|rows| |plan: &LanePlan, chunk: &Chunk| rows.write(plan, chunk));
         timed(&mut timings.sweep_s, || {
-            let each = write.as_mut().map(|write| write as &mut ChunkSink);
-            run.sweep(&executor.clone().with_progress(console::inc(&bar)), each)
+            let each = write.as_mut().map(|write| write as &mut EachChunk);
+            run.compute(&executor.clone().with_progress(console::inc(&bar)), each)
         })?;
         bar.finish_and_clear();
         if self.shards.is_part() {

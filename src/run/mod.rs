@@ -53,12 +53,12 @@ pub fn merge(dir: &Path, again: &dyn Fn(&str, Shard) -> String) -> Result<(Outpu
     match kind_of(&plan)?.as_str() {
         Study::KIND => {
             let folder = OutputDir::open(dir, STUDY_RECORD)?;
-            let merged = Study::merge_or(dir, &|shard| again("study", shard))?;
+            let merged = Study::merge_parts(dir, &|shard| again("study", shard))?;
             Ok((folder, Merged::Study(Box::new(merged))))
         }
         kind if Sample::is_kind(kind) => {
             let folder = OutputDir::open(dir, ESTIMATE_RECORD)?;
-            let merged = Sample::merge_or(dir, &|shard| again("sample", shard))?;
+            let merged = Sample::merge_parts(dir, &|shard| again("sample", shard))?;
             Ok((folder, Merged::Sample(Box::new(merged))))
         }
         other => {

@@ -7,6 +7,7 @@ use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::compare::CompareOptions;
 use lanesweep::run::justify::{Conclusion, Dossier, JustifyOptions, Rules, justify};
+use lanesweep::run::parts::Job;
 use lanesweep::run::score::ScoreOptions;
 use lanesweep::run::study::{Study, StudyOptions};
 use lanesweep::scenario::Category;

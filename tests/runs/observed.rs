@@ -9,7 +9,7 @@ use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::close_following::{CloseFollowing, close_units};
-use lanesweep::run::parts::Shard;
+use lanesweep::run::parts::{Job, Shard};
 use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, SampleTally, plan_samples};
 use lanesweep::run::study::{Study, StudyOptions, plan_study};
 use lanesweep::scenario::DataProvenance;
@@ -68,7 +68,7 @@ fn shards_from_recorded_gaps_give_the_counts_of_the_whole() {
     for index in 0..3 {
         study.run_shard(dir.path(), Shard { index, of: 3 }, &executor).unwrap();
     }
-    let (merged, result) = Study::merge(dir.path()).unwrap();
+    let (merged, result) = Study::merge_parts(dir.path(), &|shard| shard.to_string()).unwrap();
     assert_eq!(result.counts, study.run(&executor).unwrap().counts);
     for (ours, theirs) in merged.facts().categories.iter().zip(&study.facts().categories) {
         assert_eq!(ours.close_units, theirs.close_units);

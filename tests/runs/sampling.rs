@@ -108,7 +108,7 @@ fn a_list_of_worst_lanes_is_the_same_where_only_lanes_that_may_enter_it_are_valu
             let sampled = |backend: &dyn Backend, range: std::ops::Range<u64>| {
                 let executor =
                     Executor { recheck: Some(RecheckOptions { seed: 1, one_in: 10 }), ..Executor::new(backend) };
-                let mut of_chunk = |chunk: &Chunk| {
+                let mut of_chunk = |_: &LanePlan, chunk: &Chunk| {
                     let few = chunk.valued.as_ref().map(Vec::len);
                     valued.set(valued.get() + few.unwrap_or(chunk.outcomes.len()));
                     Ok(())

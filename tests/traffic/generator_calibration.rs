@@ -7,6 +7,7 @@ mod traffic;
 
 use lanesweep::engine::{CpuBackend, Executor};
 use lanesweep::model::profile::Profile;
+use lanesweep::run::parts::Job;
 use lanesweep::run::score::published_failures;
 use lanesweep::run::study::Study;
 use lanesweep::scenario::{Category, Scenario};

@@ -54,7 +54,7 @@ fn collect(dir: &Path, units: u64, again: impl Fn(Shard) -> String) -> Result<Ve
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Input`] with the missing, duplicate, foreign or damaged parts, and the command from `again`.
-pub(crate) fn read_parts<T: MergeableCounts>(
+pub(super) fn read_parts<T: MergeableCounts>(
     dir: &Path,
     run_sha256: &str,
     units: u64,

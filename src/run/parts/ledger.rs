@@ -234,16 +234,14 @@ impl<T: MergeableCounts> Ledger<T> {
         Ok(joined)
     }
 
-    /// Removes and returns the merged counts of all segments, so that no count is held twice.
+    /// Removes and returns all counts, segment by segment, so that no count is held twice.
     ///
     /// # Errors
     /// Those of [`MergeableCounts::join`].
-    pub fn take(&mut self) -> Result<Option<T>> {
+    pub fn take(&mut self) -> Result<Vec<T>> {
         self.settle()?;
         self.unwritten.clear();
-        let mut all = self.segments.iter_mut().filter_map(Option::take);
-        let Some(first) = all.next() else { return Ok(None) };
-        all.try_fold(first, T::join).map(Some)
+        Ok(self.segments.iter_mut().filter_map(Option::take).collect())
     }
 
     /// All counts, segment by segment, and the journal, to be deleted after the result is written.

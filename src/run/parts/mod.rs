@@ -1,22 +1,23 @@
 //! Runs in parts: shards of a plan, journals of finished chunks, part files, and what merging checks.
 //!
-//! A part is an interval of units. While it runs, a [`Ledger`] holds its counts and appends them to a journal; a
+//! A [`Job`] is computed in parts. A part is an interval of units. While it runs, a [`Ledger`] holds its counts and appends them to a journal; a
 //! finished part becomes a part file. Both identify their run by its hash. The types of the counts are in the
 //! [`engine`](crate::engine) and [`sampling`](crate::run::sampling).
 
 mod folder;
+mod job;
 mod journal;
 mod ledger;
 mod run_dir;
 mod sealed;
 
-pub(crate) use folder::read_parts;
 pub use folder::{Part, read_part, write_part};
+pub use job::{Computed, EachChunk, Job, JobRun};
 pub(crate) use journal::run_of_journal;
 pub use journal::{Journal, Records};
 pub use ledger::{Counted, Ledger, MergeableCounts};
 pub use run_dir::{PLAN_FILE, RUN_PLAN_FILE};
-pub(crate) use run_dir::{RunDir, RunState, leave_plan, units_of};
+pub(crate) use run_dir::{leave_plan, units_of};
 pub(crate) use sealed::{kind_of, read_sealed};
 pub use sealed::{read_sealed_line, seal, unseal};
 

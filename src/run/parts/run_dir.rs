@@ -24,7 +24,7 @@ pub const PLAN_FILE: &str = "plan.json";
 pub const RUN_PLAN_FILE: &str = "run-plan.json";
 
 /// A running interval of a run: its lock, its journal, its counts.
-pub(crate) struct RunState<T> {
+pub(super) struct RunState<T> {
     /// The interval.
     pub units: Range<u64>,
     /// The counts.
@@ -35,7 +35,7 @@ pub(crate) struct RunState<T> {
 }
 
 /// The files of a run or of one of its parts in its folder.
-pub(crate) struct RunDir {
+pub(super) struct RunDir {
     /// The run's folder.
     pub out: PathBuf,
     /// File name of the whole run's record.
@@ -67,7 +67,7 @@ impl RunDir {
     ///
     /// # Errors
     /// [`Error::Input`] for a damaged or foreign file in its place.
-    pub(crate) fn is_done<T: MergeableCounts>(&self) -> Result<bool> {
+    pub(super) fn is_done<T: MergeableCounts>(&self) -> Result<bool> {
         let Some(path) = self.part().filter(|path| path.exists()) else { return Ok(false) };
         read_part::<T>(&path, &self.run_sha256, &self.units(), "run this command again").map(|_| true)
     }
@@ -77,7 +77,7 @@ impl RunDir {
     ///
     /// # Errors
     /// [`Error::Busy`] if another process computes it; [`Error::Io`]; as [`Ledger::resume`].
-    pub(crate) fn begin<T: MergeableCounts>(&self, cuts: &[u64], is_journalled: bool) -> Result<RunState<T>> {
+    pub(super) fn begin<T: MergeableCounts>(&self, cuts: &[u64], is_journalled: bool) -> Result<RunState<T>> {
         let stem = self.shard.map(|shard| shard.stem());
         let (folder, part) = match &stem {
             None => (OutputDir::open(&self.out, self.record)?, None),
@@ -124,7 +124,7 @@ impl RunDir {
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Internal`] if the ledger is not complete.
-    pub(crate) fn finish<T: MergeableCounts>(&self, mut state: RunState<T>) -> Result<()> {
+    pub(super) fn finish<T: MergeableCounts>(&self, mut state: RunState<T>) -> Result<()> {
         let Some(path) = self.part() else { return Err(Error::Internal("the whole run is no part".to_owned())) };
         if !state.ledger.missing(state.units.clone())?.is_empty() {
             return Err(Error::Internal("a part is not complete".to_owned()));
@@ -147,7 +147,7 @@ impl<T: MergeableCounts> RunState<T> {
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub(crate) fn forget(self) -> Result<()> {
+    pub(super) fn forget(self) -> Result<()> {
         let (_, journal) = self.ledger.finish()?;
         journal.map_or(Ok(()), Journal::remove)?;
         drop((self.part, self.folder));

@@ -156,7 +156,7 @@ pub fn sample_by_scenario(
     let headways = SampleHeadways::Each(plan.headways.clone());
     let options = SampleOptions { level, ..SampleOptions::new(Estimator::CRUDE, plan.unit_count(), headways) };
     let mut counts = ScenarioCounts::empty(scenarios, plan.models.len() * Criterion::ALL.len());
-    let mut add = |chunk: &Chunk| counts.add(plan, chunk, kernels);
+    let mut add = |plan: &LanePlan, chunk: &Chunk| counts.add(plan, chunk, kernels);
     let run = sample_crude(plan, 0..plan.unit_count(), executor, &options, exposure, Some(&mut add))?;
     let is_over_all = |row: &EstimateRow| plan.headways.len() == 1 || row.headway == "all";
     let rows = run.rows.into_iter().filter(is_over_all).collect();

@@ -12,10 +12,10 @@ use super::plan::SampleHeadways;
 use super::rows::{EstimateRow, crude_rows};
 use super::sample_options::SampleOptions;
 use super::tally::SampleTally;
-use crate::engine::{Chunk, Executor, LanePlan, SweepSummary, Wanted, Watch};
+use crate::engine::{Executor, LanePlan, SweepSummary, Wanted, Watch};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
-use crate::run::parts::Ledger;
+use crate::run::parts::{Computed, EachChunk, Ledger};
 use crate::stats::density::Exposure;
 use crate::stats::estimate::{Checkpoints, StopReason, StopRule};
 use crate::{Error, Place, Result};
@@ -58,11 +58,9 @@ pub struct CrudeRun {
     pub summary: SweepSummary,
 }
 
-/// Receives every chunk with its lanes. Without a receiver, a device counts lanes where they are.
-pub type EachChunk<'a> = dyn FnMut(&Chunk) -> Result<()> + 'a;
-
 /// Samples `range` of a plan that generates its own cases; risks follow from the exposure. The stop rules are evaluated
-/// after 4,096·2^k samples. `each` receives every chunk (for rows).
+/// after 4,096·2^k samples. `each` receives every chunk, not with every outcome; without it, a device counts lanes where they
+/// are.
 ///
 /// # Errors
 /// [`Error::Usage`] for stop rules with a partial range, or for an end beyond the plan; those of the backends and of
@@ -73,11 +71,12 @@ pub fn sample_crude(
     executor: &Executor,
     options: &SampleOptions,
     exposure: Option<&Exposure>,
-    each: Option<&mut EachChunk<'_>>,
+    each: Option<&mut EachChunk>,
 ) -> Result<CrudeRun> {
-    let cuts = cuts(plan.unit_count(), &range);
-    let mut ledger = Ledger::new(range, &cuts);
-    sample_into(plan, &mut ledger, executor, options, exposure, &mut |_| (), each.map(|each| (false, each)))
+    let mut ledger = Ledger::new(range.clone(), &cuts(plan.unit_count(), &range));
+    let each = each.map(|each| (false, each));
+    let computed = sample_into(plan, &mut ledger, executor, options, exposure, each)?;
+    crude_of_segments(plan, ledger.take()?, options, exposure, &computed)
 }
 
 /// The sample sizes at which a run of `samples` samples is evaluated.
@@ -93,7 +92,7 @@ pub fn cuts(samples: u64, range: &Range<u64>) -> Vec<u64> {
 }
 
 /// The same for samples that the ledger does not hold; its cuts must be those of [`cuts`]. `each` receives every chunk,
-/// with the outcome of every lane if its flag is set. `progress` receives the number of samples of every chunk.
+/// with the outcome of every lane if its flag is set.
 ///
 /// # Errors
 /// As [`sample_crude`], and those of the ledger's journal; [`Error::Interrupted`].
@@ -103,9 +102,8 @@ pub fn sample_into(
     executor: &Executor,
     options: &SampleOptions,
     exposure: Option<&Exposure>,
-    progress: &mut dyn FnMut(u64),
-    mut each: Option<(bool, &mut EachChunk<'_>)>,
-) -> Result<CrudeRun> {
+    mut each: Option<(bool, &mut EachChunk)>,
+) -> Result<Computed> {
     let started = Instant::now();
     let range = ledger.units();
     if range.start >= range.end || range.end > plan.unit_count() {
@@ -125,7 +123,6 @@ pub fn sample_into(
     let executor = &Executor { counting, ..executor.clone() };
     let mut tally = SampleTally::empty(plan, options);
     let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
-    let mut convergence = Vec::new();
     let looks = checkpoints(plan.unit_count());
     let mut at = range.start;
     loop {
@@ -149,8 +146,7 @@ pub fn sample_into(
                 if !std::mem::replace(&mut is_checked, true) {
                     SampleTally::check_counted(plan, &chunk, options, &executor.backend.describe())?;
                 }
-                progress(chunk.units.end - chunk.units.start);
-                each.as_mut().map_or(Ok(()), |(_, each)| each(&chunk))?;
+                each.as_mut().map_or(Ok(()), |(_, each)| each(plan, &chunk))?;
                 ledger.add(SampleTally::of_chunk(plan, &chunk, options)?, chunk.redone_and_rechecked)
             });
             summary.add(&ledger.kept(part)?);
@@ -158,22 +154,22 @@ pub fn sample_into(
         ledger.kept(executor.check_cancelled(next - range.start, range.end - range.start))?;
         // Rechecks of earlier processes are recorded in the journal.
         [summary.redone_lanes, summary.rechecked_lanes] = ledger.redone_and_rechecked();
-        if let Some(counts) = ledger.counts(at..next)? {
-            tally = tally.merge(counts)?;
-        }
-        at = next;
-        let rows = rows_of(plan, &tally, options, exposure, StopReason::Samples);
-        if is_whole {
-            convergence.push(Checkpoint { samples: at, rows: overall(&rows) });
-        }
-        if let Some(stopped) = stopped(options, &rows, at, range.end, started) {
-            let rows = rows_of(plan, &tally, options, exposure, stopped);
-            return Ok(CrudeRun { tally, rows, convergence, summary });
+        let before = std::mem::replace(&mut at, next);
+        let reason = match options.stop.is_fixed() {
+            true => (at >= range.end).then_some(StopReason::Samples),
+            false => {
+                tally = ledger.counts(before..at)?.into_iter().try_fold(tally, SampleTally::merge)?;
+                let rows = rows_of(plan, &tally, options, exposure, StopReason::Samples);
+                stopped(options, &rows, at, range.end, started)
+            }
+        };
+        if let Some(stopped) = reason {
+            return Ok(Computed { stopped, ..Computed::whole(summary) });
         }
     }
 }
 
-/// Combines parts to a run. Its convergence equals that of the run in one piece if all parts are given.
+/// The run whose counts these are. Its convergence equals that of the run in one piece if all parts are given.
 ///
 /// # Errors
 /// [`Error::Input`] if parts are of different runs or contain the same samples.
@@ -182,6 +178,7 @@ pub fn crude_of_segments(
     mut segments: Vec<SampleTally>,
     options: &SampleOptions,
     exposure: Option<&Exposure>,
+    computed: &Computed,
 ) -> Result<CrudeRun> {
     segments.sort_by_key(|segment| segment.covered().first().map_or(0, |range| range.start));
     let looks = checkpoints(plan.unit_count());
@@ -198,11 +195,8 @@ pub fn crude_of_segments(
             convergence.push(Checkpoint { samples: covered.end, rows });
         }
     }
-    if tally.samples() < plan.unit_count() {
-        convergence.clear();
-    }
-    let rows = rows_of(plan, &tally, options, exposure, StopReason::Samples);
-    Ok(CrudeRun { tally, rows, convergence, summary: SweepSummary::default() })
+    let rows = rows_of(plan, &tally, options, exposure, computed.stopped);
+    Ok(CrudeRun { tally, rows, convergence, summary: computed.summary })
 }
 
 fn rows_of(

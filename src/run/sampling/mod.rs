@@ -29,9 +29,7 @@ pub use compare::{
     CategoryComparison, ComparedCell, ComparedForm, ComparedParameterization, RateRecord, RecordedCell, ReplayedCell,
     SampledCell, SampledScenarios, ScenarioCounts, compare_cells, kernel_scenarios, recorded_cells, sample_by_scenario,
 };
-pub use crude::{
-    Checkpoint, CheckpointRow, CrudeRun, EachChunk, checkpoints, crude_of_segments, cuts, sample_crude, sample_into,
-};
+pub use crude::{Checkpoint, CheckpointRow, CrudeRun, checkpoints, crude_of_segments, cuts, sample_crude, sample_into};
 pub use generator::{SAMPLE_PURPOSE, SampleSource, generator_of, generator_of_points};
 pub use kernels::KernelCounts;
 pub(crate) use limit_state::marks_of;
@@ -43,7 +41,7 @@ use plan_file::{KIND, SEARCH_FILE};
 pub use proposal_file::{proposal_from_text, proposal_text, read_proposal};
 pub use rows::{EstimateRow, Risk, RiskRate, crude_rows, headway_name};
 pub use sample_options::{Estimator, SampleOptions};
-pub use sample_run::{SampleResult, SampleRun};
+pub use sample_run::{CrudeJob, SampleJob, SampleResult, WeightedJob};
 pub use tally::{SampleTally, WorstSample};
 pub use uncertainty::Uncertainty;
 pub use weighted::WeightedTally;
@@ -53,7 +51,7 @@ use std::path::Path;
 
 use crate::engine::{Executor, LanePlan};
 use crate::model::profile::Profile;
-use crate::run::parts::{PLAN_FILE, leave_plan};
+use crate::run::parts::PLAN_FILE;
 use crate::stats::density::{DensityModel, Exposure, Mixture};
 use crate::stats::estimate::{Importance, Search, SearchRun};
 use crate::{Error, Result};
@@ -95,7 +93,7 @@ use crate::{Error, Result};
 /// for index in 0..2 {
 ///     sample.run_shard(folder, Shard { index, of: 2 }, &executor)?;
 /// }
-/// let (_, merged) = Sample::merge(folder)?;
+/// let (_, merged) = Sample::merge_parts(folder, &|shard| format!("run shard {shard}"))?;
 /// assert_eq!(merged.rows, whole.rows);
 /// # Ok(())
 /// # }
@@ -171,24 +169,6 @@ impl Sample {
     /// Whether a sealed file of this kind is the plan of a sampling run.
     pub fn is_kind(kind: &str) -> bool {
         kind == KIND
-    }
-
-    /// Writes the plan file into a run's folder, or checks that the same one exists; many shards may do so at once.
-    ///
-    /// # Errors
-    /// [`Error::Input`] if the folder holds the plan of another run; [`Error::Io`]; [`Error::Internal`] before the search
-    /// of importance sampling.
-    pub fn write_plan(&self, out: &Path) -> Result<()> {
-        let text = self.seal()?.0;
-        leave_plan(out, &text, |file| file.write_all(&text))
-    }
-
-    /// The plan file's text and the hash of the run.
-    fn seal(&self) -> Result<(Vec<u8>, String)> {
-        match &self.kind {
-            SampleKind::Crude(_) | SampleKind::Weighted(_) => self.plan_file(),
-            SampleKind::Search(_) => Err(Error::Internal("a run without a proposal has no plan".to_owned())),
-        }
     }
 
     /// The density.

@@ -1,264 +1,210 @@
-//! A running sampling run: whole in memory, or whole or as a shard in a folder with a journal; and the merge of the
-//! shards.
+//! Sampling runs as jobs, one per kind of estimator.
 
 use std::ops::Range;
 use std::path::Path;
 
-use super::crude::{CrudeRun, EachChunk, crude_of_segments, cuts, sample_into};
+use super::crude::{CrudeRun, crude_of_segments, cuts, sample_into};
 use super::model_ratios::{ModelRatio, ProfileRatios};
 use super::plan_file::SEARCH_FILE;
 use super::rows::EstimateRow;
-use super::sample_options::Estimator;
 use super::tally::SampleTally;
 use super::weighted::WeightedTally;
-use super::{Sample, SampleKind};
-use crate::engine::Executor;
-use crate::run::parts::{Ledger, MergeableCounts, PLAN_FILE, RunDir, RunState, Shard, read_parts, units_of};
+use super::{Sample, SampleKind, Weighted};
+use crate::engine::{Executor, LanePlan, SweepSummary};
+use crate::run::parts::{Computed, EachChunk, Job, Ledger, MergeableCounts, PLAN_FILE, Shard, leave_plan};
 use crate::stats::density::Mixture;
 use crate::stats::estimate::SearchRound;
-use crate::support::run_dir::{ESTIMATE_RECORD, Results};
+use crate::support::run_dir::ESTIMATE_RECORD;
 use crate::{Error, Place, Result};
 
-/// A sampling run, or one of its shards, in a folder. It continues from the journal of an earlier process.
-pub struct SampleRun<'s> {
-    sample: &'s Sample,
-    run_dir: RunDir,
-    state: State,
-    crude: Option<CrudeRun>,
-    is_journalled: bool,
+/// Evaluates an expression for the job of a planned sample.
+macro_rules! with_job {
+    ($sample:expr, $job:ident => $run:expr) => {
+        match $sample.job()? {
+            SampleJob::Crude($job) => $run,
+            SampleJob::Weighted($job) => $run,
+        }
+    };
 }
 
-enum State {
-    Crude(Box<RunState<SampleTally>>),
-    Weighted(Box<RunState<WeightedTally>>),
+/// The job of a planned sample, by its estimator.
+pub enum SampleJob<'s> {
+    /// Crude Monte Carlo.
+    Crude(CrudeJob<'s>),
+    /// Importance sampling.
+    Weighted(WeightedJob<'s>),
+}
+
+/// Crude Monte Carlo.
+#[derive(Clone, Copy)]
+pub struct CrudeJob<'s> {
+    sample: &'s Sample,
+    plan: &'s LanePlan,
+}
+
+/// Importance sampling of a known proposal.
+#[derive(Clone, Copy)]
+pub struct WeightedJob<'s> {
+    sample: &'s Sample,
+    weighted: &'s Weighted,
 }
 
 impl Sample {
-    /// Runs in one piece, in memory.
+    /// The job of the estimator.
+    ///
+    /// # Errors
+    /// [`Error::Internal`] before the search of importance sampling.
+    pub fn job(&self) -> Result<SampleJob<'_>> {
+        match &self.kind {
+            SampleKind::Crude(plan) => Ok(SampleJob::Crude(CrudeJob { sample: self, plan })),
+            SampleKind::Weighted(weighted) => Ok(SampleJob::Weighted(WeightedJob { sample: self, weighted })),
+            SampleKind::Search(_) => Err(Error::Internal("a run without a proposal is no job yet".to_owned())),
+        }
+    }
+
+    /// Runs in one piece, in memory; searches a proposal first if it needs one.
     ///
     /// # Errors
     /// Those of the lanes.
     pub fn run(&self, executor: &Executor) -> Result<SampleResult> {
-        self.against_recorded(self.sampled(executor)?)
+        let SampleKind::Search(search) = &self.kind else { return with_job!(self, job => job.run(executor)) };
+        let kind = SampleKind::Weighted(Box::new(self.search(search, executor)?));
+        let (density, profile) = (self.density.clone(), self.profile.clone());
+        Sample { density, profile, options: self.options.clone(), kind }.run(executor)
     }
 
-    fn sampled(&self, executor: &Executor) -> Result<SampleResult> {
-        let units = 0..self.samples();
-        match &self.kind {
-            SampleKind::Crude(plan) => {
-                let mut ledger = Ledger::new(units.clone(), &cuts(units.end, &units));
-                let (options, exposure) = (&self.options, self.exposure());
-                let run = sample_into(plan, &mut ledger, executor, options, exposure, &mut |_| (), None)?;
-                Ok(SampleResult::of_crude(run))
-            }
-            SampleKind::Weighted(weighted) => {
-                let mut ledger = Ledger::new(units, &[]);
-                self.sample_weighted(weighted, &mut ledger, executor, |_| ())?;
-                self.weighted_result(weighted, ledger.take()?, Place::item("samples"))
-            }
-            SampleKind::Search(search) => {
-                let kind = SampleKind::Weighted(Box::new(self.search(search, executor)?));
-                let (density, profile) = (self.density.clone(), self.profile.clone());
-                Sample { density, profile, options: self.options.clone(), kind }.sampled(executor)
-            }
-        }
-    }
-
-    /// Opens a run in a folder; `None` if the shard's complete part exists already. Without a journal, counts are lost
-    /// when the process ends.
+    /// As [`Job::run_shard`].
     ///
     /// # Errors
-    /// [`Error::Busy`] if another process runs it; [`Error::Input`] for a damaged or foreign file in its place;
-    /// [`Error::Io`]; [`Error::Internal`] before the search of importance sampling.
-    pub fn open(&self, out: &Path, shard: Option<Shard>, is_journalled: bool) -> Result<Option<SampleRun<'_>>> {
-        let (run_sha256, unit_count) = (self.seal()?.1, self.samples());
-        let run_dir = RunDir { out: out.to_path_buf(), record: ESTIMATE_RECORD, run_sha256, shard, unit_count };
-        let state = match &self.kind {
-            SampleKind::Crude(_) => {
-                if run_dir.is_done::<SampleTally>()? {
-                    return Ok(None);
-                }
-                let cuts = cuts(unit_count, &units_of(shard, unit_count));
-                State::Crude(Box::new(run_dir.begin(&cuts, is_journalled)?))
-            }
-            SampleKind::Weighted(_) => {
-                if run_dir.is_done::<WeightedTally>()? {
-                    return Ok(None);
-                }
-                State::Weighted(Box::new(run_dir.begin(&[], is_journalled)?))
-            }
-            SampleKind::Search(_) => {
-                return Err(Error::Internal("a run without a proposal was opened in a folder".to_owned()));
-            }
-        };
-        Ok(Some(SampleRun { sample: self, run_dir, state, crude: None, is_journalled }))
-    }
-
-    /// Runs a shard in a folder and writes plan and part there. An interrupted run continues at the next call.
-    ///
-    /// # Errors
-    /// As [`Sample::open`] and [`Sample::run`]; [`Error::Interrupted`].
+    /// As [`Job::run_shard`]; [`Error::Internal`] before the search of importance sampling.
     pub fn run_shard(&self, out: &Path, shard: Shard, executor: &Executor) -> Result<()> {
-        self.write_plan(out)?;
-        let Some(mut run) = self.open(out, Some(shard), true)? else { return Ok(()) };
-        run.sample(executor, &mut |_| (), None)?;
-        run.write_part()
+        with_job!(self, job => job.run_shard(out, shard, executor))
     }
 
-    /// The run and the estimates of a folder of parts, bit for bit equal to those of the run in one piece.
+    /// Writes the plan file into a run's folder, or checks that the same one exists; many shards may do so at once.
+    ///
+    /// # Errors
+    /// As [`Job::write_plan`]; [`Error::Internal`] before the search of importance sampling.
+    pub fn write_plan(&self, out: &Path) -> Result<()> {
+        with_job!(self, job => job.write_plan(out))
+    }
+
+    /// The run and the estimates of a folder of parts, bit for bit equal to those of the run in one piece. `again` returns
+    /// the command that makes a shard.
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Input`] with the missing, duplicate, foreign or damaged parts.
-    pub fn merge(out: &Path) -> Result<(Sample, SampleResult)> {
-        Sample::merge_or(out, &|shard| format!("run shard {shard}"))
+    pub fn merge_parts(out: &Path, again: &dyn Fn(Shard) -> String) -> Result<(Sample, SampleResult)> {
+        let sample = Sample::read(&out.join(PLAN_FILE))?;
+        let result = with_job!(sample, job => job.merge(out, again))?;
+        Ok((sample, result))
     }
 
-    /// The same; `again` returns the command that makes a shard.
-    pub(crate) fn merge_or(out: &Path, again: &dyn Fn(Shard) -> String) -> Result<(Sample, SampleResult)> {
-        let sample = Sample::read(&out.join(PLAN_FILE))?;
-        let run_sha256 = sample.seal()?.1;
-        let result = match &sample.kind {
-            SampleKind::Crude(plan) => {
-                let parts = read_parts(out, &run_sha256, plan.unit_count(), again)?;
-                let rechecked_lanes = parts.iter().map(|part| part.lanes_redone_and_rechecked[1]).sum();
-                let count = parts.len();
-                let segments = parts.into_iter().flat_map(|part| part.segments).collect();
-                let crude = crude_of_segments(plan, segments, &sample.options, sample.exposure())?;
-                if crude.tally.samples() != plan.unit_count() {
-                    let problem = "the parts do not hold every sample that their names stand for";
-                    return Err(Error::input(Place::file(out), problem, "make them again"));
-                }
-                SampleResult { parts: count, rechecked_lanes, ..SampleResult::of_crude(crude) }
-            }
-            SampleKind::Weighted(weighted) => {
-                let parts = read_parts(out, &run_sha256, sample.samples(), again)?;
-                let count = parts.len();
-                let mut segments = parts.into_iter().flat_map(|part| part.segments);
-                let first = segments.next();
-                let tally = first.map(|first| segments.try_fold(first, WeightedTally::join)).transpose()?;
-                SampleResult { parts: count, ..sample.weighted_result(weighted, tally, Place::file(out))? }
-            }
-            SampleKind::Search(_) => {
-                return Err(Error::Internal("a plan file of a run without a proposal".to_owned()));
-            }
-        };
-        let result = sample.against_recorded(result)?;
-        Ok((sample, result))
+    fn leave_plan(&self, out: &Path) -> Result<()> {
+        let text = self.plan_file()?.0;
+        leave_plan(out, &text, |file| file.write_all(&text))
     }
 }
 
-impl SampleRun<'_> {
-    /// The samples of the shard, or of the whole run.
-    pub fn units(&self) -> Range<u64> {
-        match &self.state {
-            State::Crude(state) => state.units.clone(),
-            State::Weighted(state) => state.units.clone(),
-        }
+impl Job for CrudeJob<'_> {
+    type Counts = SampleTally;
+    type Result = SampleResult;
+    const RECORD: &'static str = ESTIMATE_RECORD;
+
+    fn unit_count(&self) -> u64 {
+        self.plan.unit_count()
     }
 
-    /// Number of samples that no earlier process has counted.
-    ///
-    /// # Errors
-    /// Those of the journal's counts.
-    pub fn missing(&mut self) -> Result<u64> {
-        let units = self.units();
-        let missing = match &mut self.state {
-            State::Crude(state) => state.ledger.missing(units)?,
-            State::Weighted(state) => state.ledger.missing(units)?,
-        };
-        Ok(missing.iter().map(|range| range.end - range.start).sum())
+    fn run_sha256(&self, _is_part: bool) -> Result<String> {
+        Ok(self.sample.plan_file()?.1)
     }
 
-    /// Samples what is missing. `progress` receives the number of samples of every chunk; `chunks` receives the chunks
-    /// of crude Monte Carlo, with all values.
-    ///
-    /// # Errors
-    /// Those of the lanes and of `chunks`; [`Error::Interrupted`] after cancellation: finished counts are in the
-    /// journal.
-    pub fn sample(
-        &mut self,
+    fn write_plan(&self, out: &Path) -> Result<()> {
+        self.sample.leave_plan(out)
+    }
+
+    fn cuts(&self, units: &Range<u64>) -> Vec<u64> {
+        cuts(self.unit_count(), units)
+    }
+
+    fn compute(
+        &self,
+        ledger: &mut Ledger<SampleTally>,
         executor: &Executor,
-        progress: &mut dyn FnMut(u64),
-        chunks: Option<&mut EachChunk<'_>>,
-    ) -> Result<()> {
-        let _resumable = self.is_journalled.then(|| executor.cancel.resumable());
-        match (&mut self.state, &self.sample.kind) {
-            (State::Crude(state), SampleKind::Crude(plan)) => {
-                if state.units.is_empty() {
-                    return Ok(());
-                }
-                let (options, exposure) = (&self.sample.options, self.sample.exposure());
-                let chunks = chunks.map(|each| (true, each));
-                let ledger = &mut state.ledger;
-                let run = sample_into(plan, ledger, executor, options, exposure, progress, chunks)?;
-                self.crude = Some(run);
-                Ok(())
-            }
-            (State::Weighted(state), SampleKind::Weighted(weighted)) => {
-                self.sample.sample_weighted(weighted, &mut state.ledger, executor, progress)
-            }
-            _ => Err(Error::Internal("a run has the counts of another estimator".to_owned())),
+        each: Option<&mut EachChunk>,
+    ) -> Result<Computed> {
+        if ledger.units().is_empty() {
+            return Ok(Computed::whole(SweepSummary::default()));
+        }
+        let (options, exposure) = (&self.sample.options, self.sample.exposure());
+        sample_into(self.plan, ledger, executor, options, exposure, each.map(|each| (true, each)))
+    }
+
+    fn result(&self, counts: Vec<SampleTally>, computed: Computed, place: Place) -> Result<SampleResult> {
+        let (options, exposure) = (&self.sample.options, self.sample.exposure());
+        let mut run = crude_of_segments(self.plan, counts, options, exposure, &computed)?;
+        if options.stop.is_fixed() && run.tally.samples() != self.unit_count() {
+            let problem = "the parts do not hold every sample that their names stand for";
+            return Err(Error::input(place, problem, "make them again"));
+        }
+        let (rows, rechecked_lanes) = (std::mem::take(&mut run.rows), run.summary.rechecked_lanes);
+        let parts = computed.parts;
+        self.sample.against_recorded(SampleResult {
+            rows,
+            rechecked_lanes,
+            parts,
+            crude: Some(run),
+            ..SampleResult::default()
+        })
+    }
+}
+
+impl Job for WeightedJob<'_> {
+    type Counts = WeightedTally;
+    type Result = SampleResult;
+    const RECORD: &'static str = ESTIMATE_RECORD;
+
+    fn unit_count(&self) -> u64 {
+        self.sample.samples()
+    }
+
+    fn run_sha256(&self, _is_part: bool) -> Result<String> {
+        Ok(self.sample.plan_file()?.1)
+    }
+
+    fn write_plan(&self, out: &Path) -> Result<()> {
+        self.sample.leave_plan(out)
+    }
+
+    fn compute(
+        &self,
+        ledger: &mut Ledger<WeightedTally>,
+        executor: &Executor,
+        _each: Option<&mut EachChunk>,
+    ) -> Result<Computed> {
+        self.sample.sample_weighted(self.weighted, ledger, executor)?;
+        Ok(Computed::whole(SweepSummary::default()))
+    }
+
+    /// The journal depends on the file of the search and is deleted next; without the file the next run's search gives the
+    /// same bits.
+    fn tidy(&self, out: &Path) -> Result<()> {
+        if self.weighted.search.is_none() {
+            return Ok(());
+        }
+        let path = out.join(SEARCH_FILE);
+        match std::fs::remove_file(&path) {
+            Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io(&path, "remove", e)),
+            _ => Ok(()),
         }
     }
 
-    /// Writes the part of a shard and deletes its journal.
-    ///
-    /// # Errors
-    /// [`Error::Io`]; [`Error::Internal`] if samples are missing or the run is not a shard.
-    pub fn write_part(self) -> Result<()> {
-        match self.state {
-            State::Crude(state) => self.run_dir.finish(*state),
-            State::Weighted(state) => self.run_dir.finish(*state),
-        }
-    }
-
-    /// Takes the estimates of a whole run.
-    ///
-    /// # Errors
-    /// [`Error::Internal`] before anything was sampled; of the lanes of recorded scenarios.
-    pub fn take_result(&mut self) -> Result<SampleResult> {
-        let result = match (&mut self.state, &self.sample.kind) {
-            (State::Weighted(state), SampleKind::Weighted(weighted)) => {
-                let tally = state.ledger.counts(0..self.sample.samples())?;
-                self.sample.weighted_result(weighted, tally, Place::file(&self.run_dir.out))?
-            }
-            _ => {
-                let nothing = || Error::Internal("nothing was sampled".to_owned());
-                SampleResult::of_crude(self.crude.take().ok_or_else(nothing)?)
-            }
-        };
-        self.sample.against_recorded(result)
-    }
-
-    /// The result files of a whole run in its folder.
-    ///
-    /// # Errors
-    /// [`Error::Io`].
-    pub fn results(&self) -> Result<Results<'_>> {
-        match &self.state {
-            State::Crude(state) => state.folder.results(),
-            State::Weighted(state) => state.folder.results(),
-        }
-    }
-
-    /// Deletes the journal of a whole run after its results are written, and the file of its search.
-    ///
-    /// # Errors
-    /// [`Error::Io`].
-    pub fn close(self) -> Result<()> {
-        if matches!(self.sample.options.estimator, Estimator::Search(_)) {
-            // The journal depends on this file and is deleted next; without the file the next run's search gives the
-            // same bits.
-            let path = self.run_dir.out.join(SEARCH_FILE);
-            match std::fs::remove_file(&path) {
-                Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(Error::io(&path, "remove", e)),
-                _ => {}
-            }
-        }
-        match self.state {
-            State::Crude(state) => state.forget(),
-            State::Weighted(state) => state.forget(),
-        }
+    fn result(&self, counts: Vec<WeightedTally>, computed: Computed, place: Place) -> Result<SampleResult> {
+        let mut counts = counts.into_iter();
+        let first = counts.next();
+        let tally = first.map(|first| counts.try_fold(first, WeightedTally::join)).transpose()?;
+        let result = self.sample.weighted_result(self.weighted, tally, place)?;
+        self.sample.against_recorded(SampleResult { parts: computed.parts, ..result })
     }
 }
 
@@ -281,11 +227,4 @@ pub struct SampleResult {
     pub parts: usize,
     /// Lanes that were rechecked.
     pub rechecked_lanes: u64,
-}
-
-impl SampleResult {
-    fn of_crude(mut run: CrudeRun) -> SampleResult {
-        let (rows, rechecked_lanes) = (std::mem::take(&mut run.rows), run.summary.rechecked_lanes);
-        SampleResult { rows, rechecked_lanes, crude: Some(run), ..SampleResult::default() }
-    }
 }

@@ -82,12 +82,11 @@ impl Sample {
         weighted: &Weighted,
         ledger: &mut Ledger<WeightedTally>,
         executor: &Executor,
-        mut progress: impl FnMut(u64),
     ) -> Result<()> {
         let nominal = truncated(&self.density)?;
         let (units, chunk) = (ledger.units(), self.chunk_samples(weighted.draws.crude_per_draw));
         // The samples of a chunk are drawn, evaluated and weighted together, so a chunk cannot be cancelled.
-        let whole = executor.clone().with_cancel(Cancel::default());
+        let whole = Executor { progress: None, ..executor.clone().with_cancel(Cancel::default()) };
         let lanes = self.limit_state(whole);
         for missing in ledger.missing(units.clone())? {
             let mut at = missing.start;
@@ -98,7 +97,7 @@ impl Sample {
                     importance_sums(&nominal, &weighted.proposal, &lanes, &weighted.draws, at..next, &pairs)?;
                 let pairs = sums.split_off(asked.len());
                 ledger.add(WeightedTally { sums: asked.into_iter().zip(sums).collect(), pairs }, [0; 2])?;
-                progress(next - at);
+                executor.progress.iter().for_each(|progress| progress(next - at));
                 at = next;
                 ledger.kept(executor.check_cancelled(at - units.start, units.end - units.start))?;
             }

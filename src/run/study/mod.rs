@@ -23,10 +23,8 @@ pub use plan_file::StudyHead;
 
 pub use reference::{Difference, ReferenceComparison};
 pub use robustness::robust_lanes;
-pub use run::{ChunkSink, StudyResult, StudyRun};
+pub use run::StudyResult;
 
-use std::fs::File;
-use std::io::{BufRead, BufReader};
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
@@ -34,10 +32,8 @@ use serde::{Deserialize, Serialize};
 
 use crate::engine::{LanePlan, Partial};
 use crate::model::profile::Profile;
-use crate::run::parts::{Shard, leave_plan, read_sealed_line, seal, units_of};
+use crate::run::parts::{Shard, read_sealed_line, seal, units_of};
 use crate::run::score::{ScoreOptions, ScoreTable, score};
-use crate::support::input_file;
-use crate::support::plain_text::sha256;
 use crate::support::run_dir::Results;
 use crate::traffic::mining::{Collection, MiningOptions, counts, counts_text};
 use crate::{Error, Place, Result};
@@ -61,7 +57,7 @@ struct StudyPlanFile {
 /// use lanesweep::Error;
 /// use lanesweep::engine::{CpuBackend, Executor};
 /// # use lanesweep::model::profile::Profile;
-/// use lanesweep::run::parts::Shard;
+/// use lanesweep::run::parts::{Job, Shard};
 /// use lanesweep::run::study::Study;
 /// # use lanesweep::traffic::mining::{MiningOptions, mine_generated};
 /// # use lanesweep::traffic::trajectory::generator::GeneratorOptions;
@@ -84,7 +80,7 @@ struct StudyPlanFile {
 ///     let shard = Shard { index, of: 2 };
 ///     Study::read(&folder.join("plan.json"), Some(shard))?.run_shard(folder, shard, &executor)?;
 /// }
-/// let (merged, result) = Study::merge(folder)?;
+/// let (merged, result) = Study::merge_parts(folder, &|shard| format!("run shard {shard}"))?;
 /// assert_eq!(result.counts, study.run(&executor)?.counts);
 /// assert_eq!(merged.score(&result.counts)?, study.score(&result.counts)?);
 /// # Ok(())
@@ -226,31 +222,6 @@ impl Study {
     /// The first line of the plan file, and the hash of the run. The line contains the checksums of the rest.
     pub(crate) fn seal(&self) -> Result<(Vec<u8>, String)> {
         seal(Study::KIND, &StudyPlanFile { facts: self.facts.clone(), plan: self.cases.head().clone() })
-    }
-
-    /// Hash of the run. Parts use the hash of the plan file. The counts of a run in one piece depend only on plan and
-    /// arithmetic, so it may be resumed with other score options.
-    fn run_sha256(&self, is_part: bool) -> Result<String> {
-        match &self.file {
-            Some((_, run_sha256)) => Ok(run_sha256.clone()),
-            None if is_part => Ok(self.seal()?.1),
-            None => Ok(sha256(format!("{} reference {}", self.plan().hash(), self.facts.reference))),
-        }
-    }
-
-    /// Writes the plan file into a run's folder, or checks that the same one exists; many shards may do so at once.
-    ///
-    /// # Errors
-    /// [`Error::Input`] if the folder holds the plan of another run; [`Error::Io`].
-    pub fn write_plan(&self, out: &Path) -> Result<()> {
-        let Some((path, _)) = &self.file else {
-            let line = self.seal()?.0;
-            return leave_plan(out, &line, |file| self.cases.write_file(&line, file));
-        };
-        // Copies the file, because a shard holds only its own scenarios and cannot write the plan.
-        let mut line = Vec::new();
-        BufReader::new(input_file::open(path)?).read_until(b'\n', &mut line).map_err(|e| Error::io(path, "read", e))?;
-        leave_plan(out, &line, |file| std::io::copy(&mut File::open(path)?, file).map(drop))
     }
 
     /// Adds the plan file to the results, unless it is larger than `max_bytes`; returns whether it did.

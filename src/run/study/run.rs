@@ -1,12 +1,15 @@
-//! A study's run: whole in memory, or whole or as a shard in a folder with a journal; and the merge of the shards.
+//! A study as a job.
 
-use std::ops::Range;
+use std::fs::File;
+use std::io::{BufRead, BufReader};
 use std::path::Path;
 
 use super::Study;
-use crate::engine::{Chunk, Executor, LanePlan, Partial, SweepSummary, Wanted};
-use crate::run::parts::{PLAN_FILE, RunDir, RunState, Shard, read_parts};
-use crate::support::run_dir::{Results, STUDY_RECORD};
+use crate::engine::{Executor, Partial, SweepSummary, Wanted};
+use crate::run::parts::{Computed, EachChunk, Job, Ledger, PLAN_FILE, Shard, leave_plan};
+use crate::support::input_file;
+use crate::support::plain_text::sha256;
+use crate::support::run_dir::STUDY_RECORD;
 use crate::{Error, Place, Result};
 
 /// Result of a whole study.
@@ -20,168 +23,89 @@ pub struct StudyResult {
     pub parts: usize,
 }
 
-/// A run of a study, or of one of its shards, in a folder. It continues from the journal of an earlier process.
-pub struct StudyRun<'s> {
-    study: &'s Study,
-    run_dir: RunDir,
-    state: RunState<Partial>,
-    summary: SweepSummary,
-}
-
-/// Receives the chunks of a study's sweep in order, with the plan of their window.
-pub type ChunkSink<'c> = dyn FnMut(&LanePlan, &Chunk) -> Result<()> + 'c;
-
 impl Study {
-    /// Runs every lane, in memory.
-    ///
-    /// # Errors
-    /// As [`Executor::sweep`]; [`Error::Usage`] for a time step that is too long for a case.
-    pub fn run(&self, executor: &Executor) -> Result<StudyResult> {
-        let mut counts = Vec::new();
-        let units = 0..self.plan().unit_count();
-        let summary = self.cases.sweep(units, Wanted::Verdicts, executor, |plan, chunk| {
-            counts.push(Partial::from_chunk(plan, &chunk)?);
-            Ok(())
-        })?;
-        let counts = counts.into_iter().try_fold(Partial::empty(self.plan()), Partial::merge)?;
-        Ok(StudyResult { counts, summary, parts: 0 })
-    }
-
-    /// Opens a run in a folder; `None` if the shard's complete part exists already.
-    ///
-    /// # Errors
-    /// [`Error::Busy`] where another process runs it; [`Error::Input`] for a damaged or foreign file in its place;
-    /// [`Error::Io`].
-    pub fn open(&self, out: &Path, shard: Option<Shard>) -> Result<Option<StudyRun<'_>>> {
-        let run_dir = RunDir {
-            out: out.to_path_buf(),
-            record: STUDY_RECORD,
-            run_sha256: self.run_sha256(shard.is_some())?,
-            shard,
-            unit_count: self.plan().unit_count(),
-        };
-        if run_dir.is_done::<Partial>()? {
-            return Ok(None);
-        }
-        let state = run_dir.begin(&[], true)?;
-        let summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
-        Ok(Some(StudyRun { study: self, run_dir, state, summary }))
-    }
-
-    /// Runs a shard in a folder and writes plan and part there. An interrupted run continues at the next call.
-    ///
-    /// # Errors
-    /// As [`Study::open`] and [`Study::run`]; [`Error::Interrupted`].
-    pub fn run_shard(&self, out: &Path, shard: Shard, executor: &Executor) -> Result<()> {
-        self.write_plan(out)?;
-        let Some(mut run) = self.open(out, Some(shard))? else { return Ok(()) };
-        run.sweep(executor, None)?;
-        run.write_part()
-    }
-
-    /// The study and the counts of a folder of parts, bit for bit equal to those of the run in one piece.
+    /// The study and the counts of a folder of parts, bit for bit equal to those of the run in one piece. `again` returns
+    /// the command that makes a shard.
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Input`] with the missing, duplicate, foreign or damaged parts.
-    pub fn merge(out: &Path) -> Result<(Study, StudyResult)> {
-        Study::merge_or(out, &|shard| format!("run shard {shard}"))
-    }
-
-    /// The same; `again` returns the command that makes a shard.
-    pub(crate) fn merge_or(out: &Path, again: &dyn Fn(Shard) -> String) -> Result<(Study, StudyResult)> {
+    pub fn merge_parts(out: &Path, again: &dyn Fn(Shard) -> String) -> Result<(Study, StudyResult)> {
         // Merging needs only counts and no scenarios.
         let study = Study::read_units(&out.join(PLAN_FILE), |_| 0..0)?;
-        let plan = study.plan();
-        let found = read_parts::<Partial>(out, &study.run_sha256(true)?, plan.unit_count(), again)?;
-        let mut summary = SweepSummary { lanes: plan.lane_count(), ..SweepSummary::default() };
-        let parts = found.len();
-        let mut counts = Partial::empty(plan);
-        for part in found {
-            summary.redone_lanes += part.lanes_redone_and_rechecked[0];
-            summary.rechecked_lanes += part.lanes_redone_and_rechecked[1];
-            counts = part.segments.into_iter().try_fold(counts, Partial::merge)?;
-        }
-        if !counts.is_complete(plan) {
-            let problem = "the parts do not hold every unit that their names stand for";
-            return Err(Error::input(Place::file(out), problem, "make them again"));
-        }
-        Ok((study, StudyResult { counts, summary, parts }))
+        let result = study.merge(out, again)?;
+        Ok((study, result))
     }
 }
 
-impl StudyRun<'_> {
-    /// The units of the shard, or of the whole run.
-    pub fn units(&self) -> Range<u64> {
-        self.state.units.clone()
+impl Job for Study {
+    type Counts = Partial;
+    type Result = StudyResult;
+    const RECORD: &'static str = STUDY_RECORD;
+
+    fn unit_count(&self) -> u64 {
+        self.plan().unit_count()
     }
 
-    /// Number of units that no earlier process has counted.
-    ///
-    /// # Errors
-    /// Those of the journal's counts.
-    pub fn missing(&mut self) -> Result<u64> {
-        Ok(self.state.ledger.missing(self.units())?.iter().map(|range| range.end - range.start).sum())
+    /// The counts of a run in one piece depend only on plan and arithmetic, so it may be resumed with other score options.
+    fn run_sha256(&self, is_part: bool) -> Result<String> {
+        match &self.file {
+            Some((_, run_sha256)) => Ok(run_sha256.clone()),
+            None if is_part => Ok(self.seal()?.1),
+            None => Ok(sha256(format!("{} reference {}", self.plan().hash(), self.facts.reference))),
+        }
     }
 
-    /// Runs the missing lanes. `rows` receives their chunks in order, with outcomes; if an earlier process has counted
-    /// lanes, their chunks come too, for which these lanes run again.
-    ///
-    /// # Errors
-    /// As [`Study::run`]; those of `rows`; [`Error::Interrupted`] after cancellation: finished counts are in the journal.
-    pub fn sweep(&mut self, executor: &Executor, mut rows: Option<&mut ChunkSink>) -> Result<SweepSummary> {
-        let _resumable = executor.cancel.resumable();
-        let (units, ledger) = (self.state.units.clone(), &mut self.state.ledger);
+    fn write_plan(&self, out: &Path) -> Result<()> {
+        let Some((path, _)) = &self.file else {
+            let line = self.seal()?.0;
+            return leave_plan(out, &line, |file| self.cases.write_file(&line, file));
+        };
+        // Copies the file, because a shard holds only its own scenarios and cannot write the plan.
+        let mut line = Vec::new();
+        BufReader::new(input_file::open(path)?).read_until(b'\n', &mut line).map_err(|e| Error::io(path, "read", e))?;
+        leave_plan(out, &line, |file| std::io::copy(&mut File::open(path)?, file).map(drop))
+    }
+
+    /// If an earlier process has counted lanes, those that `each` is to receive run again.
+    fn compute(
+        &self,
+        ledger: &mut Ledger<Partial>,
+        executor: &Executor,
+        mut each: Option<&mut EachChunk>,
+    ) -> Result<Computed> {
+        let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
+        let units = ledger.units();
         let missing = ledger.missing(units.clone())?;
         let is_fresh = missing == [units.clone()];
-        let wanted = if rows.is_some() && is_fresh { Wanted::Outcomes } else { Wanted::Verdicts };
+        let wanted = if each.is_some() && is_fresh { Wanted::Outcomes } else { Wanted::Verdicts };
         for range in missing {
-            let part = self.study.cases.sweep(range, wanted, executor, |plan, chunk| {
-                if let Some(rows) = rows.as_mut().filter(|_| is_fresh) {
-                    rows(plan, &chunk)?;
+            let part = self.cases.sweep(range, wanted, executor, |plan, chunk| {
+                if let Some(each) = each.as_mut().filter(|_| is_fresh) {
+                    each(plan, &chunk)?;
                 }
                 ledger.add(Partial::from_chunk(plan, &chunk)?, chunk.redone_and_rechecked)
             });
-            self.summary.add(&ledger.kept(part)?);
+            summary.add(&ledger.kept(part)?);
         }
-        if let Some(rows) = rows.filter(|_| !is_fresh) {
-            let again = self.study.cases.sweep(units, Wanted::Outcomes, executor, |plan, chunk| rows(plan, &chunk))?;
-            self.summary.add(&again);
+        if let Some(each) = each.filter(|_| !is_fresh) {
+            summary.add(&self.cases.sweep(units, Wanted::Outcomes, executor, |plan, chunk| each(plan, &chunk))?);
         }
         // Rechecks of earlier processes are recorded in the journal.
-        [self.summary.redone_lanes, self.summary.rechecked_lanes] = ledger.redone_and_rechecked();
-        Ok(self.summary)
+        [summary.redone_lanes, summary.rechecked_lanes] = ledger.redone_and_rechecked();
+        Ok(Computed::whole(summary))
     }
 
-    /// Writes the part of a shard and deletes its journal.
-    ///
-    /// # Errors
-    /// [`Error::Io`]; [`Error::Internal`] if lanes are missing or the run is not a shard.
-    pub fn write_part(self) -> Result<()> {
-        self.run_dir.finish(self.state)
-    }
-
-    /// Removes and returns the counts of a whole run.
-    ///
-    /// # Errors
-    /// None for counts of this program.
-    pub fn take_result(&mut self) -> Result<StudyResult> {
-        let counts = self.state.ledger.take()?.unwrap_or_else(|| Partial::empty(self.study.plan()));
-        Ok(StudyResult { counts, summary: self.summary, parts: 0 })
-    }
-
-    /// The result files of a whole run in its folder.
-    ///
-    /// # Errors
-    /// [`Error::Io`].
-    pub fn results(&self) -> Result<Results<'_>> {
-        self.state.folder.results()
-    }
-
-    /// Deletes the journal of a whole run after its results are written.
-    ///
-    /// # Errors
-    /// [`Error::Io`].
-    pub fn close(self) -> Result<()> {
-        self.state.forget()
+    fn result(&self, counts: Vec<Partial>, computed: Computed, place: Place) -> Result<StudyResult> {
+        let plan = self.plan();
+        let Computed { mut summary, parts, .. } = computed;
+        let counts = counts.into_iter().try_fold(Partial::empty(plan), Partial::merge)?;
+        if !counts.is_complete(plan) {
+            let problem = "the parts do not hold every unit that their names stand for";
+            return Err(Error::input(place, problem, "make them again"));
+        }
+        if parts > 0 {
+            summary.lanes = plan.lane_count();
+        }
+        Ok(StudyResult { counts, summary, parts })
     }
 }
