@@ -1,7 +1,5 @@
 //! Encoded cases in memory, for plans whose cases are no function of the unit.
 
-use std::sync::Arc;
-
 use super::lane_case::LaneCase;
 use super::plan::CaseSource;
 use crate::scenario::Tables;
@@ -37,17 +35,6 @@ impl CaseSource for CaseTable {
     fn case(&self, block: usize, unit: u64, variant: usize) -> LaneCase<f64> {
         let block = &self.blocks[block];
         block.cases[(unit - block.first_unit) as usize * block.variants + variant]
-    }
-
-    fn tables(&self) -> &Tables<f64> {
-        &self.tables
-    }
-}
-
-/// Plans may share their cases.
-impl CaseSource for Arc<CaseTable> {
-    fn case(&self, block: usize, unit: u64, variant: usize) -> LaneCase<f64> {
-        self.as_ref().case(block, unit, variant)
     }
 
     fn tables(&self) -> &Tables<f64> {

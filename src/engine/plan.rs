@@ -178,7 +178,7 @@ pub struct LanePlan {
     pub headways: Vec<Headway>,
     /// Categories, in order.
     pub blocks: Vec<Block>,
-    source: Box<dyn CaseSource>,
+    source: Arc<dyn CaseSource>,
     hash: String,
 }
 
@@ -205,7 +205,7 @@ impl LanePlan {
         models: Vec<ModelId>,
         headways: Vec<Headway>,
         blocks: Vec<Block>,
-        source: Box<dyn CaseSource>,
+        source: Arc<dyn CaseSource>,
     ) -> Result<LanePlan> {
         let mut plan = LanePlan::with_hash(String::new(), profile, models, headways, blocks, source)?;
         check_cases(&plan.profile, &plan.blocks, plan.source.as_ref(), plan.segments(0..plan.unit_count()))?;
@@ -223,7 +223,7 @@ impl LanePlan {
         models: Vec<ModelId>,
         headways: Vec<Headway>,
         mut blocks: Vec<Block>,
-        source: Box<dyn CaseSource>,
+        source: Arc<dyn CaseSource>,
     ) -> Result<LanePlan> {
         let empty = [("driver models", models.is_empty()), ("headways", headways.is_empty())];
         if let Some((what, _)) = empty.iter().find(|(_, empty)| *empty) {
@@ -258,7 +258,7 @@ impl LanePlan {
 
     /// The same plan that holds the cases of some units only: the units held of each block, and the source of their
     /// cases.
-    pub fn holding(&self, units: Vec<Units>, source: Box<dyn CaseSource>) -> LanePlan {
+    pub fn holding(&self, units: Vec<Units>, source: Arc<dyn CaseSource>) -> LanePlan {
         let blocks = self.blocks.iter().zip(units).map(|(block, units)| Block { units, ..block.clone() });
         LanePlan {
             profile: self.profile.clone(),

@@ -1,6 +1,8 @@
 //! Concrete cases in bulk: a row of numbers each, run with every headway and model. The columns are those of `simulate`
 //! for a single case; the outcomes are those of its lanes.
 
+use std::sync::Arc;
+
 use crate::engine::{Block, CaseTable, Executor, Headway, LaneCase, LanePlan, Outcome, Start, Units, Wanted};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -59,7 +61,7 @@ impl Cases {
         };
         let blocks = by_category.iter().map(block).collect();
         let headways = if headways.is_empty() { vec![Headway::Observed] } else { headways.to_vec() };
-        let plan = LanePlan::new(profile.clone(), models.to_vec(), headways, blocks, Box::new(source))?;
+        let plan = LanePlan::new(profile.clone(), models.to_vec(), headways, blocks, Arc::new(source))?;
         let rows = by_category.into_iter().flat_map(|(_, rows)| rows).collect();
         Ok(Cases { plan, rows, notes: doubts.sentences() })
     }

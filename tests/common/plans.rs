@@ -1,6 +1,8 @@
 //! Plans and chunks without physics: every verdict is chosen by the test.
 #![allow(dead_code)]
 
+use std::sync::Arc;
+
 use lanesweep::engine::{Block, CaseSource, Chunk, EndReason, Headway, LaneCase, LanePlan, NO_STEP, Outcome, Verdicts};
 use lanesweep::model::criterion::{Contact, Criterion};
 use lanesweep::model::driver::ModelId;
@@ -49,7 +51,7 @@ pub fn plan(blocks: &[(Category, usize, &[&str])]) -> LanePlan {
             first_lane: 0,
         })
         .collect();
-    LanePlan::new(profile, ModelId::ALL.to_vec(), Headway::paper(), blocks, Box::new(OneCase(case, tables))).unwrap()
+    LanePlan::new(profile, ModelId::ALL.to_vec(), Headway::paper(), blocks, Arc::new(OneCase(case, tables))).unwrap()
 }
 
 /// Verdict bits from what failed.

@@ -1,6 +1,8 @@
 //! Plans and uses of a device that the study never makes: subsets of the models in any order, blocks without
 //! units and of the same category, sessions side by side, and going on after an error.
 
+use std::sync::Arc;
+
 use crate::common::device::{open, out_of_memory_at, tampered};
 use lanesweep::engine::gpu::{GpuBackend, GpuOptions};
 use lanesweep::engine::verify::{RandomOptions, random_plan};
@@ -46,7 +48,7 @@ fn borrowed(from: LanePlan, models: &[ModelId], headways: &[Headway], parts: &[(
     };
     let blocks = parts.iter().map(block).collect();
     let profile = from.profile.clone();
-    let source = Box::new(Borrowed { blocks: parts.iter().map(|p| (p.0, p.1)).collect(), from });
+    let source = Arc::new(Borrowed { blocks: parts.iter().map(|p| (p.0, p.1)).collect(), from });
     LanePlan::new(profile, models.to_vec(), headways.to_vec(), blocks, source).unwrap()
 }
 

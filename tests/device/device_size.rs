@@ -1,6 +1,8 @@
 //! Sizes at which kernels break: more than 65,535 workgroups in one dispatch, more than 2²⁷ lanes in one run.
 //! Every lane ends at its first step, and its verdict is known without computing it.
 
+use std::sync::Arc;
+
 use crate::common::device::software_device;
 use lanesweep::engine::gpu::{GpuBackend, GpuOptions};
 use lanesweep::engine::{Block, CaseSource, Executor, Headway, LaneCase, LanePlan, Verdicts, Wanted};
@@ -67,7 +69,7 @@ fn plan(units: usize, variants: usize, headways: usize) -> LanePlan {
     // Each once: 1 m of overlap or 5 m of gap, and a tenth of a millimetre more for each.
     let gap_m = |h: usize| if touches(h) { -1.0 } else { 5.0 } + 1e-4 * h as f64;
     let headways = (0..headways).map(|h| Headway::GapM(gap_m(h))).collect();
-    LanePlan::new(profile, ModelId::ALL.to_vec(), headways, blocks, Box::new(source)).unwrap()
+    LanePlan::new(profile, ModelId::ALL.to_vec(), headways, blocks, Arc::new(source)).unwrap()
 }
 
 fn expected(plan: &LanePlan, lane: u64) -> Verdicts {

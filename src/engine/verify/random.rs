@@ -1,6 +1,8 @@
 //! The random set: cases of every kind with plausible numbers, at headways from far ahead to behind. The fraction of
 //! failing lanes stays away from 0 and 1, so that a wrong verdict is detected.
 
+use std::sync::Arc;
+
 use super::pool::{LateralRole, Pool, Slice};
 use super::{CaseRandom, Purpose, check_categories};
 use crate::engine::{Block, CaseSource, Headway, LaneCase, LaneOther, LanePlan, NO_STEP};
@@ -61,7 +63,7 @@ pub fn random_plan(profile: &Profile, options: &RandomOptions) -> Result<LanePla
     };
     let blocks = options.categories.iter().map(block).collect();
     let source = RandomCases::new(profile, options);
-    LanePlan::new(profile.clone(), options.models.clone(), headways, blocks, Box::new(source))
+    LanePlan::new(profile.clone(), options.models.clone(), headways, blocks, Arc::new(source))
 }
 
 struct RandomCases {

@@ -2,6 +2,8 @@
 //! rule, and neighbours one unit in the last place to each side. It detects contracted products, reordered sums, and
 //! `<` instead of `≤`.
 
+use std::sync::Arc;
+
 use super::check_categories;
 use super::decision::{HEADWAYS, Threshold};
 use super::first_step::ThresholdCases;
@@ -59,5 +61,5 @@ pub fn threshold_plan(profile: &Profile, options: &ThresholdOptions) -> Result<L
     let block = |&category: &Category| Block::new(category, names(category), SIDES.map(str::to_owned).to_vec());
     let blocks = options.categories.iter().map(block).collect();
     let source = ThresholdCases::new(profile, options.seed, &options.categories);
-    LanePlan::new(profile.clone(), options.models.clone(), HEADWAYS.to_vec(), blocks, Box::new(source))
+    LanePlan::new(profile.clone(), options.models.clone(), HEADWAYS.to_vec(), blocks, Arc::new(source))
 }

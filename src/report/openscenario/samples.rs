@@ -4,6 +4,8 @@
 //! range and to the parameter's physical range. A point without a valid case (such as a deceleration that ends above
 //! the initial speed) is redrawn from the sample's next numbers.
 
+use std::sync::Arc;
+
 use super::distribution::{Draw, Range};
 use super::distribution_file::{DistributionFile, Distributions, Stochastic};
 use super::parameters::Names;
@@ -186,7 +188,7 @@ impl DistributionSamples {
             source.blocks[0].cases.push(LaneCase::encode(&case, profile, &mut source.tables).ahead_by(gap_m));
         }
         let block = Block::new(self.category, Units::Numbered(samples), vec![VARIANT.to_owned()]);
-        let plan = LanePlan::new(profile.clone(), models.to_vec(), headways.to_vec(), vec![block], Box::new(source))?;
+        let plan = LanePlan::new(profile.clone(), models.to_vec(), headways.to_vec(), vec![block], Arc::new(source))?;
         Ok((plan, tries))
     }
 }

@@ -135,7 +135,7 @@ impl GridPart {
         let block = Block::new(grid.category(), names.into_iter().collect(), vec![VARIANT.to_owned()]);
         let source = Arc::new(source);
         let plan = |profile: Profile, models, headways, block| {
-            LanePlan::new(profile, models, headways, vec![block], Box::new(source.clone()))
+            LanePlan::new(profile, models, headways, vec![block], source.clone())
         };
         let unreacting = plan(without_reaction(profile), vec![ModelId::Reg157], headways.clone(), block.clone())?;
         Ok(GridPart { plan: plan(profile.clone(), models, headways, block)?, unreacting, layout })

@@ -2,15 +2,18 @@
 //! a folder with a journal, and its parts merge to the bits of the whole.
 
 use std::ops::Range;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use super::Shard;
-use super::folder::read_parts;
+use super::folder::{Part, read_part, read_parts, write_part};
+use super::journal::Journal;
 use super::ledger::{Ledger, MergeableCounts};
-use super::run_dir::{RunDir, RunState, units_of};
 use crate::engine::{Chunk, Executor, LanePlan, SweepSummary};
 use crate::stats::estimate::StopReason;
-use crate::support::run_dir::Results;
+use crate::support::files::make_folder;
+use crate::support::lock::FolderLock;
+use crate::support::readable::count;
+use crate::support::run_dir::{OutputDir, Results};
 use crate::{Error, Place, Result};
 
 /// Receives the chunks of a sweep in order, with their plan.
@@ -106,13 +109,35 @@ pub trait Job: Sized {
     /// [`Error::Busy`] if another process runs it; [`Error::Input`] for a damaged or foreign file in its place;
     /// [`Error::Io`].
     fn open(&self, out: &Path, shard: Option<Shard>, is_journalled: bool) -> Result<Option<JobRun<'_, Self>>> {
-        let (run_sha256, unit_count) = (self.run_sha256(shard.is_some())?, self.unit_count());
-        let run_dir = RunDir { out: out.to_path_buf(), record: Self::RECORD, run_sha256, shard, unit_count };
-        if run_dir.is_done::<Self::Counts>()? {
+        let (run_sha256, units) = (self.run_sha256(shard.is_some())?, units_of(shard, self.unit_count()));
+        let part = shard.map(|shard| out.join(format!("{}.json", shard.stem())));
+        if let Some(part) = part.as_ref().filter(|part| part.exists()) {
+            read_part::<Self::Counts>(part, &run_sha256, &units, "run this command again")?;
             return Ok(None);
         }
-        let state = run_dir.begin(&self.cuts(&units_of(shard, unit_count)), is_journalled)?;
-        Ok(Some(JobRun { job: self, run_dir, state, computed: None, is_journalled }))
+        // Parts share the folder; a run in one piece has it alone.
+        let (folder, lock) = match shard {
+            None => (OutputDir::open(out, Self::RECORD)?, None),
+            Some(shard) => {
+                let folder = OutputDir::share(out)?;
+                let lock = FolderLock::acquire(&out.join(format!("{}.lock", shard.stem())))?;
+                warn_of_another_split(out, shard);
+                (folder, Some(lock))
+            }
+        };
+        let mut ledger = Ledger::new(units.clone(), &self.cuts(&units));
+        if is_journalled {
+            let run = &run_sha256[..16.min(run_sha256.len())];
+            let name = shard.map_or(format!("run-{run}"), |shard| shard.stem()) + ".journal";
+            let (journal, found) = Journal::open(&out.join(name), &run_sha256, units.clone())?;
+            let done = ledger.resume(journal, found)?;
+            if done > 0 {
+                let (done, all) = (count(done), count(units.end - units.start));
+                tracing::info!("{done} of {all} units are done already: this run continues");
+            }
+        }
+        let (out, computed) = (out.to_path_buf(), None);
+        Ok(Some(JobRun { job: self, out, part, run_sha256, ledger, computed, is_journalled, lock, folder }))
     }
 
     /// Runs a shard in a folder and writes plan and part there. An interrupted run continues at the next call.
@@ -145,19 +170,43 @@ pub trait Job: Sized {
     }
 }
 
+/// The units of a shard, or of the whole run.
+pub(crate) fn units_of(shard: Option<Shard>, count: u64) -> Range<u64> {
+    shard.map_or(0..count, |shard| shard.units(count))
+}
+
+/// Parts of two splits overlap; this warns before the computation, not only at the merge.
+fn warn_of_another_split(out: &Path, ours: Shard) {
+    let names = std::fs::read_dir(out).into_iter().flatten().flatten();
+    let mut names = names.filter_map(|entry| entry.file_name().into_string().ok());
+    let is_other = |name: &String| {
+        let shard = name.strip_suffix(".json").and_then(Shard::of_stem);
+        shard.is_some_and(|shard| shard.of != ours.of)
+    };
+    if let Some(name) = names.find(is_other) {
+        tracing::warn!("{name} in this folder is of a run cut into another number of shards: they cannot be merged");
+    }
+}
+
 /// A job, or one of its shards, in a folder. It continues from the journal of an earlier process.
 pub struct JobRun<'j, J: Job> {
     job: &'j J,
-    run_dir: RunDir,
-    state: RunState<J::Counts>,
+    out: PathBuf,
+    /// The part file of a shard.
+    part: Option<PathBuf>,
+    run_sha256: String,
+    ledger: Ledger<J::Counts>,
     computed: Option<Computed>,
     is_journalled: bool,
+    // Dropped last, the lock of the shard first: until then no other process computes these units.
+    lock: Option<FolderLock>,
+    folder: OutputDir,
 }
 
 impl<J: Job> JobRun<'_, J> {
     /// The units of the shard, or of the whole run.
     pub fn units(&self) -> Range<u64> {
-        self.state.units.clone()
+        self.ledger.units()
     }
 
     /// Number of units that no earlier process has counted.
@@ -165,7 +214,7 @@ impl<J: Job> JobRun<'_, J> {
     /// # Errors
     /// Those of the journal's counts.
     pub fn missing(&mut self) -> Result<u64> {
-        Ok(self.state.ledger.missing(self.units())?.iter().map(|range| range.end - range.start).sum())
+        Ok(self.ledger.missing(self.units())?.iter().map(|range| range.end - range.start).sum())
     }
 
     /// Computes the units that are missing. `each` receives every chunk with its outcomes.
@@ -174,7 +223,7 @@ impl<J: Job> JobRun<'_, J> {
     /// As [`Job::compute`].
     pub fn compute(&mut self, executor: &Executor, each: Option<&mut EachChunk>) -> Result<()> {
         let _resumable = self.is_journalled.then(|| executor.cancel.resumable());
-        self.computed = Some(self.job.compute(&mut self.state.ledger, executor, each)?);
+        self.computed = Some(self.job.compute(&mut self.ledger, executor, each)?);
         Ok(())
     }
 
@@ -182,8 +231,21 @@ impl<J: Job> JobRun<'_, J> {
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Internal`] if units are missing or the run is not a shard.
-    pub fn write_part(self) -> Result<()> {
-        self.run_dir.finish(self.state)
+    pub fn write_part(mut self) -> Result<()> {
+        if self.missing()? > 0 {
+            return Err(Error::Internal("a part is not complete".to_owned()));
+        }
+        let JobRun { part, run_sha256, ledger, lock, folder, out, .. } = self;
+        let Some(path) = part else { return Err(Error::Internal("the whole run is no part".to_owned())) };
+        let (units, lanes_redone_and_rechecked) = (ledger.units(), ledger.redone_and_rechecked());
+        let (segments, journal) = ledger.finish()?;
+        // The folder existed at the start; if it was deleted since, it is recreated to save the part.
+        make_folder(&out)?;
+        write_part(&path, &Part { run_sha256, units, lanes_redone_and_rechecked, segments })?;
+        journal.map_or(Ok(()), Journal::remove)?;
+        drop((lock, folder));
+        tracing::info!("part written to {}", path.display());
+        Ok(())
     }
 
     /// Takes the result of a whole run.
@@ -193,7 +255,7 @@ impl<J: Job> JobRun<'_, J> {
     pub fn take_result(&mut self) -> Result<J::Result> {
         let nothing = || Error::Internal("nothing was computed".to_owned());
         let computed = self.computed.take().ok_or_else(nothing)?;
-        self.job.result(self.state.ledger.take()?, computed, Place::file(&self.run_dir.out))
+        self.job.result(self.ledger.take()?, computed, Place::file(&self.out))
     }
 
     /// The result files of a whole run in its folder.
@@ -201,7 +263,7 @@ impl<J: Job> JobRun<'_, J> {
     /// # Errors
     /// [`Error::Io`].
     pub fn results(&self) -> Result<Results<'_>> {
-        self.state.folder.results()
+        self.folder.results()
     }
 
     /// Deletes the journal of a whole run after its results are written.
@@ -209,7 +271,8 @@ impl<J: Job> JobRun<'_, J> {
     /// # Errors
     /// [`Error::Io`].
     pub fn close(self) -> Result<()> {
-        self.job.tidy(&self.run_dir.out)?;
-        self.state.forget()
+        self.job.tidy(&self.out)?;
+        let (_, journal) = self.ledger.finish()?;
+        journal.map_or(Ok(()), Journal::remove)
     }
 }

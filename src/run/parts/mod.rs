@@ -8,18 +8,19 @@ mod folder;
 mod job;
 mod journal;
 mod ledger;
-mod run_dir;
 mod sealed;
+mod shared_plan;
 
 pub use folder::{Part, read_part, write_part};
+pub(crate) use job::units_of;
 pub use job::{Computed, EachChunk, Job, JobRun};
 pub(crate) use journal::run_of_journal;
 pub use journal::{Journal, Records};
 pub use ledger::{Counted, Ledger, MergeableCounts};
-pub use run_dir::{PLAN_FILE, RUN_PLAN_FILE};
-pub(crate) use run_dir::{leave_plan, units_of};
 pub(crate) use sealed::{kind_of, read_sealed};
 pub use sealed::{read_sealed_line, seal, unseal};
+pub(crate) use shared_plan::leave_plan;
+pub use shared_plan::{PLAN_FILE, RUN_PLAN_FILE};
 
 use std::ops::Range;
 use std::str::FromStr;

@@ -1,16 +1,17 @@
 //! The lane plan of a sampling run: one block whose units are sample indices. Also the density conditional on given
 //! parameters, which a run may draw from.
 
+use std::sync::Arc;
+
 use nalgebra::{DMatrix, DVector};
 use serde::{Deserialize, Serialize};
 
 use crate::engine::generated::{Generator, PointSource};
-use crate::engine::{Block, CaseSource, Headway, LaneCase, LanePlan, Units};
+use crate::engine::{Block, Headway, LanePlan, Units};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::model::scalar::Real;
 use crate::random::{SOBOL_POINTS, Stream};
-use crate::scenario::Tables;
 use crate::stats::density::{DensityKind, DensityModel, Mixture};
 use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
@@ -26,24 +27,6 @@ pub enum SampleHeadways {
     Each(Vec<Headway>),
     /// The parameter `thw_s` of the density.
     Sampled,
-}
-
-struct Generated(Generator);
-
-impl CaseSource for Generated {
-    fn case(&self, _block: usize, unit: u64, _variant: usize) -> LaneCase<f64> {
-        // Only for callers that need no series: the tables are discarded.
-        self.0.case(unit, &mut Tables::default())
-    }
-
-    fn tables(&self) -> &Tables<f64> {
-        static NONE: Tables<f64> = Tables { speed: Vec::new(), lateral: Vec::new() };
-        &NONE
-    }
-
-    fn generator(&self) -> Option<&Generator> {
-        Some(&self.0)
-    }
 }
 
 /// The plan whose unit `i` is draw `i` of `proposal` (the density itself for crude Monte Carlo).
@@ -156,7 +139,7 @@ fn plan(
         first_unit: 0,
         first_lane: 0,
     };
-    LanePlan::new(profile.clone(), models.to_vec(), headways, vec![block], Box::new(Generated(generator)))
+    LanePlan::new(profile.clone(), models.to_vec(), headways, vec![block], Arc::new(generator))
 }
 
 /// Spread of a given parameter, relative to the spread of its kernels: negligible in the lane arithmetic, but not zero.

@@ -1,5 +1,7 @@
 //! Evaluates descriptions: each is fitted on some scenarios and judged on others, lane by lane.
 
+use std::sync::Arc;
+
 use rayon::prelude::*;
 
 use super::{Candidate, Objective, Scope, SearchOptions};
@@ -233,7 +235,7 @@ impl<'a> Evaluator<'a> {
             ModelId::ALL.to_vec(),
             self.options.headways.clone(),
             vec![block],
-            Box::new(source),
+            Arc::new(source),
         )?;
         let width = self.options.headways.len() * ModelId::ALL.len();
         let mut verdicts = vec![Vec::with_capacity(by_unit.len() * width); variants];

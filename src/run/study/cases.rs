@@ -101,7 +101,7 @@ impl StudyCases {
             }
         }
         check_cases(profile, &plan.blocks, &table, plan.segments(units))?;
-        Ok(plan.holding(held, Box::new(table)))
+        Ok(plan.holding(held, Arc::new(table)))
     }
 
     /// Passes plans of consecutive windows of an interval to `each`, each with the cases of a limited number of units.

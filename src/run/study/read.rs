@@ -2,31 +2,17 @@
 
 use std::io::{Read, Seek, SeekFrom, Write};
 use std::ops::Range;
+use std::sync::Arc;
 
 use sha2::{Digest, Sha256};
 
 use super::cases::{StudyCases, parameterizations};
 use super::plan_file::{PAGE, StudyHead, lines, stripped};
-use crate::engine::lane_case::LaneCase;
-use crate::engine::plan::{Block, CaseSource, LanePlan, Units};
+use crate::engine::{Block, CaseTable, LanePlan, Units};
+use crate::scenario::Scenario;
 use crate::scenario::parameterization::Reduction;
-use crate::scenario::{Scenario, Tables};
 use crate::support::plain_text::hex;
 use crate::{Error, Place, Result};
-
-/// Case source of a plan without cases.
-struct NoCases;
-
-impl CaseSource for NoCases {
-    fn case(&self, _block: usize, _unit: u64, _variant: usize) -> LaneCase<f64> {
-        unreachable!("an outline is asked for counts and keys; lanes are run on its windows")
-    }
-
-    fn tables(&self) -> &Tables<f64> {
-        static NONE: Tables<f64> = Tables { speed: Vec::new(), lateral: Vec::new() };
-        &NONE
-    }
-}
 
 impl StudyHead {
     /// The study with some of its scenarios; `first_held` is the unit of the first one.
@@ -47,7 +33,8 @@ impl StudyHead {
         }
         let (profile, models, headways) = (self.profile.clone(), self.models.clone(), self.headways.clone());
         let hash = self.plan_sha256.clone();
-        let outline = LanePlan::with_hash(hash, profile, models, headways, blocks, Box::new(NoCases))?;
+        // Counts and keys; lanes are run on its windows.
+        let outline = LanePlan::with_hash(hash, profile, models, headways, blocks, Arc::new(CaseTable::new([])))?;
         Ok(StudyCases { head: self, outline, reductions, first_held, held, left_out: Vec::new() })
     }
 
