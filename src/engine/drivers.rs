@@ -8,10 +8,10 @@ use crate::scenario::{Category, Tables};
 
 use super::cpu::foreign;
 use super::cpu::lane_result::Ending;
-use super::cpu::pending::Lanes;
-use super::cpu::rules::Rules;
+use super::cpu::lane_stream::run_stream;
+use super::cpu::pending_lanes::Lanes;
+use super::cpu::shared_rules::Rules;
 use super::cpu::simd::Instructions;
-use super::cpu::stream::run_stream;
 use super::frame::{Frame, Simulation, Start};
 use super::lane::{Observer, run_lane};
 use super::lane_case::LaneCase;

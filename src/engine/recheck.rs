@@ -210,9 +210,9 @@ fn mixed(seed: u64, index: u64) -> u64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::engine::cpu::pending::Lanes;
+    use crate::engine::cpu::lane_stream::run_stream;
+    use crate::engine::cpu::pending_lanes::Lanes;
     use crate::engine::cpu::series::Series;
-    use crate::engine::cpu::stream::run_stream;
     use crate::engine::drivers::Constants;
     use crate::engine::frame::Simulation;
     use crate::engine::lane::{Silent, run_lane};

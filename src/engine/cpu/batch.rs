@@ -8,9 +8,9 @@
 
 use crate::engine::cpu::batch_arrays::{FixedArrays, Floats, LaneArrays, Slots, StateArrays, TrackArrays, Words};
 use crate::engine::cpu::fast_forward::quiescent_steps;
-use crate::engine::cpu::pending::{Lanes, Pending, ROOM};
-use crate::engine::cpu::rules::Rules;
+use crate::engine::cpu::pending_lanes::{Lanes, Pending, ROOM};
 use crate::engine::cpu::series::Window;
+use crate::engine::cpu::shared_rules::Rules;
 use crate::engine::cpu::steady_following::steady_steps;
 use crate::engine::cpu::{LANES, ROWS};
 use crate::engine::frame::Simulation;

@@ -6,8 +6,8 @@
 use bytemuck::{Pod, Zeroable};
 
 use crate::engine::cpu::LANES;
-use crate::engine::cpu::rules::Rules;
 use crate::engine::cpu::series::{Track, VehicleTracks};
+use crate::engine::cpu::shared_rules::Rules;
 use crate::engine::lane_step::{LaneConstants, LaneState, OtherConstants, Record};
 use crate::engine::outcome::NO_STEP;
 use crate::model::criterion::{BrakeThreatMaximum, TtcMinimum};

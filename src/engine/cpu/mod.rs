@@ -7,14 +7,14 @@ mod batch_arrays;
 mod fast_forward;
 pub(in crate::engine) mod foreign;
 pub(in crate::engine) mod lane_result;
+pub(in crate::engine) mod lane_stream;
 mod lead_only;
-pub(in crate::engine) mod pending;
-pub(in crate::engine) mod rules;
+pub(in crate::engine) mod pending_lanes;
 pub(in crate::engine) mod runner;
 pub(in crate::engine) mod series;
+pub(in crate::engine) mod shared_rules;
 pub(in crate::engine) mod simd;
 mod steady_following;
-pub(in crate::engine) mod stream;
 
 /// Lanes of a batch: one AVX-512 register of binary32 values.
 pub(in crate::engine) const LANES: usize = 16;

@@ -6,7 +6,7 @@ use std::sync::Mutex;
 
 use crate::engine::backend::Watch;
 use crate::engine::cpu::lane_result::Ending;
-use crate::engine::cpu::pending::Lanes;
+use crate::engine::cpu::pending_lanes::Lanes;
 use crate::engine::cpu::series::Series;
 use crate::engine::cpu::simd::Instructions;
 use crate::engine::drivers::Constants;

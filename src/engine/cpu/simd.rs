@@ -11,13 +11,13 @@
 use super::{
     LANES, ROWS,
     batch_arrays::{Slots, TrackArrays, Words},
-    pending::ROOM,
+    pending_lanes::ROOM,
     series::{goes_on, places},
 };
 use crate::engine::cpu::batch::{Fleet, burst};
-use crate::engine::cpu::pending::{Pending, take};
-use crate::engine::cpu::rules::Rules;
+use crate::engine::cpu::pending_lanes::{Pending, take};
 use crate::engine::cpu::series::Window;
+use crate::engine::cpu::shared_rules::Rules;
 use crate::engine::frame::Simulation;
 use crate::model::driver::DriverModel;
 use crate::{Error, Place, Result};

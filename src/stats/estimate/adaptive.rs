@@ -3,7 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::importance::{Importance, importance};
-use super::problem::{Density, LimitState};
+use super::limit_state::{Density, LimitState};
 use super::search::{Found, Search, SearchRun, search};
 use super::summary::Estimate;
 use crate::Result;

@@ -11,10 +11,10 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::blocks::BlockSums;
-use super::problem::{ATTEMPTS, Density, Failure, LimitState, batches, failing, purpose};
+use super::limit_state::{ATTEMPTS, Density, Failure, LimitState, batches, failing, purpose};
 use super::stop::StopReason;
 use super::summary::Estimate;
-use super::trust::Warning;
+use super::warnings::Warning;
 use super::weights::WeightSums;
 use crate::Result;
 use crate::random::Stream;

@@ -5,9 +5,9 @@ use rayon::prelude::*;
 
 use super::importance::{Importance, weighted_failures};
 use super::interval::log_normal;
-use super::problem::{Density, LimitState, purpose};
+use super::limit_state::{Density, LimitState, purpose};
 use super::summary::Estimate;
-use super::trust::Warning;
+use super::warnings::Warning;
 use crate::Result;
 use crate::stats::density::Mixture;
 

@@ -7,18 +7,18 @@
 
 mod adaptive;
 mod blocks;
+mod evaluated_points;
 mod importance;
 mod interval;
 mod kernels;
+mod limit_state;
 mod monte_carlo;
-mod pool;
-mod problem;
+mod proposal_mixtures;
 mod ratio;
 mod search;
-mod shapes;
 mod stop;
 mod summary;
-mod trust;
+mod warnings;
 mod weights;
 
 pub use adaptive::{AdaptiveRun, Goal, adaptive};
@@ -26,13 +26,13 @@ pub use blocks::{BLOCK, BlockSums, Join};
 pub use importance::{Importance, from_weight_sums, importance, importance_of_points, importance_sums};
 pub use interval::{Interval, IntervalKind, clopper_pearson, gamma, log_normal, rule_of_three, wilson};
 pub use kernels::{KernelShares, kernel_shares};
+pub use limit_state::{ATTEMPTS, Density, Draw, Failure, LimitState, StandardNormal, Truncated};
 pub use monte_carlo::{BinomialInterval, Counts, from_clusters, from_counts};
-pub use problem::{ATTEMPTS, Density, Draw, Failure, LimitState, StandardNormal, Truncated};
 pub use ratio::{
     ClusterRate, Clusters, Enough, Ratio, RatioMethod, RatioVerdict, cluster_rate, paired_ratio, weighted_ratio,
 };
 pub use search::{Found, Search, SearchRound, SearchRun, search};
 pub use stop::{Checkpoints, StopReason, StopRule};
 pub use summary::{Estimate, WeightFigures};
-pub use trust::{Trust, Verdict, Warning};
+pub use warnings::{Trust, Verdict, Warning};
 pub use weights::WeightSums;

@@ -11,9 +11,9 @@ use nalgebra::DMatrix;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::pool::{Pool, effective_size};
-use super::problem::{Density, LimitState, purpose};
-use super::shapes::{designs, fitted};
+use super::evaluated_points::{Pool, effective_size};
+use super::limit_state::{Density, LimitState, purpose};
+use super::proposal_mixtures::{designs, fitted};
 use crate::random::Stream;
 use crate::stats::density::Mixture;
 use crate::stats::density::moments::{factor_or_diagonal, moments};

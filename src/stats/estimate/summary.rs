@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::interval::Interval;
 use super::ratio::ClusterRate;
 use super::stop::StopReason;
-use super::trust::{Trust, Warning};
+use super::warnings::{Trust, Warning};
 
 /// A probability of failure with measures of its accuracy.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]

@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 use super::blocks::Join;
 use super::interval::{Interval, gamma, log_normal};
 use super::summary::WeightFigures;
-use super::trust::{Trust, Warning};
+use super::warnings::{Trust, Warning};
 
 /// Sums over draws of a proposal and of the density, for one question. A failing draw has the weight 1/(m + g/f): m draws
 /// of the density f belong to every draw of the proposal g, and a point has the same weight whichever it came from (balance

@@ -6,8 +6,8 @@
 use crate::engine::cpu::LANES;
 use crate::engine::cpu::batch::{BATCHES, Fleet};
 use crate::engine::cpu::lane_result::Ending;
-use crate::engine::cpu::pending::{Lanes, Pending};
-use crate::engine::cpu::rules::Rules;
+use crate::engine::cpu::pending_lanes::{Lanes, Pending};
+use crate::engine::cpu::shared_rules::Rules;
 use crate::engine::cpu::simd::{Burst, Instructions, burst_for};
 use crate::engine::frame::Simulation;
 use crate::engine::scene::Scene;

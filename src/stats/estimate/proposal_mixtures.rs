@@ -2,7 +2,7 @@
 
 use rayon::prelude::*;
 
-use super::pool::Pool;
+use super::evaluated_points::Pool;
 use crate::Result;
 use crate::stats::density::{Mixture, MixtureFitOptions};
 

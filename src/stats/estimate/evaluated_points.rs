@@ -4,7 +4,7 @@
 
 use rayon::prelude::*;
 
-use super::problem::{BATCH, Density, LimitState, evaluate_checked};
+use super::limit_state::{BATCH, Density, LimitState, evaluate_checked};
 use crate::Result;
 use crate::random::Stream;
 use crate::stats::density::Mixture;
