@@ -6,7 +6,7 @@ use crate::model::profile::Profile;
 use crate::model::scalar::Real;
 use crate::scenario::{Category, Tables};
 
-use super::cpu::foreign;
+use super::cpu::foreign::{Setting, run_one};
 use super::cpu::lane_result::Ending;
 use super::cpu::lane_stream::run_stream;
 use super::cpu::pending_lanes::Lanes;
@@ -141,7 +141,9 @@ fn foreign_lane<R: Real>(
     observer: &mut impl Observer<R>,
 ) -> Outcome<R> {
     let driver = model.foreign().unwrap_or_else(|| unreachable!("the model is built in"));
-    let outcome = foreign::run_one(constants, model, &*driver, case, tables, start, observer);
+    let Constants { dt_s, criteria, frames, .. } = constants;
+    let setting = Setting::new((model, &*driver), frames[model.index()], *criteria, *dt_s);
+    let outcome = run_one(&setting, case, tables, start, observer);
     outcome.unwrap_or_else(|error| panic!("{error}"))
 }
 

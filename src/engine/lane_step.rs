@@ -133,7 +133,7 @@ pub(crate) struct LaneState<R> {
     pub reaction_step: u32,
     /// Minima and maxima over the steps so far.
     pub record: Record<R>,
-    /// The last step has been made, possibly long before the time cap; the [result](crate::engine::cpu::lane_result)
+    /// The last step has been made, possibly long before the time cap; the result (`cpu/lane_result.rs`)
     /// says why. Later steps change nothing, or in verdict-only sweeps nothing that affects a verdict.
     pub over: Flag,
 }

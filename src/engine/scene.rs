@@ -44,7 +44,7 @@ impl Scene {
         Scene { is_pair: !always_there, always_there, in_lane, is_steady: false, may_cross: false }
     }
 
-    /// Properties of lanes of these cases [once only their second vehicles matter](crate::engine::cpu::lead_only).
+    /// Properties of lanes of these cases once only their second vehicles matter (`cpu/lead_only.rs`).
     /// These are present, evaluated and attended to.
     pub(super) fn of_lead_only<R: Real>(cases: &[LaneCase<R>]) -> Scene {
         let in_lane = cases.iter().all(|case| case.pair == 0 || is_centred(&case.others[1], case.ego_width));

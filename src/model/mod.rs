@@ -4,6 +4,7 @@
 //! The only file read here is a profile. Nothing is simulated here: the engine steps these definitions.
 
 pub mod case;
+pub mod category;
 #[macro_use]
 pub mod driver;
 pub mod criterion;

@@ -8,7 +8,7 @@ use rayon::prelude::*;
 
 use crate::Result;
 use crate::engine::backend::{Backend, Chunk, RecheckBy, Session, Wanted, Watch};
-use crate::engine::cpu::foreign::{self, BATCH_LANES};
+use crate::engine::cpu::foreign::BATCH_LANES;
 use crate::engine::cpu::runner::LaneRunner;
 use crate::engine::cpu::series::max_entries;
 use crate::engine::cpu::simd::Instructions;
@@ -261,7 +261,8 @@ impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
             }
             for (at_model, &model) in plan.models.iter().enumerate() {
                 let Some(driver) = model.foreign() else { continue };
-                let found = foreign::run_block(plan, block, inside.clone(), model, &*driver)?;
+                let runner = LaneRunner::<f32>::of_few(plan);
+                let found = runner.run_foreign(block, inside.clone(), model, &*driver)?;
                 for (at, outcome) in found.into_iter().enumerate() {
                     let lane = from + at * plan.models.len() + at_model;
                     verdicts[lane] = outcome.verdicts;

@@ -3,7 +3,7 @@
 //!
 //! A burst is [`ROWS`] steps of [`BATCHES`] batches in turn. Each step of a batch depends on the previous one, but
 //! batches are independent, which hides the latency of the instructions. A finished lane stays unchanged until the
-//! burst ends. A lane in steady following continues to its end, which changes no verdict. [`crate::engine::cpu::simd`]
+//! burst ends. A lane in steady following continues to its end, which changes no verdict. `cpu/simd.rs`
 //! selects the instruction set; nothing here depends on it.
 
 use crate::engine::cpu::batch_arrays::{FixedArrays, Floats, LaneArrays, Slots, StateArrays, TrackArrays, Words};

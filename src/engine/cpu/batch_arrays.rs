@@ -6,7 +6,6 @@
 use bytemuck::{Pod, Zeroable};
 
 use crate::engine::cpu::LANES;
-use crate::engine::cpu::series::{Track, VehicleTracks};
 use crate::engine::cpu::shared_rules::Rules;
 use crate::engine::lane_step::{LaneConstants, LaneState, OtherConstants, Record};
 use crate::engine::outcome::NO_STEP;
@@ -27,6 +26,34 @@ const PARTS: usize = 6;
 pub(in crate::engine) type Floats = [f32; LANES];
 /// One word per lane.
 pub(in crate::engine) type Words = [u32; LANES];
+
+/// One series in the pool of `series.rs`; it is constant from its last entry on.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::engine) struct Track {
+    /// Its first entry.
+    pub first: u32,
+    /// Offset of the last entry from the first.
+    pub last: u32,
+}
+
+/// Series of another vehicle's motion.
+#[derive(Debug, Clone, Copy)]
+pub(in crate::engine) struct VehicleTracks {
+    /// Speed, m/s.
+    pub speed: Track,
+    /// Lateral position, m.
+    pub position: Track,
+    /// Lateral speed towards the ego, m/s.
+    pub towards: Track,
+}
+
+impl VehicleTracks {
+    /// Speed, lateral position, lateral speed.
+    #[inline(always)]
+    pub(super) fn all(&self) -> [Track; 3] {
+        [self.speed, self.position, self.towards]
+    }
+}
 
 /// All data of `N` lanes except the other vehicles' motions, which are in series.
 #[derive(Debug, Clone, Copy)]

@@ -1,19 +1,16 @@
 //! Lanes of a [`VectorDriver`]: they run side by side, so that the driver is called once per step. Frame, criteria and
 //! order are those of the built-in drivers' lanes, in binary32.
 
-use std::ops::Range;
+use std::borrow::Cow;
 
 use rayon::prelude::*;
 
 use crate::engine::cpu::lane_result::conclude;
-use crate::engine::cpu::runner::LaneRunner;
-use crate::engine::drivers::Constants;
 use crate::engine::frame::{Frame, Simulation, Start};
 use crate::engine::lane::{Observer, Step};
 use crate::engine::lane_case::LaneCase;
 use crate::engine::lane_step::{LaneConstants, LaneState, Moved, OtherState, Seen, advance};
 use crate::engine::outcome::{NO_STEP, Outcome};
-use crate::engine::plan::LanePlan;
 use crate::engine::scene::Scene;
 use crate::model::criterion::Criteria;
 use crate::model::driver::{
@@ -50,24 +47,30 @@ impl<R: Real> DriverModel<R> for Unreacting {
 }
 
 /// What all lanes of a driver in one category share.
-struct Setting<R> {
+pub(in crate::engine) struct Setting<'d, R> {
+    model: ModelId,
+    driver: &'d dyn VectorDriver,
+    dt_s: f64,
     frame: Frame<R>,
     criteria: Criteria<R>,
-    model_index: usize,
 }
 
-impl<R: Real> Setting<R> {
-    fn new(constants: &Constants<R>, model: ModelId, driver: &dyn VectorDriver) -> Self {
-        let model_index = model.index();
-        let mut frame = constants.frames[model_index];
+impl<'d, R: Real> Setting<'d, R> {
+    /// A driver with the frame and the criteria of its category, and the time step.
+    pub(in crate::engine) fn new(
+        (model, driver): (ModelId, &'d dyn VectorDriver),
+        mut frame: Frame<R>,
+        criteria: Criteria<R>,
+        dt_s: f64,
+    ) -> Self {
         frame.end_when_settled &= !driver.may_accelerate();
-        Setting { frame, criteria: constants.criteria, model_index }
+        Setting { model, driver, dt_s, frame, criteria }
     }
 
     fn simulation(&self, case: &LaneCase<R>) -> Simulation<'_, R, Unreacting> {
-        let Setting { frame, criteria, model_index } = self;
+        let Setting { frame, criteria, model, .. } = self;
         let scene = Scene::unknown(case.pair != 0);
-        Simulation { frame, criteria, model: &Unreacting, model_index: *model_index, scene }
+        Simulation { frame, criteria, model: &Unreacting, model_index: model.index(), scene }
     }
 }
 
@@ -80,7 +83,7 @@ struct BatchLane<R> {
 }
 
 impl<R: Real> BatchLane<R> {
-    fn new(setting: &Setting<R>, at: usize, case: &LaneCase<R>, start: Start<R>) -> Self {
+    fn new(setting: &Setting<'_, R>, at: usize, case: &LaneCase<R>, start: Start<R>) -> Self {
         let simulation = setting.simulation(case);
         let constants = LaneConstants::new(&simulation, case);
         BatchLane { case: at, constants, state: LaneState::new(&simulation, case, start) }
@@ -119,77 +122,60 @@ impl<R: Real> BatchLane<R> {
 /// # Errors
 /// Those of the driver; [`Error::Input`] for an acceleration that is missing, NaN or above the maximum.
 pub(in crate::engine) fn run_one<R: Real>(
-    constants: &Constants<R>,
-    model: ModelId,
-    driver: &dyn VectorDriver,
+    setting: &Setting<R>,
     case: &LaneCase<R>,
     tables: &Tables<R>,
     start: Start<R>,
     observer: &mut impl Observer<R>,
 ) -> Result<Outcome<R>> {
-    let setting = Setting::new(constants, model, driver);
-    let mut lane = BatchLane::new(&setting, 0, case, start);
-    let mut accelerations = driver.start(1, constants.dt_s)?;
+    let mut lane = BatchLane::new(setting, 0, case, start);
+    let mut accelerations = setting.driver.start(1, setting.dt_s)?;
     loop {
-        let moved = lane.moved(&setting, case, tables);
+        let moved = lane.moved(setting, case, tables);
         let LaneState { index, v_ego, .. } = lane.state;
         observer.step(&Step { index, v_ego, seen: moved.0.seen, hazard: moved.0.hazard });
         let seen = std::iter::once((0, &lane, case));
-        let found = accelerations(columns_of(index, constants.dt_s, seen, std::slice::from_ref(&moved)))?;
-        check(model, driver, &found, 1, index, |_| "of a single run".to_owned())?;
-        if let Some(outcome) = lane.steer(&setting, case, &moved, found[0]) {
+        let found = accelerations(columns_of(index, setting.dt_s, seen, std::slice::from_ref(&moved)))?;
+        check(setting, &found, 1, index, |_| "of a single run".to_owned())?;
+        if let Some(outcome) = lane.steer(setting, case, &moved, found[0]) {
             return Ok(outcome);
         }
     }
 }
 
-/// Outcomes of the lanes of some units of a block under one model of the plan, by unit, variant and headway.
+/// Outcomes of lanes side by side, by case and start; `key` names a lane.
 ///
 /// # Errors
 /// Those of the driver; [`Error::Input`] for accelerations that are missing, NaN or above the maximum.
-pub(in crate::engine) fn run_block(
-    plan: &LanePlan,
-    block: usize,
-    units: Range<u64>,
-    model: ModelId,
-    driver: &dyn VectorDriver,
+pub(in crate::engine) fn run_lanes(
+    setting: &Setting<f32>,
+    cases: &[(LaneCase<f32>, Cow<'_, Tables<f32>>)],
+    starts: &[Start<f32>],
+    key: impl Fn(usize) -> String,
 ) -> Result<Vec<Outcome<f64>>> {
-    let (runner, first_unit) = (LaneRunner::<f32>::of_few(plan), units.start);
-    let of_block = &plan.blocks[block];
-    let variants = of_block.variants.len();
-    let constants = Constants::<f32>::resolve(&plan.profile, of_block.category);
-    let setting = Setting::new(&constants, model, driver);
-    let keys = units.flat_map(|unit| (0..variants).map(move |variant| (unit, variant)));
-    let cases: Vec<_> = keys.map(|(unit, variant)| runner.case(block, unit, variant)).collect();
-    let starts: Vec<_> = plan.headways.iter().map(|headway| headway.start::<f32>()).collect();
     let of_case = |at: usize| starts.iter().map(move |start| (at, *start));
     let lanes = (0..cases.len()).flat_map(of_case);
     let mut lanes: Vec<BatchLane<f32>> =
-        lanes.map(|(at, start)| BatchLane::new(&setting, at, &cases[at].0, start)).collect();
+        lanes.map(|(at, start)| BatchLane::new(setting, at, &cases[at].0, start)).collect();
     // Every lane gets its outcome below.
     let mut outcomes = vec![Outcome::NONE; lanes.len()];
     let mut running: Vec<usize> = (0..lanes.len()).collect();
-    let mut accelerations = driver.start(lanes.len(), constants.dt_s)?;
-    let key = |lane: usize| {
-        let (case, headway) = (lane / starts.len(), lane % starts.len());
-        let unit = of_block.units.name(first_unit + (case / variants) as u64);
-        format!("{unit}/{}/{}/{}", of_block.variants[case % variants], plan.headways[headway], model.name())
-    };
+    let mut accelerations = setting.driver.start(lanes.len(), setting.dt_s)?;
     let mut step = 0;
     while !running.is_empty() {
         let moved = |&at: &usize| {
             let lane: &BatchLane<f32> = &lanes[at];
             let (case, tables) = &cases[lane.case];
-            lane.moved(&setting, case, tables)
+            lane.moved(setting, case, tables)
         };
         let moved: Vec<_> = running.par_iter().map(moved).collect();
         let seen = running.iter().map(|&at| (at, &lanes[at], &cases[lanes[at].case].0));
-        let found = accelerations(columns_of(step, constants.dt_s, seen, &moved))?;
-        check(model, driver, &found, running.len(), step, |at| key(running[at]))?;
+        let found = accelerations(columns_of(step, setting.dt_s, seen, &moved))?;
+        check(setting, &found, running.len(), step, |at| key(running[at]))?;
         let mut still_running = Vec::with_capacity(running.len());
         for ((&at, moved), acceleration) in running.iter().zip(&moved).zip(found) {
             let lane = &mut lanes[at];
-            match lane.steer(&setting, &cases[lane.case].0, moved, acceleration) {
+            match lane.steer(setting, &cases[lane.case].0, moved, acceleration) {
                 Some(outcome) => outcomes[at] = outcome.widen(),
                 None => still_running.push(at),
             }
@@ -201,20 +187,13 @@ pub(in crate::engine) fn run_block(
 }
 
 /// Checks what the driver returned for the running lanes; `key` names one of them.
-fn check(
-    model: ModelId,
-    driver: &dyn VectorDriver,
-    found: &[f32],
-    lanes: usize,
-    step: u32,
-    key: impl Fn(usize) -> String,
-) -> Result<()> {
-    let place = || Place::item(format!("driver {}, step {step}", model.name()));
+fn check<R>(setting: &Setting<R>, found: &[f32], lanes: usize, step: u32, key: impl Fn(usize) -> String) -> Result<()> {
+    let place = || Place::item(format!("driver {}, step {step}", setting.model.name()));
     if found.len() != lanes {
         let problem = format!("it returned {} accelerations for {lanes} lanes", found.len());
         return Err(Error::input(place(), problem, "return one number per lane, in m/s²"));
     }
-    let most = if driver.may_accelerate() { MAX_ACCELERATION_MPS2 } else { 0.0 };
+    let most = if setting.driver.may_accelerate() { MAX_ACCELERATION_MPS2 } else { 0.0 };
     // A NaN is wrong too.
     let is_right = |acceleration: &f32| (-MAX_ACCELERATION_MPS2..=most).contains(acceleration);
     let Some(at) = found.iter().position(|acceleration| !is_right(acceleration)) else { return Ok(()) };
@@ -275,7 +254,7 @@ mod tests {
     use std::sync::Arc;
 
     use crate::engine::verify::{RandomOptions, random_plan};
-    use crate::engine::{Backend, Chunk, CpuBackend, Executor, Wanted};
+    use crate::engine::{Backend, Chunk, CpuBackend, Executor, LanePlan, LaneRunner, Wanted};
     use crate::model::driver::{Accelerations, DriverProfile};
     use crate::model::profile::Profile;
     use crate::scenario::Category;

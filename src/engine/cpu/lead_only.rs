@@ -8,9 +8,8 @@ use crate::model::driver::DriverModel;
 use crate::model::scalar::Flag;
 
 use crate::engine::cpu::ROWS;
-use crate::engine::cpu::batch_arrays::NEVER_LEAVES;
+use crate::engine::cpu::batch_arrays::{NEVER_LEAVES, Track, VehicleTracks};
 use crate::engine::cpu::fast_forward::is_out_of_the_way;
-use crate::engine::cpu::series::{Track, VehicleTracks};
 use crate::engine::frame::Simulation;
 use crate::engine::lane_step::{LaneConstants, OtherState};
 

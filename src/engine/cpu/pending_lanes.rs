@@ -4,9 +4,8 @@
 use crate::model::driver::DriverModel;
 
 use crate::engine::cpu::LANES;
-use crate::engine::cpu::batch_arrays::{LaneArrays, NEVER_LEAVES, Slots, Words, steady_from};
+use crate::engine::cpu::batch_arrays::{LaneArrays, NEVER_LEAVES, Slots, VehicleTracks, Words, steady_from};
 use crate::engine::cpu::lead_only::lead_only_from;
-use crate::engine::cpu::series::VehicleTracks;
 use crate::engine::frame::{Simulation, Start};
 use crate::engine::lane_case::LaneCase;
 use crate::engine::lane_step::{LaneConstants, LaneState};

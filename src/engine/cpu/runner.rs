@@ -4,7 +4,9 @@ use std::borrow::Cow;
 use std::ops::Range;
 use std::sync::Mutex;
 
+use crate::Result;
 use crate::engine::backend::Watch;
+use crate::engine::cpu::foreign::{Setting, run_lanes};
 use crate::engine::cpu::lane_result::Ending;
 use crate::engine::cpu::pending_lanes::Lanes;
 use crate::engine::cpu::series::Series;
@@ -16,7 +18,7 @@ use crate::engine::lane_case::LaneCase;
 use crate::engine::outcome::{Outcome, Verdicts};
 use crate::engine::plan::{LaneKey, LanePlan};
 use crate::engine::scene::{Scene, fastest_in, may_cross};
-use crate::model::driver::ModelId;
+use crate::model::driver::{ModelId, VectorDriver};
 use crate::model::scalar::Real;
 use crate::scenario::Tables;
 
@@ -147,6 +149,33 @@ impl<'p, R: Real> LaneRunner<'p, R> {
             Scene { may_cross, ..Scene::unknown(case.pair != 0) }
         };
         self.constants[block].run_in(model, scene, case, tables, start, &mut Silent)
+    }
+}
+
+impl LaneRunner<'_, f32> {
+    /// Outcomes of the lanes of some units of a block under a driver outside the registry, by unit, variant and headway.
+    ///
+    /// # Errors
+    /// As [`run_lanes`].
+    pub(super) fn run_foreign(
+        &self,
+        block: usize,
+        units: Range<u64>,
+        model: ModelId,
+        driver: &dyn VectorDriver,
+    ) -> Result<Vec<Outcome<f64>>> {
+        let (plan, first_unit) = (self.plan, units.start);
+        let Constants { dt_s, criteria, frames, .. } = &self.constants[block];
+        let setting = Setting::new((model, driver), frames[model.index()], *criteria, *dt_s);
+        let of_block = &plan.blocks[block];
+        let variants = of_block.variants.len();
+        let keys = units.flat_map(|unit| (0..variants).map(move |variant| (unit, variant)));
+        let cases: Vec<_> = keys.map(|(unit, variant)| self.case(block, unit, variant)).collect();
+        run_lanes(&setting, &cases, &self.starts, |lane| {
+            let (case, headway) = (lane / self.starts.len(), lane % self.starts.len());
+            let unit = of_block.units.name(first_unit + (case / variants) as u64);
+            format!("{unit}/{}/{}/{}", of_block.variants[case % variants], plan.headways[headway], model.name())
+        })
     }
 }
 

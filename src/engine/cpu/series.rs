@@ -2,7 +2,7 @@
 //! case. The last entry of every series is repeated, so that a batch reads [`ROWS`] entries at a time without testing
 //! for the end. A [`Window`] holds one quantity for all lanes of a batch over the rows of a burst.
 
-use crate::engine::cpu::batch_arrays::{Floats, TrackArrays, Words};
+use crate::engine::cpu::batch_arrays::{Floats, Track, TrackArrays, VehicleTracks, Words};
 use crate::engine::cpu::{LANES, ROWS};
 use crate::engine::lane_case::LaneCase;
 use crate::model::scalar::Real;
@@ -12,34 +12,6 @@ use crate::scenario::{LATERAL_SAMPLED, Motion, SPEED_SAMPLED, Tables};
 #[derive(Debug, Default)]
 pub(in crate::engine) struct Series {
     entries: Vec<f32>,
-}
-
-/// One series in the pool; it is constant from its last entry on.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::engine) struct Track {
-    /// Its first entry.
-    pub first: u32,
-    /// Offset of the last entry from the first.
-    pub last: u32,
-}
-
-/// Series of another vehicle's motion.
-#[derive(Debug, Clone, Copy)]
-pub(in crate::engine) struct VehicleTracks {
-    /// Speed, m/s.
-    pub speed: Track,
-    /// Lateral position, m.
-    pub position: Track,
-    /// Lateral speed towards the ego, m/s.
-    pub towards: Track,
-}
-
-impl VehicleTracks {
-    /// Speed, lateral position, lateral speed.
-    #[inline(always)]
-    pub(super) fn all(&self) -> [Track; 3] {
-        [self.speed, self.position, self.towards]
-    }
 }
 
 /// Maximum number of entries of a vehicle's motion.

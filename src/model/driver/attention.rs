@@ -4,7 +4,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use crate::model::case::Category;
+use crate::model::category::Category;
 use crate::model::scalar::Real;
 
 use super::delay_steps;

@@ -253,7 +253,7 @@ fn delay_steps(delay_s: f64, dt_s: f64) -> u32 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::model::case::Category;
+    use crate::model::category::Category;
     use crate::model::profile::Profile;
     use lanesweep_random::random::{philox4x32_10, unit_uniform};
 

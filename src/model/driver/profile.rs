@@ -1,7 +1,7 @@
 //! The interface of every driver model's constants in a profile, and their ranges.
 
 use super::{AttentionRule, DriverModel};
-use crate::model::case::Category;
+use crate::model::category::Category;
 use crate::model::scalar::Real;
 
 /// Physical range of a constant, in its unit. A value in the range is finite and not subnormal in binary32, and so are

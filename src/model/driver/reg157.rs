@@ -8,7 +8,7 @@ use super::{
     AttentionRule, Bound, DriverModel, DriverProfile, DriverState, Hazard, SHORT_STEP_S, View, delay_bound_s,
     delay_steps, latched_braking,
 };
-use crate::model::case::Category;
+use crate::model::category::Category;
 use crate::model::scalar::{Flag, Real};
 
 /// Constants of the model as a profile gives them.

@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 use super::{
     Bound, DriverModel, DriverProfile, DriverState, Hazard, View, delay_bound_s, delay_steps, latched_braking,
 };
-use crate::model::case::Category;
+use crate::model::category::Category;
 use crate::model::scalar::{Flag, Real};
 
 /// Constants of the model as a profile gives them.

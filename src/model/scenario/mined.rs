@@ -9,7 +9,7 @@ use std::fmt::Display;
 use serde::{Deserialize, Serialize};
 
 use super::parameterization::ReducedScenario;
-use crate::model::case::Category;
+use crate::model::category::Category;
 use crate::{Error, Place, Result};
 
 /// Side of the ego's lane, in the direction of travel.

@@ -18,8 +18,9 @@ mod schema;
 mod table_reader;
 mod units;
 
-pub use crate::model::case::{Ahead, Case, Category, LANE_WIDTH_M, Participant, PlainCase};
+pub use crate::model::case::{Ahead, Case, LANE_WIDTH_M, Participant, PlainCase};
 pub use crate::model::case::{check_headway, missing_parameter};
+pub use crate::model::category::Category;
 pub use crate::model::motion::{LATERAL_SAMPLED, Lateral, LateralState, Motion, SPEED_SAMPLED, Speed, Tables};
 pub use case_file::CaseFile;
 pub use case_parameters::{CaseNumber, CaseParameters, NUMBERS, NamedNumber};

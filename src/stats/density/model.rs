@@ -176,7 +176,7 @@ impl DensityModel {
         let mut not_compared = None;
         let mut representativeness = None;
         if options.representativeness {
-            match Representativeness::estimate(&space, &used, options) {
+            match Representativeness::estimate(&space, &used, (options.kind, options.rule), options.seed) {
                 Ok(found) => representativeness = Some(found),
                 Err(error @ Error::Input { .. }) => not_compared = Some(named(error, &name())),
                 Err(error) => return Err(error),

@@ -17,12 +17,12 @@
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
+use super::bandwidth::BandwidthRule;
 use super::kde::Kde;
-use super::model::FitOptions;
 use super::moments::{scale_of, standard_deviation};
 use super::normal::Draws;
 use super::parameters::ParameterSpace;
-use super::transformed::TransformedMixture;
+use super::transformed::{DensityKind, TransformedMixture};
 use super::transport::{mean_distance, sinkhorn, wasserstein};
 use crate::random::Stream;
 use crate::scenario::Scenario;
@@ -94,10 +94,13 @@ impl Representativeness {
     pub(super) fn estimate(
         space: &ParameterSpace,
         scenarios: &[&Scenario],
-        options: &FitOptions,
+        form: (DensityKind, BandwidthRule),
+        seed: u64,
     ) -> Result<Representativeness> {
         let test = (scenarios.len() / 5).max(1);
-        let split = |repetition: usize| one_split(space, scenarios, test, options, repetition as u32);
+        let split = |repetition: usize| {
+            one_split(space, scenarios, test, form, Stream { seed, purpose: PURPOSE + repetition as u32 })
+        };
         let distances = (0..REPETITIONS).into_par_iter().map(split).collect::<Result<Vec<_>>>()?;
         let mean = |k: usize| distances.iter().map(|d| d[k]).sum::<f64>() / REPETITIONS as f64;
         let metrics: Vec<f64> = distances.iter().map(|d| combine(d[0], d[1])).collect();
@@ -113,7 +116,7 @@ impl Representativeness {
             repetitions: REPETITIONS as u64,
             train: (scenarios.len() - test) as u64,
             test: test as u64,
-            seed: options.seed,
+            seed,
         })
     }
 }
@@ -123,10 +126,9 @@ fn one_split(
     space: &ParameterSpace,
     scenarios: &[&Scenario],
     test: usize,
-    options: &FitOptions,
-    repetition: u32,
+    (kind, rule): (DensityKind, BandwidthRule),
+    stream: Stream,
 ) -> Result<[f64; 5]> {
-    let stream = Stream { seed: options.seed, purpose: PURPOSE + repetition };
     // Index 0 of the stream shuffles, the others draw.
     let mut shuffled = scenarios.to_vec();
     let mut draws = Draws::new(stream, 0);
@@ -139,8 +141,8 @@ fn one_split(
     let points = |set: &[&Scenario]| set.iter().map(|s| fitted.point(s)).collect::<Result<Vec<_>>>();
     let train_points = points(train)?;
     let names: Vec<&str> = space.parameters().iter().map(|p| p.name.as_str()).collect();
-    let kde = Kde::fit(train_points.clone(), &names, options.rule)?;
-    let mixture = TransformedMixture::fit(options.kind, &train_points, fitted.parameters())?;
+    let kde = Kde::fit(train_points.clone(), &names, rule)?;
+    let mixture = TransformedMixture::fit(kind, &train_points, fitted.parameters())?;
     let draw = |index: u64| mixture.as_ref().map_or_else(|| kde.draw(&stream, index), |of| of.draw(&stream, index));
     let kernels = kde.mixture()?;
     let log_density =

@@ -33,6 +33,6 @@ pub use ratio::{
 };
 pub use search::{Found, Search, SearchRound, SearchRun, search};
 pub use stop::{Checkpoints, StopReason, StopRule};
-pub use summary::{Estimate, WeightFigures};
+pub use summary::Estimate;
 pub use warnings::{Trust, Verdict, Warning};
-pub use weights::WeightSums;
+pub use weights::{WeightFigures, WeightSums};

@@ -6,6 +6,7 @@ use super::interval::Interval;
 use super::ratio::ClusterRate;
 use super::stop::StopReason;
 use super::warnings::{Trust, Warning};
+use super::weights::WeightFigures;
 
 /// A probability of failure with measures of its accuracy.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -36,17 +37,6 @@ pub struct Estimate {
     pub stopped: StopReason,
     /// Warnings about the estimate.
     pub trust: Trust,
-}
-
-/// Figures about the weights of a sample.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-pub struct WeightFigures {
-    /// Effective number of failures, (Σw)²/Σw².
-    pub effective_failures: f64,
-    /// Fraction of the estimate from the failure with the largest weight.
-    pub largest_fraction: f64,
-    /// Fraction of the estimate from draws of the density itself.
-    pub crude_fraction: f64,
 }
 
 impl Estimate {

@@ -4,7 +4,6 @@ use serde::{Deserialize, Serialize};
 
 use super::blocks::Join;
 use super::interval::{Interval, gamma, log_normal};
-use super::summary::WeightFigures;
 use super::warnings::{Trust, Warning};
 
 /// Sums over draws of a proposal and of the density, for one question. A failing draw has the weight 1/(m + g/f): m draws
@@ -26,6 +25,17 @@ pub struct WeightSums {
     pub crude_failing: f64,
     /// Largest w of a failing draw.
     pub largest_failing: f64,
+}
+
+/// Figures about the weights of a sample.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct WeightFigures {
+    /// Effective number of failures, (Σw)²/Σw².
+    pub effective_failures: f64,
+    /// Fraction of the estimate from the failure with the largest weight.
+    pub largest_fraction: f64,
+    /// Fraction of the estimate from draws of the density itself.
+    pub crude_fraction: f64,
 }
 
 impl Join for WeightSums {

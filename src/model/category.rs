@@ -1,0 +1,44 @@
+//! Kinds of scenario.
+
+use serde::{Deserialize, Serialize};
+
+/// The three kinds of scenario of UN R157, Annex 3.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Category {
+    /// Another vehicle changes into the ego's lane in front of it.
+    CutIn,
+    /// The leader leaves the ego's lane and uncovers a slower vehicle.
+    CutOut,
+    /// The leader decelerates.
+    Lvd,
+}
+
+impl Category {
+    /// All categories, in the order of every table.
+    pub const ALL: [Category; 3] = [Category::CutIn, Category::CutOut, Category::Lvd];
+
+    /// Name in files and keys: `cut_in`, `cut_out`, `lvd`.
+    pub fn key(self) -> &'static str {
+        match self {
+            Category::CutIn => "cut_in",
+            Category::CutOut => "cut_out",
+            Category::Lvd => "lvd",
+        }
+    }
+
+    /// Name in running text and tables: `cut-in`, `cut-out`, `LVD`.
+    pub fn label(self) -> &'static str {
+        match self {
+            Category::CutIn => "cut-in",
+            Category::CutOut => "cut-out",
+            Category::Lvd => "LVD",
+        }
+    }
+
+    /// Parses either name.
+    pub fn parse(text: &str) -> Option<Category> {
+        let folded = text.to_ascii_lowercase().replace('-', "_");
+        Category::ALL.into_iter().find(|c| c.key() == folded)
+    }
+}
