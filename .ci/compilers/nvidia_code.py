@@ -7,9 +7,11 @@ Prints rows `device,kernel,statistic,value`. Vulkan's driver has another front e
 near those of a device, not equal. Needs the PyPI packages nvidia-cuda-nvrtc and nvidia-cuda-nvdisasm.
 """
 import ctypes
+import os
 import re
 import subprocess
 import sys
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import nvidia
@@ -90,23 +92,30 @@ class Compiler:
 def main(folder, architectures):
     header = (Path(__file__).parent / "metal.cuh").read_text()
     compiler, disassembler = Compiler(), package_file("nvdisasm")
-    print("device,kernel,statistic,value")
+
+    def rows(task):
+        """Writes the machine code of a kernel; returns its rows."""
+        architecture, path = task
+        out, kernel = folder / f"nvidia-{architecture}", path.name.removesuffix(".metal")
+        code, log = compiler.compile(cuda_source(path.read_text(), header), kernel, architecture)
+        binary = out / f"{kernel}.cubin"
+        binary.write_bytes(code)
+        listing = subprocess.run([disassembler, "-c", binary], check=True, capture_output=True, text=True).stdout
+        (out / f"{kernel}.assembly").write_text(listing)
+        registers = int(re.search(r"Used (\d+) registers", log).group(1))
+        spilled = sum(int(n) for n in re.findall(r"(\d+) bytes spill (?:stores|loads)", log))
+        stack = int(re.search(r"(\d+) bytes stack frame", log).group(1))
+        statistics = (("Registers", registers), ("Spilled bytes", spilled), ("Stack bytes", stack))
+        return [f"nvidia-{architecture},{kernel},{statistic},{value}" for statistic, value in statistics]
+
     for architecture in architectures:
-        out = folder / f"nvidia-{architecture}"
-        out.mkdir(exist_ok=True)
-        for path in sorted(folder.glob("*.metal")):
-            kernel = path.name.removesuffix(".metal")
-            source = cuda_source(path.read_text(), header)
-            code, log = compiler.compile(source, kernel, architecture)
-            binary = out / f"{kernel}.cubin"
-            binary.write_bytes(code)
-            listing = subprocess.run([disassembler, "-c", binary], check=True, capture_output=True, text=True).stdout
-            (out / f"{kernel}.assembly").write_text(listing)
-            registers = int(re.search(r"Used (\d+) registers", log).group(1))
-            spilled = sum(int(n) for n in re.findall(r"(\d+) bytes spill (?:stores|loads)", log))
-            stack = int(re.search(r"(\d+) bytes stack frame", log).group(1))
-            for statistic, value in (("Registers", registers), ("Spilled bytes", spilled), ("Stack bytes", stack)):
-                print(f"nvidia-{architecture},{kernel},{statistic},{value}")
+        (folder / f"nvidia-{architecture}").mkdir(exist_ok=True)
+    tasks = [(architecture, path) for architecture in architectures for path in sorted(folder.glob("*.metal"))]
+    print("device,kernel,statistic,value")
+    # The compiler and the disassembler run outside Python's lock.
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        for of_kernel in pool.map(rows, tasks):
+            print("\n".join(of_kernel))
 
 
 if __name__ == "__main__":
