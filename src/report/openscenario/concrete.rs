@@ -165,3 +165,8 @@ pub(crate) fn paths<R: Real>(
     }
     all
 }
+
+/// Formats a number as the shortest text that reads back to the same bits, without negative zero.
+pub(super) fn number(value: f64) -> String {
+    (value + 0.0).to_string()
+}

@@ -7,7 +7,6 @@
 mod concrete;
 mod distribution;
 mod distribution_file;
-mod elements;
 mod lanes;
 mod parameters;
 mod road;

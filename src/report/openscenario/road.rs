@@ -1,10 +1,8 @@
 //! The road of a scenario as ASAM OpenDRIVE 1.7: straight and level, with as many equal lanes as the vehicles need, all
 //! in the ego's direction.
 
-use super::concrete::Concrete;
-use super::elements::{Elements, number};
+use super::concrete::{Concrete, number};
 use super::{AUTHOR, DATE};
-use crate::Result;
 
 /// A straight road along x. The middle of the ego's lane is y = 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -62,85 +60,55 @@ impl Road {
     }
 }
 
-/// Builds the road's file.
-///
-/// # Errors
-/// None for finite numbers.
-pub(super) fn road_file(road: &Road) -> Result<Vec<u8>> {
-    let text = |text: &str| text.to_owned();
-    let mut xml = Elements::new()?;
-    let lanes = road.left_lanes + 1 + road.right_lanes;
-    let top = road.reference_y_m();
-    xml.open("OpenDRIVE", vec![])?;
-    xml.empty(
-        "header",
-        vec![
-            ("revMajor", text("1")),
-            ("revMinor", text("7")),
-            ("name", text("straight road")),
-            ("version", text("1.00")),
-            ("date", text(DATE)),
-            ("north", number(top)),
-            ("south", number(top - f64::from(lanes) * road.lane_width_m)),
-            ("east", number(road.start_m + road.length_m)),
-            ("west", number(road.start_m)),
-            ("vendor", text(AUTHOR)),
-        ],
-    )?;
-    let length = number(road.length_m);
-    xml.open(
-        "road",
-        vec![
-            ("name", text("straight")),
-            ("length", length.clone()),
-            ("id", text("1")),
-            ("junction", text("-1")),
-            ("rule", text("RHT")),
-        ],
-    )?;
-    xml.empty("type", vec![("s", text("0")), ("type", text("motorway"))])?;
-    xml.open("planView", vec![])?;
-    xml.open(
-        "geometry",
-        vec![("s", text("0")), ("x", number(road.start_m)), ("y", number(top)), ("hdg", text("0")), ("length", length)],
-    )?;
-    xml.empty("line", vec![])?;
-    xml.close()?;
-    xml.close()?;
-    xml.open("lanes", vec![])?;
-    xml.open("laneSection", vec![("s", text("0"))])?;
-    xml.open("center", vec![])?;
-    lane(&mut xml, 0, None, "solid")?;
-    xml.close()?;
-    xml.open("right", vec![])?;
-    for at in 1..=lanes {
-        lane(&mut xml, at, Some(road.lane_width_m), if at == lanes { "solid" } else { "broken" })?;
-    }
-    xml.finish()
+/// The road's file.
+pub(super) fn road_file(road: &Road) -> String {
+    let (lanes, top_m) = (road.left_lanes + 1 + road.right_lanes, road.reference_y_m());
+    let (north, west) = (number(top_m), number(road.start_m));
+    let lane_of =
+        |at: u32| lane(&format!("-{at}"), Some(road.lane_width_m), if at == lanes { "solid" } else { "broken" });
+    format!(
+        r#"<?xml version="1.0" encoding="UTF-8"?>
+<OpenDRIVE>
+  <header revMajor="1" revMinor="7" name="straight road" version="1.00" date="{DATE}" {extent} vendor="{AUTHOR}"/>
+  <road name="straight" length="{length}" id="1" junction="-1" rule="RHT">
+    <type s="0" type="motorway"/>
+    <planView>
+      <geometry s="0" x="{west}" y="{north}" hdg="0" length="{length}">
+        <line/>
+      </geometry>
+    </planView>
+    <lanes>
+      <laneSection s="0">
+        <center>
+{edge}        </center>
+        <right>
+{lanes}        </right>
+      </laneSection>
+    </lanes>
+  </road>
+</OpenDRIVE>
+"#,
+        extent = format_args!(
+            "north=\"{north}\" south=\"{}\" east=\"{}\" west=\"{west}\"",
+            number(top_m - f64::from(lanes) * road.lane_width_m),
+            number(road.start_m + road.length_m),
+        ),
+        length = number(road.length_m),
+        edge = lane("0", None, "solid"),
+        lanes = (1..=lanes).map(lane_of).collect::<String>(),
+    )
 }
 
 /// A lane with the line at its right; for the centre lane, at the road's left edge.
-fn lane(xml: &mut Elements, at: u32, width_m: Option<f64>, line: &str) -> Result<()> {
-    let text = |text: &str| text.to_owned();
+fn lane(id: &str, width_m: Option<f64>, line: &str) -> String {
     let kind = if width_m.is_some() { "driving" } else { "none" };
-    let id = if at == 0 { text("0") } else { format!("-{at}") };
-    xml.open("lane", vec![("id", id), ("type", text(kind)), ("level", text("false"))])?;
-    if let Some(width) = width_m {
-        let zero = || text("0");
-        xml.empty(
-            "width",
-            vec![("sOffset", zero()), ("a", number(width)), ("b", zero()), ("c", zero()), ("d", zero())],
-        )?;
-    }
-    xml.empty(
-        "roadMark",
-        vec![
-            ("sOffset", text("0")),
-            ("type", text(line)),
-            ("weight", text("standard")),
-            ("color", text("standard")),
-            ("width", text("0.15")),
-        ],
-    )?;
-    xml.close()
+    let width = width_m.map_or(String::new(), |width_m| {
+        format!("            <width sOffset=\"0\" a=\"{}\" b=\"0\" c=\"0\" d=\"0\"/>\n", number(width_m))
+    });
+    format!(
+        r#"          <lane id="{id}" type="{kind}" level="false">
+{width}            <roadMark sOffset="0" type="{line}" weight="standard" color="standard" width="0.15"/>
+          </lane>
+"#
+    )
 }

@@ -8,8 +8,7 @@
 
 use std::path::Path;
 
-use super::concrete::{Concrete, EgoMotion, PlayedVehicle};
-use super::elements::{Attribute, Element, Elements, number, plain};
+use super::concrete::{Concrete, EgoMotion, PlayedVehicle, Vertex, number};
 use super::road::{Road, road_file};
 use super::{AUTHOR, DATE};
 use crate::Result;
@@ -29,200 +28,219 @@ const HEIGHT_M: f64 = 1.5;
 ///
 /// # Errors
 /// As [`Concrete::check`].
-fn scenario_file(scenario: &Concrete, road: &str) -> Result<Vec<u8>> {
+fn scenario_file(scenario: &Concrete, road: &str) -> Result<String> {
     scenario.check()?;
-    let mut xml = Elements::new()?;
-    xml.open("OpenSCENARIO", vec![])?;
-    header(&mut xml, scenario)?;
-    xml.open("ParameterDeclarations", vec![])?;
-    for (name, value) in &scenario.parameters {
-        let declared = vec![text("name", &identifier(name)), text("parameterType", "double"), float("value", *value)];
-        xml.empty("ParameterDeclaration", declared)?;
-    }
-    xml.close()?;
-    xml.empty("CatalogLocations", vec![])?;
-    xml.open("RoadNetwork", vec![])?;
-    xml.empty("LogicFile", vec![text("filepath", road)])?;
-    xml.close()?;
-    xml.open("Entities", vec![])?;
-    for vehicle in &scenario.vehicles {
-        entity(&mut xml, vehicle)?;
-    }
-    xml.close()?;
-    xml.open("Storyboard", vec![])?;
-    init(&mut xml, scenario)?;
-    story(&mut xml, scenario)?;
-    xml.open("StopTrigger", vec![])?;
-    at_time(&mut xml, "end", scenario.end_s())?;
-    xml.finish()
+    let declared = scenario.parameters.iter().map(|(name, value)| {
+        let (name, value) = (identifier(name), number(*value));
+        format!("    <ParameterDeclaration name=\"{name}\" parameterType=\"double\" value=\"{value}\"/>\n")
+    });
+    let skipped = usize::from(scenario.ego == EgoMotion::External);
+    let followers = scenario.vehicles.iter().skip(skipped);
+    Ok(format!(
+        r#"<?xml version="1.0" encoding="UTF-8"?>
+<OpenSCENARIO>
+{header}  <ParameterDeclarations>
+{declared}  </ParameterDeclarations>
+  <CatalogLocations/>
+  <RoadNetwork>
+    <LogicFile filepath="{road}"/>
+  </RoadNetwork>
+  <Entities>
+{entities}  </Entities>
+  <Storyboard>
+    <Init>
+      <Actions>
+{starts}      </Actions>
+    </Init>
+    <Story name="story">
+      <Act name="act">
+{paths}        <StartTrigger>
+{begin}        </StartTrigger>
+      </Act>
+    </Story>
+    <StopTrigger>
+{end}    </StopTrigger>
+  </Storyboard>
+</OpenSCENARIO>
+"#,
+        header = header(scenario),
+        declared = declared.collect::<String>(),
+        road = escaped(road),
+        entities = scenario.vehicles.iter().map(entity).collect::<String>(),
+        starts = (0..scenario.vehicles.len()).map(|at| start(scenario, at)).collect::<String>(),
+        paths = followers.map(|vehicle| path(scenario, vehicle)).collect::<String>(),
+        begin = at_time(10, "act start", 0.0),
+        end = at_time(6, "end", scenario.end_s()),
+    ))
 }
 
-fn header(xml: &mut Elements, scenario: &Concrete) -> Result<()> {
+fn header(scenario: &Concrete) -> String {
     let synthetic = if scenario.is_synthetic { "SYNTHETIC DATA: " } else { "" };
-    let overlap_s = scenario.others_overlap_s();
-    let overlap = overlap_s.map_or(String::new(), |time_s| {
+    let overlap_s = scenario.others_overlap_s().map(number);
+    let overlap = overlap_s.as_ref().map_or(String::new(), |time_s| {
         format!(
-            "; Other drives through Ahead from {} s on: a player that checks all vehicles reports a collision of these two, \
-             which is none of Ego's",
-            number(time_s)
+            "; Other drives through Ahead from {time_s} s on: a player that checks all vehicles reports a collision of \
+             these two, which is none of Ego's"
         )
     });
     let description = format!("{synthetic}{} {}{overlap}", scenario.category.label(), scenario.key);
-    xml.open(
-        "FileHeader",
-        vec![
-            text("revMajor", "1"),
-            text("revMinor", "2"),
-            text("date", DATE),
-            text("description", &description),
-            text("author", AUTHOR),
-        ],
-    )?;
-    xml.open("Properties", vec![])?;
-    for (name, value) in &scenario.properties {
-        xml.empty("Property", vec![text("name", name), text("value", value)])?;
-    }
-    if let Some(time_s) = overlap_s {
-        xml.empty("Property", vec![text("name", OTHERS_OVERLAP), text("value", &number(time_s))])?;
-    }
-    xml.close()?;
-    xml.close()
+    let own = scenario.properties.iter().map(|(name, value)| (name.as_str(), value));
+    let properties = own
+        .chain(overlap_s.iter().map(|time_s| (OTHERS_OVERLAP, time_s)))
+        .map(|(name, value)| format!("      <Property name=\"{}\" value=\"{}\"/>\n", escaped(name), escaped(value)));
+    format!(
+        "  <FileHeader revMajor=\"1\" revMinor=\"2\" date=\"{DATE}\" description=\"{}\" author=\"{AUTHOR}\">
+    <Properties>
+{}    </Properties>
+  </FileHeader>
+",
+        escaped(&description),
+        properties.collect::<String>()
+    )
 }
 
-fn entity(xml: &mut Elements, vehicle: &PlayedVehicle) -> Result<()> {
-    let (length, width) = (vehicle.length_m, vehicle.width_m);
-    xml.open("ScenarioObject", vec![text("name", vehicle.name)])?;
-    xml.open("Vehicle", vec![text("name", vehicle.name), text("vehicleCategory", "car")])?;
-    xml.open("BoundingBox", vec![])?;
-    let centre = vec![float("x", vehicle.centre_offset_m()), float("y", 0.0), float("z", HEIGHT_M / 2.0)];
-    xml.empty("Center", centre)?;
-    let dimensions = vec![float("width", width), float("length", length), float("height", HEIGHT_M)];
-    xml.empty("Dimensions", dimensions)?;
-    xml.close()?;
-    let limits = vec![float("maxSpeed", 150.0), float("maxAcceleration", 10.0), float("maxDeceleration", 50.0)];
-    xml.empty("Performance", limits)?;
-    xml.open("Axles", vec![])?;
+fn entity(vehicle: &PlayedVehicle) -> String {
     let axle = |at_m: f64, steering: f64| {
-        vec![
-            float("maxSteering", steering),
-            float("wheelDiameter", 0.6),
-            float("trackWidth", 0.85 * width),
-            float("positionX", at_m),
-            float("positionZ", 0.3),
-        ]
+        let (track_m, at_m) = (number(0.85 * vehicle.width_m), number(at_m));
+        format!(
+            "maxSteering=\"{steering}\" wheelDiameter=\"0.6\" trackWidth=\"{track_m}\" positionX=\"{at_m}\" \
+             positionZ=\"0.3\""
+        )
     };
-    xml.empty("FrontAxle", axle(vehicle.wheelbase_m(), 0.5))?;
-    xml.empty("RearAxle", axle(0.0, 0.0))?;
-    xml.close()?;
-    xml.empty("Properties", vec![])?;
-    xml.close()?;
-    xml.close()
+    format!(
+        r#"    <ScenarioObject name="{name}">
+      <Vehicle name="{name}" vehicleCategory="car">
+        <BoundingBox>
+          <Center x="{centre}" y="0" z="{middle}"/>
+          <Dimensions width="{width}" length="{length}" height="{HEIGHT_M}"/>
+        </BoundingBox>
+        <Performance maxSpeed="150" maxAcceleration="10" maxDeceleration="50"/>
+        <Axles>
+          <FrontAxle {front}/>
+          <RearAxle {rear}/>
+        </Axles>
+        <Properties/>
+      </Vehicle>
+    </ScenarioObject>
+"#,
+        name = escaped(vehicle.name),
+        centre = number(vehicle.centre_offset_m()),
+        middle = HEIGHT_M / 2.0,
+        width = number(vehicle.width_m),
+        length = number(vehicle.length_m),
+        front = axle(vehicle.wheelbase_m(), 0.5),
+        rear = axle(0.0, 0.0),
+    )
 }
 
-/// Writes the initial positions and speeds.
-fn init(xml: &mut Elements, scenario: &Concrete) -> Result<()> {
-    xml.open("Init", vec![])?;
-    xml.open("Actions", vec![])?;
-    for (at, vehicle) in scenario.vehicles.iter().enumerate() {
-        let Some(first) = vehicle.path.first() else { continue };
-        xml.open("Private", vec![text("entityRef", vehicle.name)])?;
-        xml.nested(&[
-            ("PrivateAction", vec![]),
-            ("TeleportAction", vec![]),
-            ("Position", vec![]),
-            world(scenario, vehicle, first.x_m, first.y_m),
-        ])?;
-        let is_declared = at == 0 && scenario.parameters.iter().any(|(name, _)| name == EGO_SPEED);
-        let is_free = is_declared && scenario.ego == EgoMotion::External;
-        let speed = if is_free { ("value", format!("${EGO_SPEED}")) } else { float("value", first.v_mps) };
-        xml.open("PrivateAction", vec![])?;
-        xml.open("LongitudinalAction", vec![])?;
-        xml.open("SpeedAction", vec![])?;
-        xml.empty(
-            "SpeedActionDynamics",
-            vec![text("dynamicsShape", "step"), float("value", 0.0), text("dynamicsDimension", "time")],
-        )?;
-        xml.nested(&[("SpeedActionTarget", vec![]), ("AbsoluteTargetSpeed", vec![speed])])?;
-        for _ in 0..4 {
-            xml.close()?;
-        }
-    }
-    xml.close()?;
-    xml.close()
+/// The initial position and speed of a vehicle.
+fn start(scenario: &Concrete, at: usize) -> String {
+    let vehicle = &scenario.vehicles[at];
+    let Some(first) = vehicle.path.first() else { return String::new() };
+    let is_declared = at == 0 && scenario.parameters.iter().any(|(name, _)| name == EGO_SPEED);
+    let is_free = is_declared && scenario.ego == EgoMotion::External;
+    format!(
+        r#"        <Private entityRef="{name}">
+          <PrivateAction><TeleportAction>{position}</TeleportAction></PrivateAction>
+          <PrivateAction>
+            <LongitudinalAction>
+              <SpeedAction>
+                <SpeedActionDynamics dynamicsShape="step" value="0" dynamicsDimension="time"/>
+                <SpeedActionTarget><AbsoluteTargetSpeed value="{speed}"/></SpeedActionTarget>
+              </SpeedAction>
+            </LongitudinalAction>
+          </PrivateAction>
+        </Private>
+"#,
+        name = escaped(vehicle.name),
+        position = position(scenario, vehicle, first),
+        speed = if is_free { format!("${EGO_SPEED}") } else { number(first.v_mps) },
+    )
 }
 
-/// Writes the paths of the vehicles.
-fn story(xml: &mut Elements, scenario: &Concrete) -> Result<()> {
-    xml.open("Story", vec![text("name", "story")])?;
-    xml.open("Act", vec![text("name", "act")])?;
-    let skipped = usize::from(scenario.ego == EgoMotion::External);
-    for vehicle in scenario.vehicles.iter().skip(skipped) {
-        let name = vehicle.name;
-        let named = |what: &str| text("name", &format!("{name} {what}"));
-        xml.open("ManeuverGroup", vec![text("maximumExecutionCount", "1"), named("group")])?;
-        xml.open("Actors", vec![text("selectTriggeringEntities", "false")])?;
-        xml.empty("EntityRef", vec![text("entityRef", name)])?;
-        xml.close()?;
-        xml.open("Maneuver", vec![named("maneuver")])?;
-        xml.open("Event", vec![named("event"), text("priority", "parallel"), text("maximumExecutionCount", "1")])?;
-        xml.open("Action", vec![named("action")])?;
-        xml.open("PrivateAction", vec![])?;
-        xml.open("RoutingAction", vec![])?;
-        xml.open("FollowTrajectoryAction", vec![])?;
-        xml.open("TrajectoryRef", vec![])?;
-        xml.open("Trajectory", vec![named("trajectory"), text("closed", "false")])?;
-        xml.open("Shape", vec![])?;
-        xml.open("Polyline", vec![])?;
-        for v in &vehicle.path {
-            let vertex = ("Vertex", vec![float("time", v.time_s)]);
-            xml.nested(&[vertex, ("Position", vec![]), world(scenario, vehicle, v.x_m, v.y_m)])?;
-        }
-        for _ in 0..4 {
-            xml.close()?;
-        }
-        let timing = vec![text("domainAbsoluteRelative", "absolute"), float("scale", 1.0), float("offset", 0.0)];
-        xml.nested(&[("TimeReference", vec![]), ("Timing", timing)])?;
-        xml.empty("TrajectoryFollowingMode", vec![text("followingMode", "position")])?;
-        for _ in 0..4 {
-            xml.close()?;
-        }
-        xml.open("StartTrigger", vec![])?;
-        at_time(xml, &format!("{name} start"), 0.0)?;
-        for _ in 0..4 {
-            xml.close()?;
-        }
-    }
-    xml.open("StartTrigger", vec![])?;
-    at_time(xml, "act start", 0.0)?;
-    xml.close()?;
-    xml.close()?;
-    xml.close()
+/// The path of a vehicle.
+fn path(scenario: &Concrete, vehicle: &PlayedVehicle) -> String {
+    let vertex = |v: &Vertex| {
+        let (time_s, position) = (number(v.time_s), position(scenario, vehicle, v));
+        format!("{:30}<Vertex time=\"{time_s}\">{position}</Vertex>\n", "")
+    };
+    format!(
+        r#"        <ManeuverGroup maximumExecutionCount="1" name="{name} group">
+          <Actors selectTriggeringEntities="false">
+            <EntityRef entityRef="{name}"/>
+          </Actors>
+          <Maneuver name="{name} maneuver">
+            <Event name="{name} event" priority="parallel" maximumExecutionCount="1">
+              <Action name="{name} action">
+                <PrivateAction>
+                  <RoutingAction>
+                    <FollowTrajectoryAction>
+                      <TrajectoryRef>
+                        <Trajectory name="{name} trajectory" closed="false">
+                          <Shape>
+                            <Polyline>
+{vertices}                            </Polyline>
+                          </Shape>
+                        </Trajectory>
+                      </TrajectoryRef>
+                      <TimeReference><Timing domainAbsoluteRelative="absolute" scale="1" offset="0"/></TimeReference>
+                      <TrajectoryFollowingMode followingMode="position"/>
+                    </FollowTrajectoryAction>
+                  </RoutingAction>
+                </PrivateAction>
+              </Action>
+              <StartTrigger>
+{begin}              </StartTrigger>
+            </Event>
+          </Maneuver>
+        </ManeuverGroup>
+"#,
+        name = escaped(vehicle.name),
+        vertices = vehicle.path.iter().map(vertex).collect::<String>(),
+        begin = at_time(16, &format!("{} start", vehicle.name), 0.0),
+    )
 }
 
 /// The condition that the simulation time has reached a value.
-fn at_time(xml: &mut Elements, name: &str, time_s: f64) -> Result<()> {
-    xml.open("ConditionGroup", vec![])?;
-    xml.nested(&[
-        ("Condition", vec![text("name", name), float("delay", 0.0), text("conditionEdge", "none")]),
-        ("ByValueCondition", vec![]),
-        ("SimulationTimeCondition", vec![float("value", time_s), text("rule", "greaterOrEqual")]),
-    ])?;
-    xml.close()
+fn at_time(indent: usize, name: &str, time_s: f64) -> String {
+    let (indent, name) = (" ".repeat(indent), escaped(name));
+    let time = format!(
+        "<ByValueCondition><SimulationTimeCondition value=\"{}\" rule=\"greaterOrEqual\"/></ByValueCondition>",
+        number(time_s)
+    );
+    format!(
+        r#"{indent}<ConditionGroup>
+{indent}  <Condition name="{name}" delay="0" conditionEdge="none">{time}</Condition>
+{indent}</ConditionGroup>
+"#
+    )
 }
 
-/// Converts a position of a vehicle's centre to that of its reference point.
-fn world<'a>(scenario: &Concrete, vehicle: &PlayedVehicle, x_m: f64, y_m: f64) -> Element<'a> {
-    let x_m = x_m - vehicle.centre_offset_m();
-    let place = vec![float("x", x_m), float("y", scenario.world_y_m(y_m)), float("z", 0.0), float("h", 0.0)];
-    ("WorldPosition", place)
+/// The position of a vehicle's reference point.
+fn position(scenario: &Concrete, vehicle: &PlayedVehicle, centre: &Vertex) -> String {
+    let (x_m, y_m) = (number(centre.x_m - vehicle.centre_offset_m()), number(scenario.world_y_m(centre.y_m)));
+    format!("<Position><WorldPosition x=\"{x_m}\" y=\"{y_m}\" z=\"0\" h=\"0\"/></Position>")
 }
 
-fn text<'a>(name: &'a str, value: &str) -> Attribute<'a> {
-    (name, plain(value).into_owned())
-}
-
-fn float(name: &str, value: f64) -> Attribute<'_> {
-    (name, number(value))
+/// A text as the value of an attribute, valid for XML 1.0 and for OpenSCENARIO, where a leading `$` is a parameter.
+fn escaped(text: &str) -> String {
+    let mut value = String::new();
+    if text.starts_with('$') {
+        value.push(' ');
+    }
+    for c in text.chars() {
+        match c {
+            '<' => value += "&lt;",
+            '>' => value += "&gt;",
+            '&' => value += "&amp;",
+            '\'' => value += "&apos;",
+            '"' => value += "&quot;",
+            '\t' | '\n' | '\r' => value += &format!("&#{};", u32::from(c)),
+            '\0'..' ' | '\u{fffe}' | '\u{ffff}' => value.push('\u{fffd}'),
+            c => value.push(c),
+        }
+    }
+    value
 }
 
 /// A valid identifier: letters, digits and `_`, not starting with a digit.
@@ -255,7 +273,7 @@ pub fn export_folder(dir: &Path, scenarios: &[Concrete]) -> Result<Vec<IndexRow>
     for (at, scenario) in scenarios.iter().enumerate() {
         let stem = format!("{:03}-{}", at + 1, safe(&scenario.key));
         let row = IndexRow { file: format!("{stem}.xosc"), road: format!("{stem}.xodr"), lane: scenario.key.clone() };
-        made.push((scenario_file(scenario, &row.road)?, road_file(&Road::around(scenario))?, row));
+        made.push((scenario_file(scenario, &row.road)?, road_file(&Road::around(scenario)), row));
     }
     let folder = OutputDir::open(dir, INDEX)?;
     let mut results = folder.results()?;
@@ -265,8 +283,8 @@ pub fn export_folder(dir: &Path, scenarios: &[Concrete]) -> Result<Vec<IndexRow>
     });
     let mut rows = Vec::new();
     for (text, road, row) in made {
-        results.add(&row.road, &road)?;
-        results.add(&row.file, &text)?;
+        results.add(&row.road, road.as_bytes())?;
+        results.add(&row.file, text.as_bytes())?;
         rows.push(row);
     }
     let property = |scenario: &Concrete, name: &String| {
