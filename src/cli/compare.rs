@@ -11,8 +11,8 @@ use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::source::SourceFlags;
 use super::{Exit, Output, lists};
-use crate::report::compare::CompareFile;
-use crate::report::sampling::HostRecord;
+use crate::report::compare::CompareReport;
+use crate::report::host::Host;
 use crate::run::compare::{self, CompareOptions, CompareResult};
 use crate::run::study::StudyOptions;
 use crate::stats::density::DensityKind;
@@ -117,15 +117,11 @@ impl Compare {
         let complete = collection.problems.is_empty() && left_out.is_empty();
 
         let left_out = collection.problems.iter().chain(&failed).map(Error::to_string).collect();
-        let mut file = CompareFile::of(
-            &compare,
-            categories,
-            left_out,
-            HostRecord::of(&opened, swept.rechecked_lanes, started, configured.record(false)),
-        );
-        file.write(folder.results()?)?;
+        let host = Host::of(&opened, swept.rechecked_lanes, started, configured.record(false));
+        let report = CompareReport { compare: &compare, categories, left_out, host };
+        let files = report.write(folder.results()?)?;
         let exit = if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete };
-        self.format.output_in(&self.out, exit, || file.text(), || file.json())
+        self.format.output_in(&self.out, exit, || report.text(), || report.json(&files))
     }
 
     /// Results must not replace an input.

@@ -16,7 +16,7 @@ use super::{Cli, Verb};
 use crate::cli::settings::{Assignment, FILE_VARIABLE, Key, KeyKind, Layers, Origin, Setting, Settings};
 use crate::engine::{BackendChoice, DeviceName, OpenBackend};
 use crate::model::profile::Profile;
-use crate::report::run_record::SettingRecord;
+use crate::report::host::SettingRecord;
 use crate::support::plain_text::nearest;
 use crate::{Error, Place, Result};
 

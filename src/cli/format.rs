@@ -108,13 +108,13 @@ impl TablesFlag {
     /// Writes the files and prints the answer, or all tables.
     pub(super) fn finish(
         self,
-        mut report: StudyReport,
+        report: StudyReport,
         results: Results,
         is_incomplete: bool,
         format: FormatFlag,
     ) -> Result<Output> {
         let out = results.dir().to_path_buf();
-        report.write(results)?;
+        let files = report.write(results)?;
         let width = console::width();
         let claims = if report.evaluation.claims.is_empty() { "" } else { ", claims" };
         let all = if format.format == Format::Both { "" } else { "--tables, or " };
@@ -124,7 +124,7 @@ impl TablesFlag {
         let shown = || if self.tables { report.text(width) } else { answer() };
         let printed = format.output(exit, shown, || report.json())?;
         let page = out.join("report.html");
-        tracing::info!("{} files written; start with {}", report.run.files.len() + 1, page.display());
+        tracing::info!("{} files written; start with {}", files.len() + 1, page.display());
         Ok(printed)
     }
 }

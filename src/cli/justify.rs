@@ -13,7 +13,7 @@ use super::source::SourceFlags;
 use super::{Exit, Output, lists};
 use crate::model::driver::ModelId;
 use crate::report::dossier::DossierReport;
-use crate::report::sampling::HostRecord;
+use crate::report::host::Host;
 use crate::run::compare::CompareOptions;
 use crate::run::justify::{Conclusion, JustifyOptions, justify};
 use crate::run::study::StudyOptions;
@@ -124,7 +124,7 @@ impl Justify {
             author: self.author.clone(),
             date: self.date.clone(),
             command: configured.command.clone(),
-            host: HostRecord::of(&opened, dossier.summary.rechecked_lanes, started, configured.record(false)),
+            host: Host::of(&opened, dossier.summary.rechecked_lanes, started, configured.record(false)),
         };
         let files = report.write(folder.results()?)?;
         let is_complete = collection.problems.is_empty() && dossier.left_out.is_empty();

@@ -13,9 +13,9 @@ use super::source::PlausibilityFlag;
 use super::{Exit, Output, lists};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::report::map::{MapHost, MapReport};
+use crate::report::host::{Host, SweepRecord};
+use crate::report::map::MapReport;
 use crate::report::openscenario::{Names, Rename, read_distribution, variations};
-use crate::report::run_record::SweepRecord;
 use crate::run::grid::{self, Against, Grid, GridText, MapGrids, MapOptions, MapResult, PARAMETERS, presets::Presets};
 use crate::scenario::Category;
 use crate::support::plausibility::Doubts;
@@ -146,24 +146,13 @@ impl Map {
         let started = Instant::now();
         let MapResult { grids, summary } = map.run(&executor.with_progress(console::inc(&bar)))?;
         bar.finish_and_clear();
-        let host = MapHost {
-            backend: opened.backend().describe(),
-            device: opened.device().cloned(),
-            sweep: SweepRecord {
-                rechecked_lanes: summary.rechecked_lanes,
-                recheck_seed: RECHECK_SEED,
-                redone_lanes: summary.redone_lanes,
-                device_s: summary.device_s,
-            },
-            threads: rayon::current_num_threads(),
-            plan_s,
-            sweep_s: started.elapsed().as_secs_f64(),
-            settings: configured.record(false),
-        };
-        let report = MapReport { grids, criterion, against, profile, preset: self.preset.clone(), host };
+        let host = Host::of(&opened, summary.rechecked_lanes, started, configured.record(false));
+        let sweep = SweepRecord::of(&summary, RECHECK_SEED);
+        let preset = self.preset.clone();
+        let report = MapReport { grids, criterion, against, profile, preset, host, sweep, plan_s };
         let written = report.write(folder.results()?)?;
-        let output = self.format.output(Exit::Ok, || report.text(), || report.json(written.clone()))?;
-        let (simulations, seconds) = (count(report.simulations()), value(report.host.sweep_s));
+        let output = self.format.output(Exit::Ok, || report.text(), || report.json(&written))?;
+        let (simulations, seconds) = (count(report.simulations()), value(report.host.seconds));
         tracing::info!("{simulations} simulations in {seconds} s on {}", report.host.backend);
         tracing::info!("{} files written to {}", written.len() + 1, self.out.display());
         Ok(output)

@@ -8,8 +8,8 @@ use super::arguments::from_arguments;
 use super::format::{FormatFlag, TablesFlag};
 use super::{Exit, Output};
 use crate::Result;
-use crate::report::run_record::StudyHost;
-use crate::report::sampling::{EstimateFile, HostRecord};
+use crate::report::host::{Host, Timings};
+use crate::report::sampling::EstimateFile;
 use crate::report::study::StudyReport;
 use crate::run::parts::PLAN_FILE;
 use crate::run::{Merged, merge};
@@ -45,12 +45,14 @@ impl Merge {
         match merged {
             Merged::Study(merged) => {
                 let (study, result) = *merged;
-                let report = StudyReport::of(&study, &result.counts, None, StudyHost::of_parts(&result))?;
+                let (swept, timings) = (&result.summary, Timings::default());
+                let host = Host::of_parts(result.parts, swept.rechecked_lanes);
+                let report = StudyReport::of(&study, &result.counts, None, host, swept, timings)?;
                 self.tables.finish(report, folder.results()?, study.facts().incomplete, self.format)
             }
             Merged::Sample(merged) => {
                 let (sample, result) = *merged;
-                let host = HostRecord::of_parts(result.parts, result.rechecked_lanes);
+                let host = Host::of_parts(result.parts, result.rechecked_lanes);
                 let mut file = EstimateFile::of_sample(&sample, &result, host)?;
                 file.write(folder.results()?, &sample, &result)?;
                 self.format.output_in(&self.folder, Exit::Ok, || file.text(), || file.json())

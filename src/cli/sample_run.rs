@@ -12,8 +12,9 @@ use super::sample_options::{guard, only_crude};
 use super::{Exit, Output, sample_distribution};
 use crate::engine::{Chunk, Executor, LanePlan, OpenBackend};
 use crate::model::profile::Profile;
+use crate::report::host::Host;
 use crate::report::lanes;
-use crate::report::sampling::{EstimateFile, HostRecord};
+use crate::report::sampling::EstimateFile;
 use crate::run::parts::{EachChunk, Job, PLAN_FILE};
 use crate::run::sampling::{
     self, EstimateRow, SampleJob, SampleKind, SampleOptions, SampleResult, SampleSource, conditional,
@@ -209,7 +210,7 @@ impl Sample {
             }
         }
         let settings = configured.record(self.shards.plan.is_some());
-        let host = HostRecord::of(opened, result.rechecked_lanes, started, settings);
+        let host = Host::of(opened, result.rechecked_lanes, started, settings);
         let mut results = run.results()?;
         rows.into_iter().for_each(|table| results.join(table));
         let output = write(sample, &result, host, results, self.format)?;
@@ -265,7 +266,7 @@ fn warn(sample: &sampling::Sample) -> Result<()> {
 fn write(
     sample: &sampling::Sample,
     result: &SampleResult,
-    host: HostRecord,
+    host: Host,
     results: Results,
     format: FormatFlag,
 ) -> Result<Output> {

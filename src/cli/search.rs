@@ -11,7 +11,7 @@ use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::source::{self, SourceFlags};
 use super::{Exit, Output, lists};
-use crate::report::sampling::HostRecord;
+use crate::report::host::Host;
 use crate::report::search::SearchReport;
 use crate::run::parts::Shard;
 use crate::run::search::{self, Objective, SearchOptions};
@@ -149,7 +149,7 @@ impl Search {
             synthetic: collection.synthetic,
             profile: &profile,
             command: configured.command.clone(),
-            host: HostRecord::of(&opened, 0, started, configured.record(false)),
+            host: Host::of(&opened, 0, started, configured.record(false)),
         };
         let files = report.write(folder.results()?)?;
         let exit = if collection.problems.is_empty() { Exit::Ok } else { Exit::Incomplete };

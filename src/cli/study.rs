@@ -14,8 +14,8 @@ use super::source::{self, SourceFlags};
 use super::{Exit, Output, lists};
 use crate::Result;
 use crate::engine::{Chunk, Headway, LanePlan, OpenBackend};
+use crate::report::host::{Host, Timings};
 use crate::report::lanes::{StudyRows, table_format};
-use crate::report::run_record::{StudyHost, Timings};
 use crate::report::study::StudyReport;
 use crate::run::parts::{EachChunk, Job, PLAN_FILE, RUN_PLAN_FILE};
 use crate::run::study::{self, GivenReplay, ReferenceComparison, StudyOptions, StudyResult};
@@ -206,8 +206,7 @@ impl Study {
         mut timings: Timings,
         verbosity: Verbosity,
     ) -> Result<Output> {
-        let plan = study.plan();
-        let backend = opened.backend();
+        let (plan, backend, started) = (study.plan(), opened.backend(), Instant::now());
         let executor = opened.executor().with_recheck(study.facts().score.seed);
         if self.shards.is_part() {
             study.write_plan(&self.out)?;
@@ -238,18 +237,13 @@ impl Study {
             results.join(rows.stage()?);
         }
         let comparison = self.compare_reference.then(|| ReferenceComparison::of_study(study.cases())).transpose()?;
-        let host = StudyHost {
-            backend: match (executor.fallback, swept.redone_lanes) {
-                (Some(stand_in), 1..) => format!("{}; after its failure {}", backend.describe(), stand_in.describe()),
-                _ => backend.describe(),
-            },
-            device: opened.device().cloned(),
-            swept,
-            timings,
-            settings: configured.record(self.shards.plan.is_some()),
-        };
+        let settings = configured.record(self.shards.plan.is_some());
+        let mut host = Host::of(opened, swept.rechecked_lanes, started, settings);
+        if let (Some(stand_in), 1..) = (executor.fallback, swept.redone_lanes) {
+            host.backend += &format!("; after its failure {}", stand_in.describe());
+        }
         self.leave_plan(study, &mut results)?;
-        let report = StudyReport::of(study, &counts, comparison, host)?;
+        let report = StudyReport::of(study, &counts, comparison, host, &swept, timings)?;
         let output = self.tables.finish(report, results, study.facts().incomplete, self.format)?;
         run.close()?;
         Ok(output)

@@ -293,59 +293,42 @@ impl CaseSheet<'_> {
         if first.verdict() == Verdict::Undecided {
             warnings.push(format!("{}.", self.answer()));
         }
-        let case = Section { facts: self.numbers(), ..Section::new("case", "Case") };
-        let drivers = Section {
-            intro: format!(
-                "{} {DRIVERS}. Changes with: what turns the collision verdict, of {VARIED}.",
-                match &first.verdicts.reference_drivers[..] {
-                    [] => format!("{} has no reference drivers: it does not say what is preventable.", first.profile),
-                    drivers => format!(
-                        "A collision is preventable where one of the reference drivers ({}) avoids it. Where nothing \
-                         collides even if the ego never reacts, there is no conflict.",
-                        drivers.iter().map(|model| model.name()).collect::<Vec<_>>().join(" or ")
-                    ),
-                },
+        let case = Section::new("case", "Case").facts(self.numbers());
+        let preventable = match &first.verdicts.reference_drivers[..] {
+            [] => format!("{} has no reference drivers: it does not say what is preventable.", first.profile),
+            drivers => format!(
+                "A collision is preventable where one of the reference drivers ({}) avoids it. Where nothing collides even \
+                 if the ego never reacts, there is no conflict.",
+                drivers.iter().map(|model| model.name()).collect::<Vec<_>>().join(" or ")
             ),
-            tables: vec![self.drivers().captioned("Drivers")],
-            ..Section::new("drivers", "Drivers")
         };
-        let clauses = Section {
-            intro: format!(
+        let drivers = Section::new("drivers", "Drivers")
+            .intro(format!("{preventable} {DRIVERS}. Changes with: what turns the collision verdict, of {VARIED}."))
+            .tables([self.drivers().captioned("Drivers")]);
+        let clauses = Section::new("clauses", "Clauses")
+            .intro(format!(
                 "What the clauses say of the case, with the numbers of {}; then the conditions of other clauses of \
                  cut-ins that differ from these.",
                 first.profile
-            ),
-            tables: vec![self.clauses().captioned("Clauses")],
-            ..Section::new("clauses", "Clauses")
-        };
-        let boundaries = Section {
-            intro: format!("{BOUNDARIES}."),
-            tables: vec![self.boundaries().captioned("Distance to the boundary")],
-            ..Section::new("boundary", "Distance to another answer")
-        };
+            ))
+            .tables([self.clauses().captioned("Clauses")]);
+        let boundaries = Section::new("boundary", "Distance to another answer")
+            .intro(format!("{BOUNDARIES}."))
+            .tables([self.boundaries().captioned("Distance to the boundary")]);
         let above = TraceFigure { subtitle: None, ..self.figure(TracePanels::Course) };
         let drawn = |panels: TracePanels| PageFigure::new(&self.figure(panels).svg(), &[]);
-        let course = Section {
-            figures: vec![drawn(TracePanels::Course), PageFigure::new(&above.positions().svg(), &[])],
-            parts: vec![Section {
-                title: "TTC, BTN, fuzzy surrogates and lateral position".to_owned(),
-                figures: vec![drawn(TracePanels::Measures)],
-                ..Section::default()
-            }],
-            ..Section::new("course", "Course of the case")
-        };
-        let reproduction = Section {
-            facts: vec![
-                ("command".to_owned(), self.command.clone()),
-                ("program".to_owned(), PROGRAM.to_owned()),
-                ("profile".to_owned(), format!("{}: {}", first.profile, self.profiles[0].description)),
-                ("data".to_owned(), self.origin.clone()),
-                ("arithmetic".to_owned(), format!("binary64, time step {} s", self.profiles[0].frame.dt_s)),
-            ],
-            parts: vec![Section::options(format!("Profile {}", first.profile), &self.profiles[0])],
-            ..Section::new("reproduction", "Reproduction")
-        };
-        let page = Page {
+        let course = Section::new("course", "Course of the case")
+            .figures([drawn(TracePanels::Course), PageFigure::new(&above.positions().svg(), &[])])
+            .parts([Section::new("", "TTC, BTN, fuzzy surrogates and lateral position")
+                .figures([drawn(TracePanels::Measures)])]);
+        let reproduction = Section::new("reproduction", "Reproduction")
+            .fact("command", &self.command)
+            .fact("program", PROGRAM)
+            .fact("profile", format!("{}: {}", first.profile, self.profiles[0].description))
+            .fact("data", &self.origin)
+            .fact("arithmetic", format!("binary64, time step {} s", self.profiles[0].frame.dt_s))
+            .parts([Section::options(format!("Profile {}", first.profile), &self.profiles[0])]);
+        Page {
             title: format!("One {} under {}", self.subject.category().label(), first.profile),
             lead: std::iter::once(self.case())
                 .chain([self.answer()])
@@ -358,8 +341,8 @@ impl CaseSheet<'_> {
             synthetic: self.is_synthetic,
             warnings,
             sections: vec![course, case, drivers, clauses, boundaries, reproduction],
-        };
-        page.html()
+        }
+        .html()
     }
 }
 

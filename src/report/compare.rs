@@ -1,139 +1,99 @@
 //! A comparison of failure rates as text and files.
 
-use serde::Serialize;
 use std::fmt::Write;
 
 use super::close_following::{CloseRow, close_following};
 use super::dots::{DotRow, Dots, dots};
+use super::host::Host;
 use super::html::{Page, PageFigure, Section};
 use super::plot::{AxisScale, Figure, INK, Look, PlotAxis, Series, Symbol, Value, logarithmic_reach};
-use super::records::{PROGRAM, document};
-use super::run_record::SettingRecord;
-use super::sampling::HostRecord;
+use super::records::{PROGRAM, document, record};
 use super::tables::{WIDTH, wrap};
 use crate::Result;
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
 use crate::run::compare::Compare;
 use crate::run::sampling::{
     CategoryComparison, ComparedCell, ComparedParameterization, RateRecord, RecordedCell, RiskRate, Uncertainty,
 };
 use crate::run::score::f1;
-use crate::scenario::Driven;
+use crate::scenario::DataProvenance;
 use crate::stats::density::{DensityKind, Representativeness, normal_quantile};
 use crate::stats::estimate::{Enough, Ratio, RatioVerdict};
 use crate::support::readable;
 use crate::support::run_dir::Results;
 use crate::support::table::{Column, Digits, NumberText, Table};
 
-/// `compare.json`.
-#[derive(Debug, Clone, Serialize)]
-pub struct CompareFile {
-    /// Version of this file.
-    pub lanesweep_comparison: u64,
-    /// Program and version.
-    pub program: String,
-    /// The data in one line; synthetic data say so.
-    pub data: String,
-    /// True if the data are synthetic: no statement about real traffic.
-    pub synthetic: bool,
-    /// SHA-256 of the scenarios as a scenario file.
-    pub scenarios_sha256: String,
-    /// Driven time and distance, if known.
-    pub driven: Option<Driven>,
-    /// Profile, with its time step.
-    pub profile: Profile,
-    /// Models.
-    pub models: Vec<ModelId>,
-    /// Headways.
-    pub headways: Vec<String>,
-    /// Samples per density.
-    pub samples: u64,
-    /// Seed of the draws.
-    pub seed: u64,
-    /// Confidence level of the intervals.
-    pub level: f64,
-    /// Minimum number of failures for a paired ratio, on each side.
-    pub enough: Enough,
-    /// Hash of the plan of S and S'.
-    pub study_plan_sha256: String,
+/// A comparison with the facts that its files state.
+pub struct CompareReport<'a> {
+    /// What was compared.
+    pub compare: &'a Compare<'a>,
+    /// The rates, category by category.
+    pub categories: Vec<CategoryComparison>,
     /// Skipped recordings and parameterizations, with reasons.
     pub left_out: Vec<String>,
-    /// Per category.
-    pub categories: Vec<CategoryComparison>,
-    /// Options of the command, with their sources.
-    pub settings: Vec<SettingRecord>,
-    /// Files beside this one.
-    pub files: Vec<String>,
     /// The machine.
-    pub host: HostRecord,
+    pub host: Host,
 }
 
-impl CompareFile {
-    /// From a comparison and its rates.
-    pub fn of(
-        compare: &Compare,
-        categories: Vec<CategoryComparison>,
-        left_out: Vec<String>,
-        host: HostRecord,
-    ) -> CompareFile {
-        let (plan, options, provenance) = (compare.lane_plan(), compare.options(), compare.provenance().clone());
-        CompareFile {
-            lanesweep_comparison: 1,
-            program: PROGRAM.to_owned(),
-            data: provenance.data,
-            synthetic: provenance.synthetic,
-            scenarios_sha256: provenance.scenarios_sha256,
-            driven: provenance.driven,
-            profile: plan.profile.clone(),
-            models: plan.models.clone(),
-            headways: plan.headways.iter().map(Headway::to_string).collect(),
-            samples: options.samples,
-            seed: options.seed,
-            level: Compare::LEVEL,
-            enough: options.enough,
-            study_plan_sha256: plan.hash().to_owned(),
-            left_out,
-            categories,
-            settings: host.settings.clone(),
-            files: Vec::new(),
-            host,
-        }
+impl CompareReport<'_> {
+    fn headways(&self) -> &[Headway] {
+        &self.compare.lane_plan().headways
     }
 
-    /// Writes tables, figures and page to their folder, the record last.
+    /// Writes tables, figures and page to their folder, the record last; returns the names of the other files.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn write(&mut self, mut results: Results) -> Result<()> {
+    pub fn write(&self, mut results: Results) -> Result<Vec<String>> {
         results.add("compare.csv", self.csv().as_bytes())?;
         results.add("compare.txt", self.text().as_bytes())?;
         let mut figures = Vec::new();
         for comparison in &self.categories {
             for criterion in Criterion::ALL {
-                let drawn =
-                    [("ratios", ratios(self, comparison, criterion)), ("rates", rates(self, comparison, criterion))];
-                for (kind, figure) in drawn {
-                    let name = format!("{kind}-{}-{}.svg", comparison.category.key(), criterion.key());
-                    let svg = figure.svg();
-                    results.add(&name, svg.as_bytes())?;
-                    figures.push(PageFigure::new(&svg, &[&name, "compare.csv"]));
+                for (kind, figure) in [
+                    ("ratios", ratios(self.compare, comparison, criterion)),
+                    ("rates", rates(self.compare, comparison, criterion)),
+                ] {
+                    let name = format!("{kind}-{}-{}", comparison.category.key(), criterion.key());
+                    figures.push(PageFigure::add_svg(&mut results, &name, &figure.svg(), "compare.csv")?);
                 }
             }
         }
         results.add("report.html", self.html(figures).as_bytes())?;
-        self.files = results.names();
-        results.publish(self.json()?.as_bytes())
+        let files = results.names();
+        results.publish(self.json(&files)?.as_bytes())?;
+        Ok(files)
     }
 
-    /// As JSON; NaN and infinity become null.
+    /// `compare.json`; `files` are in the same folder.
     ///
     /// # Errors
     /// None for a record of this program.
-    pub fn json(&self) -> Result<String> {
-        document(self)
+    pub fn json(&self, files: &[String]) -> Result<String> {
+        let (plan, options) = (self.compare.lane_plan(), self.compare.options());
+        let DataProvenance { data, synthetic, scenarios_sha256, driven } = self.compare.provenance();
+        document(&record! {
+            lanesweep_comparison: 1,
+            program: PROGRAM,
+            data: &data,
+            synthetic: *synthetic,
+            scenarios_sha256: &scenarios_sha256,
+            driven: &driven,
+            profile: &plan.profile,
+            models: &plan.models,
+            headways: plan.headways.iter().map(Headway::to_string).collect::<Vec<_>>(),
+            samples: options.samples,
+            seed: options.seed,
+            level: Compare::LEVEL,
+            enough: options.enough,
+            study_plan_sha256: plan.hash(),
+            left_out: &self.left_out,
+            categories: &self.categories,
+            settings: &self.host.settings,
+            files: &files,
+            host: &self.host,
+        })
     }
 
     /// `compare.csv`: one row per category, parameterization, model and criterion.
@@ -148,6 +108,9 @@ impl CompareFile {
         let risks: [(&str, Pick); 2] = [("", |risk| risk.estimate), ("_sd", |risk| risk.standard_deviation)];
         type End = fn(&RateRecord) -> f64;
         let ends: [(&str, End); 3] = [("rate", |r| r.rate), ("low", |r| r.low), ("high", |r| r.high)];
+        type RatioEnd = fn(&Ratio) -> Option<f64>;
+        let ratios: [(&str, RatioEnd); 3] =
+            [("ratio", |r| r.ratio), ("ratio_low", |r| r.low), ("ratio_high", |r| r.high)];
         let first =
             self.categories.iter().flat_map(|category| &category.parameterizations).find(|of| !of.forms.is_empty());
         let forms: Vec<DensityKind> = first.map_or(Vec::new(), |of| of.forms.iter().map(|other| other.form).collect());
@@ -157,30 +120,20 @@ impl CompareFile {
             .column("parameters", |(_, of, ..)| of.parameters)
             .column("model", |(_, _, s, ..)| s.model.name())
             .column("criterion", |(_, _, s, ..)| s.criterion.key())
-            .column("s_rate", |(_, _, s, ..)| s.rate.rate)
-            .column("s_low", |(_, _, s, ..)| s.rate.low)
-            .column("s_high", |(_, _, s, ..)| s.rate.high)
+            .columns(ends, |(name, _)| format!("s_{name}"), |(_, _, s, ..), (_, end)| end(&s.rate))
             .column("s_failures", |(_, _, s, ..)| s.rate.failures)
             .column("s_lanes", |(_, _, s, ..)| s.rate.lanes)
             .column("s_failing_scenarios", |(_, _, s, ..)| s.failing_scenarios)
-            .column("s_prime_rate", |(.., replayed, _)| replayed.rate.rate)
-            .column("s_prime_low", |(.., replayed, _)| replayed.rate.low)
-            .column("s_prime_high", |(.., replayed, _)| replayed.rate.high)
-            .column("s_prime_ratio", |(.., replayed, _)| replayed.ratio.ratio)
-            .column("s_prime_ratio_low", |(.., replayed, _)| replayed.ratio.low)
-            .column("s_prime_ratio_high", |(.., replayed, _)| replayed.ratio.high)
+            .columns(ends, |(name, _)| format!("s_prime_{name}"), |(.., of, _), (_, end)| end(&of.rate))
+            .columns(ratios, |(name, _)| format!("s_prime_{name}"), |(.., of, _), (_, end)| end(&of.ratio))
             .column("s_prime_verdict", |(.., replayed, _)| replayed.ratio.verdict.text())
             .column("f1", |(.., replayed, _)| f1(&replayed.labels))
-            .column("density_rate", |(.., sampled)| sampled.rate.rate)
-            .column("density_low", |(.., sampled)| sampled.rate.low)
-            .column("density_high", |(.., sampled)| sampled.rate.high)
+            .columns(ends, |(name, _)| format!("density_{name}"), |(.., of), (_, end)| end(&of.rate))
             .column("density_low_with_data", |(.., sampled)| sampled.with_data[0])
             .column("density_high_with_data", |(.., sampled)| sampled.with_data[1])
             .column("density_failures", |(.., sampled)| sampled.rate.failures)
             .column("density_lanes", |(.., sampled)| sampled.rate.lanes)
-            .column("ratio", |(.., sampled)| sampled.ratio.ratio)
-            .column("ratio_low", |(.., sampled)| sampled.ratio.low)
-            .column("ratio_high", |(.., sampled)| sampled.ratio.high)
+            .columns(ratios, |(name, _)| name, |(.., of), (_, end)| end(&of.ratio))
             .column("verdict", |(.., sampled)| sampled.ratio.verdict.text())
             .columns(
                 forms.iter().flat_map(|form| ends.map(|end| (*form, end))),
@@ -194,7 +147,7 @@ impl CompareFile {
             .columns(risks, |of| format!("s_per_1000_km{}", of.0), |(_, _, s, ..), of| s.risk.per_1000_km.map(of.1))
             .columns(risks, |of| format!("density_per_hour{}", of.0), |(.., s), of| s.risk.per_hour.map(of.1))
             .columns(risks, |of| format!("density_per_1000_km{}", of.0), |(.., s), of| s.risk.per_1000_km.map(of.1))
-            .column("data", |_| self.data.as_str())
+            .column("data", |_| self.compare.provenance().data.as_str())
             .build()
             .csv()
     }
@@ -202,7 +155,8 @@ impl CompareFile {
     /// The tables for the terminal, at most 120 columns wide; only a long word in the data's description (a path) can
     /// exceed this.
     pub fn text(&self) -> String {
-        let mut text = format!("{}\n\n{}\n", wrap(&self.data, WIDTH), self.rule());
+        let provenance = self.compare.provenance();
+        let mut text = format!("{}\n\n{}\n", wrap(&provenance.data, WIDTH), self.rule());
         for category in &self.categories {
             let _ = writeln!(
                 text,
@@ -212,9 +166,9 @@ impl CompareFile {
                 if self.is_observed() {
                     "their recorded gaps".to_owned()
                 } else {
-                    format!("{} headways", self.headways.len())
+                    format!("{} headways", self.headways().len())
                 },
-                readable::count(self.samples),
+                readable::count(self.compare.options().samples),
                 if self.is_observed() { "drawn headways" } else { "the same" }
             );
             for criterion in Criterion::ALL {
@@ -222,148 +176,63 @@ impl CompareFile {
             }
             text.push_str(&summary(category));
             text.push_str(&goodness(category));
-            text.push_str(&self.uncertainty(category));
+            text.push_str(&uncertainty(category));
         }
         let close = self.categories.iter().filter_map(|comparison| {
             let close = comparison.close_following.as_ref()?;
-            Some(CloseRow { category: comparison.category, models: &self.models, close })
+            Some(CloseRow { category: comparison.category, models: &self.compare.lane_plan().models, close })
         });
-        let headways: Vec<Headway> = self.headways.iter().filter_map(|text| Headway::parse(text)).collect();
-        let close = close_following(&close.collect::<Vec<_>>(), "S", &headways, WIDTH);
+        let close = close_following(&close.collect::<Vec<_>>(), "S", self.headways(), WIDTH);
         text.extend((!close.is_empty()).then(|| format!("\n{close}")));
         for reason in &self.left_out {
             let _ = writeln!(text, "\n{}", wrap(&format!("left out: {reason}"), WIDTH));
         }
-        if self.synthetic {
+        if provenance.synthetic {
             text.push_str("\nSYNTHETIC DATA: no number above is a statement about real traffic\n");
         }
         text
     }
 
     /// The comparison as one page with these figures.
-    ///
-    /// # Errors
-    /// None for a page of this program.
-    pub fn html(&self, figures: Vec<PageFigure>) -> String {
-        let mut warnings = Vec::new();
-        if !self.left_out.is_empty() {
-            warnings.push(format!("{} parts were left out; see the end of Rates.", self.left_out.len()));
-        }
+    fn html(&self, figures: Vec<PageFigure>) -> String {
+        let (plan, options, provenance) = (self.compare.lane_plan(), self.compare.options(), self.compare.provenance());
+        let left_out = format!("{} parts were left out; see the end of Rates.", self.left_out.len());
         let mut figures = figures.into_iter();
         let per_category = 2 * Criterion::ALL.len();
         let shown = self.categories.iter().map(|category| {
-            let label = category.category.label();
-            Section {
-                figures: figures.by_ref().take(per_category).collect(),
-                parts: vec![Section {
-                    title: "Every ratio".to_owned(),
-                    tables: vec![self.ratio_table(category)],
-                    ..Section::default()
-                }],
-                ..Section::new(category.category.key(), &format!("{label}: failures of S' and of densities beside S"))
-            }
+            let title = format!("{}: failures of S' and of densities beside S", category.category.label());
+            Section::new(category.category.key(), title)
+                .figures(figures.by_ref().take(per_category))
+                .parts([Section::new("", "Every ratio").tables([ratio_table(category)])])
         });
-        let shown: Vec<Section> = shown.collect();
-        let rates = Section { text: self.text(), is_folded: true, ..Section::new("rates", "Rates and their ratios") };
-        let facts = [
-            ("program", self.program.clone()),
-            ("profile", self.profile.name.clone()),
-            ("seed", self.seed.to_string()),
-            ("samples of each density", readable::count(self.samples)),
-            ("SHA-256 of the scenarios", self.scenarios_sha256.clone()),
-            ("SHA-256 of the plan of S and S'", self.study_plan_sha256.clone()),
-        ];
-        let host = [
-            ("computed by", self.host.backend.clone()),
-            ("seconds", format!("{:.2} on {} threads", self.host.seconds, self.host.threads)),
-        ];
-        let named = |(name, value): (&str, String)| (name.to_owned(), value);
-        let reproduction = Section {
-            intro:
-                "The same scenarios, flags and seed give the same numbers, on any machine. compare.json holds all of \
-                    it."
-                .to_owned(),
-            facts: facts.into_iter().map(named).collect(),
-            host: host.into_iter().map(named).collect(),
-            ..Section::new("reproduction", "Reproduction")
-        };
-        let page = Page {
+        let rates = Section::new("rates", "Rates and their ratios").text(self.text()).folded();
+        let reproduction = Section::new("reproduction", "Reproduction")
+            .intro("The same scenarios, flags and seed give the same numbers, on any machine. compare.json holds all of it.")
+            .fact("program", PROGRAM)
+            .fact("profile", &plan.profile.name)
+            .fact("seed", options.seed.to_string())
+            .fact("samples of each density", readable::count(options.samples))
+            .fact("SHA-256 of the scenarios", &provenance.scenarios_sha256)
+            .fact("SHA-256 of the plan of S and S'", plan.hash())
+            .host([self.host.computed_by(), self.host.wall_clock()]);
+        Page {
             title: "Rates of failure: recorded, replayed, drawn".to_owned(),
-            lead: self.data.clone(),
-            synthetic: self.synthetic,
-            warnings,
-            sections: shown.into_iter().chain([rates, reproduction]).collect(),
-        };
-        page.html()
-    }
-
-    /// Every cell of a category.
-    fn ratio_table(&self, category: &CategoryComparison) -> Table {
-        let rows = category
-            .parameterizations
-            .iter()
-            .flat_map(|of| category.recorded.iter().zip(&of.cells).map(move |(s, cell)| (of, s, cell)));
-        let ratio = |ratio: &Ratio| ratio.ratio.map(|value| NumberText(format!("{} {}", factor(value), ends(ratio))));
-        Table::of(rows)
-            .column("criterion", |(_, s, _)| s.criterion.label())
-            .column("model", |(_, s, _)| s.model.name())
-            .column("parameterization", |(of, ..)| of.key.as_str())
-            .column("share of S", |(_, s, _)| NumberText(short(s.rate.rate)))
-            .column("n", |(_, s, _)| s.failing_scenarios)
-            .column(Column::from("S' / S").null("–"), |(.., cell)| ratio(&cell.replayed.ratio))
-            .column("S'", |(.., cell)| cell.replayed.ratio.verdict.text())
-            .column(Column::from("density / S").null("–"), |(.., cell)| ratio(&cell.sampled.ratio))
-            .column("density", |(.., cell)| cell.sampled.ratio.verdict.text())
-            .build()
-            .captioned(format!("Ratios to S with their {} % intervals; n: failing scenarios of S", 100.0 * self.level))
-    }
-
-    /// What the risk of a category is uncertain by, over all its parameterizations and forms.
-    fn uncertainty(&self, category: &CategoryComparison) -> String {
-        let rows: Vec<(&RecordedCell, Option<&Uncertainty>)> =
-            category.recorded.iter().zip(&category.uncertainty).map(|(s, of)| (s, of.as_ref())).collect();
-        if rows.iter().all(|(_, of)| of.is_none()) {
-            return String::new();
+            lead: provenance.data.clone(),
+            synthetic: provenance.synthetic,
+            warnings: if self.left_out.is_empty() { Vec::new() } else { vec![left_out] },
+            sections: shown.chain([rates, reproduction]).collect(),
         }
-        type Pick = fn(&Uncertainty) -> Option<f64>;
-        let parts: [(&str, Pick); 5] = [
-            ("draws", |u| Some(u.draws)),
-            ("scenarios", |u| Some(u.scenarios)),
-            ("frequency", |u| Some(u.exposure)),
-            ("form", |u| u.form),
-            ("parameterization", |u| u.parameterization),
-        ];
-        let z = normal_quantile(0.5 + 0.5 * self.level);
-        let table = Table::of(rows)
-            .column("risk uncertain by", |(s, _)| s.model.name())
-            .column("criterion", |(s, _)| s.criterion.key())
-            .column(Column::from("factor").digits(Digits::Significant(3)).null("-"), |(_, of)| {
-                of.map(|of| libm::exp(z * of.deviation))
-            })
-            .columns(
-                parts,
-                |(name, _)| Column::from(format!("{name} %")).digits(Digits::Fixed(0)).null("-"),
-                |(_, of), (_, pick)| of.and_then(pick).map(|part| 100.0 * part),
-            );
-        let rule = format!(
-            "Factor: the {:.0} % interval of the risk, whichever of the densities above it comes from, is about from 1/factor \
-             to factor times their geometric mean. The parts are those of the variance of its logarithm; form and \
-             parameterization (- where only one was sampled) are the spread of the densities' rates, less the draws: rough \
-             figures, because they rest on a few choices. A rate without failures counts as its upper bound, so it \
-             understates the spread; - in a whole row: no density fails.",
-            100.0 * self.level
-        );
-        format!("\n{}{}\n", table.build().text(), wrap(&rule, WIDTH))
+        .html()
     }
 
     /// Whether scenarios start from their recorded gaps.
     fn is_observed(&self) -> bool {
-        self.headways.iter().any(|text| Headway::parse(text) == Some(Headway::Observed))
+        Headway::is_observed(self.headways())
     }
 
     /// How to read a cell.
     fn rule(&self) -> String {
-        let Enough { clusters, margin } = self.enough;
+        let Enough { clusters, margin } = self.compare.options().enough;
         let text = format!(
             "A cell is: failed share of the lanes, its ratio to S, the ratio's {:.0} % interval, verdict. = agrees: the \
              interval lies within {:.2} … {margin}. > too high, < too low: it lies on one side of 1 and reaches \
@@ -374,7 +243,7 @@ impl CompareFile {
              says whether these scenarios are represented, not whether they are enough. Of cells whose ratio is 1, at \
              most 1 in 20 is marked too high or too low by chance. Risks \
              have the ratios of the rates: S and densities have the same exposure.",
-            100.0 * self.level,
+            100.0 * Compare::LEVEL,
             1.0 / margin,
             match self.categories.iter().flat_map(|of| &of.parameterizations).any(|of| !of.forms.is_empty()) {
                 true =>
@@ -420,7 +289,7 @@ impl CompareFile {
                 rows.push((format!("{} {}", of.key, other.form.key()), cells.collect()));
             }
         }
-        let models = self.models.iter().enumerate();
+        let models = self.compare.lane_plan().models.iter().enumerate();
         let table = Table::of(&rows).column(criterion.label(), |(name, _)| name.as_str()).columns(
             models,
             |(_, model)| model.name(),
@@ -428,6 +297,65 @@ impl CompareFile {
         );
         table.build().text() + "\n"
     }
+}
+
+/// Every cell of a category.
+fn ratio_table(category: &CategoryComparison) -> Table {
+    let rows = category
+        .parameterizations
+        .iter()
+        .flat_map(|of| category.recorded.iter().zip(&of.cells).map(move |(s, cell)| (of, s, cell)));
+    let ratio = |ratio: &Ratio| ratio.ratio.map(|value| NumberText(format!("{} {}", factor(value), ends(ratio))));
+    Table::of(rows)
+        .column("criterion", |(_, s, _)| s.criterion.label())
+        .column("model", |(_, s, _)| s.model.name())
+        .column("parameterization", |(of, ..)| of.key.as_str())
+        .column("share of S", |(_, s, _)| NumberText(short(s.rate.rate)))
+        .column("n", |(_, s, _)| s.failing_scenarios)
+        .column(Column::from("S' / S").null("–"), |(.., cell)| ratio(&cell.replayed.ratio))
+        .column("S'", |(.., cell)| cell.replayed.ratio.verdict.text())
+        .column(Column::from("density / S").null("–"), |(.., cell)| ratio(&cell.sampled.ratio))
+        .column("density", |(.., cell)| cell.sampled.ratio.verdict.text())
+        .build()
+        .captioned(format!("Ratios to S with their {} % intervals; n: failing scenarios of S", 100.0 * Compare::LEVEL))
+}
+
+/// What the risk of a category is uncertain by, over all its parameterizations and forms.
+fn uncertainty(category: &CategoryComparison) -> String {
+    let rows: Vec<(&RecordedCell, Option<&Uncertainty>)> =
+        category.recorded.iter().zip(&category.uncertainty).map(|(s, of)| (s, of.as_ref())).collect();
+    if rows.iter().all(|(_, of)| of.is_none()) {
+        return String::new();
+    }
+    type Pick = fn(&Uncertainty) -> Option<f64>;
+    let parts: [(&str, Pick); 5] = [
+        ("draws", |u| Some(u.draws)),
+        ("scenarios", |u| Some(u.scenarios)),
+        ("frequency", |u| Some(u.exposure)),
+        ("form", |u| u.form),
+        ("parameterization", |u| u.parameterization),
+    ];
+    let z = normal_quantile(0.5 + 0.5 * Compare::LEVEL);
+    let table = Table::of(rows)
+        .column("risk uncertain by", |(s, _)| s.model.name())
+        .column("criterion", |(s, _)| s.criterion.key())
+        .column(Column::from("factor").digits(Digits::Significant(3)).null("-"), |(_, of)| {
+            of.map(|of| libm::exp(z * of.deviation))
+        })
+        .columns(
+            parts,
+            |(name, _)| Column::from(format!("{name} %")).digits(Digits::Fixed(0)).null("-"),
+            |(_, of), (_, pick)| of.and_then(pick).map(|part| 100.0 * part),
+        );
+    let rule = format!(
+        "Factor: the {:.0} % interval of the risk, whichever of the densities above it comes from, is about from 1/factor \
+         to factor times their geometric mean. The parts are those of the variance of its logarithm; form and \
+         parameterization (- where only one was sampled) are the spread of the densities' rates, less the draws: rough \
+         figures, because they rest on a few choices. A rate without failures counts as its upper bound, so it \
+         understates the spread; - in a whole row: no density fails.",
+        100.0 * Compare::LEVEL
+    );
+    format!("\n{}{}\n", table.build().text(), wrap(&rule, WIDTH))
 }
 
 /// Per parameterization and form: how well the density represents unseen scenarios. Empty unless forms were compared.
@@ -553,7 +481,7 @@ fn legend_name(of: &ComparedParameterization) -> String {
 
 /// Shares of failed lanes for one criterion of one category: a row per driver model; the recorded scenarios, then every
 /// density.
-fn rates(file: &CompareFile, comparison: &CategoryComparison, criterion: Criterion) -> Figure {
+fn rates(compare: &Compare, comparison: &CategoryComparison, criterion: Criterion) -> Figure {
     let (recorded, rows) = rows(comparison, criterion);
     // A logarithmic axis cannot show a rate of 0, but it can show the bound above it.
     let value = |rate: &RateRecord| {
@@ -579,15 +507,16 @@ fn rates(file: &CompareFile, comparison: &CategoryComparison, criterion: Criteri
         .collect();
     let x = PlotAxis::around("share of failed lanes", AxisScale::Logarithmic, logarithmic_reach(&reach));
     let panel = Dots { heading: String::new(), x, marked: Vec::new(), series };
+    let samples = readable::count(compare.options().samples);
     Figure {
         title: format!("{}: share of lanes that fail {}", comparison.category.label(), criterion.label()),
-        subtitle: Some(format!("{} · densities of {} samples each", file.data, readable::count(file.samples))),
+        subtitle: Some(format!("{} · densities of {samples} samples each", compare.provenance().data)),
         caption: format!(
             "Line: {0} % interval, of S over the scenarios, of a density over the draws alone; thin line: the density's \
              over draws and scenarios, at fixed bandwidth and scale. A line at the left edge goes on beyond it; an arrow \
              is a share of zero below its bound. n: scenarios in which S fails. S and the densities rest on the same \
              scenarios: the figure of the ratios compares them.",
-            100.0 * file.level
+            100.0 * Compare::LEVEL
         ),
         plots: dots(&rows, vec![panel]),
         ..Figure::default()
@@ -595,7 +524,7 @@ fn rates(file: &CompareFile, comparison: &CategoryComparison, criterion: Criteri
 }
 
 /// Ratios of the shares of failed lanes to those of S: of S', replayed, and of the density, drawn.
-fn ratios(file: &CompareFile, comparison: &CategoryComparison, criterion: Criterion) -> Figure {
+fn ratios(compare: &Compare, comparison: &CategoryComparison, criterion: Criterion) -> Figure {
     type Pick = fn(&ComparedCell) -> &Ratio;
     let sides: [(&str, Pick); 2] =
         [("S', replayed", |cell| &cell.replayed.ratio), ("density, drawn", |cell| &cell.sampled.ratio)];
@@ -604,7 +533,7 @@ fn ratios(file: &CompareFile, comparison: &CategoryComparison, criterion: Criter
         let (low, high) = (ratio.low.unwrap_or(0.0), ratio.high.unwrap_or(f64::MAX));
         Some(Value { x: ratio.ratio?, interval: Some((low, high)), ..Value::default() })
     };
-    let margin = file.enough.margin;
+    let margin = compare.options().enough.margin;
     let all = sides.iter().flat_map(|(_, pick)| {
         let cells = comparison.parameterizations.iter().flat_map(|of| &of.cells).filter(|c| c.criterion == criterion);
         cells.filter_map(|cell| value(pick(cell)))
@@ -635,13 +564,13 @@ fn ratios(file: &CompareFile, comparison: &CategoryComparison, criterion: Criter
             comparison.category.label(),
             criterion.label()
         ),
-        subtitle: Some(file.data.clone()),
+        subtitle: Some(compare.provenance().data.clone()),
         caption: format!(
             "Share of the lanes that fail, as a multiple of that of S, scenario by scenario, with its {} % interval; 1: as \
              many failures, though perhaps of other scenarios (see F1). A ratio agrees where its interval lies between \
              the dashed lines ({:.2} and {margin}). Where S never fails there is no ratio. A \
              line at an edge goes on beyond it; an arrow is a ratio of zero below its bound. n: scenarios in which S fails.",
-            100.0 * file.level,
+            100.0 * Compare::LEVEL,
             1.0 / margin
         ),
         plots: dots(&rows, sides.map(panel).into_iter().collect()),

@@ -5,7 +5,7 @@
 //! upper end is drawn instead, with an arrow downwards.
 
 use super::plot::{AxisScale, logarithmic_reach, number};
-use super::plot::{Figure, Layer, Mark, Plot, PlotAxis, Series, Value, is_few};
+use super::plot::{Figure, Mark, Plot, PlotAxis, Series, Value, is_few};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::sampling::{Checkpoint, CheckpointRow};
@@ -53,7 +53,7 @@ pub(super) fn convergence(density: &DensityModel, checkpoints: &[Checkpoint], le
             value.label = format!("{scenarios:.0}");
         }
         let series = Series::new(criterion.label(), &[Mark::Band, Mark::Line, Mark::Points], []);
-        Layer::from(Series { values, attributes: "class=\"estimate\"".to_owned(), ..series })
+        Series { values, attributes: "class=\"estimate\"".to_owned(), ..series }
     };
     let mut models: Vec<ModelId> = Vec::new();
     rows().for_each(|(_, row)| models.extend((!models.contains(&row.model)).then_some(row.model)));
@@ -63,7 +63,7 @@ pub(super) fn convergence(density: &DensityModel, checkpoints: &[Checkpoint], le
             heading: model.name().to_owned(),
             x: PlotAxis::around("samples", AxisScale::Logarithmic, samples.clone()),
             y: PlotAxis::around("failure probability", AxisScale::Logarithmic, logarithmic_reach(&reach)),
-            layers: Criterion::ALL.into_iter().filter(has).map(|criterion| series(model, criterion)).collect(),
+            series: Criterion::ALL.into_iter().filter(has).map(|criterion| series(model, criterion)).collect(),
             ..Plot::default()
         }
     };

@@ -2,9 +2,8 @@
 
 use serde_json::json;
 
-use super::records;
-use super::records::{PROGRAM, smallest_gap_m};
-use super::sampling::HostRecord;
+use super::host::Host;
+use super::records::{self, PROGRAM, smallest_gap_m};
 use super::trace::{TraceFigure, TracePanels, TraceSeries};
 use crate::Result;
 use crate::model::profile::Profile;
@@ -42,7 +41,7 @@ pub struct DossierReport<'a> {
     /// Command that reproduces it.
     pub command: String,
     /// Facts about the machine.
-    pub host: HostRecord,
+    pub host: Host,
 }
 
 impl DossierReport<'_> {

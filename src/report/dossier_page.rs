@@ -8,7 +8,7 @@ use crate::support::readable::{count, value};
 impl DossierReport<'_> {
     /// The dossier as a page.
     pub fn html(&self) -> String {
-        let page = Page {
+        Page {
             title: format!("Is {} appropriate under {}?", self.dossier.parameterization.name(), self.profile.name),
             lead: format!("{}. {} {} {}", self.answer(), self.recall(), self.coverage(), self.provenance.data),
             synthetic: self.provenance.synthetic,
@@ -16,46 +16,38 @@ impl DossierReport<'_> {
             sections: vec![
                 self.conclusion_section(),
                 self.hidden_section(),
-                Section {
-                    intro: "Thirds of the scenarios by the ego's speed, and of the failures of S by severity: closing speed at \
-                            the contact, else the shortfall of TTC or the excess of BTN. Precision has no meaning within \
-                            failures of S."
-                        .to_owned(),
-                    tables: vec![self.groups().captioned("Scores by group, [interval over scenarios]")],
-                    ..Section::new("groups", "By headway, speed and severity")
-                },
+                Section::new("groups", "By headway, speed and severity")
+                    .intro(
+                        "Thirds of the scenarios by the ego's speed, and of the failures of S by severity: closing \
+                         speed at the contact, else the shortfall of TTC or the excess of BTN. Precision has no meaning \
+                         within failures of S.",
+                    )
+                    .tables([self.groups().captioned("Scores by group, [interval over scenarios]")]),
                 self.risk_section(),
                 self.cost_section(),
-                Section {
-                    intro: "Every parameterization of this kind of scenario on the same data, by the rules for recall and \
-                            precision alone."
-                        .to_owned(),
-                    tables: vec![self.alternatives().captioned("Alternatives, [interval over scenarios]")],
-                    ..Section::new("alternatives", "The alternatives")
-                },
+                Section::new("alternatives", "The alternatives")
+                    .intro(
+                        "Every parameterization of this kind of scenario on the same data, by the rules for recall and \
+                         precision alone.",
+                    )
+                    .tables([self.alternatives().captioned("Alternatives, [interval over scenarios]")]),
                 self.credibility_section(),
-                Section { facts: self.limits(), ..Section::new("limits", "Limits of use") },
+                Section::new("limits", "Limits of use").facts(self.limits()),
                 self.reproduction_section(),
-                Section { facts: self.signature(), ..Section::new("signature", "Signature") },
+                Section::new("signature", "Signature").facts(self.signature()),
             ],
-        };
-        page.html()
+        }
+        .html()
     }
 
     fn conclusion_section(&self) -> Section {
-        Section {
-            intro: [self.need().unwrap_or_default(), self.close_following()].join(" ").trim().to_owned(),
-            tables: vec![self.findings().captioned("What each rule finds; the worst decides")],
-            facts: vec![
-                ("rule".to_owned(), self.rule()),
-                ("source of the limits".to_owned(), self.limits_of_rules()),
-                (
-                    "statistical significance".to_owned(),
-                    format!("intervals of {} % over scenarios", value(100.0 * self.score.confidence)),
-                ),
-            ],
-            ..Section::new("conclusion", "Conclusion")
-        }
+        let significance = format!("intervals of {} % over scenarios", value(100.0 * self.score.confidence));
+        Section::new("conclusion", "Conclusion")
+            .intro([self.need().unwrap_or_default(), self.close_following()].join(" ").trim())
+            .tables([self.findings().captioned("What each rule finds; the worst decides")])
+            .fact("rule", self.rule())
+            .fact("source of the limits", self.limits_of_rules())
+            .fact("statistical significance", significance)
     }
 
     fn hidden_section(&self) -> Section {
@@ -75,62 +67,54 @@ impl DossierReport<'_> {
                 share(&self.dossier.scored.f1)
             ),
         };
-        let mut section = Section { intro, ..Section::new("hidden", "Failures that are hidden") };
-        if counts.fn_ > 0 {
-            let caption = format!("Hidden failures, the most severe first. {}", self.beside(SHOWN));
-            section.tables.push(self.hidden(SHOWN).captioned(caption.trim()));
-        }
-        section.figures.extend(self.example().map(|svg| PageFigure::new(&svg, &["hidden.svg"])));
-        section
+        let caption = format!("Hidden failures, the most severe first. {}", self.beside(SHOWN));
+        Section::new("hidden", "Failures that are hidden")
+            .intro(intro)
+            .tables((counts.fn_ > 0).then(|| self.hidden(SHOWN).captioned(caption.trim())))
+            .figures(self.example().map(|svg| PageFigure::new(&svg, &["hidden.svg"])))
     }
 
     fn risk_section(&self) -> Section {
-        let mut section = Section::new("risk", "Risk");
-        match (self.risk(), &self.dossier.no_density) {
-            (Some(risk), _) => {
-                section.intro =
-                    "Rates of failure of the recorded scenarios (S), of their parameterized replays (S') and of a \
-                                 density fitted on their parameters (P)."
-                        .to_owned();
-                section.tables.push(risk.captioned("Rates and risk ratios"));
+        let risk = self.risk();
+        let intro = match (&risk, &self.dossier.no_density) {
+            (Some(_), _) => {
+                "Rates of failure of the recorded scenarios (S), of their parameterized replays (S') and of \
+                             a density fitted on their parameters (P)."
+                    .to_owned()
             }
-            (None, Some(error)) => section.intro = format!("There is no density: {error}."),
-            (None, None) => section.intro = "There is no density.".to_owned(),
-        }
-        section
+            (None, Some(error)) => format!("There is no density: {error}."),
+            (None, None) => "There is no density.".to_owned(),
+        };
+        Section::new("risk", "Risk").intro(intro).tables(risk.map(|risk| risk.captioned("Rates and risk ratios")))
     }
 
     fn cost_section(&self) -> Section {
         let d = self.dossier.parameterization.parameter_count() as f64;
         let n = self.dossier.coverage.as_ref().map_or(self.dossier.scenarios, |coverage| coverage.points) as f64;
         let needed = n.powf((4.0 + d) / 5.0);
-        let mut facts = vec![
-            ("parameters".to_owned(), format!("{d}")),
-            ("points of the density".to_owned(), count(n as u64)),
-            (
-                "cost of the dimension".to_owned(),
-                format!(
-                    "the squared error of a kernel density falls as n^(-4/(4+d)) (Silverman 1986, 4.3): as many as {} points \
-                     would give {} parameters the accuracy that one parameter has at {}",
-                    value(needed),
-                    d,
-                    count(n as u64)
-                ),
-            ),
-        ];
-        if let Some(coverage) = &self.dossier.coverage {
-            facts.push(("coverage".to_owned(), self.coverage()));
-            let percent = value(100.0 * coverage.valid_fraction);
-            facts.push(("share of the density inside its valid region".to_owned(), format!("{percent} %")));
-            facts.push((
-                "representativeness".to_owned(),
-                coverage.representativeness.map_or("too few scenarios to split".to_owned(), |(metric, train_test)| {
-                    let (metric, reached) = (value(metric), value(train_test));
-                    format!("M = {metric}; as many recorded scenarios reach {reached} (smaller is better)")
-                }),
-            ));
-        }
-        Section { facts, ..Section::new("coverage", "Parameters and coverage") }
+        let cost = format!(
+            "the squared error of a kernel density falls as n^(-4/(4+d)) (Silverman 1986, 4.3): as many as {} points would \
+             give {d} parameters the accuracy that one parameter has at {}",
+            value(needed),
+            count(n as u64)
+        );
+        let section = Section::new("coverage", "Parameters and coverage")
+            .fact("parameters", d.to_string())
+            .fact("points of the density", count(n as u64))
+            .fact("cost of the dimension", cost);
+        let Some(coverage) = &self.dossier.coverage else { return section };
+        let represents = |(metric, train_test)| {
+            let (metric, reached) = (value(metric), value(train_test));
+            format!("M = {metric}; as many recorded scenarios reach {reached} (smaller is better)")
+        };
+        let unknown = || "too few scenarios to split".to_owned();
+        section
+            .fact("coverage", self.coverage())
+            .fact(
+                "share of the density inside its valid region",
+                format!("{} %", value(100.0 * coverage.valid_fraction)),
+            )
+            .fact("representativeness", coverage.representativeness.map_or_else(unknown, represents))
     }
 
     fn credibility_section(&self) -> Section {
@@ -138,33 +122,21 @@ impl DossierReport<'_> {
             "{} lanes were computed again on the CPU with every step, and were equal to the bit",
             count(self.host.rechecked_lanes)
         );
-        Section {
-            facts: vec![
-                ("exactness".to_owned(), recheck),
-                (
-                    "not covered".to_owned(),
-                    "perception faults, vehicle dynamics beyond a deceleration with a jerk limit".to_owned(),
-                ),
-            ],
-            ..Section::new("credibility", "Credibility of the simulation")
-        }
+        Section::new("credibility", "Credibility of the simulation")
+            .fact("exactness", recheck)
+            .fact("not covered", "perception faults, vehicle dynamics beyond a deceleration with a jerk limit")
     }
 
     fn reproduction_section(&self) -> Section {
-        let density = self.dossier.density_sha256.clone().unwrap_or_else(|| "–".to_owned());
-        Section {
-            facts: vec![
-                ("command".to_owned(), self.command.clone()),
-                ("program".to_owned(), format!("{PROGRAM}, engine {}", crate::engine::ENGINE_VERSION)),
-                ("data".to_owned(), self.provenance.data.clone()),
-                ("SHA-256 of the scenarios".to_owned(), self.provenance.scenarios_sha256.clone()),
-                ("SHA-256 of the plan".to_owned(), self.dossier.plan_sha256.clone()),
-                ("SHA-256 of the density".to_owned(), density),
-                ("profile".to_owned(), format!("{}, time step {} s", self.profile.name, self.profile.frame.dt_s)),
-            ],
-            host: vec![("computed by".to_owned(), self.host.backend.clone())],
-            parts: vec![Section::options(format!("Profile {}", self.profile.name), self.profile)],
-            ..Section::new("reproduction", "Reproduction")
-        }
+        Section::new("reproduction", "Reproduction")
+            .fact("command", &self.command)
+            .fact("program", format!("{PROGRAM}, engine {}", crate::engine::ENGINE_VERSION))
+            .fact("data", &self.provenance.data)
+            .fact("SHA-256 of the scenarios", &self.provenance.scenarios_sha256)
+            .fact("SHA-256 of the plan", &self.dossier.plan_sha256)
+            .fact("SHA-256 of the density", self.dossier.density_sha256.as_deref().unwrap_or("–"))
+            .fact("profile", format!("{}, time step {} s", self.profile.name, self.profile.frame.dt_s))
+            .host([self.host.computed_by()])
+            .parts([Section::options(format!("Profile {}", self.profile.name), self.profile)])
     }
 }

@@ -151,52 +151,34 @@ impl DossierReport<'_> {
     }
 
     /// Purposes that the conclusion does not support.
-    pub(super) fn limits(&self) -> Vec<(String, String)> {
-        let model = self.dossier.model.name();
+    pub(super) fn limits(&self) -> [(&'static str, String); 6] {
         let headways = if Headway::is_observed(&self.dossier.headways) {
             "each scenario starts from its recorded gap; other traffic has others".to_owned()
         } else {
             format!("{}: rates and scores are those of these headways, not of traffic", self.headways())
         };
-        let limit = |name: &str, words: String| (name.to_owned(), words);
-        vec![
-            limit(
-                "data",
-                format!(
-                    "these {} scenarios of {} found; no other road, country or year",
-                    count(self.dossier.scenarios),
-                    count(self.dossier.found)
-                ),
-            ),
-            limit("headways", headways),
-            limit(
-                "profile",
-                format!(
-                    "the constants of {}; under another profile, model or criterion the conclusion can be another",
-                    self.profile.name
-                ),
-            ),
-            limit(
-                "system",
-                format!("{model} is a reference driver: nothing here is measured on the system to be assessed"),
-            ),
-            limit("other vehicles", "they move as recorded or drawn and do not react to the ego".to_owned()),
-            limit(
-                "intervals",
-                "over scenarios: they hold neither the choice of recordings nor errors of mining, profile or model"
-                    .to_owned(),
-            ),
+        let (model, profile) = (self.dossier.model.name(), &self.profile.name);
+        let (scenarios, found) = (count(self.dossier.scenarios), count(self.dossier.found));
+        let data = format!("these {scenarios} scenarios of {found} found; no other road, country or year");
+        let profile = format!(
+            "the constants of {profile}; under another profile, model or criterion the conclusion can be another"
+        );
+        let system = format!("{model} is a reference driver: nothing here is measured on the system to be assessed");
+        let intervals =
+            "over scenarios: they hold neither the choice of recordings nor errors of mining, profile or model";
+        [
+            ("data", data),
+            ("headways", headways),
+            ("profile", profile),
+            ("system", system),
+            ("other vehicles", "they move as recorded or drawn and do not react to the ego".to_owned()),
+            ("intervals", intervals.to_owned()),
         ]
     }
 
     /// Signatory and date, given or blank.
-    pub(super) fn signature(&self) -> Vec<(String, String)> {
-        let or_blank = |text: &Option<String>| text.clone().unwrap_or_else(|| BLANK.to_owned());
-        let line = |name: &str, text: String| (name.to_owned(), text);
-        vec![
-            line("author", or_blank(&self.author)),
-            line("date", or_blank(&self.date)),
-            line("signature", BLANK.to_owned()),
-        ]
+    pub(super) fn signature(&self) -> [(&'static str, &str); 3] {
+        let (author, date) = (self.author.as_deref(), self.date.as_deref());
+        [("author", author.unwrap_or(BLANK)), ("date", date.unwrap_or(BLANK)), ("signature", BLANK)]
     }
 }

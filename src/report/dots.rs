@@ -1,7 +1,7 @@
 //! Dot plots: estimates with their intervals, a row of close lines per quantity, a line per series, in one panel or in
 //! several over the same rows.
 
-use super::plot::{Ends, GREY, Height, Layer, Look, Mark, Name, Plot, PlotAxis, Rule, Series, Value, is_few};
+use super::plot::{Ends, GREY, Height, Look, Mark, Name, Plot, PlotAxis, Rule, Series, Value, is_few};
 
 /// Height of a line, and of the space below a row, px.
 const LINE_PX: f64 = 8.0;
@@ -45,13 +45,13 @@ pub(super) fn dots(rows: &[DotRow], panels: Vec<Dots>) -> Vec<Plot> {
                 let y = -(value.y * row_px) - ROW_GAP_PX / 2.0 - (line as f64 + 0.5) * LINE_PX;
                 Value { y, is_few, ..value }
             };
-            Layer::from(Series {
+            Series {
                 values: series.values.into_iter().map(value).collect(),
                 marks: vec![Mark::Points, Mark::Intervals],
                 look: Some(Look { line_px: 1.4, marker_px: 3.8, ..look }),
                 is_sideways: true,
                 ..series
-            })
+            }
         };
         let separators = Rule {
             runs: (1..rows.len()).map(|row| [0.0, f64::MAX].map(|x| (x, -(row as f64 * row_px))).to_vec()).collect(),
@@ -61,17 +61,15 @@ pub(super) fn dots(rows: &[DotRow], panels: Vec<Dots>) -> Vec<Plot> {
         };
         let marked = panel.marked.iter().map(|&(x, dash)| {
             let runs = vec![vec![(x, -height_px), (x, 0.0)]];
-            Layer::from(Rule { runs, colour: GREY, width_px: 1.2, dash, ..Rule::default() })
+            Rule { runs, colour: GREY, width_px: 1.2, dash, ..Rule::default() }
         });
         let ends = Ends::Exactly(-height_px, 0.0);
         Plot {
             heading: panel.heading,
             x: panel.x,
             y: PlotAxis { names: rows.iter().enumerate().map(name).collect(), ends, ..PlotAxis::default() },
-            layers: std::iter::once(separators.into())
-                .chain(marked)
-                .chain(panel.series.into_iter().enumerate().map(line))
-                .collect(),
+            rules: std::iter::once(separators).chain(marked).collect(),
+            series: panel.series.into_iter().enumerate().map(line).collect(),
             height: Height::Px(height_px),
             ..Plot::default()
         }

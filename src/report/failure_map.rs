@@ -105,7 +105,7 @@ impl FailureMaps<'_> {
                 },
                 x: axis(&axes.x),
                 y: axis(&axes.y),
-                layers: vec![Cells { cells, key: key.into_iter().flatten().collect() }.into()],
+                cells: Some(Cells { cells, key: key.into_iter().flatten().collect() }),
                 height: Height::OfWidth(1.0),
                 ..Plot::default()
             }

@@ -7,8 +7,11 @@ use base64::prelude::{BASE64_STANDARD, Engine};
 use serde::Serialize;
 use sha2::{Digest, Sha256};
 
+use super::plot::Figure;
 use super::records::PROGRAM;
+use crate::Result;
 use crate::support::plain_text::shown;
+use crate::support::run_dir::Results;
 use crate::support::table::Table;
 
 const STYLE: &str = include_str!("templates/style.css");
@@ -31,31 +34,35 @@ impl PageFigure {
         let (svg, width_px) = inline(svg);
         PageFigure { svg, files: files.iter().map(|file| (*file).to_owned()).collect(), is_wide: width_px > NARROW_PX }
     }
+
+    /// Adds a figure to the results as NAME.svg, and its values as NAME.csv.
+    pub(super) fn add(results: &mut Results, name: &str, figure: &Figure) -> Result<PageFigure> {
+        let numbers = format!("{name}.csv");
+        results.add(&numbers, figure.csv().as_bytes())?;
+        PageFigure::add_svg(results, name, &figure.svg(), &numbers)
+    }
+
+    /// Adds a complete SVG document to the results as NAME.svg; its values are in another of their files.
+    pub(super) fn add_svg(results: &mut Results, name: &str, svg: &str, numbers: &str) -> Result<PageFigure> {
+        let file = format!("{name}.svg");
+        results.add(&file, svg.as_bytes())?;
+        Ok(PageFigure::new(svg, &[&file, numbers]))
+    }
 }
 
-/// A chapter of the page.
+/// A chapter of the page, or a part at the end of one.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Section {
-    /// Anchor: lower-case letters and dashes.
-    pub id: String,
-    /// Heading.
-    pub title: String,
-    /// What the chapter shows; may be empty.
-    pub intro: String,
-    /// A monospaced text with aligned columns; may be empty.
-    pub text: String,
-    /// Tables, before the figures.
-    pub tables: Vec<Table>,
-    /// Figures.
-    pub figures: Vec<PageFigure>,
-    /// Names and values.
-    pub facts: Vec<(String, String)>,
-    /// Names and values that depend on the machine and differ between runs.
-    pub host: Vec<(String, String)>,
-    /// Whether it opens on a click.
-    pub is_folded: bool,
-    /// Parts at its end, which open on a click; they need no anchor.
-    pub parts: Vec<Section>,
+    id: String,
+    title: String,
+    intro: String,
+    text: String,
+    tables: Vec<Table>,
+    figures: Vec<PageFigure>,
+    facts: Vec<(String, String)>,
+    host: Vec<(String, String)>,
+    is_folded: bool,
+    parts: Vec<Section>,
 }
 
 /// The page.
@@ -74,20 +81,68 @@ pub(super) struct Page {
 }
 
 impl Section {
-    /// An empty chapter.
-    pub(super) fn new(id: &str, title: &str) -> Section {
-        Section { id: id.to_owned(), title: title.to_owned(), ..Section::default() }
+    /// An empty chapter. Its anchor has lower-case letters and dashes; a part needs none.
+    pub(super) fn new(id: &str, title: impl Into<String>) -> Section {
+        Section { id: id.to_owned(), title: title.into(), ..Section::default() }
     }
 
-    /// A profile or options that open on a click.
+    /// A profile or options, as a part.
     pub(super) fn options(title: impl Into<String>, options: &impl Serialize) -> Section {
         // Texts and numbers, which JSON always has.
-        Section::folded(title, serde_json::to_string_pretty(options).unwrap_or_default())
+        Section::new("", title).text(serde_json::to_string_pretty(options).unwrap_or_default())
     }
 
-    /// A long text that opens on a click.
-    pub(super) fn folded(title: impl Into<String>, text: String) -> Section {
-        Section { title: title.into(), text, ..Section::default() }
+    /// What the chapter shows; may be empty.
+    pub(super) fn intro(self, intro: impl Into<String>) -> Section {
+        Section { intro: intro.into(), ..self }
+    }
+
+    /// A monospaced text with aligned columns; may be empty.
+    pub(super) fn text(self, text: impl Into<String>) -> Section {
+        Section { text: text.into(), ..self }
+    }
+
+    /// Tables, before the figures.
+    pub(super) fn tables(mut self, tables: impl IntoIterator<Item = Table>) -> Section {
+        self.tables.extend(tables);
+        self
+    }
+
+    /// Figures.
+    pub(super) fn figures(mut self, figures: impl IntoIterator<Item = PageFigure>) -> Section {
+        self.figures.extend(figures);
+        self
+    }
+
+    /// A name and its value.
+    pub(super) fn fact(self, name: &str, value: impl Into<String>) -> Section {
+        self.facts([(name, value)])
+    }
+
+    /// Names and values.
+    pub(super) fn facts<N: Into<String>, V: Into<String>>(
+        mut self,
+        facts: impl IntoIterator<Item = (N, V)>,
+    ) -> Section {
+        self.facts.extend(facts.into_iter().map(|(name, value)| (name.into(), value.into())));
+        self
+    }
+
+    /// Names and values that depend on the machine and differ between runs.
+    pub(super) fn host(mut self, host: impl IntoIterator<Item = (&'static str, String)>) -> Section {
+        self.host.extend(host.into_iter().map(|(name, value)| (name.to_owned(), value)));
+        self
+    }
+
+    /// Parts at its end, which open on a click.
+    pub(super) fn parts(mut self, parts: impl IntoIterator<Item = Section>) -> Section {
+        self.parts.extend(parts);
+        self
+    }
+
+    /// The same chapter, which opens on a click.
+    pub(super) fn folded(self) -> Section {
+        Section { is_folded: true, ..self }
     }
 }
 
@@ -250,16 +305,12 @@ mod tests {
             .build();
         let svg = "<?xml version=\"1.0\"?>\n<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"1000\" height=\"50\" \
                    fill=\"#000\"><rect width=\"100%\" height=\"100%\"/></svg>\n";
-        let section = Section {
-            id: "a".into(),
-            title: "Part".into(),
-            tables: vec![table.captioned("A & B")],
-            figures: vec![PageFigure::new(svg, &["a.svg", "a.csv"])],
-            facts: vec![("seed".into(), "1".into())],
-            host: vec![("device".into(), "none".into())],
-            parts: vec![Section::folded("all", "x < y".into())],
-            ..Section::default()
-        };
+        let section = Section::new("a", "Part")
+            .tables([table.captioned("A & B")])
+            .figures([PageFigure::new(svg, &["a.svg", "a.csv"])])
+            .fact("seed", "1")
+            .host([("device", "none".to_owned())])
+            .parts([Section::new("", "all").text("x < y")]);
         Page { title: "T".into(), sections: vec![section], warnings: vec!["W".into()], ..Page::default() }
     }
 

@@ -1,12 +1,9 @@
 //! The files and sheets of a `map` run. Tables are in `map_tables.rs`, `map.json` in `map_record.rs`.
 
-use serde::Serialize;
-
+use super::host::{Host, SweepRecord};
 use super::html::PageFigure;
 use super::map_sheet::{MapSheet, agreement, outcome};
-use super::run_record::{SettingRecord, SweepRecord};
 use crate::Result;
-use crate::engine::DeviceRecord;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -25,28 +22,12 @@ pub struct MapReport {
     pub profile: Profile,
     /// Preset, if used.
     pub preset: Option<String>,
-    /// Facts about the machine.
-    pub host: MapHost,
-}
-
-/// Facts about the machine, which are not part of the result.
-#[derive(Debug, Clone, Serialize)]
-pub struct MapHost {
-    /// Backend of the lanes.
-    pub backend: String,
-    /// The device, if one computed.
-    pub device: Option<DeviceRecord>,
+    /// Facts about the machine; its time is that of the lanes.
+    pub host: Host,
     /// Statistics of the sweep.
     pub sweep: SweepRecord,
-    /// Number of threads.
-    pub threads: usize,
     /// Duration of planning, s.
     pub plan_s: f64,
-    /// Duration of the lanes, s.
-    pub sweep_s: f64,
-    /// Options of the command; the record has them as `settings`.
-    #[serde(skip)]
-    pub settings: Vec<SettingRecord>,
 }
 
 /// A difference between two verdicts, for every cell of a grid.
@@ -86,9 +67,8 @@ impl MapReport {
                 let what = format!("{}, {}", model.name(), self.criterion.label());
                 let kinds = outcomes.iter().map(|kind| outcome(*kind)).collect();
                 let svg = self.sheet(&mapped.plan, what, kinds, cells.collect(), not_preventable.clone());
-                let name = format!("{}_{}.svg", mapped.plan.grid.name(), slug(model.name()));
-                results.add(&name, svg.as_bytes())?;
-                figures.push(PageFigure::new(&svg, &[&name, "cells.csv"]));
+                let name = format!("{}_{}", mapped.plan.grid.name(), slug(model.name()));
+                figures.push(PageFigure::add_svg(&mut results, &name, &svg, "cells.csv")?);
             }
         }
         let differences = self.differences();
@@ -98,22 +78,21 @@ impl MapReport {
             let kinds = agreements.iter().map(|kind| agreement(*kind, &difference.first, &difference.second)).collect();
             let svg = self.sheet(difference.plan, what, kinds, cells, None);
             let name = format!(
-                "{}_{}_against_{}.svg",
+                "{}_{}_against_{}",
                 difference.grid.name(),
                 slug(difference.model.name()),
                 slug(&self.against_name())
             );
-            results.add(&name, svg.as_bytes())?;
-            figures.push(PageFigure::new(&svg, &[&name, "differences.csv"]));
+            figures.push(PageFigure::add_svg(&mut results, &name, &svg, "differences.csv")?);
         }
         results.add("report.html", self.html(figures).as_bytes())?;
         results.add_with("cells.csv", |out| self.write_cells(out))?;
         if !differences.is_empty() {
             results.add_with("differences.csv", |out| self.write_differences(&differences, out))?;
         }
-        let names = results.names();
-        results.publish(self.json(names.clone())?.as_bytes())?;
-        Ok(names)
+        let files = results.names();
+        results.publish(self.json(&files)?.as_bytes())?;
+        Ok(files)
     }
 
     pub(super) fn is_robust(&self) -> bool {

@@ -8,37 +8,23 @@ use crate::support::readable::count;
 impl MapReport {
     /// Renders the run as one page.
     pub(super) fn html(&self, figures: Vec<PageFigure>) -> String {
-        let shares = Section {
-            intro: if self.grids.iter().any(|mapped| mapped.known_percent.iter().any(Option::is_some)) {
-                "Known shares are those of the JRC's evidence.".to_owned()
-            } else {
-                String::new()
-            },
-            text: self.text(),
-            ..Section::new("shares", "Shares")
-        };
-        let sheets = Section { figures, ..Section::new("maps", "Maps") };
+        let is_known = self.grids.iter().any(|mapped| mapped.known_percent.iter().any(Option::is_some));
+        let shares = Section::new("shares", "Shares")
+            .intro(if is_known { "Known shares are those of the JRC's evidence." } else { "" })
+            .text(self.text());
         let hashes = self.grids.iter().flat_map(|mapped| {
-            let parts = mapped.plan.parts.iter();
-            parts.map(|part| {
-                (format!("SHA-256 of the plan of {}", mapped.plan.grid.name()), part.plan.hash().to_owned())
-            })
+            let name = format!("SHA-256 of the plan of {}", mapped.plan.grid.name());
+            mapped.plan.parts.iter().map(move |part| (name.clone(), part.plan.hash()))
         });
-        let mut host = vec![("computed by".to_owned(), self.host.backend.clone())];
-        host.extend(self.host.device.iter().map(|device| ("device".to_owned(), device.line())));
-        let reproduction = Section {
-            intro: "The same grid and profile give the same cells, on any machine. map.json holds all of it."
-                .to_owned(),
-            facts: [("program".to_owned(), PROGRAM.to_owned()), ("profile".to_owned(), self.profile.name.clone())]
-                .into_iter()
-                .chain(hashes)
-                .collect(),
-            host,
-            parts: vec![Section::options("Profile", &self.profile)],
-            is_folded: true,
-            ..Section::new("reproduction", "Reproduction")
-        };
-        let page = Page {
+        let reproduction = Section::new("reproduction", "Reproduction")
+            .intro("The same grid and profile give the same cells, on any machine. map.json holds all of it.")
+            .fact("program", PROGRAM)
+            .fact("profile", &self.profile.name)
+            .facts(hashes)
+            .host(self.host.facts())
+            .parts([Section::options("Profile", &self.profile)])
+            .folded();
+        Page {
             title: "Outcomes over a grid".to_owned(),
             lead: format!(
                 "{} simulations: {} over a grid of parameters, profile {}.",
@@ -46,9 +32,9 @@ impl MapReport {
                 self.criterion.label(),
                 self.profile.name
             ),
-            sections: vec![shares, sheets, reproduction],
+            sections: vec![shares, Section::new("maps", "Maps").figures(figures), reproduction],
             ..Page::default()
-        };
-        page.html()
+        }
+        .html()
     }
 }

@@ -143,13 +143,13 @@ impl MapSheet<'_> {
                 ..Rule::default()
             }
         });
-        let layers = [cells.into(), rule.into()].into_iter().chain(not_preventable.map(Into::into));
         let axis = |title, edges: &[f64]| PlotAxis::exactly(title, edges[0], edges[edges.len() - 1]);
         Plot {
             heading: self.panel_name(panel, first),
             x: axis(self.grid.x().parameter.title(), &across),
             y: axis(self.grid.y().parameter.title(), &up),
-            layers: layers.collect(),
+            cells: Some(cells),
+            rules: std::iter::once(rule).chain(not_preventable).collect(),
             height: Height::OfWidth(if self.grid.panels().len() == 1 { 0.6 } else { 0.8 }),
             ..Plot::default()
         }

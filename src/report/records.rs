@@ -1,4 +1,4 @@
-//! Records in JSON for `--format json`.
+//! Documents in JSON, of `--format json` and of the records in the folders of runs.
 
 use serde::Serialize;
 use serde_json::Value;
@@ -10,6 +10,21 @@ use crate::engine::{NO_STEP, Outcome};
 use crate::model::criterion::Criterion;
 use crate::support::table::json_number;
 use crate::{Error, Result};
+
+/// An object whose keys stand in the order given: `record! { program: PROGRAM, lanes: 3 }`.
+macro_rules! record {
+    ($($(#[$meta:meta])* $key:ident: $value:expr),* $(,)?) => {{
+        #[expect(non_camel_case_types, reason = "every field has a type of its own, which is named like it")]
+        mod object {
+            #[derive(serde::Serialize)]
+            pub(super) struct Record<$($key),*> {
+                $($(#[$meta])* pub(super) $key: $key,)*
+            }
+        }
+        object::Record { $($key: $value,)* }
+    }};
+}
+pub(super) use record;
 
 /// How a lane ended. Times in seconds; null for events that did not happen.
 pub fn outcome(outcome: &Outcome<f64>, dt_s: f64) -> Value {

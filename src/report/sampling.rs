@@ -1,26 +1,25 @@
 //! A sampling run as files and as text.
 
 use std::fmt::Write;
-use std::time::Instant;
 
 use serde::Serialize;
 
 use super::close_following::{CloseRow, close_following};
+use super::host::{Host, SettingRecord};
 use super::records::{PROGRAM, document};
-use super::run_record::SettingRecord;
 use super::sampling_tables::{VERDICTS, verdicts};
 use super::tables::{WIDTH, wrap};
 use crate::Result;
 use crate::engine::generated::ATTEMPTS;
-use crate::engine::{DeviceRecord, ENGINE_VERSION, Headway, LanePlan, OpenBackend};
+use crate::engine::{ENGINE_VERSION, Headway, LanePlan};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::close_following::CloseFollowing;
-use crate::run::sampling::{EstimateRow, RiskRate, Sample, SampleOptions, SampleTally};
+use crate::run::sampling::{EstimateRow, RiskRate, SampleOptions, SampleTally};
 use crate::scenario::Category;
 use crate::stats::density::{DensityKind, DensityModel, Provenance};
 use crate::stats::estimate::{IntervalKind, Ratio, SearchRound, StopReason};
-use crate::support::readable::{count, count_of, counted, significant, value};
+use crate::support::readable::{count, count_of, significant, value};
 use crate::support::table::{Column, Digits, NumberText, Table};
 
 /// The density of a run.
@@ -98,51 +97,6 @@ impl DrawRecord {
     }
 }
 
-/// Facts about the machine, which are not part of the result.
-#[derive(Debug, Clone, Serialize)]
-pub struct HostRecord {
-    /// Backend.
-    pub backend: String,
-    /// The device, if one computed.
-    pub device: Option<DeviceRecord>,
-    /// Lanes that the CPU recomputed with every step, all equal.
-    pub rechecked_lanes: u64,
-    /// Wall clock, s.
-    pub seconds: f64,
-    /// Threads.
-    pub threads: usize,
-    /// Options of the command; records have them as `settings`.
-    #[serde(skip)]
-    pub settings: Vec<SettingRecord>,
-}
-
-impl HostRecord {
-    /// For a run that started at `started`.
-    pub fn of(opened: &OpenBackend, rechecked_lanes: u64, started: Instant, settings: Vec<SettingRecord>) -> Self {
-        HostRecord {
-            backend: opened.backend().describe(),
-            device: opened.device().cloned(),
-            rechecked_lanes,
-            seconds: started.elapsed().as_secs_f64(),
-            threads: rayon::current_num_threads(),
-            settings,
-        }
-    }
-
-    /// For the merged parts of a run.
-    pub fn of_parts(parts: usize, rechecked_lanes: u64) -> Self {
-        let threads = rayon::current_num_threads();
-        HostRecord {
-            backend: format!("{} merged", counted(parts, "part")),
-            device: None,
-            rechecked_lanes,
-            seconds: 0.0,
-            threads,
-            settings: Vec::new(),
-        }
-    }
-}
-
 /// `estimate.json`.
 #[derive(Debug, Clone, Serialize)]
 pub struct EstimateFile {
@@ -195,26 +149,18 @@ pub struct EstimateFile {
     /// SHA-256 of `worst.csv`, if written.
     pub worst_sha256: Option<String>,
     /// The machine.
-    pub host: HostRecord,
+    pub host: Host,
 }
 
 impl EstimateFile {
-    /// The part of the record common to all runs; draws and search are added where they exist.
-    ///
-    /// # Errors
-    /// As [`DensityModel::content_sha256`].
-    pub fn new(sample: &Sample, estimates: Vec<EstimateRow>, host: HostRecord) -> Result<EstimateFile> {
-        let (density, is_sampled) = (DensityRecord::of(&sample.density)?, sample.density.space.has_thw());
-        Ok(EstimateFile::of(density, is_sampled, (&sample.profile, &sample.options), estimates, host))
-    }
-
-    /// Like [`EstimateFile::new`], from a density's record; `is_sampled_headway`: the headway is one of its parameters.
+    /// The part of the record common to all runs, to which draws and search are added where they exist;
+    /// `is_sampled_headway`: the headway is a parameter of the density.
     pub fn of(
         density: DensityRecord,
         is_sampled_headway: bool,
         (profile, options): (&Profile, &SampleOptions),
         estimates: Vec<EstimateRow>,
-        host: HostRecord,
+        host: Host,
     ) -> EstimateFile {
         let headways = options.headways();
         let names = headways.iter().map(Headway::to_string);

@@ -4,8 +4,9 @@ use sha2::{Digest, Sha256};
 
 use super::convergence::convergence;
 use super::failure_map::FailureMaps;
+use super::host::Host;
 use super::html::PageFigure;
-use super::sampling::{DrawRecord, EstimateFile, HostRecord};
+use super::sampling::{DensityRecord, DrawRecord, EstimateFile};
 use super::sampling_tables::{convergence_csv, model_ratios_csv, profile_ratios_csv, worst_csv};
 use crate::engine::LanePlan;
 use crate::run::sampling::{CrudeRun, Estimator, Sample, SampleOptions, SampleResult, WorstLane, proposal_text};
@@ -19,8 +20,10 @@ impl EstimateFile {
     ///
     /// # Errors
     /// As [`DensityModel::content_sha256`].
-    pub fn of_sample(sample: &Sample, result: &SampleResult, host: HostRecord) -> Result<EstimateFile> {
-        let mut file = EstimateFile::new(sample, result.rows.clone(), host)?;
+    pub fn of_sample(sample: &Sample, result: &SampleResult, host: Host) -> Result<EstimateFile> {
+        let (density, is_sampled) = (DensityRecord::of(&sample.density)?, sample.density.space.has_thw());
+        let of = (&sample.profile, &sample.options);
+        let mut file = EstimateFile::of(density, is_sampled, of, result.rows.clone(), host);
         if let (Some(crude), Some(plan)) = (&result.crude, sample.lane_plan()) {
             file.plan_sha256 = Some(plan.hash().to_owned());
             file.draws = Some(DrawRecord::of(&crude.tally, plan));
@@ -70,8 +73,7 @@ impl EstimateFile {
             results.add("convergence.csv", convergence_csv(&run.convergence).as_bytes())?;
             let level = self.estimates.first().map_or(0.95, |row| row.estimate.interval.level);
             let svg = convergence(density, &run.convergence, level).svg();
-            results.add("convergence.svg", svg.as_bytes())?;
-            figures.push(PageFigure::new(&svg, &["convergence.svg", "convergence.csv"]));
+            figures.push(PageFigure::add_svg(results, "convergence", &svg, "convergence.csv")?);
         }
         let Some(generator) = plan.generator() else {
             return Err(Error::Internal("the plan has no generator".to_owned()));
@@ -88,10 +90,9 @@ impl EstimateFile {
             let samples = run.tally.samples() - run.tally.voids;
             let maps = FailureMaps { density, plan, map, samples, criterion: options.criterion };
             for (model, id) in plan.models.iter().enumerate() {
-                let (name, svg) = (format!("map-{}", id.name()), maps.figure(model).svg());
-                results.add(&format!("{name}.csv"), maps.csv(model).as_bytes())?;
-                results.add(&format!("{name}.svg"), svg.as_bytes())?;
-                figures.push(PageFigure::new(&svg, &[&format!("{name}.svg"), &format!("{name}.csv")]));
+                let (name, numbers) = (format!("map-{}", id.name()), format!("map-{}.csv", id.name()));
+                results.add(&numbers, maps.csv(model).as_bytes())?;
+                figures.push(PageFigure::add_svg(results, &name, &maps.figure(model).svg(), &numbers)?);
             }
         }
         Ok(figures)
@@ -122,10 +123,7 @@ impl EstimateFile {
     /// [`Error::Io`].
     pub fn publish(&mut self, mut results: Results, mut figures: Vec<PageFigure>) -> Result<()> {
         if let Some(figure) = self.headways_figure() {
-            let svg = figure.svg();
-            results.add("headways.svg", svg.as_bytes())?;
-            results.add("headways.csv", figure.csv().as_bytes())?;
-            figures.insert(0, PageFigure::new(&svg, &["headways.svg", "headways.csv"]));
+            figures.insert(0, PageFigure::add(&mut results, "headways", &figure)?);
         }
         results.add("estimates.csv", self.csv().as_bytes())?;
         results.add("report.html", self.html(figures).as_bytes())?;

@@ -1,7 +1,7 @@
 //! A sampling run as one page.
 
 use super::html::{Page, PageFigure, Section};
-use super::plot::{AxisScale, Figure, Layer, Mark, Plot, PlotAxis, Series, Value, is_few};
+use super::plot::{AxisScale, Figure, Mark, Plot, PlotAxis, Series, Value, is_few};
 use super::sampling::{EstimateFile, interval_text, rate_text, ratio_text, short, three_digits};
 use super::sampling_tables::{VERDICTS, verdicts};
 use crate::engine::Headway;
@@ -26,11 +26,12 @@ impl EstimateFile {
             warnings.push("Ended by the clock: another machine ends elsewhere.".to_owned());
         }
         let mut sections = vec![self.estimates_section()];
-        sections.extend((!figures.is_empty()).then(|| Section { figures, ..Section::new("figures", "Figures") }));
+        sections.extend((!figures.is_empty()).then(|| Section::new("figures", "Figures").figures(figures)));
+        sections.push(self.reproduction());
         // Importance sampling seldom needs the maximum that it may draw; its runs include the search.
         let runs = self.estimates.iter().map(|row| row.estimate.runs).max();
         let drawn = self.draws.as_ref().map(|draws| draws.samples).or(runs).unwrap_or(self.samples);
-        let page = Page {
+        Page {
             title: format!("Probability of failure: {}", self.name()),
             lead: format!(
                 "{} samples of {}, estimator {}, profile {}. {}",
@@ -48,9 +49,9 @@ impl EstimateFile {
             ),
             synthetic: density.provenance.synthetic,
             warnings,
-            sections: sections.into_iter().chain([self.reproduction()]).collect(),
-        };
-        page.html()
+            sections,
+        }
+        .html()
     }
 
     /// `cut-in 2`.
@@ -108,9 +109,8 @@ impl EstimateFile {
         if !weights.rows.is_empty() {
             tables.push(weights.captioned("Weights: how much of the sample counts"));
         }
-        let said = self.remarks().into_iter();
-        Section {
-            intro: format!(
+        Section::new("estimates", "Estimates")
+            .intro(format!(
                 "Verdicts: on the draws, on the density, on the data. Draws are sound where their interval holds P of this \
                  density as often as its level says. The density agrees with recorded scenarios, differs from them, or the \
                  question is open. Enough scenarios fail, or few. ≤ bounds from above where nothing failed. {}{}",
@@ -128,11 +128,9 @@ impl EstimateFile {
                     .flatten()
                     .map(|rule| rule + ". ")
                     .collect::<String>()
-            ),
-            tables,
-            facts: said.collect(),
-            ..Section::new("estimates", "Estimates")
-        }
+            ))
+            .tables(tables)
+            .facts(self.remarks())
     }
 
     /// Probability over the headway, a panel per model; `None` for a single headway.
@@ -167,7 +165,7 @@ impl EstimateFile {
                     AxisScale::SquareRoot,
                     all.iter().map(|v| v.1).collect(),
                 ),
-                layers: series.map(Layer::from).collect(),
+                series: series.collect(),
                 ..Plot::default()
             }
         };
@@ -185,17 +183,7 @@ impl EstimateFile {
     }
 
     fn reproduction(&self) -> Section {
-        let mut facts = vec![
-            ("program".to_owned(), self.program.clone()),
-            ("estimator".to_owned(), self.estimator.to_owned()),
-            ("points".to_owned(), self.points.to_owned()),
-            ("seed".to_owned(), self.seed.to_string()),
-            ("profile".to_owned(), self.profile.name.clone()),
-            ("time step".to_owned(), format!("{} s", value(self.profile.frame.dt_s))),
-            ("SHA-256 of the density".to_owned(), self.density.sha256.clone()),
-        ];
-        facts.extend(self.plan_sha256.iter().map(|sha| ("SHA-256 of the plan".to_owned(), sha.clone())));
-        if let Some(draws) = &self.draws {
+        let draws = self.draws.as_ref().map(|draws| {
             let percent = 100.0 * draws.rejected_share;
             let text = format!(
                 "{} samples, {} lanes, {percent:.2} % of the draws invalid and drawn again, {} samples void, \
@@ -205,29 +193,28 @@ impl EstimateFile {
                 count(draws.voids),
                 count(draws.capped_lanes)
             );
-            facts.push(("draws".to_owned(), text));
-        }
-        let mut host = vec![("computed by".to_owned(), self.host.backend.clone())];
-        host.extend(self.host.device.iter().map(|device| ("device".to_owned(), device.line())));
-        host.push((
-            "checked".to_owned(),
-            format!(
-                "{} lanes computed again on the CPU with every step made, all equal",
-                count(self.host.rechecked_lanes)
-            ),
-        ));
-        if self.host.seconds > 0.0 {
-            host.push(("seconds".to_owned(), format!("{:.2} on {} threads", self.host.seconds, self.host.threads)));
-        }
-        Section {
-            intro: "The same density, options and seed give the same numbers, on any machine, whole or in shards. \
-                    estimate.json holds all of it; `simulate` reruns a lane from it."
-                .to_owned(),
-            facts,
-            host,
-            parts: vec![Section::options("Profile", &self.profile)],
-            is_folded: true,
-            ..Section::new("reproduction", "Reproduction")
-        }
+            ("draws", text)
+        });
+        let rechecked = count(self.host.rechecked_lanes);
+        let checked = format!("{rechecked} lanes computed again on the CPU with every step made, all equal");
+        Section::new("reproduction", "Reproduction")
+            .intro(
+                "The same density, options and seed give the same numbers, on any machine, whole or in shards. \
+                 estimate.json holds all of it; `simulate` reruns a lane from it.",
+            )
+            .fact("program", &self.program)
+            .fact("estimator", self.estimator)
+            .fact("points", self.points)
+            .fact("seed", self.seed.to_string())
+            .fact("profile", &self.profile.name)
+            .fact("time step", format!("{} s", value(self.profile.frame.dt_s)))
+            .fact("SHA-256 of the density", &self.density.sha256)
+            .facts(self.plan_sha256.iter().map(|sha| ("SHA-256 of the plan", sha)))
+            .facts(draws)
+            .host(self.host.facts())
+            .host([("checked", checked)])
+            .host((self.host.seconds > 0.0).then(|| self.host.wall_clock()))
+            .parts([Section::options("Profile", &self.profile)])
+            .folded()
     }
 }

@@ -4,10 +4,10 @@ use std::fmt::Write as _;
 
 use serde_json::{Value as Json, json};
 
+use super::host::Host;
 use super::html::{Page, PageFigure, Section};
-use super::plot::{Figure, Layer, Look, Mark, Plot, PlotAxis, Series, Symbol, Value};
+use super::plot::{Figure, Look, Mark, Plot, PlotAxis, Series, Symbol, Value};
 use super::records::PROGRAM;
-use super::sampling::HostRecord;
 use super::study_figures::modes;
 use super::tables::wrap;
 use crate::model::profile::Profile;
@@ -51,7 +51,7 @@ pub struct SearchReport<'a> {
     /// The command.
     pub command: String,
     /// The machine.
-    pub host: HostRecord,
+    pub host: Host,
 }
 
 /// `0.812 [0.743, 0.866]`.
@@ -248,25 +248,24 @@ impl SearchReport<'_> {
                     .filter_map(|point| value(point.parameters, &of(&point.judged)?, self.describe(&point.candidate)));
                 values.collect()
             };
-            let series = |name: &str, marks: &[Mark], look, values| {
-                Layer::from(Series { look, values, ..Series::new(name, marks, []) })
-            };
+            let line =
+                |name: &str, marks: &[Mark], look, values| Series { look, values, ..Series::new(name, marks, []) };
             let marks = &[Mark::Line, Mark::Points, Mark::Intervals];
             let cross_validated = found(&|judged| Some(judged.cross_validated));
-            let mut layers = vec![
-                series("paper", &[Mark::Points], look(PAPER, Symbol::Disc), paper.collect()),
-                series("found, cross-validated", marks, look(FRONT, Symbol::Disc), cross_validated),
+            let mut series = vec![
+                line("paper", &[Mark::Points], look(PAPER, Symbol::Disc), paper.collect()),
+                line("found, cross-validated", marks, look(FRONT, Symbol::Disc), cross_validated),
             ];
             if self.held_out.is_some() {
                 let values = found(&|judged| judged.held_out).into_iter().map(|v| Value { x: v.x + 0.12, ..v });
                 let look = look(HELD_OUT, Symbol::Polygon(3, 0.0));
-                layers.push(series("found, held-out data", marks, look, values.collect()));
+                series.push(line("found, held-out data", marks, look, values.collect()));
             }
             Plot {
                 heading: front.scope.name(),
                 x: PlotAxis { is_count: true, ..PlotAxis::exactly("parameters", 0.0, most as f64 + 1.0) },
                 y: PlotAxis::exactly(self.result.options.objective.name(), 0.0, 1.0),
-                layers,
+                series,
                 ..Plot::default()
             }
         };
@@ -306,13 +305,13 @@ impl SearchReport<'_> {
                 ..Value::default()
             });
             let values = values.collect();
-            Series { values, ..Series::new(family.clone(), &[Mark::Points], []) }.into()
+            Series { values, ..Series::new(family.clone(), &[Mark::Points], []) }
         });
         let all = count(self.result.evaluated.len() as u64);
         let plot = Plot {
             x: PlotAxis::new("root mean square error of the motions, standard deviations"),
             y: PlotAxis::exactly(format!("{}, {}", self.goal(), Scope::All.name()), 0.0, 1.0),
-            layers: series.collect(),
+            series: series.collect(),
             ..Plot::default()
         };
         Figure {
@@ -440,59 +439,45 @@ impl SearchReport<'_> {
             let found = figures.iter().filter(|(file, _)| *file == name);
             found.map(|(file, figure)| PageFigure::new(&figure.svg(), &[&format!("{file}.svg")])).collect()
         };
-        let answer = Section {
-            text: self.words(false),
-            tables: self.result.fronts.iter().take(1).map(|front| self.table(front)).collect(),
-            figures: of("front"),
-            ..Section::new("answer", "Answer")
-        };
-        let kept = Section {
-            intro: "What the winner keeps, as scenarios one standard deviation of a parameter away from the mean."
-                .to_owned(),
-            figures: of("winner"),
-            ..Section::new("winner", "The winner")
-        };
+        let answer = Section::new("answer", "Answer")
+            .text(self.words(false))
+            .tables(self.result.fronts.iter().take(1).map(|front| self.table(front)))
+            .figures(of("front"));
+        let kept = (!self.modes.is_empty()).then(|| {
+            let intro = "What the winner keeps, as scenarios one standard deviation of a parameter away from the mean.";
+            Section::new("winner", "The winner").intro(intro).figures(of("winner"))
+        });
         let described = |front: &Front| -> String {
             let line =
                 |point: &FrontPoint| format!("  found {}: {}\n", point.parameters, self.describe(&point.candidate));
             format!("{}\n{}", front.scope.name(), front.points.iter().map(line).collect::<String>())
         };
-        let tables = Section {
-            text: self.result.fronts.iter().map(described).collect::<Vec<_>>().join("\n"),
-            tables: self.result.fronts.iter().map(|front| self.table(front)).collect(),
-            ..Section::new("fronts", "Fronts")
-        };
-        let error = Section { figures: of("error"), ..Section::new("error", "Error and outcomes") };
+        let tables = Section::new("fronts", "Fronts")
+            .text(self.result.fronts.iter().map(described).collect::<Vec<_>>().join("\n"))
+            .tables(self.result.fronts.iter().map(|front| self.table(front)));
+        let error = Section::new("error", "Error and outcomes").figures(of("error"));
         let lost = self.result.unkept.iter().filter(|of| of.parameters == self.result.options.limits.max_parameters);
         let lost: String =
             lost.take(50).map(|of| format!("{}: {}\n", of.scenario, counted(of.lanes as usize, "lane"))).collect();
-        let unkept = Section {
-            intro:
+        let unkept = Section::new("unkept", "What no description keeps")
+            .intro(
                 "Scenarios with a wrong verdict under every description of the front, and the lanes of the best; at \
-                    most 50 are listed."
-                    .to_owned(),
-            text: lost,
-            ..Section::new("unkept", "What no description keeps")
-        };
-        let reproduction = Section {
-            facts: vec![
-                ("program".to_owned(), PROGRAM.to_owned()),
-                ("command".to_owned(), self.command.clone()),
-                ("profile".to_owned(), self.profile.name.clone()),
-            ],
-            host: vec![("computed by".to_owned(), self.host.backend.clone())],
-            ..Section::new("reproduction", "Reproduction")
-        };
-        let mut sections = vec![answer, kept, tables, error, unkept, reproduction];
-        sections.retain(|s| s.id != "winner" || !s.figures.is_empty());
-        let page = Page {
+                 most 50 are listed.",
+            )
+            .text(lost);
+        let reproduction = Section::new("reproduction", "Reproduction")
+            .fact("program", PROGRAM)
+            .fact("command", &self.command)
+            .fact("profile", &self.profile.name)
+            .host([self.host.computed_by()]);
+        Page {
             title: format!("Search for a parameterization: {}", self.result.category.label()),
             lead: format!("{} studies. {}", count(self.result.studies as u64), self.data),
             synthetic: self.synthetic,
             warnings: Vec::new(),
-            sections,
-        };
-        page.html()
+            sections: std::iter::once(answer).chain(kept).chain([tables, error, unkept, reproduction]).collect(),
+        }
+        .html()
     }
 
     /// Writes all files, the record last; returns the names of the others.

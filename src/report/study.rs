@@ -1,20 +1,21 @@
 //! A study as text for the terminal, as one JSON document and as files in the output folder.
 
 use super::close_following::{CloseRow, close_following};
+use super::host::{Host, SweepRecord, Timings};
+use super::html::PageFigure;
 use super::plot::Figure;
-use super::records::document;
+use super::records::{PROGRAM, document};
 use super::reference;
-use super::run_record::{RunRecord, StudyHost};
 use super::study_figures::{
     distributions, f1_by_parameters, f1_intervals, headways, modes, radar, recall_and_precision,
 };
 use super::tables;
 use crate::Result;
-use crate::engine::{CLOSE_HEADWAY_S, Headway, Partial};
+use crate::engine::{CLOSE_HEADWAY_S, Headway, Partial, SweepSummary};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::score::{Best, CategoryScores, Misfit, ScoreTable, published_failures, published_lvd_f1};
-use crate::run::study::{ReferenceComparison, Study, StudyEvaluation};
+use crate::run::study::{CategoryNumbers, ReferenceComparison, Study, StudyEvaluation, StudyProvenance};
 use crate::scenario::Category;
 use crate::scenario::parameterization::Parameterization;
 use crate::support::run_dir::Results;
@@ -22,49 +23,66 @@ use crate::support::table::{Column, Digits, Table};
 use serde_json::Value;
 
 /// A study's complete report.
-pub struct StudyReport {
+pub struct StudyReport<'a> {
+    pub(super) study: &'a Study,
     /// What the counts say.
     pub evaluation: StudyEvaluation,
-    /// Record of the run.
-    pub run: RunRecord,
-    /// Whether to show the paper's published numbers.
-    pub published: bool,
+    pub(super) host: Host,
+    pub(super) sweep: SweepRecord,
+    pub(super) timings: Timings,
     /// f32 against f64, if requested.
-    pub comparison: Option<ReferenceComparison>,
+    pub(super) comparison: Option<ReferenceComparison>,
 }
 
-impl StudyReport {
+impl<'a> StudyReport<'a> {
     /// From the counts of all lanes.
     ///
     /// # Errors
     /// As [`Study::score`].
     pub fn of(
-        study: &Study,
+        study: &'a Study,
         counts: &Partial,
         comparison: Option<ReferenceComparison>,
-        mut host: StudyHost,
-    ) -> Result<StudyReport> {
+        host: Host,
+        swept: &SweepSummary,
+        timings: Timings,
+    ) -> Result<StudyReport<'a>> {
         let started = std::time::Instant::now();
         let evaluation = study.evaluate(counts)?;
-        host.timings.score_s = started.elapsed().as_secs_f64();
-        let run = RunRecord::of(study, &evaluation.scores, host);
-        Ok(StudyReport { evaluation, run, published: study.facts().published, comparison })
+        let timings = Timings { score_s: started.elapsed().as_secs_f64(), ..timings };
+        let sweep = SweepRecord::of(swept, study.facts().score.seed);
+        Ok(StudyReport { study, evaluation, host, sweep, timings, comparison })
+    }
+
+    /// What the plan says of the data.
+    pub(super) fn facts(&self) -> &'a StudyProvenance {
+        self.study.facts()
+    }
+
+    pub(super) fn lanes(&self) -> u64 {
+        self.study.plan().lane_count()
+    }
+
+    /// The scores of each category, and its other numbers.
+    fn scored(&self) -> impl Iterator<Item = (&CategoryScores, &CategoryNumbers)> {
+        self.evaluation.scores.categories.iter().zip(&self.evaluation.categories)
     }
 
     /// All tables, at most `width` columns wide; only a long word in the data's description (a path) can exceed this.
     pub fn text(&self, width: usize) -> String {
-        let data = tables::wrap(&self.run.data, width);
+        let StudyProvenance { synthetic, published, .. } = *self.facts();
+        let data = tables::wrap(&self.facts().data, width);
         let mut parts = vec![format!("{data}\n")];
-        if self.published {
+        if published {
             parts.push("Published numbers are those of highD: other data agrees in shape at best.\n".to_owned());
         }
-        parts.push(tables::failures(&self.evaluation.scores, self.published, width));
+        parts.push(tables::failures(&self.evaluation.scores, published, width));
         parts.push(self.close_following(width));
-        parts.extend(self.evaluation.scores.categories.iter().map(|c| tables::f1_table(c, self.published, width)));
+        parts.extend(self.evaluation.scores.categories.iter().map(|c| tables::f1_table(c, published, width)));
         parts.extend(self.given_table().map(|table| table.fitted(2, width)));
         parts.extend(Some(tables::claims(&self.evaluation.claims, width)).filter(|text| !text.is_empty()));
         parts.extend(self.comparison.iter().map(reference::text));
-        if self.run.synthetic {
+        if synthetic {
             parts.push(format!("{data}\nNo number above is a statement about real traffic.\n"));
         }
         parts.join("\n")
@@ -72,8 +90,7 @@ impl StudyReport {
 
     /// Error of the motions beside the mean F1 of every variant; `None` unless S' are given as series or cross-validated.
     pub(super) fn given_table(&self) -> Option<Table> {
-        let of_categories = self.evaluation.scores.categories.iter().zip(&self.evaluation.categories);
-        let rows = of_categories.flat_map(|(scores, pictures)| {
+        let rows = self.scored().flat_map(|(scores, pictures)| {
             let variants = pictures.rmse.iter().enumerate().skip(1);
             variants.map(move |(variant, rmse)| (scores, variant, *rmse))
         });
@@ -106,34 +123,33 @@ impl StudyReport {
 
     /// Failures of S from close following.
     pub(super) fn close_following(&self, width: usize) -> String {
-        let rows = self.evaluation.scores.categories.iter().zip(&self.evaluation.categories).filter_map(
-            |(scores, pictures)| {
-                Some(CloseRow {
-                    category: scores.category,
-                    models: &scores.models,
-                    close: pictures.close_following.as_ref()?,
-                })
-            },
-        );
+        let rows = self.scored().filter_map(|(scores, pictures)| {
+            let close = pictures.close_following.as_ref()?;
+            Some(CloseRow { category: scores.category, models: &scores.models, close })
+        });
         close_following(&rows.collect::<Vec<_>>(), "S", &self.evaluation.scores.headways, width)
     }
 
-    /// Writes CSV tables, figures, the files already in `results` and `run.json` to the folder.
+    /// Writes CSV tables, figures, the files already in `results` and `run.json` to the folder; returns their names
+    /// without the record's.
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn write(&mut self, mut results: Results) -> Result<()> {
-        let data = if self.run.synthetic { "synthetic" } else { "recorded" };
+    pub fn write(&self, mut results: Results) -> Result<Vec<String>> {
+        let data = if self.facts().synthetic { "synthetic" } else { "recorded" };
         results.add("failures.csv", tables::failure_records(&self.evaluation.scores, data)?.csv().as_bytes())?;
         results.add("f1.csv", tables::f1_records(&self.evaluation.scores, data).csv().as_bytes())?;
         results.add("claims.csv", tables::claim_records(&self.evaluation.claims, data).csv().as_bytes())?;
         results.add("report.txt", self.text(tables::WIDTH).as_bytes())?;
         results.add("headways.csv", self.headways(data).csv().as_bytes())?;
-        for (at, category) in self.evaluation.scores.categories.iter().enumerate() {
-            for (name, figure) in self.figures(at) {
-                results.add(&file_name(name, category.category, "svg"), figure.svg().as_bytes())?;
-                results.add(&file_name(name, category.category, "csv"), figure.csv().as_bytes())?;
-            }
+        let mut figures = Vec::new();
+        for (at, scores) in self.evaluation.scores.categories.iter().enumerate() {
+            // `radar-cut-in.svg`.
+            let category = scores.category.key().replace('_', "-");
+            let drawn = self.figures(at).into_iter();
+            let added =
+                drawn.map(|(name, figure)| PageFigure::add(&mut results, &format!("{name}-{category}"), &figure));
+            figures.push(added.collect::<Result<Vec<_>>>()?);
         }
         if let Some(given) = self.given_table() {
             results.add("variants.csv", given.csv().as_bytes())?;
@@ -146,14 +162,15 @@ impl StudyReport {
         if let Some(comparison) = &self.comparison {
             results.add("reference.csv", reference::table(comparison).csv().as_bytes())?;
         }
-        results.add("report.html", self.html().as_bytes())?;
-        self.run.files = results.names();
-        results.publish(self.run.json()?.as_bytes())
+        results.add("report.html", self.html(figures).as_bytes())?;
+        let files = results.names();
+        results.publish(self.record(&files)?.as_bytes())?;
+        Ok(files)
     }
 
     /// The figures of a category, with the prefixes of their file names; figures without data are skipped.
-    pub(super) fn figures(&self, at: usize) -> Vec<(&'static str, Figure)> {
-        let (scores, data) = (&self.evaluation.scores.categories[at], &self.run.data);
+    fn figures(&self, at: usize) -> Vec<(&'static str, Figure)> {
+        let (scores, data) = (&self.evaluation.scores.categories[at], &self.facts().data);
         let (confidence, mut figures) = (self.evaluation.scores.options.confidence, Vec::new());
         if scores.variants.len() > 1 {
             figures.push(("f1", f1_intervals(scores, confidence, data)));
@@ -176,13 +193,7 @@ impl StudyReport {
 
     /// Failures of every variant by headway.
     fn headways(&self, data: &str) -> Table {
-        let rows = self
-            .evaluation
-            .scores
-            .categories
-            .iter()
-            .zip(&self.evaluation.categories)
-            .flat_map(|(scores, pictures)| pictures.headways.rows().map(move |row| (scores, row)));
+        let rows = self.scored().flat_map(|(scores, pictures)| pictures.headways.rows().map(move |row| (scores, row)));
         Table::of(rows)
             .column("category", |(scores, _)| scores.category.key())
             .column("variant", |(_, (variant, ..))| variant)
@@ -196,38 +207,32 @@ impl StudyReport {
     }
 }
 
-/// `radar-cut-in.svg`.
-pub(super) fn file_name(figure: &str, category: Category, ending: &str) -> String {
-    format!("{figure}-{}.{ending}", category.key().replace('_', "-"))
-}
-
-impl StudyReport {
+impl StudyReport<'_> {
     /// The same tables as one JSON document; undefined values are null. Published numbers are included if requested.
     ///
     /// # Errors
     /// None for a document of this program.
     pub fn json(&self) -> Result<String> {
         let mut value = serde_json::json!({
-            "program": self.run.program,
-            "data": self.run.data,
-            "synthetic": self.run.synthetic,
-            "plan_sha256": self.run.plan_sha256,
-            "lanes": self.run.lanes,
-            "left_out": self.run.left_out,
+            "program": PROGRAM,
+            "data": self.facts().data,
+            "synthetic": self.facts().synthetic,
+            "plan_sha256": self.study.plan().hash(),
+            "lanes": self.lanes(),
+            "left_out": self.facts().left_out,
             "failures": tables::failure_records(&self.evaluation.scores, "")?.records(),
             "f1": tables::f1_records(&self.evaluation.scores, "").records(),
             "claims": tables::claim_records(&self.evaluation.claims, "").records(),
         });
         value["best"] = self.evaluation.best.iter().map(best).collect();
-        let close =
-            self.evaluation.scores.categories.iter().zip(&self.evaluation.categories).map(|(scores, pictures)| {
-                serde_json::json!({
-                    "category": scores.category.key(), "models": scores.models, "below_s": CLOSE_HEADWAY_S,
-                    "counts": pictures.close_following,
-                })
-            });
+        let close = self.scored().map(|(scores, pictures)| {
+            serde_json::json!({
+                "category": scores.category.key(), "models": scores.models, "below_s": CLOSE_HEADWAY_S,
+                "counts": pictures.close_following,
+            })
+        });
         value["close_following"] = close.collect();
-        if self.published {
+        if self.facts().published {
             value["published"] = published(&self.evaluation.scores);
         }
         if let Some(comparison) = &self.comparison {

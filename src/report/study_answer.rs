@@ -33,13 +33,13 @@ fn table(rows: &[[String; 7]]) -> Table {
     words.columns(4..7, |at| HEADER[at], |row, at| NumberText(row[at].clone())).build()
 }
 
-impl StudyReport {
+impl StudyReport<'_> {
     /// The answer in at most 20 lines of 80 columns, or fewer columns on a narrower terminal.
     pub fn answer(&self, width: usize) -> String {
         let width = width.clamp(MIN_WIDTH, WIDTH);
-        let made_up = if self.run.synthetic { ". No number here is a statement about real traffic." } else { "" };
+        let made_up = if self.facts().synthetic { ". No number here is a statement about real traffic." } else { "" };
         let mut lines = vec![
-            wrap(&format!("{}{made_up}", self.run.data), width),
+            wrap(&format!("{}{made_up}", self.facts().data), width),
             wrap(&self.size(), width),
             String::new(),
             wrap(&self.question(), width),
@@ -62,11 +62,8 @@ impl StudyReport {
             row
         };
         let rows: Vec<[String; 7]> = self.evaluation.best.iter().map(named).collect();
-        Section {
-            intro: format!("{}. {LEGEND}", self.size()),
-            tables: vec![table(&rows).captioned(self.question())],
-            ..Section::new("answer", "")
-        }
+        let intro = format!("{}. {LEGEND}", self.size());
+        Section::new("answer", "").intro(intro).tables([table(&rows).captioned(self.question())])
     }
 
     fn size(&self) -> String {
@@ -77,7 +74,7 @@ impl StudyReport {
             kinds.collect::<Vec<_>>().join(", "),
             self.headways_in_words(),
             counted(self.evaluation.scores.categories.first().map_or(0, |c| c.models.len()), "driver"),
-            count(self.run.lanes)
+            count(self.lanes())
         )
     }
 

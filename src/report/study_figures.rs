@@ -3,7 +3,7 @@
 
 use super::dots::{DotRow, Dots, dots};
 use super::plot::{
-    AxisScale, Figure, GREY, INK, Layer, Look, Mark, Name, Plot, PlotAxis, Rule, Series, Symbol, Value, is_few, number,
+    AxisScale, Figure, GREY, INK, Look, Mark, Name, Plot, PlotAxis, Rule, Series, Symbol, Value, is_few, number,
     quantity,
 };
 use crate::engine::Headway;
@@ -73,7 +73,7 @@ pub(super) fn headways(of: &HeadwayFailures, scores: &CategoryScores, confidence
                 of.headways.iter().filter_map(Headway::value).chain([0.0]).collect(),
             ),
             y: PlotAxis { scale, ..PlotAxis::new("failed scenarios in %") },
-            layers: (0..of.variants.len()).map(|variant| series(variant).into()).collect(),
+            series: (0..of.variants.len()).map(series).collect(),
             ..Plot::default()
         }
     };
@@ -180,7 +180,7 @@ pub(super) fn radar(scores: &CategoryScores, data: &str) -> Figure {
         // Many values are equal, most often 1: lines of equal weight, markers that shrink.
         let look = Look { line_px: 1.4, ..Look::of(variant - 1, scores.variants.len() - 1) };
         let series = Series::new(legend_name(scores, variant), &[Mark::Line, Mark::Points], []);
-        Layer::from(Series { values: cells.iter().enumerate().map(value).collect(), look: Some(look), ..series })
+        Series { values: cells.iter().enumerate().map(value).collect(), look: Some(look), ..series }
     };
     let rings = [0.2, 0.4, 0.6, 0.8, 1.0].map(|at| Name { at, words: format!("{at:.1}"), ..Name::default() });
     let plot = Plot {
@@ -189,7 +189,7 @@ pub(super) fn radar(scores: &CategoryScores, data: &str) -> Figure {
             ..PlotAxis::exactly("", 0.0, cells.len() as f64)
         },
         y: PlotAxis { names: rings.to_vec(), ..PlotAxis::exactly("", 0.0, 1.0) },
-        layers: variants.clone().map(series).collect(),
+        series: variants.clone().map(series).collect(),
         is_polar: true,
         ..Plot::default()
     };
@@ -226,7 +226,7 @@ pub(super) fn recall_and_precision(scores: &CategoryScores, confidence: f64, dat
             let name = legend_name(scores, at + 1);
             let look = Look { line_px: 1.4, ..Look::of(at, scores.variants.len() - 1) };
             let series = Series::new(name, &[Mark::Points, Mark::Intervals], []);
-            Layer::from(Series { values: value.into_iter().collect(), look: Some(look), ..series })
+            Series { values: value.into_iter().collect(), look: Some(look), ..series }
         };
         let step = if low < 0.55 { 2 } else { 1 };
         let equal = (1..10).filter(|tenth| tenth % step == 0).map(|tenth| f64::from(tenth) / 10.0);
@@ -235,13 +235,14 @@ pub(super) fn recall_and_precision(scores: &CategoryScores, confidence: f64, dat
             let (label, attributes) = (f.to_string(), "class=\"equal-f1\"".to_owned());
             let runs = vec![run];
             let rule = Rule { runs, label, colour: GREY, width_px: 0.9, dash: "4,4", attributes, ..Rule::default() };
-            (rule.runs[0].len() > 1).then(|| rule.into())
+            (rule.runs[0].len() > 1).then_some(rule)
         });
         Some(Plot {
             heading: format!("{}, {}{}", model.name(), criterion.label(), few(failing)),
             x: PlotAxis::exactly("recall", low, 1.0),
             y: PlotAxis::exactly("precision", low, 1.0),
-            layers: equal.chain(values.into_iter().enumerate().map(series)).collect(),
+            rules: equal.collect(),
+            series: values.into_iter().enumerate().map(series).collect(),
             ..Plot::default()
         })
     };
@@ -314,7 +315,7 @@ pub(super) fn f1_by_parameters(scores: &CategoryScores, means: &[MeanF1], confid
             heading: format!("{name}{}", if mean.values.is_empty() { String::new() } else { few(mean.fewest_failing) }),
             x: PlotAxis { is_count: true, ..PlotAxis::exactly("parameters beside the headway", 0.0, most + 1.0) },
             y: PlotAxis::exactly("mean F1", 0.0, 1.05),
-            layers: own.into_iter().map(|(name, look)| of(name, look).into()).chain([front.into()]).collect(),
+            series: own.into_iter().map(|(name, look)| of(name, look)).chain([front]).collect(),
             ..Plot::default()
         }
     };
@@ -358,7 +359,7 @@ pub(super) fn modes(category: Category, shapes: &[ModeShape], explained: &[f64],
             heading: shape.quantity.clone(),
             x: PlotAxis::exactly("share of the duration T", 0.0, 1.0),
             y: PlotAxis::around(&shape.unit, AxisScale::Linear, ends.copied().collect()),
-            layers: std::iter::once(mean).chain(moved).map(Layer::from).collect(),
+            series: std::iter::once(mean).chain(moved).collect(),
             ..Plot::default()
         }
     };
@@ -373,7 +374,7 @@ pub(super) fn modes(category: Category, shapes: &[ModeShape], explained: &[f64],
             AxisScale::Logarithmic,
             rest.iter().map(|(_, rest)| *rest).chain([100.0]).collect(),
         ),
-        layers: vec![Series::new("", &[Mark::Line, Mark::Points], rest.iter().copied()).into()],
+        series: vec![Series::new("", &[Mark::Line, Mark::Points], rest.iter().copied())],
         ..Plot::default()
     };
     Figure {
@@ -400,7 +401,7 @@ pub(super) fn distributions(category: Category, histograms: &[ParameterHistogram
             heading: quantity(&histogram.name),
             x: PlotAxis::new(format!("{}, bins of {}", histogram.unit, number(histogram.width))),
             y: PlotAxis::new("scenarios"),
-            layers: vec![Series::new("", &[Mark::Bars(histogram.width)], values).into()],
+            series: vec![Series::new("", &[Mark::Bars(histogram.width)], values)],
             ..Plot::default()
         }
     };

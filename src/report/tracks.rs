@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::plot::{Figure, Layer, Plot, PlotAxis, Rule};
+use super::plot::{Figure, Plot, PlotAxis, Rule};
 use super::tables::wrap;
 use crate::support::readable::{count, count_of, significant};
 use crate::support::table::WIDTH;
@@ -237,23 +237,22 @@ fn figure(
 ) -> Figure {
     let mut plots = Vec::new();
     for (index, carriageway) in recording.carriageways.iter().enumerate() {
-        let mut layers: Vec<Layer> = Vec::new();
+        let mut rules: Vec<Rule> = Vec::new();
         let (mut xs, mut ys) = (Vec::new(), Vec::new());
         for (class, name, colour) in [(VehicleClass::Car, "cars", CAR), (VehicleClass::Truck, "lorries", TRUCK)] {
             let runs = runs(recording, index, class, value);
             xs.extend(runs.iter().flatten().map(|point| point.0));
             ys.extend(runs.iter().flatten().map(|point| point.1));
             if !runs.is_empty() {
-                layers.push(Rule { runs, name: name.to_owned(), colour, width_px: 0.7, ..Rule::default() }.into());
+                rules.push(Rule { runs, name: name.to_owned(), colour, width_px: 0.7, ..Rule::default() });
             }
         }
         let lane_lines = lines(index);
         ys.extend(lane_lines.iter().flatten().map(|point| point.1));
         if !lane_lines.is_empty() {
             let name = "lane lines".to_owned();
-            layers.push(
-                Rule { runs: lane_lines, name, colour: LINE, width_px: 1.6, dash: "8,5", ..Rule::default() }.into(),
-            );
+            let (runs, dash) = (lane_lines, "8,5");
+            rules.push(Rule { runs, name, colour: LINE, width_px: 1.6, dash, ..Rule::default() });
         }
         let ends = |values: &[f64]| {
             let (low, high) =
@@ -269,7 +268,7 @@ fn figure(
             heading: format!("carriageway {}, {} tracks", carriageway.name, count_of(tracks)),
             x: axis(labels[0], &xs),
             y: axis(labels[1], &ys),
-            layers,
+            rules,
             ..Plot::default()
         });
     }

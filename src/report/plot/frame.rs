@@ -123,12 +123,11 @@ mod tests {
     }
 
     fn plot(series: Vec<Series>) -> Plot {
-        let layers = series.into_iter().map(Layer::from).collect();
         Plot {
             heading: "Head".into(),
             x: PlotAxis::new("x in m"),
             y: PlotAxis::new("y in s"),
-            layers,
+            series,
             ..Plot::default()
         }
     }

@@ -1,7 +1,6 @@
-//! The layers of a plot: series (line, points, band, intervals, bars), rules and cells.
+//! What a plot draws over its cells: series (line, points, band, intervals, bars) and rules.
 
 use super::axis::{Axes, number};
-use super::cells::Cells;
 use super::look::Look;
 use super::svg::{Anchor, Canvas, GREY, Paint, Position, Type, WHITE, set};
 
@@ -106,35 +105,6 @@ pub struct Rule {
     pub dash: &'static str,
     /// Attributes of the lines' group.
     pub attributes: String,
-}
-
-/// One layer of a plot.
-#[derive(Debug, Clone)]
-pub enum Layer {
-    /// Values with marks.
-    Series(Series),
-    /// Reference lines.
-    Rule(Rule),
-    /// Rectangles.
-    Cells(Cells),
-}
-
-impl From<Series> for Layer {
-    fn from(series: Series) -> Self {
-        Layer::Series(series)
-    }
-}
-
-impl From<Rule> for Layer {
-    fn from(rule: Rule) -> Self {
-        Layer::Rule(rule)
-    }
-}
-
-impl From<Cells> for Layer {
-    fn from(cells: Cells) -> Self {
-        Layer::Cells(cells)
-    }
 }
 
 impl Rule {

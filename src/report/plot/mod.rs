@@ -1,7 +1,7 @@
-//! The one type of all figures: plots with axes, their layers, and a legend built from the layers.
+//! The one type of all figures: plots with axes, what they draw, and a legend built from it.
 //!
 //! The caller gives numbers and words; this module defines their look, as a picture and as CSV. A new kind of picture
-//! is a new layer or axis scale. A figure has the width of a column of a paper (88 mm, where its type is 6 pt), a wide
+//! is a new mark or axis scale. A figure has the width of a column of a paper (88 mm, where its type is 6 pt), a wide
 //! one that of two, and is as high as its texts need, so no text is cut.
 
 mod axis;
@@ -15,7 +15,7 @@ use std::f64::consts::TAU;
 
 pub use axis::AxisScale;
 pub use cells::{Cells, ColourBar, Fill, FilledCell};
-pub use layer::{Layer, Mark, Rule, Series, Value};
+pub use layer::{Mark, Rule, Series, Value};
 pub use look::{Look, Symbol};
 
 pub(super) use axis::{logarithmic_reach, number, plain_end, quantity};
@@ -72,7 +72,7 @@ pub struct Figure {
     pub notes: (&'static str, Vec<String>),
 }
 
-/// One plot. Without heading and layers its place in the row stays empty.
+/// One plot. With nothing to draw and without heading its place in the row stays empty.
 #[derive(Debug, Clone, Default)]
 pub struct Plot {
     /// Heading.
@@ -85,8 +85,12 @@ pub struct Plot {
     pub x: PlotAxis,
     /// Vertical axis; in a polar plot the radius.
     pub y: PlotAxis,
-    /// The layers: cells behind rules behind series.
-    pub layers: Vec<Layer>,
+    /// Rectangles, behind everything else.
+    pub cells: Option<Cells>,
+    /// Reference lines, behind the series.
+    pub rules: Vec<Rule>,
+    /// Values with marks.
+    pub series: Vec<Series>,
     /// Height of the frame.
     pub height: Height,
     /// Polar plot: the axes are angle and radius.
@@ -123,7 +127,7 @@ pub struct PlotAxis {
 /// Ends of an axis.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub enum Ends {
-    /// Around the values of the layers.
+    /// Around the values of the series.
     #[default]
     Layers,
     /// Around these values.
@@ -146,7 +150,7 @@ pub struct Name {
 }
 
 impl PlotAxis {
-    /// A linear axis around the values of the layers.
+    /// A linear axis around the values of the series.
     pub fn new(label: impl Into<String>) -> Self {
         PlotAxis { label: label.into(), ..PlotAxis::default() }
     }
@@ -194,7 +198,7 @@ impl Figure {
         y = between(&mut canvas, y + 8.0);
         y = self.rows(&mut canvas, y);
         y = self.legend(&mut canvas, y + 2.0);
-        let is_few = self.plots.iter().flat_map(Plot::series).flat_map(|series| &series.values).any(|v| v.is_few);
+        let is_few = self.series().flat_map(|series| &series.values).any(|v| v.is_few);
         let caption = if is_few { [&self.caption, HOLLOW].join(" ") } else { self.caption.clone() };
         y = canvas.paragraph((MARGIN_PX, y + 3.0), &caption, TEXT, width_px);
         if !self.notes.1.is_empty() {
@@ -208,7 +212,7 @@ impl Figure {
 
     /// The numbers of the series: one row per value.
     pub fn csv(&self) -> String {
-        let series = self.plots.iter().flat_map(|plot| plot.series().map(move |series| (plot, series)));
+        let series = self.plots.iter().flat_map(|plot| plot.series.iter().map(move |series| (plot, series)));
         let rows = series.flat_map(|(plot, series)| series.values.iter().map(move |value| (plot, series, value)));
         Table::of(rows)
             .column("panel", |(plot, ..)| plot.heading.as_str())
@@ -231,10 +235,14 @@ impl Figure {
         if self.is_wide { 2.0 * COLUMN_PX - 2.0 * MARGIN_PX } else { COLUMN_PX - 2.0 * MARGIN_PX }
     }
 
+    fn series(&self) -> impl Iterator<Item = &Series> {
+        self.plots.iter().flat_map(|plot| &plot.series)
+    }
+
     /// The names of the series, in the order of the legend.
     fn names(&self) -> Vec<&str> {
         let mut names: Vec<&str> = Vec::new();
-        for series in self.plots.iter().flat_map(Plot::series) {
+        for series in self.series() {
             if !series.name.is_empty() && !names.contains(&series.name.as_str()) {
                 names.push(&series.name);
             }
@@ -344,18 +352,18 @@ impl Figure {
     /// width); returns the y below.
     fn legend(&self, canvas: &mut Canvas, top: f64) -> f64 {
         let names = self.names();
-        let series = || self.plots.iter().flat_map(|plot| plot.series().filter(|series| plot.shows(series)));
+        let series = || self.plots.iter().flat_map(|plot| plot.series.iter().filter(|series| plot.shows(series)));
         let looks = names.iter().enumerate().filter_map(|(at, name)| {
             let series = series().find(|series| series.name == *name)?;
             Some((*name, Entry::Series(series, series.look.unwrap_or_else(|| Look::of(at, names.len())))))
         });
         let mut entries: Vec<(&str, Entry)> = looks.collect();
-        for (name, fill) in self.plots.iter().flat_map(Plot::cells).flat_map(|cells| &cells.key) {
+        for (name, fill) in self.plots.iter().flat_map(|plot| &plot.cells).flat_map(|cells| &cells.key) {
             if entries.iter().all(|entry| entry.0 != name.as_str()) {
                 entries.push((name, Entry::Fill(fill)));
             }
         }
-        for rule in self.plots.iter().flat_map(Plot::rules).filter(|rule| !rule.name.is_empty()) {
+        for rule in self.plots.iter().flat_map(|plot| &plot.rules).filter(|rule| !rule.name.is_empty()) {
             if entries.iter().all(|entry| entry.0 != rule.name.as_str()) {
                 entries.push((&rule.name, Entry::Rule(rule)));
             }
@@ -391,18 +399,6 @@ enum Entry<'a> {
 }
 
 impl Plot {
-    pub(super) fn series(&self) -> impl Iterator<Item = &Series> {
-        self.layers.iter().filter_map(|layer| if let Layer::Series(series) = layer { Some(series) } else { None })
-    }
-
-    fn rules(&self) -> impl Iterator<Item = &Rule> {
-        self.layers.iter().filter_map(|layer| if let Layer::Rule(rule) = layer { Some(rule) } else { None })
-    }
-
-    fn cells(&self) -> impl Iterator<Item = &Cells> {
-        self.layers.iter().filter_map(|layer| if let Layer::Cells(cells) = layer { Some(cells) } else { None })
-    }
-
     /// The name beside a value, or of its spoke; empty on an axis with numbers.
     fn row_of(&self, value: &Value) -> &str {
         let found = match self.is_polar {
@@ -413,7 +409,7 @@ impl Plot {
     }
 
     fn is_blank(&self) -> bool {
-        self.heading.is_empty() && self.layers.is_empty()
+        self.heading.is_empty() && self.cells.is_none() && self.rules.is_empty() && self.series.is_empty()
     }
 
     /// Whether the axes can show a value of the series, or the upper end of its interval.
@@ -439,12 +435,12 @@ impl Plot {
     fn axes(&self, across: (f64, f64), down: (f64, f64), centre: Option<Position>) -> Option<Axes> {
         let width =
             |series: &Series| series.marks.iter().find_map(|m| if let Mark::Bars(w) = m { Some(*w) } else { None });
-        let half = self.series().filter_map(width).fold(0.0, f64::max) / 2.0;
+        let half = self.series.iter().filter_map(width).fold(0.0, f64::max) / 2.0;
         let shown = || {
             let is_shown = |v: &&Value| self.x.scale.shows(v.x) && self.y.scale.shows(v.y);
-            self.series().flat_map(|series| &series.values).filter(is_shown)
+            self.series.iter().flat_map(|series| &series.values).filter(is_shown)
         };
-        if !self.is_polar && self.series().next().is_some() && !self.series().any(|series| self.shows(series)) {
+        if !self.is_polar && !self.series.is_empty() && !self.series.iter().any(|series| self.shows(series)) {
             return None;
         }
         let x = self.x.place(shown().flat_map(|v| [v.x - half, v.x + half]), across)?;
@@ -453,7 +449,7 @@ impl Plot {
         Some(Axes { x, y, centre })
     }
 
-    /// Draws the plot in a frame (across, down): axes with their numbers (below, at the left), layers.
+    /// Draws the plot in a frame (across, down): axes with their numbers (below, at the left), content.
     fn draw(
         &self,
         canvas: &mut Canvas,
@@ -463,7 +459,7 @@ impl Plot {
     ) {
         let axes = self.axes(across, down, None);
         if let Some(axes) = &axes {
-            let has_grid = self.cells().next().is_none();
+            let has_grid = self.cells.is_none();
             if self.y.names.is_empty() {
                 numbers_left(canvas, &axes.y, across, (has_y_numbers, has_grid));
             }
@@ -481,24 +477,24 @@ impl Plot {
         self.markers(canvas, &axes, look);
     }
 
-    /// Draws all layers except markers, which are above the frame.
+    /// Draws all except markers, which are above the frame.
     fn behind(&self, canvas: &mut Canvas, axes: &Axes, look: &dyn Fn(&Series) -> Look) {
-        self.cells().for_each(|cells| cells.draw(canvas, axes));
-        self.rules().for_each(|rule| rule.draw(canvas, axes));
+        self.cells.iter().for_each(|cells| cells.draw(canvas, axes));
+        self.rules.iter().for_each(|rule| rule.draw(canvas, axes));
         // All bands, then all lines, then all markers: a band never hides a value.
-        self.series().for_each(|series| series.bands(canvas, axes, &look(series)));
-        self.series().for_each(|series| series.bars_and_line(canvas, axes, &look(series)));
+        self.series.iter().for_each(|series| series.bands(canvas, axes, &look(series)));
+        self.series.iter().for_each(|series| series.bars_and_line(canvas, axes, &look(series)));
     }
 
     fn markers(&self, canvas: &mut Canvas, axes: &Axes, look: &dyn Fn(&Series) -> Look) {
         let mut taken = Vec::new();
-        self.rules().for_each(|rule| rule.name_at_end(canvas, axes, &mut taken));
-        for series in self.series() {
+        self.rules.iter().for_each(|rule| rule.name_at_end(canvas, axes, &mut taken));
+        for series in &self.series {
             series.markers(canvas, axes, &look(series), (&self.x.label, &self.y.label), &mut taken);
         }
     }
 
-    /// Draws rings, spokes with their names, and layers around the middle of the page; returns the y below.
+    /// Draws rings, spokes with their names, and series around the middle of the page; returns the y below.
     fn draw_polar(&self, canvas: &mut Canvas, look: &dyn Fn(&Series) -> Look, top: f64) -> f64 {
         let name_px = |name: &Name| TEXT.height_px(&name.words, SPOKE_PX);
         let reach = self.x.names.iter().map(name_px).fold(0.0, f64::max) + NAME_GAP_PX + RADIUS_PX;

@@ -109,7 +109,7 @@ impl TraceFigure<'_> {
         }
         let is_cut = |plot: &Plot| {
             let Ends::Exactly(_, top) = plot.y.ends else { return false };
-            plot.series().flat_map(|series| &series.values).any(|value| value.y >= top)
+            plot.series.iter().flat_map(|series| &series.values).any(|value| value.y >= top)
         };
         if plots.iter().any(is_cut) {
             notes.push("A curve that ends at the top edge goes on above it.".to_owned());

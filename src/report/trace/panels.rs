@@ -1,7 +1,7 @@
 //! The panels of a case's figure as plots. The figure arranges them on the sheet.
 
 use super::super::plot::plain_end;
-use super::super::plot::{GREY, Height, INK, Layer, Look, Mark, Plot, PlotAxis, Rule, Series, Symbol, Value};
+use super::super::plot::{GREY, Height, INK, Look, Mark, Plot, PlotAxis, Rule, Series, Symbol, Value};
 use super::thousandths;
 use crate::engine::{StepMark, Trace, TracedStep, TracedVehicle};
 
@@ -29,11 +29,11 @@ struct Curve {
     points: Vec<(f64, f64)>,
 }
 
-impl From<Curve> for Layer {
+impl From<Curve> for Series {
     fn from(curve: Curve) -> Self {
         let line_px = if curve.is_thin && curve.look.colour != GREY { 0.8 } else { curve.look.line_px };
         let look = Some(Look { line_px, ..curve.look });
-        Series { look, ..Series::new("", &[Mark::Line], curve.points) }.into()
+        Series { look, ..Series::new("", &[Mark::Line], curve.points) }
     }
 }
 
@@ -132,12 +132,8 @@ impl<'a> Shown<'a> {
         // The lines through all panels have their names in the first.
         let named =
             self.mark_lines().into_iter().map(|(mark, time_s)| format!("{} {} s", mark.label(), thousandths(time_s)));
-        let rules = shown.first_mut().into_iter().flat_map(|plot| &mut plot.layers);
-        for (layer, name) in rules.zip(named) {
-            if let Layer::Rule(rule) = layer {
-                rule.label = name;
-            }
-        }
+        let rules = shown.first_mut().into_iter().flat_map(|plot| &mut plot.rules);
+        rules.zip(named).for_each(|(rule, name)| rule.label = name);
         (vehicles, shown)
     }
 
@@ -153,27 +149,29 @@ impl<'a> Shown<'a> {
         &trace.steps[..trace.steps.partition_point(|step| step.time_s <= self.until_s)]
     }
 
-    /// A panel with axes and layers; the marks of a single lane become lines through all panels.
+    /// A panel with its levels and series; the marks of a single lane become lines through all panels.
     fn panel(
         &self,
         title: &str,
         hint: impl Into<String>,
         height_px: f64,
         ends: (f64, f64),
-        layers: Vec<Layer>,
+        levels: Vec<Rule>,
+        series: Vec<Series>,
     ) -> Plot {
         // A lane of one step needs an axis too.
         let end_s = if self.until_s > 0.0 { self.until_s } else { 1.0 };
         let through = self.mark_lines().into_iter().map(|(mark, time_s)| {
             let attributes = format!("class=\"mark-line {}\"", mark.label());
-            Rule { attributes, ..rule([(time_s, ends.0), (time_s, ends.1)], INK, 1.0, mark_dash(mark)) }.into()
+            Rule { attributes, ..rule([(time_s, ends.0), (time_s, ends.1)], INK, 1.0, mark_dash(mark)) }
         });
         Plot {
             heading: title.to_owned(),
             hint: hint.into(),
             x: PlotAxis::exactly("Time (s)", 0.0, end_s),
             y: PlotAxis::exactly("", ends.0, ends.1),
-            layers: through.chain(layers).collect(),
+            rules: through.chain(levels).collect(),
+            series,
             height: Height::Px(height_px),
             ..Plot::default()
         }
@@ -209,7 +207,7 @@ impl<'a> Shown<'a> {
         };
         let ends = around(values(&curves));
         let marks = self.marks(&StepMark::ALL, None, &|step| Some(step.v_ego_mps));
-        self.panel("Speed (m/s)", hint, 92.0, ends, layers(curves, marks))
+        self.panel("Speed (m/s)", hint, 92.0, ends, Vec::new(), with_marks(curves, marks))
     }
 
     fn acceleration(&self) -> Plot {
@@ -223,9 +221,9 @@ impl<'a> Shown<'a> {
             }
         }
         let ends = around(values(&curves).chain([0.0, -1.0]));
-        let mut layers = layers(curves, self.marks(&StepMark::ALL, None, &|step| Some(step.a_ego_mps2)));
-        layers.push(self.level(0.0, GREY, 1.1, "").into());
-        self.panel("Acceleration (m/s²)", "of the ego", 92.0, ends, layers)
+        let series = with_marks(curves, self.marks(&StepMark::ALL, None, &|step| Some(step.a_ego_mps2)));
+        let zero = self.level(0.0, GREY, 1.1, "");
+        self.panel("Acceleration (m/s²)", "of the ego", 92.0, ends, vec![zero], series)
     }
 
     fn gap(&self, vehicle: usize, name: &str) -> Plot {
@@ -234,9 +232,8 @@ impl<'a> Shown<'a> {
         let ends = around(values(&curves).chain([0.0]));
         let mut marks = self.marks(&[StepMark::Reaction, StepMark::Braking], None, &gap);
         marks.extend(self.marks(&[StepMark::Contact], Some(vehicle), &gap));
-        let mut layers = layers(curves, marks);
-        layers.push(self.level(0.0, GREY, 1.1, "").into());
-        self.panel("Gap (m)", name, 92.0, ends, layers)
+        let zero = self.level(0.0, GREY, 1.1, "");
+        self.panel("Gap (m)", name, 92.0, ends, vec![zero], with_marks(curves, marks))
     }
 
     fn ttc(&self, vehicle: usize) -> Plot {
@@ -258,9 +255,9 @@ impl<'a> Shown<'a> {
     fn measure(&self, title: &str, label: String, top: f64, threshold: f64, curves: Vec<Curve>) -> Plot {
         let is_beyond = |curve: &Curve| curve.points.iter().all(|point| point.1 > top);
         let hint = if curves.iter().any(is_beyond) { "a curve not shown is above" } else { "" };
-        let mut layers = layers(curves.into_iter().flat_map(|curve| below(curve, top)), Vec::new());
-        layers.push(Rule { label, ..self.level(threshold, INK, 1.4, "2,3") }.into());
-        self.panel(title, hint, 84.0, (-0.04 * top, top), layers)
+        let series = curves.into_iter().flat_map(|curve| below(curve, top)).map(Series::from).collect();
+        let level = Rule { label, ..self.level(threshold, INK, 1.4, "2,3") };
+        self.panel(title, hint, 84.0, (-0.04 * top, top), vec![level], series)
     }
 
     fn surrogate(&self, title: &str, hint: &str, vehicle: usize, value: &dyn Fn(&TracedVehicle) -> f64) -> Plot {
@@ -269,7 +266,7 @@ impl<'a> Shown<'a> {
             other.is_present.then(|| (value(other), false))
         };
         // The axis extends a little beyond 0 and 1, where most of the curves are.
-        self.panel(title, hint, 58.0, (-0.1, 1.1), layers(self.curves(&present), Vec::new()))
+        self.panel(title, hint, 58.0, (-0.1, 1.1), Vec::new(), with_marks(self.curves(&present), Vec::new()))
     }
 
     fn lateral(&self, vehicle: usize) -> Plot {
@@ -287,16 +284,17 @@ impl<'a> Shown<'a> {
                 let side = |&(x, y): &(f64, f64)| Value { interval: Some((y - half_m, y + half_m)), ..(x, y).into() };
                 let values: Vec<Value> = run.points.iter().map(side).collect();
                 edges.extend(run.points.iter().flat_map(|point| [point.1 - half_m, point.1 + half_m]));
-                bands.push(Series { values, look: Some(look), ..Series::new("", &[Mark::Band], []) }.into());
+                bands.push(Series { values, look: Some(look), ..Series::new("", &[Mark::Band], []) });
                 curves.push(run);
             }
         }
         let contacts = self.marks(&[StepMark::Contact], Some(vehicle), &|step| Some(step.others[vehicle].y_m));
-        let lane = [-half_lane_m, half_lane_m].map(|y| self.level(y, GREY, 1.1, "14,6").into());
-        let sides = [-ego_half_m, ego_half_m].map(|y| self.level(y, GREY, 2.4, "").into());
-        let layers = lane.into_iter().chain(sides).chain(bands).chain(layers(curves, contacts));
+        let lane = [-half_lane_m, half_lane_m].map(|y| self.level(y, GREY, 1.1, "14,6"));
+        let sides = [-ego_half_m, ego_half_m].map(|y| self.level(y, GREY, 2.4, ""));
+        let levels = lane.into_iter().chain(sides).collect();
+        bands.extend(with_marks(curves, contacts));
         let ends = around(edges.into_iter());
-        self.panel("Lateral position (m)", "grey lines: sides of the ego", 110.0, ends, layers.collect())
+        self.panel("Lateral position (m)", "grey lines: sides of the ego", 110.0, ends, levels, bands)
     }
 
     /// A value of the first series; equal for all of a sheet.
@@ -340,13 +338,13 @@ impl<'a> Shown<'a> {
         })
     }
 
-    /// Marks of the lanes as layers; with a vehicle, only contacts with it.
+    /// Marks of the lanes as series; with a vehicle, only contacts with it.
     fn marks(
         &self,
         which: &[StepMark],
         vehicle: Option<usize>,
         value: &dyn Fn(&TracedStep) -> Option<f64>,
-    ) -> Vec<Layer> {
+    ) -> Vec<Series> {
         let mut marks = Vec::new();
         for (of, look) in self.series.iter().zip(&self.looks) {
             if vehicle.is_some_and(|vehicle| usize::from(of.trace.outcome.contact_with) != vehicle) {
@@ -357,7 +355,7 @@ impl<'a> Shown<'a> {
                 let Some((step, value)) = step.and_then(|step| Some((step, value(step)?))) else { continue };
                 let attributes = format!("class=\"mark {}\" data-t=\"{}\"", mark.label(), step.time_s);
                 let series = Series::new("", &[Mark::Points], [(step.time_s, value)]);
-                marks.push(Series { look: Some(mark_look(mark, look)), attributes, ..series }.into());
+                marks.push(Series { look: Some(mark_look(mark, look)), attributes, ..series });
             }
         }
         marks
@@ -392,8 +390,8 @@ fn values(curves: &[Curve]) -> impl Iterator<Item = f64> {
     curves.iter().flat_map(|curve| &curve.points).map(|point| point.1)
 }
 
-fn layers(curves: impl IntoIterator<Item = Curve>, marks: Vec<Layer>) -> Vec<Layer> {
-    curves.into_iter().map(Layer::from).chain(marks).collect()
+fn with_marks(curves: Vec<Curve>, marks: Vec<Series>) -> Vec<Series> {
+    curves.into_iter().map(Series::from).chain(marks).collect()
 }
 
 /// Distinct, finite ends around values, with a little room.

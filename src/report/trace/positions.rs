@@ -87,7 +87,8 @@ impl TraceFigure<'_> {
                 heading,
                 x: PlotAxis::exactly("m ahead of the ego's middle", x.0, x.1),
                 y: PlotAxis::exactly("", y.0, y.1),
-                layers: vec![Cells { cells, key }.into(), edges.into()],
+                cells: Some(Cells { cells, key }),
+                rules: vec![edges],
                 height: Height::OfWidth(((y.1 - y.0) / (x.1 - x.0)).clamp(0.07, 0.2)),
                 ..Plot::default()
             }
