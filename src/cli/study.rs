@@ -15,7 +15,7 @@ use super::{Exit, Output, lists};
 use crate::Result;
 use crate::engine::{Chunk, Headway, LanePlan, OpenBackend};
 use crate::report::host::{Host, Timings};
-use crate::report::lanes::{StudyRows, table_format};
+use crate::report::lanes::{study_table, table_format, write_study_chunk};
 use crate::report::study::StudyReport;
 use crate::run::parts::{EachChunk, Job, PLAN_FILE, RUN_PLAN_FILE};
 use crate::run::study::{self, GivenReplay, ReferenceComparison, StudyOptions, StudyResult};
@@ -220,8 +220,8 @@ impl Study {
         let lanes = plan.first_lane_of(units.end) - plan.first_lane_of(units.start);
         tracing::info!("{} lanes on {}", readable::count(lanes), backend.describe());
         let bar = console::progress(verbosity, run.missing()?, "sweeping");
-        let mut rows = self.rows.as_deref().map(|path| StudyRows::create(path, study)).transpose()?;
-        let mut write = rows.as_mut().map(|rows| |plan: &LanePlan, chunk: &Chunk| rows.write(plan, chunk));
+        let mut rows = self.rows.as_deref().map(|path| study_table(path, study)).transpose()?;
+        let mut write = rows.as_mut().map(|rows| |plan: &LanePlan, chunk: &Chunk| write_study_chunk(rows, plan, chunk));
         timed(&mut timings.sweep_s, || {
             let each = write.as_mut().map(|write| write as &mut EachChunk);
             run.compute(&executor.clone().with_progress(console::inc(&bar)), each)

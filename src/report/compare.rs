@@ -2,13 +2,12 @@
 
 use std::fmt::Write;
 
-use super::close_following::{CloseRow, close_following};
 use super::dots::{DotRow, Dots, dots};
 use super::host::Host;
 use super::html::{Page, PageFigure, Section};
 use super::plot::{AxisScale, Figure, INK, Look, PlotAxis, Series, Symbol, Value, logarithmic_reach};
 use super::records::{PROGRAM, document, record};
-use super::tables::{WIDTH, wrap};
+use super::tables::{CloseRow, WIDTH, close_following, wrap};
 use crate::Result;
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;

@@ -3,48 +3,25 @@
 
 use std::path::Path;
 
-use crate::engine::{Chunk, Headway, LanePlan, NO_STEP, Outcome};
+use crate::engine::{Chunk, Headway, LanePlan, Outcome};
 use crate::model::criterion::Criterion;
-use crate::model::scalar::Real;
-use crate::report::records::smallest_gap_m;
+use crate::report::records::{at_contact, smallest_gap_m, time_s};
 use crate::run::study::{Study, robust_lanes};
 use crate::stats::density::DensityModel;
-use crate::support::atomic_file::StagedFile;
 use crate::support::files::make_folder_of;
 use crate::support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter};
 use crate::{Error, Result};
 
-/// One row per lane of a study, written chunk by chunk, so that memory does not grow with the lanes. The table is renamed
-/// to its final name together with the study's other results.
-pub struct StudyRows(TableWriter);
-
-impl StudyRows {
-    /// Begins the table.
-    ///
-    /// # Errors
-    /// [`Error::Io`]; [`Error::Usage`] for an unknown ending of the name.
-    pub fn create(path: &Path, study: &Study) -> Result<StudyRows> {
-        make_folder_of(path)?;
-        let facts = study.facts();
-        let digits = if facts.reference { Digits::Binary64 } else { Digits::Binary32 };
-        create(path, "lanes", study.plan(), facts.synthetic, columns(digits)).map(StudyRows)
-    }
-
-    /// Writes the rows of a chunk with outcomes. Chunks come in the plan's order.
-    ///
-    /// # Errors
-    /// As [`TableWriter::row`].
-    pub fn write(&mut self, plan: &LanePlan, chunk: &Chunk) -> Result<()> {
-        write_chunk(&mut self.0, plan, chunk)
-    }
-
-    /// Ends the table.
-    ///
-    /// # Errors
-    /// [`Error::Io`].
-    pub fn stage(self) -> Result<StagedFile> {
-        self.0.stage()
-    }
+/// A table for the lanes of a study; see [`write_study_chunk`]. It is written chunk by chunk, so that memory does not grow
+/// with the lanes.
+///
+/// # Errors
+/// [`Error::Io`]; [`Error::Usage`] for an unknown ending of the name.
+pub fn study_table(path: &Path, study: &Study) -> Result<TableWriter> {
+    make_folder_of(path)?;
+    let facts = study.facts();
+    let value = if facts.reference { ColumnKind::Binary64 } else { ColumnKind::Binary32 };
+    create(path, "lanes", study.plan(), facts.synthetic, columns(value))
 }
 
 /// A table for the lanes of a sampling run; see [`write_sampled_chunk`].
@@ -74,22 +51,10 @@ fn create(
     TableWriter::create(path, table_format(path)?, columns, &TableMetadata { table, profile, plan_sha256, synthetic })
 }
 
-/// Arithmetic of the numbers; they are written as the shortest text that reads back to the same bits.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Digits {
-    /// The lane arithmetic.
-    Binary32,
-    /// The reference.
-    Binary64,
-}
-
-/// The columns, in their order.
+/// The columns of a study's lanes, in their order. `value` is the arithmetic of the numbers: binary32, or binary64 of the
+/// reference; they are written as the shortest text that reads back to the same bits.
 #[rustfmt::skip] // a table: one line per column
-pub fn columns(digits: Digits) -> Vec<Column> {
-    let value = match digits {
-        Digits::Binary32 => ColumnKind::Binary32,
-        Digits::Binary64 => ColumnKind::Binary64,
-    };
+pub fn columns(value: ColumnKind) -> Vec<Column> {
     let c = Column::new;
     vec![
         c("id", ColumnKind::Text, "", "Scenario."),
@@ -116,7 +81,7 @@ pub fn columns(digits: Digits) -> Vec<Column> {
 ///
 /// # Errors
 /// As [`TableWriter::row`].
-fn write_chunk(table: &mut TableWriter, plan: &LanePlan, chunk: &Chunk) -> Result<()> {
+pub fn write_study_chunk(table: &mut TableWriter, plan: &LanePlan, chunk: &Chunk) -> Result<()> {
     let dt = plan.profile.frame.dt_s;
     let robust = robust_lanes(plan, chunk);
     for (at, outcome) in chunk.outcomes.iter().enumerate() {
@@ -128,7 +93,7 @@ fn write_chunk(table: &mut TableWriter, plan: &LanePlan, chunk: &Chunk) -> Resul
             Headway::GapM(_) | Headway::MinFollowing | Headway::Observed => Cell::Null,
         };
         let judged = |c: Criterion| Cell::Flag(outcome.verdicts.failed(c));
-        let time = |step: u32| Cell::number((step != NO_STEP).then(|| time(step, dt)));
+        let time = |step: u32| Cell::number(time_s(step, dt));
         let id = block.units.name(key.unit);
         table.row(&[
             Cell::text(id.as_ref()),
@@ -144,17 +109,12 @@ fn write_chunk(table: &mut TableWriter, plan: &LanePlan, chunk: &Chunk) -> Resul
             Cell::Whole(i64::from(outcome.contact.code())),
             time(outcome.reaction_step),
             time(outcome.contact_step),
-            Cell::number((outcome.contact_step != NO_STEP).then_some(outcome.impact_speed)),
+            Cell::number(at_contact(outcome, outcome.impact_speed)),
             time(outcome.end_step),
             robust[at].map_or(Cell::Null, Cell::Flag),
         ])?;
     }
     Ok(())
-}
-
-/// i·dt without the rounding error of the product, s.
-fn time(step: u32, dt: f64) -> f64 {
-    (f64::from_step(step) * dt * 1e9).round() / 1e9
 }
 
 /// How a lane ended: units are in the names.
@@ -179,8 +139,7 @@ fn outcome_columns() -> Vec<Column> {
 
 /// The values of [`outcome_columns`]. Null: did not happen.
 fn outcome_cells(outcome: &Outcome<f64>, dt_s: f64) -> [Cell<'static>; 12] {
-    let at_contact = |v: f64| Cell::number((outcome.contact_step != NO_STEP).then_some(v));
-    let time = |step: u32| Cell::number((step != NO_STEP).then(|| time(step, dt_s)));
+    let time = |step: u32| Cell::number(time_s(step, dt_s));
     let [collision, ttc, btn] = Criterion::ALL.map(|c| Cell::Flag(outcome.verdicts.failed(c)));
     [
         collision,
@@ -193,8 +152,8 @@ fn outcome_cells(outcome: &Outcome<f64>, dt_s: f64) -> [Cell<'static>; 12] {
         Cell::Whole(i64::from(outcome.contact.code())),
         time(outcome.reaction_step),
         time(outcome.end_step),
-        at_contact(outcome.impact_speed),
-        at_contact(outcome.impact_closing_speed),
+        Cell::number(at_contact(outcome, outcome.impact_speed)),
+        Cell::number(at_contact(outcome, outcome.impact_closing_speed)),
     ]
 }
 

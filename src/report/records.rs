@@ -28,9 +28,8 @@ pub(super) use record;
 
 /// How a lane ended. Times in seconds; null for events that did not happen.
 pub fn outcome(outcome: &Outcome<f64>, dt_s: f64) -> Value {
-    let time = |step: u32| (step != NO_STEP).then(|| (f64::from(step) * dt_s * 1e9).round() / 1e9);
+    let time = |step: u32| time_s(step, dt_s);
     let failed = |c: Criterion| outcome.verdicts.failed(c);
-    let is_contact = outcome.contact_step != NO_STEP;
     serde_json::json!({
         "collision": failed(Criterion::Collision),
         "ttc": failed(Criterion::Ttc),
@@ -42,10 +41,20 @@ pub fn outcome(outcome: &Outcome<f64>, dt_s: f64) -> Value {
         "crash_type": outcome.contact.code(),
         "t_react_s": time(outcome.reaction_step),
         "t_crash_s": time(outcome.contact_step),
-        "impact_speed_mps": is_contact.then_some(outcome.impact_speed),
-        "impact_closing_speed_mps": is_contact.then_some(outcome.impact_closing_speed),
+        "impact_speed_mps": at_contact(outcome, outcome.impact_speed),
+        "impact_closing_speed_mps": at_contact(outcome, outcome.impact_closing_speed),
         "t_end_s": time(outcome.end_step),
     })
+}
+
+/// When an event happened, s, without the rounding error of the product; `None` if it did not.
+pub(super) fn time_s(step: u32, dt_s: f64) -> Option<f64> {
+    (step != NO_STEP).then(|| (f64::from(step) * dt_s * 1e9).round() / 1e9)
+}
+
+/// A value of the contact; `None` without one.
+pub(super) fn at_contact(outcome: &Outcome<f64>, value: f64) -> Option<f64> {
+    (outcome.contact_step != NO_STEP).then_some(value)
 }
 
 /// The smallest gap of a lane, m, as tables and records have it. The lane measures it to the vehicles that TTC and BTN

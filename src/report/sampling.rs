@@ -4,11 +4,10 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use super::close_following::{CloseRow, close_following};
 use super::host::{Host, SettingRecord};
 use super::records::{PROGRAM, document};
 use super::sampling_tables::{VERDICTS, verdicts};
-use super::tables::{WIDTH, wrap};
+use super::tables::{CloseRow, WIDTH, close_following, wrap};
 use crate::Result;
 use crate::engine::generated::ATTEMPTS;
 use crate::engine::{ENGINE_VERSION, Headway, LanePlan};
@@ -18,9 +17,9 @@ use crate::run::close_following::CloseFollowing;
 use crate::run::sampling::{EstimateRow, RiskRate, SampleOptions, SampleTally};
 use crate::scenario::Category;
 use crate::stats::density::{DensityKind, DensityModel, Provenance};
-use crate::stats::estimate::{IntervalKind, Ratio, SearchRound, StopReason};
+use crate::stats::estimate::{IntervalKind, Ratio, SearchRound, StopReason, WeightFigures};
 use crate::support::readable::{count, count_of, significant, value};
-use crate::support::table::{Column, Digits, NumberText, Table};
+use crate::support::table::{Column, Digits, NumberText, Table, TableOf};
 
 /// The density of a run.
 #[derive(Debug, Clone, Serialize)]
@@ -247,12 +246,11 @@ impl EstimateFile {
                 },
             );
         }
-        if !self.given.is_empty() {
-            let list: Vec<String> = self.given.iter().map(|(name, v)| format!("{name} = {}", value(*v))).collect();
-            let _ = writeln!(text, "given {}: probabilities are conditional, risks are not known", list.join(", "));
+        if let Some(given) = self.given_list() {
+            let _ = writeln!(text, "given {given}: probabilities are conditional, risks are not known");
         }
         text.push_str(&self.table(|row| row.is_overall(&self.estimates)).text());
-        if self.estimates.iter().any(|row| row.is_rare_beside(&self.estimates)) {
+        if self.has_rare() {
             text.push_str("Rare failures, by importance sampling:\n");
             text.push_str(&self.table(|row| row.is_rare_beside(&self.estimates)).text());
         }
@@ -261,25 +259,21 @@ impl EstimateFile {
             let _ = writeln!(text, "{of}: {remark}");
         }
         if self.estimates.iter().any(|r| r.estimate.weights.is_some()) {
-            text.push_str(&self.weights_text());
+            let weights = self
+                .weights(&self.estimates)
+                .column("largest weight", weight(|w| NumberText(format!("{:.2} %", 100.0 * w.largest_fraction))))
+                .column("from the density", weight(|w| NumberText(format!("{:.1} %", 100.0 * w.crude_fraction))));
+            text.push_str(&weights.build().text());
         }
         text.push_str(&self.close_following());
-        if let Some(rule) = self.mean_rule() {
-            let _ = writeln!(text, "{}", wrap(&rule, WIDTH));
-        }
-        for rule in [self.exposure_rule(), self.sources_rule()].into_iter().flatten() {
-            let _ = writeln!(text, "{}", wrap(&rule, WIDTH));
-        }
-        if let Some(rule) = self.recorded_rule() {
-            let _ = writeln!(text, "{}", wrap(rule, WIDTH));
-        }
-        let level = self.estimates.first().map_or(0.95, |r| r.estimate.interval.level);
-        let rule = format!(
+        let intervals = format!(
             "Intervals at {} %{}. ± is the half-width of P's interval divided by P. ≤ is an upper bound where nothing failed.",
-            value(100.0 * level),
+            value(100.0 * self.level()),
             self.interval_rule()
         );
-        let _ = writeln!(text, "{}", wrap(&rule, WIDTH));
+        for rule in self.rules().chain([intervals]) {
+            let _ = writeln!(text, "{}", wrap(&rule, WIDTH));
+        }
         // A density of N scenarios is based on no data below a probability of 1/N.
         let resolved = 1.0 / self.density.kernels.max(1) as f64;
         let is_fitted = self.density.kernels > 0;
@@ -321,10 +315,8 @@ impl EstimateFile {
         };
         let sampled = |row: &EstimateRow| row.recorded.and_then(|recorded| recorded.sampled);
         let ratio = |row| sampled(row).and_then(|r| Some(format!("{} {}", short(r.ratio?), r.verdict.mark())));
-        let mut table = Table::of(estimates.iter().filter(|row| is_in(row)))
-            .column("model", |row| row.model.name())
-            .column("criterion", |row| row.criterion.label())
-            .column("THW", |row| self.headway_cell(row))
+        let mut table = self
+            .named(estimates.iter().filter(|row| is_in(row)))
             .column("failures", |row| row.estimate.failures)
             .column(three_digits("P"), |row| row.estimate.probability)
             .column("interval", |EstimateRow { estimate: e, .. }| {
@@ -343,19 +335,41 @@ impl EstimateFile {
         table.column(VERDICTS, verdicts).build()
     }
 
-    /// What the importance weights indicate.
-    fn weights_text(&self) -> String {
-        let rows = self.estimates.iter().filter_map(|row| Some((row, row.estimate.weights.as_ref()?)));
-        let table = Table::of(rows)
-            .column("model", |(row, _)| row.model.name())
-            .column("criterion", |(row, _)| row.criterion.label())
-            .column("THW", |(row, _)| self.headway_cell(row))
-            .column(three_digits("variance reduction"), |(row, _)| row.estimate.variance_reduction)
-            .column("effective failures", |(_, w)| w.effective_failures)
-            .column("largest weight", |(_, w)| NumberText(format!("{:.2} %", 100.0 * w.largest_fraction)))
-            .column("from the density", |(_, w)| NumberText(format!("{:.1} %", 100.0 * w.crude_fraction)));
-        table.build().text()
+    /// A row per estimate, with what it is of.
+    pub(super) fn named<'a>(&self, rows: impl IntoIterator<Item = &'a EstimateRow>) -> TableOf<&'a EstimateRow> {
+        Table::of(rows)
+            .column("model", |row| row.model.name())
+            .column("criterion", |row| row.criterion.label())
+            .column("THW", |row| self.headway_cell(row))
     }
+
+    /// What the importance weights indicate, for those estimates that have them.
+    pub(super) fn weights<'a>(&self, rows: impl IntoIterator<Item = &'a EstimateRow>) -> TableOf<&'a EstimateRow> {
+        self.named(rows.into_iter().filter(|row| row.estimate.weights.is_some()))
+            .column(three_digits("variance reduction"), |row| row.estimate.variance_reduction)
+            .column("effective failures", weight(|w| w.effective_failures))
+    }
+
+    /// Confidence level of the intervals.
+    pub(super) fn level(&self) -> f64 {
+        self.estimates.first().map_or(0.95, |row| row.estimate.interval.level)
+    }
+
+    /// Whether rare failures have an estimate by importance sampling, too.
+    pub(super) fn has_rare(&self) -> bool {
+        self.estimates.iter().any(|row| row.is_rare_beside(&self.estimates))
+    }
+
+    /// The parameters with given values; `None` without any.
+    pub(super) fn given_list(&self) -> Option<String> {
+        let list: Vec<String> = self.given.iter().map(|(name, v)| format!("{name} = {}", value(*v))).collect();
+        (!list.is_empty()).then(|| list.join(", "))
+    }
+}
+
+/// A number of the weights of a row that has them.
+pub(super) fn weight<V>(of: impl Fn(&WeightFigures) -> V) -> impl Fn(&EstimateRow) -> Option<V> {
+    move |row| row.estimate.weights.as_ref().map(&of)
 }
 
 /// A column of numbers with three digits.

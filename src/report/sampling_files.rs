@@ -71,8 +71,7 @@ impl EstimateFile {
         let mut figures = Vec::new();
         if !run.convergence.is_empty() {
             results.add("convergence.csv", convergence_csv(&run.convergence).as_bytes())?;
-            let level = self.estimates.first().map_or(0.95, |row| row.estimate.interval.level);
-            let svg = convergence(density, &run.convergence, level).svg();
+            let svg = convergence(density, &run.convergence, self.level()).svg();
             figures.push(PageFigure::add_svg(results, "convergence", &svg, "convergence.csv")?);
         }
         let Some(generator) = plan.generator() else {

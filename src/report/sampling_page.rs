@@ -2,7 +2,7 @@
 
 use super::html::{Page, PageFigure, Section};
 use super::plot::{AxisScale, Figure, Mark, Plot, PlotAxis, Series, Value, is_few};
-use super::sampling::{EstimateFile, interval_text, rate_text, ratio_text, short, three_digits};
+use super::sampling::{EstimateFile, interval_text, rate_text, ratio_text, short, three_digits, weight};
 use super::sampling_tables::{VERDICTS, verdicts};
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
@@ -10,16 +10,14 @@ use crate::model::driver::ModelId;
 use crate::run::sampling::EstimateRow;
 use crate::scenario::Category;
 use crate::support::readable::{count, count_of, value};
-use crate::support::table::{Column, Digits, NumberText, Table};
+use crate::support::table::{Column, Digits, NumberText};
 
 impl EstimateFile {
     /// `report.html`, with the figures of the run.
     pub fn html(&self, figures: Vec<PageFigure>) -> String {
         let density = &self.density;
         let mut warnings = Vec::new();
-        if !self.given.is_empty() {
-            let list: Vec<String> = self.given.iter().map(|(name, v)| format!("{name} = {}", value(*v))).collect();
-            let given = list.join(", ");
+        if let Some(given) = self.given_list() {
             warnings.push(format!("Given {given}: probabilities are conditional, risks are not known."));
         }
         if !self.reproducible {
@@ -40,7 +38,7 @@ impl EstimateFile {
                     0 => format!("distributions of {}", density.parameters.join(", ")),
                     kernels => format!("a density over {} mined scenarios", count_of(kernels)),
                 },
-                match self.estimates.iter().any(|row| row.is_rare_beside(&self.estimates)) {
+                match self.has_rare() {
                     true => format!("{}, rare failures by is", self.estimator),
                     false => self.estimator.to_owned(),
                 },
@@ -66,17 +64,14 @@ impl EstimateFile {
             .iter()
             .filter(|r| r.is_overall(&self.estimates) || r.is_rare_beside(&self.estimates))
             .collect();
-        let level = self.estimates.first().map_or(0.95, |row| row.estimate.interval.level);
         let wide = |row: &EstimateRow| {
             let percent = 100.0 * row.estimate.relative_half_width;
             percent
                 .is_finite()
                 .then(|| NumberText(if percent < 1000.0 { format!("{percent:.1}") } else { "> 999".to_owned() }))
         };
-        let estimates = Table::of(overall.iter().copied())
-            .column("model", |row| row.model.name())
-            .column("criterion", |row| row.criterion.label())
-            .column("THW", |row| self.headway_cell(row))
+        let estimates = self
+            .named(overall.iter().copied())
             .column("runs", |row| row.estimate.runs)
             .column("failures", |row| row.estimate.failures)
             .column(three_digits("P"), |row| row.estimate.probability)
@@ -91,20 +86,14 @@ impl EstimateFile {
             .build();
         let mut tables = vec![estimates.captioned(format!(
             "Probability of failure, and risk where the exposure is known. Intervals at {} %{}",
-            value(100.0 * level),
+            value(100.0 * self.level()),
             self.interval_rule()
         ))];
-        let weighted = overall.iter().filter_map(|row| Some((*row, row.estimate.weights.as_ref()?)));
-        let weights = Table::of(weighted)
-            .column("model", |(row, _)| row.model.name())
-            .column("criterion", |(row, _)| row.criterion.label())
-            .column("THW", |(row, _)| self.headway_cell(row))
-            .column(three_digits("variance reduction"), |(row, _)| row.estimate.variance_reduction)
-            .column("effective failures", |(_, w)| w.effective_failures)
-            .column(Column::from("largest weight in %").digits(Digits::Fixed(2)), |(_, w)| 100.0 * w.largest_fraction)
-            .column(Column::from("from draws of the density in %").digits(Digits::Fixed(1)), |(_, w)| {
-                100.0 * w.crude_fraction
-            })
+        let percent = |name, decimals| Column::from(name).digits(Digits::Fixed(decimals));
+        let weights = self
+            .weights(overall)
+            .column(percent("largest weight in %", 2), weight(|w| 100.0 * w.largest_fraction))
+            .column(percent("from draws of the density in %", 1), weight(|w| 100.0 * w.crude_fraction))
             .build();
         if !weights.rows.is_empty() {
             tables.push(weights.captioned("Weights: how much of the sample counts"));
@@ -123,11 +112,7 @@ impl EstimateFile {
                         count_of(kernels)
                     ),
                 },
-                [self.mean_rule(), self.exposure_rule(), self.sources_rule(), self.recorded_rule().map(str::to_owned)]
-                    .into_iter()
-                    .flatten()
-                    .map(|rule| rule + ". ")
-                    .collect::<String>()
+                self.rules().map(|rule| rule + ". ").collect::<String>()
             ))
             .tables(tables)
             .facts(self.remarks())

@@ -1,9 +1,8 @@
 //! The tables of a sampling run as CSV: numbers in full precision, empty where undefined. Also the sentences that
 //! explain them on the terminal and the page.
 
-use super::records::smallest_gap_m;
+use super::records::{at_contact, smallest_gap_m};
 use super::sampling::{EstimateFile, short};
-use crate::engine::NO_STEP;
 use crate::model::criterion::Criterion;
 use crate::run::sampling::{Checkpoint, EstimateRow, ModelRatio, ProfileRatios, RiskRate, Uncertainty, WorstLane};
 use crate::stats::estimate::{IntervalKind, Ratio, RatioMethod, RatioVerdict, Warning, WeightFigures};
@@ -141,7 +140,6 @@ fn ratio_columns(sides: TableOf<&ModelRatio>) -> TableOf<&ModelRatio> {
 
 /// `worst.csv`: the lanes with the smallest limit state of `criterion`, rerunnable by key.
 pub(super) fn worst_csv(rows: &[WorstLane], parameters: &[String], criterion: Criterion) -> String {
-    let at_contact = |row: &WorstLane, v: f64| (row.outcome.contact_step != NO_STEP).then_some(v);
     Table::of(rows)
         .column("model", |row| row.model.name())
         .column("rank", |row| row.rank)
@@ -154,8 +152,8 @@ pub(super) fn worst_csv(rows: &[WorstLane], parameters: &[String], criterion: Cr
         .column("min_ttc_s", |row| row.outcome.min_ttc)
         .column("max_btn", |row| row.outcome.max_btn)
         .column("min_gap_m", |row| smallest_gap_m(&row.outcome))
-        .column("impact_speed_mps", |row| at_contact(row, row.outcome.impact_speed))
-        .column("impact_closing_speed_mps", |row| at_contact(row, row.outcome.impact_closing_speed))
+        .column("impact_speed_mps", |row| at_contact(&row.outcome, row.outcome.impact_speed))
+        .column("impact_closing_speed_mps", |row| at_contact(&row.outcome, row.outcome.impact_closing_speed))
         .columns(parameters.iter().enumerate(), |(_, name)| name.clone(), |row, (at, _)| row.point[at])
         .build()
         .csv()
@@ -230,8 +228,13 @@ impl EstimateFile {
         if row.headway == "all" { format!("all {}", self.headways.len()) } else { row.headway.clone() }
     }
 
+    /// How to read the estimates, one sentence after the other.
+    pub(super) fn rules(&self) -> impl Iterator<Item = String> {
+        [self.mean_rule(), self.exposure_rule(), self.sources_rule(), self.recorded_rule()].into_iter().flatten()
+    }
+
     /// What P over all headways averages; `None` for a single headway.
-    pub(super) fn mean_rule(&self) -> Option<String> {
+    fn mean_rule(&self) -> Option<String> {
         let is_mean = self.estimates.iter().any(|row| row.headway == "all");
         is_mean.then(|| {
             format!(
@@ -244,7 +247,7 @@ impl EstimateFile {
     }
 
     /// What a rate per hour assumes; `None` if no risk is known or the density samples the headway.
-    pub(super) fn exposure_rule(&self) -> Option<String> {
+    fn exposure_rule(&self) -> Option<String> {
         let is_known = self.estimates.iter().any(|row| row.risk.per_hour.is_some() || row.risk.per_1000_km.is_some());
         (is_known && !self.plan_headways.is_empty()).then(|| {
             "Per hour and per 1000 km: scenarios occur as often as observed, but begin at these headways, which are \
@@ -254,24 +257,19 @@ impl EstimateFile {
     }
 
     /// Where the width of the intervals comes from, and what would halve it; `None` if no row knows.
-    pub(super) fn sources_rule(&self) -> Option<String> {
+    fn sources_rule(&self) -> Option<String> {
         let known: Vec<Uncertainty> = self.estimates.iter().filter_map(|row| row.uncertainty).collect();
-        let range = |of: &dyn Fn(&Uncertainty) -> f64| {
-            let values = known.iter().map(of);
-            let ends = [values.clone().fold(f64::INFINITY, f64::min), values.fold(0.0, f64::max)];
+        let range = |values: Vec<f64>| {
+            let ends = [values.iter().copied().fold(f64::INFINITY, f64::min), values.into_iter().fold(0.0, f64::max)];
             let [low, high] = ends.map(|end| significant(end, 2));
             if low == high { low } else { format!("{low} to {high}") }
         };
-        let percent = |of: fn(&Uncertainty) -> f64| range(&|u| 100.0 * of(u));
+        let percent = |of: fn(&Uncertainty) -> f64| range(known.iter().map(|u| 100.0 * of(u)).collect());
         let factors = |of: fn(&Uncertainty) -> Option<f64>, what: &str| match known.iter().filter_map(of).count() {
             0 => format!("more {what} alone do not halve any"),
             some => {
                 let rows = if some == known.len() { "them".to_owned() } else { format!("{some} of {}", known.len()) };
-                let values = known.iter().filter_map(of);
-                let ends = [values.clone().fold(f64::INFINITY, f64::min), values.fold(0.0, f64::max)];
-                let [low, high] = ends.map(|end| significant(end, 2));
-                let times = if low == high { low } else { format!("{low} to {high}") };
-                format!("{times} times the {what} halve {rows}")
+                format!("{} times the {what} halve {rows}", range(known.iter().filter_map(of).collect()))
             }
         };
         (!known.is_empty()).then(|| {
@@ -287,13 +285,14 @@ impl EstimateFile {
     }
 
     /// What the ratio to recorded scenarios and the verdict mean; `None` without a comparison.
-    pub(super) fn recorded_rule(&self) -> Option<&'static str> {
-        self.estimates.iter().any(|row| row.recorded.is_some_and(|of| of.sampled.is_some())).then_some(
+    fn recorded_rule(&self) -> Option<String> {
+        self.estimates.iter().any(|row| row.recorded.is_some_and(|of| of.sampled.is_some())).then(|| {
             "P/S: rate of the samples over that of the recorded scenarios (S), from the same headways; = agrees, > too \
              high, < too low, ? undecided (intervals: estimates.csv). The density agrees if S' (the same scenarios under this parameterization) and the \
              samples both fail as often as S to within a quarter: the intervals of S'/S and P/S lie within 0.80 to 1.25. \
-             P's interval does not hold that difference",
-        )
+             P's interval does not hold that difference"
+                .to_owned()
+        })
     }
 
     /// What the intervals cover in addition to the draws, and whether all of them hold together.

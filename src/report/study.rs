@@ -1,15 +1,13 @@
 //! A study as text for the terminal, as one JSON document and as files in the output folder.
 
-use super::close_following::{CloseRow, close_following};
 use super::host::{Host, SweepRecord, Timings};
 use super::html::PageFigure;
 use super::plot::Figure;
 use super::records::{PROGRAM, document};
-use super::reference;
 use super::study_figures::{
     distributions, f1_by_parameters, f1_intervals, headways, modes, radar, recall_and_precision,
 };
-use super::tables;
+use super::tables::{self, CloseRow, close_following};
 use crate::Result;
 use crate::engine::{CLOSE_HEADWAY_S, Headway, Partial, SweepSummary};
 use crate::model::criterion::Criterion;
@@ -81,7 +79,7 @@ impl<'a> StudyReport<'a> {
         parts.extend(self.evaluation.scores.categories.iter().map(|c| tables::f1_table(c, published, width)));
         parts.extend(self.given_table().map(|table| table.fitted(2, width)));
         parts.extend(Some(tables::claims(&self.evaluation.claims, width)).filter(|text| !text.is_empty()));
-        parts.extend(self.comparison.iter().map(reference::text));
+        parts.extend(self.comparison.iter().map(tables::reference_text));
         if synthetic {
             parts.push(format!("{data}\nNo number above is a statement about real traffic.\n"));
         }
@@ -160,7 +158,7 @@ impl<'a> StudyReport<'a> {
             results.add("folds.csv", table.build().csv().as_bytes())?;
         }
         if let Some(comparison) = &self.comparison {
-            results.add("reference.csv", reference::table(comparison).csv().as_bytes())?;
+            results.add("reference.csv", tables::reference_table(comparison).csv().as_bytes())?;
         }
         results.add("report.html", self.html(figures).as_bytes())?;
         let files = results.names();
@@ -236,7 +234,7 @@ impl StudyReport<'_> {
             value["published"] = published(&self.evaluation.scores);
         }
         if let Some(comparison) = &self.comparison {
-            value["reference"] = reference::table(comparison).records();
+            value["reference"] = tables::reference_table(comparison).records();
         }
         document(&value)
     }

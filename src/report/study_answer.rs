@@ -2,10 +2,9 @@
 //! show.
 
 use super::html::Section;
-use super::reference;
 use super::study::StudyReport;
 use super::study_figures::variant_name;
-use super::tables::wrap;
+use super::tables::{reference_text, wrap};
 use crate::run::score::Best;
 use crate::support::readable::{count, count_of, counted};
 use crate::support::table::{NumberText, Table};
@@ -48,7 +47,7 @@ impl StudyReport<'_> {
         lines.extend(
             self.comparison
                 .iter()
-                .filter_map(|comparison| Some(wrap(reference::text(comparison).lines().next()?, width))),
+                .filter_map(|comparison| Some(wrap(reference_text(comparison).lines().next()?, width))),
         );
         lines.push(wrap(LEGEND, width));
         lines.join("\n") + "\n"

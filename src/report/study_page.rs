@@ -3,7 +3,6 @@
 use super::host::Timings;
 use super::html::{Page, PageFigure, Section};
 use super::records::PROGRAM;
-use super::reference;
 use super::study::StudyReport;
 use super::tables;
 use crate::run::score::{CategoryScores, ClaimVerdict, Misfit};
@@ -42,7 +41,8 @@ impl StudyReport<'_> {
             Section::new("given", "Cross-validation and given S'").intro(intro).tables([table])
         }));
         sections.extend(self.comparison.as_ref().map(|comparison| {
-            Section::new("reference", "Lane arithmetic against double precision").text(reference::text(comparison))
+            Section::new("reference", "Lane arithmetic against double precision")
+                .text(tables::reference_text(comparison))
         }));
         sections.extend([self.data(), self.reproduction()]);
         Page {

@@ -52,13 +52,8 @@ impl TrackReport {
             self.file, "recording", self.understanding.recording, "preset", self.preset
         );
         let mut lines = self.understanding.lines();
-        lines.push(("scenarios", counts_text(&self.mined)));
-        if let Some(without) = &self.mined_without_smoothing {
-            lines.push(("", format!("without smoothing {}", counts_text(without))));
-        }
-        for (name, words) in lines {
-            text += &hanging(&format!("  {name:<10} "), &words);
-        }
+        lines.extend(mined(&self.mined, self.mined_without_smoothing.clone()));
+        lines.iter().for_each(|(name, words)| text += &line(name, words));
         let findings = &self.understanding.findings;
         if findings.is_empty() {
             text += "  nothing contradicts itself\n";
@@ -82,42 +77,38 @@ pub fn report_text(reports: &[TrackReport]) -> String {
     if reports.len() <= MAX_TOLD {
         return reports.iter().map(TrackReport::text).collect::<Vec<_>>().join("\n");
     }
-    let mut text = format!("{} recordings; JSON output tells each of them\n", count_of(reports.len()));
-    let mut line = |name: &str, words: &str| text += &hanging(&format!("  {name:<10} "), words);
-    let of_all =
-        |value: &dyn Fn(&Understanding) -> f64| reports.iter().map(|report| value(&report.understanding)).sum::<f64>();
-    let range = |value: &dyn Fn(&Understanding) -> f64| {
-        let values = reports.iter().map(|report| value(&report.understanding));
-        let (low, high) = values.fold((f64::INFINITY, 0.0_f64), |(low, high), value| (low.min(value), high.max(value)));
-        format!("{} to {}", significant(low, 3), significant(high, 3))
+    let mut lines: Vec<(&str, String)> = Vec::new();
+    let told = |name: &'static str, words: &dyn Fn(&TrackReport) -> String| {
+        variants(reports, words).into_iter().map(move |words| (name, words))
     };
-    let each = |name: &'static str, line: &mut dyn FnMut(&str, &str)| {
+    let same = |name: &'static str| {
         let words = |report: &TrackReport| {
             let lines = report.understanding.lines();
             lines.into_iter().find(|(of, _)| *of == name).map(|(_, words)| words).unwrap_or_default()
         };
-        variants(reports, &words).iter().filter(|words| !words.is_empty()).for_each(|words| line(name, words));
+        told(name, &words).filter(|(_, words)| !words.is_empty())
     };
-    variants(reports, &|report| format!("{} ({})", report.preset, report.how()))
-        .iter()
-        .for_each(|words| line("preset", words));
-    each("rate", &mut line);
-    let total = |value: fn(&Understanding) -> u64| {
-        count(reports.iter().map(|report| value(&report.understanding)).sum::<u64>())
+    let of_all = |value: fn(&Understanding) -> f64| reports.iter().map(|of| value(&of.understanding)).sum::<f64>();
+    let total =
+        |value: fn(&Understanding) -> u64| count(reports.iter().map(|of| value(&of.understanding)).sum::<u64>());
+    let range = |value: fn(&Understanding) -> f64| {
+        let values = reports.iter().map(|report| value(&report.understanding));
+        let (low, high) = values.fold((f64::INFINITY, 0.0_f64), |(low, high), value| (low.min(value), high.max(value)));
+        format!("{} to {}", significant(low, 3), significant(high, 3))
     };
-    line(
-        "vehicles",
-        &format!(
-            "{} cars, {} lorries; {} samples, {} h, {} km",
-            total(|of| of.cars),
-            total(|of| of.trucks),
-            total(|of| of.samples),
-            significant(of_all(&|of| of.hours), 3),
-            significant(of_all(&|of| of.km), 4)
-        ),
+    lines.extend(told("preset", &|report| format!("{} ({})", report.preset, report.how())));
+    lines.extend(same("rate"));
+    let vehicles = format!(
+        "{} cars, {} lorries; {} samples, {} h, {} km",
+        total(|of| of.cars),
+        total(|of| of.trucks),
+        total(|of| of.samples),
+        significant(of_all(|of| of.hours), 3),
+        significant(of_all(|of| of.km), 4)
     );
-    each("columns", &mut line);
-    each("reference", &mut line);
+    lines.push(("vehicles", vehicles));
+    lines.extend(same("columns"));
+    lines.extend(same("reference"));
     let mut classes: BTreeMap<&str, u64> = BTreeMap::new();
     for (class, number) in reports.iter().flat_map(|report| &report.understanding.classes) {
         *classes.entry(class).or_default() += number;
@@ -125,30 +116,24 @@ pub fn report_text(reports: &[TrackReport]) -> String {
     if !classes.is_empty() {
         let words: Vec<String> =
             classes.iter().take(12).map(|(class, number)| format!("{} {class}", count(*number))).collect();
-        line("classes", &words.join(", "));
+        lines.push(("classes", words.join(", ")));
     }
     let straight = |of: &TrackReport| if of.understanding.is_straight { "straight" } else { "curved" }.to_owned();
-    variants(reports, &straight).iter().for_each(|words| line("road", words));
-    line(
-        "",
-        &format!(
-            "{} m in view; vehicles wander by {} m around its line",
-            range(&|of| of.length_m),
-            range(&|of| of.wander_m)
-        ),
-    );
+    lines.extend(told("road", &straight));
+    let (length_m, wander_m) = (range(|of| of.length_m), range(|of| of.wander_m));
+    lines.push(("", format!("{length_m} m in view; vehicles wander by {wander_m} m around its line")));
     let lanes = |report: &TrackReport| {
         let of = |of: &UnderstoodCarriageway| format!("{} lanes {} from {}", of.lanes, of.way(), of.source);
         report.understanding.carriageways.iter().map(of).collect::<Vec<_>>().join("; ")
     };
-    variants(reports, &lanes).iter().for_each(|words| line("lanes", words));
+    lines.extend(told("lanes", &lanes));
     let speeds = |report: &TrackReport| {
         let of = &report.understanding;
         let from = |number: u64, what: &str| if number == 0 { "as given".to_owned() } else { format!("from {what}") };
         let (along, across) = (from(of.derived_speeds, "positions"), from(of.derived_lateral, "positions"));
         format!("{along}, lateral ones {across}, accelerations {}", from(of.derived_accelerations, "speeds"))
     };
-    variants(reports, &speeds).iter().for_each(|words| line("speeds", words));
+    lines.extend(told("speeds", &speeds));
     let sum = |mined: &dyn Fn(&TrackReport) -> Option<Vec<CategoryCount>>| {
         reports.iter().filter_map(mined).reduce(|sum, mined| {
             let add = |(a, b): (&CategoryCount, CategoryCount)| CategoryCount {
@@ -158,10 +143,12 @@ pub fn report_text(reports: &[TrackReport]) -> String {
             sum.iter().zip(mined).map(add).collect()
         })
     };
-    line("scenarios", &counts_text(&sum(&|report| Some(report.mined.clone())).unwrap_or_default()));
-    if let Some(without) = sum(&|report| report.mined_without_smoothing.clone()) {
-        line("", &format!("without smoothing {}", counts_text(&without)));
-    }
+    lines.extend(mined(
+        &sum(&|of| Some(of.mined.clone())).unwrap_or_default(),
+        sum(&|of| of.mined_without_smoothing.clone()),
+    ));
+    let mut text = format!("{} recordings; JSON output tells each of them\n", count_of(reports.len()));
+    lines.iter().for_each(|(name, words)| text += &line(name, words));
     // Findings that differ in their numbers are one kind.
     let kind = |text: &str| text.replace(|c: char| c.is_ascii_digit() || ".,".contains(c), "");
     let mut kinds: BTreeMap<(bool, String), (&str, Vec<&TrackReport>)> = BTreeMap::new();
@@ -203,6 +190,19 @@ fn names(reports: &[&TrackReport]) -> String {
     let more = reports.len().saturating_sub(MAX_NAMED);
     let more = if more > 0 { format!(" and {} more", count_of(more)) } else { String::new() };
     format!("{} recordings: {}{more}", count_of(reports.len()), first.join(", "))
+}
+
+/// The lines of found scenarios, with the preset's smoothing and without.
+fn mined(
+    counts: &[CategoryCount],
+    without: Option<Vec<CategoryCount>>,
+) -> impl Iterator<Item = (&'static str, String)> {
+    let without = without.map(|without| ("", format!("without smoothing {}", counts_text(&without))));
+    [("scenarios", counts_text(counts))].into_iter().chain(without)
+}
+
+fn line(name: &str, words: &str) -> String {
+    hanging(&format!("  {name:<10} "), words)
 }
 
 /// Words after a name, wrapped below one another.

@@ -17,14 +17,14 @@ use lanesweep::scenario::read_scenario_file;
 use lanesweep::support::plausibility::Implausible;
 use parquet::basic::Compression;
 
-use lanesweep::report::lanes::{Digits, columns};
+use lanesweep::report::lanes::columns;
 use lanesweep::support::table::{Cell, ColumnKind, TableFormat, TableMetadata, TableWriter};
 use lanesweep::traffic::trajectory::highd;
 use parquet::arrow::arrow_reader::ParquetRecordBatchReaderBuilder;
 
 /// Writes lanes that hardly repeat; the most bytes held at once.
 fn write(path: &Path, rows: u64) -> u64 {
-    let columns = columns(Digits::Binary32);
+    let columns = columns(ColumnKind::Binary32);
     memory::begin(rows);
     let mut table =
         TableWriter::create(path, TableFormat::Parquet, columns.clone(), &TableMetadata::default()).unwrap();

@@ -22,6 +22,11 @@ impl Range {
         (both.low <= both.high).then_some(both)
     }
 
+    /// The interval of one value.
+    pub(super) fn point(value: f64) -> Range {
+        Range { low: value, high: value }
+    }
+
     /// Whether a number is inside.
     pub fn holds(self, value: f64) -> bool {
         self.low <= value && value <= self.high
@@ -56,10 +61,8 @@ pub enum Distribution {
         /// Range of the truncation.
         range: Range,
     },
-    /// Intervals with weights, each uniform inside; ascending, without overlap.
-    Histogram(Vec<(Range, f64)>),
-    /// Values with weights.
-    Set(Vec<(f64, f64)>),
+    /// Intervals with weights, each uniform inside; a single value is an interval of zero width.
+    Steps(Vec<(Range, f64)>),
 }
 
 /// Maximum mean of a Poisson distribution, whose probabilities are tabulated.
@@ -68,8 +71,6 @@ pub(super) const MAX_POISSON: f64 = 1e6;
 /// A distribution truncated to a range, ready for sampling.
 #[derive(Debug, Clone, PartialEq)]
 pub enum Draw {
-    /// Uniform over a range.
-    Uniform(Range),
     /// `mean + deviation · quantile`, for probabilities `from` to `to`, counted from above if `is_mirrored`.
     Normal {
         /// Mean before truncation.
@@ -104,7 +105,7 @@ impl Distribution {
             Distribution::Uniform(range) => {
                 let both = range.and(within)?;
                 let width = range.high - range.low;
-                Some((Draw::Uniform(both), if width > 0.0 { (both.high - both.low) / width } else { 1.0 }))
+                Some((Draw::uniform(both), if width > 0.0 { (both.high - both.low) / width } else { 1.0 }))
             }
             Distribution::Normal { mean, deviation, range } => normal(*mean, *deviation, range.and(within)?, *range),
             Distribution::LogNormal { mu, sigma } => {
@@ -115,29 +116,17 @@ impl Distribution {
             }
             Distribution::Poisson { mean, range } => {
                 let whole = poisson(*mean, *range);
-                let all: f64 = whole.iter().map(|(_, p)| p).sum();
-                steps(whole.into_iter().map(|(k, p)| (Range { low: k, high: k }, p)), within, all)
+                steps(&whole, within, whole.iter().map(|(_, weight)| weight).sum())
             }
-            Distribution::Histogram(bins) => {
-                steps(bins.iter().copied(), within, bins.iter().map(|(_, weight)| weight).sum())
-            }
-            Distribution::Set(values) => {
-                let point = |&(v, weight): &(f64, f64)| (Range { low: v, high: v }, weight);
-                steps(values.iter().map(point), within, values.iter().map(|(_, weight)| weight).sum())
-            }
+            Distribution::Steps(all) => steps(all, within, all.iter().map(|(_, weight)| weight).sum()),
         }
     }
-}
 
-impl Distribution {
     /// Fraction of its probability that its own range keeps.
     pub(super) fn range_fraction(&self) -> f64 {
         match self {
             Distribution::Normal { mean, deviation, range } => normal(*mean, *deviation, *range, Range::ALL),
-            Distribution::Poisson { mean, range } => {
-                let point = |(k, p)| (Range { low: k, high: k }, p);
-                steps(poisson(*mean, *range).into_iter().map(point), Range::ALL, 1.0)
-            }
+            Distribution::Poisson { mean, range } => steps(&poisson(*mean, *range), Range::ALL, 1.0),
             _ => return 1.0,
         }
         .map_or(0.0, |(_, kept)| kept)
@@ -145,10 +134,13 @@ impl Distribution {
 }
 
 impl Draw {
+    fn uniform(range: Range) -> Draw {
+        Draw::Steps { steps: vec![range], until: vec![1.0] }
+    }
+
     /// The value of a uniform number in (0, 1).
     pub fn value(&self, uniform: f64) -> f64 {
         match self {
-            Draw::Uniform(range) => between(*range, uniform),
             Draw::Normal { mean, deviation, range, from, to, is_mirrored } => {
                 let p = from + uniform * (to - from);
                 let z = normal_quantile(p);
@@ -160,22 +152,16 @@ impl Draw {
                 let at = until.partition_point(|end| *end <= uniform).min(steps.len() - 1);
                 let from = if at == 0 { 0.0 } else { until[at - 1] };
                 let share = ((uniform - from) / (until[at] - from)).clamp(0.0, 1.0);
-                between(steps[at], share)
+                let Range { low, high } = steps[at];
+                if low == high { low } else { (low + share * (high - low)).clamp(low, high) }
             }
         }
     }
 }
 
-fn between(range: Range, share: f64) -> f64 {
-    if range.low == range.high {
-        return range.low;
-    }
-    (range.low + share * (range.high - range.low)).clamp(range.low, range.high)
-}
-
 fn normal(mean: f64, deviation: f64, range: Range, own: Range) -> Option<(Draw, f64)> {
     if deviation == 0.0 {
-        return range.holds(mean).then_some((Draw::Uniform(Range { low: mean, high: mean }), 1.0));
+        return range.holds(mean).then(|| (Draw::uniform(Range::point(mean)), 1.0));
     }
     let z = |x: f64| (x - mean) / deviation;
     // In the upper tail probabilities are counted from above, where they are small and not close to 1.
@@ -192,7 +178,7 @@ fn normal(mean: f64, deviation: f64, range: Range, own: Range) -> Option<(Draw, 
 }
 
 /// Probabilities of the integers of a range, as far as they are significant in f64.
-fn poisson(mean: f64, range: Range) -> Vec<(f64, f64)> {
+fn poisson(mean: f64, range: Range) -> Vec<(Range, f64)> {
     // Beyond 40 standard deviations (plus an offset for small means) probabilities are far below 2⁻⁵² and are never
     // drawn.
     let reach = 40.0 * mean.sqrt() + 40.0;
@@ -208,13 +194,14 @@ fn poisson(mean: f64, range: Range) -> Vec<(f64, f64)> {
         }
         libm::exp(k * libm::log(mean) - mean - libm::lgamma(k + 1.0))
     };
-    (0..=count).map(|at| first + at as f64).map(|k| (k, probability(k))).filter(|(_, p)| *p > 0.0).collect()
+    let all = (0..=count).map(|at| first + at as f64).map(|k| (Range::point(k), probability(k)));
+    all.filter(|(_, p)| *p > 0.0).collect()
 }
 
 /// Weighted intervals truncated to a range. A weight is uniform over its interval. `all` is the sum before truncation.
-fn steps(all_steps: impl Iterator<Item = (Range, f64)>, within: Range, all: f64) -> Option<(Draw, f64)> {
+fn steps(all_steps: &[(Range, f64)], within: Range, all: f64) -> Option<(Draw, f64)> {
     let (mut steps, mut until, mut sum) = (Vec::new(), Vec::new(), 0.0);
-    for (range, weight) in all_steps {
+    for &(range, weight) in all_steps {
         let Some(both) = range.and(within) else { continue };
         let width = range.high - range.low;
         let part = if width > 0.0 { weight * ((both.high - both.low) / width) } else { weight };
@@ -314,8 +301,7 @@ mod tests {
     #[test]
     fn a_histogram_and_a_set_have_their_weights_and_a_bin_is_even_inside() {
         let range = |low, high| Range { low, high };
-        let bins =
-            Distribution::Histogram(vec![(range(0.0, 1.0), 1.0), (range(1.0, 4.0), 6.0), (range(5.0, 6.0), 3.0)]);
+        let bins = Distribution::Steps(vec![(range(0.0, 1.0), 1.0), (range(1.0, 4.0), 6.0), (range(5.0, 6.0), 3.0)]);
         let cdf = |x: f64| match x {
             x if x < 1.0 => 0.1 * x,
             x if x < 4.0 => 0.1 + 0.2 * (x - 1.0),
@@ -327,7 +313,7 @@ mod tests {
         let (_, share) = bins.within(range(0.0, 2.5)).unwrap();
         assert!((share - 0.4).abs() < 1e-15);
         assert!(distance(drawn(&bins, range(0.0, 2.5)), |x| cdf(x) / 0.4) < 1.0);
-        let set = Distribution::Set(vec![(7.0, 1.0), (3.0, 0.0), (5.0, 3.0)]);
+        let set = Distribution::Steps([(7.0, 1.0), (3.0, 0.0), (5.0, 3.0)].map(|(v, p)| (Range::point(v), p)).to_vec());
         let values = drawn(&set, Range::ALL);
         let sevens = values.iter().filter(|v| **v == 7.0).count() as f64 / N as f64;
         assert!((sevens - 0.25).abs() < 5.0 * (0.25 * 0.75 / N as f64).sqrt());

@@ -110,8 +110,7 @@ pub fn parse_distribution(text: &str, path: &Path) -> Result<DistributionFile> {
         return Err(header.wrong(problem, "distributions are read of revisions 1.1 to 1.3"));
     }
     let content = at.only("ParameterValueDistribution")?;
-    content.attributes(&[])?;
-    content.children(&["ScenarioFile", "Deterministic", "Stochastic"])?;
+    content.shape(&[], &["ScenarioFile", "Deterministic", "Stochastic"])?;
     content.only("ScenarioFile")?.attributes(&["filepath"])?;
     let kinds: Vec<At> = content.all().filter(|child| child.name() != "ScenarioFile").collect();
     let [kind] = kinds[..] else {
@@ -177,8 +176,7 @@ fn values(name: &str, of: &[At], attribute: &str, texts: &mut Vec<TextParameter>
 fn deterministic(at: At, texts: &mut Vec<TextParameter>) -> Result<Vec<Deterministic>> {
     const SINGLE: &str = "DeterministicSingleParameterDistribution";
     const MULTI: &str = "DeterministicMultiParameterDistribution";
-    at.attributes(&[])?;
-    at.children(&[SINGLE, MULTI])?;
+    at.shape(&[], &[SINGLE, MULTI])?;
     let mut list = Vec::new();
     for one in at.all() {
         list.extend(if one.name() == SINGLE { single(one, texts)? } else { multi(one, texts)? });
@@ -196,15 +194,11 @@ fn single(at: At, texts: &mut Vec<TextParameter>) -> Result<Option<Deterministic
     let values = if inner.name() == "DistributionSet" {
         inner.attributes(&[])?;
         let elements = inner.some("Element")?;
-        for element in &elements {
-            element.attributes(&["value"])?;
-            element.children(&[])?;
-        }
+        elements.iter().try_for_each(|element| element.shape(&["value"], &[]))?;
         let Some(values) = values(&name, &elements, "value", texts)? else { return Ok(None) };
         values
     } else {
-        inner.attributes(&["stepWidth"])?;
-        inner.children(&["Range"])?;
+        inner.shape(&["stepWidth"], &["Range"])?;
         let range = inner.only("Range")?.range()?;
         let step = inner.number("stepWidth")?;
         GridAxis::steps((range.low, range.high), step, "DistributionRange").map_err(|e| inner.because(&e))?
@@ -225,8 +219,7 @@ fn multi(at: At, texts: &mut Vec<TextParameter>) -> Result<Option<Deterministic>
     for (row, set) in inner.some("ParameterValueSet")?.into_iter().enumerate() {
         set.attributes(&[])?;
         for assignment in set.some("ParameterAssignment")? {
-            assignment.attributes(&["parameterRef", "value"])?;
-            assignment.children(&[])?;
+            assignment.shape(&["parameterRef", "value"], &[])?;
             let name = assignment.text("parameterRef")?;
             if row == 0 && !names.contains(&name) {
                 names.push(name);
@@ -271,8 +264,7 @@ fn other_parameters(set: At, names: &[&str]) -> Error {
 }
 
 fn stochastic(at: At, texts: &mut Vec<TextParameter>) -> Result<Stochastic> {
-    at.attributes(&["numberOfTestRuns", "randomSeed"])?;
-    at.children(&["StochasticDistribution"])?;
+    at.shape(&["numberOfTestRuns", "randomSeed"], &["StochasticDistribution"])?;
     // Below 2^53 a double represents every integer.
     let is_whole = |value: f64| value.fract() == 0.0 && (0.0..9_007_199_254_740_992.0).contains(&value);
     let runs = at.number("numberOfTestRuns")?;
@@ -282,7 +274,7 @@ fn stochastic(at: At, texts: &mut Vec<TextParameter>) -> Result<Stochastic> {
     }
     // Seeds are doubles in the standard. One that is no such integer is the seed of its bits.
     let seed = |value: f64| if is_whole(value) { value as u64 } else { value.to_bits() };
-    let seed = at.has("randomSeed").then(|| at.number("randomSeed").map(seed)).transpose()?;
+    let seed = at.value("randomSeed").is_some().then(|| at.number("randomSeed").map(seed)).transpose()?;
     let mut parameters = Vec::new();
     for one in at.some("StochasticDistribution")? {
         one.attributes(&["parameterName"])?;
@@ -325,8 +317,7 @@ fn distribution(at: At, name: &str, texts: &mut Vec<TextParameter>) -> Result<Op
     };
     let found = match inner.name() {
         "UniformDistribution" => {
-            inner.attributes(&[])?;
-            inner.children(&["Range"])?;
+            inner.shape(&[], &["Range"])?;
             Distribution::Uniform(inner.only("Range")?.range()?)
         }
         "NormalDistribution" => {
@@ -347,8 +338,7 @@ fn distribution(at: At, name: &str, texts: &mut Vec<TextParameter>) -> Result<Op
             inner.attributes(&[])?;
             let mut bins: Vec<(Range, f64)> = Vec::new();
             for bin in inner.some("Bin")? {
-                bin.attributes(&["weight"])?;
-                bin.children(&["Range"])?;
+                bin.shape(&["weight"], &["Range"])?;
                 let range = bin.only("Range")?.range()?;
                 if bins.last().is_some_and(|(before, _)| range.low < before.high) {
                     let help = "give bins in rising order, none over another";
@@ -356,7 +346,7 @@ fn distribution(at: At, name: &str, texts: &mut Vec<TextParameter>) -> Result<Op
                 }
                 bins.push((range, at_least_zero(bin, "weight")?));
             }
-            Distribution::Histogram(bins)
+            Distribution::Steps(bins)
         }
         "UserDefinedDistribution" => log_normal(inner)?,
         "LogNormalDistribution" => {
@@ -368,12 +358,11 @@ fn distribution(at: At, name: &str, texts: &mut Vec<TextParameter>) -> Result<Op
             let elements = inner.some("Element")?;
             let mut weights = Vec::new();
             for element in &elements {
-                element.attributes(&["value", "weight"])?;
-                element.children(&[])?;
+                element.shape(&["value", "weight"], &[])?;
                 weights.push(at_least_zero(*element, "weight")?);
             }
             let Some(values) = values(name, &elements, "value", texts)? else { return Ok(None) };
-            Distribution::Set(values.into_iter().zip(weights).collect())
+            Distribution::Steps(values.into_iter().map(Range::point).zip(weights).collect())
         }
     };
     if found.within(Range::ALL).is_none() {

@@ -78,6 +78,12 @@ impl<'a> At<'a> {
         self.node.children().filter(Node::is_element).map(move |node| At { node, path: self.path })
     }
 
+    /// Checks that there are only these attributes and child elements.
+    pub(super) fn shape(&self, attributes: &[&str], children: &[&str]) -> Result<()> {
+        self.attributes(attributes)?;
+        self.children(children)
+    }
+
     /// Checks that there are only these attributes (except those for schemas), and no text.
     pub(super) fn attributes(&self, known: &[&str]) -> Result<()> {
         let is_known = |a: &Attribute| match a.namespace() {
@@ -150,10 +156,6 @@ impl<'a> At<'a> {
         own.find(|attribute| attribute.name() == name).map(|attribute| attribute.value())
     }
 
-    pub(super) fn has(&self, name: &str) -> bool {
-        self.value(name).is_some()
-    }
-
     pub(super) fn text(&self, name: &str) -> Result<&'a str> {
         let value = self
             .value(name)
@@ -175,8 +177,7 @@ impl<'a> At<'a> {
 
     /// Range from `lowerLimit` to `upperLimit`.
     pub(super) fn range(&self) -> Result<Range> {
-        self.attributes(&["lowerLimit", "upperLimit"])?;
-        self.children(&[])?;
+        self.shape(&["lowerLimit", "upperLimit"], &[])?;
         let range = Range { low: self.number("lowerLimit")?, high: self.number("upperLimit")? };
         if range.low <= range.high {
             return Ok(range);
