@@ -157,7 +157,7 @@ fn record(sampled: &SampledFile, samples: &DistributionSamples) -> DensityRecord
     let sha = sha256(&sampled.text);
     DensityRecord {
         sha256: sha.clone(),
-        category: sampled.category.key(),
+        category: sampled.category,
         parameterization: "distribution".to_owned(),
         parameters: samples.parameters.iter().map(|p| p.parameter.key.to_owned()).collect(),
         kernels: 0,

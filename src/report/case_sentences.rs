@@ -137,15 +137,7 @@ impl CaseSheet<'_> {
     /// What the cut-in clauses demand of the system, each clause once, and where the first profile's clause and the
     /// drivers disagree.
     pub(super) fn demand(&self) -> Vec<String> {
-        let mut sentences = self.demand_of_first();
-        let mut clauses = vec![&self.first().clause];
-        for judgement in &self.judgements[1..] {
-            if !clauses.contains(&&judgement.clause) {
-                sentences.extend(demand_of(judgement));
-                clauses.push(&judgement.clause);
-            }
-        }
-        sentences
+        self.demand_of_first().into_iter().chain(self.other_clauses().filter_map(demand_of)).collect()
     }
 
     fn demand_of_first(&self) -> Vec<String> {

@@ -51,6 +51,12 @@ impl CaseSheet<'_> {
         &self.judgements[0]
     }
 
+    /// The judgements whose clause is not that of one before.
+    pub(super) fn other_clauses(&self) -> impl Iterator<Item = &Judgement> {
+        let is_new = |at: usize| self.judgements[..at].iter().all(|of| of.clause != self.judgements[at].clause);
+        (1..self.judgements.len()).filter(move |at| is_new(*at)).map(|at| &self.judgements[at])
+    }
+
     /// The numbers of the case: name, value with unit.
     fn numbers(&self) -> Vec<(String, String)> {
         let point = self.subject.point();
@@ -125,13 +131,7 @@ impl CaseSheet<'_> {
         let mut readings: Vec<&Reading> = self.first().readings.iter().collect();
         let own = readings.len();
         // For other clauses, only the conditions that differ.
-        let mut clauses = vec![&self.first().clause];
-        for judgement in &self.judgements[1..] {
-            if !clauses.contains(&&judgement.clause) {
-                readings.extend(judgement.conditions());
-                clauses.push(&judgement.clause);
-            }
-        }
+        readings.extend(self.other_clauses().flat_map(Judgement::conditions));
         let table = Table::of(readings)
             .column("clause", |reading| reading.clause.as_str())
             .column("condition", |reading| reading.quantity)

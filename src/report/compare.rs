@@ -6,7 +6,7 @@ use super::dots::{DotRow, Dots, dots};
 use super::host::Host;
 use super::html::{Page, PageFigure, Section};
 use super::plot::{AxisScale, Figure, INK, Look, PlotAxis, Series, Symbol, Value, logarithmic_reach};
-use super::records::{PROGRAM, document, record};
+use super::records::{PROGRAM, document, publish, record};
 use super::tables::{CloseRow, WIDTH, close_following, wrap};
 use crate::Result;
 use crate::engine::Headway;
@@ -60,9 +60,7 @@ impl CompareReport<'_> {
             }
         }
         results.add("report.html", self.html(figures).as_bytes())?;
-        let files = results.names();
-        results.publish(self.json(&files)?.as_bytes())?;
-        Ok(files)
+        publish(results, |files| self.json(files))
     }
 
     /// `compare.json`; `files` are in the same folder.

@@ -55,9 +55,7 @@ impl DossierReport<'_> {
         if let Some(svg) = self.example() {
             results.add("hidden.svg", svg.as_bytes())?;
         }
-        let files = results.names();
-        results.publish(self.json(&files)?.as_bytes())?;
-        Ok(files)
+        records::publish(results, |files| self.json(files))
     }
 
     pub(super) fn findings(&self) -> Table {

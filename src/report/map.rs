@@ -3,7 +3,7 @@
 use super::host::{Host, SweepRecord};
 use super::html::{Page, PageFigure, Section};
 use super::map_sheet::{MapSheet, agreement, outcome};
-use super::records::PROGRAM;
+use super::records::{PROGRAM, publish};
 use crate::Result;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -92,9 +92,7 @@ impl MapReport {
         if !differences.is_empty() {
             results.add_with("differences.csv", |out| self.write_differences(&differences, out))?;
         }
-        let files = results.names();
-        results.publish(self.json(&files)?.as_bytes())?;
-        Ok(files)
+        publish(results, |files| self.json(files))
     }
 
     /// Renders the run as one page.

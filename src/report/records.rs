@@ -8,6 +8,7 @@ pub(super) const PROGRAM: &str = concat!("lanesweep ", env!("CARGO_PKG_VERSION")
 
 use crate::engine::{NO_STEP, Outcome};
 use crate::model::criterion::Criterion;
+use crate::support::run_dir::Results;
 use crate::support::table::json_number;
 use crate::{Error, Result};
 
@@ -61,6 +62,13 @@ pub(super) fn at_contact(outcome: &Outcome<f64>, value: f64) -> Option<f64> {
 /// evaluate; a side contact may have none. Vehicles that touch have no gap left.
 pub(crate) fn smallest_gap_m(outcome: &Outcome<f64>) -> f64 {
     if outcome.contact_step == NO_STEP { outcome.min_gap } else { outcome.min_gap.min(0.0) }
+}
+
+/// Publishes results with their record, which has the names of the other files; returns these.
+pub(super) fn publish(results: Results, record: impl FnOnce(&[String]) -> Result<String>) -> Result<Vec<String>> {
+    let files = results.names();
+    results.publish(record(&files)?.as_bytes())?;
+    Ok(files)
 }
 
 /// A document as text, with a final line break; NaN and infinity become null.

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::host::{Host, SettingRecord};
 use super::records::{PROGRAM, document};
 use super::sampling_tables::{VERDICTS, verdicts};
-use super::tables::{CloseRow, WIDTH, close_following, wrap};
+use super::tables::{CloseRow, WIDTH, close_following, paragraph};
 use crate::Result;
 use crate::engine::generated::ATTEMPTS;
 use crate::engine::{ENGINE_VERSION, Headway, LanePlan};
@@ -27,7 +27,7 @@ pub struct DensityRecord {
     /// SHA-256 of its content.
     pub sha256: String,
     /// Category.
-    pub category: &'static str,
+    pub category: Category,
     /// Parameterization.
     pub parameterization: String,
     /// Names of the parameters.
@@ -48,7 +48,7 @@ impl DensityRecord {
     pub fn of(density: &DensityModel) -> Result<DensityRecord> {
         Ok(DensityRecord {
             sha256: density.content_sha256()?,
-            category: density.category().key(),
+            category: density.category(),
             parameterization: density.space.id().key.to_string(),
             parameters: density.space.parameters().iter().map(|p| p.name.clone()).collect(),
             kernels: density.kde.points().len(),
@@ -208,7 +208,7 @@ impl EstimateFile {
         let _ = writeln!(
             text,
             "{} {}: {} ({})",
-            Category::parse(density.category).map_or(density.category, Category::label),
+            density.category.label(),
             density.parameterization,
             match density.kernels {
                 0 => format!("distributions of {}", density.parameters.join(", ")),
@@ -272,7 +272,7 @@ impl EstimateFile {
             self.interval_rule()
         );
         for rule in self.rules().chain([intervals]) {
-            let _ = writeln!(text, "{}", wrap(&rule, WIDTH));
+            text += &paragraph(&rule);
         }
         // A density of N scenarios is based on no data below a probability of 1/N.
         let resolved = 1.0 / self.density.kernels.max(1) as f64;
@@ -296,10 +296,8 @@ impl EstimateFile {
 
     /// Failures from close following; only for crude Monte Carlo.
     fn close_following(&self) -> String {
-        let Some((draws, category)) = self.draws.as_ref().zip(Category::parse(self.density.category)) else {
-            return String::new();
-        };
-        let row = CloseRow { category, models: &self.models, close: &draws.close_following };
+        let Some(draws) = &self.draws else { return String::new() };
+        let row = CloseRow { category: self.density.category, models: &self.models, close: &draws.close_following };
         close_following(&[row], "the density", &self.plan_headways, WIDTH)
     }
 

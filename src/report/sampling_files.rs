@@ -2,11 +2,10 @@
 
 use sha2::{Digest, Sha256};
 
-use super::convergence::convergence;
-use super::failure_map::FailureMaps;
 use super::host::Host;
 use super::html::PageFigure;
 use super::sampling::{DensityRecord, DrawRecord, EstimateFile};
+use super::sampling_figures::{FailureMaps, convergence};
 use super::sampling_tables::{convergence_csv, model_ratios_csv, profile_ratios_csv, worst_csv};
 use crate::engine::LanePlan;
 use crate::run::sampling::{CrudeRun, Estimator, Sample, SampleOptions, SampleResult, WorstLane, proposal_text};

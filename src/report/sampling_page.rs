@@ -8,7 +8,6 @@ use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::sampling::EstimateRow;
-use crate::scenario::Category;
 use crate::support::readable::{count, count_of, value};
 use crate::support::table::{Column, Digits, NumberText};
 
@@ -54,8 +53,7 @@ impl EstimateFile {
 
     /// `cut-in 2`.
     fn name(&self) -> String {
-        let category = Category::parse(self.density.category).map_or(self.density.category, Category::label);
-        format!("{category} {}", self.density.parameterization)
+        format!("{} {}", self.density.category.label(), self.density.parameterization)
     }
 
     fn estimates_section(&self) -> Section {

@@ -37,7 +37,7 @@ impl EstimateFile {
         let per_1000_km = |row: &EstimateRow| row.risk.per_1000_km;
         let [hour, kilometres] = ["risk_per_hour", "risk_per_1000_km"];
         Table::of(&self.estimates)
-            .column("category", |_| self.density.category)
+            .column("category", |_| self.density.category.key())
             .column("parameterization", |_| self.density.parameterization.as_str())
             .column("estimator", |row| if row.estimate.weights.is_some() { "is" } else { self.estimator })
             .column("model", |row| row.model.name())

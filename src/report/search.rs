@@ -7,9 +7,9 @@ use serde_json::{Value as Json, json};
 use super::host::Host;
 use super::html::{Page, PageFigure, Section};
 use super::plot::{Figure, Look, Mark, Plot, PlotAxis, Series, Symbol, Value};
-use super::records::PROGRAM;
+use super::records::{PROGRAM, publish};
 use super::study_figures::modes;
-use super::tables::wrap;
+use super::tables::paragraph;
 use crate::model::profile::Profile;
 use crate::run::search::{Candidate, Evaluated, Front, FrontPoint, Judged, Scope, Scored, SearchResult};
 use crate::scenario::parameterization::ModeShape;
@@ -114,32 +114,25 @@ impl SearchReport<'_> {
     fn words(&self, with_table: bool) -> String {
         let result = self.result;
         let models: Vec<&str> = result.options.models.iter().map(|model| model.name()).collect();
-        let mut text = format!("{}\n", wrap(&self.data, WIDTH));
+        let mut text = paragraph(&self.data);
         if let Some(held_out) = &self.held_out {
-            let data = format!("held out: {held_out}, {} scenarios", self.result.scenarios[1]);
-            text += &format!("{}\n", wrap(&data, WIDTH));
+            text += &paragraph(&format!("held out: {held_out}, {} scenarios", self.result.scenarios[1]));
         }
-        let _ = writeln!(
-            text,
-            "\n{}",
-            wrap(
-                &format!(
-                    "{} studies of {} {}s ({} lanes each); goal: {} for {}; {} folds {}",
-                    count(result.studies as u64),
-                    result.scenarios[0],
-                    result.category.label(),
-                    count(result.lanes),
-                    self.goal(),
-                    models.join(", "),
-                    result.options.limits.folds,
-                    match result.is_by_recording {
-                        true => "by recording",
-                        false => "by stretches of time, because there are fewer recordings",
-                    }
-                ),
-                WIDTH
-            )
-        );
+        text.push('\n');
+        text += &paragraph(&format!(
+            "{} studies of {} {}s ({} lanes each); goal: {} for {}; {} folds {}",
+            count(result.studies as u64),
+            result.scenarios[0],
+            result.category.label(),
+            count(result.lanes),
+            self.goal(),
+            models.join(", "),
+            result.options.limits.folds,
+            match result.is_by_recording {
+                true => "by recording",
+                false => "by stretches of time, because there are fewer recordings",
+            }
+        ));
         if result.options.shuffled {
             text += "SHUFFLED OUTCOMES: every scenario has those of another one; no number below says anything of a description\n";
         }
@@ -148,8 +141,7 @@ impl SearchReport<'_> {
                 let _ = writeln!(text, "\n{}", self.table(front).fitted(1, WIDTH));
             }
             for point in &front.points {
-                let words = format!("found {}: {}", point.parameters, self.describe(&point.candidate));
-                let _ = writeln!(text, "{}", wrap(&words, WIDTH));
+                text += &paragraph(&format!("found {}: {}", point.parameters, self.describe(&point.candidate)));
             }
             text.push('\n');
             if let Some(winner) = front.winner.map(|at| &front.points[at]) {
@@ -166,14 +158,13 @@ impl SearchReport<'_> {
                         format!("fewest parameters whose score is at most {margin} below the best, without interval")
                     }
                 };
-                let words = format!(
+                text += &paragraph(&format!(
                     "winner ({rule}): {} parameters, {}, {} cross-validated{}",
                     winner.parameters,
                     self.describe(&winner.candidate),
                     with_interval(&winner.judged.cross_validated),
                     winner.judged.held_out.map_or(String::new(), |of| format!(", {} held out", with_interval(&of)))
-                );
-                let _ = writeln!(text, "{}", wrap(&words, WIDTH));
+                ));
                 let gains = if winner.held_out_gains.is_empty() { &winner.gains } else { &winner.held_out_gains };
                 let gains = gains.iter().map(|(model, gain)| {
                     gain.map_or(format!("{} undefined", model.name()), |(by, i)| {
@@ -182,8 +173,7 @@ impl SearchReport<'_> {
                 });
                 let gains: Vec<String> = gains.collect();
                 let on = if winner.held_out_gains.is_empty() { "cross-validated" } else { "held out" };
-                let words = format!("against the paper's best, {on}: {}", gains.join("; "));
-                let _ = writeln!(text, "{}", wrap(&words, WIDTH));
+                text += &paragraph(&format!("against the paper's best, {on}: {}", gains.join("; ")));
             }
         }
         if let Some([Some(baseline), held_out]) = result.fronts.first().map(|front| front.headway_only) {
@@ -193,21 +183,20 @@ impl SearchReport<'_> {
         if let Some(correlation) = result.rmse.correlation {
             let by_size: Vec<String> =
                 result.rmse.by_size.iter().map(|(size, rho)| format!("{size}: {rho:+.2}")).collect();
-            let words = format!(
+            text += &paragraph(&format!(
                 "rank correlation of RMSE and {} over {} candidates: {correlation:+.2} (-1: the error of the motions \
                  orders them as the outcomes do); among those of equal size {}",
                 result.options.objective.name(),
                 count(result.evaluated.len() as u64),
                 by_size.join(", ")
-            );
-            let _ = writeln!(text, "{}", wrap(&words, WIDTH));
+            ));
         }
         if let Some([close, far]) = &result.rmse.disagreement {
             let of = |of: &Evaluated| {
                 let score = of.score(Scope::All, &result.options).unwrap_or(f64::NAN);
                 format!("{} (RMSE {:.2}, {score:.3})", self.describe(&of.candidate), of.rmse)
             };
-            let _ = writeln!(text, "{}", wrap(&format!("worst pair: {} against {}", of(close), of(far)), WIDTH));
+            text += &paragraph(&format!("worst pair: {} against {}", of(close), of(far)));
         }
         let largest = result.options.limits.max_parameters;
         let lost = result.unkept.iter().filter(|of| of.parameters == largest).count();
@@ -508,8 +497,6 @@ impl SearchReport<'_> {
         }
         results.add("report.txt", self.text().as_bytes())?;
         results.add("report.html", self.page(&figures).as_bytes())?;
-        let files = results.names();
-        results.publish(self.json(&files)?.as_bytes())?;
-        Ok(files)
+        publish(results, |files| self.json(files))
     }
 }

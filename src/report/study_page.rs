@@ -6,7 +6,6 @@ use super::records::PROGRAM;
 use super::study::StudyReport;
 use super::tables;
 use crate::run::score::{CategoryScores, ClaimVerdict, Misfit};
-use crate::scenario::Category;
 use crate::scenario::parameterization::Parameterization;
 use crate::support::readable::{count, value};
 use crate::support::table::Table;
@@ -65,9 +64,8 @@ impl StudyReport<'_> {
 
     fn data(&self) -> Section {
         let facts = self.facts();
-        let label = |key| Category::ALL.into_iter().find(|c| c.key() == key).map_or(key, Category::label);
         let counts = Table::of(&self.categories())
-            .column("scenario", |category| label(category.category))
+            .column("scenario", |category| category.category.label())
             .column("found", |category| category.found)
             .column("simulated", |category| category.kept)
             .column("lanes", |category| category.lanes)

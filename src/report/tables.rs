@@ -311,6 +311,11 @@ pub(super) fn reference_table(comparison: &ReferenceComparison) -> Table {
         .build()
 }
 
+/// A paragraph of a text, as wide as a file's lines may be.
+pub(super) fn paragraph(words: &str) -> String {
+    wrap(words, WIDTH) + "\n"
+}
+
 /// The text wrapped between words; a longer word stays whole.
 pub fn wrap(text: &str, width: usize) -> String {
     let mut lines = vec![String::new()];

@@ -10,7 +10,6 @@ mod distribution_file;
 mod lanes;
 mod parameters;
 mod road;
-mod sampled_file;
 mod samples;
 mod scenario_file;
 mod xml_at;
@@ -23,8 +22,7 @@ pub use distribution_file::{
 };
 pub use lanes::{PlayOptions, concrete_case, concrete_lanes};
 pub use parameters::{Names, Rename, variations};
-pub use sampled_file::{SampledFile, reopen};
-pub use samples::{ATTEMPTS, DistributionSamples, Sampled, SampledParameter};
+pub use samples::{ATTEMPTS, DistributionSamples, Sampled, SampledFile, SampledParameter, reopen};
 pub use scenario_file::{IndexRow, export_folder};
 
 /// Author of every file.

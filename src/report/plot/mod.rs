@@ -5,7 +5,6 @@
 //! one that of two, and is as high as its texts need, so no text is cut.
 
 mod axis;
-mod cells;
 mod frame;
 mod layer;
 mod look;
@@ -14,8 +13,7 @@ mod svg;
 use std::f64::consts::TAU;
 
 pub use axis::AxisScale;
-pub use cells::{Cells, ColourBar, Fill, FilledCell};
-pub use layer::{Mark, Rule, Series, Value};
+pub use layer::{Cells, ColourBar, Fill, FilledCell, Mark, Rule, Series, Value};
 pub use look::{Look, Symbol};
 
 pub(super) use axis::{logarithmic_reach, number, plain_end, quantity};
