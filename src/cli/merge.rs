@@ -9,7 +9,7 @@ use super::format::{FormatFlag, TablesFlag};
 use super::{Exit, Output};
 use crate::Result;
 use crate::report::host::{Host, Timings};
-use crate::report::sampling::EstimateFile;
+use crate::report::sampling::SampleReport;
 use crate::report::study::StudyReport;
 use crate::run::parts::PLAN_FILE;
 use crate::run::{Merged, merge};
@@ -53,9 +53,9 @@ impl Merge {
             Merged::Sample(merged) => {
                 let (sample, result) = *merged;
                 let host = Host::of_parts(result.parts, result.rechecked_lanes);
-                let mut file = EstimateFile::of_sample(&sample, &result, host)?;
-                file.write(folder.results()?, &sample, &result)?;
-                self.format.output_in(&self.folder, Exit::Ok, || file.text(), || file.json())
+                let mut report = SampleReport::of_sample(&sample, &result, host)?;
+                let files = report.write(folder.results()?, &sample, &result)?;
+                self.format.output_in(&self.folder, Exit::Ok, || report.text(), || report.json(&files))
             }
         }
     }

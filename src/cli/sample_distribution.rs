@@ -13,7 +13,7 @@ use crate::cli::settings::{EstimatorKind, PointKind};
 use crate::engine::Headway;
 use crate::report::host::Host;
 use crate::report::openscenario::{DistributionSamples, SampledFile};
-use crate::report::sampling::{DensityRecord, DrawRecord, EstimateFile};
+use crate::report::sampling::{DensityRecord, DrawRecord, SampleReport};
 use crate::report::sampling_tables::convergence_csv;
 use crate::run::reopen::DISTRIBUTION_FILE;
 use crate::run::sampling::{Estimator, SampleHeadways, SampleOptions, WorstLane, sample_crude};
@@ -113,15 +113,15 @@ pub(super) fn run(
     bar.finish_and_clear();
     let host = Host::of(&opened, crude.summary.rechecked_lanes, started, configured.record(false));
     let record = record(&sampled, &samples);
-    let mut file = EstimateFile::of(record, samples.has_distance(), (&profile, &options), crude.rows.clone(), host);
-    file.plan_headways = plan.headways.clone();
-    file.plan_sha256 = Some(plan.hash().to_owned());
+    let mut report = SampleReport::of(record, samples.has_distance(), (&profile, &options), crude.rows.clone(), host);
+    report.plan_headways = plan.headways.clone();
+    report.plan_sha256 = Some(plan.hash().to_owned());
     let mut draws = DrawRecord::of(&crude.tally, &plan);
     if draws.samples == count {
         draws.tries = tries;
         draws.rejected_share = (tries - count) as f64 / tries as f64;
     }
-    file.draws = Some(draws);
+    report.draws = Some(draws);
     let mut results = folder.results()?;
     results.add("convergence.csv", convergence_csv(&crude.convergence).as_bytes())?;
     let names: Vec<String> = samples.parameters.iter().map(|p| p.parameter.key.to_owned()).collect();
@@ -129,10 +129,10 @@ pub(super) fn run(
         let point = samples.draw(seed, key.unit, &plan.profile)?.values;
         Ok((point, samples.has_distance().then(|| "sampled".to_owned())))
     })?;
-    file.add_worst(&mut results, &worst, &options, &names)?;
+    report.add_worst(&mut results, &worst, &names)?;
     results.add(DISTRIBUTION_FILE, &sampled.to_json()?)?;
-    file.publish(results, Vec::new())?;
-    flags.format.output_in(&flags.out, Exit::Ok, || file.text(), || file.json())
+    let files = report.publish(results, Vec::new())?;
+    flags.format.output_in(&flags.out, Exit::Ok, || report.text(), || report.json(&files))
 }
 
 /// Checks the fixed values and the quartiles of the distributions; the tails are truncated anyway.

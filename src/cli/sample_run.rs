@@ -14,7 +14,7 @@ use crate::engine::{Chunk, Executor, LanePlan, OpenBackend};
 use crate::model::profile::Profile;
 use crate::report::host::Host;
 use crate::report::lanes;
-use crate::report::sampling::EstimateFile;
+use crate::report::sampling::SampleReport;
 use crate::run::parts::{EachChunk, Job, PLAN_FILE};
 use crate::run::sampling::{
     self, EstimateRow, SampleJob, SampleKind, SampleOptions, SampleResult, SampleSource, conditional,
@@ -271,7 +271,7 @@ fn write(
     format: FormatFlag,
 ) -> Result<Output> {
     let out = results.dir().to_path_buf();
-    let mut file = EstimateFile::of_sample(sample, result, host)?;
-    file.write(results, sample, result)?;
-    format.output_in(&out, Exit::Ok, || file.text(), || file.json())
+    let mut report = SampleReport::of_sample(sample, result, host)?;
+    let files = report.write(results, sample, result)?;
+    format.output_in(&out, Exit::Ok, || report.text(), || report.json(&files))
 }

@@ -4,14 +4,13 @@ use std::fmt::Write;
 
 use serde::Serialize;
 
-use super::host::{Host, SettingRecord};
-use super::records::{PROGRAM, document};
+use super::host::Host;
+use super::records::{PROGRAM, document, record};
 use super::sampling_tables::{VERDICTS, verdicts};
 use super::tables::{CloseRow, WIDTH, close_following, paragraph};
 use crate::Result;
 use crate::engine::generated::ATTEMPTS;
 use crate::engine::{ENGINE_VERSION, Headway, LanePlan};
-use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::close_following::CloseFollowing;
 use crate::run::sampling::{EstimateRow, RiskRate, SampleOptions, SampleTally};
@@ -96,109 +95,106 @@ impl DrawRecord {
     }
 }
 
-/// `estimate.json`.
-#[derive(Debug, Clone, Serialize)]
-pub struct EstimateFile {
-    /// Version of this file.
-    pub lanesweep_estimate: u64,
-    /// Program and version.
-    pub program: String,
-    /// [`ENGINE_VERSION`] of the program, which identifies the bits of its lanes.
-    pub engine: u64,
-    /// Estimator: `mc`, `is`. With `mc`, rows of rare failures may be of importance sampling.
-    pub estimator: &'static str,
+/// A sampling run with the facts that its files state.
+pub struct SampleReport {
     /// The density sampled.
     pub density: DensityRecord,
     /// Profile, with its time step.
     pub profile: Profile,
-    /// Models.
-    pub models: Vec<ModelId>,
+    /// Options, as in the plan.
+    pub options: SampleOptions,
     /// Headways, by name.
     pub headways: Vec<String>,
     /// Headways, as in the plan.
     pub plan_headways: Vec<Headway>,
-    /// Kind of points: `random`, `sobol`.
-    pub points: &'static str,
-    /// Requested number of samples.
-    pub samples: u64,
-    /// Seed.
-    pub seed: u64,
-    /// Level at which all intervals hold together; `None` if each holds on its own.
-    pub together: Option<f64>,
-    /// Parameters with given values; the estimates are conditional on them.
-    pub given: Vec<(String, f64)>,
     /// Hash of the plan; only for crude Monte Carlo.
     pub plan_sha256: Option<String>,
     /// Draws; only for crude Monte Carlo.
     pub draws: Option<DrawRecord>,
-    /// Options, as in the plan.
-    pub options: SampleOptions,
-    /// Options of the command, with their sources; a merge has none, because its parts had their own.
-    pub settings: Vec<SettingRecord>,
-    /// Why the run ended.
-    pub stopped: StopReason,
-    /// Whether the same flags give the same numbers on every machine.
-    pub reproducible: bool,
     /// Estimates.
     pub estimates: Vec<EstimateRow>,
     /// Rounds of the search of importance sampling.
     pub search: Vec<SearchRound>,
-    /// Files beside this one.
-    pub files: Vec<String>,
     /// SHA-256 of `worst.csv`, if written.
     pub worst_sha256: Option<String>,
     /// The machine.
     pub host: Host,
 }
 
-impl EstimateFile {
-    /// The part of the record common to all runs, to which draws and search are added where they exist;
-    /// `is_sampled_headway`: the headway is a parameter of the density.
+impl SampleReport {
+    /// What is common to all runs, to which draws and search are added where they exist; `is_sampled_headway`: the headway
+    /// is a parameter of the density.
     pub fn of(
         density: DensityRecord,
         is_sampled_headway: bool,
         (profile, options): (&Profile, &SampleOptions),
         estimates: Vec<EstimateRow>,
         host: Host,
-    ) -> EstimateFile {
+    ) -> SampleReport {
         let headways = options.headways();
         let names = headways.iter().map(Headway::to_string);
-        let stopped = estimates.iter().map(|r| r.estimate.stopped).max_by_key(|s| *s == StopReason::TimeLimit);
-        EstimateFile {
-            lanesweep_estimate: 1,
-            program: PROGRAM.to_owned(),
-            engine: ENGINE_VERSION,
-            estimator: options.estimator.key(),
+        SampleReport {
             density,
             profile: profile.clone(),
-            models: options.models.clone(),
+            options: options.clone(),
             headways: if is_sampled_headway { vec!["sampled".to_owned()] } else { names.collect() },
             plan_headways: headways.to_vec(),
-            points: options.source.key(),
-            samples: options.stop.samples,
-            seed: options.seed,
-            together: options.together,
-            given: options.given.clone(),
             plan_sha256: None,
             draws: None,
-            options: options.clone(),
-            settings: host.settings.clone(),
-            stopped: stopped.unwrap_or(StopReason::Samples),
-            reproducible: estimates.iter().all(|r| r.estimate.stopped.is_reproducible()),
             estimates,
             search: Vec::new(),
-            files: Vec::new(),
             worst_sha256: None,
             host,
         }
     }
 
-    /// As JSON; NaN and infinity become null.
+    /// `estimate.json`; `files` are in the same folder.
     ///
     /// # Errors
     /// None for a record of this program.
-    pub fn json(&self) -> Result<String> {
-        document(self)
+    pub fn json(&self, files: &[String]) -> Result<String> {
+        document(&record! {
+            lanesweep_estimate: 1,
+            program: PROGRAM,
+            // Identifies the bits of the program's lanes.
+            engine: ENGINE_VERSION,
+            // With `mc`, rows of rare failures may be of importance sampling.
+            estimator: self.options.estimator.key(),
+            density: &self.density,
+            profile: &self.profile,
+            models: &self.options.models,
+            headways: &self.headways,
+            plan_headways: &self.plan_headways,
+            points: self.options.source.key(),
+            samples: self.options.stop.samples,
+            seed: self.options.seed,
+            // Level at which all intervals hold together; null if each holds on its own.
+            together: self.options.together,
+            // Parameters with given values; the estimates are conditional on them.
+            given: &self.options.given,
+            plan_sha256: &self.plan_sha256,
+            draws: &self.draws,
+            options: &self.options,
+            settings: &self.host.settings,
+            stopped: self.stopped(),
+            reproducible: self.is_reproducible(),
+            estimates: &self.estimates,
+            search: &self.search,
+            files: &files,
+            worst_sha256: &self.worst_sha256,
+            host: &self.host,
+        })
+    }
+
+    /// Why the run ended.
+    fn stopped(&self) -> StopReason {
+        let stopped = self.estimates.iter().map(|r| r.estimate.stopped).max_by_key(|s| *s == StopReason::TimeLimit);
+        stopped.unwrap_or(StopReason::Samples)
+    }
+
+    /// Whether the same flags give the same numbers on every machine.
+    pub(super) fn is_reproducible(&self) -> bool {
+        self.estimates.iter().all(|r| r.estimate.stopped.is_reproducible())
     }
 
     /// The text for the terminal.
@@ -220,12 +216,14 @@ impl EstimateFile {
             },
             density.provenance.data
         );
-        if let Some(draws) =
-            self.draws.as_ref().filter(|d| d.samples < self.samples && self.stopped == StopReason::Samples)
+        if let Some(draws) = self
+            .draws
+            .as_ref()
+            .filter(|d| d.samples < self.options.stop.samples && self.stopped() == StopReason::Samples)
         {
             let ranges: Vec<String> =
                 draws.ranges.iter().map(|[a, b]| format!("{}..{}", count(*a), count(*b))).collect();
-            let _ = writeln!(text, "A PART: samples {} of {}", ranges.join(", "), count(self.samples));
+            let _ = writeln!(text, "A PART: samples {} of {}", ranges.join(", "), count(self.options.stop.samples));
         }
         if let Some(draws) = &self.draws {
             let _ = writeln!(
@@ -297,7 +295,8 @@ impl EstimateFile {
     /// Failures from close following; only for crude Monte Carlo.
     fn close_following(&self) -> String {
         let Some(draws) = &self.draws else { return String::new() };
-        let row = CloseRow { category: self.density.category, models: &self.models, close: &draws.close_following };
+        let row =
+            CloseRow { category: self.density.category, models: &self.options.models, close: &draws.close_following };
         close_following(&[row], "the density", &self.plan_headways, WIDTH)
     }
 
@@ -360,7 +359,7 @@ impl EstimateFile {
 
     /// The parameters with given values; `None` without any.
     pub(super) fn given_list(&self) -> Option<String> {
-        let list: Vec<String> = self.given.iter().map(|(name, v)| format!("{name} = {}", value(*v))).collect();
+        let list: Vec<String> = self.options.given.iter().map(|(name, v)| format!("{name} = {}", value(*v))).collect();
         (!list.is_empty()).then(|| list.join(", "))
     }
 }

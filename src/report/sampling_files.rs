@@ -4,25 +4,26 @@ use sha2::{Digest, Sha256};
 
 use super::host::Host;
 use super::html::PageFigure;
-use super::sampling::{DensityRecord, DrawRecord, EstimateFile};
+use super::records::publish;
+use super::sampling::{DensityRecord, DrawRecord, SampleReport};
 use super::sampling_figures::{FailureMaps, convergence};
 use super::sampling_tables::{convergence_csv, model_ratios_csv, profile_ratios_csv, worst_csv};
 use crate::engine::LanePlan;
-use crate::run::sampling::{CrudeRun, Estimator, Sample, SampleOptions, SampleResult, WorstLane, proposal_text};
+use crate::run::sampling::{CrudeRun, Estimator, Sample, SampleResult, WorstLane, proposal_text};
 use crate::stats::density::DensityModel;
 use crate::support::plain_text::hex;
 use crate::support::run_dir::Results;
 use crate::{Error, Result};
 
-impl EstimateFile {
+impl SampleReport {
     /// From a run and its result.
     ///
     /// # Errors
     /// As [`DensityModel::content_sha256`].
-    pub fn of_sample(sample: &Sample, result: &SampleResult, host: Host) -> Result<EstimateFile> {
+    pub fn of_sample(sample: &Sample, result: &SampleResult, host: Host) -> Result<SampleReport> {
         let (density, is_sampled) = (DensityRecord::of(&sample.density)?, sample.density.space.has_thw());
         let of = (&sample.profile, &sample.options);
-        let mut file = EstimateFile::of(density, is_sampled, of, result.rows.clone(), host);
+        let mut file = SampleReport::of(density, is_sampled, of, result.rows.clone(), host);
         if let (Some(crude), Some(plan)) = (&result.crude, sample.lane_plan()) {
             file.plan_sha256 = Some(plan.hash().to_owned());
             file.draws = Some(DrawRecord::of(&crude.tally, plan));
@@ -31,14 +32,14 @@ impl EstimateFile {
         Ok(file)
     }
 
-    /// Writes every file of the run to its folder, the record last.
+    /// Writes every file of the run to its folder, the record last; returns the names of the others.
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn write(&mut self, mut results: Results, sample: &Sample, result: &SampleResult) -> Result<()> {
+    pub fn write(&mut self, mut results: Results, sample: &Sample, result: &SampleResult) -> Result<Vec<String>> {
         let (density, mut figures) = (sample.density(), Vec::new());
         if let (Some(crude), Some(plan)) = (&result.crude, sample.lane_plan()) {
-            figures = self.crude_files(&mut results, plan, density, crude, &sample.options)?;
+            figures = self.crude_files(&mut results, plan, density, crude)?;
         }
         let ratios = sample.model_ratios(result);
         if !ratios.is_empty() {
@@ -65,7 +66,6 @@ impl EstimateFile {
         plan: &LanePlan,
         density: &DensityModel,
         run: &CrudeRun,
-        options: &SampleOptions,
     ) -> Result<Vec<PageFigure>> {
         let mut figures = Vec::new();
         if !run.convergence.is_empty() {
@@ -83,10 +83,10 @@ impl EstimateFile {
             let headway = density.space.thw_s(&point).map(|thw_s| format!("{thw_s}s"));
             Ok((point, headway))
         })?;
-        self.add_worst(results, &worst, options, &names)?;
+        self.add_worst(results, &worst, &names)?;
         if let Some(map) = &run.tally.map {
             let samples = run.tally.samples() - run.tally.voids;
-            let maps = FailureMaps { density, plan, map, samples, criterion: options.criterion };
+            let maps = FailureMaps { density, plan, map, samples, criterion: self.options.criterion };
             for (model, id) in plan.models.iter().enumerate() {
                 let (name, numbers) = (format!("map-{}", id.name()), format!("map-{}.csv", id.name()));
                 results.add(&numbers, maps.csv(model).as_bytes())?;
@@ -100,32 +100,25 @@ impl EstimateFile {
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn add_worst(
-        &mut self,
-        results: &mut Results,
-        lanes: &[WorstLane],
-        options: &SampleOptions,
-        names: &[String],
-    ) -> Result<()> {
-        if options.worst == 0 {
+    pub fn add_worst(&mut self, results: &mut Results, lanes: &[WorstLane], names: &[String]) -> Result<()> {
+        if self.options.worst == 0 {
             return Ok(());
         }
-        let table = worst_csv(lanes, names, options.criterion);
+        let table = worst_csv(lanes, names, self.options.criterion);
         self.worst_sha256 = Some(hex(&Sha256::digest(&table)));
         results.add("worst.csv", table.as_bytes())
     }
 
-    /// Adds table and page of the estimates, then publishes all files with the record.
+    /// Adds table and page of the estimates, then publishes all files with the record; returns their names.
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn publish(&mut self, mut results: Results, mut figures: Vec<PageFigure>) -> Result<()> {
+    pub fn publish(&self, mut results: Results, mut figures: Vec<PageFigure>) -> Result<Vec<String>> {
         if let Some(figure) = self.headways_figure() {
             figures.insert(0, PageFigure::add(&mut results, "headways", &figure)?);
         }
         results.add("estimates.csv", self.csv().as_bytes())?;
         results.add("report.html", self.html(figures).as_bytes())?;
-        self.files = results.names();
-        results.publish(self.json()?.as_bytes())
+        publish(results, |files| self.json(files))
     }
 }

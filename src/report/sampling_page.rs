@@ -2,7 +2,8 @@
 
 use super::html::{Page, PageFigure, Section};
 use super::plot::{AxisScale, Figure, Mark, Plot, PlotAxis, Series, Value, is_few};
-use super::sampling::{EstimateFile, interval_text, rate_text, ratio_text, short, three_digits, weight};
+use super::records::PROGRAM;
+use super::sampling::{SampleReport, interval_text, rate_text, ratio_text, short, three_digits, weight};
 use super::sampling_tables::{VERDICTS, verdicts};
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
@@ -11,7 +12,7 @@ use crate::run::sampling::EstimateRow;
 use crate::support::readable::{count, count_of, value};
 use crate::support::table::{Column, Digits, NumberText};
 
-impl EstimateFile {
+impl SampleReport {
     /// `report.html`, with the figures of the run.
     pub fn html(&self, figures: Vec<PageFigure>) -> String {
         let density = &self.density;
@@ -19,7 +20,7 @@ impl EstimateFile {
         if let Some(given) = self.given_list() {
             warnings.push(format!("Given {given}: probabilities are conditional, risks are not known."));
         }
-        if !self.reproducible {
+        if !self.is_reproducible() {
             warnings.push("Ended by the clock: another machine ends elsewhere.".to_owned());
         }
         let mut sections = vec![self.estimates_section()];
@@ -27,7 +28,7 @@ impl EstimateFile {
         sections.push(self.reproduction());
         // Importance sampling seldom needs the maximum that it may draw; its runs include the search.
         let runs = self.estimates.iter().map(|row| row.estimate.runs).max();
-        let drawn = self.draws.as_ref().map(|draws| draws.samples).or(runs).unwrap_or(self.samples);
+        let drawn = self.draws.as_ref().map(|draws| draws.samples).or(runs).unwrap_or(self.options.stop.samples);
         Page {
             title: format!("Probability of failure: {}", self.name()),
             lead: format!(
@@ -38,8 +39,8 @@ impl EstimateFile {
                     kernels => format!("a density over {} mined scenarios", count_of(kernels)),
                 },
                 match self.has_rare() {
-                    true => format!("{}, rare failures by is", self.estimator),
-                    false => self.estimator.to_owned(),
+                    true => format!("{}, rare failures by is", self.options.estimator.key()),
+                    false => self.options.estimator.key().to_owned(),
                 },
                 self.profile.name,
                 density.provenance.data
@@ -160,7 +161,7 @@ impl EstimateFile {
                 "Marker: estimate at one headway; area: its interval over draws and scenarios. Vertical axis by the \
                       square root. n: effective number of recorded scenarios that fail, where there is room."
                     .to_owned(),
-            plots: self.models.iter().map(panel).collect(),
+            plots: self.options.models.iter().map(panel).collect(),
             ..Figure::default()
         })
     }
@@ -185,10 +186,10 @@ impl EstimateFile {
                 "The same density, options and seed give the same numbers, on any machine, whole or in shards. \
                  estimate.json holds all of it; `simulate` reruns a lane from it.",
             )
-            .fact("program", &self.program)
-            .fact("estimator", self.estimator)
-            .fact("points", self.points)
-            .fact("seed", self.seed.to_string())
+            .fact("program", PROGRAM)
+            .fact("estimator", self.options.estimator.key())
+            .fact("points", self.options.source.key())
+            .fact("seed", self.options.seed.to_string())
             .fact("profile", &self.profile.name)
             .fact("time step", format!("{} s", value(self.profile.frame.dt_s)))
             .fact("SHA-256 of the density", &self.density.sha256)

@@ -2,14 +2,14 @@
 //! explain them on the terminal and the page.
 
 use super::records::{at_contact, smallest_gap_m};
-use super::sampling::{EstimateFile, short};
+use super::sampling::{SampleReport, short};
 use crate::model::criterion::Criterion;
 use crate::run::sampling::{Checkpoint, EstimateRow, ModelRatio, ProfileRatios, RiskRate, Uncertainty, WorstLane};
 use crate::stats::estimate::{IntervalKind, Ratio, RatioMethod, RatioVerdict, Warning, WeightFigures};
 use crate::support::readable::{counted, significant, value};
 use crate::support::table::{Table, TableOf};
 
-impl EstimateFile {
+impl SampleReport {
     /// `estimates.csv`.
     pub fn csv(&self) -> String {
         type Weight = fn(&WeightFigures) -> f64;
@@ -39,7 +39,7 @@ impl EstimateFile {
         Table::of(&self.estimates)
             .column("category", |_| self.density.category.key())
             .column("parameterization", |_| self.density.parameterization.as_str())
-            .column("estimator", |row| if row.estimate.weights.is_some() { "is" } else { self.estimator })
+            .column("estimator", |row| if row.estimate.weights.is_some() { "is" } else { self.options.estimator.key() })
             .column("model", |row| row.model.name())
             .column("criterion", |row| row.criterion.key())
             .column("headway", |row| row.headway.as_str())
@@ -185,7 +185,7 @@ pub(super) fn verdicts(row: &EstimateRow) -> String {
     format!("{}, {}, {}", trust.draws(), trust.density(), trust.data())
 }
 
-impl EstimateFile {
+impl SampleReport {
     /// What is said about the shown rows, each time with what it is said about. Too few scenarios are said once.
     pub(super) fn remarks(&self) -> Vec<(String, String)> {
         let name = |row: &EstimateRow| format!("{} {} {}", row.model.name(), row.criterion.label(), row.headway);
@@ -222,7 +222,7 @@ impl EstimateFile {
     }
 }
 
-impl EstimateFile {
+impl SampleReport {
     /// The headway of a row, or the number of headways that P averages.
     pub(super) fn headway_cell(&self, row: &EstimateRow) -> String {
         if row.headway == "all" { format!("all {}", self.headways.len()) } else { row.headway.clone() }
@@ -305,6 +305,7 @@ impl EstimateFile {
             " cover the draws alone, not what other scenarios would change"
         };
         let together = self
+            .options
             .together
             .map(|level| format!("; all rows of estimates.csv hold together at {} %", value(100.0 * level)));
         format!("{covered}{}", together.unwrap_or_default())

@@ -2,21 +2,21 @@
 
 use std::fmt::Write as _;
 
-use serde_json::{Value as Json, json};
+use serde_json::json;
 
 use super::host::Host;
 use super::html::{Page, PageFigure, Section};
 use super::plot::{Figure, Look, Mark, Plot, PlotAxis, Series, Symbol, Value};
-use super::records::{PROGRAM, publish};
+use super::records::{self, PROGRAM, publish};
 use super::study_figures::modes;
 use super::tables::paragraph;
+use crate::Result;
 use crate::model::profile::Profile;
 use crate::run::search::{Candidate, Evaluated, Front, FrontPoint, Judged, Scope, Scored, SearchResult};
 use crate::scenario::parameterization::ModeShape;
 use crate::support::readable::{count, counted};
 use crate::support::run_dir::Results;
 use crate::support::table::{Table, WIDTH};
-use crate::{Error, Result};
 
 /// Approximate number of candidates of a figure, in even steps of their scores; the paper's are all drawn.
 const MAX_DRAWN: usize = 400;
@@ -372,11 +372,14 @@ impl SearchReport<'_> {
             .build()
     }
 
-    fn record(&self, files: &[String]) -> Result<Json> {
-        let internal = |error| Error::Internal(format!("a search as JSON: {error}"));
+    /// The record as JSON; `files` are in the same folder.
+    ///
+    /// # Errors
+    /// None for a record of this program.
+    pub fn json(&self, files: &[String]) -> Result<String> {
         let result = self.result;
         let winner = result.fronts.first().and_then(|front| Some(&front.points[front.winner?]));
-        Ok(json!({
+        records::document(&json!({
             "program": PROGRAM,
             "search_sha256": result.sha256,
             "command": self.command,
@@ -392,7 +395,7 @@ impl SearchReport<'_> {
             "objective": result.options.objective.name(),
             "shuffled": result.options.shuffled,
             "headways": result.options.headways.iter().map(ToString::to_string).collect::<Vec<_>>(),
-            "limits": serde_json::to_value(&result.options.limits).map_err(internal)?,
+            "limits": result.options.limits,
             "scenarios": result.scenarios[0],
             "held_out_scenarios": result.scenarios[1],
             "studies": result.studies,
@@ -411,23 +414,12 @@ impl SearchReport<'_> {
             "fronts": self.front_csv().records(),
             "settings": self.host.settings,
             "files": files,
-            "host": serde_json::to_value(&self.host).map_err(internal)?,
+            "host": self.host,
         }))
     }
 
-    /// The record as JSON; `files` are in the same folder.
-    ///
-    /// # Errors
-    /// [`Error::Internal`] for a defect of this program.
-    pub fn json(&self, files: &[String]) -> Result<String> {
-        super::records::document(&self.record(files)?)
-    }
-
-    fn page(&self, figures: &[(&str, Figure)]) -> String {
-        let of = |name: &str| -> Vec<PageFigure> {
-            let found = figures.iter().filter(|(file, _)| *file == name);
-            found.map(|(file, figure)| PageFigure::new(&figure.svg(), &[&format!("{file}.svg")])).collect()
-        };
+    fn page(&self, figures: &[(&str, PageFigure)]) -> String {
+        let of = |name| figures.iter().find(|(of, _)| *of == name).map(|(_, figure)| figure.clone());
         let answer = Section::new("answer", "Answer")
             .text(self.words(false))
             .tables(self.result.fronts.iter().take(1).map(|front| self.table(front)))
@@ -472,7 +464,7 @@ impl SearchReport<'_> {
     /// Writes all files, the record last; returns the names of the others.
     ///
     /// # Errors
-    /// [`Error::Io`].
+    /// [`crate::Error::Io`].
     pub fn write(&self, mut results: Results) -> Result<Vec<String>> {
         let mut figures = vec![("front", self.front_figure()), ("error", self.error_figure())];
         if !self.modes.is_empty() {
@@ -485,9 +477,12 @@ impl SearchReport<'_> {
             };
             figures.push(("winner", figure));
         }
-        for (name, figure) in &figures {
-            results.add(&format!("{name}.svg"), figure.svg().as_bytes())?;
+        let mut drawn = Vec::new();
+        for (name, figure) in figures {
+            let (file, svg) = (format!("{name}.svg"), figure.svg());
+            results.add(&file, svg.as_bytes())?;
             results.add(&format!("{name}.csv"), figure.csv().as_bytes())?;
+            drawn.push((name, PageFigure::new(&svg, &[&file])));
         }
         results.add("fronts.csv", self.front_csv().csv().as_bytes())?;
         results.add("candidates.csv", self.candidates().csv().as_bytes())?;
@@ -496,7 +491,7 @@ impl SearchReport<'_> {
             results.add("winner.json", &winner.to_json(&self.data)?)?;
         }
         results.add("report.txt", self.text().as_bytes())?;
-        results.add("report.html", self.page(&figures).as_bytes())?;
+        results.add("report.html", self.page(&drawn).as_bytes())?;
         publish(results, |files| self.json(files))
     }
 }

@@ -269,23 +269,22 @@ pub struct IndexRow {
 /// As `scenario_file`; [`crate::Error::Io`].
 pub fn export_folder(dir: &Path, scenarios: &[Concrete]) -> Result<Vec<IndexRow>> {
     // Everything is built before the first file is written, so that an error leaves the folder unchanged.
-    let mut made = Vec::new();
-    for (at, scenario) in scenarios.iter().enumerate() {
+    let row = |(at, scenario): (usize, &Concrete)| {
         let stem = format!("{:03}-{}", at + 1, safe(&scenario.key));
-        let row = IndexRow { file: format!("{stem}.xosc"), road: format!("{stem}.xodr"), lane: scenario.key.clone() };
-        made.push((scenario_file(scenario, &row.road)?, road_file(&Road::around(scenario)), row));
-    }
+        IndexRow { file: format!("{stem}.xosc"), road: format!("{stem}.xodr"), lane: scenario.key.clone() }
+    };
+    let rows: Vec<IndexRow> = scenarios.iter().enumerate().map(row).collect();
+    let texts = scenarios.iter().zip(&rows).map(|(scenario, row)| scenario_file(scenario, &row.road));
+    let texts = texts.collect::<Result<Vec<_>>>()?;
     let folder = OutputDir::open(dir, INDEX)?;
     let mut results = folder.results()?;
     // The lane already has its own column.
     let names: Vec<String> = scenarios.first().map_or(Vec::new(), |s| {
         s.properties.iter().map(|(name, _)| name.clone()).filter(|name| name != "lanesweep.lane").collect()
     });
-    let mut rows = Vec::new();
-    for (text, road, row) in made {
-        results.add(&row.road, road.as_bytes())?;
+    for ((scenario, row), text) in scenarios.iter().zip(&rows).zip(&texts) {
+        results.add(&row.road, road_file(&Road::around(scenario)).as_bytes())?;
         results.add(&row.file, text.as_bytes())?;
-        rows.push(row);
     }
     let property = |scenario: &Concrete, name: &String| {
         scenario.properties.iter().find(|(n, _)| n == name).map(|(_, value)| value.clone())
