@@ -8,7 +8,7 @@ use crate::support::readable::value;
 
 impl CaseSheet<'_> {
     /// The case in one line, with the deciding reading: speeds along the road in km/h, other values in SI units.
-    pub fn case(&self) -> String {
+    pub(super) fn case(&self) -> String {
         let point = self.subject.point();
         let kmh = |name: &str, mps: f64| format!("{name} {} km/h", value(mps * KMH));
         let quantities = [
@@ -36,7 +36,7 @@ impl CaseSheet<'_> {
     }
 
     /// The answer in one sentence; "robust" is used only if it holds for every verdict named, and says what varied.
-    pub fn answer(&self) -> String {
+    pub(super) fn answer(&self) -> String {
         let first = self.first();
         let (answer, references) = (first.verdicts.answer(), &first.verdicts.reference_drivers);
         let (avoided_by, collide) = (first.verdicts.avoided_by(), first.verdicts.collided_by());

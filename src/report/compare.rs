@@ -94,7 +94,7 @@ impl CompareReport<'_> {
     }
 
     /// `compare.csv`: one row per category, parameterization, model and criterion.
-    pub fn csv(&self) -> String {
+    fn csv(&self) -> String {
         let rows = self.categories.iter().flat_map(|category| {
             category.parameterizations.iter().flat_map(move |of| {
                 let cells = category.recorded.iter().zip(&of.cells);

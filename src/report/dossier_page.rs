@@ -7,7 +7,7 @@ use crate::support::readable::{count, value};
 
 impl DossierReport<'_> {
     /// The dossier as a page.
-    pub fn html(&self) -> String {
+    pub(super) fn html(&self) -> String {
         Page {
             title: format!("Is {} appropriate under {}?", self.dossier.parameterization.name(), self.profile.name),
             lead: format!("{}. {} {} {}", self.answer(), self.recall(), self.coverage(), self.provenance.data),

@@ -10,7 +10,7 @@ const BLANK: &str = "______________________________";
 
 impl DossierReport<'_> {
     /// The conclusion in one sentence.
-    pub fn answer(&self) -> String {
+    pub(super) fn answer(&self) -> String {
         let dossier = self.dossier;
         format!(
             "Under profile {}, {} is {} for {} and {} on this data ({} of {} found scenarios, {} simulations of S from {})",

@@ -33,7 +33,7 @@ const MAX_NARROW: usize = 3;
 const MAX_COLUMNS: usize = 8;
 
 /// Name and colour of an outcome.
-pub fn outcome(outcome: CellOutcome) -> (String, &'static str) {
+pub(super) fn outcome(outcome: CellOutcome) -> (String, &'static str) {
     let colour = match outcome {
         CellOutcome::NoConflict => NO_CONFLICT,
         CellOutcome::Pass => "#f3dfa2",

@@ -14,7 +14,7 @@ use crate::support::table::{Column, Digits, NumberText};
 
 impl SampleReport {
     /// `report.html`, with the figures of the run.
-    pub fn html(&self, figures: Vec<PageFigure>) -> String {
+    pub(super) fn html(&self, figures: Vec<PageFigure>) -> String {
         let density = &self.density;
         let mut warnings = Vec::new();
         if let Some(given) = self.given_list() {

@@ -11,7 +11,7 @@ use crate::support::table::{Table, TableOf};
 
 impl SampleReport {
     /// `estimates.csv`.
-    pub fn csv(&self) -> String {
+    pub(super) fn csv(&self) -> String {
         type Weight = fn(&WeightFigures) -> f64;
         let weights: [(&str, Weight); 3] = [
             ("ess_failures", |w| w.effective_failures),

@@ -248,6 +248,14 @@ impl Figure {
         names
     }
 
+    /// The look of a series: its own, or that of its place in the legend.
+    fn look(&self, series: &Series) -> Look {
+        series.look.unwrap_or_else(|| {
+            let names = self.names();
+            Look::of(names.iter().position(|name| *name == series.name).unwrap_or(0), names.len())
+        })
+    }
+
     /// Whether all plots have the same axis.
     fn shares(&self, axis: fn(&Plot) -> &PlotAxis) -> bool {
         let mut shown = self.plots.iter().filter(|plot| !plot.is_blank());
@@ -262,11 +270,6 @@ impl Figure {
             (0, 2 | 4) => 2,
             (0, _) => 3,
             (columns, _) => columns,
-        };
-        let names = self.names();
-        let look = |series: &Series| {
-            let place = names.iter().position(|name| *name == series.name);
-            series.look.unwrap_or_else(|| Look::of(place.unwrap_or(0), names.len()))
         };
         let (shares_x, shares_y) = (self.shares(|plot| &plot.x), self.shares(|plot| &plot.y));
         // Shared numbers need room at the edges only.
@@ -312,7 +315,7 @@ impl Figure {
                     canvas.paragraph((from, above), &plot.y.label, TICK, across.1 - from);
                 }
                 if plot.is_polar {
-                    bottom = bottom.max(plot.draw_polar(canvas, &look, frame_top));
+                    bottom = bottom.max(plot.draw_polar(canvas, &|series| self.look(series), frame_top));
                     continue;
                 }
                 let frame_px = match plot.height {
@@ -323,7 +326,7 @@ impl Figure {
                 let down = (frame_top, frame_top + frame_px);
                 let below = self.plots.iter().skip((row + 1) * columns + column).step_by(columns);
                 let is_lowest = !shares_x || below.clone().all(Plot::is_blank);
-                plot.draw(canvas, &look, (across, down), (is_lowest, !shares_y || column == 0));
+                plot.draw(canvas, &|series| self.look(series), (across, down), (is_lowest, !shares_y || column == 0));
                 let mut end = down.1 + if is_lowest { 24.0 } else { 6.0 };
                 if !shares_x {
                     let middle = (across.0 + across.1) / 2.0;
@@ -349,21 +352,19 @@ impl Figure {
     /// Draws samples and names of what is drawn, in two columns read downwards (one if a name is too long for half the
     /// width); returns the y below.
     fn legend(&self, canvas: &mut Canvas, top: f64) -> f64 {
-        let names = self.names();
-        let series = || self.plots.iter().flat_map(|plot| plot.series.iter().filter(|series| plot.shows(series)));
-        let looks = names.iter().enumerate().filter_map(|(at, name)| {
-            let series = series().find(|series| series.name == *name)?;
-            Some((*name, Entry::Series(series, series.look.unwrap_or_else(|| Look::of(at, names.len())))))
+        let shown = || self.plots.iter().flat_map(|plot| plot.series.iter().filter(|series| plot.shows(series)));
+        let series = self.names().into_iter().filter_map(|name| {
+            let series = shown().find(|series| series.name == name)?;
+            Some((name, Entry::Series(series, self.look(series))))
         });
-        let mut entries: Vec<(&str, Entry)> = looks.collect();
-        for (name, fill) in self.plots.iter().flat_map(|plot| &plot.cells).flat_map(|cells| &cells.key) {
-            if entries.iter().all(|entry| entry.0 != name.as_str()) {
-                entries.push((name, Entry::Fill(fill)));
-            }
-        }
-        for rule in self.plots.iter().flat_map(|plot| &plot.rules).filter(|rule| !rule.name.is_empty()) {
-            if entries.iter().all(|entry| entry.0 != rule.name.as_str()) {
-                entries.push((&rule.name, Entry::Rule(rule)));
+        let fills = self.plots.iter().flat_map(|plot| &plot.cells).flat_map(|cells| &cells.key);
+        let fills = fills.map(|(name, fill)| (name.as_str(), Entry::Fill(fill)));
+        let rules = self.plots.iter().flat_map(|plot| &plot.rules).filter(|rule| !rule.name.is_empty());
+        let rules = rules.map(|rule| (rule.name.as_str(), Entry::Rule(rule)));
+        let mut entries: Vec<(&str, Entry)> = series.collect();
+        for entry in fills.chain(rules) {
+            if entries.iter().all(|(name, _)| *name != entry.0) {
+                entries.push(entry);
             }
         }
         let half_px = self.width_px() / 2.0;
