@@ -116,9 +116,7 @@ impl Justify {
         console::warn(&dossier.left_out);
         let report = DossierReport {
             dossier: &dossier,
-            rules: &options.rules,
-            margin: options.compare.enough.margin,
-            score: &options.score,
+            options: &options,
             provenance: &facts,
             profile: &profile,
             author: self.author.clone(),

@@ -297,8 +297,8 @@ impl CaseSheet<'_> {
         let preventable = match &first.verdicts.reference_drivers[..] {
             [] => format!("{} has no reference drivers: it does not say what is preventable.", first.profile),
             drivers => format!(
-                "A collision is preventable where one of the reference drivers ({}) avoids it. Where nothing collides even \
-                 if the ego never reacts, there is no conflict.",
+                "A collision is preventable where one of the reference drivers ({}) avoids it. Where nothing collides \
+                 even if the ego never reacts, there is no conflict.",
                 drivers.iter().map(|model| model.name()).collect::<Vec<_>>().join(" or ")
             ),
         };

@@ -7,7 +7,7 @@ use super::host::Host;
 use super::html::{Page, PageFigure, Section};
 use super::plot::{AxisScale, Figure, INK, Look, PlotAxis, Series, Symbol, Value, logarithmic_reach};
 use super::records::{PROGRAM, document, publish, record};
-use super::tables::{CloseRow, WIDTH, close_following, wrap};
+use super::tables::{CloseRow, WIDTH, close_following, paragraph};
 use crate::Result;
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
@@ -153,7 +153,7 @@ impl CompareReport<'_> {
     /// exceed this.
     pub fn text(&self) -> String {
         let provenance = self.compare.provenance();
-        let mut text = format!("{}\n\n{}\n", wrap(&provenance.data, WIDTH), self.rule());
+        let mut text = format!("{}\n{}", paragraph(&provenance.data), paragraph(&self.rule()));
         for category in &self.categories {
             let _ = writeln!(
                 text,
@@ -182,7 +182,7 @@ impl CompareReport<'_> {
         let close = close_following(&close.collect::<Vec<_>>(), "S", self.headways(), WIDTH);
         text.extend((!close.is_empty()).then(|| format!("\n{close}")));
         for reason in &self.left_out {
-            let _ = writeln!(text, "\n{}", wrap(&format!("left out: {reason}"), WIDTH));
+            let _ = write!(text, "\n{}", paragraph(&format!("left out: {reason}")));
         }
         if provenance.synthetic {
             text.push_str("\nSYNTHETIC DATA: no number above is a statement about real traffic\n");
@@ -204,7 +204,10 @@ impl CompareReport<'_> {
         });
         let rates = Section::new("rates", "Rates and their ratios").text(self.text()).folded();
         let reproduction = Section::new("reproduction", "Reproduction")
-            .intro("The same scenarios, flags and seed give the same numbers, on any machine. compare.json holds all of it.")
+            .intro(
+                "The same scenarios, flags and seed give the same numbers, on any machine. compare.json holds all of \
+                 it.",
+            )
             .fact("program", PROGRAM)
             .fact("profile", &plan.profile.name)
             .fact("seed", options.seed.to_string())
@@ -230,7 +233,7 @@ impl CompareReport<'_> {
     /// How to read a cell.
     fn rule(&self) -> String {
         let Enough { clusters, margin } = self.compare.options().enough;
-        let text = format!(
+        format!(
             "A cell is: failed share of the lanes, its ratio to S, the ratio's {:.0} % interval, verdict. = agrees: the \
              interval lies within {:.2} … {margin}. > too high, < too low: it lies on one side of 1 and reaches \
              beyond. ? undecided: it contains 1 and is wider. Also undecided: one side has fewer than {clusters} \
@@ -248,8 +251,7 @@ impl CompareReport<'_> {
                 false => "",
             },
             if self.is_observed() { "from the recorded gaps" } else { "from headways that are imposed, not observed" }
-        );
-        wrap(&text, WIDTH)
+        )
     }
 
     /// The table of one criterion: a row for S, its risk, and two rows per parameterization; a column per model.
@@ -352,7 +354,7 @@ fn uncertainty(category: &CategoryComparison) -> String {
          understates the spread; - in a whole row: no density fails.",
         100.0 * Compare::LEVEL
     );
-    format!("\n{}{}\n", table.build().text(), wrap(&rule, WIDTH))
+    format!("\n{}{}", table.build().text(), paragraph(&rule))
 }
 
 /// Per parameterization and form: how well the density represents unseen scenarios. Empty unless forms were compared.
@@ -503,7 +505,7 @@ fn rates(compare: &Compare, comparison: &CategoryComparison, criterion: Criterio
         })
         .collect();
     let x = PlotAxis::around("share of failed lanes", AxisScale::Logarithmic, logarithmic_reach(&reach));
-    let panel = Dots { heading: String::new(), x, marked: Vec::new(), series };
+    let panel = Dots { x, series, ..Dots::default() };
     let samples = readable::count(compare.options().samples);
     Figure {
         title: format!("{}: share of lanes that fail {}", comparison.category.label(), criterion.label()),

@@ -7,9 +7,8 @@ use super::records::{self, PROGRAM, smallest_gap_m};
 use super::trace::{TraceFigure, TracePanels, TraceSeries};
 use crate::Result;
 use crate::model::profile::Profile;
-use crate::run::justify::{Dossier, Hidden, REGULATION, Rules, Scored, Share};
+use crate::run::justify::{Dossier, Hidden, JustifyOptions, REGULATION, Scored, Share};
 use crate::run::sampling::RateRecord;
-use crate::run::score::ScoreOptions;
 use crate::scenario::DataProvenance;
 use crate::scenario::parameterization::Parameterization;
 use crate::stats::estimate::Ratio;
@@ -24,12 +23,8 @@ pub(super) const SHOWN: usize = 20;
 pub struct DossierReport<'a> {
     /// The dossier.
     pub dossier: &'a Dossier,
-    /// The rules.
-    pub rules: &'a Rules,
-    /// Ratios within 1/margin to margin agree.
-    pub margin: f64,
-    /// Confidence of the intervals, and how many failing scenarios they need.
-    pub score: &'a ScoreOptions,
+    /// Rules, scores and comparison.
+    pub options: &'a JustifyOptions,
     /// Provenance of the scenarios.
     pub provenance: &'a DataProvenance,
     /// Profile.
@@ -241,10 +236,10 @@ impl DossierReport<'_> {
             "date": self.date,
             "conclusion": dossier.conclusion,
             "sentence": self.answer(),
-            "rules": self.rules,
-            "margin": self.margin,
-            "confidence": self.score.confidence,
-            "min_failures": self.score.min_failures,
+            "rules": self.options.rules,
+            "margin": self.options.compare.enough.margin,
+            "confidence": self.options.score.confidence,
+            "min_failures": self.options.score.min_failures,
             "findings": dossier.findings,
             "rule": self.rule(),
             "found": dossier.found,

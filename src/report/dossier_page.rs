@@ -19,8 +19,8 @@ impl DossierReport<'_> {
                 Section::new("groups", "By headway, speed and severity")
                     .intro(
                         "Thirds of the scenarios by the ego's speed, and of the failures of S by severity: closing \
-                         speed at the contact, else the shortfall of TTC or the excess of BTN. Precision has no meaning \
-                         within failures of S.",
+                         speed at the contact, else the shortfall of TTC or the excess of BTN. Precision has no \
+                         meaning within failures of S.",
                     )
                     .tables([self.groups().captioned("Scores by group, [interval over scenarios]")]),
                 self.risk_section(),
@@ -41,7 +41,7 @@ impl DossierReport<'_> {
     }
 
     fn conclusion_section(&self) -> Section {
-        let significance = format!("intervals of {} % over scenarios", value(100.0 * self.score.confidence));
+        let significance = format!("intervals of {} % over scenarios", value(100.0 * self.options.score.confidence));
         Section::new("conclusion", "Conclusion")
             .intro([self.need().unwrap_or_default(), self.close_following()].join(" ").trim())
             .tables([self.findings().captioned("What each rule finds; the worst decides")])
@@ -93,8 +93,8 @@ impl DossierReport<'_> {
         let n = self.dossier.coverage.as_ref().map_or(self.dossier.scenarios, |coverage| coverage.points) as f64;
         let needed = n.powf((4.0 + d) / 5.0);
         let cost = format!(
-            "the squared error of a kernel density falls as n^(-4/(4+d)) (Silverman 1986, 4.3): as many as {} points would \
-             give {d} parameters the accuracy that one parameter has at {}",
+            "the squared error of a kernel density falls as n^(-4/(4+d)) (Silverman 1986, 4.3): as many as {} points \
+             would give {d} parameters the accuracy that one parameter has at {}",
             value(needed),
             count(n as u64)
         );

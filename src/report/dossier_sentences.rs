@@ -36,18 +36,18 @@ impl DossierReport<'_> {
              the interval contains a limit, neither is shown: undecided. So are recall and precision with fewer than {} failing \
              scenarios. Coverage is a count without an interval. One rule that fails makes the parameterization not appropriate; \
              all have to pass for appropriate.",
-            self.score.min_failures
+            self.options.score.min_failures
         )
     }
 
     /// Where the limits come from, and how to change them.
     pub(super) fn limits_of_rules(&self) -> String {
-        let Rules { min_recall, min_precision, min_coverage } = self.rules;
+        let Rules { min_recall, min_precision, min_coverage } = self.options.rules;
         format!(
             "The limits are conventions of this program, not of a standard. Keys of the configuration change them: \
              justify.min_recall ({min_recall}), justify.min_precision ({min_precision}), justify.min_coverage ({min_coverage}), \
              compare.margin ({}), score.min_failures ({}), score.confidence ({}).",
-            self.margin, self.score.min_failures, self.score.confidence
+            self.options.compare.enough.margin, self.options.score.min_failures, self.options.score.confidence
         )
     }
 

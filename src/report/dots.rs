@@ -14,6 +14,7 @@ pub(super) struct DotRow {
 }
 
 /// One panel.
+#[derive(Default)]
 pub(super) struct Dots {
     pub heading: String,
     /// The axis of the estimates.

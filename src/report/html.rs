@@ -281,16 +281,15 @@ fn facts(facts: &[(String, String)]) -> String {
 
 /// An SVG document as an element that scales with the page, and its width, px: a view box replaces width and height.
 fn inline(svg: &str) -> (String, f64) {
-    let svg = &svg[svg.find("<svg").unwrap_or(0)..];
-    let size = |name: &str| {
-        let (_, value) = svg.split_once('>')?.0.split_once(&format!(" {name}=\""))?;
-        value.split_once('"').map(|(value, _)| value.to_owned())
-    };
-    let (Some(width), Some(height)) = (size("width"), size("height")) else { return (svg.to_owned(), 0.0) };
-    let view_box = format!(" viewBox=\"0 0 {width} {height}\" role=\"img\"");
-    let scaled =
-        svg.replacen(&format!(" width=\"{width}\""), &view_box, 1).replacen(&format!(" height=\"{height}\""), "", 1);
-    (scaled.trim_end().to_owned(), width.parse().unwrap_or(0.0))
+    let svg = svg[svg.find("<svg").unwrap_or(0)..].trim_end();
+    let size = svg.split_once(" width=\"").and_then(|(before, after)| {
+        let (width, after) = after.split_once("\" height=\"")?;
+        let (height, after) = after.split_once('"')?;
+        Some((before, width, height, after))
+    });
+    let Some((before, width, height, after)) = size else { return (svg.to_owned(), 0.0) };
+    let scaled = format!("{before} viewBox=\"0 0 {width} {height}\" role=\"img\"{after}");
+    (scaled, width.parse().unwrap_or(0.0))
 }
 
 #[cfg(test)]

@@ -12,8 +12,8 @@ use crate::support::files::make_folder_of;
 use crate::support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter};
 use crate::{Error, Result};
 
-/// A table for the lanes of a study; see [`write_study_chunk`]. It is written chunk by chunk, so that memory does not grow
-/// with the lanes.
+/// A table for the lanes of a study; see [`write_study_chunk`]. It is written chunk by chunk, so that memory does not
+/// grow with the lanes.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Usage`] for an unknown ending of the name.
@@ -51,8 +51,8 @@ fn create(
     TableWriter::create(path, table_format(path)?, columns, &TableMetadata { table, profile, plan_sha256, synthetic })
 }
 
-/// The columns of a study's lanes, in their order. `value` is the arithmetic of the numbers: binary32, or binary64 of the
-/// reference; they are written as the shortest text that reads back to the same bits.
+/// The columns of a study's lanes, in their order. `value` is the arithmetic of the numbers: binary32, or binary64 of
+/// the reference; they are written as the shortest text that reads back to the same bits.
 #[rustfmt::skip] // a table: one line per column
 pub fn columns(value: ColumnKind) -> Vec<Column> {
     let c = Column::new;

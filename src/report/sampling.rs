@@ -122,8 +122,8 @@ pub struct SampleReport {
 }
 
 impl SampleReport {
-    /// What is common to all runs, to which draws and search are added where they exist; `is_sampled_headway`: the headway
-    /// is a parameter of the density.
+    /// What is common to all runs, to which draws and search are added where they exist; `is_sampled_headway`: the
+    /// headway is a parameter of the density.
     pub fn of(
         density: DensityRecord,
         is_sampled_headway: bool,

@@ -1,12 +1,12 @@
 //! The figures of a sampling run.
 //!
 //! Convergence of an estimate: failure probability with its interval over the number of samples, one panel per driver
-//! model, all panels on the same axes. Both axes are logarithmic, because probabilities span decades. They cannot show an
-//! estimate of zero: its interval's upper end is drawn instead, with an arrow downwards.
+//! model, all panels on the same axes. Both axes are logarithmic, because probabilities span decades. They cannot show
+//! an estimate of zero: its interval's upper end is drawn instead, with an arrow downwards.
 //!
-//! Where failures occur: the fraction of failed samples per cell of two scenario parameters, as heat maps. The colours go
-//! from pale yellow over green to dark blue and darken with each step, so that colour-blind readers and grey prints can
-//! distinguish them, but for pale cells; the scale is the same for all models and headways of a run.
+//! Where failures occur: the fraction of failed samples per cell of two scenario parameters, as heat maps. The colours
+//! go from pale yellow over green to dark blue and darken with each step, so that colour-blind readers and grey prints
+//! can distinguish them, but for pale cells; the scale is the same for all models and headways of a run.
 
 use super::plot::{
     AxisScale, Cells, ColourBar, Figure, Fill, FilledCell, Height, Mark, Plot, PlotAxis, Series, Value, is_few,

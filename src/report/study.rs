@@ -1,5 +1,5 @@
-//! A study as text for the terminal, as one JSON document and as files in the output folder; the last is `run.json`, with
-//! data, program and settings, so that its numbers can be reproduced.
+//! A study as text for the terminal, as one JSON document and as files in the output folder; the last is `run.json`,
+//! with data, program and settings, so that its numbers can be reproduced.
 
 use super::host::{Host, SweepRecord, Timings};
 use super::html::PageFigure;

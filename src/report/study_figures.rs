@@ -137,12 +137,7 @@ pub(super) fn f1_intervals(scores: &CategoryScores, confidence: f64, data: &str)
         let values = cells.iter().enumerate().filter_map(value).collect();
         Series { values, ..Series::new(legend_name(scores, variant), &[], []) }
     };
-    let panel = Dots {
-        heading: String::new(),
-        x: PlotAxis::exactly("F1", -0.02, 1.02),
-        marked: Vec::new(),
-        series: (1..scores.variants.len()).map(series).collect(),
-    };
+    let (x, series) = (PlotAxis::exactly("F1", -0.02, 1.02), (1..scores.variants.len()).map(series).collect());
     Figure {
         caption: format!(
             "Marker: F1; further right is better; in each row in the order below. Line: its {} % interval over scenarios. \
@@ -150,7 +145,7 @@ pub(super) fn f1_intervals(scores: &CategoryScores, confidence: f64, data: &str)
              nor S' fails.",
             100.0 * confidence
         ),
-        plots: dots(&rows, vec![panel]),
+        plots: dots(&rows, vec![Dots { x, series, ..Dots::default() }]),
         ..titled(scores, "F1 of parameterized against recorded scenarios", data)
     }
 }

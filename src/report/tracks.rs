@@ -254,13 +254,10 @@ fn figure(
             let (runs, dash) = (lane_lines, "8,5");
             rules.push(Rule { runs, name, colour: LINE, width_px: 1.6, dash, ..Rule::default() });
         }
-        let ends = |values: &[f64]| {
+        let axis = |label: &str, values: &[f64]| {
             let (low, high) =
                 values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)));
-            if low < high { (low, high) } else { (low - 1.0, low + 1.0) }
-        };
-        let axis = |label: &str, values: &[f64]| {
-            let (low, high) = ends(values);
+            let (low, high) = if low < high { (low, high) } else { (low - 1.0, low + 1.0) };
             PlotAxis::exactly(label, low, high)
         };
         let tracks = recording.tracks.iter().filter(|track| track.carriageway == index).count();

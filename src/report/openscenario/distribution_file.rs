@@ -201,7 +201,8 @@ fn single(at: At, texts: &mut Vec<TextParameter>) -> Result<Option<Deterministic
         inner.shape(&["stepWidth"], &["Range"])?;
         let range = inner.only("Range")?.range()?;
         let step = inner.number("stepWidth")?;
-        GridAxis::steps((range.low, range.high), step, "DistributionRange").map_err(|e| inner.because(&e))?
+        GridAxis::steps((range.low, range.high), step, "DistributionRange")
+            .map_err(|e| inner.wrong(e.to_string(), e.help().unwrap_or_default()))?
     };
     if values.len() > MAX_VALUES {
         return Err(inner.wrong(format!("{} values", values.len()), format!("give {MAX_VALUES} at most")));

@@ -4,7 +4,7 @@
 //! A lane stores the ego's width and half the sums of two lengths. Unknown lengths are chosen so that the sums, and
 //! therefore every gap and contact, stay the same.
 
-use super::{Concrete, EgoMotion, PlayedVehicle, paths};
+use super::concrete::{Concrete, EgoMotion, PlayedVehicle, paths};
 use crate::engine::{EndReason, LaneCase, LaneKey, LaneOther, LanePlan, LaneRunner, NO_STEP, Trace};
 use crate::model::criterion::Criterion;
 use crate::model::driver::NEVER;

@@ -14,7 +14,6 @@ mod samples;
 mod scenario_file;
 mod xml_at;
 
-pub(crate) use concrete::paths;
 pub use concrete::{Concrete, EgoMotion, PlayedVehicle, Vertex};
 pub use distribution::{Distribution, Draw, Range};
 pub use distribution_file::{
@@ -25,8 +24,5 @@ pub use parameters::{Names, Rename, variations};
 pub use samples::{ATTEMPTS, DistributionSamples, Sampled, SampledFile, SampledParameter, reopen};
 pub use scenario_file::{IndexRow, export_folder};
 
-/// Author of every file.
-pub(crate) const AUTHOR: &str = concat!("lanesweep ", env!("CARGO_PKG_VERSION"));
-
 /// Date of every file; it is constant, so that the same input gives the same bytes.
-pub(crate) const DATE: &str = "1970-01-01T00:00:00";
+const DATE: &str = "1970-01-01T00:00:00";

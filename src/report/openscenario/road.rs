@@ -1,8 +1,9 @@
 //! The road of a scenario as ASAM OpenDRIVE 1.7: straight and level, with as many equal lanes as the vehicles need, all
 //! in the ego's direction.
 
+use super::DATE;
 use super::concrete::{Concrete, number};
-use super::{AUTHOR, DATE};
+use crate::report::records::PROGRAM;
 
 /// A straight road along x. The middle of the ego's lane is y = 0.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -69,7 +70,7 @@ pub(super) fn road_file(road: &Road) -> String {
     format!(
         r#"<?xml version="1.0" encoding="UTF-8"?>
 <OpenDRIVE>
-  <header revMajor="1" revMinor="7" name="straight road" version="1.00" date="{DATE}" {extent} vendor="{AUTHOR}"/>
+  <header revMajor="1" revMinor="7" name="straight road" version="1.00" date="{DATE}" {extent} vendor="{PROGRAM}"/>
   <road name="straight" length="{length}" id="1" junction="-1" rule="RHT">
     <type s="0" type="motorway"/>
     <planView>

@@ -2,7 +2,8 @@
 //!
 //! Every parameter uses one uniform number of the sample, in the file's order; its distribution is truncated to its own
 //! range and to the parameter's physical range. A point without a valid case (such as a deceleration that ends above
-//! the initial speed) is redrawn from the sample's next numbers. A run keeps its input, so that its lanes can be reproduced.
+//! the initial speed) is redrawn from the sample's next numbers. A run keeps its input, so that its lanes can be
+//! reproduced.
 
 use std::path::Path;
 use std::sync::Arc;

@@ -8,10 +8,11 @@
 
 use std::path::Path;
 
+use super::DATE;
 use super::concrete::{Concrete, EgoMotion, PlayedVehicle, Vertex, number};
 use super::road::{Road, road_file};
-use super::{AUTHOR, DATE};
 use crate::Result;
+use crate::report::records::PROGRAM;
 use crate::support::run_dir::OutputDir;
 use crate::support::table::Table;
 
@@ -89,7 +90,7 @@ fn header(scenario: &Concrete) -> String {
         .chain(overlap_s.iter().map(|time_s| (OTHERS_OVERLAP, time_s)))
         .map(|(name, value)| format!("      <Property name=\"{}\" value=\"{}\"/>\n", escaped(name), escaped(value)));
     format!(
-        "  <FileHeader revMajor=\"1\" revMinor=\"2\" date=\"{DATE}\" description=\"{}\" author=\"{AUTHOR}\">
+        "  <FileHeader revMajor=\"1\" revMinor=\"2\" date=\"{DATE}\" description=\"{}\" author=\"{PROGRAM}\">
     <Properties>
 {}    </Properties>
   </FileHeader>

@@ -69,11 +69,6 @@ impl<'a> At<'a> {
         Error::input(place, problem, help)
     }
 
-    /// Adds this place to another check's error.
-    pub(super) fn because(&self, error: &Error) -> Error {
-        self.wrong(error.to_string(), error.help().unwrap_or_default())
-    }
-
     pub(super) fn all(self) -> impl Iterator<Item = At<'a>> {
         self.node.children().filter(Node::is_element).map(move |node| At { node, path: self.path })
     }

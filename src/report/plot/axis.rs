@@ -98,7 +98,7 @@ impl Axis {
 
     /// Whether `value` is between the ends.
     pub(super) fn holds(&self, value: f64) -> bool {
-        self.shows(value) && (self.low - 1e-9..=self.high + 1e-9).contains(&self.scale.place(value))
+        self.scale.shows(value) && (self.low - 1e-9..=self.high + 1e-9).contains(&self.scale.place(value))
     }
 
     /// Its ends on the page, the smaller first.
@@ -118,11 +118,6 @@ impl Axis {
     pub(super) fn vertical_numbers(&self) -> usize {
         let max = if self.scale == AxisScale::Logarithmic { 8.0 } else { 6.0 };
         (self.length_px() / 18.0).clamp(2.0, max) as usize
-    }
-
-    /// Whether the axis can show `value`.
-    fn shows(&self, value: f64) -> bool {
-        self.scale.shows(value)
     }
 
     /// Position of `value`, px; the nearer end if the axis cannot show it.
@@ -289,7 +284,7 @@ impl Axes {
     }
 
     pub(super) fn shows(&self, (x, y): (f64, f64)) -> bool {
-        self.x.shows(x) && self.y.shows(y)
+        self.x.scale.shows(x) && self.y.scale.shows(y)
     }
 
     /// Whether a position on the page lies in the plot.

@@ -105,7 +105,8 @@ pub(super) fn colour_bar(canvas: &mut Canvas, bar: &ColourBar, (left, right): (f
     });
     canvas.rect((left, top), (right, bottom), Paint::line(GREY, 1.0));
     for tick in Axis::exactly((0.0, bar.largest), (bottom, top)).ticks(6) {
-        canvas.line((right, tick.at_px), (right + 5.0, tick.at_px), GREY, 1.0);
+        let mark = vec![(right, tick.at_px), (right + 5.0, tick.at_px)];
+        canvas.path(&[mark], false, Paint::line(GREY, 1.0));
         canvas.text((right + 8.0, tick.at_px + 4.5), tick.label.as_deref().unwrap_or(""), TICK, Anchor::Start);
     }
 }

@@ -1,5 +1,5 @@
-//! What a plot draws: cells (rectangles whose flat colour shows their content), over them rules, over both series (line,
-//! points, band, intervals, bars).
+//! What a plot draws: cells (rectangles whose flat colour shows their content), over them rules, over both series
+//! (line, points, band, intervals, bars).
 
 use super::axis::{Axes, number};
 use super::look::Look;

@@ -173,10 +173,6 @@ impl Canvas {
         }
     }
 
-    pub(super) fn line(&mut self, from: Position, to: Position, colour: &str, width_px: f64) {
-        self.path(&[vec![from, to]], false, Paint::line(colour, width_px));
-    }
-
     /// Draws one line of text on its base line.
     pub(crate) fn text(&mut self, (x, y): Position, line: &str, set: Type, anchor: Anchor) {
         let mut text = format!("<text x=\"{}\" y=\"{}\" font-size=\"{}\"", Number(x), Number(y), set.size_px);

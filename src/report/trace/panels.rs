@@ -199,12 +199,8 @@ impl<'a> Shown<'a> {
             }
         }
         curves.extend(self.curves(&|step| Some((step.v_ego_mps, false))));
-        let hint = match (vehicles, is_shared) {
-            (1, true) => "grey: the other vehicle",
-            (_, true) => "grey: the other vehicles",
-            (1, _) => "thin: the other vehicle",
-            _ => "thin: the other vehicles",
-        };
+        let (look, plural) = (if is_shared { "grey" } else { "thin" }, if vehicles == 1 { "" } else { "s" });
+        let hint = format!("{look}: the other vehicle{plural}");
         let ends = around(values(&curves));
         let marks = self.marks(&StepMark::ALL, None, &|step| Some(step.v_ego_mps));
         self.panel("Speed (m/s)", hint, 92.0, ends, Vec::new(), with_marks(curves, marks))
