@@ -488,14 +488,14 @@ fn rates(compare: &Compare, comparison: &CategoryComparison, criterion: Criterio
     };
     let own = recorded.iter().enumerate().filter_map(|(row, s)| Some(Value { y: row as f64, ..value(&s.rate)? }));
     let look = Look { colour: INK, symbol: Symbol::Polygon(4, 0.0), ..Look::of(0, 1) };
-    let mut series = vec![Series { values: own.collect(), look: Some(look), ..Series::new("S, as recorded", &[], []) }];
+    let mut series = vec![Series::new("S, as recorded", &[], own).with_look(look)];
     for (at, of) in comparison.parameterizations.iter().enumerate() {
         let drawn = |cell: &ComparedCell| {
             let [low, high] = cell.sampled.with_data;
             Some(Value { outer: Some((low, high)), ..value(&cell.sampled.rate)? })
         };
-        let look = Some(Look::of(at, comparison.parameterizations.len()));
-        series.push(Series { values: values(of, &recorded, drawn), look, ..Series::new(legend_name(of), &[], []) });
+        let look = Look::of(at, comparison.parameterizations.len());
+        series.push(Series::new(legend_name(of), &[], values(of, &recorded, drawn)).with_look(look));
     }
     let all = series.iter().flat_map(|series| &series.values);
     let reach: Vec<(f64, f64, f64)> = all
@@ -551,10 +551,7 @@ fn ratios(compare: &Compare, comparison: &CategoryComparison, criterion: Criteri
         series: comparison
             .parameterizations
             .iter()
-            .map(|of| Series {
-                values: values(of, &recorded, |cell| value(pick(cell))),
-                ..Series::new(legend_name(of), &[], [])
-            })
+            .map(|of| Series::new(legend_name(of), &[], values(of, &recorded, |cell| value(pick(cell)))))
             .collect(),
     };
     Figure {

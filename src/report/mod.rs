@@ -1,6 +1,6 @@
 //! Reports: the output of a run for people and for other programs.
 //!
-//! This module holds the terminal tables, the CSV files, the figures (SVG, all drawn by [`plot`]), the pages and
+//! This module holds the terminal tables, the CSV files, the figures (SVG, all drawn by `plot`), the pages and
 //! `run.json`. It computes nothing beyond formatting. Scores come from [`crate::run::score`]; text and files go to the
 //! user.
 

@@ -61,8 +61,8 @@ pub(super) fn convergence(density: &DensityModel, checkpoints: &[Checkpoint], le
         {
             value.label = format!("{scenarios:.0}");
         }
-        let series = Series::new(criterion.label(), &[Mark::Band, Mark::Line, Mark::Points], []);
-        Series { values, attributes: "class=\"estimate\"".to_owned(), ..series }
+        let series = Series::new(criterion.label(), &[Mark::Band, Mark::Line, Mark::Points], values);
+        Series { attributes: "class=\"estimate\"".to_owned(), ..series }
     };
     let mut models: Vec<ModelId> = Vec::new();
     rows().for_each(|(_, row)| models.extend((!models.contains(&row.model)).then_some(row.model)));

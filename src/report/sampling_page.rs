@@ -138,7 +138,7 @@ impl SampleReport {
                 };
                 let mut values: Vec<Value> = own.filter_map(point).collect();
                 values.sort_by(|a, b| a.x.total_cmp(&b.x));
-                Series { values, ..Series::new(criterion.label(), &[Mark::Band, Mark::Line, Mark::Points], []) }
+                Series::new(criterion.label(), &[Mark::Band, Mark::Line, Mark::Points], values)
             };
             let series = Criterion::ALL.map(series).into_iter().filter(|series| !series.values.is_empty());
             Plot {

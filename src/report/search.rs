@@ -221,7 +221,7 @@ impl SearchReport<'_> {
                 ..Value::default()
             })
         };
-        let look = |colour, symbol| Some(Look { colour, symbol, ..Look::of(0, 1) });
+        let look = |colour, symbol| Look { colour, symbol, ..Look::of(0, 1) };
         let points = |front: &Front| front.paper.iter().chain(&front.points).map(|point| point.parameters).max();
         let most = self.result.fronts.iter().filter_map(points).max().unwrap_or(1);
         let plot = |front: &Front| {
@@ -237,18 +237,16 @@ impl SearchReport<'_> {
                     .filter_map(|point| value(point.parameters, &of(&point.judged)?, self.describe(&point.candidate)));
                 values.collect()
             };
-            let line =
-                |name: &str, marks: &[Mark], look, values| Series { look, values, ..Series::new(name, marks, []) };
             let marks = &[Mark::Line, Mark::Points, Mark::Intervals];
             let cross_validated = found(&|judged| Some(judged.cross_validated));
             let mut series = vec![
-                line("paper", &[Mark::Points], look(PAPER, Symbol::Disc), paper.collect()),
-                line("found, cross-validated", marks, look(FRONT, Symbol::Disc), cross_validated),
+                Series::new("paper", &[Mark::Points], paper).with_look(look(PAPER, Symbol::Disc)),
+                Series::new("found, cross-validated", marks, cross_validated).with_look(look(FRONT, Symbol::Disc)),
             ];
             if self.held_out.is_some() {
                 let values = found(&|judged| judged.held_out).into_iter().map(|v| Value { x: v.x + 0.12, ..v });
                 let look = look(HELD_OUT, Symbol::Polygon(3, 0.0));
-                series.push(line("found, held-out data", marks, look, values.collect()));
+                series.push(Series::new("found, held-out data", marks, values).with_look(look));
             }
             Plot {
                 heading: front.scope.name(),
@@ -293,8 +291,7 @@ impl SearchReport<'_> {
                 tip: self.describe(&of.candidate),
                 ..Value::default()
             });
-            let values = values.collect();
-            Series { values, ..Series::new(family.clone(), &[Mark::Points], []) }
+            Series::new(family.clone(), &[Mark::Points], values)
         });
         let all = count(self.result.evaluated.len() as u64);
         let plot = Plot {

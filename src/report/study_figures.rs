@@ -55,12 +55,12 @@ pub(super) fn headways(of: &HeadwayFailures, scores: &CategoryScores, confidence
                 }
             }
             if variant == 0 {
-                let look = Look { colour: INK, dash: "", line_px: 1.8, symbol: Symbol::Disc, ..Look::of(0, 1) };
-                let series = Series::new("S, as recorded", &[Mark::Band, Mark::Line, Mark::Points], []);
-                return Series { values, look: Some(Look { marker_px: 3.0, ..look }), ..series };
+                let look = Look { colour: INK, line_px: 1.8, marker_px: 3.0, ..Look::of(0, 1) };
+                let marks = &[Mark::Band, Mark::Line, Mark::Points];
+                return Series::new("S, as recorded", marks, values).with_look(look);
             }
             let look = Look { line_px: 1.2, ..Look::of(variant - 1, of.variants.len() - 1) };
-            Series { values, look: Some(look), ..Series::new(legend_name(scores, variant), &[Mark::Line], []) }
+            Series::new(legend_name(scores, variant), &[Mark::Line], values).with_look(look)
         };
         let shares = (0..of.variants.len()).flat_map(|variant| (0..of.headways.len()).map(count(variant, cell)));
         let (least, most) = shares.fold((u64::MAX, 0), |(low, high), count| (low.min(count), high.max(count)));
@@ -134,8 +134,7 @@ pub(super) fn f1_intervals(scores: &CategoryScores, confidence: f64, data: &str)
             let interval = ends(cell.f1_interval);
             Some(Value { interval, ..Value::from((f1(&cell.counts)?, row as f64)) })
         };
-        let values = cells.iter().enumerate().filter_map(value).collect();
-        Series { values, ..Series::new(legend_name(scores, variant), &[], []) }
+        Series::new(legend_name(scores, variant), &[], cells.iter().enumerate().filter_map(value))
     };
     let (x, series) = (PlotAxis::exactly("F1", -0.02, 1.02), (1..scores.variants.len()).map(series).collect());
     Figure {
@@ -174,8 +173,8 @@ pub(super) fn radar(scores: &CategoryScores, data: &str) -> Figure {
         };
         // Many values are equal, most often 1: lines of equal weight, markers that shrink.
         let look = Look { line_px: 1.4, ..Look::of(variant - 1, scores.variants.len() - 1) };
-        let series = Series::new(legend_name(scores, variant), &[Mark::Line, Mark::Points], []);
-        Series { values: cells.iter().enumerate().map(value).collect(), look: Some(look), ..series }
+        let values = cells.iter().enumerate().map(value);
+        Series::new(legend_name(scores, variant), &[Mark::Line, Mark::Points], values).with_look(look)
     };
     let rings = [0.2, 0.4, 0.6, 0.8, 1.0].map(|at| Name { at, words: format!("{at:.1}"), ..Name::default() });
     let plot = Plot {
@@ -220,8 +219,7 @@ pub(super) fn recall_and_precision(scores: &CategoryScores, confidence: f64, dat
         let series = |(at, value): (usize, Option<Value>)| {
             let name = legend_name(scores, at + 1);
             let look = Look { line_px: 1.4, ..Look::of(at, scores.variants.len() - 1) };
-            let series = Series::new(name, &[Mark::Points, Mark::Intervals], []);
-            Series { values: value.into_iter().collect(), look: Some(look), ..series }
+            Series::new(name, &[Mark::Points, Mark::Intervals], value).with_look(look)
         };
         let step = if low < 0.55 { 2 } else { 1 };
         let equal = (1..10).filter(|tenth| tenth % step == 0).map(|tenth| f64::from(tenth) / 10.0);
@@ -288,8 +286,7 @@ pub(super) fn f1_by_parameters(scores: &CategoryScores, means: &[MeanF1], confid
                 let place = Value::from((id.parameter_count() as f64, value));
                 Value { label: id.key.to_string(), is_few, interval: ends(interval), ..place }
             };
-            let series = Series::new(name, &[Mark::Points, Mark::Intervals], []);
-            Series { values: own.map(value).collect(), look: Some(look), ..series }
+            Series::new(name, &[Mark::Points, Mark::Intervals], own.map(value)).with_look(look)
         };
         let points = ids.iter().map(|(at, id)| (id.parameter_count() as f64, mean.values[*at].0));
         let front = if is_few { Vec::new() } else { pareto_front(&points.collect::<Vec<_>>()) };
@@ -300,8 +297,7 @@ pub(super) fn f1_by_parameters(scores: &CategoryScores, means: &[MeanF1], confid
             ("kinematic", Look { colour: INK, symbol: Symbol::Disc, marker_px: 5.0, ..look }),
             ("SVD", Look { colour: "#d55e00", symbol: Symbol::Polygon(4, 0.5), marker_px: 3.2, ..look }),
         ];
-        let front =
-            Series { look: Some(look), ..Series::new("best with as many parameters or fewer", &[Mark::Line], steps) };
+        let front = Series::new("best with as many parameters or fewer", &[Mark::Line], steps).with_look(look);
         let name = match mean.criteria[..] {
             [criterion] => criterion.label(),
             _ => "all criteria",
@@ -337,10 +333,7 @@ pub(super) fn modes(category: Category, shapes: &[ModeShape], explained: &[f64],
     let panel = |shape: &ModeShape| {
         let last = shape.mean.len().saturating_sub(1).max(1) as f64;
         let at = move |(k, v): (usize, &f64)| Value::from((k as f64 / last, *v));
-        let line = |name: String, values: &[f64]| Series {
-            values: values.iter().enumerate().map(at).collect(),
-            ..Series::new(name, &[Mark::Line], [])
-        };
+        let line = |name: String, values: &[f64]| Series::new(name, &[Mark::Line], values.iter().enumerate().map(at));
         let mut mean = line("mean; area: the middle 90 % of the scenarios at each instant".to_owned(), &shape.mean);
         mean.marks.push(Mark::Band);
         for (value, [low, high]) in mean.values.iter_mut().zip(&shape.envelope) {

@@ -140,10 +140,15 @@ impl Rule {
 }
 
 impl Series {
-    /// Values without intervals, with marks.
-    pub fn new(name: impl Into<String>, marks: &[Mark], values: impl IntoIterator<Item = (f64, f64)>) -> Self {
-        let values = values.into_iter().map(Value::from).collect();
+    /// Values with marks; pairs are values without intervals.
+    pub fn new<V: Into<Value>>(name: impl Into<String>, marks: &[Mark], values: impl IntoIterator<Item = V>) -> Self {
+        let values = values.into_iter().map(Into::into).collect();
         Series { name: name.into(), marks: marks.to_vec(), values, ..Series::default() }
+    }
+
+    /// The same with a look of its own.
+    pub(in crate::report) fn with_look(self, look: Look) -> Self {
+        Series { look: Some(look), ..self }
     }
 
     fn has(&self, mark: Mark) -> bool {

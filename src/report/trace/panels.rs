@@ -32,8 +32,7 @@ struct Curve {
 impl From<Curve> for Series {
     fn from(curve: Curve) -> Self {
         let line_px = if curve.is_thin && curve.look.colour != GREY { 0.8 } else { curve.look.line_px };
-        let look = Some(Look { line_px, ..curve.look });
-        Series { look, ..Series::new("", &[Mark::Line], curve.points) }
+        Series::new("", &[Mark::Line], curve.points).with_look(Look { line_px, ..curve.look })
     }
 }
 
@@ -278,9 +277,8 @@ impl<'a> Shown<'a> {
             };
             for run in runs(look, self.steps(trace), &centre) {
                 let side = |&(x, y): &(f64, f64)| Value { interval: Some((y - half_m, y + half_m)), ..(x, y).into() };
-                let values: Vec<Value> = run.points.iter().map(side).collect();
                 edges.extend(run.points.iter().flat_map(|point| [point.1 - half_m, point.1 + half_m]));
-                bands.push(Series { values, look: Some(look), ..Series::new("", &[Mark::Band], []) });
+                bands.push(Series::new("", &[Mark::Band], run.points.iter().map(side)).with_look(look));
                 curves.push(run);
             }
         }
@@ -350,8 +348,8 @@ impl<'a> Shown<'a> {
                 let step = of.trace.step_of(mark).and_then(|step| self.steps(of.trace).get(step as usize));
                 let Some((step, value)) = step.and_then(|step| Some((step, value(step)?))) else { continue };
                 let attributes = format!("class=\"mark {}\" data-t=\"{}\"", mark.label(), step.time_s);
-                let series = Series::new("", &[Mark::Points], [(step.time_s, value)]);
-                marks.push(Series { look: Some(mark_look(mark, look)), attributes, ..series });
+                let series = Series::new("", &[Mark::Points], [(step.time_s, value)]).with_look(mark_look(mark, look));
+                marks.push(Series { attributes, ..series });
             }
         }
         marks
