@@ -103,16 +103,12 @@ impl GridText {
             rows = rows.iter().flat_map(|row| axis.values.iter().map(move |v| with(row, *v))).collect();
         }
         Ok(GridParts {
-            name: category.key().to_owned(),
-            category,
-            x,
-            y,
             panel_axes: set_axes.into_iter().chain(left).collect(),
             fixed,
-            style: CaseStyle::Plain,
             native_gap: self.native_gap,
             closing_only: self.closing_only,
             panel_rows: is_of_file.then_some(rows),
+            ..GridParts::new(category.key(), category, x, y)
         })
     }
 }

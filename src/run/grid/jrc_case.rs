@@ -22,23 +22,29 @@ pub const NATIVE_THW_S: f64 = 2.0;
 /// Lateral acceleration of the run-up, m/s².
 const RUN_UP_MPS2: f64 = 1.5;
 
-/// A cut-in at constant speeds; `run_up` is the number of steps before the nominal start.
-pub fn cut_in(ego_mps: f64, cutter_mps: f64, lateral_mps: f64, run_up: u32, dt_s: f64) -> Case {
+/// A vehicle of the simulator's width.
+fn vehicle(length_m: f64, speed: Speed, lateral: Lateral) -> Participant {
+    Participant { length_m, width_m: WIDTH_M, speed, lateral }
+}
+
+/// A case in which the principal vehicle has the simulator's length.
+fn case(category: Category, ego_mps: f64, speed: Speed, lateral: Lateral, ahead: Option<Ahead>) -> Case {
     Case {
-        category: Category::CutIn,
+        category,
         ego_length_m: LENGTH_M,
         ego_width_m: WIDTH_M,
         lane_width_m: LANE_WIDTH_M,
         ego_speed_mps: ego_mps,
-        principal: Participant {
-            length_m: LENGTH_M,
-            width_m: WIDTH_M,
-            speed: Speed::constant(cutter_mps),
-            lateral: cut_in_lateral(lateral_mps, run_up, dt_s),
-        },
-        ahead: None,
+        principal: vehicle(LENGTH_M, speed, lateral),
+        ahead,
         horizon_s: 0.0,
     }
+}
+
+/// A cut-in at constant speeds; `run_up` is the number of steps before the nominal start.
+pub fn cut_in(ego_mps: f64, cutter_mps: f64, lateral_mps: f64, run_up: u32, dt_s: f64) -> Case {
+    let lateral = cut_in_lateral(lateral_mps, run_up, dt_s);
+    case(Category::CutIn, ego_mps, Speed::constant(cutter_mps), lateral, None)
 }
 
 /// The gap at the frame's nominal start. The last step of the run-up has the case's gap `gap_m`, and the frame's start
@@ -73,16 +79,7 @@ fn change_steps(distance_m: f64, lateral_mps: f64, dt_s: f64) -> usize {
 pub fn lvd(initial_mps: f64, end_mps: f64, deceleration_mps2: f64) -> Case {
     let until_s = if deceleration_mps2 > 0.0 { (initial_mps - end_mps).max(0.0) / deceleration_mps2 } else { 0.0 };
     let speed = Speed::Kinematic { initial_mps, acceleration_mps2: -deceleration_mps2, until_s };
-    Case {
-        category: Category::Lvd,
-        ego_length_m: LENGTH_M,
-        ego_width_m: WIDTH_M,
-        lane_width_m: LANE_WIDTH_M,
-        ego_speed_mps: initial_mps,
-        principal: Participant { length_m: LENGTH_M, width_m: WIDTH_M, speed, lateral: Lateral::Centred },
-        ahead: None,
-        horizon_s: until_s,
-    }
+    Case { horizon_s: until_s, ..case(Category::Lvd, initial_mps, speed, Lateral::Centred, None) }
 }
 
 /// The vehicle ahead of a cutting-out one, as the JRC's tables give it.
@@ -98,29 +95,12 @@ pub struct Front {
 
 /// A cut-out: ego and cutting-out vehicle have the same speed, and the lateral motion begins at the start.
 pub fn cut_out(speed_mps: f64, lateral_mps: f64, front: Front, dt_s: f64) -> Case {
-    Case {
-        category: Category::CutOut,
-        ego_length_m: LENGTH_M,
-        ego_width_m: WIDTH_M,
-        lane_width_m: LANE_WIDTH_M,
-        ego_speed_mps: speed_mps,
-        principal: Participant {
-            length_m: LENGTH_M,
-            width_m: WIDTH_M,
-            speed: Speed::constant(speed_mps),
-            lateral: cut_out_lateral(lateral_mps, dt_s),
-        },
-        ahead: Some(Ahead {
-            vehicle: Participant {
-                length_m: front.length_m,
-                width_m: WIDTH_M,
-                speed: Speed::constant(front.speed_mps),
-                lateral: Lateral::Centred,
-            },
-            gap_m: front.distance_m - (front.length_m - LENGTH_M) / 2.0,
-        }),
-        horizon_s: 0.0,
-    }
+    let ahead = Ahead {
+        vehicle: vehicle(front.length_m, Speed::constant(front.speed_mps), Lateral::Centred),
+        gap_m: front.distance_m - (front.length_m - LENGTH_M) / 2.0,
+    };
+    let lateral = cut_out_lateral(lateral_mps, dt_s);
+    case(Category::CutOut, speed_mps, Speed::constant(speed_mps), lateral, Some(ahead))
 }
 
 /// The initial distance at which a following FSM does not react: v τ + v²/(2 b_comf) − v²/(2 b_lead) + 2 d1, m.

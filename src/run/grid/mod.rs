@@ -92,6 +92,24 @@ pub struct GridParts {
     pub panel_rows: Option<Vec<Vec<f64>>>,
 }
 
+impl GridParts {
+    /// A grid of plain cases without panels and fixed values.
+    pub fn new(name: &str, category: Category, x: GridAxis, y: GridAxis) -> GridParts {
+        GridParts {
+            name: name.to_owned(),
+            category,
+            x,
+            y,
+            panel_axes: Vec::new(),
+            fixed: Vec::new(),
+            style: CaseStyle::Plain,
+            native_gap: false,
+            closing_only: false,
+            panel_rows: None,
+        }
+    }
+}
+
 impl Grid {
     /// Checks that every quantity is given once, that none is missing, and that there are not too many cells.
     ///

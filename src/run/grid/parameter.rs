@@ -3,7 +3,7 @@
 use crate::model::profile::Profile;
 use crate::scenario::{Category, LANE_WIDTH_M, PlainCase, check_headway};
 use crate::support::plain_text::nearest;
-use crate::support::plausibility::{self, Doubts};
+use crate::support::plausibility::{Doubts, HELP, Quantity as Of};
 use crate::{Error, Place, Result};
 
 /// The quantity that a parameter sets.
@@ -59,6 +59,8 @@ pub struct MapParameter {
     pub unit: &'static str,
     /// The quantity that it sets.
     pub quantity: MapQuantity,
+    /// Its quantity in the table of plausible values; that of a deceleration has the other sign.
+    plausible: Of,
     /// Number of its units in one SI unit.
     pub per_si: f64,
     /// Minimum value, in its unit.
@@ -79,37 +81,38 @@ const fn parameter(
     label: &'static str,
     unit: &'static str,
     quantity: MapQuantity,
+    plausible: Of,
     per_si: f64,
     (min, max): (f64, f64),
     categories: &'static [Category],
 ) -> MapParameter {
-    MapParameter { key, label, unit, quantity, per_si, min, max, categories }
+    MapParameter { key, label, unit, quantity, plausible, per_si, min, max, categories }
 }
 
 /// All, in the order of help texts.
 #[rustfmt::skip] // a table
 pub const PARAMETERS: [MapParameter; 21] = [
-    parameter("ego_speed_mps", "Speed of the ego", "m/s", MapQuantity::EgoSpeed, 1.0, (0.0, 150.0), EVERY),
-    parameter("ego_speed_kmh", "Speed of the ego", "km/h", MapQuantity::EgoSpeed, KMH, (0.0, 540.0), EVERY),
-    parameter("other_speed_mps", "Speed of the other vehicle", "m/s", MapQuantity::OtherSpeed, 1.0, (0.0, 150.0), EVERY),
-    parameter("other_speed_kmh", "Speed of the other vehicle", "km/h", MapQuantity::OtherSpeed, KMH, (0.0, 540.0), EVERY),
-    parameter("relative_speed_mps", "Speed of the other vehicle minus that of the ego", "m/s", MapQuantity::RelativeSpeed, 1.0, (-150.0, 150.0), EVERY),
-    parameter("relative_speed_kmh", "Speed of the other vehicle minus that of the ego", "km/h", MapQuantity::RelativeSpeed, KMH, (-540.0, 540.0), EVERY),
-    parameter("gap_m", "Initial gap", "m", MapQuantity::Gap, 1.0, (0.0, 1e4), EVERY),
-    parameter("thw_s", "Initial time headway", "s", MapQuantity::Thw, 1.0, (0.0, 100.0), EVERY),
-    parameter("lateral_speed_mps", "Lateral speed", "m/s", MapQuantity::LateralSpeed, 1.0, (0.0, 20.0), LANE_CHANGES),
-    parameter("lateral_distance_m", "Lateral distance of the lane change", "m", MapQuantity::LateralDistance, 1.0, (0.01, 20.0), LANE_CHANGES),
-    parameter("deceleration_mps2", "Deceleration of the other vehicle", "m/s²", MapQuantity::Deceleration, 1.0, (0.0, 50.0), EVERY),
-    parameter("end_speed_mps", "End speed of the other vehicle", "m/s", MapQuantity::EndSpeed, 1.0, (0.0, 150.0), EVERY),
-    parameter("end_speed_kmh", "End speed of the other vehicle", "km/h", MapQuantity::EndSpeed, KMH, (0.0, 540.0), EVERY),
-    parameter("ahead_speed_mps", "Speed of the vehicle ahead", "m/s", MapQuantity::AheadSpeed, 1.0, (0.0, 150.0), CUT_OUT),
-    parameter("ahead_speed_kmh", "Speed of the vehicle ahead", "km/h", MapQuantity::AheadSpeed, KMH, (0.0, 540.0), CUT_OUT),
-    parameter("ahead_gap_m", "Gap to the vehicle ahead", "m", MapQuantity::AheadGap, 1.0, (0.0, 1e4), CUT_OUT),
-    parameter("length_m", "Length of the vehicles", "m", MapQuantity::Length, 1.0, (0.1, 50.0), EVERY),
-    parameter("width_m", "Width of the vehicles", "m", MapQuantity::Width, 1.0, (0.1, 10.0), EVERY),
-    parameter("ego_length_m", "Length of the ego", "m", MapQuantity::EgoLength, 1.0, (0.1, 50.0), EVERY),
-    parameter("ego_width_m", "Width of the ego", "m", MapQuantity::EgoWidth, 1.0, (0.1, 10.0), EVERY),
-    parameter("lane_width_m", "Width of the lanes", "m", MapQuantity::LaneWidth, 1.0, (1.0, 20.0), LANE_CHANGES),
+    parameter("ego_speed_mps", "Speed of the ego", "m/s", MapQuantity::EgoSpeed, Of::Speed, 1.0, (0.0, 150.0), EVERY),
+    parameter("ego_speed_kmh", "Speed of the ego", "km/h", MapQuantity::EgoSpeed, Of::Speed, KMH, (0.0, 540.0), EVERY),
+    parameter("other_speed_mps", "Speed of the other vehicle", "m/s", MapQuantity::OtherSpeed, Of::Speed, 1.0, (0.0, 150.0), EVERY),
+    parameter("other_speed_kmh", "Speed of the other vehicle", "km/h", MapQuantity::OtherSpeed, Of::Speed, KMH, (0.0, 540.0), EVERY),
+    parameter("relative_speed_mps", "Speed of the other vehicle minus that of the ego", "m/s", MapQuantity::RelativeSpeed, Of::Speed, 1.0, (-150.0, 150.0), EVERY),
+    parameter("relative_speed_kmh", "Speed of the other vehicle minus that of the ego", "km/h", MapQuantity::RelativeSpeed, Of::Speed, KMH, (-540.0, 540.0), EVERY),
+    parameter("gap_m", "Initial gap", "m", MapQuantity::Gap, Of::Gap, 1.0, (0.0, 1e4), EVERY),
+    parameter("thw_s", "Initial time headway", "s", MapQuantity::Thw, Of::Headway, 1.0, (0.0, 100.0), EVERY),
+    parameter("lateral_speed_mps", "Lateral speed", "m/s", MapQuantity::LateralSpeed, Of::LateralSpeed, 1.0, (0.0, 20.0), LANE_CHANGES),
+    parameter("lateral_distance_m", "Lateral distance of the lane change", "m", MapQuantity::LateralDistance, Of::LateralPosition, 1.0, (0.01, 20.0), LANE_CHANGES),
+    parameter("deceleration_mps2", "Deceleration of the other vehicle", "m/s²", MapQuantity::Deceleration, Of::Acceleration, 1.0, (0.0, 50.0), EVERY),
+    parameter("end_speed_mps", "End speed of the other vehicle", "m/s", MapQuantity::EndSpeed, Of::Speed, 1.0, (0.0, 150.0), EVERY),
+    parameter("end_speed_kmh", "End speed of the other vehicle", "km/h", MapQuantity::EndSpeed, Of::Speed, KMH, (0.0, 540.0), EVERY),
+    parameter("ahead_speed_mps", "Speed of the vehicle ahead", "m/s", MapQuantity::AheadSpeed, Of::Speed, 1.0, (0.0, 150.0), CUT_OUT),
+    parameter("ahead_speed_kmh", "Speed of the vehicle ahead", "km/h", MapQuantity::AheadSpeed, Of::Speed, KMH, (0.0, 540.0), CUT_OUT),
+    parameter("ahead_gap_m", "Gap to the vehicle ahead", "m", MapQuantity::AheadGap, Of::Gap, 1.0, (0.0, 1e4), CUT_OUT),
+    parameter("length_m", "Length of the vehicles", "m", MapQuantity::Length, Of::Length, 1.0, (0.1, 50.0), EVERY),
+    parameter("width_m", "Width of the vehicles", "m", MapQuantity::Width, Of::Width, 1.0, (0.1, 10.0), EVERY),
+    parameter("ego_length_m", "Length of the ego", "m", MapQuantity::EgoLength, Of::Length, 1.0, (0.1, 50.0), EVERY),
+    parameter("ego_width_m", "Width of the ego", "m", MapQuantity::EgoWidth, Of::Width, 1.0, (0.1, 10.0), EVERY),
+    parameter("lane_width_m", "Width of the lanes", "m", MapQuantity::LaneWidth, Of::LaneWidth, 1.0, (1.0, 20.0), LANE_CHANGES),
 ];
 
 impl MapParameter {
@@ -166,36 +169,18 @@ impl MapParameter {
         format!("{} ({})", self.label, self.unit)
     }
 
-    /// Its quantity in the table of plausible values, and the sign of this quantity.
-    fn plausible(&self) -> (plausibility::Quantity, f64) {
-        use plausibility::Quantity as Of;
-        match self.quantity {
-            MapQuantity::EgoSpeed
-            | MapQuantity::OtherSpeed
-            | MapQuantity::RelativeSpeed
-            | MapQuantity::EndSpeed
-            | MapQuantity::AheadSpeed => (Of::Speed, 1.0),
-            MapQuantity::Gap | MapQuantity::AheadGap => (Of::Gap, 1.0),
-            MapQuantity::Thw => (Of::Headway, 1.0),
-            MapQuantity::LateralSpeed => (Of::LateralSpeed, 1.0),
-            MapQuantity::LateralDistance => (Of::LateralPosition, 1.0),
-            MapQuantity::Deceleration => (Of::Acceleration, -1.0),
-            MapQuantity::Length | MapQuantity::EgoLength => (Of::Length, 1.0),
-            MapQuantity::Width | MapQuantity::EgoWidth => (Of::Width, 1.0),
-            MapQuantity::LaneWidth => (Of::LaneWidth, 1.0),
-        }
-    }
-
     /// Checks the plausibility of a user's value.
     ///
     /// # Errors
     /// [`Error::Usage`] for a value beyond the physical range, unless such values are accepted.
     pub fn check_plausible(&self, value: f64, doubts: &mut Doubts) -> Result<()> {
-        let (quantity, sign) = self.plausible();
-        let is_relative = self.quantity == MapQuantity::RelativeSpeed;
-        let si = if is_relative { self.si(value).abs() } else { sign * self.si(value) };
-        let judged = doubts.check(quantity, si, || self.key.to_owned());
-        judged.map_err(|problem| Error::usage(Place::item(self.key), problem, plausibility::HELP))
+        let si = match self.quantity {
+            MapQuantity::RelativeSpeed => self.si(value).abs(),
+            MapQuantity::Deceleration => -self.si(value),
+            _ => self.si(value),
+        };
+        let judged = doubts.check(self.plausible, si, || self.key.to_owned());
+        judged.map_err(|problem| Error::usage(Place::item(self.key), problem, HELP))
     }
 
     /// Checks the range of a value. A speed that is noise of a stationary vehicle becomes 0, with a warning.
@@ -204,7 +189,7 @@ impl MapParameter {
     /// [`Error::Usage`] with the range.
     pub fn check(&self, value: f64, flag: &str) -> Result<f64> {
         let mut doubts = Doubts::default();
-        let is_still = self.plausible().0 == plausibility::Quantity::Speed
+        let is_still = self.plausible == Of::Speed
             && self.quantity != MapQuantity::RelativeSpeed
             && doubts.speed(self.si(value), || format!("{} = {value}", self.key)) != self.si(value);
         doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));

@@ -97,18 +97,7 @@ fn jrc(category: Category, profile: &Profile) -> Result<Vec<Preset>> {
         (true, _) => CaseStyle::Jrc,
     };
     let range = |key, ends, step| GridAxis::range(category, key, ends, step);
-    let parts = |name: &str, x, y| GridParts {
-        name: name.to_owned(),
-        category,
-        x,
-        y,
-        panel_axes: Vec::new(),
-        fixed: Vec::new(),
-        style,
-        native_gap: true,
-        closing_only: false,
-        panel_rows: None,
-    };
+    let parts = |name, x, y| GridParts { style, native_gap: true, ..GridParts::new(name, category, x, y) };
     let following = vec![Cchdm, Rss, Fsm];
     match category {
         Category::CutIn => {
@@ -166,18 +155,8 @@ fn r157(category: Category) -> Result<Vec<Preset>> {
         values.iter().map(|(key, value)| Ok((MapParameter::find(category, key, "preset")?, *value))).collect()
     };
     let grid = |name: &str, x: GridAxis, y: GridAxis, panel_axes, values: &[(&str, f64)]| -> Result<Preset> {
-        let grid = Grid::new(GridParts {
-            name: name.to_owned(),
-            category,
-            x,
-            y,
-            closing_only: category == Category::CutIn,
-            panel_axes,
-            fixed: fixed(values)?,
-            style: CaseStyle::Plain,
-            native_gap: false,
-            panel_rows: None,
-        })?;
+        let (closing_only, fixed) = (category == Category::CutIn, fixed(values)?);
+        let grid = Grid::new(GridParts { closing_only, panel_axes, fixed, ..GridParts::new(name, category, x, y) })?;
         let models = ModelId::ALL.to_vec();
         Ok(Preset { grid, models, known_percent: Vec::new(), is_chosen_to_match: false })
     };
