@@ -9,7 +9,7 @@ use super::{Reopened, SampleRecord};
 use crate::engine::{Backend, Chunk, CpuBackend, Executor, LaneKey, LanePlan, Wanted, Watch};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
-use crate::run::sampling::{limit_state, marks_of};
+use crate::run::sampling::{WorstSample, limit_state, marks_of};
 use crate::run::study::{Study, WINDOW};
 use crate::support::input_file;
 use crate::support::plain_text::hex;
@@ -35,9 +35,6 @@ pub struct WorstOptions<'a> {
     /// Models [default: all].
     pub models: Option<&'a [ModelId]>,
 }
-
-/// The [limit state](limit_state) of a lane, and the lane.
-type Ranked = (f64, u64);
 
 impl Reopened {
     /// Returns the worst lanes of each model.
@@ -140,7 +137,7 @@ fn worst_of_study(study: &Study, options: &WorstOptions, models: &[usize]) -> Re
         let variant = &plan.blocks[key.block].variants[key.variant];
         models.contains(&key.model) && (variants.is_empty() || variants.iter().any(|v| v.trim() == variant))
     };
-    let mut worst: Vec<Vec<Ranked>> = vec![Vec::new(); plan.models.len()];
+    let mut worst: Vec<Vec<WorstSample>> = vec![Vec::new(); plan.models.len()];
     study.cases().in_windows(0..plan.unit_count(), WINDOW, |plan, units| {
         let mut from = units.start;
         while from < units.end {
@@ -157,20 +154,20 @@ fn worst_of_study(study: &Study, options: &WorstOptions, models: &[usize]) -> Re
         Ok(())
     })?;
     let lanes = models.iter().flat_map(|model| worst[*model].iter());
-    Ok(lanes.filter_map(|(_, lane)| plan.key(*lane)).collect())
+    Ok(lanes.filter_map(|worst| plan.key(worst.lane)).collect())
 }
 
 /// Results that the next lanes must return, so that the lists are the same as with the values of all lanes.
 fn wanted(
     plan: &LanePlan,
-    worst: &[Vec<Ranked>],
+    worst: &[Vec<WorstSample>],
     options: &WorstOptions,
     criterion: Criterion,
     models: &[usize],
 ) -> Wanted {
     let mut watch = Watch::NOTHING;
     for &model in models {
-        let last = worst[model].get(options.count - 1).map(|(value, _)| *value);
+        let last = worst[model].get(options.count - 1).map(|last| last.value);
         // `Some` criterion means that all its failures are marked. A study has too many failures for that, so all
         // values are computed.
         match last.and_then(|last| marks_of(&plan.profile, criterion, last)) {
@@ -187,7 +184,7 @@ fn add(
     chunk: &Chunk,
     criterion: Criterion,
     is_wanted: &dyn Fn(&LaneKey) -> bool,
-    worst: &mut [Vec<Ranked>],
+    worst: &mut [Vec<WorstSample>],
     count: usize,
 ) {
     let valued = chunk.valued.iter().flatten().map(|(lane, outcome)| (*lane, outcome));
@@ -199,25 +196,18 @@ fn add(
             unit = Some((key.block, key.unit));
             keep(worst, &mut of_unit, count);
         }
-        let found = (limit_state(&plan.profile, criterion, outcome), lane);
+        let found = WorstSample { value: limit_state(&plan.profile, criterion, outcome), lane };
         let so_far = &mut of_unit[key.model];
-        if so_far.is_none_or(|known| is_worse(&found, &known)) {
+        if so_far.is_none_or(|known| found.is_worse_than(&known)) {
             *so_far = Some(found);
         }
     }
     keep(worst, &mut of_unit, count);
 }
 
-fn is_worse(a: &Ranked, b: &Ranked) -> bool {
-    a.0.total_cmp(&b.0).then(a.1.cmp(&b.1)).is_lt()
-}
-
-fn keep(worst: &mut [Vec<Ranked>], of_unit: &mut [Option<Ranked>], count: usize) {
+fn keep(worst: &mut [Vec<WorstSample>], of_unit: &mut [Option<WorstSample>], count: usize) {
     for (kept, found) in worst.iter_mut().zip(of_unit) {
-        let Some(found) = found.take() else { continue };
-        let at = kept.partition_point(|known| is_worse(known, &found));
-        kept.insert(at, found);
-        kept.truncate(count);
+        found.take().into_iter().for_each(|found| found.enter(kept, count));
     }
 }
 

@@ -5,17 +5,16 @@
 use serde::Serialize;
 
 use super::Sample;
-use super::kernels::{KernelCounts, MAX_GROUPS};
+use super::kernels::{KernelCounts, cell_of};
 use super::plan::SampleHeadways;
 use super::rows::EstimateRow;
 use super::sample_run::SampleResult;
 use crate::engine::{CpuBackend, Executor, Headway, Wanted};
-use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::study::{StudyOptions, plan_study};
 use crate::stats::density::DensityModel;
-use crate::stats::estimate::{Clusters, Enough, Ratio, RatioVerdict, Warning, paired_ratio};
+use crate::stats::estimate::{Ratio, RatioVerdict, Warning};
 use crate::{Error, Result};
 
 /// Ratios of failure rates to that of S, over the same scenarios, headways, model and criterion.
@@ -27,28 +26,13 @@ pub struct RecordedRatios {
     pub sampled: Option<Ratio>,
 }
 
-/// Failed lanes per group of scenarios: headway × model × criterion, each with one number per group.
-struct GroupedFailures {
-    scenarios: Vec<u64>,
-    failures: Vec<Vec<u64>>,
-}
-
-impl GroupedFailures {
-    /// Runs and failures per group, summed over some cells.
-    fn over(&self, cells: &[usize]) -> (Vec<u64>, Vec<u64>) {
-        let runs = self.scenarios.iter().map(|n| n * cells.len() as u64).collect();
-        let of_group = |group: usize| cells.iter().map(|cell| self.failures[*cell][group]).sum();
-        (runs, (0..self.scenarios.len()).map(of_group).collect())
-    }
-}
-
-/// The lanes of S and of S' under the density's parameterization; `None` if the density cannot be replayed.
+/// The lanes of S and of S' under the density's parameterization, with scenarios as kernels; `None` if the density cannot be replayed.
 fn replay(
     density: &DensityModel,
     profile: &Profile,
     models: &[ModelId],
     headways: &[Headway],
-) -> Result<Option<[GroupedFailures; 2]>> {
+) -> Result<Option<[KernelCounts; 2]>> {
     let id = density.space.id();
     let options = StudyOptions {
         categories: vec![id.category],
@@ -76,25 +60,14 @@ fn replay(
     })?;
     let (variants, lanes) = (block.variants.len(), headways.len() * models.len());
     let units = block.units.len() as usize;
-    let groups = units.min(MAX_GROUPS);
-    let grouped = |variant: usize| {
-        let mut counts = GroupedFailures {
-            scenarios: vec![0; groups],
-            failures: vec![vec![0; groups]; lanes * Criterion::ALL.len()],
-        };
+    let counted = |variant: usize| {
+        let mut counts = KernelCounts::zero(units, lanes);
         for unit in 0..units {
-            counts.scenarios[unit % groups] += 1;
-            let of_unit = &verdicts[(unit * variants + variant) * lanes..][..lanes];
-            for (at, verdict) in of_unit.iter().enumerate() {
-                for criterion in Criterion::ALL {
-                    let cell = at * Criterion::ALL.len() + criterion.index();
-                    counts.failures[cell][unit % groups] += u64::from(verdict.failed(criterion));
-                }
-            }
+            counts.count_sample(unit as u32, &verdicts[(unit * variants + variant) * lanes..][..lanes]);
         }
         counts
     };
-    Ok(Some([grouped(0), grouped(variant)]))
+    Ok(Some([counted(0), counted(variant)]))
 }
 
 impl Sample {
@@ -120,13 +93,8 @@ impl Sample {
         let sampled = result.crude.as_ref().and_then(|crude| crude.tally.by_kernel.as_ref());
         for row in &mut result.rows {
             let cells = cells_of(row, &options.models, &headways);
-            let (runs, failures) = recorded.over(&cells);
-            let s = Clusters { runs: &runs, failures: &failures };
-            let ratio = |(runs, failures): (Vec<u64>, Vec<u64>)| {
-                paired_ratio(Clusters { runs: &runs, failures: &failures }, s, Enough::default(), options.level)
-            };
-            let sampled = sampled.map(|counts: &KernelCounts| ratio(counts.over(&cells)));
-            let ratios = RecordedRatios { replayed: ratio(replayed.over(&cells)), sampled };
+            let ratio = |of: &KernelCounts| of.ratio(&cells, (&recorded, &cells), options.level);
+            let ratios = RecordedRatios { replayed: ratio(&replayed), sampled: sampled.map(ratio) };
             warn(row, &ratios);
             row.recorded = Some(ratios);
         }
@@ -137,10 +105,9 @@ impl Sample {
 /// The cells of a row: one headway, or all.
 fn cells_of(row: &EstimateRow, models: &[ModelId], headways: &[Headway]) -> Vec<usize> {
     let model = models.iter().position(|model| *model == row.model).unwrap_or_default();
-    let cell = |headway: usize| (headway * models.len() + model) * Criterion::ALL.len() + row.criterion.index();
     // A density with its own headway has a single headway, independent of its name.
     let is_of = |at: &usize| headways.len() == 1 || row.headway == "all" || headways[*at].to_string() == row.headway;
-    (0..headways.len()).filter(is_of).map(cell).collect()
+    (0..headways.len()).filter(is_of).map(|at| cell_of(models.len(), at, model, row.criterion)).collect()
 }
 
 /// Decided differences come first, then S': if the replays of the same scenarios differ, the samples differ too.

@@ -158,8 +158,7 @@ pub fn sample_by_scenario(
     let mut counts = ScenarioCounts::empty(scenarios, plan.models.len() * Criterion::ALL.len());
     let mut add = |plan: &LanePlan, chunk: &Chunk| counts.add(plan, chunk, kernels);
     let run = sample_crude(plan, 0..plan.unit_count(), executor, &options, exposure, Some(&mut add))?;
-    let is_over_all = |row: &EstimateRow| plan.headways.len() == 1 || row.headway == "all";
-    let rows = run.rows.into_iter().filter(is_over_all).collect();
+    let rows = run.rows.iter().filter(|row| row.is_overall(&run.rows)).cloned().collect();
     Ok(SampledScenarios { counts, rows, tally: run.tally, summary: run.summary })
 }
 
@@ -283,8 +282,7 @@ impl ComparedForm {
     /// # Errors
     /// As [`DensityModel::content_sha256`].
     pub fn of(density: &DensityModel, rows: &[EstimateRow]) -> Result<ComparedForm> {
-        let is_single = rows.iter().all(|row| row.headway != "all");
-        let overall = rows.iter().filter(|row| is_single || row.headway == "all");
+        let overall = rows.iter().filter(|row| row.is_overall(rows));
         Ok(ComparedForm {
             form: density.kind(),
             density_sha256: density.content_sha256()?,

@@ -212,8 +212,6 @@ fn rows_of(
 
 /// The rows over all headways.
 fn overall(rows: &[EstimateRow]) -> Vec<CheckpointRow> {
-    let has_all = rows.iter().any(|row| row.headway == "all");
-    let kept = rows.iter().filter(|row| !has_all || row.headway == "all");
     let of = |row: &EstimateRow| CheckpointRow {
         model: row.model,
         criterion: row.criterion,
@@ -221,7 +219,7 @@ fn overall(rows: &[EstimateRow]) -> Vec<CheckpointRow> {
         interval: row.draws,
         with_data: row.failing_scenarios.map(|n| ([row.estimate.interval.low, row.estimate.interval.high], n)),
     };
-    kept.map(of).collect()
+    rows.iter().filter(|row| row.is_overall(rows)).map(of).collect()
 }
 
 /// The widest of the criterion's intervals over all models decides.
@@ -232,8 +230,7 @@ fn stopped(
     end: u64,
     started: Instant,
 ) -> Option<StopReason> {
-    let has_all = rows.iter().any(|row| row.headway == "all");
-    let judged = rows.iter().filter(|r| r.criterion == options.criterion && (!has_all || r.headway == "all"));
+    let judged = rows.iter().filter(|row| row.criterion == options.criterion && row.is_overall(rows));
     // More samples reduce the uncertainty of the draws, never that of the data.
     let widest = judged.max_by(|a, b| a.draws_half_width().total_cmp(&b.draws_half_width()))?;
     let rule = StopRule { samples: end, ..options.stop };

@@ -1,5 +1,6 @@
 //! Makes a case generator from a parameter space and a mixture.
 
+use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::engine::attention_rules;
@@ -18,13 +19,13 @@ use crate::{Error, Place, Result};
 /// Purpose of the random stream of the samples.
 pub const SAMPLE_PURPOSE: u32 = 0x5341_4d50;
 
-/// Type of the sample points.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+/// Points of crude Monte Carlo.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum SampleSource {
-    /// Independent draws.
+    /// Independent draws
     Random,
-    /// Scrambled Sobol points.
+    /// Owen-scrambled Sobol points
     Sobol,
 }
 

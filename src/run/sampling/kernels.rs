@@ -6,14 +6,24 @@ use serde::{Deserialize, Serialize};
 
 use crate::engine::{Chunk, LanePlan, Verdicts};
 use crate::model::criterion::Criterion;
-use crate::stats::estimate::{ClusterRate, Clusters, cluster_rate};
+use crate::stats::estimate::{ClusterRate, Clusters, Enough, Ratio, cluster_rate, paired_ratio};
 
 /// Maximum number of groups of kernels: kernel k counts in group k mod 512. With fewer kernels, each is a group. With
 /// more kernels, groups vary as much as kernels do, and a journal stays small.
-pub(super) const MAX_GROUPS: usize = 512;
+const MAX_GROUPS: usize = 512;
 
 /// Kernel of a void sample.
 pub(super) const NO_KERNEL: u32 = u32::MAX;
+
+/// Adds counts to others of the same places.
+pub(super) fn add_counts(ours: &mut [u64], theirs: &[u64]) {
+    ours.iter_mut().zip(theirs).for_each(|(ours, theirs)| *ours = ours.saturating_add(*theirs));
+}
+
+/// Index of a cell among headway × model × criterion, the last innermost.
+pub(super) fn cell_of(plan_models: usize, headway: usize, model: usize, criterion: Criterion) -> usize {
+    (headway * plan_models + model) * Criterion::ALL.len() + criterion.index()
+}
 
 /// Counts over a set of samples, per group of kernels.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -33,9 +43,13 @@ impl KernelCounts {
         let points = &plan.generator()?.points;
         // Either all points have a kernel or none.
         points.component(0, 1)?;
-        let groups = (points.components() as usize).min(MAX_GROUPS);
-        let cells = plan.headways.len() * plan.models.len() * Criterion::ALL.len();
-        Some(KernelCounts { samples: vec![0; groups], failures: vec![0; cells * groups] })
+        Some(KernelCounts::zero(points.components() as usize, plan.headways.len() * plan.models.len()))
+    }
+
+    /// Counts of zero of so many kernels and lanes of a sample.
+    pub(super) fn zero(kernels: usize, lanes: usize) -> KernelCounts {
+        let groups = kernels.min(MAX_GROUPS);
+        KernelCounts { samples: vec![0; groups], failures: vec![0; lanes * Criterion::ALL.len() * groups] }
     }
 
     /// Counts the lanes of a chunk; `kernels` has one number per sample.
@@ -77,10 +91,8 @@ impl KernelCounts {
     }
 
     pub(super) fn add(&mut self, other: &KernelCounts) {
-        let sum =
-            |ours: &mut [u64], theirs: &[u64]| ours.iter_mut().zip(theirs).for_each(|(a, b)| *a = a.saturating_add(*b));
-        sum(&mut self.samples, &other.samples);
-        sum(&mut self.failures, &other.failures);
+        add_counts(&mut self.samples, &other.samples);
+        add_counts(&mut self.failures, &other.failures);
     }
 
     /// Number of groups and of counts.
@@ -94,8 +106,15 @@ impl KernelCounts {
         cluster_rate(Clusters { runs: &runs, failures: &failures }, level)
     }
 
+    /// The ratio of the rate over some cells to that of other counts over others, group by group.
+    pub(super) fn ratio(&self, cells: &[usize], (other, of_other): (&KernelCounts, &[usize]), level: f64) -> Ratio {
+        let ((runs, failures), (other_runs, other_failures)) = (self.over(cells), other.over(of_other));
+        let other = Clusters { runs: &other_runs, failures: &other_failures };
+        paired_ratio(Clusters { runs: &runs, failures: &failures }, other, Enough::default(), level)
+    }
+
     /// Lanes and failed lanes over some cells, group by group.
-    pub(super) fn over(&self, cells: &[usize]) -> (Vec<u64>, Vec<u64>) {
+    fn over(&self, cells: &[usize]) -> (Vec<u64>, Vec<u64>) {
         let groups = self.samples.len();
         let runs = self.samples.iter().map(|n| n * cells.len() as u64).collect();
         let of_group = |group: usize| cells.iter().map(|cell| self.failures[cell * groups + group]).sum();

@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::kernels::add_counts;
 use crate::engine::CountedAxis;
 use crate::stats::density::DensityModel;
 use crate::{Error, Place, Result};
@@ -153,12 +154,8 @@ impl MapCounts {
     }
 
     pub(super) fn add(&mut self, other: &MapCounts) {
-        let sum =
-            |ours: &mut [u64], theirs: &[u64]| ours.iter_mut().zip(theirs).for_each(|(a, b)| *a = a.saturating_add(*b));
-        sum(&mut self.samples, &other.samples);
-        for (ours, theirs) in self.failures.iter_mut().zip(&other.failures) {
-            sum(ours, theirs);
-        }
+        add_counts(&mut self.samples, &other.samples);
+        self.failures.iter_mut().zip(&other.failures).for_each(|(ours, theirs)| add_counts(ours, theirs));
     }
 }
 

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::crude::sample_crude;
-use super::kernels::KernelCounts;
+use super::kernels::{KernelCounts, cell_of};
 use super::plan::{mixture_of, plan_samples};
 use super::rows::headway_name;
 use super::sample_run::SampleResult;
@@ -13,7 +13,7 @@ use crate::engine::{Executor, LanePlan};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::stats::estimate::{Clusters, Enough, Ratio, StopRule, paired_ratio};
+use crate::stats::estimate::{Ratio, StopRule};
 use crate::{Error, Place, Result};
 
 /// The rate of one model over that of another. Both met the same samples (common random numbers), so what the samples
@@ -117,17 +117,10 @@ fn ratios_of(
     for criterion in Criterion::ALL {
         for pair in pairs {
             for (headway, of) in &groups {
-                let over = |side: usize| {
-                    let cell = |at: &usize| (at * models.len() + pair[side]) * Criterion::ALL.len() + criterion.index();
-                    counts[side].over(&of.iter().map(cell).collect::<Vec<_>>())
-                };
-                let ((runs, failures), (other_runs, other_failures)) = (over(0), over(1));
-                let ratio = paired_ratio(
-                    Clusters { runs: &runs, failures: &failures },
-                    Clusters { runs: &other_runs, failures: &other_failures },
-                    Enough::default(),
-                    level,
-                );
+                let [ours, theirs] = pair.map(|model| -> Vec<usize> {
+                    of.iter().map(|headway| cell_of(models.len(), *headway, model, criterion)).collect()
+                });
+                let ratio = counts[0].ratio(&ours, (counts[1], &theirs), level);
                 let [model, other] = pair.map(|at| models[at]);
                 ratios.push(ModelRatio { model, other, criterion, headway: headway.clone(), ratio });
             }

@@ -4,6 +4,7 @@
 use serde::Serialize;
 
 use super::against_recorded::RecordedRatios;
+use super::kernels::cell_of;
 use super::tally::SampleTally;
 use super::uncertainty::Uncertainty;
 use crate::engine::LanePlan;
@@ -11,7 +12,7 @@ use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::stats::density::{Exposure, Rate, normal_quantile};
 use crate::stats::estimate::{
-    BinomialInterval, Counts, Estimate, Interval, KernelShares, StopReason, Warning, from_clusters, from_counts,
+    BinomialInterval, Counts, Estimate, Interval, StopReason, Warning, from_clusters, from_counts,
 };
 
 /// An estimate with its model, criterion and headway.
@@ -72,15 +73,15 @@ impl EstimateRow {
         }
     }
 
-    /// Adds the uncertainty of the data, or a warning that it is missing.
-    pub fn with_data(mut self, shares: Option<&KernelShares>, exposure: Option<&Exposure>) -> EstimateRow {
-        let Some(shares) = shares else {
+    /// Adds the uncertainty of the data, with which the estimate is another, and the effective number of failing
+    /// scenarios; or a warning that it is missing.
+    pub(super) fn with_data(mut self, with: Option<(Estimate, f64)>, exposure: Option<&Exposure>) -> EstimateRow {
+        let Some((estimate, failing_scenarios)) = with else {
             self.estimate.trust.warn_if(true, Warning::DataLeftOut);
             return self;
         };
         let of_draws = self.estimate.variance;
-        self.estimate = self.estimate.over_kernels(shares);
-        self.failing_scenarios = Some(shares.effective_failing);
+        (self.estimate, self.failing_scenarios) = (estimate, Some(failing_scenarios));
         self.risk = Risk::of(&self.estimate, exposure);
         self.with_sources(of_draws, exposure)
     }
@@ -112,20 +113,12 @@ pub fn crude_rows(
     let mut rows = Vec::new();
     for (model, &id) in plan.models.iter().enumerate() {
         for criterion in Criterion::ALL {
-            let cell = |headway: usize| (headway * models + model) * criteria + criterion.index();
+            let cell = |headway: usize| cell_of(models, headway, model, criterion);
             let mut push = |headway: String, estimate: Estimate, cells: &[usize]| {
-                let mut row = EstimateRow::of_draws(id, criterion, headway, estimate, exposure);
-                if let Some(counts) = &tally.by_kernel {
-                    let clusters = counts.rate(cells, level);
-                    let of_draws = row.estimate.variance;
-                    row.estimate = row.estimate.over_scenarios(&clusters);
-                    row.failing_scenarios = Some(clusters.effective_failing);
-                    row.risk = Risk::of(&row.estimate, exposure);
-                    row = row.with_sources(of_draws, exposure);
-                } else {
-                    row = row.with_data(None, exposure);
-                }
-                rows.push(row);
+                let clusters = tally.by_kernel.as_ref().map(|counts| counts.rate(cells, level));
+                let with = clusters.map(|of| (estimate.clone().over_scenarios(&of), of.effective_failing));
+                let row = EstimateRow::of_draws(id, criterion, headway, estimate, exposure);
+                rows.push(row.with_data(with, exposure));
             };
             if headways > 1 {
                 let sum = (0..headways).map(|headway| tally.failures[cell(headway)]).sum();

@@ -6,7 +6,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::kernels::{KernelCounts, NO_KERNEL};
+use super::kernels::{KernelCounts, NO_KERNEL, add_counts};
 use super::limit_state::limit_state;
 use super::map::{MAP_CELLS, MapAxes, MapCounts};
 use super::sample_options::SampleOptions;
@@ -28,6 +28,23 @@ pub struct WorstSample {
     pub value: f64,
     /// Lane index in the plan.
     pub lane: u64,
+}
+
+impl WorstSample {
+    /// A total order: smaller value first, then the lane.
+    pub(crate) fn is_worse_than(&self, other: &WorstSample) -> bool {
+        self.value.total_cmp(&other.value).then(self.lane.cmp(&other.lane)).is_lt()
+    }
+
+    /// Inserts the lane into the list of the worst ones, in their order, if it is among the first `limit`.
+    pub(crate) fn enter(self, worst: &mut Vec<WorstSample>, limit: usize) {
+        // Fast path: most lanes are not among the worst.
+        if worst.len() >= limit && worst.last().is_some_and(|last| !self.is_worse_than(last)) {
+            return;
+        }
+        worst.insert(worst.partition_point(|known| known.is_worse_than(&self)), self);
+        worst.truncate(limit);
+    }
 }
 
 /// Counts over a set of samples of one plan.
@@ -177,7 +194,7 @@ impl SampleTally {
         if options.worst > 0 {
             for (lane, outcome) in chunk.valued.iter().flatten() {
                 let value = limit_state(&plan.profile, options.criterion, outcome);
-                tally.offer(plan.model_of(*lane), WorstSample { value, lane: *lane });
+                WorstSample { value, lane: *lane }.enter(&mut tally.worst[plan.model_of(*lane)], options.worst);
             }
         }
         tally.covered = vec![units];
@@ -252,7 +269,7 @@ impl SampleTally {
                 {
                     let value = limit_state(&plan.profile, options.criterion, outcome);
                     let lane = chunk.first_lane + (first + at) as u64;
-                    self.offer(model, WorstSample { value, lane });
+                    WorstSample { value, lane }.enter(&mut self.worst[model], self.worst_limit);
                 }
             }
             for (square, k) in self.squares[model * criteria..].iter_mut().zip(failed) {
@@ -269,33 +286,17 @@ impl SampleTally {
         kernel.unwrap_or(NO_KERNEL)
     }
 
-    /// Inserts a lane if it is among the worst.
-    fn offer(&mut self, model: usize, lane: WorstSample) {
-        let worst = &mut self.worst[model];
-        // Fast path: most lanes are not among the worst.
-        if worst.len() >= self.worst_limit && worst.last().is_some_and(|last| !is_worse(&lane, last)) {
-            return;
-        }
-        let at = worst.partition_point(|w| is_worse(w, &lane));
-        worst.insert(at, lane);
-        worst.truncate(self.worst_limit);
-    }
-
     /// Adds counts of other samples; the caller joins the covered intervals.
     fn add(&mut self, other: SampleTally) {
-        let sum =
-            |ours: &mut [u64], theirs: &[u64]| ours.iter_mut().zip(theirs).for_each(|(a, b)| *a = a.saturating_add(*b));
         self.voids = self.voids.saturating_add(other.voids);
         self.tries = self.tries.saturating_add(other.tries);
-        sum(&mut self.failures, &other.failures);
-        sum(&mut self.squares, &other.squares);
-        sum(&mut self.capped, &other.capped);
+        add_counts(&mut self.failures, &other.failures);
+        add_counts(&mut self.squares, &other.squares);
+        add_counts(&mut self.capped, &other.capped);
         self.close_lanes = self.close_lanes.saturating_add(other.close_lanes);
-        sum(&mut self.close_failures, &other.close_failures);
-        for (model, lanes) in other.worst.into_iter().enumerate() {
-            for lane in lanes {
-                self.offer(model, lane);
-            }
+        add_counts(&mut self.close_failures, &other.close_failures);
+        for (worst, lanes) in self.worst.iter_mut().zip(other.worst) {
+            lanes.into_iter().for_each(|lane| lane.enter(worst, self.worst_limit));
         }
         if let (Some(ours), Some(theirs)) = (&mut self.map, &other.map) {
             ours.add(theirs);
@@ -402,9 +403,4 @@ fn is_close(plan: &LanePlan, drawn: Option<&DrawnPoint>, unit: u64, headway: usi
     };
     let case = plan.case(0, unit, 0);
     start.gap(case.ego_speed) + case.others[0].gap_offset < CLOSE_HEADWAY_S * case.ego_speed
-}
-
-/// A total order: smaller value first, then the lane.
-fn is_worse(a: &WorstSample, b: &WorstSample) -> bool {
-    a.value.total_cmp(&b.value).then(a.lane.cmp(&b.lane)).is_lt()
 }

@@ -139,8 +139,9 @@ impl Sample {
         for (((question, _), estimate), shares) in tally.sums.iter().zip(estimates).zip(&shares) {
             let estimate = estimate.after_search(searched);
             let headway = options.headway_name(question.headway);
+            let with = shares.as_ref().map(|of| (estimate.clone().over_kernels(of), of.effective_failing));
             let row = EstimateRow::of_draws(question.model, question.criterion, headway, estimate, exposure);
-            rows.push(row.with_data(shares.as_ref(), exposure));
+            rows.push(row.with_data(with, exposure));
         }
         let of = |sums: &BlockSums<WeightSums>| sums.total().unwrap_or_default();
         let ratio = |([a, b], both): ([usize; 2], &BlockSums<WeightSums>)| {
