@@ -1,7 +1,7 @@
 //! Compares failure rates of recorded scenarios (S), of their parameterized replays (S') and of densities fitted on the
 //! same scenarios.
 
-use crate::engine::{Block, Executor, Headway, LanePlan, Partial, SweepSummary, Wanted};
+use crate::engine::{Block, Chunk, Executor, Headway, LanePlan, Partial, SweepSummary, Wanted};
 use crate::model::profile::Profile;
 use crate::run::close_following::{CloseFollowing, close_units};
 use crate::run::sampling::{
@@ -146,8 +146,18 @@ impl<'a> Compare<'a> {
     /// # Errors
     /// As [`Executor::sweep`].
     pub fn replay(&self, executor: &Executor) -> Result<(Partial, SweepSummary)> {
+        self.replay_each(executor, |_| ())
+    }
+
+    /// The same; `each` receives every chunk.
+    pub(crate) fn replay_each(
+        &self,
+        executor: &Executor,
+        mut each: impl FnMut(&Chunk),
+    ) -> Result<(Partial, SweepSummary)> {
         let (plan, mut parts) = (&self.plan, Vec::new());
         let summary = executor.sweep(plan, 0..plan.unit_count(), Wanted::Verdicts, |chunk| {
+            each(&chunk);
             parts.push(Partial::from_chunk(plan, &chunk)?);
             Ok(())
         })?;

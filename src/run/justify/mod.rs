@@ -149,47 +149,34 @@ pub fn justify(
     let id = options.compare.parameterizations.first().cloned().ok_or_else(|| {
         Error::usage(Place::option("parameterization"), "it is missing", "name one, such as 2 or iii")
     })?;
-    let model = options
-        .compare
-        .study
-        .models
-        .first()
-        .copied()
-        .ok_or_else(|| Error::usage(Place::option("model"), "it is missing", "name one driver model"))?;
+    let model = options.compare.study.models.first().copied();
+    let model = model.ok_or_else(|| Error::usage(Place::option("model"), "it is missing", "name one driver model"))?;
     let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
     let replay = Replay::run(scenarios, facts, profile, options, executor, &mut summary)?;
     let (plan, variant) = (replay.plan(), replay.variant(&id)?);
     let block = &plan.blocks[0];
-    let failed =
-        |unit: usize, variant: usize, headway: usize| replay.verdicts(unit, variant, headway).failed(options.criterion);
-    let labels = replay.labels(&failed);
-    let scored = labels.score(variant, &options.score);
+    let scored = replay.score(variant, &options.score);
     let regulation = match profile.name == REGULATION {
         true => None,
         false => {
             let replay = Replay::run(scenarios, facts, &Profile::load(REGULATION)?, options, executor, &mut summary)?;
-            let failed = |unit: usize, variant: usize, headway: usize| {
-                replay.verdicts(unit, variant, headway).failed(options.criterion)
-            };
-            Some(replay.labels(&failed).score(replay.variant(&id)?, &options.score))
+            Some(replay.score(replay.variant(&id)?, &options.score))
         }
     };
     let runner = LaneRunner::<f32>::new(plan);
     let key = |unit: usize, variant, headway| LaneKey { block: 0, unit: unit as u64, variant, headway, model: 0 };
     let severity = |unit, headway| severity(&runner.run(&key(unit, 0, headway)).widen(), options.criterion);
-    let ego_mps = |unit: usize| plan.case(0, unit as u64, 0).ego_speed;
-    let headways: Vec<String> = plan.headways.iter().map(ToString::to_string).collect();
-    let groups = labels.groups(variant, &headways, &ego_mps, &severity, &options.score);
+    let groups = replay.groups(variant, &severity, &options.score);
     let mut hidden = Vec::new();
-    for unit in 0..labels.units {
-        for (headway, name) in headways.iter().enumerate() {
-            if failed(unit, 0, headway) && !failed(unit, variant, headway) {
+    for unit in 0..replay.units() {
+        for (headway, of) in plan.headways.iter().enumerate() {
+            if replay.failed(unit, 0, headway) && !replay.failed(unit, variant, headway) {
                 let lane = key(unit, variant, headway);
                 hidden.push(Hidden {
                     lane,
                     key: plan.key_text(&lane),
                     scenario: block.units.name(unit as u64).into_owned(),
-                    headway: name.clone(),
+                    headway: of.to_string(),
                     recorded: runner.run(&key(unit, 0, headway)).widen(),
                     parameterized: runner.run(&lane).widen(),
                 });
@@ -204,18 +191,15 @@ pub fn justify(
     let example = hidden.first().map(|h| [runner.trace(&LaneKey { variant: 0, ..h.lane }), runner.trace(&h.lane)]);
     let (mut compared, mut density_sha256, mut coverage) = (None, None, None);
     let (mut no_density, mut left_out) = (None, Vec::new());
-    match replay.compare.fit(&id, DensityKind::Kernel, true) {
-        Ok(fitted) => {
-            coverage = Some(Coverage::of(&fitted));
-            left_out = fitted.left_out;
-            match replay.compare.sample_density(&fitted.model, &replay.counts, executor, &mut summary) {
-                Ok(of) => {
-                    density_sha256 = Some(of.density_sha256);
-                    compared = of.cells.into_iter().find(|cell| cell.criterion == options.criterion);
-                }
-                Err(error @ (Error::Input { .. } | Error::Usage { .. })) => no_density = Some(error),
-                Err(error) => return Err(error),
-            }
+    let sampled = replay.compare.fit(&id, DensityKind::Kernel, true).and_then(|fitted| {
+        coverage = Some(Coverage::of(&fitted));
+        left_out = fitted.left_out;
+        replay.compare.sample_density(&fitted.model, &replay.counts, executor, &mut summary)
+    });
+    match sampled {
+        Ok(of) => {
+            density_sha256 = Some(of.density_sha256);
+            compared = of.cells.into_iter().find(|cell| cell.criterion == options.criterion);
         }
         Err(error @ (Error::Input { .. } | Error::Usage { .. })) => no_density = Some(error),
         Err(error) => return Err(error),
@@ -224,7 +208,7 @@ pub fn justify(
     let close_following = CloseFollowing::of_recorded(plan, &replay.counts, 0, &close_units)?;
     let alternatives = Parameterization::of(id.category).filter_map(|other| {
         let variant = replay.variant(&other).ok()?;
-        let scored = labels.score(variant, &options.score);
+        let scored = replay.score(variant, &options.score);
         let findings = options.rules.of_labels(&scored, &options.score);
         Some((other, scored, Conclusion::of(&findings)))
     });

@@ -1,15 +1,19 @@
 //! Compares the labels of S' with those of S, lane by lane: the replay that produces them, then recall, precision and
 //! F1 with intervals over scenarios, in total and by groups.
 
+use std::collections::HashMap;
+
 use super::JustifyOptions;
-use crate::engine::{Confusion, Executor, LanePlan, Partial, SweepSummary, Verdicts, Wanted};
+use crate::engine::{Confusion, Executor, LanePlan, Partial, SweepSummary, Verdicts};
+use crate::model::criterion::Criterion;
 use crate::model::profile::Profile;
 use crate::run::compare::Compare;
-use crate::run::score::{CROSS_VALIDATED, ScoreOptions, f1, f1_interval, precision, recall};
+use crate::run::score::{
+    CROSS_VALIDATED, ScoreInterval, ScoreOptions, f1, f1_interval, precision, recall, share_interval,
+};
 use crate::scenario::DataProvenance;
 use crate::scenario::Scenario;
 use crate::scenario::parameterization::Parameterization;
-use crate::stats::estimate::{Clusters, cluster_rate};
 use crate::{Error, Place, Result};
 
 /// A fraction with its interval. The value is `None` for 0/0; the interval is `None` with too few failing scenarios.
@@ -47,15 +51,68 @@ pub struct Group {
     pub scored: Scored,
 }
 
-/// Verdicts of S and of every S'.
-pub(super) struct Labels<'a> {
-    pub units: usize,
-    pub headways: usize,
-    /// Whether the lane (unit, variant, headway) failed.
-    pub failed: &'a dyn Fn(usize, usize, usize) -> bool,
+/// The lanes of one model with all verdicts kept, because hidden failures are identified lane by lane.
+pub(super) struct Replay<'a> {
+    pub compare: Compare<'a>,
+    pub counts: Partial,
+    verdicts: Vec<Verdicts>,
+    criterion: Criterion,
+    data: &'a str,
 }
 
-impl Labels<'_> {
+impl<'a> Replay<'a> {
+    /// Runs the lanes.
+    ///
+    /// # Errors
+    /// As [`Compare::plan`] and [`Compare::replay`].
+    pub(super) fn run(
+        scenarios: &'a [Scenario],
+        facts: &'a DataProvenance,
+        profile: &Profile,
+        options: &JustifyOptions,
+        executor: &Executor,
+        summary: &mut SweepSummary,
+    ) -> Result<Replay<'a>> {
+        let compare = Compare::plan(scenarios, facts, profile.clone(), options.compare.clone())?;
+        let mut verdicts = Vec::new();
+        let (counts, swept) = compare.replay_each(executor, |chunk| verdicts.extend_from_slice(&chunk.verdicts))?;
+        summary.add(&swept);
+        Ok(Replay { compare, counts, verdicts, criterion: options.criterion, data: &facts.data })
+    }
+
+    pub(super) fn plan(&self) -> &LanePlan {
+        self.compare.lane_plan()
+    }
+
+    /// Number of scenarios.
+    pub(super) fn units(&self) -> usize {
+        self.plan().blocks[0].units.len() as usize
+    }
+
+    /// Index of a parameterization among the variants: the cross-validated one, if there is one.
+    ///
+    /// # Errors
+    /// [`Error::Input`] for one that is impossible with this data.
+    pub(super) fn variant(&self, id: &Parameterization) -> Result<usize> {
+        let variants = &self.plan().blocks[0].variants;
+        let held_out = format!("{}{CROSS_VALIDATED}", id.key);
+        // A basis that has seen the scenario flatters itself.
+        let found = variants.iter().position(|name| *name == held_out);
+        let found = found.or_else(|| variants.iter().position(|name| *name == id.key));
+        found.ok_or_else(|| {
+            let problem = format!("the data has no {}", id.name());
+            let help = "its decomposition needs more scenarios: use more recordings, or another parameterization";
+            Error::input(Place::item(self.data), problem, help)
+        })
+    }
+
+    /// Whether a lane failed.
+    pub(super) fn failed(&self, unit: usize, variant: usize, headway: usize) -> bool {
+        let plan = self.plan();
+        let lane = (unit * plan.blocks[0].variants.len() + variant) * plan.headways.len() + headway;
+        self.verdicts[lane].failed(self.criterion)
+    }
+
     pub(super) fn score(&self, variant: usize, options: &ScoreOptions) -> Scored {
         self.score_of(variant, options, &|_, _| true)
     }
@@ -64,32 +121,24 @@ impl Labels<'_> {
     fn score_of(&self, variant: usize, options: &ScoreOptions, holds: &dyn Fn(usize, usize) -> bool) -> Scored {
         let of_unit = |unit: usize| {
             let mut counts = Confusion::<u32>::default();
-            for headway in (0..self.headways).filter(|&headway| holds(unit, headway)) {
-                let [s, parameterized] = [0, variant].map(|variant| (self.failed)(unit, variant, headway));
-                counts.count(s, parameterized);
+            for headway in (0..self.plan().headways.len()).filter(|&headway| holds(unit, headway)) {
+                counts.count(self.failed(unit, 0, headway), self.failed(unit, variant, headway));
             }
             counts
         };
-        let units: Vec<Confusion<u32>> = (0..self.units).map(of_unit).collect();
-        let sum = |of: fn(&Confusion<u32>) -> u32| units.iter().map(|c| u64::from(of(c))).sum::<u64>();
-        let counts = Confusion { tp: sum(|c| c.tp), fn_: sum(|c| c.fn_), fp: sum(|c| c.fp), tn: sum(|c| c.tn) };
-        // The interval of a fraction of failures treats scenarios as clusters.
-        let share = |value, of: fn(&Confusion<u32>) -> u32| {
-            let clusters = units.iter().map(|c| (u64::from(of(c)), u64::from(c.tp))).filter(|(runs, _)| *runs > 0);
-            let (runs, agreed): (Vec<u64>, Vec<u64>) = clusters.unzip();
-            let is_enough = runs.len() as u64 >= u64::from(options.min_failures.max(2));
-            let interval = is_enough.then(|| {
-                let interval = cluster_rate(Clusters { runs: &runs, failures: &agreed }, options.confidence).interval;
-                (interval.low, interval.high)
-            });
-            Share { value, interval }
-        };
-        let f1_interval = f1_interval(units.iter(), options).map(|interval| (interval.low, interval.high));
+        let units: Vec<Confusion<u32>> = (0..self.units()).map(of_unit).collect();
+        let mut counts = Confusion::default();
+        units.iter().for_each(|unit| counts.add(unit));
+        let ends = |interval: Option<ScoreInterval>| interval.map(|interval| (interval.low, interval.high));
+        let f1_interval = ends(f1_interval(units.iter(), options));
+        // A share in one scenario has no interval.
+        let options = &ScoreOptions { min_failures: options.min_failures.max(2), ..options.clone() };
+        let share = |value, missed| Share { value, interval: ends(share_interval(units.iter(), missed, options)) };
         Scored {
             counts,
             failing_scenarios: units.iter().filter(|c| c.tp + c.fn_ > 0).count() as u64,
-            recall: share(recall(&counts), |c| c.tp + c.fn_),
-            precision: share(precision(&counts), |c| c.tp + c.fp),
+            recall: share(recall(&counts), |c| c.fn_),
+            precision: share(precision(&counts), |c| c.fp),
             f1: Share { value: f1(&counts), interval: f1_interval },
         }
     }
@@ -98,27 +147,25 @@ impl Labels<'_> {
     pub(super) fn groups(
         &self,
         variant: usize,
-        headways: &[String],
-        ego_mps: &dyn Fn(usize) -> f64,
         severity: &dyn Fn(usize, usize) -> f64,
         options: &ScoreOptions,
     ) -> Vec<Group> {
-        let mut groups = Vec::new();
-        for (at, name) in headways.iter().enumerate() {
+        let (plan, mut groups) = (self.plan(), Vec::new());
+        for (at, headway) in plan.headways.iter().enumerate() {
             let scored = self.score_of(variant, options, &|_, headway| headway == at);
-            groups.push(Group { by: "headway", name: name.clone(), scored });
+            groups.push(Group { by: "headway", name: headway.to_string(), scored });
         }
-        let speeds: Vec<f64> = (0..self.units).map(ego_mps).collect();
+        let speeds: Vec<f64> = (0..self.units()).map(|unit| plan.case(0, unit as u64, 0).ego_speed).collect();
         let limits = thirds(speeds.clone());
         for third in 0..3 {
             let scored = self.score_of(variant, options, &|unit, _| third_of(speeds[unit], limits) == third);
             let name = interval_name(third, limits.map(|mps| mps * 3.6), "km/h");
             groups.push(Group { by: "ego speed", name, scored });
         }
-        let lanes = (0..self.units).flat_map(|unit| (0..self.headways).map(move |headway| (unit, headway)));
-        let failing: Vec<(usize, usize)> = lanes.filter(|&(unit, headway)| (self.failed)(unit, 0, headway)).collect();
-        let severities: std::collections::HashMap<(usize, usize), f64> =
-            failing.iter().map(|&(unit, headway)| ((unit, headway), severity(unit, headway))).collect();
+        let lanes = (0..self.units()).flat_map(|unit| (0..plan.headways.len()).map(move |headway| (unit, headway)));
+        let failing = lanes.filter(|&(unit, headway)| self.failed(unit, 0, headway));
+        let severities: HashMap<(usize, usize), f64> =
+            failing.map(|(unit, headway)| ((unit, headway), severity(unit, headway))).collect();
         let limits = thirds(severities.values().copied().collect());
         for (third, name) in ["least severe third", "middle third", "most severe third"].into_iter().enumerate() {
             let holds = |unit, headway| {
@@ -147,73 +194,5 @@ fn interval_name(third: usize, [low, high]: [f64; 2], unit: &str) -> String {
         0 => format!("below {low:.0} {unit}"),
         1 => format!("{low:.0} to {high:.0} {unit}"),
         _ => format!("from {high:.0} {unit} on"),
-    }
-}
-
-/// The lanes of one model with all verdicts kept, because hidden failures are identified lane by lane.
-pub(super) struct Replay<'a> {
-    pub compare: Compare<'a>,
-    pub counts: Partial,
-    verdicts: Vec<Verdicts>,
-    data: &'a str,
-}
-
-impl<'a> Replay<'a> {
-    /// Runs the lanes.
-    ///
-    /// # Errors
-    /// As [`Compare::plan`] and [`Executor::sweep`].
-    pub(super) fn run(
-        scenarios: &'a [Scenario],
-        facts: &'a DataProvenance,
-        profile: &Profile,
-        options: &JustifyOptions,
-        executor: &Executor,
-        summary: &mut SweepSummary,
-    ) -> Result<Replay<'a>> {
-        let compare = Compare::plan(scenarios, facts, profile.clone(), options.compare.clone())?;
-        let (mut verdicts, mut parts) = (Vec::new(), Vec::new());
-        let plan = compare.lane_plan();
-        let swept = executor.sweep(plan, 0..plan.unit_count(), Wanted::Verdicts, |chunk| {
-            verdicts.extend(chunk.verdicts.iter().copied());
-            parts.push(Partial::from_chunk(plan, &chunk)?);
-            Ok(())
-        })?;
-        let counts = parts.into_iter().try_fold(Partial::empty(plan), Partial::merge)?;
-        summary.add(&swept);
-        Ok(Replay { compare, counts, verdicts, data: &facts.data })
-    }
-
-    pub(super) fn plan(&self) -> &LanePlan {
-        self.compare.lane_plan()
-    }
-
-    /// Index of a parameterization among the variants: the cross-validated one, if there is one.
-    ///
-    /// # Errors
-    /// [`Error::Input`] for one that is impossible with this data.
-    pub(super) fn variant(&self, id: &Parameterization) -> Result<usize> {
-        let variants = &self.plan().blocks[0].variants;
-        let held_out = format!("{}{CROSS_VALIDATED}", id.key);
-        // A basis that has seen the scenario flatters itself.
-        let found = variants.iter().position(|name| *name == held_out);
-        let found = found.or_else(|| variants.iter().position(|name| *name == id.key));
-        found.ok_or_else(|| {
-            let problem = format!("the data has no {}", id.name());
-            let help = "its decomposition needs more scenarios: use more recordings, or another parameterization";
-            Error::input(Place::item(self.data), problem, help)
-        })
-    }
-
-    /// The verdicts of a lane.
-    pub(super) fn verdicts(&self, unit: usize, variant: usize, headway: usize) -> Verdicts {
-        let plan = self.plan();
-        self.verdicts[(unit * plan.blocks[0].variants.len() + variant) * plan.headways.len() + headway]
-    }
-
-    /// Labels by a function that says whether a lane failed.
-    pub(super) fn labels<'f>(&self, failed: &'f dyn Fn(usize, usize, usize) -> bool) -> Labels<'f> {
-        let plan = self.plan();
-        Labels { units: plan.blocks[0].units.len() as usize, headways: plan.headways.len(), failed }
     }
 }
