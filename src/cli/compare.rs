@@ -1,18 +1,16 @@
 //! `lanesweep compare`: compares failure rates of S, S' and densities.
 
 use std::path::PathBuf;
-use std::time::Instant;
 
 use clap::Args;
 
 use super::arguments::from_arguments;
 use super::configured::Configured;
-use super::console::{self, Verbosity};
+use super::console::{self, Units};
 use super::format::FormatFlag;
 use super::source::SourceFlags;
 use super::{Exit, Output, lists};
 use crate::report::compare::CompareReport;
-use crate::report::host::Host;
 use crate::run::compare::{self, CompareOptions, CompareResult};
 use crate::run::study::StudyOptions;
 use crate::stats::density::DensityKind;
@@ -64,8 +62,7 @@ from_arguments!(
 );
 
 impl Compare {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Output> {
-        let started = Instant::now();
+    pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         let config = &configured.settings;
         let categories = self.categories.list()?;
         let ids = self.parameterizations.list(&categories)?;
@@ -76,7 +73,7 @@ impl Compare {
         self.guard_inputs(configured)?;
         check_folder(&self.out)?;
         let opened = configured.open()?;
-        let (collection, facts) = self.data.load_with_exposure(configured, verbosity, typed)?;
+        let (collection, facts) = self.data.load_with_exposure(configured, typed)?;
 
         let options = CompareOptions {
             study: StudyOptions {
@@ -99,25 +96,21 @@ impl Compare {
         let folder = OutputDir::open(&self.out, COMPARE_RECORD)?;
         tracing::info!("{} lanes of S and S' on {}", count(plan.lane_count()), opened.backend().describe());
         let executor = opened.executor().with_recheck(config.compare.seed);
-        let bar = console::progress(verbosity, plan.unit_count(), "sweeping");
-        let (counts, mut swept) = compare.replay(&executor.clone().with_progress(console::inc(&bar)))?;
-        bar.finish_and_clear();
-        let bar = console::progress(
-            verbosity,
-            compare.options().parameterizations.len() as u64
-                * config.compare.samples
-                * if self.forms { DensityKind::ALL.len() as u64 } else { 1 },
-            "fitting and sampling",
-        );
-        let result = compare.sample(&counts, &executor.with_progress(console::inc(&bar)));
-        bar.finish_and_clear();
-        let CompareResult { categories, left_out, failed, summary } = result?;
+        let units = Units::All(plan.unit_count());
+        let (counts, mut swept) =
+            configured.with_progress(units, "sweeping", &executor, |executor| compare.replay(executor))?;
+        let densities = compare.options().parameterizations.len() * if self.forms { DensityKind::ALL.len() } else { 1 };
+        let units = Units::All(densities as u64 * config.compare.samples);
+        let CompareResult { categories, left_out, failed, summary } =
+            configured.with_progress(units, "fitting and sampling", &executor, |executor| {
+                compare.sample(&counts, executor)
+            })?;
         swept.add(&summary);
         console::warn(left_out.iter().chain(&failed));
         let complete = collection.problems.is_empty() && left_out.is_empty();
 
         let left_out = collection.problems.iter().chain(&failed).map(Error::to_string).collect();
-        let host = Host::of(&opened, swept.rechecked_lanes, started, configured.record(false));
+        let host = configured.host(&opened, swept.rechecked_lanes, false);
         let report = CompareReport { compare: &compare, categories, left_out, host };
         let files = report.write(folder.results()?)?;
         let exit = if complete && failed.is_empty() { Exit::Ok } else { Exit::Incomplete };

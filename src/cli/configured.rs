@@ -3,25 +3,28 @@
 
 use std::collections::BTreeSet;
 use std::path::PathBuf;
+use std::time::Instant;
 
 use clap::builder::{PossibleValue, PossibleValuesParser};
 use clap::error::{ContextKind, ContextValue};
 use clap::parser::ValueSource;
 use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, FromArgMatches};
+use indicatif::ProgressBar;
 
 use super::arguments::{Arguments, NEEDS, Value};
+use super::console::{self, Units, Verbosity};
 use super::help::{DATA, MODELS, OUTPUT, RUN};
 use super::signals::CANCEL;
 use super::{Cli, Verb};
 use crate::cli::settings::{Assignment, FILE_VARIABLE, Key, KeyKind, Layers, Origin, Setting, Settings};
-use crate::engine::{BackendChoice, DeviceName, OpenBackend};
+use crate::engine::{BackendChoice, DeviceName, Executor, OpenBackend};
 use crate::model::profile::Profile;
-use crate::report::host::SettingRecord;
+use crate::report::host::{Host, SettingRecord};
 use crate::support::plain_text::nearest;
 use crate::{Error, Place, Result};
 
-/// The configuration of a run.
-#[derive(Debug, Clone, Default)]
+/// The configuration of a run, and what every verb needs besides.
+#[derive(Debug, Clone)]
 pub(super) struct Configured {
     /// Values.
     pub settings: Settings,
@@ -29,6 +32,9 @@ pub(super) struct Configured {
     pub layers: Layers,
     /// The command line or call, for repeating the run.
     pub command: String,
+    /// What stderr shows.
+    pub verbosity: Verbosity,
+    started: Instant,
 }
 
 /// A flag that sets a key: the key, the flag, the value's name unless the key defines it, its heading, whether only
@@ -216,7 +222,7 @@ impl Configured {
             }
         }
         let is_reference = last.try_contains_id("reference").is_ok_and(|known| known) && last.get_flag("reference");
-        let configured = Configured::combined(layers, is_reference, command)?;
+        let configured = Configured::combined(layers, is_reference, command, cli.common.verbosity())?;
         configured.fill(&mut cli.verb);
         Ok((cli, configured))
     }
@@ -233,7 +239,8 @@ impl Configured {
                 layers.flag(key, &flag_name(id), value)?;
             }
         }
-        Configured::combined(layers, arguments.is_given("reference"), arguments.call().to_owned())
+        let is_reference = arguments.is_given("reference");
+        Configured::combined(layers, is_reference, arguments.call().to_owned(), Verbosity::Normal)
     }
 
     /// Gives a verb its settings.
@@ -243,7 +250,7 @@ impl Configured {
         }
     }
 
-    fn combined(layers: Layers, is_reference: bool, command: String) -> Result<Configured> {
+    fn combined(layers: Layers, is_reference: bool, command: String, verbosity: Verbosity) -> Result<Configured> {
         let mut settings = layers.settings()?;
         // Like every flag, a flag that allows only one backend overrides a file's backend.
         let layer = |key: &str| layers.get(key).map_or(0, |setting| setting.origin.layer());
@@ -256,7 +263,7 @@ impl Configured {
         if is_cpu || (is_reference && layer("run.device") < flags) {
             settings.run.device = None;
         }
-        Ok(Configured { settings, layers, command })
+        Ok(Configured { settings, layers, command, verbosity, started: Instant::now() })
     }
 
     /// The profile with its time step.
@@ -307,6 +314,41 @@ impl Configured {
             source: setting.origin.to_string(),
         };
         self.layers.list().filter(|setting| !(has_plan && is_of_plan(&setting.key.name))).map(record).collect()
+    }
+
+    /// The record of the host, at the end of the run.
+    pub(super) fn host(&self, opened: &OpenBackend, rechecked_lanes: u64, has_plan: bool) -> Host {
+        Host::of(opened, rechecked_lanes, self.started, self.record(has_plan))
+    }
+
+    /// Does work with a bar.
+    ///
+    /// # Errors
+    /// Those of the work.
+    pub(super) fn with_bar<T>(
+        &self,
+        units: Units,
+        what: &str,
+        work: impl FnOnce(&ProgressBar) -> Result<T>,
+    ) -> Result<T> {
+        let bar = console::progress(self.verbosity, units, what);
+        let done = work(&bar);
+        bar.finish_and_clear();
+        done
+    }
+
+    /// The same for work whose executor moves the bar.
+    ///
+    /// # Errors
+    /// Those of the work.
+    pub(super) fn with_progress<T>(
+        &self,
+        units: Units,
+        what: &str,
+        executor: &Executor,
+        work: impl FnOnce(&Executor) -> Result<T>,
+    ) -> Result<T> {
+        self.with_bar(units, what, |bar| work(&executor.clone().with_progress(console::inc(bar))))
     }
 
     /// Refuses flags about lanes together with a plan file, which would ignore them. A file that the environment names is

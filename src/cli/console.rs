@@ -151,6 +151,15 @@ pub(super) fn command_line(words: &[OsString]) -> String {
     format!("lanesweep {}", words.collect::<Vec<_>>().join(" "))
 }
 
+/// Units of some work.
+#[derive(Debug, Clone, Copy)]
+pub(super) enum Units {
+    /// So many.
+    All(u64),
+    /// It may end before the last one.
+    AtMost(u64),
+}
+
 /// Returns a callback that advances a bar.
 pub(super) fn inc(bar: &ProgressBar) -> impl Fn(u64) + Send + Sync + 'static {
     let bar = bar.clone();
@@ -158,16 +167,11 @@ pub(super) fn inc(bar: &ProgressBar) -> impl Fn(u64) + Send + Sync + 'static {
 }
 
 /// A progress bar on stderr, or a line now and then if stderr is no terminal. Its remaining time follows from the units per time.
-pub(super) fn progress(verbosity: Verbosity, length: u64, what: &str) -> ProgressBar {
-    bar_of(verbosity, length, what, "about")
-}
-
-/// The same for work that may end before its last unit.
-pub(super) fn progress_to_maximum(verbosity: Verbosity, length: u64, what: &str) -> ProgressBar {
-    bar_of(verbosity, length, what, "at most about")
-}
-
-fn bar_of(verbosity: Verbosity, length: u64, what: &str, bound: &'static str) -> ProgressBar {
+pub(super) fn progress(verbosity: Verbosity, units: Units, what: &str) -> ProgressBar {
+    let (length, bound) = match units {
+        Units::All(units) => (units, "about"),
+        Units::AtMost(units) => (units, "at most about"),
+    };
     let bar = ProgressBar::new(length);
     let is_terminal = io::stderr().is_terminal();
     if verbosity == Verbosity::Quiet || !is_terminal {

@@ -75,7 +75,7 @@ pub fn run(function: &str, values: Vec<(String, Value)>) -> Result<Output> {
             let requested = configured.settings.run.threads;
             let pool = pool_of(requested)?.stack_size(STACK_BYTES);
             let pool = pool.build().map_err(|error| not_started(requested, &error))?;
-            pool.install(|| verb.run(&configured, Verbosity::Normal))
+            pool.install(|| verb.run(&configured))
         });
         console::captured().iter_mut().for_each(|captured| captured.bar = None);
         result

@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::arguments::from_arguments;
 use super::configured::Configured;
-use super::console::{self, Verbosity};
+use super::console::{self, Units};
 use super::format::FormatFlag;
 use super::lists;
 use super::source::{self, SourceFlags};
@@ -68,7 +68,7 @@ from_arguments!(
 );
 
 impl Fit {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Output> {
+    pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         let config = &configured.settings;
         let ids = self.ids()?;
         let typed = self.exposure.driven()?;
@@ -82,32 +82,33 @@ impl Fit {
             representativeness: !self.no_comparison,
         };
         let files = self.files(&ids, configured)?;
-        let (collection, facts) = self.data.load_with_exposure(configured, verbosity, typed)?;
+        let (collection, facts) = self.data.load_with_exposure(configured, typed)?;
 
         // A single file needs no folder.
         let folder = (!self.is_single()).then(|| OutputDir::open_without_record(&self.out)).transpose()?;
-        let bar = console::progress(verbosity, ids.len() as u64, "fitting");
         let mut fitted: Vec<(PathBuf, DensityModel)> = Vec::new();
         let (mut failed, mut complete) = (Vec::new(), collection.problems.is_empty());
-        for (id, file) in ids.iter().zip(files) {
-            let result = DensityModel::fit(id.clone(), &collection.scenarios, &facts, &options);
-            bar.inc(1);
-            let mut result = match result {
-                Ok(result) => result,
-                Err(error @ Error::Input { .. }) => {
-                    push_once(&mut failed, error);
-                    continue;
+        configured.with_bar(Units::All(ids.len() as u64), "fitting", |bar| {
+            for (id, file) in ids.iter().zip(files) {
+                let result = DensityModel::fit(id.clone(), &collection.scenarios, &facts, &options);
+                bar.inc(1);
+                let mut result = match result {
+                    Ok(result) => result,
+                    Err(error @ Error::Input { .. }) => {
+                        push_once(&mut failed, error);
+                        continue;
+                    }
+                    Err(error) => return Err(error),
+                };
+                bar.suspend(|| console::warn(result.left_out.iter().chain(&result.not_compared)));
+                if self.without_scenarios {
+                    result.model.scenarios.clear();
                 }
-                Err(error) => return Err(error),
-            };
-            bar.suspend(|| console::warn(result.left_out.iter().chain(&result.not_compared)));
-            if self.without_scenarios {
-                result.model.scenarios.clear();
+                complete &= result.left_out.is_empty();
+                fitted.push((file, result.model));
             }
-            complete &= result.left_out.is_empty();
-            fitted.push((file, result.model));
-        }
-        bar.finish_and_clear();
+            Ok(())
+        })?;
         if fitted.is_empty() && !failed.is_empty() {
             return Err(failed.swap_remove(0));
         }

@@ -1,19 +1,17 @@
 //! `lanesweep justify`: is a parameterization appropriate for one driver model, kind of scenario and criterion?
 
 use std::path::PathBuf;
-use std::time::Instant;
 
 use clap::Args;
 
 use super::arguments::from_arguments;
 use super::configured::Configured;
-use super::console::{self, Verbosity};
+use super::console;
 use super::format::FormatFlag;
 use super::source::SourceFlags;
 use super::{Exit, Output, lists};
 use crate::model::driver::ModelId;
 use crate::report::dossier::DossierReport;
-use crate::report::host::Host;
 use crate::run::compare::CompareOptions;
 use crate::run::justify::{Conclusion, JustifyOptions, justify};
 use crate::run::study::StudyOptions;
@@ -71,8 +69,7 @@ from_arguments!(
 );
 
 impl Justify {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Output> {
-        let started = Instant::now();
+    pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         let config = &configured.settings;
         let id = parameterization(&self.parameterization)?;
         let model = ModelId::parse(self.models.trim()).ok_or_else(|| {
@@ -87,7 +84,7 @@ impl Justify {
         }
         check_folder(&self.out)?;
         let opened = configured.open()?;
-        let collection = self.data.report_and_load(configured, verbosity)?;
+        let collection = self.data.report_and_load(configured)?;
         let facts = self.data.source(configured).provenance(&collection, Driven { hours: None, kilometres: None })?;
         let options = JustifyOptions {
             compare: CompareOptions {
@@ -122,7 +119,7 @@ impl Justify {
             author: self.author.clone(),
             date: self.date.clone(),
             command: configured.command.clone(),
-            host: Host::of(&opened, dossier.summary.rechecked_lanes, started, configured.record(false)),
+            host: configured.host(&opened, dossier.summary.rechecked_lanes, false),
         };
         let files = report.write(folder.results()?)?;
         let is_complete = collection.problems.is_empty() && dossier.left_out.is_empty();

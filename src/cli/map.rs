@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::arguments::from_arguments;
 use super::configured::Configured;
-use super::console::{self, Verbosity};
+use super::console::Units;
 use super::format::FormatFlag;
 use super::source::PlausibilityFlag;
 use super::{Exit, Output, lists};
@@ -121,7 +121,7 @@ fn after_long_help() -> String {
 }
 
 impl Map {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Output> {
+    pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         let category = Category::parse(&self.category).ok_or_else(|| {
             let problem = format!("there is no category `{}`", self.category);
             Error::usage(Place::item("CATEGORY"), problem, "use cut-in, cut-out or lvd")
@@ -142,10 +142,9 @@ impl Map {
         let opened = if self.reference { configured.open_reference()? } else { configured.open()? };
         let folder = OutputDir::open(&self.out, MAP_RECORD)?;
         let executor = opened.executor().with_recheck(RECHECK_SEED);
-        let bar = console::progress(verbosity, map.unit_count(), "sweeping");
-        let started = Instant::now();
-        let MapResult { grids, summary } = map.run(&executor.with_progress(console::inc(&bar)))?;
-        bar.finish_and_clear();
+        let (units, started) = (Units::All(map.unit_count()), Instant::now());
+        let MapResult { grids, summary } =
+            configured.with_progress(units, "sweeping", &executor, |executor| map.run(executor))?;
         let host = Host::of(&opened, summary.rechecked_lanes, started, configured.record(false));
         let sweep = SweepRecord::of(&summary, RECHECK_SEED);
         let preset = self.preset.clone();

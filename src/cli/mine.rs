@@ -6,7 +6,6 @@ use clap::Args;
 
 use super::arguments::from_arguments;
 use super::configured::Configured;
-use super::console::Verbosity;
 use super::source::{self, PlausibilityFlag, PresetFlag};
 use super::{Exit, Output, console};
 use crate::Result;
@@ -49,7 +48,7 @@ fn lock_of(path: &Path) -> Result<FolderLock> {
 }
 
 impl Mine {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Output> {
+    pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         if let Some(path) = &self.out {
             source::refuse_recording(path, &self.recordings, self.preset.preset.as_deref(), "--out")?;
             check_scenario_file(path)?;
@@ -59,7 +58,7 @@ impl Mine {
         }
         let _lock = self.out.as_deref().map(lock_of).transpose()?;
         let from = Source::Recordings { path: self.recordings.clone(), preset: self.preset.preset.clone() };
-        let mut collection = source::load(&from, &configured.settings.mining, self.plausibility.policy(), verbosity)?;
+        let mut collection = source::load(&from, configured, self.plausibility.policy())?;
         if self.kept {
             collection.scenarios.retain(|s| s.kept);
         }

@@ -150,7 +150,7 @@ pub fn main_with(words: &[OsString]) -> Exit {
         let (cli, configured) = Configured::of(&matches, console::command_line(words))?;
         let requested = configured.settings.run.threads;
         pool_of(requested)?.build_global().map_err(|error| not_started(requested, &error))?;
-        cli.verb.run(&configured, cli.common.verbosity()).map(|output| output.exit)
+        cli.verb.run(&configured).map(|output| output.exit)
     })
 }
 
@@ -178,23 +178,23 @@ fn without_panic<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
 }
 
 impl Verb {
-    fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Output> {
+    fn run(&self, configured: &Configured) -> Result<Output> {
         match self {
-            Verb::Study(verb) => verb.run(configured, verbosity),
+            Verb::Study(verb) => verb.run(configured),
             Verb::Tracks(verb) => verb.run(configured),
-            Verb::Mine(verb) => verb.run(configured, verbosity),
-            Verb::Fit(verb) => verb.run(configured, verbosity),
-            Verb::Sample(verb) => verb.run(configured, verbosity),
-            Verb::Search(verb) => verb.run(configured, verbosity),
-            Verb::Compare(verb) => verb.run(configured, verbosity),
-            Verb::Justify(verb) => verb.run(configured, verbosity),
-            Verb::Synth(verb) => verb.run(configured, verbosity),
-            Verb::Map(verb) => verb.run(configured, verbosity),
-            Verb::Simulate(verb) => verb.run(configured, verbosity),
+            Verb::Mine(verb) => verb.run(configured),
+            Verb::Fit(verb) => verb.run(configured),
+            Verb::Sample(verb) => verb.run(configured),
+            Verb::Search(verb) => verb.run(configured),
+            Verb::Compare(verb) => verb.run(configured),
+            Verb::Justify(verb) => verb.run(configured),
+            Verb::Synth(verb) => verb.run(configured),
+            Verb::Map(verb) => verb.run(configured),
+            Verb::Simulate(verb) => verb.run(configured),
             Verb::Check(verb) => verb.run(configured),
             Verb::Export(verb) => verb.run(configured),
             Verb::Cluster(verb) => verb.run(),
-            Verb::Verify(verb) => verb.run(configured, verbosity),
+            Verb::Verify(verb) => verb.run(configured),
             Verb::Config(verb) => verb.run(configured),
         }
     }

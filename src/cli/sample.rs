@@ -10,11 +10,11 @@ use super::lists;
 use super::shard_flags::ShardFlags;
 use super::source::PlausibilityFlag;
 use crate::Result;
-use crate::cli::settings::{EstimatorKind, PointKind, SampleSettings};
+use crate::cli::settings::{EstimatorKind, SampleSettings};
 use crate::engine::Headway;
 use crate::model::driver::ModelId;
 use crate::report::openscenario::Rename;
-use crate::run::sampling::SampleHeadways;
+use crate::run::sampling::{SampleHeadways, SampleSource};
 use crate::stats::density::DensityModel;
 
 /// How likely does a driver fail?
@@ -130,7 +130,7 @@ impl Sample {
         let needs_crude = !self.given.is_empty()
             || self.rows.is_some()
             || self.distribution.is_some()
-            || self.settings.points == PointKind::Sobol
+            || self.settings.points == SampleSource::Sobol
             || self.settings.time_limit_s.is_some()
             || self.shards.is_part()
             || self.shards.plan_only

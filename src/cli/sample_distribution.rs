@@ -2,21 +2,19 @@
 
 use std::fmt::Write;
 use std::path::Path;
-use std::time::Instant;
 
 use super::configured::Configured;
-use super::console::{self, Verbosity};
+use super::console::Units;
 use super::sample::Sample;
 use super::sample_options::only_crude;
 use super::{Exit, Output};
-use crate::cli::settings::{EstimatorKind, PointKind};
+use crate::cli::settings::EstimatorKind;
 use crate::engine::Headway;
-use crate::report::host::Host;
 use crate::report::openscenario::{DistributionSamples, SampledFile};
 use crate::report::sampling::{DensityRecord, DrawRecord, SampleReport};
 use crate::report::sampling_tables::convergence_csv;
 use crate::run::reopen::DISTRIBUTION_FILE;
-use crate::run::sampling::{Estimator, SampleHeadways, SampleOptions, WorstLane, sample_crude};
+use crate::run::sampling::{Estimator, SampleHeadways, SampleOptions, SampleSource, WorstLane, sample_crude};
 use crate::scenario::Category;
 use crate::stats::density::Provenance;
 use crate::support::plain_text::sha256;
@@ -32,18 +30,12 @@ const NOTHING: f64 = 5e-6;
 const FEW: f64 = 1e-3;
 
 /// Samples the distributions of a file.
-pub(super) fn run(
-    flags: &Sample,
-    configured: &Configured,
-    path: &Path,
-    started: Instant,
-    verbosity: Verbosity,
-) -> Result<Output> {
+pub(super) fn run(flags: &Sample, configured: &Configured, path: &Path) -> Result<Output> {
     let settings = &flags.settings;
     if settings.estimator == EstimatorKind::Is {
         return Err(only_crude("--distribution"));
     }
-    if settings.points == PointKind::Sobol {
+    if settings.points == SampleSource::Sobol {
         let help = "leave out --points: draws of a distribution file are independent";
         return Err(Error::usage(
             Place::item("--points"),
@@ -106,12 +98,11 @@ pub(super) fn run(
     };
     let options = if flags.simultaneous { options.together(settings.level) } else { options };
     tracing::info!("{} samples on {}", readable::count(count), executor.backend.describe());
-    let bar = console::progress(verbosity, count, "sampling");
     // The frequency of such scenarios is unknown, so there is no exposure.
-    let executor = executor.with_progress(console::inc(&bar));
-    let crude = sample_crude(&plan, 0..count, &executor, &options, None, None)?;
-    bar.finish_and_clear();
-    let host = Host::of(&opened, crude.summary.rechecked_lanes, started, configured.record(false));
+    let crude = configured.with_progress(Units::All(count), "sampling", &executor, |executor| {
+        sample_crude(&plan, 0..count, executor, &options, None, None)
+    })?;
+    let host = configured.host(&opened, crude.summary.rechecked_lanes, false);
     let record = record(&sampled, &samples);
     let mut report = SampleReport::of(record, samples.has_distance(), (&profile, &options), crude.rows.clone(), host);
     report.plan_headways = plan.headways.clone();

@@ -5,7 +5,7 @@ use std::time::Duration;
 
 use super::sample::Sample;
 use super::source::file_of;
-use crate::cli::settings::{EstimatorKind, IntervalKind, PointKind};
+use crate::cli::settings::{EstimatorKind, IntervalKind};
 use crate::model::driver::ModelId;
 use crate::report::lanes::table_format;
 use crate::run::sampling::{Estimator, MapAxes, SampleHeadways, SampleOptions, SampleSource, read_proposal};
@@ -49,10 +49,7 @@ impl Sample {
             stop: self.stop(samples),
             given: self.given.clone(),
             worst: self.settings.worst,
-            source: match self.settings.points {
-                PointKind::Random => SampleSource::Random,
-                PointKind::Sobol => SampleSource::Sobol,
-            },
+            source: self.settings.points,
             map: if self.is_crude() { self.map_axes(density)? } else { None },
             ..SampleOptions::new(self.estimator(density)?, samples, headways)
         };
@@ -161,7 +158,7 @@ impl Sample {
             ("--map", self.map.is_some()),
             ("--given", !self.given.is_empty()),
             ("--other-profile", self.other_profile.is_some()),
-            ("--points sobol", settings.points == PointKind::Sobol),
+            ("--points sobol", settings.points == SampleSource::Sobol),
         ];
         if let Some((flag, _)) = belongs_to_crude.iter().find(|(_, given)| *given && !is_crude) {
             return Err(only_crude(flag));

@@ -1,18 +1,12 @@
 //! `lanesweep sample`: plans the run, executes it whole or as a shard, and writes the result.
 
-use std::time::Instant;
-
-use indicatif::ProgressBar;
-
 use super::configured::Configured;
-use super::console::{self, Verbosity};
-use super::format::FormatFlag;
+use super::console::Units;
 use super::sample::Sample;
 use super::sample_options::{guard, only_crude};
 use super::{Exit, Output, sample_distribution};
 use crate::engine::{Chunk, Executor, LanePlan, OpenBackend};
 use crate::model::profile::Profile;
-use crate::report::host::Host;
 use crate::report::lanes;
 use crate::report::sampling::SampleReport;
 use crate::run::parts::{EachChunk, Job, PLAN_FILE};
@@ -24,7 +18,7 @@ use crate::stats::estimate::{Search, StopRule};
 use crate::support::atomic_file::StagedFile;
 use crate::support::files::check_folder;
 use crate::support::readable::{count, counted, duration};
-use crate::support::run_dir::{ESTIMATE_RECORD, OutputDir, Results};
+use crate::support::run_dir::{ESTIMATE_RECORD, OutputDir};
 use crate::support::table::TableWriter;
 use crate::{Error, Place, Result};
 
@@ -32,8 +26,7 @@ use crate::{Error, Place, Result};
 const FEW_SCENARIOS: f64 = 5.0;
 
 impl Sample {
-    pub fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Output> {
-        let started = Instant::now();
+    pub fn run(&self, configured: &Configured) -> Result<Output> {
         self.check()?;
         self.shards.start()?;
         if let Some(path) = &self.shards.plan {
@@ -45,17 +38,17 @@ impl Sample {
                 }
                 guard(rows, &self.out, std::iter::once(path))?;
             }
-            return self.run_sample(sample, (&configured.open()?, None), configured, started, verbosity);
+            return self.run_sample(sample, (&configured.open()?, None), configured);
         }
         if let Some(path) = &self.distribution {
-            return sample_distribution::run(self, configured, path, started, verbosity);
+            return sample_distribution::run(self, configured, path);
         }
         let (sample, data) = self.planned(configured)?;
         let other = self.other_profile.as_deref().map(|name| configured.profile_of(name)).transpose()?;
         let opened = configured.open()?;
         tracing::info!("{data}");
         let sample = if self.is_refined() { self.chosen(sample, &opened)? } else { sample };
-        self.run_sample(sample, (&opened, other.as_ref()), configured, started, verbosity)
+        self.run_sample(sample, (&opened, other.as_ref()), configured)
     }
 
     /// The run of crude Monte Carlo with as many samples as are cheaper than importance sampling.
@@ -107,26 +100,23 @@ impl Sample {
     fn run_sample(
         &self,
         sample: sampling::Sample,
-        (opened, other): (&OpenBackend, Option<&Profile>),
+        opened: (&OpenBackend, Option<&Profile>),
         configured: &Configured,
-        started: Instant,
-        verbosity: Verbosity,
     ) -> Result<Output> {
-        let executor = opened.executor().with_recheck(sample.options.seed);
+        let executor = &opened.0.executor().with_recheck(sample.options.seed);
         let is_split = self.shards.plan_only || self.shards.is_part();
-        let sample = match &sample.kind {
+        let sample = match sample.kind {
             SampleKind::Search(search) => {
-                let (searching, bar) = searching(&sample, search, &executor, verbosity);
-                let found = if is_split {
-                    sample.searched(&searching, &self.out, true)
-                } else {
-                    // The search is kept in the folder, so it needs the folder's lock too.
-                    let _folder = OutputDir::open(&self.out, ESTIMATE_RECORD)?;
-                    let found = sample.searched(&searching, &self.out, false);
-                    found.and_then(|found| found.keep_search(&self.out).map(|()| found))
-                };
-                bar.finish_and_clear();
-                found?
+                let units = Units::AtMost(warn_of_long(&sample, &search));
+                // The search is kept in the folder, so it needs the folder's lock too.
+                let _folder = (!is_split).then(|| OutputDir::open(&self.out, ESTIMATE_RECORD)).transpose()?;
+                let found = configured.with_progress(units, "searching", executor, |executor| {
+                    sample.searched(executor, &self.out, is_split)
+                })?;
+                if !is_split {
+                    found.keep_search(&self.out)?;
+                }
+                found
             }
             _ => sample,
         };
@@ -136,15 +126,13 @@ impl Sample {
         if self.shards.plan_only {
             return self.format.planned(Exit::Ok, sample.lane_count(), &self.out.join(PLAN_FILE));
         }
-        let (opened, executor) = ((opened, other), &executor);
         match sample.job()? {
-            SampleJob::Crude(job) => self.run_job(&job, &sample, opened, executor, configured, started, verbosity),
-            SampleJob::Weighted(job) => self.run_job(&job, &sample, opened, executor, configured, started, verbosity),
+            SampleJob::Crude(job) => self.run_job(&job, &sample, opened, executor, configured),
+            SampleJob::Weighted(job) => self.run_job(&job, &sample, opened, executor, configured),
         }
     }
 
     /// Executes a job, whole or a shard of it.
-    #[expect(clippy::too_many_arguments, reason = "the state of one run")]
     fn run_job(
         &self,
         job: &impl Job<Result = SampleResult>,
@@ -152,8 +140,6 @@ impl Sample {
         (opened, other): (&OpenBackend, Option<&Profile>),
         executor: &Executor,
         configured: &Configured,
-        started: Instant,
-        verbosity: Verbosity,
     ) -> Result<Output> {
         warn(sample)?;
         // Rows are written during the run, so a run with rows cannot resume.
@@ -164,20 +150,18 @@ impl Sample {
         let missing = run.missing()?;
         tracing::info!("{} samples on {}", count(missing), executor.backend.describe());
         let is_empty = run.units().is_empty();
-        let (density, lane_plan) = (sample.density(), sample.lane_plan());
+        let (density, lane_plan) = (&sample.density, sample.lane_plan());
         let rows = self.rows.as_deref().filter(|_| !is_empty).zip(lane_plan);
         let mut table = rows.map(|(path, plan)| lanes::sampled_table(path, plan, density)).transpose()?;
-        let bar = match sample.options.stop.is_fixed() {
-            true => console::progress(verbosity, missing, "sampling"),
-            false => console::progress_to_maximum(verbosity, missing, "sampling"),
+        let units = match sample.options.stop.is_fixed() {
+            true => Units::All(missing),
+            false => Units::AtMost(missing),
         };
         let mut write_chunk = table
             .as_mut()
             .map(|table| |plan: &LanePlan, chunk: &Chunk| lanes::write_sampled_chunk(table, plan, density, chunk));
         let each = write_chunk.as_mut().map(|write| write as &mut EachChunk);
-        let computed = run.compute(&executor.clone().with_progress(console::inc(&bar)), each);
-        bar.finish_and_clear();
-        computed?;
+        configured.with_progress(units, "sampling", executor, |executor| run.compute(executor, each))?;
         let rows = table.map(TableWriter::stage).transpose()?;
         if self.shards.is_part() {
             rows.map_or(Ok(()), StagedFile::publish)?;
@@ -188,10 +172,10 @@ impl Sample {
         if let Some(half_width) = self.settings.half_width.filter(|_| self.is_refined()) {
             tracing::info!("importance sampling of what is rare");
             let search = self.search(&sample.options.models, &sample.options.headways);
-            let (searching, bar) = searching(sample, &search, executor, verbosity);
-            let refined = sample.refined(result, &search, half_width, &searching);
-            bar.finish_and_clear();
-            result = refined?;
+            let units = Units::AtMost(warn_of_long(sample, &search));
+            result = configured.with_progress(units, "searching", executor, |executor| {
+                sample.refined(result, &search, half_width, executor)
+            })?;
         }
         if let Some(other) = other {
             tracing::info!("the same samples under profile {}", other.name);
@@ -209,23 +193,19 @@ impl Sample {
                 );
             }
         }
-        let settings = configured.record(self.shards.plan.is_some());
-        let host = Host::of(opened, result.rechecked_lanes, started, settings);
+        let host = configured.host(opened, result.rechecked_lanes, self.shards.plan.is_some());
         let mut results = run.results()?;
         rows.into_iter().for_each(|table| results.join(table));
-        let output = write(sample, &result, host, results, self.format)?;
+        let mut report = SampleReport::of_sample(sample, &result, host)?;
+        let files = report.write(results, sample, &result)?;
+        let output = self.format.output_in(&self.out, Exit::Ok, || report.text(), || report.json(&files))?;
         run.close()?;
         Ok(output)
     }
 }
 
-/// An executor whose points move a bar, for a search, which may end long before its maximum. Warns where it takes long.
-fn searching<'a>(
-    sample: &sampling::Sample,
-    search: &Search,
-    executor: &Executor<'a>,
-    verbosity: Verbosity,
-) -> (Executor<'a>, ProgressBar) {
+/// The maximum number of points of a search, which may end long before it. Warns where it takes long.
+fn warn_of_long(sample: &sampling::Sample, search: &Search) -> u64 {
     let most = search.most_points(sample.options.asked().len());
     for model in &sample.options.models {
         if model.foreign().is_some_and(|driver| driver.may_accelerate()) {
@@ -238,8 +218,7 @@ fn searching<'a>(
             );
         }
     }
-    let bar = console::progress_to_maximum(verbosity, most, "searching");
-    (executor.clone().with_progress(console::inc(&bar)), bar)
+    most
 }
 
 /// Warns about limits of the estimates of crude Monte Carlo.
@@ -260,18 +239,4 @@ fn warn(sample: &sampling::Sample) -> Result<()> {
         }
     }
     Ok(())
-}
-
-/// Writes the result.
-fn write(
-    sample: &sampling::Sample,
-    result: &SampleResult,
-    host: Host,
-    results: Results,
-    format: FormatFlag,
-) -> Result<Output> {
-    let out = results.dir().to_path_buf();
-    let mut report = SampleReport::of_sample(sample, result, host)?;
-    let files = report.write(results, sample, result)?;
-    format.output_in(&out, Exit::Ok, || report.text(), || report.json(&files))
 }

@@ -1,7 +1,6 @@
 //! `lanesweep search`: which description of a scenario keeps the outcomes with the fewest parameters?
 
 use std::path::PathBuf;
-use std::time::Instant;
 
 use clap::Args;
 
@@ -73,8 +72,7 @@ from_arguments!(
 );
 
 impl Search {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Output> {
-        let started = Instant::now();
+    pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         let config = &configured.settings;
         let [category] = source::categories(std::slice::from_ref(&self.category), "--category")?[..] else {
             return Err(Error::usage(
@@ -101,8 +99,8 @@ impl Search {
         check_folder(&self.out)?;
         let opened = configured.open()?;
         let data = self.data.source(configured);
-        let collection = self.data.report_and_load(configured, verbosity)?;
-        let held_out = self.held_out(configured, category, verbosity)?;
+        let collection = self.data.report_and_load(configured)?;
+        let held_out = self.held_out(configured, category)?;
         let sha256 = data.scenarios_sha256(&collection)?;
         if config.search.studies < config.search.min_studies() {
             tracing::warn!(
@@ -119,15 +117,12 @@ impl Search {
         };
         make_folder(folder.dir())?;
         let executor = opened.executor().with_recheck(config.score.seed);
-        let bar = console::progress(verbosity, config.search.studies as u64, "searching");
-        let result = search.run(
-            held_out.as_ref().map(|(scenarios, ..)| scenarios.as_slice()),
-            (Some(folder.dir()), self.shard),
-            &executor,
-            &|studies| bar.set_position(studies as u64),
-        );
-        bar.finish_and_clear();
-        let Some(result) = result? else {
+        let unread = held_out.as_ref().map(|(scenarios, ..)| scenarios.as_slice());
+        let (units, of) = (Units::All(config.search.studies as u64), (Some(folder.dir()), self.shard));
+        let result = configured.with_bar(units, "searching", |bar| {
+            search.run(unread, of, &executor, &|studies| bar.set_position(studies as u64))
+        })?;
+        let Some(result) = result else {
             tracing::info!("the candidates of this part are in {}", self.out.display());
             return Ok(Exit::Ok.into());
         };
@@ -149,7 +144,7 @@ impl Search {
             synthetic: collection.synthetic,
             profile: &profile,
             command: configured.command.clone(),
-            host: Host::of(&opened, 0, started, configured.record(false)),
+            host: configured.host(&opened, 0, false),
         };
         let files = report.write(folder.results()?)?;
         let exit = if collection.problems.is_empty() { Exit::Ok } else { Exit::Incomplete };
@@ -157,18 +152,13 @@ impl Search {
     }
 
     /// The scenarios that the search does not read, their description, and their checksum.
-    fn held_out(
-        &self,
-        configured: &Configured,
-        category: Category,
-        verbosity: Verbosity,
-    ) -> Result<Option<(Vec<Scenario>, String, String)>> {
+    fn held_out(&self, configured: &Configured, category: Category) -> Result<Option<(Vec<Scenario>, String, String)>> {
         let Some(path) = &self.held_out else { return Ok(None) };
         let source = match path.is_dir() {
             true => Source::Recordings { path: path.clone(), preset: self.data.preset.preset.clone() },
             false => Source::Scenarios(path.clone()),
         };
-        let collection = source::load(&source, &configured.settings.mining, self.data.policy(), verbosity)?;
+        let collection = source::load(&source, configured, self.data.policy())?;
         let (data, sha256) = (source.describe(collection.synthetic), source.scenarios_sha256(&collection)?);
         let mut scenarios = collection.scenarios;
         scenarios.retain(|scenario| scenario.category == category);

@@ -81,7 +81,7 @@ from_arguments!(
 );
 
 impl Simulate {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Output> {
+    pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         self.guard_plot()?;
         let (lanes, incomplete) = self.lanes(configured)?;
         let report = TraceReport(&lanes);
@@ -92,7 +92,7 @@ impl Simulate {
         }
         let exit = if incomplete { Exit::Incomplete } else { Exit::Ok };
         let output = self.format.output(exit, || report.csv(), || report.json())?;
-        if verbosity != Verbosity::Quiet {
+        if configured.verbosity != Verbosity::Quiet {
             console::say(&report.text());
         }
         Ok(output)

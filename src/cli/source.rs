@@ -7,13 +7,13 @@ use indicatif::ProgressBar;
 
 use super::arguments::from_arguments;
 use super::configured::Configured;
-use super::console::{self, Verbosity};
+use super::console::{self, Units};
 use super::signals::CANCEL;
 use crate::scenario::{Category, DataProvenance, Driven, Scenario, ScenarioFile, read_scenario_file};
 use crate::support::plausibility::Implausible;
 use crate::support::ranges::refuse_repeats;
 use crate::traffic::Source;
-use crate::traffic::mining::{Collection, MiningOptions, counts, counts_text};
+use crate::traffic::mining::{Collection, counts, counts_text};
 use crate::traffic::trajectory::{InputFile, Inputs};
 use crate::{Error, Place, Result};
 
@@ -22,16 +22,11 @@ use crate::{Error, Place, Result};
 ///
 /// # Errors
 /// As [`Source::load`].
-pub(super) fn load(
-    source: &Source,
-    mining: &MiningOptions,
-    implausible: Implausible,
-    verbosity: Verbosity,
-) -> Result<Collection> {
+pub(super) fn load(source: &Source, configured: &Configured, implausible: Implausible) -> Result<Collection> {
     let what = if matches!(source, Source::Generated(_)) { "generating and mining" } else { "reading and mining" };
-    let bar = console::progress(verbosity, source.recordings(), what);
-    let collection = source.load(mining, implausible, || advance(&bar))?;
-    bar.finish_and_clear();
+    let collection = configured.with_bar(Units::All(source.recordings()), what, |bar| {
+        source.load(&configured.settings.mining, implausible, || advance(bar))
+    })?;
     complain_of(&collection.problems, &collection.notes);
     let data = source.describe(collection.synthetic);
     if data != source.describe(false) {
@@ -127,24 +122,23 @@ impl SourceFlags {
     }
 
     /// Like [`load`].
-    pub(super) fn load(&self, configured: &Configured, verbosity: Verbosity) -> Result<Collection> {
-        load(&self.source(configured), &configured.settings.mining, self.plausibility.policy(), verbosity)
+    pub(super) fn load(&self, configured: &Configured) -> Result<Collection> {
+        load(&self.source(configured), configured, self.plausibility.policy())
     }
 
     /// Like [`load`], but first reports the source of the data.
-    pub(super) fn report_and_load(&self, configured: &Configured, verbosity: Verbosity) -> Result<Collection> {
+    pub(super) fn report_and_load(&self, configured: &Configured) -> Result<Collection> {
         tracing::info!("{}", self.source(configured).describe(false));
-        self.load(configured, verbosity)
+        self.load(configured)
     }
 
     /// Like [`SourceFlags::report_and_load`], with the provenance; `given` are the flags of the exposure.
     pub(super) fn load_with_exposure(
         &self,
         configured: &Configured,
-        verbosity: Verbosity,
         given: Driven,
     ) -> Result<(Collection, DataProvenance)> {
-        let collection = self.report_and_load(configured, verbosity)?;
+        let collection = self.report_and_load(configured)?;
         let provenance = self.source(configured).provenance(&collection, given)?;
         if provenance.driven.is_none() {
             tracing::warn!(

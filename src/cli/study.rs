@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::arguments::{choices, from_arguments};
 use super::configured::Configured;
-use super::console::{self, Verbosity};
+use super::console::{self, Units};
 use super::format::{FormatFlag, TablesFlag};
 use super::shard_flags::ShardFlags;
 use super::source::{self, SourceFlags};
@@ -119,7 +119,7 @@ impl KeepPlan {
 }
 
 impl Study {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Output> {
+    pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         self.guard_inputs(configured)?;
         check_folder(&self.out)?;
         self.rows.as_deref().map_or(Ok(()), check_folder_of)?;
@@ -131,25 +131,25 @@ impl Study {
             if study.facts().reference {
                 opened = configured.open_reference()?;
             }
-            return self.sweep(&study, &opened, configured, Timings::default(), verbosity);
+            return self.sweep(&study, &opened, configured, Timings::default());
         }
         if self.shards.plan_only {
             if self.reference {
                 configured.open_reference()?;
             }
-            let (study, _) = self.prepare(configured, verbosity)?;
+            let (study, _) = self.prepare(configured)?;
             study.write_plan(&self.out)?;
             let exit = if study.facts().incomplete { Exit::Incomplete } else { Exit::Ok };
             return self.format.planned(exit, study.plan().lane_count(), &self.out.join(PLAN_FILE));
         }
         // Open before the work, so that a missing device is reported at once.
         let opened = if self.reference { configured.open_reference()? } else { configured.open()? };
-        let (study, timings) = self.prepare(configured, verbosity)?;
-        self.sweep(&study, &opened, configured, timings, verbosity)
+        let (study, timings) = self.prepare(configured)?;
+        self.sweep(&study, &opened, configured, timings)
     }
 
     /// Makes a plan from the data.
-    fn prepare(&self, configured: &Configured, verbosity: Verbosity) -> Result<(study::Study, Timings)> {
+    fn prepare(&self, configured: &Configured) -> Result<(study::Study, Timings)> {
         let config = configured.settings.clone();
         let profile = configured.profile()?;
         let mut options = StudyOptions {
@@ -168,7 +168,7 @@ impl Study {
             tracing::info!("{}", source.describe(false));
         }
         let mut timings = Timings::default();
-        let collection = timed(&mut timings.mine_s, || self.data.load(configured, verbosity))?;
+        let collection = timed(&mut timings.mine_s, || self.data.load(configured))?;
         for path in &self.external {
             if lists::is_file(&path.to_string_lossy()) {
                 options.searched.push(lists::of_file(&path.to_string_lossy(), &options.categories)?);
@@ -204,7 +204,6 @@ impl Study {
         opened: &OpenBackend,
         configured: &Configured,
         mut timings: Timings,
-        verbosity: Verbosity,
     ) -> Result<Output> {
         let (plan, backend, started) = (study.plan(), opened.backend(), Instant::now());
         let executor = opened.executor().with_recheck(study.facts().score.seed);
@@ -219,14 +218,13 @@ impl Study {
         let units = run.units();
         let lanes = plan.first_lane_of(units.end) - plan.first_lane_of(units.start);
         tracing::info!("{} lanes on {}", readable::count(lanes), backend.describe());
-        let bar = console::progress(verbosity, run.missing()?, "sweeping");
+        let missing = Units::All(run.missing()?);
         let mut rows = self.rows.as_deref().map(|path| study_table(path, study)).transpose()?;
         let mut write = rows.as_mut().map(|rows| |plan: &LanePlan, chunk: &Chunk| write_study_chunk(rows, plan, chunk));
         timed(&mut timings.sweep_s, || {
             let each = write.as_mut().map(|write| write as &mut EachChunk);
-            run.compute(&executor.clone().with_progress(console::inc(&bar)), each)
+            configured.with_progress(missing, "sweeping", &executor, |executor| run.compute(executor, each))
         })?;
-        bar.finish_and_clear();
         if self.shards.is_part() {
             run.write_part()?;
             return Ok(Exit::Ok.into());

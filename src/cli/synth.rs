@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::arguments::from_arguments;
 use super::configured::Configured;
-use super::console::{self, Verbosity};
+use super::console::Units;
 use super::source;
 use super::{Exit, Output};
 use crate::support::files::check_folder;
@@ -30,7 +30,7 @@ pub(super) struct Synth {
 from_arguments!(Synth { folder });
 
 impl Synth {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Output> {
+    pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         let options = &configured.settings.generator;
         check_folder(&self.folder)?;
         let folder = OutputDir::open(&self.folder, SYNTHETIC_MARKER)?;
@@ -51,14 +51,14 @@ impl Synth {
         let sentence = Source::Generated(options.clone()).describe(true);
         let marker = format!("{sentence}\nNo number on these recordings is a statement about real traffic.\n");
         let mut results = folder.results()?;
-        let bar = console::progress(verbosity, options.recordings as u64, "writing recordings");
-        for index in 0..options.recordings {
-            let recording = generate_one(options, index)?;
-            let staged = highd::stage(&self.folder, &recording, &RecordingInfo::default())?;
-            staged.into_iter().for_each(|file| results.join(file.closed()));
-            source::advance(&bar)?;
-        }
-        bar.finish_and_clear();
+        configured.with_bar(Units::All(options.recordings as u64), "writing recordings", |bar| {
+            (0..options.recordings).try_for_each(|index| {
+                let recording = generate_one(options, index)?;
+                let staged = highd::stage(&self.folder, &recording, &RecordingInfo::default())?;
+                staged.into_iter().for_each(|file| results.join(file.closed()));
+                source::advance(bar)
+            })
+        })?;
         // A part of the recordings could be mistaken for all of them, or for real data. All are therefore renamed
         // together, the marker file last.
         results.publish(marker.as_bytes())?;

@@ -3,7 +3,7 @@
 use clap::{Args, Subcommand};
 
 use super::configured::Configured;
-use super::console::{self, Verbosity};
+use super::console::{self, Units};
 use super::devices::Devices;
 use super::format::FormatFlag;
 use super::source::SourceFlags;
@@ -59,7 +59,7 @@ enum VerifyVerb {
 const MAX_LANES: u64 = 100_000_000;
 
 impl Verify {
-    pub(super) fn run(&self, configured: &Configured, verbosity: Verbosity) -> Result<Output> {
+    pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         match &self.verb {
             Some(VerifyVerb::Devices(verb)) => return verb.run(),
             None => (),
@@ -77,7 +77,7 @@ impl Verify {
         let opened = configured.open_to_verify()?;
         let tested = opened.backend();
         if let Some(key) = &self.lane {
-            return self.one_lane(key, configured, &profile, tested, verbosity);
+            return self.one_lane(key, configured, &profile, tested);
         }
         let head = format!("Under test: {}\nProfile {}, seed {}\n", tested.describe(), profile.name, self.seed);
         let is_text = !self.format.is_json();
@@ -86,10 +86,14 @@ impl Verify {
         }
         let mut sets = Vec::new();
         let (mut equal, mut lanes, mut differing) = (true, 0, 0);
-        for (name, plan) in self.sets(configured, &profile, verbosity)? {
-            let bar = console::progress(verbosity, plan.lane_count(), name);
-            let comparison = compare(name, &plan, tested, |lanes| bar.inc(lanes))?;
-            bar.finish_and_clear();
+        for (name, plan) in [
+            ("Random lanes", self.random(&profile)?),
+            ("Lanes on thresholds", self.thresholds(&profile)?),
+            ("Study", self.study(configured, &profile)?),
+        ] {
+            let comparison = configured.with_bar(Units::All(plan.lane_count()), name, |bar| {
+                compare(name, &plan, tested, |lanes| bar.inc(lanes))
+            })?;
             // Print set by set, so that a later failure of the device keeps earlier results.
             if is_text {
                 console::print(&format!("\n{}", verification::comparison(&comparison)))?;
@@ -124,20 +128,6 @@ impl Verify {
         }
     }
 
-    /// The sets with their names.
-    fn sets(
-        &self,
-        configured: &Configured,
-        profile: &Profile,
-        verbosity: Verbosity,
-    ) -> Result<Vec<(&'static str, LanePlan)>> {
-        Ok(vec![
-            ("Random lanes", self.random(profile)?),
-            ("Lanes on thresholds", self.thresholds(profile)?),
-            ("Study", self.study(configured, profile, verbosity)?),
-        ])
-    }
-
     fn random(&self, profile: &Profile) -> Result<LanePlan> {
         let lanes_per_model_and_category = self.random_lanes;
         random_plan(profile, &RandomOptions { seed: self.seed, lanes_per_model_and_category, ..Default::default() })
@@ -148,8 +138,8 @@ impl Verify {
         threshold_plan(profile, &ThresholdOptions { seed: self.seed, units_per_threshold, ..Default::default() })
     }
 
-    fn study(&self, configured: &Configured, profile: &Profile, verbosity: Verbosity) -> Result<LanePlan> {
-        let collection = self.data.load(configured, verbosity)?;
+    fn study(&self, configured: &Configured, profile: &Profile) -> Result<LanePlan> {
+        let collection = self.data.load(configured)?;
         let options = StudyOptions { categories: Category::ALL.to_vec(), ..StudyOptions::default() };
         let plan = plan_study(&collection.scenarios, profile, &options)?;
         if plan.unit_count() == 0 {
@@ -165,20 +155,13 @@ impl Verify {
     }
 
     /// One lane on the three backends.
-    fn one_lane(
-        &self,
-        text: &str,
-        configured: &Configured,
-        profile: &Profile,
-        tested: &dyn Backend,
-        verbosity: Verbosity,
-    ) -> Result<Output> {
+    fn one_lane(&self, text: &str, configured: &Configured, profile: &Profile, tested: &dyn Backend) -> Result<Output> {
         // The keys of the generated sets contain their seed; a user's scenario may start with the same prefix.
         let own = |prefix: &str| text.starts_with(prefix) && text.contains(&format!("-seed{}-", self.seed));
         let plan = match () {
             () if own("random-") => self.random(profile)?,
             () if own("threshold-") => self.thresholds(profile)?,
-            () => self.study(configured, profile, verbosity)?,
+            () => self.study(configured, profile)?,
         };
         let key = plan.parse_key(text).ok_or_else(|| {
             Error::usage(

@@ -6,6 +6,7 @@ use serde::{Deserialize, Serialize};
 use crate::engine::BackendChoice;
 use crate::model::criterion::Criterion;
 use crate::model::driver::Bound;
+use crate::run::sampling::SampleSource;
 use crate::run::score::ScoreOptions;
 use crate::scenario::parameterization::{ParameterizationOptions, SvdLateral};
 use crate::stats::density::{BandwidthRule, DensityKind};
@@ -126,7 +127,7 @@ pub(crate) struct SampleSettings {
     /// Criterion to map, rank or estimate.
     pub criterion: Criterion,
     /// Kind of points of `mc`.
-    pub points: PointKind,
+    pub points: SampleSource,
     /// Kind of interval of `mc`.
     pub interval: IntervalKind,
     /// Level of the intervals.
@@ -157,7 +158,7 @@ impl Default for SampleSettings {
             estimator: EstimatorKind::Auto,
             samples: None,
             criterion: Criterion::Collision,
-            points: PointKind::Random,
+            points: SampleSource::Random,
             interval: IntervalKind::Wilson,
             level: 0.95,
             half_width: None,
@@ -180,17 +181,6 @@ pub(crate) enum EstimatorKind {
     Mc,
     #[allow(missing_docs)]
     Is,
-}
-
-/// Points of crude Monte Carlo.
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "kebab-case")]
-pub(crate) enum PointKind {
-    /// Independent draws
-    #[default]
-    Random,
-    /// Owen-scrambled Sobol points
-    Sobol,
 }
 
 /// Interval of crude Monte Carlo.
