@@ -108,6 +108,27 @@ impl Reading {
     }
 }
 
+/// A clause of which readings are made.
+struct Clause {
+    name: String,
+    /// Its readings are conditions: [`Reading::is_condition`].
+    has_conditions: bool,
+}
+
+impl Clause {
+    /// A reading of a quantity in a unit: its time and value, the required relation to a threshold, the consequence.
+    fn reading(
+        &self,
+        (quantity, unit): (&'static str, &'static str),
+        (time_s, value): (Option<f64>, Option<f64>),
+        (relation, threshold): (Relation, f64),
+        then: &'static str,
+    ) -> Reading {
+        let (clause, is_condition, is_cut_off) = (self.name.clone(), self.has_conditions, false);
+        Reading { clause, is_condition, quantity, unit, value, is_cut_off, relation, threshold, time_s, then }
+    }
+}
+
 /// The readings of a category in the order of the clauses; `unreacting` is the trace of an ego that keeps its speed.
 /// There is no reading of the deviation for a driver that attends at once.
 pub(super) fn readings(
@@ -184,59 +205,38 @@ pub(super) fn lane_intrusion(profile: &Profile, trace: &Trace) -> Vec<Reading> {
     let moved_s = trace.steps.iter().find(moves).map(|step| trace.time_s(step.step.saturating_sub(1)));
     let change_mps = |step: &TracedStep| first.map_or(0.0, |first| (other(step).v_mps - first.v_mps).abs());
     let changed = first_largest(trace.steps.iter().map(|step| (step.time_s, change_mps(step))));
-    let reading = |quantity, unit, value: Option<f64>, relation, threshold, then| Reading {
-        clause: constants.clause.clone(),
-        is_condition: true,
-        quantity,
-        unit,
-        value,
-        is_cut_off: false,
-        relation,
-        threshold,
-        time_s: intrusion.as_ref().map(|intrusion| intrusion.time_s),
-        then,
-    };
+    let clause = Clause { name: constants.clause.clone(), has_conditions: true };
+    let time_s = intrusion.as_ref().map(|intrusion| intrusion.time_s);
     let closing_mps = intrusion.as_ref().map(|intrusion| intrusion.closing_mps);
     let required_s =
         closing_mps.unwrap_or(0.0).max(0.0) / (2.0 * constants.deceleration_mps2) + constants.reaction_time_s;
     let mut list = vec![
-        reading(
-            "(a) relative speed at lane intrusion",
-            "m/s",
-            closing_mps,
-            Relation::Above,
-            0.0,
+        clause.reading(
+            ("(a) relative speed at lane intrusion", "m/s"),
+            (time_s, closing_mps),
+            (Relation::Above, 0.0),
             "the other vehicle is slower",
         ),
-        Reading {
-            time_s: changed.map(|(time_s, _)| time_s),
-            ..reading(
-                "(a) largest change of the other vehicle's speed",
-                "m/s",
-                changed.map(|(_, change_mps)| change_mps),
-                Relation::AtMost,
-                SPEED_MPS,
-                "the other vehicle keeps its speed, to 0.1 km/h",
-            )
-        },
+        clause.reading(
+            ("(a) largest change of the other vehicle's speed", "m/s"),
+            changed.unzip(),
+            (Relation::AtMost, SPEED_MPS),
+            "the other vehicle keeps its speed, to 0.1 km/h",
+        ),
     ];
     if constants.visible_lateral_movement_s > 0.0 {
-        let visible = reading(
-            "(b) lateral movement visible before lane intrusion",
-            "s",
-            intrusion.as_ref().zip(moved_s).map(|(intrusion, moved_s)| intrusion.time_s - moved_s),
-            Relation::AtLeast,
-            constants.visible_lateral_movement_s,
+        let visible = clause.reading(
+            ("(b) lateral movement visible before lane intrusion", "s"),
+            (time_s, time_s.zip(moved_s).map(|(time_s, moved_s)| time_s - moved_s)),
+            (Relation::AtLeast, constants.visible_lateral_movement_s),
             "the movement could be seen",
         );
         list.push(Reading { is_cut_off: has_begun, ..visible });
     }
-    let ttc = reading(
-        "(c) TTC at lane intrusion",
-        "s",
-        intrusion.as_ref().and_then(|intrusion| intrusion.ttc_s),
-        Relation::Above,
-        required_s,
+    let ttc = clause.reading(
+        ("(c) TTC at lane intrusion", "s"),
+        (time_s, intrusion.as_ref().and_then(|intrusion| intrusion.ttc_s)),
+        (Relation::Above, required_s),
         if list.len() > 2 {
             "with (a) and (b): the system has to avoid the collision"
         } else {
@@ -270,22 +270,9 @@ fn competent_driver(profile: &Profile, category: Category, trace: &Trace) -> Vec
         let at_s = event.map(|step| step.time_s + constants.perception_time_s)?;
         trace.steps.iter().find(|step| step.time_s >= at_s - 1e-9)
     };
-    let reading = |quantity, unit, value, relation, threshold, time_s, then| Reading {
-        clause: if constants.wandering_m > 0.0 {
-            "Annex 3, CCHDM".to_owned()
-        } else {
-            format!("CCHDM of {}", profile.name)
-        },
-        is_condition: false,
-        quantity,
-        unit,
-        value,
-        is_cut_off: false,
-        relation,
-        threshold,
-        time_s,
-        then,
-    };
+    let is_annex = constants.wandering_m > 0.0;
+    let name = if is_annex { "Annex 3, CCHDM".to_owned() } else { format!("CCHDM of {}", profile.name) };
+    let clause = Clause { name, has_conditions: false };
     if category == Category::Lvd {
         // The deceleration of a step acts from the step before.
         let decelerations = trace
@@ -301,15 +288,9 @@ fn competent_driver(profile: &Profile, category: Category, trace: &Trace) -> Vec
         } else {
             "perceived after the risk perception time"
         };
-        return vec![reading(
-            if delay_only { "deceleration at the leader's first loss of speed" } else { "deceleration of the leader" },
-            "m/s²",
-            found.map(|(_, deceleration)| deceleration),
-            Relation::Above,
-            trigger_mps2,
-            found.map(|(time_s, _)| time_s),
-            then,
-        )];
+        let quantity =
+            if delay_only { "deceleration at the leader's first loss of speed" } else { "deceleration of the leader" };
+        return vec![clause.reading((quantity, "m/s²"), found.unzip(), (Relation::Above, trigger_mps2), then)];
     }
     let wandering_m = constants.wandering_m;
     // A driver without wandering attends to vehicles within its lateral gate.
@@ -320,23 +301,17 @@ fn competent_driver(profile: &Profile, category: Category, trace: &Trace) -> Vec
     let seen = perceived(event);
     let found = first_above(trace.steps.iter().map(|step| (step.time_s, deviation_m(step))), wandering_m);
     let mut list = if sees_gate {
-        vec![reading(
-            "lateral gap at which the driver begins to see",
-            "m",
-            event.map(|step| step.others[0].lateral_gap_m),
-            Relation::AtMost,
-            constants.lateral_gate_m,
-            event.map(|step| step.time_s),
+        vec![clause.reading(
+            ("lateral gap at which the driver begins to see", "m"),
+            event.map(|step| (step.time_s, step.others[0].lateral_gap_m)).unzip(),
+            (Relation::AtMost, constants.lateral_gate_m),
             "perceived at once",
         )]
     } else {
-        vec![reading(
-            "deviation from the lane centre",
-            "m",
-            found.map(|(_, deviation)| deviation),
-            Relation::Above,
-            wandering_m,
-            found.map(|(time_s, _)| time_s),
+        vec![clause.reading(
+            ("deviation from the lane centre", "m"),
+            found.unzip(),
+            (Relation::Above, wandering_m),
             "perceived after the risk perception time",
         )]
     };
@@ -365,7 +340,8 @@ fn competent_driver(profile: &Profile, category: Category, trace: &Trace) -> Vec
             }
             _ => "braking begins after the delay; else once it holds",
         };
-        list.push(reading(quantity, "s", value, Relation::AtMost, threshold, seen.map(|step| step.time_s), then));
+        let at = (seen.map(|step| step.time_s), value);
+        list.push(clause.reading((quantity, "s"), at, (Relation::AtMost, threshold), then));
     }
     list
 }
@@ -376,17 +352,10 @@ fn fuzzy_driver(trace: &Trace) -> Vec<Reading> {
     let largest = |of: fn(&TracedVehicle) -> f64| {
         first.map(|step| step.others[..trace.vehicles].iter().map(of).fold(0.0, f64::max))
     };
-    let reading = |quantity, value| Reading {
-        clause: "Annex 3, FSM".to_owned(),
-        is_condition: false,
-        quantity,
-        unit: "1",
-        value,
-        is_cut_off: false,
-        relation: Relation::Above,
-        threshold: 0.0,
-        time_s: first.map(|step| step.time_s),
-        then: "the driver reacts",
+    let clause = Clause { name: "Annex 3, FSM".to_owned(), has_conditions: false };
+    let reading = |quantity, value| {
+        let at = (first.map(|step| step.time_s), value);
+        clause.reading((quantity, "1"), at, (Relation::Above, 0.0), "the driver reacts")
     };
     vec![
         reading("PFS at the reaction", largest(|other| other.pfs)),
