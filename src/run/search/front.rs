@@ -1,12 +1,14 @@
 //! The conclusion of a search: the best description of each size, judged again with intervals, in sample, and on data that
 //! the search has not read, beside the paper's parameterizations.
 
+use std::cmp::Reverse;
+
 use super::evaluation::{Evaluation, Evaluator, Training, of_paper};
 use super::{Candidate, Evaluated, Scope, Search, SearchOptions, candidates, cell_of};
 use crate::engine::{Confusion, Executor};
 use crate::model::driver::ModelId;
 use crate::run::score::{Contrast, ScenarioRate, ScoreInterval, min_contrast};
-use crate::scenario::parameterization::{Parameterization, Reduction};
+use crate::scenario::parameterization::Parameterization;
 use crate::scenario::{Category, Scenario};
 use crate::{Error, Place, Result};
 
@@ -53,20 +55,14 @@ impl FrontPoint {
     /// The verdict over all models of gains against the paper's best.
     pub fn verdict(&self) -> &'static str {
         let gains = if self.held_out_gains.is_empty() { &self.gains } else { &self.held_out_gains };
-        if gains.iter().any(|(_, gain)| gain.is_none()) {
-            return "not compared: undefined or without interval";
-        }
-        let all = |of: &dyn Fn(f64, f64) -> bool| {
-            !gains.is_empty()
-                && gains.iter().all(|(_, gain)| gain.is_some_and(|(_, interval)| of(interval.low, interval.high)))
-        };
-        let any_below = gains.iter().any(|(_, gain)| gain.is_some_and(|(_, interval)| interval.high < 0.0));
+        let gains: Option<Vec<ScoreInterval>> =
+            gains.iter().map(|(_, gain)| gain.map(|(_, interval)| interval)).collect();
+        let Some(gains) = gains else { return "not compared: undefined or without interval" };
+        let better = gains.iter().filter(|gain| gain.low > 0.0).count();
         match () {
-            () if all(&|low, _| low > 0.0) => "better for every model",
-            () if any_below => "worse for a model shown",
-            () if gains.iter().any(|(_, gain)| gain.is_some_and(|(_, interval)| interval.low > 0.0)) => {
-                "better for a model, worse shown for none"
-            }
+            () if better > 0 && better == gains.len() => "better for every model",
+            () if gains.iter().any(|gain| gain.high < 0.0) => "worse for a model shown",
+            () if better > 0 => "better for a model, worse shown for none",
             () => "no difference shown",
         }
     }
@@ -185,32 +181,26 @@ pub(super) fn conclude(
             held_out: held_out.as_ref().and_then(|of| Some(scored(of[at].as_ref()?, scope, options))),
         })
     };
-    let rmse = |at: usize| cross_validated[at].as_ref().map_or(f64::NAN, |of| of.rmse);
     let mut fronts = Vec::new();
     for (scope, chosen) in scopes.iter().zip(&chosen) {
         let scope = *scope;
-        let plain = |at: usize, candidate: &Candidate| {
+        let plain = |candidate: &Candidate| {
+            let at = found(candidate)?;
             Some(FrontPoint {
                 candidate: candidate.clone(),
                 parameters: candidate.parameter_count(category),
                 judged: judged(at, scope)?,
-                rmse: rmse(at),
+                rmse: cross_validated[at].as_ref()?.rmse,
                 gains: Vec::new(),
                 held_out_gains: Vec::new(),
                 below_best: None,
             })
         };
-        let of_paper = paper.iter().enumerate();
-        let of_paper = of_paper.filter_map(|(at, candidate)| Some((at, plain(at, candidate)?)));
-        let of_paper: Vec<(usize, FrontPoint)> = of_paper.collect();
-        let value = |(_, (_, point)): &(usize, &(usize, FrontPoint))| point.judged.cross_validated.value;
-        let best_paper = of_paper
-            .iter()
-            .enumerate()
-            .filter(|item| value(item).is_some())
-            .max_by(|a, b| value(a).unwrap_or_default().total_cmp(&value(b).unwrap_or_default()))
-            .map(|(index, _)| index);
-        let rival = best_paper.map(|index| of_paper[index].0);
+        let paper: Vec<FrontPoint> = paper.iter().filter_map(plain).collect();
+        let valued = paper.iter().enumerate();
+        let valued = valued.filter_map(|(index, point)| Some((index, point.judged.cross_validated.value?)));
+        let best_paper = valued.max_by(|a, b| a.1.total_cmp(&b.1)).map(|(index, _)| index);
+        let rival = best_paper.and_then(|index| found(&paper[index].candidate));
         let best = chosen.last().and_then(found);
         let gains = |of: &[Option<Evaluation>], at: usize| {
             let of_model = |model: ModelId| {
@@ -229,7 +219,7 @@ pub(super) fn conclude(
                 gains: gains(&cross_validated, at),
                 held_out_gains: held_out.as_ref().map_or(Vec::new(), |of| gains(of, at)),
                 below_best,
-                ..plain(at, candidate)?
+                ..plain(candidate)?
             })
         };
         let points: Vec<FrontPoint> = chosen.iter().filter_map(point).collect();
@@ -244,7 +234,6 @@ pub(super) fn conclude(
         let is_sampled = |point: &FrontPoint| !matches!(&point.candidate, Candidate::Linear(spec) if spec.registered);
         let winner = points.iter().enumerate().position(|of| is_enough(of) && is_sampled(of.1));
         let winner = winner.or_else(|| points.iter().rposition(is_sampled));
-        let paper = of_paper.into_iter().map(|(_, point)| point).collect();
         let headway_only = [
             evaluator.headway_only(scope, options),
             unread_evaluator.as_ref().and_then(|evaluator| evaluator.headway_only(scope, options)),
@@ -346,7 +335,7 @@ fn fitted(candidate: &Candidate, search: &Search) -> Result<Parameterization> {
             }
         }
     };
-    let reduction: Reduction = spec.fit(category, &search.scenarios, parameterization)?;
+    let reduction = spec.fit(category, &search.scenarios, parameterization)?;
     Ok(Parameterization::linear("winner", reduction))
 }
 
@@ -372,13 +361,7 @@ fn unkept(all: &[Candidate], evaluations: &[Option<Evaluation>], search: &Search
             }
         }
     }
-    unkept.sort_by(|a, b| {
-        (a.parameters, std::cmp::Reverse(a.lanes), &a.scenario).cmp(&(
-            b.parameters,
-            std::cmp::Reverse(b.lanes),
-            &b.scenario,
-        ))
-    });
+    unkept.sort_by_cached_key(|of| (of.parameters, Reverse(of.lanes), of.scenario.clone()));
     unkept
 }
 

@@ -27,7 +27,7 @@ impl StudyHead {
             let variants = std::iter::once("S".to_owned()).chain(variants).collect();
             blocks.push(Block::new(block.category, Units::Held(block.units, from - first, names.into()), variants));
             let basis = block.basis.clone();
-            let of_basis = |basis| Reduction::from_parts(block.category, basis, &self.parameterization);
+            let of_basis = |basis| Reduction::from_parts(block.category, basis, &self.parameterization, None);
             reductions.push(basis.map(of_basis).transpose()?);
             first = end;
         }

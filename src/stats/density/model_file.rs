@@ -150,7 +150,7 @@ impl File {
             };
             let d = basis.directions.len().min(self.parameters.len());
             let linear = self.searched.map(|(spec, encoder)| (spec, encoder, self.parameters[..d].to_vec()));
-            Reduction::from_linear_parts(self.category, basis, &self.options, linear)
+            Reduction::from_parts(self.category, basis, &self.options, linear)
         });
         let reduction = reduction.transpose().map_err(below)?;
         let searched = reduction.as_ref().filter(|reduction| reduction.spec().is_some());

@@ -119,7 +119,7 @@ impl Parameterization {
                 fitted.options.validate()?;
                 let Fitted { spec, parameters, encoder, basis, options } = fitted;
                 let linear = Some((spec, encoder, parameters));
-                let reduction = Reduction::from_linear_parts(file.category, basis, &options, linear);
+                let reduction = Reduction::from_parts(file.category, basis, &options, linear);
                 reduction.map(|reduction| Parameterization::linear(key, reduction)).map_err(|e| wrong(e.to_string()))
             }
         }

@@ -107,28 +107,24 @@ impl Feature {
 
     /// The features of a category, in order.
     pub fn of_category(category: Category) -> impl Iterator<Item = Feature> {
-        Self::ALL.into_iter().filter(move |feature| match feature.actor() {
-            Actor::Ego => category != Category::Lvd,
-            Actor::Lead => category == Category::CutOut,
-            Actor::TargetAcross => category != Category::Lvd,
-            Actor::All | Actor::TargetAlong => true,
-        })
+        Self::ALL.into_iter().filter(move |feature| feature.exists_in(category))
     }
 
-    fn actor(self) -> Actor {
+    fn exists_in(self, category: Category) -> bool {
         match self {
-            // In LVD the ego starts at the leader's speed.
-            Feature::EgoSpeed => Actor::Ego,
-            Feature::Duration => Actor::All,
-            Feature::LeadGap | Feature::LeadSpeed | Feature::LeadSpeedEnd | Feature::LeadAcceleration => Actor::Lead,
-            Feature::LateralSpeed
+            Feature::LeadGap | Feature::LeadSpeed | Feature::LeadSpeedEnd | Feature::LeadAcceleration => {
+                category == Category::CutOut
+            }
+            // In LVD the ego starts at the leader's speed, and the leader stays in its lane.
+            Feature::EgoSpeed
+            | Feature::LateralSpeed
             | Feature::LateralSpeedStart
             | Feature::LateralSpeedPeak
             | Feature::LateralStart
             | Feature::LateralHalf
             | Feature::LateralEnd
-            | Feature::CrossingTime => Actor::TargetAcross,
-            _ => Actor::TargetAlong,
+            | Feature::CrossingTime => category != Category::Lvd,
+            _ => true,
         }
     }
 
@@ -162,7 +158,7 @@ impl Feature {
             Feature::CrossingTime => ("crossing_time_s", "s", Some(0.0)),
             Feature::LeadSpeedEnd => ("v_lead_end_mps", "m/s", Some(0.0)),
         };
-        Parameter { name: name.to_owned(), unit: unit.to_owned(), lower, lower_excluded: false, upper: None }
+        Parameter::from(name, unit, lower)
     }
 
     /// The value in a scenario.
@@ -217,14 +213,6 @@ impl Feature {
             Feature::LeadAcceleration => mean_acceleration(vehicle_ahead(scenario)?.0, duration_s),
         })
     }
-}
-
-enum Actor {
-    All,
-    Ego,
-    TargetAlong,
-    TargetAcross,
-    Lead,
 }
 
 /// The fraction of the duration at which the magnitude of a series first passes a limit; 1 if it does not.

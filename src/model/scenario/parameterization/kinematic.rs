@@ -64,16 +64,9 @@ impl Values {
 impl Kinematic {
     /// Whether scenarios of the category can have these features.
     pub(super) fn exists_in(self, category: Category) -> bool {
-        match category {
-            Category::CutIn | Category::CutOut => {
-                self.lane_change != LaneChange::None
-                    && matches!(self.speed, SpeedProfile::Constant | SpeedProfile::ConstantAcceleration)
-            }
-            Category::Lvd => {
-                self.lane_change == LaneChange::None
-                    && matches!(self.speed, SpeedProfile::ConstantAcceleration | SpeedProfile::Sinusoidal)
-            }
-        }
+        let is_lvd = category == Category::Lvd;
+        let lacking = if is_lvd { SpeedProfile::Constant } else { SpeedProfile::Sinusoidal };
+        is_lvd == (self.lane_change == LaneChange::None) && self.speed != lacking
     }
 
     /// The variables in the order of a point's numbers.

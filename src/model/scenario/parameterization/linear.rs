@@ -200,18 +200,21 @@ impl LinearSpec {
         let shape = Shape { series: series.len(), instants: options.svd_instants };
         let weights = column_weights(&rows, (shape.series, lateral), shape.instants, options.series_scale, &name)?;
         let extra = |variable: &Variable| variable.parameter(category, &options);
-        let landmark = self.registered.then(landmark_parameter);
+        let landmark =
+            Parameter { lower_excluded: true, upper: Some(1.0), ..Parameter::from("landmark", "1", Some(0.0)) };
+        let landmark = self.registered.then_some(landmark);
         let (basis, encoder, parameters) = match &self.family {
             LinearFamily::Svd { coefficients, signal, emphasis } => {
                 let parameters = (0..*coefficients).map(Parameter::coefficient).collect();
-                let (basis, encoder) = match signal {
+                let (mut basis, encoder) = match signal {
                     Signal::Values => {
                         let weights = emphasized(&weights, emphasis, shape);
                         (decompose(&rows, weights, &name)?, Encoder::Directions)
                     }
                     Signal::Changes => of_changes(&rows, &weights, shape, *coefficients, &name)?,
                 };
-                (truncated(basis, *coefficients), encoder, parameters)
+                basis.directions.truncate(*coefficients);
+                (basis, encoder, parameters)
             }
             LinearFamily::Functions { kind, sizes } => {
                 let names = series.iter().zip(sizes).flat_map(|(of, size)| {
@@ -223,13 +226,7 @@ impl LinearSpec {
                     // Amplitudes and control points may be negative where the speed is not.
                     let lower = lower.filter(|_| *kind == FunctionKind::Lines);
                     let suffix = unit.replace('/', "p");
-                    (1..=*size).map(move |i| Parameter {
-                        name: format!("{name}_{i}_{suffix}"),
-                        unit: unit.to_owned(),
-                        lower,
-                        lower_excluded: false,
-                        upper: None,
-                    })
+                    (1..=*size).map(move |i| Parameter::from(format!("{name}_{i}_{suffix}"), unit, lower))
                 });
                 let parameters = names.chain(extras.iter().map(extra)).chain(landmark).collect();
                 let (basis, encoder) = of_functions(*kind, sizes, weights, shape, rows.len());
@@ -244,13 +241,8 @@ impl LinearSpec {
                 (regression(&rows, &points, weights, &name)?, Encoder::Features(features.clone()), parameters)
             }
         };
-        Ok(Reduction::linear(category, basis, &options, (self.clone(), encoder, parameters)))
+        Ok(Reduction { category, basis, options, linear: Some((self.clone(), encoder, parameters)) })
     }
-}
-
-fn landmark_parameter() -> Parameter {
-    let (lower, upper) = (Some(0.0), Some(1.0));
-    Parameter { name: "landmark".to_owned(), unit: "1".to_owned(), lower, lower_excluded: true, upper }
 }
 
 /// The layout of a vector: series of equal length, then extras.
@@ -277,11 +269,6 @@ fn emphasized(weights: &[f64], emphasis: &[f64], shape: Shape) -> Vec<f64> {
         Some(knots[below] + (knots[below + 1] - knots[below]) * (place - below as f64))
     };
     weights.iter().enumerate().map(|(column, w)| w * libm::exp(at_column(column).unwrap_or(0.0))).collect()
-}
-
-fn truncated(mut basis: SvdBasis, count: usize) -> SvdBasis {
-    basis.directions.truncate(count);
-    basis
 }
 
 /// Decomposition of initial values and changes, written as a basis of the values.
@@ -323,7 +310,8 @@ fn of_changes(
         let problem = "a series never changes, or begins equal in all scenarios";
         return Err(Error::input(Place::item(name), problem, "use more data"));
     }
-    let basis = truncated(decompose(&changed, of_changes.clone(), name)?, count);
+    let mut basis = decompose(&changed, of_changes.clone(), name)?;
+    basis.directions.truncate(count);
     let unweighted = |row: &[f64]| -> Vec<f64> {
         let u: Vec<f64> = row.iter().zip(&of_changes).map(|(v, w)| v / w).collect();
         values(&u).iter().zip(weights).map(|(z, w)| z * w).collect()

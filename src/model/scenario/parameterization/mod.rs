@@ -269,8 +269,7 @@ impl Parameterization {
             Family::Kinematic(features) => features.decode(self.category, point, sizes, grid.into(), options),
             // A point has no side, so its lateral series is not mirrored.
             Family::Svd(_) | Family::Linear(_) => {
-                let reduction = self.fitted(reduction)?;
-                reduction.case_of(&reduction.rebuild(point, 1.0), sizes, grid)
+                self.fitted(reduction)?.rebuild(point, 1.0).case(self.category, sizes, grid.into())
             }
         }
     }

@@ -99,7 +99,7 @@ impl Variable {
             Variable::MeanDeceleration => ("mean_deceleration_mps2", "m/s²", Some(0.0), true, None),
             Variable::TimeHeadway => ("thw_s", "s", Some(0.0), true, None),
         };
-        Parameter { name: name.to_owned(), unit: unit.to_owned(), lower, lower_excluded, upper }
+        Parameter { lower_excluded, upper, ..Parameter::from(name, unit, lower) }
     }
 
     /// Returns the value in a mined scenario.
@@ -150,9 +150,14 @@ impl Parameter {
         }
     }
 
+    /// A number from `lower` on.
+    pub(super) fn from(name: impl Into<String>, unit: &str, lower: Option<f64>) -> Parameter {
+        Parameter { name: name.into(), unit: unit.to_owned(), lower, lower_excluded: false, upper: None }
+    }
+
     /// Coefficient `j` of a decomposition, counted from 0: unbounded, dimensionless.
     pub(super) fn coefficient(j: usize) -> Parameter {
-        Parameter { name: format!("c{}", j + 1), unit: "1".to_owned(), lower: None, lower_excluded: false, upper: None }
+        Parameter::from(format!("c{}", j + 1), "1", None)
     }
 
     /// Whether a value is within the bounds; false for NaN.

@@ -60,9 +60,9 @@ pub struct Reduction {
     pub category: Category,
     /// Weights, mean, directions.
     pub basis: SvdBasis,
-    options: ParameterizationOptions,
+    pub(super) options: ParameterizationOptions,
     /// Specification, encoder and parameters of a basis that is not the paper's decomposition.
-    linear: Option<(LinearSpec, Encoder, Vec<Parameter>)>,
+    pub(super) linear: Option<(LinearSpec, Encoder, Vec<Parameter>)>,
 }
 
 /// Range of the instant of a landmark, in units of T.
@@ -124,16 +124,6 @@ impl Reduction {
         Ok(Reduction { category, basis, options: options.clone(), linear: None })
     }
 
-    /// A basis of another family.
-    pub(super) fn linear(
-        category: Category,
-        basis: SvdBasis,
-        options: &ParameterizationOptions,
-        linear: (LinearSpec, Encoder, Vec<Parameter>),
-    ) -> Reduction {
-        Reduction { category, basis, options: options.clone(), linear: Some(linear) }
-    }
-
     /// The same specification fitted on other scenarios.
     ///
     /// # Errors
@@ -173,17 +163,12 @@ impl Reduction {
         self.spec().is_some_and(|spec| spec.registered)
     }
 
-    /// A previously fitted decomposition, as a density file holds it.
+    /// A previously fitted decomposition, as a density file holds it, or a basis of another family.
     ///
     /// # Errors
     /// [`Error::Input`] if lengths do not match the category and the number of instants, a number is not finite, or a
     /// weight is not above 0.
-    pub fn from_parts(category: Category, basis: SvdBasis, options: &ParameterizationOptions) -> Result<Reduction> {
-        Reduction::from_linear_parts(category, basis, options, None)
-    }
-
-    /// The same for a basis of another family.
-    pub fn from_linear_parts(
+    pub fn from_parts(
         category: Category,
         basis: SvdBasis,
         options: &ParameterizationOptions,
@@ -313,15 +298,7 @@ impl Reduction {
 
     /// The case of a scenario reduced to `d` coefficients, with the scenario's sizes.
     pub fn case(&self, scenario: &Scenario, d: usize, grid: impl Into<TimeGrid>) -> Result<Case> {
-        self.case_of(&self.reduce(scenario, d)?, &Sizes::of(scenario), grid)
-    }
-
-    /// The case of a reconstructed scenario on a time grid.
-    ///
-    /// # Errors
-    /// [`Error::Input`] for a cut-out without the size of the vehicle ahead.
-    pub(super) fn case_of(&self, reduced: &ReducedScenario, sizes: &Sizes, grid: impl Into<TimeGrid>) -> Result<Case> {
-        reduced.case(self.category, sizes, grid.into())
+        self.reduce(scenario, d)?.case(self.category, &Sizes::of(scenario), grid.into())
     }
 
     /// The series of the decomposition with their shapes over the given scenarios. Left-positive series use only the
