@@ -55,15 +55,8 @@ pub enum CaseStyle {
 /// value, within a row along `x`.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Grid {
-    name: String,
-    category: Category,
-    x: GridAxis,
-    y: GridAxis,
-    panel_axes: Vec<GridAxis>,
+    parts: GridParts,
     panels: Vec<Vec<f64>>,
-    fixed: Vec<(&'static MapParameter, f64)>,
-    style: CaseStyle,
-    native_gap: bool,
     perturbation: Option<Perturbation>,
 }
 
@@ -115,29 +108,30 @@ impl Grid {
     ///
     /// # Errors
     /// [`Error::Usage`] with the parameter.
-    pub fn new(parts: GridParts) -> Result<Grid> {
-        let GridParts { name, category, x, y, panel_axes, fixed, style, native_gap, closing_only, panel_rows } = parts;
-        let axes = || [&x, &y].into_iter().chain(&panel_axes);
-        let given: Vec<&MapParameter> = axes().map(|a| a.parameter).chain(fixed.iter().map(|(p, _)| *p)).collect();
+    pub fn new(mut parts: GridParts) -> Result<Grid> {
+        let axes = || [&parts.x, &parts.y].into_iter().chain(&parts.panel_axes);
+        let fixed = parts.fixed.iter().map(|(parameter, _)| *parameter);
+        let given: Vec<&MapParameter> = axes().map(|axis| axis.parameter).chain(fixed).collect();
         MapParameter::refuse_repeats(&given)?;
         for axis in axes() {
             refuse_repeats(|| Place::item(axis.parameter.key), axis.values.iter().map(|v| (v.to_bits(), v)))?;
         }
         let has = |quantity| given.iter().any(|p| p.quantity == quantity);
-        check_complete(category, native_gap, &has, FOR_A_MAP)?;
-        let panels = match panel_rows {
-            Some(rows) => checked(rows, &panel_axes)?,
-            None => combinations(&panel_axes)?,
+        check_complete(parts.category, parts.native_gap, &has, FOR_A_MAP)?;
+        let panels = match parts.panel_rows.take() {
+            Some(rows) => checked(rows, &parts.panel_axes)?,
+            None => combinations(&parts.panel_axes)?,
         };
-        let cells = panels.len().saturating_mul(x.len()).saturating_mul(y.len());
+        let (nx, ny) = (parts.x.len(), parts.y.len());
+        let cells = panels.len().saturating_mul(nx).saturating_mul(ny);
         if cells > MAX_CELLS {
-            let problem = format!("{} panels of {} × {} cells are {cells} cells", panels.len(), x.len(), y.len());
+            let problem = format!("{} panels of {nx} × {ny} cells are {cells} cells", panels.len());
             let help = format!("use longer steps or fewer panels: {MAX_CELLS} cells at most");
-            return Err(Error::usage(Place::item(name), problem, help));
+            return Err(Error::usage(Place::item(parts.name), problem, help));
         }
-        let mut grid = Grid { name, category, x, y, panel_axes, panels, fixed, style, native_gap, perturbation: None };
+        let mut grid = Grid { parts, panels, perturbation: None };
         grid.leave_out_backwards();
-        if closing_only {
+        if grid.parts.closing_only {
             grid.leave_out_receding()?;
         }
         Ok(grid)
@@ -150,7 +144,8 @@ impl Grid {
         let (left, kept): (Vec<_>, Vec<_>) =
             self.panels.iter().cloned().partition(|panel| other_mps(panel).is_some_and(|mps| mps < 0.0));
         let Some(first) = left.first().filter(|_| !kept.is_empty()) else { return };
-        let values = self.panel_axes.iter().zip(first).map(|(axis, value)| format!("{}={value}", axis.parameter.key));
+        let values =
+            self.parts.panel_axes.iter().zip(first).map(|(axis, value)| format!("{}={value}", axis.parameter.key));
         tracing::warn!(
             "{} of {} panels are left out: the other vehicle would drive backwards, first at {}",
             left.len(),
@@ -187,27 +182,27 @@ impl Grid {
 
     /// Name, for files and tables.
     pub fn name(&self) -> &str {
-        &self.name
+        &self.parts.name
     }
 
     /// Kind of scenario.
     pub fn category(&self) -> Category {
-        self.category
+        self.parts.category
     }
 
     /// The horizontal axis.
     pub fn x(&self) -> &GridAxis {
-        &self.x
+        &self.parts.x
     }
 
     /// The vertical axis.
     pub fn y(&self) -> &GridAxis {
-        &self.y
+        &self.parts.y
     }
 
     /// Parameters that distinguish the panels.
     pub fn panel_axes(&self) -> &[GridAxis] {
-        &self.panel_axes
+        &self.parts.panel_axes
     }
 
     /// The panels: a value for each of [`Grid::panel_axes`]. At least one.
@@ -217,78 +212,81 @@ impl Grid {
 
     /// Values that are equal in every cell.
     pub fn fixed(&self) -> &[(&'static MapParameter, f64)] {
-        &self.fixed
+        &self.parts.fixed
     }
 
     /// How a point becomes a case.
     pub fn style(&self) -> CaseStyle {
-        self.style
+        self.parts.style
     }
 
     /// Whether each model starts at its own distance.
     pub fn has_native_gap(&self) -> bool {
-        self.native_gap
+        self.parts.native_gap
     }
 
     /// Number of cells.
     pub fn cell_count(&self) -> usize {
-        self.panels.len() * self.x.len() * self.y.len()
+        self.panels.len() * self.parts.x.len() * self.parts.y.len()
     }
 
     /// Index of a cell from panel, horizontal index and vertical index.
     pub fn cell(&self, panel: usize, i: usize, j: usize) -> usize {
-        (panel * self.y.len() + j) * self.x.len() + i
+        (panel * self.parts.y.len() + j) * self.parts.x.len() + i
     }
 
     /// Panel, horizontal index and vertical index of a cell below [`Grid::cell_count`].
     pub fn places(&self, cell: usize) -> (usize, usize, usize) {
-        let (nx, ny) = (self.x.len(), self.y.len());
+        let (nx, ny) = (self.parts.x.len(), self.parts.y.len());
         (cell / (nx * ny), cell % nx, cell / nx % ny)
     }
 
     /// The values of a cell in the units of their parameters: first the panel's, then `y`, then `x`.
     pub fn values(&self, cell: usize) -> Vec<(&'static MapParameter, f64)> {
         let (panel, i, j) = self.places(cell);
-        let of_panel = self.panel_axes.iter().map(|a| a.parameter).zip(self.panels[panel].iter().copied());
-        of_panel.chain([(self.y.parameter, self.y.values[j]), (self.x.parameter, self.x.values[i])]).collect()
+        let of_panel = self.parts.panel_axes.iter().map(|a| a.parameter).zip(self.panels[panel].iter().copied());
+        of_panel
+            .chain([(self.parts.y.parameter, self.parts.y.values[j]), (self.parts.x.parameter, self.parts.x.values[i])])
+            .collect()
     }
 
     /// The point of a cell, in SI units, fixed values included.
     pub fn point(&self, cell: usize) -> Point {
         let (panel, i, j) = self.places(cell);
         let mut point = self.panel_point(&self.panels[panel]);
-        point.set(self.y.parameter, self.y.values[j]);
-        point.set(self.x.parameter, self.x.values[i]);
+        point.set(self.parts.y.parameter, self.parts.y.values[j]);
+        point.set(self.parts.x.parameter, self.parts.x.values[i]);
         self.perturbation.map_or(point, |perturbation| perturbation.of_inputs(point))
     }
 
     /// The same cells with a perturbed case each; sizes that the grid does not set are those of the profile.
     fn perturbed(&self, perturbation: Perturbation, profile: &Profile) -> Grid {
         let mut grid = Grid { perturbation: Some(perturbation), ..self.clone() };
-        let is_set = |quantity| self.values(0).iter().chain(&self.fixed).any(|(known, _)| known.quantity == quantity);
+        let is_set =
+            |quantity| self.values(0).iter().chain(&self.parts.fixed).any(|(known, _)| known.quantity == quantity);
         let frame = &profile.frame;
         for (quantity, size_m) in
             [(MapQuantity::Length, frame.default_length_m), (MapQuantity::Width, frame.default_width_m)]
         {
             let parameter = PARAMETERS.iter().find(|known| known.quantity == quantity);
-            grid.fixed.extend(parameter.filter(|_| !is_set(quantity)).map(|parameter| (parameter, size_m)));
+            grid.parts.fixed.extend(parameter.filter(|_| !is_set(quantity)).map(|parameter| (parameter, size_m)));
         }
         grid
     }
 
     /// The perturbations of the cells' inputs.
     pub fn perturbations(&self) -> Vec<Perturbation> {
-        let mut all = Perturbation::all(self.category);
-        all.retain(|by| self.style == CaseStyle::Plain || !by.is_of_geometry());
+        let mut all = Perturbation::all(self.parts.category);
+        all.retain(|by| self.parts.style == CaseStyle::Plain || !by.is_of_geometry());
         all
     }
 
     fn panel_point(&self, panel: &[f64]) -> Point {
         let mut point = Point::default();
-        for (parameter, value) in &self.fixed {
+        for (parameter, value) in &self.parts.fixed {
             point.set(parameter, *value);
         }
-        for (axis, value) in self.panel_axes.iter().zip(panel) {
+        for (axis, value) in self.parts.panel_axes.iter().zip(panel) {
             point.set(axis.parameter, *value);
         }
         point
@@ -297,9 +295,9 @@ impl Grid {
     /// The profile for sweeping the grid: the JRC's comparison sweep has its own rules.
     pub fn profile(&self, profile: &Profile) -> Profile {
         let mut profile = profile.clone();
-        if self.style == CaseStyle::JrcComparison {
+        if self.parts.style == CaseStyle::JrcComparison {
             profile.cchdm.abort_on_large_ttc = true;
-            let of = |cell| run_up(self.style, &self.point(cell), profile.frame.dt_s);
+            let of = |cell| run_up(self.parts.style, &self.point(cell), profile.frame.dt_s);
             let longest = (0..self.cell_count()).map(of).max().unwrap_or(0);
             profile.frame.time_cap_s += f64::from(longest) * profile.frame.dt_s;
         }
@@ -316,12 +314,12 @@ impl Grid {
         let ego_mps = value(MapQuantity::EgoSpeed, 0.0);
         let other_mps = value(MapQuantity::OtherSpeed, ego_mps);
         let lateral_mps = value(MapQuantity::LateralSpeed, 0.0);
-        if self.style == CaseStyle::Plain {
-            return point.plain_case(self.category, profile)?.case(profile.frame.time_cap_s);
+        if self.parts.style == CaseStyle::Plain {
+            return point.plain_case(self.parts.category, profile)?.case(profile.frame.time_cap_s);
         }
-        Ok(match self.category {
+        Ok(match self.parts.category {
             Category::CutIn => {
-                jrc_case::cut_in(ego_mps, other_mps, lateral_mps, run_up(self.style, &point, dt_s), dt_s)
+                jrc_case::cut_in(ego_mps, other_mps, lateral_mps, run_up(self.parts.style, &point, dt_s), dt_s)
             }
             Category::Lvd => {
                 let (end, deceleration) = (value(MapQuantity::EndSpeed, 0.0), value(MapQuantity::Deceleration, 0.0));
@@ -340,7 +338,7 @@ impl Grid {
     pub fn gap_m(&self, cell: usize, model: ModelId, profile: &Profile) -> f64 {
         let point = self.point(cell);
         let ego_mps = point.get(MapQuantity::EgoSpeed).unwrap_or(0.0);
-        if self.native_gap {
+        if self.parts.native_gap {
             return jrc_case::native_distance(profile, model, ego_mps);
         }
         let of_headway = point.get(MapQuantity::Thw).map(|thw_s| thw_s * ego_mps);
@@ -352,7 +350,8 @@ impl Grid {
         let point = self.point(cell);
         let ego_mps = point.get(MapQuantity::EgoSpeed).unwrap_or(0.0);
         let other_mps = point.get(MapQuantity::OtherSpeed).unwrap_or(ego_mps);
-        let of_run_up = jrc_case::gap_before_run_up(0.0, ego_mps, other_mps, run_up(self.style, &point, dt_s), dt_s);
+        let of_run_up =
+            jrc_case::gap_before_run_up(0.0, ego_mps, other_mps, run_up(self.parts.style, &point, dt_s), dt_s);
         of_run_up + self.perturbation.map_or(0.0, Perturbation::gap_m)
     }
 }

@@ -78,14 +78,17 @@ pub struct Map {
 }
 
 struct PlannedGrid {
-    plan: GridPlan,
+    own: Planned,
     known_percent: Vec<Option<f64>>,
     is_chosen_to_match: bool,
-    other: Option<(String, GridPlan)>,
+    other: Option<(String, Planned)>,
+}
+
+/// A grid under one profile.
+struct Planned {
+    plan: GridPlan,
     /// Perturbed plans of the same cells.
     perturbed: Vec<(Perturbation, GridPlan)>,
-    /// Perturbed plans under the other profile.
-    other_perturbed: Vec<(Perturbation, GridPlan)>,
 }
 
 /// A swept grid with its published results.
@@ -164,30 +167,22 @@ impl Map {
         };
         let mut grids = Vec::new();
         for preset in options.presets(profile)? {
-            let other = match &others {
-                Some((other, presets)) => {
-                    let same = presets.iter().find(|p| p.grid.name() == preset.grid.name()).unwrap_or(&preset);
-                    let plan = GridPlan::new(same.grid.clone(), other, &preset.models)?;
-                    Some((other.name.clone(), plan))
-                }
-                None => None,
+            let planned = |grid: &Grid, profile: &Profile| -> Result<Planned> {
+                let plan = GridPlan::new(grid.clone(), profile, &preset.models)?;
+                let all = plan.grid.perturbations().into_iter().filter(|_| options.robust);
+                let perturbed = all.map(|by| Ok((by, plan.perturbed(profile, by)?))).collect::<Result<_>>()?;
+                Ok(Planned { plan, perturbed })
+            };
+            let under = |(other, presets): &(&Profile, Vec<Preset>)| -> Result<(String, Planned)> {
+                let same = presets.iter().find(|p| p.grid.name() == preset.grid.name()).unwrap_or(&preset);
+                Ok((other.name.clone(), planned(&same.grid, other)?))
             };
             let known = |model: &ModelId| if is_published { preset.known(*model) } else { None };
-            let perturbed = |plan: &GridPlan, profile: &Profile| {
-                let all = plan.grid.perturbations().into_iter().filter(|_| options.robust);
-                all.map(|by| Ok((by, plan.perturbed(profile, by)?))).collect::<Result<Vec<_>>>()
-            };
-            let plan = GridPlan::new(preset.grid.clone(), profile, &preset.models)?;
             grids.push(PlannedGrid {
+                other: others.as_ref().map(under).transpose()?,
+                own: planned(&preset.grid, profile)?,
                 known_percent: preset.models.iter().map(known).collect(),
                 is_chosen_to_match: preset.is_chosen_to_match && is_published,
-                perturbed: perturbed(&plan, profile)?,
-                other_perturbed: match (&other, &others) {
-                    (Some((_, plan)), Some((profile, _))) => perturbed(plan, profile)?,
-                    _ => Vec::new(),
-                },
-                plan,
-                other,
             });
         }
         Ok(Map { grids })
@@ -195,11 +190,8 @@ impl Map {
 
     /// Every grid's plans.
     fn plans(&self) -> impl Iterator<Item = &GridPlan> {
-        self.grids.iter().flat_map(|grid| {
-            let other = grid.other.iter().map(|(_, plan)| plan);
-            let perturbed = grid.perturbed.iter().chain(&grid.other_perturbed).map(|(_, plan)| plan);
-            std::iter::once(&grid.plan).chain(other).chain(perturbed)
-        })
+        let all = self.grids.iter().flat_map(|grid| grid.other.iter().map(|(_, other)| other).chain([&grid.own]));
+        all.flat_map(|of| of.perturbed.iter().map(|(_, plan)| plan).chain([&of.plan]))
     }
 
     /// Number of units that the run sweeps, including those of the unreacting ego.
@@ -221,28 +213,22 @@ impl Map {
         let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
         let reference = CpuBackend::reference();
         let binary64 = Executor { backend: Arc::new(&reference), fallback: None, recheck: None, ..executor.clone() };
-        let mut swept = |plan: &GridPlan, perturbed: &[(Perturbation, GridPlan)]| -> Result<GridMap> {
+        let mut swept = |Planned { plan, perturbed }: Planned| -> Result<(GridPlan, GridMap)> {
             let mut sweep = |plan: &GridPlan, executor: &Executor| -> Result<GridMap> {
                 let (map, of_map) = GridMap::sweep(plan, executor)?;
                 summary.add(&of_map);
                 Ok(map)
             };
-            let mut map = sweep(plan, executor)?;
+            let mut map = sweep(&plan, executor)?;
             for (by, plan) in perturbed {
-                map.mark_undecided(&sweep(plan, if by.is_binary64() { &binary64 } else { executor })?);
+                map.mark_undecided(&sweep(&plan, if by.is_binary64() { &binary64 } else { executor })?);
             }
-            Ok(map)
+            Ok((plan, map))
         };
         let mut grids = Vec::new();
-        for PlannedGrid { plan, known_percent, is_chosen_to_match, other, perturbed, other_perturbed } in self.grids {
-            let map = swept(&plan, &perturbed)?;
-            let other = match other {
-                Some((name, plan)) => {
-                    let map = swept(&plan, &other_perturbed)?;
-                    Some((name, plan, map))
-                }
-                None => None,
-            };
+        for PlannedGrid { own, known_percent, is_chosen_to_match, other } in self.grids {
+            let (plan, map) = swept(own)?;
+            let other = other.map(|(name, other)| swept(other).map(|(plan, map)| (name, plan, map))).transpose()?;
             let drives_through = plan.drives_through()?;
             grids.push(MappedGrid { plan, map, known_percent, is_chosen_to_match, other, drives_through });
         }
