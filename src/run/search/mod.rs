@@ -33,7 +33,7 @@ use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::parts::Shard;
 use crate::run::score::{ScenarioRate, ScoreOptions, f1, recall};
-use crate::scenario::parameterization::{LinearSpec, ParameterizationOptions};
+use crate::scenario::parameterization::{LinearSpec, Parameterization, ParameterizationOptions};
 use crate::scenario::{Category, Scenario};
 use crate::support::ranges;
 use crate::{Error, Place, Result};
@@ -119,6 +119,11 @@ impl SearchLimits {
     pub fn validate(&self) -> Result<()> {
         ranges::check("search", self)
     }
+
+    /// Studies that the optimiser needs at least: one generation for each size.
+    pub fn min_studies(&self) -> usize {
+        candidates::POPULATION * (self.max_parameters - 1)
+    }
 }
 
 /// Everything that decides the results of a search, besides the scenarios and the profile.
@@ -157,7 +162,6 @@ pub enum Candidate {
 impl Candidate {
     /// Number of parameters that a point has; the duration counts where it is needed.
     fn parameter_count(&self, category: Category) -> usize {
-        use crate::scenario::parameterization::Parameterization;
         match self {
             Candidate::Paper(key) => Parameterization::find(category, key)
                 .map_or(0, |id| id.coefficients().unwrap_or_else(|| id.variables().len())),
@@ -167,7 +171,6 @@ impl Candidate {
 
     /// The description in one line.
     pub fn describe(&self, category: Category) -> String {
-        use crate::scenario::parameterization::Parameterization;
         match self {
             Candidate::Paper(key) => {
                 let found = Parameterization::find(category, key);
@@ -247,13 +250,6 @@ impl Evaluated {
         let of = |model: &ModelId| options.objective.of(&self.cells[cell_of(*model, options.criterion)]);
         let scores = models.iter().map(of).collect::<Option<Vec<f64>>>()?;
         Some(scores.iter().sum::<f64>() / scores.len() as f64)
-    }
-}
-
-impl SearchLimits {
-    /// Studies that the optimiser needs at least: one generation for each size.
-    pub fn min_studies(&self) -> usize {
-        candidates::POPULATION * (self.max_parameters - 1)
     }
 }
 
