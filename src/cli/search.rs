@@ -6,11 +6,10 @@ use clap::Args;
 
 use super::arguments::from_arguments;
 use super::configured::Configured;
-use super::console::{self, Verbosity};
+use super::console::Units;
 use super::format::FormatFlag;
 use super::source::{self, SourceFlags};
 use super::{Exit, Output, lists};
-use crate::report::host::Host;
 use crate::report::search::SearchReport;
 use crate::run::parts::Shard;
 use crate::run::search::{self, Objective, SearchOptions};

@@ -228,8 +228,8 @@ mod tests {
         let (backend, every_model) = (CpuBackend::lane_arithmetic(), [0, 1, 2, 3]);
         let mut is_watched = false;
         for criterion in Criterion::ALL {
-            let mut every: Vec<Vec<Ranked>> = vec![Vec::new(); plan.models.len()];
-            let sweep = |every: &mut [Vec<Ranked>], count| {
+            let mut every: Vec<Vec<WorstSample>> = vec![Vec::new(); plan.models.len()];
+            let sweep = |every: &mut [Vec<WorstSample>], count| {
                 let units = 0..plan.unit_count();
                 study.cases().sweep(units, Wanted::Outcomes, &Executor::new(&backend), |plan, chunk| {
                     add(plan, &chunk, criterion, &|_| true, every, count);
@@ -238,7 +238,7 @@ mod tests {
             };
             sweep(&mut every, 5).unwrap();
             let options = WorstOptions { count: 5, criterion: Some(criterion), variants: &[], models: None };
-            let expected: Vec<LaneKey> = every.iter().flatten().filter_map(|(_, lane)| plan.key(*lane)).collect();
+            let expected: Vec<LaneKey> = every.iter().flatten().filter_map(|worst| plan.key(worst.lane)).collect();
             assert_eq!(worst_of_study(&study, &options, &every_model).unwrap(), expected, "{criterion:?}");
             is_watched |= wanted(plan, &every, &options, criterion, &every_model) != Wanted::Outcomes;
         }
