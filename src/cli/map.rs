@@ -195,7 +195,7 @@ impl Map {
                 let mut doubts = Doubts::new(self.plausibility.policy());
                 parts.check_plausible(&mut doubts)?;
                 doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
-                Grid::new(parts).map(MapGrids::Own)
+                Grid::new(parts).map(|grid| MapGrids::Own(Box::new(grid)))
             }
         }
     }

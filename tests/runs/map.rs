@@ -583,7 +583,7 @@ fn a_cell_is_undecided_where_the_single_case_is() {
     .unwrap();
     let profile = profile("un-r157");
     let options = MapOptions {
-        grids: MapGrids::Own(grid.clone()),
+        grids: MapGrids::Own(Box::new(grid.clone())),
         models: Some(vec![ModelId::Cchdm]),
         criterion: Criterion::Collision,
         against: None,

@@ -21,7 +21,7 @@ pub enum MapGrids {
     /// Predefined grids of a category, with their models.
     Preset(Presets, Category),
     /// One grid.
-    Own(Grid),
+    Own(Box<Grid>),
 }
 
 /// The other side of a comparison.
@@ -121,7 +121,7 @@ impl MapOptions {
         let mut presets = match &self.grids {
             MapGrids::Preset(presets, category) => presets.of(*category, profile)?,
             MapGrids::Own(grid) => vec![Preset {
-                grid: grid.clone(),
+                grid: Grid::clone(grid),
                 models: ModelId::ALL.to_vec(),
                 known_percent: Vec::new(),
                 is_chosen_to_match: false,
