@@ -253,7 +253,7 @@ pub(super) fn choose(
         return Err(Error::input(table.header().column(column), "there is no such column", help));
     }
     let at: Vec<usize> = chosen.iter().map(|column| column.at).collect();
-    table.want(&at)?;
+    table.rows.want(&at)?;
     Ok(chosen)
 }
 

@@ -78,9 +78,9 @@ impl ParameterRows {
     /// and the next rows follow.
     ///
     /// # Errors
-    /// As [`TableReader::next_row`].
+    /// As [`TableRows::next_row`](crate::support::table::TableRows::next_row).
     pub fn next_row(&mut self) -> Result<Option<NumberedRow>> {
-        match self.table.next_row() {
+        match self.table.rows.next_row() {
             Ok(Some(row)) => Ok(Some((row.number, self.typed(row)))),
             Ok(None) => Ok(None),
             Err(Error::Input { place, problem, help }) => match place.row {

@@ -42,7 +42,7 @@ pub(super) fn read(path: &Path, format: TableFormat, implausible: Implausible) -
     } else {
         return parameter_table::read(table, implausible);
     };
-    while let Some(row) = reader.table.next_row()? {
+    while let Some(row) = reader.table.rows.next_row()? {
         if has_time { reader.instant(row) } else { reader.scenario(row) }
     }
     reader.end();

@@ -4,11 +4,12 @@
 use std::collections::HashMap;
 use std::sync::Arc;
 
+use arrow_array::RecordBatch;
 use arrow_array::builder::{
-    BooleanBuilder, Float32Builder, Float64Builder, Int64Builder, ListBuilder, StringBuilder, StringDictionaryBuilder,
+    ArrayBuilder, BooleanBuilder, Float32Builder, Float64Builder, Int64Builder, ListBuilder, StringBuilder,
+    StringDictionaryBuilder, make_builder,
 };
 use arrow_array::types::Int32Type;
-use arrow_array::{ArrayRef, RecordBatch};
 use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
 
 use super::{Cell, Column, ColumnKind};
@@ -17,7 +18,7 @@ use crate::{Error, Result};
 /// Rows that are collected for the next record batch.
 pub struct ArrowRows {
     schema: SchemaRef,
-    builders: Vec<Builder>,
+    builders: Vec<(ColumnKind, Box<dyn ArrayBuilder>)>,
     count: usize,
 }
 
@@ -25,7 +26,9 @@ impl ArrowRows {
     /// No rows yet; `metadata` belongs to the schema.
     pub fn new(columns: &[Column], metadata: HashMap<String, String>) -> ArrowRows {
         let fields: Vec<Field> = columns.iter().map(field).collect();
-        let builders = columns.iter().map(|column| Builder::new(column.kind)).collect();
+        let builders =
+            columns.iter().zip(&fields).map(|(column, field)| (column.kind, make_builder(field.data_type(), 0)));
+        let builders = builders.collect();
         ArrowRows { schema: Arc::new(Schema::new_with_metadata(fields, metadata)), builders, count: 0 }
     }
 
@@ -44,8 +47,8 @@ impl ArrowRows {
     /// # Errors
     /// [`Error::Internal`] for more than 2³¹ different names in a column.
     pub fn row(&mut self, row: &[Cell]) -> Result<()> {
-        for (builder, cell) in self.builders.iter_mut().zip(row) {
-            builder.append(cell).map_err(defect)?;
+        for ((kind, builder), cell) in self.builders.iter_mut().zip(row) {
+            append(*kind, builder, cell)?;
         }
         self.count += 1;
         Ok(())
@@ -57,7 +60,7 @@ impl ArrowRows {
     /// [`Error::Internal`] if rows had too few cells.
     pub fn batch(&mut self) -> Result<RecordBatch> {
         self.count = 0;
-        let arrays = self.builders.iter_mut().map(Builder::finish).collect();
+        let arrays = self.builders.iter_mut().map(|(_, builder)| builder.finish()).collect();
         RecordBatch::try_new(self.schema.clone(), arrays).map_err(defect)
     }
 }
@@ -83,73 +86,45 @@ fn field(column: &Column) -> Field {
     Field::new(column.name.as_ref(), data_type, true).with_metadata(words)
 }
 
-/// Collects the values of a column.
-enum Builder {
-    Text(StringBuilder),
-    Name(StringDictionaryBuilder<Int32Type>),
-    Flag(BooleanBuilder),
-    Whole(Int64Builder),
-    Binary32(Float32Builder),
-    Binary64(Float64Builder),
-    Series(ListBuilder<Float64Builder>),
-    Wholes(ListBuilder<Int64Builder>),
+/// The builder of a type of column.
+fn typed<B: 'static>(builder: &mut Box<dyn ArrayBuilder>) -> Result<&mut B> {
+    let typed = builder.as_any_mut().downcast_mut();
+    typed.ok_or_else(|| Error::Internal("a column of Arrow has another type".to_owned()))
 }
 
-impl Builder {
-    fn new(kind: ColumnKind) -> Builder {
-        match kind {
-            ColumnKind::Text => Builder::Text(StringBuilder::new()),
-            ColumnKind::Name => Builder::Name(StringDictionaryBuilder::new()),
-            ColumnKind::Flag => Builder::Flag(BooleanBuilder::new()),
-            ColumnKind::Whole => Builder::Whole(Int64Builder::new()),
-            ColumnKind::Binary32 => Builder::Binary32(Float32Builder::new()),
-            ColumnKind::Binary64 => Builder::Binary64(Float64Builder::new()),
-            ColumnKind::Series => Builder::Series(ListBuilder::new(Float64Builder::new())),
-            ColumnKind::Wholes => Builder::Wholes(ListBuilder::new(Int64Builder::new())),
-        }
-    }
-
-    /// Appends a cell. A cell of another type becomes null; the caller prevents it.
-    fn append(&mut self, cell: &Cell) -> std::result::Result<(), ArrowError> {
-        let number = match cell {
-            Cell::Number(number) | Cell::Decimal(number) => Some(*number),
-            _ => None,
-        };
-        match (self, cell) {
-            (Builder::Text(builder), Cell::Text(text)) => builder.append_value(text),
-            (Builder::Text(builder), _) => builder.append_null(),
-            (Builder::Name(builder), Cell::Text(text)) => drop(builder.append(text)?),
-            (Builder::Name(builder), _) => builder.append_null(),
-            (Builder::Flag(builder), Cell::Flag(flag)) => builder.append_value(*flag),
-            (Builder::Flag(builder), _) => builder.append_null(),
-            (Builder::Whole(builder), Cell::Whole(number)) => builder.append_value(*number),
-            (Builder::Whole(builder), _) => builder.append_null(),
-            (Builder::Binary32(builder), _) => builder.append_option(number.map(|number| number as f32)),
-            (Builder::Binary64(builder), _) => builder.append_option(number),
-            (Builder::Series(builder), Cell::Series(series)) => {
-                builder.values().append_slice(series);
-                builder.append(true);
+/// Appends a cell to a column of this type. A cell of another type becomes null; the caller prevents it.
+fn append(kind: ColumnKind, builder: &mut Box<dyn ArrayBuilder>, cell: &Cell) -> Result<()> {
+    let text = if let Cell::Text(text) = cell { Some(text) } else { None };
+    let flag = if let Cell::Flag(flag) = cell { Some(*flag) } else { None };
+    let whole = if let Cell::Whole(number) = cell { Some(*number) } else { None };
+    let number = if let Cell::Number(number) | Cell::Decimal(number) = cell { Some(*number) } else { None };
+    match kind {
+        ColumnKind::Text => typed::<StringBuilder>(builder)?.append_option(text),
+        ColumnKind::Name => {
+            let names = typed::<StringDictionaryBuilder<Int32Type>>(builder)?;
+            match text {
+                Some(text) => drop(names.append(text).map_err(defect)?),
+                None => names.append_null(),
             }
-            (Builder::Series(builder), _) => builder.append(false),
-            (Builder::Wholes(builder), Cell::Wholes(numbers)) => {
-                builder.values().append_slice(numbers);
-                builder.append(true);
+        }
+        ColumnKind::Flag => typed::<BooleanBuilder>(builder)?.append_option(flag),
+        ColumnKind::Whole => typed::<Int64Builder>(builder)?.append_option(whole),
+        ColumnKind::Binary32 => typed::<Float32Builder>(builder)?.append_option(number.map(|number| number as f32)),
+        ColumnKind::Binary64 => typed::<Float64Builder>(builder)?.append_option(number),
+        ColumnKind::Series | ColumnKind::Wholes => {
+            let list = typed::<ListBuilder<Box<dyn ArrayBuilder>>>(builder)?;
+            match (kind, cell) {
+                (ColumnKind::Series, Cell::Series(series)) => {
+                    typed::<Float64Builder>(list.values())?.append_slice(series);
+                    list.append(true);
+                }
+                (ColumnKind::Wholes, Cell::Wholes(numbers)) => {
+                    typed::<Int64Builder>(list.values())?.append_slice(numbers);
+                    list.append(true);
+                }
+                _ => list.append(false),
             }
-            (Builder::Wholes(builder), _) => builder.append(false),
-        }
-        Ok(())
-    }
-
-    fn finish(&mut self) -> ArrayRef {
-        match self {
-            Builder::Text(builder) => Arc::new(builder.finish()),
-            Builder::Name(builder) => Arc::new(builder.finish()),
-            Builder::Flag(builder) => Arc::new(builder.finish()),
-            Builder::Whole(builder) => Arc::new(builder.finish()),
-            Builder::Binary32(builder) => Arc::new(builder.finish()),
-            Builder::Binary64(builder) => Arc::new(builder.finish()),
-            Builder::Series(builder) => Arc::new(builder.finish()),
-            Builder::Wholes(builder) => Arc::new(builder.finish()),
         }
     }
+    Ok(())
 }

@@ -1,15 +1,14 @@
 //! Rows of a CSV file, one at a time.
 
-use std::cell::Cell;
 use std::fs::File;
 use std::io::{BufReader, Read};
 use std::path::{Path, PathBuf};
-use std::rc::Rc;
 
 use serde_json::Value;
 
-use super::Row;
+use super::reader::TableRows;
 use super::writer::text_of_cell;
+use super::{Cell, Row};
 use crate::support::input_file;
 use crate::{Error, Place, Result};
 
@@ -19,7 +18,6 @@ const MAX_ROW_BYTES: u64 = 16 << 20;
 pub(super) struct CsvRows {
     path: PathBuf,
     reader: csv::Reader<BudgetedFile>,
-    ration: Rc<Cell<u64>>,
     record: csv::StringRecord,
     wanted: Vec<usize>,
 }
@@ -27,28 +25,27 @@ pub(super) struct CsvRows {
 /// A file that returns an error after a budget of bytes.
 struct BudgetedFile {
     file: BufReader<File>,
-    left: Rc<Cell<u64>>,
+    left: u64,
 }
 
 impl Read for BudgetedFile {
     fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
-        if self.left.get() == 0 {
+        if self.left == 0 {
             return Err(std::io::Error::from(std::io::ErrorKind::OutOfMemory));
         }
         let count = self.file.read(bytes)?;
-        self.left.set(self.left.get().saturating_sub(count as u64));
+        self.left = self.left.saturating_sub(count as u64);
         Ok(count)
     }
 }
 
 impl CsvRows {
     pub(super) fn open(path: &Path) -> Result<(Vec<String>, CsvRows)> {
-        let ration = Rc::new(Cell::new(MAX_ROW_BYTES));
-        let file = BudgetedFile { file: BufReader::new(input_file::open(path)?), left: ration.clone() };
+        let file = BudgetedFile { file: BufReader::new(input_file::open(path)?), left: MAX_ROW_BYTES };
         let reader = csv::ReaderBuilder::new().trim(csv::Trim::All).from_reader(file);
-        let mut rows =
-            CsvRows { path: path.to_path_buf(), reader, ration, record: csv::StringRecord::new(), wanted: Vec::new() };
-        let header = rows.reader.headers().cloned().map_err(|e| csv_error(path, e))?;
+        let (path, record) = (path.to_path_buf(), csv::StringRecord::new());
+        let mut rows = CsvRows { path, reader, record, wanted: Vec::new() };
+        let header = rows.reader.headers().cloned().map_err(|e| csv_error(&rows.path, e))?;
         let columns: Vec<String> =
             header.iter().map(|name| name.trim_start_matches('\u{feff}').trim().to_owned()).collect();
         if let [one] = &columns[..]
@@ -56,42 +53,39 @@ impl CsvRows {
         {
             let mark = if one.contains(';') { "semicolons" } else { "tabs" };
             let problem = format!("the fields are separated by {mark}; expected commas");
-            return Err(Error::input(
-                Place::file(path).row(1),
-                problem,
-                "write the table with commas and decimal points",
-            ));
+            let help = "write the table with commas and decimal points";
+            return Err(Error::input(Place::file(&rows.path).row(1), problem, help));
         }
-        rows.want(&(0..columns.len()).collect::<Vec<_>>());
+        rows.wanted = (0..columns.len()).collect();
         Ok((columns, rows))
     }
+}
 
-    pub(super) fn want(&mut self, columns: &[usize]) {
+impl TableRows for CsvRows {
+    fn want(&mut self, columns: &[usize]) -> Result<()> {
         self.wanted = columns.to_vec();
+        Ok(())
     }
 
-    pub(super) fn step(&mut self) -> Result<bool> {
-        self.ration.set(MAX_ROW_BYTES);
+    fn step(&mut self) -> Result<bool> {
+        self.reader.get_mut().left = MAX_ROW_BYTES;
         self.reader.read_record(&mut self.record).map_err(|e| csv_error(&self.path, e))
     }
 
-    pub(super) fn cell(&self, wanted: usize) -> super::Cell<'_> {
+    fn cell(&self, wanted: usize) -> Cell<'_> {
         match self.record.get(self.wanted[wanted]) {
-            None | Some("") => super::Cell::Null,
-            Some(text) => super::Cell::text(text_of_cell(text)),
+            None | Some("") => Cell::Null,
+            Some(text) => Cell::text(text_of_cell(text)),
         }
     }
 
-    pub(super) fn next_row(&mut self) -> Result<Option<Row>> {
+    fn next_row(&mut self) -> Result<Option<Row>> {
         if !self.step()? {
             return Ok(None);
         }
         let number = self.record.position().map_or(0, csv::Position::line);
-        let value = |at: &usize| match self.record.get(*at) {
-            None | Some("") => Value::Null,
-            Some(text) => Value::from(text_of_cell(text)),
-        };
-        Ok(Some(Row { number, values: self.wanted.iter().map(value).collect() }))
+        let value = |at| if let Cell::Text(text) = self.cell(at) { Value::from(text) } else { Value::Null };
+        Ok(Some(Row { number, values: (0..self.wanted.len()).map(value).collect() }))
     }
 }
 

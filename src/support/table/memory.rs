@@ -119,52 +119,28 @@ pub trait CellValue {
 /// Formatted numbers, such as an interval or a part of a whole.
 pub struct NumberText(pub String);
 
-impl CellValue for NumberText {
-    const KIND: ColumnKind = ColumnKind::Binary64;
-
-    fn cell(self) -> Cell<'static> {
-        Cell::text(self.0)
-    }
-}
-
-/// An empty text is null.
-impl CellValue for String {
-    const KIND: ColumnKind = ColumnKind::Text;
-
-    fn cell(self) -> Cell<'static> {
-        if self.is_empty() { Cell::Null } else { Cell::text(self) }
-    }
-}
-
-impl CellValue for &str {
-    const KIND: ColumnKind = ColumnKind::Text;
-
-    fn cell(self) -> Cell<'static> {
-        self.to_owned().cell()
-    }
-}
-
-impl CellValue for f64 {
-    const KIND: ColumnKind = ColumnKind::Binary64;
-
-    fn cell(self) -> Cell<'static> {
-        Cell::Number(self)
-    }
-}
-
-/// Counts; null above 63 bits.
-macro_rules! whole {
-    ($($kind:ty),*) => {$(
-        impl CellValue for $kind {
-            const KIND: ColumnKind = ColumnKind::Whole;
+/// Types of values, the kind of their column, and the cell of a value.
+macro_rules! cell_values {
+    ($($($of:ty),* => $kind:ident, $cell:expr;)*) => {$($(
+        impl CellValue for $of {
+            const KIND: ColumnKind = ColumnKind::$kind;
 
             fn cell(self) -> Cell<'static> {
-                i64::try_from(self).map_or(Cell::Null, Cell::Whole)
+                let cell: fn($of) -> Cell<'static> = $cell;
+                cell(self)
             }
         }
-    )*};
+    )*)*};
 }
-whole!(u8, u32, u64, usize, i64);
+cell_values! {
+    NumberText => Binary64, |number| Cell::text(number.0);
+    // An empty text is null.
+    String => Text, |text| if text.is_empty() { Cell::Null } else { Cell::text(text) };
+    &str => Text, |text| text.to_owned().cell();
+    f64 => Binary64, Cell::Number;
+    // Counts; null above 63 bits.
+    u8, u32, u64, usize, i64 => Whole, |count| i64::try_from(count).map_or(Cell::Null, Cell::Whole);
+}
 
 impl<V: CellValue> CellValue for Option<V> {
     const KIND: ColumnKind = V::KIND;

@@ -22,16 +22,14 @@ mod writer;
 
 #[cfg(feature = "arrow")]
 pub use arrow::ArrowRows;
-pub use column::Row;
-pub use column::{Cell, Column, ColumnKind, Digits, TableMetadata};
+pub use column::{Cell, Column, ColumnKind, Digits, Row, TableMetadata};
 pub use memory::{CellValue, NumberText, Table, TableOf};
 pub use names::{NameUnit, Named, Resolved, nearest, resolve};
 #[cfg(feature = "parquet")]
 pub use parquet_reader::is_panic_caught;
-pub use reader::TableReader;
+pub use reader::{TableReader, TableRows};
 pub use text::WIDTH;
-pub use writer::TableWriter;
-pub use writer::{csv_field, json_number, text_of_cell};
+pub use writer::{TableWriter, csv_field, json_number, text_of_cell};
 
 use std::path::Path;
 

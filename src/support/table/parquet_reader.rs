@@ -21,6 +21,7 @@ use parquet::arrow::arrow_reader::{
 use parquet::basic::Compression;
 use serde_json::Value;
 
+use super::reader::TableRows;
 use super::{Cell as TableCell, Row};
 use crate::support::input_file;
 use crate::{Error, Place, Result};
@@ -91,9 +92,7 @@ impl Leaf {
         }
         leaf
     }
-}
 
-impl Leaf {
     fn is_null(&self, at: usize) -> bool {
         self.record.as_ref().is_some_and(|record| record.is_null(at)) || self.values.is_null(at)
     }
@@ -163,7 +162,43 @@ impl ParquetRows {
         Ok((names, rows))
     }
 
-    pub(super) fn want(&mut self, columns: &[usize]) -> Result<()> {
+    fn data_type(&self, column: usize) -> DataType {
+        let (root, inner) = self.leaves[column];
+        let field: &Field = self.metadata.schema().field(root);
+        match (field.data_type(), inner) {
+            (DataType::Struct(fields), Some(at)) => fields[at].data_type().clone(),
+            (other, _) => other.clone(),
+        }
+    }
+
+    /// The requested columns of a batch.
+    fn leaves_of(&self, batch: &RecordBatch) -> std::result::Result<Vec<Leaf>, String> {
+        let leaf = |&column: &usize| {
+            let (root, inner) = self.leaves[column];
+            // The batch has the requested fields of the root, in the order of the file.
+            let before = |&&other: &&usize| self.leaves[other].0 < root;
+            let mut roots: Vec<usize> = self.wanted.iter().filter(before).map(|&other| self.leaves[other].0).collect();
+            roots.sort_unstable();
+            roots.dedup();
+            let array = batch.columns().get(roots.len()).ok_or("a column is missing")?;
+            let (record, values) = match inner {
+                None => (None, array.clone()),
+                Some(at) => {
+                    let record = array.as_any().downcast_ref::<StructArray>().ok_or("a record is none")?;
+                    (Some(array.clone()), record.column(at).clone())
+                }
+            };
+            if !is_readable(values.data_type()) {
+                return Err("a column changes its type".to_owned());
+            }
+            Ok(Leaf::new(record, values))
+        };
+        self.wanted.iter().map(leaf).collect()
+    }
+}
+
+impl TableRows for ParquetRows {
+    fn want(&mut self, columns: &[usize]) -> Result<()> {
         for &column in columns {
             let data_type = self.data_type(column);
             if !is_readable(&data_type) {
@@ -195,24 +230,7 @@ impl ParquetRows {
         Ok(())
     }
 
-    fn data_type(&self, column: usize) -> DataType {
-        let (root, inner) = self.leaves[column];
-        let field: &Field = self.metadata.schema().field(root);
-        match (field.data_type(), inner) {
-            (DataType::Struct(fields), Some(at)) => fields[at].data_type().clone(),
-            (other, _) => other.clone(),
-        }
-    }
-
-    pub(super) fn has_lists(&self) -> bool {
-        self.wanted.iter().any(|&column| matches!(self.data_type(column), DataType::List(_)))
-    }
-
-    pub(super) fn has_instants(&self, column: usize) -> bool {
-        matches!(self.data_type(column), DataType::Timestamp(..))
-    }
-
-    pub(super) fn step(&mut self) -> Result<bool> {
+    fn step(&mut self) -> Result<bool> {
         while self.at == self.batch_rows {
             let Some(reader) = &mut self.reader else { return Ok(false) };
             let next = guarded(&self.path, || reader.next().transpose())?;
@@ -225,8 +243,7 @@ impl ParquetRows {
         Ok(true)
     }
 
-    /// A value of the present row that is no list.
-    pub(super) fn cell(&self, wanted: usize) -> TableCell<'_> {
+    fn cell(&self, wanted: usize) -> TableCell<'_> {
         let (leaf, at) = (&self.batch[wanted], self.at - 1);
         match &leaf.plain {
             Plain::Reals(values) => TableCell::Number(values[at]),
@@ -235,7 +252,7 @@ impl ParquetRows {
         }
     }
 
-    pub(super) fn next_row(&mut self) -> Result<Option<Row>> {
+    fn next_row(&mut self) -> Result<Option<Row>> {
         if !self.step()? {
             return Ok(None);
         }
@@ -244,29 +261,12 @@ impl ParquetRows {
         Ok(Some(Row { number: self.number, values }))
     }
 
-    /// The requested columns of a batch.
-    fn leaves_of(&self, batch: &RecordBatch) -> std::result::Result<Vec<Leaf>, String> {
-        let leaf = |&column: &usize| {
-            let (root, inner) = self.leaves[column];
-            // The batch has the requested fields of the root, in the order of the file.
-            let before = |&&other: &&usize| self.leaves[other].0 < root;
-            let mut roots: Vec<usize> = self.wanted.iter().filter(before).map(|&other| self.leaves[other].0).collect();
-            roots.sort_unstable();
-            roots.dedup();
-            let array = batch.columns().get(roots.len()).ok_or("a column is missing")?;
-            let (record, values) = match inner {
-                None => (None, array.clone()),
-                Some(at) => {
-                    let record = array.as_any().downcast_ref::<StructArray>().ok_or("a record is none")?;
-                    (Some(array.clone()), record.column(at).clone())
-                }
-            };
-            if !is_readable(values.data_type()) {
-                return Err("a column changes its type".to_owned());
-            }
-            Ok(Leaf::new(record, values))
-        };
-        self.wanted.iter().map(leaf).collect()
+    fn has_lists(&self) -> bool {
+        self.wanted.iter().any(|&column| matches!(self.data_type(column), DataType::List(_)))
+    }
+
+    fn has_instants(&self, column: usize) -> bool {
+        matches!(self.data_type(column), DataType::Timestamp(..))
     }
 }
 

@@ -39,14 +39,15 @@ impl FileChecksum {
 
 /// A column that the header has, by index.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct CsvColumn(usize);
+pub(super) struct CsvColumn(pub usize);
 
 /// What a reader expects of a table.
-pub(super) struct CsvFormat<'a> {
+#[derive(Clone, Copy)]
+pub(super) struct CsvFormat {
     /// Name of the format in messages.
-    pub name: &'a str,
-    /// Column names of the format: they are never reported as misspelt.
-    pub known: &'a [&'a str],
+    pub name: &'static str,
+    /// Column names of the format, separated by commas: they are never reported as misspelt.
+    pub header: &'static str,
     /// The delimiter; `None`: the one that the header has most of.
     pub delimiter: Option<u8>,
 }
@@ -55,8 +56,7 @@ pub(super) struct CsvFormat<'a> {
 pub(super) struct CsvTable {
     path: PathBuf,
     reader: Reader<HashingReader<Box<dyn Read + Send>>>,
-    format: String,
-    known: Vec<String>,
+    format: CsvFormat,
     header: Vec<String>,
     record: ByteRecord,
     line: u64,
@@ -79,7 +79,7 @@ impl CsvTable {
     ///
     /// # Errors
     /// If it cannot be read, is empty, or has no delimited header in UTF-8.
-    pub(super) fn open(path: &Path, format: &CsvFormat) -> Result<Self> {
+    pub(super) fn open(path: &Path, format: CsvFormat) -> Result<Self> {
         let mut file = input_file::open_text(path)?;
         let mut start = Vec::new();
         if format.delimiter != Some(b',') {
@@ -87,7 +87,9 @@ impl CsvTable {
         }
         let delimiter = format.delimiter.unwrap_or_else(|| delimiter_of(&start));
         let decimal_commas = delimiter != b',' && has_decimal_commas(&start, delimiter);
-        let file: Box<dyn Read + Send> = Box::new(Cursor::new(start).chain(file));
+        let inner: Box<dyn Read + Send> = Box::new(Cursor::new(start).chain(file));
+        let file =
+            HashingReader { inner, hash: Sha256::new(), bytes: 0, at_end: false, line_from: 0, is_endless: false };
         let reader = ReaderBuilder::new()
             .has_headers(false)
             .flexible(true)
@@ -95,12 +97,11 @@ impl CsvTable {
             // Not CRLF, with which the line number is one too small in files with Windows line ends.
             .terminator(Terminator::Any(b'\n'))
             .buffer_capacity(READ_AHEAD_BYTES)
-            .from_reader(HashingReader::new(file));
+            .from_reader(file);
         let mut table = CsvTable {
             path: path.to_path_buf(),
             reader,
-            format: format.name.to_owned(),
-            known: format.known.iter().map(|&name| name.to_owned()).collect(),
+            format,
             header: Vec::new(),
             record: ByteRecord::new(),
             line: 0,
@@ -157,10 +158,15 @@ impl CsvTable {
     /// If the header has none, or two; names the most similar column.
     pub(super) fn column(&self, name: &str) -> Result<CsvColumn> {
         self.optional_column(name)?.ok_or_else(|| {
-            let problem = format!("the column is missing{}", self.strange_names_for_message());
+            let strange: Vec<&str> = self.strange_names().collect();
+            let others = match strange.is_empty() {
+                true => String::new(),
+                false => format!("; the header has names that are not part of the format: {}", list(&strange)),
+            };
+            let problem = format!("the column is missing{others}");
             let help = match self.similar_name(name) {
                 Some(similar) => format!("rename the column `{similar}` to `{name}`, if that is what it holds"),
-                None => format!("add the column `{name}`, or export the file again in the {} format", self.format),
+                None => format!("add the column `{name}`, or export the file again in the {} format", self.format.name),
             };
             Error::input(Place::file(&self.path).row(1).column(name), problem, help)
         })
@@ -189,14 +195,9 @@ impl CsvTable {
     }
 
     /// The bytes of a field.
-    fn bytes(&self, column: CsvColumn) -> &[u8] {
-        self.bytes_at(column.0)
-    }
-
-    /// The bytes of the field at a position of the header.
-    pub(super) fn bytes_at(&self, at: usize) -> &[u8] {
+    pub(super) fn bytes(&self, column: CsvColumn) -> &[u8] {
         // Every line has as many fields as the header, so the field exists.
-        let field = self.record.get(at).unwrap_or_default();
+        let field = self.record.get(column.0).unwrap_or_default();
         // Windows line ends leave this in the last field.
         field.strip_suffix(b"\r").unwrap_or(field)
     }
@@ -338,16 +339,7 @@ impl CsvTable {
 
     /// Header names that are not part of the format.
     fn strange_names(&self) -> impl Iterator<Item = &str> {
-        self.header.iter().map(String::as_str).filter(|name| !self.known.iter().any(|known| known == name))
-    }
-
-    /// A hint from the header about a misnamed column.
-    fn strange_names_for_message(&self) -> String {
-        let strange: Vec<&str> = self.strange_names().collect();
-        if strange.is_empty() {
-            return String::new();
-        }
-        format!("; the header has names that are not part of the format: {}", list(&strange))
+        self.header.iter().map(String::as_str).filter(|name| !self.format.header.split(',').any(|known| known == *name))
     }
 
     fn check_header(&self) -> Result<()> {
@@ -470,12 +462,6 @@ struct HashingReader<R> {
     line_from: u64,
     /// That line is too long.
     is_endless: bool,
-}
-
-impl<R> HashingReader<R> {
-    fn new(inner: R) -> Self {
-        HashingReader { inner, hash: Sha256::new(), bytes: 0, at_end: false, line_from: 0, is_endless: false }
-    }
 }
 
 impl<R: Read> Read for HashingReader<R> {

@@ -1,84 +1,24 @@
-//! Column names of the three highD files in the order of the format.
+//! Headers of the three highD files, with the columns in the order of the format.
 
 use crate::traffic::trajectory::csv_table::CsvFormat;
 
 /// `NN_tracks.csv`: one line per vehicle and frame.
-pub(super) const TRACKS_COLUMNS: [&str; 25] = [
-    "frame",
-    "id",
-    "x",
-    "y",
-    "width",
-    "height",
-    "xVelocity",
-    "yVelocity",
-    "xAcceleration",
-    "yAcceleration",
-    "frontSightDistance",
-    "backSightDistance",
-    "dhw",
-    "thw",
-    "ttc",
-    "precedingXVelocity",
-    "precedingId",
-    "followingId",
-    "leftPrecedingId",
-    "leftAlongsideId",
-    "leftFollowingId",
-    "rightPrecedingId",
-    "rightAlongsideId",
-    "rightFollowingId",
-    "laneId",
-];
+pub(super) const TRACKS_HEADER: &str = "frame,id,x,y,width,height,xVelocity,yVelocity,xAcceleration,yAcceleration,\
+    frontSightDistance,backSightDistance,dhw,thw,ttc,precedingXVelocity,precedingId,followingId,leftPrecedingId,\
+    leftAlongsideId,leftFollowingId,rightPrecedingId,rightAlongsideId,rightFollowingId,laneId";
 
 /// `NN_tracksMeta.csv`: one line per vehicle.
-pub(super) const TRACKS_META_COLUMNS: [&str; 16] = [
-    "id",
-    "width",
-    "height",
-    "initialFrame",
-    "finalFrame",
-    "numFrames",
-    "class",
-    "drivingDirection",
-    "traveledDistance",
-    "minXVelocity",
-    "maxXVelocity",
-    "meanXVelocity",
-    "minDHW",
-    "minTHW",
-    "minTTC",
-    "numLaneChanges",
-];
+pub(super) const TRACKS_META_HEADER: &str = "id,width,height,initialFrame,finalFrame,numFrames,class,drivingDirection,\
+    traveledDistance,minXVelocity,maxXVelocity,meanXVelocity,minDHW,minTHW,minTTC,numLaneChanges";
 
 /// `NN_recordingMeta.csv`: one line. The last column is ours; only synthetic recordings have it.
-pub(super) const RECORDING_META_COLUMNS: [&str; 16] = [
-    "id",
-    "frameRate",
-    "locationId",
-    "speedLimit",
-    "month",
-    "weekDay",
-    "startTime",
-    "duration",
-    "totalDrivenDistance",
-    "totalDrivenTime",
-    "numVehicles",
-    "numCars",
-    "numTrucks",
-    "upperLaneMarkings",
-    "lowerLaneMarkings",
-    "synthetic",
-];
+pub(super) const RECORDING_META_HEADER: &str = "id,frameRate,locationId,speedLimit,month,weekDay,startTime,duration,\
+    totalDrivenDistance,totalDrivenTime,numVehicles,numCars,numTrucks,upperLaneMarkings,lowerLaneMarkings,\
+    synthetic";
 
-/// How its tables are read.
-pub(super) fn csv_format<'a>(known: &'a [&'a str]) -> CsvFormat<'a> {
-    CsvFormat { name: "highD", known, delimiter: Some(b',') }
-}
-
-/// Returns the header line of a file.
-pub(super) fn header(columns: &[&str]) -> String {
-    columns.join(",") + "\n"
+/// How a table with this header is read.
+pub(super) fn csv_format(header: &'static str) -> CsvFormat {
+    CsvFormat { name: "highD", header, delimiter: Some(b',') }
 }
 
 /// Valid frame rates. Others are errors, for instance a period instead of a rate, and derived counts would overflow.

@@ -1,7 +1,7 @@
 //! The two small files of a recording: `recordingMeta` (frame rate, lane lines) and `tracksMeta`
 //! (size, class and direction of each vehicle).
 
-use super::format::{FRAME_RATES_HZ, LANE_LINES_LIMIT, RECORDING_META_COLUMNS, TRACKS_META_COLUMNS, csv_format};
+use super::format::{FRAME_RATES_HZ, LANE_LINES_LIMIT, RECORDING_META_HEADER, TRACKS_META_HEADER, csv_format};
 use super::frame::{Direction, LaneNumbers};
 use super::inventory::HighdFiles;
 use crate::support::plausibility::{Doubts, HELP, Quantity};
@@ -44,7 +44,7 @@ pub(super) struct VehicleMeta {
 
 /// Reads `recordingMeta`.
 pub(super) fn read_recording_meta(files: &HighdFiles, doubts: &mut Doubts) -> Result<RecordingMeta> {
-    let mut table = CsvTable::open(&files.recording_meta, &csv_format(&RECORDING_META_COLUMNS))?;
+    let mut table = CsvTable::open(&files.recording_meta, csv_format(RECORDING_META_HEADER))?;
     let frame_rate = table.column("frameRate")?;
     let upper_column = table.column(Direction::Upper.markings_column())?;
     let lower_column = table.column(Direction::Lower.markings_column())?;
@@ -176,7 +176,7 @@ pub(super) fn read_tracks_meta(
     recording: &RecordingMeta,
     doubts: &mut Doubts,
 ) -> Result<(Vec<VehicleMeta>, FileChecksum)> {
-    let mut table = CsvTable::open(&files.tracks_meta, &csv_format(&TRACKS_META_COLUMNS))?;
+    let mut table = CsvTable::open(&files.tracks_meta, csv_format(TRACKS_META_HEADER))?;
     let columns = MetaColumns::of(&table)?;
     let mut vehicles: Vec<(VehicleMeta, Place)> = Vec::new();
     while table.next_row()? {

@@ -3,7 +3,7 @@
 use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::format::{FRAME_LIMIT, TRACKS_COLUMNS, csv_format};
+use super::format::{FRAME_LIMIT, TRACKS_HEADER, csv_format};
 use super::geometry;
 use super::inventory::{HighdFiles, folder_of, made_up};
 use super::meta::{self, RecordingMeta, VehicleMeta};
@@ -34,7 +34,7 @@ pub fn read_checked(files: &HighdFiles, implausible: Implausible) -> Result<Load
     let mut doubts = Doubts::new(implausible);
     let recording_meta = meta::read_recording_meta(files, &mut doubts)?;
     let (vehicles, tracks_meta_checksum) = meta::read_tracks_meta(files, &recording_meta, &mut doubts)?;
-    let mut table = CsvTable::open(&files.tracks, &csv_format(&TRACKS_COLUMNS))?;
+    let mut table = CsvTable::open(&files.tracks, csv_format(TRACKS_HEADER))?;
     let columns = TrackColumns::of(&table)?;
     let reserve = can_hold(&files.tracks, &vehicles);
     let empty = vehicles.iter().map(|vehicle| empty_track(vehicle, reserve)).collect();

@@ -4,7 +4,7 @@
 use std::fs;
 use std::path::Path;
 
-use super::format::{RECORDING_META_COLUMNS, TRACKS_COLUMNS, TRACKS_META_COLUMNS, header};
+use super::format::{RECORDING_META_HEADER, TRACKS_HEADER, TRACKS_META_HEADER};
 use super::frame::Direction;
 use super::inventory::HighdFiles;
 use super::neighbours::{Around, NOBODY, neighbours};
@@ -158,8 +158,7 @@ impl Writer<'_> {
     }
 
     fn tracks(&self, path: &Path) -> Result<(StagedFile, Vec<Summary>)> {
-        let mut file = AtomicFile::create_inside(path)?;
-        file.append(header(&TRACKS_COLUMNS).as_bytes())?;
+        let mut file = begun(path, TRACKS_HEADER)?;
         let around = neighbours(self.recording);
         let mut summaries = vec![Summary::default(); self.recording.tracks.len()];
         let mut line = CsvLine::new(self.info.precision);
@@ -237,8 +236,7 @@ impl Writer<'_> {
     }
 
     fn tracks_meta(&self, path: &Path, summaries: &[Summary]) -> Result<StagedFile> {
-        let mut file = AtomicFile::create_inside(path)?;
-        file.append(header(&TRACKS_META_COLUMNS).as_bytes())?;
+        let mut file = begun(path, TRACKS_META_HEADER)?;
         let mut line = CsvLine::new(self.info.precision);
         for (track, summary) in self.recording.tracks.iter().zip(summaries) {
             line.integer(i64::from(track.id));
@@ -289,13 +287,12 @@ impl Writer<'_> {
         line.integer(trucks as i64);
         line.measured_list(&self.layout.upper_y);
         line.measured_list(&self.layout.lower_y);
-        let (last, columns) = (RECORDING_META_COLUMNS.len() - 1, RECORDING_META_COLUMNS);
-        let columns = if self.recording.synthetic { &columns[..] } else { &columns[..last] };
+        let mut header = RECORDING_META_HEADER.trim_end_matches(",synthetic");
         if self.recording.synthetic {
+            header = RECORDING_META_HEADER;
             line.text("1");
         }
-        let mut file = AtomicFile::create_inside(path)?;
-        file.append(header(columns).as_bytes())?;
+        let mut file = begun(path, header)?;
         file.append(line.end())?;
         file.stage()
     }
@@ -303,6 +300,13 @@ impl Writer<'_> {
 
 /// Minimum speed of a time headway, m/s.
 const STANDSTILL_MPS: f64 = 1e-3;
+
+/// A file with its header.
+fn begun(path: &Path, header: &str) -> Result<AtomicFile> {
+    let mut file = AtomicFile::create_inside(path)?;
+    file.append(format!("{header}\n").as_bytes())?;
+    Ok(file)
+}
 
 fn driven_m(track: &Track) -> f64 {
     track.s_m.last().zip(track.s_m.first()).map_or(0.0, |(last, first)| (last - first).abs())

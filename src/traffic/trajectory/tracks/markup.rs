@@ -17,18 +17,20 @@ const MAX_JSON_BYTES: u64 = 1 << 30;
 /// Maximum nesting of XML elements.
 const DEEPEST: usize = 64;
 
+/// Names and values of attributes; the values are texts.
+type Attributes = Vec<(String, Value)>;
+
 /// Gives the attributes of every element with this name, and those of the elements around it as `element.attribute`, until
 /// `each` returns false.
-#[allow(clippy::type_complexity)]
 pub(super) fn each_element(
     path: &Path,
     row: &str,
-    each: &mut dyn FnMut(&[(String, String)], &dyn Fn() -> Place) -> Result<bool>,
+    each: &mut dyn FnMut(&Attributes, &dyn Fn() -> Place) -> Result<bool>,
 ) -> Result<()> {
-    let file = BufReader::with_capacity(1 << 18, LimitedLine::new(input_file::open_text(path)?));
-    let mut reader = Reader::from_reader(file);
+    let file = LimitedLine { inner: input_file::open_text(path)?, since: 0 };
+    let mut reader = Reader::from_reader(BufReader::with_capacity(1 << 18, file));
     let mut buffer = Vec::new();
-    let mut around: Vec<Vec<(String, String)>> = Vec::new();
+    let mut around: Vec<Attributes> = Vec::new();
     let wrong = |at: u64, problem: String| {
         let problem = format!("not well-formed XML at byte {at}: {problem}");
         Error::input(Place::file(path), problem, "export the file again")
@@ -77,12 +79,6 @@ struct LimitedLine<R> {
     since: u64,
 }
 
-impl<R> LimitedLine<R> {
-    fn new(inner: R) -> Self {
-        LimitedLine { inner, since: 0 }
-    }
-}
-
 impl<R: Read> Read for LimitedLine<R> {
     fn read(&mut self, bytes: &mut [u8]) -> std::io::Result<usize> {
         if self.since > MAX_ELEMENT_BYTES {
@@ -94,7 +90,7 @@ impl<R: Read> Read for LimitedLine<R> {
     }
 }
 
-fn attributes(start: &BytesStart) -> std::result::Result<Vec<(String, String)>, String> {
+fn attributes(start: &BytesStart) -> std::result::Result<Attributes, String> {
     let mut found = Vec::new();
     let mut names = HashSet::new();
     // Its own check of repeated names compares each with each.
@@ -105,7 +101,7 @@ fn attributes(start: &BytesStart) -> std::result::Result<Vec<(String, String)>, 
         if !names.insert(name.clone()) {
             return Err(format!("the attribute `{name}` is there twice"));
         }
-        found.push((name, value.into_owned()));
+        found.push((name, Value::from(value)));
     }
     Ok(found)
 }

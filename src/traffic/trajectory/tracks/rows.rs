@@ -12,7 +12,7 @@ use super::markup::{each_element, json_rows};
 use super::preset::{FileFormat, Preset};
 use super::roles::{ColumnName, Role};
 use crate::support::table::{Cell as TableCell, TableFormat, TableReader};
-use crate::traffic::trajectory::csv_table::{CsvFormat, CsvTable, FileChecksum};
+use crate::traffic::trajectory::csv_table::{CsvColumn, CsvFormat, CsvTable, FileChecksum};
 use crate::traffic::trajectory::number;
 use crate::{Error, Place, Result};
 
@@ -207,7 +207,7 @@ impl Rows {
         let (header, source) = match format {
             FileFormat::Csv => {
                 let delimiter = delimiter.and_then(|c| u8::try_from(c).ok());
-                let table = CsvTable::open(path, &CsvFormat { name: "expected", known: &[], delimiter })?;
+                let table = CsvTable::open(path, CsvFormat { name: "expected", header: "", delimiter })?;
                 (table.header().to_vec(), RowSource::Csv(Box::new(table)))
             }
             FileFormat::Parquet => {
@@ -288,25 +288,25 @@ impl Rows {
                 let mut wanted: Vec<usize> = columns.at.iter().flatten().map(|(at, _)| *at).collect();
                 wanted.sort_unstable();
                 wanted.dedup();
-                reader.want(&wanted)?;
+                reader.rows.want(&wanted)?;
                 let mut columns = Cow::Borrowed(columns);
                 if let Some((at, _)) = columns.at[Role::Time as usize]
-                    && reader.has_instants(at)
+                    && reader.rows.has_instants(at)
                 {
                     columns.found_time.set(Some(FoundTime::Date));
                     columns.to_mut().at[Role::Time as usize] = Some((at, 1.0));
                 }
                 let columns = columns.as_ref();
-                if !reader.has_lists() {
+                if !reader.rows.has_lists() {
                     let mut order = vec![0; self.header.len()];
                     wanted.iter().enumerate().for_each(|(position, at)| order[*at] = position);
-                    while reader.step()? {
+                    while reader.rows.step()? {
                         rows += 1;
                         each(&TableRow { reader: &reader, row: rows, columns, order: &order })?;
                     }
                 }
                 // Without lists, this is behind the last row.
-                while let Some(row) = reader.next_row()? {
+                while let Some(row) = reader.rows.next_row()? {
                     rows += 1;
                     let mut cells = vec![&Value::Null; self.header.len()];
                     wanted.iter().zip(&row.values).for_each(|(at, value)| cells[*at] = value);
@@ -327,13 +327,13 @@ impl Rows {
                     self.header.iter().enumerate().map(|(at, name)| (name.as_str(), at)).collect();
                 each_element(&self.path, &row, &mut |attributes, place| {
                     rows += 1;
-                    let mut texts: Vec<&str> = vec![""; self.header.len()];
+                    let mut cells = vec![&Value::Null; self.header.len()];
                     for (name, value) in attributes {
                         if let Some(at) = index.get(name.as_str()) {
-                            texts[*at] = value;
+                            cells[*at] = value;
                         }
                     }
-                    each(&TextRow { texts: &texts, columns, place })?;
+                    each(&CellRow { cells: &cells, sample: 0, columns, place })?;
                     Ok(true)
                 })?;
             }
@@ -396,7 +396,7 @@ struct CsvRow<'a> {
 
 impl CsvRow<'_> {
     fn bytes(&self, role: Role) -> Option<&[u8]> {
-        self.columns.at[role as usize].map(|(at, _)| self.table.bytes_at(at))
+        self.columns.at[role as usize].map(|(at, _)| self.table.bytes(CsvColumn(at)))
     }
 }
 
@@ -430,28 +430,6 @@ impl SampleRow for CsvRow<'_> {
     }
 }
 
-struct TextRow<'a> {
-    texts: &'a [&'a str],
-    columns: &'a Columns,
-    place: &'a dyn Fn() -> Place,
-}
-
-impl SampleRow for TextRow<'_> {
-    fn number(&self, role: Role) -> Result<Option<f64>> {
-        let Some((at, _)) = self.columns.at[role as usize] else { return Ok(None) };
-        number_of(self.texts[at].as_bytes(), role, self.columns, &|| self.place(role))
-    }
-
-    fn text(&self, role: Role) -> Result<Option<Cow<'_, str>>> {
-        let text = self.columns.at[role as usize].map(|(at, _)| Cow::Borrowed(self.texts[at].trim()));
-        Ok(text.filter(|text| !self.columns.is_none(text)))
-    }
-
-    fn place(&self, role: Role) -> Place {
-        (self.place)().column(self.columns.name(role))
-    }
-}
-
 /// A row of a table with a type for every column.
 struct TableRow<'a> {
     reader: &'a TableReader,
@@ -463,7 +441,7 @@ struct TableRow<'a> {
 
 impl TableRow<'_> {
     fn cell(&self, role: Role) -> TableCell<'_> {
-        self.columns.at[role as usize].map_or(TableCell::Null, |(at, _)| self.reader.cell(self.order[at]))
+        self.columns.at[role as usize].map_or(TableCell::Null, |(at, _)| self.reader.rows.cell(self.order[at]))
     }
 }
 
