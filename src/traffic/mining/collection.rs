@@ -58,12 +58,30 @@ pub struct Collection {
 }
 
 impl Collection {
-    fn add(&mut self, part: MinedPart) {
+    /// The scenarios of one recording.
+    fn of(recording: &Recording, mined: Mined, files: Vec<FileChecksum>, options: &MiningOptions) -> Collection {
+        let [driven_s, driven_m] = driven(recording, options);
+        let summary = RecordingSummary {
+            id: recording.id.clone(),
+            vehicles: recording.tracks.len() as u64,
+            samples: recording.tracks.iter().map(|t| t.len() as u64).sum(),
+            data_sets: mined.data_sets,
+            driven_s,
+            driven_m,
+            frame_rate_hz: recording.frame_rate_hz,
+            files,
+            preset: None,
+        };
+        let (scenarios, recordings) = (mined.scenarios, vec![summary]);
+        Collection { scenarios, recordings, synthetic: recording.synthetic, ..Collection::default() }
+    }
+
+    fn add(&mut self, part: Collection) {
         self.problems.extend(part.problems);
         self.notes.extend(part.notes);
         self.synthetic |= part.synthetic;
-        self.scenarios.extend(part.mined.scenarios);
-        self.recordings.push(part.summary);
+        self.scenarios.extend(part.scenarios);
+        self.recordings.extend(part.recordings);
     }
 }
 
@@ -143,14 +161,6 @@ impl Drop for Turn<'_> {
     }
 }
 
-struct MinedPart {
-    mined: Mined,
-    summary: RecordingSummary,
-    problems: Vec<Error>,
-    notes: Vec<String>,
-    synthetic: bool,
-}
-
 /// Reads and mines every recording of a folder, or of a file. `done` is called after each file, from any thread; its error
 /// ends the work.
 ///
@@ -184,15 +194,15 @@ pub fn mine_inputs(
         mined.scenarios.iter_mut().for_each(|scenario| name_as_in_file(scenario, &loaded));
         let ScenarioFile { scenarios, problems, notes: doubts } = usable(mined.scenarios, implausible);
         mined.scenarios = scenarios;
-        let mut summary = summary(&loaded.recording, &mined, options, loaded.checksum_sha256);
-        summary.preset.clone_from(&preset);
+        let mut part = Collection::of(&loaded.recording, mined, loaded.checksum_sha256, options);
+        part.recordings[0].preset.clone_from(&preset);
         let name = |note: String| format!("recording {}: {note}", loaded.recording.id);
-        let notes = loaded.notes.into_iter().chain(doubts).chain(of_noise).map(name).collect();
-        MinedPart { mined, summary, problems, notes, synthetic: loaded.recording.synthetic }
+        part.notes = loaded.notes.into_iter().chain(doubts).chain(of_noise).map(name).collect();
+        Collection { problems, ..part }
     };
     let turns = Turns::default();
     // The outer error ends the work; an inner one leaves out a file.
-    let parts: Result<Vec<Result<Vec<MinedPart>>>> = files
+    let parts: Result<Vec<Result<Vec<Collection>>>> = files
         .par_iter()
         .with_max_len(1)
         .map(|file| {
@@ -208,11 +218,12 @@ pub fn mine_inputs(
         match parts {
             Ok(parts) => {
                 for part in parts {
-                    if names.insert(part.summary.id.clone()) {
+                    let id = part.recordings[0].id.clone();
+                    if names.insert(id.clone()) {
                         collection.add(part);
                         continue;
                     }
-                    let place = Place::item(format!("recording {}", part.summary.id));
+                    let place = Place::item(format!("recording {id}"));
                     let problem = "another file has a recording of this name";
                     collection.problems.push(Error::input(place, problem, "rename one of the files"));
                 }
@@ -253,43 +264,19 @@ pub fn mine_generated(
     done: impl Fn() -> Result<()> + Sync,
 ) -> Result<Collection> {
     options.validate()?;
-    let parts: Vec<MinedPart> = (0..generator.recordings)
+    let parts: Vec<Collection> = (0..generator.recordings)
         .into_par_iter()
         .with_max_len(1)
         .map(|index| {
             let recording = generate_one(generator, index)?;
             let mined = mine(&recording, options);
-            let summary = summary(&recording, &mined, options, Vec::new());
             done()?;
-            let (problems, notes) = (Vec::new(), Vec::new());
-            Ok(MinedPart { mined, summary, problems, notes, synthetic: recording.synthetic })
+            Ok(Collection::of(&recording, mined, Vec::new(), options))
         })
         .collect::<Result<_>>()?;
     let mut collection = Collection::default();
-    for part in parts {
-        collection.add(part);
-    }
+    parts.into_iter().for_each(|part| collection.add(part));
     Ok(collection)
-}
-
-fn summary(
-    recording: &Recording,
-    mined: &Mined,
-    options: &MiningOptions,
-    files: Vec<FileChecksum>,
-) -> RecordingSummary {
-    let [driven_s, driven_m] = driven(recording, options);
-    RecordingSummary {
-        id: recording.id.clone(),
-        vehicles: recording.tracks.len() as u64,
-        samples: recording.tracks.iter().map(|t| t.len() as u64).sum(),
-        data_sets: mined.data_sets,
-        driven_s,
-        driven_m,
-        frame_rate_hz: recording.frame_rate_hz,
-        files,
-        preset: None,
-    }
 }
 
 /// Time and distance of all ego data sets, from each ego's first sample to its last with tags: the exposure.

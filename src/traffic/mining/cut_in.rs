@@ -8,12 +8,11 @@
 //! t = 0 is the first sample of item 1 inside the data set; the end is the first of: end of the lane
 //! change, target no longer leader, ego no longer keeps its lane, end of the data.
 
-use super::data_set::{DataSet, FoundScenario};
+use super::data_set::{DataSet, FoundScenario, Stretch};
 use super::lateral::LaneChangeKind;
 use super::options::{CutInOptions, TOLERANCE};
 use super::tags::{Item, Match, Tags};
 use crate::scenario::{Category, Scenario, Side};
-use crate::traffic::trajectory::Track;
 
 /// The items, in order.
 pub const ITEMS: [Item<'static, Tags>; 2] =
@@ -21,26 +20,10 @@ pub const ITEMS: [Item<'static, Tags>; 2] =
         t.has(Tags::CHANGES_IN | Tags::EGO_KEEPS_LANE | Tags::LEADER)
     }];
 
-/// The scenario of one match, with the verdict of the filters. `tags` are those of the match's stretch,
-/// `first` the ego's sample of the first of them.
-pub(super) fn scenario(
-    set: &DataSet,
-    target_index: usize,
-    matched: &Match,
-    first: usize,
-    tags: &[Tags],
-) -> Option<Scenario> {
-    let target = &set.recording_tags.recording.tracks[target_index];
-    let (start, end) = (first + matched.start(), first + matched.end);
-    let found = FoundScenario { set, target, category: Category::CutIn, start, end };
-    let change = lane_change_of(&found, target_index)?;
-    let side = match change.kind {
-        LaneChangeKind::RightIn | LaneChangeKind::LeftOut => Side::Left,
-        LaneChangeKind::LeftIn | LaneChangeKind::RightOut => Side::Right,
-    };
-    let mut scenario = found.scenario(side)?;
+/// The scenario of one match, with the verdict of the filters.
+pub(super) fn scenario(set: &DataSet, target_index: usize, matched: &Match, stretch: &Stretch) -> Option<Scenario> {
+    let (_, mut scenario) = with_lane_change(set, Category::CutIn, target_index, matched, stretch)?;
     (scenario.kept, scenario.reason) = verdict(&scenario, &set.recording_tags.options.cut_in);
-    describe(&mut scenario, &found, change.start, matched, first, end_cause(tags, matched, Tags::CHANGES_IN, true));
     Some(scenario)
 }
 
@@ -62,34 +45,35 @@ fn verdict(scenario: &Scenario, options: &CutInOptions) -> (bool, String) {
     }
 }
 
-/// The target's lane change relative to the ego's lane that is in progress at t = 0.
-pub(super) fn lane_change_of<'a>(
-    found: &FoundScenario<'a>,
+/// A match with a lane change of the target (cut-in and cut-out), and its scenario, not kept.
+pub(super) fn with_lane_change<'a>(
+    set: &'a DataSet<'a>,
+    category: Category,
     target_index: usize,
-) -> Option<&'a super::lateral::LaneChange> {
-    let set: &'a DataSet<'a> = found.set;
-    let j = found.sample_of(found.target, found.start)?;
-    set.recording_tags.activities[target_index].lane_change(set.ego.lane[found.start], j)
-}
-
-/// Sets the origin fields common to cut-in and cut-out.
-pub(super) fn describe(
-    scenario: &mut Scenario,
-    found: &FoundScenario,
-    change_start: usize,
     matched: &Match,
-    first: usize,
-    end_cause: &str,
-) {
-    let target: &Track = found.target;
-    scenario.truncated_start = Some(target.first_frame + (change_start as i64) < scenario.frame0);
-    scenario.frame_switch = Some(found.frame(first + matched.starts[1]));
-    scenario.end_cause = Some(end_cause.to_owned());
+    stretch: &Stretch,
+) -> Option<(FoundScenario<'a>, Scenario)> {
+    let target = &set.recording_tags.recording.tracks[target_index];
+    let (start, end) = (stretch.first + matched.start(), stretch.first + matched.end);
+    let found = FoundScenario { set, target, category, start, end };
+    // Relative to the ego's lane, in progress at t = 0.
+    let sample = found.sample_of(target, start)?;
+    let change = set.recording_tags.activities[target_index].lane_change(set.ego.lane[start], sample)?;
+    let mut scenario = found.scenario(match change.kind {
+        LaneChangeKind::RightIn | LaneChangeKind::LeftOut => Side::Left,
+        LaneChangeKind::LeftIn | LaneChangeKind::RightOut => Side::Right,
+    })?;
+    scenario.truncated_start = Some(target.first_frame + (change.start as i64) < scenario.frame0);
+    scenario.frame_switch = Some(found.frame(stretch.first + matched.starts[1]));
+    scenario.end_cause = Some(end_cause(stretch.tags[matched.end], matched, category).to_owned());
+    Some((found, scenario))
 }
 
-/// The event that ended a match. `change` is the lane change's tag; `leads`: the target leads in the last item.
-pub(super) fn end_cause(tags: &[Tags], matched: &Match, change: Tags, leads: bool) -> &'static str {
-    let at_end = tags[matched.end];
+/// The event that ended a match, from the tags at its end.
+fn end_cause(at_end: Tags, matched: &Match, category: Category) -> &'static str {
+    // The lane change, and whether the target leads in the last item.
+    let (change, leads) =
+        if category == Category::CutIn { (Tags::CHANGES_IN, true) } else { (Tags::CHANGES_OUT, false) };
     if matched.clamped {
         "data_end"
     } else if !at_end.has(change) {

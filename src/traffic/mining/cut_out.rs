@@ -9,12 +9,11 @@
 //! That is *found*. A cut-out is *kept* if the nearest vehicle ahead of the target in the ego's lane at t = 0 stays
 //! in that lane and in range until the end, and is slower than the ego at t = 0.
 
-use super::cut_in::{describe, end_cause, lane_change_of};
-use super::data_set::{DataSet, FoundScenario, micrometres};
-use super::lateral::LaneChangeKind;
+use super::cut_in::with_lane_change;
+use super::data_set::{DataSet, FoundScenario, Stretch, micrometres};
 use super::options::{CutOutOptions, TOLERANCE};
 use super::tags::{Item, Match, Tags};
-use crate::scenario::{Category, Scenario, Side};
+use crate::scenario::{Category, Scenario};
 use crate::traffic::trajectory::Track;
 
 /// The items, in order.
@@ -23,31 +22,16 @@ pub(super) const ITEMS: [Item<'static, Tags>; 2] =
         t.has(Tags::CHANGES_OUT | Tags::EGO_KEEPS_LANE) && !t.has(Tags::LEADER)
     }];
 
-/// The scenario of one match, with the verdict of the filters. `tags` are those of the match's stretch,
-/// `first` the ego's sample of the first of them.
-pub(super) fn scenario(
-    set: &DataSet,
-    target_index: usize,
-    matched: &Match,
-    first: usize,
-    tags: &[Tags],
-) -> Option<Scenario> {
-    let target = &set.recording_tags.recording.tracks[target_index];
-    let (start, end) = (first + matched.start(), first + matched.end);
-    let found = FoundScenario { set, target, category: Category::CutOut, start, end };
-    let change = lane_change_of(&found, target_index)?;
-    let side = match change.kind {
-        LaneChangeKind::LeftOut | LaneChangeKind::RightIn => Side::Left,
-        LaneChangeKind::RightOut | LaneChangeKind::LeftIn => Side::Right,
-    };
-    let mut scenario = found.scenario(side)?;
-    describe(&mut scenario, &found, change.start, matched, first, end_cause(tags, matched, Tags::CHANGES_OUT, false));
+/// The scenario of one match, with the verdict of the filters.
+pub(super) fn scenario(set: &DataSet, target_index: usize, matched: &Match, stretch: &Stretch) -> Option<Scenario> {
+    let (found, mut scenario) = with_lane_change(set, Category::CutOut, target_index, matched, stretch)?;
     match uncovered(&found) {
         Ok(lead) => {
-            let (j, l) = (found.sample_of(target, start)?, found.sample_of(lead, start)?);
+            let target = found.target;
+            let (j, l) = (found.sample_of(target, found.start)?, found.sample_of(lead, found.start)?);
             let lead_gap = lead.s_m[l] - target.s_m[j] - 0.5 * (lead.length_m + target.length_m);
             scenario.lead_id = Some(lead.id);
-            scenario.lead = Some(found.other(lead, side)?);
+            scenario.lead = Some(found.other(lead, scenario.side)?);
             scenario.lead_gap = Some(micrometres(lead_gap));
             (scenario.kept, scenario.reason) = verdict(&scenario, &set.recording_tags.options.cut_out);
         }

@@ -55,11 +55,11 @@ fn mine_pair(set: &DataSet, target_index: usize, scenarios: &mut Vec<Scenario>) 
         let shorter = |min_s: f64| move |m: &Match| (m.len() as f64 / rate) < min_s - TOLERANCE;
         let discarded = shorter(options.cut_in.min_duration_s);
         each_match(&stretches, &cut_in::ITEMS, samples(options.cut_in.pause_s, rate), discarded, |stretch, m| {
-            scenarios.extend(cut_in::scenario(set, target_index, m, stretch.first, &stretch.tags));
+            scenarios.extend(cut_in::scenario(set, target_index, m, stretch));
         });
         let discarded = shorter(options.cut_out.min_duration_s);
         each_match(&stretches, &cut_out::ITEMS, samples(options.cut_out.pause_s, rate), discarded, |stretch, m| {
-            scenarios.extend(cut_out::scenario(set, target_index, m, stretch.first, &stretch.tags));
+            scenarios.extend(cut_out::scenario(set, target_index, m, stretch));
         });
     }
     if activities.decelerates() {

@@ -5,6 +5,7 @@
 //! scenarios. Data comes from files or from the generator and goes to [`crate::traffic::mining`].
 
 mod csv_table;
+mod frame_index;
 pub mod generator;
 pub mod highd;
 mod inputs;
@@ -16,6 +17,7 @@ mod recording;
 pub mod tracks;
 
 pub use csv_table::FileChecksum;
+pub(crate) use frame_index::FrameIndex;
 pub use inputs::{InputFile, Inputs};
 pub(crate) use noise::{Noise, SUSTAINED_S, running_median};
 pub use number::Precision;

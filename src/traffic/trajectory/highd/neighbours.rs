@@ -1,5 +1,6 @@
 //! Neighbours of each vehicle per frame, for highD's neighbour columns. Only the writer needs them.
 
+use crate::traffic::trajectory::frame_index::{FrameIndex, VehicleAtFrame};
 use crate::traffic::trajectory::{Recording, Track};
 
 /// No vehicle.
@@ -33,65 +34,36 @@ const NOBODY_BESIDE: Beside = Beside { preceding: NOBODY, alongside: NOBODY, fol
 
 const ALONE: Around = Around { preceding: NOBODY, following: NOBODY, left: NOBODY_BESIDE, right: NOBODY_BESIDE };
 
-/// A vehicle of a lane at one instant.
-#[derive(Clone, Copy)]
-struct Here {
-    s_m: f64,
-    index: u32,
-}
-
 /// The neighbours of each vehicle at each of its samples. Vehicles in no lane have none.
 pub(super) fn neighbours(recording: &Recording) -> Vec<Vec<Around>> {
     let tracks = &recording.tracks;
     let mut around: Vec<Vec<Around>> = tracks.iter().map(|track| vec![ALONE; track.len()]).collect();
     for (index, carriageway) in recording.carriageways.iter().enumerate() {
-        let mut waiting: Vec<u32> =
-            (0..tracks.len() as u32).filter(|&at| tracks[at as usize].carriageway == index).collect();
-        waiting.sort_by_key(|&at| std::cmp::Reverse((tracks[at as usize].first_frame, at)));
-        let mut present: Vec<u32> = Vec::new();
-        let mut lanes: Vec<Vec<Here>> = vec![Vec::new(); carriageway.lane_count()];
-        let mut frame = i64::MIN;
-        while !(present.is_empty() && waiting.is_empty()) {
-            let next = waiting.last().map_or(i64::MAX, |&at| tracks[at as usize].first_frame);
-            frame = if present.is_empty() { next } else { frame + 1 };
-            while let Some(at) = waiting.pop_if(|at| tracks[*at as usize].first_frame == frame) {
-                present.push(at);
+        // Ascending along the road.
+        let mut lanes: Vec<Vec<VehicleAtFrame>> = vec![Vec::new(); carriageway.lane_count()];
+        for present in FrameIndex::new(recording, index).frames() {
+            lanes.iter_mut().for_each(Vec::clear);
+            for here in present {
+                let lane = tracks[here.track as usize].lane[here.sample as usize];
+                if let Some(vehicles) = lanes.get_mut(usize::from(lane)) {
+                    vehicles.push(*here);
+                }
             }
-            present.retain(|&at| tracks[at as usize].last_frame() >= frame);
-            fill(&mut lanes, tracks, &present, frame);
-            note(&mut around, tracks, &lanes, frame);
+            note(&mut around, tracks, &lanes);
         }
     }
     around
 }
 
-/// Sorts the present vehicles into lanes, ascending along the road.
-fn fill(lanes: &mut [Vec<Here>], tracks: &[Track], present: &[u32], frame: i64) {
-    lanes.iter_mut().for_each(Vec::clear);
-    for &index in present {
-        let track = &tracks[index as usize];
-        if let Some(sample) = track.index_of(frame)
-            && let Some(lane) = lanes.get_mut(usize::from(track.lane[sample]))
-        {
-            lane.push(Here { s_m: track.s_m[sample], index });
-        }
-    }
-    for lane in lanes {
-        lane.sort_by(|a, b| a.s_m.total_cmp(&b.s_m).then(a.index.cmp(&b.index)));
-    }
-}
-
-fn note(around: &mut [Vec<Around>], tracks: &[Track], lanes: &[Vec<Here>], frame: i64) {
-    let beside = |lane: Option<usize>, here: Here| match lane.and_then(|lane| lanes.get(lane)) {
+fn note(around: &mut [Vec<Around>], tracks: &[Track], lanes: &[Vec<VehicleAtFrame>]) {
+    let beside = |lane: Option<usize>, here: VehicleAtFrame| match lane.and_then(|lane| lanes.get(lane)) {
         Some(vehicles) => beside(tracks, vehicles, here),
         None => NOBODY_BESIDE,
     };
     for (lane, vehicles) in lanes.iter().enumerate() {
         for (place, &here) in vehicles.iter().enumerate() {
-            let index = here.index as usize;
-            let Some(sample) = tracks[index].index_of(frame) else { continue };
-            let at = |place: Option<usize>| place.and_then(|place| vehicles.get(place)).map_or(NOBODY, |v| v.index);
-            around[index][sample] = Around {
+            let at = |place: Option<usize>| place.and_then(|place| vehicles.get(place)).map_or(NOBODY, |v| v.track);
+            around[here.track as usize][here.sample as usize] = Around {
                 preceding: at(Some(place + 1)),
                 following: at(place.checked_sub(1)),
                 left: beside(lane.checked_sub(1), here),
@@ -101,21 +73,21 @@ fn note(around: &mut [Vec<Around>], tracks: &[Track], lanes: &[Vec<Here>], frame
     }
 }
 
-fn beside(tracks: &[Track], vehicles: &[Here], here: Here) -> Beside {
-    let length_m = tracks[here.index as usize].length_m;
+fn beside(tracks: &[Track], vehicles: &[VehicleAtFrame], here: VehicleAtFrame) -> Beside {
+    let length_m = tracks[here.track as usize].length_m;
     let mut found = NOBODY_BESIDE;
     let mut nearest_m = f64::INFINITY;
     for other in vehicles {
         let ahead_m = other.s_m - here.s_m;
-        if ahead_m.abs() < 0.5 * (length_m + tracks[other.index as usize].length_m) {
+        if ahead_m.abs() < 0.5 * (length_m + tracks[other.track as usize].length_m) {
             if ahead_m.abs() < nearest_m {
                 nearest_m = ahead_m.abs();
-                found.alongside = other.index;
+                found.alongside = other.track;
             }
         } else if ahead_m <= 0.0 {
-            found.following = other.index;
+            found.following = other.track;
         } else if found.preceding == NOBODY {
-            found.preceding = other.index;
+            found.preceding = other.track;
         }
     }
     found
