@@ -25,7 +25,7 @@ const BRAKING_FROM_MPS: f64 = 22.0;
 /// A vehicle that already decelerates more than this does not start a scheduled braking, m/s².
 const BRAKING_ALREADY_MPS2: f64 = -0.6;
 
-impl Traffic {
+impl Traffic<'_> {
     /// Starts the lane changes and brakings of this step.
     pub(super) fn decide(&mut self) {
         for place in 0..self.order.len() {
@@ -35,7 +35,7 @@ impl Traffic {
                 continue;
             }
             let s_m = self.vehicles[i].s_m;
-            let in_view = s_m > -RAISED_BEFORE_M && s_m < self.setting.window_m;
+            let in_view = s_m > -RAISED_BEFORE_M && s_m < self.options.window_m;
             let hazards = if in_view { self.hazards_in_view } else { Hazards::UNRAISED };
             if self.vehicles[i].braking.is_none() && self.vehicles[i].change.is_none() {
                 self.consider_braking(place, hazards.brakings);
@@ -51,9 +51,9 @@ impl Traffic {
         }
         let follower = self.view(place, own.lane).behind;
         if follower.is_some_and(|f| f.gap_m < FOLLOWER_WITHIN_S * f.speed_mps)
-            && self.decisions.chance(self.setting.behaviour.brakings_per_s * factor * DECISION_S)
+            && self.decisions.chance(self.options.behaviour.brakings_per_s * factor * DECISION_S)
         {
-            let braking = Braking::draw(&self.setting.behaviour, &mut self.decisions);
+            let braking = Braking::draw(&self.options.behaviour, &mut self.decisions);
             self.vehicles[self.order[place]].braking = Some(braking);
         }
     }
@@ -78,7 +78,7 @@ impl Traffic {
                 continue;
             }
             let there = self.view(place, to);
-            let behaviour = &self.setting.behaviour;
+            let behaviour = &self.options.behaviour;
             let of_class = if own.class == VehicleClass::Truck { behaviour.truck_change_factor } else { 1.0 };
             let motive = motive(way, own.speed_mps, &own.driver, here, there.ahead);
             let rate = LANE_CHANGES_PER_S * of_class * motive;
@@ -92,11 +92,11 @@ impl Traffic {
     }
 
     fn start_lane_change(&mut self, i: usize, to: usize, accelerates: bool) {
-        let width = self.setting.lane_width_m;
+        let width = self.lane_width_m;
         let own = &mut self.vehicles[i];
         let target_m = draw_line(centre_of(to, width), width, own.width_m, &mut self.decisions);
         let (lanes, way_m) = ((own.lane, to), (own.line_m, target_m));
-        let behaviour = &self.setting.behaviour;
+        let behaviour = &self.options.behaviour;
         let change = LaneChangeMotion::draw(lanes, way_m, own.class, accelerates, behaviour, &mut self.decisions);
         own.line_m = target_m;
         own.occupied |= 1 << to;

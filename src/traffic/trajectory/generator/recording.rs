@@ -4,11 +4,10 @@
 use super::inflow::demand;
 use super::options::GeneratorOptions;
 use super::random::{Purpose, TrafficRandom};
-use super::traffic::{RoadSetup, Traffic};
+use super::traffic::Traffic;
 use super::vehicle::Vehicle;
 use crate::support::error::Result;
-use crate::traffic::trajectory::{Carriageway, NO_LANE, Recording, Track};
-use crate::traffic::trajectory::{Precision, highd};
+use crate::traffic::trajectory::{Carriageway, NO_LANE, Precision, Recording, Track, highd};
 
 /// Upper edge of the image to the first line, and between the carriageways, m.
 const VERGE_M: f64 = 8.0;
@@ -23,22 +22,12 @@ pub(super) fn record(options: &GeneratorOptions, index: usize) -> Result<Recordi
     let road = [lanes, if index % 6 == 4 { 2 } else { lanes }];
     let speed_level = site.normal_within(1.0, 0.03, 0.92, 1.08);
     let truck_level = site.normal_within(1.0, 0.15, 0.6, 1.4);
-    let steps_per_sample = options.steps_per_sample();
-    let setting = RoadSetup {
-        lane_width_m,
-        window_m: options.window_m,
-        step_s: 1.0 / (options.frame_rate_hz * steps_per_sample as f64),
-        steps_per_sample,
-        event_rate_factor: options.event_rate_factor,
-        behaviour: options.behaviour,
-    };
-
     let mut seen: Vec<(usize, Vehicle)> = Vec::new();
     for (carriageway, &lanes) in road.iter().enumerate() {
         let flow_level = site.normal_within(1.0, 0.08, 0.8, 1.12);
         let demand = demand(options, lanes, flow_level, truck_level, speed_level);
-        let traffic = Traffic::new(setting.clone(), demand, (options.seed, index, carriageway));
-        seen.extend(traffic.run(options.samples()).into_iter().map(|vehicle| (carriageway, vehicle)));
+        let traffic = Traffic::new(options, lane_width_m, demand, (index, carriageway));
+        seen.extend(traffic.run().into_iter().map(|vehicle| (carriageway, vehicle)));
     }
     // Numbers ascend by first appearance; the sort is stable, so ties keep carriageway and arrival.
     seen.sort_by_key(|(_, vehicle)| vehicle.samples.first);

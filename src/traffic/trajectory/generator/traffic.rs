@@ -6,7 +6,7 @@ use super::events::{DECISION_S, Hazards, SETTLE_S};
 use super::idm::{HARDEST_BRAKING_MPS2, LeaderView, following_acceleration, free_acceleration};
 use super::inflow::{Inflow, LaneDemand};
 use super::lane_change::{LaneView, Neighbour};
-use super::options::Behaviour;
+use super::options::GeneratorOptions;
 use super::random::{Purpose, TrafficRandom};
 use super::vehicle::{Samples, Vehicle};
 use crate::traffic::trajectory::VehicleClass;
@@ -41,26 +41,12 @@ const ROOM_M: f64 = 3.0;
 const ROOM_HEADWAY_S: f64 = 0.3;
 const ROOM_TTC_S: f64 = 4.0;
 
-/// Dimensions of a simulation.
-#[derive(Debug, Clone, PartialEq)]
-pub(super) struct RoadSetup {
-    /// Lane width, m.
-    pub lane_width_m: f64,
-    /// Length of road in view, m.
-    pub window_m: f64,
-    /// Time step, s.
-    pub step_s: f64,
-    /// Steps from one sample to the next.
-    pub steps_per_sample: usize,
-    /// Multiplies the rates of lane changes and hard brakings in the camera's view.
-    pub event_rate_factor: f64,
-    /// Behaviour of drivers and traffic that determines the scenarios.
-    pub behaviour: Behaviour,
-}
-
 /// One carriageway.
-pub(super) struct Traffic {
-    pub(super) setting: RoadSetup,
+pub(super) struct Traffic<'a> {
+    pub(super) options: &'a GeneratorOptions,
+    pub(super) lane_width_m: f64,
+    /// Time step, s.
+    step_s: f64,
     pub(super) lanes: usize,
     pub(super) vehicles: Vec<Vehicle>,
     /// Vehicles on the road, front first.
@@ -80,19 +66,23 @@ pub(super) struct Traffic {
     relaxation: f64,
 }
 
-impl Traffic {
-    /// An empty road. `key` is (seed, recording, carriageway).
-    pub(super) fn new(setting: RoadSetup, demand: Vec<LaneDemand>, key: (u64, usize, usize)) -> Traffic {
-        let stream = |purpose| TrafficRandom::new(key.0, key.1, key.2, purpose);
+impl<'a> Traffic<'a> {
+    /// An empty road. `key` is (recording, carriageway).
+    pub(super) fn new(
+        options: &'a GeneratorOptions,
+        lane_width_m: f64,
+        demand: Vec<LaneDemand>,
+        key: (usize, usize),
+    ) -> Traffic<'a> {
+        let stream = |purpose| TrafficRandom::new(options.seed, key.0, key.1, purpose);
         let mut arrivals = stream(Purpose::Inflow);
         let lanes = demand.len();
-        let width = setting.lane_width_m;
         let inflows = demand
             .into_iter()
             .enumerate()
-            .map(|(lane, demand)| Inflow::new(demand, lane, centre_of(lane, width), width, &mut arrivals))
+            .map(|(lane, demand)| Inflow::new(demand, lane, centre_of(lane, lane_width_m), lane_width_m, &mut arrivals))
             .collect();
-        let dt = setting.step_s;
+        let dt = 1.0 / (options.frame_rate_hz * options.steps_per_sample() as f64);
         let keep = libm::exp(-dt / NOISE_CORRELATION_S);
         Traffic {
             lanes,
@@ -109,33 +99,36 @@ impl Traffic {
             lag: 1.0 - libm::exp(-dt / ACTUATION_LAG_S),
             perception: 1.0 - libm::exp(-dt / PERCEPTION_S),
             relaxation: 1.0 - libm::exp(-dt / RELAXATION_S),
-            hazards_in_view: Hazards::raised(setting.event_rate_factor),
-            setting,
+            hazards_in_view: Hazards::raised(options.event_rate_factor),
+            options,
+            lane_width_m,
+            step_s: dt,
         }
     }
 
-    /// Runs until the road is full, then for `samples` samples. Returns the camera's samples of each vehicle, in the
-    /// order of arrival.
-    pub(super) fn run(mut self, samples: usize) -> Vec<Vehicle> {
+    /// Runs until the road is full, then for the samples of a recording. Returns the camera's samples of each vehicle, in
+    /// the order of arrival.
+    pub(super) fn run(mut self) -> Vec<Vehicle> {
         // Warm-up: the slowest trucks pass the whole road once.
-        let warm_up_s = (UPSTREAM_M + self.setting.window_m + DOWNSTREAM_M) / FILLING_MPS;
-        let warm_up = (warm_up_s / self.setting.step_s).ceil() as usize;
-        let steps = warm_up + (samples.max(1) - 1) * self.setting.steps_per_sample + 1;
+        let warm_up_s = (UPSTREAM_M + self.options.window_m + DOWNSTREAM_M) / FILLING_MPS;
+        let warm_up = (warm_up_s / self.step_s).ceil() as usize;
+        let steps_per_sample = self.options.steps_per_sample();
+        let steps = warm_up + (self.options.samples().max(1) - 1) * steps_per_sample + 1;
         for step in 0..steps {
             self.inject();
             self.sort();
             self.decide();
             self.accelerate();
             let since = step.checked_sub(warm_up);
-            let sample = since.filter(|s| s.is_multiple_of(self.setting.steps_per_sample));
-            self.advance(sample.map(|s| s / self.setting.steps_per_sample));
+            let sample = since.filter(|s| s.is_multiple_of(steps_per_sample));
+            self.advance(sample.map(|s| s / steps_per_sample));
         }
         self.vehicles.retain(|vehicle| !vehicle.samples.s_m.is_empty());
         self.vehicles
     }
 
     fn inject(&mut self) {
-        let now_s = self.step as f64 * self.setting.step_s;
+        let now_s = self.step as f64 * self.step_s;
         for lane in 0..self.lanes {
             let last = self.order.iter().rev().find(|&&i| self.vehicles[i].is_in(lane));
             let last = last.map(|&i| (self.vehicles[i].rear_m(), self.vehicles[i].speed_mps));
@@ -206,7 +199,7 @@ impl Traffic {
 
             // During a lane change the driver keeps a smaller headway.
             let kept_s = if own.change.is_some() {
-                self.setting.behaviour.change_headway_fraction * headway_s
+                self.options.behaviour.change_headway_fraction * headway_s
             } else {
                 headway_s
             };
@@ -257,8 +250,8 @@ impl Traffic {
 
     /// Writes the sample, if this step is one, and moves every vehicle by one step.
     fn advance(&mut self, sample: Option<usize>) {
-        let dt = self.setting.step_s;
-        let width = self.setting.lane_width_m;
+        let dt = self.step_s;
+        let width = self.lane_width_m;
         for &i in &self.order {
             let own = &mut self.vehicles[i];
             let mut a = own.acceleration_mps2 + (own.command_mps2 - own.acceleration_mps2) * self.lag;
@@ -268,7 +261,7 @@ impl Traffic {
             own.acceleration_mps2 = a;
             let (d_m, v_d_mps) = own.lateral();
             if let Some(sample) = sample
-                && (0.0..=self.setting.window_m).contains(&own.s_m)
+                && (0.0..=self.options.window_m).contains(&own.s_m)
             {
                 own.samples.push(sample, own.s_m, d_m, own.speed_mps, v_d_mps, a);
             }
@@ -301,7 +294,7 @@ impl Traffic {
                 }
             }
         }
-        let end_m = self.setting.window_m + DOWNSTREAM_M;
+        let end_m = self.options.window_m + DOWNSTREAM_M;
         let vehicles = &self.vehicles;
         self.order.retain(|&i| vehicles[i].s_m < end_m);
         self.step += 1;
