@@ -15,15 +15,19 @@ pub(super) struct Overlaps {
     pub first: String,
 }
 
-/// Finds overlaps in the samples of a track that `looked_at` gives; `None` without any.
-pub(super) fn overlaps<I: Iterator<Item = usize>>(
-    recording: &Recording,
-    looked_at: impl Fn(&Track) -> I,
-) -> Option<Overlaps> {
+/// One sample of a track per second, at the same frames for all tracks.
+pub(super) fn each_second(recording: &Recording, track: &Track) -> impl Iterator<Item = usize> + use<> {
+    let second = recording.frame_rate_hz.round().max(1.0) as usize;
+    let first = (-track.first_frame).rem_euclid(second as i64) as usize;
+    (first..track.len()).step_by(second)
+}
+
+/// Finds overlaps, once a second; `None` without any.
+pub(super) fn overlaps(recording: &Recording) -> Option<Overlaps> {
     let mut boxes: Vec<(usize, i64, f64, usize, usize)> = Vec::new();
     for (index, track) in recording.tracks.iter().enumerate() {
         let here = |k: usize| (track.carriageway, track.first_frame + k as i64, track.s_m[k], index, k);
-        boxes.extend(looked_at(track).map(here));
+        boxes.extend(each_second(recording, track).map(here));
     }
     boxes.sort_by(|a, b| (a.0, a.1).cmp(&(b.0, b.1)).then(a.2.total_cmp(&b.2)).then(a.3.cmp(&b.3)));
     let longest_m = recording.tracks.iter().map(|track| track.length_m).fold(0.0, f64::max);

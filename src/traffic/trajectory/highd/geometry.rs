@@ -3,7 +3,7 @@
 
 use super::frame::Direction;
 use crate::support::plausibility::Implausible;
-use crate::traffic::trajectory::overlap::overlaps;
+use crate::traffic::trajectory::overlap::{each_second, overlaps};
 use crate::traffic::trajectory::{Recording, Track};
 use crate::{Error, Place, Result};
 
@@ -61,16 +61,6 @@ struct Finding {
     is_general: bool,
 }
 
-/// Samples of a track that are checked.
-fn looked_at(track: &Track, stride: i64) -> impl Iterator<Item = usize> + use<> {
-    let first = (-track.first_frame).rem_euclid(stride) as usize;
-    (first..track.len()).step_by(stride as usize)
-}
-
-fn stride(recording: &Recording) -> i64 {
-    (recording.frame_rate_hz.round() as i64).max(1)
-}
-
 fn direction(recording: &Recording, track: &Track) -> Direction {
     let name = &recording.carriageways[track.carriageway].name;
     if *name == Direction::Upper.name() { Direction::Upper } else { Direction::Lower }
@@ -90,7 +80,7 @@ fn beyond_m(recording: &Recording, track: &Track, sample: usize, d_m: f64) -> f6
 /// The first misplaced sample of a vehicle that is misplaced most of the time.
 fn first_misplaced(recording: &Recording, track: &Track, d_of: &dyn Fn(f64) -> f64) -> Option<usize> {
     let mut samples = 0;
-    let mut beyond = looked_at(track, stride(recording)).inspect(|_| samples += 1);
+    let mut beyond = each_second(recording, track).inspect(|_| samples += 1);
     let is_beyond = |sample: &usize| beyond_m(recording, track, *sample, d_of(track.d_m[*sample])) > MARGIN_M;
     let first = beyond.find(is_beyond);
     let more = beyond.filter(is_beyond).count();
@@ -99,7 +89,7 @@ fn first_misplaced(recording: &Recording, track: &Track, d_of: &dyn Fn(f64) -> f
 
 /// Vehicles that are not in the lane of their `laneId`, or beside the road.
 fn misplaced(recording: &Recording) -> Option<Finding> {
-    let judged = recording.tracks.iter().filter(|track| looked_at(track, stride(recording)).next().is_some());
+    let judged = recording.tracks.iter().filter(|track| each_second(recording, track).next().is_some());
     let mut found = judged.clone().filter_map(|track| Some((track, first_misplaced(recording, track, &|d_m| d_m)?)));
     let (track, sample) = found.next()?;
     let (count, all) = (1 + found.count(), judged.clone().count());
@@ -136,7 +126,7 @@ fn misplaced(recording: &Recording) -> Option<Finding> {
 fn off_centre(recording: &Recording) -> Option<Finding> {
     let offset = |track: &Track| {
         let carriageway = &recording.carriageways[track.carriageway];
-        let offsets = looked_at(track, stride(recording)).filter_map(|sample| {
+        let offsets = each_second(recording, track).filter_map(|sample| {
             let lane = carriageway.lane(track.lane[sample].into())?;
             Some(direction(recording, track).leftward(track.d_m[sample] - lane.centre_m()))
         });
@@ -171,7 +161,7 @@ fn against(recording: &Recording) -> Option<Finding> {
     let (mut cross_sum, mut change_sum, mut speed_sum, mut samples) = (0.0, 0.0, 0.0, 0_u32);
     let mut strongest: Option<(f64, &Track, usize)> = None;
     for track in &recording.tracks {
-        for k in looked_at(track, stride(recording)).filter(|k| (1..track.len() - 1).contains(k)) {
+        for k in each_second(recording, track).filter(|k| (1..track.len() - 1).contains(k)) {
             let change_mps = (track.d_m[k + 1] - track.d_m[k - 1]) * recording.frame_rate_hz / 2.0;
             let speed_mps = track.v_d_mps[k];
             (cross_sum, change_sum, speed_sum) = (
@@ -205,8 +195,7 @@ fn against(recording: &Recording) -> Option<Finding> {
 
 /// Boxes that overlap.
 fn overlapping(recording: &Recording) -> Option<String> {
-    let stride = stride(recording);
-    let found = overlaps(recording, |track| looked_at(track, stride))?;
+    let found = overlaps(recording)?;
     Some(format!(
         "{} pair(s) of vehicles overlap, the first are {}: check sizes and reference point (x and y are the left and \
          upper edge of the box in the image)",

@@ -48,7 +48,7 @@ pub(super) fn assemble(
     about.unused = unused.to_vec();
     about.reference = preset.reference;
     about.note_classes(&raw, preset);
-    std::mem::take(&mut raw.notes).into_iter().for_each(|note| about.find(false, note));
+    std::mem::take(&mut raw.notes).into_iter().for_each(|note| about.warn(note));
     let before = raw.vehicles.len();
     raw.vehicles.retain(|vehicle| !is_ignored(vehicle, preset));
     about.ignored = (before - raw.vehicles.len()) as u64;

@@ -6,7 +6,7 @@ use quick_xml::XmlVersion;
 use quick_xml::events::Event;
 use quick_xml::reader::Reader;
 
-use super::raw::{NO_LABEL, RawFile, RawRecording, RawSample, RawVehicle};
+use super::raw::{RawFile, RawRecording, RawSample, RawVehicle};
 use super::roles::Role;
 use crate::support::input_file;
 use crate::traffic::trajectory::csv_table::FileChecksum;
@@ -18,21 +18,6 @@ const MAX_BYTES: u64 = 256 << 20;
 const HELP: &str = "give CommonRoad 2020a (XML); CommonRoad's own tools convert older files";
 /// Maximum nesting of elements.
 const DEEPEST: usize = 32;
-
-const NAN_SAMPLE: RawSample = RawSample {
-    at: f64::NAN,
-    xy_m: [f64::NAN; 2],
-    heading: [f64::NAN; 2],
-    speed_mps: f64::NAN,
-    velocity_mps: [f64::NAN; 2],
-    along_mps: [f64::NAN; 2],
-    acceleration_mps2: f64::NAN,
-    acceleration_xy_mps2: [f64::NAN; 2],
-    lane: NO_LABEL,
-    lane_offset_m: f64::NAN,
-    other_clock: f64::NAN,
-    facts: [0; 4],
-};
 
 /// Reads the obstacles of a scene as one recording.
 ///
@@ -152,7 +137,7 @@ impl Scene {
             ("rectangle", "length") => self.vehicle.lengths_m = vec![number()?],
             ("rectangle", "width") => self.vehicle.widths_m = vec![number()?],
             _ if inside("initialState") || inside("state") => {
-                let sample = self.sample.get_or_insert(NAN_SAMPLE);
+                let sample = self.sample.get_or_insert_with(RawSample::unknown);
                 match (parent.as_str(), element.as_str()) {
                     ("point", "x") => sample.xy_m[0] = number()?,
                     ("point", "y") => sample.xy_m[1] = number()?,

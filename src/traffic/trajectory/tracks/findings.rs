@@ -3,7 +3,7 @@
 use super::preset::{Preset, Side};
 use super::road::median;
 use super::understanding::{Exclusion, Finding, TIMES, Understanding};
-use crate::support::plausibility::{Doubts, Implausible, NOISE_MPS, Quantity};
+use crate::support::plausibility::{Doubts, Implausible, Limits, NOISE_MPS, Quantity};
 use crate::support::readable::{count, significant, value};
 use crate::traffic::trajectory::motion::{Impossible, JUMP_ACROSS_M, JUMP_ALONG_M, impossible, jumps};
 use crate::traffic::trajectory::overlap::overlaps;
@@ -49,10 +49,21 @@ impl Understanding {
         self.findings.push(Finding { is_grave, text: text.into() });
     }
 
+    /// Finds what makes the tracks unusable.
+    pub(super) fn refuse(&mut self, text: impl Into<String>) {
+        self.find(true, text);
+    }
+
+    /// Finds what is strange in tracks that can be used.
+    pub(super) fn warn(&mut self, text: impl Into<String>) {
+        self.find(false, text);
+    }
+
     pub(super) fn check_units(&mut self, recording: &Recording) {
         if self.ratios.len() >= MIN_VEHICLES.min(recording.tracks.len()) && !self.ratios.is_empty() {
             let ratio = median(&mut self.ratios);
             self.positions_over_speeds = Some(ratio);
+            let times = significant(ratio, 3);
             if (ratio - 1.0).abs() > MAX_SPEED_DIFFERENCE {
                 // A rate that the times give is right.
                 let rate = |why: &str| why.starts_with("the frame rate");
@@ -60,18 +71,10 @@ impl Understanding {
                     (ratio / factor - 1.0).abs() < 0.06 && !(rate(why) && self.rate_source == TIMES)
                 };
                 let why = MISTAKEN.iter().find(near).map_or("check units and frame rate", |(_, why)| why);
-                self.find(
-                    true,
-                    format!("vehicles move {} times as far as their speeds tell: {why}", significant(ratio, 3)),
-                );
+                self.refuse(format!("vehicles move {times} times as far as their speeds tell: {why}"));
             } else if (ratio - 1.0).abs() > USUAL_SPEED_DIFFERENCE {
-                self.find(
-                    false,
-                    format!(
-                        "vehicles move {} times as far as their speeds tell: distances or speeds are wrong",
-                        significant(ratio, 3)
-                    ),
-                );
+                let why = "distances or speeds are wrong";
+                self.warn(format!("vehicles move {times} times as far as their speeds tell: {why}"));
             }
         }
         let told = self.acceleration;
@@ -79,20 +82,20 @@ impl Understanding {
         if told.count > 50.0 && told.of_given.max(told.of_derived) > 0.01 * told.count {
             let size = libm::sqrt(told.of_given / told.of_derived.max(1e-12));
             if told.is_opposite() || !(0.4..=2.5).contains(&size) {
-                self.find(true, format!(
+                self.refuse(format!(
                     "accelerations do not fit the changes of speed (they are {} times as large, {}): check their unit and sign",
                     significant(size, 2),
                     if told.product < 0.0 { "of the other sign" } else { "of the same sign" }
                 ));
             } else if (told.slope() - 1.0).abs() > USUAL_ACCELERATION_DIFFERENCE + 4.0 * told.slope_error() {
-                self.find(false, format!(
+                self.warn(format!(
                     "accelerations are {} times the changes of speed; leader decelerations are kept for the peaks of the former",
                     significant(told.slope(), 2)
                 ));
             }
             let offset_mps2 = told.difference / told.count;
             if offset_mps2.abs() > USUAL_ACCELERATION_OFFSET_MPS2 {
-                self.find(false, format!(
+                self.warn(format!(
                     "accelerations are {} m/s² {} the changes of speed on average; leader decelerations are kept for the peaks of the former",
                     significant(offset_mps2.abs(), 2),
                     if offset_mps2 < 0.0 { "below" } else { "above" }
@@ -120,74 +123,58 @@ impl Understanding {
         }
         check(Quantity::Rate, self.rate_hz, "frame rate".to_owned());
         // Half of the vehicles beyond what is plausible is a unit, not an odd vehicle.
-        let general = |of: &dyn Fn(&Track) -> f64, quantity: Quantity| {
-            let mut values: Vec<f64> = recording.tracks.iter().map(of).collect();
+        let general = |quantity: Quantity, of: &dyn Fn(&Track) -> f64| {
+            let (Limits { name, unit, mistaken, .. }, mut values) =
+                (quantity.limits(), recording.tracks.iter().map(of).collect::<Vec<f64>>());
             let middle = median(&mut values);
-            let hint = quantity.limits().mistaken.iter().find(|(_, factor)| quantity.is_plausible(middle / factor));
+            let hint = mistaken.iter().find(|(_, factor)| quantity.is_plausible(middle / factor));
             let hint = hint.map_or(String::new(), |(unit, _)| format!(": it looks like {unit}"));
-            (!quantity.is_plausible(middle)).then(|| {
-                format!(
-                    "the median {} is {} {}{hint}",
-                    quantity.limits().name,
-                    significant(middle, 3),
-                    quantity.limits().unit
-                )
-            })
+            let text = || format!("the median {name} is {} {unit}{hint}", significant(middle, 3));
+            (!quantity.is_plausible(middle)).then(text)
         };
-        let general: Vec<String> = [
-            general(&mean, Quantity::Speed),
-            general(&|track| track.length_m, Quantity::Length),
-            general(&|track| track.width_m, Quantity::Width),
-        ]
-        .into_iter()
-        .flatten()
-        .collect();
+        let general = [
+            general(Quantity::Speed, &mean),
+            general(Quantity::Length, &|track| track.length_m),
+            general(Quantity::Width, &|track| track.width_m),
+        ];
         if let Some(first) = grave.first() {
             let more = if grave.len() > 1 { format!(" ({} more such)", grave.len() - 1) } else { String::new() };
-            self.find(true, format!("{first}{more}"));
+            self.refuse(format!("{first}{more}"));
         }
         // A wrong ratio names the unit already.
         if self.positions_over_speeds.is_none_or(|ratio| (ratio - 1.0).abs() <= MAX_SPEED_DIFFERENCE) {
-            general.into_iter().for_each(|text| self.find(true, text));
+            general.into_iter().flatten().for_each(|text| self.refuse(text));
         }
         let narrow =
             self.carriageways.iter().any(|of| of.lane_width_m.iter().all(|w| !Quantity::LaneWidth.is_plausible(*w)));
         if narrow {
-            self.find(true, "no lane has a plausible width: check the unit of y, and what `lane` means");
+            self.refuse("no lane has a plausible width: check the unit of y, and what `lane` means");
         }
-        let (mut outside, mut samples) = (0_u64, 0_u64);
-        for track in &recording.tracks {
-            samples += track.len() as u64;
-            outside += track.lane.iter().filter(|lane| **lane == NO_LANE).count() as u64;
-        }
-        if 2 * outside > samples {
-            self.find(true, "vehicles are mostly in no lane: check the axes, and the lanes in the file");
+        let lanes = || recording.tracks.iter().flat_map(|track| &track.lane);
+        if 2 * lanes().filter(|lane| **lane == NO_LANE).count() > lanes().count() {
+            self.refuse("vehicles are mostly in no lane: check the axes, and the lanes in the file");
         }
         let mut cars_m: Vec<f64> =
             recording.tracks.iter().filter(|of| of.class == VehicleClass::Car).map(|of| of.length_m).collect();
         let car_m = median(&mut cars_m);
         if car_m < SHORT_CAR_M {
-            self.find(
-                false,
-                format!("half of the cars are shorter than {} m: check `length` and its unit", significant(car_m, 3)),
-            );
+            let car_m = significant(car_m, 3);
+            self.warn(format!("half of the cars are shorter than {car_m} m: check `length` and its unit"));
         }
         let widths = self.carriageways.iter().flat_map(|of| of.lane_width_m);
         let narrowest = widths.fold(f64::INFINITY, f64::min);
         if !narrow && narrowest < NARROW_LANE_M {
-            self.find(false, format!("lanes of {} m are narrow: check the unit of y", significant(narrowest, 3)));
+            self.warn(format!("lanes of {} m are narrow: check the unit of y", significant(narrowest, 3)));
         }
         let long =
             recording.tracks.iter().filter(|track| track.class == VehicleClass::Car && track.length_m >= 9.0).count();
         if long > 0 && !self.classes.is_empty() {
-            self.find(false, format!("{long} vehicle(s) of 9 m and longer are cars by their class: see `classes`"));
+            self.warn(format!("{long} vehicle(s) of 9 m and longer are cars by their class: see `classes`"));
         }
-        doubts.sentences().into_iter().for_each(|text| self.find(false, text));
+        doubts.sentences().into_iter().for_each(|text| self.warn(text));
         if self.length_m < 50.0 {
-            self.find(
-                false,
-                format!("only {} m of road are in view: check the unit of x and y", significant(self.length_m, 3)),
-            );
+            let length_m = significant(self.length_m, 3);
+            self.warn(format!("only {length_m} m of road are in view: check the unit of x and y"));
         }
     }
 
@@ -215,7 +202,7 @@ impl Understanding {
         let contradicted = constant.iter().filter(|track| speed_range_mps(track, self.rate_hz) > MAX_RANGE_MPS).count();
         if contradicted > 0 && 20 * contradicted >= constant.len() && 10 * constant.len() >= 9 * recording.tracks.len()
         {
-            self.find(true, format!(
+            self.refuse(format!(
                 "the speed of a vehicle does not change, although {contradicted} move at speeds that differ by more than \
                  {MAX_RANGE_MPS} m/s: it is one speed per vehicle; leave out the column, so that speeds follow from positions"
             ));
@@ -229,7 +216,7 @@ impl Understanding {
                 true => "name the text that stands for no value in `none`, or leave out the column of speeds",
                 false => "correct the values, or derive them from smoothed positions (`smoothing_s`)",
             };
-            self.find(true, format!(
+            self.refuse(format!(
                 "{vehicles} vehicle(s) have samples that cannot be, the first is vehicle {vehicle} at frame {frame}: {problem}; {help}"
             ));
         }
@@ -237,23 +224,22 @@ impl Understanding {
 
     pub(super) fn check_axes(&mut self, recording: &Recording, preset: &Preset) {
         if self.lateral.correlation() < -0.5 && self.lateral.is_opposite() && recording.tracks.len() >= MIN_VEHICLES {
-            self.find(true, "vehicles move across the road against their lateral speeds: y, or the lateral speed, is mirrored; see `axes.y`");
+            self.refuse("vehicles move across the road against their lateral speeds: y, or the lateral speed, is mirrored; see `axes.y`");
         }
         if let Some((cosine, lateral)) = self.heading_facts {
             if cosine < 0.9 {
-                self.find(true, format!(
+                self.refuse(format!(
                     "headings and motion differ (median cosine {}): check the unit of the heading, and `axes.heading` (from-x or from-north)",
                     significant(cosine, 2)
                 ));
             } else if lateral.slope() < -0.3 && lateral.correlation() < -0.3 && lateral.is_opposite() {
-                self.find(
-                    true,
+                self.refuse(
                     "headings turn against the motion across the road: y, or the heading, is mirrored; see `axes.y`",
                 );
             }
         }
         if self.across_fraction > MAX_ACROSS {
-            self.find(true, format!(
+            self.refuse(format!(
                 "{} % of the vehicles cross the road by more than 15 m: this is no motorway, or vehicles of several roads are in one file",
                 significant(100.0 * self.across_fraction, 2)
             ));
@@ -262,7 +248,7 @@ impl Understanding {
         if let Some(oncoming) = self.oncoming_left_m {
             let is_left_hand = oncoming < 0.0;
             if is_left_hand != (preset.traffic == Side::Left) {
-                self.find(true, format!(
+                self.refuse(format!(
                     "oncoming vehicles are on the {} of the vehicles, which does not fit traffic on the {keeps}: y is mirrored (`axes.y`), or set `traffic = \"{}\"`",
                     if is_left_hand { "right" } else { "left" },
                     if is_left_hand { "left" } else { "right" },
@@ -272,22 +258,14 @@ impl Understanding {
             self.check_slow_side(recording, preset, keeps);
         }
         if let Some(difference) = self.lane_offset_error_m.filter(|difference| *difference > 0.5) {
-            self.find(
-                false,
-                format!(
-                    "offsets in the lane differ from the positions by {} m (median) and are not used",
-                    significant(difference, 2)
-                ),
-            );
+            let by = significant(difference, 2);
+            self.warn(format!("offsets in the lane differ from the positions by {by} m (median) and are not used"));
         }
         if let Some(mismatch) = self.label_mismatch.filter(|mismatch| *mismatch > 0.05) {
-            self.find(
-                mismatch > 0.2,
-                format!(
-                    "{} % of the samples are not where the name of their lane says; positions decide",
-                    significant(100.0 * mismatch, 2)
-                ),
-            );
+            let percent = significant(100.0 * mismatch, 2);
+            let text =
+                format!("{percent} % of the samples are not where the name of their lane says; positions decide");
+            self.find(mismatch > 0.2, text);
         }
     }
 
@@ -316,7 +294,7 @@ impl Understanding {
             (mean_lane(VehicleClass::Car), mean_lane(VehicleClass::Truck))
         else {
             if self.carriageways.iter().any(|of| of.lanes > 1) {
-                self.find(false, "one direction of travel and few lorries: nothing tells whether y is mirrored");
+                self.warn("one direction of travel and few lorries: nothing tells whether y is mirrored");
             }
             return;
         };
@@ -335,12 +313,7 @@ impl Understanding {
     }
 
     pub(super) fn check_boxes(&mut self, recording: &Recording) {
-        let stride = recording.frame_rate_hz.round().max(1.0) as usize;
-        let looked_at = |track: &Track| {
-            let first = (-track.first_frame).rem_euclid(stride as i64) as usize;
-            (first..track.len()).step_by(stride)
-        };
-        if let Some(found) = overlaps(recording, looked_at) {
+        if let Some(found) = overlaps(recording) {
             let mut involved: Vec<usize> = found.pairs.iter().flat_map(|(a, b)| [*a, *b]).collect();
             involved.sort_unstable();
             involved.dedup();
@@ -356,34 +329,26 @@ impl Understanding {
                 self.exclude(recording.tracks[*shorter].id, Exclusion::Overlap);
             }
         }
-        match edge_slope(recording) {
-            Some((slope, error)) if (0.6..1.6).contains(&slope.abs()) && slope.abs() > 4.0 * error => self.find(true, format!(
-                "wide vehicles are beside the middle of their lanes by {} of half their width: the position is that of an edge or a corner; see `reference`",
-                significant(slope.abs(), 2)
-            )),
-            Some((slope, _)) if slope.abs() > 0.6 => self.find(
-                false,
-                "too few vehicles to tell whether the position is that of an edge or a corner; see `reference`",
-            ),
-            _ => {}
+        let edge = edge_slope(recording).map(|(slope, error)| (slope.abs(), error)).filter(|(slope, _)| *slope >= 0.6);
+        if let Some((slope, error)) = edge {
+            let what = "the position is that of an edge or a corner; see `reference`";
+            if slope < 1.6 && slope > 4.0 * error {
+                let part = significant(slope, 2);
+                self.refuse(format!(
+                    "wide vehicles are beside the middle of their lanes by {part} of half their width: {what}"
+                ));
+            } else if slope > 0.6 {
+                self.warn(format!("too few vehicles to tell whether {what}"));
+            }
         }
         if self.assumed_sizes > 0 {
-            self.find(
-                false,
-                format!(
-                    "{} vehicles have no size in the file; `sizes` of the preset, or usual ones, take its place",
-                    count(self.assumed_sizes)
-                ),
-            );
+            let number = count(self.assumed_sizes);
+            let instead = "`sizes` of the preset, or usual ones, take its place";
+            self.warn(format!("{number} vehicles have no size in the file; {instead}"));
         }
         if self.changing_sizes > 0 {
-            self.find(
-                false,
-                format!(
-                    "the size of {} vehicles varies by more than a tenth; the median is used",
-                    count(self.changing_sizes)
-                ),
-            );
+            let number = count(self.changing_sizes);
+            self.warn(format!("the size of {number} vehicles varies by more than a tenth; the median is used"));
         }
     }
 
@@ -391,7 +356,7 @@ impl Understanding {
         let is_jumping = |track: &&Track| jumps(track, recording.frame_rate_hz);
         let jumping: Vec<u32> = recording.tracks.iter().filter(is_jumping).map(|track| track.id).collect();
         if let Some(first) = jumping.first() {
-            self.find(false, format!(
+            self.warn(format!(
                 "{} tracks jump by more than {JUMP_ALONG_M} m along or {JUMP_ACROSS_M} m across the road, the first is vehicle {first}",
                 jumping.len()
             ));
@@ -401,15 +366,13 @@ impl Understanding {
         let against = recording.tracks.iter().filter(against).count();
         if against > 0 {
             let is_grave = 10 * against > recording.tracks.len();
-            self.find(
-                is_grave,
-                format!("{against} vehicle(s) move against their direction of travel: check `direction`"),
-            );
+            let text = format!("{against} vehicle(s) move against their direction of travel: check `direction`");
+            self.find(is_grave, text);
         }
         for [a, b] in [["x_speed", "y_speed"], ["y_speed", "x_speed"], ["x_acceleration", "y_acceleration"]] {
             let has = |key: &str| self.columns.iter().any(|(role, _)| *role == key);
             if has(a) && !has(b) {
-                self.find(false, format!("`{a}` is not used without `{b}`; `speed` is a speed along the road"));
+                self.warn(format!("`{a}` is not used without `{b}`; `speed` is a speed along the road"));
             }
         }
         let backwards = self.exclusions.iter().filter(|(_, why)| *why == Exclusion::Backwards).count();
@@ -426,34 +389,29 @@ impl Understanding {
         ];
         for (number, what) in notes {
             if number > 0 {
-                self.find(false, format!("{} {what}", count(number)));
+                self.warn(format!("{} {what}", count(number)));
             }
         }
         if self.noise_speeds > 0 {
             let (number, lowest) = (count(self.noise_speeds), value(self.lowest_noise_mps));
-            self.find(false, format!("{number} speeds below 0 count as 0; the lowest is {lowest} m/s"));
+            self.warn(format!("{number} speeds below 0 count as 0; the lowest is {lowest} m/s"));
         }
         if self.conflicts > 0 {
-            let text = format!(
-                "{} of these rows name another position; the first row counts: check `vehicle` and `time`",
-                count(self.conflicts)
-            );
+            let number = count(self.conflicts);
+            let help = "check `vehicle` and `time`";
+            let text = format!("{number} of these rows name another position; the first row counts: {help}");
             let samples: usize = recording.tracks.iter().map(Track::len).sum();
             self.find(100 * self.conflicts > samples as u64, text);
         }
         if self.interpolated > 0 {
-            let why = if self.off_raster_frames > 0.02 {
-                format!("times are off the raster by up to {} frames", significant(self.off_raster_frames, 2))
-            } else {
-                "gaps are filled".to_owned()
+            let why = match self.off_raster_frames > 0.02 {
+                true => format!("times are off the raster by up to {} frames", significant(self.off_raster_frames, 2)),
+                false => "gaps are filled".to_owned(),
             };
-            self.find(
-                false,
-                format!("{} samples are of tracks that were interpolated: {why}", count(self.interpolated)),
-            );
+            self.warn(format!("{} samples are of tracks that were interpolated: {why}", count(self.interpolated)));
         }
         if !self.vehicle_names.is_empty() {
-            self.find(false, "vehicles have other numbers than in the file: their ids are no small whole numbers, or a track was split; the ids of scenarios keep the file's");
+            self.warn("vehicles have other numbers than in the file: their ids are no small whole numbers, or a track was split; the ids of scenarios keep the file's");
         }
     }
 }

@@ -100,17 +100,23 @@ fn centres_by_name(samples: &[Lateral]) -> Vec<f64> {
         .map(|group| (group[group.len() / 2].0, group.len() as f64))
         .collect();
     centres.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let mut joined = joined(centres, MIN_SPACING_M);
+    joined.truncate(MAX_LANES);
+    joined
+}
+
+/// Values in falling order, with weights; those that are nearer to one another become their mean.
+fn joined(falling: impl IntoIterator<Item = (f64, f64)>, apart_m: f64) -> Vec<f64> {
     let mut joined: Vec<(f64, f64)> = Vec::new();
-    for (d_m, weight) in centres {
+    for (d_m, weight) in falling {
         match joined.last_mut() {
-            Some((of, sum)) if *of - d_m < MIN_SPACING_M => {
+            Some((of, sum)) if *of - d_m < apart_m => {
                 *of = (*of * *sum + d_m * weight) / (*sum + weight);
                 *sum += weight;
             }
             _ => joined.push((d_m, weight)),
         }
     }
-    joined.truncate(MAX_LANES);
     joined.into_iter().map(|(d_m, _)| d_m).collect()
 }
 
@@ -161,17 +167,7 @@ fn centres_by_position(samples: &[Lateral]) -> Vec<f64> {
 /// Lane lines of a map, from the lateral positions of its boundaries: those that are near one another are one.
 pub(super) fn lines_of_map(mut d: Vec<f64>) -> Vec<f64> {
     d.sort_by(|a, b| b.total_cmp(a));
-    let mut lines: Vec<(f64, f64)> = Vec::new();
-    for value in d {
-        match lines.last_mut() {
-            Some((line, count)) if *line - value < 0.8 => {
-                *line = (*line * *count + value) / (*count + 1.0);
-                *count += 1.0;
-            }
-            _ => lines.push((value, 1.0)),
-        }
-    }
-    lines.into_iter().map(|(line, _)| line).collect()
+    joined(d.into_iter().map(|line| (line, 1.0)), 0.8)
 }
 
 #[cfg(test)]

@@ -77,14 +77,14 @@ pub(super) fn pieces(
             let text = format!(
                 "frame numbers rise by {stride} from row to row; at {rate_hz} frames per second ({source}), rows are {apart_s} s apart"
             );
-            about.find(false, text);
+            about.warn(text);
         }
         (rate_hz / stride, 1.0 / stride, origin / stride)
     } else {
         let rate_hz = rate_of_times(raw, step);
         about.rate_source = TIMES.to_owned();
         if let Some(said) = preset.frame_rate_hz.filter(|said| (said / rate_hz - 1.0).abs() > 0.02) {
-            about.find(true, format!("the times have {rate_hz:.2} frames per second, the preset says {said}"));
+            about.refuse(format!("the times have {rate_hz:.2} frames per second, the preset says {said}"));
         }
         (rate_hz, rate_hz, if origin.abs() < 1e6 { origin * rate_hz } else { 0.0 })
     };
@@ -224,38 +224,11 @@ fn at_frames<'a>(piece: &'a [RawSample], frames: &[f64], about: &mut Understandi
         }
         let (a, b) = (k, (k + 1).min(frames.len() - 1));
         let part = if b > a { ((frame - frames[a]) / (frames[b] - frames[a])).clamp(0.0, 1.0) } else { 0.0 };
-        samples.push(mix(&piece[a], &piece[b], part));
+        samples.push(RawSample::between(&piece[a], &piece[b], part));
         frame += 1.0;
     }
     let off = |frame: &f64| (frame - frame.round()).abs();
     about.interpolated += samples.len() as u64;
     about.off_raster_frames = frames.iter().map(off).fold(about.off_raster_frames, f64::max);
     (samples.into(), first as i64)
-}
-
-fn mix(a: &RawSample, b: &RawSample, part: f64) -> RawSample {
-    let one = |a: f64, b: f64| {
-        if part == 0.0 {
-            a
-        } else if part == 1.0 {
-            b
-        } else {
-            a + part * (b - a)
-        }
-    };
-    let two = |a: [f64; 2], b: [f64; 2]| [one(a[0], b[0]), one(a[1], b[1])];
-    RawSample {
-        at: one(a.at, b.at),
-        xy_m: two(a.xy_m, b.xy_m),
-        heading: two(a.heading, b.heading),
-        speed_mps: one(a.speed_mps, b.speed_mps),
-        velocity_mps: two(a.velocity_mps, b.velocity_mps),
-        along_mps: two(a.along_mps, b.along_mps),
-        acceleration_mps2: one(a.acceleration_mps2, b.acceleration_mps2),
-        acceleration_xy_mps2: two(a.acceleration_xy_mps2, b.acceleration_xy_mps2),
-        lane: if part < 0.5 { a.lane } else { b.lane },
-        lane_offset_m: if part < 0.5 { a.lane_offset_m } else { b.lane_offset_m },
-        other_clock: one(a.other_clock, b.other_clock),
-        facts: if part < 0.5 { a.facts } else { b.facts },
-    }
 }

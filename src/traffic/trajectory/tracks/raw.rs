@@ -309,11 +309,10 @@ impl<'a> Collecting<'a> {
             along_mps: [number(Role::ForwardSpeed)?, number(Role::LeftwardSpeed)?],
             acceleration_mps2: number(Role::Acceleration)?,
             acceleration_xy_mps2: [number(Role::XAcceleration)?, self.y_sign * number(Role::YAcceleration)?],
-            lane: NO_LABEL,
             lane_offset_m: number(Role::LaneOffset)?,
             // Only numbers of the file are compared with one another: a text counts as no value.
             other_clock: row.number(self.other_clock).ok().flatten().unwrap_or(f64::NAN),
-            facts: [0; 4],
+            ..RawSample::unknown()
         };
         let of = &self.recordings[recording];
         let before = &of.vehicles[vehicle].samples;

@@ -3,33 +3,56 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Meaning of a column.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
-#[serde(rename_all = "snake_case")]
-#[allow(missing_docs)] // docs/src/tracks.md has the table
-pub enum Role {
-    Recording,
-    Vehicle,
-    Frame,
-    Time,
-    X,
-    Y,
-    Heading,
-    Speed,
-    XSpeed,
-    YSpeed,
-    ForwardSpeed,
-    LeftwardSpeed,
-    Acceleration,
-    XAcceleration,
-    YAcceleration,
-    Length,
-    Width,
-    Class,
-    Lane,
-    LaneOffset,
-    Direction,
-    FrameRate,
+macro_rules! roles {
+    ($($role:ident $key:literal $dimension:ident,)*) => {
+        /// Meaning of a column.
+        #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize, JsonSchema)]
+        #[serde(rename_all = "snake_case")]
+        #[allow(missing_docs)] // docs/src/tracks.md has the table
+        pub enum Role {
+            $($role,)*
+        }
+
+        impl Role {
+            /// All roles.
+            pub const ALL: [Role; [$($key),*].len()] = [$(Role::$role),*];
+
+            /// Its key in a preset.
+            pub fn key(self) -> &'static str {
+                [$($key),*][self as usize]
+            }
+
+            pub(super) fn dimension(self) -> Dimension {
+                [$(Dimension::$dimension),*][self as usize]
+            }
+        }
+    };
+}
+
+// Each with its key and what it measures.
+roles! {
+    Recording "recording" Text,
+    Vehicle "vehicle" Text,
+    Frame "frame" Number,
+    Time "time" Time,
+    X "x" Length,
+    Y "y" Length,
+    Heading "heading" Angle,
+    Speed "speed" Speed,
+    XSpeed "x_speed" Speed,
+    YSpeed "y_speed" Speed,
+    ForwardSpeed "forward_speed" Speed,
+    LeftwardSpeed "leftward_speed" Speed,
+    Acceleration "acceleration" Acceleration,
+    XAcceleration "x_acceleration" Acceleration,
+    YAcceleration "y_acceleration" Acceleration,
+    Length "length" Length,
+    Width "width" Length,
+    Class "class" Text,
+    Lane "lane" Text,
+    LaneOffset "lane_offset" Length,
+    Direction "direction" Number,
+    FrameRate "frame_rate" Number,
 }
 
 /// What a role measures.
@@ -42,74 +65,6 @@ pub(super) enum Dimension {
     Speed,
     Acceleration,
     Angle,
-}
-
-impl Role {
-    /// All roles.
-    pub const ALL: [Role; 22] = [
-        Role::Recording,
-        Role::Vehicle,
-        Role::Frame,
-        Role::Time,
-        Role::X,
-        Role::Y,
-        Role::Heading,
-        Role::Speed,
-        Role::XSpeed,
-        Role::YSpeed,
-        Role::ForwardSpeed,
-        Role::LeftwardSpeed,
-        Role::Acceleration,
-        Role::XAcceleration,
-        Role::YAcceleration,
-        Role::Length,
-        Role::Width,
-        Role::Class,
-        Role::Lane,
-        Role::LaneOffset,
-        Role::Direction,
-        Role::FrameRate,
-    ];
-
-    /// Its key in a preset.
-    pub fn key(self) -> &'static str {
-        match self {
-            Role::Recording => "recording",
-            Role::Vehicle => "vehicle",
-            Role::Frame => "frame",
-            Role::Time => "time",
-            Role::X => "x",
-            Role::Y => "y",
-            Role::Heading => "heading",
-            Role::Speed => "speed",
-            Role::XSpeed => "x_speed",
-            Role::YSpeed => "y_speed",
-            Role::ForwardSpeed => "forward_speed",
-            Role::LeftwardSpeed => "leftward_speed",
-            Role::Acceleration => "acceleration",
-            Role::XAcceleration => "x_acceleration",
-            Role::YAcceleration => "y_acceleration",
-            Role::Length => "length",
-            Role::Width => "width",
-            Role::Class => "class",
-            Role::Lane => "lane",
-            Role::LaneOffset => "lane_offset",
-            Role::Direction => "direction",
-            Role::FrameRate => "frame_rate",
-        }
-    }
-
-    pub(super) fn dimension(self) -> Dimension {
-        match self {
-            Role::Recording | Role::Vehicle | Role::Class | Role::Lane => Dimension::Text,
-            Role::Frame | Role::Direction | Role::FrameRate => Dimension::Number,
-            Role::Time => Dimension::Time,
-            Role::X | Role::Y | Role::Length | Role::Width | Role::LaneOffset => Dimension::Length,
-            Role::Heading => Dimension::Angle,
-            Role::Speed | Role::XSpeed | Role::YSpeed | Role::ForwardSpeed | Role::LeftwardSpeed => Dimension::Speed,
-            Role::Acceleration | Role::XAcceleration | Role::YAcceleration => Dimension::Acceleration,
-        }
-    }
 }
 
 /// Names of a column, and the unit of its values.

@@ -1,10 +1,14 @@
 //! The samples of a vehicle, column by column: a file of gigabytes has to fit in memory, and most of its columns are empty,
 //! constant or decimals of a few digits. Every number is returned with the bits that it came with.
 
-use super::raw::RawSample;
+use super::raw::{NO_LABEL, RawSample};
 
 /// Columns of a sample.
 const COLUMNS: usize = 20;
+const LANE: usize = 13;
+const LANE_OFFSET: usize = 14;
+const OTHER_CLOCK: usize = 15;
+const FACTS: usize = 16;
 /// Maximum number of decimals of a column of [`Column::Decimals`].
 const MAX_DECIMALS: usize = 6;
 const POWERS: [f64; MAX_DECIMALS + 1] = [1.0, 10.0, 100.0, 1e3, 1e4, 1e5, 1e6];
@@ -50,22 +54,7 @@ impl Samples {
 
     /// Sample `k`, below [`Samples::len`].
     pub(super) fn get(&self, k: usize) -> RawSample {
-        let [at, x, y, heading_x, heading_y, speed, vx, vy, forward, leftward, a, ax, ay, _, offset, other_clock] =
-            std::array::from_fn(|column| self.columns[column].get(k));
-        RawSample {
-            at,
-            xy_m: [x, y],
-            heading: [heading_x, heading_y],
-            speed_mps: speed,
-            velocity_mps: [vx, vy],
-            along_mps: [forward, leftward],
-            acceleration_mps2: a,
-            acceleration_xy_mps2: [ax, ay],
-            lane: self.lane(k),
-            lane_offset_m: offset,
-            other_clock,
-            facts: std::array::from_fn(|fact| self.fact(fact, k)),
-        }
+        of_values(std::array::from_fn(|column| self.columns[column].get(k)))
     }
 
     /// Frame number or time of sample `k`.
@@ -80,17 +69,17 @@ impl Samples {
 
     /// Index of the name of the lane of sample `k`, or `NO_LABEL`.
     pub(super) fn lane(&self, k: usize) -> u32 {
-        self.columns[13].get(k) as i32 as u32
+        self.columns[LANE].get(k) as i32 as u32
     }
 
     /// The time of sample `k` where `at` counts frames, else its frame.
     pub(super) fn other_clock(&self, k: usize) -> f64 {
-        self.columns[15].get(k)
+        self.columns[OTHER_CLOCK].get(k)
     }
 
     /// One of the facts of sample `k`.
     pub(super) fn fact(&self, fact: usize, k: usize) -> u16 {
-        self.columns[16 + fact].get(k) as u16
+        self.columns[FACTS + fact].get(k) as u16
     }
 
     pub(super) fn iter(&self) -> impl Iterator<Item = RawSample> {
@@ -152,6 +141,49 @@ fn values(of: &RawSample) -> [f64; COLUMNS] {
         f64::from(of.facts[2]),
         f64::from(of.facts[3]),
     ]
+}
+
+/// The inverse of [`values`].
+fn of_values(values: [f64; COLUMNS]) -> RawSample {
+    let [at, x, y, heading_x, heading_y, speed, vx, vy, forward, leftward, a, ax, ay, lane, offset, clock, facts @ ..] =
+        values;
+    RawSample {
+        at,
+        xy_m: [x, y],
+        heading: [heading_x, heading_y],
+        speed_mps: speed,
+        velocity_mps: [vx, vy],
+        along_mps: [forward, leftward],
+        acceleration_mps2: a,
+        acceleration_xy_mps2: [ax, ay],
+        lane: lane as i32 as u32,
+        lane_offset_m: offset,
+        other_clock: clock,
+        facts: facts.map(|fact| fact as u16),
+    }
+}
+
+impl RawSample {
+    /// A sample of which the file says nothing.
+    pub(super) fn unknown() -> RawSample {
+        RawSample { lane: NO_LABEL, ..of_values([f64::NAN; COLUMNS]) }
+    }
+
+    /// The sample between two others, by linear interpolation; names and facts are those of the nearer one.
+    pub(super) fn between(before: &RawSample, after: &RawSample, part: f64) -> RawSample {
+        let (before, after) = (values(before), values(after));
+        of_values(std::array::from_fn(|column| {
+            let (a, b) = (before[column], after[column]);
+            let is_of_nearer = matches!(column, LANE | LANE_OFFSET | FACTS..);
+            if part == 0.0 || (is_of_nearer && part < 0.5) {
+                a
+            } else if part == 1.0 || is_of_nearer {
+                b
+            } else {
+                a + part * (b - a)
+            }
+        }))
+    }
 }
 
 fn is_same(a: f64, b: f64) -> bool {
@@ -224,7 +256,6 @@ mod tests {
     use proptest::prelude::*;
 
     use super::*;
-    use crate::traffic::trajectory::tracks::raw::NO_LABEL;
 
     fn sample(value: f64, other: f64, lane: u32) -> RawSample {
         RawSample {

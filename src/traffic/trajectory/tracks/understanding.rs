@@ -278,7 +278,7 @@ impl Understanding {
             // The checks above say these too.
             let is_said = about.findings.iter().any(|finding| finding.text.contains(&note));
             if !is_said && !note.contains("overlap") && !note.contains("jump by") {
-                about.find(false, note);
+                about.warn(note);
             }
         }
         (about, recording)
@@ -297,10 +297,7 @@ impl Understanding {
         let without = preset.classes.truck.iter().filter(|word| preset.is_own && !begins(word));
         let without: Vec<String> = without.map(|word| format!("`{word}`")).collect();
         if !without.is_empty() && !classes.is_empty() {
-            self.find(
-                false,
-                format!("no class begins with {}, which the preset takes for lorries", without.join(", ")),
-            );
+            self.warn(format!("no class begins with {}, which the preset takes for lorries", without.join(", ")));
         }
         self.classes = classes.into_iter().map(|(class, number)| (class.to_owned(), number)).collect();
     }
@@ -475,7 +472,7 @@ impl Understanding {
     /// Adds notes on tracks that can be used; what is wrong comes first.
     pub fn note(&mut self, notes: Vec<String>) {
         if self.is_usable() {
-            notes.into_iter().for_each(|text| self.find(false, text));
+            notes.into_iter().for_each(|text| self.warn(text));
         }
     }
 
