@@ -16,7 +16,7 @@ use lanesweep::run::score::{ScoreOptions, score};
 use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::traffic::mining::{MiningOptions, mine_folder};
 use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
-use lanesweep::traffic::trajectory::highd::{self, RecordingInfo};
+use lanesweep::traffic::trajectory::highd;
 
 const REPETITIONS: usize = 5;
 const MIN_BYTES: u64 = 1_000_000_000;
@@ -72,7 +72,7 @@ fn write_recordings(dir: &Path) -> u64 {
         let options = GeneratorOptions { seed: 1000 + index, recordings: 1, ..GeneratorOptions::default() };
         let mut recording = generate_one(&options, 0).unwrap();
         recording.id = format!("{:03}", index + 1);
-        highd::write(dir, &recording, &RecordingInfo::default()).unwrap();
+        highd::write(dir, &recording).unwrap();
         index += 1;
         bytes = std::fs::read_dir(dir).unwrap().map(|file| file.unwrap().metadata().unwrap().len()).sum();
     }

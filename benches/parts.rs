@@ -19,7 +19,7 @@ use lanesweep::scenario::parameterization::{ParameterizationOptions, Reduction};
 use lanesweep::scenario::{Category, Scenario};
 use lanesweep::traffic::mining::{MiningOptions, mine, mine_folder, mine_generated};
 use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
-use lanesweep::traffic::trajectory::highd::{self, HighdFiles, RecordingInfo};
+use lanesweep::traffic::trajectory::highd::{self, HighdFiles};
 
 /// Reading one recording, mining it, and both for a folder of four.
 fn recordings(criterion: &mut Criterion) {
@@ -27,7 +27,7 @@ fn recordings(criterion: &mut Criterion) {
     let options = GeneratorOptions { recordings: 4, ..GeneratorOptions::default() };
     for index in 0..options.recordings {
         let recording = generate_one(&options, index).unwrap();
-        highd::write(folder.path(), &recording, &RecordingInfo::default()).unwrap();
+        highd::write(folder.path(), &recording).unwrap();
     }
     let files = HighdFiles::named(folder.path(), "01");
     let bytes = std::fs::metadata(&files.tracks).unwrap().len();

@@ -13,7 +13,7 @@ use crate::support::files::check_folder;
 use crate::support::run_dir::{OutputDir, unfinished};
 use crate::traffic::Source;
 use crate::traffic::trajectory::generator::generate_one;
-use crate::traffic::trajectory::highd::{self, HighdFiles, RecordingInfo, SYNTHETIC_MARKER};
+use crate::traffic::trajectory::highd::{self, HighdFiles, SYNTHETIC_MARKER};
 use crate::{Error, Place, Result};
 
 /// Write the synthetic recordings that `study` uses without data
@@ -54,7 +54,7 @@ impl Synth {
         configured.with_bar(Units::All(options.recordings as u64), "writing recordings", |bar| {
             (0..options.recordings).try_for_each(|index| {
                 let recording = generate_one(options, index)?;
-                let staged = highd::stage(&self.folder, &recording, &RecordingInfo::default())?;
+                let staged = highd::stage(&self.folder, &recording)?;
                 staged.into_iter().for_each(|file| results.join(file.closed()));
                 source::advance(bar)
             })

@@ -16,7 +16,7 @@ use crate::support::plausibility::Implausible;
 use crate::support::run_dir::{OutputDir, unfinished};
 use crate::support::table::{Table, TableMetadata};
 use crate::traffic::mining::{CategoryCount, counts, mine, noise_notes};
-use crate::traffic::trajectory::highd::{self, HighdFiles, RecordingInfo, SYNTHETIC_MARKER};
+use crate::traffic::trajectory::highd::{self, HighdFiles, SYNTHETIC_MARKER};
 use crate::traffic::trajectory::tracks::{LoadedTracks, Preset, SYNTHETIC, Understanding, draft, read_tracks};
 use crate::traffic::trajectory::{InputFile, Inputs, NO_LANE, Recording, Track, VehicleClass};
 use crate::{Error, Place, Result};
@@ -254,7 +254,7 @@ fn convert_to_highd(to: &Path, reports: &[TrackReport], recordings: &[Recording]
     }
     let mut results = folder.results()?;
     for (recording, id) in recordings.iter().zip(&names) {
-        let staged = highd::stage(to, &Recording { id: id.clone(), ..recording.clone() }, &RecordingInfo::default())?;
+        let staged = highd::stage(to, &Recording { id: id.clone(), ..recording.clone() })?;
         staged.into_iter().for_each(|file| results.join(file.closed()));
     }
     if recordings.iter().any(|recording| recording.synthetic) {

@@ -6,9 +6,8 @@ use std::fs;
 use std::path::Path;
 
 use lanesweep::Result;
-use lanesweep::traffic::trajectory::highd::{self, HighdFiles, RecordingInfo};
-use lanesweep::traffic::trajectory::{Carriageway, Recording, Track, VehicleClass};
-use lanesweep::traffic::trajectory::{Loaded, Precision};
+use lanesweep::traffic::trajectory::highd::{self, HighdFiles};
+use lanesweep::traffic::trajectory::{Carriageway, Loaded, Recording, Track, VehicleClass};
 
 /// A vehicle at constant speed in the middle of a lane, at 25 samples per second.
 pub fn cruising(
@@ -53,7 +52,7 @@ pub fn recording() -> Recording {
     recording.tracks = tracks
         .map(|(id, carriageway, lane, from, samples)| cruising(id, carriageway, lane, from, samples, &recording))
         .into();
-    highd::quantize(&mut recording, Precision::Hundredths).unwrap();
+    highd::quantize(&mut recording).unwrap();
     recording
 }
 
@@ -73,7 +72,7 @@ impl Texts {
 
     pub fn of(recording: &Recording) -> Self {
         let dir = tempfile::tempdir().unwrap();
-        highd::write(dir.path(), recording, &RecordingInfo::default()).unwrap();
+        highd::write(dir.path(), recording).unwrap();
         let files = HighdFiles::named(dir.path(), &recording.id);
         let text = |path: &Path| fs::read_to_string(path).unwrap();
         Texts {

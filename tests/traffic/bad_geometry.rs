@@ -3,9 +3,8 @@
 use crate::common::small::{self, Texts, cruising};
 
 use lanesweep::support::plausibility::Implausible;
-use lanesweep::traffic::trajectory::Recording;
 use lanesweep::traffic::trajectory::highd::{self, HighdFiles};
-use lanesweep::traffic::trajectory::{Loaded, Precision};
+use lanesweep::traffic::trajectory::{Loaded, Recording};
 use lanesweep::{Error, Result};
 
 /// Ten vehicles in five lanes of both directions, 2.4 s; each sways across its lane.
@@ -22,7 +21,7 @@ fn traffic() -> Recording {
         track
     });
     recording.tracks = tracks.collect();
-    highd::quantize(&mut recording, Precision::Hundredths).unwrap();
+    highd::quantize(&mut recording).unwrap();
     recording
 }
 

@@ -6,8 +6,8 @@ use std::path::Path;
 use crate::common::small::{self, Texts, edit_line, with_field, with_repeated_line, without_column, without_line};
 use lanesweep::Error;
 use lanesweep::support::plausibility::Implausible;
-use lanesweep::traffic::trajectory::highd::{self, HighdFiles, RecordingInfo};
-use lanesweep::traffic::trajectory::{Precision, Track};
+use lanesweep::traffic::trajectory::Track;
+use lanesweep::traffic::trajectory::highd::{self, HighdFiles};
 use proptest::prelude::*;
 
 /// The message has all of these and comes with advice.
@@ -99,7 +99,7 @@ fn a_folder_or_file_without_permission_is_named() {
     let forbid = |path: &Path| fs::set_permissions(path, fs::Permissions::from_mode(0o000)).unwrap();
     let allow = |path: &Path| fs::set_permissions(path, fs::Permissions::from_mode(0o700)).unwrap();
     let dir = tempfile::tempdir().unwrap();
-    highd::write(dir.path(), &small::recording(), &Default::default()).unwrap();
+    highd::write(dir.path(), &small::recording()).unwrap();
     let files = HighdFiles::named(dir.path(), "01");
     forbid(&files.tracks);
     let from_file = fs::read(&files.tracks).is_err().then(|| highd::read(&files));
@@ -234,14 +234,14 @@ fn small_speeds_backwards_are_noise_that_is_counted_and_larger_ones_an_error() {
 fn a_speed_that_contradicts_the_positions_and_a_jump_are_refused_unless_accepted() {
     let mut recording = small::recording();
     recording.tracks = vec![small::cruising(1, 1, 0, 1, 60, &recording)];
-    highd::quantize(&mut recording, Precision::Hundredths).unwrap();
+    highd::quantize(&mut recording).unwrap();
     let spoilt: [fn(&mut Track); 2] =
         [|track| track.v_s_mps[30] = 0.0, |track| track.s_m[30..].iter_mut().for_each(|s| *s += 8.0)];
     for spoil in spoilt {
         let mut wrong = recording.clone();
         spoil(&mut wrong.tracks[0]);
         let dir = tempfile::tempdir().unwrap();
-        highd::write(dir.path(), &wrong, &RecordingInfo::default()).unwrap();
+        highd::write(dir.path(), &wrong).unwrap();
         let files = HighdFiles::named(dir.path(), "01");
         let error = highd::read_checked(&files, Implausible::Refused).unwrap_err();
         assert_says(&error, &["01_tracks.csv", "`xVelocity`", "vehicle 1 at frame", "its speed is", "but it moves by"]);

@@ -6,7 +6,7 @@ use std::path::Path;
 
 use lanesweep::support::plausibility::Implausible;
 use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate_one};
-use lanesweep::traffic::trajectory::highd::{self, RecordingInfo};
+use lanesweep::traffic::trajectory::highd;
 use lanesweep::traffic::trajectory::tracks::{self, Preset, TrackFile};
 use lanesweep::traffic::trajectory::{Inputs, Recording};
 
@@ -114,7 +114,7 @@ fn a_compressed_file_beside_itself_is_read_once() {
 fn compressed_highd_files_are_read() {
     let dir = tempfile::tempdir().unwrap();
     let recording = Recording { id: "01".to_owned(), ..generated() };
-    highd::write(dir.path(), &recording, &RecordingInfo::default()).unwrap();
+    highd::write(dir.path(), &recording).unwrap();
     let of = |dir: &Path| {
         let (files, problems) = Inputs::of(dir, None).unwrap().files();
         assert!(problems.is_empty(), "{problems:?}");

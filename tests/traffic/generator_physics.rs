@@ -1,7 +1,7 @@
 //! The synthetic recordings are physically possible, well-formed, and the same everywhere.
 
 use lanesweep::traffic::trajectory::generator::{GeneratorOptions, generate, generate_one};
-use lanesweep::traffic::trajectory::highd::{self, RecordingInfo};
+use lanesweep::traffic::trajectory::highd;
 use lanesweep::traffic::trajectory::{Recording, Track};
 use rayon::prelude::*;
 use sha2::{Digest, Sha256};
@@ -201,7 +201,7 @@ fn recordings_read_back_from_their_own_files_are_the_same_bits() {
     let generated = generate(&options).unwrap();
     let dir = tempfile::tempdir().unwrap();
     for recording in &generated {
-        highd::write(dir.path(), recording, &RecordingInfo::default()).unwrap();
+        highd::write(dir.path(), recording).unwrap();
     }
     let inventory = highd::inventory(dir.path()).unwrap();
     assert!(inventory.problems.is_empty());

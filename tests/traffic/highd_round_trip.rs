@@ -5,15 +5,13 @@ use crate::common;
 use std::fs;
 
 use crate::common::small;
-use lanesweep::traffic::trajectory::highd::{self, RecordingInfo};
-use lanesweep::traffic::trajectory::{Carriageway, NO_LANE, Recording, Track, VehicleClass};
-use lanesweep::traffic::trajectory::{Loaded, Precision};
+use lanesweep::traffic::trajectory::highd;
+use lanesweep::traffic::trajectory::{Carriageway, Loaded, NO_LANE, Recording, Track, VehicleClass};
 use proptest::prelude::*;
 
-fn read_back(recording: &Recording, precision: Precision) -> Loaded {
+fn read_back(recording: &Recording) -> Loaded {
     let dir = tempfile::tempdir().unwrap();
-    let info = RecordingInfo { precision, ..RecordingInfo::default() };
-    highd::write(dir.path(), recording, &info).unwrap();
+    highd::write(dir.path(), recording).unwrap();
     let names = fs::read_dir(dir.path()).unwrap().count();
     assert_eq!(names, 3, "nothing but the three files is left in the folder");
     let inventory = highd::inventory(dir.path()).unwrap();
@@ -88,23 +86,21 @@ proptest! {
 
     #[test]
     fn a_quantized_recording_survives_its_own_files_bit_for_bit(recording in recording()) {
-        for precision in [Precision::Hundredths, Precision::Shortest] {
-            let mut quantized = recording.clone();
-            highd::quantize(&mut quantized, precision).unwrap();
-            let read = read_back(&quantized, precision).recording;
-            prop_assert_eq!(&read, &quantized);
-            prop_assert_eq!(bits(&read), bits(&quantized));
-            let mut again = quantized.clone();
-            highd::quantize(&mut again, precision).unwrap();
-            prop_assert_eq!(bits(&again), bits(&quantized), "quantizing twice changes nothing more");
-        }
+        let mut quantized = recording.clone();
+        highd::quantize(&mut quantized).unwrap();
+        let read = read_back(&quantized).recording;
+        prop_assert_eq!(&read, &quantized);
+        prop_assert_eq!(bits(&read), bits(&quantized));
+        let mut again = quantized.clone();
+        highd::quantize(&mut again).unwrap();
+        prop_assert_eq!(bits(&again), bits(&quantized), "quantizing twice changes nothing more");
     }
 
     #[test]
     fn reading_back_an_unquantized_recording_gives_its_quantized_form(recording in recording()) {
         let mut quantized = recording.clone();
-        highd::quantize(&mut quantized, Precision::Hundredths).unwrap();
-        let read = read_back(&recording, Precision::Hundredths).recording;
+        highd::quantize(&mut quantized).unwrap();
+        let read = read_back(&recording).recording;
         prop_assert_eq!(bits(&read), bits(&quantized));
         // Position and half a size are each off by half a hundredth and a quarter of one, at most.
         for (a, b) in read.tracks.iter().zip(&recording.tracks) {
@@ -118,7 +114,7 @@ proptest! {
 #[test]
 fn a_recording_reads_back_with_its_checksums_rows_and_no_notes() {
     let recording = small::recording();
-    let loaded = read_back(&recording, Precision::Hundredths);
+    let loaded = read_back(&recording);
     assert_eq!(loaded.recording, recording);
     assert_eq!(loaded.rows, 8 + 5 + 8 + 5);
     assert_eq!(loaded.notes, [""; 0]);
@@ -276,11 +272,11 @@ fn a_recording_that_the_format_cannot_hold_is_refused_and_nothing_is_written() {
         let mut recording = small::recording();
         spoil(&mut recording);
         let dir = tempfile::tempdir().unwrap();
-        let error = highd::write(dir.path(), &recording, &RecordingInfo::default()).unwrap_err();
+        let error = highd::write(dir.path(), &recording).unwrap_err();
         assert!(error.to_string().contains(expected), "{error}");
         assert!(error.help().is_some());
         assert_eq!(fs::read_dir(dir.path()).unwrap().count(), 0);
-        assert!(highd::quantize(&mut recording, Precision::Hundredths).is_err());
+        assert!(highd::quantize(&mut recording).is_err());
     }
 }
 
@@ -313,6 +309,6 @@ fn every_sumo_recording_reads_and_its_written_form_reads_alike() {
         };
         let agreeing: usize = recording.tracks.iter().map(in_lane).sum();
         assert!(agreeing as f64 > 0.999 * samples as f64, "laneId and geometry agree: {agreeing} of {samples}");
-        assert_eq!(read_back(recording, Precision::Hundredths).recording, *recording);
+        assert_eq!(read_back(recording).recording, *recording);
     }
 }

@@ -81,41 +81,21 @@ fn short_integer(field: &[u8]) -> Option<i64> {
     Some(value)
 }
 
-/// Decimals of the measured values in written files.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub enum Precision {
-    /// Two, as highD has.
-    #[default]
-    Hundredths,
-    /// The minimum number that reads back to the same `f64`.
-    Shortest,
+/// The value that the text of `value` reads as; `value` within ±10¹².
+pub(super) fn rounded(value: f64) -> f64 {
+    // One correctly rounded division of two exact integers equals the result of any correct parser.
+    hundredths(value) as f64 / 100.0
 }
 
-impl Precision {
-    /// The value that the text of `value` reads as; `value` within ±10¹².
-    pub(super) fn rounded(self, value: f64) -> f64 {
-        match self {
-            // One correctly rounded division of two exact integers equals the result of any correct parser.
-            Precision::Hundredths => hundredths(value) as f64 / 100.0,
-            Precision::Shortest => value,
-        }
+/// Appends a number with two decimals, as highD has.
+pub(super) fn push_hundredths(line: &mut Vec<u8>, value: f64) {
+    let count = hundredths(value);
+    if count < 0 {
+        line.push(b'-');
     }
-
-    /// Appends the text of `value`.
-    pub(super) fn push(self, line: &mut Vec<u8>, value: f64) {
-        match self {
-            Precision::Hundredths => {
-                let count = hundredths(value);
-                if count < 0 {
-                    line.push(b'-');
-                }
-                let count = count.unsigned_abs();
-                push_integer(line, count / 100);
-                line.extend([b'.', b'0' + (count / 10 % 10) as u8, b'0' + (count % 10) as u8]);
-            }
-            Precision::Shortest => line.extend(value.to_string().into_bytes()),
-        }
-    }
+    let count = count.unsigned_abs();
+    push_integer(line, count / 100);
+    line.extend([b'.', b'0' + (count / 10 % 10) as u8, b'0' + (count % 10) as u8]);
 }
 
 /// Appends a whole number. Own code, because a recording has millions of them.
@@ -177,20 +157,18 @@ mod tests {
         assert_eq!(integer(b"nan"), None);
     }
 
-    fn text(precision: Precision, value: f64) -> String {
+    fn text(value: f64) -> String {
         let mut line = Vec::new();
-        precision.push(&mut line, value);
+        push_hundredths(&mut line, value);
         String::from_utf8(line).unwrap()
     }
 
     proptest! {
         #[test]
         fn reading_the_text_gives_the_rounded_value_bit_for_bit(value in -1e6..1e6f64) {
-            for precision in [Precision::Hundredths, Precision::Shortest] {
-                let read = real(text(precision, value).as_bytes()).unwrap();
-                prop_assert_eq!(read.to_bits(), precision.rounded(value).to_bits());
-                prop_assert_eq!(precision.rounded(read).to_bits(), read.to_bits());
-            }
+            let read = real(text(value).as_bytes()).unwrap();
+            prop_assert_eq!(read.to_bits(), rounded(value).to_bits());
+            prop_assert_eq!(rounded(read).to_bits(), read.to_bits());
         }
 
         #[test]
@@ -203,7 +181,7 @@ mod tests {
 
     #[test]
     fn hundredths_look_as_in_highd() {
-        let texts = [0.0, -0.0, -0.004, -0.05, 12.0, 12.345, -3.456].map(|value| text(Precision::Hundredths, value));
+        let texts = [0.0, -0.0, -0.004, -0.05, 12.0, 12.345, -3.456].map(text);
         assert_eq!(texts, ["0.00", "0.00", "0.00", "-0.05", "12.00", "12.35", "-3.46"]);
     }
 }

@@ -7,7 +7,7 @@ use super::random::{Purpose, TrafficRandom};
 use super::traffic::Traffic;
 use super::vehicle::Vehicle;
 use crate::support::error::Result;
-use crate::traffic::trajectory::{Carriageway, NO_LANE, Precision, Recording, Track, highd};
+use crate::traffic::trajectory::{Carriageway, NO_LANE, Recording, Track, highd};
 
 /// Upper edge of the image to the first line, and between the carriageways, m.
 const VERGE_M: f64 = 8.0;
@@ -40,7 +40,7 @@ pub(super) fn record(options: &GeneratorOptions, index: usize) -> Result<Recordi
         .collect();
     let id = format!("{:02}", index + 1);
     let mut recording = Recording { id, frame_rate_hz: options.frame_rate_hz, carriageways, tracks, synthetic: true };
-    highd::quantize(&mut recording, Precision::Hundredths)?;
+    highd::quantize(&mut recording)?;
     label_lanes(&mut recording);
     Ok(recording)
 }

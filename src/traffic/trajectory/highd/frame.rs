@@ -83,10 +83,9 @@ impl Direction {
 /// Converts `laneId` (1 + number of lane lines above) for one recording.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub(super) struct LaneNumbers {
-    /// Number of upper lane lines: n bound n − 1 lanes, with the ids 2..=n.
-    pub upper_lines: usize,
-    /// Number of lower lane lines; their lanes follow the median, with the ids upper + 2..=upper + lower.
-    pub lower_lines: usize,
+    /// Number of upper lane lines: n bound n − 1 lanes, with the ids 2..=n. Then that of the lower ones; their lanes follow
+    /// the median, with the ids upper + 2..=upper + lower.
+    pub lines: [usize; 2],
 }
 
 impl LaneNumbers {
@@ -94,27 +93,20 @@ impl LaneNumbers {
     pub(super) fn lane_of(self, direction: Direction, lane_id: i64) -> u16 {
         let lane = match direction {
             // Driving towards −x with y down, the left is the greater y.
-            Direction::Upper => (self.upper_lines as i64).saturating_sub(lane_id),
-            Direction::Lower => lane_id.saturating_sub(self.upper_lines as i64 + 2),
+            Direction::Upper => (self.lines[0] as i64).saturating_sub(lane_id),
+            Direction::Lower => lane_id.saturating_sub(self.lines[0] as i64 + 2),
         };
-        let lanes = self.lines(direction).saturating_sub(1) as i64;
+        let lanes = self.lines[direction as usize].saturating_sub(1) as i64;
         if (0..lanes).contains(&lane) { lane as u16 } else { NO_LANE }
     }
 
     /// The id of a lane; `None` if the carriageway has no such lane.
     pub(super) fn id_of(self, direction: Direction, lane: u16) -> Option<i64> {
-        let lanes = self.lines(direction).saturating_sub(1);
+        let lanes = self.lines[direction as usize].saturating_sub(1);
         (usize::from(lane) < lanes).then(|| match direction {
-            Direction::Upper => self.upper_lines as i64 - i64::from(lane),
-            Direction::Lower => self.upper_lines as i64 + 2 + i64::from(lane),
+            Direction::Upper => self.lines[0] as i64 - i64::from(lane),
+            Direction::Lower => self.lines[0] as i64 + 2 + i64::from(lane),
         })
-    }
-
-    fn lines(self, direction: Direction) -> usize {
-        match direction {
-            Direction::Upper => self.upper_lines,
-            Direction::Lower => self.lower_lines,
-        }
     }
 }
 
@@ -125,7 +117,7 @@ mod tests {
     #[test]
     fn lane_ids_count_the_lines_above_and_lane_0_is_the_leftmost_of_its_travel() {
         // Three upper and four lower lanes: ids 2, 3, 4 | median 5 | 6, 7, 8, 9.
-        let numbers = LaneNumbers { upper_lines: 4, lower_lines: 5 };
+        let numbers = LaneNumbers { lines: [4, 5] };
         let upper: Vec<_> = (1..=5).map(|id| numbers.lane_of(Direction::Upper, id)).collect();
         assert_eq!(upper, [NO_LANE, 2, 1, 0, NO_LANE]);
         let lower: Vec<_> = (5..=10).map(|id| numbers.lane_of(Direction::Lower, id)).collect();
@@ -136,8 +128,8 @@ mod tests {
 
     #[test]
     fn lane_ids_go_both_ways() {
-        for (upper_lines, lower_lines) in [(4, 4), (2, 5), (0, 3), (3, 0)] {
-            let numbers = LaneNumbers { upper_lines, lower_lines };
+        for lines in [[4, 4], [2, 5], [0, 3], [3, 0]] {
+            let numbers = LaneNumbers { lines };
             for direction in Direction::BOTH {
                 for lane in 0..6 {
                     if let Some(id) = numbers.id_of(direction, lane) {

@@ -90,7 +90,7 @@ pub(super) fn read_recording_meta(files: &HighdFiles, doubts: &mut Doubts) -> Re
             "keep the line of this recording and remove the others",
         ));
     }
-    let lane_numbers = LaneNumbers { upper_lines: upper.len(), lower_lines: lower.len() };
+    let lane_numbers = LaneNumbers { lines: [upper.len(), lower.len()] };
     let carriageways = [(Direction::Upper, upper), (Direction::Lower, lower)]
         .into_iter()
         .filter(|(_, lines)| !lines.is_empty())

@@ -18,5 +18,4 @@ pub(crate) use inventory::made_up;
 pub use inventory::{HighdFiles, Inventory, SYNTHETIC_MARKER, inventory};
 pub use read::{read, read_checked};
 pub use writable::quantize;
-pub use write::stage;
-pub use write::{RecordingInfo, write};
+pub use write::{stage, write};

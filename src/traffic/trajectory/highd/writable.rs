@@ -2,25 +2,25 @@
 
 use super::format::{FRAME_LIMIT, FRAME_RATES_HZ, LANE_LINES_LIMIT};
 use super::frame::{Direction, LaneNumbers};
-use crate::traffic::trajectory::number::{Precision, REAL_LIMIT};
+use crate::traffic::trajectory::number::{REAL_LIMIT, rounded};
 use crate::traffic::trajectory::{NO_LANE, Recording, Track};
 use crate::{Error, Place, Result};
 
 /// Rounds a recording to the values that its own files hold: writing the quantized recording with
-/// [`write`](super::write) and reading it gives the same bits, at the same precision.
+/// [`write`](super::write) and reading it gives the same bits.
 ///
-/// Every value is transformed, rounded to the decimals and transformed back until it no longer changes.
+/// Every value is transformed, rounded to hundredths and transformed back until it no longer changes.
 ///
 /// # Errors
 /// If the format cannot hold the recording, see [`write`](super::write).
-pub fn quantize(recording: &mut Recording, precision: Precision) -> Result<()> {
-    let layout = ImageLayout::of(recording, precision)?;
+pub fn quantize(recording: &mut Recording) -> Result<()> {
+    let layout = ImageLayout::of(recording)?;
     let settle = |values: &mut [f64], to_file: &dyn Fn(f64) -> f64, from_file: &dyn Fn(f64) -> f64| {
         for value in values {
             // Twice is enough: fl(fl(a + h) − h) is a fixed point of its own repetition (Knuth, The Art of
             // Computer Programming 2, theorem 4.2.2 D).
             for _ in 0..3 {
-                *value = from_file(precision.rounded(to_file(*value)));
+                *value = from_file(rounded(to_file(*value)));
             }
         }
     };
@@ -31,7 +31,7 @@ pub fn quantize(recording: &mut Recording, precision: Precision) -> Result<()> {
     for track in &mut recording.tracks {
         let direction = layout.directions[track.carriageway];
         let (forward, leftward) = (|v| direction.forward(v), |v| direction.leftward(v));
-        let (length_m, width_m) = (precision.rounded(track.length_m), precision.rounded(track.width_m));
+        let (length_m, width_m) = (rounded(track.length_m), rounded(track.width_m));
         (track.length_m, track.width_m) = (length_m, width_m);
         settle(&mut track.s_m, &|s| direction.x_of(s, length_m), &|x| direction.s_of(x, length_m));
         settle(&mut track.d_m, &|d| direction.y_of(d, width_m), &|y| direction.d_of(y, width_m));
@@ -51,10 +51,8 @@ pub fn quantize(recording: &mut Recording, precision: Precision) -> Result<()> {
 pub(super) struct ImageLayout {
     /// By index of the carriageway.
     pub directions: Vec<Direction>,
-    /// y of the upper lane lines, rounded, ascending; empty without that carriageway.
-    pub upper_y: Vec<f64>,
-    /// y of the lower lane lines, rounded, ascending.
-    pub lower_y: Vec<f64>,
+    /// y of the upper and of the lower lane lines, rounded, ascending; empty without that carriageway.
+    pub lines_y: [Vec<f64>; 2],
     /// The numbers of the lanes.
     pub lane_numbers: LaneNumbers,
 }
@@ -64,13 +62,12 @@ impl ImageLayout {
     ///
     /// # Errors
     /// The first reason why it cannot.
-    pub(super) fn of(recording: &Recording, precision: Precision) -> Result<Self> {
+    pub(super) fn of(recording: &Recording) -> Result<Self> {
         check_frame(recording)?;
         let mut layout = ImageLayout {
             directions: Vec::new(),
-            upper_y: Vec::new(),
-            lower_y: Vec::new(),
-            lane_numbers: LaneNumbers { upper_lines: 0, lower_lines: 0 },
+            lines_y: [Vec::new(), Vec::new()],
+            lane_numbers: LaneNumbers { lines: [0; 2] },
         };
         for carriageway in &recording.carriageways {
             let bad = |problem: &str, help: &str| {
@@ -85,7 +82,7 @@ impl ImageLayout {
                     bad("unknown, repeated or out of order", "name them `1` (upper lanes) and `2` (lower lanes)")
                 })?;
             let mut lines: Vec<f64> =
-                carriageway.lane_lines_m.iter().map(|&d| precision.rounded(direction.leftward(d))).collect();
+                carriageway.lane_lines_m.iter().map(|&d| rounded(direction.leftward(d))).collect();
             if direction == Direction::Upper {
                 lines.reverse();
             }
@@ -98,13 +95,10 @@ impl ImageLayout {
                     "give the lines from left to right, at least a hundredth of a metre apart",
                 ));
             }
-            match direction {
-                Direction::Upper => layout.upper_y = lines,
-                Direction::Lower => layout.lower_y = lines,
-            }
+            layout.lines_y[direction as usize] = lines;
             layout.directions.push(direction);
         }
-        if let (Some(last_upper), Some(first_lower)) = (layout.upper_y.last(), layout.lower_y.first())
+        if let [Some(last_upper), Some(first_lower)] = [layout.lines_y[0].last(), layout.lines_y[1].first()]
             && last_upper > first_lower
         {
             return Err(Error::input(
@@ -113,8 +107,8 @@ impl ImageLayout {
                 "shift one of them sideways",
             ));
         }
-        layout.lane_numbers = LaneNumbers { upper_lines: layout.upper_y.len(), lower_lines: layout.lower_y.len() };
-        check_tracks(recording, precision)?;
+        layout.lane_numbers.lines = [0, 1].map(|half| layout.lines_y[half].len());
+        check_tracks(recording)?;
         Ok(layout)
     }
 
@@ -122,7 +116,7 @@ impl ImageLayout {
     pub(super) fn lane_id(&self, direction: Direction, lane: u16, d_m: f64) -> i64 {
         self.lane_numbers.id_of(direction, lane).unwrap_or_else(|| {
             let y = direction.leftward(d_m);
-            let above = self.upper_y.iter().chain(&self.lower_y).filter(|&&line| line < y).count() as i64;
+            let above = self.lines_y.iter().flatten().filter(|&&line| line < y).count() as i64;
             let is_none = self.lane_numbers.lane_of(direction, above + 1) == NO_LANE;
             if is_none { above + 1 } else { 0 }
         })
@@ -153,23 +147,20 @@ fn check_frame(recording: &Recording) -> Result<()> {
     Ok(())
 }
 
-fn check_tracks(recording: &Recording, precision: Precision) -> Result<()> {
+fn check_tracks(recording: &Recording) -> Result<()> {
     for track in &recording.tracks {
-        if let Some(problem) = track_problem(track, recording, precision) {
+        if let Some(problem) = track_problem(track, recording) {
             let place = Place::item(format!("recording {}, vehicle {}", recording.id, track.id));
-            return Err(Error::input(
-                place,
-                format!("{problem}; highD files cannot represent it"),
-                "correct the recording",
-            ));
+            let problem = format!("{problem}; highD files cannot represent it");
+            return Err(Error::input(place, problem, "correct the recording"));
         }
     }
     Ok(())
 }
 
-fn track_problem(track: &Track, recording: &Recording, precision: Precision) -> Option<&'static str> {
+fn track_problem(track: &Track, recording: &Recording) -> Option<&'static str> {
     let series = [&track.s_m, &track.d_m, &track.v_s_mps, &track.v_d_mps, &track.a_s_mps2];
-    let size_is_good = |size: f64| in_range(size) && precision.rounded(size) > 0.0;
+    let size_is_good = |size: f64| in_range(size) && rounded(size) > 0.0;
     if track.carriageway >= recording.carriageways.len() {
         Some("it drives on a carriageway that does not exist")
     } else if !size_is_good(track.length_m) || !size_is_good(track.width_m) {
