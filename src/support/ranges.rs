@@ -129,3 +129,22 @@ pub fn refuse_repeats<K: Eq + Hash, S: Display>(
 
 /// Help for a repeated value.
 pub const GIVE_ONCE: &str = "give every value once";
+
+/// Declares tables of settings, with the default of each field: `pub window_s: f64 = 1.0,`.
+#[macro_export]
+macro_rules! settings {
+    ($($(#[$about:meta])* $vis:vis struct $table:ident {
+        $($(#[$about_field:meta])* $vis_field:vis $field:ident: $of:ty = $default:expr,)*
+    })*) => {$(
+        $(#[$about])*
+        $vis struct $table {
+            $($(#[$about_field])* $vis_field $field: $of,)*
+        }
+
+        impl Default for $table {
+            fn default() -> Self {
+                $table { $($field: $default,)* }
+            }
+        }
+    )*};
+}

@@ -4,73 +4,75 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::support::error::Result;
 use crate::support::ranges;
 use crate::traffic::trajectory::{EgoViewOptions, LIMIT_TOLERANCE_M};
+use crate::{Result, settings};
 
-/// All options of [`mine`](super::mine). Values above 10⁶ have no meaning in traffic, and their number of samples would
-/// overflow.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct MiningOptions {
-    /// Extent of an ego's data set. Default 100 m around the ego, to 100 m before its final position (paper).
-    pub ego_view: EgoViewOptions,
-    /// A vehicle ahead in the ego's lane is its leader up to this time headway, s. Default 2.
-    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
-    pub leader_max_thw_s: f64,
-    /// Detection of acceleration, deceleration and cruising.
-    pub longitudinal: LongitudinalOptions,
-    /// Detection of lane changes.
-    pub lateral: LateralOptions,
-    /// The cut-in and its filters.
-    pub cut_in: CutInOptions,
-    /// The cut-out and its filters.
-    pub cut_out: CutOutOptions,
-    /// The leader deceleration and its filter.
-    pub lvd: LvdOptions,
-}
+settings! {
+    /// All options of [`mine`](super::mine). Values above 10⁶ have no meaning in traffic, and their number of samples
+    /// would overflow.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct MiningOptions {
+        /// Extent of an ego's data set. Default 100 m around the ego, to 100 m before its final position (paper).
+        pub ego_view: EgoViewOptions = EgoViewOptions::default(),
+        /// A vehicle ahead in the ego's lane is its leader up to this time headway, s. Default 2.
+        #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
+        pub leader_max_thw_s: f64 = 2.0,
+        /// Detection of acceleration, deceleration and cruising.
+        pub longitudinal: LongitudinalOptions = LongitudinalOptions::default(),
+        /// Detection of lane changes.
+        pub lateral: LateralOptions = LateralOptions::default(),
+        /// The cut-in and its filters.
+        pub cut_in: CutInOptions = CutInOptions::default(),
+        /// The cut-out and its filters.
+        pub cut_out: CutOutOptions = CutOutOptions::default(),
+        /// The leader deceleration and its filter.
+        pub lvd: LvdOptions = LvdOptions::default(),
+    }
 
-/// Longitudinal activities.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct LongitudinalOptions {
-    /// Window of a speed change, s. Default 1 (k_h).
-    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
-    pub window_s: f64,
-    /// Mean acceleration over the window below which a vehicle cruises, m/s². Default 0.1 (a_cruise).
-    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
-    pub cruise_acceleration_mps2: f64,
-    /// An activity changes the speed by more than this, m/s. Default 1 (Δv).
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub min_speed_change_mps: f64,
-    /// Cruising shorter than this between two activities is removed, s. Default 4 (N_cruise).
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub min_cruise_s: f64,
-}
+    /// Longitudinal activities.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct LongitudinalOptions {
+        /// Window of a speed change, s. Default 1 (k_h).
+        #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
+        pub window_s: f64 = 1.0,
+        /// Mean acceleration over the window below which a vehicle cruises, m/s². Default 0.1 (a_cruise).
+        #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
+        pub cruise_acceleration_mps2: f64 = 0.1,
+        /// An activity changes the speed by more than this, m/s. Default 1 (Δv).
+        #[schemars(range(min = 0.0, max = 1e6))]
+        pub min_speed_change_mps: f64 = 1.0,
+        /// Cruising shorter than this between two activities is removed, s. Default 4 (N_cruise).
+        #[schemars(range(min = 0.0, max = 1e6))]
+        pub min_cruise_s: f64 = 4.0,
+    }
 
-/// Lane changes.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct LateralOptions {
-    /// Window of lateral motion, s. Default 1 (k_h).
-    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
-    pub window_s: f64,
-    /// Mean lateral speed over the window below which lateral motion is steady, m/s. Default 0.25 (v_lat).
-    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
-    pub quiescent_speed_mps: f64,
-    /// Beyond this fraction of the lane width from the line, the change has certainly ended or not yet begun. Default
-    /// 0.5 (α_max).
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub far_share: f64,
-    /// Beyond this fraction of the lane width from the line, steady lateral motion means that the change has ended or
-    /// not yet begun. Default 0.1 (α_min).
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub near_share: f64,
-    /// Maximum time from the crossing to start and end, s. Default 10.
-    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
-    pub search_s: f64,
-    /// Which window decides that a lane change has ended. Default [`LaneChangeEnd::Observed`].
-    pub lc_end: LaneChangeEnd,
+    /// Lane changes.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct LateralOptions {
+        /// Window of lateral motion, s. Default 1 (k_h).
+        #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
+        pub window_s: f64 = 1.0,
+        /// Mean lateral speed over the window below which lateral motion is steady, m/s. Default 0.25 (v_lat).
+        #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
+        pub quiescent_speed_mps: f64 = 0.25,
+        /// Beyond this fraction of the lane width from the line, the change has certainly ended or not yet begun.
+        /// Default 0.5 (α_max).
+        #[schemars(range(min = 0.0, max = 1e6))]
+        pub far_share: f64 = 0.5,
+        /// Beyond this fraction of the lane width from the line, steady lateral motion means that the change has ended
+        /// or not yet begun. Default 0.1 (α_min).
+        #[schemars(range(min = 0.0, max = 1e6))]
+        pub near_share: f64 = 0.1,
+        /// Maximum time from the crossing to start and end, s. Default 10.
+        #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
+        pub search_s: f64 = 10.0,
+        /// Which window decides that a lane change has ended. Default [`LaneChangeEnd::Observed`].
+        pub lc_end: LaneChangeEnd = LaneChangeEnd::Observed,
+    }
 }
 
 /// Position of the window in which steady lateral motion ends a lane change. It determines T.
@@ -84,107 +86,53 @@ pub enum LaneChangeEnd {
     Observed,
 }
 
-/// The cut-in: what counts as found, and the filters of the paper.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct CutInOptions {
-    /// Shorter ones are discarded, s. Default 0.1.
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub min_duration_s: f64,
-    /// The search goes on this long after a cut-in of the same ego and target, s. Default 5.
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub pause_s: f64,
-    /// Kept only if the target's initial speed is below this fraction of the ego's. Default 0.95 (paper).
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub max_speed_share: f64,
-    /// Kept only if the initial THW is below this, s. Default 2 (paper).
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub max_thw_s: f64,
-}
-
-/// The cut-out: what counts as found, and the filters of the paper.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct CutOutOptions {
-    /// Shorter ones are discarded, s. Default 0.1.
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub min_duration_s: f64,
-    /// The search goes on this long after a cut-out of the same ego and target, s. Default 5.
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub pause_s: f64,
-    /// Kept only if the vehicle ahead of the target is initially slower than the ego. Default true (paper). A cut-out
-    /// without a vehicle ahead is never kept.
-    pub require_slower_lead: bool,
-}
-
-/// The leader deceleration: what counts as found, and the filter of the paper.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct LvdOptions {
-    /// Intervals of the tags up to this long are discarded, s. Default 0.1.
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub max_discarded_s: f64,
-    /// Dropped if shorter than this after trimming to the speed's maximum and minimum, s. Default 0.5.
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub min_duration_s: f64,
-    /// Kept only if the peak deceleration is above this, m/s². Default 2 (paper).
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub min_peak_deceleration_mps2: f64,
-}
-
-impl Default for MiningOptions {
-    fn default() -> Self {
-        MiningOptions {
-            ego_view: EgoViewOptions::default(),
-            leader_max_thw_s: 2.0,
-            longitudinal: LongitudinalOptions::default(),
-            lateral: LateralOptions::default(),
-            cut_in: CutInOptions::default(),
-            cut_out: CutOutOptions::default(),
-            lvd: LvdOptions::default(),
-        }
+settings! {
+    /// The cut-in: what counts as found, and the filters of the paper.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct CutInOptions {
+        /// Shorter ones are discarded, s. Default 0.1.
+        #[schemars(range(min = 0.0, max = 1e6))]
+        pub min_duration_s: f64 = 0.1,
+        /// The search goes on this long after a cut-in of the same ego and target, s. Default 5.
+        #[schemars(range(min = 0.0, max = 1e6))]
+        pub pause_s: f64 = 5.0,
+        /// Kept only if the target's initial speed is below this fraction of the ego's. Default 0.95 (paper).
+        #[schemars(range(min = 0.0, max = 1e6))]
+        pub max_speed_share: f64 = 0.95,
+        /// Kept only if the initial THW is below this, s. Default 2 (paper).
+        #[schemars(range(min = 0.0, max = 1e6))]
+        pub max_thw_s: f64 = 2.0,
     }
-}
 
-impl Default for LongitudinalOptions {
-    fn default() -> Self {
-        LongitudinalOptions {
-            window_s: 1.0,
-            cruise_acceleration_mps2: 0.1,
-            min_speed_change_mps: 1.0,
-            min_cruise_s: 4.0,
-        }
+    /// The cut-out: what counts as found, and the filters of the paper.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct CutOutOptions {
+        /// Shorter ones are discarded, s. Default 0.1.
+        #[schemars(range(min = 0.0, max = 1e6))]
+        pub min_duration_s: f64 = 0.1,
+        /// The search goes on this long after a cut-out of the same ego and target, s. Default 5.
+        #[schemars(range(min = 0.0, max = 1e6))]
+        pub pause_s: f64 = 5.0,
+        /// Kept only if the vehicle ahead of the target is initially slower than the ego. Default true (paper). A
+        /// cut-out without a vehicle ahead is never kept.
+        pub require_slower_lead: bool = true,
     }
-}
 
-impl Default for LateralOptions {
-    fn default() -> Self {
-        LateralOptions {
-            window_s: 1.0,
-            quiescent_speed_mps: 0.25,
-            far_share: 0.5,
-            near_share: 0.1,
-            search_s: 10.0,
-            lc_end: LaneChangeEnd::Observed,
-        }
-    }
-}
-
-impl Default for CutInOptions {
-    fn default() -> Self {
-        CutInOptions { min_duration_s: 0.1, pause_s: 5.0, max_speed_share: 0.95, max_thw_s: 2.0 }
-    }
-}
-
-impl Default for CutOutOptions {
-    fn default() -> Self {
-        CutOutOptions { min_duration_s: 0.1, pause_s: 5.0, require_slower_lead: true }
-    }
-}
-
-impl Default for LvdOptions {
-    fn default() -> Self {
-        LvdOptions { max_discarded_s: 0.1, min_duration_s: 0.5, min_peak_deceleration_mps2: 2.0 }
+    /// The leader deceleration: what counts as found, and the filter of the paper.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct LvdOptions {
+        /// Intervals of the tags up to this long are discarded, s. Default 0.1.
+        #[schemars(range(min = 0.0, max = 1e6))]
+        pub max_discarded_s: f64 = 0.1,
+        /// Dropped if shorter than this after trimming to the speed's maximum and minimum, s. Default 0.5.
+        #[schemars(range(min = 0.0, max = 1e6))]
+        pub min_duration_s: f64 = 0.5,
+        /// Kept only if the peak deceleration is above this, m/s². Default 2 (paper).
+        #[schemars(range(min = 0.0, max = 1e6))]
+        pub min_peak_deceleration_mps2: f64 = 2.0,
     }
 }
 

@@ -9,6 +9,7 @@
 use std::collections::BTreeMap;
 
 use super::csv_table::FileChecksum;
+use crate::settings;
 
 /// One recording: a stretch of road over a period of time.
 #[derive(Debug, Clone, PartialEq)]
@@ -171,22 +172,18 @@ impl Recording {
 /// would give other scenarios.
 pub(crate) const LIMIT_TOLERANCE_M: f64 = 1e-6;
 
-/// Extent of an ego-centric view.
-#[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct EgoViewOptions {
-    /// Farthest along-road distance, centre to centre, at which another vehicle is in view, m. Paper: 100.
-    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
-    pub range_m: f64,
-    /// Distance before the ego's final position at which the view ends, m; vehicles that travel less have
-    /// no view. Paper: 100.
-    #[schemars(range(min = 0.0, max = 1e6))]
-    pub cut_m: f64,
-}
-
-impl Default for EgoViewOptions {
-    fn default() -> Self {
-        EgoViewOptions { range_m: 100.0, cut_m: 100.0 }
+settings! {
+    /// Extent of an ego-centric view.
+    #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize, schemars::JsonSchema)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct EgoViewOptions {
+        /// Farthest along-road distance, centre to centre, at which another vehicle is in view, m. Paper: 100.
+        #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1e6))]
+        pub range_m: f64 = 100.0,
+        /// Distance before the ego's final position at which the view ends, m; vehicles that travel less have
+        /// no view. Paper: 100.
+        #[schemars(range(min = 0.0, max = 1e6))]
+        pub cut_m: f64 = 100.0,
     }
 }
 

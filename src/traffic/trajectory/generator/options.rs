@@ -4,57 +4,43 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::support::error::Result;
 use crate::support::ranges;
+use crate::{Result, settings};
 
-/// Options of the generator. `lanesweep study` without data uses the default.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct GeneratorOptions {
-    /// Seed of every random number. Same seed and options, same bits.
-    pub seed: u64,
-    /// Number of generated recordings. They are called `01`, `02`, ….
-    #[schemars(range(min = 1, max = 99))]
-    pub recordings: usize,
-    /// Length of each recording, s.
-    #[schemars(range(min = 1.0, max = 7200.0))]
-    pub duration_s: f64,
-    /// Samples per second; the simulation step is the largest fraction of a sample ≤ 0.04 s.
-    #[schemars(range(min = 1.0, max = 200.0))]
-    pub frame_rate_hz: f64,
-    /// Length of road that the camera sees, m.
-    #[schemars(range(min = 50.0, max = 5000.0))]
-    pub window_m: f64,
-    /// Mean flow per direction of travel, vehicles per hour, for roads with the default mix of two and
-    /// three lanes (published: 3,350).
-    #[schemars(range(min = 60.0, max = 4500.0))]
-    pub flow_vehph: f64,
-    /// Fraction of trucks among all vehicles, 0 to 0.5 (published: about 0.2).
-    #[schemars(range(min = 0.0, max = 0.5))]
-    pub truck_fraction: f64,
-    /// Factor on the rates of lane changes and hard braking in the camera's view. 1 stands for the published rates,
-    /// which the traffic meets in part (`docs/src/validation.md`). The default gives as many kept cut-outs as the paper
-    /// has, more cut-ins and LVDs, in a third of highD's time. A larger one disturbs the traffic: vehicles brake for
-    /// lane changes of others.
-    #[schemars(range(min = 0.0, max = 20.0))]
-    pub event_rate_factor: f64,
-    /// How scenarios arise.
-    pub behaviour: Behaviour,
-}
-
-impl Default for GeneratorOptions {
-    fn default() -> Self {
-        GeneratorOptions {
-            seed: 20_240_901,
-            recordings: 84,
-            duration_s: 245.0,
-            frame_rate_hz: 25.0,
-            window_m: 420.0,
-            flow_vehph: 3350.0,
-            truck_fraction: 0.2,
-            event_rate_factor: 3.0,
-            behaviour: Behaviour::default(),
-        }
+settings! {
+    /// Options of the generator. `lanesweep study` without data uses the default.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct GeneratorOptions {
+        /// Seed of every random number. Same seed and options, same bits.
+        pub seed: u64 = 20_240_901,
+        /// Number of generated recordings. They are called `01`, `02`, ….
+        #[schemars(range(min = 1, max = 99))]
+        pub recordings: usize = 84,
+        /// Length of each recording, s.
+        #[schemars(range(min = 1.0, max = 7200.0))]
+        pub duration_s: f64 = 245.0,
+        /// Samples per second; the simulation step is the largest fraction of a sample ≤ 0.04 s.
+        #[schemars(range(min = 1.0, max = 200.0))]
+        pub frame_rate_hz: f64 = 25.0,
+        /// Length of road that the camera sees, m.
+        #[schemars(range(min = 50.0, max = 5000.0))]
+        pub window_m: f64 = 420.0,
+        /// Mean flow per direction of travel, vehicles per hour, for roads with the default mix of two and
+        /// three lanes (published: 3,350).
+        #[schemars(range(min = 60.0, max = 4500.0))]
+        pub flow_vehph: f64 = 3350.0,
+        /// Fraction of trucks among all vehicles, 0 to 0.5 (published: about 0.2).
+        #[schemars(range(min = 0.0, max = 0.5))]
+        pub truck_fraction: f64 = 0.2,
+        /// Factor on the rates of lane changes and hard braking in the camera's view. 1 stands for the published rates,
+        /// which the traffic meets in part (`docs/src/validation.md`). The default gives as many kept cut-outs as the
+        /// paper has, more cut-ins and LVDs, in a third of highD's time. A larger one disturbs the traffic: vehicles
+        /// brake for lane changes of others.
+        #[schemars(range(min = 0.0, max = 20.0))]
+        pub event_rate_factor: f64 = 3.0,
+        /// How scenarios arise.
+        pub behaviour: Behaviour = Behaviour::default(),
     }
 }
 
@@ -76,70 +62,54 @@ impl GeneratorOptions {
     }
 }
 
-/// How drivers change lanes and brake. Rates and fractions are those at rate factor 1.
-///
-/// The defaults are fitted to the paper's 36 failure rates of S and to published traffic figures
-/// (`examples/calibrate_generator.rs`, which also prints what other numbers give); four were then moved by hand. The
-/// fit never saw an F1, a claim of the paper or the seed of the default recordings.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct Behaviour {
-    /// Factor on the desired speeds of cars.
-    #[schemars(range(min = 0.5, max = 1.5))]
-    pub car_speed_factor: f64,
-    /// Braking of the new follower that reduces the acceptance of a gap by a factor e, m/s².
-    #[schemars(range(min = 0.001, max = 10.0))]
-    pub follower_braking_mps2: f64,
-    /// Fraction of decisions by a driver who accelerates during the change and lets a faster follower brake, 0 to 1.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub accelerating_fraction: f64,
-    /// The same braking of the new follower, for such a driver, m/s².
-    #[schemars(range(min = 0.001, max = 10.0))]
-    pub accelerating_follower_braking_mps2: f64,
-    /// Mean acceleration of such a driver during the change where there is room, before values outside of 0 to 2.8 m/s²
-    /// are drawn again, m/s².
-    #[schemars(range(min = 0.0, max = 2.8))]
-    pub change_acceleration_mps2: f64,
-    /// Median duration of lane changes, before those outside of the published 2.9 to 7.3 s are left out, s.
-    #[schemars(range(min = 2.9, max = 7.3))]
-    pub change_duration_s: f64,
-    /// Factor on the rate at which trucks change lanes.
-    #[schemars(range(min = 0.0, max = 20.0))]
-    pub truck_change_factor: f64,
-    /// Fraction of the time headway that a driver keeps to the new leader during a lane change.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub change_headway_fraction: f64,
-    /// Rate of hard brakings of a vehicle with a follower, 1/s.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub brakings_per_s: f64,
-    /// Median time for which a hard braking is held, s.
-    #[schemars(range(min = 0.1, max = 60.0))]
-    pub braking_hold_s: f64,
-    /// Mean excess of its peak over 2 m/s², m/s².
-    #[schemars(range(min = 0.0, max = 5.0))]
-    pub braking_excess_mps2: f64,
-    /// How much harder than needed a driver brakes where the gap is too short, as a fraction of the comfortable
-    /// deceleration.
-    #[schemars(range(min = 0.0, max = 2.0))]
-    pub overreaction: f64,
-}
-
-impl Default for Behaviour {
-    fn default() -> Self {
-        Behaviour {
-            car_speed_factor: 0.896,
-            follower_braking_mps2: 0.00556,
-            accelerating_fraction: 0.0464,
-            accelerating_follower_braking_mps2: 9.0,
-            change_acceleration_mps2: 2.35,
-            change_duration_s: 6.45,
-            truck_change_factor: 1.2,
-            change_headway_fraction: 0.203,
-            brakings_per_s: 0.00009,
-            braking_hold_s: 9.0,
-            braking_excess_mps2: 0.543,
-            overreaction: 0.226,
-        }
+settings! {
+    /// How drivers change lanes and brake. Rates and fractions are those at rate factor 1.
+    ///
+    /// The defaults are fitted to the paper's 36 failure rates of S and to published traffic figures
+    /// (`examples/calibrate_generator.rs`, which also prints what other numbers give); four were then moved by hand.
+    /// The fit never saw an F1, a claim of the paper or the seed of the default recordings.
+    #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+    #[serde(default, deny_unknown_fields)]
+    pub struct Behaviour {
+        /// Factor on the desired speeds of cars.
+        #[schemars(range(min = 0.5, max = 1.5))]
+        pub car_speed_factor: f64 = 0.896,
+        /// Braking of the new follower that reduces the acceptance of a gap by a factor e, m/s².
+        #[schemars(range(min = 0.001, max = 10.0))]
+        pub follower_braking_mps2: f64 = 0.00556,
+        /// Fraction of decisions by a driver who accelerates during the change and lets a faster follower brake, 0 to
+        /// 1.
+        #[schemars(range(min = 0.0, max = 1.0))]
+        pub accelerating_fraction: f64 = 0.0464,
+        /// The same braking of the new follower, for such a driver, m/s².
+        #[schemars(range(min = 0.001, max = 10.0))]
+        pub accelerating_follower_braking_mps2: f64 = 9.0,
+        /// Mean acceleration of such a driver during the change where there is room, before values outside of 0 to 2.8
+        /// m/s² are drawn again, m/s².
+        #[schemars(range(min = 0.0, max = 2.8))]
+        pub change_acceleration_mps2: f64 = 2.35,
+        /// Median duration of lane changes, before those outside of the published 2.9 to 7.3 s are left out, s.
+        #[schemars(range(min = 2.9, max = 7.3))]
+        pub change_duration_s: f64 = 6.45,
+        /// Factor on the rate at which trucks change lanes.
+        #[schemars(range(min = 0.0, max = 20.0))]
+        pub truck_change_factor: f64 = 1.2,
+        /// Fraction of the time headway that a driver keeps to the new leader during a lane change.
+        #[schemars(range(min = 0.0, max = 1.0))]
+        pub change_headway_fraction: f64 = 0.203,
+        /// Rate of hard brakings of a vehicle with a follower, 1/s.
+        #[schemars(range(min = 0.0, max = 1.0))]
+        pub brakings_per_s: f64 = 0.00009,
+        /// Median time for which a hard braking is held, s.
+        #[schemars(range(min = 0.1, max = 60.0))]
+        pub braking_hold_s: f64 = 9.0,
+        /// Mean excess of its peak over 2 m/s², m/s².
+        #[schemars(range(min = 0.0, max = 5.0))]
+        pub braking_excess_mps2: f64 = 0.543,
+        /// How much harder than needed a driver brakes where the gap is too short, as a fraction of the comfortable
+        /// deceleration.
+        #[schemars(range(min = 0.0, max = 2.0))]
+        pub overreaction: f64 = 0.226,
     }
 }
 
