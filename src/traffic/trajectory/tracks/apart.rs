@@ -3,7 +3,7 @@
 
 use super::preset::Preset;
 use super::raw::RawRecording;
-use super::road::median;
+use super::road::{median, range};
 use super::samples::Samples;
 use crate::support::readable::significant;
 
@@ -45,7 +45,7 @@ fn periods(mut recording: RawRecording, rate_hz: f64) -> Vec<RawRecording> {
     let zero_s = |samples: &Samples, k: usize| samples.other_clock(k) - samples.at(k) / rate_hz;
     let of_vehicle = |samples: &'_ Samples| (0..samples.len()).map(|k| zero_s(samples, k)).collect::<Vec<f64>>();
     let zeros = || recording.vehicles.iter().flat_map(|of| of_vehicle(&of.samples)).filter(|zero| !zero.is_nan());
-    let (low, high) = zeros().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), zero| (l.min(zero), h.max(zero)));
+    let (low, high) = range(zeros());
     // Also without times.
     if high - low <= SAME_TIME_S {
         return vec![recording];

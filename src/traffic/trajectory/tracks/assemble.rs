@@ -8,7 +8,7 @@ use super::lanes::{LaneSource, Lateral, lane_lines, lines_of_map};
 use super::pieces::{Piece, pieces};
 use super::preset::{Preset, Reference, Side};
 use super::raw::{NO_LABEL, RawRecording, RawSample, RawVehicle};
-use super::road::{OnRoad, Path, RoadLine, cross, dot, median};
+use super::road::{OnRoad, Path, RoadLine, cross, d_range, dot, median};
 use super::roles::Role;
 use super::samples::Samples;
 use super::smooth::{central, savitzky_golay};
@@ -126,8 +126,7 @@ pub(super) fn assemble(
     }
     tracks.sort_by_key(|track| track.id);
     let recording = Recording { id: raw.id, frame_rate_hz: rate_hz, carriageways, tracks, synthetic: raw.synthetic };
-    let (recording, excluded) = about.judge(recording, preset);
-    about.excluded = excluded;
+    let recording = about.judge(recording, preset);
     if recording.tracks.is_empty() {
         let why = about.findings.iter().map(|finding| finding.text.as_str()).collect::<Vec<_>>().join("; ");
         let problem = format!("no vehicle is left: {why}");
@@ -143,9 +142,7 @@ fn map_lines(line: &RoadLine, boundaries: &[Vec<[f64; 2]>]) -> Vec<f64> {
         // Only those along this direction of travel.
         let along = on.last()?.s_m - on.first()?.s_m;
         let mut d: Vec<f64> = on.iter().map(|p| p.d_m).collect();
-        let spread =
-            d.iter().copied().fold(f64::NEG_INFINITY, f64::max) - d.iter().copied().fold(f64::INFINITY, f64::min);
-        (along > 5.0 && spread < 1.5).then(|| median(&mut d))
+        (along > 5.0 && d_range(&on) < 1.5).then(|| median(&mut d))
     };
     lines_of_map(boundaries.iter().filter_map(middle).collect())
 }

@@ -4,7 +4,7 @@ use super::assemble::Placed;
 use super::pieces::Piece;
 use super::preset::{Preset, RoadSource};
 use super::raw::RawRecording;
-use super::road::{Path, RoadLine, dot, median};
+use super::road::{Path, RoadLine, d_range, dot, median};
 use super::understanding::Understanding;
 
 /// Maximum number of paths that the road is fitted to.
@@ -107,11 +107,11 @@ pub(super) fn describe_road(about: &mut Understanding, lines: &[Option<RoadLine>
     let mut ends = [(f64::INFINITY, f64::NEG_INFINITY); 2];
     let mut across = 0_u64;
     for of in placed {
-        let (l, h) = of.on.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p.d_m), h.max(p.d_m)));
+        let by_m = d_range(&of.on);
         let travel = of.on[of.on.len() - 1].s_m - of.on[0].s_m;
-        if travel.abs() >= 30.0 || h - l > 15.0 {
-            ranges.push(h - l);
-            across += u64::from(h - l > 15.0);
+        if travel.abs() >= 30.0 || by_m > 15.0 {
+            ranges.push(by_m);
+            across += u64::from(by_m > 15.0);
         }
         let here = &mut ends[usize::from(of.is_forward)];
         *here = of.on.iter().fold(*here, |(l, h), p| (l.min(p.s_m), h.max(p.s_m)));

@@ -3,32 +3,24 @@
 use std::fmt::Write as _;
 use std::path::Path;
 
+use super::columns_of;
 use super::preset::Preset;
-use super::roles::Role;
+use super::roles::{Role, units};
 use super::rows::letters;
-use super::{FileFormat, columns_of};
 use crate::Result;
 use crate::support::files::file_name;
 use crate::support::input_file::unpacked;
 
-/// Units in the names of columns.
-const UNITS: [(&str, &str); 16] = [
-    ("km/h", "km/h"),
-    ("kmh", "km/h"),
-    ("kph", "km/h"),
-    ("mph", "mph"),
-    ("ft/s", "ft/s"),
-    ("feet", "ft"),
-    ("_ft", "ft"),
-    ("[ft]", "ft"),
-    ("_cm", "cm"),
-    ("[cm]", "cm"),
-    ("(cm)", "cm"),
-    ("_mm", "mm"),
-    ("[mm]", "mm"),
-    ("(mm)", "mm"),
-    ("_ms", "ms"),
-    ("rad", "rad"),
+/// Units, and what names of columns say for them.
+const UNITS: [(&str, &[&str]); 8] = [
+    ("km/h", &["km/h", "kmh", "kph"]),
+    ("mph", &["mph"]),
+    ("ft/s", &["ft/s"]),
+    ("ft", &["feet", "_ft", "[ft]"]),
+    ("cm", &["_cm", "[cm]", "(cm)"]),
+    ("mm", &["_mm", "[mm]", "(mm)"]),
+    ("ms", &["_ms"]),
+    ("rad", &["rad"]),
 ];
 
 /// The text of a preset with the columns whose names tell what they are. What no name tells is a question, `"?"`: its user
@@ -43,18 +35,12 @@ pub fn draft(path: &Path) -> Result<String> {
     let stem = unpacked(&name).rsplit_once('.').map_or(name.as_str(), |(stem, _)| stem);
     let mut text = format!(
         "# A first preset for {}. Answer each \"?\" and check every line; the chapter on tracks explains the keys.\n\
-         name = {}\ntitle = {}\nformat = {:?}\n\
+         name = {}\ntitle = {}\nformat = {}\n\
          # Point that x and y describe: centre, front, rear, corner.\nreference = \"?\"\n",
         quoted(&name),
         quoted(stem),
         quoted(&format!("tracks like {stem}")),
-        match format {
-            FileFormat::Csv => "csv",
-            FileFormat::Parquet => "parquet",
-            FileFormat::Xml => "xml",
-            FileFormat::Json => "json",
-            FileFormat::Commonroad => "commonroad",
-        }
+        serde_json::json!(format)
     );
     let guesses: Vec<[String; 3]> = header.iter().map(|header| guesses(header)).collect();
     let mut used: Vec<&str> = Vec::new();
@@ -70,10 +56,13 @@ pub fn draft(path: &Path) -> Result<String> {
             Some(header) if !used.contains(&header.as_str()) => {
                 used.push(header);
                 let lower = header.to_lowercase();
-                let unit = UNITS.iter().find(|(sign, unit)| lower.contains(sign) && fits(role, unit));
+                let fits = |unit: &str| units(role.dimension()).iter().any(|(known, _)| *known == unit);
+                let says =
+                    |(unit, signs): &&(&str, &[&str])| fits(unit) && signs.iter().any(|sign| lower.contains(sign));
+                let unit = UNITS.iter().find(says);
                 let name = quoted(header);
                 let _ = match unit {
-                    Some((_, unit)) => writeln!(columns, "{} = {{ name = {name}, unit = {unit:?} }}", role.key()),
+                    Some((unit, _)) => writeln!(columns, "{} = {{ name = {name}, unit = {unit:?} }}", role.key()),
                     None => writeln!(columns, "{} = {name}", role.key()),
                 };
             }
@@ -116,17 +105,6 @@ pub fn draft(path: &Path) -> Result<String> {
         words(&generic.classes.ignored)
     );
     Ok(text)
-}
-
-fn fits(role: Role, unit: &str) -> bool {
-    use super::roles::Dimension as D;
-    match role.dimension() {
-        D::Length => matches!(unit, "ft" | "cm" | "mm"),
-        D::Speed => matches!(unit, "km/h" | "mph" | "ft/s"),
-        D::Time => unit == "ms",
-        D::Angle => unit == "rad",
-        _ => false,
-    }
 }
 
 /// A text between quotation marks as TOML has it, on one line: as JSON, which leaves one character that TOML forbids.

@@ -1,7 +1,7 @@
 //! What contradicts itself in a recording: units, axes, boxes, quality.
 
 use super::preset::{Preset, Side};
-use super::road::median;
+use super::road::{median, range};
 use super::understanding::{Exclusion, Finding, TIMES, Understanding};
 use crate::support::plausibility::{Doubts, Implausible, Limits, NOISE_MPS, Quantity};
 use crate::support::readable::{count, significant, value};
@@ -420,7 +420,7 @@ impl Understanding {
 fn speed_range_mps(track: &Track, rate_hz: f64) -> f64 {
     let second = rate_hz.round().max(1.0) as usize;
     let speeds = (second..track.len()).map(|k| (track.s_m[k] - track.s_m[k - second]) * rate_hz / second as f64);
-    let (low, high) = speeds.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v), h.max(v)));
+    let (low, high) = range(speeds);
     high - low
 }
 

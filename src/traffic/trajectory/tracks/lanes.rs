@@ -35,6 +35,8 @@ pub(super) enum LaneSource {
     Positions,
     /// Boundaries of a map.
     Map,
+    /// Lane lines in the file.
+    Lines,
 }
 
 /// Lane lines from left to right; `None` without samples.

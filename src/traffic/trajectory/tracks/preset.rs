@@ -209,28 +209,15 @@ pub struct MetaFile {
 macro_rules! shipped {
     ($($name:literal),* $(,)?) => {
         /// Names and texts of the presets that are part of the program, `generic` last.
-        pub(super) const SHIPPED: &[(&str, &str)] =
+        const SHIPPED: &[(&str, &str)] =
             &[$(($name, include_str!(concat!("../../../../configs/presets/", $name, ".toml")))),*];
     };
 }
 
-shipped!(
-    "automatum",
-    "citysim",
-    "commonroad",
-    "dlr-ht",
-    "exid",
-    "i24",
-    "mitra",
-    "ngsim",
-    "omega-prime",
-    "sumo-fcd",
-    "sumo-fcd-parquet",
-    "sumo-fcd-xml",
-    "swiftraj",
-    "tgsim",
-    "generic",
-);
+shipped! {
+    "automatum", "citysim", "commonroad", "dlr-ht", "exid", "i24", "mitra", "ngsim", "omega-prime", "sumo-fcd",
+    "sumo-fcd-parquet", "sumo-fcd-xml", "swiftraj", "tgsim", "generic",
+}
 
 /// Name of the preset of the format that has its own reader.
 pub const HIGHD: &str = "highd";
@@ -284,34 +271,31 @@ impl Preset {
     }
 
     fn check(&self, place: &Place) -> Result<()> {
-        let bad = |key: &str, problem: String, help: String| Err(Error::input(place.clone().of(key), problem, help));
+        let bad = |key: &str, problem: &str, help: &str| Err(Error::input(place.clone().of(key), problem, help));
         let files = self.vehicles.iter().chain(&self.recording).map(|meta| &meta.columns);
         for (role, column) in files.chain([&self.columns]).flatten() {
             if column.factor(*role).is_none_or(|factor| !factor.is_finite() || factor == 0.0) {
                 let known: Vec<&str> = units(role.dimension()).iter().map(|(name, _)| *name).collect();
                 let unit = column.unit().unwrap_or_default();
                 let problem = format!("the unit `{unit}` or the factor is not usable");
-                return bad(role.key(), problem, format!("units are {}; a factor is not 0", known.join(", ")));
+                return bad(role.key(), &problem, &format!("units are {}; a factor is not 0", known.join(", ")));
             }
             if column.names().is_empty() {
-                return bad(role.key(), "no column is named".to_owned(), "name one".to_owned());
+                return bad(role.key(), "no column is named", "name one");
             }
         }
         let has = |role: Role| self.columns.contains_key(&role);
         let is_table = self.format != FileFormat::Commonroad;
         let needed = [Role::Vehicle, Role::X, Role::Y];
         if let Some(role) = needed.into_iter().find(|role| is_table && !has(*role)) {
-            return bad("columns", format!("`{}` is missing", role.key()), "name its column".to_owned());
+            return bad("columns", &format!("`{}` is missing", role.key()), "name its column");
         }
         if is_table && !has(Role::Frame) && !has(Role::Time) {
-            return bad("columns", "neither `frame` nor `time` is there".to_owned(), "name one of them".to_owned());
+            return bad("columns", "neither `frame` nor `time` is there", "name one of them");
         }
         if self.files.matches('*').count() != 1 {
-            return bad(
-                "files",
-                format!("`{}` has not one `*`", self.files),
-                "write *_tracks.csv, for instance".to_owned(),
-            );
+            let problem = format!("`{}` has not one `*`", self.files);
+            return bad("files", &problem, "write *_tracks.csv, for instance");
         }
         let ranges = [
             ("frame_rate_hz", self.frame_rate_hz, 0.1, 1e4),
@@ -322,15 +306,12 @@ impl Preset {
         ];
         for (key, value, min, max) in ranges {
             if let Some(value) = value.filter(|value| !(min..=max).contains(value)) {
-                return bad(key, format!("{value} is out of range"), format!("give {min} to {max}"));
+                return bad(key, &format!("{value} is out of range"), &format!("give {min} to {max}"));
             }
         }
         if let Some((class, _)) = self.sizes.iter().find(|(_, size)| size.iter().any(|v| !(0.1..=100.0).contains(v))) {
-            return bad(
-                "sizes",
-                format!("the size of `{class}` is out of range"),
-                "give length and width in metres".to_owned(),
-            );
+            let problem = format!("the size of `{class}` is out of range");
+            return bad("sizes", &problem, "give length and width in metres");
         }
         Ok(())
     }

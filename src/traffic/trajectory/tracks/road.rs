@@ -72,6 +72,11 @@ pub(super) fn median(values: &mut [f64]) -> f64 {
     *values.select_nth_unstable_by(middle, f64::total_cmp).1
 }
 
+/// The smallest and the largest value.
+pub(super) fn range(values: impl IntoIterator<Item = f64>) -> (f64, f64) {
+    values.into_iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), value| (low.min(value), high.max(value)))
+}
+
 impl RoadLine {
     /// The straight line through a point.
     pub(super) fn straight(through: [f64; 2], direction: [f64; 2]) -> RoadLine {
@@ -214,8 +219,8 @@ fn path_length(path: &[[f64; 2]]) -> f64 {
     }
 }
 
-fn d_range(on: &[OnRoad]) -> f64 {
-    let (low, high) = on.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), p| (l.min(p.d_m), h.max(p.d_m)));
+pub(super) fn d_range(on: &[OnRoad]) -> f64 {
+    let (low, high) = range(on.iter().map(|p| p.d_m));
     high - low
 }
 
@@ -325,8 +330,7 @@ fn extend(line: &mut RoadLine, paths: &[Path]) -> Option<()> {
 
 /// Index of a bin along the line.
 fn bin(line: &RoadLine, s_m: f64) -> usize {
-    let bins = (line.s_m[line.s_m.len() - 1] / BIN_M).ceil() as usize;
-    ((s_m / BIN_M).max(0.0) as usize).min(bins.saturating_sub(1))
+    ((s_m / BIN_M).max(0.0) as usize).min(bins(line) - 1)
 }
 
 fn bins(line: &RoadLine) -> usize {

@@ -7,7 +7,7 @@ use serde::Serialize;
 use super::lanes::LaneSource;
 use super::preset::{Preset, Reference};
 use super::raw::RawRecording;
-use super::road::median;
+use super::road::{median, range};
 use crate::support::readable::{count, significant, value};
 use crate::traffic::trajectory::{Noise, Recording, Track, VehicleClass};
 
@@ -67,6 +67,7 @@ impl UnderstoodCarriageway {
                 LaneSource::Bands => "bands of the width in the preset",
                 LaneSource::Positions => "where vehicles drive",
                 LaneSource::Map => "the boundaries in the file",
+                LaneSource::Lines => "the lane lines in the file",
             },
             tracks,
         }
@@ -247,33 +248,22 @@ impl Understanding {
         let mut ranges = Vec::new();
         let mut ends = vec![(f64::INFINITY, f64::NEG_INFINITY); recording.carriageways.len()];
         for track in &recording.tracks {
-            let range = |values: &[f64]| {
-                values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(*v), h.max(*v)))
-            };
-            let across = range(&track.d_m);
+            let across = range(track.d_m.iter().copied());
             ranges.push(across.1 - across.0);
-            let along = range(&track.s_m);
+            let along = range(track.s_m.iter().copied());
             let here = &mut ends[track.carriageway];
             *here = (here.0.min(along.0), here.1.max(along.1));
-            about.note_speeds(
-                &track.s_m,
-                Some(&track.v_s_mps),
-                &track.d_m,
-                Some(&track.v_d_mps),
-                recording.frame_rate_hz,
-            );
+            let (v_s, v_d) = (Some(&track.v_s_mps[..]), Some(&track.v_d_mps[..]));
+            about.note_speeds(&track.s_m, v_s, &track.d_m, v_d, recording.frame_rate_hz);
         }
         about.wander_m = median(&mut ranges);
         about.length_m = ends.iter().map(|(low, high)| high - low).fold(0.0, f64::max);
         for (index, carriageway) in recording.carriageways.iter().enumerate() {
             let tracks = recording.tracks.iter().filter(|track| track.carriageway == index).count();
-            let mut of =
-                UnderstoodCarriageway::of(&carriageway.name, &carriageway.lane_lines_m, LaneSource::Map, tracks);
-            of.source = "the lane lines in the file";
-            about.carriageways.push(of);
+            let (name, lines_m) = (&carriageway.name, &carriageway.lane_lines_m);
+            about.carriageways.push(UnderstoodCarriageway::of(name, lines_m, LaneSource::Lines, tracks));
         }
-        let (recording, excluded) = about.judge(recording, &Preset::default());
-        about.excluded = excluded;
+        let recording = about.judge(recording, &Preset::default());
         for note in notes {
             // The checks above say these too.
             let is_said = about.findings.iter().any(|finding| finding.text.contains(&note));
@@ -332,7 +322,7 @@ impl Understanding {
     }
 
     /// Checks the recording against itself, and leaves out what the preset wants left out.
-    pub(super) fn judge(&mut self, mut recording: Recording, preset: &Preset) -> (Recording, u64) {
+    pub(super) fn judge(&mut self, mut recording: Recording, preset: &Preset) -> Recording {
         self.note_backwards(&recording);
         self.check_units(&recording);
         self.check_motion(&recording);
@@ -346,7 +336,7 @@ impl Understanding {
         };
         recording.tracks.retain(|track| !is_out(track));
         recording.tracks.iter_mut().flat_map(|track| &mut track.v_s_mps).for_each(|v| *v = v.max(0.0));
-        let excluded = (before - recording.tracks.len()) as u64;
+        self.excluded = (before - recording.tracks.len()) as u64;
         self.cars = recording.tracks.iter().filter(|track| track.class == VehicleClass::Car).count() as u64;
         self.trucks = recording.tracks.len() as u64 - self.cars;
         self.samples = recording.tracks.iter().map(|track| track.len() as u64).sum();
@@ -355,24 +345,16 @@ impl Understanding {
         self.km = recording.tracks.iter().map(moved).sum::<f64>() / 1000.0;
         let noise = Noise::of(&recording);
         (self.speed_noise_mps, self.acceleration_noise_mps2) = (noise.speed_mps, noise.acceleration_mps2);
-        (recording, excluded)
+        recording
     }
 
     /// What was understood, line by line: a name and what it is.
     pub fn lines(&self) -> Vec<(&'static str, String)> {
+        let [cars, trucks, samples] = [self.cars, self.trucks, self.samples].map(count);
+        let (hours, km) = (significant(self.hours, 3), significant(self.km, 4));
         let mut lines = vec![
             ("rate", format!("{} Hz, from the {}", value(self.rate_hz), self.rate_source)),
-            (
-                "vehicles",
-                format!(
-                    "{} cars, {} lorries; {} samples, {} h, {} km",
-                    count(self.cars),
-                    count(self.trucks),
-                    count(self.samples),
-                    significant(self.hours, 3),
-                    significant(self.km, 4)
-                ),
-            ),
+            ("vehicles", format!("{cars} cars, {trucks} lorries; {samples} samples, {hours} h, {km} km")),
         ];
         if !self.columns.is_empty() {
             let of = |(role, column): &(&str, String)| {
@@ -382,18 +364,13 @@ impl Understanding {
             let unused =
                 if self.unused.is_empty() { String::new() } else { format!("; not used: {}", self.unused.join(", ")) };
             lines.push(("columns", format!("{used}{unused}")));
-            lines.push((
-                "reference",
-                format!(
-                    "{}, as the preset says or assumes",
-                    match self.reference {
-                        Reference::Centre => "centre of the box",
-                        Reference::Front => "front bumper",
-                        Reference::Rear => "rear bumper",
-                        Reference::Corner => "corner of the box",
-                    }
-                ),
-            ));
+            let point = match self.reference {
+                Reference::Centre => "centre of the box",
+                Reference::Front => "front bumper",
+                Reference::Rear => "rear bumper",
+                Reference::Corner => "corner of the box",
+            };
+            lines.push(("reference", format!("{point}, as the preset says or assumes")));
         }
         if !self.classes.is_empty() {
             let of = |(class, number): &(String, u64)| format!("{} {class}", count(*number));
@@ -404,23 +381,13 @@ impl Understanding {
         } else {
             format!("curved, radius down to {} m", significant(self.min_radius_m, 2))
         };
-        lines.push((
-            "road",
-            format!(
-                "{shape}, {} m in view; vehicles wander by {} m around its line (0.1 to 0.6 is lane keeping){}",
-                significant(self.length_m, 4),
-                significant(self.wander_m, 2),
-                match self.lane_offset_error_m {
-                    Some(error) if error <= 0.5 => {
-                        format!(
-                            "; positions in the lane are the file's, {} m (median) from those by the line",
-                            significant(error, 2)
-                        )
-                    }
-                    _ => String::new(),
-                }
-            ),
-        ));
+        let (length, wander) = (significant(self.length_m, 4), significant(self.wander_m, 2));
+        let keeping = "around its line (0.1 to 0.6 is lane keeping)";
+        let offset = self.lane_offset_error_m.filter(|error| *error <= 0.5).map_or(String::new(), |error| {
+            let by = significant(error, 2);
+            format!("; positions in the lane are the file's, {by} m (median) from those by the line")
+        });
+        lines.push(("road", format!("{shape}, {length} m in view; vehicles wander by {wander} m {keeping}{offset}")));
         for of in &self.carriageways {
             let [low, high] = of.lane_width_m;
             let width = if high - low < 0.05 {
@@ -429,16 +396,9 @@ impl Understanding {
                 format!("{} to {} m", significant(low, 3), significant(high, 3))
             };
             let lanes = if of.lanes == 1 { "lane" } else { "lanes" };
-            lines.push((
-                "lanes",
-                format!(
-                    "{}: {} {lanes} of {width} from {}; {} tracks",
-                    of.way(),
-                    of.lanes,
-                    of.source,
-                    count(of.tracks as u64)
-                ),
-            ));
+            let (way, tracks) = (of.way(), count(of.tracks as u64));
+            lines
+                .push(("lanes", format!("{way}: {} {lanes} of {width} from {}; {tracks} tracks", of.lanes, of.source)));
         }
         let tracks: u64 = self.carriageways.iter().map(|of| of.tracks as u64).sum();
         let from = |derived: u64, what: &str| match derived {
