@@ -12,6 +12,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::{NamedTempFile, TempPath};
 
+use crate::support::files::folder_of;
 use crate::{Error, Place, Result};
 
 /// Hidden names are `.lanesweep-<file name>-XXXXXX.part`.
@@ -98,13 +99,6 @@ fn prefix(target: &Path) -> OsString {
         _ => {}
     }
     prefix
-}
-
-fn folder_of(target: &Path) -> &Path {
-    match target.parent() {
-        Some(folder) if !folder.as_os_str().is_empty() => folder,
-        _ => Path::new("."),
-    }
 }
 
 /// The error for a file that cannot be created. If the folder is missing, the system's message does not name it.

@@ -5,7 +5,7 @@
 
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read, Seek, SeekFrom};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 use flate2::read::MultiGzDecoder;
 use serde::de::DeserializeOwned;
@@ -69,20 +69,23 @@ pub fn open_text(path: &Path) -> Result<Box<dyn Read + Send>> {
         reader = Box::new(MultiGzDecoder::new(BufReader::with_capacity(1 << 16, reader)));
     }
     let mark = begin(&mut reader).map_err(io)?;
-    Ok(match mark[..] {
-        [0xff, 0xfe] => {
-            Box::new(Utf16 { inner: reader, unit: u16::from_le_bytes, rest: Vec::new(), ready: Cursor::default() })
-        }
-        [0xfe, 0xff] => {
-            Box::new(Utf16 { inner: reader, unit: u16::from_be_bytes, rest: Vec::new(), ready: Cursor::default() })
-        }
-        _ => Box::new(Cursor::new(mark).chain(reader)),
-    })
+    let unit = match mark[..] {
+        [0xff, 0xfe] => u16::from_le_bytes,
+        [0xfe, 0xff] => u16::from_be_bytes,
+        _ => return Ok(Box::new(Cursor::new(mark).chain(reader))),
+    };
+    Ok(Box::new(Utf16 { inner: reader, unit, rest: Vec::new(), ready: Cursor::default() }))
 }
 
 /// The name of a file that gzip compressed, without its ending; other names as they are.
 pub fn unpacked(name: &str) -> &str {
     name.strip_suffix(".gz").or_else(|| name.strip_suffix(".GZ")).unwrap_or(name)
+}
+
+/// The file, or the one that gzip compressed in its place.
+pub fn packed_or_not(file: PathBuf) -> PathBuf {
+    let packed = file.with_added_extension("gz");
+    if !file.exists() && packed.exists() { packed } else { file }
 }
 
 /// Whether [`open_text`] gives the bytes of the file as they are.

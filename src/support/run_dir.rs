@@ -12,10 +12,9 @@ use std::collections::BTreeSet;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
-use crate::support::atomic_file::Live;
-use crate::support::atomic_file::{AtomicFile, StagedFile, clear_stale, refuse_link, sync_folder};
+use crate::support::atomic_file::{AtomicFile, Live, StagedFile, clear_stale, refuse_link, sync_folder};
 use crate::support::file_list::{FileList, LIST, RunFiles};
-use crate::support::files::make_folder;
+use crate::support::files::{folder_of, make_folder};
 use crate::support::lock::FolderLock;
 use crate::{Error, Place, Result};
 
@@ -217,11 +216,7 @@ impl Results<'_> {
 
     /// Adds a complete file that a user named, in this folder or elsewhere.
     pub fn join(&mut self, file: StagedFile) {
-        let folder_of = |path: &Path| match path.parent() {
-            Some(folder) if !folder.as_os_str().is_empty() => folder.canonicalize().ok(),
-            _ => Path::new(".").canonicalize().ok(),
-        };
-        let is_inside = folder_of(file.target()) == self.folder.dir.canonicalize().ok();
+        let is_inside = folder_of(file.target()).canonicalize().ok() == self.folder.dir.canonicalize().ok();
         match file.target().file_name().and_then(|name| name.to_str()) {
             Some(name) if is_inside => {
                 self.named.insert(name.to_owned());

@@ -4,8 +4,8 @@ use std::path::Path;
 
 use serde_json::{Map, Value};
 
-use super::writer::append_csv;
-use super::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter, csv_field, writer};
+use super::writer::{append_csv, csv_header};
+use super::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter, writer};
 use crate::Result;
 use crate::support::readable;
 
@@ -41,8 +41,7 @@ impl Table {
 
     /// The table as CSV: numbers in full precision, null as an empty field.
     pub fn csv(&self) -> String {
-        let names: Vec<String> = self.columns.iter().map(|column| csv_field(&column.name)).collect();
-        let mut text = names.join(",") + "\n";
+        let mut text = csv_header(&self.columns);
         self.rows.iter().for_each(|row| append_csv(&mut text, &self.columns, row));
         text
     }

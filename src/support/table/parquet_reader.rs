@@ -67,29 +67,22 @@ enum Plain {
 impl Leaf {
     fn new(record: Option<ArrayRef>, values: ArrayRef) -> Leaf {
         let mut leaf = Leaf { record, values, plain: Plain::Other };
-        let rows = 0..leaf.values.len();
-        let of = leaf.values.data_type();
-        if leaf.record.is_none() && leaf.values.null_count() == 0 {
+        let (of, rows) = (leaf.values.data_type(), 0..leaf.values.len());
+        let is_usual = leaf.record.is_none() && leaf.values.null_count() == 0;
+        leaf.plain = match of {
             // The usual ones at once.
-            match of {
-                DataType::Float64 => {
-                    leaf.plain = Plain::Reals(leaf.values.as_primitive::<Float64Type>().values().to_vec());
-                    return leaf;
-                }
-                DataType::Int64 => {
-                    leaf.plain = Plain::Wholes(leaf.values.as_primitive::<Int64Type>().values().to_vec());
-                    return leaf;
-                }
-                _ => {}
+            DataType::Float64 if is_usual => Plain::Reals(leaf.values.as_primitive::<Float64Type>().values().to_vec()),
+            DataType::Int64 if is_usual => Plain::Wholes(leaf.values.as_primitive::<Int64Type>().values().to_vec()),
+            _ if of.is_floating() || matches!(of, DataType::Timestamp(..)) => {
+                let real = |at| if let TableCell::Number(value) = cell(&leaf, at) { value } else { f64::NAN };
+                Plain::Reals(rows.map(real).collect())
             }
-        }
-        if of.is_floating() || matches!(of, DataType::Timestamp(..)) {
-            let real = |at| if let TableCell::Number(value) = cell(&leaf, at) { value } else { f64::NAN };
-            leaf.plain = Plain::Reals(rows.map(real).collect());
-        } else if of.is_integer() {
-            let whole = |at| if let TableCell::Whole(value) = cell(&leaf, at) { Some(value) } else { None };
-            leaf.plain = rows.map(whole).collect::<Option<_>>().map_or(Plain::Other, Plain::Wholes);
-        }
+            _ if of.is_integer() => {
+                let whole = |at| if let TableCell::Whole(value) = cell(&leaf, at) { Some(value) } else { None };
+                rows.map(whole).collect::<Option<_>>().map_or(Plain::Other, Plain::Wholes)
+            }
+            _ => Plain::Other,
+        };
         leaf
     }
 
@@ -316,48 +309,38 @@ fn cell(leaf: &Leaf, at: usize) -> TableCell<'_> {
     if leaf.is_null(at) {
         return TableCell::Null;
     }
-    macro_rules! whole {
+    macro_rules! value {
         ($of:ident) => {
-            TableCell::Whole(i64::from(array.as_primitive::<$of>().value(at)))
-        };
-    }
-    macro_rules! number {
-        ($of:ident) => {
-            TableCell::Number(f64::from(array.as_primitive::<$of>().value(at)))
-        };
-    }
-    macro_rules! instant {
-        ($of:ident, $per_s:literal) => {
-            TableCell::Number(array.as_primitive::<$of>().value(at) as f64 / $per_s)
+            array.as_primitive::<$of>().value(at)
         };
     }
     match array.data_type() {
         DataType::Utf8 => TableCell::Text(array.as_string::<i32>().value(at).into()),
         DataType::Boolean => TableCell::Flag(array.as_boolean().value(at)),
-        DataType::Int8 => whole!(Int8Type),
-        DataType::Int16 => whole!(Int16Type),
-        DataType::Int32 => whole!(Int32Type),
-        DataType::Int64 => whole!(Int64Type),
-        DataType::UInt8 => whole!(UInt8Type),
-        DataType::UInt16 => whole!(UInt16Type),
-        DataType::UInt32 => whole!(UInt32Type),
-        DataType::UInt64 => {
-            i64::try_from(array.as_primitive::<UInt64Type>().value(at)).map_or(TableCell::Null, TableCell::Whole)
+        DataType::Int8 => TableCell::Whole(value!(Int8Type).into()),
+        DataType::Int16 => TableCell::Whole(value!(Int16Type).into()),
+        DataType::Int32 => TableCell::Whole(value!(Int32Type).into()),
+        DataType::Int64 => TableCell::Whole(value!(Int64Type)),
+        DataType::UInt8 => TableCell::Whole(value!(UInt8Type).into()),
+        DataType::UInt16 => TableCell::Whole(value!(UInt16Type).into()),
+        DataType::UInt32 => TableCell::Whole(value!(UInt32Type).into()),
+        DataType::UInt64 => i64::try_from(value!(UInt64Type)).map_or(TableCell::Null, TableCell::Whole),
+        DataType::Float16 => TableCell::Number(value!(Float16Type).into()),
+        DataType::Float32 => TableCell::Number(value!(Float32Type).into()),
+        DataType::Float64 => TableCell::Number(value!(Float64Type)),
+        DataType::Timestamp(TimeUnit::Second, _) => TableCell::Number(value!(TimestampSecondType) as f64),
+        DataType::Timestamp(TimeUnit::Millisecond, _) => {
+            TableCell::Number(value!(TimestampMillisecondType) as f64 / 1e3)
         }
-        DataType::Float16 => number!(Float16Type),
-        DataType::Float32 => number!(Float32Type),
-        DataType::Float64 => number!(Float64Type),
-        DataType::Timestamp(TimeUnit::Second, _) => instant!(TimestampSecondType, 1.0),
-        DataType::Timestamp(TimeUnit::Millisecond, _) => instant!(TimestampMillisecondType, 1e3),
-        DataType::Timestamp(TimeUnit::Microsecond, _) => instant!(TimestampMicrosecondType, 1e6),
-        DataType::Timestamp(TimeUnit::Nanosecond, _) => instant!(TimestampNanosecondType, 1e9),
+        DataType::Timestamp(TimeUnit::Microsecond, _) => {
+            TableCell::Number(value!(TimestampMicrosecondType) as f64 / 1e6)
+        }
+        DataType::Timestamp(TimeUnit::Nanosecond, _) => TableCell::Number(value!(TimestampNanosecondType) as f64 / 1e9),
         DataType::Decimal128(_, scale) => {
-            let value = array.as_primitive::<Decimal128Type>().value(at) as f64;
-            TableCell::Number(value / 10f64.powi(i32::from(*scale)))
+            TableCell::Number(value!(Decimal128Type) as f64 / 10f64.powi(i32::from(*scale)))
         }
         DataType::Decimal256(_, scale) => {
-            let digits = array.as_primitive::<Decimal256Type>().value(at).to_string();
-            let value = digits.parse::<f64>().unwrap_or(f64::NAN);
+            let value = value!(Decimal256Type).to_string().parse::<f64>().unwrap_or(f64::NAN);
             TableCell::Number(value / 10f64.powi(i32::from(*scale)))
         }
         _ => TableCell::Null,

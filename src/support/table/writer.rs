@@ -24,10 +24,12 @@ pub struct TableWriter {
     out: Out,
 }
 
+/// Appends a row to a text.
+type AppendRow = fn(&mut String, &[Column], &[Cell]);
+
 enum Out {
     /// With a buffer for the row.
-    Csv(AtomicFile, String),
-    JsonLines(AtomicFile, String),
+    Text(AtomicFile, AppendRow, String),
     #[cfg(feature = "parquet")]
     Parquet(Box<ParquetFile>),
 }
@@ -48,11 +50,10 @@ impl TableWriter {
         let out = match format {
             TableFormat::Csv => {
                 let mut file = AtomicFile::create(path)?;
-                let names: Vec<String> = columns.iter().map(|column| csv_field(&column.name)).collect();
-                file.append(format!("{}\n", names.join(",")).as_bytes())?;
-                Out::Csv(file, String::new())
+                file.append(csv_header(&columns).as_bytes())?;
+                Out::Text(file, append_csv, String::new())
             }
-            TableFormat::JsonLines => Out::JsonLines(AtomicFile::create(path)?, String::new()),
+            TableFormat::JsonLines => Out::Text(AtomicFile::create(path)?, append_json, String::new()),
             #[cfg(feature = "parquet")]
             TableFormat::Parquet => Out::Parquet(Box::new(ParquetFile::create(path, &columns, facts)?)),
             #[cfg(not(feature = "parquet"))]
@@ -73,14 +74,9 @@ impl TableWriter {
             return Err(Error::Internal(format!("a row does not fit its table: {row:?}")));
         }
         match &mut self.out {
-            Out::Csv(file, text) => {
+            Out::Text(file, append, text) => {
                 text.clear();
-                append_csv(text, &self.columns, row);
-                file.append(text.as_bytes())
-            }
-            Out::JsonLines(file, text) => {
-                text.clear();
-                append_json(text, &self.columns, row);
+                append(text, &self.columns, row);
                 file.append(text.as_bytes())
             }
             #[cfg(feature = "parquet")]
@@ -102,7 +98,7 @@ impl TableWriter {
     /// [`Error::Io`].
     pub fn stage(self) -> Result<StagedFile> {
         let file = match self.out {
-            Out::Csv(file, _) | Out::JsonLines(file, _) => file,
+            Out::Text(file, ..) => file,
             #[cfg(feature = "parquet")]
             Out::Parquet(file) => file.finish()?,
         };
@@ -120,6 +116,11 @@ fn fits(kind: ColumnKind, cell: &Cell) -> bool {
         Cell::Series(_) => kind == ColumnKind::Series,
         Cell::Wholes(_) => kind == ColumnKind::Wholes,
     }
+}
+
+/// The line of column names.
+pub(super) fn csv_header(columns: &[Column]) -> String {
+    columns.iter().map(|column| csv_field(&column.name)).collect::<Vec<_>>().join(",") + "\n"
 }
 
 /// Appends a row as CSV. Numbers have as many digits as needed to read back unchanged in their arithmetic.
@@ -181,9 +182,8 @@ pub fn csv_field(text: &str) -> String {
 
 /// Appends a row as JSON; fields are in the order of the columns.
 fn append_json(line: &mut String, columns: &[Column], row: &[Cell]) {
-    let separator = |at: usize| if at == 0 { '{' } else { ',' };
     for (at, (column, cell)) in columns.iter().zip(row).enumerate() {
-        line.push(separator(at));
+        line.push(if at == 0 { '{' } else { ',' });
         line.push_str(&Value::from(column.name.as_ref()).to_string());
         line.push(':');
         line.push_str(&json_value(column.kind, cell).to_string());

@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::highd::{self, HighdFiles};
 use super::recording::Loaded;
 use super::tracks::{self, HIGHD, Preset, TrackFile};
-use crate::support::files::file_name;
+use crate::support::files::{file_name, folder_of};
 use crate::support::input_file::unpacked;
 use crate::support::plausibility::Implausible;
 use crate::{Error, Place, Result};
@@ -182,9 +182,8 @@ impl InputFile {
 
 /// A table with fewer columns holds no tracks: vehicle, time, x and y.
 const MIN_COLUMNS: usize = 4;
-/// Endings of the files of highD's format.
-const HIGHD_FILES: [&str; 3] = [HIGHD_ENDING, "_tracksMeta.csv", "_recordingMeta.csv"];
-const HIGHD_ENDING: &str = "_tracks.csv";
+/// Ending of the tracks in highD's format.
+const HIGHD_ENDING: &str = highd::SUFFIXES[0];
 /// Files that a message lists.
 const MAX_TRIED: usize = 5;
 
@@ -204,8 +203,7 @@ fn highd_inputs(path: &Path) -> Result<Inputs> {
     }
     let name = file_name(path);
     let id = unpacked(&name).strip_suffix(HIGHD_ENDING).unwrap_or(&name);
-    let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let recordings = vec![HighdFiles::found(folder, id)];
+    let recordings = vec![HighdFiles::found(folder_of(path), id)];
     Ok(Inputs::Highd(highd::Inventory { recordings, problems: Vec::new() }))
 }
 
@@ -241,7 +239,7 @@ fn is_of_sumo(path: &Path) -> bool {
 
 /// Whether a file has a name of highD's format.
 fn is_of_highd(path: &Path) -> bool {
-    ends_with_any(path, &HIGHD_FILES)
+    ends_with_any(path, &highd::SUFFIXES)
 }
 
 fn ends_with_any(path: &Path, endings: &[&str]) -> bool {

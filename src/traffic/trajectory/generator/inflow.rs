@@ -2,7 +2,8 @@
 
 use super::options::GeneratorOptions;
 use super::random::TrafficRandom;
-use super::vehicle::Vehicle;
+use super::traffic::centre_of;
+use super::vehicle::{Vehicle, draw_line};
 use crate::traffic::trajectory::VehicleClass;
 
 /// Fraction of arrivals that follow the previous vehicle at their desired headway, at the published flow or more; the
@@ -31,16 +32,18 @@ pub(super) struct LaneDemand {
     car_speed_mps: f64,
     /// Overreaction of its drivers.
     overreaction: f64,
+    /// Index, centre and width of the lane.
+    lane: usize,
+    centre_m: f64,
+    lane_width_m: f64,
 }
 
 /// The demand of every lane of a carriageway, leftmost first. `flow_level`, `truck_level` and `speed_level` (about 1)
 /// vary between recordings.
 pub(super) fn demand(
     options: &GeneratorOptions,
-    lanes: usize,
-    flow_level: f64,
-    truck_level: f64,
-    speed_level: f64,
+    (lanes, lane_width_m): (usize, f64),
+    [flow_level, truck_level, speed_level]: [f64; 3],
 ) -> Vec<LaneDemand> {
     // Fractions of the flow and of the trucks, and desired car speeds, from the leftmost lane. The speeds are above the
     // published peak of 33 m/s, because most cars drive behind others.
@@ -59,6 +62,9 @@ pub(super) fn demand(
                 truck_fraction: (truck_fraction * trucks[lane] / flow[lane]).min(0.95),
                 car_speed_mps: speeds[lane] * speed_level * options.behaviour.car_speed_factor,
                 overreaction: options.behaviour.overreaction,
+                lane,
+                centre_m: centre_of(lane, lane_width_m),
+                lane_width_m,
             }
         })
         .collect()
@@ -68,25 +74,16 @@ pub(super) fn demand(
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct Inflow {
     demand: LaneDemand,
-    lane: usize,
-    centre_m: f64,
-    lane_width_m: f64,
     due_s: f64,
     next: Vehicle,
 }
 
 impl Inflow {
     /// The queue of an empty lane.
-    pub(super) fn new(
-        demand: LaneDemand,
-        lane: usize,
-        centre_m: f64,
-        lane_width_m: f64,
-        stream: &mut TrafficRandom,
-    ) -> Inflow {
-        let next = draw(&demand, lane, centre_m, lane_width_m, stream);
+    pub(super) fn new(demand: LaneDemand, stream: &mut TrafficRandom) -> Inflow {
+        let next = draw(&demand, stream);
         let due_s = stream.between(0.0, 2.0 * demand.mean_headway_s);
-        Inflow { demand, lane, centre_m, lane_width_m, due_s, next }
+        Inflow { demand, due_s, next }
     }
 
     /// The next vehicle, if it is due and has space behind the last one of its lane (`last`: rear bumper and speed),
@@ -111,8 +108,7 @@ impl Inflow {
             }
             speed_mps = speed_mps.min(last_mps + (2.0 * APPROACH_MPS2 * spare_m).sqrt());
         }
-        let mut vehicle =
-            std::mem::replace(&mut self.next, draw(&self.demand, self.lane, self.centre_m, self.lane_width_m, stream));
+        let mut vehicle = std::mem::replace(&mut self.next, draw(&self.demand, stream));
         vehicle.s_m = entrance_m;
         vehicle.speed_mps = speed_mps;
         self.due_s = self.due_s.max(now_s - 5.0) + self.headway_s(speed_mps, stream);
@@ -135,9 +131,11 @@ impl Inflow {
     }
 }
 
-fn draw(demand: &LaneDemand, lane: usize, centre_m: f64, lane_width_m: f64, stream: &mut TrafficRandom) -> Vehicle {
+fn draw(demand: &LaneDemand, stream: &mut TrafficRandom) -> Vehicle {
     let class = if stream.chance(demand.truck_fraction) { VehicleClass::Truck } else { VehicleClass::Car };
     let mut vehicle = Vehicle::draw(class, demand.car_speed_mps, demand.overreaction, stream);
-    vehicle.place(lane, centre_m, lane_width_m, stream);
+    vehicle.lane = demand.lane;
+    vehicle.occupied = 1 << demand.lane;
+    vehicle.line_m = draw_line(demand.centre_m, demand.lane_width_m, vehicle.width_m, stream);
     vehicle
 }

@@ -25,7 +25,7 @@ pub(super) fn record(options: &GeneratorOptions, index: usize) -> Result<Recordi
     let mut seen: Vec<(usize, Vehicle)> = Vec::new();
     for (carriageway, &lanes) in road.iter().enumerate() {
         let flow_level = site.normal_within(1.0, 0.08, 0.8, 1.12);
-        let demand = demand(options, lanes, flow_level, truck_level, speed_level);
+        let demand = demand(options, (lanes, lane_width_m), [flow_level, truck_level, speed_level]);
         let traffic = Traffic::new(options, lane_width_m, demand, (index, carriageway));
         seen.extend(traffic.run().into_iter().map(|vehicle| (carriageway, vehicle)));
     }

@@ -77,11 +77,7 @@ impl<'a> Traffic<'a> {
         let stream = |purpose| TrafficRandom::new(options.seed, key.0, key.1, purpose);
         let mut arrivals = stream(Purpose::Inflow);
         let lanes = demand.len();
-        let inflows = demand
-            .into_iter()
-            .enumerate()
-            .map(|(lane, demand)| Inflow::new(demand, lane, centre_of(lane, lane_width_m), lane_width_m, &mut arrivals))
-            .collect();
+        let inflows = demand.into_iter().map(|demand| Inflow::new(demand, &mut arrivals)).collect();
         let dt = 1.0 / (options.frame_rate_hz * options.steps_per_sample() as f64);
         let keep = libm::exp(-dt / NOISE_CORRELATION_S);
         Traffic {

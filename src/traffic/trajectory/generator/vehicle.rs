@@ -131,13 +131,6 @@ impl Vehicle {
         }
     }
 
-    /// Places it in a lane at a random lateral position.
-    pub(super) fn place(&mut self, lane: usize, centre_m: f64, lane_width_m: f64, stream: &mut TrafficRandom) {
-        self.lane = lane;
-        self.occupied = 1 << lane;
-        self.line_m = draw_line(centre_m, lane_width_m, self.width_m, stream);
-    }
-
     /// Front bumper, m.
     pub(super) fn front_m(&self) -> f64 {
         self.s_m + 0.5 * self.length_m
@@ -162,11 +155,11 @@ impl Vehicle {
 
 /// Median time headway of car drivers, s. With the deviation below, the mean is the 1.5 s of the hierarchical IDM fit
 /// on highD.
-pub(super) const CAR_HEADWAY_S: f64 = 1.30;
+const CAR_HEADWAY_S: f64 = 1.30;
 /// Median time headway of truck drivers, s.
-pub(super) const TRUCK_HEADWAY_S: f64 = 1.7;
+const TRUCK_HEADWAY_S: f64 = 1.7;
 /// Standard deviation of the headway's logarithm.
-pub(super) const HEADWAY_SIGMA: f64 = 0.5;
+const HEADWAY_SIGMA: f64 = 0.5;
 
 /// The intended lateral position in a lane: near the middle, with the whole body inside the lane.
 pub(super) fn draw_line(centre_m: f64, lane_width_m: f64, width_m: f64, stream: &mut TrafficRandom) -> f64 {

@@ -29,14 +29,10 @@ impl HighdFiles {
 
     /// The same; files that only gzip's ending tells from these names take their places.
     pub(in crate::traffic::trajectory) fn found(dir: &Path, id: &str) -> Self {
-        let mut files = HighdFiles::named(dir, id);
-        for file in [&mut files.tracks, &mut files.tracks_meta, &mut files.recording_meta] {
-            let packed = PathBuf::from(format!("{}.gz", file.display()));
-            if !file.exists() && packed.exists() {
-                *file = packed;
-            }
-        }
-        files
+        let HighdFiles { id, tracks, tracks_meta, recording_meta } = HighdFiles::named(dir, id);
+        let [tracks, tracks_meta, recording_meta] =
+            [tracks, tracks_meta, recording_meta].map(input_file::packed_or_not);
+        HighdFiles { id, tracks, tracks_meta, recording_meta }
     }
 }
 
@@ -50,7 +46,7 @@ pub struct Inventory {
 }
 
 /// File names after the prefix, in the order of the fields of [`HighdFiles`].
-const SUFFIXES: [&str; 3] = ["_tracks.csv", "_tracksMeta.csv", "_recordingMeta.csv"];
+pub(in crate::traffic::trajectory) const SUFFIXES: [&str; 3] = ["_tracks.csv", "_tracksMeta.csv", "_recordingMeta.csv"];
 
 /// Finds the recordings of a folder (not of its subfolders).
 ///
@@ -96,11 +92,6 @@ pub const SYNTHETIC_MARKER: &str = "SYNTHETIC.txt";
 pub(crate) fn made_up(dir: &Path) -> Option<String> {
     let text = input_file::read_text(&dir.join(SYNTHETIC_MARKER), input_file::MAX_SETTINGS_BYTES).ok()?;
     text.lines().next().filter(|line| line.starts_with("SYNTHETIC DATA")).map(str::to_owned)
-}
-
-/// The folder that a recording's file is in.
-pub(super) fn folder_of(file: &Path) -> &Path {
-    file.parent().filter(|dir| !dir.as_os_str().is_empty()).unwrap_or(Path::new("."))
 }
 
 /// Every prefix with the presence of its three files, sorted.

@@ -14,6 +14,7 @@ mod read;
 mod writable;
 mod write;
 
+pub(super) use inventory::SUFFIXES;
 pub(crate) use inventory::made_up;
 pub use inventory::{HighdFiles, Inventory, SYNTHETIC_MARKER, inventory};
 pub use read::{read, read_checked};

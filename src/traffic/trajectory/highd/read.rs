@@ -5,8 +5,9 @@ use std::path::Path;
 
 use super::format::{FRAME_LIMIT, TRACKS_HEADER, csv_format};
 use super::geometry;
-use super::inventory::{HighdFiles, folder_of, made_up};
+use super::inventory::{HighdFiles, made_up};
 use super::meta::{self, RecordingMeta, VehicleMeta};
+use crate::support::files::folder_of;
 use crate::support::plausibility::{Doubts, HELP, Implausible, Quantity};
 use crate::traffic::trajectory::Loaded;
 use crate::traffic::trajectory::csv_table::{CsvColumn, CsvTable};

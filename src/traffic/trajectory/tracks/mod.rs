@@ -40,7 +40,7 @@ use rows::{Columns, Rows};
 
 use super::Loaded;
 use super::highd::made_up;
-use crate::support::files::file_name;
+use crate::support::files::{file_name, folder_of};
 use crate::support::input_file::{open_text, unpacked};
 use crate::support::plausibility::Implausible;
 use crate::{Error, Place, Result};
@@ -248,13 +248,13 @@ pub struct LoadedTracks {
 pub fn read_tracks(file: &TrackFile, preset: &Preset) -> Result<Vec<LoadedTracks>> {
     let raw = match preset.format {
         FileFormat::Commonroad => commonroad::read(&file.path, &file.id)?,
-        _ => raw::read_table(&file.path, &file.id, preset)?,
+        _ => raw::read_table(file, preset)?,
     };
     let place = Place::file(&file.path);
     if raw.recordings.iter().all(|recording| recording.vehicles.is_empty()) {
         return Err(raw::no_vehicle(&file.path));
     }
-    let synthetic = made_up(file.path.parent().unwrap_or(Path::new("."))).is_some();
+    let synthetic = made_up(folder_of(&file.path)).is_some();
     let bytes = raw.checksums.iter().map(|file| file.bytes).sum();
     let mut all = Vec::new();
     for mut recording in raw.recordings {

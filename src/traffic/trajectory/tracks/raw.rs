@@ -8,7 +8,8 @@ use super::preset::{HeadingOrigin, MetaFile, Preset, Side};
 use super::roles::{ColumnName, Role};
 use super::rows::{Columns, FoundTime, Rows, SampleRow};
 use super::samples::Samples;
-use super::sumo;
+use super::{TrackFile, sumo};
+use crate::support::input_file::packed_or_not;
 use crate::support::plain_text::nearest;
 use crate::traffic::trajectory::csv_table::FileChecksum;
 use crate::{Error, Place, Result};
@@ -160,8 +161,8 @@ pub(super) struct RawFile {
 ///
 /// # Errors
 /// Those of the files, with the place of a bad value.
-pub(super) fn read_table(path: &Path, id: &str, preset: &Preset) -> Result<RawFile> {
-    let rows = Rows::of_preset(path, preset)?;
+pub(super) fn read_table(file: &TrackFile, preset: &Preset) -> Result<RawFile> {
+    let rows = Rows::of_preset(&file.path, preset)?;
     let columns = Columns::of(&preset.columns, rows.header(), &preset.none);
     check_columns(&rows, &columns, preset)?;
     let mut roles: Vec<(Role, String)> = Role::ALL
@@ -171,9 +172,9 @@ pub(super) fn read_table(path: &Path, id: &str, preset: &Preset) -> Result<RawFi
         .collect();
     let is_used = |name: &&String| roles.iter().any(|(_, used)| used == *name);
     let unused = rows.header().iter().filter(|name| !is_used(name)).cloned().collect();
-    let mut file = Collecting::new(id, preset, &columns);
-    let (checksum, count) = rows.each(&columns, &mut |row| file.add(row))?;
-    let mut recordings = file.recordings;
+    let mut collecting = Collecting::new(&file.id, preset, &columns);
+    let (checksum, count) = rows.each(&columns, &mut |row| collecting.add(row))?;
+    let mut recordings = collecting.recordings;
     recordings.retain(|recording| !recording.vehicles.is_empty());
     if let Some(found) = columns.found_time() {
         roles
@@ -183,15 +184,11 @@ pub(super) fn read_table(path: &Path, id: &str, preset: &Preset) -> Result<RawFi
     }
     recordings.iter_mut().flat_map(|of| &mut of.vehicles).for_each(|vehicle| vehicle.samples.shrink());
     let mut checksums = vec![checksum];
-    if let Some(meta) = &preset.recording {
-        checksums.extend(add_frame_rate(path, id, meta, preset, &mut recordings)?);
-    }
+    checksums.extend(add_frame_rate(file, preset, &mut recordings)?);
     let mut recordings = apart(recordings, preset);
-    if let Some(meta) = &preset.vehicles {
-        checksums.extend(add_vehicle_facts(path, id, meta, preset, &mut recordings)?);
-    }
+    checksums.extend(add_vehicle_facts(file, preset, &mut recordings)?);
     if let Some(patterns) = &preset.types_file {
-        checksums.extend(sumo::add_facts(path, id, patterns.names(), preset, &mut recordings)?);
+        checksums.extend(sumo::add_facts(file, patterns.names(), preset, &mut recordings)?);
     }
     Ok(RawFile { recordings, checksums, rows: count, roles, unused })
 }
@@ -242,8 +239,6 @@ struct Collecting<'a> {
     next: Vec<Vec<usize>>,
     has_frames: bool,
     other_clock: Role,
-    has_recordings: bool,
-    has_sizes: bool,
     y_sign: f64,
 }
 
@@ -264,8 +259,6 @@ impl<'a> Collecting<'a> {
             next: Vec::new(),
             has_frames,
             other_clock: if has_frames { Role::Time } else { Role::Frame },
-            has_recordings: columns.has(Role::Recording),
-            has_sizes: columns.has(Role::Length) || columns.has(Role::Width),
             y_sign: if preset.axes.y == Side::Right { -1.0 } else { 1.0 },
         }
     }
@@ -331,11 +324,9 @@ impl<'a> Collecting<'a> {
             let help = "write dates (2024-10-07 00:00:00.05), or seconds";
             return Err(Error::input(row.place(time).of(format!("vehicle {}", of.key)), problem, help));
         }
-        if self.has_sizes {
-            for (fact, role, sizes) in [(0, Role::Length, &mut of.lengths_m), (1, Role::Width, &mut of.widths_m)] {
-                if let Some(size) = row.number(role)?.filter(|size| *size > 0.0) {
-                    sample.facts[fact] = changed(sizes, size);
-                }
+        for (fact, role, sizes) in [(0, Role::Length, &mut of.lengths_m), (1, Role::Width, &mut of.widths_m)] {
+            if let Some(size) = row.number(role)?.filter(|size| *size > 0.0) {
+                sample.facts[fact] = changed(sizes, size);
             }
         }
         let is_same_class = of.classes.last().map(|class| row.is_text(Role::Class, class)).transpose()?;
@@ -354,7 +345,7 @@ impl<'a> Collecting<'a> {
     }
 
     fn recording(&mut self, row: &dyn SampleRow) -> Result<usize> {
-        let name = if self.has_recordings { row.text(Role::Recording)?.unwrap_or_default() } else { "".into() };
+        let name = row.text(Role::Recording)?.unwrap_or_default();
         if let Some(&at) = self.of_name.get(name.as_ref()) {
             return Ok(at);
         }
@@ -432,12 +423,8 @@ pub(in crate::traffic::trajectory) fn is_geographic(name: &str) -> bool {
 }
 
 /// The meta file beside a track file, if it is there.
-fn meta_rows(path: &Path, id: &str, meta: &MetaFile, preset: &Preset) -> Result<Option<(Rows, Columns)>> {
-    let mut beside = path.with_file_name(meta.file.replace('*', id));
-    let packed = path.with_file_name(format!("{}.gz", meta.file.replace('*', id)));
-    if !beside.exists() && packed.exists() {
-        beside = packed;
-    }
+fn meta_rows(file: &TrackFile, meta: &MetaFile, preset: &Preset) -> Result<Option<(Rows, Columns)>> {
+    let beside = packed_or_not(file.path.with_file_name(meta.file.replace('*', &file.id)));
     if !beside.exists() {
         let problem = format!("preset {} names this file, which is not there", preset.name);
         let missing = || Error::input(Place::file(&beside), problem, "add it, or remove its table from the preset");
@@ -448,19 +435,18 @@ fn meta_rows(path: &Path, id: &str, meta: &MetaFile, preset: &Preset) -> Result<
     Ok(Some((rows, columns)))
 }
 
+/// Adds classes, sizes and directions of the vehicles from their own file.
 fn add_vehicle_facts(
-    path: &Path,
-    id: &str,
-    meta: &MetaFile,
+    file: &TrackFile,
     preset: &Preset,
     recordings: &mut [RawRecording],
 ) -> Result<Option<FileChecksum>> {
-    let Some((rows, columns)) = meta_rows(path, id, meta, preset)? else {
+    let Some(meta) = &preset.vehicles else { return Ok(None) };
+    let Some((rows, columns)) = meta_rows(file, meta, preset)? else {
         let facts: Vec<&str> =
             meta.columns.keys().filter(|role| **role != Role::Vehicle).map(|role| role.key()).collect();
-        let file = meta.file.replace('*', id);
-        let note =
-            format!("{file} is not beside the tracks: {} of the vehicles are not read from it", facts.join(", "));
+        let (file, facts) = (meta.file.replace('*', &file.id), facts.join(", "));
+        let note = format!("{file} is not beside the tracks: {facts} of the vehicles are not read from it");
         recordings.iter_mut().for_each(|recording| recording.notes.push(note.clone()));
         return Ok(None);
     };
@@ -503,14 +489,10 @@ fn add_vehicle_facts(
     Ok(Some(checksum))
 }
 
-fn add_frame_rate(
-    path: &Path,
-    id: &str,
-    meta: &MetaFile,
-    preset: &Preset,
-    recordings: &mut [RawRecording],
-) -> Result<Option<FileChecksum>> {
-    let Some((rows, columns)) = meta_rows(path, id, meta, preset)? else { return Ok(None) };
+/// Adds the frame rate from the file about the recording.
+fn add_frame_rate(file: &TrackFile, preset: &Preset, recordings: &mut [RawRecording]) -> Result<Option<FileChecksum>> {
+    let Some(meta) = &preset.recording else { return Ok(None) };
+    let Some((rows, columns)) = meta_rows(file, meta, preset)? else { return Ok(None) };
     let mut rate = None;
     let (checksum, _) = rows.each(&columns, &mut |row| {
         if let Some(found) = row.number(Role::FrameRate)? {

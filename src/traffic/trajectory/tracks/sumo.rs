@@ -4,13 +4,14 @@
 use std::collections::{BTreeSet, HashMap};
 use std::path::{Path, PathBuf};
 
+use super::TrackFile;
 use super::boxes::{begins_so, usual_size_m};
 use super::preset::{FileFormat, Preset};
 use super::raw::{NO_LABEL, RawRecording, RawSample, RawVehicle};
 use super::road::cross;
 use super::roles::{ColumnName, Role};
 use super::rows::{Columns, Rows};
-use crate::support::files::file_name;
+use crate::support::files::{file_name, folder_of};
 use crate::traffic::trajectory::csv_table::FileChecksum;
 use crate::{Error, Place, Result};
 
@@ -24,16 +25,15 @@ const LONGEST_STEP_S: f64 = 1.0;
 /// # Errors
 /// Those of the files; [`Error::Input`] for a type with two sizes.
 pub(super) fn add_facts(
-    path: &Path,
-    id: &str,
+    file: &TrackFile,
     patterns: &[String],
     preset: &Preset,
     recordings: &mut [RawRecording],
 ) -> Result<Vec<FileChecksum>> {
     let mut types = Types::default();
     let mut checksums = Vec::new();
-    for (file, is_own) in types_files(path, id, patterns)? {
-        checksums.push(types.read(&file, is_own, preset)?);
+    for (of_types, is_own) in types_files(file, patterns)? {
+        checksums.push(types.read(&of_types, is_own, preset)?);
     }
     for recording in recordings {
         let mut unknown: BTreeSet<String> = BTreeSet::new();
@@ -42,9 +42,9 @@ pub(super) fn add_facts(
             match types.of(&name) {
                 Some(of) if of.files.len() > 1 => {
                     return Err(Error::input(
-                        Place::file(path).of(format!("vehicle {}", vehicle.key)),
+                        Place::file(&file.path).of(format!("vehicle {}", vehicle.key)),
                         format!("its type `{name}` has two sizes, in {}", of.files.join(" and ")),
-                        format!("name the right file like the tracks: {}", patterns[0].replace('*', id)),
+                        format!("name the right file like the tracks: {}", patterns[0].replace('*', &file.id)),
                     ));
                 }
                 Some(of) => {
@@ -125,9 +125,9 @@ impl Types {
 
 /// The files with types beside a track file, and whether they are named like it: `fcd.rou.xml` for `fcd.xml` or `fcd.2.xml`. Where none
 /// is, all that fit the pattern.
-fn types_files(path: &Path, id: &str, patterns: &[String]) -> Result<Vec<(PathBuf, bool)>> {
-    let folder = path.parent().filter(|parent| !parent.as_os_str().is_empty()).unwrap_or(Path::new("."));
-    let names = [id, id.split('.').next().unwrap_or(id)];
+fn types_files(file: &TrackFile, patterns: &[String]) -> Result<Vec<(PathBuf, bool)>> {
+    let folder = folder_of(&file.path);
+    let names = [file.id.as_str(), file.id.split('.').next().unwrap_or_default()];
     let (mut own, mut others) = (Vec::new(), Vec::new());
     for pattern in patterns {
         let like_tracks = names.map(|name| folder.join(pattern.replace('*', name)));
