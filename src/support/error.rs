@@ -4,6 +4,7 @@
 
 use std::borrow::Cow;
 use std::fmt;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 use crate::support::plain_text::{MAX_PATH, cut, cut_names, shown_in_line};
@@ -196,48 +197,44 @@ impl Error {
 
     /// What the user can do about it; `None` if the message says it all.
     pub fn help(&self) -> Option<String> {
-        match self {
-            Error::Input { help, .. } | Error::Usage { help, .. } | Error::Device { help, .. } => {
-                (!help.is_empty()).then(|| help.clone())
+        let help = match self {
+            Error::Input { help, .. } | Error::Usage { help, .. } | Error::Device { help, .. } => help,
+            Error::Io { source, .. } if is_limit_of_open_files(source) => {
+                "the limit of open files is reached: raise it (`ulimit -n`), or close programs that hold many"
             }
-            Error::Io { source, .. } if is_limit_of_open_files(source) => Some(
-                "the limit of open files is reached: raise it (`ulimit -n`), or close programs that hold many".to_owned(),
-            ),
-            Error::Io { action, source, .. } => Some(match source.kind() {
-                std::io::ErrorKind::NotFound => "check the path for typing errors".to_owned(),
-                std::io::ErrorKind::PermissionDenied => {
-                    format!("you have no permission to {action} here: change the permissions or choose another path")
+            Error::Io { action, source, .. } => match source.kind() {
+                ErrorKind::NotFound => "check the path for typing errors",
+                ErrorKind::PermissionDenied => {
+                    let change = "change the permissions or choose another path";
+                    return Some(format!("you have no permission to {action} here: {change}"));
                 }
-                std::io::ErrorKind::UnexpectedEof => "the file is truncated: copy it again".to_owned(),
-                std::io::ErrorKind::InvalidData => "save the file as UTF-8 text".to_owned(),
-                std::io::ErrorKind::IsADirectory => "this is a folder; give the path of a file".to_owned(),
-                std::io::ErrorKind::NotADirectory | std::io::ErrorKind::AlreadyExists => {
-                    "a file is where a folder is needed: choose another path".to_owned()
+                ErrorKind::UnexpectedEof => "the file is truncated: copy it again",
+                ErrorKind::InvalidData => "save the file as UTF-8 text",
+                ErrorKind::IsADirectory => "this is a folder; give the path of a file",
+                ErrorKind::NotADirectory | ErrorKind::AlreadyExists => {
+                    "a file is where a folder is needed: choose another path"
                 }
-                std::io::ErrorKind::StorageFull => "the disk is full: free some space and run again".to_owned(),
-                std::io::ErrorKind::QuotaExceeded => "your quota is used up: free some space and run again".to_owned(),
-                std::io::ErrorKind::FileTooLarge => {
-                    "files may not become that large here: raise the limit (`ulimit -f`) and run again".to_owned()
+                ErrorKind::StorageFull => "the disk is full: free some space and run again",
+                ErrorKind::QuotaExceeded => "your quota is used up: free some space and run again",
+                ErrorKind::FileTooLarge => {
+                    "files may not become that large here: raise the limit (`ulimit -f`) and run again"
                 }
-                std::io::ErrorKind::WouldBlock | std::io::ErrorKind::OutOfMemory => {
-                    "the limit of processes or of memory \
-                     is reached: use fewer threads (option `threads`; more threads than cores do not help), or raise the limit \
-                     (`ulimit -u`, `ulimit -v`)"
-                        .to_owned()
+                ErrorKind::WouldBlock | ErrorKind::OutOfMemory => {
+                    "the limit of processes or of memory is reached: use fewer threads (option `threads`; more threads than \
+                     cores do not help), or raise the limit (`ulimit -u`, `ulimit -v`)"
                 }
-                std::io::ErrorKind::ReadOnlyFilesystem => {
-                    "the disk is mounted read-only: choose another path, or mount it writable and run again".to_owned()
+                ErrorKind::ReadOnlyFilesystem => {
+                    "the disk is mounted read-only: choose another path, or mount it writable and run again"
                 }
-                _ => "check that the disk is present and has space, then run again".to_owned(),
-            }),
-            Error::Verification(_) => None,
-            Error::Busy { .. } => Some("wait for it and run this again, or choose another option `out`".to_owned()),
-            Error::Internal(_) => {
-                Some("this is a defect of lanesweep: please report it with the command and its input".to_owned())
-            }
-            Error::Interrupted { is_kept: true, .. } => Some("run the same command again: it continues".to_owned()),
-            Error::Interrupted { is_kept: false, .. } => Some("run it again: nothing was kept".to_owned()),
-        }
+                _ => "check that the disk is present and has space, then run again",
+            },
+            Error::Verification(_) => "",
+            Error::Busy { .. } => "wait for it and run this again, or choose another option `out`",
+            Error::Internal(_) => "this is a defect of lanesweep: please report it with the command and its input",
+            Error::Interrupted { is_kept: true, .. } => "run the same command again: it continues",
+            Error::Interrupted { is_kept: false, .. } => "run it again: nothing was kept",
+        };
+        (!help.is_empty()).then(|| help.to_owned())
     }
 }
 

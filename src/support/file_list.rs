@@ -57,7 +57,7 @@ impl FileList {
             list.lanesweep_files == VERSION
                 && list.runs.iter().flat_map(|run| run.files.iter().chain(&run.record)).all(is_plain)
         });
-        let of_record = |name: &&str| {
+        let of_record = |(name, _): &(&str, &[&str])| {
             let record: RecordFiles = serde_json::from_slice(&read(name)?).ok()?;
             let is_ours = record.program.starts_with("lanesweep ") && record.files.iter().all(is_plain);
             is_ours.then(|| RunFiles { record: Some((*name).to_owned()), files: record.files, is_complete: true })

@@ -61,45 +61,36 @@ fn cut_words(text: &str) -> String {
     text.split_inclusive(char::is_whitespace).flat_map(cut).collect()
 }
 
-fn escaped(text: &str, stays: &[char]) -> String {
+/// Replaces the characters that act, except some.
+fn escaped<'a>(text: &'a str, stays: &[char], escape: impl Fn(char) -> String) -> Cow<'a, str> {
+    let is_escaped = |c: &char| acts(*c) && !stays.contains(c);
+    if !text.chars().any(|c| is_escaped(&c)) {
+        return Cow::Borrowed(text);
+    }
     let mut shown = String::with_capacity(text.len() + 16);
     for c in text.chars() {
-        match c {
-            c if acts(c) && !stays.contains(&c) => shown.extend(c.escape_default()),
-            c => shown.push(c),
+        match is_escaped(&c) {
+            true => shown.push_str(&escape(c)),
+            false => shown.push(c),
         }
     }
-    shown
+    Cow::Owned(shown)
 }
 
 /// Escapes a text of several lines: line breaks stay, all other acting characters become `\u{1b}`.
 pub fn shown(text: &str) -> Cow<'_, str> {
-    let stays = ['\n', '\t'];
-    match text.chars().any(|c| acts(c) && !stays.contains(&c)) {
-        true => Cow::Owned(escaped(text, &stays)),
-        false => Cow::Borrowed(text),
-    }
+    escaped(text, &['\n', '\t'], |c| c.escape_default().to_string())
 }
 
 /// Escapes a name within a line, line breaks included.
 pub fn shown_in_line(text: &str) -> String {
-    escaped(text, &[])
+    escaped(text, &[], |c| c.escape_default().to_string()).into_owned()
 }
 
 /// Escapes a JSON document: acting characters become `\u001b`, which reads back unchanged. Line breaks between tokens
 /// stay; those in texts are already escapes.
 pub fn shown_json(json: &str) -> Cow<'_, str> {
-    if !json.chars().any(|c| acts(c) && c != '\n') {
-        return Cow::Borrowed(json);
-    }
-    let mut shown = String::with_capacity(json.len() + 16);
-    for c in json.chars() {
-        match c {
-            c if acts(c) && c != '\n' => shown.push_str(&format!("\\u{:04x}", u32::from(c))),
-            c => shown.push(c),
-        }
-    }
-    Cow::Owned(shown)
+    escaped(json, &['\n'], |c| format!("\\u{:04x}", u32::from(c)))
 }
 
 /// One word of a POSIX shell, for commands in messages: as it is where nothing in it is special, else in single quotes.

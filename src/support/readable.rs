@@ -88,13 +88,11 @@ pub fn one_two_five(value: f64) -> OneTwoFive {
     // The shortest decimal text gives digit and exponent without rounding.
     let written = format!("{value:e}");
     let (mantissa, exponent) = written.split_once('e').unwrap_or((&written, "0"));
-    let mantissa: f64 = mantissa.parse().unwrap_or(1.0);
-    let digit = if mantissa >= 5.0 {
-        5
-    } else if mantissa >= 2.0 {
-        2
-    } else {
-        1
+    let mantissa = mantissa.parse().unwrap_or(1.0);
+    let digit = match mantissa {
+        5.0.. => 5,
+        2.0.. => 2,
+        _ => 1,
     };
     (digit, exponent.parse().unwrap_or(0))
 }

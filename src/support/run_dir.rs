@@ -31,25 +31,19 @@ pub const SEARCH_RECORD: &str = "search.json";
 /// Record of a dossier.
 pub const DOSSIER_RECORD: &str = "dossier.json";
 
-/// Records of runs that write files with the same names, such as `report.html`: a folder holds one of them.
-pub(super) const RECORDS: [&str; 6] =
-    [STUDY_RECORD, ESTIMATE_RECORD, MAP_RECORD, COMPARE_RECORD, SEARCH_RECORD, DOSSIER_RECORD];
+/// Records of runs that write files with the same names, such as `report.html`: a folder holds one of them. With the other
+/// files that every such run writes: a user's file of such a name is detected before the work starts.
+pub(super) const RECORDS: [(&str, &[&str]); 6] = [
+    (STUDY_RECORD, &["failures.csv", "f1.csv", "claims.csv", "headways.csv", "report.txt", "report.html"]),
+    (ESTIMATE_RECORD, &["estimates.csv", "report.html"]),
+    (MAP_RECORD, &["cells.csv", "report.html"]),
+    (COMPARE_RECORD, &["compare.csv", "compare.txt", "report.html"]),
+    (SEARCH_RECORD, &["fronts.csv", "candidates.csv", "report.html"]),
+    (DOSSIER_RECORD, &["hidden.csv", "report.html"]),
+];
 
 /// The lock of the whole folder.
 const LOCK: &str = "run.lock";
-
-/// Files that every run with this record writes. A user's file of such a name is detected before the work starts.
-fn usual_files(record: &str) -> &'static [&'static str] {
-    match record {
-        STUDY_RECORD => &["failures.csv", "f1.csv", "claims.csv", "headways.csv", "report.txt", "report.html"],
-        ESTIMATE_RECORD => &["estimates.csv", "report.html"],
-        MAP_RECORD => &["cells.csv", "report.html"],
-        COMPARE_RECORD => &["compare.csv", "compare.txt", "report.html"],
-        SEARCH_RECORD => &["fronts.csv", "candidates.csv", "report.html"],
-        DOSSIER_RECORD => &["hidden.csv", "report.html"],
-        _ => &[],
-    }
-}
 
 /// The right to write a run directory, until it is dropped.
 #[derive(Debug)]
@@ -73,7 +67,8 @@ impl OutputDir {
         let mut folder = OutputDir::take(dir, Some(record), FolderLock::acquire)?;
         folder.enter_lock();
         folder.refuse_another_verb(record)?;
-        folder.refuse_foreign(usual_files(record).iter().copied().chain([record]))?;
+        let usual_files = RECORDS.iter().filter(|(name, _)| *name == record).flat_map(|(_, files)| *files);
+        folder.refuse_foreign(usual_files.copied().chain([record]))?;
         Ok(folder)
     }
 
@@ -128,9 +123,10 @@ impl OutputDir {
     }
 
     fn refuse_another_verb(&self, record: &str) -> Result<()> {
+        let is_one = |name: &str| RECORDS.iter().any(|(record, _)| *record == name);
         let of_another = |run: &&RunFiles| {
             let other = run.record.as_deref().unwrap_or_default();
-            RECORDS.contains(&record) && RECORDS.contains(&other) && other != record
+            is_one(record) && is_one(other) && other != record
         };
         if let Some(run) = FileList::read(&self.dir).runs.iter().find(of_another) {
             let other = run.record.as_deref().unwrap_or_default();

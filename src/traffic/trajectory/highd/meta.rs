@@ -186,11 +186,7 @@ pub(super) fn read_tracks_meta(
         vehicles.push((vehicle, table.place()));
     }
     if vehicles.is_empty() {
-        return Err(Error::input(
-            table.file_place(),
-            "the recording has no vehicle: no line follows the header",
-            "remove the three files of this recording from the folder, or copy them again",
-        ));
+        return Err(no_vehicle(&table));
     }
     // Stable, so that the error names the later one of two lines with one id.
     vehicles.sort_by_key(|(vehicle, _)| vehicle.id);
@@ -202,6 +198,13 @@ pub(super) fn read_tracks_meta(
         ));
     }
     Ok((vehicles.into_iter().map(|(vehicle, _)| vehicle).collect(), table.finish()?))
+}
+
+/// The error for a table without lines.
+pub(super) fn no_vehicle(table: &CsvTable) -> Error {
+    let problem = "the recording has no vehicle: no line follows the header";
+    let help = "remove the three files of this recording from the folder, or copy them again";
+    Error::input(table.file_place(), problem, help)
 }
 
 struct MetaColumns {

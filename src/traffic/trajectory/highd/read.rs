@@ -123,11 +123,7 @@ fn read_tracks(
     check_counts(table, vehicles, &tracks)?;
     tracks.retain(|track| !track.is_empty());
     if tracks.is_empty() {
-        return Err(Error::input(
-            table.file_place(),
-            "the recording has no vehicle: no line follows the header",
-            "remove the three files of this recording from the folder, or copy them again",
-        ));
+        return Err(meta::no_vehicle(table));
     }
     Ok(tracks)
 }

@@ -96,7 +96,7 @@ impl Writer<'_> {
         let mut file = begun(path, TRACKS_HEADER)?;
         let around = neighbours(self.recording);
         let mut all_minima = vec![Minima::default(); self.recording.tracks.len()];
-        let mut line = CsvLine::new();
+        let mut line = CsvLine::default();
         for ((track, around), minima) in self.recording.tracks.iter().zip(&around).zip(&mut all_minima) {
             for (sample, around) in around.iter().enumerate() {
                 let headways = self.headways(track, sample, around);
@@ -104,7 +104,7 @@ impl Writer<'_> {
                     lower(minima, &headways);
                 }
                 self.track_line(&mut line, track, sample, around, &headways);
-                file.append(line.end())?;
+                line.end(&mut file)?;
             }
         }
         Ok((file.stage()?, all_minima))
@@ -169,7 +169,7 @@ impl Writer<'_> {
 
     fn tracks_meta(&self, path: &Path, minima: &[Minima]) -> Result<StagedFile> {
         let mut file = begun(path, TRACKS_META_HEADER)?;
-        let mut line = CsvLine::new();
+        let mut line = CsvLine::default();
         for (track, minima) in self.recording.tracks.iter().zip(minima) {
             line.integer(i64::from(track.id));
             line.number(track.length_m);
@@ -189,7 +189,7 @@ impl Writer<'_> {
             line.number(speeds().sum::<f64>() / track.len() as f64);
             minima.iter().for_each(|min| line.number(min.unwrap_or(-1.0)));
             line.integer(track.lane.array_windows().filter(|[before, after]| before != after).count() as i64);
-            file.append(line.end())?;
+            line.end(&mut file)?;
         }
         file.stage()
     }
@@ -200,7 +200,7 @@ impl Writer<'_> {
         let first = tracks.iter().map(|track| track.first_frame).min().unwrap_or(0);
         let last = tracks.iter().map(Track::last_frame).max().unwrap_or(0);
         let trucks = tracks.iter().filter(|track| track.class == VehicleClass::Truck).count();
-        let mut line = CsvLine::new();
+        let mut line = CsvLine::default();
         // The format's id is a number; the file name identifies the recording.
         line.integer(id.parse::<u32>().map_or(1, i64::from));
         line.text(&frame_rate_hz.to_string());
@@ -222,7 +222,7 @@ impl Writer<'_> {
             line.text("1");
         }
         let mut file = begun(path, header)?;
-        file.append(line.end())?;
+        line.end(&mut file)?;
         file.stage()
     }
 }
@@ -242,25 +242,16 @@ fn driven_m(track: &Track) -> f64 {
 }
 
 /// One line of a file, written field by field into a reused buffer.
-struct CsvLine {
-    bytes: Vec<u8>,
-    ended: bool,
-}
+#[derive(Default)]
+struct CsvLine(Vec<u8>);
 
 impl CsvLine {
-    fn new() -> Self {
-        CsvLine { bytes: Vec::with_capacity(256), ended: true }
-    }
-
     /// The buffer at the next field.
     fn field(&mut self) -> &mut Vec<u8> {
-        if self.ended {
-            self.bytes.clear();
-            self.ended = false;
-        } else {
-            self.bytes.push(b',');
+        if !self.0.is_empty() {
+            self.0.push(b',');
         }
-        &mut self.bytes
+        &mut self.0
     }
 
     fn number(&mut self, value: f64) {
@@ -290,10 +281,11 @@ impl CsvLine {
         self.field().extend_from_slice(text.as_bytes());
     }
 
-    /// The complete line.
-    fn end(&mut self) -> &[u8] {
-        self.ended = true;
-        self.bytes.push(b'\n');
-        &self.bytes
+    /// Appends the complete line to a file, and begins the next one.
+    fn end(&mut self, file: &mut AtomicFile) -> Result<()> {
+        self.0.push(b'\n');
+        file.append(&self.0)?;
+        self.0.clear();
+        Ok(())
     }
 }

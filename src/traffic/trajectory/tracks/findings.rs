@@ -2,7 +2,7 @@
 
 use super::preset::{Preset, Side};
 use super::road::{median, range};
-use super::understanding::{Exclusion, Finding, TIMES, Understanding};
+use super::understanding::{Finding, TIMES, Understanding};
 use crate::support::plausibility::{Doubts, Implausible, Limits, NOISE_MPS, Quantity};
 use crate::support::readable::{count, significant, value};
 use crate::traffic::trajectory::motion::{Impossible, JUMP_ACROSS_M, JUMP_ALONG_M, impossible, jumps};
@@ -183,7 +183,7 @@ impl Understanding {
         for track in &recording.tracks {
             let backwards = track.v_s_mps.iter().filter(|v| **v < NOISE_MPS).count();
             if 20 * backwards > track.len() {
-                self.exclude(track.id, Exclusion::Backwards);
+                self.backwards.push(track.id);
                 continue;
             }
             let below = track.v_s_mps.iter().filter(|v| **v < 0.0);
@@ -326,7 +326,7 @@ impl Understanding {
             ));
             for (a, b) in &found.pairs {
                 let shorter = if recording.tracks[*a].len() < recording.tracks[*b].len() { a } else { b };
-                self.exclude(recording.tracks[*shorter].id, Exclusion::Overlap);
+                self.doubtful.push(recording.tracks[*shorter].id);
             }
         }
         let edge = edge_slope(recording).map(|(slope, error)| (slope.abs(), error)).filter(|(slope, _)| *slope >= 0.6);
@@ -360,7 +360,7 @@ impl Understanding {
                 "{} tracks jump by more than {JUMP_ALONG_M} m along or {JUMP_ACROSS_M} m across the road, the first is vehicle {first}",
                 jumping.len()
             ));
-            jumping.iter().for_each(|id| self.exclusions.push((*id, Exclusion::Jump)));
+            self.doubtful.extend(&jumping);
         }
         let against = |track: &&Track| track.s_m[track.len() - 1] - track.s_m[0] < -5.0;
         let against = recording.tracks.iter().filter(against).count();
@@ -375,7 +375,7 @@ impl Understanding {
                 self.warn(format!("`{a}` is not used without `{b}`; `speed` is a speed along the road"));
             }
         }
-        let backwards = self.exclusions.iter().filter(|(_, why)| *why == Exclusion::Backwards).count();
+        let backwards = self.backwards.len();
         if backwards > 0 {
             let is_grave = 5 * backwards > recording.tracks.len();
             self.find(is_grave, format!(

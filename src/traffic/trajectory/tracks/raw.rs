@@ -6,7 +6,7 @@ use std::path::Path;
 use super::apart::apart;
 use super::preset::{HeadingOrigin, MetaFile, Preset, Side};
 use super::roles::{ColumnName, Role};
-use super::rows::{Columns, FoundTime, Rows, SampleRow};
+use super::rows::{Columns, Rows, SampleRow, TIME_OF_DAY};
 use super::samples::Samples;
 use super::{TrackFile, sumo};
 use crate::support::input_file::packed_or_not;
@@ -177,10 +177,7 @@ pub(super) fn read_table(file: &TrackFile, preset: &Preset) -> Result<RawFile> {
     let mut recordings = collecting.recordings;
     recordings.retain(|recording| !recording.vehicles.is_empty());
     if let Some(found) = columns.found_time() {
-        roles
-            .iter_mut()
-            .filter(|(role, _)| *role == Role::Time)
-            .for_each(|(_, name)| *name += &format!(" ({})", found.text()));
+        roles.iter_mut().filter(|(role, _)| *role == Role::Time).for_each(|(_, name)| *name += &format!(" ({found})"));
     }
     recordings.iter_mut().flat_map(|of| &mut of.vehicles).for_each(|vehicle| vehicle.samples.shrink());
     let mut checksums = vec![checksum];
@@ -317,7 +314,7 @@ impl<'a> Collecting<'a> {
         }
         let of = &mut self.recordings[recording].vehicles[vehicle];
         if let Some(last) = of.samples.len().checked_sub(1)
-            && self.columns.found_time() == Some(FoundTime::Clock)
+            && self.columns.found_time() == Some(TIME_OF_DAY)
             && of.samples.at(last) - at > HALF_A_DAY_S
         {
             let problem = "the times of day of this vehicle begin again: the recording goes past midnight";

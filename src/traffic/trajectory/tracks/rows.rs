@@ -32,64 +32,39 @@ pub(super) struct Columns {
     none_numbers: Vec<f64>,
 }
 
-/// What times without a unit are, by their size or their text.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(super) enum FoundTime {
-    Milliseconds,
-    Microseconds,
-    Nanoseconds,
-    Date,
-    /// `08:15:30.25`: it begins again at midnight.
-    Clock,
-    /// SUMO's `0:08:15:30.25`, with days.
-    Days,
+/// What times without a unit are, by their size or their text, in words after the name of the column.
+pub(super) type FoundTime = &'static str;
+/// `08:15:30.25`: it begins again at midnight.
+pub(super) const TIME_OF_DAY: FoundTime = "time of day";
+const DATES: FoundTime = "dates";
+
+/// What a time of this size is, and its factor to seconds; `None` for seconds. No recording is from the year 5138 or later.
+fn unit_of_time(value: f64) -> Option<(FoundTime, f64)> {
+    match value.abs() {
+        1e11..1e14 => Some(("ms since 1970", 1e-3)),
+        1e14..1e17 => Some(("µs since 1970", 1e-6)),
+        1e17..1e19 => Some(("ns since 1970", 1e-9)),
+        _ => None,
+    }
 }
 
-impl FoundTime {
-    /// In words, after the name of the column.
-    pub(super) fn text(self) -> &'static str {
-        match self {
-            FoundTime::Milliseconds => "ms since 1970",
-            FoundTime::Microseconds => "µs since 1970",
-            FoundTime::Nanoseconds => "ns since 1970",
-            FoundTime::Date => "dates",
-            FoundTime::Clock => "time of day",
-            FoundTime::Days => "days:hours:minutes:seconds",
-        }
+/// Seconds of a text, and what it is.
+fn time_of_text(text: &str) -> Option<(FoundTime, f64)> {
+    let text = text.replace(',', ".");
+    if let Some(seconds) = seconds_of_date(&text) {
+        return Some((DATES, seconds));
     }
-
-    /// What a number of this size is; `None` for seconds. No recording is from the year 5138 or later.
-    fn of_number(value: f64) -> Option<(FoundTime, f64)> {
-        match value.abs() {
-            0.0..1e11 => None,
-            1e11..1e14 => Some((FoundTime::Milliseconds, 1e-3)),
-            1e14..1e17 => Some((FoundTime::Microseconds, 1e-6)),
-            1e17..1e19 => Some((FoundTime::Nanoseconds, 1e-9)),
-            _ => None,
-        }
-    }
-
-    /// Seconds of a text.
-    fn of_text(text: &str) -> Option<(FoundTime, f64)> {
-        let text = text.replace(',', ".");
-        if let Some(seconds) = seconds_of_date(&text) {
-            return Some((FoundTime::Date, seconds));
-        }
-        let parts: Option<Vec<f64>> =
-            text.split(':').map(|part| part.parse().ok().filter(|value: &f64| *value >= 0.0)).collect();
-        let (days, [hours, minutes, seconds]) = match parts?[..] {
-            [hours, minutes, seconds] => (None, [hours, minutes, seconds]),
-            [days, hours, minutes, seconds] => (Some(days), [hours, minutes, seconds]),
-            _ => return None,
-        };
-        let is_usual =
-            hours.fract() == 0.0 && minutes.fract() == 0.0 && hours < 24.0 && minutes < 60.0 && seconds < 61.0;
-        let of_day = 3600.0 * hours + 60.0 * minutes + seconds;
-        is_usual.then_some(match days {
-            None => (FoundTime::Clock, of_day),
-            Some(days) => (FoundTime::Days, 86_400.0 * days + of_day),
-        })
-    }
+    let parts: Option<Vec<f64>> =
+        text.split(':').map(|part| part.parse().ok().filter(|value: &f64| *value >= 0.0)).collect();
+    // SUMO writes `0:08:15:30.25`, with days.
+    let (found, [days, hours, minutes, seconds]) = match parts?[..] {
+        [hours, minutes, seconds] => (TIME_OF_DAY, [0.0, hours, minutes, seconds]),
+        [days, hours, minutes, seconds] => ("days:hours:minutes:seconds", [days, hours, minutes, seconds]),
+        _ => return None,
+    };
+    let is_usual = hours.fract() == 0.0 && minutes.fract() == 0.0 && hours < 24.0 && minutes < 60.0 && seconds < 61.0;
+    let of_day = 3600.0 * hours + 60.0 * minutes + seconds;
+    is_usual.then_some((found, 86_400.0 * days + of_day))
 }
 
 impl Columns {
@@ -134,7 +109,7 @@ impl Columns {
         if value.is_nan() {
             return Ok(None);
         }
-        let found = if role == Role::Time && !self.has_time_unit { FoundTime::of_number(value) } else { None };
+        let found = if role == Role::Time && !self.has_time_unit { unit_of_time(value) } else { None };
         if let Some((found, _)) = found {
             self.found_time.set(Some(found));
         }
@@ -293,7 +268,7 @@ impl Rows {
                 if let Some((at, _)) = columns.at[Role::Time as usize]
                     && reader.rows.has_instants(at)
                 {
-                    columns.found_time.set(Some(FoundTime::Date));
+                    columns.found_time.set(Some(DATES));
                     columns.to_mut().at[Role::Time as usize] = Some((at, 1.0));
                 }
                 let columns = columns.as_ref();
@@ -369,7 +344,7 @@ fn number_of(text: &[u8], role: Role, columns: &Columns, place: &dyn Fn() -> Pla
         return Ok(None);
     }
     if role == Role::Time && !columns.has_time_unit {
-        let (found, seconds) = FoundTime::of_text(&shown).ok_or_else(|| bad(place(), &shown, A_TIME))?;
+        let (found, seconds) = time_of_text(&shown).ok_or_else(|| bad(place(), &shown, A_TIME))?;
         columns.found_time.set(Some(found));
         return Ok(Some(seconds));
     }

@@ -4,6 +4,7 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
+use super::boxes::begins_so;
 use super::lanes::LaneSource;
 use super::preset::{Preset, Reference};
 use super::raw::RawRecording;
@@ -21,18 +22,6 @@ pub struct Finding {
     pub is_grave: bool,
     /// What is strange, and what to do.
     pub text: String,
-}
-
-/// Why a vehicle is doubtful.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub(super) enum Exclusion {
-    /// It drives backwards.
-    Backwards,
-    /// Its box overlaps that of another vehicle.
-    Overlap,
-    /// Its position jumps.
-    Jump,
 }
 
 /// Lanes of one direction of travel.
@@ -168,8 +157,12 @@ pub struct Understanding {
     /// Lateral position of the oncoming traffic seen from the forward one, m.
     #[serde(skip)]
     pub(super) oncoming_left_m: Option<f64>,
+    /// Vehicles that drive backwards.
     #[serde(skip)]
-    pub(super) exclusions: Vec<(u32, Exclusion)>,
+    pub(super) backwards: Vec<u32>,
+    /// Vehicles that overlap others, or whose position jumps.
+    #[serde(skip)]
+    pub(super) doubtful: Vec<u32>,
     #[serde(skip)]
     pub(super) ratios: Vec<f64>,
     /// Given lateral speeds over derived ones.
@@ -280,20 +273,13 @@ impl Understanding {
         for class in raw.vehicles.iter().filter_map(|vehicle| vehicle.class.as_deref()) {
             *classes.entry(class).or_default() += 1;
         }
-        let begins = |word: &String| {
-            let word = word.to_lowercase();
-            classes.keys().any(|class| class.to_lowercase().starts_with(&word))
-        };
+        let begins = |word: &String| classes.keys().any(|class| begins_so(class, std::slice::from_ref(word)));
         let without = preset.classes.truck.iter().filter(|word| preset.is_own && !begins(word));
         let without: Vec<String> = without.map(|word| format!("`{word}`")).collect();
         if !without.is_empty() && !classes.is_empty() {
             self.warn(format!("no class begins with {}, which the preset takes for lorries", without.join(", ")));
         }
         self.classes = classes.into_iter().map(|(class, number)| (class.to_owned(), number)).collect();
-    }
-
-    pub(super) fn exclude(&mut self, id: u32, why: Exclusion) {
-        self.exclusions.push((id, why));
     }
 
     /// Compares the speeds of a track with its positions.
@@ -331,8 +317,7 @@ impl Understanding {
         self.check_quality(&recording);
         let before = recording.tracks.len();
         let is_out = |track: &Track| {
-            let why = self.exclusions.iter().filter(|(id, _)| *id == track.id);
-            why.into_iter().any(|(_, why)| preset.exclude_doubtful || *why == Exclusion::Backwards)
+            self.backwards.contains(&track.id) || preset.exclude_doubtful && self.doubtful.contains(&track.id)
         };
         recording.tracks.retain(|track| !is_out(track));
         recording.tracks.iter_mut().flat_map(|track| &mut track.v_s_mps).for_each(|v| *v = v.max(0.0));
