@@ -10,20 +10,14 @@ use crate::support::input_file::unpacked;
 use crate::support::plausibility::Implausible;
 use crate::{Error, Place, Result};
 
-/// Recordings whose format is known.
-#[derive(Debug)]
-pub enum Inputs {
-    /// highD's format.
-    Highd(highd::Inventory),
-    /// The format of a preset.
-    Tracks {
-        /// The files.
-        files: Vec<TrackFile>,
-        /// Other files of tracks in the folder, which are not read.
-        problems: Vec<Error>,
-        /// The preset.
-        preset: Box<Preset>,
-    },
+/// Recordings whose format is known: highD's, or that of a preset.
+#[derive(Debug, Default)]
+pub struct Inputs {
+    highd: Vec<HighdFiles>,
+    tracks: Vec<TrackFile>,
+    /// What is wrong with recordings, or with other files that could be tracks.
+    problems: Vec<Error>,
+    preset: Option<Preset>,
 }
 
 /// One file of recordings.
@@ -42,8 +36,8 @@ impl Inputs {
     /// [`Error::Io`]; [`Error::Input`] if there is no recording, or if no preset fits; those of [`Preset::load`].
     pub fn of(path: &Path, preset: Option<&str>) -> Result<Inputs> {
         let with = |preset: Preset| {
-            let files = tracks::track_files(path, &preset)?;
-            Ok(Inputs::Tracks { files, problems: Vec::new(), preset: Box::new(preset) })
+            let tracks = tracks::track_files(path, &preset)?;
+            Ok(Inputs { tracks, preset: Some(preset), ..Inputs::default() })
         };
         match preset {
             Some(HIGHD) => return highd_inputs(path),
@@ -104,9 +98,7 @@ impl Inputs {
             }
         }
         for (file, found) in foreign {
-            if let Inputs::Tracks { files, .. } = &mut self {
-                files.retain(|track| track.path != file);
-            }
+            self.tracks.retain(|track| track.path != file);
             let has_ending = ending_of(&file).is_some_and(|ending| endings.contains(&ending));
             match found {
                 _ if is_of_sumo(&file) => {}
@@ -120,40 +112,26 @@ impl Inputs {
                 _ => {}
             }
         }
-        match &mut self {
-            Inputs::Highd(inventory) => inventory.problems.extend(others),
-            Inputs::Tracks { problems, .. } => *problems = others,
-        }
+        self.problems.extend(others);
         Ok(self)
     }
 
     /// The preset; `None` for highD's format.
     pub fn preset(&self) -> Option<&Preset> {
-        match self {
-            Inputs::Highd(_) => None,
-            Inputs::Tracks { preset, .. } => Some(preset),
-        }
+        self.preset.as_ref()
     }
 
     /// Number of files of recordings.
     pub fn count(&self) -> usize {
-        match self {
-            Inputs::Highd(inventory) => inventory.recordings.len(),
-            Inputs::Tracks { files, .. } => files.len(),
-        }
+        self.highd.len() + self.tracks.len()
     }
 
     /// The files, and what is wrong with others.
-    pub fn files(self) -> (Vec<InputFile>, Vec<Error>) {
-        match self {
-            Inputs::Highd(inventory) => {
-                (inventory.recordings.into_iter().map(InputFile::Highd).collect(), inventory.problems)
-            }
-            Inputs::Tracks { mut files, problems, preset } => {
-                tracks::keep_apart(&mut files);
-                (files.into_iter().map(|file| InputFile::Tracks(file, preset.clone())).collect(), problems)
-            }
-        }
+    pub fn files(mut self) -> (Vec<InputFile>, Vec<Error>) {
+        tracks::keep_apart(&mut self.tracks);
+        let with_preset = |file| Some(InputFile::Tracks(file, Box::new(self.preset.clone()?)));
+        let tracks = self.tracks.into_iter().filter_map(with_preset);
+        (self.highd.into_iter().map(InputFile::Highd).chain(tracks).collect(), self.problems)
     }
 }
 
@@ -199,12 +177,12 @@ fn ending_of(path: &Path) -> Option<String> {
 
 fn highd_inputs(path: &Path) -> Result<Inputs> {
     if path.is_dir() || !is_highd_name(path) {
-        return highd::inventory(path).map(Inputs::Highd);
+        let highd::Inventory { recordings, problems } = highd::inventory(path)?;
+        return Ok(Inputs { highd: recordings, problems, ..Inputs::default() });
     }
     let name = file_name(path);
     let id = unpacked(&name).strip_suffix(HIGHD_ENDING).unwrap_or(&name);
-    let recordings = vec![HighdFiles::found(folder_of(path), id)];
-    Ok(Inputs::Highd(highd::Inventory { recordings, problems: Vec::new() }))
+    Ok(Inputs { highd: vec![HighdFiles::found(folder_of(path), id)], ..Inputs::default() })
 }
 
 /// The files of a folder, sorted; hidden ones are left out.

@@ -116,7 +116,7 @@ fn read_tracks(
         at = find_vehicle(table, columns.id, vehicles, at)?;
         add_sample(table, columns, meta, &vehicles[at], &mut tracks[at], doubts)?;
         let sample = check.sample(&tracks[at], &mut sums_mps2[at]);
-        if !sample.is_plausible() {
+        if !is_plausible(&sample) {
             report(&sample, table, columns, &tracks[at], doubts)?;
         }
     }
@@ -229,15 +229,10 @@ struct SampleCheck {
     inverse_window: f64,
 }
 
-/// The checked quantities of one sample; 0 if not yet defined.
-struct CheckedSample {
-    speed_mps: f64,
-    lateral_speed_mps: f64,
-    /// Difference of the lateral positions over the time between two samples.
-    lateral_change_mps: f64,
-    /// Mean over the last second.
-    acceleration_mps2: f64,
-}
+/// The checked quantities of a sample: speed, lateral speed, difference of the lateral positions over the time between two
+/// samples, and mean acceleration over the last second.
+const CHECKED: [Quantity; 4] =
+    [Quantity::Speed, Quantity::LateralSpeed, Quantity::LateralSpeed, Quantity::Acceleration];
 
 impl SampleCheck {
     fn new(rate_hz: f64) -> Self {
@@ -245,9 +240,10 @@ impl SampleCheck {
         SampleCheck { rate_hz, window, inverse_window: 1.0 / window as f64 }
     }
 
-    /// `sum_mps2` is the sum of the track's accelerations over the last second so far.
+    /// The values of [`CHECKED`], 0 if not yet defined. `sum_mps2` is the sum of the track's accelerations over the last
+    /// second so far.
     #[inline]
-    fn sample(&self, track: &Track, sum_mps2: &mut f64) -> CheckedSample {
+    fn sample(&self, track: &Track, sum_mps2: &mut f64) -> [f64; 4] {
         let last = |series: &[f64]| series.last().copied().unwrap_or_default();
         *sum_mps2 += last(&track.a_s_mps2);
         let samples = track.a_s_mps2.len();
@@ -258,24 +254,15 @@ impl SampleCheck {
             [.., before, now] => now - before,
             _ => 0.0,
         };
-        CheckedSample {
-            speed_mps: last(&track.v_s_mps),
-            lateral_speed_mps: last(&track.v_d_mps),
-            lateral_change_mps: lateral_change_m * self.rate_hz,
-            acceleration_mps2: if samples >= self.window { *sum_mps2 * self.inverse_window } else { 0.0 },
-        }
+        let acceleration_mps2 = if samples >= self.window { *sum_mps2 * self.inverse_window } else { 0.0 };
+        [last(&track.v_s_mps), last(&track.v_d_mps), lateral_change_m * self.rate_hz, acceleration_mps2]
     }
 }
 
-impl CheckedSample {
-    /// One test for all quantities: nearly every sample passes it.
-    #[inline]
-    fn is_plausible(&self) -> bool {
-        Quantity::Speed.is_plausible(self.speed_mps)
-            & Quantity::LateralSpeed.is_plausible(self.lateral_speed_mps)
-            & Quantity::LateralSpeed.is_plausible(self.lateral_change_mps)
-            & Quantity::Acceleration.is_plausible(self.acceleration_mps2)
-    }
+/// One test for all quantities: nearly every sample passes it.
+#[inline]
+fn is_plausible(sample: &[f64; 4]) -> bool {
+    CHECKED.iter().zip(sample).fold(true, |is_so, (quantity, value)| is_so & quantity.is_plausible(*value))
 }
 
 /// Counts the implausible values of a sample.
@@ -284,20 +271,18 @@ impl CheckedSample {
 /// A value outside the physical range, unless such values are accepted.
 #[cold]
 fn report(
-    sample: &CheckedSample,
+    sample: &[f64; 4],
     table: &CsvTable,
     columns: &TrackColumns,
     track: &Track,
     doubts: &mut Doubts,
 ) -> Result<()> {
-    let mut check_plausible = |quantity, value, column| {
+    let columns = [columns.velocity_x, columns.velocity_y, columns.y, columns.acceleration_x];
+    for ((quantity, value), column) in CHECKED.into_iter().zip(*sample).zip(columns) {
         let place = || table.field(column).of(format!("vehicle {}", track.id)).to_string();
-        doubts.check(quantity, value, place).map_err(|problem| table.bad(column, problem, HELP))
-    };
-    check_plausible(Quantity::Speed, sample.speed_mps, columns.velocity_x)?;
-    check_plausible(Quantity::LateralSpeed, sample.lateral_speed_mps, columns.velocity_y)?;
-    check_plausible(Quantity::LateralSpeed, sample.lateral_change_mps, columns.y)?;
-    check_plausible(Quantity::Acceleration, sample.acceleration_mps2, columns.acceleration_x)
+        doubts.check(quantity, value, place).map_err(|problem| table.bad(column, problem, HELP))?;
+    }
+    Ok(())
 }
 
 /// The error for a frame that is not the one after the vehicle's last.

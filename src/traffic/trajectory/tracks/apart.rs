@@ -20,20 +20,15 @@ const PAUSE_S: f64 = 2.0;
 pub(super) fn apart(recordings: Vec<RawRecording>, preset: &Preset) -> Vec<RawRecording> {
     let mut all = Vec::new();
     for recording in recordings {
-        match recording.frame_rate_hz.or(preset.frame_rate_hz).filter(|_| recording.has_frames) {
-            Some(rate_hz) => {
-                for mut part in periods(recording, rate_hz) {
-                    part_returning(&mut part, rate_hz, preset);
-                    all.push(part);
-                }
-            }
-            None => {
-                let mut recording = recording;
-                if !recording.has_frames {
-                    part_returning(&mut recording, 1.0, preset);
-                }
-                all.push(recording);
-            }
+        let rate_hz = recording.frame_rate_hz.or(preset.frame_rate_hz);
+        let per_s = if recording.has_frames { rate_hz } else { Some(1.0) };
+        let parts = match rate_hz.filter(|_| recording.has_frames) {
+            Some(rate_hz) => periods(recording, rate_hz),
+            None => vec![recording],
+        };
+        for mut part in parts {
+            per_s.into_iter().for_each(|per_s| part_returning(&mut part, per_s, preset));
+            all.push(part);
         }
     }
     all
