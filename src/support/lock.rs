@@ -6,6 +6,7 @@ use std::io::{ErrorKind, Read, Seek, Write};
 use std::path::{Path, PathBuf};
 
 use crate::support::atomic_file::{is_named, refuse_link};
+use crate::support::files::folder_of;
 use crate::{Error, Place, Result};
 
 /// Maximum length of a lock file, bytes: a process id and an end of line are shorter.
@@ -87,18 +88,14 @@ fn open(path: &Path) -> Result<Option<File>> {
     match result {
         Ok(file) => Ok(Some(file)),
         // The file vanished between the two calls. The folder exists, or the first call would have failed.
-        Err(error) if error.kind() == ErrorKind::NotFound && path.parent().is_some_and(is_folder) => Ok(None),
+        Err(error) if error.kind() == ErrorKind::NotFound && folder_of(path).is_dir() => Ok(None),
         Err(error) if error.kind() == ErrorKind::NotFound => {
-            let folder = path.parent().unwrap_or(Path::new(".")).display();
+            let folder = folder_of(path).display();
             let why = format!("the folder {folder} vanished while the run began; the same command begins anew");
             Err(Error::io(path, "lock", std::io::Error::other(why)))
         }
         Err(error) => Err(Error::io(path, "lock", error)),
     }
-}
-
-fn is_folder(path: &Path) -> bool {
-    path.as_os_str().is_empty() || path.is_dir()
 }
 
 /// Refuses a file that is not a lock, because it would lose its content. A lock file holds a process id or nothing.

@@ -73,11 +73,6 @@ pub fn lane_changes(d_m: &[f64], lane: Lane, frame_rate_hz: f64, options: &Later
     found
 }
 
-/// The lane change in progress at sample `k`, if any.
-pub(super) fn lane_change_at(changes: &[LaneChange], k: usize) -> Option<&LaneChange> {
-    changes.iter().find(|c| c.start <= k && k < c.end)
-}
-
 /// Samples at which the vehicle crosses a line of the lane, ascending, with the possible change of each.
 fn crossings(d_m: &[f64], lane: Lane) -> Vec<(usize, LaneChangeKind)> {
     let mut crossings = Vec::new();

@@ -5,7 +5,7 @@
 //! exactly when item i ends. Intervals are half open: from the first sample with the item to the first without, or to
 //! the last sample.
 
-use super::lateral::{LaneChange, lane_change_at, lane_changes};
+use super::lateral::{LaneChange, lane_changes};
 use super::longitudinal::{Longitudinal, LongitudinalEvent, longitudinal_events};
 use super::options::{MiningOptions, TOLERANCE};
 use crate::traffic::trajectory::{Carriageway, Track};
@@ -83,7 +83,7 @@ impl Activities {
 
     /// The lane change relative to `lane` in progress at sample `k`.
     pub(super) fn lane_change(&self, lane: u16, k: usize) -> Option<&LaneChange> {
-        lane_change_at(self.lane_changes.get(usize::from(lane))?, k)
+        self.lane_changes.get(usize::from(lane))?.iter().find(|change| (change.start..change.end).contains(&k))
     }
 
     /// The longitudinal activity at sample `k`.

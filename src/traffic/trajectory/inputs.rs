@@ -70,18 +70,17 @@ impl Inputs {
     /// files, and files that do not fit or cannot be opened although they have the ending of those that are read.
     fn with_others(mut self, folder: &Path) -> Result<Inputs> {
         let own = self.preset().map(|preset| (preset.name.clone(), preset.format));
-        let mut others: Vec<Error> = Vec::new();
         let mut endings: Vec<String> = own.is_none().then(|| "csv".to_owned()).into_iter().collect();
         let mut foreign = Vec::new();
         for file in files_of(folder)? {
             let name = file_name(&file);
             if tracks::is_compressed(&file) {
                 let help = "unpack it, or compress text with gzip (.gz), which is read";
-                others.push(Error::input(Place::file(&file), "it may hold tracks, and is compressed", help));
+                self.problems.push(Error::input(Place::file(&file), "it may hold tracks, and is compressed", help));
             }
             if tracks::is_second(&file) && tracks::may_hold_tracks(&file) {
                 let problem = "the same file lies beside it, not compressed";
-                others.push(Error::input(Place::file(&file), problem, "remove one of the two"));
+                self.problems.push(Error::input(Place::file(&file), problem, "remove one of the two"));
                 continue;
             }
             let is_highd = own.is_none() && is_of_highd(&file);
@@ -104,15 +103,14 @@ impl Inputs {
                 _ if is_of_sumo(&file) => {}
                 Ok(Some(other)) => {
                     let problem = format!("it fits preset {}, the other files here do not", other.name);
-                    others.push(Error::input(Place::file(&file), problem, "put it into a folder of its own"));
+                    self.problems.push(Error::input(Place::file(&file), problem, "put it into a folder of its own"));
                 }
                 // A table with few columns is a list of something else.
-                Ok(None) if has_ending && has_columns(&file) => others.push(unknown(&file)),
-                Err(error) if has_ending => others.push(error),
+                Ok(None) if has_ending && has_columns(&file) => self.problems.push(unknown(&file)),
+                Err(error) if has_ending => self.problems.push(error),
                 _ => {}
             }
         }
-        self.problems.extend(others);
         Ok(self)
     }
 

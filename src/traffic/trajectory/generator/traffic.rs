@@ -8,7 +8,7 @@ use super::inflow::{Inflow, LaneDemand};
 use super::lane_change::{LaneView, Neighbour};
 use super::options::GeneratorOptions;
 use super::random::{Purpose, TrafficRandom};
-use super::vehicle::{Samples, Vehicle};
+use super::vehicle::Vehicle;
 use crate::traffic::trajectory::VehicleClass;
 
 /// Road before the camera's view, m. Followers need this distance to settle behind their leaders. On a longer road,
@@ -259,7 +259,15 @@ impl<'a> Traffic<'a> {
             if let Some(sample) = sample
                 && (0.0..=self.options.window_m).contains(&own.s_m)
             {
-                own.samples.push(sample, own.s_m, d_m, own.speed_mps, v_d_mps, a);
+                let samples = &mut own.samples;
+                if samples.s_m.is_empty() {
+                    samples.first = sample;
+                }
+                samples.s_m.push(own.s_m);
+                samples.d_m.push(d_m);
+                samples.v_s_mps.push(own.speed_mps);
+                samples.v_d_mps.push(v_d_mps);
+                samples.a_s_mps2.push(a);
             }
 
             own.s_m += own.speed_mps * dt + 0.5 * a * dt * dt;
@@ -294,19 +302,6 @@ impl<'a> Traffic<'a> {
         let vehicles = &self.vehicles;
         self.order.retain(|&i| vehicles[i].s_m < end_m);
         self.step += 1;
-    }
-}
-
-impl Samples {
-    fn push(&mut self, sample: usize, s_m: f64, d_m: f64, v_s_mps: f64, v_d_mps: f64, a_s_mps2: f64) {
-        if self.s_m.is_empty() {
-            self.first = sample;
-        }
-        self.s_m.push(s_m);
-        self.d_m.push(d_m);
-        self.v_s_mps.push(v_s_mps);
-        self.v_d_mps.push(v_d_mps);
-        self.a_s_mps2.push(a_s_mps2);
     }
 }
 

@@ -160,11 +160,8 @@ fn empty_track(vehicle: &VehicleMeta, reserve: bool) -> Track {
 fn find_vehicle(table: &CsvTable, column: CsvColumn, vehicles: &[VehicleMeta], before: usize) -> Result<usize> {
     let id = table.integer(column)?;
     let is = |at: usize| vehicles.get(at).is_some_and(|vehicle| i64::from(vehicle.id) == id);
-    if is(before) {
-        return Ok(before);
-    }
-    if is(before + 1) {
-        return Ok(before + 1);
+    if let Some(at) = [before, before + 1].into_iter().find(|at| is(*at)) {
+        return Ok(at);
     }
     vehicles.binary_search_by_key(&id, |vehicle| i64::from(vehicle.id)).map_err(|_| {
         table.bad(

@@ -183,11 +183,12 @@ pub(super) fn track_files(path: &Path, preset: &Preset) -> Result<Vec<TrackFile>
         });
     }
     let listed = std::fs::read_dir(path).map_err(|e| Error::io(path, "list", e))?;
+    let format = if preset.format == FileFormat::Commonroad { FileFormat::Xml } else { preset.format };
     let mut files: Vec<TrackFile> = Vec::new();
     for entry in listed {
         let file = entry.map_err(|e| Error::io(path, "list", e))?.path();
         let name = file_name(&file);
-        let is_ours = preset.recording_of(unpacked(&name)).is_some() && is_format(&file, preset);
+        let is_ours = preset.recording_of(unpacked(&name)).is_some() && format_of(&file) == Some(format);
         if file.is_file() && is_ours && !name.starts_with('.') && !is_meta(&name, preset) && !is_second(&file) {
             files.extend(of(file));
         }
@@ -213,11 +214,6 @@ pub(super) fn keep_apart(files: &mut [TrackFile]) {
     for file in files.iter_mut().filter(|file| counts[&file.id] > 1) {
         file.id = file_name(&file.path);
     }
-}
-
-fn is_format(path: &Path, preset: &Preset) -> bool {
-    let format = if preset.format == FileFormat::Commonroad { FileFormat::Xml } else { preset.format };
-    format_of(path) == Some(format)
 }
 
 /// Whether a file name is that of a preset's other files.
@@ -252,7 +248,7 @@ pub fn read_tracks(file: &TrackFile, preset: &Preset) -> Result<Vec<LoadedTracks
     };
     let place = Place::file(&file.path);
     if raw.recordings.iter().all(|recording| recording.vehicles.is_empty()) {
-        return Err(raw::no_vehicle(&file.path));
+        return Err(Error::input(place, "there is no vehicle", "check that this is the file with the tracks"));
     }
     let synthetic = made_up(folder_of(&file.path)).is_some();
     let bytes = raw.checksums.iter().map(|file| file.bytes).sum();

@@ -1,7 +1,6 @@
 //! What a track file says: vehicles with samples in SI units and right-handed axes, before any road is known.
 
 use std::collections::HashMap;
-use std::path::Path;
 
 use super::apart::apart;
 use super::preset::{HeadingOrigin, MetaFile, Preset, Side};
@@ -503,9 +502,4 @@ fn add_frame_rate(file: &TrackFile, preset: &Preset, recordings: &mut [RawRecord
     })?;
     recordings.iter_mut().for_each(|recording| recording.frame_rate_hz = rate);
     Ok(Some(checksum))
-}
-
-/// The error for a file without vehicles.
-pub(super) fn no_vehicle(path: &Path) -> Error {
-    Error::input(Place::file(path), "there is no vehicle", "check that this is the file with the tracks")
 }

@@ -136,7 +136,7 @@ impl ColumnName {
 }
 
 /// Metres of an international foot.
-pub(super) const FOOT_M: f64 = 0.3048;
+const FOOT_M: f64 = 0.3048;
 
 /// Known units with their factors.
 pub(super) fn units(dimension: Dimension) -> &'static [(&'static str, f64)] {
