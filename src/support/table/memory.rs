@@ -137,8 +137,12 @@ cell_values! {
     String => Text, |text| if text.is_empty() { Cell::Null } else { Cell::text(text) };
     &str => Text, |text| text.to_owned().cell();
     f64 => Binary64, Cell::Number;
-    // Counts; null above 63 bits.
-    u8, u32, u64, usize, i64 => Whole, |count| i64::try_from(count).map_or(Cell::Null, Cell::Whole);
+    u8, u32, u64, usize, i64 => Whole, whole;
+}
+
+/// A count; null above 63 bits.
+fn whole(count: impl TryInto<i64>) -> Cell<'static> {
+    count.try_into().map_or(Cell::Null, Cell::Whole)
 }
 
 impl<V: CellValue> CellValue for Option<V> {

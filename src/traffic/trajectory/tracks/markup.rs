@@ -20,13 +20,12 @@ const DEEPEST: usize = 64;
 /// Names and values of attributes; the values are texts.
 type Attributes = Vec<(String, Value)>;
 
+/// Receives the attributes of an element and its place; whether to go on.
+type EachElement<'e> = dyn FnMut(&Attributes, &dyn Fn() -> Place) -> Result<bool> + 'e;
+
 /// Gives the attributes of every element with this name, and those of the elements around it as `element.attribute`, until
 /// `each` returns false.
-pub(super) fn each_element(
-    path: &Path,
-    row: &str,
-    each: &mut dyn FnMut(&Attributes, &dyn Fn() -> Place) -> Result<bool>,
-) -> Result<()> {
+pub(super) fn each_element(path: &Path, row: &str, each: &mut EachElement) -> Result<()> {
     let file = LimitedLine { inner: input_file::open_text(path)?, since: 0 };
     let mut reader = Reader::from_reader(BufReader::with_capacity(1 << 18, file));
     let mut buffer = Vec::new();
