@@ -5,7 +5,7 @@ use lanesweep_model::{model, scenario};
 use lanesweep_report::report;
 use lanesweep_run::run;
 use lanesweep_stats::stats;
-use lanesweep_support::{Error, Place, Result, support};
+use lanesweep_support::{Error, Place, Result, settings, support};
 use lanesweep_traffic::traffic;
 
 #[path = "mod.rs"]

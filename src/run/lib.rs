@@ -4,7 +4,7 @@ use lanesweep_engine::engine;
 use lanesweep_model::{model, scenario};
 use lanesweep_random::random;
 use lanesweep_stats::stats;
-use lanesweep_support::{Error, Place, Result, support};
+use lanesweep_support::{Error, Place, Result, settings, support};
 use lanesweep_traffic::traffic;
 
 #[path = "mod.rs"]

@@ -9,7 +9,9 @@ use crate::model::driver::Bound;
 use crate::run::sampling::SampleSource;
 use crate::run::score::ScoreOptions;
 use crate::scenario::parameterization::{ParameterizationOptions, SvdLateral};
-use crate::stats::density::{BandwidthRule, DensityKind};
+use crate::settings;
+use crate::stats::density::{BandwidthRule, DensityKind, FitOptions};
+use crate::stats::estimate::Enough;
 use crate::traffic::mining::MiningOptions;
 use crate::traffic::trajectory::generator::GeneratorOptions;
 
@@ -47,126 +49,89 @@ impl Settings {
     }
 }
 
-/// Options of every verb.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub(crate) struct RunSettings {
-    /// Threads; results do not depend on it. Without it: all cores.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(range(min = 1, max = 4096))]
-    pub threads: Option<usize>,
-    /// Backend; auto: a GPU if there is one.
-    pub backend: BackendChoice,
-    /// Device, by part of its name, PCI bus id or index. `lanesweep verify devices` lists the devices. The default is
-    /// the first GPU.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub device: Option<String>,
-    /// paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc` takes
-    /// jrc-2021 unless it is set.
-    pub profile: String,
-    /// Time step, s. Without it: the profile's.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("minimum" = Bound::TIME_STEP.smallest, "maximum" = Bound::TIME_STEP.largest))]
-    pub dt_s: Option<f64>,
-}
-
-impl Default for RunSettings {
-    fn default() -> Self {
-        RunSettings {
-            threads: None,
-            backend: BackendChoice::Auto,
-            device: None,
-            profile: "paper".to_owned(),
-            dt_s: None,
-        }
+settings! {
+    /// Options of every verb.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+    #[serde(deny_unknown_fields, default)]
+    pub(crate) struct RunSettings {
+        /// Threads; results do not depend on it. Without it: all cores.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        #[schemars(range(min = 1, max = 4096))]
+        pub threads: Option<usize> = None,
+        /// Backend; auto: a GPU if there is one.
+        pub backend: BackendChoice = BackendChoice::Auto,
+        /// Device, by part of its name, PCI bus id or index. `lanesweep verify devices` lists the devices. The default
+        /// is the first GPU.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        pub device: Option<String> = None,
+        /// paper, paper-fit, jrc-2021, un-r157. Name of a profile, or a TOML file of your own. `map --preset jrc` takes
+        /// jrc-2021 unless it is set.
+        pub profile: String = "paper".to_owned(),
+        /// Time step, s. Without it: the profile's.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        #[schemars(extend("minimum" = Bound::TIME_STEP.smallest, "maximum" = Bound::TIME_STEP.largest))]
+        pub dt_s: Option<f64> = None,
     }
 }
 
-/// `lanesweep fit`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub(crate) struct FitSettings {
-    /// Form of the density. Intervals of a mixture or copula cover the draws alone, and they have no ratio to recorded
-    /// scenarios.
-    pub density: DensityKind,
-    /// Search interval of the bandwidth.
-    pub bandwidth_rule: BandwidthRule,
-    /// Sign of the lateral series of densities and of the replays that `compare` and `justify` compare with them.
-    pub svd_lateral: SvdLateral,
-    /// Seed of P_valid and of the splits for M.
-    pub seed: u64,
-    /// Number of draws for P_valid; with 10^9 its relative standard error is 0.01 % if it is 0.1.
-    #[schemars(range(min = 1, max = 1_000_000_000))]
-    pub valid_draws: u64,
-}
-
-impl Default for FitSettings {
-    fn default() -> Self {
-        let options = crate::stats::density::FitOptions::default();
-        FitSettings {
-            density: options.kind,
-            bandwidth_rule: options.rule,
-            svd_lateral: options.parameterization.svd_lateral,
-            seed: options.seed,
-            valid_draws: options.valid_draws,
-        }
+settings! {
+    /// `lanesweep fit`.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+    #[serde(deny_unknown_fields, default)]
+    pub(crate) struct FitSettings {
+        /// Form of the density. Intervals of a mixture or copula cover the draws alone, and they have no ratio to
+        /// recorded scenarios.
+        pub density: DensityKind = FitOptions::default().kind,
+        /// Search interval of the bandwidth.
+        pub bandwidth_rule: BandwidthRule = FitOptions::default().rule,
+        /// Sign of the lateral series of densities and of the replays that `compare` and `justify` compare with them.
+        pub svd_lateral: SvdLateral = FitOptions::default().parameterization.svd_lateral,
+        /// Seed of P_valid and of the splits for M.
+        pub seed: u64 = FitOptions::default().seed,
+        /// Number of draws for P_valid; with 10^9 its relative standard error is 0.01 % if it is 0.1.
+        #[schemars(range(min = 1, max = 1_000_000_000))]
+        pub valid_draws: u64 = FitOptions::default().valid_draws,
     }
 }
 
-/// `lanesweep sample`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub(crate) struct SampleSettings {
-    /// Crude, importance, or the cheaper one. Importance sampling searches the failures, then draws
-    /// around them; `auto` chooses for each model and headway, and is `mc` without a half-width.
-    pub estimator: EstimatorKind,
-    /// Number of samples. With a half-width: the maximum. Without it: 100000, or as needed.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(range(min = 1))]
-    pub samples: Option<u64>,
-    /// Criterion to map, rank or estimate.
-    pub criterion: Criterion,
-    /// Kind of points of `mc`.
-    pub points: SampleSource,
-    /// Kind of interval of `mc`.
-    pub interval: IntervalKind,
-    /// Level of the intervals.
-    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
-    pub level: f64,
-    /// Reach this half-width over estimate. It is that of the draws' interval; mc checks it after 4096·2^k samples. The
-    /// default of is is 0.1 unless the number of samples is given; else none.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("exclusiveMinimum" = 0.0))]
-    pub half_width: Option<f64>,
-    /// Stop at the first check after this time (not reproducible), s. Without it: no limit.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1e9))]
-    pub time_limit_s: Option<f64>,
-    /// Worst lanes to list per model; 0 runs faster.
-    pub worst: usize,
-    /// Maximum number of lanes of the density itself, in the search of `is` and of the rare rows of `auto` and again beside
-    /// its final draws. They meet the failures that the proposal misses, or bound them.
-    #[schemars(range(min = 1))]
-    pub crude_lanes: u64,
-    /// Seed of the draws.
-    pub seed: u64,
-}
-
-impl Default for SampleSettings {
-    fn default() -> Self {
-        SampleSettings {
-            estimator: EstimatorKind::Auto,
-            samples: None,
-            criterion: Criterion::Collision,
-            points: SampleSource::Random,
-            interval: IntervalKind::Wilson,
-            level: 0.95,
-            half_width: None,
-            time_limit_s: None,
-            worst: 20,
-            crude_lanes: 100_000_000,
-            seed: 157,
-        }
+settings! {
+    /// `lanesweep sample`.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+    #[serde(deny_unknown_fields, default)]
+    pub(crate) struct SampleSettings {
+        /// Crude, importance, or the cheaper one. Importance sampling searches the failures, then draws
+        /// around them; `auto` chooses for each model and headway, and is `mc` without a half-width.
+        pub estimator: EstimatorKind = EstimatorKind::Auto,
+        /// Number of samples. With a half-width: the maximum. Without it: 100000, or as needed.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        #[schemars(range(min = 1))]
+        pub samples: Option<u64> = None,
+        /// Criterion to map, rank or estimate.
+        pub criterion: Criterion = Criterion::Collision,
+        /// Kind of points of `mc`.
+        pub points: SampleSource = SampleSource::Random,
+        /// Kind of interval of `mc`.
+        pub interval: IntervalKind = IntervalKind::Wilson,
+        /// Level of the intervals.
+        #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
+        pub level: f64 = 0.95,
+        /// Reach this half-width over estimate. It is that of the draws' interval; mc checks it after 4096·2^k
+        /// samples. The default of is is 0.1 unless the number of samples is given; else none.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        pub half_width: Option<f64> = None,
+        /// Stop at the first check after this time (not reproducible), s. Without it: no limit.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1e9))]
+        pub time_limit_s: Option<f64> = None,
+        /// Worst lanes to list per model; 0 runs faster.
+        pub worst: usize = 20,
+        /// Maximum number of lanes of the density itself, in the search of `is` and of the rare rows of `auto` and
+        /// again beside its final draws. They meet the failures that the proposal misses, or bound them.
+        #[schemars(range(min = 1))]
+        pub crude_lanes: u64 = 100_000_000,
+        /// Seed of the draws.
+        pub seed: u64 = 157,
     }
 }
 
@@ -194,22 +159,18 @@ pub(crate) enum IntervalKind {
     ClopperPearson,
 }
 
-/// `lanesweep compare`.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub(crate) struct CompareSettings {
-    /// Samples of each density; each runs from every headway.
-    #[schemars(range(min = 1, max = 281_474_976_710_655_u64))]
-    pub samples: u64,
-    /// Seed of the draws.
-    pub seed: u64,
-    /// Rates agree if the interval of their ratio lies between 1/margin and margin (1.25).
-    #[schemars(extend("exclusiveMinimum" = 1.0, "maximum" = 100.0))]
-    pub margin: f64,
-}
-
-impl Default for CompareSettings {
-    fn default() -> Self {
-        CompareSettings { samples: 20_000, seed: 157, margin: crate::stats::estimate::Enough::default().margin }
+settings! {
+    /// `lanesweep compare`.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+    #[serde(deny_unknown_fields, default)]
+    pub(crate) struct CompareSettings {
+        /// Samples of each density; each runs from every headway.
+        #[schemars(range(min = 1, max = 281_474_976_710_655_u64))]
+        pub samples: u64 = 20_000,
+        /// Seed of the draws.
+        pub seed: u64 = 157,
+        /// Rates agree if the interval of their ratio lies between 1/margin and margin (1.25).
+        #[schemars(extend("exclusiveMinimum" = 1.0, "maximum" = 100.0))]
+        pub margin: f64 = Enough::default().margin,
     }
 }

@@ -7,29 +7,26 @@ use super::Coverage;
 use super::scores::{Scored, Share};
 use crate::run::sampling::ComparedCell;
 use crate::run::score::ScoreOptions;
+use crate::settings;
 use crate::stats::estimate::Ratio;
 
-/// Limits, conventions of this program: a quantity passes where its whole interval lies within them, fails where the
-/// whole interval lies outside, and is undecided otherwise.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct Rules {
-    /// Minimum recall: the fraction of the failures of S that S' also has (0.9). A hidden failure is the error that an
-    /// assessment must not make.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub min_recall: f64,
-    /// Minimum precision: the fraction of the failures of S' that S also has (0.8). False alarms cost effort, not
-    /// safety.
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub min_precision: f64,
-    /// Minimum fraction of kept scenarios that are points of the parameter space (0.95).
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub min_coverage: f64,
-}
-
-impl Default for Rules {
-    fn default() -> Self {
-        Rules { min_recall: 0.9, min_precision: 0.8, min_coverage: 0.95 }
+settings! {
+    /// Limits, conventions of this program: a quantity passes where its whole interval lies within them, fails where
+    /// the whole interval lies outside, and is undecided otherwise.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+    #[serde(deny_unknown_fields, default)]
+    pub struct Rules {
+        /// Minimum recall: the fraction of the failures of S that S' also has (0.9). A hidden failure is the error
+        /// that an assessment must not make.
+        #[schemars(range(min = 0.0, max = 1.0))]
+        pub min_recall: f64 = 0.9,
+        /// Minimum precision: the fraction of the failures of S' that S also has (0.8). False alarms cost effort, not
+        /// safety.
+        #[schemars(range(min = 0.0, max = 1.0))]
+        pub min_precision: f64 = 0.8,
+        /// Minimum fraction of kept scenarios that are points of the parameter space (0.95).
+        #[schemars(range(min = 0.0, max = 1.0))]
+        pub min_coverage: f64 = 0.95,
     }
 }
 

@@ -327,7 +327,7 @@ fn clustered(counts: &ScenarioCounts, cell: usize, headways: usize, level: f64) 
 }
 
 /// The cells of S.
-pub fn recorded_cells(
+pub(crate) fn recorded_cells(
     plan: &LanePlan,
     counts: &ScenarioCounts,
     exposure: Option<&Exposure>,
@@ -346,7 +346,7 @@ pub fn recorded_cells(
 ///
 /// # Errors
 /// As [`ScenarioCounts::of_variant`]; [`Error::Internal`] for samples of other models.
-pub fn compare_cells(
+pub(crate) fn compare_cells(
     plan: &LanePlan,
     partial: &Partial,
     block: usize,

@@ -173,7 +173,7 @@ pub fn sample_into(
 ///
 /// # Errors
 /// [`Error::Input`] if parts are of different runs or contain the same samples.
-pub fn crude_of_segments(
+pub(crate) fn crude_of_segments(
     plan: &LanePlan,
     mut segments: Vec<SampleTally>,
     options: &SampleOptions,

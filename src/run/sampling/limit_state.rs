@@ -174,7 +174,7 @@ pub fn truncated(density: &DensityModel) -> Result<Truncated<impl Fn(&[f64]) -> 
 ///
 /// # Errors
 /// Those of the lanes.
-pub fn scenario_shares(
+pub(crate) fn scenario_shares(
     lanes: &LaneLimitState,
     proposal: &Mixture,
     (seed, crude): (u64, u64),

@@ -27,19 +27,21 @@ pub use against_recorded::RecordedRatios;
 pub use choice::Choice;
 pub use compare::{
     CategoryComparison, ComparedCell, ComparedForm, ComparedParameterization, RateRecord, RecordedCell, ReplayedCell,
-    SampledCell, SampledScenarios, ScenarioCounts, compare_cells, kernel_scenarios, recorded_cells, sample_by_scenario,
+    SampledCell, SampledScenarios, ScenarioCounts, kernel_scenarios, sample_by_scenario,
 };
-pub use crude::{Checkpoint, CheckpointRow, CrudeRun, checkpoints, crude_of_segments, cuts, sample_crude, sample_into};
+pub(crate) use compare::{compare_cells, recorded_cells};
+pub use crude::{Checkpoint, CheckpointRow, CrudeRun, checkpoints, cuts, sample_crude, sample_into};
 pub use generator::{SAMPLE_PURPOSE, SampleSource, generator_of, generator_of_points};
 pub use kernels::KernelCounts;
 pub(crate) use limit_state::marks_of;
-pub use limit_state::{LaneLimitState, Question, limit_state, scenario_shares, truncated};
+pub use limit_state::{LaneLimitState, Question, limit_state, truncated};
 pub use map::{MAP_CELLS, MapAxes, MapAxis, MapCounts};
 pub use model_ratios::{ModelRatio, ProfileRatios};
-pub use plan::{Conditional, SampleHeadways, conditional, mixture_of, plan_points, plan_samples};
+pub(crate) use plan::mixture_of;
+pub use plan::{Conditional, SampleHeadways, conditional, plan_points, plan_samples};
 use plan_file::{KIND, SEARCH_FILE};
 pub use proposal_file::{proposal_from_text, proposal_text, read_proposal};
-pub use rows::{EstimateRow, Risk, RiskRate, crude_rows, headway_name};
+pub use rows::{EstimateRow, Risk, RiskRate};
 pub use sample_options::{Estimator, SampleOptions};
 pub use sample_run::{CrudeJob, SampleJob, SampleResult, WeightedJob};
 pub use tally::{SampleTally, WorstSample};
@@ -167,7 +169,7 @@ impl Sample {
     }
 
     /// Whether a sealed file of this kind is the plan of a sampling run.
-    pub fn is_kind(kind: &str) -> bool {
+    pub(crate) fn is_kind(kind: &str) -> bool {
         kind == KIND
     }
 

@@ -196,6 +196,6 @@ pub fn conditional(density: &DensityModel, given: &[(String, f64)]) -> Result<Co
 ///
 /// # Errors
 /// As [`conditional`].
-pub fn mixture_of(density: &DensityModel, given: &[(String, f64)]) -> Result<Mixture> {
+pub(crate) fn mixture_of(density: &DensityModel, given: &[(String, f64)]) -> Result<Mixture> {
     if given.is_empty() { density.mixture() } else { Ok(conditional(density, given)?.mixture) }
 }

@@ -94,12 +94,12 @@ impl EstimateRow {
 }
 
 /// Name of a plan's headway in tables.
-pub fn headway_name(plan: &LanePlan, headway: usize, is_sampled: bool) -> String {
+pub(crate) fn headway_name(plan: &LanePlan, headway: usize, is_sampled: bool) -> String {
     if is_sampled { "sampled".to_owned() } else { plan.headways[headway].to_string() }
 }
 
 /// All rows of crude Monte Carlo. Headways share their samples, so the mean over them treats samples as clusters.
-pub fn crude_rows(
+pub(crate) fn crude_rows(
     plan: &LanePlan,
     tally: &SampleTally,
     exposure: Option<&Exposure>,

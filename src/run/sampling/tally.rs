@@ -111,7 +111,7 @@ impl SampleTally {
     ///
     /// # Errors
     /// [`Error::Verification`] if the backend's counts are others; as [`SampleTally::of_chunk`].
-    pub fn check_counted(plan: &LanePlan, chunk: &Chunk, options: &SampleOptions, backend: &str) -> Result<()> {
+    pub(crate) fn check_counted(plan: &LanePlan, chunk: &Chunk, options: &SampleOptions, backend: &str) -> Result<()> {
         if chunk.counted.is_none() {
             return Ok(());
         }

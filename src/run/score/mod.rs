@@ -31,7 +31,7 @@ use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::scenario::Category;
 use crate::support::ranges;
-use crate::{Error, Place, Result};
+use crate::{Error, Place, Result, settings};
 
 /// Ending of the name of a parameterization that replays each scenario by a basis that has not seen it.
 pub const CROSS_VALIDATED: &str = "-cv";
@@ -229,23 +229,20 @@ pub fn score(plan: &LanePlan, partial: &Partial, options: &ScoreOptions) -> Resu
     Ok(ScoreTable { categories, headways: plan.headways.clone(), options: options.clone() })
 }
 
-/// How scores are made.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct ScoreOptions {
-    /// Seed that chooses the lanes to check on the CPU. No score depends on it.
-    pub seed: u64,
-    /// Coverage of the intervals (0.95).
-    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
-    pub confidence: f64,
-    /// Below so many failures in S F1 has no interval; below so many scenarios with one a claim is not evaluated (10).
-    #[schemars(range(min = 0, max = 4_294_967_295_u32))]
-    pub min_failures: u32,
-}
-
-impl Default for ScoreOptions {
-    fn default() -> Self {
-        ScoreOptions { seed: 157, confidence: 0.95, min_failures: 10 }
+settings! {
+    /// How scores are made.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+    #[serde(deny_unknown_fields, default)]
+    pub struct ScoreOptions {
+        /// Seed that chooses the lanes to check on the CPU. No score depends on it.
+        pub seed: u64 = 157,
+        /// Coverage of the intervals (0.95).
+        #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
+        pub confidence: f64 = 0.95,
+        /// Below so many failures in S F1 has no interval; below so many scenarios with one a claim is not evaluated
+        /// (10).
+        #[schemars(range(min = 0, max = 4_294_967_295_u32))]
+        pub min_failures: u32 = 10,
     }
 }
 

@@ -36,7 +36,7 @@ use crate::run::score::{ScenarioRate, ScoreOptions, f1, recall};
 use crate::scenario::parameterization::{LinearSpec, Parameterization, ParameterizationOptions};
 use crate::scenario::{Category, Scenario};
 use crate::support::ranges;
-use crate::{Error, Place, Result};
+use crate::{Error, Place, Result, settings};
 
 /// What is searched for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -85,29 +85,25 @@ impl Objective {
     }
 }
 
-/// Options of a search, and of a cross-validation.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct SearchLimits {
-    /// Folds of the cross-validation, also of `study` (5).
-    #[schemars(range(min = 2, max = 100))]
-    pub folds: usize,
-    /// Maximum number of parameters, the duration T counted (8).
-    #[schemars(range(min = 2, max = 12))]
-    pub max_parameters: usize,
-    /// Studies for the optimiser of the weights (8000).
-    #[schemars(range(min = 0, max = 10_000_000))]
-    pub studies: usize,
-    /// Non-inferiority margin: the winner's score is shown to be at most this much below the best (0.05).
-    #[schemars(range(min = 0.0, max = 1.0))]
-    pub margin: f64,
-    /// Seed of the optimiser.
-    pub seed: u64,
-}
-
-impl Default for SearchLimits {
-    fn default() -> Self {
-        SearchLimits { folds: 5, max_parameters: 8, studies: 8000, margin: 0.05, seed: 157 }
+settings! {
+    /// Options of a search, and of a cross-validation.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+    #[serde(deny_unknown_fields, default)]
+    pub struct SearchLimits {
+        /// Folds of the cross-validation, also of `study` (5).
+        #[schemars(range(min = 2, max = 100))]
+        pub folds: usize = 5,
+        /// Maximum number of parameters, the duration T counted (8).
+        #[schemars(range(min = 2, max = 12))]
+        pub max_parameters: usize = 8,
+        /// Studies for the optimiser of the weights (8000).
+        #[schemars(range(min = 0, max = 10_000_000))]
+        pub studies: usize = 8000,
+        /// Non-inferiority margin: the winner's score is shown to be at most this much below the best (0.05).
+        #[schemars(range(min = 0.0, max = 1.0))]
+        pub margin: f64 = 0.05,
+        /// Seed of the optimiser.
+        pub seed: u64 = 157,
     }
 }
 
@@ -317,8 +313,8 @@ impl<'a> Search<'a> {
         Err(Error::input(Place::item("held-out data"), problem, "hold out other recordings"))
     }
 
-    /// Runs the search: all of it, or the tasks of one shard; `None` for a shard. `folder` holds the journals. `done` is
-    /// called with the number of studies so far.
+    /// Runs the search: all of it, or the tasks of one shard; `None` for a shard. `folder` holds the journals. `done`
+    /// is called with the number of studies so far.
     ///
     /// # Errors
     /// [`Error::Input`] if S fails in too few scenarios for every model; those of the sweep and of the files;

@@ -14,7 +14,7 @@ use serde::{Deserialize, Serialize};
 use crate::{Error, Place, Result};
 
 /// Indices in a block. Ranges that start and end at multiples of it join fastest.
-pub const BLOCK: u64 = 4096;
+pub(crate) const BLOCK: u64 = 4096;
 
 /// Sums that can be joined: `left` covers the indices just before `right`.
 pub trait Join: Sized {

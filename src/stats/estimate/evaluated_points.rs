@@ -72,7 +72,7 @@ impl<'a> Pool<'a> {
     }
 
     /// Number of attempts at draws of the density, which no guide has influenced.
-    pub fn density_draws(&self) -> f64 {
+    pub(crate) fn density_draws(&self) -> f64 {
         self.nominal_draws + self.crude_draws
     }
 
@@ -92,7 +92,7 @@ impl<'a> Pool<'a> {
     }
 
     /// The points whose values are all kept, also those that do not fail.
-    pub fn guided(&self) -> impl Iterator<Item = usize> + '_ {
+    pub(crate) fn guided(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.points.len()).filter(|point| !self.is_crude[*point])
     }
 
@@ -103,12 +103,12 @@ impl<'a> Pool<'a> {
     }
 
     /// The weight of a point among [`Pool::guided`].
-    pub fn guided_weight(&self, point: usize) -> f64 {
+    pub(crate) fn guided_weight(&self, point: usize) -> f64 {
         libm::exp(self.log_f[point] - self.log_sources[point])
     }
 
     /// Draws from the density and keeps every point.
-    pub fn add_nominal(&mut self, stream: Stream, draws: u64) -> Result<()> {
+    pub(crate) fn add_nominal(&mut self, stream: Stream, draws: u64) -> Result<()> {
         let more = libm::log(draws as f64);
         self.log_sources.iter_mut().zip(&self.log_f).for_each(|(sum, log_f)| *sum = log_add(*sum, more + log_f));
         self.nominal_draws += draws as f64;
@@ -117,7 +117,7 @@ impl<'a> Pool<'a> {
     }
 
     /// Draws from the density and keeps only failures.
-    pub fn add_crude(&mut self, stream: Stream, indices: std::ops::Range<u64>) -> Result<()> {
+    pub(crate) fn add_crude(&mut self, stream: Stream, indices: std::ops::Range<u64>) -> Result<()> {
         let draws = indices.end - indices.start;
         // Valid draws, each as good as several attempts.
         self.crude_draws += draws as f64 / self.nominal.validity_fraction();
@@ -128,12 +128,17 @@ impl<'a> Pool<'a> {
     }
 
     /// The failures among these draws.
-    pub fn crude_failures(&self) -> impl Iterator<Item = usize> + '_ {
+    pub(crate) fn crude_failures(&self) -> impl Iterator<Item = usize> + '_ {
         (0..self.points.len()).filter(|point| self.is_crude[*point])
     }
 
     /// Draws from a mixture; returns the indices of the new points.
-    pub fn add_source(&mut self, mixture: Mixture, stream: Stream, draws: u64) -> Result<std::ops::Range<usize>> {
+    pub(crate) fn add_source(
+        &mut self,
+        mixture: Mixture,
+        stream: Stream,
+        draws: u64,
+    ) -> Result<std::ops::Range<usize>> {
         let from = self.points.len();
         let points = self.attempts(&mixture, stream, 0..draws);
         self.register(mixture, draws as f64);

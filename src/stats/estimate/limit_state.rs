@@ -18,19 +18,19 @@ pub const ATTEMPTS: u32 = 64;
 /// Purposes of the estimators' random words; no two estimators use the same draws.
 pub(crate) mod purpose {
     /// Draws of the density itself.
-    pub const NOMINAL: u32 = 0x4553_0001;
+    pub(crate) const NOMINAL: u32 = 0x4553_0001;
     /// Final draws of a proposal.
-    pub const PROPOSAL: u32 = 0x4553_0002;
+    pub(crate) const PROPOSAL: u32 = 0x4553_0002;
     /// Draws of the density beside these.
-    pub const BESIDE_PROPOSAL: u32 = 0x4553_0005;
+    pub(crate) const BESIDE_PROPOSAL: u32 = 0x4553_0005;
     /// Draws of a search: 64 times the round and the number of the mixture within the round are added.
     pub const SEARCH: u32 = 0x4553_4000;
     /// Draws that determine which kernels failures come from.
-    pub const SHARES: u32 = 0x4553_0004;
+    pub(crate) const SHARES: u32 = 0x4553_0004;
     /// Draws of the density beside these.
-    pub const BESIDE_SHARES: u32 = 0x4553_0006;
+    pub(crate) const BESIDE_SHARES: u32 = 0x4553_0006;
     /// The estimate of a valid fraction.
-    pub const VALIDITY: u32 = 0x4553_0003;
+    pub(crate) const VALIDITY: u32 = 0x4553_0003;
 }
 
 /// A valid point and the number of attempts.

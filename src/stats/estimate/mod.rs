@@ -22,7 +22,7 @@ mod warnings;
 mod weights;
 
 pub use adaptive::{AdaptiveRun, Goal, adaptive};
-pub use blocks::{BLOCK, BlockSums, Join};
+pub use blocks::{BlockSums, Join};
 pub use importance::{Importance, from_weight_sums, importance, importance_of_points, importance_sums};
 pub use interval::{Interval, IntervalKind, clopper_pearson, gamma, log_normal, rule_of_three, wilson};
 pub use kernels::{KernelShares, kernel_shares};

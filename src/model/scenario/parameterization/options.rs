@@ -3,8 +3,8 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::Result;
 use crate::support::ranges;
+use crate::{Result, settings};
 
 /// What a constant acceleration does after the scenario's duration T.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -67,52 +67,37 @@ pub enum SvdFit {
     All,
 }
 
-/// Options of all parameterizations.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default)]
-pub struct ParameterizationOptions {
-    /// Constant acceleration after T (2, 4, b, d).
-    pub after_duration: AfterDuration,
-    /// Constant lateral speed (1, 2, a, b).
-    pub lateral_speed: LateralSpeed,
-    /// Start of 1 and 2.
-    pub lateral_start: LateralStart,
-    /// Lateral distance of a lane change, m (3.5).
-    #[schemars(extend("exclusiveMinimum" = 0.0))]
-    pub lane_change_m: f64,
-    /// Minimum lateral speed, m/s (1e-3).
-    #[schemars(extend("exclusiveMinimum" = 0.0))]
-    #[serde(alias = "least_lateral_speed_mps")] // in density files of earlier builds
-    pub min_lateral_speed_mps: f64,
-    /// LVD ii: 0 samples the sinusoid itself at every step; n > 0 joins n + 1 points of it by lines, as an
-    /// independent implementation does with 200 (largest effect on a speed: Δ·π²/(16 n²)).
-    #[schemars(range(max = 1_000_000))]
-    pub sinusoid_intervals: usize,
-    /// n_t: instants of a series in the decomposition (50).
-    #[schemars(range(min = 2, max = 10_000))]
-    pub svd_instants: usize,
-    /// Weight of a series.
-    pub series_scale: SeriesScale,
-    /// Sign of the lateral series.
-    pub svd_lateral: SvdLateral,
-    /// Scenarios the decomposition is fitted on.
-    pub svd_fit: SvdFit,
-}
-
-impl Default for ParameterizationOptions {
-    fn default() -> Self {
-        ParameterizationOptions {
-            after_duration: AfterDuration::Hold,
-            lateral_speed: LateralSpeed::Mean,
-            lateral_start: LateralStart::LaneWidth,
-            lane_change_m: 3.5,
-            min_lateral_speed_mps: 1e-3,
-            sinusoid_intervals: 0,
-            svd_instants: 50,
-            series_scale: SeriesScale::PerInstant,
-            svd_lateral: SvdLateral::Signed,
-            svd_fit: SvdFit::Kept,
-        }
+settings! {
+    /// Options of all parameterizations.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+    #[serde(deny_unknown_fields, default)]
+    pub struct ParameterizationOptions {
+        /// Constant acceleration after T (2, 4, b, d).
+        pub after_duration: AfterDuration = AfterDuration::Hold,
+        /// Constant lateral speed (1, 2, a, b).
+        pub lateral_speed: LateralSpeed = LateralSpeed::Mean,
+        /// Start of 1 and 2.
+        pub lateral_start: LateralStart = LateralStart::LaneWidth,
+        /// Lateral distance of a lane change, m (3.5).
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        pub lane_change_m: f64 = 3.5,
+        /// Minimum lateral speed, m/s (1e-3).
+        #[schemars(extend("exclusiveMinimum" = 0.0))]
+        #[serde(alias = "least_lateral_speed_mps")] // in density files of earlier builds
+        pub min_lateral_speed_mps: f64 = 1e-3,
+        /// LVD ii: 0 samples the sinusoid itself at every step; n > 0 joins n + 1 points of it by lines, as an
+        /// independent implementation does with 200 (largest effect on a speed: Δ·π²/(16 n²)).
+        #[schemars(range(max = 1_000_000))]
+        pub sinusoid_intervals: usize = 0,
+        /// n_t: instants of a series in the decomposition (50).
+        #[schemars(range(min = 2, max = 10_000))]
+        pub svd_instants: usize = 50,
+        /// Weight of a series.
+        pub series_scale: SeriesScale = SeriesScale::PerInstant,
+        /// Sign of the lateral series.
+        pub svd_lateral: SvdLateral = SvdLateral::Signed,
+        /// Scenarios the decomposition is fitted on.
+        pub svd_fit: SvdFit = SvdFit::Kept,
     }
 }
 
