@@ -101,6 +101,21 @@ impl FromValue for bool {
     }
 }
 
+/// Parses an integer as in the configuration: `10000`, `10_000` or `1e4`.
+///
+/// # Errors
+/// What to write, if the text is not an integer or is out of range.
+pub(super) fn whole<T: TryFrom<u64>>(text: &str) -> std::result::Result<T, String> {
+    let plain = text.replace('_', "");
+    let of_power = || {
+        // Above 2^53 a floating-point number no longer identifies one integer.
+        let value = plain.parse::<f64>().ok().filter(|value| value.fract() == 0.0 && (0.0..9e15).contains(value));
+        value.map(|value| value as u64)
+    };
+    let value = plain.parse().ok().or_else(of_power).ok_or("write a whole number such as 10000, 10_000 or 1e4")?;
+    T::try_from(value).map_err(|_| format!("{value} is too large"))
+}
+
 /// What a text of an option says, numbers as their texts.
 fn parsed<T>(value: &Value, expected: &str, parse: impl Fn(&str) -> Option<T>) -> std::result::Result<T, String> {
     let parsed = value.text().ok().and_then(|text| parse(text.trim()));
@@ -109,7 +124,7 @@ fn parsed<T>(value: &Value, expected: &str, parse: impl Fn(&str) -> Option<T>) -
 
 impl FromValue for usize {
     fn of(value: Value) -> std::result::Result<Self, String> {
-        parsed(&value, "a whole number from 0", |text| super::lists::whole(text).ok())
+        parsed(&value, "a whole number from 0", |text| whole(text).ok())
     }
 }
 

@@ -4,7 +4,6 @@
 use clap::Args;
 
 use super::arguments::from_arguments;
-use super::source;
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -14,19 +13,21 @@ use crate::scenario::parameterization::Parameterization;
 use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
-/// Parses an integer as in the configuration: `10000`, `10_000` or `1e4`.
-///
-/// # Errors
-/// What to write, if the text is not an integer or is out of range.
-pub(super) fn whole<T: TryFrom<u64>>(text: &str) -> std::result::Result<T, String> {
-    let plain = text.replace('_', "");
-    let of_power = || {
-        // Above 2^53 a floating-point number no longer identifies one integer.
-        let value = plain.parse::<f64>().ok().filter(|value| value.fract() == 0.0 && (0.0..9e15).contains(value));
-        value.map(|value| value as u64)
+/// Parses the categories of a flag, in the order of every table; all if the list is empty.
+pub(super) fn categories(list: &[String], flag: &str) -> Result<Vec<Category>> {
+    if list.is_empty() {
+        return Ok(Category::ALL.to_vec());
+    }
+    let parse = |text: &String| {
+        Category::parse(text.trim()).ok_or_else(|| {
+            let problem = format!("there is no category `{text}`");
+            Error::usage(Place::item(flag), problem, "use cut-in, cut-out, lvd")
+        })
     };
-    let value = plain.parse().ok().or_else(of_power).ok_or("write a whole number such as 10000, 10_000 or 1e4")?;
-    T::try_from(value).map_err(|_| format!("{value} is too large"))
+    let mut found = list.iter().map(parse).collect::<Result<Vec<_>>>()?;
+    refuse_repeats(|| Place::item(flag), found.iter().zip(list.iter().map(|text| text.trim())))?;
+    found.sort();
+    Ok(found)
 }
 
 /// `--categories`.
@@ -45,7 +46,7 @@ impl CategoriesFlag {
     /// # Errors
     /// [`Error::Usage`] for an unknown category.
     pub(super) fn list(&self) -> Result<Vec<Category>> {
-        source::categories(&self.categories, "--categories")
+        categories(&self.categories, "--categories")
     }
 }
 

@@ -73,7 +73,7 @@ from_arguments!(
 impl Search {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         let config = &configured.settings;
-        let [category] = source::categories(std::slice::from_ref(&self.category), "--category")?[..] else {
+        let [category] = lists::categories(std::slice::from_ref(&self.category), "--category")?[..] else {
             return Err(Error::usage(
                 Place::item("--category"),
                 "one category is needed",

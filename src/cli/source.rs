@@ -9,9 +9,8 @@ use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::console::{self, Units};
 use super::signals::CANCEL;
-use crate::scenario::{Category, DataProvenance, Driven, Scenario, ScenarioFile, read_scenario_file};
+use crate::scenario::{DataProvenance, Driven, Scenario, ScenarioFile, read_scenario_file};
 use crate::support::plausibility::Implausible;
-use crate::support::ranges::refuse_repeats;
 use crate::traffic::Source;
 use crate::traffic::mining::{Collection, counts, counts_text};
 use crate::traffic::trajectory::{InputFile, Inputs};
@@ -160,23 +159,6 @@ pub(super) fn scenarios_of(path: &Path, implausible: Implausible) -> Result<(Vec
     let ScenarioFile { scenarios, problems, notes } = read_scenario_file(path, implausible)?;
     complain_of(&problems, &notes);
     Ok((scenarios, !problems.is_empty()))
-}
-
-/// Parses the categories of a flag, in the order of every table; all if the list is empty.
-pub(super) fn categories(list: &[String], flag: &str) -> Result<Vec<Category>> {
-    if list.is_empty() {
-        return Ok(Category::ALL.to_vec());
-    }
-    let parse = |text: &String| {
-        Category::parse(text.trim()).ok_or_else(|| {
-            let problem = format!("there is no category `{text}`");
-            Error::usage(Place::item(flag), problem, "use cut-in, cut-out, lvd")
-        })
-    };
-    let mut found = list.iter().map(parse).collect::<Result<Vec<_>>>()?;
-    refuse_repeats(|| Place::item(flag), found.iter().zip(list.iter().map(|text| text.trim())))?;
-    found.sort();
-    Ok(found)
 }
 
 /// The canonical path of a file, however it is written.

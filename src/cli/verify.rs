@@ -7,7 +7,7 @@ use super::console::{self, Units};
 use super::devices::Devices;
 use super::format::FormatFlag;
 use super::source::SourceFlags;
-use super::{Exit, Output, lists};
+use super::{Exit, Output};
 use crate::engine::verify::{RandomOptions, ThresholdOptions, compare, random_plan, threshold_plan};
 use crate::engine::{Backend, LanePlan, LaneRunner, Wanted};
 use crate::model::profile::Profile;
@@ -35,10 +35,10 @@ pub(super) struct Verify {
     #[command(flatten)]
     data: SourceFlags,
     /// Random lanes per model and category
-    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = lists::whole::<u64>, help_heading = "Models and criteria")]
+    #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = super::arguments::whole::<u64>, help_heading = "Models and criteria")]
     random_lanes: u64,
     /// Units of 12 lanes per model, threshold and category
-    #[arg(long, value_name = "N", default_value_t = 64, value_parser = lists::whole::<u64>, help_heading = "Models and criteria", hide_short_help = true)]
+    #[arg(long, value_name = "N", default_value_t = 64, value_parser = super::arguments::whole::<u64>, help_heading = "Models and criteria", hide_short_help = true)]
     threshold_units: u64,
     /// Seed of the random lanes and of those on thresholds
     #[arg(long, value_name = "N", default_value_t = 157, help_heading = "Run")]

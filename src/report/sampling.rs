@@ -6,7 +6,6 @@ use serde::Serialize;
 
 use super::host::Host;
 use super::records::{PROGRAM, document, record};
-use super::sampling_tables::{VERDICTS, verdicts};
 use super::tables::{CloseRow, WIDTH, close_following, paragraph};
 use crate::Result;
 use crate::engine::generated::ATTEMPTS;
@@ -372,6 +371,15 @@ pub(super) fn weight<V>(of: impl Fn(&WeightFigures) -> V) -> impl Fn(&EstimateRo
 /// A column of numbers with three digits.
 pub(super) fn three_digits(name: &'static str) -> Column {
     Column::from(name).digits(Digits::Significant(3))
+}
+
+/// Heading of [`verdicts`].
+pub(super) const VERDICTS: &str = "verdicts";
+
+/// One word for each uncertainty of a row: draws, density, data.
+pub(super) fn verdicts(row: &EstimateRow) -> String {
+    let trust = &row.estimate.trust;
+    format!("{}, {}, {}", trust.draws(), trust.density(), trust.data())
 }
 
 /// Three digits.

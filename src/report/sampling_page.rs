@@ -3,8 +3,9 @@
 use super::html::{Page, PageFigure, Section};
 use super::plot::{AxisScale, Figure, Mark, Plot, PlotAxis, Series, Value, is_few};
 use super::records::PROGRAM;
-use super::sampling::{SampleReport, interval_text, rate_text, ratio_text, short, three_digits, weight};
-use super::sampling_tables::{VERDICTS, verdicts};
+use super::sampling::{
+    SampleReport, VERDICTS, interval_text, rate_text, ratio_text, short, three_digits, verdicts, weight,
+};
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;

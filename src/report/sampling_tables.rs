@@ -176,15 +176,6 @@ fn kind_name(kind: IntervalKind) -> &'static str {
     }
 }
 
-/// Heading of [`verdicts`].
-pub(super) const VERDICTS: &str = "verdicts";
-
-/// One word for each uncertainty of a row: draws, density, data.
-pub(super) fn verdicts(row: &EstimateRow) -> String {
-    let trust = &row.estimate.trust;
-    format!("{}, {}, {}", trust.draws(), trust.density(), trust.data())
-}
-
 impl SampleReport {
     /// What is said about the shown rows, each time with what it is said about. Too few scenarios are said once.
     pub(super) fn remarks(&self) -> Vec<(String, String)> {

@@ -12,7 +12,6 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 
 use tempfile::{NamedTempFile, TempPath};
 
-use crate::support::files::folder_of;
 use crate::{Error, Place, Result};
 
 /// Hidden names are `.lanesweep-<file name>-XXXXXX.part`.
@@ -22,6 +21,11 @@ const SUFFIX: &str = ".part";
 const RANDOM: usize = 6;
 /// Maximum number of bytes of the file name that a hidden name repeats: file systems limit a name to 255 bytes.
 const LONGEST: usize = 200;
+
+/// The folder that a file is in.
+pub fn folder_of(file: &Path) -> &Path {
+    file.parent().filter(|dir| !dir.as_os_str().is_empty()).unwrap_or(Path::new("."))
+}
 
 /// Removes from `dir` the hidden files of killed processes, of one target or of all. A process locks the hidden files
 /// that it writes, and the lock ends with the process. Files that cannot be removed are harmless and stay.

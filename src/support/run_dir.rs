@@ -12,35 +12,15 @@ use std::collections::BTreeSet;
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
+use crate::support::atomic_file::folder_of;
 use crate::support::atomic_file::{AtomicFile, Live, StagedFile, clear_stale, refuse_link, sync_folder};
-use crate::support::file_list::{FileList, LIST, RunFiles};
-use crate::support::files::{folder_of, make_folder};
+pub use crate::support::file_list::{
+    COMPARE_RECORD, DOSSIER_RECORD, ESTIMATE_RECORD, MAP_RECORD, SEARCH_RECORD, STUDY_RECORD,
+};
+use crate::support::file_list::{FileList, LIST, RECORDS, RunFiles};
+use crate::support::files::make_folder;
 use crate::support::lock::FolderLock;
 use crate::{Error, Place, Result};
-
-/// Record of a study.
-pub const STUDY_RECORD: &str = "run.json";
-/// Record of a sampling run.
-pub const ESTIMATE_RECORD: &str = "estimate.json";
-/// Record of a map.
-pub const MAP_RECORD: &str = "map.json";
-/// Record of a comparison.
-pub const COMPARE_RECORD: &str = "compare.json";
-/// Record of a search.
-pub const SEARCH_RECORD: &str = "search.json";
-/// Record of a dossier.
-pub const DOSSIER_RECORD: &str = "dossier.json";
-
-/// Records of runs that write files with the same names, such as `report.html`: a folder holds one of them. With the other
-/// files that every such run writes: a user's file of such a name is detected before the work starts.
-pub(super) const RECORDS: [(&str, &[&str]); 6] = [
-    (STUDY_RECORD, &["failures.csv", "f1.csv", "claims.csv", "headways.csv", "report.txt", "report.html"]),
-    (ESTIMATE_RECORD, &["estimates.csv", "report.html"]),
-    (MAP_RECORD, &["cells.csv", "report.html"]),
-    (COMPARE_RECORD, &["compare.csv", "compare.txt", "report.html"]),
-    (SEARCH_RECORD, &["fronts.csv", "candidates.csv", "report.html"]),
-    (DOSSIER_RECORD, &["hidden.csv", "report.html"]),
-];
 
 /// The lock of the whole folder.
 const LOCK: &str = "run.lock";

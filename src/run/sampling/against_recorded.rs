@@ -2,13 +2,11 @@
 //! replayed under the parameterization (S'). The interval of P includes the uncertainty of draws and data. The error of
 //! the parameterization itself is visible only in this comparison.
 
-use serde::Serialize;
-
 use super::Sample;
 use super::kernels::{KernelCounts, cell_of};
-use super::plan::SampleHeadways;
-use super::rows::EstimateRow;
-use super::sample_run::SampleResult;
+use super::result::SampleResult;
+use super::rows::{EstimateRow, RecordedRatios};
+use super::sample_options::SampleHeadways;
 use crate::engine::{CpuBackend, Executor, Headway, Wanted};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -16,15 +14,6 @@ use crate::run::study::{StudyOptions, plan_study};
 use crate::stats::density::DensityModel;
 use crate::stats::estimate::{Ratio, RatioVerdict, Warning};
 use crate::{Error, Result};
-
-/// Ratios of failure rates to that of S, over the same scenarios, headways, model and criterion.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct RecordedRatios {
-    /// S'/S: rates of the parameterized replays.
-    pub replayed: Ratio,
-    /// P/S: rates of the samples. Only for crude Monte Carlo, whose draws identify their scenario.
-    pub sampled: Option<Ratio>,
-}
 
 /// The lanes of S and of S' under the density's parameterization, with scenarios as kernels; `None` if the density cannot be replayed.
 fn replay(

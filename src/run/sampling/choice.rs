@@ -4,8 +4,8 @@
 
 use std::time::Instant;
 
+use super::result::SampleResult;
 use super::sample_options::{Estimator, SampleOptions};
-use super::sample_run::SampleResult;
 use super::{EstimateRow, Question, Sample};
 use crate::Result;
 use crate::engine::Executor;

@@ -14,9 +14,8 @@
 use serde::Serialize;
 
 use super::crude::sample_crude;
-use super::plan::SampleHeadways;
 use super::rows::{EstimateRow, Risk};
-use super::sample_options::{Estimator, SampleOptions};
+use super::sample_options::{Estimator, SampleHeadways, SampleOptions};
 use super::tally::SampleTally;
 use super::uncertainty::Uncertainty;
 use crate::engine::{Chunk, Confusion, Executor, LanePlan, Partial, SweepSummary};
@@ -24,7 +23,7 @@ use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::close_following::CloseFollowing;
 use crate::scenario::{Category, Scenario};
-use crate::stats::density::{DensityKind, DensityModel, Exposure, Representativeness};
+use crate::stats::density::{DensityKind, DensityModel, Exposure, Representativeness, normal_quantile};
 use crate::stats::estimate::{
     Clusters, Enough, Estimate, Ratio, StopReason, cluster_rate, from_clusters, paired_ratio,
 };
@@ -310,6 +309,48 @@ pub struct CategoryComparison {
     pub parameterizations: Vec<ComparedParameterization>,
     /// What the risk is uncertain by: model × criterion.
     pub uncertainty: Vec<Option<Uncertainty>>,
+}
+
+impl Uncertainty {
+    /// The uncertainty of the risk of a category under any of its parameterizations and forms: model × criterion. `None`
+    /// where no density has a failure. A rate without failures counts as its upper bound, so what it differs by is a
+    /// minimum.
+    pub(crate) fn of_category(category: &CategoryComparison, level: f64) -> Vec<Option<Uncertainty>> {
+        let z = normal_quantile(0.5 + 0.5 * level);
+        let variance = |low: f64, high: f64| (libm::log(high / low) / (2.0 * z)).powi(2);
+        let of_rate = |rate: &RateRecord| if rate.failures > 0 { variance(rate.low, rate.high) } else { 0.0 };
+        let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
+        // Variance of ln rate over the choices, less that of the draws; `None` for a single choice.
+        let between = |rates: &[&RateRecord]| {
+            let log = |rate: &&RateRecord| libm::log(if rate.failures > 0 { rate.rate } else { rate.high });
+            let logs: Vec<f64> = rates.iter().map(log).collect();
+            let of_draws: Vec<f64> = rates.iter().map(|rate| of_rate(rate)).collect();
+            let middle = mean(&logs);
+            let squares: f64 = logs.iter().map(|log| (log - middle).powi(2)).sum();
+            (logs.len() > 1).then(|| (squares / (logs.len() - 1) as f64 - mean(&of_draws)).max(0.0))
+        };
+        let all = &category.parameterizations;
+        let cell = |at: usize| {
+            let sampled = all.iter().map(|of| &of.cells[at].sampled);
+            let failing: Vec<_> = sampled.clone().filter(|of| of.rate.failures > 0).collect();
+            if failing.is_empty() {
+                return None;
+            }
+            let of_draws: Vec<f64> = failing.iter().map(|of| of_rate(&of.rate)).collect();
+            let with_data: Vec<f64> = failing.iter().map(|of| variance(of.with_data[0], of.with_data[1])).collect();
+            let forms = all.iter().filter(|of| !of.forms.is_empty()).filter_map(|of| {
+                let others = of.forms.iter().map(|form| &form.rates[at]);
+                between(&std::iter::once(&of.cells[at].sampled.rate).chain(others).collect::<Vec<_>>())
+            });
+            let forms: Vec<f64> = forms.collect();
+            let exposure = category.exposure.map_or(0.0, |of| 1.0 / of.events.max(1) as f64);
+            let draws = mean(&of_draws);
+            let parts = [draws, (mean(&with_data) - draws).max(0.0), exposure];
+            let rates: Vec<&RateRecord> = sampled.map(|of| &of.rate).collect();
+            Uncertainty::new(parts, (!forms.is_empty()).then(|| mean(&forms)), between(&rates))
+        };
+        (0..category.recorded.len()).map(cell).collect()
+    }
 }
 
 /// Model and criterion of every cell, in order.

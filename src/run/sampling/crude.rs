@@ -8,9 +8,8 @@ use std::time::Instant;
 use serde::Serialize;
 
 use super::limit_state::marks_of;
-use super::plan::SampleHeadways;
 use super::rows::{EstimateRow, crude_rows};
-use super::sample_options::SampleOptions;
+use super::sample_options::{SampleHeadways, SampleOptions};
 use super::tally::SampleTally;
 use crate::engine::{Executor, LanePlan, SweepSummary, Wanted, Watch};
 use crate::model::criterion::Criterion;

@@ -3,9 +3,8 @@
 
 use std::ops::Range;
 
-use serde::{Deserialize, Serialize};
-
-use super::plan::{SampleHeadways, plan_draws, plan_points};
+use super::plan::{plan_draws, plan_points};
+use super::sample_options::{Question, SampleHeadways};
 use crate::Result;
 use crate::engine::{Executor, Marks, Outcome, Wanted};
 use crate::model::criterion::Criterion;
@@ -43,18 +42,6 @@ pub fn limit_state(profile: &Profile, criterion: Criterion, outcome: &Outcome<f6
         Criterion::Btn => profile.criteria.btn_threshold - outcome.max_btn.min(MAX_BTN),
     };
     if failed { value.min(0.0) } else { value.max(MIN_UNFAILED) }
-}
-
-/// What is asked of a sample: does this driver model fail under this criterion from this headway?
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields)]
-pub struct Question {
-    /// Driver model.
-    pub model: ModelId,
-    /// Criterion.
-    pub criterion: Criterion,
-    /// Index into the headways of the run; 0 if the density draws the headway.
-    pub headway: usize,
 }
 
 /// Lanes as a limit state with several questions, over the points of the density's [mixture](DensityModel::mixture). Each has three guides: the [limit state](limit_state()), the smallest

@@ -15,6 +15,7 @@ mod model_ratios;
 mod plan;
 pub(crate) mod plan_file;
 mod proposal_file;
+mod result;
 mod rows;
 mod sample_options;
 mod sample_run;
@@ -23,7 +24,6 @@ mod uncertainty;
 mod weighted;
 mod worst;
 
-pub use against_recorded::RecordedRatios;
 pub use choice::Choice;
 pub use compare::{
     CategoryComparison, ComparedCell, ComparedForm, ComparedParameterization, RateRecord, RecordedCell, ReplayedCell,
@@ -34,16 +34,16 @@ pub use crude::{Checkpoint, CheckpointRow, CrudeRun, checkpoints, cuts, sample_c
 pub use generator::{SAMPLE_PURPOSE, SampleSource, generator_of, generator_of_points};
 pub use kernels::KernelCounts;
 pub(crate) use limit_state::marks_of;
-pub use limit_state::{LaneLimitState, Question, limit_state, truncated};
+pub use limit_state::{LaneLimitState, limit_state, truncated};
 pub use map::{MAP_CELLS, MapAxes, MapAxis, MapCounts};
-pub use model_ratios::{ModelRatio, ProfileRatios};
 pub(crate) use plan::mixture_of;
-pub use plan::{Conditional, SampleHeadways, conditional, plan_points, plan_samples};
+pub use plan::{Conditional, conditional, plan_points, plan_samples};
 use plan_file::{KIND, SEARCH_FILE};
 pub use proposal_file::{proposal_from_text, proposal_text, read_proposal};
-pub use rows::{EstimateRow, Risk, RiskRate};
-pub use sample_options::{Estimator, SampleOptions};
-pub use sample_run::{CrudeJob, SampleJob, SampleResult, WeightedJob};
+pub use result::{ModelRatio, ProfileRatios, SampleResult};
+pub use rows::{EstimateRow, RecordedRatios, Risk, RiskRate};
+pub use sample_options::{Estimator, Question, SampleHeadways, SampleOptions};
+pub use sample_run::{CrudeJob, SampleJob, WeightedJob};
 pub use tally::{SampleTally, WorstSample};
 pub use uncertainty::Uncertainty;
 pub use weighted::WeightedTally;

@@ -1,37 +1,17 @@
 //! Driver models, and profiles, against each other on the same samples.
 
-use serde::Serialize;
-
 use super::crude::sample_crude;
 use super::kernels::{KernelCounts, cell_of};
 use super::plan::{mixture_of, plan_samples};
+use super::result::{ModelRatio, ProfileRatios, SampleResult};
 use super::rows::headway_name;
-use super::sample_run::SampleResult;
 use super::tally::SampleTally;
 use super::{Sample, SampleOptions};
 use crate::engine::{Executor, LanePlan};
 use crate::model::criterion::Criterion;
-use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::stats::estimate::{Ratio, StopRule};
+use crate::stats::estimate::StopRule;
 use crate::{Error, Place, Result};
-
-/// The rate of one model over that of another. Both met the same samples (common random numbers), so what the samples
-/// and their scenarios have in common cancels. The interval covers the draws and the data; by importance sampling the
-/// draws alone.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct ModelRatio {
-    /// Numerator.
-    pub model: ModelId,
-    /// Denominator.
-    pub other: ModelId,
-    /// Criterion.
-    pub criterion: Criterion,
-    /// Headway, or `all`.
-    pub headway: String,
-    /// The ratio.
-    pub ratio: Ratio,
-}
 
 impl Sample {
     /// Every pair of models of a result. Where importance sampling answered, its ratio takes the place of the crude one.
@@ -52,15 +32,6 @@ impl Sample {
         }
         all
     }
-}
-
-/// The models of a run under its profile against the same models under another one.
-#[derive(Debug, Clone)]
-pub struct ProfileRatios {
-    /// The profile of the denominators.
-    pub other: String,
-    /// Numerator and denominator are of one model.
-    pub ratios: Vec<ModelRatio>,
 }
 
 impl Sample {

@@ -4,7 +4,6 @@
 use std::sync::Arc;
 
 use nalgebra::{DMatrix, DVector};
-use serde::{Deserialize, Serialize};
 
 use crate::engine::generated::{Generator, PointSource};
 use crate::engine::{Block, Headway, LanePlan, Units};
@@ -17,17 +16,7 @@ use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
 use super::generator::{SampleSource, generator_of, generator_of_points};
-use super::sample_options::SampleOptions;
-
-/// Initial headways of sampled lanes.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum SampleHeadways {
-    /// Every sample starts from each of these.
-    Each(Vec<Headway>),
-    /// The parameter `thw_s` of the density.
-    Sampled,
-}
+use super::sample_options::{SampleHeadways, SampleOptions};
 
 /// The plan whose unit `i` is draw `i` of `proposal` (the density itself for crude Monte Carlo).
 ///

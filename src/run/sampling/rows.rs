@@ -3,7 +3,6 @@
 
 use serde::Serialize;
 
-use super::against_recorded::RecordedRatios;
 use super::kernels::cell_of;
 use super::tally::SampleTally;
 use super::uncertainty::Uncertainty;
@@ -12,7 +11,7 @@ use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::stats::density::{Exposure, Rate, normal_quantile};
 use crate::stats::estimate::{
-    BinomialInterval, Counts, Estimate, Interval, StopReason, Warning, from_clusters, from_counts,
+    BinomialInterval, Counts, Estimate, Interval, Ratio, StopReason, Warning, from_clusters, from_counts,
 };
 
 /// An estimate with its model, criterion and headway.
@@ -37,6 +36,15 @@ pub struct EstimateRow {
     pub uncertainty: Option<Uncertainty>,
     /// Ratios to the rate of the recorded scenarios; `None` if the density does not contain them.
     pub recorded: Option<RecordedRatios>,
+}
+
+/// Ratios of failure rates to that of S, over the same scenarios, headways, model and criterion.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct RecordedRatios {
+    /// S'/S: rates of the parameterized replays.
+    pub replayed: Ratio,
+    /// P/S: rates of the samples. Only for crude Monte Carlo, whose draws identify their scenario.
+    pub sampled: Option<Ratio>,
 }
 
 impl EstimateRow {
@@ -90,6 +98,20 @@ impl EstimateRow {
     pub fn draws_half_width(&self) -> f64 {
         let [low, high] = self.draws;
         Interval { low, high, ..self.estimate.interval }.relative_half_width(self.estimate.probability)
+    }
+}
+
+impl EstimateRow {
+    /// The sources of the uncertainty, once the row includes that of the data. `of_draws` is the variance of the draws.
+    pub(super) fn with_sources(mut self, of_draws: f64, exposure: Option<&Exposure>) -> EstimateRow {
+        let square = self.estimate.probability.powi(2);
+        let of_data = (self.estimate.variance - of_draws).max(0.0);
+        let rate = exposure.and_then(|exposure| exposure.per_hour.or(exposure.per_kilometre));
+        let of_rate = rate.map_or(0.0, |rate| (rate.standard_deviation / rate.estimate).powi(2));
+        // The variance of ln X is about ln(1 + relative variance of X).
+        let parts = [of_draws / square, of_data / square, of_rate].map(libm::log1p);
+        self.uncertainty = Uncertainty::new(parts, None, None);
+        self
     }
 }
 

@@ -3,9 +3,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::generator::SampleSource;
-use super::limit_state::Question;
 use super::map::MapAxes;
-use super::plan::SampleHeadways;
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
@@ -52,6 +50,28 @@ impl Estimator {
             _ => BinomialInterval::Wilson,
         }
     }
+}
+
+/// Initial headways of sampled lanes.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum SampleHeadways {
+    /// Every sample starts from each of these.
+    Each(Vec<Headway>),
+    /// The parameter `thw_s` of the density.
+    Sampled,
+}
+
+/// What is asked of a sample: does this driver model fail under this criterion from this headway?
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Question {
+    /// Driver model.
+    pub model: ModelId,
+    /// Criterion.
+    pub criterion: Criterion,
+    /// Index into the headways of the run; 0 if the density draws the headway.
+    pub headway: usize,
 }
 
 /// Options of a sampling run.

@@ -3,17 +3,14 @@
 use std::ops::Range;
 use std::path::Path;
 
-use super::crude::{CrudeRun, crude_of_segments, cuts, sample_into};
-use super::model_ratios::{ModelRatio, ProfileRatios};
+use super::crude::{crude_of_segments, cuts, sample_into};
 use super::plan_file::SEARCH_FILE;
-use super::rows::EstimateRow;
+use super::result::SampleResult;
 use super::tally::SampleTally;
 use super::weighted::WeightedTally;
 use super::{Sample, SampleKind, Weighted};
 use crate::engine::{Executor, LanePlan, SweepSummary};
 use crate::run::parts::{Computed, EachChunk, Job, Ledger, MergeableCounts, PLAN_FILE, Shard, leave_plan};
-use crate::stats::density::Mixture;
-use crate::stats::estimate::SearchRound;
 use crate::support::run_dir::ESTIMATE_RECORD;
 use crate::{Error, Place, Result};
 
@@ -206,25 +203,4 @@ impl Job for WeightedJob<'_> {
         let result = self.sample.weighted_result(self.weighted, tally, place)?;
         self.sample.against_recorded(SampleResult { parts: computed.parts, ..result })
     }
-}
-
-/// Result of a sampling run.
-#[derive(Debug, Clone, Default)]
-pub struct SampleResult {
-    /// The estimates.
-    pub rows: Vec<EstimateRow>,
-    /// Ratios of the rates of two models by importance sampling.
-    pub ratios: Vec<ModelRatio>,
-    /// Ratios to the rates under another profile, if it was asked for.
-    pub profiles: Option<ProfileRatios>,
-    /// Counts and convergence of crude Monte Carlo.
-    pub crude: Option<CrudeRun>,
-    /// The rounds of the search.
-    pub search: Vec<SearchRound>,
-    /// The proposal found.
-    pub proposal: Option<Mixture>,
-    /// Number of merged parts; 0 for a run in one piece.
-    pub parts: usize,
-    /// Lanes that were rechecked.
-    pub rechecked_lanes: u64,
 }

@@ -5,10 +5,10 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
-use super::limit_state::{LaneLimitState, Question, scenario_shares, truncated};
-use super::model_ratios::ModelRatio;
+use super::limit_state::{LaneLimitState, scenario_shares, truncated};
+use super::result::{ModelRatio, SampleResult};
 use super::rows::EstimateRow;
-use super::sample_run::SampleResult;
+use super::sample_options::Question;
 use super::{Sample, Weighted};
 use crate::engine::{CpuBackend, Executor, lanes_within_seconds};
 use crate::run::parts::{Ledger, MergeableCounts};

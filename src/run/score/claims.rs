@@ -9,7 +9,7 @@
 
 use super::ScoreTable;
 use super::difference::ScoreInterval;
-use super::paper_claims::paper_claims;
+use super::paper_claims::{Claim, paper_claims};
 use super::statistic::{Scenarios, Statistic};
 use crate::engine::{Headway, LanePlan, Partial, UnitCounts};
 use crate::model::criterion::Criterion;
@@ -18,21 +18,6 @@ use crate::scenario::Category;
 
 /// Bound of a claimed equality of F1.
 const NEAR: f64 = 0.05;
-
-/// A claim as data.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Claim {
-    /// Short name.
-    pub id: &'static str,
-    /// Kind of scenario.
-    pub category: Category,
-    /// What the paper says.
-    pub statement: &'static str,
-    /// Its cells. A claim that compares models has one cell per criterion, under its first model.
-    pub cells: Vec<(ModelId, Criterion)>,
-    /// The statistic of the claim.
-    pub statistic: Statistic,
-}
 
 /// Verdict on a claim or a cell.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -15,10 +15,11 @@ mod published;
 mod statistic;
 
 pub use best::{Best, BestScore, best_parameterizations};
-pub use claims::{Claim, ClaimResult, ClaimRow, ClaimVerdict, check_claims};
+pub use claims::{ClaimResult, ClaimRow, ClaimVerdict, check_claims};
 pub use difference::{Contrast, ScenarioRate, ScoreInterval, min_contrast};
 pub use headways::HeadwayFailures;
 pub use mean::{MeanF1, equal_f1, pareto_front};
+pub use paper_claims::Claim;
 pub use published::{Misfit, PublishedFailures, published_failures, published_lvd_f1};
 pub use statistic::Statistic;
 

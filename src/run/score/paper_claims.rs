@@ -1,11 +1,25 @@
 //! The claims of the paper as data, from its sections on results and discussion.
 
-use super::claims::Claim;
 use super::published::PAPER_MODELS;
 use super::statistic::Statistic;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::scenario::Category;
+
+/// A claim as data.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Claim {
+    /// Short name.
+    pub id: &'static str,
+    /// Kind of scenario.
+    pub category: Category,
+    /// What the paper says.
+    pub statement: &'static str,
+    /// Its cells. A claim that compares models has one cell per criterion, under its first model.
+    pub cells: Vec<(ModelId, Criterion)>,
+    /// The statistic of the claim.
+    pub statistic: Statistic,
+}
 
 fn cells(models: &[ModelId], criteria: &[Criterion]) -> Vec<(ModelId, Criterion)> {
     models.iter().flat_map(|&m| criteria.iter().map(move |&c| (m, c))).collect()

@@ -6,9 +6,8 @@ use std::path::{Path, PathBuf};
 
 use serde_json::Value;
 
-use super::reader::TableRows;
 use super::writer::text_of_cell;
-use super::{Cell, Row};
+use super::{Cell, Row, TableRows};
 use crate::support::input_file;
 use crate::{Error, Place, Result};
 

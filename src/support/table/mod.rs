@@ -22,12 +22,12 @@ mod writer;
 
 #[cfg(feature = "arrow")]
 pub use arrow::ArrowRows;
-pub use column::{Cell, Column, ColumnKind, Digits, Row, TableMetadata};
+pub use column::{Cell, Column, ColumnKind, Digits, Row, TableMetadata, TableRows};
 pub use memory::{CellValue, NumberText, Table, TableOf};
 pub use names::{NameUnit, Named, Resolved, nearest, resolve};
 #[cfg(feature = "parquet")]
 pub use parquet_reader::is_panic_caught;
-pub use reader::{TableReader, TableRows};
+pub use reader::TableReader;
 pub use text::WIDTH;
 pub use writer::{TableWriter, csv_field, json_number, text_of_cell};
 

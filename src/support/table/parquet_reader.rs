@@ -21,8 +21,7 @@ use parquet::arrow::arrow_reader::{
 use parquet::basic::Compression;
 use serde_json::Value;
 
-use super::reader::TableRows;
-use super::{Cell as TableCell, Row};
+use super::{Cell as TableCell, Row, TableRows};
 use crate::support::input_file;
 use crate::{Error, Place, Result};
 

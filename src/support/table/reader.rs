@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use super::csv_reader::CsvRows;
 #[cfg(feature = "parquet")]
 use super::parquet_reader::ParquetRows;
-use super::{Cell, Row, TableFormat};
+use super::{TableFormat, TableRows};
 use crate::{Error, Place, Result};
 
 /// A table being read.
@@ -16,40 +16,6 @@ pub struct TableReader {
     is_text: bool,
     /// The rows.
     pub rows: Box<dyn TableRows>,
-}
-
-/// The rows of a table, of any format.
-pub trait TableRows {
-    /// Selects the columns, in the order in which rows have them. Call it before the first row.
-    ///
-    /// # Errors
-    /// [`Error::Input`] if a selected column has an unsupported type, or its pages claim more than the file can hold.
-    fn want(&mut self, columns: &[usize]) -> Result<()>;
-
-    /// Returns the next row; `None` after the last.
-    ///
-    /// # Errors
-    /// [`Error::Io`]; [`Error::Input`] for damaged data.
-    fn next_row(&mut self) -> Result<Option<Row>>;
-
-    /// Advances to the next row, whose values [`TableRows::cell`] gives; false after the last.
-    ///
-    /// # Errors
-    /// As [`TableRows::next_row`].
-    fn step(&mut self) -> Result<bool>;
-
-    /// The value of a selected column, by its position in the selection, after [`TableRows::step`]; null for a list.
-    fn cell(&self, wanted: usize) -> Cell<'_>;
-
-    /// Whether a selected column has lists.
-    fn has_lists(&self) -> bool {
-        false
-    }
-
-    /// Whether a column has instants, which are numbers in seconds since 1970.
-    fn has_instants(&self, _column: usize) -> bool {
-        false
-    }
 }
 
 impl TableReader {

@@ -9,7 +9,7 @@ use crate::traffic::trajectory::{EgoViewOptions, LIMIT_TOLERANCE_M};
 use crate::{Result, settings};
 
 settings! {
-    /// All options of [`mine`](super::mine). Values above 10⁶ have no meaning in traffic, and their number of samples
+    /// All options of `mine`. Values above 10⁶ have no meaning in traffic, and their number of samples
     /// would overflow.
     #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
     #[serde(default, deny_unknown_fields)]

@@ -7,7 +7,7 @@ use super::format::{FRAME_LIMIT, TRACKS_HEADER, csv_format};
 use super::geometry;
 use super::inventory::{HighdFiles, made_up};
 use super::meta::{self, RecordingMeta, VehicleMeta};
-use crate::support::files::folder_of;
+use crate::support::atomic_file::folder_of;
 use crate::support::plausibility::{Doubts, HELP, Implausible, Quantity};
 use crate::traffic::trajectory::Loaded;
 use crate::traffic::trajectory::csv_table::{CsvColumn, CsvTable};

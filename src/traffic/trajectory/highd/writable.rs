@@ -7,12 +7,12 @@ use crate::traffic::trajectory::{NO_LANE, Recording, Track};
 use crate::{Error, Place, Result};
 
 /// Rounds a recording to the values that its own files hold: writing the quantized recording with
-/// [`write`](super::write) and reading it gives the same bits.
+/// `write` and reading it gives the same bits.
 ///
 /// Every value is transformed, rounded to hundredths and transformed back until it no longer changes.
 ///
 /// # Errors
-/// If the format cannot hold the recording, see [`write`](super::write).
+/// If the format cannot hold the recording, see `write`.
 pub fn quantize(recording: &mut Recording) -> Result<()> {
     let layout = ImageLayout::of(recording)?;
     let settle = |values: &mut [f64], to_file: &dyn Fn(f64) -> f64, from_file: &dyn Fn(f64) -> f64| {

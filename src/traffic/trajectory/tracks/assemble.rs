@@ -3,7 +3,7 @@
 use std::collections::{BTreeMap, HashSet};
 
 use super::boxes::{Sized, centre, is_ignored, sized};
-use super::directions::{describe_road, oncoming_left_m, road};
+use super::directions::{Placed, describe_road, oncoming_left_m, road};
 use super::lanes::{LaneSource, Lateral, lane_lines, lines_of_map};
 use super::pieces::{Piece, pieces};
 use super::preset::{Preset, Reference, Side};
@@ -15,14 +15,6 @@ use super::smooth::{central, savitzky_golay};
 use super::understanding::{Comparison, Understanding, UnderstoodCarriageway};
 use crate::traffic::trajectory::{Carriageway, NO_LANE, Recording, Track};
 use crate::{Error, Place, Result};
-
-/// A piece on its carriageway.
-pub(super) struct Placed {
-    pub piece: Piece,
-    pub sized: Sized,
-    pub is_forward: bool,
-    pub on: Vec<OnRoad>,
-}
 
 impl Placed {
     /// Directions of the road at its samples. They are computed again, because memory would hold two numbers a sample.

@@ -1,11 +1,19 @@
 //! Directions of travel: the line of the road for each, and who drives along which.
 
-use super::assemble::Placed;
+use super::boxes::Sized;
 use super::pieces::Piece;
 use super::preset::{Preset, RoadSource};
 use super::raw::RawRecording;
-use super::road::{Path, RoadLine, d_range, dot, median};
+use super::road::{OnRoad, Path, RoadLine, d_range, dot, median};
 use super::understanding::Understanding;
+
+/// A piece on its carriageway.
+pub(super) struct Placed {
+    pub piece: Piece,
+    pub sized: Sized,
+    pub is_forward: bool,
+    pub on: Vec<OnRoad>,
+}
 
 /// Maximum number of paths that the road is fitted to.
 const FITTED_PATHS: usize = 400;

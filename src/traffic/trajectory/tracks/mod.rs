@@ -40,7 +40,8 @@ use rows::{Columns, Rows};
 
 use super::Loaded;
 use super::highd::made_up;
-use crate::support::files::{file_name, folder_of};
+use crate::support::atomic_file::folder_of;
+use crate::support::files::file_name;
 use crate::support::input_file::{open_text, unpacked};
 use crate::support::plausibility::Implausible;
 use crate::{Error, Place, Result};

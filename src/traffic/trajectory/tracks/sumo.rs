@@ -11,7 +11,8 @@ use super::raw::{NO_LABEL, RawRecording, RawSample, RawVehicle};
 use super::road::cross;
 use super::roles::{ColumnName, Role};
 use super::rows::{Columns, Rows};
-use crate::support::files::{file_name, folder_of};
+use crate::support::atomic_file::folder_of;
+use crate::support::files::file_name;
 use crate::traffic::trajectory::csv_table::FileChecksum;
 use crate::{Error, Place, Result};
 
