@@ -18,7 +18,7 @@ use crate::report::host::{Host, Timings};
 use crate::report::lanes::{study_table, table_format, write_study_chunk};
 use crate::report::study::StudyReport;
 use crate::run::parts::{EachChunk, Job, PLAN_FILE, RUN_PLAN_FILE};
-use crate::run::study::{self, GivenReplay, ReferenceComparison, StudyOptions, StudyResult};
+use crate::run::study::{self, ExternalReplay, ReferenceComparison, StudyOptions, StudyResult};
 use crate::support::files::{check_folder, check_folder_of};
 use crate::support::input_file;
 use crate::support::readable;
@@ -173,7 +173,7 @@ impl Study {
             if lists::is_file(&path.to_string_lossy()) {
                 options.searched.push(lists::of_file(&path.to_string_lossy(), &options.categories)?);
             } else {
-                options.external.extend(GivenReplay::read(
+                options.external.extend(ExternalReplay::read(
                     path,
                     &collection.scenarios,
                     &options.categories,

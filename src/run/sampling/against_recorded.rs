@@ -3,9 +3,9 @@
 //! the parameterization itself is visible only in this comparison.
 
 use super::Sample;
-use super::kernels::{KernelCounts, cell_of};
+use super::estimate_rows::{EstimateRow, RecordedRatios};
+use super::kernel_counts::{KernelCounts, cell_of};
 use super::result::SampleResult;
-use super::rows::{EstimateRow, RecordedRatios};
 use super::sample_options::SampleHeadways;
 use crate::engine::{CpuBackend, Executor, Headway, Wanted};
 use crate::model::driver::ModelId;

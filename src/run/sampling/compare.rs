@@ -14,7 +14,7 @@
 use serde::Serialize;
 
 use super::crude::sample_crude;
-use super::rows::{EstimateRow, Risk};
+use super::estimate_rows::{EstimateRow, Risk};
 use super::sample_options::{Estimator, SampleHeadways, SampleOptions};
 use super::tally::SampleTally;
 use super::uncertainty::Uncertainty;

@@ -7,8 +7,8 @@ use std::time::Instant;
 
 use serde::Serialize;
 
+use super::estimate_rows::{EstimateRow, crude_rows};
 use super::limit_state::marks_of;
-use super::rows::{EstimateRow, crude_rows};
 use super::sample_options::{SampleHeadways, SampleOptions};
 use super::tally::SampleTally;
 use crate::engine::{Executor, LanePlan, SweepSummary, Wanted, Watch};

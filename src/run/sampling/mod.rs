@@ -4,19 +4,19 @@
 //! Densities and estimators come from [`crate::stats`]; lanes run in [`crate::engine`].
 
 mod against_recorded;
-mod choice;
+mod cheaper_estimator;
 mod compare;
 mod crude;
+mod estimate_rows;
+mod failure_map;
 mod generator;
-mod kernels;
+mod kernel_counts;
 mod limit_state;
-mod map;
 mod model_ratios;
 mod plan;
 pub(crate) mod plan_file;
 mod proposal_file;
 mod result;
-mod rows;
 mod sample_options;
 mod sample_run;
 mod tally;
@@ -24,24 +24,24 @@ mod uncertainty;
 mod weighted;
 mod worst;
 
-pub use choice::Choice;
+pub use cheaper_estimator::Choice;
 pub use compare::{
     CategoryComparison, ComparedCell, ComparedForm, ComparedParameterization, RateRecord, RecordedCell, ReplayedCell,
     SampledCell, SampledScenarios, ScenarioCounts, kernel_scenarios, sample_by_scenario,
 };
 pub(crate) use compare::{compare_cells, recorded_cells};
 pub use crude::{Checkpoint, CheckpointRow, CrudeRun, checkpoints, cuts, sample_crude, sample_into};
+pub use estimate_rows::{EstimateRow, RecordedRatios, Risk, RiskRate};
+pub use failure_map::{MAP_CELLS, MapAxes, MapAxis, MapCounts};
 pub use generator::{SAMPLE_PURPOSE, SampleSource, generator_of, generator_of_points};
-pub use kernels::KernelCounts;
+pub use kernel_counts::KernelCounts;
 pub(crate) use limit_state::marks_of;
 pub use limit_state::{LaneLimitState, limit_state, truncated};
-pub use map::{MAP_CELLS, MapAxes, MapAxis, MapCounts};
 pub(crate) use plan::mixture_of;
 pub use plan::{Conditional, conditional, plan_points, plan_samples};
 use plan_file::{KIND, SEARCH_FILE};
 pub use proposal_file::{proposal_from_text, proposal_text, read_proposal};
 pub use result::{ModelRatio, ProfileRatios, SampleResult};
-pub use rows::{EstimateRow, RecordedRatios, Risk, RiskRate};
 pub use sample_options::{Estimator, Question, SampleHeadways, SampleOptions};
 pub use sample_run::{CrudeJob, SampleJob, WeightedJob};
 pub use tally::{SampleTally, WorstSample};

@@ -1,10 +1,10 @@
 //! Driver models, and profiles, against each other on the same samples.
 
 use super::crude::sample_crude;
-use super::kernels::{KernelCounts, cell_of};
+use super::estimate_rows::headway_name;
+use super::kernel_counts::{KernelCounts, cell_of};
 use super::plan::{mixture_of, plan_samples};
 use super::result::{ModelRatio, ProfileRatios, SampleResult};
-use super::rows::headway_name;
 use super::tally::SampleTally;
 use super::{Sample, SampleOptions};
 use crate::engine::{Executor, LanePlan};

@@ -3,7 +3,7 @@
 use serde::Serialize;
 
 use super::crude::CrudeRun;
-use super::rows::EstimateRow;
+use super::estimate_rows::EstimateRow;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::stats::density::Mixture;

@@ -2,8 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::failure_map::MapAxes;
 use super::generator::SampleSource;
-use super::map::MapAxes;
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;

@@ -6,9 +6,9 @@ use std::ops::Range;
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use super::kernels::{KernelCounts, NO_KERNEL, add_counts};
+use super::failure_map::{MAP_CELLS, MapAxes, MapCounts};
+use super::kernel_counts::{KernelCounts, NO_KERNEL, add_counts};
 use super::limit_state::limit_state;
-use super::map::{MAP_CELLS, MapAxes, MapCounts};
 use super::sample_options::SampleOptions;
 use crate::engine::generated::{ATTEMPTS, DrawnPoint, Generator};
 use crate::engine::{CLOSE_HEADWAY_S, Chunk, CountLayout, Counted, Counting, Headway, LanePlan, Verdicts};

@@ -5,9 +5,9 @@ use std::ops::Range;
 
 use serde::{Deserialize, Serialize};
 
+use super::estimate_rows::EstimateRow;
 use super::limit_state::{LaneLimitState, scenario_shares, truncated};
 use super::result::{ModelRatio, SampleResult};
-use super::rows::EstimateRow;
 use super::sample_options::Question;
 use super::{Sample, Weighted};
 use crate::engine::{CpuBackend, Executor, lanes_within_seconds};

@@ -3,10 +3,10 @@
 
 mod cases;
 mod evaluation;
-mod facts;
-mod given;
+mod external_replays;
 mod plan;
 pub(crate) mod plan_file;
+mod provenance;
 mod read;
 mod reference;
 mod robustness;
@@ -15,11 +15,11 @@ mod run;
 pub use cases::StudyCases;
 pub(crate) use cases::WINDOW;
 pub use evaluation::{CategoryNumbers, StudyEvaluation};
-use facts::category_facts;
-pub use facts::{CategoryProvenance, ParameterHistogram, StudyProvenance};
-pub use given::GivenReplay;
+pub use external_replays::ExternalReplay;
 pub use plan::{StudyOptions, outline_study, plan_study};
 pub use plan_file::StudyHead;
+use provenance::category_provenance;
+pub use provenance::{CategoryProvenance, ParameterHistogram, StudyProvenance};
 
 pub use reference::{Difference, ReferenceComparison};
 pub use robustness::robust_lanes;
@@ -165,7 +165,7 @@ impl StudyBuilder<'_> {
             reference: self.reference,
             incomplete: !collection.problems.is_empty(),
             scenario_file_sha256: self.scenario_file_sha256,
-            categories: category_facts(collection, &cases, &options)?,
+            categories: category_provenance(collection, &cases, &options)?,
             left_out: collection.problems.iter().chain(cases.left_out()).map(Error::to_string).collect(),
             notes: collection.notes.clone(),
             recordings: collection.recordings.clone(),

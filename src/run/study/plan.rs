@@ -4,7 +4,7 @@ use crate::engine::plan::{Headway, LanePlan};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::study::cases::{StudyCases, entries_per_step, parameterizations};
-use crate::run::study::given::{GivenReplay, held_out, searched};
+use crate::run::study::external_replays::{ExternalReplay, held_out, searched};
 use crate::run::study::plan_file::{BlockHead, StudyHead, stripped};
 use crate::scenario::parameterization::{
     Parameterization, ParameterizationOptions, ReducedScenario, Reduction, SvdFit, TimeGrid, steps_of, vehicle_ahead,
@@ -30,7 +30,7 @@ pub struct StudyOptions {
     /// Searched parameterizations, beside those of the paper.
     pub searched: Vec<Parameterization>,
     /// S' of other programs.
-    pub external: Vec<GivenReplay>,
+    pub external: Vec<ExternalReplay>,
 }
 
 impl Default for StudyOptions {
@@ -99,7 +99,7 @@ pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyO
             Err(error) => return Err(error),
         };
         let mut replays = Vec::new();
-        let mut add = |made: Result<Vec<GivenReplay>>| match made {
+        let mut add = |made: Result<Vec<ExternalReplay>>| match made {
             Ok(made) => {
                 replays.extend(made);
                 Ok(())
@@ -118,7 +118,7 @@ pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyO
         }
         replays.extend(options.external.iter().filter(|replay| replay.category == category).cloned());
         let given = |scenario: &Scenario| -> Result<Vec<ReducedScenario>> {
-            let of = |replay: &GivenReplay| replay.scenarios.get(&scenario.id).cloned();
+            let of = |replay: &ExternalReplay| replay.scenarios.get(&scenario.id).cloned();
             let all: Option<Vec<ReducedScenario>> = replays.iter().map(of).collect();
             all.ok_or_else(|| Error::Internal(format!("an S' of scenario {} is missing", scenario.id)))
         };

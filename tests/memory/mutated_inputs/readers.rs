@@ -12,7 +12,7 @@ use lanesweep::run::sampling::{
     Estimator, SampleHeadways, SampleOptions, SampleTally, WeightedTally, plan_samples, read_proposal,
 };
 use lanesweep::run::score::ScoreOptions;
-use lanesweep::run::study::{GivenReplay, StudyHead, StudyOptions, plan_study};
+use lanesweep::run::study::{ExternalReplay, StudyHead, StudyOptions, plan_study};
 use lanesweep::scenario::DataProvenance;
 use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction};
 use lanesweep::scenario::{Category, Scenario, read_scenarios};
@@ -241,7 +241,7 @@ fn searched(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> 
 /// S' of another program.
 fn external(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> {
     let path = file(bytes, dir, "other.jsonl");
-    let external = GivenReplay::read(&path, &seeds.scenarios, &Category::ALL, Implausible::Refused)?;
+    let external = ExternalReplay::read(&path, &seeds.scenarios, &Category::ALL, Implausible::Refused)?;
     let options = StudyOptions { headways: vec![Headway::ThwS(1.0)], external, ..StudyOptions::default() };
     let plan = plan_study(&seeds.scenarios, &seeds.profile, &options)?;
     if heavy { run_some(&plan, 1) } else { Ok(()) }

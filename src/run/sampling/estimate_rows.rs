@@ -3,7 +3,7 @@
 
 use serde::Serialize;
 
-use super::kernels::cell_of;
+use super::kernel_counts::cell_of;
 use super::tally::SampleTally;
 use super::uncertainty::Uncertainty;
 use crate::engine::LanePlan;

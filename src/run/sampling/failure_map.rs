@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::kernels::add_counts;
+use super::kernel_counts::add_counts;
 use crate::engine::CountedAxis;
 use crate::stats::density::DensityModel;
 use crate::{Error, Place, Result};

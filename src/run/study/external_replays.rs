@@ -15,7 +15,7 @@ use crate::{Error, Place, Result};
 
 /// S' of the scenarios of a category, by their ids.
 #[derive(Debug, Clone, PartialEq)]
-pub struct GivenReplay {
+pub struct ExternalReplay {
     /// Kind of scenario.
     pub category: Category,
     /// Name of the variant.
@@ -24,7 +24,7 @@ pub struct GivenReplay {
     pub scenarios: BTreeMap<String, ReducedScenario>,
 }
 
-impl GivenReplay {
+impl ExternalReplay {
     /// S' of a scenario file of another program: the ids of S, any sample rate and length. The variants have the name of
     /// the file, with - for other characters than letters, digits, - and _.
     ///
@@ -35,7 +35,7 @@ impl GivenReplay {
         scenarios: &[Scenario],
         categories: &[Category],
         implausible: Implausible,
-    ) -> Result<Vec<GivenReplay>> {
+    ) -> Result<Vec<ExternalReplay>> {
         let place = || Place::file(path);
         let ScenarioFile { scenarios: given, mut problems, .. } = read_scenario_file(path, implausible)?;
         if !problems.is_empty() {
@@ -53,7 +53,7 @@ impl GivenReplay {
             return Err(Error::input(place(), problem, help));
         }
         let known: BTreeMap<&str, &Scenario> = scenarios.iter().map(|s| (s.id.as_str(), s)).collect();
-        let mut replays: BTreeMap<Category, GivenReplay> = BTreeMap::new();
+        let mut replays: BTreeMap<Category, ExternalReplay> = BTreeMap::new();
         for own in given {
             let at = || place().of(format!("scenario {}", own.id));
             match known.get(own.id.as_str()) {
@@ -83,7 +83,7 @@ impl GivenReplay {
                 return Err(Error::input(at(), problem, "add them"));
             }
             let replay = replays.entry(own.category);
-            let replay = replay.or_insert_with(|| GivenReplay {
+            let replay = replay.or_insert_with(|| ExternalReplay {
                 category: own.category,
                 key: key.clone(),
                 scenarios: BTreeMap::new(),
@@ -107,11 +107,11 @@ impl GivenReplay {
 ///
 /// # Errors
 /// As [`held_out`].
-pub(super) fn searched(id: &Parameterization, kept: &[&Scenario], folds: Option<usize>) -> Result<Vec<GivenReplay>> {
+pub(super) fn searched(id: &Parameterization, kept: &[&Scenario], folds: Option<usize>) -> Result<Vec<ExternalReplay>> {
     let (Some(fitted), Some(d)) = (id.fitted_basis(), id.coefficients()) else { return Ok(Vec::new()) };
     let reduced = kept.iter().map(|scenario| Ok((scenario.id.clone(), fitted.reduce(scenario, d)?)));
     let scenarios = reduced.collect::<Result<_>>()?;
-    let mut replays = vec![GivenReplay { category: id.category, key: id.key.to_string(), scenarios }];
+    let mut replays = vec![ExternalReplay { category: id.category, key: id.key.to_string(), scenarios }];
     if let Some(count) = folds {
         replays.extend(of_folds(kept, count, &[(&id.key, d)], |train| fitted.refit(train))?);
     }
@@ -127,7 +127,7 @@ pub(super) fn held_out(
     kept: &[&Scenario],
     options: &ParameterizationOptions,
     count: usize,
-) -> Result<Vec<GivenReplay>> {
+) -> Result<Vec<ExternalReplay>> {
     let ids: Vec<Parameterization> = Parameterization::of(category).collect();
     let sizes: Vec<(&str, usize)> = ids.iter().filter_map(|id| Some((id.key.as_ref(), id.coefficients()?))).collect();
     of_folds(kept, count, &sizes, |train| Reduction::fit(category, train, options))
@@ -138,7 +138,7 @@ fn of_folds(
     count: usize,
     sizes: &[(&str, usize)],
     fit: impl Fn(&[&Scenario]) -> Result<Reduction> + Sync,
-) -> Result<Vec<GivenReplay>> {
+) -> Result<Vec<ExternalReplay>> {
     let of = folds(kept, count)?;
     let train = |fold: usize| -> Vec<&Scenario> {
         kept.iter().zip(&of).filter(|(_, of)| **of != fold).map(|(scenario, _)| *scenario).collect()
@@ -148,7 +148,11 @@ fn of_folds(
         let reduced =
             kept.iter().zip(&of).map(|(scenario, fold)| Ok((scenario.id.clone(), fitted[*fold].reduce(scenario, *d)?)));
         let category = fitted[0].category;
-        Ok(GivenReplay { category, key: format!("{key}{CROSS_VALIDATED}"), scenarios: reduced.collect::<Result<_>>()? })
+        Ok(ExternalReplay {
+            category,
+            key: format!("{key}{CROSS_VALIDATED}"),
+            scenarios: reduced.collect::<Result<_>>()?,
+        })
     };
     sizes.iter().map(replay).collect()
 }

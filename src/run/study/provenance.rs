@@ -78,7 +78,7 @@ pub struct StudyProvenance {
 }
 
 /// The data of every block of the plan.
-pub(super) fn category_facts(
+pub(super) fn category_provenance(
     collection: &Collection,
     planned: &StudyCases,
     options: &StudyOptions,
