@@ -108,7 +108,7 @@ impl CountLayout {
     }
 
     /// Number of counts that every sample may change; the others belong to a cell or a group.
-    pub(crate) fn of_every_sample(&self) -> usize {
+    pub fn of_every_sample(&self) -> usize {
         self.close_failures().end
     }
 

@@ -171,13 +171,14 @@ pub trait TableRows {
     /// Selects the columns, in the order in which rows have them. Call it before the first row.
     ///
     /// # Errors
-    /// [`Error::Input`] if a selected column has an unsupported type, or its pages claim more than the file can hold.
+    /// [`Error::Input`](crate::Error::Input) if a selected column has an unsupported type, or its pages claim more than the
+    /// file can hold.
     fn want(&mut self, columns: &[usize]) -> Result<()>;
 
     /// Returns the next row; `None` after the last.
     ///
     /// # Errors
-    /// [`Error::Io`]; [`Error::Input`] for damaged data.
+    /// [`Error::Io`](crate::Error::Io); [`Error::Input`](crate::Error::Input) for damaged data.
     fn next_row(&mut self) -> Result<Option<Row>>;
 
     /// Advances to the next row, whose values [`TableRows::cell`] gives; false after the last.

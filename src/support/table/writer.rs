@@ -97,6 +97,10 @@ impl TableWriter {
     /// # Errors
     /// [`Error::Io`].
     pub fn stage(self) -> Result<StagedFile> {
+        #[cfg_attr(
+            not(feature = "parquet"),
+            expect(clippy::infallible_destructuring_match, reason = "without Parquet a table is text")
+        )]
         let file = match self.out {
             Out::Text(file, ..) => file,
             #[cfg(feature = "parquet")]
