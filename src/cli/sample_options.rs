@@ -10,7 +10,7 @@ use crate::model::driver::ModelId;
 use crate::report::lanes::table_format;
 use crate::run::sampling::{Estimator, MapAxes, SampleHeadways, SampleOptions, SampleSource, read_proposal};
 use crate::stats::density::{DensityModel, Mixture};
-use crate::stats::estimate::{BinomialInterval, Checkpoints, Search, StopRule};
+use crate::stats::estimate::{BinomialInterval, Checkpoints, Goal, Search, StopRule};
 use crate::support::plausibility::{Doubts, HELP};
 use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
@@ -24,7 +24,7 @@ impl Sample {
                 // The choice is made after a pilot.
                 EstimatorKind::Auto if self.is_refined() => None,
                 EstimatorKind::Is if self.settings.samples.is_none() => {
-                    Some(self.settings.half_width.unwrap_or(DEFAULT_HALF_WIDTH))
+                    Some(self.settings.half_width.unwrap_or(Goal::HALF_WIDTH))
                 }
                 _ => self.settings.half_width,
             },
@@ -134,8 +134,6 @@ const DEFAULT_SAMPLES: u64 = 100_000;
 const CRUDE_PER_DRAW: u64 = 10;
 /// Maximum number of crude draws of a search with a driver outside the registry.
 const DRIVER_CRUDE: u64 = 1 << 15;
-/// Half-width of importance sampling if neither it nor a number of samples is given.
-const DEFAULT_HALF_WIDTH: f64 = 0.1;
 /// Maximum number of draws of importance sampling after a search, if none is given.
 const MAX_DRAWS: u64 = 10_000_000;
 
