@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::arguments::from_arguments;
 use super::configured::Configured;
-use super::console::{self, Units};
+use super::console::{self, Total};
 use super::format::FormatFlag;
 use super::source::SourceFlags;
 use super::{Exit, Output, lists};
@@ -96,11 +96,11 @@ impl Compare {
         let folder = OutputDir::open(&self.out, COMPARE_RECORD)?;
         tracing::info!("{} lanes of S and S' on {}", count(plan.lane_count()), opened.backend().describe());
         let executor = opened.executor().with_recheck(config.compare.seed);
-        let units = Units::All(plan.unit_count());
+        let units = Total::Exact(plan.unit_count());
         let (counts, mut swept) =
             configured.with_progress(units, "sweeping", &executor, |executor| compare.replay(executor))?;
         let densities = compare.options().parameterizations.len() * if self.forms { DensityKind::ALL.len() } else { 1 };
-        let units = Units::All(densities as u64 * config.compare.samples);
+        let units = Total::Exact(densities as u64 * config.compare.samples);
         let CompareResult { categories, left_out, failed, summary } =
             configured.with_progress(units, "fitting and sampling", &executor, |executor| {
                 compare.sample(&counts, executor)

@@ -12,7 +12,7 @@ use clap::{Arg, ArgAction, ArgMatches, Command, CommandFactory, FromArgMatches};
 use indicatif::ProgressBar;
 
 use super::arguments::{Arguments, NEEDS, Value};
-use super::console::{self, Units, Verbosity};
+use super::console::{self, Total, Verbosity};
 use super::help::{DATA, MODELS, OUTPUT, RUN};
 use super::signals::CANCEL;
 use super::{Cli, Verb};
@@ -327,7 +327,7 @@ impl Configured {
     /// Those of the work.
     pub(super) fn with_bar<T>(
         &self,
-        units: Units,
+        units: Total,
         what: &str,
         work: impl FnOnce(&ProgressBar) -> Result<T>,
     ) -> Result<T> {
@@ -343,7 +343,7 @@ impl Configured {
     /// Those of the work.
     pub(super) fn with_progress<T>(
         &self,
-        units: Units,
+        units: Total,
         what: &str,
         executor: &Executor,
         work: impl FnOnce(&Executor) -> Result<T>,

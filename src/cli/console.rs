@@ -151,12 +151,12 @@ pub(super) fn command_line(words: &[OsString]) -> String {
     format!("lanesweep {}", words.collect::<Vec<_>>().join(" "))
 }
 
-/// Units of some work.
+/// Number of units of the work that a bar shows.
 #[derive(Debug, Clone, Copy)]
-pub(super) enum Units {
-    /// So many.
-    All(u64),
-    /// It may end before the last one.
+pub(super) enum Total {
+    /// The work has this number of units.
+    Exact(u64),
+    /// The work may end earlier.
     AtMost(u64),
 }
 
@@ -167,10 +167,10 @@ pub(super) fn inc(bar: &ProgressBar) -> impl Fn(u64) + Send + Sync + 'static {
 }
 
 /// A progress bar on stderr, or a line now and then if stderr is no terminal. Its remaining time follows from the units per time.
-pub(super) fn progress(verbosity: Verbosity, units: Units, what: &str) -> ProgressBar {
+pub(super) fn progress(verbosity: Verbosity, units: Total, what: &str) -> ProgressBar {
     let (length, bound) = match units {
-        Units::All(units) => (units, "about"),
-        Units::AtMost(units) => (units, "at most about"),
+        Total::Exact(units) => (units, "about"),
+        Total::AtMost(units) => (units, "at most about"),
     };
     let bar = ProgressBar::new(length);
     let is_terminal = io::stderr().is_terminal();

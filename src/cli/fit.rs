@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::arguments::from_arguments;
 use super::configured::Configured;
-use super::console::{self, Units};
+use super::console::{self, Total};
 use super::format::FormatFlag;
 use super::lists;
 use super::source::{self, SourceFlags};
@@ -88,7 +88,7 @@ impl Fit {
         let folder = (!self.is_single()).then(|| OutputDir::open_without_record(&self.out)).transpose()?;
         let mut fitted: Vec<(PathBuf, DensityModel)> = Vec::new();
         let (mut failed, mut complete) = (Vec::new(), collection.problems.is_empty());
-        configured.with_bar(Units::All(ids.len() as u64), "fitting", |bar| {
+        configured.with_bar(Total::Exact(ids.len() as u64), "fitting", |bar| {
             for (id, file) in ids.iter().zip(files) {
                 let result = DensityModel::fit(id.clone(), &collection.scenarios, &facts, &options);
                 bar.inc(1);

@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::arguments::from_arguments;
 use super::configured::Configured;
-use super::console::Units;
+use super::console::Total;
 use super::format::FormatFlag;
 use super::source::PlausibilityFlag;
 use super::{Exit, Output, lists};
@@ -142,7 +142,7 @@ impl Map {
         let opened = if self.reference { configured.open_reference()? } else { configured.open()? };
         let folder = OutputDir::open(&self.out, MAP_RECORD)?;
         let executor = opened.executor().with_recheck(RECHECK_SEED);
-        let (units, started) = (Units::All(map.unit_count()), Instant::now());
+        let (units, started) = (Total::Exact(map.unit_count()), Instant::now());
         let MapResult { grids, summary } =
             configured.with_progress(units, "sweeping", &executor, |executor| map.run(executor))?;
         let host = Host::of(&opened, summary.rechecked_lanes, started, configured.record(false));

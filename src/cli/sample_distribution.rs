@@ -4,7 +4,7 @@ use std::fmt::Write;
 use std::path::Path;
 
 use super::configured::Configured;
-use super::console::Units;
+use super::console::Total;
 use super::sample::Sample;
 use super::sample_options::only_crude;
 use super::{Exit, Output};
@@ -99,7 +99,7 @@ pub(super) fn run(flags: &Sample, configured: &Configured, path: &Path) -> Resul
     let options = if flags.simultaneous { options.together(settings.level) } else { options };
     tracing::info!("{} samples on {}", readable::count(count), executor.backend.describe());
     // The frequency of such scenarios is unknown, so there is no exposure.
-    let crude = configured.with_progress(Units::All(count), "sampling", &executor, |executor| {
+    let crude = configured.with_progress(Total::Exact(count), "sampling", &executor, |executor| {
         sample_crude(&plan, 0..count, executor, &options, None, None)
     })?;
     let host = configured.host(&opened, crude.summary.rechecked_lanes, false);

@@ -1,7 +1,7 @@
 //! `lanesweep sample`: plans the run, executes it whole or as a shard, and writes the result.
 
 use super::configured::Configured;
-use super::console::Units;
+use super::console::Total;
 use super::sample::Sample;
 use super::sample_options::{guard, only_crude};
 use super::{Exit, Output, sample_distribution};
@@ -107,7 +107,7 @@ impl Sample {
         let is_split = self.shards.plan_only || self.shards.is_part();
         let sample = match sample.kind {
             SampleKind::Search(search) => {
-                let units = Units::AtMost(warn_of_long(&sample, &search));
+                let units = Total::AtMost(warn_of_long(&sample, &search));
                 // The search is kept in the folder, so it needs the folder's lock too.
                 let _folder = (!is_split).then(|| OutputDir::open(&self.out, ESTIMATE_RECORD)).transpose()?;
                 let found = configured.with_progress(units, "searching", executor, |executor| {
@@ -154,8 +154,8 @@ impl Sample {
         let rows = self.rows.as_deref().filter(|_| !is_empty).zip(lane_plan);
         let mut table = rows.map(|(path, plan)| lanes::sampled_table(path, plan, density)).transpose()?;
         let units = match sample.options.stop.is_fixed() {
-            true => Units::All(missing),
-            false => Units::AtMost(missing),
+            true => Total::Exact(missing),
+            false => Total::AtMost(missing),
         };
         let mut write_chunk = table
             .as_mut()
@@ -172,7 +172,7 @@ impl Sample {
         if let Some(half_width) = self.settings.half_width.filter(|_| self.is_refined()) {
             tracing::info!("importance sampling of what is rare");
             let search = self.search(&sample.options.models, &sample.options.headways);
-            let units = Units::AtMost(warn_of_long(sample, &search));
+            let units = Total::AtMost(warn_of_long(sample, &search));
             result = configured.with_progress(units, "searching", executor, |executor| {
                 sample.refined(result, &search, half_width, executor)
             })?;

@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::arguments::from_arguments;
 use super::configured::Configured;
-use super::console::Units;
+use super::console::Total;
 use super::format::FormatFlag;
 use super::source::{self, SourceFlags};
 use super::{Exit, Output, lists};
@@ -117,7 +117,7 @@ impl Search {
         make_folder(folder.dir())?;
         let executor = opened.executor().with_recheck(config.score.seed);
         let unread = held_out.as_ref().map(|(scenarios, ..)| scenarios.as_slice());
-        let (units, of) = (Units::All(config.search.studies as u64), (Some(folder.dir()), self.shard));
+        let (units, of) = (Total::Exact(config.search.studies as u64), (Some(folder.dir()), self.shard));
         let result = configured.with_bar(units, "searching", |bar| {
             search.run(unread, of, &executor, &|studies| bar.set_position(studies as u64))
         })?;

@@ -7,7 +7,7 @@ use indicatif::ProgressBar;
 
 use super::arguments::from_arguments;
 use super::configured::Configured;
-use super::console::{self, Units};
+use super::console::{self, Total};
 use super::signals::CANCEL;
 use crate::scenario::{DataProvenance, Driven, Scenario, ScenarioFile, read_scenario_file};
 use crate::support::plausibility::Implausible;
@@ -23,7 +23,7 @@ use crate::{Error, Place, Result};
 /// As [`Source::load`].
 pub(super) fn load(source: &Source, configured: &Configured, implausible: Implausible) -> Result<Collection> {
     let what = if matches!(source, Source::Generated(_)) { "generating and mining" } else { "reading and mining" };
-    let collection = configured.with_bar(Units::All(source.recordings()), what, |bar| {
+    let collection = configured.with_bar(Total::Exact(source.recordings()), what, |bar| {
         source.load(&configured.settings.mining, implausible, || advance(bar))
     })?;
     complain_of(&collection.problems, &collection.notes);

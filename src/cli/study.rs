@@ -7,7 +7,7 @@ use clap::Args;
 
 use super::arguments::{choices, from_arguments};
 use super::configured::Configured;
-use super::console::{self, Units};
+use super::console::{self, Total};
 use super::format::{FormatFlag, TablesFlag};
 use super::shard_flags::ShardFlags;
 use super::source::{self, SourceFlags};
@@ -218,7 +218,7 @@ impl Study {
         let units = run.units();
         let lanes = plan.first_lane_of(units.end) - plan.first_lane_of(units.start);
         tracing::info!("{} lanes on {}", readable::count(lanes), backend.describe());
-        let missing = Units::All(run.missing()?);
+        let missing = Total::Exact(run.missing()?);
         let mut rows = self.rows.as_deref().map(|path| study_table(path, study)).transpose()?;
         let mut write = rows.as_mut().map(|rows| |plan: &LanePlan, chunk: &Chunk| write_study_chunk(rows, plan, chunk));
         timed(&mut timings.sweep_s, || {

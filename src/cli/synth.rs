@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::arguments::from_arguments;
 use super::configured::Configured;
-use super::console::Units;
+use super::console::Total;
 use super::source;
 use super::{Exit, Output};
 use crate::support::files::check_folder;
@@ -51,7 +51,7 @@ impl Synth {
         let sentence = Source::Generated(options.clone()).describe(true);
         let marker = format!("{sentence}\nNo number on these recordings is a statement about real traffic.\n");
         let mut results = folder.results()?;
-        configured.with_bar(Units::All(options.recordings as u64), "writing recordings", |bar| {
+        configured.with_bar(Total::Exact(options.recordings as u64), "writing recordings", |bar| {
             (0..options.recordings).try_for_each(|index| {
                 let recording = generate_one(options, index)?;
                 let staged = highd::stage(&self.folder, &recording)?;

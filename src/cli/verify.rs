@@ -3,7 +3,7 @@
 use clap::{Args, Subcommand};
 
 use super::configured::Configured;
-use super::console::{self, Units};
+use super::console::{self, Total};
 use super::devices::Devices;
 use super::format::FormatFlag;
 use super::source::SourceFlags;
@@ -91,7 +91,7 @@ impl Verify {
             ("Lanes on thresholds", self.thresholds(&profile)?),
             ("Study", self.study(configured, &profile)?),
         ] {
-            let comparison = configured.with_bar(Units::All(plan.lane_count()), name, |bar| {
+            let comparison = configured.with_bar(Total::Exact(plan.lane_count()), name, |bar| {
                 compare(name, &plan, tested, |lanes| bar.inc(lanes))
             })?;
             // Print set by set, so that a later failure of the device keeps earlier results.

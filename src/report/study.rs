@@ -137,7 +137,7 @@ impl<'a> StudyReport<'a> {
     /// [`crate::Error::Io`].
     pub fn write(&self, mut results: Results) -> Result<Vec<String>> {
         let data = if self.facts().synthetic { "synthetic" } else { "recorded" };
-        results.add("failures.csv", tables::failure_records(&self.evaluation.scores, data).csv().as_bytes())?;
+        results.add("failures.csv", tables::failure_records(&self.evaluation.scores, data)?.csv().as_bytes())?;
         results.add("f1.csv", tables::f1_records(&self.evaluation.scores, data).csv().as_bytes())?;
         results.add("claims.csv", tables::claim_records(&self.evaluation.claims, data).csv().as_bytes())?;
         results.add("report.txt", self.text(tables::WIDTH).as_bytes())?;
@@ -218,7 +218,7 @@ impl StudyReport<'_> {
             "plan_sha256": self.study.plan().hash(),
             "lanes": self.lanes(),
             "left_out": self.facts().left_out,
-            "failures": tables::failure_records(&self.evaluation.scores, "").records(),
+            "failures": tables::failure_records(&self.evaluation.scores, "")?.records(),
             "f1": tables::f1_records(&self.evaluation.scores, "").records(),
             "claims": tables::claim_records(&self.evaluation.claims, "").records(),
         });

@@ -15,6 +15,7 @@ use crate::scenario::parameterization::Parameterization;
 use crate::support::readable;
 pub use crate::support::table::WIDTH;
 use crate::support::table::{Column, Digits, NumberText, Table};
+use crate::{Error, Result};
 
 /// The table of failures with its heading and the misfit.
 pub fn failures(scores: &ScoreTable, published: bool, width: usize) -> String {
@@ -148,14 +149,23 @@ pub(super) fn claim_table(results: &[ClaimResult], width: usize) -> Table {
 }
 
 /// Failures of S and S': one row per category, variant, model and criterion. `data` describes the swept data.
-pub(super) fn failure_records(scores: &ScoreTable, data: &str) -> Table {
-    let rows = scores.categories.iter().flat_map(|category| {
-        // Cells are variant × model × criterion; these counts are variant × model.
-        let capped = |at: usize| category.capped.get(at / Criterion::ALL.len()).copied();
-        category.cells.iter().enumerate().map(move |(at, cell)| (category, cell, capped(at)))
-    });
+///
+/// # Errors
+/// [`Error::Internal`] if there are fewer counts of capped lanes than cells.
+pub(super) fn failure_records(scores: &ScoreTable, data: &str) -> Result<Table> {
+    let mut rows = Vec::new();
+    for category in &scores.categories {
+        for (at, cell) in category.cells.iter().enumerate() {
+            // Cells are variant × model × criterion; these counts are variant × model.
+            let capped = category.capped.get(at / Criterion::ALL.len()).ok_or_else(|| {
+                let what = format!("{} of {}", cell.model.name(), category.variants[cell.variant]);
+                Error::Internal(format!("no count of lanes at the time cap for {what}"))
+            })?;
+            rows.push((category, cell, *capped));
+        }
+    }
     let failures = |cell: &ScoreCell| cell.counts.tp + if cell.variant == 0 { 0 } else { cell.counts.fp };
-    Table::of(rows)
+    Ok(Table::of(rows)
         .column("category", |(category, ..)| category.category.key())
         .column("variant", |(category, cell, _)| category.variants[cell.variant].as_str())
         .column("model", |(_, cell, _)| cell.model.name())
@@ -164,7 +174,7 @@ pub(super) fn failure_records(scores: &ScoreTable, data: &str) -> Table {
         .column("simulations", |(category, ..)| category.simulations)
         .column("capped", |(.., capped)| capped)
         .column("data", |_| data)
-        .build()
+        .build())
 }
 
 /// Scores: one row per category, parameterization, model and criterion.
@@ -359,10 +369,10 @@ mod tests {
 
     #[test]
     fn no_model_gets_the_capped_lanes_of_another_one() {
-        let text = failure_records(&scores(vec![3, 8]), "synthetic").csv();
+        let text = failure_records(&scores(vec![3, 8]), "synthetic").unwrap().csv();
         assert!(text.contains("lvd,S,RSS,collision,0,10,3,") && text.contains("lvd,S,FSM,btn,0,10,8,"), "{text}");
-        let text = failure_records(&scores(vec![3]), "synthetic").csv();
-        assert!(text.contains("lvd,S,RSS,collision,0,10,3,") && text.contains("lvd,S,FSM,btn,0,10,,"), "{text}");
+        let Err(error) = failure_records(&scores(vec![3]), "synthetic") else { panic!("a table") };
+        assert!(error.to_string().contains("FSM of S"), "{error}");
     }
 
     #[test]

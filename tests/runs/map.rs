@@ -12,8 +12,8 @@ use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::grid::presets::{self, Presets};
 use lanesweep::run::grid::{
-    Agreement, CaseStyle, CellOutcome, Grid, GridAxis, GridMap, GridParts, GridPlan, Map, MapGrids, MapOptions,
-    MapParameter, MapQuantity, boundary, count,
+    Agreement, CellOutcome, Grid, GridAxis, GridMap, GridParts, GridPlan, Map, MapGrids, MapOptions, MapParameter,
+    MapQuantity, boundary, count,
 };
 use lanesweep::scenario::{Category, Tables};
 use proptest::prelude::*;
@@ -32,18 +32,7 @@ fn failed(map: &GridMap, model: usize) -> Vec<bool> {
 }
 
 fn parts(category: Category, x: &str, y: &str) -> GridParts {
-    GridParts {
-        name: category.key().to_owned(),
-        category,
-        x: axis(category, x),
-        y: axis(category, y),
-        panel_axes: Vec::new(),
-        fixed: Vec::new(),
-        style: CaseStyle::Plain,
-        native_gap: false,
-        closing_only: false,
-        panel_rows: None,
-    }
+    GridParts::new(category.key(), category, axis(category, x), axis(category, y))
 }
 
 fn profile(name: &str) -> Profile {

@@ -15,7 +15,8 @@ use crate::stats::density::DensityModel;
 use crate::stats::estimate::{Ratio, RatioVerdict, Warning};
 use crate::{Error, Result};
 
-/// The lanes of S and of S' under the density's parameterization, with scenarios as kernels; `None` if the density cannot be replayed.
+/// The lanes of S and of S' under the density's parameterization, with scenarios as kernels. `None` if the density
+/// cannot be replayed.
 fn replay(
     density: &DensityModel,
     profile: &Profile,

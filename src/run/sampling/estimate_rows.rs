@@ -81,8 +81,8 @@ impl EstimateRow {
         }
     }
 
-    /// Adds the uncertainty of the data, with which the estimate is another, and the effective number of failing
-    /// scenarios; or a warning that it is missing.
+    /// Takes the estimate that includes the uncertainty of the data, and the effective number of failing scenarios.
+    /// Without them the row gets a warning.
     pub(super) fn with_data(mut self, with: Option<(Estimate, f64)>, exposure: Option<&Exposure>) -> EstimateRow {
         let Some((estimate, failing_scenarios)) = with else {
             self.estimate.trust.warn_if(true, Warning::DataLeftOut);
