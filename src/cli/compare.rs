@@ -17,7 +17,7 @@ use crate::stats::density::DensityKind;
 use crate::stats::estimate::Enough;
 use crate::support::files::check_folder;
 use crate::support::readable::count;
-use crate::support::run_dir::{COMPARE_RECORD, OutputDir};
+use crate::support::run_folder::{COMPARE_RECORD, RunFolder};
 use crate::{Error, Result};
 
 /// Which parameterizations give the right risk, not only the right labels?
@@ -93,7 +93,7 @@ impl Compare {
         };
         let compare = compare::Compare::plan(&collection.scenarios, &facts, profile, options)?;
         let plan = compare.lane_plan();
-        let folder = OutputDir::open(&self.out, COMPARE_RECORD)?;
+        let folder = RunFolder::open(&self.out, COMPARE_RECORD)?;
         tracing::info!("{} lanes of S and S' on {}", count(plan.lane_count()), opened.backend().describe());
         let executor = opened.executor().with_recheck(config.compare.seed);
         let units = Total::Exact(plan.unit_count());

@@ -20,7 +20,7 @@ use crate::stats::density::{DensityModel, FitOptions, write_density};
 use crate::support::error::push_once;
 use crate::support::files::{check_folder_of, make_folder_of};
 use crate::support::readable::counted;
-use crate::support::run_dir::OutputDir;
+use crate::support::run_folder::RunFolder;
 use crate::{Error, Place, Result};
 
 /// How are the parameters of scenarios distributed?
@@ -85,7 +85,7 @@ impl Fit {
         let (collection, facts) = self.data.load_with_exposure(configured, typed)?;
 
         // A single file needs no folder.
-        let folder = (!self.is_single()).then(|| OutputDir::open_without_record(&self.out)).transpose()?;
+        let folder = (!self.is_single()).then(|| RunFolder::open_without_record(&self.out)).transpose()?;
         let mut fitted: Vec<(PathBuf, DensityModel)> = Vec::new();
         let (mut failed, mut complete) = (Vec::new(), collection.problems.is_empty());
         configured.with_bar(Total::Exact(ids.len() as u64), "fitting", |bar| {
@@ -156,7 +156,7 @@ impl Fit {
 }
 
 /// Publishes all densities together. Each is an independent result with its checksum, so those of other runs are kept.
-fn write(fitted: &[(PathBuf, DensityModel)], folder: Option<&OutputDir>) -> Result<()> {
+fn write(fitted: &[(PathBuf, DensityModel)], folder: Option<&RunFolder>) -> Result<()> {
     let Some(folder) = folder else {
         return fitted.iter().try_for_each(|(path, model)| {
             make_folder_of(path)?;

@@ -7,7 +7,7 @@ use super::{Exit, Output, console};
 use crate::report::study::StudyReport;
 use crate::report::tables;
 use crate::support::readable::count;
-use crate::support::run_dir::Results;
+use crate::support::run_folder::Results;
 use crate::{Error, Place, Result};
 
 /// How tables are printed.

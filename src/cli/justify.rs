@@ -20,7 +20,7 @@ use crate::scenario::Driven;
 use crate::scenario::parameterization::Parameterization;
 use crate::stats::estimate::Enough;
 use crate::support::files::check_folder;
-use crate::support::run_dir::{DOSSIER_RECORD, OutputDir};
+use crate::support::run_folder::{DOSSIER_RECORD, RunFolder};
 use crate::{Error, Place, Result};
 
 /// Is a parameterization appropriate for this driver model, scenario type and criterion?
@@ -107,7 +107,7 @@ impl Justify {
             score: config.score.clone(),
             rules: config.justify.clone(),
         };
-        let folder = OutputDir::open(&self.out, DOSSIER_RECORD)?;
+        let folder = RunFolder::open(&self.out, DOSSIER_RECORD)?;
         let executor = opened.executor().with_recheck(config.compare.seed);
         let dossier = justify(&collection.scenarios, &facts, &profile, &options, &executor)?;
         console::warn(&dossier.left_out);

@@ -20,7 +20,7 @@ use crate::run::grid::{self, Against, Grid, GridText, MapGrids, MapOptions, MapR
 use crate::scenario::Category;
 use crate::support::plausibility::Doubts;
 use crate::support::readable::{count, value};
-use crate::support::run_dir::{MAP_RECORD, OutputDir};
+use crate::support::run_folder::{MAP_RECORD, RunFolder};
 use crate::{Error, Place, Result};
 
 /// Seed of the random selection of device lanes that the CPU recomputes.
@@ -140,7 +140,7 @@ impl Map {
         let map = grid::Map::plan(options, &profile)?;
         let plan_s = started.elapsed().as_secs_f64();
         let opened = if self.reference { configured.open_reference()? } else { configured.open()? };
-        let folder = OutputDir::open(&self.out, MAP_RECORD)?;
+        let folder = RunFolder::open(&self.out, MAP_RECORD)?;
         let executor = opened.executor().with_recheck(RECHECK_SEED);
         let (units, started) = (Total::Exact(map.unit_count()), Instant::now());
         let MapResult { grids, summary } =

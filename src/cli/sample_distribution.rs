@@ -20,7 +20,7 @@ use crate::stats::density::Provenance;
 use crate::support::plain_text::sha256;
 use crate::support::plausibility::Doubts;
 use crate::support::readable;
-use crate::support::run_dir::{ESTIMATE_RECORD, OutputDir};
+use crate::support::run_folder::{ESTIMATE_RECORD, RunFolder};
 use crate::{Error, Place, Result};
 
 /// A smaller fraction is shown as 0.
@@ -80,7 +80,7 @@ pub(super) fn run(flags: &Sample, configured: &Configured, path: &Path) -> Resul
     let seed = of_file.unwrap_or(settings.seed);
     let count = settings.samples.unwrap_or(samples.runs);
     let opened = configured.open()?;
-    let folder = OutputDir::open(&flags.out, ESTIMATE_RECORD)?;
+    let folder = RunFolder::open(&flags.out, ESTIMATE_RECORD)?;
     let (plan, tries) = samples.plan((count, seed), &profile, &models, &headways)?;
     let executor = opened.executor().with_recheck(seed);
     let headways = match samples.has_distance() {

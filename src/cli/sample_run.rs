@@ -18,7 +18,7 @@ use crate::stats::estimate::{Search, StopRule};
 use crate::support::atomic_file::StagedFile;
 use crate::support::files::check_folder;
 use crate::support::readable::{count, counted, duration};
-use crate::support::run_dir::{ESTIMATE_RECORD, OutputDir};
+use crate::support::run_folder::{ESTIMATE_RECORD, RunFolder};
 use crate::support::table::TableWriter;
 use crate::{Error, Place, Result};
 
@@ -109,7 +109,7 @@ impl Sample {
             SampleKind::Search(search) => {
                 let units = Total::AtMost(warn_of_long(&sample, &search));
                 // The search is kept in the folder, so it needs the folder's lock too.
-                let _folder = (!is_split).then(|| OutputDir::open(&self.out, ESTIMATE_RECORD)).transpose()?;
+                let _folder = (!is_split).then(|| RunFolder::open(&self.out, ESTIMATE_RECORD)).transpose()?;
                 let found = configured.with_progress(units, "searching", executor, |executor| {
                     sample.searched(executor, &self.out, is_split)
                 })?;

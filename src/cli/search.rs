@@ -16,7 +16,7 @@ use crate::run::search::{self, Objective, SearchOptions};
 use crate::scenario::{Category, Scenario};
 use crate::support::files::{check_folder, make_folder};
 use crate::support::readable::count;
-use crate::support::run_dir::{OutputDir, SEARCH_RECORD};
+use crate::support::run_folder::{RunFolder, SEARCH_RECORD};
 use crate::traffic::Source;
 use crate::{Error, Place, Result};
 
@@ -111,8 +111,8 @@ impl Search {
         let search = search::Search::plan(&collection.scenarios, &profile, options)?;
         // Shards share the folder; the run that concludes has it alone.
         let folder = match self.shard {
-            Some(_) => OutputDir::share(&self.out)?,
-            None => OutputDir::open(&self.out, SEARCH_RECORD)?,
+            Some(_) => RunFolder::share(&self.out)?,
+            None => RunFolder::open(&self.out, SEARCH_RECORD)?,
         };
         make_folder(folder.dir())?;
         let executor = opened.executor().with_recheck(config.score.seed);

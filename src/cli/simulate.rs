@@ -15,7 +15,7 @@ use crate::report::openscenario::reopen;
 use crate::report::trace::TraceReport;
 use crate::run::reopen::{Reopened, TracedLanes};
 use crate::support::files::{make_folder_of, write_atomically};
-use crate::support::run_dir::is_listed;
+use crate::support::run_folder::is_listed;
 use crate::{Error, Place, Result};
 
 /// Run one concrete scenario and print or draw its time series

@@ -22,7 +22,7 @@ use crate::run::study::{self, ExternalReplay, ReferenceComparison, StudyOptions,
 use crate::support::files::{check_folder, check_folder_of};
 use crate::support::input_file;
 use crate::support::readable;
-use crate::support::run_dir::Results;
+use crate::support::run_folder::Results;
 use crate::traffic::Source;
 
 /// How far do parameterized scenarios agree with recorded ones?

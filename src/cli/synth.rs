@@ -10,7 +10,7 @@ use super::console::Total;
 use super::source;
 use super::{Exit, Output};
 use crate::support::files::check_folder;
-use crate::support::run_dir::{OutputDir, unfinished};
+use crate::support::run_folder::{RunFolder, unfinished};
 use crate::traffic::Source;
 use crate::traffic::trajectory::generator::generate_one;
 use crate::traffic::trajectory::highd::{self, HighdFiles, SYNTHETIC_MARKER};
@@ -33,7 +33,7 @@ impl Synth {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         let options = &configured.settings.generator;
         check_folder(&self.folder)?;
-        let folder = OutputDir::open(&self.folder, SYNTHETIC_MARKER)?;
+        let folder = RunFolder::open(&self.folder, SYNTHETIC_MARKER)?;
         // Files that a killed run was renaming are written anew.
         let unfinished = unfinished(&self.folder).unwrap_or_default();
         let is_unfinished = |tracks: &Path| unfinished.iter().any(|name| tracks.ends_with(name));

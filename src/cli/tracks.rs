@@ -13,7 +13,7 @@ use crate::report::tracks::{TrackReport, across, report_text, space_time};
 use crate::scenario::{ScenarioFile, usable};
 use crate::support::files::{check_folder, write_atomically};
 use crate::support::plausibility::Implausible;
-use crate::support::run_dir::{OutputDir, unfinished};
+use crate::support::run_folder::{RunFolder, unfinished};
 use crate::support::table::{Table, TableMetadata};
 use crate::traffic::mining::{CategoryCount, counts, mine, noise_notes};
 use crate::traffic::trajectory::highd::{self, HighdFiles, SYNTHETIC_MARKER};
@@ -176,7 +176,7 @@ impl Tracks {
 }
 
 fn write_figures(out: &Path, reports: &[TrackReport], recordings: &[Recording]) -> Result<()> {
-    let folder = OutputDir::open(out, "tracks.json")?;
+    let folder = RunFolder::open(out, "tracks.json")?;
     let mut results = folder.results()?;
     for recording in recordings {
         results.add(&format!("{}-time.svg", recording.id), space_time(recording).svg().as_bytes())?;
@@ -242,7 +242,7 @@ const CONVERTED: &str = "converted.json";
 
 /// Writes recordings in highD's format: all of them, or none.
 fn convert_to_highd(to: &Path, reports: &[TrackReport], recordings: &[Recording]) -> Result<()> {
-    let folder = OutputDir::open(to, CONVERTED)?;
+    let folder = RunFolder::open(to, CONVERTED)?;
     let unfinished = unfinished(to).unwrap_or_default();
     let names = names(recordings);
     let is_foreign = |file: &PathBuf| file.exists() && !unfinished.iter().any(|name| file.ends_with(name));

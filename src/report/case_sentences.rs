@@ -1,9 +1,10 @@
 //! The leading sentences of a sheet: the case and its reading, the answer, and the demands of the cut-in clauses.
 
-use super::case_sheet::{CaseSheet, KMH};
+use super::case_sheet::CaseSheet;
 use crate::model::driver::ModelId;
 use crate::run::check::{Answer, Demand, Holds, Judged, Judgement, Verdict};
-use crate::run::grid::{MapQuantity, PARAMETERS, VARIED};
+use crate::run::grid::VARIED;
+use crate::scenario::{CaseQuantity, KMH};
 use crate::support::readable::value;
 
 impl CaseSheet<'_> {
@@ -12,22 +13,22 @@ impl CaseSheet<'_> {
         let point = self.subject.point();
         let kmh = |name: &str, mps: f64| format!("{name} {} km/h", value(mps * KMH));
         let quantities = [
-            (MapQuantity::EgoSpeed, "ego"),
-            (MapQuantity::OtherSpeed, "other vehicle"),
-            (MapQuantity::Gap, "gap"),
-            (MapQuantity::Thw, "headway"),
-            (MapQuantity::LateralSpeed, "across"),
-            (MapQuantity::Deceleration, "other vehicle's deceleration"),
-            (MapQuantity::EndSpeed, "to"),
-            (MapQuantity::AheadSpeed, "vehicle ahead"),
-            (MapQuantity::AheadGap, "its gap"),
+            (CaseQuantity::EgoSpeed, "ego"),
+            (CaseQuantity::OtherSpeed, "other vehicle"),
+            (CaseQuantity::Gap, "gap"),
+            (CaseQuantity::Thw, "headway"),
+            (CaseQuantity::LateralSpeed, "across"),
+            (CaseQuantity::Deceleration, "other vehicle's deceleration"),
+            (CaseQuantity::EndSpeed, "to"),
+            (CaseQuantity::AheadSpeed, "vehicle ahead"),
+            (CaseQuantity::AheadGap, "its gap"),
         ];
         let parts = quantities.into_iter().filter_map(|(quantity, name)| {
             let si = point.get(quantity)?;
-            let unit = PARAMETERS.iter().find(|parameter| parameter.quantity == quantity)?.unit;
-            Some(match unit {
-                "m/s" | "km/h" if quantity != MapQuantity::LateralSpeed => kmh(name, si),
-                unit => format!("{name} {} {unit}", value(si)),
+            let number = quantity.number();
+            Some(match number.needs_unit() {
+                true => kmh(name, si),
+                false => format!("{name} {} {}", value(si), number.unit()),
             })
         });
         let first = self.first();

@@ -11,12 +11,11 @@ use crate::Result;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::check::{Boundary, Change, Demand, Judged, Judgement, Reading, RunEnd, Subject, Verdict};
-use crate::run::grid::{MapQuantity, PARAMETERS, VARIED};
+use crate::run::grid::{PARAMETERS, VARIED};
+use crate::scenario::{CaseQuantity, KMH, NUMBERS};
 use crate::support::readable::value;
 use crate::support::table::{Column, NumberText, Table, json_number};
 
-/// Kilometres per hour in one metre per second.
-pub(super) const KMH: f64 = 3.6;
 /// What the columns of the drivers show.
 const DRIVERS: &str = "Smallest gap to a vehicle in the ego's path, smallest TTC, largest BTN. At a contact while the gap \
      closes, TTC is 0 and BTN ∞ by definition. Touches: no contact, but the smallest gap is below 1 cm, or becomes so as the \
@@ -61,39 +60,19 @@ impl CaseSheet<'_> {
     fn numbers(&self) -> Vec<(String, String)> {
         let point = self.subject.point();
         let mut list: Vec<(String, String)> = Vec::new();
-        let shown = [
-            MapQuantity::EgoSpeed,
-            MapQuantity::OtherSpeed,
-            MapQuantity::Gap,
-            MapQuantity::Thw,
-            MapQuantity::LateralSpeed,
-            MapQuantity::LateralDistance,
-            MapQuantity::Deceleration,
-            MapQuantity::EndSpeed,
-            MapQuantity::AheadSpeed,
-            MapQuantity::AheadGap,
-            MapQuantity::EgoLength,
-            MapQuantity::EgoWidth,
-            MapQuantity::Length,
-            MapQuantity::Width,
-            MapQuantity::LaneWidth,
-        ];
-        for quantity in shown {
-            let Some(parameter) = PARAMETERS.iter().find(|p| p.quantity == quantity) else { continue };
-            let Some(si) = point.get(quantity) else { continue };
-            let text = match parameter.unit {
-                "m/s" if quantity != MapQuantity::LateralSpeed => {
-                    format!("{} km/h ({} m/s)", value(si * KMH), value(si))
-                }
-                unit => format!("{} {unit}", value(si)),
+        for number in &NUMBERS {
+            let Some(si) = point.get(number.quantity) else { continue };
+            let text = match number.needs_unit() {
+                true => format!("{} km/h ({} m/s)", value(si * KMH), value(si)),
+                false => format!("{} {}", value(si), number.unit()),
             };
-            list.push((parameter.label.to_owned(), text));
+            list.push((number.label.to_owned(), text));
         }
         if let Some(duration_s) = self.subject.duration_s() {
             list.push(("Duration of the motions".to_owned(), format!("{} s", value(duration_s))));
         }
-        let ego_mps = point.get(MapQuantity::EgoSpeed).unwrap_or(0.0);
-        match (point.get(MapQuantity::Gap), point.get(MapQuantity::Thw)) {
+        let ego_mps = point.get(CaseQuantity::EgoSpeed).unwrap_or(0.0);
+        match (point.get(CaseQuantity::Gap), point.get(CaseQuantity::Thw)) {
             (Some(gap_m), _) if ego_mps > 0.0 => {
                 list.push(("Initial time headway".to_owned(), format!("{} s", value(gap_m / ego_mps))));
             }
@@ -250,7 +229,7 @@ impl CaseSheet<'_> {
         let point = self.subject.point();
         let numbers: serde_json::Map<String, Value> = PARAMETERS
             .iter()
-            .filter(|parameter| parameter.per_si == 1.0)
+            .filter(|parameter| parameter.per_si == 1.0 && !parameter.is_relative)
             .filter_map(|parameter| Some((parameter.key.to_owned(), json!(point.get(parameter.quantity)?))))
             .chain(self.subject.duration_s().map(|duration_s| ("duration_s".to_owned(), json!(duration_s))))
             .collect();

@@ -20,7 +20,7 @@ use crate::scenario::DataProvenance;
 use crate::stats::density::{DensityKind, Representativeness, normal_quantile};
 use crate::stats::estimate::{Enough, Ratio, RatioVerdict};
 use crate::support::readable;
-use crate::support::run_dir::Results;
+use crate::support::run_folder::Results;
 use crate::support::table::{Column, Digits, NumberText, Table};
 
 /// A comparison with the facts that its files state.

@@ -13,7 +13,7 @@ use crate::scenario::DataProvenance;
 use crate::scenario::parameterization::Parameterization;
 use crate::stats::estimate::Ratio;
 use crate::support::readable::{count, value};
-use crate::support::run_dir::Results;
+use crate::support::run_folder::Results;
 use crate::support::table::{Column, NumberText, Table};
 
 /// Maximum number of hidden failures on the page; `hidden.csv` has all.

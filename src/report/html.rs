@@ -11,7 +11,7 @@ use super::plot::Figure;
 use super::records::PROGRAM;
 use crate::Result;
 use crate::support::plain_text::shown;
-use crate::support::run_dir::Results;
+use crate::support::run_folder::Results;
 use crate::support::table::Table;
 
 const STYLE: &str = include_str!("templates/style.css");

@@ -10,7 +10,7 @@ use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::grid::{Against, Agreement, CaseStyle, CellOutcome, Grid, GridPlan, MappedGrid};
 use crate::support::readable::count;
-use crate::support::run_dir::Results;
+use crate::support::run_folder::Results;
 
 /// A complete run.
 pub struct MapReport {

@@ -5,7 +5,7 @@ use std::io::{self, Write};
 use super::map::{Difference, MapReport};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
-use crate::run::grid::{CellOutcome, Grid, MapParameter, MapQuantity, MappedGrid, VARIED, count};
+use crate::run::grid::{CaseQuantity, CellOutcome, Grid, MapParameter, MappedGrid, VARIED, count};
 use crate::scenario::Category;
 use crate::support::readable;
 use crate::support::table::{Column, Digits, NumberText, Table, csv_field};
@@ -112,7 +112,7 @@ impl MapReport {
                 ));
             }
             let brakes = (0..plan.grid.cell_count())
-                .any(|cell| plan.grid.point(cell).get(MapQuantity::Deceleration).is_some_and(|a| a != 0.0));
+                .any(|cell| plan.grid.point(cell).get(CaseQuantity::Deceleration).is_some_and(|a| a != 0.0));
             let is_clause = plan.grid.category() == Category::CutIn && !self.profile.reg157.clause.is_empty();
             if brakes && is_clause && map.models.contains(&ModelId::Reg157) {
                 all.push(format!(

@@ -8,7 +8,7 @@ pub(super) const PROGRAM: &str = concat!("lanesweep ", env!("CARGO_PKG_VERSION")
 
 use crate::engine::{NO_STEP, Outcome};
 use crate::model::criterion::Criterion;
-use crate::support::run_dir::Results;
+use crate::support::run_folder::Results;
 use crate::support::table::json_number;
 use crate::{Error, Result};
 

@@ -12,7 +12,7 @@ use crate::engine::LanePlan;
 use crate::run::sampling::{CrudeRun, Estimator, Sample, SampleResult, WorstLane, proposal_text};
 use crate::stats::density::DensityModel;
 use crate::support::plain_text::hex;
-use crate::support::run_dir::Results;
+use crate::support::run_folder::Results;
 use crate::{Error, Result};
 
 impl SampleReport {

@@ -15,7 +15,7 @@ use crate::model::profile::Profile;
 use crate::run::search::{Candidate, Evaluated, Front, FrontPoint, Judged, Scope, Scored, SearchResult};
 use crate::scenario::parameterization::ModeShape;
 use crate::support::readable::{count, counted};
-use crate::support::run_dir::Results;
+use crate::support::run_folder::Results;
 use crate::support::table::{Table, WIDTH};
 
 /// Approximate number of candidates of a figure, in even steps of their scores; the paper's are all drawn.

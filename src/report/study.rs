@@ -17,7 +17,7 @@ use crate::run::score::{Best, CategoryScores, Misfit, ScoreTable, f1, published_
 use crate::run::study::{CategoryNumbers, ReferenceComparison, Study, StudyEvaluation, StudyProvenance};
 use crate::scenario::Category;
 use crate::scenario::parameterization::Parameterization;
-use crate::support::run_dir::Results;
+use crate::support::run_folder::Results;
 use crate::support::table::{Column, Digits, Table};
 use serde::Serialize;
 use serde_json::Value;

@@ -25,7 +25,7 @@ pub mod study;
 use std::path::Path;
 
 use crate::support::files::check_run_folder;
-use crate::support::run_dir::{ESTIMATE_RECORD, OutputDir, STUDY_RECORD};
+use crate::support::run_folder::{ESTIMATE_RECORD, RunFolder, STUDY_RECORD};
 use crate::{Error, Place, Result};
 use parts::{PLAN_FILE, Shard, kind_of};
 use sampling::{Sample, SampleResult};
@@ -44,7 +44,7 @@ pub enum Merged {
 /// # Errors
 /// [`Error::Io`]; [`Error::Busy`] if another process writes there; [`Error::Input`] with the missing, duplicate,
 /// foreign or damaged parts.
-pub fn merge(dir: &Path, again: &dyn Fn(&str, Shard) -> String) -> Result<(OutputDir, Merged)> {
+pub fn merge(dir: &Path, again: &dyn Fn(&str, Shard) -> String) -> Result<(RunFolder, Merged)> {
     check_run_folder(dir)?;
     let plan = dir.join(PLAN_FILE);
     if !plan.exists() {
@@ -52,12 +52,12 @@ pub fn merge(dir: &Path, again: &dyn Fn(&str, Shard) -> String) -> Result<(Outpu
     }
     match kind_of(&plan)?.as_str() {
         Study::KIND => {
-            let folder = OutputDir::open(dir, STUDY_RECORD)?;
+            let folder = RunFolder::open(dir, STUDY_RECORD)?;
             let merged = Study::merge_parts(dir, &|shard| again("study", shard))?;
             Ok((folder, Merged::Study(Box::new(merged))))
         }
         kind if Sample::is_kind(kind) => {
-            let folder = OutputDir::open(dir, ESTIMATE_RECORD)?;
+            let folder = RunFolder::open(dir, ESTIMATE_RECORD)?;
             let merged = Sample::merge_parts(dir, &|shard| again("sample", shard))?;
             Ok((folder, Merged::Sample(Box::new(merged))))
         }

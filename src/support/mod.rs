@@ -14,6 +14,6 @@ pub mod plain_text;
 pub mod plausibility;
 pub mod ranges;
 pub mod readable;
-pub mod run_dir;
+pub mod run_folder;
 pub mod table;
 pub mod vector_state;

@@ -12,8 +12,8 @@ use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::grid::presets::{self, Presets};
 use lanesweep::run::grid::{
-    Agreement, CellOutcome, Grid, GridAxis, GridMap, GridParts, GridPlan, Map, MapGrids, MapOptions, MapParameter,
-    MapQuantity, boundary, count,
+    Agreement, CaseQuantity, CellOutcome, Grid, GridAxis, GridMap, GridParts, GridPlan, Map, MapGrids, MapOptions,
+    MapParameter, boundary, count,
 };
 use lanesweep::scenario::{Category, Tables};
 use proptest::prelude::*;
@@ -101,10 +101,10 @@ proptest! {
             let (panel, i, j) = grid.places(cell);
             prop_assert_eq!(grid.cell(panel, i, j), cell);
             let point = grid.point(cell);
-            prop_assert_eq!(point.get(MapQuantity::Gap), Some(grid.x().values[i]));
-            prop_assert_eq!(point.get(MapQuantity::LateralSpeed), Some(grid.y().values[j]));
-            prop_assert_eq!(point.get(MapQuantity::EgoSpeed), Some(grid.panels()[panel][0]));
-            prop_assert_eq!(point.get(MapQuantity::OtherSpeed), Some(grid.panels()[panel][1]));
+            prop_assert_eq!(point.get(CaseQuantity::Gap), Some(grid.x().values[i]));
+            prop_assert_eq!(point.get(CaseQuantity::LateralSpeed), Some(grid.y().values[j]));
+            prop_assert_eq!(point.get(CaseQuantity::EgoSpeed), Some(grid.panels()[panel][0]));
+            prop_assert_eq!(point.get(CaseQuantity::OtherSpeed), Some(grid.panels()[panel][1]));
         }
     }
 
@@ -127,7 +127,7 @@ proptest! {
 fn alone(grid: &Grid, cell: usize, model: ModelId, profile: &Profile) -> Verdicts {
     let mut tables = Tables::default();
     let case = LaneCase::encode(&grid.case(cell, profile).unwrap(), profile, &mut tables);
-    let start: Start<f32> = match grid.point(cell).get(MapQuantity::Thw) {
+    let start: Start<f32> = match grid.point(cell).get(CaseQuantity::Thw) {
         Some(thw_s) => Headway::ThwS(thw_s).start(),
         None => Headway::GapM(grid.gap_m(cell, model, profile)).start(),
     };
@@ -187,7 +187,7 @@ fn a_cell_is_what_simulate_says_of_the_same_numbers() {
     let mut failures = 0;
     for cell in 0..grid.cell_count() {
         let point = grid.point(cell);
-        let [gap, lateral] = [MapQuantity::Gap, MapQuantity::LateralSpeed].map(|q| point.get(q).unwrap().to_string());
+        let [gap, lateral] = [CaseQuantity::Gap, CaseQuantity::LateralSpeed].map(|q| point.get(q).unwrap().to_string());
         let simulated = lanesweep(&[
             "simulate",
             "--category",
@@ -233,8 +233,8 @@ fn the_presets_have_the_size_of_the_evidence() {
 fn moved(grid: &Grid, gap_m: f64, lateral_mps: f64) -> Grid {
     let shifted = |axis: &GridAxis| {
         let by = match axis.parameter.quantity {
-            MapQuantity::Gap => gap_m,
-            MapQuantity::LateralSpeed => lateral_mps,
+            CaseQuantity::Gap => gap_m,
+            CaseQuantity::LateralSpeed => lateral_mps,
             _ => 0.0,
         };
         GridAxis { parameter: axis.parameter, values: axis.values.iter().map(|v| (v + by).max(0.0)).collect() }
@@ -583,7 +583,7 @@ fn a_cell_is_undecided_where_the_single_case_is() {
     let map = &result.grids[0].map;
     for cell in 0..map.cell_count() {
         let point = grid.point(cell);
-        let gap_m = point.get(MapQuantity::Gap).unwrap();
+        let gap_m = point.get(CaseQuantity::Gap).unwrap();
         let subject = Subject::plain(&point.plain_case(Category::CutIn, &profile).unwrap(), Headway::GapM(gap_m));
         let check = Check { subject, profiles: vec![profile.clone()], models: vec![ModelId::Cchdm] };
         let judged = &check.run_without_boundaries().unwrap()[0];

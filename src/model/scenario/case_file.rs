@@ -5,7 +5,8 @@ use std::fmt;
 use serde::Deserialize;
 use serde::de::{self, DeserializeSeed, Deserializer, Error as _, MapAccess, Visitor};
 
-use super::case_parameters::{CaseParameters, NUMBERS, NamedNumber};
+use super::case_parameters::{CaseParameters, NamedNumber};
+use super::case_quantity::NUMBERS;
 use super::units::Written;
 use crate::Error;
 

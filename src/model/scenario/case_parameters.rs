@@ -1,10 +1,11 @@
 //! A concrete case from the few numbers that a user gives: on the command line, in a file, or in a row of a table.
 
+use super::case_quantity::{CaseNumber, NUMBERS};
 use super::units::{self, Written};
 use super::{Category, LANE_WIDTH_M, PlainCase, check_headway, missing_parameter};
 use crate::model::profile::FrameProfile;
 use crate::support::plausibility::{Doubts, HELP, Quantity};
-use crate::support::table::{NameUnit, Named, Resolved, resolve};
+use crate::support::table::{NameUnit, Resolved, resolve};
 use crate::{Error, Place, Result};
 
 /// Shortest and longest duration, s: the longest is the time cap of the paper's profile.
@@ -34,81 +35,6 @@ pub struct CaseParameters {
     pub duration: Option<f64>,
 }
 
-/// A number of a case: its key, what it measures, its meaning, and its field. A time span has no plausible range.
-pub struct CaseNumber {
-    /// Name in files, tables and options.
-    pub key: &'static str,
-    quantity: Option<Quantity>,
-    /// Meaning, with the default in brackets.
-    pub help: &'static str,
-    get: fn(&CaseParameters) -> Option<f64>,
-    field: fn(&mut CaseParameters) -> &mut Option<f64>,
-}
-
-macro_rules! number {
-    ($key:ident, $quantity:expr, $help:literal) => {
-        CaseNumber {
-            key: stringify!($key),
-            quantity: $quantity,
-            help: $help,
-            get: |case| case.$key,
-            field: |case| &mut case.$key,
-        }
-    };
-}
-
-/// Every number of a case.
-#[rustfmt::skip] // a table
-pub const NUMBERS: [CaseNumber; 16] = [
-    number!(ego_speed, Some(Quantity::Speed), "Initial speed of the ego, with its unit: 60km/h"),
-    number!(speed, Some(Quantity::Speed), "Initial speed of the other vehicle, with its unit [default: the ego's]"),
-    number!(gap, Some(Quantity::Gap), "Initial gap, bumper to bumper"),
-    number!(thw, Some(Quantity::Headway), "Initial time headway instead of the gap"),
-    number!(lateral_speed, Some(Quantity::LateralSpeed), "Cut-in, cut-out: lateral speed"),
-    number!(lateral_distance, Some(Quantity::LateralPosition), "Cut-in: lateral distance at the start; cut-out: at the end [default: the lane's width]"),
-    number!(acceleration, Some(Quantity::Acceleration), "Acceleration of the other vehicle; an LVD needs one [default: 0]"),
-    number!(end_speed, Some(Quantity::Speed), "Speed at which the acceleration ends, with its unit [default: standstill, or never]"),
-    number!(ahead_speed, Some(Quantity::Speed), "Cut-out: speed of the vehicle ahead of the cutting-out one, with its unit [default: 0]"),
-    number!(ahead_gap, Some(Quantity::Gap), "Cut-out: gap between the two, bumper to bumper"),
-    number!(length, Some(Quantity::Length), "Length of every vehicle [default: the profile's]"),
-    number!(width, Some(Quantity::Width), "Width of every vehicle [default: the profile's]"),
-    number!(ego_length, Some(Quantity::Length), "Length of the ego [default: that of every vehicle]"),
-    number!(ego_width, Some(Quantity::Width), "Width of the ego [default: that of every vehicle]"),
-    number!(lane_width, Some(Quantity::LaneWidth), "Width of the lanes [default: the scenario's, else 3.5]"),
-    number!(duration, None, "Duration of the other vehicles' motion"),
-];
-
-impl CaseNumber {
-    /// Sets it to a text: a speed along the road needs its unit (`60km/h`), others may have theirs.
-    ///
-    /// # Errors
-    /// What to write.
-    pub fn set_text(&self, case: &mut CaseParameters, text: &str) -> std::result::Result<(), String> {
-        let unit = if self.needs_unit() { NameUnit::Needed } else { NameUnit::Customary };
-        let si = units::si(Written::Text(text), self.unit(), unit);
-        *(self.field)(case) = Some(si.map_err(|unusable| match unusable.lacks_unit {
-            true => format!("{}; write {}", unusable.problem, unusable.write),
-            false => format!("write {}", unusable.write),
-        })?);
-        Ok(())
-    }
-
-    /// Whether a value needs a unit: a speed along the road, which people give in km/h and in m/s.
-    pub fn needs_unit(&self) -> bool {
-        self.quantity == Some(Quantity::Speed)
-    }
-
-    /// Its SI unit.
-    pub fn unit(&self) -> &'static str {
-        self.quantity.map_or("s", |quantity| quantity.limits().unit)
-    }
-
-    /// The name that users give it. A speed along the road needs a unit; every other quantity has one customary unit.
-    pub(super) fn named(&self) -> Named {
-        Named { name: self.key.to_owned(), unit: self.unit(), needs_unit: self.needs_unit() }
-    }
-}
-
 /// A number of a case under the name that a user gives it: its key, with or without its unit at the end.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct NamedNumber {
@@ -122,7 +48,7 @@ impl NamedNumber {
     /// # Errors
     /// [`Error::Usage`] for a unit that the number cannot have.
     pub fn find(name: &str) -> Result<Option<NamedNumber>> {
-        match resolve(name, &NUMBERS.map(|number| number.named())) {
+        match resolve(name, &NUMBERS.each_ref().map(CaseNumber::named)) {
             Resolved::Field(at, unit) => Ok(Some(NamedNumber { at, unit })),
             Resolved::WrongUnit(problem, help) => Err(Error::usage(Place::item(name), problem, help)),
             Resolved::Unknown => Ok(None),
@@ -209,8 +135,8 @@ impl CaseParameters {
     /// # Errors
     /// [`Error::Usage`] for a value outside the physical range, unless such values are accepted.
     pub fn check_plausible(&self, doubts: &mut Doubts) -> Result<()> {
-        for CaseNumber { key, quantity, get, .. } in &NUMBERS {
-            let (Some(quantity), Some(value)) = (*quantity, get(self)) else { continue };
+        for CaseNumber { key, plausible, get, .. } in &NUMBERS {
+            let (Some(quantity), Some(value)) = (*plausible, get(self)) else { continue };
             doubts
                 .check(quantity, value, || (*key).to_owned())
                 .map_err(|problem| Error::usage(Place::item(*key), problem, HELP))?;

@@ -6,6 +6,7 @@
 
 mod case_file;
 mod case_parameters;
+mod case_quantity;
 mod check;
 mod columns;
 mod file;
@@ -23,7 +24,8 @@ pub use crate::model::case::{check_headway, missing_parameter};
 pub use crate::model::category::Category;
 pub use crate::model::motion::{LATERAL_SAMPLED, Lateral, LateralState, Motion, SPEED_SAMPLED, Speed, Tables};
 pub use case_file::CaseFile;
-pub use case_parameters::{CaseNumber, CaseParameters, NUMBERS, NamedNumber};
+pub use case_parameters::{CaseParameters, NamedNumber};
+pub use case_quantity::{CaseNumber, CaseQuantity, GAP_ERROR_M, KMH, MeasurementError, NUMBERS, SPEED_ERROR_MPS};
 pub use check::problem_of;
 pub use file::{check_scenario_file, read_scenario_file, read_scenarios, write_scenarios, write_scenarios_to};
 pub use found::{ScenarioFile, usable};

@@ -3,7 +3,8 @@
 
 use serde_json::Value;
 
-use super::case_parameters::{CaseNumber, CaseParameters, DURATIONS_S, NUMBERS, NamedNumber};
+use super::case_parameters::{CaseParameters, DURATIONS_S, NamedNumber};
+use super::case_quantity::{CaseNumber, NUMBERS};
 use super::check::name;
 use super::columns::{Chosen, HELP, choose};
 use super::found::{ScenarioFile, ScenariosRead};

@@ -17,12 +17,12 @@ use crate::engine::{Block, CaseTable, Headway, LaneCase, LanePlan, Units};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::random::Stream;
-use crate::run::grid::{MapParameter, MapQuantity, Point, check_complete};
+use crate::run::grid::{CaseQuantity, MapParameter, Point, check_complete};
 use crate::run::reopen::{DISTRIBUTION_FILE, Reopened, SampleRecord};
 use crate::scenario::{Case, Category};
 use crate::stats::density::Draws;
 use crate::support::input_file;
-use crate::support::run_dir::ESTIMATE_RECORD;
+use crate::support::run_folder::ESTIMATE_RECORD;
 use crate::{Error, Place, Result};
 
 /// Purpose of this random stream.
@@ -115,7 +115,7 @@ impl DistributionSamples {
         // If the headway is not a parameter, a flag gives it.
         let has = |quantity| {
             let is_given = given.iter().any(|p| p.quantity == quantity);
-            is_given || (quantity == MapQuantity::Thw && !given.iter().any(|p| p.quantity == MapQuantity::Gap))
+            is_given || (quantity == CaseQuantity::Thw && !given.iter().any(|p| p.quantity == CaseQuantity::Gap))
         };
         check_complete(
             names.category,
@@ -130,7 +130,7 @@ impl DistributionSamples {
     /// Whether the initial distance is one of the parameters.
     pub fn has_distance(&self) -> bool {
         let given = self.parameters.iter().map(|p| p.parameter).chain(self.fixed.iter().map(|(p, _)| *p));
-        given.into_iter().any(|p| matches!(p.quantity, MapQuantity::Gap | MapQuantity::Thw))
+        given.into_iter().any(|p| matches!(p.quantity, CaseQuantity::Gap | CaseQuantity::Thw))
     }
 
     /// The point of a sample: the first draw that is a valid case.
@@ -190,8 +190,8 @@ impl DistributionSamples {
         for index in 0..samples {
             let (sampled, point, case) = self.drawn(seed, index, profile)?;
             tries += u64::from(sampled.tries);
-            let of_headway = point.get(MapQuantity::Thw).map(|thw_s| thw_s * case.ego_speed_mps);
-            let gap_m = point.get(MapQuantity::Gap).or(of_headway).unwrap_or(0.0);
+            let of_headway = point.get(CaseQuantity::Thw).map(|thw_s| thw_s * case.ego_speed_mps);
+            let gap_m = point.get(CaseQuantity::Gap).or(of_headway).unwrap_or(0.0);
             source.blocks[0].cases.push(LaneCase::encode(&case, profile, &mut source.tables).ahead_by(gap_m));
         }
         let block = Block::new(self.category, Units::Numbered(samples), vec![VARIANT.to_owned()]);

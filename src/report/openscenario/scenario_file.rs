@@ -13,7 +13,7 @@ use super::concrete::{Concrete, EgoMotion, PlayedVehicle, Vertex, number};
 use super::road::{Road, road_file};
 use crate::Result;
 use crate::report::records::PROGRAM;
-use crate::support::run_dir::OutputDir;
+use crate::support::run_folder::RunFolder;
 use crate::support::table::Table;
 
 /// Name of the parameter for the initial speed of an external ego.
@@ -277,7 +277,7 @@ pub fn export_folder(dir: &Path, scenarios: &[Concrete]) -> Result<Vec<IndexRow>
     let rows: Vec<IndexRow> = scenarios.iter().enumerate().map(row).collect();
     let texts = scenarios.iter().zip(&rows).map(|(scenario, row)| scenario_file(scenario, &row.road));
     let texts = texts.collect::<Result<Vec<_>>>()?;
-    let folder = OutputDir::open(dir, INDEX)?;
+    let folder = RunFolder::open(dir, INDEX)?;
     let mut results = folder.results()?;
     // The lane already has its own column.
     let names: Vec<String> = scenarios.first().map_or(Vec::new(), |s| {

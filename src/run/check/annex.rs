@@ -5,8 +5,8 @@
 use super::subject::Lane;
 use crate::model::driver::{BelowTrigger, CutInBraking};
 use crate::model::profile::Profile;
-use crate::run::grid::{MapQuantity, Point, SPEED_MPS};
-use crate::scenario::Category;
+use crate::run::grid::Point;
+use crate::scenario::{CaseQuantity, Category, SPEED_ERROR_MPS};
 use crate::support::readable::value;
 
 /// Returns the condition under which CCHDM detects a danger, in a few words.
@@ -33,12 +33,12 @@ pub(super) fn danger(profile: &Profile, category: Category) -> String {
 /// of a cut-out are checked.
 pub(super) fn outside(profile: &Profile, category: Category, point: &Point) -> Option<String> {
     let cchdm = &profile.cchdm;
-    let ego_mps = point.get(MapQuantity::EgoSpeed)?;
+    let ego_mps = point.get(CaseQuantity::EgoSpeed)?;
     match category {
         Category::Lvd if cchdm.lead_deceleration_trigger_mps2 > 0.0 => {
-            let lead_mps = point.get(MapQuantity::OtherSpeed)?;
+            let lead_mps = point.get(CaseQuantity::OtherSpeed)?;
             // Equal up to the error of a speed; a thousandth more, for rounding.
-            ((ego_mps - lead_mps).abs() > 1.001 * SPEED_MPS).then(|| {
+            ((ego_mps - lead_mps).abs() > 1.001 * SPEED_ERROR_MPS).then(|| {
                 let word = if ego_mps > lead_mps { "faster" } else { "slower" };
                 format!(
                     "the ego is {word} than the leader at the start; the annex starts at equal speeds, and its driver \
@@ -48,7 +48,7 @@ pub(super) fn outside(profile: &Profile, category: Category, point: &Point) -> O
         }
         Category::CutOut if cchdm.cut_out_headway_s > 0.0 => {
             let headway_s = cchdm.cut_out_headway_s;
-            let (gap_m, thw_s) = (point.get(MapQuantity::Gap), point.get(MapQuantity::Thw));
+            let (gap_m, thw_s) = (point.get(CaseQuantity::Gap), point.get(CaseQuantity::Thw));
             let gap_m = gap_m.or_else(|| thw_s.map(|thw_s| thw_s * ego_mps))?;
             (gap_m > headway_s * ego_mps + cchdm.cut_out_headway_tolerance_m + 1e-9).then(|| {
                 format!(

@@ -7,7 +7,7 @@ use super::{CaseVerdicts, StepBudget, Verdict};
 use crate::Result;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::grid::{MapParameter, MapQuantity, PARAMETERS};
+use crate::run::grid::{CaseQuantity, MapParameter, PARAMETERS};
 
 /// Number of scanned values on each side.
 const SCANNED: u32 = 100;
@@ -57,7 +57,7 @@ pub(super) fn boundaries(subject: &Subject, profile: &Profile, budget: &StepBudg
         let Some(parameter) = PARAMETERS.iter().find(|parameter| parameter.key == key) else { continue };
         let Some(si) = subject.point().get(parameter.quantity) else { continue };
         // An acceleration is outside the axis of decelerations.
-        if parameter.quantity == MapQuantity::Deceleration && si < 0.0 {
+        if parameter.quantity == CaseQuantity::Deceleration && si < 0.0 {
             continue;
         }
         let value = si * parameter.per_si;

@@ -4,8 +4,7 @@
 use crate::engine::{Trace, TracedStep, TracedVehicle};
 use crate::model::driver::{BelowTrigger, ModelId, lane_centre};
 use crate::model::profile::Profile;
-use crate::run::grid::SPEED_MPS;
-use crate::scenario::Category;
+use crate::scenario::{Category, SPEED_ERROR_MPS};
 
 /// Required relation of a value to its threshold.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -220,7 +219,7 @@ pub(super) fn lane_intrusion(profile: &Profile, trace: &Trace) -> Vec<Reading> {
         clause.reading(
             ("(a) largest change of the other vehicle's speed", "m/s"),
             changed.unzip(),
-            (Relation::AtMost, SPEED_MPS),
+            (Relation::AtMost, SPEED_ERROR_MPS),
             "the other vehicle keeps its speed, to 0.1 km/h",
         ),
     ];

@@ -22,8 +22,8 @@ use crate::engine::{NO_STEP, Outcome, StepMark, Trace, check_time_step};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::grid::{GAP_M, Perturbation, Point, without_reaction};
-use crate::scenario::Category;
+use crate::run::grid::{Perturbation, Point, without_reaction};
+use crate::scenario::{Category, GAP_ERROR_M};
 use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
@@ -304,7 +304,7 @@ impl Check {
         let touches = |model: &ModelId| {
             let [gap, finer_gap] = [&changed[0], found].map(|of| of.verdicts.min_gap_m[model.index()]);
             let limit_m = limit_gap_m((gap, profile.frame.dt_s), (finer_gap, finer_dt_s));
-            !changed[0].verdicts.collides(*model) && gap.min(limit_m) < GAP_M
+            !changed[0].verdicts.collides(*model) && gap.min(limit_m) < GAP_ERROR_M
         };
         Ok(ModelId::ALL.into_iter().filter(touches).collect())
     }

@@ -3,7 +3,7 @@
 use crate::engine::{Constants, Headway, LaneCase, Outcome, Step, Trace};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::grid::{MapQuantity, Point, without_reaction};
+use crate::run::grid::{CaseQuantity, Point, without_reaction};
 use crate::scenario::parameterization::{TimeGrid, recorded_case};
 use crate::scenario::{Case, Category, Lateral, PlainCase, Scenario, Speed, Tables};
 use crate::{Error, Place, Result};
@@ -43,28 +43,29 @@ impl Subject {
     pub fn plain(case: &PlainCase, headway: Headway) -> Subject {
         let start = start(headway, case.ego_speed_mps);
         let mut point = Point::default()
-            .with(MapQuantity::EgoSpeed, case.ego_speed_mps)
-            .with(MapQuantity::OtherSpeed, case.speed_mps)
+            .with(CaseQuantity::EgoSpeed, case.ego_speed_mps)
+            .with(CaseQuantity::OtherSpeed, case.speed_mps)
             .with(start.0, start.1)
-            .with(MapQuantity::Length, case.length_m)
-            .with(MapQuantity::Width, case.width_m)
-            .with(MapQuantity::EgoLength, case.ego_length_m)
-            .with(MapQuantity::EgoWidth, case.ego_width_m);
+            .with(CaseQuantity::Length, case.length_m)
+            .with(CaseQuantity::Width, case.width_m)
+            .with(CaseQuantity::EgoLength, case.ego_length_m)
+            .with(CaseQuantity::EgoWidth, case.ego_width_m);
         if case.acceleration_mps2 != 0.0 {
-            point = point.with(MapQuantity::Deceleration, -case.acceleration_mps2);
+            point = point.with(CaseQuantity::Deceleration, -case.acceleration_mps2);
         }
         if let Some(end_mps) = case.end_speed_mps {
-            point = point.with(MapQuantity::EndSpeed, end_mps);
+            point = point.with(CaseQuantity::EndSpeed, end_mps);
         }
         if case.category != Category::Lvd {
             point = point
-                .with(MapQuantity::LateralSpeed, case.lateral_speed_mps)
-                .with(MapQuantity::LateralDistance, case.lateral_distance_m)
-                .with(MapQuantity::LaneWidth, case.lane_width_m);
+                .with(CaseQuantity::LateralSpeed, case.lateral_speed_mps)
+                .with(CaseQuantity::LateralDistance, case.lateral_distance_m)
+                .with(CaseQuantity::LaneWidth, case.lane_width_m);
         }
         if case.category == Category::CutOut {
-            point =
-                point.with(MapQuantity::AheadSpeed, case.ahead_speed_mps).with(MapQuantity::AheadGap, case.ahead_gap_m);
+            point = point
+                .with(CaseQuantity::AheadSpeed, case.ahead_speed_mps)
+                .with(CaseQuantity::AheadGap, case.ahead_gap_m);
         }
         Subject::Plain(*case, point)
     }
@@ -82,19 +83,19 @@ impl Subject {
         let ego_mps = if scenario.category == Category::Lvd { other_mps } else { scenario.ego.v0 };
         let start = match headway {
             Some(headway) => start(headway, ego_mps),
-            None => (MapQuantity::Gap, scenario.gap0.filter(|gap| gap.is_finite()).ok_or_else(missing)?),
+            None => (CaseQuantity::Gap, scenario.gap0.filter(|gap| gap.is_finite()).ok_or_else(missing)?),
         };
         let mut point = Point::default()
-            .with(MapQuantity::EgoSpeed, ego_mps)
-            .with(MapQuantity::OtherSpeed, other_mps)
+            .with(CaseQuantity::EgoSpeed, ego_mps)
+            .with(CaseQuantity::OtherSpeed, other_mps)
             .with(start.0, start.1)
-            .with(MapQuantity::Length, scenario.target.length)
-            .with(MapQuantity::Width, scenario.target.width)
-            .with(MapQuantity::EgoLength, scenario.ego.length)
-            .with(MapQuantity::EgoWidth, scenario.ego.width);
+            .with(CaseQuantity::Length, scenario.target.length)
+            .with(CaseQuantity::Width, scenario.target.width)
+            .with(CaseQuantity::EgoLength, scenario.ego.length)
+            .with(CaseQuantity::EgoWidth, scenario.ego.width);
         if let Some(y_m) = scenario.target.y.first().filter(|_| scenario.category != Category::Lvd) {
             point =
-                point.with(MapQuantity::LateralDistance, y_m.abs()).with(MapQuantity::LaneWidth, scenario.lane_width);
+                point.with(CaseQuantity::LateralDistance, y_m.abs()).with(CaseQuantity::LaneWidth, scenario.lane_width);
         }
         Ok(Subject::Recorded(Box::new(scenario), point))
     }
@@ -142,7 +143,7 @@ impl Subject {
     /// # Errors
     /// [`Error::Usage`] for contradictory numbers; [`Error::Input`] for a cut-out without a vehicle ahead.
     pub fn lane(&self, profile: &Profile, point: &Point) -> Result<Lane> {
-        let headway = match (point.get(MapQuantity::Thw), point.get(MapQuantity::Gap)) {
+        let headway = match (point.get(CaseQuantity::Thw), point.get(CaseQuantity::Gap)) {
             (Some(thw_s), _) => Headway::ThwS(thw_s),
             (None, gap_m) => Headway::GapM(gap_m.unwrap_or(0.0)),
         };
@@ -153,11 +154,11 @@ impl Subject {
 }
 
 /// The quantity and value that a headway sets; the regulation's distance is a gap.
-fn start(headway: Headway, ego_mps: f64) -> (MapQuantity, f64) {
+fn start(headway: Headway, ego_mps: f64) -> (CaseQuantity, f64) {
     match headway {
-        Headway::ThwS(thw_s) => (MapQuantity::Thw, thw_s),
+        Headway::ThwS(thw_s) => (CaseQuantity::Thw, thw_s),
         Headway::GapM(_) | Headway::MinFollowing | Headway::Observed => {
-            (MapQuantity::Gap, headway.start().gap(ego_mps))
+            (CaseQuantity::Gap, headway.start().gap(ego_mps))
         }
     }
 }
@@ -165,7 +166,7 @@ fn start(headway: Headway, ego_mps: f64) -> (MapQuantity, f64) {
 fn plain(of: &PlainCase, point: &Point, profile: &Profile) -> Result<Case> {
     let case = PlainCase {
         // A map has only decelerations and no durations.
-        acceleration_mps2: point.get(MapQuantity::Deceleration).map_or(0.0, |a| 0.0 - a),
+        acceleration_mps2: point.get(CaseQuantity::Deceleration).map_or(0.0, |a| 0.0 - a),
         duration_s: of.duration_s,
         ..point.plain_case(of.category, profile)?
     };
@@ -175,25 +176,25 @@ fn plain(of: &PlainCase, point: &Point, profile: &Profile) -> Result<Case> {
 /// Changes the first values and the sizes of a recorded case; series keep their shape.
 fn move_to(case: &mut Case, from: &Point, to: &Point) {
     let change = |quantity| to.get(quantity).zip(from.get(quantity)).map_or(0.0, |(to, from)| to - from);
-    case.ego_speed_mps = (case.ego_speed_mps + change(MapQuantity::EgoSpeed)).max(0.0);
-    let by_mps = change(MapQuantity::OtherSpeed);
+    case.ego_speed_mps = (case.ego_speed_mps + change(CaseQuantity::EgoSpeed)).max(0.0);
+    let by_mps = change(CaseQuantity::OtherSpeed);
     if let Speed::Sampled(series) = &mut case.principal.speed
         && by_mps != 0.0
     {
         series.iter_mut().for_each(|v| *v = (*v + by_mps).max(0.0));
     }
-    let by_m = change(MapQuantity::LateralDistance);
+    let by_m = change(CaseQuantity::LateralDistance);
     if let Lateral::Sampled { position_m, .. } = &mut case.principal.lateral
         && by_m != 0.0
     {
         let side = position_m.first().map_or(1.0, |y| y.signum());
         position_m.iter_mut().for_each(|y| *y += side * by_m);
     }
-    case.ego_length_m += change(MapQuantity::EgoLength);
-    case.ego_width_m += change(MapQuantity::EgoWidth);
-    case.principal.length_m += change(MapQuantity::Length);
-    case.principal.width_m += change(MapQuantity::Width);
-    case.lane_width_m += change(MapQuantity::LaneWidth);
+    case.ego_length_m += change(CaseQuantity::EgoLength);
+    case.ego_width_m += change(CaseQuantity::EgoWidth);
+    case.principal.length_m += change(CaseQuantity::Length);
+    case.principal.width_m += change(CaseQuantity::Width);
+    case.lane_width_m += change(CaseQuantity::LaneWidth);
 }
 
 impl Lane {

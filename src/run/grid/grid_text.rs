@@ -2,10 +2,10 @@
 //! all its cells.
 
 use super::axis::GridAxis;
-use super::parameter::{MapParameter, MapQuantity};
+use super::parameter::MapParameter;
 use super::{CaseStyle, Grid, GridParts, MAX_PANELS, jrc_case};
 use crate::model::profile::Profile;
-use crate::scenario::{Category, LANE_WIDTH_M};
+use crate::scenario::{CaseQuantity, Category, LANE_WIDTH_M};
 use crate::support::plausibility::Doubts;
 use crate::{Error, Place, Result};
 
@@ -65,10 +65,10 @@ impl GridText {
                 }
                 None => {
                     // Panels can leave out relative speeds that are none, axes cannot.
-                    let has_relative = left.iter().any(|axis| axis.parameter.quantity == MapQuantity::RelativeSpeed);
+                    let has_relative = left.iter().any(|axis| axis.parameter.is_relative);
                     let is_speed = |axis: &GridAxis| {
-                        has_relative
-                            && matches!(axis.parameter.quantity, MapQuantity::EgoSpeed | MapQuantity::RelativeSpeed)
+                        let is_ego = axis.parameter.quantity == CaseQuantity::EgoSpeed;
+                        has_relative && (is_ego || axis.parameter.is_relative)
                     };
                     let several = left.iter().position(|axis| axis.len() > 1 && !is_speed(axis));
                     let several = several.or_else(|| left.iter().position(|axis| axis.len() > 1));
@@ -152,20 +152,20 @@ impl Grid {
         let (category, is_jrc) = (self.category(), self.style() != CaseStyle::Plain);
         let point = self.point(0);
         let sets = |quantity| point.get(quantity).is_some();
-        if !sets(MapQuantity::OtherSpeed) {
+        if !sets(CaseQuantity::OtherSpeed) {
             held.push("the other vehicle starts as fast as the ego".to_owned());
         }
-        if !sets(MapQuantity::Deceleration) {
+        if !sets(CaseQuantity::Deceleration) {
             held.push("the other vehicle keeps its speed".to_owned());
-        } else if !sets(MapQuantity::EndSpeed) {
+        } else if !sets(CaseQuantity::EndSpeed) {
             held.push("the other vehicle decelerates to a standstill".to_owned());
         }
-        if category == Category::CutOut && !sets(MapQuantity::AheadSpeed) {
+        if category == Category::CutOut && !sets(CaseQuantity::AheadSpeed) {
             held.push("the vehicle ahead stands".to_owned());
         }
-        if category != Category::Lvd && !sets(MapQuantity::LateralDistance) {
+        if category != Category::Lvd && !sets(CaseQuantity::LateralDistance) {
             let distance_m = match (is_jrc, category) {
-                (false, _) => point.get(MapQuantity::LaneWidth).unwrap_or(LANE_WIDTH_M),
+                (false, _) => point.get(CaseQuantity::LaneWidth).unwrap_or(LANE_WIDTH_M),
                 (true, Category::CutOut) => jrc_case::CUT_OUT_LATERAL_M,
                 (true, _) => jrc_case::CUT_IN_LATERAL_M,
             };
@@ -175,8 +175,8 @@ impl Grid {
         let size = |quantity, of_jrc_m: f64, of_profile_m: f64| {
             (!sets(quantity)).then(|| format!("{} m", number(if is_jrc { of_jrc_m } else { of_profile_m })))
         };
-        let length = size(MapQuantity::Length, jrc_case::LENGTH_M, profile.frame.default_length_m);
-        let width = size(MapQuantity::Width, jrc_case::WIDTH_M, profile.frame.default_width_m);
+        let length = size(CaseQuantity::Length, jrc_case::LENGTH_M, profile.frame.default_length_m);
+        let width = size(CaseQuantity::Width, jrc_case::WIDTH_M, profile.frame.default_width_m);
         held.extend(match (length, width) {
             (Some(length), Some(width)) => Some(format!("vehicles {length} × {width}")),
             (Some(length), None) => Some(format!("vehicles {length} long")),

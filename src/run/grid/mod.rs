@@ -19,17 +19,17 @@ pub use axis::{GridAxis, MAX_VALUES};
 pub use grid_text::{GridText, Variations};
 use jrc_case::Front;
 pub use map::{Agreement, CellOutcome, GridMap, boundary, count, runs};
-pub use parameter::{MapParameter, MapQuantity, PARAMETERS, Point};
+pub use parameter::{MapParameter, PARAMETERS, Point};
 pub use plan::{GridPart, GridPlan};
-pub(crate) use robustness::{GAP_M, SPEED_MPS, without_reaction};
+pub(crate) use robustness::without_reaction;
 pub use robustness::{Perturbation, VARIED};
 pub use run::{Against, Map, MapGrids, MapOptions, MapResult, MappedGrid};
 
-pub use crate::scenario::{LANE_WIDTH_M, PlainCase};
+pub use crate::scenario::{CaseQuantity, LANE_WIDTH_M, PlainCase};
 
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::scenario::{Case, Category, missing_parameter};
+use crate::scenario::{Case, Category, NUMBERS, missing_parameter};
 use crate::support::ranges::refuse_repeats;
 use crate::{Error, Place, Result};
 
@@ -140,7 +140,7 @@ impl Grid {
     /// Leaves out the panels whose relative speed makes the other vehicle drive backwards. If all do, their cases are
     /// refused later.
     fn leave_out_backwards(&mut self) {
-        let other_mps = |panel: &Vec<f64>| self.panel_point(panel).get(MapQuantity::OtherSpeed);
+        let other_mps = |panel: &Vec<f64>| self.panel_point(panel).get(CaseQuantity::OtherSpeed);
         let (left, kept): (Vec<_>, Vec<_>) =
             self.panels.iter().cloned().partition(|panel| other_mps(panel).is_some_and(|mps| mps < 0.0));
         let Some(first) = left.first().filter(|_| !kept.is_empty()) else { return };
@@ -156,7 +156,7 @@ impl Grid {
     }
 
     fn leave_out_receding(&mut self) -> Result<()> {
-        let speeds = |point: &Point| point.get(MapQuantity::EgoSpeed).zip(point.get(MapQuantity::OtherSpeed));
+        let speeds = |point: &Point| point.get(CaseQuantity::EgoSpeed).zip(point.get(CaseQuantity::OtherSpeed));
         let mut kept = Vec::new();
         for panel in &self.panels {
             let Some((ego_mps, other_mps)) = speeds(&self.panel_point(panel)) else {
@@ -266,7 +266,7 @@ impl Grid {
             |quantity| self.values(0).iter().chain(&self.parts.fixed).any(|(known, _)| known.quantity == quantity);
         let frame = &profile.frame;
         for (quantity, size_m) in
-            [(MapQuantity::Length, frame.default_length_m), (MapQuantity::Width, frame.default_width_m)]
+            [(CaseQuantity::Length, frame.default_length_m), (CaseQuantity::Width, frame.default_width_m)]
         {
             let parameter = PARAMETERS.iter().find(|known| known.quantity == quantity);
             grid.parts.fixed.extend(parameter.filter(|_| !is_set(quantity)).map(|parameter| (parameter, size_m)));
@@ -311,9 +311,9 @@ impl Grid {
     pub fn case(&self, cell: usize, profile: &Profile) -> Result<Case> {
         let (point, dt_s) = (self.point(cell), profile.frame.dt_s);
         let value = |quantity, otherwise: f64| point.get(quantity).unwrap_or(otherwise);
-        let ego_mps = value(MapQuantity::EgoSpeed, 0.0);
-        let other_mps = value(MapQuantity::OtherSpeed, ego_mps);
-        let lateral_mps = value(MapQuantity::LateralSpeed, 0.0);
+        let ego_mps = value(CaseQuantity::EgoSpeed, 0.0);
+        let other_mps = value(CaseQuantity::OtherSpeed, ego_mps);
+        let lateral_mps = value(CaseQuantity::LateralSpeed, 0.0);
         if self.parts.style == CaseStyle::Plain {
             return point.plain_case(self.parts.category, profile)?.case(profile.frame.time_cap_s);
         }
@@ -322,13 +322,13 @@ impl Grid {
                 jrc_case::cut_in(ego_mps, other_mps, lateral_mps, run_up(self.parts.style, &point, dt_s), dt_s)
             }
             Category::Lvd => {
-                let (end, deceleration) = (value(MapQuantity::EndSpeed, 0.0), value(MapQuantity::Deceleration, 0.0));
+                let (end, deceleration) = (value(CaseQuantity::EndSpeed, 0.0), value(CaseQuantity::Deceleration, 0.0));
                 jrc_case::lvd(ego_mps, end, deceleration)
             }
             Category::CutOut => {
-                let speed_mps = value(MapQuantity::AheadSpeed, 0.0);
+                let speed_mps = value(CaseQuantity::AheadSpeed, 0.0);
                 let length_m = if speed_mps > 0.0 { jrc_case::LENGTH_M } else { jrc_case::STANDING_LENGTH_M };
-                let front = Front { speed_mps, length_m, distance_m: value(MapQuantity::AheadGap, 0.0) };
+                let front = Front { speed_mps, length_m, distance_m: value(CaseQuantity::AheadGap, 0.0) };
                 jrc_case::cut_out(ego_mps, lateral_mps, front, dt_s)
             }
         })
@@ -337,19 +337,19 @@ impl Grid {
     /// The initial gap of a cell's lane of a model, m, bumper to bumper at the nominal start.
     pub fn gap_m(&self, cell: usize, model: ModelId, profile: &Profile) -> f64 {
         let point = self.point(cell);
-        let ego_mps = point.get(MapQuantity::EgoSpeed).unwrap_or(0.0);
+        let ego_mps = point.get(CaseQuantity::EgoSpeed).unwrap_or(0.0);
         if self.parts.native_gap {
             return jrc_case::native_distance(profile, model, ego_mps);
         }
-        let of_headway = point.get(MapQuantity::Thw).map(|thw_s| thw_s * ego_mps);
-        point.get(MapQuantity::Gap).or(of_headway).unwrap_or(0.0)
+        let of_headway = point.get(CaseQuantity::Thw).map(|thw_s| thw_s * ego_mps);
+        point.get(CaseQuantity::Gap).or(of_headway).unwrap_or(0.0)
     }
 
     /// The gap that a run-up and a perturbation add to a cell's gap, m.
     fn added_gap_m(&self, cell: usize, dt_s: f64) -> f64 {
         let point = self.point(cell);
-        let ego_mps = point.get(MapQuantity::EgoSpeed).unwrap_or(0.0);
-        let other_mps = point.get(MapQuantity::OtherSpeed).unwrap_or(ego_mps);
+        let ego_mps = point.get(CaseQuantity::EgoSpeed).unwrap_or(0.0);
+        let other_mps = point.get(CaseQuantity::OtherSpeed).unwrap_or(ego_mps);
         let of_run_up =
             jrc_case::gap_before_run_up(0.0, ego_mps, other_mps, run_up(self.parts.style, &point, dt_s), dt_s);
         of_run_up + self.perturbation.map_or(0.0, Perturbation::gap_m)
@@ -358,7 +358,7 @@ impl Grid {
 
 /// Number of steps of a case's lateral run-up.
 fn run_up(style: CaseStyle, point: &Point, dt_s: f64) -> u32 {
-    match (style, point.get(MapQuantity::LateralSpeed)) {
+    match (style, point.get(CaseQuantity::LateralSpeed)) {
         (CaseStyle::JrcComparison, Some(lateral_mps)) => jrc_case::run_up_steps(lateral_mps, dt_s),
         _ => 0,
     }
@@ -390,21 +390,15 @@ fn checked(rows: Vec<Vec<f64>>, axes: &[GridAxis]) -> Result<Vec<Vec<f64>>> {
 pub fn check_complete(
     category: Category,
     native_gap: bool,
-    has: &dyn Fn(MapQuantity) -> bool,
+    has: &dyn Fn(CaseQuantity) -> bool,
     (needing, how): Needing,
 ) -> Result<()> {
     let missing = |what: &str, example: &str| {
         let problem = format!("{needing} of {}s needs {what}", category.label());
         Err(Error::usage(Place::item(what), problem, format!("{how} {example}")))
     };
-    let has_gap = has(MapQuantity::Gap) || has(MapQuantity::Thw);
-    let has_parameter = |key: &str| match key {
-        "ego_speed" => has(MapQuantity::EgoSpeed),
-        "lateral_speed" => has(MapQuantity::LateralSpeed),
-        "acceleration" => has(MapQuantity::Deceleration),
-        "ahead_gap" => has(MapQuantity::AheadGap),
-        _ => true,
-    };
+    let has_gap = has(CaseQuantity::Gap) || has(CaseQuantity::Thw);
+    let has_parameter = |key: &str| NUMBERS.iter().any(|number| number.key == key && has(number.quantity));
     match missing_parameter(category, has_parameter) {
         None => {}
         Some("ego_speed") => return missing("the ego's speed", "ego_speed_kmh=60"),
@@ -412,7 +406,7 @@ pub fn check_complete(
         Some("acceleration") => return missing("the leader's deceleration", "deceleration_mps2=6"),
         Some(_) => return missing("the gap to the vehicle ahead", "ahead_gap_m=50"),
     }
-    if has(MapQuantity::Gap) && has(MapQuantity::Thw) || native_gap && has_gap {
+    if has(CaseQuantity::Gap) && has(CaseQuantity::Thw) || native_gap && has_gap {
         let problem = "the initial distance is given twice".to_owned();
         let help = "keep one of gap_m, thw_s and option `native_gap`";
         return Err(Error::usage(Place::item("gap_m, thw_s"), problem, help));

@@ -10,9 +10,9 @@ use crate::model::profile::Profile;
 use crate::{Error, Place, Result};
 
 use super::axis::GridAxis;
-use super::parameter::{MapParameter, MapQuantity};
+use super::parameter::MapParameter;
 use super::robustness::{Perturbation, without_reaction};
-use super::{Grid, jrc_case};
+use super::{CaseQuantity, Grid, jrc_case};
 
 /// Name of the only variant.
 const VARIANT: &str = "cell";
@@ -167,12 +167,12 @@ fn of_cell(grid: &Grid, cell: usize, error: Error) -> Error {
 }
 
 fn is_distance(parameter: &MapParameter) -> bool {
-    matches!(parameter.quantity, MapQuantity::Gap | MapQuantity::Thw)
+    matches!(parameter.quantity, CaseQuantity::Gap | CaseQuantity::Thw)
 }
 
 fn headway(parameter: &MapParameter, value: f64) -> Headway {
     match parameter.quantity {
-        MapQuantity::Thw => Headway::thw(parameter.si(value)),
+        CaseQuantity::Thw => Headway::thw(parameter.si(value)),
         _ => Headway::GapM(parameter.si(value)),
     }
 }

@@ -13,7 +13,7 @@ use crate::stats::estimate::StopReason;
 use crate::support::files::make_folder;
 use crate::support::lock::FolderLock;
 use crate::support::readable::count;
-use crate::support::run_dir::{OutputDir, Results};
+use crate::support::run_folder::{Results, RunFolder};
 use crate::{Error, Place, Result};
 
 /// Receives the chunks of a sweep in order, with their plan.
@@ -117,9 +117,9 @@ pub trait Job: Sized {
         }
         // Parts share the folder; a run in one piece has it alone.
         let (folder, lock) = match shard {
-            None => (OutputDir::open(out, Self::RECORD)?, None),
+            None => (RunFolder::open(out, Self::RECORD)?, None),
             Some(shard) => {
-                let folder = OutputDir::share(out)?;
+                let folder = RunFolder::share(out)?;
                 let lock = FolderLock::acquire(&out.join(format!("{}.lock", shard.stem())))?;
                 warn_of_another_split(out, shard);
                 (folder, Some(lock))
@@ -200,7 +200,7 @@ pub struct JobRun<'j, J: Job> {
     is_journalled: bool,
     // Dropped last, the lock of the shard first: until then no other process computes these units.
     lock: Option<FolderLock>,
-    folder: OutputDir,
+    folder: RunFolder,
 }
 
 impl<J: Job> JobRun<'_, J> {

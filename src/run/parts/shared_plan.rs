@@ -6,7 +6,7 @@ use std::path::Path;
 
 use crate::support::files::write_inside;
 use crate::support::input_file;
-use crate::support::run_dir::OutputDir;
+use crate::support::run_folder::RunFolder;
 use crate::{Error, Place, Result};
 
 /// File name of the plan in a run's folder.
@@ -23,7 +23,7 @@ pub const RUN_PLAN_FILE: &str = "run-plan.json";
 /// # Errors
 /// [`Error::Input`] if the folder holds the plan of another run; [`Error::Io`].
 pub(crate) fn leave_plan(out: &Path, line: &[u8], write: impl Fn(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
-    let (_folder, path) = (OutputDir::share(out)?, out.join(PLAN_FILE));
+    let (_folder, path) = (RunFolder::share(out)?, out.join(PLAN_FILE));
     let io = |e| Error::io(&path, "read", e);
     match input_file::open(&path) {
         Ok(mut there) => {

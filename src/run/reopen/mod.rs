@@ -23,7 +23,7 @@ use crate::scenario::Scenario;
 use crate::stats::density::DensityModel;
 use crate::support::files::check_run_folder;
 use crate::support::ranges::refuse_repeats;
-use crate::support::run_dir::{ESTIMATE_RECORD, STUDY_RECORD};
+use crate::support::run_folder::{ESTIMATE_RECORD, STUDY_RECORD};
 use crate::{Error, Place, Result};
 
 /// Lanes that can be rerun.

@@ -13,7 +13,7 @@ use crate::run::sampling::{Estimator, SampleHeadways, SampleOptions, SampleSourc
 use crate::run::study::Study;
 use crate::stats::density::{DensityModel, read_density};
 use crate::support::input_file::{MAX_TABLE_BYTES, read_json};
-use crate::support::run_dir::{ESTIMATE_RECORD, STUDY_RECORD};
+use crate::support::run_folder::{ESTIMATE_RECORD, STUDY_RECORD};
 use crate::{Error, Place, Result};
 
 /// Fields read from `estimate.json` of a sampling run.

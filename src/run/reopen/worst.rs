@@ -14,7 +14,7 @@ use crate::run::study::{Study, WINDOW};
 use crate::support::input_file;
 use crate::support::plain_text::hex;
 use crate::support::ranges::refuse_repeats;
-use crate::support::run_dir::ESTIMATE_RECORD;
+use crate::support::run_folder::ESTIMATE_RECORD;
 use crate::support::table::text_of_cell;
 use crate::{Error, Place, Result};
 

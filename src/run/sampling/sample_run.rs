@@ -11,7 +11,7 @@ use super::weighted::WeightedTally;
 use super::{Sample, SampleKind, Weighted};
 use crate::engine::{Executor, LanePlan, SweepSummary};
 use crate::run::parts::{Computed, EachChunk, Job, Ledger, MergeableCounts, PLAN_FILE, Shard, leave_plan};
-use crate::support::run_dir::ESTIMATE_RECORD;
+use crate::support::run_folder::ESTIMATE_RECORD;
 use crate::{Error, Place, Result};
 
 /// Evaluates an expression for the job of a planned sample.

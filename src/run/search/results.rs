@@ -10,7 +10,7 @@ use super::{Candidate, Evaluated};
 use crate::run::parts::{Journal, Shard, run_of_journal};
 use crate::support::input_file;
 use crate::support::lock::FolderLock;
-use crate::support::run_dir::SEARCH_RECORD;
+use crate::support::run_folder::SEARCH_RECORD;
 use crate::{Error, Result};
 
 /// A record: a candidate and its result, `None` for one that cannot be fitted.

@@ -34,7 +34,7 @@ use crate::engine::{LanePlan, Partial};
 use crate::model::profile::Profile;
 use crate::run::parts::{Shard, read_sealed_line, seal, units_of};
 use crate::run::score::{ScoreOptions, ScoreTable, score};
-use crate::support::run_dir::Results;
+use crate::support::run_folder::Results;
 use crate::traffic::mining::{Collection, MiningOptions, counts, counts_text};
 use crate::{Error, Place, Result};
 

@@ -9,7 +9,7 @@ use crate::engine::{Executor, Partial, SweepSummary, Wanted};
 use crate::run::parts::{Computed, EachChunk, Job, Ledger, PLAN_FILE, Shard, leave_plan};
 use crate::support::input_file;
 use crate::support::plain_text::sha256;
-use crate::support::run_dir::STUDY_RECORD;
+use crate::support::run_folder::STUDY_RECORD;
 use crate::{Error, Place, Result};
 
 /// Result of a whole study.

@@ -54,7 +54,7 @@ pub(in crate::traffic::trajectory) const SUFFIXES: [&str; 3] = ["_tracks.csv", "
 /// If it is not a folder, cannot be listed, or holds no complete recording.
 pub fn inventory(dir: &Path) -> Result<Inventory> {
     let found = prefixes(dir)?;
-    let unfinished = crate::support::run_dir::unfinished(dir).unwrap_or_default();
+    let unfinished = crate::support::run_folder::unfinished(dir).unwrap_or_default();
     if unfinished.iter().any(|name| name.ends_with(SUFFIXES[0])) {
         let problem = "`synth`, or a conversion by `tracks`, did not finish here, so recordings are missing";
         let help = "repeat that command, which completes the folder, or remove the folder";

@@ -27,7 +27,7 @@ const LOCK: &str = "run.lock";
 
 /// The right to write a run directory, until it is dropped.
 #[derive(Debug)]
-pub struct OutputDir {
+pub struct RunFolder {
     dir: PathBuf,
     record: Option<&'static str>,
     is_new: bool,
@@ -36,15 +36,15 @@ pub struct OutputDir {
     live: Vec<Live>,
 }
 
-impl OutputDir {
+impl RunFolder {
     /// Opens a folder for a run that leaves this record, and creates it if needed. Hidden files of killed runs are
     /// removed.
     ///
     /// # Errors
     /// [`Error::Busy`] if another process writes it; [`Error::Usage`] if it holds another verb's run, or unlisted files
     /// with the names of this run's; [`Error::Input`] for a link in the place of lock or record; [`Error::Io`].
-    pub fn open(dir: &Path, record: &'static str) -> Result<OutputDir> {
-        let mut folder = OutputDir::take(dir, Some(record), FolderLock::acquire)?;
+    pub fn open(dir: &Path, record: &'static str) -> Result<RunFolder> {
+        let mut folder = RunFolder::take(dir, Some(record), FolderLock::acquire)?;
         folder.enter_lock();
         folder.refuse_another_verb(record)?;
         let usual_files = RECORDS.iter().filter(|(name, _)| *name == record).flat_map(|(_, files)| *files);
@@ -52,30 +52,30 @@ impl OutputDir {
         Ok(folder)
     }
 
-    /// Like [`OutputDir::open`], for files that are independent results, without a record.
+    /// Like [`RunFolder::open`], for files that are independent results, without a record.
     ///
     /// # Errors
-    /// As [`OutputDir::open`].
-    pub fn open_without_record(dir: &Path) -> Result<OutputDir> {
-        let mut folder = OutputDir::take(dir, None, FolderLock::acquire)?;
+    /// As [`RunFolder::open`].
+    pub fn open_without_record(dir: &Path) -> Result<RunFolder> {
+        let mut folder = RunFolder::take(dir, None, FolderLock::acquire)?;
         folder.enter_lock();
         Ok(folder)
     }
 
-    /// Like [`OutputDir::open`], for a part of a run, together with other parts.
+    /// Like [`RunFolder::open`], for a part of a run, together with other parts.
     ///
     /// # Errors
-    /// As [`OutputDir::open`]; [`Error::Busy`] only if a whole run or a merge is active.
-    pub fn share(dir: &Path) -> Result<OutputDir> {
-        OutputDir::take(dir, None, FolderLock::share)
+    /// As [`RunFolder::open`]; [`Error::Busy`] only if a whole run or a merge is active.
+    pub fn share(dir: &Path) -> Result<RunFolder> {
+        RunFolder::take(dir, None, FolderLock::share)
     }
 
-    fn take(dir: &Path, record: Option<&'static str>, lock: impl Fn(&Path) -> Result<FolderLock>) -> Result<OutputDir> {
+    fn take(dir: &Path, record: Option<&'static str>, lock: impl Fn(&Path) -> Result<FolderLock>) -> Result<RunFolder> {
         let is_new = !dir.exists();
         make_folder(dir)?;
         let lock = Some(lock(&dir.join(LOCK))?);
         let live = if is_new { vec![Live::enter(dir.to_path_buf())] } else { Vec::new() };
-        let folder = OutputDir { dir: dir.to_path_buf(), record, is_new, lock, live };
+        let folder = RunFolder { dir: dir.to_path_buf(), record, is_new, lock, live };
         record.into_iter().chain([LIST]).try_for_each(|name| refuse_link(&dir.join(name)))?;
         clear_stale(dir, None);
         Ok(folder)
@@ -143,7 +143,7 @@ impl OutputDir {
     }
 }
 
-impl Drop for OutputDir {
+impl Drop for RunFolder {
     fn drop(&mut self) {
         self.live.clear();
         self.lock = None;
@@ -156,7 +156,7 @@ impl Drop for OutputDir {
 
 /// Results of a run under hidden names; dropping them before [`Results::publish`] removes them.
 pub struct Results<'a> {
-    folder: &'a OutputDir,
+    folder: &'a RunFolder,
     staged: Vec<(String, StagedFile)>,
     elsewhere: Vec<StagedFile>,
     kept: BTreeSet<String>,
@@ -290,11 +290,11 @@ mod tests {
     use super::*;
     use std::fs;
 
-    fn folder(dir: &Path) -> OutputDir {
-        OutputDir::open(dir, MAP_RECORD).unwrap()
+    fn folder(dir: &Path) -> RunFolder {
+        RunFolder::open(dir, MAP_RECORD).unwrap()
     }
 
-    fn publish(folder: &OutputDir, names: &[&str], text: &str) {
+    fn publish(folder: &RunFolder, names: &[&str], text: &str) {
         let mut results = folder.results().unwrap();
         names.iter().for_each(|name| results.add(name, text.as_bytes()).unwrap());
         let record = serde_json::json!({"program": "lanesweep 0", "files": results.names(), "text": text});
@@ -321,7 +321,7 @@ mod tests {
         assert!(is_listed(&out, "b.svg") && is_listed(&out, "map.json") && !is_listed(&out, "map-of-germany.svg"));
     }
 
-    fn refusal(result: Result<OutputDir>) -> String {
+    fn refusal(result: Result<RunFolder>) -> String {
         let error = result.unwrap_err();
         assert!(matches!(error, Error::Usage { .. } | Error::Input { .. }), "{error}");
         error.to_string()
@@ -334,11 +334,11 @@ mod tests {
         fs::write(out.join("a.csv"), "mine").unwrap();
         let foreign = r#"{"program":"QGIS 3","files":["a.csv"]}"#;
         fs::write(out.join(MAP_RECORD), foreign).unwrap();
-        assert!(refusal(OutputDir::open(out, MAP_RECORD)).contains(MAP_RECORD));
+        assert!(refusal(RunFolder::open(out, MAP_RECORD)).contains(MAP_RECORD));
         assert_eq!(fs::read_to_string(out.join(MAP_RECORD)).unwrap(), foreign);
         fs::remove_file(out.join(MAP_RECORD)).unwrap();
         fs::write(out.join("report.html"), "mine").unwrap();
-        assert!(refusal(OutputDir::open(out, MAP_RECORD)).contains("report.html"), "before the work starts");
+        assert!(refusal(RunFolder::open(out, MAP_RECORD)).contains("report.html"), "before the work starts");
         fs::remove_file(out.join("report.html")).unwrap();
         let folder = folder(out);
         let mut results = folder.results().unwrap();
@@ -393,7 +393,7 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path();
         let add = |name: &str, text: &str| {
-            let folder = OutputDir::open_without_record(out).unwrap();
+            let folder = RunFolder::open_without_record(out).unwrap();
             let mut results = folder.results().unwrap();
             results.add(name, text.as_bytes()).unwrap();
             results.publish_each()
@@ -413,13 +413,13 @@ mod tests {
         let dir = tempfile::tempdir().unwrap();
         let out = dir.path().join("out");
         let held = folder(&out);
-        assert!(matches!(OutputDir::open(&out, STUDY_RECORD), Err(Error::Busy { .. })));
-        assert!(matches!(OutputDir::share(&out), Err(Error::Busy { .. })));
+        assert!(matches!(RunFolder::open(&out, STUDY_RECORD), Err(Error::Busy { .. })));
+        assert!(matches!(RunFolder::share(&out), Err(Error::Busy { .. })));
         publish(&held, &["report.html"], "map");
         drop(held);
-        let error = OutputDir::open(&out, STUDY_RECORD).unwrap_err();
+        let error = RunFolder::open(&out, STUDY_RECORD).unwrap_err();
         assert!(matches!(error, Error::Usage { .. }) && error.to_string().contains("map.json"), "{error}");
-        assert!(OutputDir::open(&out, "index.csv").is_ok(), "its files have other names");
+        assert!(RunFolder::open(&out, "index.csv").is_ok(), "its files have other names");
     }
 
     #[test]
@@ -443,7 +443,7 @@ mod tests {
         fs::write(&precious, "mine").unwrap();
         for name in [LOCK, MAP_RECORD, LIST, "a.csv"] {
             std::os::unix::fs::symlink(&precious, out.join(name)).unwrap();
-            let refused = match OutputDir::open(&out, MAP_RECORD) {
+            let refused = match RunFolder::open(&out, MAP_RECORD) {
                 Ok(folder) => folder.results().unwrap().add("a.csv", b"text").unwrap_err(),
                 Err(error) => error,
             };
