@@ -49,6 +49,7 @@ __all__ = [
     "synth",
     "trace",
     "tracks",
+    "vary",
 ]
 
 
@@ -583,8 +584,14 @@ def check(
     scenario: str | None = None,
     models: Models | None = None,
     profiles: Paths | None = None,
+    results: Path | None = None,
+    nominal: bool = False,
     sheet: Path | None = None,
+    rows: Path | None = None,
+    sheets: Path | None = None,
     series: Path | None = None,
+    backend: Literal["auto", "cpu", "gpu"] | None = None,
+    device: str | Int | None = None,
     **case: Unpack[Case],
 ) -> Result:
     """Check whether the reference drivers of UN R157 avoid the collision of a concrete case.
@@ -605,10 +612,23 @@ def check(
         Driver models, by default Reg157, CCHDM, RSS and FSM.
     profiles : list of str or path
         Profiles; the first one decides. By default un-r157, the two of EU 2022/1426, jrc-2021, paper and paper-fit.
+    results : path
+        Another simulator's results for a table of cases, compared with those of one driver: columns id and collision, and where known
+        t_react_s, t_brake_s, min_gap_m, min_ttc_s, t_crash_s, impact_speed_mps.
+    nominal : bool
+        Only the computed answers of a table, by lanes: a million rows take seconds. No perturbation, clause or boundary is examined.
     sheet : path
-        Also write the case sheet as an HTML page.
+        Also write the case sheet as an HTML page; of a table, a page with the worst cases on top.
+    rows : path
+        Also write a table's answers, one row per case: .csv, .jsonl or .parquet.
+    sheets : path
+        Also write a sheet of every row of a table into this folder.
     series : path
         Also write every step of every model under the first profile, as CSV.
+    backend : {"auto", "cpu", "gpu"}
+        Of `nominal`. ``"auto"``: a GPU if there is one.
+    device : str or int
+        Device of `nominal`, by part of its name, PCI bus id or index.
     **case
         `Case` of `lanesweep.options`; it overrides values of a file.
 
@@ -740,6 +760,59 @@ def export_xosc(
     Result
     """
     return run("export_xosc", locals(), default_out="xosc")
+
+
+def vary(
+    file: Path | None = None,
+    *,
+    range: Keys | dict[str, str],
+    inside: Int | None = None,
+    edge: Int | None = None,
+    outside: Int | None = None,
+    boundary: Int | None = None,
+    seed: Int | None = None,
+    xosc: bool = False,
+    models: Models | None = None,
+    profile: Path | None = None,
+    dt: Float | None = None,
+    out: Path | None = None,
+    **case: Unpack[Case],
+) -> Result:
+    """Make concrete cases around a case: inside, at and outside ranges, and where the answer changes.
+
+    The same seed gives the same cases. `check` compares another simulator's results for them (`results`).
+
+    Parameters
+    ----------
+    file : path, optional
+        TOML file, or table (.csv, .parquet), with the case or cases; every row of a table is varied.
+    range : list of str, or mapping
+        Quantities with their ranges: ``{"gap_m": "5..40"}``.
+    inside, edge, outside : int
+        Numbers of cases inside all ranges (by default 64), at an end of one (16), and outside of one by up to a quarter of it (16).
+    boundary : int
+        Pairs of cases on both sides of a boundary between two answers, by default 8.
+    seed : int
+        Seed of the cases.
+    xosc : bool
+        Also write every case as OpenSCENARIO, for your own controller of the ego.
+    models : list of str or Driver
+        Not used.
+    profile : str or path
+        Profile that answers, by default un-r157.
+    dt : float
+        Time step, s; by default that of the profile.
+    out : path
+        Folder of cases.csv, by default a new one.
+    **case
+        `Case` of `lanesweep.options`; it overrides values of a file.
+
+    Returns
+    -------
+    Result
+        Its status is ``"ok"``.
+    """
+    return run("vary", locals(), default_out="vary")
 
 
 def synth(folder: Path, *, synth_recordings: Int | None = None, **options: Unpack[Run]) -> Result:

@@ -122,11 +122,16 @@ fn parsed<T>(value: &Value, expected: &str, parse: impl Fn(&str) -> Option<T>) -
     parsed.ok_or_else(|| format!("{value} is not {expected}"))
 }
 
-impl FromValue for usize {
-    fn of(value: Value) -> std::result::Result<Self, String> {
-        parsed(&value, "a whole number from 0", |text| whole(text).ok())
-    }
+macro_rules! whole_values {
+    ($($of:ty),*) => {$(
+        impl FromValue for $of {
+            fn of(value: Value) -> std::result::Result<Self, String> {
+                parsed(&value, "a whole number from 0", |text| whole(text).ok())
+            }
+        }
+    )*};
 }
+whole_values!(usize, u32, u64);
 
 impl FromValue for f64 {
     fn of(value: Value) -> std::result::Result<Self, String> {

@@ -3,25 +3,24 @@
 use std::path::{Path, PathBuf};
 
 use clap::Args;
-use rayon::prelude::*;
 
 use super::arguments::from_arguments;
-use super::case_flags::{CaseFlags, CaseTable, GivenCase, from_table, from_toml};
+use super::case_flags::{CaseFlags, GivenCase, from_table, from_toml};
+use super::check_results::ComparedTable;
+use super::check_table::CheckedTable;
 use super::configured::Configured;
-use super::console;
 use super::format::FormatFlag;
-use super::signals::CANCEL;
-use super::source::{PlausibilityFlag, complain_of, refuse_overwriting, scenarios_of};
+use super::source::{PlausibilityFlag, refuse_overwriting, scenarios_of};
 use super::{Exit, Output};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::report::case_sheet::CaseSheet;
-use crate::report::case_table::{CaseAnswer, CaseTable as Answers};
 use crate::report::trace;
 use crate::run::check::{Answer, Check as Checked, Subject, Verdict};
 use crate::scenario::{Category, Scenario};
 use crate::support::files::{make_folder_of, write_atomically};
 use crate::support::plausibility::Doubts;
+use crate::support::table::TableFormat;
 use crate::{Error, Place, Result};
 
 /// Default profiles; the first one decides.
@@ -63,9 +62,26 @@ pub(super) struct Check {
     /// Profiles; the first one decides [default: un-r157, the two of EU 2022/1426, jrc-2021, paper, paper-fit]
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Models and criteria")]
     profiles: Vec<String>,
-    /// Also write the case sheet as an HTML page for printing
+    /// Also write the case sheet as an HTML page for printing; of a table, a page with the worst cases on top
     #[arg(long, value_name = "FILE.html", help_heading = "Output")]
     sheet: Option<PathBuf>,
+    /// Also write a table's answers, one row per case: .csv, .jsonl or .parquet
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    rows: Option<PathBuf>,
+    /// Also write a sheet of every row of a table into this folder
+    #[arg(long, value_name = "DIR", conflicts_with = "nominal", help_heading = "Output")]
+    sheets: Option<PathBuf>,
+    /// Compare another simulator's results for a table of cases with those of one driver (--models)
+    ///
+    /// The table has the columns id and collision, and where known t_react_s, t_brake_s, min_gap_m, min_ttc_s, t_crash_s,
+    /// impact_speed_mps. Exit status: 0 all agree, 5 they differ, 4 cases have no result.
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["nominal", "sheets", "sheet"], help_heading = "Data")]
+    results: Option<PathBuf>,
+    /// Only the computed answers of a table, by lanes: a million rows take seconds
+    ///
+    /// No perturbation, clause or boundary is examined, so that no answer is robust.
+    #[arg(long, help_heading = "Models and criteria")]
+    nominal: bool,
     /// Also write every step of every model under the first profile
     #[arg(long, value_name = "FILE.csv", help_heading = "Output")]
     series: Option<PathBuf>,
@@ -76,7 +92,7 @@ pub(super) struct Check {
 }
 
 from_arguments!(
-    Check { file, row, scenario, profiles, sheet, series }
+    Check { file, row, scenario, profiles, sheet, rows, sheets, results, nominal, series }
     groups { case, plausibility, format }
 );
 
@@ -99,8 +115,32 @@ impl Check {
         let mut profiles = names.iter().map(|name| Profile::load(name.trim())).collect::<Result<Vec<_>>>()?;
         let models = self.case.named_models()?.unwrap_or_else(|| ModelId::ALL.to_vec());
         if let Some(path) = self.whole_table()? {
-            return self.check_all(path, &profiles[0], &models);
+            if let Some(results) = &self.results {
+                let compared = ComparedTable {
+                    path,
+                    results,
+                    profile: &profiles[0],
+                    models: &models,
+                    case: &self.case,
+                    implausible: self.plausibility.policy(),
+                    rows: self.rows.as_deref(),
+                };
+                return compared.run(self.format);
+            }
+            let batch = CheckedTable {
+                path,
+                profile: &profiles[0],
+                models: &models,
+                case: &self.case,
+                implausible: self.plausibility.policy(),
+                is_nominal: self.nominal,
+                page: self.sheet.as_deref(),
+                rows: self.rows.as_deref(),
+                sheets: self.sheets.as_deref(),
+            };
+            return batch.run(configured, self.format);
         }
+        self.refuse_of_tables()?;
         let request = self.request(&profiles[0])?;
         // A profile that only adds its own cut-in clause does not apply to other cases.
         if self.profiles.is_empty() && request.subject.category() != Category::CutIn {
@@ -141,11 +181,7 @@ impl Check {
         if !is_table || self.row.is_some() || self.scenario.is_some() {
             return Ok(None);
         }
-        let of_one = [
-            ("--sheet", self.sheet.is_some()),
-            ("--series", self.series.is_some()),
-            ("--profiles", self.profiles.len() > 1),
-        ];
+        let of_one = [("--series", self.series.is_some()), ("--profiles", self.profiles.len() > 1)];
         match of_one.iter().find(|(_, is_given)| *is_given) {
             Some(("--profiles", _)) => {
                 let problem = format!("{} is judged with all its rows, under one profile", path.display());
@@ -159,56 +195,21 @@ impl Check {
         }
     }
 
-    /// Judges every row of a table under one profile.
-    fn check_all(&self, path: &Path, profile: &Profile, models: &[ModelId]) -> Result<Output> {
-        let mut table = CaseTable::open(path)?;
-        let mut doubts = Doubts::new(self.plausibility.policy());
-        let (mut cases, mut broken, mut is_end) = (Vec::new(), Vec::new(), false);
-        while !is_end {
-            let mut subjects = Vec::new();
-            while subjects.len() < ROWS && !is_end {
-                let Some(given) = table.next()? else {
-                    is_end = true;
-                    continue;
-                };
-                let subject = given.and_then(|given| {
-                    let given = self.case.over(given);
-                    Ok((subject(&given, profile, &mut doubts)?, given))
-                });
-                subjects.push((table.row(), subject));
+    /// Refuses the flags of whole tables.
+    fn refuse_of_tables(&self) -> Result<()> {
+        let of_tables = [
+            ("--rows", self.rows.is_some()),
+            ("--sheets", self.sheets.is_some()),
+            ("--results", self.results.is_some()),
+            ("--nominal", self.nominal),
+        ];
+        match of_tables.iter().find(|(_, is_given)| *is_given) {
+            Some((flag, _)) => {
+                let help = "give a table (.csv, .parquet) without --row, or leave it out";
+                Err(Error::usage(Place::item(*flag), "it is of a table of cases, and this is one case", help))
             }
-            let answers = subjects.into_par_iter().map(|(row, subject)| {
-                let (subject, given) = subject?;
-                given.located(judge(row, given.id.clone(), subject, profile, models))
-            });
-            // In the order of the rows.
-            for answer in answers.collect::<Vec<_>>() {
-                match answer {
-                    Ok(answer) => cases.push(answer),
-                    Err(error) => broken.push(error),
-                }
-            }
-            CANCEL.check()?;
+            None => Ok(()),
         }
-        cases.retain(|case: &CaseAnswer| {
-            let refused = case.id().and_then(|id| table.refused_later(id));
-            let is_used = refused.is_none();
-            broken.extend(refused);
-            is_used
-        });
-        doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
-        complain_of(&broken, &[]);
-        if cases.is_empty() {
-            let help = "the chapter on tables lists the columns (docs/src/tables.md)";
-            let problem = if table.row() == 0 { "it has no rows" } else { "no row of it can be judged" };
-            return Err(Error::input(Place::file(path), problem, help));
-        }
-        let broken: Vec<String> = broken.iter().map(ToString::to_string).collect();
-        let is_complete = broken.is_empty();
-        let origin = path.display().to_string();
-        let answers = Answers { origin, profile: profile.name.clone(), cases, broken };
-        let exit = if is_complete { status(answers.worst()) } else { Exit::Incomplete };
-        self.format.output(exit, || answers.text(console::width()), || answers.json())
     }
 
     fn request(&self, profile: &Profile) -> Result<CheckRequest> {
@@ -276,6 +277,11 @@ impl Check {
     /// Outputs must have the right file ending and must not replace an input.
     fn guard_outputs(&self) -> Result<()> {
         let inputs: Vec<PathBuf> = self.file.iter().cloned().collect();
+        if let Some(path) = &self.rows {
+            TableFormat::of(path, &TableFormat::EVERY, "--rows")?;
+            let inputs: Vec<PathBuf> = inputs.iter().chain(&self.results).cloned().collect();
+            refuse_overwriting(path, &inputs, "--rows")?;
+        }
         let outputs = [(&self.sheet, "html", "--sheet"), (&self.series, "csv", "--series")];
         for (path, ending, flag) in outputs {
             let Some(path) = path else { continue };
@@ -290,36 +296,12 @@ impl Check {
 }
 
 /// The case that is given.
-fn subject(given: &GivenCase, profile: &Profile, doubts: &mut Doubts) -> Result<Subject> {
+pub(super) fn subject(given: &GivenCase, profile: &Profile, doubts: &mut Doubts) -> Result<Subject> {
     Ok(Subject::plain(&given.plain_case(profile, doubts)?, given.headway()?))
 }
 
-/// Rows of a table that are judged together.
-const ROWS: usize = 256;
-
-/// Judges a row of a table.
-fn judge(
-    row: usize,
-    id: Option<String>,
-    subject: Subject,
-    profile: &Profile,
-    models: &[ModelId],
-) -> Result<CaseAnswer> {
-    let check = Checked { subject, profiles: vec![profile.clone()], models: models.to_vec() };
-    let judgements = check.run_without_boundaries()?;
-    let sheet = CaseSheet {
-        subject: &check.subject,
-        origin: String::new(),
-        is_synthetic: false,
-        profiles: &check.profiles,
-        judgements: &judgements,
-        command: String::new(),
-    };
-    Ok(CaseAnswer::new(row, id, &sheet))
-}
-
 /// The exit status of an answer.
-fn status(verdict: Verdict) -> Exit {
+pub(super) fn status(verdict: Verdict) -> Exit {
     match verdict {
         Verdict::Undecided | Verdict::Answer(Answer::Open) => Exit::Undecided,
         Verdict::OutsideAnnex | Verdict::NotJudged => Exit::OutsideAnnex,
@@ -342,7 +324,7 @@ fn unknown(path: &Path, id: &str, scenarios: &[Scenario]) -> Error {
     )
 }
 
-fn write(path: &Path, bytes: &[u8]) -> Result<()> {
+pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<()> {
     make_folder_of(path)?;
     write_atomically(path, bytes)
 }

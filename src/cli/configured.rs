@@ -41,9 +41,9 @@ pub(super) struct Configured {
 /// `--help` shows it, and its verbs. Range, default and help are the key's.
 type KeyFlag = (&'static str, &'static str, &'static str, &'static str, bool, &'static [&'static str]);
 
-const SWEEPING: &[&str] = &["study", "search", "sample", "compare", "justify", "map", "verify", "show"];
+const SWEEPING: &[&str] = &["study", "search", "sample", "compare", "justify", "map", "check", "verify", "show"];
 const SIMULATING: &[&str] =
-    &["study", "search", "sample", "compare", "justify", "map", "verify", "show", "simulate", "xosc"];
+    &["study", "search", "sample", "compare", "justify", "map", "verify", "show", "simulate", "xosc", "vary"];
 const GENERATING: &[&str] = &["study", "search", "fit", "compare", "justify", "verify", "show"];
 
 #[rustfmt::skip] // a table: one line per flag

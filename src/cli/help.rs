@@ -7,7 +7,7 @@ use clap::{Arg, ArgAction, Command};
 const VERBS: [(&str, &[&str]); 5] = [
     ("Study a data set", &["tracks", "study", "mine", "search", "compare", "justify"]),
     ("Probabilities", &["fit", "sample"]),
-    ("Single cases and grids", &["check", "simulate", "map", "export"]),
+    ("Single cases and grids", &["check", "simulate", "map", "vary", "export"]),
     ("More machines", &["cluster"]),
     ("Tools", &["verify", "config", "synth"]),
 ];

@@ -4,6 +4,8 @@
 mod arguments;
 mod case_flags;
 mod check;
+mod check_results;
+mod check_table;
 mod cluster;
 mod compare;
 mod config;
@@ -37,6 +39,7 @@ mod source;
 mod study;
 mod synth;
 mod tracks;
+mod vary;
 mod verify;
 
 pub use exit::Exit;
@@ -104,6 +107,7 @@ enum Verb {
     Map(Box<map::Map>),
     Simulate(simulate::Simulate),
     Check(check::Check),
+    Vary(vary::Vary),
     Export(export::Export),
     Cluster(cluster::Cluster),
     Verify(Box<verify::Verify>),
@@ -192,6 +196,7 @@ impl Verb {
             Verb::Map(verb) => verb.run(configured),
             Verb::Simulate(verb) => verb.run(configured),
             Verb::Check(verb) => verb.run(configured),
+            Verb::Vary(verb) => verb.run(configured),
             Verb::Export(verb) => verb.run(configured),
             Verb::Cluster(verb) => verb.run(),
             Verb::Verify(verb) => verb.run(configured),

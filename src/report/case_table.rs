@@ -1,17 +1,21 @@
-//! A table of concrete cases against the regulation: a row per case with its answer, as text and as JSON.
+//! A table of concrete cases against the regulation: a row per case with its answer, as text, as JSON, as a table file
+//! and as a page.
 
 use std::iter::once;
+use std::path::Path;
 
 use serde_json::json;
 
 use super::case_sentences::{drives_through, past_the_cap, touching};
 use super::case_sheet::{CaseSheet, verdict_of};
+use super::html::{Page, Section};
 use super::records::{self, PROGRAM};
 use super::tables::wrap;
 use crate::Result;
-use crate::run::check::{Answer, Demand, Judgement, Verdict};
+use crate::model::driver::ModelId;
+use crate::run::check::{Answer, CaseVerdicts, Demand, Judgement, RunEnd, Verdict};
 use crate::support::readable::counted;
-use crate::support::table::{Column, Table, TableOf};
+use crate::support::table::{Column, Table, TableMetadata, TableOf};
 
 /// All verdicts, the worst first: those without a driver of Annex 3 that avoids the collision, then those with one, then
 /// those without a collision.
@@ -24,10 +28,13 @@ const WORST_FIRST: [Verdict; 6] = [
     Verdict::Answer(Answer::NoConflict),
 ];
 
+const LEGEND: &str = "Verdict: as on the sheet of one case. Demanded: whether the profile's clause of cut-ins demands that \
+                      the system avoids the collision. None: there is nothing to avoid.";
+
 /// One case of a table.
 pub struct CaseAnswer {
     /// Row, from 1 after the header.
-    row: usize,
+    pub row: usize,
     /// Its key, if the table has keys.
     id: Option<String>,
     case: String,
@@ -37,6 +44,8 @@ pub struct CaseAnswer {
     demanded: &'static str,
     /// Each model with its collision verdict.
     collisions: Vec<(&'static str, &'static str)>,
+    /// The only reference driver that avoids the collision.
+    rests_on: &'static str,
     note: String,
 }
 
@@ -60,6 +69,7 @@ impl CaseAnswer {
                 (Some(_), _) => "undecided",
             },
             collisions: models.map(|judged| (judged.trace.model.name(), verdict_of(judgement, judged))).collect(),
+            rests_on: rests_on(&judgement.verdicts),
             note: once(note(judgement))
                 .chain(sheet.silent())
                 .chain(drives_through(judgement))
@@ -69,9 +79,38 @@ impl CaseAnswer {
         }
     }
 
+    /// The computed answer of a row, without perturbations and clauses.
+    pub fn nominal(row: usize, id: Option<String>, verdicts: &CaseVerdicts, models: &[ModelId]) -> CaseAnswer {
+        let collision = |model: ModelId| match (verdicts.collides(model), verdicts.unreacting) {
+            (true, _) => "COLLIDES",
+            (false, RunEnd::Contact) => "avoids",
+            (false, RunEnd::Open) => "open",
+            (false, RunEnd::Clear) => "none",
+        };
+        CaseAnswer {
+            row,
+            id,
+            case: String::new(),
+            verdict: verdicts.verdict(),
+            answer: String::new(),
+            demand: Vec::new(),
+            demanded: "",
+            collisions: models.iter().map(|model| (model.name(), collision(*model))).collect(),
+            rests_on: rests_on(verdicts),
+            note: String::new(),
+        }
+    }
+
     /// Its key.
     pub fn id(&self) -> Option<&str> {
         self.id.as_deref()
+    }
+}
+
+fn rests_on(verdicts: &CaseVerdicts) -> &'static str {
+    match (verdicts.verdict(), &verdicts.avoided_by()[..]) {
+        (Verdict::Answer(Answer::Preventable), [one]) if verdicts.reference_drivers.len() > 1 => one.name(),
+        _ => "",
     }
 }
 
@@ -103,7 +142,16 @@ pub struct CaseTable {
     pub cases: Vec<CaseAnswer>,
     /// Why the other rows could not be judged, with file, line and column.
     pub broken: Vec<String>,
+    /// The answers are those of lanes: no perturbation, clause or boundary was examined.
+    pub is_nominal: bool,
+    /// Command that reproduces the table.
+    pub command: String,
 }
+
+/// Maximum number of rows in the text, and on the page; the table file has all.
+const MAX_ROWS: [usize; 2] = [200, 1000];
+const NOMINAL: &str = "Nominal answers: the lanes of every case as given, in lane arithmetic. No measurement error, no \
+                       shorter time step and no clause was examined: no answer is robust by this table.";
 
 impl CaseTable {
     /// The worst verdict.
@@ -127,9 +175,39 @@ impl CaseTable {
         format!("{} under {}: {}{broken}", counted(self.cases.len(), "case"), self.profile, counts.join(", "))
     }
 
-    fn columns(&self) -> TableOf<&CaseAnswer> {
+    /// How many preventable cases only one reference driver avoids; empty if none.
+    fn rests_on(&self) -> String {
+        let count = |name: &str| self.cases.iter().filter(|case| case.rests_on == name).count();
+        let counts = ModelId::ALL.map(|model| (model.name(), count(model.name())));
+        let alone: Vec<String> =
+            counts.iter().filter(|(_, count)| *count > 0).map(|(name, count)| format!("{count} on {name}")).collect();
+        if alone.is_empty() {
+            return String::new();
+        }
+        let all = self.count(Verdict::Answer(Answer::Preventable));
+        format!("Of {} called preventable, one driver alone decides: {}.", counted(all, "case"), alone.join(", "))
+    }
+
+    /// The rows to be shown: all in the order of the file, or the worst of many.
+    fn shown(&self, max: usize) -> Vec<&CaseAnswer> {
+        if self.cases.len() <= max { self.cases.iter().collect() } else { self.worst_first(max) }
+    }
+
+    fn worst_first(&self, max: usize) -> Vec<&CaseAnswer> {
+        let of = |verdict: Verdict| self.cases.iter().filter(move |case| case.verdict == verdict);
+        WORST_FIRST.into_iter().flat_map(of).take(max).collect()
+    }
+
+    fn left_out(&self, max: usize) -> String {
+        match self.cases.len().saturating_sub(max) {
+            0 => String::new(),
+            left => format!("The worst {max} rows; {left} more are in the table of option `rows`."),
+        }
+    }
+
+    fn columns<'c>(&'c self, cases: &[&'c CaseAnswer]) -> TableOf<&'c CaseAnswer> {
         let models = self.cases.first().map_or(0, |case| case.collisions.len());
-        let mut table = Table::of(&self.cases).column("row", |case| case.row);
+        let mut table = Table::of(cases.iter().copied()).column("row", |case| case.row);
         if self.cases.iter().any(|case| case.id.is_some()) {
             table = table.column("id", |case| case.id.clone());
         }
@@ -142,11 +220,61 @@ impl CaseTable {
         table.columns(0..models, name, collision).column("note", |case| case.note.as_str())
     }
 
+    /// All columns of all rows.
+    fn all(&self) -> Table {
+        self.columns(&self.shown(usize::MAX))
+            .column("case", |case| case.case.as_str())
+            .column("answer", |case| case.answer.as_str())
+            .column("demand", |case| case.demand.join(". "))
+            .column("rests_on", |case| case.rests_on)
+            .build()
+    }
+
+    /// Writes the rows as a table: CSV, JSON Lines or Parquet, by the ending of the name.
+    ///
+    /// # Errors
+    /// [`Error::Io`](crate::Error::Io), and for an unknown ending.
+    pub fn save(&self, path: &Path) -> Result<()> {
+        let metadata =
+            TableMetadata { table: "cases", profile: Some(self.profile.clone()), ..TableMetadata::default() };
+        self.all().save(path, &metadata)
+    }
+
+    /// The page: counts, then the cases with the worst on top.
+    pub fn html(&self) -> String {
+        let counts = Table::of(WORST_FIRST.iter().filter(|verdict| self.count(**verdict) > 0))
+            .column("answer", |verdict| verdict.label())
+            .column("cases", |verdict| self.count(*verdict))
+            .build();
+        let cases = self.columns(&self.worst_first(MAX_ROWS[1])).build();
+        let broken = Section::new("", format!("{} cannot be judged", counted(self.broken.len(), "row")));
+        Page {
+            title: format!("{} under {}", counted(self.cases.len(), "case"), self.profile),
+            lead: format!("{}. {}", self.summary(), self.rests_on()),
+            synthetic: false,
+            warnings: self.is_nominal.then(|| NOMINAL.to_owned()).into_iter().collect(),
+            sections: vec![
+                Section::new("counts", "Answers").tables([counts.captioned("Cases by answer, the worst first")]),
+                Section::new("cases", "Cases")
+                    .intro(format!("The worst answer on top. {LEGEND} {}", self.left_out(MAX_ROWS[1])))
+                    .tables([cases.captioned("Cases")])
+                    .parts((!self.broken.is_empty()).then(|| broken.text(self.broken.join("\n")))),
+                Section::new("reproduction", "Reproduction")
+                    .fact("command", &self.command)
+                    .fact("program", PROGRAM)
+                    .fact("data", &self.origin),
+            ],
+        }
+        .html()
+    }
+
     /// The table as text.
     pub fn text(&self, width: usize) -> String {
-        let legend = "Verdict: as on the sheet of one case. Demanded: whether the profile's clause of cut-ins demands that \
-                      the system avoids the collision. None: there is nothing to avoid.";
-        format!("{}\n{}{}\n", self.summary(), self.columns().build().text(), wrap(legend, width))
+        let nominal = if self.is_nominal { NOMINAL } else { "" };
+        let notes = [LEGEND, &self.left_out(MAX_ROWS[0]), &self.rests_on(), nominal].map(str::to_owned);
+        let notes: Vec<String> = notes.into_iter().filter(|note| !note.is_empty()).collect();
+        let rows = self.columns(&self.shown(MAX_ROWS[0])).build().text();
+        format!("{}\n{rows}{}\n", self.summary(), wrap(&notes.join(" "), width))
     }
 
     /// The table as one document.
@@ -154,11 +282,6 @@ impl CaseTable {
     /// # Errors
     /// None for a table of this program.
     pub fn json(&self) -> Result<String> {
-        let cases = self
-            .columns()
-            .column("case", |case| case.case.as_str())
-            .column("answer", |case| case.answer.as_str())
-            .column("demand", |case| case.demand.join(". "));
         let counts = WORST_FIRST.map(|verdict| (verdict.label().to_owned(), json!(self.count(verdict))));
         records::document(&json!({
             "program": PROGRAM,
@@ -166,7 +289,8 @@ impl CaseTable {
             "profile": self.profile,
             "verdict": self.worst().label(),
             "counts": serde_json::Map::from_iter(counts),
-            "cases": cases.build().records(),
+            "nominal": self.is_nominal,
+            "cases": self.all().records(),
             "cannot_be_judged": self.broken,
         }))
     }

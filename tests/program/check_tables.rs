@@ -185,6 +185,56 @@ fn a_table_is_judged_whole_and_its_status_is_that_of_the_worst_row() {
 }
 
 #[test]
+fn a_batch_leaves_a_table_a_page_and_a_sheet_of_every_row() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let rows: String = [2, 1, 0, 3].iter().map(|&at: &usize| format!("{}\n", ROWS[at].0)).collect();
+    file(dir, "cases.csv", &format!("{HEADER}{rows}no-gap,cut-in,60,40,,1\n"));
+    let files = ["--rows", "answers.csv", "--sheet", "page.html", "--sheets", "sheets"];
+    let (code, _, error) = run(dir, &[&["check", "cases.csv"], &files[..]].concat());
+    assert_eq!(code, 4, "one row has no gap: {error}");
+    let read = |name: &str| std::fs::read_to_string(dir.join(name)).unwrap();
+    let answers = read("answers.csv");
+    let verdicts: Vec<&str> = answers.lines().skip(1).map(|line| line.split(',').nth(2).unwrap()).collect();
+    assert_eq!(verdicts, ["no conflict", "preventable", "not preventable", "no conflict"], "in the order of the file");
+    // The worst on top.
+    let page = read("page.html");
+    let at = |word: &str| page.find(&format!("<td class=\"text\">{word}</td>")).or_else(|| page.find(word)).unwrap();
+    assert!(page.contains("cases.csv, line 6") && at("not preventable") < at("no conflict"));
+    for row in 1..=4 {
+        let alone = ["check", "cases.csv", "--row", &row.to_string(), "--profiles", "un-r157", "--format", "json"];
+        let answer: Value = serde_json::from_str(&run(dir, &alone).1).unwrap();
+        let sheet = read(&format!("sheets/row-{row}.html"));
+        let drivers = answer["answer"].as_str().unwrap().split(':').next().unwrap();
+        assert!(sheet.contains(drivers), "the sheet of row {row} has its answer: {drivers}");
+    }
+    assert!(!dir.join("sheets/row-5.html").exists());
+    let (code, _, error) = run(dir, &["check", "cases.csv", "--row", "2", "--rows", "answers.csv"]);
+    assert!(code == 2 && error.contains("--rows"), "{error}");
+}
+
+/// Cases far from every boundary have the same answer by lanes as by the full check.
+#[test]
+fn a_nominal_batch_answers_by_lanes_and_says_that_nothing_else_was_examined() {
+    let dir = tempfile::tempdir().unwrap();
+    let dir = dir.path();
+    let rows: String = ROWS.iter().map(|row| format!("{}\n", row.0)).collect();
+    file(dir, "cases.csv", &format!("{HEADER}{rows}"));
+    let nominal = ["check", "cases.csv", "--nominal", "--backend", "cpu"];
+    let (code, out, error) = run(dir, &nominal);
+    assert!(code == 1 && out.contains("no answer is robust by this table"), "{out} {error}");
+    let found = document(dir, &nominal);
+    assert_eq!(found["nominal"], true);
+    for (case, row) in found["cases"].as_array().unwrap().iter().zip(ROWS) {
+        assert_eq!(case["verdict"], row.1, "{case}");
+    }
+    let threads = run(dir, &[&nominal[..], &["--threads", "1", "--format", "json"]].concat()).1;
+    assert_eq!(serde_json::from_str::<Value>(&threads).unwrap(), found, "threads change nothing");
+    let (code, _, error) = run(dir, &[&nominal[..], &["--sheets", "sheets"]].concat());
+    assert!(code == 2 && error.contains("--sheets"), "{error}");
+}
+
+#[test]
 fn a_row_that_cannot_be_judged_is_named_and_the_others_are_judged() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
@@ -234,9 +284,9 @@ fn what_shows_one_case_asks_for_a_row_of_a_table_with_several() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     file(dir, "cases.csv", &format!("{HEADER}{}\n{}\n", ROWS[0].0, ROWS[1].0));
+    let (code, _, error) = run(dir, &["check", "cases.csv", "--series", "case.csv"]);
+    assert!(code == 2 && error.contains("--series") && error.contains("--row N"), "{error}");
     for flag in [["--sheet", "case.html"], ["--series", "case.csv"]] {
-        let (code, _, error) = run(dir, &[&["check", "cases.csv"], &flag[..]].concat());
-        assert!(code == 2 && error.contains(flag[0]) && error.contains("--row N"), "{error}");
         let (code, _, error) = run(dir, &[&["check", "cases.csv", "--row", "2"], &flag[..]].concat());
         assert!(code == 0 && dir.join(flag[1]).exists(), "{error}");
     }

@@ -17,3 +17,4 @@ mod report_width;
 mod rooms;
 mod shell;
 mod source_rules;
+mod vary;

@@ -6,7 +6,10 @@
 mod annex;
 mod boundary;
 mod clauses;
+mod nominal;
+mod results;
 mod subject;
+mod vary;
 mod verdict;
 
 use std::cell::Cell;
@@ -15,7 +18,10 @@ use rayon::prelude::*;
 
 pub use boundary::{Boundary, Change};
 pub use clauses::{Demand, Holds, Reading, Relation};
+pub use nominal::nominal_verdicts;
+pub use results::{COMPARED, Compared, ComparedCase, Difference, ResultComparison, TheirResult};
 pub use subject::{Lane, Subject};
+pub use vary::{VariationCounts, Variations, VariedCase, VariedRange, vary};
 pub use verdict::{Answer, CaseVerdicts, RunEnd, Verdict};
 
 use crate::engine::{NO_STEP, Outcome, StepMark, Trace, check_time_step};

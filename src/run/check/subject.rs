@@ -4,12 +4,13 @@ use crate::engine::{Constants, Headway, LaneCase, Outcome, Step, Trace};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::grid::{CaseQuantity, Point, without_reaction};
+use crate::run::reopen::TracedCase;
 use crate::scenario::parameterization::{TimeGrid, recorded_case};
 use crate::scenario::{Case, Category, Lateral, PlainCase, Scenario, Speed, Tables};
 use crate::{Error, Place, Result};
 
 /// A concrete case.
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub enum Subject {
     /// Constant speeds, one deceleration, a lane change at constant lateral speed: the case, and its numbers.
     Plain(PlainCase, Point),
@@ -143,13 +144,36 @@ impl Subject {
     /// # Errors
     /// [`Error::Usage`] for contradictory numbers; [`Error::Input`] for a cut-out without a vehicle ahead.
     pub fn lane(&self, profile: &Profile, point: &Point) -> Result<Lane> {
-        let headway = match (point.get(CaseQuantity::Thw), point.get(CaseQuantity::Gap)) {
-            (Some(thw_s), _) => Headway::ThwS(thw_s),
-            (None, gap_m) => Headway::GapM(gap_m.unwrap_or(0.0)),
-        };
+        let headway = start_of(point);
         let mut tables = Tables::default();
         let case = LaneCase::encode(&self.case(profile, point)?, profile, &mut tables);
         Ok(Lane { case, tables, headway })
+    }
+
+    /// The case with every step of some models.
+    ///
+    /// # Errors
+    /// As [`TracedCase::run`].
+    pub fn traced(&self, profile: &Profile, models: &[ModelId]) -> Result<TracedCase> {
+        TracedCase::run(&self.case(profile, self.point())?, start_of(self.point()), profile, models)
+    }
+
+    /// The case with its initial gap, for a plan whose lanes start where their cases do.
+    ///
+    /// # Errors
+    /// As [`Subject::lane`].
+    pub(super) fn encode(&self, profile: &Profile, tables: &mut Tables<f64>) -> Result<LaneCase<f64>> {
+        let case = self.case(profile, self.point())?;
+        let gap_m = start_of(self.point()).start().gap(case.ego_speed_mps);
+        Ok(LaneCase::encode(&case, profile, tables).ahead_by(gap_m))
+    }
+}
+
+/// The headway or gap of a point.
+fn start_of(point: &Point) -> Headway {
+    match (point.get(CaseQuantity::Thw), point.get(CaseQuantity::Gap)) {
+        (Some(thw_s), _) => Headway::ThwS(thw_s),
+        (None, gap_m) => Headway::GapM(gap_m.unwrap_or(0.0)),
     }
 }
 

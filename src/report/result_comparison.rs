@@ -1,0 +1,148 @@
+//! Results of another simulator beside a driver's lanes: agreement, and what differs first.
+
+use serde_json::json;
+
+use super::records::{self, PROGRAM};
+use super::tables::wrap;
+use crate::Result;
+use crate::run::check::{COMPARED, ComparedCase, ResultComparison};
+use crate::support::readable::{counted, significant, value};
+use crate::support::table::{Column, Digits, Table, json_number};
+
+/// A comparison with what its readers need to know.
+pub struct ResultReport<'a> {
+    /// The comparison.
+    pub comparison: &'a ResultComparison,
+    /// Name of the profile.
+    pub profile: &'a str,
+    /// The file of the results, as the user named it.
+    pub theirs: String,
+    /// Cases without a result.
+    pub missing: usize,
+}
+
+const LEGEND: &str = "Differences are theirs minus ours. Up to the tolerance they count as none. Decides: the first quantity, \
+                      in the order of cause and effect, that differs by more, or that only they have.";
+
+impl ResultReport<'_> {
+    /// How many cases agree, with an interval.
+    fn agreement(&self) -> String {
+        let (of, interval) = (self.comparison, self.comparison.agreement());
+        let missing = if self.missing > 0 {
+            format!("; {} have no result", counted(self.missing, "case"))
+        } else {
+            String::new()
+        };
+        format!(
+            "{} and {} under {} agree in {} of {} on whether the vehicles touch ({} to {} % at 95 %, if the cases are a random \
+             sample){missing}.",
+            self.theirs,
+            of.model.name(),
+            self.profile,
+            of.agreeing(),
+            counted(of.cases.len(), "case"),
+            significant(100.0 * interval.low, 3),
+            significant(100.0 * interval.high, 3)
+        )
+    }
+
+    /// The cause that most differences have in common.
+    fn cause(&self) -> String {
+        let Some(cause) = self.comparison.cause() else {
+            return "No quantity differs beyond its tolerance in most cases.".to_owned();
+        };
+        let compared = &COMPARED[cause.quantity];
+        let [min, median, max] = cause.range.map(|by| significant(by.abs(), 3));
+        let direction = match (compared.unit, cause.range[1] > 0.0) {
+            ("s", true) => "later",
+            ("s", false) => "earlier",
+            (_, true) => "larger",
+            (_, false) => "smaller",
+        };
+        let range = if min == max { String::new() } else { format!("; from {min} to {max} {}", compared.unit) };
+        format!(
+            "The first cause: {} is {median} {} {direction} there (median of {}{range}).",
+            compared.words,
+            compared.unit,
+            counted(cause.cases, "case"),
+        )
+    }
+
+    fn differences(&self) -> Table {
+        Table::of(&self.comparison.differences)
+            .column("quantity", |of| COMPARED[of.quantity].column)
+            .column("cases", |of| of.cases)
+            .column("beyond", |of| of.beyond)
+            .column("tolerance", |of| COMPARED[of.quantity].tolerance)
+            .column(Column::from("min").digits(Digits::Signed(3)), |of| of.range[0])
+            .column(Column::from("median").digits(Digits::Signed(3)), |of| of.range[1])
+            .column(Column::from("max").digits(Digits::Signed(3)), |of| of.range[2])
+            .build()
+    }
+
+    /// All cases as a table.
+    pub fn rows(&self) -> Table {
+        rows(self.comparison.cases.iter())
+    }
+
+    /// The comparison as text.
+    pub fn text(&self, width: usize) -> String {
+        let differing: Vec<&ComparedCase> =
+            self.comparison.cases.iter().filter(|case| case.collides[0] != case.collides[1]).collect();
+        let differing = match differing.is_empty() {
+            true => String::new(),
+            false => format!("\nOther answers\n{}", rows(differing.into_iter()).text()),
+        };
+        format!(
+            "{}\n{}{differing}{}\n",
+            wrap(&format!("{} {}", self.agreement(), self.cause()), width),
+            self.differences().text(),
+            wrap(LEGEND, width)
+        )
+    }
+
+    /// The comparison as one document.
+    ///
+    /// # Errors
+    /// None for a comparison of this program.
+    pub fn json(&self) -> Result<String> {
+        let (of, interval) = (self.comparison, self.comparison.agreement());
+        records::document(&json!({
+            "program": PROGRAM,
+            "profile": self.profile,
+            "model": of.model.name(),
+            "results": self.theirs,
+            "cases": of.cases.len(),
+            "without_result": self.missing,
+            "agreeing": of.agreeing(),
+            "agreement": {"low": json_number(interval.low), "high": json_number(interval.high), "level": interval.level},
+            "agreement_sentence": self.agreement(),
+            "cause": self.comparison.cause().map(|cause| COMPARED[cause.quantity].column),
+            "cause_sentence": self.cause(),
+            "differences": self.differences().records(),
+            "rows": self.rows().records(),
+        }))
+    }
+}
+
+fn rows<'c>(cases: impl Iterator<Item = &'c ComparedCase>) -> Table {
+    let touches = |collides: bool| if collides { "touches" } else { "none" };
+    Table::of(cases)
+        .column("id", |case| case.id.as_str())
+        .column("here", |case| touches(case.collides[0]))
+        .column("there", |case| touches(case.collides[1]))
+        .column(Column::from("decides").null("–"), |case| case.decides.map(|at| COMPARED[at].column))
+        .columns(
+            COMPARED.iter().enumerate(),
+            |(_, of)| Column::from(of.column).null("–"),
+            |case, (at, _)| case.differences[at].map(|by| (by * 1e6).round() / 1e6),
+        )
+        .build()
+}
+
+/// The columns that a table of results may have, in words.
+pub fn columns() -> String {
+    let all: Vec<String> =
+        COMPARED.iter().map(|of| format!("{} (tolerance {} {})", of.column, value(of.tolerance), of.unit)).collect();
+    all.join(", ")
+}

@@ -1,0 +1,115 @@
+//! The computed answers of many cases, by lanes of a backend. No change of an input or of the time step is examined.
+
+use std::sync::Arc;
+
+use super::annex;
+use super::subject::Subject;
+use super::verdict::{CaseVerdicts, RunEnd};
+use crate::Result;
+use crate::engine::{Block, CaseTable, Executor, Headway, LanePlan, Units, Verdicts, Wanted};
+use crate::model::criterion::Criterion;
+use crate::model::driver::{MODELS, ModelId};
+use crate::model::profile::Profile;
+use crate::run::grid::without_reaction;
+use crate::scenario::Category;
+
+/// Returns how the lanes of every case end, in the arithmetic of the executor's backend; smallest gaps are NaN. A lane of
+/// an ego that never reacts and reaches the time cap is open, as in a map.
+///
+/// # Errors
+/// As [`Check::run`](super::Check::run), and those of the backend.
+pub fn nominal_verdicts(subjects: &[Subject], profile: &Profile, executor: &Executor) -> Result<Vec<CaseVerdicts>> {
+    let drivers = ends(subjects, profile, &ModelId::ALL, executor)?;
+    let unreacting = ends(subjects, &without_reaction(profile), &[ModelId::Reg157], executor)?;
+    let collides = |verdicts: &Verdicts| verdicts.failed(Criterion::Collision);
+    let of = |((subject, drivers), unreacting): ((&Subject, &[Verdicts]), &Verdicts)| CaseVerdicts {
+        collide: std::array::from_fn(|model| collides(&drivers[model])),
+        min_gap_m: [f64::NAN; MODELS],
+        unreacting: match (collides(unreacting), unreacting.capped() && profile.frame.end_when_settled) {
+            (true, _) => RunEnd::Contact,
+            (false, true) => RunEnd::Open,
+            (false, false) => RunEnd::Clear,
+        },
+        is_outside_annex: annex::outside(profile, subject.category(), subject.point()).is_some(),
+        reference_drivers: profile.reference_drivers.clone(),
+    };
+    Ok(subjects.iter().zip(drivers.chunks(MODELS)).zip(&unreacting).map(of).collect())
+}
+
+/// The verdicts of every case and model, the model varying fastest.
+fn ends(subjects: &[Subject], profile: &Profile, models: &[ModelId], executor: &Executor) -> Result<Vec<Verdicts>> {
+    let mut source = CaseTable::new([1; Category::ALL.len()]);
+    let mut rows: [Vec<usize>; Category::ALL.len()] = Default::default();
+    for (row, subject) in subjects.iter().enumerate() {
+        let block = subject.category() as usize;
+        source.blocks[block].cases.push(subject.encode(profile, &mut source.tables)?);
+        rows[block].push(row);
+    }
+    // A plan has no empty blocks.
+    source.blocks.retain(|block| !block.cases.is_empty());
+    let block = |(category, rows): (Category, &Vec<usize>)| {
+        Block::new(category, Units::Numbered(rows.len() as u64), vec!["case".to_owned()])
+    };
+    let blocks = Category::ALL.into_iter().zip(&rows).filter(|(_, rows)| !rows.is_empty()).map(block).collect();
+    let plan = LanePlan::new(profile.clone(), models.to_vec(), vec![Headway::Observed], blocks, Arc::new(source))?;
+    let rows = rows.concat();
+    let mut ends = vec![Verdicts::default(); subjects.len() * models.len()];
+    executor.sweep(&plan, 0..plan.unit_count(), Wanted::Verdicts, |chunk| {
+        let rows = &rows[chunk.units.start as usize..chunk.units.end as usize];
+        for (row, verdicts) in rows.iter().zip(chunk.verdicts.chunks(models.len())) {
+            ends[row * models.len()..][..models.len()].copy_from_slice(verdicts);
+        }
+        Ok(())
+    })?;
+    Ok(ends)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::{Answer, Check};
+    use super::*;
+    use crate::engine::CpuBackend;
+    use crate::scenario::PlainCase;
+
+    /// Cases far from every boundary: the lanes of a batch answer as the check of one case does.
+    #[test]
+    fn the_lanes_of_a_batch_answer_as_the_check_of_one_case() {
+        let profile = Profile::load("un-r157").unwrap();
+        let case = |category, speed_mps, acceleration_mps2, lateral_speed_mps| PlainCase {
+            category,
+            ego_speed_mps: 20.0,
+            speed_mps,
+            acceleration_mps2,
+            end_speed_mps: None,
+            lateral_speed_mps,
+            lateral_distance_m: 3.5,
+            ahead_speed_mps: 0.0,
+            ahead_gap_m: 60.0,
+            length_m: 4.3,
+            width_m: 1.9,
+            ego_length_m: 4.3,
+            ego_width_m: 1.9,
+            lane_width_m: 3.5,
+            duration_s: None,
+        };
+        let cases = [
+            (case(Category::CutIn, 10.0, 0.0, 1.0), 8.0),
+            (case(Category::Lvd, 20.0, -6.0, 0.0), 30.0),
+            (case(Category::CutIn, 10.0, 0.0, 1.0), 60.0),
+            (case(Category::CutIn, 25.0, 0.0, 1.0), 40.0),
+            (case(Category::CutOut, 20.0, 0.0, 1.5), 30.0),
+        ];
+        let subjects: Vec<Subject> =
+            cases.iter().map(|(case, gap_m)| Subject::plain(case, Headway::GapM(*gap_m))).collect();
+        let executor = Executor::new(CpuBackend::lane_arithmetic());
+        let found: Vec<Answer> =
+            nominal_verdicts(&subjects, &profile, &executor).unwrap().iter().map(CaseVerdicts::answer).collect();
+        let one = |subject: &Subject| {
+            let check =
+                Check { subject: subject.clone(), profiles: vec![profile.clone()], models: ModelId::ALL.to_vec() };
+            check.run_without_boundaries().unwrap()[0].verdicts.answer()
+        };
+        assert_eq!(found, subjects.iter().map(one).collect::<Vec<_>>());
+        assert!(found.contains(&Answer::Preventable) && found.contains(&Answer::NotPreventable), "{found:?}");
+    }
+}

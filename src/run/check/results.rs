@@ -1,0 +1,174 @@
+//! Results of another simulator for the same cases, compared with a driver's lanes row by row. A difference is explained
+//! by the first quantity, in the order of cause and effect, that differs.
+
+use super::subject::Subject;
+use crate::Result;
+use crate::engine::{StepMark, Trace};
+use crate::model::driver::ModelId;
+use crate::model::profile::Profile;
+use crate::stats::estimate::{Interval, clopper_pearson};
+
+/// A quantity that two simulators can compare.
+pub struct Compared {
+    /// Column of the results, with its unit.
+    pub column: &'static str,
+    /// What it is, as the subject of a sentence.
+    pub words: &'static str,
+    /// Unit.
+    pub unit: &'static str,
+    /// Differences up to this are none: a time step of the other simulator, or its rounding.
+    pub tolerance: f64,
+    of: fn(&Trace) -> Option<f64>,
+}
+
+fn finite(value: f64) -> Option<f64> {
+    value.is_finite().then_some(value)
+}
+
+/// The quantities, a cause before its effects.
+pub const COMPARED: [Compared; 6] = [
+    Compared {
+        column: "t_react_s",
+        words: "the driver's first reaction",
+        unit: "s",
+        tolerance: 0.05,
+        of: |trace| trace.step_of(StepMark::Reaction).map(|step| trace.time_s(step)),
+    },
+    Compared {
+        column: "t_brake_s",
+        words: "the beginning of the braking",
+        unit: "s",
+        tolerance: 0.05,
+        of: |trace| trace.step_of(StepMark::Braking).map(|step| trace.time_s(step)),
+    },
+    Compared {
+        column: "min_gap_m",
+        words: "the smallest gap",
+        unit: "m",
+        tolerance: 0.1,
+        of: |trace| finite(trace.outcome.min_gap),
+    },
+    Compared {
+        column: "min_ttc_s",
+        words: "the smallest TTC",
+        unit: "s",
+        tolerance: 0.05,
+        of: |trace| finite(trace.outcome.min_ttc),
+    },
+    Compared {
+        column: "t_crash_s",
+        words: "the contact",
+        unit: "s",
+        tolerance: 0.05,
+        of: |trace| trace.step_of(StepMark::Contact).map(|step| trace.time_s(step)),
+    },
+    Compared {
+        column: "impact_speed_mps",
+        words: "the ego's speed at the contact",
+        unit: "m/s",
+        tolerance: 0.2,
+        of: |trace| trace.step_of(StepMark::Contact).map(|_| trace.outcome.impact_speed),
+    },
+];
+
+/// One row of the other simulator.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TheirResult {
+    /// The case's id.
+    pub id: String,
+    /// Whether the vehicles touch.
+    pub collides: bool,
+    /// The values of [`COMPARED`] where the table has them.
+    pub values: [Option<f64>; COMPARED.len()],
+}
+
+/// One case, theirs and ours.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ComparedCase {
+    /// The case's id.
+    pub id: String,
+    /// Whether the vehicles touch here, and there.
+    pub collides: [bool; 2],
+    /// Per quantity: theirs minus ours, where both have it.
+    pub differences: [Option<f64>; COMPARED.len()],
+    /// Index of the first quantity that differs by more than its tolerance, or that only one of both has.
+    pub decides: Option<usize>,
+}
+
+/// A quantity over all cases.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Difference {
+    /// Index in [`COMPARED`].
+    pub quantity: usize,
+    /// Cases in which both have it.
+    pub cases: usize,
+    /// Cases in which it differs by more than the tolerance.
+    pub beyond: usize,
+    /// Minimum, median and maximum of theirs minus ours.
+    pub range: [f64; 3],
+}
+
+/// All cases.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ResultComparison {
+    /// The driver.
+    pub model: ModelId,
+    /// In the order of the results.
+    pub cases: Vec<ComparedCase>,
+    /// The quantities that both have in some case, in the order of [`COMPARED`].
+    pub differences: Vec<Difference>,
+}
+
+impl ResultComparison {
+    /// Compares results with the lanes of a driver, in binary64; a pair per case that both have.
+    ///
+    /// # Errors
+    /// As [`Subject::lane`].
+    pub fn new(pairs: &[(&Subject, &TheirResult)], profile: &Profile, model: ModelId) -> Result<ResultComparison> {
+        let cases = pairs.iter().map(|(subject, theirs)| {
+            let trace = subject.lane(profile, subject.point())?.trace(profile, subject.category(), model);
+            Ok(ComparedCase::of(&trace, theirs))
+        });
+        let cases: Vec<ComparedCase> = cases.collect::<Result<_>>()?;
+        let difference = |(quantity, compared): (usize, &Compared)| {
+            let mut all: Vec<f64> = cases.iter().filter_map(|case| case.differences[quantity]).collect();
+            all.sort_by(f64::total_cmp);
+            let beyond = all.iter().filter(|by| by.abs() > compared.tolerance).count();
+            let range = [*all.first()?, all[all.len() / 2], *all.last()?];
+            Some(Difference { quantity, cases: all.len(), beyond, range })
+        };
+        let differences = COMPARED.iter().enumerate().filter_map(difference).collect();
+        Ok(ResultComparison { model, cases, differences })
+    }
+
+    /// Cases with the same answer to whether the vehicles touch.
+    pub fn agreeing(&self) -> usize {
+        self.cases.iter().filter(|case| case.collides[0] == case.collides[1]).count()
+    }
+
+    /// The interval of the fraction that agrees, if the cases are a random sample of those that matter.
+    pub fn agreement(&self) -> Interval {
+        let (cases, agreeing) = (self.cases.len() as u64, self.agreeing() as u64);
+        clopper_pearson(agreeing, cases, 0.95)
+    }
+
+    /// The first quantity, in the order of cause and effect, that differs beyond its tolerance in most of the cases.
+    pub fn cause(&self) -> Option<&Difference> {
+        self.differences.iter().find(|difference| 2 * difference.beyond > difference.cases)
+    }
+}
+
+impl ComparedCase {
+    fn of(trace: &Trace, theirs: &TheirResult) -> ComparedCase {
+        let ours = COMPARED.each_ref().map(|compared| (compared.of)(trace));
+        let differences = std::array::from_fn(|k| Some(theirs.values[k]? - ours[k]?));
+        let differs = |k: &usize| match (theirs.values[*k], ours[*k]) {
+            (Some(theirs), Some(ours)) => (theirs - ours).abs() > COMPARED[*k].tolerance,
+            // A table without the column says nothing; an empty field of an event does.
+            (theirs, _) => theirs.is_some(),
+        };
+        let collides = [trace.step_of(StepMark::Contact).is_some(), theirs.collides];
+        let decides = (0..COMPARED.len()).find(differs);
+        ComparedCase { id: theirs.id.clone(), collides, differences, decides }
+    }
+}
