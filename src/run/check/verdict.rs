@@ -113,7 +113,7 @@ impl CaseVerdicts {
     }
 
     /// The answer if Annex 3 describes the case. An answer of no conflict does not need Annex 3.
-    pub fn verdict(&self) -> Verdict {
+    pub(crate) fn verdict(&self) -> Verdict {
         match self.answer() {
             _ if self.reference_drivers.is_empty() => Verdict::NotJudged,
             Answer::NoConflict => Verdict::Answer(Answer::NoConflict),

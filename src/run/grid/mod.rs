@@ -25,8 +25,6 @@ pub(crate) use robustness::{GAP_M, SPEED_MPS, without_reaction};
 pub use robustness::{Perturbation, VARIED};
 pub use run::{Against, Map, MapGrids, MapOptions, MapResult, MappedGrid};
 
-pub use crate::scenario::{LANE_WIDTH_M, PlainCase};
-
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::scenario::{Case, Category, missing_parameter};
@@ -43,7 +41,7 @@ pub const MAX_PANELS: usize = 1000;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CaseStyle {
-    /// As `simulate` makes it: see [`PlainCase`].
+    /// As `simulate` makes it: see [`PlainCase`](crate::scenario::PlainCase).
     Plain,
     /// As the JRC's simulator makes it.
     Jrc,
@@ -293,7 +291,7 @@ impl Grid {
     }
 
     /// The profile for sweeping the grid: the JRC's comparison sweep has its own rules.
-    pub fn profile(&self, profile: &Profile) -> Profile {
+    pub(crate) fn profile(&self, profile: &Profile) -> Profile {
         let mut profile = profile.clone();
         if self.parts.style == CaseStyle::JrcComparison {
             profile.cchdm.abort_on_large_ttc = true;

@@ -63,7 +63,7 @@ pub enum Perturbation {
 
 impl Perturbation {
     /// All that a category has, in the order of messages.
-    pub fn all(category: Category) -> Vec<Perturbation> {
+    pub(crate) fn all(category: Category) -> Vec<Perturbation> {
         let has = |of: &&Variation| {
             PARAMETERS.iter().any(|known| known.quantity == of.quantity && known.categories.contains(&category))
         };
@@ -73,7 +73,7 @@ impl Perturbation {
     }
 
     /// Description.
-    pub fn label(self) -> &'static str {
+    pub(crate) fn label(self) -> &'static str {
         match self {
             Perturbation::FinerStep => "a tenth of the time step",
             Perturbation::More(of) => of.more,
@@ -98,7 +98,7 @@ impl Perturbation {
     }
 
     /// Change of the initial gap, m.
-    pub fn gap_m(self) -> f64 {
+    pub(crate) fn gap_m(self) -> f64 {
         self.change().filter(|(quantity, _)| *quantity == MapQuantity::Gap).map_or(0.0, |(_, by_m)| by_m)
     }
 
@@ -106,7 +106,7 @@ impl Perturbation {
     ///
     /// # Errors
     /// [`crate::Error::Usage`] for a time step that is too short.
-    pub fn profile(self, profile: &Profile) -> Result<Profile> {
+    pub(crate) fn profile(self, profile: &Profile) -> Result<Profile> {
         match self {
             Perturbation::FinerStep => {
                 let frame = &profile.frame;
