@@ -129,7 +129,7 @@ pub(crate) fn log_normal(
 /// // Nothing found in a million draws: no more than 3.69e-6.
 /// assert!((gamma(0.0, 0.0, 1e-6, 0.95).high - 3.689e-6).abs() < 1e-9);
 /// ```
-pub(crate) fn gamma(probability: f64, variance: f64, largest_weight: f64, level: f64) -> Interval {
+pub fn gamma(probability: f64, variance: f64, largest_weight: f64, level: f64) -> Interval {
     let tail = 0.5 * (1.0 - level);
     let quantile = |mean: f64, variance: f64, p: f64| variance / mean * gamma_quantile(mean * mean / variance, p);
     let low = match probability > 0.0 {
