@@ -27,7 +27,7 @@ impl Devices {
     }
 
     #[cfg(not(feature = "gpu"))]
-    pub fn run(&self) -> Result<Output> {
+    pub(crate) fn run(&self) -> Result<Output> {
         Err(crate::engine::no_gpu("lanesweep verify devices"))
     }
 }

@@ -91,7 +91,7 @@ impl Exit {
     ];
 
     /// The table for `--help`.
-    pub fn table() -> String {
+    pub(crate) fn table() -> String {
         let ends = Exit::ALL.iter().map(|exit| (exit.code(), exit.meaning())).chain(Exit::BY_SIGNAL);
         let lines = ends.map(|(code, meaning)| format!("  {code:>3}  {meaning}\n"));
         format!("Exit codes:\n{}", lines.collect::<String>())

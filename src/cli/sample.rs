@@ -44,7 +44,7 @@ use crate::stats::density::DensityModel;
                   lanesweep sample --distribution cut-in-stochastic.xosc --category cut-in \\\n      \
                   --rename Ego_Speed_kph=ego_speed_kmh --rename Other_Speed_kph=other_speed_kmh"
 )]
-pub struct Sample {
+pub(crate) struct Sample {
     /// Density file
     #[arg(value_name = "DENSITY", required_unless_present_any = ["plan", "distribution"], help_heading = "Data")]
     pub density: Option<PathBuf>,

@@ -26,7 +26,7 @@ use crate::{Error, Place, Result};
 const FEW_SCENARIOS: f64 = 5.0;
 
 impl Sample {
-    pub fn run(&self, configured: &Configured) -> Result<Output> {
+    pub(crate) fn run(&self, configured: &Configured) -> Result<Output> {
         self.check()?;
         self.shards.start()?;
         if let Some(path) = &self.shards.plan {

@@ -1,6 +1,6 @@
 //! Handling of SIGINT, SIGTERM and SIGHUP.
 //!
-//! At the first signal a resumable run ends in good order, within [`LONGEST_WAIT`]. Any other run, and any run at the
+//! At the first signal a resumable run ends in good order, within `LONGEST_WAIT`. Any other run, and any run at the
 //! second signal, ends at once: its unfinished files are removed and the exit status is 128 + the signal's number, as
 //! shells expect.
 
@@ -14,7 +14,7 @@ pub(super) const EXIT_STATUS: u8 = 75;
 
 /// Maximum wait for a run to end in good order after a signal. The journal written by then is kept; the work on the
 /// present chunk, or before the first one, is lost.
-pub const LONGEST_WAIT: Duration = Duration::from_secs(4);
+pub(crate) const LONGEST_WAIT: Duration = Duration::from_secs(4);
 
 /// The cancellation token of this process: signals and `--stop-after` set it, and runs hold it.
 pub static CANCEL: LazyLock<Cancel> = LazyLock::new(Cancel::default);

@@ -26,7 +26,7 @@ pub struct Frame<R> {
 
 impl<R: Real> Frame<R> {
     /// Resolves the constants; `abort_above_ttc_s` is that of the driver model.
-    pub fn resolve(profile: &FrameProfile, abort_above_ttc_s: f64) -> Self {
+    pub(crate) fn resolve(profile: &FrameProfile, abort_above_ttc_s: f64) -> Self {
         Frame {
             dt: R::from_f64(profile.dt_s),
             inverse_dt: R::from_f64(1.0 / profile.dt_s),

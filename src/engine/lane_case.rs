@@ -5,7 +5,7 @@
 //! Laterally, a vehicle is evaluated once per step, so it must not pass from one side of the ego to the other within a
 //! step. Derivation: docs/src/methods/lane.md, time step.
 
-pub use crate::model::driver::NEVER;
+pub(crate) use crate::model::driver::NEVER;
 use crate::model::driver::{AttentionRule, DriverProfile, LaneGeometry, MODELS};
 use crate::model::profile::{CutOutEvaluated, CutOutTarget, Profile};
 use crate::model::scalar::Real;

@@ -44,7 +44,7 @@ pub struct RecheckOptions {
 
 impl RecheckOptions {
     /// One lane in `ONE_IN`.
-    pub fn of_seed(seed: u64) -> Self {
+    pub(crate) fn of_seed(seed: u64) -> Self {
         RecheckOptions { seed, one_in: ONE_IN }
     }
 }

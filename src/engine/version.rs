@@ -97,7 +97,7 @@ impl Canonical {
     }
 
     /// A case, field by field.
-    pub fn case(&mut self, case: &LaneCase<f64>) {
+    pub(crate) fn case(&mut self, case: &LaneCase<f64>) {
         let LaneCase { others, ego_speed, ego_width, lane_width, horizon, pair } = case;
         let mut bytes = Vec::with_capacity(320);
         for other in others {
@@ -109,7 +109,7 @@ impl Canonical {
     }
 
     /// A generator of cases.
-    pub fn generator(&mut self, generator: &Generator) {
+    pub(crate) fn generator(&mut self, generator: &Generator) {
         let Generator { points, recipe, basis } = generator;
         match &points.source {
             PointSource::Random(stream) => {

@@ -11,3 +11,4 @@ pub mod criterion;
 pub mod motion;
 pub mod profile;
 pub mod scalar;
+pub mod severity;

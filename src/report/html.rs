@@ -30,7 +30,7 @@ pub struct PageFigure {
 
 impl PageFigure {
     /// From a complete SVG document.
-    pub fn new(svg: &str, files: &[&str]) -> PageFigure {
+    pub(crate) fn new(svg: &str, files: &[&str]) -> PageFigure {
         let (svg, width_px) = inline(svg);
         PageFigure { svg, files: files.iter().map(|file| (*file).to_owned()).collect(), is_wide: width_px > NARROW_PX }
     }

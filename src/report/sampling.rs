@@ -43,7 +43,7 @@ impl DensityRecord {
     ///
     /// # Errors
     /// As [`DensityModel::content_sha256`].
-    pub fn of(density: &DensityModel) -> Result<DensityRecord> {
+    pub(crate) fn of(density: &DensityModel) -> Result<DensityRecord> {
         Ok(DensityRecord {
             sha256: density.content_sha256()?,
             category: density.category(),

@@ -65,7 +65,7 @@ pub fn is_named(path: &Path, file: &File) -> bool {
 
 /// On other systems std cannot compare the files; there the name of an open file stays in use until it is closed.
 #[cfg(not(unix))]
-pub fn is_named(_: &Path, _: &File) -> bool {
+pub(crate) fn is_named(_: &Path, _: &File) -> bool {
     true
 }
 
@@ -269,7 +269,7 @@ impl StagedFile {
     ///
     /// # Errors
     /// If the system refuses.
-    pub fn place(self) -> Result<()> {
+    pub(crate) fn place(self) -> Result<()> {
         let StagedFile { target, path, file, live } = self;
         path.persist(&target).map_err(|error| failed(&target, error.error))?;
         drop((file, live));

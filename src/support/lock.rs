@@ -34,7 +34,7 @@ impl FolderLock {
     ///
     /// # Errors
     /// As [`FolderLock::acquire`].
-    pub fn share(path: &Path) -> Result<FolderLock> {
+    pub(crate) fn share(path: &Path) -> Result<FolderLock> {
         FolderLock::take(path, File::try_lock_shared, false)
     }
 

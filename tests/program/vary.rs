@@ -78,7 +78,7 @@ fn an_error_of_a_tenth_of_a_second_in_a_delay_is_found_and_named() {
     let (code, late) = compare("late.csv");
     assert_eq!((code, &late["cause"], &late["without_result"]), (5, &"t_brake_s".into(), &1.into()), "{late}");
     let sentence = late["cause_sentence"].as_str().unwrap();
-    assert!(sentence.contains("the beginning of the braking is 0.1 s later there"), "{sentence}");
+    assert!(sentence.contains("the beginning of the braking is 0.100 s later there"), "{sentence}");
 }
 
 #[test]

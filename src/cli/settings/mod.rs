@@ -11,8 +11,8 @@ mod schema;
 mod tables;
 
 pub(crate) use file::FILE_VARIABLE;
-pub use keys::{Choice, Key, KeyKind};
 pub(crate) use keys::{DEFAULT_FILE, DEFAULT_FILE_NAME, text_of};
+pub use keys::{Key, KeyKind};
 pub(crate) use layers::{Assignment, Layers, Origin, Setting};
 pub(crate) use schema::{profile_schema, settings_schema};
 pub(crate) use tables::{EstimatorKind, IntervalKind, SampleSettings, Settings};

@@ -67,7 +67,7 @@ impl Points {
     }
 
     /// Number of points; `None` if every index has one. A [plan](crate::engine::LanePlan) holds no sample beyond.
-    pub fn count(&self) -> Option<u64> {
+    pub(crate) fn count(&self) -> Option<u64> {
         match &self.source {
             PointSource::Random(_) => None,
             PointSource::Sobol(_) => Some(SOBOL_POINTS),
@@ -80,7 +80,7 @@ impl Points {
     /// # Panics
     /// For an index beyond [`Points::count`], because no such point exists.
     #[inline]
-    pub fn draw(&self, index: u64, is_valid: impl Fn(&[f32]) -> bool) -> DrawnPoint {
+    pub(crate) fn draw(&self, index: u64, is_valid: impl Fn(&[f32]) -> bool) -> DrawnPoint {
         let attempts = if matches!(self.source, PointSource::Random(_)) { ATTEMPTS } else { 1 };
         for attempt in 0..attempts {
             let values = self.attempt(index, attempt);
@@ -93,7 +93,7 @@ impl Points {
 
     /// Lowest and highest value of a parameter over all draws, valid or not: no normal deviate exceeds that of the last
     /// word.
-    pub fn range(&self, parameter: usize) -> [f64; 2] {
+    pub(crate) fn range(&self, parameter: usize) -> [f64; 2] {
         let d = self.dimensions;
         let largest = f64::from(standard_normal(u32::MAX));
         let spread = |component: usize| match self.source {

@@ -474,7 +474,7 @@ impl GpuBackend {
     }
 
     /// Description of the device for the record of a run.
-    pub fn record(&self) -> DeviceRecord {
+    pub(crate) fn record(&self) -> DeviceRecord {
         DeviceRecord {
             name: self.card.name.clone(),
             api: self.card.api.label(),

@@ -97,7 +97,7 @@ impl Concrete {
     ///
     /// # Errors
     /// [`Error::Input`] naming the lane, for numbers that are not finite, and for paths that are too short or too long.
-    pub fn check(&self) -> Result<()> {
+    pub(crate) fn check(&self) -> Result<()> {
         let place = || Place::item(format!("lane {}", self.key));
         for vehicle in &self.vehicles {
             let count = vehicle.path.len();

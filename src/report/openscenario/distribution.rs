@@ -14,7 +14,7 @@ pub struct Range {
 
 impl Range {
     /// All numbers.
-    pub const ALL: Range = Range { low: f64::NEG_INFINITY, high: f64::INFINITY };
+    pub(crate) const ALL: Range = Range { low: f64::NEG_INFINITY, high: f64::INFINITY };
 
     /// The intersection; `None` if it is empty.
     fn and(self, other: Range) -> Option<Range> {
@@ -28,7 +28,7 @@ impl Range {
     }
 
     /// Whether a number is inside.
-    pub fn holds(self, value: f64) -> bool {
+    pub(crate) fn holds(self, value: f64) -> bool {
         self.low <= value && value <= self.high
     }
 }

@@ -130,7 +130,7 @@ pub fn parse_distribution(text: &str, path: &Path) -> Result<DistributionFile> {
 
 impl DistributionFile {
     /// Names and lines of all parameters: in order, then those with texts.
-    pub fn names(&self) -> Vec<(&str, u64)> {
+    pub(crate) fn names(&self) -> Vec<(&str, u64)> {
         let mut names: Vec<(&str, u64)> = match &self.distributions {
             Distributions::Deterministic(list) => list
                 .iter()

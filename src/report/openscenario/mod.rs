@@ -21,7 +21,7 @@ pub use distribution_file::{
 };
 pub use lanes::{PlayOptions, concrete_case, concrete_lanes};
 pub use parameters::{Names, Rename, variations};
-pub use samples::{ATTEMPTS, DistributionSamples, Sampled, SampledFile, SampledParameter, reopen};
+pub use samples::{DistributionSamples, Sampled, SampledFile, SampledParameter, reopen};
 pub use scenario_file::{IndexRow, export_folder};
 
 /// Date of every file; it is constant, so that the same input gives the same bytes.

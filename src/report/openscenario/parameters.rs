@@ -80,7 +80,7 @@ impl Names<'_> {
     ///
     /// # Errors
     /// [`Error::Input`] with the range.
-    pub fn value(&self, (parameter, factor): (&MapParameter, f64), value: f64, line: u64) -> Result<f64> {
+    pub(crate) fn value(&self, (parameter, factor): (&MapParameter, f64), value: f64, line: u64) -> Result<f64> {
         let ours = if factor == 1.0 { value } else { (value * factor * 1e9).round() / 1e9 };
         parameter.check(ours, "").map_err(|error| {
             let place = Place::file(self.path).row(line).of(format!("parameter `{}`", parameter.key));
@@ -135,7 +135,7 @@ impl Names<'_> {
 /// The variations of a file.
 ///
 /// # Errors
-/// [`Error::Usage`] for a stochastic file; as `Names::find` and [`Names::value`]; [`Error::Input`] for a repeated
+/// [`Error::Usage`] for a stochastic file; as `Names::find` and `Names::value`; [`Error::Input`] for a repeated
 /// value, and for too many combinations of sets.
 pub fn variations(file: &DistributionFile, names: &Names) -> Result<Variations> {
     names.check_renames(&file.names())?;

@@ -32,7 +32,7 @@ const DISTRIBUTION_PURPOSE: u32 = 0x4f53_4344;
 const MAX_SAMPLES: u64 = 1_000_000;
 
 /// Maximum number of points drawn for one sample.
-pub const ATTEMPTS: u32 = 64;
+pub(crate) const ATTEMPTS: u32 = 64;
 
 /// Name of the only variant.
 const VARIANT: &str = "distribution";
@@ -136,7 +136,7 @@ impl DistributionSamples {
     /// The point of a sample: the first draw that is a valid case.
     ///
     /// # Errors
-    /// [`Error::Usage`] if none of [`ATTEMPTS`] draws is valid.
+    /// [`Error::Usage`] if none of `ATTEMPTS` draws is valid.
     pub fn draw(&self, seed: u64, index: u64, profile: &Profile) -> Result<Sampled> {
         self.drawn(seed, index, profile).map(|(sampled, _, _)| sampled)
     }

@@ -141,7 +141,11 @@ impl Rule {
 
 impl Series {
     /// Values with marks; pairs are values without intervals.
-    pub fn new<V: Into<Value>>(name: impl Into<String>, marks: &[Mark], values: impl IntoIterator<Item = V>) -> Self {
+    pub(crate) fn new<V: Into<Value>>(
+        name: impl Into<String>,
+        marks: &[Mark],
+        values: impl IntoIterator<Item = V>,
+    ) -> Self {
         let values = values.into_iter().map(Into::into).collect();
         Series { name: name.into(), marks: marks.to_vec(), values, ..Series::default() }
     }

@@ -12,9 +12,9 @@ mod svg;
 
 use std::f64::consts::TAU;
 
-pub use axis::AxisScale;
-pub use layer::{Cells, ColourBar, Fill, FilledCell, Mark, Rule, Series, Value};
-pub use look::{Look, Symbol};
+pub(super) use axis::AxisScale;
+pub(super) use layer::{Cells, ColourBar, Fill, FilledCell, Mark, Rule, Series, Value};
+pub(super) use look::{Look, Symbol};
 
 pub(super) use axis::{logarithmic_reach, number, plain_end, quantity};
 use layer::HOLLOW;
@@ -149,17 +149,17 @@ pub struct Name {
 
 impl PlotAxis {
     /// A linear axis around the values of the series.
-    pub fn new(label: impl Into<String>) -> Self {
+    pub(crate) fn new(label: impl Into<String>) -> Self {
         PlotAxis { label: label.into(), ..PlotAxis::default() }
     }
 
     /// A linear axis with these ends.
-    pub fn exactly(label: impl Into<String>, low: f64, high: f64) -> Self {
+    pub(crate) fn exactly(label: impl Into<String>, low: f64, high: f64) -> Self {
         PlotAxis { ends: Ends::Exactly(low, high), ..PlotAxis::new(label) }
     }
 
     /// An axis of this scale around these values.
-    pub fn around(label: impl Into<String>, scale: AxisScale, values: Vec<f64>) -> Self {
+    pub(crate) fn around(label: impl Into<String>, scale: AxisScale, values: Vec<f64>) -> Self {
         PlotAxis { scale, ends: Ends::Around(values), ..PlotAxis::new(label) }
     }
 
@@ -209,7 +209,7 @@ impl Figure {
     }
 
     /// The numbers of the series: one row per value.
-    pub fn csv(&self) -> String {
+    pub(crate) fn csv(&self) -> String {
         let series = self.plots.iter().flat_map(|plot| plot.series.iter().map(move |series| (plot, series)));
         let rows = series.flat_map(|(plot, series)| series.values.iter().map(move |value| (plot, series, value)));
         Table::of(rows)

@@ -54,7 +54,7 @@ impl Agreement {
     ];
 
     /// The agreement of two verdicts.
-    pub fn of(first_fails: bool, second_fails: bool) -> Agreement {
+    pub(crate) fn of(first_fails: bool, second_fails: bool) -> Agreement {
         match (first_fails, second_fails) {
             (false, false) => Agreement::BothPass,
             (true, true) => Agreement::BothFail,

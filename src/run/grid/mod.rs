@@ -25,7 +25,7 @@ pub(crate) use robustness::without_reaction;
 pub use robustness::{Perturbation, VARIED};
 pub use run::{Against, Map, MapGrids, MapOptions, MapResult, MappedGrid};
 
-pub use crate::scenario::{CaseQuantity, LANE_WIDTH_M, PlainCase};
+pub use crate::scenario::CaseQuantity;
 
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -43,7 +43,7 @@ pub const MAX_PANELS: usize = 1000;
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum CaseStyle {
-    /// As `simulate` makes it: see [`PlainCase`].
+    /// As `simulate` makes it: see [`PlainCase`](crate::scenario::PlainCase).
     Plain,
     /// As the JRC's simulator makes it.
     Jrc,
@@ -293,7 +293,7 @@ impl Grid {
     }
 
     /// The profile for sweeping the grid: the JRC's comparison sweep has its own rules.
-    pub fn profile(&self, profile: &Profile) -> Profile {
+    pub(crate) fn profile(&self, profile: &Profile) -> Profile {
         let mut profile = profile.clone();
         if self.parts.style == CaseStyle::JrcComparison {
             profile.cchdm.abort_on_large_ttc = true;

@@ -142,7 +142,7 @@ impl GridPart {
     }
 
     /// The cell of a lane's unit and headway.
-    pub fn cell(&self, grid: &Grid, unit: u64, headway: usize) -> usize {
+    pub(crate) fn cell(&self, grid: &Grid, unit: u64, headway: usize) -> usize {
         self.layout.cell(grid, unit as usize, headway)
     }
 }

@@ -24,7 +24,7 @@ pub enum Perturbation {
 
 impl Perturbation {
     /// All that a category has, in the order of messages.
-    pub fn all(category: Category) -> Vec<Perturbation> {
+    pub(crate) fn all(category: Category) -> Vec<Perturbation> {
         // The gap first: it decides most often.
         let ordered = [CaseQuantity::Gap.number()].into_iter();
         let ordered = ordered.chain(NUMBERS.iter().filter(|number| number.quantity != CaseQuantity::Gap));
@@ -37,7 +37,7 @@ impl Perturbation {
     }
 
     /// Description.
-    pub fn label(self) -> &'static str {
+    pub(crate) fn label(self) -> &'static str {
         match self {
             Perturbation::FinerStep => "a tenth of the time step",
             Perturbation::More(_, error) => error.more,
@@ -62,7 +62,7 @@ impl Perturbation {
     }
 
     /// Change of the initial gap, m.
-    pub fn gap_m(self) -> f64 {
+    pub(crate) fn gap_m(self) -> f64 {
         self.change().filter(|(quantity, _)| *quantity == CaseQuantity::Gap).map_or(0.0, |(_, by_m)| by_m)
     }
 
@@ -70,7 +70,7 @@ impl Perturbation {
     ///
     /// # Errors
     /// [`crate::Error::Usage`] for a time step that is too short.
-    pub fn profile(self, profile: &Profile) -> Result<Profile> {
+    pub(crate) fn profile(self, profile: &Profile) -> Result<Profile> {
         match self {
             Perturbation::FinerStep => {
                 let frame = &profile.frame;

@@ -86,7 +86,7 @@ impl Conclusion {
     }
 
     /// The worst conclusion of several rules.
-    pub fn of(findings: &[Finding]) -> Conclusion {
+    pub(crate) fn of(findings: &[Finding]) -> Conclusion {
         let any = |conclusion| findings.iter().any(|finding| finding.conclusion == conclusion);
         if any(Conclusion::NotAppropriate) {
             Conclusion::NotAppropriate

@@ -32,7 +32,7 @@ pub struct Computed {
 
 impl Computed {
     /// Of sweeps up to the last unit.
-    pub fn whole(summary: SweepSummary) -> Computed {
+    pub(crate) fn whole(summary: SweepSummary) -> Computed {
         Computed { summary, stopped: StopReason::Samples, parts: 0 }
     }
 }

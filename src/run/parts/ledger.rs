@@ -238,7 +238,7 @@ impl<T: MergeableCounts> Ledger<T> {
     ///
     /// # Errors
     /// Those of [`MergeableCounts::join`].
-    pub fn take(&mut self) -> Result<Vec<T>> {
+    pub(crate) fn take(&mut self) -> Result<Vec<T>> {
         self.settle()?;
         self.unwritten.clear();
         Ok(self.segments.iter_mut().filter_map(Option::take).collect())

@@ -129,7 +129,7 @@ impl Reopened {
     }
 
     /// The plan; for a study it has no cases.
-    pub fn plan(&self) -> &LanePlan {
+    pub(crate) fn plan(&self) -> &LanePlan {
         match &self.lanes {
             Lanes::Study(study) => study.plan(),
             Lanes::Sample(plan, _) | Lanes::Distribution(plan) | Lanes::Scenarios(plan) => plan,
@@ -194,7 +194,7 @@ impl Reopened {
     ///
     /// # Errors
     /// [`Error::Usage`] for a lane that does not exist, and for a void sample, which has no case.
-    pub fn find(&self, text: &str) -> Result<LaneKey> {
+    pub(crate) fn find(&self, text: &str) -> Result<LaneKey> {
         let plan = self.plan();
         let key = plan.parse_key(text).ok_or_else(|| {
             let why = wrong_part(plan, text);

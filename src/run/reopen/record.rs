@@ -47,7 +47,7 @@ impl SampleRecord {
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Input`] if the folder does not hold a run of this version and engine.
-    pub fn read(dir: &Path) -> Result<SampleRecord> {
+    pub(crate) fn read(dir: &Path) -> Result<SampleRecord> {
         let path = dir.join(ESTIMATE_RECORD);
         let wrong = |problem: String| {
             let help = "give the folder (option `out`) of a `lanesweep sample` run by this version";

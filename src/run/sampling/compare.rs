@@ -40,7 +40,7 @@ pub struct ScenarioCounts {
 
 impl ScenarioCounts {
     /// Counts of zero.
-    pub fn empty(scenarios: usize, cells: usize) -> ScenarioCounts {
+    pub(crate) fn empty(scenarios: usize, cells: usize) -> ScenarioCounts {
         ScenarioCounts { lanes: vec![0; scenarios], failures: vec![vec![0; scenarios]; cells] }
     }
 
@@ -280,7 +280,7 @@ impl ComparedForm {
     ///
     /// # Errors
     /// As [`DensityModel::content_sha256`].
-    pub fn of(density: &DensityModel, rows: &[EstimateRow]) -> Result<ComparedForm> {
+    pub(crate) fn of(density: &DensityModel, rows: &[EstimateRow]) -> Result<ComparedForm> {
         let overall = rows.iter().filter(|row| row.is_overall(rows));
         Ok(ComparedForm {
             form: density.kind(),

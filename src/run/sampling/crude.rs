@@ -79,7 +79,7 @@ pub fn sample_crude(
 }
 
 /// The sample sizes at which a run of `samples` samples is evaluated.
-pub fn checkpoints(samples: u64) -> Vec<u64> {
+pub(crate) fn checkpoints(samples: u64) -> Vec<u64> {
     let next = |at: &u64| Some(Checkpoints::Doubling.next(*at)).filter(|next| *next > *at);
     std::iter::successors(next(&0), next).take_while(|at| *at < samples).chain([samples]).collect()
 }

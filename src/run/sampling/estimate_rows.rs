@@ -59,7 +59,7 @@ impl EstimateRow {
     }
 
     /// A row whose interval covers the draws alone.
-    pub fn of_draws(
+    pub(crate) fn of_draws(
         model: ModelId,
         criterion: Criterion,
         headway: String,
@@ -207,7 +207,7 @@ impl RiskRate {
 
 impl Risk {
     /// Risk of an estimate under an exposure.
-    pub fn of(estimate: &Estimate, exposure: Option<&Exposure>) -> Risk {
+    pub(crate) fn of(estimate: &Estimate, exposure: Option<&Exposure>) -> Risk {
         let product = |rate: Option<&Rate>, scale: f64| rate.map(|rate| RiskRate::of(rate, scale, estimate));
         Risk {
             per_hour: product(exposure.and_then(|e| e.per_hour.as_ref()), 1.0),

@@ -129,7 +129,7 @@ impl MapAxes {
     }
 
     /// Cell of a point, row by row from below; `None` outside the axes.
-    pub fn cell(&self, point: &[f32]) -> Option<usize> {
+    pub(crate) fn cell(&self, point: &[f32]) -> Option<usize> {
         let along = |axis: &MapAxis| axis.cell(f64::from(*point.get(axis.parameter)?));
         Some(along(&self.y)? * MAP_CELLS + along(&self.x)?)
     }

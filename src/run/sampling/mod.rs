@@ -30,7 +30,7 @@ pub use compare::{
     SampledCell, SampledScenarios, ScenarioCounts, kernel_scenarios, sample_by_scenario,
 };
 pub(crate) use compare::{compare_cells, recorded_cells};
-pub use crude::{Checkpoint, CheckpointRow, CrudeRun, checkpoints, cuts, sample_crude, sample_into};
+pub use crude::{Checkpoint, CheckpointRow, CrudeRun, cuts, sample_crude, sample_into};
 pub use estimate_rows::{EstimateRow, RecordedRatios, Risk, RiskRate};
 pub use failure_map::{MAP_CELLS, MapAxes, MapAxis, MapCounts};
 pub use generator::{SAMPLE_PURPOSE, SampleSource, generator_of, generator_of_points};
@@ -187,7 +187,7 @@ impl Sample {
     }
 
     /// Number of samples; before a search, and with a stop rule, the maximum.
-    pub fn samples(&self) -> u64 {
+    pub(crate) fn samples(&self) -> u64 {
         match &self.kind {
             SampleKind::Weighted(weighted) => weighted.draws.draws,
             _ => self.options.stop.samples,

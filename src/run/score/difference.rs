@@ -26,7 +26,7 @@ pub struct ScenarioRate {
 
 impl ScenarioRate {
     /// Hits over runs; both have one entry per scenario, in the same order for all rates of a contrast.
-    pub fn new(runs: Vec<u64>, hits: Vec<u64>) -> ScenarioRate {
+    pub(crate) fn new(runs: Vec<u64>, hits: Vec<u64>) -> ScenarioRate {
         ScenarioRate { runs, hits, is_f1: false }
     }
 
@@ -47,12 +47,12 @@ impl ScenarioRate {
     }
 
     /// The score; `None` for 0/0.
-    pub fn value(&self) -> Option<f64> {
+    pub(crate) fn value(&self) -> Option<f64> {
         self.runs.iter().any(|runs| *runs > 0).then(|| self.score(self.clusters().rate()))
     }
 
     /// Its interval over the scenarios that have a run.
-    pub fn interval(&self, level: f64) -> ScoreInterval {
+    pub(crate) fn interval(&self, level: f64) -> ScoreInterval {
         let with_runs = self.runs.iter().zip(&self.hits).filter(|(runs, _)| **runs > 0);
         let (runs, hits): (Vec<u64>, Vec<u64>) = with_runs.unzip();
         let rate = cluster_rate(Clusters { runs: &runs, failures: &hits }, level).interval;

@@ -20,7 +20,7 @@ pub struct MeanF1 {
 
 impl MeanF1 {
     /// Over all models and these criteria, from the scores and the counts of each scenario.
-    pub fn of(
+    pub(crate) fn of(
         scores: &CategoryScores,
         (plan, counts): (&LanePlan, &Partial),
         criteria: &[Criterion],

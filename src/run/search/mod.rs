@@ -61,7 +61,7 @@ impl Objective {
     }
 
     /// The value, 1 is best; `None` if S never fails.
-    pub fn of(self, counts: &Confusion) -> Option<f64> {
+    pub(crate) fn of(self, counts: &Confusion) -> Option<f64> {
         match self {
             Objective::F1 => f1(counts),
             Objective::Recall => recall(counts),
@@ -112,7 +112,7 @@ impl SearchLimits {
     ///
     /// # Errors
     /// [`Error::Usage`].
-    pub fn validate(&self) -> Result<()> {
+    pub(crate) fn validate(&self) -> Result<()> {
         ranges::check("search", self)
     }
 

@@ -90,7 +90,7 @@ impl Kde {
     }
 
     /// Number of parameters.
-    pub fn dimensions(&self) -> usize {
+    pub(crate) fn dimensions(&self) -> usize {
         self.scale.len()
     }
 

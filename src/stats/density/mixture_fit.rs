@@ -19,7 +19,7 @@ const JITTER: f64 = 1e-6;
 
 /// Options of a fit.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FitOptions {
+pub(crate) struct FitOptions {
     /// Maximum number of components, ≥ 1; fewer where the points do not carry them.
     pub components: usize,
     /// Choose among 1, 2, 3, 4, 6, 8, 12, … up to `components` by the likelihood of held-out points: so many parts of the
@@ -46,7 +46,7 @@ impl Mixture {
     ///
     /// # Errors
     /// [`Error::Usage`] if there is no point, shapes differ, or weights are negative, not finite or all zero.
-    pub fn fit(points: &[Vec<f64>], weights: &[f64], options: &FitOptions) -> Result<Mixture> {
+    pub(crate) fn fit(points: &[Vec<f64>], weights: &[f64], options: &FitOptions) -> Result<Mixture> {
         let total: f64 = weights.iter().sum();
         let d = points.first().map_or(0, Vec::len);
         let well_formed = d > 0

@@ -26,7 +26,7 @@ pub use bandwidth::{Bandwidth, BandwidthRule, LeaveOneOut, SearchEnd};
 pub use constrained::ConstrainedKde;
 pub use kde::Kde;
 pub use mixture::Mixture;
-pub use mixture_fit::FitOptions as MixtureFitOptions;
+pub(crate) use mixture_fit::FitOptions as MixtureFitOptions;
 pub use model::{DensityModel, Exposure, FitOptions, Fitted, Provenance, Rate};
 pub use model_file::{MAX_FILE_BYTES, read_density, write_density};
 pub use moments::standard_deviation;

@@ -106,7 +106,7 @@ impl Transformation {
     }
 
     /// x = T(z).
-    pub fn values(&self, z: &[f64]) -> Vec<f64> {
+    pub(crate) fn values(&self, z: &[f64]) -> Vec<f64> {
         let value = |(of, z): (&Vec<f64>, &f64)| {
             let at = Self::piece(*z);
             of[at] + (of[at + 1] - of[at]) * ((z - knot(at)) / (knot(at + 1) - knot(at)))
@@ -115,7 +115,7 @@ impl Transformation {
     }
 
     /// z = T⁻¹(x).
-    pub fn inverse(&self, values: &[f64]) -> Vec<f64> {
+    pub(crate) fn inverse(&self, values: &[f64]) -> Vec<f64> {
         let z = |(of, x): (&Vec<f64>, &f64)| {
             let at = of[1..PIECES].partition_point(|knot| knot <= x);
             knot(at) + (knot(at + 1) - knot(at)) * ((x - of[at]) / (of[at + 1] - of[at]))
@@ -124,7 +124,7 @@ impl Transformation {
     }
 
     /// Σ_j ln dT_j/dz_j.
-    pub fn log_slope(&self, z: &[f64]) -> f64 {
+    pub(crate) fn log_slope(&self, z: &[f64]) -> f64 {
         let slope = |(of, z): (&Vec<f64>, &f64)| {
             let at = Self::piece(*z);
             libm::log((of[at + 1] - of[at]) / (knot(at + 1) - knot(at)))
@@ -168,7 +168,11 @@ impl TransformedMixture {
     ///
     /// # Errors
     /// [`Error::Input`] for a parameter that is equal in all points, or on the wrong side of its bound.
-    pub fn fit(kind: DensityKind, points: &[Vec<f64>], parameters: &[Parameter]) -> Result<Option<TransformedMixture>> {
+    pub(crate) fn fit(
+        kind: DensityKind,
+        points: &[Vec<f64>],
+        parameters: &[Parameter],
+    ) -> Result<Option<TransformedMixture>> {
         if kind == DensityKind::Kernel {
             return Ok(None);
         }
@@ -191,12 +195,12 @@ impl TransformedMixture {
     }
 
     /// Draw of an index, not checked for validity.
-    pub fn draw(&self, stream: &Stream, index: u64) -> Vec<f64> {
+    pub(crate) fn draw(&self, stream: &Stream, index: u64) -> Vec<f64> {
         self.transformation.values(&self.mixture.draw(stream, index, 0))
     }
 
     /// ln of the density of x [1 / product of the units].
-    pub fn log_density(&self, values: &[f64]) -> f64 {
+    pub(crate) fn log_density(&self, values: &[f64]) -> f64 {
         let z = self.transformation.inverse(values);
         self.mixture.log_density(&z) - self.transformation.log_slope(&z)
     }

@@ -55,7 +55,7 @@ pub(super) fn effective_size(weights: impl Iterator<Item = f64>) -> f64 {
 }
 
 impl<'a> Pool<'a> {
-    pub fn new(nominal: &'a dyn Density, limit_state: &'a dyn LimitState) -> Self {
+    pub(crate) fn new(nominal: &'a dyn Density, limit_state: &'a dyn LimitState) -> Self {
         Pool {
             nominal,
             limit_state,
@@ -77,17 +77,17 @@ impl<'a> Pool<'a> {
     }
 
     /// The value of a guide; the sign of guide 0 decides failure.
-    pub fn value(&self, point: usize, question: usize, guide: usize) -> f64 {
+    pub(crate) fn value(&self, point: usize, question: usize, guide: usize) -> f64 {
         let (questions, guides) = (self.limit_state.questions(), self.limit_state.guides());
         self.values[(point * questions + question) * guides + guide]
     }
 
-    pub fn fails(&self, point: usize, question: usize) -> bool {
+    pub(crate) fn fails(&self, point: usize, question: usize) -> bool {
         self.value(point, question, 0) <= 0.0
     }
 
     /// The failures of a question.
-    pub fn failures(&self, question: usize) -> Vec<usize> {
+    pub(crate) fn failures(&self, question: usize) -> Vec<usize> {
         (0..self.points.len()).filter(|point| self.fails(*point, question)).collect()
     }
 
@@ -97,7 +97,7 @@ impl<'a> Pool<'a> {
     }
 
     /// The weight of a failure.
-    pub fn weight(&self, point: usize) -> f64 {
+    pub(crate) fn weight(&self, point: usize) -> f64 {
         let crude = libm::log(self.crude_draws) + self.log_f[point];
         libm::exp(self.log_f[point] - log_add(self.log_sources[point], crude))
     }

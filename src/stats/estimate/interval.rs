@@ -93,7 +93,7 @@ pub fn clopper_pearson(failures: u64, runs: u64, level: f64) -> Interval {
 
 /// The upper limit after `runs` runs without a failure, 1 − (1 − level)^{1/runs}: about 3/runs at 95 %. One-sided, so
 /// it is lower than Clopper and Pearson's limit.
-pub fn rule_of_three(runs: u64, level: f64) -> Interval {
+pub(crate) fn rule_of_three(runs: u64, level: f64) -> Interval {
     if runs == 0 {
         return Interval::nothing(level);
     }
@@ -104,7 +104,12 @@ pub fn rule_of_three(runs: u64, level: f64) -> Interval {
 /// P·exp(∓ t·c) for an estimate with the coefficient of variation c: an interval on the scale of ln P. It stays above 0
 /// and is as asymmetric as estimates of small probabilities. t is Student's quantile for the given degrees of freedom
 /// (≥ 1; ∞ gives the normal quantile). On the log scale the standard deviation is √ln(1 + c²).
-pub fn log_normal(probability: f64, coefficient_of_variation: f64, degrees_of_freedom: f64, level: f64) -> Interval {
+pub(crate) fn log_normal(
+    probability: f64,
+    coefficient_of_variation: f64,
+    degrees_of_freedom: f64,
+    level: f64,
+) -> Interval {
     if probability.is_nan() || probability <= 0.0 || !coefficient_of_variation.is_finite() {
         return Interval::nothing(level);
     }

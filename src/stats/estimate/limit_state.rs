@@ -24,13 +24,11 @@ pub(crate) mod purpose {
     /// Draws of the density beside these.
     pub(crate) const BESIDE_PROPOSAL: u32 = 0x4553_0005;
     /// Draws of a search: 64 times the round and the number of the mixture within the round are added.
-    pub const SEARCH: u32 = 0x4553_4000;
+    pub(crate) const SEARCH: u32 = 0x4553_4000;
     /// Draws that determine which kernels failures come from.
     pub(crate) const SHARES: u32 = 0x4553_0004;
     /// Draws of the density beside these.
     pub(crate) const BESIDE_SHARES: u32 = 0x4553_0006;
-    /// The estimate of a valid fraction.
-    pub(crate) const VALIDITY: u32 = 0x4553_0003;
 }
 
 /// A valid point and the number of attempts.
@@ -136,18 +134,6 @@ pub struct Truncated<V> {
 }
 
 impl<V: Fn(&[f64]) -> bool + Sync> Truncated<V> {
-    /// Truncates the mixture and estimates P_valid from `draws` draws. No interval includes its relative error √((1 −
-    /// P_valid) / (P_valid · draws)): choose `draws` so that it is negligible.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] if no draw is valid.
-    pub fn new(mixture: Mixture, is_valid: V, seed: u64, draws: u64) -> Result<Self> {
-        let stream = Stream { seed, purpose: purpose::VALIDITY };
-        let valid =
-            (0..draws).into_par_iter().filter(|index| is_valid(&mixture.draw(&stream, *index, 0))).count() as u64;
-        Self::with_validity(mixture, is_valid, valid as f64 / draws as f64)
-    }
-
     /// Truncates the mixture with a known P_valid.
     ///
     /// # Errors
@@ -304,8 +290,7 @@ mod tests {
     #[test]
     fn a_truncated_density_draws_inside_only_and_knows_its_share() {
         let mixture = Mixture::of_kernels(vec![vec![0.0, 0.0]], &[1.0, 1.0]).unwrap();
-        let half = Truncated::new(mixture, |x: &[f64]| x[0] > 0.0, 1, 100_000).unwrap();
-        assert!((half.validity_fraction() - 0.5).abs() < 0.01);
+        let half = Truncated::with_validity(mixture, |x: &[f64]| x[0] > 0.0, 0.5).unwrap();
         let stream = Stream { seed: 2, purpose: 3 };
         let draws: Vec<Draw> = (0..10_000).filter_map(|i| half.draw(&stream, i)).collect();
         assert!(draws.iter().all(|d| d.point[0] > 0.0));
@@ -317,8 +302,7 @@ mod tests {
     #[test]
     fn an_index_without_a_valid_point_is_void() {
         let mixture = Mixture::of_kernels(vec![vec![0.0]], &[1.0]).unwrap();
-        let never = Truncated::with_validity(mixture.clone(), |_: &[f64]| false, 0.5).unwrap();
+        let never = Truncated::with_validity(mixture, |_: &[f64]| false, 0.5).unwrap();
         assert!(never.draw(&Stream { seed: 2, purpose: 3 }, 0).is_none());
-        assert!(Truncated::new(mixture, |_: &[f64]| false, 1, 100).is_err());
     }
 }

@@ -68,12 +68,12 @@ impl WeightSums {
     }
 
     /// Variance of the estimate.
-    pub fn variance(&self) -> f64 {
+    pub(crate) fn variance(&self) -> f64 {
         WeightSums::covariance(self, self, self).max(0.0)
     }
 
     /// Covariance of the estimates of two questions about the same draws; `both` sums those that fail both.
-    pub fn covariance(a: &WeightSums, b: &WeightSums, both: &WeightSums) -> f64 {
+    pub(crate) fn covariance(a: &WeightSums, b: &WeightSums, both: &WeightSums) -> f64 {
         let proposal = |of: &WeightSums| of.failing - of.crude_failing;
         let means =
             ratio(proposal(a) * proposal(b), a.draws as f64) + ratio(a.crude_failing * b.crude_failing, a.crude as f64);
@@ -82,7 +82,7 @@ impl WeightSums {
 
     /// Interval of the estimate. With draws of the density no failure weighs more than one of these, whether it was found
     /// or missed; without, Student's interval on the scale of ln P with the effective number of failures less one.
-    pub fn interval(&self, level: f64) -> Interval {
+    pub(crate) fn interval(&self, level: f64) -> Interval {
         let (probability, variance) = (self.probability(), self.variance());
         if self.crude > 0 {
             return gamma(probability.min(1.0), variance, 1.0 / self.crude as f64, level);

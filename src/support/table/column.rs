@@ -77,7 +77,7 @@ pub enum Digits {
 
 impl Digits {
     /// Formats a number for people.
-    pub fn text(self, number: f64) -> String {
+    pub(crate) fn text(self, number: f64) -> String {
         match self {
             Digits::Readable => readable::value(number),
             Digits::Significant(digits) => readable::significant(number, digits),

@@ -27,7 +27,7 @@ impl Tags {
     pub const EGO_KEEPS_LANE: Tags = Tags(16);
 
     /// All of `others` are set.
-    pub fn has(self, others: Tags) -> bool {
+    pub(crate) fn has(self, others: Tags) -> bool {
         self.0 & others.0 == others.0
     }
 
@@ -114,13 +114,8 @@ impl Match {
     }
 
     /// Samples from start to end.
-    pub fn len(&self) -> usize {
+    pub(crate) fn len(&self) -> usize {
         self.end - self.start()
-    }
-
-    /// True if it starts and ends at the same sample.
-    pub fn is_empty(&self) -> bool {
-        self.len() == 0
     }
 
     /// The samples at which the last item holds.

@@ -129,7 +129,7 @@ impl Feature {
     }
 
     /// Name with its unit, unit and bounds.
-    pub fn parameter(self, category: Category, options: &ParameterizationOptions) -> Parameter {
+    pub(crate) fn parameter(self, category: Category, options: &ParameterizationOptions) -> Parameter {
         let (name, unit, lower) = match self {
             Feature::EgoSpeed => return Variable::EgoSpeed.parameter(category, options),
             Feature::Duration => return Variable::Duration.parameter(category, options),
@@ -165,7 +165,7 @@ impl Feature {
     ///
     /// # Errors
     /// [`Error::Input`](crate::Error::Input) for a cut-out without the vehicle ahead.
-    pub fn of(self, scenario: &Scenario, options: &ParameterizationOptions) -> Result<f64> {
+    pub(crate) fn of(self, scenario: &Scenario, options: &ParameterizationOptions) -> Result<f64> {
         let duration_s = scenario.duration_s();
         let value = |series: &[f64], t_s: f64| at(series, scenario.fps, t_s.clamp(0.0, duration_s));
         let v = |t_s: f64| value(&scenario.target.v, t_s);

@@ -141,7 +141,7 @@ impl LinearSpec {
     ///
     /// # Errors
     /// [`Error::Input`].
-    pub fn validate(&self, category: Category) -> Result<()> {
+    pub(crate) fn validate(&self, category: Category) -> Result<()> {
         let wrong = |problem: String| Err(Error::input(Place::item("spec"), problem, "search for it again"));
         let count = self.parameter_count(category);
         if count == 0 || count > MAX_LINEAR_PARAMETERS {

@@ -24,9 +24,7 @@ use std::sync::Arc;
 pub use features::Feature;
 pub use kinematic::{Kinematic, LaneChange, SpeedProfile};
 pub use linear::{EMPHASIS_KNOTS, FunctionKind, Linear, LinearFamily, LinearSpec, Signal};
-pub use options::{
-    AfterDuration, LateralSpeed, LateralStart, ParameterizationOptions, SeriesScale, SvdFit, SvdLateral,
-};
+pub use options::{AfterDuration, LateralStart, ParameterizationOptions, SeriesScale, SvdFit, SvdLateral};
 pub use parameter::{MAX_DURATION_S, MIN_DURATION_S, Parameter, Variable};
 pub use reduction::{Encoder, ModeShape, ReducedScenario, ReducedSeries, Reduction};
 pub use series::steps_of;

@@ -19,7 +19,7 @@ pub enum AfterDuration {
 /// Which lateral speed a constant one stands for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
-pub enum LateralSpeed {
+pub(crate) enum LateralSpeed {
     /// |y(0) − y(T)|/T: higher F1 on real cut-ins.
     Mean,
     /// Mean of the first 0.4 s.

@@ -141,7 +141,7 @@ impl Reduction {
     }
 
     /// The parameters of `d` coefficients.
-    pub fn parameters(&self, d: usize) -> Vec<Parameter> {
+    pub(crate) fn parameters(&self, d: usize) -> Vec<Parameter> {
         match &self.linear {
             Some((.., parameters)) => parameters.iter().take(d).cloned().collect(),
             None => (0..d).map(Parameter::coefficient).collect(),

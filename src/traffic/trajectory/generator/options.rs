@@ -46,7 +46,7 @@ settings! {
 
 impl GeneratorOptions {
     /// Checks every option; the error names the first one outside its range.
-    pub fn validate(&self) -> Result<()> {
+    pub(crate) fn validate(&self) -> Result<()> {
         ranges::check("generator", self)
     }
 

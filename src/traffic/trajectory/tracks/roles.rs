@@ -15,10 +15,10 @@ macro_rules! roles {
 
         impl Role {
             /// All roles.
-            pub const ALL: [Role; [$($key),*].len()] = [$(Role::$role),*];
+            pub(crate) const ALL: [Role; [$($key),*].len()] = [$(Role::$role),*];
 
             /// Its key in a preset.
-            pub fn key(self) -> &'static str {
+            pub(crate) fn key(self) -> &'static str {
                 [$($key),*][self as usize]
             }
 
@@ -100,7 +100,7 @@ pub enum OneOrMany {
 
 impl OneOrMany {
     /// The texts, in the order of the file.
-    pub fn names(&self) -> &[String] {
+    pub(crate) fn names(&self) -> &[String] {
         match self {
             OneOrMany::One(name) => std::slice::from_ref(name),
             OneOrMany::Many(names) => names,
