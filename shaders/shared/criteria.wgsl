@@ -14,6 +14,7 @@ struct Record {
     btn: BrakeThreatMaximum,
     // UNBOUNDED if no vehicle was seen.
     min_gap: f32,
+    measures: Measures,
 }
 
 // Whether TTC and BTN evaluate a vehicle here: its centre is in front, and it is close enough laterally. A `centred`

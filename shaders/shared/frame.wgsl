@@ -139,7 +139,7 @@ fn start_lane(lane: LaneCase, start: Start) -> LaneState {
         lane.ego_speed,
         lane.ego_speed,
         NO_STEP,
-        Record(ttc_nothing(), btn_nothing(), UNBOUNDED),
+        Record(ttc_nothing(), btn_nothing(), UNBOUNDED, measures_nothing()),
         0u,
         END_NOT_YET,
         0u,
@@ -184,11 +184,18 @@ fn observe(state: LaneState, lane: LaneCase) -> Moment {
     moment.touching = is_touched(moment.first, lane.others[0]);
     moment.aborting = aborts(moment.first);
     var settled = is_settled(moment.first);
+    var nearest = ttc_nothing();
+    if frame_values {
+        nearest = nearest_ttc(nearest, moment.first);
+    }
     if scene_paired {
         if is_pair(lane) {
             let second = see(ego, lane.others[1], state.other_1, scene_lateral_1, state.gap_1, state.index);
             moment.second = second;
             moment.record = update_record(moment.record, second);
+            if frame_values {
+                nearest = nearest_ttc(nearest, second);
+            }
             let other_is_unsafe = attentive_check(second, lane.others[1], state.index);
             // The nearest unsafe vehicle determines the reaction.
             moment.second_decides = other_is_unsafe & (!moment.is_unsafe | (state.gap_1 < state.gap_0));
@@ -198,6 +205,12 @@ fn observe(state: LaneState, lane: LaneCase) -> Moment {
             moment.aborting = moment.aborting | aborts(second);
             settled = settled & is_settled(second);
         }
+    }
+    if frame_values {
+        let is_ahead = moment.first.present & (state.gap_0 >= 0.0) & (state.index >= 1u);
+        let exposed = measures_expose(moment.record.measures, nearest);
+        moment.record.measures =
+            measures_encroach(exposed, moment.first.across, is_ahead, state.gap_0, v_ego, v_ego * frame_dt);
     }
     moment.is_unsafe = moment.is_unsafe | keeps_braking(state.driver, moment.first.view);
     let over = (state.index >= lane.horizon) & frame_end_when_settled;
@@ -304,11 +317,21 @@ fn see(ego: EgoState, other: LaneOther, place: OtherState, lateral: u32, gap: f3
 fn update_record(record: Record, seen: Seen) -> Record {
     let gap = seen.view.gap;
     let dv = closing(seen.view);
+    var measures = record.measures;
+    if frame_values {
+        measures = measures_update(measures, seen.judged, seen.view.v_ego, gap, dv);
+    }
     return Record(
         ttc_update(record.ttc, seen.judged, gap, dv),
         btn_update(record.btn, seen.judged, gap, dv),
         select(record.min_gap, smaller(gap, record.min_gap), seen.judged & frame_values),
+        measures,
     );
+}
+
+// The smaller TTC of the vehicles at one step.
+fn nearest_ttc(nearest: TtcMinimum, seen: Seen) -> TtcMinimum {
+    return ttc_update(nearest, seen.judged, seen.view.gap, closing(seen.view));
 }
 
 fn attentive_check(seen: Seen, other: LaneOther, index: u32) -> bool {
@@ -360,5 +383,10 @@ fn outcome(state: LaneState, lane: LaneCase) -> OutcomeRecord {
         btn.numerator,
         btn.denominator,
         bounded_bits(state.record.min_gap),
+        measures_min_thw_bits(state.record.measures),
+        measures_max_drac_bits(state.record.measures),
+        state.record.measures.tet_steps,
+        state.record.measures.tit_sum * frame_dt,
+        measures_pet_bits(state.record.measures),
     );
 }

@@ -87,6 +87,12 @@ struct OutcomeRecord {
     btn_numerator: f32,
     btn_denominator: f32,
     min_gap_bits: u32,
+    min_thw_bits: u32,
+    max_drac_bits: u32,
+    tet_steps: u32,
+    tit: f32,
+    // NO_STEP if there is none.
+    pet_bits: u32,
 }
 
 // Maximum number of draws of a sample. With more it is void.

@@ -58,21 +58,23 @@ macro_rules! declare_constants {
                 start: Start<R>,
                 observer: &mut impl Observer<R>,
             ) -> Outcome<R> {
-                self.run_in(id, Scene::unknown(case.pair != 0), case, tables, start, observer)
+                self.run_in(id, &self.criteria, Scene::unknown(case.pair != 0), case, tables, start, observer)
             }
 
-            /// The same, with known properties of the case.
+            /// The same, with these criteria and known properties of the case.
             #[inline]
+            #[expect(clippy::too_many_arguments, reason = "a lane has as many properties")]
             pub(super) fn run_in(
                 &self,
                 id: ModelId,
+                criteria: &Criteria<R>,
                 scene: Scene,
                 case: &LaneCase<R>,
                 tables: &Tables<R>,
                 start: Start<R>,
                 observer: &mut impl Observer<R>,
             ) -> Outcome<R> {
-                let (criteria, model_index) = (&self.criteria, id.index());
+                let model_index = id.index();
                 let frame = &self.frames[model_index];
                 match id {
                     $(ModelId::$model => {

@@ -9,7 +9,7 @@
 //! Truth values are [`Flag`]s, which vector units combine fastest. Step indices are at most [`Flag::LATEST_STEP`],
 //! which stands for "never".
 
-use crate::model::criterion::{BrakeThreatMaximum, Criteria, TtcMinimum, held_in_contact, overlaps_along};
+use crate::model::criterion::{BrakeThreatMaximum, Criteria, Measures, TtcMinimum, held_in_contact, overlaps_along};
 use crate::model::driver::{DriverModel, DriverState, Hazard, View};
 use crate::model::scalar::{Flag, Real};
 use crate::scenario::{Motion, Tables};
@@ -114,6 +114,17 @@ pub(crate) struct Record<R> {
     pub btn: BrakeThreatMaximum<R>,
     /// Minimum gap to a vehicle that TTC and BTN evaluate, m.
     pub min_gap: R,
+    /// Values without a verdict.
+    pub measures: Measures<R>,
+}
+
+impl<R: Real> Record<R> {
+    /// Before the first step.
+    #[inline(always)]
+    pub(super) fn new() -> Self {
+        let (ttc, btn, measures) = (TtcMinimum::new(), BrakeThreatMaximum::new(), Measures::new());
+        Record { ttc, btn, min_gap: R::INFINITY, measures }
+    }
 }
 
 /// A lane between two steps.
@@ -150,7 +161,7 @@ impl<R: Real> LaneState<R> {
             gaps: [gap_start + case.others[0].gap_offset, gap_start + case.others[1].gap_offset],
             driver: simulation.model.initial(),
             reaction_step: NO_STEP,
-            record: Record { ttc: TtcMinimum::new(), btn: BrakeThreatMaximum::new(), min_gap: R::INFINITY },
+            record: Record::new(),
             over: Flag::FALSE,
         }
     }
@@ -208,6 +219,13 @@ pub(super) fn advance<R: Real, M: DriverModel<R>>(
         touched = touched | is_touched(scene, &second, &lane.others[1]);
         settled = settled & is_settled(scene, &second);
         aborted = aborted | aborts(frame, &second);
+    }
+    if keeps_values && criteria.keeps_measures {
+        let ahead = first.present & !gaps[0].is_negative() & Flag::reached(index, 1);
+        let overlaps = runs & is_across(scene, &first);
+        let nearest = nearest_ttc(simulation, &first, &second);
+        record.measures = record.measures.expose(&nearest, criteria.tet_threshold);
+        record.measures = record.measures.encroach(runs, overlaps, ahead, gaps[0], v_ego, v_ego * frame.dt);
     }
     let at_rest = !v_ego.is_positive();
     let past_horizon = Flag::reached(index, lane.horizon);
@@ -314,15 +332,31 @@ pub(super) fn update_record<R: Real>(criteria: &Criteria<R>, record: &Record<R>,
     let keeps_values = criteria.keeps_values;
     let ttc = criteria.ttc.update(record.ttc, seen.judged, gap, closing, keeps_values);
     let btn = criteria.btn.update(record.btn, seen.judged, gap, closing, keeps_values);
-    let smaller = if keeps_values { gap.smaller(record.min_gap) } else { record.min_gap };
-    Record { ttc, btn, min_gap: seen.judged.choose(smaller, record.min_gap) }
+    if !keeps_values {
+        return Record { ttc, btn, ..*record };
+    }
+    let min_gap = seen.judged.choose(gap.smaller(record.min_gap), record.min_gap);
+    let measures = &record.measures;
+    let measures =
+        if criteria.keeps_measures { measures.update(seen.judged, seen.view.v_ego, gap, closing) } else { *measures };
+    Record { ttc, btn, min_gap, measures }
+}
+
+/// The smaller TTC of both vehicles at one step.
+#[inline(always)]
+fn nearest_ttc<R: Real, M>(simulation: &Simulation<R, M>, first: &Seen<R>, second: &Seen<R>) -> TtcMinimum<R> {
+    let smaller = |ttc: TtcMinimum<R>, seen: &Seen<R>| {
+        simulation.criteria.ttc.update(ttc, seen.judged, seen.view.gap, seen.view.closing(), true)
+    };
+    let nearest = smaller(TtcMinimum::new(), first);
+    if simulation.scene.is_pair { smaller(nearest, second) } else { nearest }
 }
 
 /// The gap, m ≥ 0, above which no criterion in the record begins to fail at this closing speed, m/s, or a lower one.
 /// Rounding is not included.
 #[inline(always)]
 pub(super) fn criteria_safe_gap<R: Real>(criteria: &Criteria<R>, record: &Record<R>, closing: R) -> R {
-    let Record { ttc, btn, min_gap: _ } = record;
+    let Record { ttc, btn, .. } = record;
     let mut safe = R::ZERO;
     if closing > R::ZERO && !ttc.failed.holds() {
         safe = safe.larger(criteria.ttc.safe_gap(closing));
@@ -350,16 +384,20 @@ pub(super) fn check<R: Real, M: DriverModel<R>>(
 #[inline(always)]
 pub(super) fn is_touched<R: Real>(scene: Scene, seen: &Seen<R>, other: &OtherConstants<R>) -> Flag {
     let along = overlaps_along(seen.view.gap, other.half_lengths);
-    let across = if scene.in_lane { Flag::TRUE } else { seen.view.lateral_gap.is_negative() };
     let judged = if scene.always_there { Flag::TRUE } else { other.judged };
-    seen.present & judged & across & along
+    seen.present & judged & is_across(scene, seen) & along
+}
+
+/// The vehicle overlaps the ego's path across the road.
+#[inline(always)]
+fn is_across<R: Real>(scene: Scene, seen: &Seen<R>) -> Flag {
+    if scene.in_lane { Flag::TRUE } else { seen.view.lateral_gap.is_negative() }
 }
 
 /// No further event is possible with this vehicle: it is behind, out of the lane, or not slower.
 #[inline(always)]
 pub(super) fn is_settled<R: Real>(scene: Scene, seen: &Seen<R>) -> Flag {
-    let across = if scene.in_lane { Flag::TRUE } else { seen.view.lateral_gap.is_negative() };
-    let in_lane = seen.judged | (seen.present & across);
+    let in_lane = seen.judged | (seen.present & is_across(scene, seen));
     seen.view.is_behind() | !in_lane | !seen.view.closing().is_positive()
 }
 

@@ -71,6 +71,17 @@ pub struct Outcome<R> {
     pub max_btn: R,
     /// Minimum gap to a vehicle that TTC and BTN evaluate, m; infinite if there was none.
     pub min_gap: R,
+    /// Minimum time headway, s, ≥ 0; infinite if no vehicle was evaluated while the ego moved.
+    pub min_thw: R,
+    /// Maximum deceleration rate to avoid the crash, m/s², ≥ 0; infinite at contact.
+    pub max_drac: R,
+    /// Time exposed TTC, in steps.
+    pub tet_steps: u32,
+    /// Time integrated TTC, s², ≥ 0.
+    pub tit: R,
+    /// Post-encroachment time of a cut-in, s, ≥ 0; infinite if the ego stops before the place of encroachment, `None` if
+    /// there is none.
+    pub pet: Option<R>,
 }
 
 impl Outcome<f64> {
@@ -88,6 +99,11 @@ impl Outcome<f64> {
         min_ttc: 0.0,
         max_btn: 0.0,
         min_gap: 0.0,
+        min_thw: 0.0,
+        max_drac: 0.0,
+        tet_steps: 0,
+        tit: 0.0,
+        pet: None,
     };
 }
 
@@ -114,6 +130,11 @@ impl<R: Real> Outcome<R> {
             min_ttc: self.min_ttc.to_f64(),
             max_btn: self.max_btn.to_f64(),
             min_gap: self.min_gap.to_f64(),
+            min_thw: self.min_thw.to_f64(),
+            max_drac: self.max_drac.to_f64(),
+            tet_steps: self.tet_steps,
+            tit: self.tit.to_f64(),
+            pet: self.pet.map(R::to_f64),
         }
     }
 }

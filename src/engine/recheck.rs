@@ -182,20 +182,46 @@ pub fn same_words(a: &Outcome<f64>, b: &Outcome<f64>) -> bool {
 }
 
 /// An outcome as words, in the order of its fields; values as the bits of their exact widening.
-pub fn words(outcome: &Outcome<f64>) -> [u64; 12] {
+pub fn words(outcome: &Outcome<f64>) -> [u64; 17] {
+    // Destructures every field, so that a new field must be compared.
+    let &Outcome {
+        verdicts,
+        contact,
+        contact_with,
+        end,
+        reaction_step,
+        contact_step,
+        end_step,
+        impact_speed,
+        impact_closing_speed,
+        min_ttc,
+        max_btn,
+        min_gap,
+        min_thw,
+        max_drac,
+        tet_steps,
+        tit,
+        pet,
+    } = outcome;
     [
-        outcome.verdicts.0.into(),
-        outcome.contact.code().into(),
-        outcome.contact_with.into(),
-        outcome.end as u64,
-        outcome.reaction_step.into(),
-        outcome.contact_step.into(),
-        outcome.end_step.into(),
-        outcome.impact_speed.to_bits(),
-        outcome.impact_closing_speed.to_bits(),
-        outcome.min_ttc.to_bits(),
-        outcome.max_btn.to_bits(),
-        outcome.min_gap.to_bits(),
+        verdicts.0.into(),
+        contact.code().into(),
+        contact_with.into(),
+        end as u64,
+        reaction_step.into(),
+        contact_step.into(),
+        end_step.into(),
+        impact_speed.to_bits(),
+        impact_closing_speed.to_bits(),
+        min_ttc.to_bits(),
+        max_btn.to_bits(),
+        min_gap.to_bits(),
+        min_thw.to_bits(),
+        max_drac.to_bits(),
+        tet_steps.into(),
+        tit.to_bits(),
+        // No value has these bits.
+        pet.map_or(u64::MAX, f64::to_bits),
     ]
 }
 

@@ -191,6 +191,7 @@ impl Profile {
             ("criteria.btn_threshold", criteria.btn_threshold, Bound::RATIO),
             ("criteria.max_deceleration_mps2", criteria.max_deceleration_mps2, Bound::DECELERATION),
             ("criteria.jerk_mps3", criteria.jerk_mps3, Bound::JERK),
+            ("criteria.tet_threshold_s", criteria.tet_threshold_s, Bound::TIME),
         ];
         let own = own.into_iter().map(|(key, value, bound)| (key.to_owned(), value, bound));
         own.chain(self.driver_bounds()).collect()

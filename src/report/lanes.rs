@@ -12,6 +12,13 @@ use crate::support::files::make_folder_of;
 use crate::support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter};
 use crate::{Error, Result};
 
+const MIN_THW: &str = "Smallest time headway; infinite if no vehicle was evaluated while the ego moved.";
+const MAX_DRAC: &str = "Largest deceleration rate to avoid the crash; infinite at contact.";
+const TET: &str = "Time exposed TTC: time with a TTC below the profile's tet_threshold_s.";
+const TIT: &str = "Time integrated TTC: integral of threshold minus TTC over that time.";
+const PET: &str =
+    "Post-encroachment time of a cut-in; infinite if the ego stops before the place, null if there is none.";
+
 /// A table for the lanes of a study; see [`write_study_chunk`]. It is written chunk by chunk, so that memory does not
 /// grow with the lanes.
 ///
@@ -73,6 +80,11 @@ pub fn columns(value: ColumnKind) -> Vec<Column> {
         c("impact_speed", value, "m/s", "Speed of the ego at contact; null without one."),
         c("t_end", ColumnKind::Binary64, "s", "When the run ended."),
         c("robust", ColumnKind::Flag, "", "Moving the initial gap by 1e-9 m changes neither verdict nor contact in binary64; null for drivers outside the registry."),
+        c("min_thw", value, "s", MIN_THW),
+        c("max_drac", value, "m/s²", MAX_DRAC),
+        c("tet", ColumnKind::Binary64, "s", TET),
+        c("tit", value, "s²", TIT),
+        c("pet", value, "s", PET),
     ]
 }
 
@@ -112,6 +124,11 @@ pub fn write_study_chunk(table: &mut TableWriter, plan: &LanePlan, chunk: &Chunk
             Cell::number(at_contact(outcome, outcome.impact_speed)),
             time(outcome.end_step),
             robust[at].map_or(Cell::Null, Cell::Flag),
+            Cell::Number(outcome.min_thw),
+            Cell::Number(outcome.max_drac),
+            time(outcome.tet_steps),
+            Cell::Number(outcome.tit),
+            Cell::number(outcome.pet),
         ])?;
     }
     Ok(())
@@ -134,11 +151,16 @@ fn outcome_columns() -> Vec<Column> {
         c("end_s", ColumnKind::Binary64, "s", "When the run ended."),
         c("impact_speed_mps", ColumnKind::Binary32, "m/s", "Speed of the ego at contact; null without one."),
         c("impact_closing_speed_mps", ColumnKind::Binary32, "m/s", "Closing speed at contact; null without one."),
+        c("min_thw_s", ColumnKind::Binary32, "s", MIN_THW),
+        c("max_drac_mps2", ColumnKind::Binary32, "m/s²", MAX_DRAC),
+        c("tet_s", ColumnKind::Binary64, "s", TET),
+        c("tit_s2", ColumnKind::Binary32, "s²", TIT),
+        c("pet_s", ColumnKind::Binary32, "s", PET),
     ]
 }
 
 /// The values of [`outcome_columns`]. Null: did not happen.
-fn outcome_cells(outcome: &Outcome<f64>, dt_s: f64) -> [Cell<'static>; 12] {
+fn outcome_cells(outcome: &Outcome<f64>, dt_s: f64) -> [Cell<'static>; 17] {
     let time = |step: u32| Cell::number(time_s(step, dt_s));
     let [collision, ttc, btn] = Criterion::ALL.map(|c| Cell::Flag(outcome.verdicts.failed(c)));
     [
@@ -154,6 +176,11 @@ fn outcome_cells(outcome: &Outcome<f64>, dt_s: f64) -> [Cell<'static>; 12] {
         time(outcome.end_step),
         Cell::number(at_contact(outcome, outcome.impact_speed)),
         Cell::number(at_contact(outcome, outcome.impact_closing_speed)),
+        Cell::Number(outcome.min_thw),
+        Cell::Number(outcome.max_drac),
+        time(outcome.tet_steps),
+        Cell::Number(outcome.tit),
+        Cell::number(outcome.pet),
     ]
 }
 

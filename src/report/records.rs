@@ -45,6 +45,11 @@ pub fn outcome(outcome: &Outcome<f64>, dt_s: f64) -> Value {
         "impact_speed_mps": at_contact(outcome, outcome.impact_speed),
         "impact_closing_speed_mps": at_contact(outcome, outcome.impact_closing_speed),
         "t_end_s": time(outcome.end_step),
+        "min_thw_s": json_number(outcome.min_thw),
+        "max_drac_mps2": json_number(outcome.max_drac),
+        "tet_s": time(outcome.tet_steps),
+        "tit_s2": json_number(outcome.tit),
+        "pet_s": outcome.pet.map(json_number),
     })
 }
 

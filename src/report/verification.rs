@@ -84,7 +84,7 @@ pub fn lane(key: &str, names: [&str; 3], outcomes: &[Outcome<f64>; 3]) -> String
 }
 
 /// The words for people. Numbers have all digits, because a difference may be in the last one.
-fn shown(o: &Outcome<f64>) -> [String; 12] {
+fn shown(o: &Outcome<f64>) -> [String; 17] {
     let number = |v: f64| if v.is_finite() { v.to_string() } else { value(v) };
     let step = |step: u32| if step == u32::MAX { "never".to_owned() } else { step.to_string() };
     [
@@ -100,5 +100,10 @@ fn shown(o: &Outcome<f64>) -> [String; 12] {
         number(o.min_ttc),
         number(o.max_btn),
         number(o.min_gap),
+        number(o.min_thw),
+        number(o.max_drac),
+        o.tet_steps.to_string(),
+        number(o.tit),
+        o.pet.map_or_else(|| "none".to_owned(), number),
     ]
 }

@@ -81,6 +81,11 @@ pub fn chunk(
         min_ttc: *min_ttc,
         max_btn: 0.1,
         min_gap: 1.0,
+        min_thw: 0.5,
+        max_drac: 1.0,
+        tet_steps: 2,
+        tit: 0.1,
+        pet: None,
     };
     Chunk {
         units,

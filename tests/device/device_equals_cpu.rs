@@ -170,6 +170,29 @@ fn one_unit_in_the_last_place_of_a_constant_is_found() {
     }
 }
 
+/// A wrong value without a verdict is found in its own word, and in no other.
+#[test]
+fn one_wrong_value_without_a_verdict_is_found_under_its_name() {
+    let plants = [
+        ("measures.thw_gap = room;", "measures.thw_gap = room + room;", "min_thw"),
+        ("let denominator = room + room;", "let denominator = room;", "max_drac"),
+        ("before.tet_steps + 1u", "before.tet_steps + 2u", "tet_steps"),
+        ("(criteria_tet_threshold - ttc)", "criteria_tet_threshold", "tit"),
+        ("measures.pet_distance = gap;", "measures.pet_distance = gap + 1.0;", "pet"),
+    ];
+    for (from, to, name) in plants {
+        let Some(gpu) = patched(from, to) else { return };
+        let plan = random(&Profile::load("paper").unwrap(), 400);
+        let found = compare("random", &plan, &gpu, |_| ()).unwrap();
+        assert!(
+            found.worst.len() > 5 && found.worst.iter().all(|lane| lane.names() == [name]),
+            "{to}: {:?}",
+            found.worst
+        );
+        assert!(found.tallies.iter().all(|t| t.words_differing == t.lanes_differing && t.verdicts_differing == 0));
+    }
+}
+
 /// Steps that are skipped down to no gap at all: contacts and reactions are missed.
 #[test]
 fn a_jump_that_goes_too_far_is_found() {

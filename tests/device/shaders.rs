@@ -65,7 +65,8 @@ fn records() -> Vec<Record> {
         }),
         record!("OutcomeRecord", OutcomeRecord, {
             word: u32, reaction_step: u32, end_step: u32, impact_speed: f32, impact_closing_speed: f32,
-            min_ttc_bits: u32, btn_numerator: f32, btn_denominator: f32, min_gap_bits: u32,
+            min_ttc_bits: u32, btn_numerator: f32, btn_denominator: f32, min_gap_bits: u32, min_thw_bits: u32,
+            max_drac_bits: u32, tet_steps: u32, tit: f32, pet_bits: u32,
         }),
     ]
 }
@@ -379,6 +380,11 @@ fn the_host_reads_from_an_outcome_word_what_a_lane_writes_into_it() {
             btn_numerator: 0.0,
             btn_denominator: 1.0,
             min_gap_bits: unbounded,
+            min_thw_bits: unbounded,
+            max_drac_bits: 0,
+            tet_steps: 0,
+            tit: 0.0,
+            pet_bits: NO_STEP,
         };
         record.outcome(&criteria)
     };

@@ -489,10 +489,14 @@ fn where_f32_and_f64_differ_a_tenth_of_a_millimetre_decides() {
 fn a_step_takes_no_more_operations_than_it_should() {
     let profile = paper();
     let case = lvd(30.0, 10.0, 4.0);
-    for (model, max) in [(ModelId::Reg157, 80), (ModelId::Cchdm, 80), (ModelId::Rss, 95), (ModelId::Fsm, 130)] {
+    let models = [(ModelId::Reg157, 80), (ModelId::Cchdm, 80), (ModelId::Rss, 95), (ModelId::Fsm, 130)];
+    // Values without a verdict take as many more.
+    let kinds = models.into_iter().flat_map(|(model, max)| [(model, false, max), (model, true, max + 30)]);
+    for (model, keeps_values, max) in kinds {
         let mut tables = Tables::default();
         let lane = LaneCase::encode(&case, &profile, &mut tables).cast::<Counting>();
-        let (tables, constants) = (tables.cast(), Constants::<Counting>::resolve(&profile, case.category));
+        let (tables, mut constants) = (tables.cast(), Constants::<Counting>::resolve(&profile, case.category));
+        constants.criteria.keeps_values = keeps_values;
         let (outcome, count) = Counting::measure(|| {
             constants.run(model, &lane, &tables, Start::Headway(Counting::from_f64(1.0)), &mut Silent)
         });
@@ -515,7 +519,9 @@ fn no_lane_depends_on_the_sign_of_a_zero_or_on_an_infinite_number() {
                 assert_eq!(count.unbounded, 0, "{place} compares an infinite number");
                 let bounded = |number: f64| if number == f64::MAX { f64::INFINITY } else { number };
                 let (min_ttc, min_gap) = (bounded(outcome.min_ttc), bounded(outcome.min_gap));
-                assert_eq!(Outcome { min_ttc, min_gap, ..outcome }, expected, "{place}");
+                let (min_thw, max_drac) = (bounded(outcome.min_thw), bounded(outcome.max_drac));
+                let pet = outcome.pet.map(bounded);
+                assert_eq!(Outcome { min_ttc, min_gap, min_thw, max_drac, pet, ..outcome }, expected, "{place}");
             }
         }
     }

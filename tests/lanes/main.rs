@@ -8,6 +8,7 @@ mod counting;
 mod conformance;
 mod domain_claims;
 mod hand_calculated;
+mod measures;
 mod partial;
 mod sampled_lanes;
 mod score;

@@ -64,7 +64,7 @@ fn options(samples: u64, source: SampleSource) -> SampleOptions {
     SampleOptions { seed: 2026, source, ..SampleOptions::new(Estimator::CRUDE, samples, headways) }
 }
 
-fn outcomes(plan: &LanePlan, backend: &dyn Backend, cuts: &[u64]) -> Vec<[u64; 12]> {
+fn outcomes(plan: &LanePlan, backend: &dyn Backend, cuts: &[u64]) -> Vec<[u64; 17]> {
     let mut session = backend.prepare(plan).unwrap();
     let mut all = Vec::new();
     for ends in cuts.windows(2) {

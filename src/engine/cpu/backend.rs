@@ -169,14 +169,24 @@ impl RunUnits<f32> for InBatches<'_> {
 /// Scalar lanes.
 impl<R: Real> RunUnits<R> for LaneRunner<'_, R> {
     fn outcomes(&self, block: usize, units: Range<u64>, each: &mut dyn FnMut(usize, Outcome<R>)) {
-        let per_unit = self.plan().lanes_per_unit(&self.plan().blocks[block]) as usize;
-        for (k, unit) in units.enumerate() {
-            self.run_unit(block, unit, |at, outcome| each(k * per_unit + at, outcome));
-        }
+        run_one_by_one(self, block, units, true, each);
     }
 
     fn verdicts(&self, block: usize, units: Range<u64>, _watch: Option<&Watch>, verdicts: &mut [Verdicts]) {
-        self.outcomes(block, units, &mut |at, outcome| verdicts[at] = outcome.verdicts);
+        run_one_by_one(self, block, units, false, |at, outcome| verdicts[at] = outcome.verdicts);
+    }
+}
+
+fn run_one_by_one<R: Real>(
+    runner: &LaneRunner<'_, R>,
+    block: usize,
+    units: Range<u64>,
+    keeps_measures: bool,
+    mut each: impl FnMut(usize, Outcome<R>),
+) {
+    let per_unit = runner.plan().lanes_per_unit(&runner.plan().blocks[block]) as usize;
+    for (k, unit) in units.enumerate() {
+        runner.run_unit(block, unit, keeps_measures, |at, outcome| each(k * per_unit + at, outcome));
     }
 }
 
@@ -262,7 +272,7 @@ impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
             for (at_model, &model) in plan.models.iter().enumerate() {
                 let Some(driver) = model.foreign() else { continue };
                 let runner = LaneRunner::<f32>::of_few(plan);
-                let found = runner.run_foreign(block, inside.clone(), model, &*driver)?;
+                let found = runner.run_foreign(block, inside.clone(), model, &*driver, wanted == Wanted::Outcomes)?;
                 for (at, outcome) in found.into_iter().enumerate() {
                     let lane = from + at * plan.models.len() + at_model;
                     verdicts[lane] = outcome.verdicts;

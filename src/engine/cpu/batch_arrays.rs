@@ -9,7 +9,7 @@ use crate::engine::cpu::LANES;
 use crate::engine::cpu::shared_rules::Rules;
 use crate::engine::lane_step::{LaneConstants, LaneState, OtherConstants, Record};
 use crate::engine::outcome::NO_STEP;
-use crate::model::criterion::{BrakeThreatMaximum, TtcMinimum};
+use crate::model::criterion::{BrakeThreatMaximum, Measures, TtcMinimum};
 use crate::model::driver::{DriverModel, DriverState};
 use crate::model::scalar::Flag;
 
@@ -153,6 +153,16 @@ pub(in crate::engine) struct ValueArrays<const N: usize> {
     btn_numerator: [f32; N],
     btn_denominator: [f32; N],
     min_gap: [f32; N],
+    thw_gap: [f32; N],
+    thw_speed: [f32; N],
+    drac_numerator: [f32; N],
+    drac_denominator: [f32; N],
+    tet_steps: [u32; N],
+    tit_sum: [f32; N],
+    pet_begun: [u32; N],
+    pet_distance: [f32; N],
+    pet_speed: [f32; N],
+    pet_steps: [u32; N],
 }
 
 macro_rules! made_of_rows {
@@ -246,6 +256,17 @@ impl<const N: usize> LaneArrays<N> {
             fill(&mut values.btn_numerator, from, state.record.btn.numerator);
             fill(&mut values.btn_denominator, from, state.record.btn.denominator);
             fill(&mut values.min_gap, from, state.record.min_gap);
+            let measures = state.record.measures;
+            fill(&mut values.thw_gap, from, measures.thw_gap);
+            fill(&mut values.thw_speed, from, measures.thw_speed);
+            fill(&mut values.drac_numerator, from, measures.drac_numerator);
+            fill(&mut values.drac_denominator, from, measures.drac_denominator);
+            fill(&mut values.tet_steps, from, measures.tet_steps);
+            fill(&mut values.tit_sum, from, measures.tit_sum);
+            fill(&mut values.pet_begun, from, measures.pet_begun.to_bits());
+            fill(&mut values.pet_distance, from, measures.pet_distance);
+            fill(&mut values.pet_speed, from, measures.pet_speed);
+            fill(&mut values.pet_steps, from, measures.pet_steps);
         }
     }
 
@@ -340,6 +361,18 @@ impl<const N: usize> StateArrays<N> {
                     failed: Flag::from_bits(moving.btn_failed[k]),
                 },
                 min_gap: values.min_gap[k],
+                measures: Measures {
+                    thw_gap: values.thw_gap[k],
+                    thw_speed: values.thw_speed[k],
+                    drac_numerator: values.drac_numerator[k],
+                    drac_denominator: values.drac_denominator[k],
+                    tet_steps: values.tet_steps[k],
+                    tit_sum: values.tit_sum[k],
+                    pet_begun: Flag::from_bits(values.pet_begun[k]),
+                    pet_distance: values.pet_distance[k],
+                    pet_speed: values.pet_speed[k],
+                    pet_steps: values.pet_steps[k],
+                },
             },
             over: Flag::from_bits(moving.over[k]),
         }
@@ -350,7 +383,6 @@ impl<const N: usize> StateArrays<N> {
     #[inline(always)]
     pub(super) fn is_steady(&self, k: usize) -> LaneState<f32> {
         let moving = &self.moving;
-        let record = Record { ttc: TtcMinimum::new(), btn: BrakeThreatMaximum::new(), min_gap: f32::INFINITY };
         LaneState {
             index: 1,
             v_ego: moving.v_ego[k],
@@ -358,7 +390,7 @@ impl<const N: usize> StateArrays<N> {
             gaps: [moving.gap[k]; 2],
             driver: DriverState { deceleration: moving.deceleration[k], delay_steps: 0 },
             reaction_step: NO_STEP,
-            record,
+            record: Record::new(),
             over: Flag::FALSE,
         }
     }
@@ -402,6 +434,20 @@ impl<const N: usize> StateArrays<N> {
         values.btn_numerator[k] = lane.record.btn.numerator;
         values.btn_denominator[k] = lane.record.btn.denominator;
         values.min_gap[k] = lane.record.min_gap;
+        if !rules.keeps_measures {
+            return;
+        }
+        let measures = lane.record.measures;
+        values.thw_gap[k] = measures.thw_gap;
+        values.thw_speed[k] = measures.thw_speed;
+        values.drac_numerator[k] = measures.drac_numerator;
+        values.drac_denominator[k] = measures.drac_denominator;
+        values.tet_steps[k] = measures.tet_steps;
+        values.tit_sum[k] = measures.tit_sum;
+        values.pet_begun[k] = measures.pet_begun.to_bits();
+        values.pet_distance[k] = measures.pet_distance;
+        values.pet_speed[k] = measures.pet_speed;
+        values.pet_steps[k] = measures.pet_steps;
     }
 }
 
@@ -465,6 +511,18 @@ mod tests {
             ttc: TtcMinimum { gap: 10.0, closing: 11.0, failed: Flag::TRUE },
             btn: BrakeThreatMaximum { numerator: 12.0, denominator: 13.0, failed: Flag::TRUE },
             min_gap: 14.0,
+            measures: Measures {
+                thw_gap: 41.0,
+                thw_speed: 42.0,
+                drac_numerator: 43.0,
+                drac_denominator: 44.0,
+                tet_steps: 45,
+                tit_sum: 46.0,
+                pet_begun: Flag::TRUE,
+                pet_distance: 47.0,
+                pet_speed: 48.0,
+                pet_steps: 49,
+            },
         };
         let state = LaneState {
             index: 15,

@@ -116,7 +116,8 @@ fn is_still<M: DriverModel<f32>>(
     // Destructures every field, so that a new field must be compared here or explicitly excluded.
     let bits = |state: &LaneState<f32>| {
         let &LaneState { index: _, v_ego, v_before, gaps, driver, reaction_step: _, record, over } = state;
-        let (DriverState { deceleration, delay_steps }, Record { ttc, btn, min_gap: _ }) = (driver, record);
+        let (DriverState { deceleration, delay_steps }, Record { ttc, btn, min_gap: _, measures: _ }) =
+            (driver, record);
         let TtcMinimum { failed: ttc_failed, gap: _, closing: _ } = ttc;
         let BrakeThreatMaximum { failed: btn_failed, numerator: _, denominator: _ } = btn;
         // A field that a model does not read is not stored: see `StateArrays::set`.
@@ -167,7 +168,7 @@ fn quiescent_gap<M: DriverModel<f32>>(
     let ego = Ego::of(lane, state.v_ego, 0.0);
     let seen = see(simulation, &ego, other, place, lowest, index, Flag::TRUE);
     // Evaluates every criterion that the record holds.
-    let Record { ttc, btn, min_gap: _ } = update_record(criteria, record, &seen);
+    let Record { ttc, btn, .. } = update_record(criteria, record, &seen);
     let fails = (ttc.failed & !record.ttc.failed) | (btn.failed & !record.btn.failed);
     // The driver may not attend to the vehicle yet; then this underestimates the quiescent steps.
     let reacts = check(simulation, &seen, other, Flag::LATEST_STEP).is_unsafe;
@@ -323,7 +324,7 @@ mod tests {
             record: Record {
                 ttc: TtcMinimum { failed: Flag::of(between(0.0, 1.0) < 0.3), ..TtcMinimum::new() },
                 btn: BrakeThreatMaximum { failed: Flag::of(between(0.0, 1.0) < 0.3), ..BrakeThreatMaximum::new() },
-                min_gap: 0.0,
+                ..Record::new()
             },
             over: Flag::FALSE,
         };

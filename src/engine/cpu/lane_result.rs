@@ -133,6 +133,11 @@ pub(crate) fn conclude<R: Real, M>(
         min_ttc: record.ttc.value(),
         max_btn: R::from_f64(criteria.btn.value(&btn)),
         min_gap: record.min_gap,
+        min_thw: record.measures.min_thw(),
+        max_drac: record.measures.max_drac(),
+        tet_steps: record.measures.tet_steps,
+        tit: record.measures.tit_sum * frame.dt,
+        pet: record.measures.pet(frame.dt),
     }
 }
 

@@ -10,7 +10,7 @@ use crate::engine::frame::{Simulation, Start};
 use crate::engine::lane_case::LaneCase;
 use crate::engine::lane_step::{LaneConstants, LaneState};
 
-/// Maximum number of pending lanes: 29 KiB with one other vehicle for verdicts, 49 KiB with all fields, padding
+/// Maximum number of pending lanes: 29 KiB with one other vehicle for verdicts, 60 KiB with all fields, padding
 /// included.
 pub(in crate::engine) const MAX_PENDING: usize = 256;
 

@@ -18,6 +18,7 @@ use crate::engine::lane_case::LaneCase;
 use crate::engine::outcome::{Outcome, Verdicts};
 use crate::engine::plan::{LaneKey, LanePlan};
 use crate::engine::scene::{Scene, fastest_in, may_cross};
+use crate::model::criterion::Criteria;
 use crate::model::driver::{ModelId, VectorDriver};
 use crate::model::scalar::Real;
 use crate::scenario::Tables;
@@ -79,8 +80,10 @@ impl<'p, R: Real> LaneRunner<'p, R> {
     pub fn run(&self, key: &LaneKey) -> Outcome<R> {
         let (case, tables) = self.case(key.block, key.unit, key.variant);
         let scene = Scene::unknown(case.pair != 0);
-        self.constants[key.block].run_in(
+        let constants = &self.constants[key.block];
+        constants.run_in(
             self.plan.models[key.model],
+            &constants.criteria,
             scene,
             &case,
             &tables,
@@ -117,8 +120,15 @@ impl<'p, R: Real> LaneRunner<'p, R> {
     }
 
     /// Runs all lanes of one unit in the plan's order, except those of drivers outside the registry; passes position
-    /// within the unit and outcome.
-    pub(super) fn run_unit(&self, block: usize, unit: u64, mut each: impl FnMut(usize, Outcome<R>)) {
+    /// within the unit and outcome, for verdicts without [`Measures`](crate::model::criterion::Measures).
+    pub(super) fn run_unit(
+        &self,
+        block: usize,
+        unit: u64,
+        keeps_measures: bool,
+        mut each: impl FnMut(usize, Outcome<R>),
+    ) {
+        let criteria = Criteria { keeps_measures, ..self.constants[block].criteria };
         let mut at = 0;
         for variant in 0..self.plan.blocks[block].variants.len() {
             let (case, tables) = self.case(block, unit, variant);
@@ -126,7 +136,7 @@ impl<'p, R: Real> LaneRunner<'p, R> {
             for &start in &self.starts {
                 for &model in &self.plan.models {
                     if model.foreign().is_none() {
-                        each(at, self.run_case(block, &case, &tables, may_cross, start, model));
+                        each(at, self.run_case(block, &criteria, &case, &tables, may_cross, start, model));
                     }
                     at += 1;
                 }
@@ -134,9 +144,11 @@ impl<'p, R: Real> LaneRunner<'p, R> {
         }
     }
 
+    #[expect(clippy::too_many_arguments, reason = "a lane has as many properties")]
     fn run_case(
         &self,
         block: usize,
+        criteria: &Criteria<R>,
         case: &LaneCase<R>,
         tables: &Tables<R>,
         may_cross: bool,
@@ -148,7 +160,7 @@ impl<'p, R: Real> LaneRunner<'p, R> {
         } else {
             Scene { may_cross, ..Scene::unknown(case.pair != 0) }
         };
-        self.constants[block].run_in(model, scene, case, tables, start, &mut Silent)
+        self.constants[block].run_in(model, criteria, scene, case, tables, start, &mut Silent)
     }
 }
 
@@ -163,10 +175,12 @@ impl LaneRunner<'_, f32> {
         units: Range<u64>,
         model: ModelId,
         driver: &dyn VectorDriver,
+        keeps_measures: bool,
     ) -> Result<Vec<Outcome<f64>>> {
         let (plan, first_unit) = (self.plan, units.start);
         let Constants { dt_s, criteria, frames, .. } = &self.constants[block];
-        let setting = Setting::new((model, driver), frames[model.index()], *criteria, *dt_s);
+        let criteria = Criteria { keeps_measures, ..*criteria };
+        let setting = Setting::new((model, driver), frames[model.index()], criteria, *dt_s);
         let of_block = &plan.blocks[block];
         let variants = of_block.variants.len();
         let keys = units.flat_map(|unit| (0..variants).map(move |variant| (unit, variant)));
@@ -266,10 +280,11 @@ impl LaneRunner<'_, f32> {
         model: ModelId,
         mut each: impl FnMut(usize, E),
     ) {
+        let criteria = &Criteria { keeps_measures: E::HAS_VALUES, ..self.constants[block].criteria };
         for (at_case, case) in cases.iter().enumerate() {
             let may_cross = may_cross(case, fastest_in(tables), self.dt());
             for (at_start, &start) in self.starts.iter().enumerate() {
-                let outcome = self.run_case(block, case, tables, may_cross, start, model);
+                let outcome = self.run_case(block, criteria, case, tables, may_cross, start, model);
                 each(at_case * self.starts.len() + at_start, outcome.into());
             }
         }

@@ -16,17 +16,20 @@ pub(in crate::engine) struct Rules {
     is_seldom: bool,
     /// The sweep returns only verdicts: minima and maxima are not gathered.
     pub is_verdict_only: bool,
+    /// The sweep returns values, so measures are gathered. Rarely used rules gather minima and maxima for verdicts too.
+    pub keeps_measures: bool,
 }
 
 impl Rules {
     /// Number of sets.
-    pub(in crate::engine) const SETS: u32 = 18;
+    pub(in crate::engine) const SETS: u32 = 22;
 
     const VERDICT_ONLY: u32 = 4;
     const SELDOM: u32 = 8;
     const IN_LANE: u32 = 12;
     const STEADY_FOLLOWING: u32 = 13;
     const CROSSING: u32 = 14;
+    const SELDOM_VALUES: u32 = 18;
 
     /// Rules of a simulation; `None` for the exact form of the BTN, which iterates and runs lane by lane.
     /// `values`: the sweep returns values, not only verdicts.
@@ -47,7 +50,7 @@ impl Rules {
         // Rarely used rules always test for contacts between two steps.
         let may_cross = scene.may_cross || is_seldom;
         let scene = Scene { in_lane: scene.in_lane && is_verdict_only, may_cross, ..scene };
-        Some(Rules { scene, is_ratio, sees_overlap, is_seldom, is_verdict_only })
+        Some(Rules { scene, is_ratio, sees_overlap, is_seldom, is_verdict_only, keeps_measures: values })
     }
 
     /// Rules of steady-following steps with a single vehicle, for verdicts only.
@@ -65,7 +68,8 @@ impl Rules {
             return Rules::IN_LANE;
         }
         if self.is_seldom {
-            return Rules::SELDOM + (self.scene.is_pair as u32 | (self.is_ratio as u32) << 1);
+            let first = if self.keeps_measures { Rules::SELDOM_VALUES } else { Rules::SELDOM };
+            return first + (self.scene.is_pair as u32 | (self.is_ratio as u32) << 1);
         }
         if self.scene.may_cross {
             return Rules::CROSSING + (self.sees_overlap as u32 | (self.is_verdict_only as u32) << 1);
@@ -78,27 +82,33 @@ impl Rules {
     pub(in crate::engine) const fn from_bits(bits: u32) -> Rules {
         let is_pair = bits & 1 != 0;
         let scene = Scene { is_pair, always_there: !is_pair, in_lane: false, is_steady: false, may_cross: false };
-        let common = Rules { scene, is_ratio: false, sees_overlap: false, is_seldom: false, is_verdict_only: false };
+        let common = Rules {
+            scene,
+            is_ratio: false,
+            sees_overlap: false,
+            is_seldom: false,
+            is_verdict_only: false,
+            keeps_measures: true,
+        };
+        let keeps_measures = bits >= Rules::SELDOM_VALUES;
+        let seldom = bits.wrapping_sub(if keeps_measures { Rules::SELDOM_VALUES } else { Rules::SELDOM });
+        if seldom < 4 {
+            let scene = Scene { may_cross: true, ..scene };
+            return Rules { scene, is_ratio: seldom & 2 != 0, is_seldom: true, keeps_measures, ..common };
+        }
         if bits >= Rules::CROSSING {
             let scene = Scene { is_pair: true, always_there: false, may_cross: true, ..scene };
             let (sees_overlap, is_verdict_only) =
                 ((bits - Rules::CROSSING) & 1 != 0, (bits - Rules::CROSSING) & 2 != 0);
-            return Rules { scene, sees_overlap, is_verdict_only, ..common };
+            return Rules { scene, sees_overlap, is_verdict_only, keeps_measures: !is_verdict_only, ..common };
         }
         if bits >= Rules::IN_LANE {
             // Lateral motion is not evaluated, so there is no gate.
             let scene = Scene { is_steady: bits == Rules::STEADY_FOLLOWING, ..Scene::in_lane() };
-            return Rules { scene, is_verdict_only: true, ..common };
+            return Rules { scene, is_verdict_only: true, keeps_measures: false, ..common };
         }
-        if bits >= Rules::SELDOM {
-            return Rules {
-                scene: Scene { may_cross: true, ..scene },
-                is_ratio: bits & 2 != 0,
-                is_seldom: true,
-                ..common
-            };
-        }
-        Rules { sees_overlap: bits & 2 != 0, is_verdict_only: bits >= Rules::VERDICT_ONLY, ..common }
+        let is_verdict_only = bits >= Rules::VERDICT_ONLY;
+        Rules { sees_overlap: bits & 2 != 0, is_verdict_only, keeps_measures: !is_verdict_only, ..common }
     }
 
     /// The constants of the simulation; those that the rules fix become compile-time constants.
@@ -115,8 +125,8 @@ impl Rules {
             (false, false) => (LateralGate::EgoWidth, 0.0),
         };
         let frame = Frame { abort_above_ttc, ..*frame };
-        let keeps_values = !self.is_verdict_only;
-        (frame, Criteria { gate, keeps_values, btn: criteria.btn.known_as(form), ..*criteria })
+        let (keeps_values, keeps_measures) = (!self.is_verdict_only, self.keeps_measures);
+        (frame, Criteria { gate, keeps_values, keeps_measures, btn: criteria.btn.known_as(form), ..*criteria })
     }
 }
 

@@ -61,6 +61,10 @@ macro_rules! for_rules {
             15 => $burst::<$model, 15>,
             16 => $burst::<$model, 16>,
             17 => $burst::<$model, 17>,
+            18 => $burst::<$model, 18>,
+            19 => $burst::<$model, 19>,
+            20 => $burst::<$model, 20>,
+            21 => $burst::<$model, 21>,
             Rules::SETS.. => return None,
         }
     };

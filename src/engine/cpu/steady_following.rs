@@ -91,7 +91,7 @@ mod tests {
             record: Record {
                 ttc: TtcMinimum { failed: Flag::of(between(0.0, 1.0) < 0.3), ..TtcMinimum::new() },
                 btn: BrakeThreatMaximum { failed: Flag::of(between(0.0, 1.0) < 0.3), ..BrakeThreatMaximum::new() },
-                min_gap: 0.0,
+                ..Record::new()
             },
             over: Flag::FALSE,
         };

@@ -100,6 +100,16 @@ pub struct OutcomeRecord {
     pub btn_denominator: f32,
     /// Bits of the smallest gap, m.
     pub min_gap_bits: u32,
+    /// Bits of the smallest time headway, s.
+    pub min_thw_bits: u32,
+    /// Bits of the largest deceleration rate to avoid the crash, m/s².
+    pub max_drac_bits: u32,
+    /// Time exposed TTC.
+    pub tet_steps: u32,
+    /// Time integrated TTC, s².
+    pub tit: f32,
+    /// Bits of the post-encroachment time, s; [`NO_STEP`] if there is none.
+    pub pet_bits: u32,
 }
 
 impl OutcomeRecord {
@@ -139,6 +149,11 @@ impl OutcomeRecord {
             min_ttc: f32::from_bits(self.min_ttc_bits),
             max_btn: criteria.btn.value(&btn) as f32,
             min_gap: f32::from_bits(self.min_gap_bits),
+            min_thw: f32::from_bits(self.min_thw_bits),
+            max_drac: f32::from_bits(self.max_drac_bits),
+            tet_steps: self.tet_steps,
+            tit: self.tit,
+            pet: (self.pet_bits != NO_STEP).then(|| f32::from_bits(self.pet_bits)),
         })
     }
 }

@@ -9,7 +9,7 @@ pub const ENTRY: &str = "lanes";
 pub const WORKGROUP: u32 = 64;
 
 /// Fragments that every model shares, in the order in which they are joined.
-pub const SHARED: [(&str, &str); 12] = [
+pub const SHARED: [(&str, &str); 13] = [
     ("shared/records.wgsl", include_str!("../../../shaders/shared/records.wgsl")),
     ("lane.wgsl", include_str!("../../../shaders/lane.wgsl")),
     ("shared/exact.wgsl", include_str!("../../../shaders/shared/exact.wgsl")),
@@ -18,6 +18,7 @@ pub const SHARED: [(&str, &str); 12] = [
     ("shared/collision.wgsl", include_str!("../../../shaders/shared/collision.wgsl")),
     ("shared/ttc.wgsl", include_str!("../../../shaders/shared/ttc.wgsl")),
     ("shared/btn.wgsl", include_str!("../../../shaders/shared/btn.wgsl")),
+    ("shared/measures.wgsl", include_str!("../../../shaders/shared/measures.wgsl")),
     ("shared/criteria.wgsl", include_str!("../../../shaders/shared/criteria.wgsl")),
     ("shared/frame.wgsl", include_str!("../../../shaders/shared/frame.wgsl")),
     ("shared/fast_forward.wgsl", include_str!("../../../shaders/shared/fast_forward.wgsl")),

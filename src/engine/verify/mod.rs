@@ -97,7 +97,7 @@ impl CaseRandom {
 }
 
 /// Names of the output words, in the order of [`words`].
-pub const WORDS: [&str; 12] = [
+pub const WORDS: [&str; 17] = [
     "verdicts",
     "contact",
     "contact_with",
@@ -110,6 +110,11 @@ pub const WORDS: [&str; 12] = [
     "min_ttc",
     "max_btn",
     "min_gap",
+    "min_thw",
+    "max_drac",
+    "tet_steps",
+    "tit",
+    "pet",
 ];
 
 /// Differing lanes that a comparison keeps.

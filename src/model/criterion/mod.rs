@@ -3,15 +3,19 @@
 //! Each keeps a continuous value and a verdict; the verdict comes from its own predicate, never from comparing a
 //! printed value. This module has no time loop. Constants come from a profile; verdicts go to the lane's outcome.
 //!
+//! [`Measures`] are values without a verdict.
+//!
 //! To add a criterion: one file here, its twin in `shaders/`, one line in [`Criterion`], and the code that counts
 //! verdicts. The chapter `docs/src/extend/criterion.md` lists every place.
 
 mod btn;
 mod collision;
+mod measures;
 mod ttc;
 
 pub use btn::{BrakeThreat, BrakeThreatMaximum, BtnContact, BtnForm};
 pub use collision::{Contact, contact, held_in_contact, overlaps_along};
+pub use measures::Measures;
 pub use ttc::{TimeToCollision, TtcMinimum};
 
 use schemars::JsonSchema;
@@ -92,6 +96,14 @@ pub struct CriteriaProfile {
     pub max_deceleration_mps2: f64,
     /// Jerk of the ramp up to it, m/s³ (12.65).
     pub jerk_mps3: f64,
+    /// TET and TIT count a TTC below this, s (3).
+    #[serde(default = "default_tet_threshold_s")]
+    pub tet_threshold_s: f64,
+}
+
+/// Profiles from before this key have none.
+fn default_tet_threshold_s() -> f64 {
+    3.0
 }
 
 /// The criteria of a lane, in its arithmetic.
@@ -105,8 +117,12 @@ pub struct Criteria<R> {
     pub ttc: TimeToCollision<R>,
     /// Brake Threat Number.
     pub btn: BrakeThreat<R>,
+    /// TTC below which TET and TIT count a step, s.
+    pub tet_threshold: R,
     /// Whether minimum TTC and maximum BTN are computed; verdicts do not need them.
     pub keeps_values: bool,
+    /// Whether [`Measures`] are computed too. Some loops keep values where only verdicts are returned.
+    pub keeps_measures: bool,
     /// Verdicts mark contacts at or above this closing speed, m/s; infinite: none.
     pub marks_contacts_from: R,
 }
@@ -119,7 +135,9 @@ impl CriteriaProfile {
             btn_contact: self.btn_contact,
             ttc: TimeToCollision { threshold: R::from_f64(self.ttc_threshold_s) },
             btn: BrakeThreat::new(self.btn, self.btn_threshold, self.max_deceleration_mps2, self.jerk_mps3),
+            tet_threshold: R::from_f64(self.tet_threshold_s),
             keeps_values: true,
+            keeps_measures: true,
             marks_contacts_from: R::INFINITY,
         }
     }
@@ -132,6 +150,7 @@ impl<R: Real> Criteria<R> {
             ("criteria_gate", f64::from(self.gate as u32)),
             ("criteria_any_contact", f64::from(u8::from(self.btn_contact == BtnContact::Any))),
             ("criteria_ttc_threshold", self.ttc.threshold.to_f64()),
+            ("criteria_tet_threshold", self.tet_threshold.to_f64()),
         ];
         all.extend(self.btn.shader_constants());
         all

@@ -1,0 +1,263 @@
+//! Values without a verdict: smallest THW, largest DRAC, TET, TIT, and the PET of a cut-in.
+
+use lanesweep::engine::{Constants, LaneCase, LaneRunner, Outcome, Silent, Start, Step};
+use lanesweep::model::criterion::BtnContact;
+use lanesweep::model::driver::ModelId;
+use lanesweep::model::profile::Profile;
+use lanesweep::model::scalar::Real;
+use lanesweep::scenario::{Ahead, Case, Category, Lateral, Participant, Speed, Tables};
+
+use crate::common::lane_sets::random;
+
+/// A profile whose FSM keeps its speed: its reaction time is longer than any run.
+fn unreacting(time_cap_s: f64) -> Profile {
+    let mut profile = Profile::load("paper").unwrap();
+    profile.fsm.reaction_time_s = 1000.0;
+    profile.frame.time_cap_s = time_cap_s;
+    profile
+}
+
+fn vehicle(speed_mps: f64, lateral: Lateral) -> Participant {
+    Participant { length_m: 4.3, width_m: 1.8, speed: Speed::constant(speed_mps), lateral }
+}
+
+fn case(category: Category, ego_speed_mps: f64, principal: Participant, horizon_s: f64) -> Case {
+    let (ego_length_m, ego_width_m, lane_width_m) = (4.6, 1.9, 3.5);
+    Case { category, ego_length_m, ego_width_m, lane_width_m, ego_speed_mps, principal, ahead: None, horizon_s }
+}
+
+/// From 3.5 m beside the lane at 1 m/s: it overlaps the ego's path below 1.85 m, first at step 42 (1.68 s).
+fn cut_in(ego_mps: f64, other_mps: f64, horizon_s: f64) -> Case {
+    let lateral = Lateral::Kinematic { start_m: 3.5, rate_mps: -1.0, end_m: 0.0 };
+    case(Category::CutIn, ego_mps, vehicle(other_mps, lateral), horizon_s)
+}
+const ENCROACHES_S: f64 = 1.68;
+
+fn run_in<R: Real>(profile: &Profile, case: &Case, model: ModelId, gap_m: f64) -> Outcome<f64> {
+    let mut tables = Tables::default();
+    let lane = LaneCase::encode(case, profile, &mut tables);
+    let constants = Constants::<R>::resolve(profile, case.category);
+    let start = Start::Gap(R::from_f64(gap_m));
+    constants.run(model, &lane.cast(), &tables.cast(), start, &mut Silent).widen()
+}
+
+/// In binary64, and in binary32 with the same result but for rounding.
+fn run(profile: &Profile, case: &Case, model: ModelId, gap_m: f64) -> Outcome<f64> {
+    let (exact, narrow) = (run_in::<f64>(profile, case, model, gap_m), run_in::<f32>(profile, case, model, gap_m));
+    let pair = |of: fn(&Outcome<f64>) -> f64| near(of(&narrow), of(&exact), 1e-4);
+    pair(|o| o.min_thw);
+    pair(|o| o.max_drac);
+    pair(|o| o.tit);
+    assert_eq!(narrow.tet_steps, exact.tet_steps);
+    exact
+}
+
+fn near(value: f64, expected: f64, relative: f64) {
+    let is_near = value == expected || (value - expected).abs() <= relative * expected.abs().max(1.0);
+    assert!(is_near, "{value} is not {expected}");
+}
+
+/// 20 m/s towards a vehicle that stands 100.4 m ahead: gap 100.4 m − 0.8 m·i, up to step 99.
+#[test]
+fn an_obstacle_at_constant_speed_has_the_values_of_the_closed_forms() {
+    let obstacle = case(Category::Lvd, 20.0, vehicle(0.0, Lateral::Centred), 100.0);
+    let found = run(&unreacting(4.0), &obstacle, ModelId::Fsm, 100.4);
+    let last_gap_m = 100.4 - 0.8 * 99.0;
+    near(found.min_thw, last_gap_m / 20.0, 1e-12);
+    near(found.max_drac, 20.0 * 20.0 / (2.0 * last_gap_m), 1e-12);
+    // TTC = 5.02 s − 0.04 s·i is below 3 s from step 51 on, and 3 s − TTC has the mean of its first and last term.
+    assert_eq!(found.tet_steps, 49);
+    near(found.tit, 0.04 * 49.0 * ((0.04 * 51.0 - 2.02) + (0.04 * 99.0 - 2.02)) / 2.0, 1e-9);
+    assert_eq!(found.pet, None, "the leader was there from the first step on");
+    // Another threshold: 2 s, reached at step 76.
+    let mut profile = unreacting(4.0);
+    profile.criteria.tet_threshold_s = 2.0;
+    let found = run(&profile, &obstacle, ModelId::Fsm, 100.4);
+    assert_eq!(found.tet_steps, 24);
+    near(found.tit, 0.04 * 24.0 * ((0.04 * 76.0 - 3.02) + (0.04 * 99.0 - 3.02)) / 2.0, 1e-9);
+    // Step 126 is the contact: no gap, no braking helps, and the step counts with a TTC of 0.
+    let hit = run(&unreacting(60.0), &obstacle, ModelId::Fsm, 100.4);
+    assert_eq!((hit.contact_step, hit.min_thw, hit.max_drac), (126, 0.0, f64::INFINITY));
+    assert_eq!(hit.tet_steps, 126 - 50);
+}
+
+#[test]
+fn an_ego_that_does_not_close_in_has_a_headway_and_nothing_else() {
+    let following = case(Category::Lvd, 25.0, vehicle(25.0, Lateral::Centred), 2.0);
+    let found = run(&unreacting(60.0), &following, ModelId::Fsm, 30.0);
+    near(found.min_thw, 1.2, 1e-12);
+    assert_eq!((found.max_drac, found.tet_steps, found.tit, found.pet), (0.0, 0, 0.0, None));
+    let standing = case(Category::Lvd, 0.0, vehicle(0.0, Lateral::Centred), 2.0);
+    assert_eq!(run(&unreacting(60.0), &standing, ModelId::Fsm, 5.0).min_thw, f64::INFINITY);
+}
+
+/// Both vehicles are approached in some steps; each step counts once.
+#[test]
+fn a_step_counts_once_with_the_nearer_of_two_vehicles() {
+    let slower = vehicle(18.0, Lateral::Kinematic { start_m: 0.0, rate_mps: 1.0, end_m: 3.5 });
+    let ahead = Some(Ahead { vehicle: vehicle(0.0, Lateral::Centred), gap_m: 40.0 });
+    let cut_out = Case { ahead, ..case(Category::CutOut, 20.0, slower, 3.5) };
+    let found = run(&unreacting(60.0), &cut_out, ModelId::Fsm, 5.0);
+    let alone = Case { ahead: None, ..cut_out.clone() };
+    // The slower vehicle is at 2.5 s and below until it is more than 1.9 m beside; the obstacle, 49.3 m ahead at the
+    // start, below 3 s from the first step on.
+    let of_slower = run(&unreacting(60.0), &alone, ModelId::Fsm, 5.0);
+    assert!(of_slower.tet_steps > 30 && of_slower.tet_steps < found.tet_steps);
+    assert_eq!(found.tet_steps, found.end_step + 1);
+}
+
+#[test]
+fn the_pet_of_an_ego_that_keeps_its_speed_is_its_headway_at_the_encroachment() {
+    // The ego reaches the place within the lane; or the lane ends before, because the other vehicle is faster.
+    for (ego_mps, other_mps, gap_m) in [(30.0, 20.0, 45.1), (20.0, 25.0, 20.1), (30.0, 20.0, 17.1)] {
+        let (profile, case) = (unreacting(60.0), cut_in(ego_mps, other_mps, 2.0));
+        let at_encroachment_m = gap_m + (other_mps - ego_mps) * ENCROACHES_S;
+        for (run, relative) in [(run_in::<f64> as fn(_, _, _, _) -> _, 1e-9), (run_in::<f32>, 1e-5)] {
+            near(run(&profile, &case, ModelId::Fsm, gap_m).pet.unwrap(), at_encroachment_m / ego_mps, relative);
+        }
+    }
+    let beside = run_in::<f64>(&unreacting(60.0), &cut_in(30.0, 20.0, 2.0), ModelId::Fsm, 16.0);
+    assert_eq!(beside.pet, None, "its rear bumper was beside the ego");
+}
+
+/// A vehicle that stands and slides across, 20 m ahead of an ego at 5 m/s that stops before it.
+#[test]
+fn an_ego_that_stops_before_the_place_has_an_infinite_pet() {
+    let profile = Profile::load("paper").unwrap();
+    for run in [run_in::<f64>, run_in::<f32>] {
+        let found = run(&profile, &cut_in(5.0, 0.0, 2.0), ModelId::Rss, 20.0);
+        assert_eq!((found.contact_step, found.pet), (u32::MAX, Some(f64::INFINITY)));
+        assert!(found.min_thw > 0.0 && found.max_drac.is_finite());
+    }
+}
+
+#[test]
+fn only_a_vehicle_that_comes_into_the_path_during_the_lane_has_a_pet() {
+    let profile = Profile::load("paper").unwrap();
+    let within = Lateral::Kinematic { start_m: 1.0, rate_mps: -0.5, end_m: 0.0 };
+    let beside = Lateral::Kinematic { start_m: 3.5, rate_mps: -1.0, end_m: 2.0 };
+    let leaves = Lateral::Kinematic { start_m: 0.0, rate_mps: 1.0, end_m: 3.5 };
+    for (category, lateral) in [
+        (Category::Lvd, Lateral::Centred),
+        (Category::CutIn, within),
+        (Category::CutIn, beside),
+        (Category::CutOut, leaves),
+    ] {
+        let found = run(&profile, &case(category, 25.0, vehicle(20.0, lateral), 3.0), ModelId::Reg157, 40.0);
+        assert_eq!(found.pet, None, "{category:?}");
+    }
+}
+
+/// Values by their definitions from the steps of a lane, in binary64.
+#[derive(Default)]
+struct Defined {
+    min_thw: Option<f64>,
+    max_drac: f64,
+    ttc_s: Vec<f64>,
+    /// Speed and, of the principal vehicle, gap, overlap and presence.
+    steps: Vec<(f64, f64, bool, bool)>,
+}
+
+impl Defined {
+    fn take(&mut self, step: &Step<f64>, is_pair: bool) {
+        let mut ttc_s = f64::INFINITY;
+        for seen in &step.seen[..1 + usize::from(is_pair)] {
+            let (gap_m, closing) = (seen.view.gap, seen.view.closing());
+            if !seen.judged.holds() {
+                continue;
+            }
+            if step.v_ego > 0.0 {
+                let thw_s = gap_m.max(0.0) / step.v_ego;
+                self.min_thw = Some(self.min_thw.map_or(thw_s, |least| least.min(thw_s)));
+            }
+            if closing > 0.0 {
+                let drac = if gap_m > 0.0 { closing * closing / (2.0 * gap_m) } else { f64::INFINITY };
+                self.max_drac = self.max_drac.max(drac);
+                ttc_s = ttc_s.min(gap_m.max(0.0) / closing);
+            }
+        }
+        self.ttc_s.push(ttc_s);
+        let view = &step.seen[0].view;
+        self.steps.push((step.v_ego, view.gap, view.lateral_gap < 0.0, step.seen[0].present.holds()));
+    }
+
+    fn pet_s(&self, dt_s: f64) -> Option<f64> {
+        let first = self.steps.iter().position(|step| step.2)?;
+        let (mut v, mut left_m, _, present) = self.steps[first];
+        if first == 0 || left_m < 0.0 || !present {
+            return None;
+        }
+        let mut time_s = 0.0;
+        for (v_next, ..) in &self.steps[first + 1..] {
+            v = *v_next;
+            if v * dt_s >= left_m {
+                break;
+            }
+            left_m -= v * dt_s;
+            time_s += dt_s;
+        }
+        Some(if left_m == 0.0 { time_s } else { time_s + left_m / v })
+    }
+}
+
+/// Random lanes of every category and model, vehicles that appear and leave among them.
+#[test]
+fn every_value_is_that_of_its_definition_and_keeps_its_bounds() {
+    for name in ["paper", "jrc-2021"] {
+        let profile = Profile::load(name).unwrap();
+        let (dt_s, threshold_s) = (profile.frame.dt_s, profile.criteria.tet_threshold_s);
+        let plan = random(&profile, 1500);
+        let constants: Vec<_> =
+            plan.blocks.iter().map(|block| Constants::<f64>::resolve(&profile, block.category)).collect();
+        let (mut pets, mut exposed) = ([0; 3], 0);
+        for key in (0..plan.lane_count()).map(|lane| plan.key(lane).unwrap()) {
+            let case = plan.case(key.block, key.unit, key.variant);
+            let mut defined = Defined::default();
+            let mut see = |step: &Step<f64>| defined.take(step, case.pair != 0);
+            let (model, start) = (plan.models[key.model], plan.headways[key.headway].start());
+            let found = constants[key.block].run(model, &case, plan.tables(), start, &mut see);
+            let what = plan.key_text(&key);
+            let same = |value: f64, expected: f64| {
+                let is_near = value == expected || (value - expected).abs() <= 1e-9 * (1.0 + expected.abs());
+                assert!(is_near, "{what}: {value} is not {expected}");
+            };
+            same(found.min_thw, defined.min_thw.unwrap_or(f64::INFINITY));
+            same(found.max_drac, defined.max_drac);
+            let below: Vec<f64> = defined.ttc_s.iter().copied().filter(|ttc_s| *ttc_s < threshold_s).collect();
+            assert_eq!(found.tet_steps as usize, below.len(), "{what}");
+            same(found.tit, below.iter().map(|ttc_s| (threshold_s - ttc_s) * dt_s).sum());
+            let pet_s = defined.pet_s(dt_s);
+            assert_eq!(found.pet.is_some(), pet_s.is_some(), "{what}: {:?} {pet_s:?}", found.pet);
+            same(found.pet.unwrap_or(0.0), pet_s.unwrap_or(0.0));
+            pets[pet_s.map_or(0, |pet_s| 1 + usize::from(pet_s.is_infinite()))] += 1;
+            // Bounds.
+            assert!(found.tit >= 0.0 && found.tit <= threshold_s * f64::from(found.tet_steps) * dt_s * (1.0 + 1e-9));
+            assert_eq!(found.tet_steps > 0, found.min_ttc < threshold_s, "{what}");
+            exposed += u32::from(found.tet_steps > 0);
+        }
+        assert!(pets.iter().all(|count| *count > 20) && exposed > 1000, "{name}: {pets:?} {exposed}");
+    }
+}
+
+/// BTN adds the ramp of the deceleration to DRAC: it is never smaller, and with a very large jerk it is DRAC over the
+/// largest deceleration.
+#[test]
+fn the_btn_without_a_ramp_is_the_drac_over_the_largest_deceleration() {
+    let mut profile = Profile::load("paper").unwrap();
+    profile.criteria.btn_contact = BtnContact::Gated;
+    let mut instant = profile.clone();
+    instant.criteria.jerk_mps3 = 1e6;
+    let a_max = profile.criteria.max_deceleration_mps2;
+    for (profile, is_instant) in [(&profile, false), (&instant, true)] {
+        let plan = random(profile, 1000);
+        let runner = LaneRunner::<f64>::new(&plan);
+        for key in (0..plan.lane_count()).map(|lane| plan.key(lane).unwrap()) {
+            let found = runner.run(&key);
+            let drac = found.max_drac / a_max;
+            assert!(found.max_btn >= drac * (1.0 - 1e-12), "{}: {} {drac}", plan.key_text(&key), found.max_btn);
+            if is_instant && drac < 10.0 {
+                near(found.max_btn, drac, 1e-3);
+            }
+        }
+    }
+}
