@@ -585,6 +585,8 @@ def check(
     profiles: Paths | None = None,
     sheet: Path | None = None,
     series: Path | None = None,
+    date: str | None = None,
+    author: str | None = None,
     **case: Unpack[Case],
 ) -> Result:
     """Check whether the reference drivers of UN R157 avoid the collision of a concrete case.
@@ -609,6 +611,8 @@ def check(
         Also write the case sheet as an HTML page.
     series : path
         Also write every step of every model under the first profile, as CSV.
+    date, author : str
+        Date of the run and author, as the sheet is to show them. The clock is not asked.
     **case
         `Case` of `lanesweep.options`; it overrides values of a file.
 

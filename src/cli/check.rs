@@ -15,12 +15,14 @@ use super::source::{PlausibilityFlag, complain_of, refuse_overwriting, scenarios
 use super::{Exit, Output};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
+use crate::report::case_identity::CaseIdentity;
 use crate::report::case_sheet::CaseSheet;
 use crate::report::case_table::{CaseAnswer, CaseTable as Answers};
 use crate::report::trace;
 use crate::run::check::{Answer, Check as Checked, Subject, Verdict};
 use crate::scenario::{Category, Scenario};
 use crate::support::files::{make_folder_of, write_atomically};
+use crate::support::input_file;
 use crate::support::plausibility::Doubts;
 use crate::{Error, Place, Result};
 
@@ -69,6 +71,12 @@ pub(super) struct Check {
     /// Also write every step of every model under the first profile
     #[arg(long, value_name = "FILE.csv", help_heading = "Output")]
     series: Option<PathBuf>,
+    /// Date of the run, as the sheet is to show it; the clock is not asked
+    #[arg(long, value_name = "TEXT", help_heading = "Output")]
+    date: Option<String>,
+    /// Author, as the sheet is to show it
+    #[arg(long, value_name = "TEXT", help_heading = "Output")]
+    author: Option<String>,
     #[command(flatten)]
     plausibility: PlausibilityFlag,
     #[command(flatten)]
@@ -76,7 +84,7 @@ pub(super) struct Check {
 }
 
 from_arguments!(
-    Check { file, row, scenario, profiles, sheet, series }
+    Check { file, row, scenario, profiles, sheet, series, date, author }
     groups { case, plausibility, format }
 );
 
@@ -119,6 +127,7 @@ impl Check {
             profiles: &check.profiles,
             judgements: &judgements,
             command: configured.command.clone(),
+            identity: self.identity()?,
         };
         if let Some(path) = &self.sheet {
             write(path, sheet.html().as_bytes())?;
@@ -130,6 +139,16 @@ impl Check {
         // If input was skipped the answer is incomplete.
         let exit = if request.incomplete { Exit::Incomplete } else { status(judgements[0].verdict()) };
         self.format.output(exit, || sheet.text(), || sheet.json())
+    }
+
+    /// What identifies the sheet besides the case.
+    fn identity(&self) -> Result<CaseIdentity> {
+        Ok(CaseIdentity {
+            commit: env!("LANESWEEP_COMMIT"),
+            file_sha256: self.file.as_deref().map(input_file::sha256).transpose()?,
+            date: self.date.clone(),
+            author: self.author.clone(),
+        })
     }
 
     /// The table to be judged with all rows.
@@ -144,6 +163,8 @@ impl Check {
         let of_one = [
             ("--sheet", self.sheet.is_some()),
             ("--series", self.series.is_some()),
+            ("--date", self.date.is_some()),
+            ("--author", self.author.is_some()),
             ("--profiles", self.profiles.len() > 1),
         ];
         match of_one.iter().find(|(_, is_given)| *is_given) {
@@ -314,6 +335,7 @@ fn judge(
         profiles: &check.profiles,
         judgements: &judgements,
         command: String::new(),
+        identity: CaseIdentity::default(),
     };
     Ok(CaseAnswer::new(row, id, &sheet))
 }
