@@ -592,6 +592,8 @@ def check(
     series: Path | None = None,
     backend: Literal["auto", "cpu", "gpu"] | None = None,
     device: str | Int | None = None,
+    date: str | None = None,
+    author: str | None = None,
     **case: Unpack[Case],
 ) -> Result:
     """Check whether the reference drivers of UN R157 avoid the collision of a concrete case.
@@ -629,6 +631,8 @@ def check(
         Of `nominal`. ``"auto"``: a GPU if there is one.
     device : str or int
         Device of `nominal`, by part of its name, PCI bus id or index.
+    date, author : str
+        Date of the run and author, as the sheet is to show them. The clock is not asked.
     **case
         `Case` of `lanesweep.options`; it overrides values of a file.
 

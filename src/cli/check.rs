@@ -14,11 +14,13 @@ use super::source::{PlausibilityFlag, refuse_overwriting, scenarios_of};
 use super::{Exit, Output};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
+use crate::report::case_identity::CaseIdentity;
 use crate::report::case_sheet::CaseSheet;
 use crate::report::trace;
 use crate::run::check::{Answer, Check as Checked, Subject, Verdict};
 use crate::scenario::{Category, Scenario};
 use crate::support::files::{make_folder_of, write_atomically};
+use crate::support::input_file;
 use crate::support::plausibility::Doubts;
 use crate::support::table::TableFormat;
 use crate::{Error, Place, Result};
@@ -85,6 +87,12 @@ pub(super) struct Check {
     /// Also write every step of every model under the first profile
     #[arg(long, value_name = "FILE.csv", help_heading = "Output")]
     series: Option<PathBuf>,
+    /// Date of the run, as the sheet is to show it; the clock is not asked
+    #[arg(long, value_name = "TEXT", help_heading = "Output")]
+    date: Option<String>,
+    /// Author, as the sheet is to show it
+    #[arg(long, value_name = "TEXT", help_heading = "Output")]
+    author: Option<String>,
     #[command(flatten)]
     plausibility: PlausibilityFlag,
     #[command(flatten)]
@@ -92,7 +100,7 @@ pub(super) struct Check {
 }
 
 from_arguments!(
-    Check { file, row, scenario, profiles, sheet, rows, sheets, results, nominal, series }
+    Check { file, row, scenario, profiles, sheet, rows, sheets, results, nominal, series, date, author }
     groups { case, plausibility, format }
 );
 
@@ -137,6 +145,7 @@ impl Check {
                 page: self.sheet.as_deref(),
                 rows: self.rows.as_deref(),
                 sheets: self.sheets.as_deref(),
+                identity: self.identity()?,
             };
             return batch.run(configured, self.format);
         }
@@ -159,6 +168,7 @@ impl Check {
             profiles: &check.profiles,
             judgements: &judgements,
             command: configured.command.clone(),
+            identity: self.identity()?,
         };
         if let Some(path) = &self.sheet {
             write(path, sheet.html().as_bytes())?;
@@ -172,6 +182,16 @@ impl Check {
         self.format.output(exit, || sheet.text(), || sheet.json())
     }
 
+    /// What identifies the sheet besides the case.
+    fn identity(&self) -> Result<CaseIdentity> {
+        Ok(CaseIdentity {
+            commit: env!("LANESWEEP_COMMIT"),
+            file_sha256: self.file.as_deref().map(input_file::sha256).transpose()?,
+            date: self.date.clone(),
+            author: self.author.clone(),
+        })
+    }
+
     /// The table to be judged with all rows.
     fn whole_table(&self) -> Result<Option<&Path>> {
         let Some(path) = &self.file else { return Ok(None) };
@@ -181,7 +201,13 @@ impl Check {
         if !is_table || self.row.is_some() || self.scenario.is_some() {
             return Ok(None);
         }
-        let of_one = [("--series", self.series.is_some()), ("--profiles", self.profiles.len() > 1)];
+        let has_sheets = self.sheets.is_some();
+        let of_one = [
+            ("--series", self.series.is_some()),
+            ("--date", self.date.is_some() && !has_sheets),
+            ("--author", self.author.is_some() && !has_sheets),
+            ("--profiles", self.profiles.len() > 1),
+        ];
         match of_one.iter().find(|(_, is_given)| *is_given) {
             Some(("--profiles", _)) => {
                 let problem = format!("{} is judged with all its rows, under one profile", path.display());

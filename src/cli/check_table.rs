@@ -15,6 +15,7 @@ use super::{Exit, Output};
 use crate::engine::Executor;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
+use crate::report::case_identity::CaseIdentity;
 use crate::report::case_sheet::CaseSheet;
 use crate::report::case_table::{CaseAnswer, CaseTable as Answers};
 use crate::run::check::{Check, Subject, nominal_verdicts};
@@ -40,6 +41,8 @@ pub(super) struct CheckedTable<'a> {
     pub rows: Option<&'a Path>,
     /// Folder of a sheet per row.
     pub sheets: Option<&'a Path>,
+    /// What identifies these sheets besides their cases.
+    pub identity: CaseIdentity,
 }
 
 /// A row with its case, or why it has none.
@@ -161,6 +164,7 @@ impl CheckedTable<'_> {
             profiles: &check.profiles,
             judgements: &judgements,
             command: command.to_owned(),
+            identity: self.identity.clone(),
         };
         Ok((CaseAnswer::new(row, id, &sheet), has_sheet.then(|| sheet.html())))
     }

@@ -3,6 +3,7 @@
 
 use serde_json::{Value, json};
 
+use super::case_identity::{self, CaseIdentity, NOT_CONSIDERED, assumptions_json};
 use super::html::{Page, PageFigure, Section};
 use super::records::{self, PROGRAM};
 use super::tables::{WIDTH, wrap};
@@ -11,7 +12,7 @@ use crate::Result;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::check::{Boundary, Change, Demand, Judged, Judgement, Reading, RunEnd, Subject, Verdict};
-use crate::run::grid::{PARAMETERS, VARIED};
+use crate::run::grid::VARIED;
 use crate::scenario::{CaseQuantity, KMH, NUMBERS};
 use crate::support::readable::value;
 use crate::support::table::{Column, NumberText, Table, json_number};
@@ -43,6 +44,8 @@ pub struct CaseSheet<'a> {
     pub judgements: &'a [Judgement],
     /// Command that reproduces the sheet.
     pub command: String,
+    /// What the user and the build say of it.
+    pub identity: CaseIdentity,
 }
 
 impl CaseSheet<'_> {
@@ -106,6 +109,17 @@ impl CaseSheet<'_> {
         without_repeats(table, 0)
     }
 
+    /// The drivers under the first profile, and those under the others that differ.
+    fn drivers_by_profile(&self) -> [Table; 2] {
+        let (mut first, mut others) = (self.drivers(), self.drivers());
+        let profile = &self.first().profile;
+        let is_first: Vec<bool> = first.shown().1.iter().map(|row| row[0] == *profile).collect();
+        let (mut at, mut other_at) = (is_first.iter(), is_first.iter());
+        first.rows.retain(|_| at.next() == Some(&true));
+        others.rows.retain(|_| other_at.next() == Some(&false));
+        [first.captioned(format!("Drivers under {profile}")), others.captioned("Drivers under other profiles")]
+    }
+
     fn clauses(&self) -> Table {
         let mut readings: Vec<&Reading> = self.first().readings.iter().collect();
         let own = readings.len();
@@ -155,7 +169,7 @@ impl CaseSheet<'_> {
         let sentences = self.demand().into_iter().chain(self.silent()).chain(cautions);
         let demand: Vec<String> = sentences.map(|sentence| format!("  {sentence}\n")).collect();
         format!(
-            "{synthetic}{}\n{}\n{}{}\n{}\n{}\nClauses under {}\n{}\n{}\n{}",
+            "{synthetic}{}\n{}\n{}{}\n{}\n{}\nClauses under {}\n{}\n{}\n{}\n{}",
             self.case(),
             self.answer(),
             demand.concat(),
@@ -166,6 +180,7 @@ impl CaseSheet<'_> {
             self.clauses().text(),
             wrap(&format!("Where the answer changes under {}. {BOUNDARIES}", self.first().profile), WIDTH),
             self.boundaries().text(),
+            self.identity_text(),
         )
     }
 
@@ -205,7 +220,10 @@ impl CaseSheet<'_> {
             let is_answer = matches!(judgement.verdict(), Verdict::Answer(_) | Verdict::Undecided);
             json!({
                 "profile": judgement.profile,
+                "sha256": case_identity::profile_sha256(profile).unwrap_or_default(),
                 "dt_s": profile.frame.dt_s,
+                "time_cap_s": profile.frame.time_cap_s,
+                "finer_step": case_identity::finer_json(judgement),
                 "verdict": judgement.verdict().label(),
                 "nominal_answer": is_answer.then(|| judgement.verdicts.answer().label()),
                 "clause": judgement.clause,
@@ -226,25 +244,21 @@ impl CaseSheet<'_> {
                 "boundaries": boundaries.collect::<Vec<_>>(),
             })
         };
-        let point = self.subject.point();
-        let numbers: serde_json::Map<String, Value> = PARAMETERS
-            .iter()
-            .filter(|parameter| parameter.per_si == 1.0 && !parameter.is_relative)
-            .filter_map(|parameter| Some((parameter.key.to_owned(), json!(point.get(parameter.quantity)?))))
-            .chain(self.subject.duration_s().map(|duration_s| ("duration_s".to_owned(), json!(duration_s))))
-            .collect();
         records::document(&json!({
             "program": PROGRAM,
+            "identity": self.identity_json()?,
             "data": self.origin,
             "synthetic": self.is_synthetic,
             "category": self.subject.category().key(),
-            "case": numbers,
+            "case": self.case_numbers(),
             "verdict": self.first().verdict().label(),
             "answer": self.answer(),
             "demand": self.demand(),
             "silent": self.silent(),
             "cautions": self.cautions(),
             "profiles": self.judgements.iter().zip(self.profiles).map(judgement).collect::<Vec<_>>(),
+            "assumptions": assumptions_json(&self.profiles[0]),
+            "not_considered": NOT_CONSIDERED.map(|(what, how)| format!("{what}: {how}")),
         }))
     }
 
@@ -260,7 +274,7 @@ impl CaseSheet<'_> {
             title: format!("{} under {}: {}", self.subject.category().label(), first.profile, first.verdict().label()),
             subtitle: Some(format!("{synthetic}{}. {}.", self.case(), self.answer())),
             series: series.collect(),
-            until_s: None,
+            until_s: Some(self.shown_until_s()),
             panels,
         }
     }
@@ -281,9 +295,17 @@ impl CaseSheet<'_> {
                 drivers.iter().map(|model| model.name()).collect::<Vec<_>>().join(" or ")
             ),
         };
-        let drivers = Section::new("drivers", "Drivers")
-            .intro(format!("{preventable} {DRIVERS}. Changes with: what turns the collision verdict, of {VARIED}."))
-            .tables([self.drivers().captioned("Drivers")]);
+        let [of_first, of_others] = self.drivers_by_profile();
+        let notes = [("demand", self.demand()), ("readings", self.silent()), ("limits", self.cautions())];
+        let notes = notes.into_iter().filter(|(_, sentences)| !sentences.is_empty());
+        let answer = Section::new("answer", "Answer")
+            .fact("answer", first.verdict().label())
+            .fact("rule", preventable)
+            .facts(notes.map(|(name, sentences)| (name, sentences.join(".\n") + ".")));
+        let drivers = Section::new("drivers", "Drivers").intro(format!("{DRIVERS}.")).tables([of_first]);
+        let others = Section::new("others", "Other profiles")
+            .intro(format!("Columns as above. Changes with: what turns the collision verdict, of {VARIED}."))
+            .tables([of_others]);
         let clauses = Section::new("clauses", "Clauses")
             .intro(format!(
                 "What the clauses say of the case, with the numbers of {}; then the conditions of other clauses of \
@@ -296,30 +318,36 @@ impl CaseSheet<'_> {
             .tables([self.boundaries().captioned("Distance to the boundary")]);
         let above = TraceFigure { subtitle: None, ..self.figure(TracePanels::Course) };
         let drawn = |panels: TracePanels| PageFigure::new(&self.figure(panels).svg(), &[]);
+        let recorded = self.recorded_motion();
         let course = Section::new("course", "Course of the case")
+            .intro([self.cut(), recorded.clone().unwrap_or_default()].join(" "))
             .figures([drawn(TracePanels::Course), PageFigure::new(&above.positions().svg(), &[])])
+            .figures(recorded.map(|_| drawn(TracePanels::Motion)))
             .parts([Section::new("", "TTC, BTN, fuzzy surrogates and lateral position")
                 .figures([drawn(TracePanels::Measures)])]);
-        let reproduction = Section::new("reproduction", "Reproduction")
-            .fact("command", &self.command)
-            .fact("program", PROGRAM)
-            .fact("profile", format!("{}: {}", first.profile, self.profiles[0].description))
-            .fact("data", &self.origin)
-            .fact("arithmetic", format!("binary64, time step {} s", self.profiles[0].frame.dt_s))
+        // The profile's constants are a table for people; this is a copy for programs.
+        let assumptions = self
+            .assumptions_section()
             .parts([Section::options(format!("Profile {}", first.profile), &self.profiles[0])]);
         Page {
             title: format!("One {} under {}", self.subject.category().label(), first.profile),
-            lead: std::iter::once(self.case())
-                .chain([self.answer()])
-                .chain(self.demand())
-                .chain(self.silent())
-                .chain(self.cautions())
-                .map(|sentence| format!("{sentence}."))
-                .collect::<Vec<_>>()
-                .join(" "),
+            lead: format!("{}. {}.", self.case(), self.answer()),
             synthetic: self.is_synthetic,
             warnings,
-            sections: vec![course, case, drivers, clauses, boundaries, reproduction],
+            sections: vec![
+                answer,
+                case,
+                drivers,
+                self.identity_section(),
+                self.signature_section(),
+                course,
+                others,
+                clauses,
+                boundaries,
+                self.numerics_section(),
+                assumptions,
+                CaseSheet::not_considered_section(),
+            ],
         }
         .html()
     }

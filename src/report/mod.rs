@@ -4,6 +4,8 @@
 //! `run.json`. It computes nothing beyond formatting. Scores come from [`crate::run::score`]; text and files go to the
 //! user.
 
+mod case_course;
+pub mod case_identity;
 mod case_sentences;
 pub mod case_sheet;
 pub mod case_table;

@@ -6,6 +6,7 @@ mod common;
 mod adding_a_model;
 mod book;
 mod check;
+mod check_sheet;
 mod check_tables;
 mod command_line;
 mod configuration;

@@ -4,6 +4,7 @@
 use serde_json::{Map, Value, json};
 
 use super::Settings;
+use crate::model::assumptions::Constant;
 use crate::model::driver::Bound;
 use crate::model::profile::Profile;
 use crate::support::ranges;
@@ -74,6 +75,12 @@ pub(crate) fn profile_schema() -> Result<Value> {
     let mut schema = profile_part(&values.iter().collect::<Vec<_>>(), &files.iter().collect::<Vec<_>>(), "", &bounds);
     schema["$schema"] = json!("https://json-schema.org/draft/2020-12/schema");
     schema["title"] = json!("lanesweep profile");
+    for Constant { key, meaning, .. } in Constant::all() {
+        let path = format!("/properties/{}", key.replace('.', "/properties/"));
+        let Some(property) = schema.pointer_mut(&path) else { continue };
+        let range = property.get("description").and_then(Value::as_str).map(|range| format!("; {range}"));
+        property["description"] = json!(meaning + &range.unwrap_or_default());
+    }
     Ok(schema)
 }
 

@@ -64,6 +64,8 @@ pub enum TracePanels {
     Course,
     /// TTC, BTN, fuzzy surrogates, lateral position: how it is judged.
     Measures,
+    /// Speed and lateral position of the other vehicles: what is given.
+    Motion,
 }
 
 /// An acceleration that turns more often than this is drawn thin.
@@ -127,6 +129,10 @@ impl<'a> Shown<'a> {
             TracePanels::All => all,
             TracePanels::Course => all[..course].to_vec(),
             TracePanels::Measures => all[course..].to_vec(),
+            TracePanels::Motion => {
+                let speeds = (0..vehicles).map(|vehicle| self.speed_of(vehicle));
+                speeds.chain(others.iter().map(|plots| plots[5].clone())).collect()
+            }
         };
         // The lines through all panels have their names in the first.
         let named =
@@ -203,6 +209,19 @@ impl<'a> Shown<'a> {
         let ends = around(values(&curves));
         let marks = self.marks(&StepMark::ALL, None, &|step| Some(step.v_ego_mps));
         self.panel("Speed (m/s)", hint, 92.0, ends, Vec::new(), with_marks(curves, marks))
+    }
+
+    /// The speed of another vehicle alone.
+    fn speed_of(&self, vehicle: usize) -> Plot {
+        let courses = self.courses(vehicle, &|other| other.v_mps);
+        let speed = |step: &TracedStep| {
+            let other = &step.others[vehicle];
+            other.is_present.then_some((other.v_mps, false))
+        };
+        let curves: Vec<Curve> =
+            courses.into_iter().flat_map(|(look, trace)| runs(look, self.steps(trace), &speed)).collect();
+        let name = if vehicle == 0 { "of the other vehicle" } else { "of the vehicle ahead of it" };
+        self.panel("Speed (m/s)", name, 92.0, around(values(&curves)), Vec::new(), with_marks(curves, Vec::new()))
     }
 
     fn acceleration(&self) -> Plot {

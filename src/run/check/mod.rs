@@ -6,6 +6,7 @@
 mod annex;
 mod boundary;
 mod clauses;
+mod finer;
 mod nominal;
 mod results;
 mod subject;
@@ -18,6 +19,7 @@ use rayon::prelude::*;
 
 pub use boundary::{Boundary, Change};
 pub use clauses::{Demand, Holds, Reading, Relation};
+pub use finer::FinerStep;
 pub use nominal::nominal_verdicts;
 pub use results::{COMPARED, Compared, ComparedCase, Difference, ResultComparison, TheirResult};
 pub use subject::{Lane, Subject};
@@ -89,6 +91,8 @@ pub struct Judgement {
     pub readings: Vec<Reading>,
     /// Values of each parameter at which the answer changes.
     pub boundaries: Vec<Boundary>,
+    /// The runs with a tenth of the time step; `None` without the boundaries.
+    pub finer: Option<FinerStep>,
     /// Maximum duration of a run, s.
     pub time_cap_s: f64,
     /// Cut-out: the time from which the vehicle that cuts out drives through the one ahead of it, s.
@@ -297,6 +301,9 @@ impl Check {
                 true => boundary::boundaries(&self.subject, profile, &budget)?,
                 false => Vec::new(),
             },
+            finer: with_boundaries
+                .then(|| FinerStep::run(&self.subject, profile, &self.models, &budget))
+                .transpose()?,
             time_cap_s: profile.frame.time_cap_s,
             drives_through_s: self.subject.case(profile, self.subject.point())?.drives_through_s(profile),
         })

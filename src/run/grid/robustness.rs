@@ -37,7 +37,7 @@ impl Perturbation {
     }
 
     /// Description.
-    pub(crate) fn label(self) -> &'static str {
+    pub fn label(self) -> &'static str {
         match self {
             Perturbation::FinerStep => "a tenth of the time step",
             Perturbation::More(_, error) => error.more,

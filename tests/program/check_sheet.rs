@@ -1,0 +1,159 @@
+//! The sheet of `lanesweep check` as evidence: what identifies it, what it rests on, what it leaves out.
+
+use std::path::Path;
+
+use assert_cmd::Command;
+use serde_json::Value;
+use sha2::{Digest, Sha256};
+
+const CASE: &str = "check --category cut-in --ego-speed 60km/h --speed 40km/h --gap 15 --lateral-speed 1";
+
+/// Runs a check in a folder; its output.
+fn check(folder: &Path, args: &[&str]) -> String {
+    let mut command = Command::new(env!("CARGO_BIN_EXE_lanesweep"));
+    let output = command.current_dir(folder).env("NO_COLOR", "1").args(args).output().unwrap();
+    let error = String::from_utf8_lossy(&output.stderr);
+    assert!([0, 1, 8, 9, 10].contains(&output.status.code().unwrap()), "{error}");
+    String::from_utf8(output.stdout).unwrap()
+}
+
+/// The document and the page of a check.
+fn sheet(folder: &Path, case: &str, more: &[&str]) -> (Value, String) {
+    let args: Vec<&str> = case.split(' ').chain(more.iter().copied()).collect();
+    let out = check(folder, &[&args[..], &["--sheet", "case.html", "--format", "json"]].concat());
+    (serde_json::from_str(&out).unwrap(), std::fs::read_to_string(folder.join("case.html")).unwrap())
+}
+
+fn sha256(bytes: &[u8]) -> String {
+    Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[test]
+fn the_same_inputs_give_the_same_bytes_in_every_run_folder_and_number_of_threads() {
+    let [here, there] = [tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap()];
+    let case = "category = \"cut-in\"\nego_speed_kmh = 60\nspeed_kmh = 40\ngap = 15\nlateral_speed = 1.0\n";
+    let files = |folder: &Path, threads: &str| {
+        std::fs::write(folder.join("case.toml"), case).unwrap();
+        let args = ["check", "case.toml", "--date", "12 May", "--sheet", "case.html", "--threads", threads];
+        let document = check(folder, &[&args[..], &["--format", "json"]].concat());
+        let page = std::fs::read_to_string(folder.join("case.html")).unwrap();
+        let text = check(folder, &args);
+        [document, page, text].map(|text| text.replace(&format!("--threads {threads}"), "--threads N"))
+    };
+    let first = files(here.path(), "1");
+    assert_eq!(first, files(here.path(), "1"));
+    assert_eq!(first, files(there.path(), "3"));
+}
+
+/// A hash of the file for who has it, and one of the numbers, which is the same for every way to write them.
+#[test]
+fn a_sheet_names_its_input_by_the_bytes_of_the_file_and_by_the_numbers_of_the_case() {
+    let dir = tempfile::tempdir().unwrap();
+    let case = "category = \"cut-in\"\nego_speed_kmh = 60\nspeed_kmh = 40\ngap = 15\nlateral_speed = 1.0\n";
+    std::fs::write(dir.path().join("case.toml"), case).unwrap();
+    let flags = sheet(dir.path(), CASE, &["--profiles", "un-r157"]).0["identity"].clone();
+    let (document, page) = sheet(dir.path(), "check case.toml", &["--profiles", "un-r157"]);
+    assert_eq!(
+        (&flags["file_sha256"], &document["identity"]["file_sha256"]),
+        (&Value::Null, &sha256(case.as_bytes()).into())
+    );
+    assert_eq!(flags["case_sha256"], document["identity"]["case_sha256"]);
+    for hash in ["case_sha256", "file_sha256"] {
+        assert!(page.contains(document["identity"][hash].as_str().unwrap()), "{hash}");
+    }
+    let farther = sheet(dir.path(), "check case.toml", &["--profiles", "un-r157", "--gap", "15.01"]).0;
+    assert_eq!(farther["identity"]["file_sha256"], document["identity"]["file_sha256"]);
+    assert_ne!(farther["identity"]["case_sha256"], document["identity"]["case_sha256"]);
+}
+
+#[test]
+fn a_sheet_names_program_and_profile_and_a_comment_is_no_other_profile() {
+    let dir = tempfile::tempdir().unwrap();
+    let shipped = include_str!("../../configs/profiles/un-r157.toml");
+    std::fs::write(dir.path().join("same.toml"), format!("# mine\n{shipped}")).unwrap();
+    let changed = shipped.replace("delay_s = 0.75", "delay_s = 0.7").replace("\"un-r157\"", "\"mine\"");
+    std::fs::write(dir.path().join("other.toml"), changed).unwrap();
+    let of = |profile: &str| sheet(dir.path(), CASE, &["--profiles", profile]);
+    let hash = |document: &Value| document["profiles"][0]["sha256"].as_str().unwrap().to_owned();
+    let ((ours, page), (same, _), (other, other_page)) = (of("un-r157"), of("same.toml"), of("other.toml"));
+    assert!(hash(&ours).len() == 64 && page.contains(&hash(&ours)));
+    assert_eq!(hash(&ours), hash(&same));
+    assert_ne!(hash(&ours), hash(&other));
+    // Every constant has its source; one that the user changed has none, and the sheet says so.
+    let sources = |document: &Value| {
+        let all = document["assumptions"].as_array().unwrap().clone();
+        let without = all.iter().filter(|of| of["source"].is_null()).map(|of| of["key"].as_str().unwrap().to_owned());
+        (all.len(), without.collect::<Vec<_>>())
+    };
+    assert_eq!(sources(&ours).1, Vec::<String>::new());
+    assert_eq!(sources(&other), (sources(&ours).0, vec!["cchdm.delay_s".to_owned()]));
+    let none = "no source recorded: the profile&#x27;s own value";
+    assert!(!page.contains(none) && other_page.contains(none));
+    let program = ours["program"].as_str().unwrap();
+    let commit = ours["identity"]["commit"].as_str().map_or("unknown", |commit| commit);
+    assert!(
+        page.contains(&format!("{program}, commit {commit}, engine {}", ours["identity"]["engine_version"])),
+        "{commit}"
+    );
+}
+
+#[test]
+fn date_and_author_are_those_that_the_user_gives_and_else_lines_to_write_on() {
+    let dir = tempfile::tempdir().unwrap();
+    let blank = "<dt>date of the run</dt><dd></dd></div>\n<div><dt>author</dt><dd></dd>";
+    assert!(sheet(dir.path(), CASE, &[]).1.contains(blank));
+    let (document, page) = sheet(dir.path(), CASE, &["--date", "12 May 2031", "--author", "A. <b>Signer</b>"]);
+    assert_eq!(
+        (&document["identity"]["date"], &document["identity"]["author"]),
+        (&"12 May 2031".into(), &"A. <b>Signer</b>".into())
+    );
+    assert!(
+        page.contains("<dt>date of the run</dt><dd>12 May 2031</dd>") && page.contains("<dt>signature</dt><dd></dd>")
+    );
+    assert!(page.contains("A. &lt;b&gt;Signer") && !page.contains("<b>Signer"));
+}
+
+/// FSM stops at the leader: its gap of 2 cm at the shipped step is 0.2 cm at a tenth of it.
+#[test]
+fn the_sheet_says_what_a_tenth_of_the_time_step_changes() {
+    let dir = tempfile::tempdir().unwrap();
+    let case =
+        "check --category cut-in --ego-speed 60km/h --speed 20km/h --gap 22 --lateral-speed 1.2 --profiles un-r157";
+    let (document, page) = sheet(dir.path(), case, &[]);
+    let profile = &document["profiles"][0];
+    let gap = |models: &Value| {
+        let fsm = models.as_array().unwrap().iter().find(|model| model["model"] == "FSM").unwrap();
+        fsm["min_gap_m"].as_f64().unwrap()
+    };
+    let (coarse, fine) = (gap(&profile["models"]), gap(&profile["finer_step"]["models"]));
+    assert_eq!(profile["finer_step"]["dt_s"], 0.001);
+    assert!((0.015..0.025).contains(&coarse) && (0.001..0.003).contains(&fine), "{coarse} {fine}");
+    let row = page.split("What a time step of 0.001 s in place of 0.01 s adds").nth(1).unwrap();
+    let row = row.split("<tr>").find(|row| row.contains(">FSM<")).unwrap();
+    assert!(row.contains("the same") && row.contains(&format!("{:.5}", fine - coarse)), "{row}");
+}
+
+/// A leader that brakes and then rolls for a minute: the series is drawn, the minute is not.
+#[test]
+fn a_recorded_motion_is_drawn_for_the_seconds_that_decide() {
+    let dir = tempfile::tempdir().unwrap();
+    let speeds: Vec<f64> = (0..1750).map(|i| (20.0 - 6.0 * f64::from(i.min(60)) / 25.0).max(0.0)).collect();
+    let target = serde_json::json!({"length": 4.3, "width": 1.9, "v": speeds, "y": vec![0.0; 1750]});
+    let ego = serde_json::json!({"v0": 20.0, "length": 4.3, "width": 1.9});
+    let line = serde_json::json!({"id": "a", "category": "lvd", "fps": 25, "kept": true, "side": "left", "ego": ego, "target": target});
+    std::fs::write(dir.path().join("one.jsonl"), format!("{line}\n")).unwrap();
+    let (document, page) = sheet(dir.path(), "check one.jsonl --scenario a --gap 20 --profiles un-r157", &[]);
+    assert!(page.contains("The other vehicles move as recorded, at 25 samples per second until 69.96 s"), "drawn");
+    for panel in ["of the other vehicle", "grey lines: sides of the ego"] {
+        assert!(page.contains(panel), "{panel}");
+    }
+    let said = page.split("Shown are the decisive ").nth(1).expect("a cut");
+    let until_s: f64 = said.split(' ').next().unwrap().parse().unwrap();
+    // Every contact and braking is shown.
+    let models = document["profiles"][0]["models"].as_array().unwrap();
+    let last = models.iter().flat_map(|model| [&model["t_brake_s"], &model["t_crash_s"]]).filter_map(Value::as_f64);
+    let last_s = last.fold(0.0, f64::max);
+    assert!(last_s < until_s && until_s < 20.0, "{last_s} {until_s}");
+    // A case of plain numbers has no recorded motion.
+    assert!(!sheet(dir.path(), CASE, &[]).1.contains("move as recorded"));
+}
