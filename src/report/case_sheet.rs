@@ -151,7 +151,11 @@ impl CaseSheet<'_> {
         let synthetic = if self.is_synthetic { "SYNTHETIC DATA: " } else { "" };
         let numbers: Vec<String> =
             self.numbers().iter().map(|(name, number)| format!("  {name}: {number}\n")).collect();
-        let cautions = self.cautions().into_iter().map(|caution| wrap(&caution, WIDTH - 2).replace('\n', "\n  "));
+        let cautions = self
+            .rule()
+            .into_iter()
+            .chain(self.cautions())
+            .map(|caution| wrap(&caution, WIDTH - 2).replace('\n', "\n  "));
         let sentences = self.demand().into_iter().chain(self.silent()).chain(cautions);
         let demand: Vec<String> = sentences.map(|sentence| format!("  {sentence}\n")).collect();
         format!(
@@ -165,7 +169,7 @@ impl CaseSheet<'_> {
             self.first().profile,
             self.clauses().text(),
             wrap(&format!("Where the answer changes under {}. {BOUNDARIES}", self.first().profile), WIDTH),
-            self.boundaries().text(),
+            self.boundaries().text() + &self.by_rule_text(),
         )
     }
 
@@ -243,6 +247,8 @@ impl CaseSheet<'_> {
             "answer": self.answer(),
             "demand": self.demand(),
             "silent": self.silent(),
+            "rule": self.rule(),
+            "by_rule": self.by_rule_records(),
             "cautions": self.cautions(),
             "profiles": self.judgements.iter().zip(self.profiles).map(judgement).collect::<Vec<_>>(),
         }))
@@ -313,13 +319,19 @@ impl CaseSheet<'_> {
                 .chain([self.answer()])
                 .chain(self.demand())
                 .chain(self.silent())
+                .chain(self.rule())
                 .chain(self.cautions())
                 .map(|sentence| format!("{sentence}."))
                 .collect::<Vec<_>>()
                 .join(" "),
             synthetic: self.is_synthetic,
             warnings,
-            sections: vec![course, case, drivers, clauses, boundaries, reproduction],
+            sections: [course, case, drivers]
+                .into_iter()
+                .chain(self.by_rule_section())
+                .chain([clauses, boundaries])
+                .chain([reproduction])
+                .collect(),
         }
         .html()
     }

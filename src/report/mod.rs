@@ -4,6 +4,7 @@
 //! `run.json`. It computes nothing beyond formatting. Scores come from [`crate::run::score`]; text and files go to the
 //! user.
 
+mod case_sensitivity;
 mod case_sentences;
 pub mod case_sheet;
 pub mod case_table;
@@ -18,6 +19,7 @@ mod html;
 pub mod lanes;
 pub mod map;
 mod map_record;
+mod map_rules;
 mod map_sheet;
 mod map_tables;
 pub mod openscenario;
