@@ -585,6 +585,9 @@ def check(
     profiles: Paths | None = None,
     sheet: Path | None = None,
     series: Path | None = None,
+    uncertain: Values | None = None,
+    draws: Int | None = None,
+    seed: Int | None = None,
     **case: Unpack[Case],
 ) -> Result:
     """Check whether the reference drivers of UN R157 avoid the collision of a concrete case.
@@ -609,6 +612,14 @@ def check(
         Also write the case sheet as an HTML page.
     series : path
         Also write every step of every model under the first profile, as CSV.
+    uncertain : dict, list of str or str
+        Errors of inputs, ``{"gap": "0.5m", "ego_speed": "1km/h"}``: independent normal errors with these standard errors, or uniform ones
+        (``"+-0.5m"``). A name in a list has its usual error; ``"all"`` is every input of the case. The sheet then has the fraction of
+        draws with each answer, and the input that matters most.
+    draws : int
+        With `uncertain`: number of draws, by default 100,000.
+    seed : int
+        With `uncertain`: seed of the draws.
     **case
         `Case` of `lanesweep.options`; it overrides values of a file.
 

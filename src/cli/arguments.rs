@@ -128,6 +128,12 @@ impl FromValue for usize {
     }
 }
 
+impl FromValue for u64 {
+    fn of(value: Value) -> std::result::Result<Self, String> {
+        parsed(&value, "a whole number from 0", |text| whole(text).ok())
+    }
+}
+
 impl FromValue for f64 {
     fn of(value: Value) -> std::result::Result<Self, String> {
         parsed(&value, "a number", |text| text.parse().ok())
@@ -198,10 +204,12 @@ pub(super) fn choice<T: ValueEnum>(value: &Value) -> std::result::Result<T, Stri
 }
 
 /// An argument that means nothing without another one, by verb.
-pub(super) const NEEDS: [(&[&str], &str, &str); 16] = [
+pub(super) const NEEDS: [(&[&str], &str, &str); 18] = [
     (&["study", "search", "compare", "justify", "fit", "verify", "mine"], "preset", "recordings"),
     (&["check"], "scenario", "file"),
     (&["check"], "row", "file"),
+    (&["check"], "draws", "uncertain"),
+    (&["check"], "seed", "uncertain"),
     (&["simulate"], "row", "table"),
     (&["xosc"], "worst", "from"),
     (&["xosc"], "criterion", "worst"),

@@ -12,13 +12,15 @@ use super::console;
 use super::format::FormatFlag;
 use super::signals::CANCEL;
 use super::source::{PlausibilityFlag, complain_of, refuse_overwriting, scenarios_of};
+use super::uncertain_flags::UncertainFlags;
 use super::{Exit, Output};
+use crate::engine::{CpuBackend, Executor};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::report::case_sheet::CaseSheet;
 use crate::report::case_table::{CaseAnswer, CaseTable as Answers};
 use crate::report::trace;
-use crate::run::check::{Answer, Check as Checked, Subject, Verdict};
+use crate::run::check::{Answer, Check as Checked, Subject, Uncertain, Verdict};
 use crate::scenario::{Category, Scenario};
 use crate::support::files::{make_folder_of, write_atomically};
 use crate::support::plausibility::Doubts;
@@ -70,6 +72,8 @@ pub(super) struct Check {
     #[arg(long, value_name = "FILE.csv", help_heading = "Output")]
     series: Option<PathBuf>,
     #[command(flatten)]
+    uncertain: UncertainFlags,
+    #[command(flatten)]
     plausibility: PlausibilityFlag,
     #[command(flatten)]
     format: FormatFlag,
@@ -77,7 +81,7 @@ pub(super) struct Check {
 
 from_arguments!(
     Check { file, row, scenario, profiles, sheet, series }
-    groups { case, plausibility, format }
+    groups { case, uncertain, plausibility, format }
 );
 
 /// The checked case, with facts for the reader.
@@ -110,14 +114,20 @@ impl Check {
             };
             profiles.retain(|profile| profile.name == first.name || !is_first(profile));
         }
+        let uncertain = self.uncertain.of(&request.subject)?;
         let check = Checked { subject: request.subject, profiles, models };
         let judgements = check.run()?;
+        let executor = Executor::new(CpuBackend::lane_arithmetic()).with_cancel(CANCEL.clone());
+        let drawn =
+            |of: Uncertain| of.run(&check.subject, &check.profiles[0], judgements[0].verdicts.answer(), &executor);
+        let uncertainty = uncertain.map(drawn).transpose()?;
         let sheet = CaseSheet {
             subject: &check.subject,
             origin: request.origin,
             is_synthetic: request.is_synthetic,
             profiles: &check.profiles,
             judgements: &judgements,
+            uncertainty: uncertainty.as_ref(),
             command: configured.command.clone(),
         };
         if let Some(path) = &self.sheet {
@@ -144,6 +154,7 @@ impl Check {
         let of_one = [
             ("--sheet", self.sheet.is_some()),
             ("--series", self.series.is_some()),
+            ("--uncertain", self.uncertain.is_given()),
             ("--profiles", self.profiles.len() > 1),
         ];
         match of_one.iter().find(|(_, is_given)| *is_given) {
@@ -313,6 +324,7 @@ fn judge(
         is_synthetic: false,
         profiles: &check.profiles,
         judgements: &judgements,
+        uncertainty: None,
         command: String::new(),
     };
     Ok(CaseAnswer::new(row, id, &sheet))

@@ -37,6 +37,7 @@ mod source;
 mod study;
 mod synth;
 mod tracks;
+mod uncertain_flags;
 mod verify;
 
 pub use exit::Exit;

@@ -10,7 +10,7 @@ use super::trace::{TraceFigure, TracePanels, TraceSeries};
 use crate::Result;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::check::{Boundary, Change, Demand, Judged, Judgement, Reading, RunEnd, Subject, Verdict};
+use crate::run::check::{Boundary, Change, Demand, Judged, Judgement, Reading, RunEnd, Subject, Uncertainty, Verdict};
 use crate::run::grid::{PARAMETERS, VARIED};
 use crate::scenario::{CaseQuantity, KMH, NUMBERS};
 use crate::support::readable::value;
@@ -41,6 +41,8 @@ pub struct CaseSheet<'a> {
     pub profiles: &'a [Profile],
     /// One judgement per profile, at least one; the first decides.
     pub judgements: &'a [Judgement],
+    /// What draws of uncertain inputs say under the first profile, if they were asked for.
+    pub uncertainty: Option<&'a Uncertainty>,
     /// Command that reproduces the sheet.
     pub command: String,
 }
@@ -169,7 +171,7 @@ impl CaseSheet<'_> {
             self.first().profile,
             self.clauses().text(),
             wrap(&format!("Where the answer changes under {}. {BOUNDARIES}", self.first().profile), WIDTH),
-            self.boundaries().text() + &self.by_rule_text(),
+            self.boundaries().text() + &self.by_rule_text() + &self.uncertainty_text(),
         )
     }
 
@@ -249,6 +251,7 @@ impl CaseSheet<'_> {
             "silent": self.silent(),
             "rule": self.rule(),
             "by_rule": self.by_rule_records(),
+            "uncertainty": self.uncertainty.map(|of| self.uncertainty_record(of)),
             "cautions": self.cautions(),
             "profiles": self.judgements.iter().zip(self.profiles).map(judgement).collect::<Vec<_>>(),
         }))
@@ -330,6 +333,7 @@ impl CaseSheet<'_> {
                 .into_iter()
                 .chain(self.by_rule_section())
                 .chain([clauses, boundaries])
+                .chain(self.uncertainty.map(|of| self.uncertainty_section(of)))
                 .chain([reproduction])
                 .collect(),
         }
@@ -360,7 +364,7 @@ fn without_repeats(mut table: Table, first: usize) -> Table {
     table
 }
 
-fn nearest(change: &Change, from: f64) -> Option<f64> {
+pub(super) fn nearest(change: &Change, from: f64) -> Option<f64> {
     let distance = |at: &f64| (at - from).abs();
     change.below.into_iter().chain(change.above).min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
@@ -386,6 +390,6 @@ fn ends(change: &Change) -> Value {
 }
 
 /// A number with its sign.
-fn signed(number: f64) -> String {
+pub(super) fn signed(number: f64) -> String {
     format!("{}{}", if number < 0.0 { "-" } else { "+" }, value(number.abs()))
 }

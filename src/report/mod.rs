@@ -8,6 +8,7 @@ mod case_sensitivity;
 mod case_sentences;
 pub mod case_sheet;
 pub mod case_table;
+mod case_uncertainty;
 pub mod compare;
 pub mod density;
 pub mod dossier;

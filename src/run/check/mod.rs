@@ -8,6 +8,7 @@ mod boundary;
 mod clauses;
 mod sensitivity;
 mod subject;
+mod uncertainty;
 mod verdict;
 
 use std::cell::Cell;
@@ -18,6 +19,7 @@ pub use boundary::{Boundary, Change};
 pub use clauses::{Demand, Holds, Reading, Relation};
 pub use sensitivity::{DriverRule, RuleVerdicts};
 pub use subject::{Lane, Subject};
+pub use uncertainty::{UNCERTAIN_DRAWS, UNCERTAIN_LEVEL, Uncertain, UncertainInput, Uncertainty};
 use verdict::settled;
 pub use verdict::{Answer, CaseVerdicts, RunEnd, Verdict};
 

@@ -143,13 +143,17 @@ impl Subject {
     /// # Errors
     /// [`Error::Usage`] for contradictory numbers; [`Error::Input`] for a cut-out without a vehicle ahead.
     pub fn lane(&self, profile: &Profile, point: &Point) -> Result<Lane> {
-        let headway = match (point.get(CaseQuantity::Thw), point.get(CaseQuantity::Gap)) {
-            (Some(thw_s), _) => Headway::ThwS(thw_s),
-            (None, gap_m) => Headway::GapM(gap_m.unwrap_or(0.0)),
-        };
         let mut tables = Tables::default();
         let case = LaneCase::encode(&self.case(profile, point)?, profile, &mut tables);
-        Ok(Lane { case, tables, headway })
+        Ok(Lane { case, tables, headway: headway(point) })
+    }
+}
+
+/// The initial headway or gap of a point.
+pub(super) fn headway(point: &Point) -> Headway {
+    match (point.get(CaseQuantity::Thw), point.get(CaseQuantity::Gap)) {
+        (Some(thw_s), _) => Headway::ThwS(thw_s),
+        (None, gap_m) => Headway::GapM(gap_m.unwrap_or(0.0)),
     }
 }
 

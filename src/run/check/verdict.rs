@@ -20,6 +20,9 @@ pub enum Answer {
 }
 
 impl Answer {
+    /// All, in the order of tables.
+    pub const ALL: [Answer; 4] = [Answer::Preventable, Answer::NotPreventable, Answer::NoConflict, Answer::Open];
+
     /// The words of sheets and maps.
     pub fn label(self) -> &'static str {
         match self {
