@@ -594,6 +594,9 @@ def check(
     device: str | Int | None = None,
     date: str | None = None,
     author: str | None = None,
+    uncertain: Values | None = None,
+    draws: Int | None = None,
+    seed: Int | None = None,
     **case: Unpack[Case],
 ) -> Result:
     """Check whether the reference drivers of UN R157 avoid the collision of a concrete case.
@@ -633,6 +636,14 @@ def check(
         Device of `nominal`, by part of its name, PCI bus id or index.
     date, author : str
         Date of the run and author, as the sheet is to show them. The clock is not asked.
+    uncertain : dict, list of str or str
+        Errors of inputs, ``{"gap": "0.5m", "ego_speed": "1km/h"}``: independent normal errors with these standard errors, or uniform ones
+        (``"+-0.5m"``). A name in a list has its usual error; ``"all"`` is every input of the case. The sheet then has the fraction of
+        draws with each answer, and the input that matters most.
+    draws : int
+        With `uncertain`: number of draws, by default 100,000.
+    seed : int
+        With `uncertain`: seed of the draws.
     **case
         `Case` of `lanesweep.options`; it overrides values of a file.
 

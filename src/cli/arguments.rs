@@ -203,10 +203,12 @@ pub(super) fn choice<T: ValueEnum>(value: &Value) -> std::result::Result<T, Stri
 }
 
 /// An argument that means nothing without another one, by verb.
-pub(super) const NEEDS: [(&[&str], &str, &str); 16] = [
+pub(super) const NEEDS: [(&[&str], &str, &str); 18] = [
     (&["study", "search", "compare", "justify", "fit", "verify", "mine"], "preset", "recordings"),
     (&["check"], "scenario", "file"),
     (&["check"], "row", "file"),
+    (&["check"], "draws", "uncertain"),
+    (&["check"], "seed", "uncertain"),
     (&["simulate"], "row", "table"),
     (&["xosc"], "worst", "from"),
     (&["xosc"], "criterion", "worst"),

@@ -10,14 +10,17 @@ use super::check_results::ComparedTable;
 use super::check_table::CheckedTable;
 use super::configured::Configured;
 use super::format::FormatFlag;
+use super::signals::CANCEL;
 use super::source::{PlausibilityFlag, refuse_overwriting, scenarios_of};
+use super::uncertain_flags::UncertainFlags;
 use super::{Exit, Output};
+use crate::engine::{CpuBackend, Executor};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::report::case_identity::CaseIdentity;
 use crate::report::case_sheet::CaseSheet;
 use crate::report::trace;
-use crate::run::check::{Answer, Check as Checked, Subject, Verdict};
+use crate::run::check::{Answer, Check as Checked, Subject, Uncertain, Verdict};
 use crate::scenario::{Category, Scenario};
 use crate::support::files::{make_folder_of, write_atomically};
 use crate::support::input_file;
@@ -94,6 +97,8 @@ pub(super) struct Check {
     #[arg(long, value_name = "TEXT", help_heading = "Output")]
     author: Option<String>,
     #[command(flatten)]
+    uncertain: UncertainFlags,
+    #[command(flatten)]
     plausibility: PlausibilityFlag,
     #[command(flatten)]
     format: FormatFlag,
@@ -101,7 +106,7 @@ pub(super) struct Check {
 
 from_arguments!(
     Check { file, row, scenario, profiles, sheet, rows, sheets, results, nominal, series, date, author }
-    groups { case, plausibility, format }
+    groups { case, uncertain, plausibility, format }
 );
 
 /// The checked case, with facts for the reader.
@@ -159,14 +164,20 @@ impl Check {
             };
             profiles.retain(|profile| profile.name == first.name || !is_first(profile));
         }
+        let uncertain = self.uncertain.of(&request.subject)?;
         let check = Checked { subject: request.subject, profiles, models };
         let judgements = check.run()?;
+        let executor = Executor::new(CpuBackend::lane_arithmetic()).with_cancel(CANCEL.clone());
+        let drawn =
+            |of: Uncertain| of.run(&check.subject, &check.profiles[0], judgements[0].verdicts.answer(), &executor);
+        let uncertainty = uncertain.map(drawn).transpose()?;
         let sheet = CaseSheet {
             subject: &check.subject,
             origin: request.origin,
             is_synthetic: request.is_synthetic,
             profiles: &check.profiles,
             judgements: &judgements,
+            uncertainty: uncertainty.as_ref(),
             command: configured.command.clone(),
             identity: self.identity()?,
         };
@@ -206,6 +217,7 @@ impl Check {
             ("--series", self.series.is_some()),
             ("--date", self.date.is_some() && !has_sheets),
             ("--author", self.author.is_some() && !has_sheets),
+            ("--uncertain", self.uncertain.is_given()),
             ("--profiles", self.profiles.len() > 1),
         ];
         match of_one.iter().find(|(_, is_given)| *is_given) {

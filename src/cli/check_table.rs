@@ -163,6 +163,7 @@ impl CheckedTable<'_> {
             is_synthetic: false,
             profiles: &check.profiles,
             judgements: &judgements,
+            uncertainty: None,
             command: command.to_owned(),
             identity: self.identity.clone(),
         };

@@ -39,6 +39,7 @@ mod source;
 mod study;
 mod synth;
 mod tracks;
+mod uncertain_flags;
 mod vary;
 mod verify;
 

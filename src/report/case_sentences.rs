@@ -4,7 +4,7 @@ use super::case_sheet::CaseSheet;
 use crate::model::driver::ModelId;
 use crate::run::check::{Answer, Demand, Holds, Judged, Judgement, Verdict};
 use crate::run::grid::VARIED;
-use crate::scenario::{CaseQuantity, KMH};
+use crate::scenario::{CaseQuantity, Category, KMH};
 use crate::support::readable::value;
 
 impl CaseSheet<'_> {
@@ -138,7 +138,15 @@ impl CaseSheet<'_> {
     /// What the cut-in clauses demand of the system, each clause once, and where the first profile's clause and the
     /// drivers disagree.
     pub(super) fn demand(&self) -> Vec<String> {
-        self.demand_of_first().into_iter().chain(self.other_clauses().filter_map(demand_of)).collect()
+        let of_others = self.other_clauses().filter_map(demand_of);
+        self.demand_of_first().into_iter().chain(of_others).chain(self.clause_of_leaders()).collect()
+    }
+
+    /// The clause of a leader that brakes, which names no driver.
+    fn clause_of_leaders(&self) -> Option<String> {
+        let clause = "UN R157, 5.2.5.1 still holds, whatever the drivers of Annex 3 do: the system has to avoid a collision with a \
+                      leader that brakes up to its full performance (its conditions are not tested here)";
+        (self.subject.category() == Category::Lvd).then(|| clause.to_owned())
     }
 
     fn demand_of_first(&self) -> Vec<String> {

@@ -11,7 +11,7 @@ use super::trace::{TraceFigure, TracePanels, TraceSeries};
 use crate::Result;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::run::check::{Boundary, Change, Demand, Judged, Judgement, Reading, RunEnd, Subject, Verdict};
+use crate::run::check::{Boundary, Change, Demand, Judged, Judgement, Reading, RunEnd, Subject, Uncertainty, Verdict};
 use crate::run::grid::VARIED;
 use crate::scenario::{CaseQuantity, KMH, NUMBERS};
 use crate::support::readable::value;
@@ -42,6 +42,8 @@ pub struct CaseSheet<'a> {
     pub profiles: &'a [Profile],
     /// One judgement per profile, at least one; the first decides.
     pub judgements: &'a [Judgement],
+    /// What draws of uncertain inputs say under the first profile, if they were asked for.
+    pub uncertainty: Option<&'a Uncertainty>,
     /// Command that reproduces the sheet.
     pub command: String,
     /// What the user and the build say of it.
@@ -165,7 +167,11 @@ impl CaseSheet<'_> {
         let synthetic = if self.is_synthetic { "SYNTHETIC DATA: " } else { "" };
         let numbers: Vec<String> =
             self.numbers().iter().map(|(name, number)| format!("  {name}: {number}\n")).collect();
-        let cautions = self.cautions().into_iter().map(|caution| wrap(&caution, WIDTH - 2).replace('\n', "\n  "));
+        let cautions = self
+            .rule()
+            .into_iter()
+            .chain(self.cautions())
+            .map(|caution| wrap(&caution, WIDTH - 2).replace('\n', "\n  "));
         let sentences = self.demand().into_iter().chain(self.silent()).chain(cautions);
         let demand: Vec<String> = sentences.map(|sentence| format!("  {sentence}\n")).collect();
         format!(
@@ -179,7 +185,7 @@ impl CaseSheet<'_> {
             self.first().profile,
             self.clauses().text(),
             wrap(&format!("Where the answer changes under {}. {BOUNDARIES}", self.first().profile), WIDTH),
-            self.boundaries().text(),
+            self.boundaries().text() + &self.by_rule_text() + &self.uncertainty_text(),
             self.identity_text(),
         )
     }
@@ -255,6 +261,9 @@ impl CaseSheet<'_> {
             "answer": self.answer(),
             "demand": self.demand(),
             "silent": self.silent(),
+            "rule": self.rule(),
+            "by_rule": self.by_rule_records(),
+            "uncertainty": self.uncertainty.map(|of| self.uncertainty_record(of)),
             "cautions": self.cautions(),
             "profiles": self.judgements.iter().zip(self.profiles).map(judgement).collect::<Vec<_>>(),
             "assumptions": assumptions_json(&self.profiles[0]),
@@ -296,7 +305,12 @@ impl CaseSheet<'_> {
             ),
         };
         let [of_first, of_others] = self.drivers_by_profile();
-        let notes = [("demand", self.demand()), ("readings", self.silent()), ("limits", self.cautions())];
+        let notes = [
+            ("drivers", self.rule()),
+            ("demand", self.demand()),
+            ("readings", self.silent()),
+            ("limits", self.cautions()),
+        ];
         let notes = notes.into_iter().filter(|(_, sentences)| !sentences.is_empty());
         let answer = Section::new("answer", "Answer")
             .fact("answer", first.verdict().label())
@@ -334,20 +348,13 @@ impl CaseSheet<'_> {
             lead: format!("{}. {}.", self.case(), self.answer()),
             synthetic: self.is_synthetic,
             warnings,
-            sections: vec![
-                answer,
-                case,
-                drivers,
-                self.identity_section(),
-                self.signature_section(),
-                course,
-                others,
-                clauses,
-                boundaries,
-                self.numerics_section(),
-                assumptions,
-                CaseSheet::not_considered_section(),
-            ],
+            sections: [answer, case, drivers, self.identity_section(), self.signature_section(), course, others]
+                .into_iter()
+                .chain(self.by_rule_section())
+                .chain([clauses, boundaries])
+                .chain(self.uncertainty.map(|of| self.uncertainty_section(of)))
+                .chain([self.numerics_section(), assumptions, CaseSheet::not_considered_section()])
+                .collect(),
         }
         .html()
     }
@@ -376,7 +383,7 @@ fn without_repeats(mut table: Table, first: usize) -> Table {
     table
 }
 
-fn nearest(change: &Change, from: f64) -> Option<f64> {
+pub(super) fn nearest(change: &Change, from: f64) -> Option<f64> {
     let distance = |at: &f64| (at - from).abs();
     change.below.into_iter().chain(change.above).min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
@@ -402,6 +409,6 @@ fn ends(change: &Change) -> Value {
 }
 
 /// A number with its sign.
-fn signed(number: f64) -> String {
+pub(super) fn signed(number: f64) -> String {
     format!("{}{}", if number < 0.0 { "-" } else { "+" }, value(number.abs()))
 }

@@ -24,6 +24,8 @@ impl MapReport {
             simulations: self.simulations(),
             grids: self.grids.iter().map(|mapped| self.grid_record(mapped, &shown)).collect::<Vec<_>>(),
             differences: self.differences().iter().map(difference_record).collect::<Vec<_>>(),
+            // Preventable conflict cells, and those that a rule turns, by the driver that decides.
+            driver_rules: self.rule_records(),
             profile: &self.profile,
             other_profile: match &self.against {
                 Some(Against::Profile(profile)) => Some(profile),

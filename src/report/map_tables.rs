@@ -53,6 +53,7 @@ impl MapReport {
             );
         }
         text.push_str(&self.words_of_outcomes(&outcomes));
+        text.push_str(&self.rule_text());
         let differences = self.differences();
         if !differences.is_empty() {
             let shown = self.shown_agreements();

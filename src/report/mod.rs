@@ -6,9 +6,11 @@
 
 mod case_course;
 pub mod case_identity;
+mod case_sensitivity;
 mod case_sentences;
 pub mod case_sheet;
 pub mod case_table;
+mod case_uncertainty;
 pub mod compare;
 pub mod density;
 pub mod dossier;
@@ -20,6 +22,7 @@ mod html;
 pub mod lanes;
 pub mod map;
 mod map_record;
+mod map_rules;
 mod map_sheet;
 mod map_tables;
 pub mod openscenario;

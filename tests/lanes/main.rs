@@ -13,4 +13,5 @@ mod partial;
 mod sampled_lanes;
 mod score;
 mod simd_equals_scalar;
+mod uncertain_inputs;
 mod verify_sets;

@@ -823,3 +823,42 @@ fn named_options_explain_every_cell_between_the_readings() {
     step!("`frame.start_shift` (with it the JRC's cases and starts)", frame.start_shift);
     assert_eq!(step!("`criteria.gate`", criteria.gate), 0, "nothing else tells the readings apart");
 }
+
+/// The cells by rule are those that the verdicts of the two drivers give. In these cut-ins CCHDM never avoids what FSM does not.
+#[test]
+fn cells_by_rule_follow_from_the_verdicts_of_the_reference_drivers() {
+    let dir = tempfile::tempdir().unwrap();
+    let rules = |args: &[&str]| {
+        let ran = lanesweep(&[&["-q", "map", "--out", text(dir.path())], args].concat());
+        assert_eq!(ran.status.code(), Some(0), "{}", stderr(&ran));
+        let record = std::fs::read_to_string(dir.path().join("map.json")).unwrap();
+        serde_json::from_str::<serde_json::Value>(&record).unwrap()["driver_rules"].as_array().unwrap().clone()
+    };
+    let found = rules(&["cut-in", "--preset", "r157", "--models", "CCHDM,FSM"]);
+    let cells = std::fs::read_to_string(dir.path().join("cells.csv")).unwrap();
+    let mut lines = cells.lines().map(|line| line.split(',').collect::<Vec<_>>());
+    let header = lines.next().unwrap();
+    let at = |name: &str| header.iter().position(|column| *column == name).unwrap();
+    let (model, collision, conflict) = (at("model"), at("collision"), at("conflict"));
+    let rows: Vec<Vec<&str>> = lines.collect();
+    let (mut conflicts, mut either, mut both) = (0, 0, 0);
+    for cell in rows.chunks(2).filter(|cell| cell[0][conflict] == "1") {
+        assert_eq!([cell[0][model], cell[1][model]], ["CCHDM", "FSM"]);
+        let avoids = [0, 1].map(|driver: usize| cell[driver][collision] == "0");
+        conflicts += 1;
+        either += u64::from(avoids[0] || avoids[1]);
+        both += u64::from(avoids[0] && avoids[1]);
+    }
+    let of_all = |rule: &str| {
+        let row = found.iter().find(|row| row["map"] == "all maps" && row["rule"] == rule).unwrap();
+        ["conflict", "preventable", "turned"].map(|key| row[key].as_u64().unwrap())
+    };
+    assert_eq!(of_all("any (in force)"), [conflicts, either, 0]);
+    assert_eq!(of_all("all"), [conflicts, both, either - both]);
+    assert_eq!(of_all("CCHDM alone"), [27_869, 18_002, 5301], "what the book says");
+    assert_eq!(of_all("FSM alone"), [27_869, 23_303, 0]);
+    // Without a common start, without both drivers, and for other criteria there is nothing to decide.
+    assert!(rules(&["lvd", "--preset", "jrc"]).is_empty());
+    assert!(rules(&["cut-in", "--preset", "r157", "--models", "FSM"]).is_empty());
+    assert!(rules(&["cut-in", "--preset", "r157", "--models", "CCHDM,FSM", "--criterion", "ttc"]).is_empty());
+}

@@ -62,7 +62,24 @@ impl NamedNumber {
 
     /// Its key, without a unit.
     pub fn key(self) -> &'static str {
-        NUMBERS[self.at].key
+        self.number().key
+    }
+
+    /// Its row of [`NUMBERS`].
+    pub fn number(self) -> &'static CaseNumber {
+        &NUMBERS[self.at]
+    }
+
+    /// A written value in SI units.
+    ///
+    /// # Errors
+    /// As [`NamedNumber::set`].
+    pub fn si(self, written: Written<'_>) -> Result<f64> {
+        let number = self.number();
+        units::si(written, number.unit(), self.unit).map_err(|unusable| {
+            let help = unusable.help(number.key);
+            Error::usage(Place::item(number.key), unusable.problem, help)
+        })
     }
 
     /// Sets it to a written value.
@@ -70,12 +87,7 @@ impl NamedNumber {
     /// # Errors
     /// [`Error::Usage`] at the key: a text that is no such quantity, or a speed without a unit.
     pub fn set(self, case: &mut CaseParameters, written: Written<'_>) -> Result<()> {
-        let number = &NUMBERS[self.at];
-        let si = units::si(written, number.unit(), self.unit).map_err(|unusable| {
-            let help = unusable.help(number.key);
-            Error::usage(Place::item(number.key), unusable.problem, help)
-        })?;
-        *(number.field)(case) = Some(si);
+        *(self.number().field)(case) = Some(self.si(written)?);
         Ok(())
     }
 

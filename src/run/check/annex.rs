@@ -63,15 +63,25 @@ pub(super) fn outside(profile: &Profile, category: Category, point: &Point) -> O
     }
 }
 
-/// Returns our interpretations where the annex is silent, each with a profile that has another interpretation.
-pub(super) fn readings_where_silent(profile: &Profile, category: Category) -> Vec<(String, Profile)> {
+/// One of our interpretations where the annex is silent, and another one.
+pub(super) struct Reading {
+    /// Ours, as a sentence.
+    pub sentence: String,
+    /// The other one: the key of the profile with its value.
+    pub instead: &'static str,
+    /// The profile with the other one.
+    pub profile: Profile,
+}
+
+/// Returns our interpretations where the annex is silent.
+pub(super) fn readings_where_silent(profile: &Profile, category: Category) -> Vec<Reading> {
     let mut all = Vec::new();
     let (coasting_mps2, ttc_s) = (value(profile.cchdm.coasting_mps2), value(profile.cchdm.ttc_s));
-    let mut other = |sentence: String, change: &dyn Fn(&mut Profile)| {
+    let mut other = |sentence: String, instead: &'static str, change: &dyn Fn(&mut Profile)| {
         let mut other = profile.clone();
         change(&mut other);
         if other != *profile {
-            all.push((sentence, other));
+            all.push(Reading { sentence, instead, profile: other });
         }
     };
     // `wandering_m` is the lateral deviation that the annex regards as normal. A profile without it does not follow the
@@ -80,16 +90,21 @@ pub(super) fn readings_where_silent(profile: &Profile, category: Category) -> Ve
         return all;
     }
     let coasts = format!("CCHDM coasts at {coasting_mps2} m/s² during its delay (the JRC's; the annex gives no value)");
-    other(coasts, &|other| other.cchdm.coasting_mps2 = 0.0);
+    other(coasts, "cchdm.coasting_mps2 = 0", &|other| other.cchdm.coasting_mps2 = 0.0);
     match category {
         Category::CutIn => {
             let brakes = format!("CCHDM brakes until the speeds are equal, not only while TTC ≤ {ttc_s} s (ours)");
-            other(brakes, &|other| other.cchdm.cut_in_braking = CutInBraking::WhileUnsafe);
+            let instead = "cchdm.cut_in_braking = while-unsafe";
+            other(brakes, instead, &|other| other.cchdm.cut_in_braking = CutInBraking::WhileUnsafe);
         }
         Category::Lvd => {
-            for below in [BelowTrigger::Never, BelowTrigger::DelayOnly, BelowTrigger::AtOnce] {
+            for (below, instead) in [
+                (BelowTrigger::Never, "cchdm.lvd_below_threshold = never"),
+                (BelowTrigger::DelayOnly, "cchdm.lvd_below_threshold = delay-only"),
+                (BelowTrigger::AtOnce, "cchdm.lvd_below_threshold = at-once"),
+            ] {
                 let reacts = "CCHDM reacts to a leader that never exceeds the trigger by `lvd_below_threshold` (ours)";
-                other(reacts.to_owned(), &|other| other.cchdm.lvd_below_threshold = below);
+                other(reacts.to_owned(), instead, &|other| other.cchdm.lvd_below_threshold = below);
             }
         }
         Category::CutOut => {}

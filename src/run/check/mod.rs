@@ -9,7 +9,9 @@ mod clauses;
 mod finer;
 mod nominal;
 mod results;
+mod sensitivity;
 mod subject;
+mod uncertainty;
 mod vary;
 mod verdict;
 
@@ -22,8 +24,11 @@ pub use clauses::{Demand, Holds, Reading, Relation};
 pub use finer::FinerStep;
 pub use nominal::nominal_verdicts;
 pub use results::{COMPARED, Compared, ComparedCase, Difference, ResultComparison, TheirResult};
+pub use sensitivity::{DriverRule, RuleVerdicts};
 pub use subject::{Lane, Subject};
+pub use uncertainty::{UNCERTAIN_DRAWS, UNCERTAIN_LEVEL, Uncertain, UncertainInput, Uncertainty};
 pub use vary::{VariationCounts, Variations, VariedCase, VariedRange, vary};
+use verdict::settled;
 pub use verdict::{Answer, CaseVerdicts, RunEnd, Verdict};
 
 use crate::engine::{NO_STEP, Outcome, StepMark, Trace, check_time_step};
@@ -93,6 +98,8 @@ pub struct Judgement {
     pub boundaries: Vec<Boundary>,
     /// The runs with a tenth of the time step; `None` without the boundaries.
     pub finer: Option<FinerStep>,
+    /// The verdicts by rule, of the profile as it is and of each other reading; empty without reference drivers.
+    pub by_rule: Vec<RuleVerdicts>,
     /// Maximum duration of a run, s.
     pub time_cap_s: f64,
     /// Cut-out: the time from which the vehicle that cuts out drives through the one ahead of it, s.
@@ -126,11 +133,7 @@ impl Judgement {
     /// The answer, if no perturbation changes it, the time step resolves the gap that it rests on, and Annex 3 describes
     /// the case. An answer of no conflict does not need Annex 3.
     pub fn verdict(&self) -> Verdict {
-        match self.verdicts.verdict() {
-            verdict @ (Verdict::OutsideAnnex | Verdict::NotJudged) => verdict,
-            verdict if self.flips.is_empty() && !self.rests_on_touching() => verdict,
-            _ => Verdict::Undecided,
-        }
+        settled(self.verdicts.verdict(), self.flips.is_empty() && !self.rests_on_touching())
     }
 
     /// Reference drivers that avoid a collision which an ego without a reaction has.
@@ -140,8 +143,7 @@ impl Judgement {
 
     /// Whether every driver that avoids the collision touches.
     pub fn rests_on_touching(&self) -> bool {
-        self.verdicts.answer() == Answer::Preventable
-            && self.verdicts.avoided_by().iter().all(|model| self.touching.contains(model))
+        self.verdicts.rests_on(&self.touching, DriverRule::Any)
     }
 
     /// What the clause of cut-ins demands. `None` for other cases and for a profile without a clause.
@@ -237,7 +239,8 @@ impl Check {
         self.judge(true)
     }
 
-    /// Like [`Check::run`], without the search for the values at which the answer changes: by far the most lanes.
+    /// Like [`Check::run`], without the values at which the answer changes, which need by far the most lanes, and without
+    /// the verdicts by rule.
     ///
     /// # Errors
     /// As [`Check::run`].
@@ -280,7 +283,7 @@ impl Check {
             profile: profile.name.clone(),
             models: models.collect(),
             verdicts: changed[0].verdicts.clone(),
-            flips: flips(&changed, |changed| changed.verdicts.answer_within_the_cap()),
+            flips: flips(&changed, |changed| changed.verdicts.answer_within_the_cap(DriverRule::Any)),
             open_with: changed.iter().filter(opens).map(|changed| changed.by).collect(),
             driver_flips: ModelId::ALL.map(driver).to_vec(),
             touching,
@@ -304,6 +307,7 @@ impl Check {
             finer: with_boundaries
                 .then(|| FinerStep::run(&self.subject, profile, &self.models, &budget))
                 .transpose()?,
+            by_rule: if with_boundaries { self.by_rule(profile, &budget)? } else { Vec::new() },
             time_cap_s: profile.frame.time_cap_s,
             drives_through_s: self.subject.case(profile, self.subject.point())?.drives_through_s(profile),
         })
@@ -338,9 +342,9 @@ impl Check {
             Ok(found.answer() != is.answer() || found.collides(ModelId::Cchdm) != is.collides(ModelId::Cchdm))
         };
         let mut all = Vec::new();
-        for (sentence, other) in annex::readings_where_silent(profile, category) {
-            if !all.contains(&sentence) && decides(&other)? {
-                all.push(sentence);
+        for other in annex::readings_where_silent(profile, category) {
+            if !all.contains(&other.sentence) && decides(&other.profile)? {
+                all.push(other.sentence);
             }
         }
         all.extend(attends_at_once.map(str::to_owned));

@@ -144,10 +144,9 @@ impl Subject {
     /// # Errors
     /// [`Error::Usage`] for contradictory numbers; [`Error::Input`] for a cut-out without a vehicle ahead.
     pub fn lane(&self, profile: &Profile, point: &Point) -> Result<Lane> {
-        let headway = start_of(point);
         let mut tables = Tables::default();
         let case = LaneCase::encode(&self.case(profile, point)?, profile, &mut tables);
-        Ok(Lane { case, tables, headway })
+        Ok(Lane { case, tables, headway: headway(point) })
     }
 
     /// The case with every step of some models.
@@ -155,7 +154,7 @@ impl Subject {
     /// # Errors
     /// As [`TracedCase::run`].
     pub fn traced(&self, profile: &Profile, models: &[ModelId]) -> Result<TracedCase> {
-        TracedCase::run(&self.case(profile, self.point())?, start_of(self.point()), profile, models)
+        TracedCase::run(&self.case(profile, self.point())?, headway(self.point()), profile, models)
     }
 
     /// The case with its initial gap, for a plan whose lanes start where their cases do.
@@ -164,13 +163,13 @@ impl Subject {
     /// As [`Subject::lane`].
     pub(super) fn encode(&self, profile: &Profile, tables: &mut Tables<f64>) -> Result<LaneCase<f64>> {
         let case = self.case(profile, self.point())?;
-        let gap_m = start_of(self.point()).start().gap(case.ego_speed_mps);
+        let gap_m = headway(self.point()).start().gap(case.ego_speed_mps);
         Ok(LaneCase::encode(&case, profile, tables).ahead_by(gap_m))
     }
 }
 
-/// The headway or gap of a point.
-fn start_of(point: &Point) -> Headway {
+/// The initial headway or gap of a point.
+pub(super) fn headway(point: &Point) -> Headway {
     match (point.get(CaseQuantity::Thw), point.get(CaseQuantity::Gap)) {
         (Some(thw_s), _) => Headway::ThwS(thw_s),
         (None, gap_m) => Headway::GapM(gap_m.unwrap_or(0.0)),

@@ -1,5 +1,6 @@
 //! The answer of a check, derived from the ends of the runs of the drivers and of an ego that never reacts.
 
+use super::sensitivity::DriverRule;
 use super::subject::LaneRun;
 use crate::engine::EndReason;
 use crate::model::criterion::Criterion;
@@ -19,6 +20,9 @@ pub enum Answer {
 }
 
 impl Answer {
+    /// All, in the order of tables.
+    pub const ALL: [Answer; 4] = [Answer::Preventable, Answer::NotPreventable, Answer::NoConflict, Answer::Open];
+
     /// The words of sheets and maps.
     pub fn label(self) -> &'static str {
         match self {
@@ -114,7 +118,12 @@ impl CaseVerdicts {
 
     /// The answer if Annex 3 describes the case. An answer of no conflict does not need Annex 3.
     pub fn verdict(&self) -> Verdict {
-        match self.answer() {
+        self.verdict_by(DriverRule::Any)
+    }
+
+    /// The same by another rule.
+    pub(super) fn verdict_by(&self, rule: DriverRule) -> Verdict {
+        match self.answer_by(rule) {
             _ if self.reference_drivers.is_empty() => Verdict::NotJudged,
             Answer::NoConflict => Verdict::Answer(Answer::NoConflict),
             _ if self.is_outside_annex => Verdict::OutsideAnnex,
@@ -125,8 +134,8 @@ impl CaseVerdicts {
 
     /// The answer for comparisons with a perturbed case: a gap that closes for longer than a run is no other answer than
     /// one that does not close.
-    pub(super) fn answer_within_the_cap(&self) -> Answer {
-        match self.answer() {
+    pub(super) fn answer_within_the_cap(&self, rule: DriverRule) -> Answer {
+        match self.answer_by(rule) {
             Answer::Open => Answer::NoConflict,
             answer => answer,
         }
@@ -134,11 +143,31 @@ impl CaseVerdicts {
 
     /// The answer that follows from the ends.
     pub fn answer(&self) -> Answer {
+        self.answer_by(DriverRule::Any)
+    }
+
+    fn answer_by(&self, rule: DriverRule) -> Answer {
         match self.unreacting {
             RunEnd::Clear => Answer::NoConflict,
             RunEnd::Open => Answer::Open,
-            RunEnd::Contact if !self.avoided_by().is_empty() => Answer::Preventable,
+            RunEnd::Contact if rule.holds(&self.reference_drivers, |model| !self.collides(model)) => {
+                Answer::Preventable
+            }
             RunEnd::Contact => Answer::NotPreventable,
         }
+    }
+
+    /// Whether the answer is preventable only if drivers that touch avoid the collision.
+    pub(super) fn rests_on(&self, touching: &[ModelId], rule: DriverRule) -> bool {
+        let avoids_clearly = |model: ModelId| !self.collides(model) && !touching.contains(&model);
+        self.answer_by(rule) == Answer::Preventable && !rule.holds(&self.reference_drivers, avoids_clearly)
+    }
+}
+
+/// The verdict of a case whose answer is robust or not. What Annex 3 does not describe has no answer to be robust.
+pub(super) fn settled(verdict: Verdict, is_robust: bool) -> Verdict {
+    match verdict {
+        Verdict::Answer(_) if !is_robust => Verdict::Undecided,
+        verdict => verdict,
     }
 }
