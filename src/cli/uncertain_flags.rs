@@ -14,17 +14,17 @@ const MAX_DRAWS: u64 = 1_000_000_000;
 
 #[derive(Debug, Args)]
 pub(super) struct UncertainFlags {
-    /// Draw errors of inputs: how often each answer is [without a LIST: every input, its usual error]
+    /// Draw errors of these inputs, else of all, and count the answers
     ///
     /// LIST is `gap=0.5m,ego_speed=1km/h`: independent normal errors with these standard errors. A name alone has its usual
-    /// error, `gap=+-0.5m` is uniform in ± 0.5 m. `all` is every input. The case and FILE stand before it.
-    #[arg(long, value_name = "LIST", num_args = 0..=1, default_missing_value = ALL, value_delimiter = ',', help_heading = "Uncertain inputs")]
+    /// error, `gap=+-0.5m` is uniform in ± 0.5 m. Without a LIST, or with `all`, every input has its usual error. FILE stands before it.
+    #[arg(long, value_name = "LIST", num_args = 0..=1, default_missing_value = ALL, value_delimiter = ',', help_heading = "Scenario")]
     uncertain: Vec<String>,
     /// With --uncertain: number of draws
-    #[arg(long, value_name = "N", default_value_t = UNCERTAIN_DRAWS, value_parser = super::arguments::whole::<u64>, help_heading = "Uncertain inputs", hide_short_help = true)]
+    #[arg(long, value_name = "N", default_value_t = UNCERTAIN_DRAWS, value_parser = super::arguments::whole::<u64>, help_heading = "Scenario", hide_short_help = true)]
     draws: u64,
     /// With --uncertain: seed of the draws
-    #[arg(long, value_name = "N", default_value_t = 157, help_heading = "Uncertain inputs", hide_short_help = true)]
+    #[arg(long, value_name = "N", default_value_t = 157, help_heading = "Scenario", hide_short_help = true)]
     seed: u64,
 }
 
