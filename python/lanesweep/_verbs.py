@@ -592,6 +592,7 @@ def check(
     series: Path | None = None,
     backend: Literal["auto", "cpu", "gpu"] | None = None,
     device: str | Int | None = None,
+    injury: Keys | None = None,
     date: str | None = None,
     author: str | None = None,
     uncertain: Values | None = None,
@@ -634,6 +635,9 @@ def check(
         Of `nominal`. ``"auto"``: a GPU if there is one.
     device : str or int
         Device of `nominal`, by part of its name, PCI bus id or index.
+    injury : list of str
+        Injury risks of contacts by published curves: ``"nhtsa-2022-frontal-mais3"``, ``"nhtsa-2022-frontal-fatal"``,
+        ``"nhtsa-2022-rear-end-mais3"``, ``"joksch-1993-fatal"``.
     date, author : str
         Date of the run and author, as the sheet is to show them. The clock is not asked.
     uncertain : dict, list of str or str

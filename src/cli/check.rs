@@ -17,6 +17,7 @@ use super::{Exit, Output};
 use crate::engine::{CpuBackend, Executor};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
+use crate::model::severity::{INJURY_CURVES, InjuryCurve};
 use crate::report::case_identity::CaseIdentity;
 use crate::report::case_sheet::CaseSheet;
 use crate::report::trace;
@@ -90,6 +91,15 @@ pub(super) struct Check {
     /// Also write every step of every model under the first profile
     #[arg(long, value_name = "FILE.csv", help_heading = "Output")]
     series: Option<PathBuf>,
+    /// Injury risks of contacts, by published curves (nhtsa-2022-frontal-mais3, joksch-1993-fatal, …)
+    #[arg(
+        long,
+        value_name = "LIST",
+        value_delimiter = ',',
+        help_heading = "Models and criteria",
+        hide_short_help = true
+    )]
+    injury: Vec<String>,
     /// Date of the run, as the sheet is to show it; the clock is not asked
     #[arg(long, value_name = "TEXT", help_heading = "Output")]
     date: Option<String>,
@@ -105,7 +115,7 @@ pub(super) struct Check {
 }
 
 from_arguments!(
-    Check { file, row, scenario, profiles, sheet, rows, sheets, results, nominal, series, date, author }
+    Check { file, row, scenario, profiles, sheet, rows, sheets, results, nominal, series, injury, date, author }
     groups { case, uncertain, plausibility, format }
 );
 
@@ -178,6 +188,7 @@ impl Check {
             profiles: &check.profiles,
             judgements: &judgements,
             uncertainty: uncertainty.as_ref(),
+            injury: &self.injury_curves()?,
             command: configured.command.clone(),
             identity: self.identity()?,
         };
@@ -191,6 +202,18 @@ impl Check {
         // If input was skipped the answer is incomplete.
         let exit = if request.incomplete { Exit::Incomplete } else { status(judgements[0].verdict()) };
         self.format.output(exit, || sheet.text(), || sheet.json())
+    }
+
+    /// The named curves of injury risk.
+    fn injury_curves(&self) -> Result<Vec<&'static InjuryCurve>> {
+        let curve = |name: &String| {
+            InjuryCurve::find(name.trim()).ok_or_else(|| {
+                let names: Vec<&str> = INJURY_CURVES.iter().map(|curve| curve.name).collect();
+                let problem = format!("there is no curve `{name}`");
+                Error::usage(Place::item("--injury"), problem, format!("there are {}", names.join(", ")))
+            })
+        };
+        self.injury.iter().map(curve).collect()
     }
 
     /// What identifies the sheet besides the case.
@@ -218,6 +241,7 @@ impl Check {
             ("--date", self.date.is_some() && !has_sheets),
             ("--author", self.author.is_some() && !has_sheets),
             ("--uncertain", self.uncertain.is_given()),
+            ("--injury", !self.injury.is_empty()),
             ("--profiles", self.profiles.len() > 1),
         ];
         match of_one.iter().find(|(_, is_given)| *is_given) {

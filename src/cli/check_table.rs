@@ -164,6 +164,7 @@ impl CheckedTable<'_> {
             profiles: &check.profiles,
             judgements: &judgements,
             uncertainty: None,
+            injury: &[],
             command: command.to_owned(),
             identity: self.identity.clone(),
         };

@@ -11,6 +11,7 @@ use super::trace::{TraceFigure, TracePanels, TraceSeries};
 use crate::Result;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
+use crate::model::severity::InjuryCurve;
 use crate::run::check::{Boundary, Change, Demand, Judged, Judgement, Reading, RunEnd, Subject, Uncertainty, Verdict};
 use crate::run::grid::VARIED;
 use crate::scenario::{CaseQuantity, KMH, NUMBERS};
@@ -44,6 +45,8 @@ pub struct CaseSheet<'a> {
     pub judgements: &'a [Judgement],
     /// What draws of uncertain inputs say under the first profile, if they were asked for.
     pub uncertainty: Option<&'a Uncertainty>,
+    /// Curves of injury risk to be shown; usually none.
+    pub injury: &'a [&'static InjuryCurve],
     /// Command that reproduces the sheet.
     pub command: String,
     /// What the user and the build say of it.
@@ -185,7 +188,7 @@ impl CaseSheet<'_> {
             self.first().profile,
             self.clauses().text(),
             wrap(&format!("Where the answer changes under {}. {BOUNDARIES}", self.first().profile), WIDTH),
-            self.boundaries().text() + &self.by_rule_text() + &self.uncertainty_text(),
+            self.boundaries().text() + &self.by_rule_text() + &self.uncertainty_text() + &self.severity_text(),
             self.identity_text(),
         )
     }
@@ -199,6 +202,18 @@ impl CaseSheet<'_> {
             let models = judgement.models.iter().map(|judged| {
                 let mut outcome = records::outcome(&judged.trace.outcome, judged.trace.dt_s);
                 outcome["model"] = json!(judged.trace.model.name());
+                let delta_v_mps = self.delta_v_mps(judged);
+                outcome["delta_v_ego_mps"] = json!(delta_v_mps.map(|both| both[0]));
+                outcome["delta_v_other_mps"] = json!(delta_v_mps.map(|both| both[1]));
+                if !self.injury.is_empty() {
+                    let risk = |curve: &&InjuryCurve| {
+                        json!({
+                            "curve": curve.name, "injury": curve.injury, "source": curve.source,
+                            "risk": delta_v_mps.and_then(|both| curve.risk(both[0])),
+                        })
+                    };
+                    outcome["injury_risk_ego"] = json!(self.injury.iter().map(risk).collect::<Vec<_>>());
+                }
                 outcome["t_brake_s"] = json!(judged.braking_s());
                 outcome["changes_with"] = json!(judged.flips);
                 outcome["is_contact_like"] = json!(judged.touches);
@@ -352,6 +367,7 @@ impl CaseSheet<'_> {
                 .into_iter()
                 .chain(self.by_rule_section())
                 .chain([clauses, boundaries])
+                .chain(self.severity_section())
                 .chain(self.uncertainty.map(|of| self.uncertainty_section(of)))
                 .chain([self.numerics_section(), assumptions, CaseSheet::not_considered_section()])
                 .collect(),

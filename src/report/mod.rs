@@ -8,6 +8,7 @@ mod case_course;
 pub mod case_identity;
 mod case_sensitivity;
 mod case_sentences;
+mod case_severity;
 pub mod case_sheet;
 pub mod case_table;
 mod case_uncertainty;
