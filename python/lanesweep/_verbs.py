@@ -637,7 +637,7 @@ def check(
         Device of `nominal`, by part of its name, PCI bus id or index.
     injury : list of str
         Injury risks of contacts by published curves: ``"nhtsa-2022-frontal-mais3"``, ``"nhtsa-2022-frontal-fatal"``,
-        ``"nhtsa-2022-rear-end-mais3"``, ``"joksch-1993-fatal"``.
+        ``"joksch-1993-fatal"``.
     date, author : str
         Date of the run and author, as the sheet is to show them. The clock is not asked.
     uncertain : dict, list of str or str
@@ -793,7 +793,6 @@ def vary(
     xosc: bool = False,
     models: Models | None = None,
     profile: Path | None = None,
-    dt: Float | None = None,
     out: Path | None = None,
     **case: Unpack[Case],
 ) -> Result:
@@ -819,8 +818,6 @@ def vary(
         Not used.
     profile : str or path
         Profile that answers, by default un-r157.
-    dt : float
-        Time step, s; by default that of the profile.
     out : path
         Folder of cases.csv, by default a new one.
     **case

@@ -259,6 +259,19 @@ impl CaseTable {
     }
 }
 
+/// All rows of a table; a row that is no case is an error.
+pub(super) fn all_cases(path: &Path) -> Result<Vec<GivenCase>> {
+    let mut table = CaseTable::open(path)?;
+    let mut all = Vec::new();
+    while let Some(given) = table.next()? {
+        all.push(given?);
+    }
+    if all.is_empty() {
+        return Err(Error::input(Place::file(path), "it has no rows", "give a case per row"));
+    }
+    Ok(all)
+}
+
 /// Reads a case from a row of a table; rows count from 1 after the header. Without a number the table has one row.
 pub(super) fn from_table(path: &Path, row: Option<usize>) -> Result<GivenCase> {
     let mut table = CaseTable::open(path)?;

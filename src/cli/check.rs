@@ -65,22 +65,22 @@ pub(super) struct Check {
     scenario: Option<String>,
     #[command(flatten)]
     case: CaseFlags,
-    /// Profiles; the first one decides [default: un-r157, the two of EU 2022/1426, jrc-2021, paper, paper-fit]
+    /// Profiles; the first one decides [default: un-r157, and the five others]
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Models and criteria")]
     profiles: Vec<String>,
-    /// Also write the case sheet as an HTML page for printing; of a table, a page with the worst cases on top
+    /// Also write the case sheet for printing; of a table, a page with the worst on top
     #[arg(long, value_name = "FILE.html", help_heading = "Output")]
     sheet: Option<PathBuf>,
     /// Also write a table's answers, one row per case: .csv, .jsonl or .parquet
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     rows: Option<PathBuf>,
     /// Also write a sheet of every row of a table into this folder
-    #[arg(long, value_name = "DIR", conflicts_with = "nominal", help_heading = "Output")]
+    #[arg(long, value_name = "DIR", conflicts_with = "nominal", help_heading = "Output", hide_short_help = true)]
     sheets: Option<PathBuf>,
-    /// Compare another simulator's results for a table of cases with those of one driver (--models)
+    /// Another simulator's results for a table, to be compared with --models NAME
     ///
     /// The table has the columns id and collision, and where known t_react_s, t_brake_s, min_gap_m, min_ttc_s, t_crash_s,
-    /// impact_speed_mps. Exit status: 0 all agree, 5 they differ, 4 cases have no result.
+    /// impact_speed_mps (the ego's speed at the contact, not the closing speed). Exit status: 0 all agree, 5 they differ, 4 cases have no result.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["nominal", "sheets", "sheet"], help_heading = "Data")]
     results: Option<PathBuf>,
     /// Only the computed answers of a table, by lanes: a million rows take seconds
@@ -89,7 +89,7 @@ pub(super) struct Check {
     #[arg(long, help_heading = "Models and criteria")]
     nominal: bool,
     /// Also write every step of every model under the first profile
-    #[arg(long, value_name = "FILE.csv", help_heading = "Output")]
+    #[arg(long, value_name = "FILE.csv", help_heading = "Output", hide_short_help = true)]
     series: Option<PathBuf>,
     /// Injury risks of contacts, by published curves (nhtsa-2022-frontal-mais3, joksch-1993-fatal, …)
     #[arg(
@@ -101,10 +101,10 @@ pub(super) struct Check {
     )]
     injury: Vec<String>,
     /// Date of the run, as the sheet is to show it; the clock is not asked
-    #[arg(long, value_name = "TEXT", help_heading = "Output")]
+    #[arg(long, value_name = "TEXT", help_heading = "Output", hide_short_help = true)]
     date: Option<String>,
     /// Author, as the sheet is to show it
-    #[arg(long, value_name = "TEXT", help_heading = "Output")]
+    #[arg(long, value_name = "TEXT", help_heading = "Output", hide_short_help = true)]
     author: Option<String>,
     #[command(flatten)]
     uncertain: UncertainFlags,

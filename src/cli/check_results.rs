@@ -3,11 +3,10 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use super::case_flags::CaseFlags;
+use super::case_flags::{CaseFlags, all_cases};
 use super::check::subject;
 use super::console;
 use super::format::FormatFlag;
-use super::vary::all_cases;
 use super::{Exit, Output};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;

@@ -41,16 +41,18 @@ pub(super) struct Configured {
 /// `--help` shows it, and its verbs. Range, default and help are the key's.
 type KeyFlag = (&'static str, &'static str, &'static str, &'static str, bool, &'static [&'static str]);
 
-const SWEEPING: &[&str] = &["study", "search", "sample", "compare", "justify", "map", "check", "verify", "show"];
+const SWEEPING: &[&str] = &["study", "search", "sample", "compare", "justify", "map", "verify", "show"];
 const SIMULATING: &[&str] =
-    &["study", "search", "sample", "compare", "justify", "map", "verify", "show", "simulate", "xosc", "vary"];
+    &["study", "search", "sample", "compare", "justify", "map", "verify", "show", "simulate", "xosc"];
 const GENERATING: &[&str] = &["study", "search", "fit", "compare", "justify", "verify", "show"];
 
 #[rustfmt::skip] // a table: one line per flag
-pub(super) const FLAGS: [KeyFlag; 27] = [
+pub(super) const FLAGS: [KeyFlag; 29] = [
     ("run.threads", "threads", "", RUN, true, &["lanesweep"]),
     ("run.backend", "backend", "", RUN, false, SWEEPING),
     ("run.device", "device", "NAME|pci:BUS|INDEX", RUN, false, SWEEPING),
+    ("run.backend", "backend", "", RUN, true, &["check"]),
+    ("run.device", "device", "NAME|pci:BUS|INDEX", RUN, true, &["check"]),
     ("run.profile", "profile", "NAME|FILE", MODELS, false, SIMULATING),
     ("run.dt_s", "dt", "", MODELS, true, SIMULATING),
     ("generator.recordings", "synth_recordings", "", DATA, true, GENERATING),

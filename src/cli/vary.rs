@@ -1,11 +1,11 @@
 //! `lanesweep vary`: concrete cases around a case, for a simulator of one's own.
 
-use std::path::{Path, PathBuf};
+use std::path::PathBuf;
 
 use clap::Args;
 
 use super::arguments::from_arguments;
-use super::case_flags::{CaseFlags, CaseTable, GivenCase, from_toml};
+use super::case_flags::{CaseFlags, GivenCase, all_cases, from_toml};
 use super::check::subject;
 use super::configured::Configured;
 use super::format::FormatFlag;
@@ -33,7 +33,7 @@ use crate::{Error, Place, Result};
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Example:\n  \
-                  lanesweep vary --category cut-in --ego-speed 60km/h --speed 40km/h --gap 15 --lateral-speed 1.0 \\\\\n      \
+                  lanesweep vary --category cut-in --ego-speed 60km/h --speed 40km/h --gap 15 --lateral-speed 1.0 \\\n      \
                   --range gap_m=5..40 --range lateral_speed_mps=0.5..2 --boundary 8 --out variations")]
 pub(super) struct Vary {
     /// TOML file, or table (.csv, .parquet), with the case or cases
@@ -59,6 +59,9 @@ pub(super) struct Vary {
     /// Seed of the cases
     #[arg(long, value_name = "N", default_value_t = 157, help_heading = "Run")]
     seed: u64,
+    /// Profile that answers [default: un-r157]
+    #[arg(long, value_name = "NAME|FILE", help_heading = "Models and criteria")]
+    profile: Option<String>,
     /// Also write every case as OpenSCENARIO, in the folder xosc; your own controller drives the ego
     #[arg(long, help_heading = "Output")]
     xosc: bool,
@@ -72,7 +75,7 @@ pub(super) struct Vary {
 }
 
 from_arguments!(
-    Vary { file, range, inside, edge, outside, boundary, seed, xosc, out }
+    Vary { file, range, inside, edge, outside, boundary, seed, profile, xosc, out }
     groups { case, plausibility, format }
 );
 
@@ -81,8 +84,8 @@ const MAX_CASES: u32 = 100_000;
 
 impl Vary {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
-        let name = if configured.is_set("run.profile") { None } else { Some("un-r157") };
-        let profile = name.map_or_else(|| configured.profile(), |name| configured.profile_of(name))?;
+        configured.refuse_assigned("has no effect on variations", "leave it out; --profile names the profile")?;
+        let profile = Profile::load(self.profile.as_deref().unwrap_or("un-r157"))?;
         let counts =
             VariationCounts { inside: self.inside, edge: self.edge, outside: self.outside, boundary: self.boundary };
         if [counts.inside, counts.edge, counts.outside, counts.boundary].iter().any(|count| *count > MAX_CASES) {
@@ -147,13 +150,15 @@ impl Vary {
 
     fn ranges(&self, category: Category) -> Result<Vec<VariedRange>> {
         let range = |text: &String| {
-            let wrong = |problem: String| {
-                Error::usage(Place::item("--range"), problem, "write NAME=FROM..TO, for instance gap_m=5..40")
+            let wrong = || {
+                let help = "write NAME=FROM..TO with two numbers, the smaller first, for instance gap_m=5..40";
+                Error::usage(Place::item("--range"), format!("`{text}` is no range"), help)
             };
-            let (name, ends) = text.split_once('=').ok_or_else(|| wrong(format!("`{text}` has no range")))?;
-            let (from, to) = ends.split_once("..").ok_or_else(|| wrong(format!("`{text}` is no range")))?;
+            let (name, ends) = text.split_once('=').ok_or_else(wrong)?;
+            let number = |end: &str| end.trim().parse::<f64>().ok().filter(|value| value.is_finite());
+            let ends = ends.split_once("..").and_then(|(from, to)| number(from).zip(number(to)));
+            let (from, to) = ends.filter(|(from, to)| from < to).ok_or_else(wrong)?;
             let axis = GridAxis::parse(category, &format!("{name}={from},{to}"), "--range")?;
-            let [from, to] = axis.values[..] else { return Err(wrong(format!("`{text}` is no range"))) };
             Ok(VariedRange { parameter: axis.parameter, from, to })
         };
         self.range.iter().map(range).collect()
@@ -173,14 +178,4 @@ impl Vary {
         }
         export_folder(&self.out.join("xosc"), &scenarios).map(drop)
     }
-}
-
-/// All rows of a table; a row that is no case is an error.
-pub(super) fn all_cases(path: &Path) -> Result<Vec<GivenCase>> {
-    let mut table = CaseTable::open(path)?;
-    let mut all = Vec::new();
-    while let Some(given) = table.next()? {
-        all.push(given?);
-    }
-    Ok(all)
 }

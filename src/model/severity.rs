@@ -51,8 +51,6 @@ enum Form {
 const MPH: f64 = 1.0 / 0.447_04;
 const NHTSA_FRONTAL: &str =
     "Wang, MAIS(05/08) injury probability curves as functions of delta V, NHTSA DOT HS 813 219, 2022, table A-6";
-const NHTSA_REAR_END: &str =
-    "Wang, MAIS(05/08) injury probability curves as functions of delta V, NHTSA DOT HS 813 219, 2022, table A-9";
 /// The data of NHTSA's curves reach 60 mph.
 const NHTSA_TO_MPS: f64 = 60.0 / MPH;
 
@@ -67,14 +65,12 @@ const fn nhtsa(
 }
 
 const FRONTAL: &str = "occupants of cars in frontal crashes, United States, 2010 to 2015";
-const REAR_END: &str = "occupants of cars in rear-end crashes, United States, 2010 to 2015";
 
 #[rustfmt::skip] // a table: one line per curve
 /// All curves.
-pub const INJURY_CURVES: [InjuryCurve; 4] = [
+pub const INJURY_CURVES: [InjuryCurve; 3] = [
     nhtsa("nhtsa-2022-frontal-mais3", "MAIS3+", NHTSA_FRONTAL, FRONTAL, (-6.9774, 0.1620)),
     nhtsa("nhtsa-2022-frontal-fatal", "death", NHTSA_FRONTAL, FRONTAL, (-9.0422, 0.1571)),
-    nhtsa("nhtsa-2022-rear-end-mais3", "MAIS3+", NHTSA_REAR_END, REAR_END, (-8.0329, 0.1793)),
     InjuryCurve {
         name: "joksch-1993-fatal",
         injury: "death",
@@ -120,7 +116,6 @@ mod tests {
         let risk = |name: &str, mph: f64| InjuryCurve::find(name).unwrap().risk(mph / MPH);
         assert!((risk("nhtsa-2022-frontal-mais3", 30.0).unwrap() - 0.1074).abs() < 1e-4);
         assert!((risk("nhtsa-2022-frontal-fatal", 55.0).unwrap() - 0.4009).abs() < 1e-4);
-        assert!((risk("nhtsa-2022-rear-end-mais3", 40.0).unwrap() - 0.2972).abs() < 1e-4);
         assert!((risk("joksch-1993-fatal", 35.5).unwrap() - 1.0 / 16.0).abs() < 1e-12);
         assert_eq!((risk("nhtsa-2022-frontal-mais3", 61.0), risk("joksch-1993-fatal", 72.0)), (None, None));
         for curve in &INJURY_CURVES {

@@ -40,7 +40,10 @@ pub const NOT_CONSIDERED: [(&str, &str); 9] = [
     ),
     ("0.85 g after full overlap (Annex 3, table 1)", "the profile's maximum deceleration applies throughout"),
     ("Other traffic", "only the vehicles of the case exist: nothing follows the ego, and no vehicle reacts to it"),
-    ("Consequences", "vehicles are rectangles along the road; no yaw, injury or second collision"),
+    (
+        "Consequences",
+        "vehicles are rectangles along the road; no yaw and no second collision; injury risks only by curves that are named",
+    ),
 ];
 
 /// What the user and the build say of a sheet.

@@ -3,7 +3,8 @@
 use super::case_sheet::CaseSheet;
 use super::html::Section;
 use super::tables::{WIDTH, wrap};
-use crate::model::severity::{InjuryCurve, RESTITUTION, delta_v_mps, mass_kg};
+use crate::model::criterion::Contact;
+use crate::model::severity::{CAR_KG, InjuryCurve, RESTITUTION, delta_v_mps, mass_kg};
 use crate::run::check::Judged;
 use crate::scenario::{CaseQuantity, KMH};
 use crate::support::readable::value;
@@ -12,9 +13,17 @@ use crate::support::table::{Column, Digits, Table};
 impl CaseSheet<'_> {
     /// Changes of speed of ego and other vehicle in the contact of a driver's run, m/s; `None` without one.
     pub(super) fn delta_v_mps(&self, judged: &Judged) -> Option<[f64; 2]> {
-        let closing_mps = judged.impact_closing_mps()?;
+        // A side contact, and a vehicle that drives away, have no central contact.
+        let is_central = judged.trace.outcome.contact == Contact::Frontal;
+        let closing_mps = judged.impact_closing_mps().filter(|mps| is_central && *mps > 0.0)?;
         let [ego_kg, other_kg] = self.masses_kg()?;
         Some([delta_v_mps(closing_mps, ego_kg, other_kg), delta_v_mps(closing_mps, other_kg, ego_kg)])
+    }
+
+    /// The risk of the ego's occupants; `None` beyond the curve's data, and for a truck, of which the curves are not.
+    pub(super) fn injury_risk(&self, delta_v_mps: Option<[f64; 2]>, curve: &InjuryCurve) -> Option<f64> {
+        let is_car = self.masses_kg().is_some_and(|[ego_kg, _]| ego_kg == CAR_KG);
+        curve.risk(delta_v_mps.filter(|_| is_car)?[0])
     }
 
     fn masses_kg(&self) -> Option<[f64; 2]> {
@@ -25,15 +34,17 @@ impl CaseSheet<'_> {
     fn severity(&self) -> Table {
         let contacts = self.first().models.iter().filter(|judged| judged.impact_closing_mps().is_some());
         let delta_v = |judged: &Judged, of: usize| self.delta_v_mps(judged).map(|both| both[of]);
-        let risk = |judged: &Judged, curve: &InjuryCurve| curve.risk(delta_v(judged, 0)?).map(|risk| 100.0 * risk);
+        let risk = |judged: &Judged, curve: &InjuryCurve| {
+            self.injury_risk(self.delta_v_mps(judged), curve).map(|risk| 100.0 * risk)
+        };
         Table::of(contacts)
             .column("model", |judged| judged.trace.model.name())
             .column("closing km/h", |judged| judged.impact_closing_mps().map(|mps| mps * KMH))
-            .column("ΔV ego km/h", |judged| delta_v(judged, 0).map(|mps| mps * KMH))
-            .column("ΔV other km/h", |judged| delta_v(judged, 1).map(|mps| mps * KMH))
+            .column(Column::from("ΔV ego km/h").null("–"), |judged| delta_v(judged, 0).map(|mps| mps * KMH))
+            .column(Column::from("ΔV other km/h").null("–"), |judged| delta_v(judged, 1).map(|mps| mps * KMH))
             .columns(
                 self.injury,
-                |curve| Column::from(format!("{} %", curve.name)).digits(Digits::Significant(2)).null("beyond"),
+                |curve| Column::from(format!("{} %", curve.name)).digits(Digits::Significant(2)).null("–"),
                 |judged, curve| risk(judged, curve),
             )
             .build()
@@ -51,7 +62,7 @@ impl CaseSheet<'_> {
         });
         let masses = format!(
             "A central contact in line, by conservation of momentum: masses of {ego_kg} kg (ego) and {other_kg} kg by length, restitution \
-             {RESTITUTION} (ours). A side contact is not of this kind. A risk is one of the crashes that a curve was fitted to, not of this vehicle."
+             {RESTITUTION} (ours). –: a side contact, which is not of this kind; a risk beyond the data of its curve, or of the occupants of a truck. A risk is one of the crashes that a curve was fitted to, not of this vehicle."
         );
         std::iter::once(masses).chain(curves).collect::<Vec<_>>().join(" ")
     }

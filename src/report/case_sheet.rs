@@ -209,7 +209,7 @@ impl CaseSheet<'_> {
                     let risk = |curve: &&InjuryCurve| {
                         json!({
                             "curve": curve.name, "injury": curve.injury, "source": curve.source,
-                            "risk": delta_v_mps.and_then(|both| curve.risk(both[0])),
+                            "risk": self.injury_risk(delta_v_mps, curve),
                         })
                     };
                     outcome["injury_risk_ego"] = json!(self.injury.iter().map(risk).collect::<Vec<_>>());

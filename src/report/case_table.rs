@@ -69,7 +69,7 @@ impl CaseAnswer {
                 (Some(_), _) => "undecided",
             },
             collisions: models.map(|judged| (judged.trace.model.name(), verdict_of(judgement, judged))).collect(),
-            rests_on: rests_on(&judgement.verdicts),
+            rests_on: rests_on(judgement.verdict(), &judgement.verdicts),
             note: once(note(judgement))
                 .chain(sheet.silent())
                 .chain(drives_through(judgement))
@@ -96,7 +96,7 @@ impl CaseAnswer {
             demand: Vec::new(),
             demanded: "",
             collisions: models.iter().map(|model| (model.name(), collision(*model))).collect(),
-            rests_on: rests_on(verdicts),
+            rests_on: rests_on(verdicts.verdict(), verdicts),
             note: String::new(),
         }
     }
@@ -107,8 +107,8 @@ impl CaseAnswer {
     }
 }
 
-fn rests_on(verdicts: &CaseVerdicts) -> &'static str {
-    match (verdicts.verdict(), &verdicts.avoided_by()[..]) {
+fn rests_on(verdict: Verdict, verdicts: &CaseVerdicts) -> &'static str {
+    match (verdict, &verdicts.avoided_by()[..]) {
         (Verdict::Answer(Answer::Preventable), [one]) if verdicts.reference_drivers.len() > 1 => one.name(),
         _ => "",
     }
@@ -180,12 +180,12 @@ impl CaseTable {
         let count = |name: &str| self.cases.iter().filter(|case| case.rests_on == name).count();
         let counts = ModelId::ALL.map(|model| (model.name(), count(model.name())));
         let alone: Vec<String> =
-            counts.iter().filter(|(_, count)| *count > 0).map(|(name, count)| format!("{count} on {name}")).collect();
+            counts.iter().filter(|(_, count)| *count > 0).map(|(name, count)| format!("{count} ({name})")).collect();
         if alone.is_empty() {
             return String::new();
         }
         let all = self.count(Verdict::Answer(Answer::Preventable));
-        format!("Of {} called preventable, one driver alone decides: {}.", counted(all, "case"), alone.join(", "))
+        format!("Of {} called preventable, one driver alone decides in {}.", counted(all, "case"), alone.join(", "))
     }
 
     /// The rows to be shown: all in the order of the file, or the worst of many.

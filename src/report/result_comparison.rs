@@ -34,7 +34,7 @@ impl ResultReport<'_> {
             String::new()
         };
         format!(
-            "{} and {} under {} agree in {} of {} on whether the vehicles touch ({} to {} % at 95 %, if the cases are a random \
+            "{} and {} under {} agree in {} of {} on the collision ({} to {} % at 95 %, if the cases are a random \
              sample){missing}.",
             self.theirs,
             of.model.name(),
@@ -48,6 +48,11 @@ impl ResultReport<'_> {
 
     /// The cause that most differences have in common.
     fn cause(&self) -> String {
+        if self.comparison.differences.is_empty() {
+            return "The results have no other quantity: a driver that reacts late would not be found by the collisions of most \
+                    cases. Give times and gaps."
+                .to_owned();
+        }
         let Some(cause) = self.comparison.cause() else {
             return "No quantity differs beyond its tolerance in most cases.".to_owned();
         };
@@ -126,11 +131,11 @@ impl ResultReport<'_> {
 }
 
 fn rows<'c>(cases: impl Iterator<Item = &'c ComparedCase>) -> Table {
-    let touches = |collides: bool| if collides { "touches" } else { "none" };
+    let word = |collides: bool| if collides { "COLLIDES" } else { "none" };
     Table::of(cases)
         .column("id", |case| case.id.as_str())
-        .column("here", |case| touches(case.collides[0]))
-        .column("there", |case| touches(case.collides[1]))
+        .column("here", |case| word(case.collides[0]))
+        .column("there", |case| word(case.collides[1]))
         .column(Column::from("decides").null("–"), |case| case.decides.map(|at| COMPARED[at].column))
         .columns(
             COMPARED.iter().enumerate(),
