@@ -9,6 +9,7 @@ use super::arguments::{Arguments, FromArguments};
 use crate::engine::Headway;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
+use crate::run::check::Subject;
 use crate::run::reopen::TracedCase;
 use crate::scenario::{
     CaseFile, CaseNumber, CaseParameters, CaseRow, NUMBERS, ParameterRows, PlainCase, RowPlace, Written, si,
@@ -187,6 +188,11 @@ impl GivenCase {
         doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
         let case = self.located(plain.case(profile.frame.time_cap_s))?;
         TracedCase::run(&case, self.headway()?, profile, &self.models()?)
+    }
+
+    /// The case as a check takes it.
+    pub(super) fn subject(&self, profile: &Profile, doubts: &mut Doubts) -> Result<Subject> {
+        Ok(Subject::plain(&self.plain_case(profile, doubts)?, self.headway()?))
     }
 
     /// The numbers of the case.

@@ -68,7 +68,7 @@ pub(super) struct Check {
     /// Profiles; the first one decides [default: un-r157, and the five others]
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Models and criteria")]
     profiles: Vec<String>,
-    /// Also write the case sheet for printing; of a table, a page with the worst on top
+    /// Also write the sheet for printing; of a table, a page of the worst first
     #[arg(long, value_name = "FILE.html", help_heading = "Output")]
     sheet: Option<PathBuf>,
     /// Also write a table's answers, one row per case: .csv, .jsonl or .parquet
@@ -318,7 +318,7 @@ impl Check {
             return Err(Error::usage(Place::item("lanesweep check"), "there is nothing to check", help));
         }
         let mut doubts = Doubts::new(self.plausibility.policy());
-        let subject = subject(&given, profile, &mut doubts)?;
+        let subject = given.subject(profile, &mut doubts)?;
         doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
         Ok(CheckRequest { subject, origin, is_synthetic: false, incomplete: false })
     }
@@ -355,11 +355,6 @@ impl Check {
         }
         Ok(())
     }
-}
-
-/// The case that is given.
-pub(super) fn subject(given: &GivenCase, profile: &Profile, doubts: &mut Doubts) -> Result<Subject> {
-    Ok(Subject::plain(&given.plain_case(profile, doubts)?, given.headway()?))
 }
 
 /// The exit status of an answer.

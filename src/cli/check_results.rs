@@ -4,7 +4,6 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use super::case_flags::{CaseFlags, all_cases};
-use super::check::subject;
 use super::console;
 use super::format::FormatFlag;
 use super::{Exit, Output};
@@ -39,7 +38,7 @@ impl ComparedTable<'_> {
         let mut subjects: Vec<(String, Subject)> = Vec::new();
         for given in all_cases(self.path)? {
             let given = self.case.over(given);
-            let subject = given.located(subject(&given, self.profile, &mut doubts))?;
+            let subject = given.located(given.subject(self.profile, &mut doubts))?;
             let id = given.id.ok_or_else(|| {
                 let help = "add a column `id`, which the results repeat";
                 Error::input(Place::file(self.path), "a case has no id", help)

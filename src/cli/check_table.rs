@@ -5,7 +5,7 @@ use std::path::Path;
 use rayon::prelude::*;
 
 use super::case_flags::{CaseFlags, CaseTable, GivenCase};
-use super::check::{status, subject, write};
+use super::check::{status, write};
 use super::configured::Configured;
 use super::console::{self, Total};
 use super::format::FormatFlag;
@@ -67,7 +67,7 @@ impl CheckedTable<'_> {
                     };
                     let subject = given.and_then(|given| {
                         let given = self.case.over(given);
-                        Ok((subject(&given, self.profile, &mut doubts)?, given))
+                        Ok((given.subject(self.profile, &mut doubts)?, given))
                     });
                     rows.push((table.row(), subject));
                 }

@@ -6,7 +6,6 @@ use clap::Args;
 
 use super::arguments::from_arguments;
 use super::case_flags::{CaseFlags, GivenCase, all_cases, from_toml};
-use super::check::subject;
 use super::configured::Configured;
 use super::format::FormatFlag;
 use super::source::PlausibilityFlag;
@@ -97,7 +96,7 @@ impl Vary {
         let (mut cases, mut left_out, mut missing) = (Vec::new(), 0, 0);
         for given in self.given()? {
             let given = self.case.over(given);
-            let subject = given.located(subject(&given, &profile, &mut doubts))?;
+            let subject = given.located(given.subject(&profile, &mut doubts))?;
             let found = vary(&subject, &self.ranges(subject.category())?, counts, self.seed, &profile)?;
             let named = |case: VariedCase| match &given.id {
                 Some(id) => VariedCase { id: format!("{id}-{}", case.id), ..case },
