@@ -40,7 +40,7 @@ pub(super) struct Vary {
     file: Option<PathBuf>,
     #[command(flatten)]
     case: CaseFlags,
-    /// A quantity and its range; repeatable. The names are those of `map --help`
+    /// Quantity, a name of `map --help`, and its range; repeatable
     #[arg(long, value_name = "NAME=FROM..TO", help_heading = "Scenario")]
     range: Vec<String>,
     /// Cases inside all ranges, by a Sobol sequence
@@ -49,10 +49,12 @@ pub(super) struct Vary {
     /// Cases with one quantity at an end of its range
     #[arg(long, value_name = "N", default_value_t = 16, help_heading = "Scenario")]
     edge: u32,
-    /// Cases with one quantity outside of its range, by up to a quarter of it
+    /// Cases with one quantity up to a quarter outside
     #[arg(long, value_name = "N", default_value_t = 16, help_heading = "Scenario")]
     outside: u32,
-    /// Pairs of cases on both sides of a boundary between two answers, by bisection between cases inside
+    /// Pairs on both sides of a change of the answer
+    ///
+    /// By bisection between neighbouring cases inside.
     #[arg(long, value_name = "N", default_value_t = 8, help_heading = "Scenario")]
     boundary: u32,
     /// Seed of the cases
@@ -61,7 +63,9 @@ pub(super) struct Vary {
     /// Profile that answers [default: un-r157]
     #[arg(long, value_name = "NAME|FILE", help_heading = "Models and criteria")]
     profile: Option<String>,
-    /// Also write every case as OpenSCENARIO, in the folder xosc; your own controller drives the ego
+    /// Also write OpenSCENARIO, for an own controller of the ego
+    ///
+    /// In the folder xosc of --out.
     #[arg(long, help_heading = "Output")]
     xosc: bool,
     #[command(flatten)]
