@@ -80,7 +80,7 @@ fn the_library_names_no_flag() {
     assert!(texts > 1000, "only {texts} texts were found");
 }
 
-/// ARCHITECTURE.md names these four: the FSM's demand, a sampled case's times, the BTN and the reported values.
+/// ARCHITECTURE.md names these: the FSM's demand, a sampled case's times, the BTN, and the reported TTC and measures.
 #[test]
 fn lanes_divide_only_where_the_architecture_says() {
     let src = Path::new(env!("CARGO_MANIFEST_DIR")).join("src");

@@ -252,8 +252,10 @@ pub(in crate::engine) fn burst<M: DriverModel<f32>, const RULES: u32>(
         if slots != 0 {
             let from = pending.take(slots.count_ones() as usize);
             let values = !rules.is_verdict_only;
-            let pending = pending.lanes().parts(rules.scene.is_pair, values);
-            for (rows, pending) in batch.lanes.parts_mut(rules.scene.is_pair, values).into_iter().zip(pending) {
+            let pending = pending.lanes().parts(rules.scene.is_pair, values, rules.keeps_measures);
+            for (rows, pending) in
+                batch.lanes.parts_mut(rules.scene.is_pair, values, rules.keeps_measures).into_iter().zip(pending)
+            {
                 take(rows, pending, from, slots);
             }
             batch.free &= !slots;

@@ -20,7 +20,7 @@ pub(in crate::engine) const NEVER_LEAVES: u32 = Flag::LATEST_STEP;
 pub(in crate::engine) type Slots = u16;
 
 /// Parts of [`LaneArrays`].
-const PARTS: usize = 6;
+const PARTS: usize = 7;
 
 /// One number per lane.
 pub(in crate::engine) type Floats = [f32; LANES];
@@ -119,6 +119,7 @@ pub(in crate::engine) struct StateArrays<const N: usize> {
     pub moving: MovingArrays<N>,
     pub ahead: AheadArrays<N>,
     pub values: ValueArrays<N>,
+    pub measures: MeasureArrays<N>,
 }
 
 /// Fields that every step changes.
@@ -153,6 +154,12 @@ pub(in crate::engine) struct ValueArrays<const N: usize> {
     btn_numerator: [f32; N],
     btn_denominator: [f32; N],
     min_gap: [f32; N],
+}
+
+/// Fields of [`Measures`].
+#[derive(Debug, Clone, Copy)]
+#[repr(C)]
+pub(in crate::engine) struct MeasureArrays<const N: usize> {
     thw_gap: [f32; N],
     thw_speed: [f32; N],
     drac_numerator: [f32; N],
@@ -177,35 +184,38 @@ macro_rules! made_of_rows {
     };
 }
 
-made_of_rows! { EgoArrays OtherArrays TrackArrays MovingArrays AheadArrays ValueArrays }
+made_of_rows! { EgoArrays OtherArrays TrackArrays MovingArrays AheadArrays ValueArrays MeasureArrays }
 
 impl<const N: usize> LaneArrays<N> {
     /// No lanes: all slots are over.
     pub(super) fn idle() -> Self {
         let moving = MovingArrays { over: [Flag::TRUE.to_bits(); N], ..Zeroable::zeroed() };
-        let state = StateArrays { moving, ahead: Zeroable::zeroed(), values: Zeroable::zeroed() };
+        let (ahead, values, measures) = (Zeroable::zeroed(), Zeroable::zeroed(), Zeroable::zeroed());
+        let state = StateArrays { moving, ahead, values, measures };
         LaneArrays { fixed: FixedArrays { ego: Zeroable::zeroed(), others: Zeroable::zeroed() }, state }
     }
 
     /// All rows that a stream with these properties needs, part by part.
     #[inline(always)]
-    pub(super) fn parts(&self, is_pair: bool, values: bool) -> [&[[u32; N]]; PARTS] {
+    pub(super) fn parts(&self, is_pair: bool, values: bool, measures: bool) -> [&[[u32; N]]; PARTS] {
         let FixedArrays { ego, others: [principal, second] } = &self.fixed;
-        let StateArrays { moving, ahead, values: gathered } = &self.state;
+        let StateArrays { moving, ahead, values: gathered, measures: measured } = &self.state;
         let (second, ahead): (&[_], &[_]) = if is_pair { (second.rows(), ahead.rows()) } else { (&[], &[]) };
         let gathered: &[_] = if values { gathered.rows() } else { &[] };
-        [ego.rows(), principal.rows(), second, moving.rows(), ahead, gathered]
+        let measured: &[_] = if measures { measured.rows() } else { &[] };
+        [ego.rows(), principal.rows(), second, moving.rows(), ahead, gathered, measured]
     }
 
     /// Mutable version of `parts`.
     #[inline(always)]
-    pub(super) fn parts_mut(&mut self, is_pair: bool, values: bool) -> [&mut [[u32; N]]; PARTS] {
+    pub(super) fn parts_mut(&mut self, is_pair: bool, values: bool, measures: bool) -> [&mut [[u32; N]]; PARTS] {
         let FixedArrays { ego, others: [principal, second] } = &mut self.fixed;
-        let StateArrays { moving, ahead, values: gathered } = &mut self.state;
+        let StateArrays { moving, ahead, values: gathered, measures: measured } = &mut self.state;
         let (second, ahead): (&mut [_], &mut [_]) =
             if is_pair { (second.rows_mut(), ahead.rows_mut()) } else { (&mut [], &mut []) };
         let gathered: &mut [_] = if values { gathered.rows_mut() } else { &mut [] };
-        [ego.rows_mut(), principal.rows_mut(), second, moving.rows_mut(), ahead, gathered]
+        let measured: &mut [_] = if measures { measured.rows_mut() } else { &mut [] };
+        [ego.rows_mut(), principal.rows_mut(), second, moving.rows_mut(), ahead, gathered, measured]
     }
 
     /// Writes one case into [`LANES`] lanes. Only the gaps in `state` may differ between them; [`LaneArrays::start`]
@@ -256,17 +266,17 @@ impl<const N: usize> LaneArrays<N> {
             fill(&mut values.btn_numerator, from, state.record.btn.numerator);
             fill(&mut values.btn_denominator, from, state.record.btn.denominator);
             fill(&mut values.min_gap, from, state.record.min_gap);
-            let measures = state.record.measures;
-            fill(&mut values.thw_gap, from, measures.thw_gap);
-            fill(&mut values.thw_speed, from, measures.thw_speed);
-            fill(&mut values.drac_numerator, from, measures.drac_numerator);
-            fill(&mut values.drac_denominator, from, measures.drac_denominator);
-            fill(&mut values.tet_steps, from, measures.tet_steps);
-            fill(&mut values.tit_sum, from, measures.tit_sum);
-            fill(&mut values.pet_begun, from, measures.pet_begun.to_bits());
-            fill(&mut values.pet_distance, from, measures.pet_distance);
-            fill(&mut values.pet_speed, from, measures.pet_speed);
-            fill(&mut values.pet_steps, from, measures.pet_steps);
+            let (rows, measures) = (&mut self.state.measures, state.record.measures);
+            fill(&mut rows.thw_gap, from, measures.thw_gap);
+            fill(&mut rows.thw_speed, from, measures.thw_speed);
+            fill(&mut rows.drac_numerator, from, measures.drac_numerator);
+            fill(&mut rows.drac_denominator, from, measures.drac_denominator);
+            fill(&mut rows.tet_steps, from, measures.tet_steps);
+            fill(&mut rows.tit_sum, from, measures.tit_sum);
+            fill(&mut rows.pet_begun, from, measures.pet_begun.to_bits());
+            fill(&mut rows.pet_distance, from, measures.pet_distance);
+            fill(&mut rows.pet_speed, from, measures.pet_speed);
+            fill(&mut rows.pet_steps, from, measures.pet_steps);
         }
     }
 
@@ -341,7 +351,7 @@ impl<const N: usize> StateArrays<N> {
     /// Sets the state of one lane.
     #[inline(always)]
     pub(super) fn at(&self, k: usize) -> LaneState<f32> {
-        let StateArrays { moving, ahead, values } = self;
+        let StateArrays { moving, ahead, values, measures } = self;
         LaneState {
             index: moving.index[k],
             v_ego: moving.v_ego[k],
@@ -362,16 +372,16 @@ impl<const N: usize> StateArrays<N> {
                 },
                 min_gap: values.min_gap[k],
                 measures: Measures {
-                    thw_gap: values.thw_gap[k],
-                    thw_speed: values.thw_speed[k],
-                    drac_numerator: values.drac_numerator[k],
-                    drac_denominator: values.drac_denominator[k],
-                    tet_steps: values.tet_steps[k],
-                    tit_sum: values.tit_sum[k],
-                    pet_begun: Flag::from_bits(values.pet_begun[k]),
-                    pet_distance: values.pet_distance[k],
-                    pet_speed: values.pet_speed[k],
-                    pet_steps: values.pet_steps[k],
+                    thw_gap: measures.thw_gap[k],
+                    thw_speed: measures.thw_speed[k],
+                    drac_numerator: measures.drac_numerator[k],
+                    drac_denominator: measures.drac_denominator[k],
+                    tet_steps: measures.tet_steps[k],
+                    tit_sum: measures.tit_sum[k],
+                    pet_begun: Flag::from_bits(measures.pet_begun[k]),
+                    pet_distance: measures.pet_distance[k],
+                    pet_speed: measures.pet_speed[k],
+                    pet_steps: measures.pet_steps[k],
                 },
             },
             over: Flag::from_bits(moving.over[k]),
@@ -408,7 +418,7 @@ impl<const N: usize> StateArrays<N> {
     /// Sets the rows that a step of a model changes under these rules.
     #[inline(always)]
     pub(super) fn set<M: DriverModel<f32>>(&mut self, k: usize, lane: &LaneState<f32>, rules: Rules) {
-        let StateArrays { moving, ahead, values } = self;
+        let StateArrays { moving, ahead, values, measures: rows } = self;
         moving.index[k] = lane.index;
         moving.v_ego[k] = lane.v_ego;
         if M::SEES_OWN_ACCELERATION || !rules.is_verdict_only {
@@ -438,16 +448,16 @@ impl<const N: usize> StateArrays<N> {
             return;
         }
         let measures = lane.record.measures;
-        values.thw_gap[k] = measures.thw_gap;
-        values.thw_speed[k] = measures.thw_speed;
-        values.drac_numerator[k] = measures.drac_numerator;
-        values.drac_denominator[k] = measures.drac_denominator;
-        values.tet_steps[k] = measures.tet_steps;
-        values.tit_sum[k] = measures.tit_sum;
-        values.pet_begun[k] = measures.pet_begun.to_bits();
-        values.pet_distance[k] = measures.pet_distance;
-        values.pet_speed[k] = measures.pet_speed;
-        values.pet_steps[k] = measures.pet_steps;
+        rows.thw_gap[k] = measures.thw_gap;
+        rows.thw_speed[k] = measures.thw_speed;
+        rows.drac_numerator[k] = measures.drac_numerator;
+        rows.drac_denominator[k] = measures.drac_denominator;
+        rows.tet_steps[k] = measures.tet_steps;
+        rows.tit_sum[k] = measures.tit_sum;
+        rows.pet_begun[k] = measures.pet_begun.to_bits();
+        rows.pet_distance[k] = measures.pet_distance;
+        rows.pet_speed[k] = measures.pet_speed;
+        rows.pet_steps[k] = measures.pet_steps;
     }
 }
 
@@ -537,7 +547,7 @@ mod tests {
         let mut lanes = LaneArrays::<32>::idle();
         lanes.fill(16, &constants, &tracks, &state, 24, true);
         lanes.start(31, 23, state.gaps);
-        assert!(lanes.parts(true, true).into_iter().flatten().all(|row| row[31] != 0), "{lanes:?}");
+        assert!(lanes.parts(true, true, true).into_iter().flatten().all(|row| row[31] != 0), "{lanes:?}");
         assert_eq!(lanes.state.at(31), state);
 
         // A lane that continues with the second vehicle has it first, with its gap.
@@ -555,7 +565,7 @@ mod tests {
         assert_eq!((pending.fixed.ego.lane[31], pending.fixed.ego.leaves_from[31]), (23, NEVER_LEAVES));
         assert!(pending.fixed.others[0].tracks.iter().all(|track| (track.first[31], track.last[31]) == (31, 32)));
         assert_eq!((pending.fixed.ego.eventful_until[31], pending.state.at(31).gaps[0]), (32, state.gaps[1]));
-        assert!(pending.parts(false, false).into_iter().flatten().all(|row| row[31] != 0), "{pending:?}");
+        assert!(pending.parts(false, false, false).into_iter().flatten().all(|row| row[31] != 0), "{pending:?}");
 
         // A lane that continues with its first vehicle keeps everything except the step at which it leaves.
         let mut pending = LaneArrays::<32>::idle();
@@ -563,7 +573,7 @@ mod tests {
         assert_eq!(pending.fixed.at(31).others[0].half_lengths, 1.0);
         assert_eq!((pending.fixed.ego.lane[31], pending.fixed.ego.leaves_from[31]), (23, 25));
         assert_eq!((pending.fixed.ego.eventful_until[31], pending.state.at(31).gaps[0]), (32, state.gaps[0]));
-        assert!(pending.parts(false, false).into_iter().flatten().all(|row| row[31] != 0), "{pending:?}");
+        assert!(pending.parts(false, false, false).into_iter().flatten().all(|row| row[31] != 0), "{pending:?}");
 
         let mut after: StateArrays<LANES> = LaneArrays::idle().state;
         let everything = Rules::from_bits(1);

@@ -142,7 +142,7 @@ impl Pending {
 
     /// Moves the pending lanes to the front.
     fn close_up(&mut self, is_pair: bool) {
-        for part in self.lanes.parts_mut(is_pair, self.values) {
+        for part in self.lanes.parts_mut(is_pair, self.values, self.values) {
             for row in part {
                 row.copy_within(self.first..self.end, 0);
             }
