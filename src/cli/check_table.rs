@@ -131,14 +131,11 @@ impl CheckedTable<'_> {
     fn nominal(&self, rows: Vec<Row>, executor: &Executor) -> Result<Vec<Result<Answered>>> {
         let subjects = rows.iter().filter_map(|(_, row)| row.as_ref().ok().map(|(subject, _)| subject.clone()));
         let subjects: Vec<Subject> = subjects.collect();
-        if subjects.is_empty() {
-            return Ok(rows.into_iter().filter_map(|(_, row)| row.err()).map(Err).collect());
-        }
         let mut verdicts = nominal_verdicts(&subjects, self.profile, executor)?.into_iter();
         let answers = rows.into_iter().map(|(row, of)| {
             let (_, given) = of?;
-            let missing = || Error::Internal("a case has no verdict".to_owned());
-            let verdicts = verdicts.next().ok_or_else(missing)?;
+            let missing = || Err(Error::Internal("a case has no verdict".to_owned()));
+            let verdicts = given.located(verdicts.next().unwrap_or_else(missing))?;
             Ok((CaseAnswer::nominal(row, given.id, &verdicts, self.models), None))
         });
         Ok(answers.collect())

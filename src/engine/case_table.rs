@@ -5,6 +5,7 @@ use super::plan::CaseSource;
 use crate::scenario::Tables;
 
 /// The cases of every block, and the series that they share.
+#[derive(Default)]
 pub struct CaseTable {
     /// In the plan's order.
     pub blocks: Vec<EncodedBlock>,

@@ -3,7 +3,9 @@
 
 use std::sync::Arc;
 
-use crate::engine::{Block, CaseTable, Executor, Headway, LaneCase, LanePlan, Outcome, Start, Units, Wanted};
+use crate::engine::{
+    Block, CaseTable, Chunk, EncodedBlock, Executor, Headway, LaneCase, LanePlan, Outcome, Start, Units, Wanted,
+};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::scenario::{CaseParameters, Category, Tables};
@@ -37,32 +39,18 @@ impl Cases {
         implausible: Implausible,
     ) -> Result<Cases> {
         let mut doubts = Doubts::new(implausible);
-        let mut source = CaseTable::new([1; Category::ALL.len()]);
-        let mut by_category: Vec<(Category, Vec<usize>)> = Vec::new();
+        let mut cases = CaseRows::default();
         for (row, parameters) in rows.into_iter().enumerate() {
-            let at = first_row + row as u64;
-            let (category, case) = encode(parameters, profile, headways, &mut source.tables, &mut doubts)
-                .map_err(|error| of_row(at, error))?;
-            let block = match by_category.iter().position(|(known, _)| *known == category) {
-                Some(block) => block,
-                None => {
-                    by_category.push((category, Vec::new()));
-                    by_category.len() - 1
-                }
-            };
-            by_category[block].1.push(row);
-            source.blocks[block].cases.push(case);
+            cases
+                .push(|tables| encode(parameters, profile, headways, tables, &mut doubts))
+                .map_err(|error| of_row(first_row + row as u64, error))?;
         }
-        if by_category.is_empty() {
+        if cases.count == 0 {
             return Err(Error::usage(Place::item("cases"), "there are no rows", "give at least one case"));
         }
-        let block = |(category, rows): &(Category, Vec<usize>)| {
-            Block::new(*category, Units::Numbered(rows.len() as u64), vec![VARIANT.to_owned()])
-        };
-        let blocks = by_category.iter().map(block).collect();
         let headways = if headways.is_empty() { vec![Headway::Observed] } else { headways.to_vec() };
-        let plan = LanePlan::new(profile.clone(), models.to_vec(), headways, blocks, Arc::new(source))?;
-        let rows = by_category.into_iter().flat_map(|(_, rows)| rows).collect();
+        let (blocks, source, rows) = cases.planned();
+        let plan = LanePlan::new(profile.clone(), models.to_vec(), headways, blocks, source)?;
         Ok(Cases { plan, rows, notes: doubts.sentences() })
     }
 
@@ -76,20 +64,71 @@ impl Cases {
     /// # Errors
     /// Those of the backend; [`Error::Interrupted`].
     pub fn run(&self, executor: &Executor) -> Result<Vec<Outcome<f64>>> {
-        let per_row = self.plan.headways.len() * self.plan.models.len();
-        let mut outcomes: Vec<Option<Outcome<f64>>> = vec![None; self.rows.len() * per_row];
-        executor.sweep(&self.plan, 0..self.plan.unit_count(), Wanted::Outcomes, |chunk| {
-            let rows = &self.rows[chunk.units.start as usize..chunk.units.end as usize];
-            for (row, lanes) in rows.iter().zip(chunk.outcomes.chunks(per_row)) {
-                for (to, outcome) in outcomes[row * per_row..].iter_mut().zip(lanes) {
-                    *to = Some(*outcome);
-                }
-            }
-            Ok(())
-        })?;
-        let all: Option<Vec<_>> = outcomes.into_iter().collect();
-        all.ok_or_else(|| Error::Internal("a case has no outcome".to_owned()))
+        by_row(&self.plan, &self.rows, executor, Wanted::Outcomes, |chunk| &chunk.outcomes)
     }
+}
+
+/// Lane cases of several categories, with the rows that they come from.
+#[derive(Default)]
+pub(super) struct CaseRows {
+    source: CaseTable,
+    by_category: Vec<(Category, Vec<usize>)>,
+    count: usize,
+}
+
+impl CaseRows {
+    /// Adds the case of the next row.
+    ///
+    /// # Errors
+    /// That of `encode`: the case is left out, and its row has no number.
+    pub(super) fn push(
+        &mut self,
+        encode: impl FnOnce(&mut Tables<f64>) -> Result<(Category, LaneCase<f64>)>,
+    ) -> Result<()> {
+        let (category, case) = encode(&mut self.source.tables)?;
+        let block = self.by_category.iter().position(|(known, _)| *known == category).unwrap_or_else(|| {
+            self.by_category.push((category, Vec::new()));
+            self.source.blocks.push(EncodedBlock { first_unit: 0, variants: 1, cases: Vec::new() });
+            self.by_category.len() - 1
+        });
+        self.by_category[block].1.push(self.count);
+        self.source.blocks[block].cases.push(case);
+        self.count += 1;
+        Ok(())
+    }
+
+    /// The blocks of a plan with these cases, their source, and the row of every unit.
+    pub(super) fn planned(self) -> (Vec<Block>, Arc<CaseTable>, Vec<usize>) {
+        let block = |(category, rows): &(Category, Vec<usize>)| {
+            Block::new(*category, Units::Numbered(rows.len() as u64), vec![VARIANT.to_owned()])
+        };
+        let blocks = self.by_category.iter().map(block).collect();
+        (blocks, Arc::new(self.source), self.by_category.into_iter().flat_map(|(_, rows)| rows).collect())
+    }
+}
+
+/// Runs a plan of [`CaseRows`]. Returns what `lanes` takes of a chunk per row, headway and model, the last varying fastest.
+///
+/// # Errors
+/// Those of the backend; [`Error::Interrupted`].
+pub(super) fn by_row<T: Copy>(
+    plan: &LanePlan,
+    rows: &[usize],
+    executor: &Executor,
+    wanted: Wanted,
+    lanes: impl Fn(&Chunk) -> &[T],
+) -> Result<Vec<T>> {
+    let per_row = plan.headways.len() * plan.models.len();
+    let mut all: Vec<Option<T>> = vec![None; rows.len() * per_row];
+    executor.sweep(plan, 0..plan.unit_count(), wanted, |chunk| {
+        let rows = &rows[chunk.units.start as usize..chunk.units.end as usize];
+        for (row, lanes) in rows.iter().zip(lanes(&chunk).chunks(per_row)) {
+            all[row * per_row..].iter_mut().zip(lanes).for_each(|(to, lane)| *to = Some(*lane));
+        }
+        Ok(())
+    })?;
+    let all: Option<Vec<_>> = all.into_iter().collect();
+    all.ok_or_else(|| Error::Internal("a case has no lane".to_owned()))
 }
 
 /// The lane case of a row.

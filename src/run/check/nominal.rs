@@ -5,63 +5,59 @@ use std::sync::Arc;
 use super::annex;
 use super::subject::Subject;
 use super::verdict::{CaseVerdicts, RunEnd};
-use crate::Result;
-use crate::engine::{Block, CaseTable, Executor, Headway, LanePlan, Units, Verdicts, Wanted};
+use crate::engine::{Executor, Headway, LanePlan, Verdicts, Wanted};
 use crate::model::criterion::Criterion;
 use crate::model::driver::{MODELS, ModelId};
 use crate::model::profile::Profile;
+use crate::run::cases::{CaseRows, by_row};
 use crate::run::grid::without_reaction;
-use crate::scenario::Category;
+use crate::{Error, Result};
 
-/// Returns how the lanes of every case end, in the arithmetic of the executor's backend; smallest gaps are NaN. A lane of
-/// an ego that never reacts and reaches the time cap is open, as in a map.
+/// Returns how the lanes of every case end, in the arithmetic of the executor's backend, or why it cannot run; smallest
+/// gaps are NaN. A lane of an ego that never reacts and reaches the time cap is open, as in a map.
 ///
 /// # Errors
-/// As [`Check::run`](super::Check::run), and those of the backend.
-pub fn nominal_verdicts(subjects: &[Subject], profile: &Profile, executor: &Executor) -> Result<Vec<CaseVerdicts>> {
-    let drivers = ends(subjects, profile, &ModelId::ALL, executor)?;
-    let unreacting = ends(subjects, &without_reaction(profile), &[ModelId::Reg157], executor)?;
-    let collides = |verdicts: &Verdicts| verdicts.failed(Criterion::Collision);
-    let of = |((subject, drivers), unreacting): ((&Subject, &[Verdicts]), &Verdicts)| CaseVerdicts {
-        collide: std::array::from_fn(|model| collides(&drivers[model])),
-        min_gap_m: [f64::NAN; MODELS],
-        unreacting: match (collides(unreacting), unreacting.capped() && profile.frame.end_when_settled) {
-            (true, _) => RunEnd::Contact,
-            (false, true) => RunEnd::Open,
-            (false, false) => RunEnd::Clear,
-        },
-        is_outside_annex: annex::outside(profile, subject.category(), subject.point()).is_some(),
-        reference_drivers: profile.reference_drivers.clone(),
-    };
-    Ok(subjects.iter().zip(drivers.chunks(MODELS)).zip(&unreacting).map(of).collect())
-}
-
-/// The verdicts of every case and model, the model varying fastest.
-fn ends(subjects: &[Subject], profile: &Profile, models: &[ModelId], executor: &Executor) -> Result<Vec<Verdicts>> {
-    let mut source = CaseTable::new([1; Category::ALL.len()]);
-    let mut rows: [Vec<usize>; Category::ALL.len()] = Default::default();
-    for (row, subject) in subjects.iter().enumerate() {
-        let block = subject.category() as usize;
-        source.blocks[block].cases.push(subject.encode(profile, &mut source.tables)?);
-        rows[block].push(row);
+/// Those of the backend.
+pub fn nominal_verdicts(
+    subjects: &[Subject],
+    profile: &Profile,
+    executor: &Executor,
+) -> Result<Vec<Result<CaseVerdicts>>> {
+    let mut cases = CaseRows::default();
+    let encoded: Vec<Result<()>> = subjects
+        .iter()
+        .map(|subject| cases.push(|tables| Ok((subject.category(), subject.encode(profile, tables)?))))
+        .collect();
+    let (blocks, source, rows) = cases.planned();
+    if rows.is_empty() {
+        return Ok(encoded.into_iter().filter_map(Result::err).map(Err).collect());
     }
-    // A plan has no empty blocks.
-    source.blocks.retain(|block| !block.cases.is_empty());
-    let block = |(category, rows): (Category, &Vec<usize>)| {
-        Block::new(category, Units::Numbered(rows.len() as u64), vec!["case".to_owned()])
+    let ends = |profile: Profile, models: &[ModelId]| {
+        // The cases are checked, and nothing resumes the plan: it needs no hash.
+        let (models, source, headways) = (models.to_vec(), Arc::clone(&source), vec![Headway::Observed]);
+        let plan = LanePlan::with_hash(String::new(), profile, models, headways, blocks.clone(), source)?;
+        by_row(&plan, &rows, executor, Wanted::Verdicts, |chunk| &chunk.verdicts)
     };
-    let blocks = Category::ALL.into_iter().zip(&rows).filter(|(_, rows)| !rows.is_empty()).map(block).collect();
-    let plan = LanePlan::new(profile.clone(), models.to_vec(), vec![Headway::Observed], blocks, Arc::new(source))?;
-    let rows = rows.concat();
-    let mut ends = vec![Verdicts::default(); subjects.len() * models.len()];
-    executor.sweep(&plan, 0..plan.unit_count(), Wanted::Verdicts, |chunk| {
-        let rows = &rows[chunk.units.start as usize..chunk.units.end as usize];
-        for (row, verdicts) in rows.iter().zip(chunk.verdicts.chunks(models.len())) {
-            ends[row * models.len()..][..models.len()].copy_from_slice(verdicts);
-        }
-        Ok(())
-    })?;
-    Ok(ends)
+    let (drivers, unreacting) =
+        (ends(profile.clone(), &ModelId::ALL)?, ends(without_reaction(profile), &[ModelId::Reg157])?);
+    let mut lanes = drivers.chunks(MODELS).zip(&unreacting);
+    let collides = |verdicts: &Verdicts| verdicts.failed(Criterion::Collision);
+    let of = |(subject, encoded): (&Subject, Result<()>)| {
+        encoded?;
+        let (drivers, unreacting) = lanes.next().ok_or_else(|| Error::Internal("a case has no verdicts".to_owned()))?;
+        Ok(CaseVerdicts {
+            collide: std::array::from_fn(|model| collides(&drivers[model])),
+            min_gap_m: [f64::NAN; MODELS],
+            unreacting: match (collides(unreacting), unreacting.capped() && profile.frame.end_when_settled) {
+                (true, _) => RunEnd::Contact,
+                (false, true) => RunEnd::Open,
+                (false, false) => RunEnd::Clear,
+            },
+            is_outside_annex: annex::outside(profile, subject.category(), subject.point()).is_some(),
+            reference_drivers: profile.reference_drivers.clone(),
+        })
+    };
+    Ok(subjects.iter().zip(encoded).map(of).collect())
 }
 
 #[cfg(test)]
@@ -102,8 +98,11 @@ mod tests {
         let subjects: Vec<Subject> =
             cases.iter().map(|(case, gap_m)| Subject::plain(case, Headway::GapM(*gap_m))).collect();
         let executor = Executor::new(CpuBackend::lane_arithmetic());
-        let found: Vec<Answer> =
-            nominal_verdicts(&subjects, &profile, &executor).unwrap().iter().map(CaseVerdicts::answer).collect();
+        let found: Vec<Answer> = nominal_verdicts(&subjects, &profile, &executor)
+            .unwrap()
+            .iter()
+            .map(|of| of.as_ref().unwrap().answer())
+            .collect();
         let one = |subject: &Subject| {
             let check =
                 Check { subject: subject.clone(), profiles: vec![profile.clone()], models: ModelId::ALL.to_vec() };

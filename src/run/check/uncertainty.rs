@@ -2,19 +2,13 @@
 //!
 //! Draws run as lanes in binary32, in batches. The numbers of a draw follow from the seed, its index and the quantity.
 
-use std::sync::Arc;
-
-use super::subject::headway;
-use super::{Answer, CaseVerdicts, RunEnd, Subject, annex};
-use crate::engine::{
-    Block, CaseTable, Executor, Headway, LaneCase, LanePlan, Units, Verdicts, Wanted, check_time_step,
-};
-use crate::model::criterion::Criterion;
-use crate::model::driver::{MODELS, ModelId};
+use super::{Answer, CaseVerdicts, RunEnd, Subject, nominal_verdicts};
+use crate::engine::Executor;
+use crate::model::driver::MODELS;
 use crate::model::profile::Profile;
 use crate::random::{Stream, standard_normal, unit_uniform};
-use crate::run::grid::{Point, without_reaction};
-use crate::scenario::{CaseQuantity, GAP_ERROR_M, NUMBERS};
+use crate::run::grid::Point;
+use crate::scenario::{CaseQuantity, GAP_ERROR_M, NUMBERS, PlainCase};
 use crate::stats::estimate::{FirstOrder, first_order};
 use crate::{Error, Place, Result};
 
@@ -123,11 +117,11 @@ impl Uncertain {
             let problem = format!("profile `{}` has no reference drivers, so a draw has no answer", profile.name);
             return refused(problem, "name another profile first, by option `profiles`");
         }
-        if matches!(subject, Subject::Recorded(..)) {
+        let Subject::Plain(case, point) = subject else {
             let problem = "a recorded scenario follows its series, whose errors are not known".to_owned();
             return refused(problem, "give the case in numbers");
-        }
-        let draws = Draws { uncertain: self, subject, profile, executor };
+        };
+        let draws = Draws { uncertain: self, case, point, profile, executor };
         let same = |drawn: &Drawn| drawn.as_ref().ok().map(|of| f64::from(of.answer() == is));
         let mut all = Uncertainty {
             uncertain: self.clone(),
@@ -185,7 +179,8 @@ type Drawn = std::result::Result<CaseVerdicts, &'static str>;
 /// What all draws have in common.
 struct Draws<'a> {
     uncertain: &'a Uncertain,
-    subject: &'a Subject,
+    case: &'a PlainCase,
+    point: &'a Point,
     profile: &'a Profile,
     executor: &'a Executor<'a>,
 }
@@ -194,17 +189,22 @@ impl Draws<'_> {
     /// Runs draws 0 to `count` in order. `purpose` says of which stream a quantity's errors are.
     fn each(&self, count: u64, purpose: impl Fn(CaseQuantity) -> u32, mut take: impl FnMut(&Drawn)) -> Result<()> {
         for from in (0..count).step_by(BATCH as usize) {
-            let points = (from..count.min(from + BATCH)).map(|draw| self.point(draw, &purpose));
-            self.verdicts(points.collect())?.iter().for_each(&mut take);
+            let drawn = (from..count.min(from + BATCH)).map(|draw| self.subject(draw, &purpose));
+            let drawn: Vec<std::result::Result<Subject, &'static str>> = drawn.collect();
+            let subjects: Vec<Subject> = drawn.iter().filter_map(|of| of.as_ref().ok().cloned()).collect();
+            let mut verdicts = nominal_verdicts(&subjects, self.profile, self.executor)?.into_iter();
+            for subject in drawn {
+                take(&subject.and_then(|_| verdicts.next().and_then(Result::ok).ok_or(CONTRADICTION)));
+            }
         }
         Ok(())
     }
 
-    /// The numbers of a draw.
-    fn point(&self, draw: u64, purpose: &impl Fn(CaseQuantity) -> u32) -> std::result::Result<Point, &'static str> {
-        let mut point = *self.subject.point();
+    /// The case of a draw, or the quantity whose value has no meaning.
+    fn subject(&self, draw: u64, purpose: &impl Fn(CaseQuantity) -> u32) -> std::result::Result<Subject, &'static str> {
+        let mut point = *self.point;
         for UncertainInput { quantity, error, is_bound } in &self.uncertain.inputs {
-            let Some(from) = self.subject.point().get(*quantity) else { continue };
+            let Some(from) = self.point.get(*quantity) else { continue };
             let place = *quantity as u32;
             let stream = Stream { seed: self.uncertain.seed, purpose: purpose(*quantity) };
             let word = stream.words(draw, place / 4)[place as usize % 4];
@@ -217,68 +217,6 @@ impl Draws<'_> {
             }
             point = point.with(*quantity, to);
         }
-        Ok(point)
-    }
-
-    /// The verdicts of every driver and of an ego that never reacts, one per point.
-    fn verdicts(&self, points: Vec<std::result::Result<Point, &'static str>>) -> Result<Vec<Drawn>> {
-        let Draws { subject, profile, .. } = self;
-        let mut source = CaseTable::new([1]);
-        let mut encode = |point: &Point| -> Result<()> {
-            let case = subject.case(profile, point)?;
-            let gap_m = headway(point).start().gap(case.ego_speed_mps);
-            let case = LaneCase::encode(&case, profile, &mut source.tables);
-            check_time_step(&case, &source.tables, profile.frame.dt_s, Place::default)?;
-            source.blocks[0].cases.push(case.ahead_by(gap_m));
-            Ok(())
-        };
-        let checked = |point: std::result::Result<Point, &'static str>| {
-            let point = point?;
-            encode(&point).map(|()| point).map_err(|_| CONTRADICTION)
-        };
-        let points: Vec<std::result::Result<Point, &'static str>> = points.into_iter().map(checked).collect();
-        let source = Arc::new(source);
-        let drivers = self.sweep(profile, &ModelId::ALL, &source)?;
-        let unreacting = self.sweep(&without_reaction(profile), &[ModelId::Reg157], &source)?;
-        let mut lanes = drivers.chunks(MODELS).zip(unreacting);
-        let mut verdicts = |point: Point| {
-            let (drivers, unreacting) = lanes.next()?;
-            let collides = |of: &Verdicts| of.failed(Criterion::Collision);
-            Some(CaseVerdicts {
-                collide: std::array::from_fn(|at| collides(&drivers[at])),
-                min_gap_m: [f64::INFINITY; MODELS],
-                unreacting: match collides(&unreacting) {
-                    true => RunEnd::Contact,
-                    false if unreacting.capped() && profile.frame.end_when_settled => RunEnd::Open,
-                    false => RunEnd::Clear,
-                },
-                is_outside_annex: annex::outside(profile, subject.category(), &point).is_some(),
-                reference_drivers: profile.reference_drivers.clone(),
-            })
-        };
-        let missing = || Error::Internal("a draw has no verdicts".to_owned());
-        let drawn = |point: std::result::Result<Point, &'static str>| match point {
-            Ok(point) => verdicts(point).map(Ok).ok_or_else(missing),
-            Err(reason) => Ok(Err(reason)),
-        };
-        points.into_iter().map(drawn).collect()
-    }
-
-    /// The verdicts of the cases, the model varying fastest.
-    fn sweep(&self, profile: &Profile, models: &[ModelId], source: &Arc<CaseTable>) -> Result<Vec<Verdicts>> {
-        let count = source.blocks[0].cases.len() as u64;
-        if count == 0 {
-            return Ok(Vec::new());
-        }
-        let block = Block::new(self.subject.category(), Units::Numbered(count), vec!["draw".to_owned()]);
-        // The plan needs no hash: nothing resumes it.
-        let (models, headways) = (models.to_vec(), vec![Headway::Observed]);
-        let plan = LanePlan::with_hash(String::new(), profile.clone(), models, headways, vec![block], source.clone())?;
-        let mut all = Vec::with_capacity(plan.lane_count() as usize);
-        self.executor.sweep(&plan, 0..count, Wanted::Verdicts, |chunk| {
-            all.extend_from_slice(&chunk.verdicts);
-            Ok(())
-        })?;
-        Ok(all)
+        Ok(Subject::Plain(*self.case, point))
     }
 }
