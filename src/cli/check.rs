@@ -68,7 +68,7 @@ pub(super) struct Check {
     /// Profiles; the first one decides [default: un-r157, and the five others]
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Models and criteria")]
     profiles: Vec<String>,
-    /// Also write the sheet for printing; of a table, a page of the worst first
+    /// Also write a page for printing: the sheet of a case, or the worst of a table
     #[arg(long, value_name = "FILE.html", help_heading = "Output")]
     sheet: Option<PathBuf>,
     /// Also write a table's answers, one row per case: .csv, .jsonl or .parquet
@@ -81,7 +81,7 @@ pub(super) struct Check {
     ///
     /// The table has the columns id and collision, and where known t_react_s, t_brake_s, min_gap_m, min_ttc_s, t_crash_s,
     /// impact_speed_mps (the ego's speed at the contact, not the closing speed). Exit status: 0 all agree, 5 they differ, 4 cases have no result.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["nominal", "sheets", "sheet"], help_heading = "Data")]
+    #[arg(long, value_name = "FILE", conflicts_with_all = ["nominal", "sheets"], help_heading = "Data")]
     results: Option<PathBuf>,
     /// Only the computed answers of a table, by lanes: a million rows take seconds
     ///
@@ -147,6 +147,9 @@ impl Check {
                     case: &self.case,
                     implausible: self.plausibility.policy(),
                     rows: self.rows.as_deref(),
+                    page: self.sheet.as_deref(),
+                    command: &configured.command,
+                    identity: self.identity()?,
                 };
                 return compared.run(self.format);
             }
@@ -235,11 +238,11 @@ impl Check {
         if !is_table || self.row.is_some() || self.scenario.is_some() {
             return Ok(None);
         }
-        let has_sheets = self.sheets.is_some();
+        let has_pages = self.sheets.is_some() || self.sheet.is_some();
         let of_one = [
             ("--series", self.series.is_some()),
-            ("--date", self.date.is_some() && !has_sheets),
-            ("--author", self.author.is_some() && !has_sheets),
+            ("--date", self.date.is_some() && !has_pages),
+            ("--author", self.author.is_some() && !has_pages),
             ("--uncertain", self.uncertain.is_given()),
             ("--injury", !self.injury.is_empty()),
             ("--profiles", self.profiles.len() > 1),
@@ -281,6 +284,10 @@ impl Check {
         let origin = path.display().to_string();
         let ending = path.extension().map(|ending| ending.to_ascii_lowercase()).unwrap_or_default();
         match (ending.to_str().unwrap_or_default(), &self.scenario) {
+            ("toml", None) if self.row.is_some() => {
+                let problem = format!("{origin} is one case and has no rows");
+                Err(Error::usage(Place::item("--row"), problem, "leave it out, or give a table (.csv, .parquet)"))
+            }
             ("toml", None) => self.of_flags(from_toml(path)?, profile, origin),
             ("csv" | "parquet", None) => {
                 let row = self.row.unwrap_or(1);

@@ -4,14 +4,17 @@ use std::collections::HashMap;
 use std::path::Path;
 
 use super::case_flags::{CaseFlags, all_cases};
+use super::check::write;
 use super::console;
 use super::format::FormatFlag;
 use super::{Exit, Output};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
+use crate::report::case_identity::CaseIdentity;
 use crate::report::result_comparison::{ResultReport, columns};
 use crate::run::check::{COMPARED, ResultComparison, Subject, TheirResult};
 use crate::support::files::make_folder_of;
+use crate::support::input_file;
 use crate::support::plausibility::{Doubts, Implausible};
 use crate::support::table::{Row, TableFormat, TableMetadata, TableReader};
 use crate::{Error, Place, Result};
@@ -25,6 +28,9 @@ pub(super) struct ComparedTable<'a> {
     pub case: &'a CaseFlags,
     pub implausible: Implausible,
     pub rows: Option<&'a Path>,
+    pub page: Option<&'a Path>,
+    pub command: &'a str,
+    pub identity: CaseIdentity,
 }
 
 impl ComparedTable<'_> {
@@ -48,24 +54,29 @@ impl ComparedTable<'_> {
         doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
         let results = results(self.results)?;
         let mut by_id: HashMap<&str, &Subject> = subjects.iter().map(|(id, of)| (id.as_str(), of)).collect();
-        let pair = |theirs: &'_ TheirResult| by_id.remove(theirs.id.as_str());
-        let found: Vec<Option<&Subject>> = results.iter().map(pair).collect();
-        if let Some((theirs, _)) = results.iter().zip(&found).find(|(_, found)| found.is_none()) {
-            let problem = format!("`{}` is the id of no case of {}, or of two results", theirs.id, self.path.display());
-            return Err(Error::input(
-                Place::file(self.results),
-                problem,
-                "give one result per case, with the case's id",
-            ));
-        }
-        let pairs: Vec<(&Subject, &TheirResult)> = found.into_iter().flatten().zip(&results).collect();
+        let pairs = results.iter().map(|(place, theirs)| {
+            let unknown = || {
+                let problem =
+                    format!("`{}` is the id of no case of {}, or of two results", theirs.id, self.path.display());
+                Error::input(place.clone().column("id"), problem, "give one result per case, with the case's id")
+            };
+            Ok((by_id.remove(theirs.id.as_str()).ok_or_else(unknown)?, theirs))
+        });
+        let pairs: Vec<(&Subject, &TheirResult)> = pairs.collect::<Result<_>>()?;
         let comparison = ResultComparison::new(&pairs, self.profile, *model)?;
         let report = ResultReport {
             comparison: &comparison,
-            profile: &self.profile.name,
+            profile: self.profile,
+            origin: self.path.display().to_string(),
             theirs: self.results.display().to_string(),
+            theirs_sha256: input_file::sha256(self.results)?,
             missing: by_id.len(),
+            command: self.command,
+            identity: &self.identity,
         };
+        if let Some(path) = self.page {
+            write(path, report.html().as_bytes())?;
+        }
         if let Some(path) = self.rows {
             make_folder_of(path)?;
             report.rows().save(path, &TableMetadata { table: "results", ..TableMetadata::default() })?;
@@ -81,7 +92,7 @@ impl ComparedTable<'_> {
 }
 
 /// Reads another simulator's results.
-fn results(path: &Path) -> Result<Vec<TheirResult>> {
+fn results(path: &Path) -> Result<Vec<(Place, TheirResult)>> {
     let format = TableFormat::of(path, &[TableFormat::Csv, TableFormat::Parquet], "--results")?;
     let mut table = TableReader::open(path, format)?;
     let help = || format!("the columns are id, collision (true or false) and, where known, {}", columns());
@@ -139,7 +150,7 @@ fn results(path: &Path) -> Result<Vec<TheirResult>> {
                 }
             };
         }
-        all.push(theirs);
+        all.push((table.place(number, None), theirs));
     }
     if all.is_empty() {
         return Err(Error::input(Place::file(path), "it has no rows", help()));

@@ -41,7 +41,7 @@ pub(super) struct CheckedTable<'a> {
     pub rows: Option<&'a Path>,
     /// Folder of a sheet per row.
     pub sheets: Option<&'a Path>,
-    /// What identifies these sheets besides their cases.
+    /// What identifies page and sheets besides their cases.
     pub identity: CaseIdentity,
 }
 
@@ -109,11 +109,12 @@ impl CheckedTable<'_> {
         let is_complete = broken.is_empty();
         let answers = Answers {
             origin: self.path.display().to_string(),
-            profile: self.profile.name.clone(),
+            profile: self.profile.clone(),
             cases,
             broken,
             is_nominal: self.is_nominal,
             command: configured.command.clone(),
+            identity: self.identity.clone(),
         };
         if let Some(path) = self.rows {
             make_folder_of(path)?;

@@ -112,12 +112,13 @@ impl Vary {
         }
         doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
         if left_out > 0 {
-            tracing::warn!("{left_out} points are left out: their numbers are out of range, or no case");
+            tracing::warn!("{} left out: numbers out of range, or no case", counted(left_out as usize, "point"));
         }
         if missing > 0 {
             tracing::warn!(
-                "{missing} pairs of --boundary were not found: fewer neighbouring cases inside differ in their answer; \
-                 give more cases by --inside, or wider ranges"
+                "{} of --boundary not found: fewer neighbouring cases inside differ in their answer; \
+                 give more cases by --inside, or wider ranges",
+                counted(missing as usize, "pair")
             );
         }
         if cases.is_empty() {

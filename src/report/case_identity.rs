@@ -68,6 +68,40 @@ impl CaseIdentity {
             commit => format!("commit {}{changes}", commit.get(..digits).unwrap_or(commit)),
         }
     }
+
+    /// The file by the first digits of its hash, behind other words; empty without a file.
+    pub(super) fn mark(&self) -> String {
+        self.file_sha256.as_ref().map_or(String::new(), |sha256| format!(", file {}", &sha256[..12]))
+    }
+
+    /// Program, data, profile and command.
+    pub(super) fn section(&self, origin: &str, profile: &Profile, command: &str) -> Section {
+        let file = self.file_sha256.as_ref().map(|sha256| format!("{origin}\nSHA-256 {sha256}"));
+        let profile_sha256 = format!("SHA-256 {}", profile_sha256(profile).unwrap_or_default());
+        Section::new("identity", "Identity")
+            .fact("program", format!("{PROGRAM}, {}, engine {ENGINE_VERSION}", self.commit(40)))
+            .fact("data", file.unwrap_or_else(|| origin.to_owned()))
+            .fact(&format!("profile {}", profile.name), profile_sha256)
+            .fact("command", command)
+    }
+
+    /// Lines to sign on, and what the drivers do not stand for.
+    pub(super) fn signatures(&self) -> Section {
+        let given = |text: &Option<String>| text.clone().unwrap_or_default();
+        Section::new("signature", "Signatures")
+            .intro("The system under assessment was not simulated: the drivers are those of the profile.")
+            .fact("system under assessment, version", "")
+            .fact("technical service", "")
+            .fact("date of the run", given(&self.date))
+            .fact("author", given(&self.author))
+            .fact("signature", "")
+            .fact("checked by, date", "")
+    }
+
+    /// What is not considered.
+    pub(super) fn not_considered() -> Section {
+        Section::new("not-considered", "Not considered").facts(NOT_CONSIDERED)
+    }
 }
 
 impl CaseSheet<'_> {
@@ -95,6 +129,11 @@ impl CaseSheet<'_> {
         Ok(canonical.finish())
     }
 
+    /// The case by the first digits of its hash.
+    pub(super) fn mark(&self) -> String {
+        format!("case {}", self.case_sha256().map_or(String::new(), |sha256| sha256[..12].to_owned()))
+    }
+
     /// The sheet's identity as text: hashes by their first 12 digits.
     pub(super) fn identity_text(&self) -> String {
         let short = |hash: Result<String>| hash.map_or(String::new(), |hash| hash[..12].to_owned());
@@ -103,7 +142,7 @@ impl CaseSheet<'_> {
         let parts = [
             Some(format!("program: {PROGRAM}, {}, engine {ENGINE_VERSION}", self.identity.commit(12))),
             self.identity.file_sha256.as_ref().map(|sha256| format!("file: {}", short(Ok(sha256.clone())))),
-            Some(format!("case: {}", short(self.case_sha256()))),
+            Some(self.mark()),
             Some(
                 wrap(&format!("profiles: {}", profiles.collect::<Vec<_>>().join(", ")), WIDTH - 2)
                     .replace('\n', "\n  "),
@@ -134,27 +173,8 @@ impl CaseSheet<'_> {
 
     /// The identity as the first chapter of the page.
     pub(super) fn identity_section(&self) -> Section {
-        let hash = |hash: Result<String>| hash.unwrap_or_default();
-        let file = self.identity.file_sha256.as_ref().map(|sha256| format!("{}\nSHA-256 {sha256}", self.origin));
-        Section::new("identity", "Identity")
-            .fact("program", format!("{PROGRAM}, {}, engine {ENGINE_VERSION}", self.identity.commit(40)))
-            .fact("data", file.unwrap_or_else(|| self.origin.clone()))
-            .fact("case, canonical", format!("SHA-256 {}", hash(self.case_sha256())))
-            .fact(
-                &format!("profile {}", self.profiles[0].name),
-                format!("SHA-256 {}", hash(profile_sha256(&self.profiles[0]))),
-            )
-            .fact("command", &self.command)
-    }
-
-    /// Lines to sign on.
-    pub(super) fn signature_section(&self) -> Section {
-        let given = |text: &Option<String>| text.clone().unwrap_or_default();
-        Section::new("signature", "Signatures")
-            .fact("date of the run", given(&self.identity.date))
-            .fact("author", given(&self.identity.author))
-            .fact("signature", "")
-            .fact("checked by, date", "")
+        let case = format!("SHA-256 {}", self.case_sha256().unwrap_or_default());
+        self.identity.section(&self.origin, &self.profiles[0], &self.command).fact("case, canonical", case)
     }
 
     /// Every constant of the first profile with its source.
@@ -223,11 +243,6 @@ impl CaseSheet<'_> {
             .tables([table
                 .build()
                 .captioned(format!("What a time step of {dt_s} s in place of {} s adds", frame.dt_s))])
-    }
-
-    /// What is not considered.
-    pub(super) fn not_considered_section() -> Section {
-        Section::new("not-considered", "Not considered").facts(NOT_CONSIDERED)
     }
 }
 

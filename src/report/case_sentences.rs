@@ -90,6 +90,7 @@ impl CaseSheet<'_> {
             of_drivers.push(format!("the case leaves Annex 3 with {}", changes(&first.annex_flips)));
         }
         of_drivers.extend(touching(first));
+        of_drivers.extend(drives_through(first));
         let robustness = match (&first.flips[..], &of_drivers[..]) {
             _ if answer == Answer::Open => "longer runs are not computed".to_owned(),
             ([], of_drivers) if first.rests_on_touching() => {
@@ -122,7 +123,6 @@ impl CaseSheet<'_> {
                 above.join(", ")
             ));
         }
-        all.extend(drives_through(first));
         all
     }
 
@@ -202,7 +202,7 @@ pub(super) fn touching(judgement: &Judgement) -> Option<String> {
 /// Why a case cannot be traffic.
 pub(super) fn drives_through(judgement: &Judgement) -> Option<String> {
     let time_s = value(judgement.drives_through_s?);
-    Some(format!("No such traffic: the vehicle that cuts out drives through the one ahead of it from {time_s} s on"))
+    Some(format!("no such traffic: the vehicle that cuts out drives through the one ahead of it from {time_s} s on"))
 }
 
 /// How a run ends whose gap still closes at the cap.

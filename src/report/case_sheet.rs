@@ -359,17 +359,17 @@ impl CaseSheet<'_> {
             .assumptions_section()
             .parts([Section::options(format!("Profile {}", first.profile), &self.profiles[0])]);
         Page {
-            title: format!("One {} under {}", self.subject.category().label(), first.profile),
+            title: format!("One {} under {}, {}", self.subject.category().label(), first.profile, self.mark()),
             lead: format!("{}. {}.", self.case(), self.answer()),
             synthetic: self.is_synthetic,
             warnings,
-            sections: [answer, case, drivers, self.identity_section(), self.signature_section(), course, others]
+            sections: [answer, case, drivers, self.identity_section(), self.identity.signatures(), course, others]
                 .into_iter()
                 .chain(self.by_rule_section())
                 .chain([clauses, boundaries])
                 .chain(self.severity_section())
                 .chain(self.uncertainty.map(|of| self.uncertainty_section(of)))
-                .chain([self.numerics_section(), assumptions, CaseSheet::not_considered_section()])
+                .chain([self.numerics_section(), assumptions, CaseIdentity::not_considered()])
                 .collect(),
         }
         .html()

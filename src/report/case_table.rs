@@ -6,6 +6,7 @@ use std::path::Path;
 
 use serde_json::json;
 
+use super::case_identity::CaseIdentity;
 use super::case_sentences::{drives_through, past_the_cap, touching};
 use super::case_sheet::{CaseSheet, verdict_of};
 use super::html::{Page, Section};
@@ -13,9 +14,10 @@ use super::records::{self, PROGRAM};
 use super::tables::wrap;
 use crate::Result;
 use crate::model::driver::ModelId;
-use crate::run::check::{Answer, CaseVerdicts, Demand, Judgement, RunEnd, Verdict};
+use crate::model::profile::Profile;
+use crate::run::check::{Answer, CaseVerdicts, Demand, DriverRule, Judgement, RuleVerdicts, RunEnd, Verdict};
 use crate::support::readable::counted;
-use crate::support::table::{Column, Table, TableMetadata, TableOf};
+use crate::support::table::{Column, Digits, Table, TableMetadata, TableOf};
 
 /// All verdicts, the worst first: those without a driver of Annex 3 that avoids the collision, then those with one, then
 /// those without a collision.
@@ -28,8 +30,13 @@ const WORST_FIRST: [Verdict; 6] = [
     Verdict::Answer(Answer::NoConflict),
 ];
 
-const LEGEND: &str = "Verdict: as on the sheet of one case. Demanded: whether the profile's clause of cut-ins demands that \
-                      the system avoids the collision. None: there is nothing to avoid.";
+/// What the columns show, of judged and of nominal answers.
+const LEGENDS: [&str; 2] = [
+    "Verdict: as on the sheet of one case. Demanded: whether the profile's clause of cut-ins demands that the system avoids the \
+     collision. None: there is nothing to avoid.",
+    "Nominal answers: the lanes of every case as given, in lane arithmetic. No measurement error, no shorter time step and no \
+     clause was examined: no answer is robust by this table, and that of a sheet can be undecided. None: there is nothing to avoid.",
+];
 
 /// One case of a table.
 pub struct CaseAnswer {
@@ -46,6 +53,7 @@ pub struct CaseAnswer {
     collisions: Vec<(&'static str, &'static str)>,
     /// The only reference driver that avoids the collision.
     rests_on: &'static str,
+    by_rule: Vec<RuleVerdicts>,
     note: String,
 }
 
@@ -70,6 +78,7 @@ impl CaseAnswer {
             },
             collisions: models.map(|judged| (judged.trace.model.name(), verdict_of(judgement, judged))).collect(),
             rests_on: rests_on(judgement.verdict(), &judgement.verdicts),
+            by_rule: judgement.by_rule.clone(),
             note: once(note(judgement))
                 .chain(sheet.silent())
                 .chain(drives_through(judgement))
@@ -97,6 +106,7 @@ impl CaseAnswer {
             demanded: "",
             collisions: models.iter().map(|model| (model.name(), collision(*model))).collect(),
             rests_on: rests_on(verdicts.verdict(), verdicts),
+            by_rule: verdicts.by_rule(),
             note: String::new(),
         }
     }
@@ -136,8 +146,8 @@ fn note(judgement: &Judgement) -> String {
 pub struct CaseTable {
     /// The file, as the user named it.
     pub origin: String,
-    /// Name of the profile.
-    pub profile: String,
+    /// Profile.
+    pub profile: Profile,
     /// At least one case, in the order of the file.
     pub cases: Vec<CaseAnswer>,
     /// Why the other rows could not be judged, with file, line and column.
@@ -146,13 +156,15 @@ pub struct CaseTable {
     pub is_nominal: bool,
     /// Command that reproduces the table.
     pub command: String,
+    /// What identifies it: commit, file, date, author.
+    pub identity: CaseIdentity,
 }
 
+/// What the table of rules shows.
+const BY_RULE: &str = "By rule: the cases if this driver alone decides; if any of the reference drivers suffices (in force); if all \
+                       of them have to avoid the collision. Turned: cases whose verdict is not that of the table.";
 /// Maximum number of rows in the text, and on the page; the table file has all.
 const MAX_ROWS: [usize; 2] = [200, 1000];
-const NOMINAL: &str = "Nominal answers: the lanes of every case as given, in lane arithmetic. No measurement error, no \
-                       shorter time step and no clause was examined: no answer is robust by this table.";
-
 impl CaseTable {
     /// The worst verdict.
     pub fn worst(&self) -> Verdict {
@@ -172,7 +184,7 @@ impl CaseTable {
             0 => String::new(),
             count => format!("; {} cannot be judged", counted(count, "row")),
         };
-        format!("{} under {}: {}{broken}", counted(self.cases.len(), "case"), self.profile, counts.join(", "))
+        format!("{} under {}: {}{broken}", counted(self.cases.len(), "case"), self.profile.name, counts.join(", "))
     }
 
     /// How many preventable cases only one reference driver avoids; empty if none.
@@ -186,6 +198,42 @@ impl CaseTable {
         }
         let all = self.count(Verdict::Answer(Answer::Preventable));
         format!("Of {} called preventable, one driver alone decides in {}.", counted(all, "case"), alone.join(", "))
+    }
+
+    fn legend(&self) -> &'static str {
+        LEGENDS[usize::from(self.is_nominal)]
+    }
+
+    /// Which driver decides: the cases by rule and, where sheets were made, by reading.
+    fn by_rule(&self) -> Table {
+        type RuleCases = (Option<&'static str>, DriverRule, [usize; WORST_FIRST.len()], usize);
+        let mut all: Vec<RuleCases> = Vec::new();
+        for case in &self.cases {
+            for (rules, (rule, verdict)) in
+                case.by_rule.iter().flat_map(|of| of.verdicts.iter().map(move |by| (of, by)))
+            {
+                let known = all.iter().position(|(reading, of, ..)| (reading, of) == (&rules.reading, rule));
+                let at = known.unwrap_or_else(|| {
+                    all.push((rules.reading, *rule, [0; WORST_FIRST.len()], 0));
+                    all.len() - 1
+                });
+                let (.., counts, turned) = &mut all[at];
+                let of_verdict = counts.iter_mut().zip(WORST_FIRST).filter(|(_, of)| of == verdict);
+                of_verdict.for_each(|(count, _)| *count += 1);
+                *turned += usize::from(*verdict != case.verdict);
+            }
+        }
+        let present = |at: &usize| all.iter().any(|(.., counts, _)| counts[*at] > 0);
+        let present: Vec<usize> = (0..WORST_FIRST.len()).filter(present).collect();
+        Table::of(all)
+            .column("reading", |(reading, ..)| reading.unwrap_or("as it is"))
+            .column("rule", |(_, rule, ..)| rule.label())
+            .columns(present, |at| WORST_FIRST[at].label(), |(.., counts, _), at| counts[at])
+            .column("turned", |(.., turned)| turned)
+            .column(Column::from("turned %").digits(Digits::Fixed(2)), |(.., counts, turned)| {
+                100.0 * turned as f64 / counts.iter().sum::<usize>() as f64
+            })
+            .build()
     }
 
     /// The rows to be shown: all in the order of the file, or the worst of many.
@@ -236,7 +284,7 @@ impl CaseTable {
     /// [`Error::Io`](crate::Error::Io), and for an unknown ending.
     pub fn save(&self, path: &Path) -> Result<()> {
         let metadata =
-            TableMetadata { table: "cases", profile: Some(self.profile.clone()), ..TableMetadata::default() };
+            TableMetadata { table: "cases", profile: Some(self.profile.name.clone()), ..TableMetadata::default() };
         self.all().save(path, &metadata)
     }
 
@@ -249,20 +297,22 @@ impl CaseTable {
         let cases = self.columns(&self.worst_first(MAX_ROWS[1])).build();
         let broken = Section::new("", format!("{} cannot be judged", counted(self.broken.len(), "row")));
         Page {
-            title: format!("{} under {}", counted(self.cases.len(), "case"), self.profile),
+            title: format!("{} under {}{}", counted(self.cases.len(), "case"), self.profile.name, self.identity.mark()),
             lead: format!("{}. {}", self.summary(), self.rests_on()),
             synthetic: false,
-            warnings: self.is_nominal.then(|| NOMINAL.to_owned()).into_iter().collect(),
+            warnings: self.is_nominal.then(|| self.legend().to_owned()).into_iter().collect(),
             sections: vec![
                 Section::new("counts", "Answers").tables([counts.captioned("Cases by answer, the worst first")]),
                 Section::new("cases", "Cases")
-                    .intro(format!("The worst answer on top. {LEGEND} {}", self.left_out(MAX_ROWS[1])))
+                    .intro(format!("The worst answer on top. {} {}", self.legend(), self.left_out(MAX_ROWS[1])))
                     .tables([cases.captioned("Cases")])
                     .parts((!self.broken.is_empty()).then(|| broken.text(self.broken.join("\n")))),
-                Section::new("reproduction", "Reproduction")
-                    .fact("command", &self.command)
-                    .fact("program", PROGRAM)
-                    .fact("data", &self.origin),
+                Section::new("rule", "Which driver decides")
+                    .intro(format!("{BY_RULE} {}.", DriverRule::SOURCE))
+                    .tables([self.by_rule().captioned("Cases by rule")]),
+                self.identity.section(&self.origin, &self.profile, &self.command),
+                self.identity.signatures(),
+                CaseIdentity::not_considered(),
             ],
         }
         .html()
@@ -270,11 +320,10 @@ impl CaseTable {
 
     /// The table as text.
     pub fn text(&self, width: usize) -> String {
-        let nominal = if self.is_nominal { NOMINAL } else { "" };
-        let notes = [LEGEND, &self.left_out(MAX_ROWS[0]), &self.rests_on(), nominal].map(str::to_owned);
+        let notes = [self.legend(), &self.left_out(MAX_ROWS[0]), &self.rests_on(), BY_RULE].map(str::to_owned);
         let notes: Vec<String> = notes.into_iter().filter(|note| !note.is_empty()).collect();
         let rows = self.columns(&self.shown(MAX_ROWS[0])).build().text();
-        format!("{}\n{rows}{}\n", self.summary(), wrap(&notes.join(" "), width))
+        format!("{}\n{rows}\n{}{}\n", self.summary(), self.by_rule().text(), wrap(&notes.join(" "), width))
     }
 
     /// The table as one document.
@@ -286,10 +335,11 @@ impl CaseTable {
         records::document(&json!({
             "program": PROGRAM,
             "data": self.origin,
-            "profile": self.profile,
+            "profile": self.profile.name,
             "verdict": self.worst().label(),
             "counts": serde_json::Map::from_iter(counts),
             "nominal": self.is_nominal,
+            "by_rule": self.by_rule().records(),
             "cases": self.all().records(),
             "cannot_be_judged": self.broken,
         }))

@@ -10,7 +10,7 @@ use crate::model::driver::ModelId;
 use crate::run::check::{Answer, UNCERTAIN_LEVEL, UncertainInput, Uncertainty, Verdict};
 use crate::scenario::KMH;
 use crate::stats::estimate::{FirstOrder, Interval, clopper_pearson};
-use crate::support::readable::{count, value};
+use crate::support::readable::{count, counted, value};
 use crate::support::table::{NumberText, Table};
 
 /// What the columns of the inputs show.
@@ -48,7 +48,9 @@ fn answers(of: &Uncertainty) -> Vec<Fraction> {
     // The sheet's word is also that of an answer that is not robust, which a draw has not.
     let name = |answer: &Answer| if *answer == Answer::Open { "open" } else { answer.label() };
     let fraction = |(answer, draws): (&Answer, u64)| Fraction { name: name(answer), draws, of: of.valid() };
-    Answer::ALL.iter().zip(of.answers).map(fraction).collect()
+    let outside = Fraction { name: "conflict or open, outside Annex 3", draws: of.outside_annex, of: of.valid() };
+    let outside = (of.outside_annex > 0).then_some(outside);
+    Answer::ALL.iter().zip(of.answers).map(fraction).chain(outside).collect()
 }
 
 /// Each driver that avoids the collision, of the draws with a conflict.
@@ -109,27 +111,27 @@ impl CaseSheet<'_> {
     fn of_draws(&self, of: &Uncertainty) -> Vec<String> {
         let uncertain = &of.uncertain;
         let mut all = vec![format!(
-            "{} draws under {} (seed {}): the inputs below have errors that are independent of one another, normal with the \
+            "{} under {} (seed {}): the inputs below have errors that are independent of one another, normal with the \
              standard error of the table, or uniform where it has ±. Fractions are of these draws; their intervals cover the \
              number of draws, not the assumed errors. Each draw counts as computed: a stop that touches counts as avoided",
-            count(uncertain.draws),
+            counted(uncertain.draws as usize, "draw"),
             self.first().profile,
             uncertain.seed
         )];
         if self.first().verdict() == Verdict::Undecided {
             all.push("The answer of the case is undecided, and no fraction decides it".to_owned());
         }
-        let invalid = of.invalid.iter().map(|(reason, draws)| format!("{} ({reason})", count(*draws)));
+        let invalid =
+            of.invalid.iter().map(|(reason, draws)| format!("{} ({reason})", counted(*draws as usize, "draw")));
         let invalid: Vec<String> = invalid.collect();
         if !invalid.is_empty() {
-            all.push(format!(
-                "No case, and in no fraction: {} draws, by what has no possible value",
-                invalid.join(", ")
-            ));
+            all.push(format!("No case, and in no fraction: {}, by what has no possible value", invalid.join(", ")));
         }
         if of.outside_annex > 0 {
-            let outside = count(of.outside_annex);
-            all.push(format!("Annex 3 does not describe {outside} draws with a conflict; they count as computed"));
+            all.push(
+                "Annex 3 does not describe the draws of the last row; the rows above count them by the answer computed"
+                    .to_owned(),
+            );
         }
         let mut found: Vec<_> =
             uncertain.inputs.iter().zip(&of.indices).filter_map(|(of, index)| Some((of, (*index)?))).collect();

@@ -187,11 +187,22 @@ impl Page {
              script-src 'sha256-{script_sha256}'; img-src data:; base-uri 'none'; form-action 'none'\">\n\
              <meta name=\"viewport\" content=\"width=device-width, initial-scale=1\">\n\
              <meta name=\"generator\" content=\"{program}\">\n<title>{title}</title>\n<link rel=\"icon\" href=\"data:,\">\n\
-             <style>\n{STYLE}\n</style>\n</head>\n<body>\n<header>\n<h1>{title}</h1>\n<p>{lead}</p>{warnings}\n</header>\n\
+             <style>\n{STYLE}\n{footer}\n</style>\n</head>\n<body>\n<header>\n<h1>{title}</h1>\n<p>{lead}</p>{warnings}\n</header>\n\
              <main>{sections}\n</main>\n<div id=\"tip\" role=\"status\" hidden></div>\n<script>{SCRIPT}</script>\n</body>\n</html>",
             program = Escaped(PROGRAM),
+            footer = self.footer(),
             lead = Escaped(&self.lead),
         )
+    }
+
+    /// Every printed page has the title and its number, so that a loose one can be told from others.
+    fn footer(&self) -> String {
+        let title: String = self.title.chars().map(|c| format!("\\{:x} ", u32::from(c))).collect();
+        let box_of =
+            |side: &str, content: &str| format!("@bottom-{side} {{ content: {content}; font: 7pt sans-serif; }}");
+        let (title, page) =
+            (box_of("left", &format!("\"{title}\"")), box_of("right", "counter(page) \" of \" counter(pages)"));
+        format!("@page {{ {title} {page} }}")
     }
 
     /// Links to all chapters but the first.

@@ -2,9 +2,12 @@
 
 use serde_json::json;
 
+use super::case_identity::CaseIdentity;
+use super::html::{Page, Section};
 use super::records::{self, PROGRAM};
 use super::tables::wrap;
 use crate::Result;
+use crate::model::profile::Profile;
 use crate::run::check::{COMPARED, ComparedCase, ResultComparison};
 use crate::support::readable::{counted, significant, value};
 use crate::support::table::{Column, Digits, Table, json_number};
@@ -13,12 +16,20 @@ use crate::support::table::{Column, Digits, Table, json_number};
 pub struct ResultReport<'a> {
     /// The comparison.
     pub comparison: &'a ResultComparison,
-    /// Name of the profile.
-    pub profile: &'a str,
+    /// Profile.
+    pub profile: &'a Profile,
+    /// The file of the cases, as the user named it.
+    pub origin: String,
     /// The file of the results, as the user named it.
     pub theirs: String,
+    /// Its SHA-256.
+    pub theirs_sha256: String,
     /// Cases without a result.
     pub missing: usize,
+    /// Command that reproduces the comparison.
+    pub command: &'a str,
+    /// What identifies it.
+    pub identity: &'a CaseIdentity,
 }
 
 const LEGEND: &str = "Differences are theirs minus ours. Up to the tolerance they count as none. Decides: the first quantity, \
@@ -38,7 +49,7 @@ impl ResultReport<'_> {
              sample){missing}.",
             self.theirs,
             of.model.name(),
-            self.profile,
+            self.profile.name,
             of.agreeing(),
             counted(of.cases.len(), "case"),
             significant(100.0 * interval.low, 3),
@@ -90,20 +101,45 @@ impl ResultReport<'_> {
         rows(self.comparison.cases.iter())
     }
 
+    /// The cases with another answer; `None` if there are none.
+    fn differing(&self) -> Option<Table> {
+        let mut differing = self.comparison.cases.iter().filter(|case| case.collides[0] != case.collides[1]).peekable();
+        differing.peek()?;
+        Some(rows(differing))
+    }
+
     /// The comparison as text.
     pub fn text(&self, width: usize) -> String {
-        let differing: Vec<&ComparedCase> =
-            self.comparison.cases.iter().filter(|case| case.collides[0] != case.collides[1]).collect();
-        let differing = match differing.is_empty() {
-            true => String::new(),
-            false => format!("\nOther answers\n{}", rows(differing.into_iter()).text()),
-        };
+        let differing = self.differing().map_or(String::new(), |rows| format!("\nOther answers\n{}", rows.text()));
         format!(
             "{}\n{}{differing}{}\n",
             wrap(&format!("{} {}", self.agreement(), self.cause()), width),
             self.differences().text(),
             wrap(LEGEND, width)
         )
+    }
+
+    /// The comparison as a page.
+    pub fn html(&self) -> String {
+        let model = self.comparison.model.name();
+        let others = self.differing().map(|rows| rows.captioned("Cases with another answer"));
+        Page {
+            title: format!("{} beside {model} under {}", self.theirs, self.profile.name),
+            lead: format!("{} {}", self.agreement(), self.cause()),
+            synthetic: false,
+            warnings: Vec::new(),
+            sections: vec![
+                Section::new("differences", "Differences")
+                    .intro(LEGEND)
+                    .tables([self.differences().captioned("Theirs minus ours")])
+                    .tables(others),
+                self.identity
+                    .section(&self.origin, self.profile, self.command)
+                    .fact("results", format!("{}\nSHA-256 {}", self.theirs, self.theirs_sha256)),
+                self.identity.signatures(),
+            ],
+        }
+        .html()
     }
 
     /// The comparison as one document.
@@ -114,7 +150,7 @@ impl ResultReport<'_> {
         let (of, interval) = (self.comparison, self.comparison.agreement());
         records::document(&json!({
             "program": PROGRAM,
-            "profile": self.profile,
+            "profile": self.profile.name,
             "model": of.model.name(),
             "results": self.theirs,
             "cases": of.cases.len(),

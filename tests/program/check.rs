@@ -601,6 +601,19 @@ fn what_turns_with_the_lateral_speed_or_the_deceleration_is_not_robust() {
     assert!(out.contains("deceleration + 0.05 m/s²"), "{out}");
 }
 
+/// Annex 3 says what its driver does with a leader that decelerates beyond 5 m/s²: no reading of softer ones applies.
+#[test]
+fn readings_of_soft_leaders_are_not_named_for_hard_ones() {
+    for (deceleration, is_soft) in [("-4", true), ("-5", true), ("-5.1", false), ("-6", false)] {
+        let lvd = ["check", "--category", "lvd", "--ego-speed", "60km/h", "--gap", "10", "--profiles", "un-r157"];
+        let (_, out, error) = check(&[&lvd[..], &["--acceleration", deceleration, "--format", "json"]].concat());
+        let sheet: Value = serde_json::from_str(&out).unwrap_or_else(|_| panic!("{error}"));
+        let readings = sheet["by_rule"].as_array().unwrap().iter().filter_map(|row| row["reading"].as_str());
+        let soft = readings.filter(|reading| reading.starts_with("cchdm.lvd_below_threshold")).count();
+        assert_eq!(soft > 0, is_soft, "{deceleration}: {sheet}");
+    }
+}
+
 #[test]
 fn a_cut_out_that_drives_through_the_vehicle_ahead_says_so() {
     let case = |ahead_gap: &str| {
@@ -610,9 +623,9 @@ fn a_cut_out_that_drives_through_the_vehicle_ahead_says_so() {
     };
     // It needs 1.9 s to clear the path, and covers 32 m in that time.
     assert!(
-        case("20").contains("No such traffic: the vehicle that cuts out drives through the one ahead of it from 1.2")
+        case("20").contains("no such traffic: the vehicle that cuts out drives through the one ahead of it from 1.2")
     );
-    assert!(!case("40").contains("No such traffic"));
+    assert!(!case("40").contains("no such traffic"));
 }
 
 #[test]

@@ -225,6 +225,11 @@ fn a_nominal_batch_answers_by_lanes_and_says_that_nothing_else_was_examined() {
     assert!(code == 1 && out.contains("no answer is robust by this table"), "{out} {error}");
     let found = document(dir, &nominal);
     assert_eq!(found["nominal"], true);
+    // Every rule counts every case; the rule in force turns none.
+    let rules = found["by_rule"].as_array().unwrap();
+    assert_eq!(rules.len(), 4, "CCHDM, FSM, any, all: {rules:?}");
+    let any = rules.iter().find(|row| row["rule"] == "any (in force)").unwrap();
+    assert_eq!((&any["turned"], &any["preventable"]), (&0.into(), &found["counts"]["preventable"]), "{any}");
     for (case, row) in found["cases"].as_array().unwrap().iter().zip(ROWS) {
         assert_eq!(case["verdict"], row.1, "{case}");
     }

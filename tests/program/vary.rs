@@ -79,6 +79,11 @@ fn an_error_of_a_tenth_of_a_second_in_a_delay_is_found_and_named() {
     assert_eq!((code, &late["cause"], &late["without_result"]), (5, &"t_brake_s".into(), &1.into()), "{late}");
     let sentence = late["cause_sentence"].as_str().unwrap();
     assert!(sentence.contains("the beginning of the braking is 0.100 s later there"), "{sentence}");
+    // The page has the sentence, and what identifies both tables.
+    let files = ["--results", "late.csv", "--models", "CCHDM", "--sheet", "late.html", "--author", "A. Author"];
+    run(dir, &[&["check", "out/cases.csv"], &files[..]].concat());
+    let page = std::fs::read_to_string(dir.join("late.html")).unwrap();
+    assert!(page.contains(sentence) && page.contains("A. Author") && page.matches("SHA-256 ").count() == 3, "{page}");
 }
 
 #[test]
@@ -91,7 +96,7 @@ fn results_without_a_case_an_id_or_a_driver_are_refused_by_name() {
     )
     .unwrap();
     for (results, models, status, said) in [
-        ("id,collision\nb,0\n", "CCHDM", 3, "`b` is the id of no case"),
+        ("id,collision\na,0\nb,0\n", "CCHDM", 3, "results.csv, line 3, column `id`: `b` is the id of no case"),
         ("id,collision\na,0\na,1\n", "CCHDM", 3, "or of two results"),
         ("id,collision\na,maybe\n", "CCHDM", 3, "neither true nor false"),
         ("id,crash\na,0\n", "CCHDM", 3, "`collision`: it is missing"),

@@ -2,8 +2,9 @@
 //! describe, and our interpretations where the annex is silent. The last two exist only for a profile with the annex's
 //! rules.
 
-use super::subject::Lane;
-use crate::model::driver::{BelowTrigger, CutInBraking};
+use super::subject::{Lane, Subject};
+use crate::Result;
+use crate::model::driver::{BelowTrigger, CutInBraking, ModelId, NEVER};
 use crate::model::profile::Profile;
 use crate::run::grid::Point;
 use crate::scenario::{CaseQuantity, Category, SPEED_ERROR_MPS};
@@ -73,8 +74,11 @@ pub(super) struct Reading {
     pub profile: Profile,
 }
 
-/// Returns our interpretations where the annex is silent.
-pub(super) fn readings_where_silent(profile: &Profile, category: Category) -> Vec<Reading> {
+/// Returns our interpretations where the annex is silent on the case.
+///
+/// # Errors
+/// As [`Subject::lane`].
+pub(super) fn readings_where_silent(profile: &Profile, subject: &Subject) -> Result<Vec<Reading>> {
     let mut all = Vec::new();
     let (coasting_mps2, ttc_s) = (value(profile.cchdm.coasting_mps2), value(profile.cchdm.ttc_s));
     let mut other = |sentence: String, instead: &'static str, change: &dyn Fn(&mut Profile)| {
@@ -87,16 +91,18 @@ pub(super) fn readings_where_silent(profile: &Profile, category: Category) -> Ve
     // `wandering_m` is the lateral deviation that the annex regards as normal. A profile without it does not follow the
     // annex, so it has no interpretations of the annex.
     if profile.cchdm.wandering_m <= 0.0 {
-        return all;
+        return Ok(all);
     }
     let coasts = format!("CCHDM coasts at {coasting_mps2} m/s² during its delay (the JRC's; the annex gives no value)");
     other(coasts, "cchdm.coasting_mps2 = 0", &|other| other.cchdm.coasting_mps2 = 0.0);
-    match category {
+    match subject.category() {
         Category::CutIn => {
             let brakes = format!("CCHDM brakes until the speeds are equal, not only while TTC ≤ {ttc_s} s (ours)");
             let instead = "cchdm.cut_in_braking = while-unsafe";
             other(brakes, instead, &|other| other.cchdm.cut_in_braking = CutInBraking::WhileUnsafe);
         }
+        // A driver that ignores a softer leader and perceives this one: the annex is not silent on it.
+        Category::Lvd if exceeds_trigger(profile, subject)? => {}
         Category::Lvd => {
             for (below, instead) in [
                 (BelowTrigger::Never, "cchdm.lvd_below_threshold = never"),
@@ -109,7 +115,15 @@ pub(super) fn readings_where_silent(profile: &Profile, category: Category) -> Ve
         }
         Category::CutOut => {}
     }
-    all
+    Ok(all)
+}
+
+/// Whether the leader decelerates beyond the trigger of CCHDM.
+fn exceeds_trigger(profile: &Profile, subject: &Subject) -> Result<bool> {
+    let mut profile = profile.clone();
+    profile.cchdm.lvd_below_threshold = BelowTrigger::Never;
+    let lane = subject.lane(&profile, subject.point())?;
+    Ok(lane.case.others[0].attend_from[ModelId::Cchdm.index()] != NEVER)
 }
 
 /// Returns a sentence on a vehicle that cuts in and overlaps the ego's path at the start. The annex perceives a cut-in

@@ -98,7 +98,8 @@ pub struct Judgement {
     pub boundaries: Vec<Boundary>,
     /// The runs with a tenth of the time step; `None` without the boundaries.
     pub finer: Option<FinerStep>,
-    /// The verdicts by rule, of the profile as it is and of each other reading; empty without reference drivers.
+    /// The verdicts by rule, of the profile as it is and, with boundaries, of each other reading; empty without reference
+    /// drivers.
     pub by_rule: Vec<RuleVerdicts>,
     /// Maximum duration of a run, s.
     pub time_cap_s: f64,
@@ -240,7 +241,7 @@ impl Check {
     }
 
     /// Like [`Check::run`], without the values at which the answer changes, which need by far the most lanes, and without
-    /// the verdicts by rule.
+    /// the verdicts under other readings.
     ///
     /// # Errors
     /// As [`Check::run`].
@@ -286,7 +287,6 @@ impl Check {
             flips: flips(&changed, |changed| changed.verdicts.answer_within_the_cap(DriverRule::Any)),
             open_with: changed.iter().filter(opens).map(|changed| changed.by).collect(),
             driver_flips: ModelId::ALL.map(driver).to_vec(),
-            touching,
             demand_flips: flips(&changed, |changed| changed.demand),
             clause: profile.reg157.clause.clone(),
             danger: annex::danger(profile, self.subject.category()),
@@ -307,7 +307,8 @@ impl Check {
             finer: with_boundaries
                 .then(|| FinerStep::run(&self.subject, profile, &self.models, &budget))
                 .transpose()?,
-            by_rule: if with_boundaries { self.by_rule(profile, &budget)? } else { Vec::new() },
+            by_rule: self.by_rule(profile, (&changed, &touching), with_boundaries, &budget)?,
+            touching,
             time_cap_s: profile.frame.time_cap_s,
             drives_through_s: self.subject.case(profile, self.subject.point())?.drives_through_s(profile),
         })
@@ -342,7 +343,7 @@ impl Check {
             Ok(found.answer() != is.answer() || found.collides(ModelId::Cchdm) != is.collides(ModelId::Cchdm))
         };
         let mut all = Vec::new();
-        for other in annex::readings_where_silent(profile, category) {
+        for other in annex::readings_where_silent(profile, &self.subject)? {
             if !all.contains(&other.sentence) && decides(&other.profile)? {
                 all.push(other.sentence);
             }

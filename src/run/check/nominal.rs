@@ -33,7 +33,7 @@ pub fn nominal_verdicts(
         return Ok(encoded.into_iter().filter_map(Result::err).map(Err).collect());
     }
     let ends = |profile: Profile, models: &[ModelId]| {
-        // The cases are checked, and nothing resumes the plan: it needs no hash.
+        // Nothing resumes the plan: it needs no hash.
         let (models, source, headways) = (models.to_vec(), Arc::clone(&source), vec![Headway::Observed]);
         let plan = LanePlan::with_hash(String::new(), profile, models, headways, blocks.clone(), source)?;
         by_row(&plan, &rows, executor, Wanted::Verdicts, |chunk| &chunk.verdicts)
@@ -65,7 +65,7 @@ mod tests {
     use super::super::{Answer, Check};
     use super::*;
     use crate::engine::CpuBackend;
-    use crate::scenario::PlainCase;
+    use crate::scenario::{Category, PlainCase};
 
     /// Cases far from every boundary: the lanes of a batch answer as the check of one case does.
     #[test]

@@ -3,7 +3,7 @@
 
 use super::annex;
 use super::verdict::settled;
-use super::{Check, StepBudget, Verdict, flips};
+use super::{CaseVerdicts, Changed, Check, StepBudget, Verdict, flips};
 use crate::Result;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -59,25 +59,46 @@ pub struct RuleVerdicts {
 }
 
 impl Check {
-    /// The verdicts by rule under a profile and under each other reading; empty without reference drivers. Each is
-    /// decided as the sheet's own: no perturbation alters it, and it does not rest on a driver that touches.
-    pub(super) fn by_rule(&self, profile: &Profile, budget: &StepBudget) -> Result<Vec<RuleVerdicts>> {
+    /// The verdicts by rule under a profile, whose runs are given, and under each other reading if these are wanted; empty
+    /// without reference drivers. Each is decided as the sheet's own: no perturbation alters it, and it does not rest on a
+    /// driver that touches.
+    pub(super) fn by_rule(
+        &self,
+        profile: &Profile,
+        (is, touching): (&[Changed], &[ModelId]),
+        with_readings: bool,
+        budget: &StepBudget,
+    ) -> Result<Vec<RuleVerdicts>> {
         let references = &profile.reference_drivers;
         if references.is_empty() {
             return Ok(Vec::new());
         }
-        let others = annex::readings_where_silent(profile, self.subject.category());
-        let readings = std::iter::once((None, profile)).chain(others.iter().map(|of| (Some(of.instead), &of.profile)));
-        let under = |(reading, profile): (Option<&'static str>, &Profile)| {
-            let changed = self.perturbed(profile, budget)?;
-            let (is, touching) = (&changed[0].verdicts, self.touching(&changed, profile)?);
+        let rules = |reading, changed: &[Changed], touching: &[ModelId]| {
+            let is = &changed[0].verdicts;
             let verdict = |rule| {
-                let is_robust = flips(&changed, |changed| changed.verdicts.answer_within_the_cap(rule)).is_empty();
-                settled(is.verdict_by(rule), is_robust && !is.rests_on(&touching, rule))
+                let is_robust = flips(changed, |changed| changed.verdicts.answer_within_the_cap(rule)).is_empty();
+                settled(is.verdict_by(rule), is_robust && !is.rests_on(touching, rule))
             };
             let verdicts = DriverRule::of(references).into_iter().map(|rule| (rule, verdict(rule))).collect();
-            Ok(RuleVerdicts { reading, verdicts })
+            RuleVerdicts { reading, verdicts }
         };
-        readings.map(under).collect()
+        let mut all = vec![rules(None, is, touching)];
+        if with_readings {
+            for other in annex::readings_where_silent(profile, &self.subject)? {
+                let changed = self.perturbed(&other.profile, budget)?;
+                all.push(rules(Some(other.instead), &changed, &self.touching(&changed, &other.profile)?));
+            }
+        }
+        Ok(all)
+    }
+}
+
+impl CaseVerdicts {
+    /// The computed verdicts by rule; empty without reference drivers.
+    pub fn by_rule(&self) -> Vec<RuleVerdicts> {
+        let verdict = |rule| (rule, self.verdict_by(rule));
+        let verdicts = DriverRule::of(&self.reference_drivers).into_iter().map(verdict).collect();
+        let is_judged = !self.reference_drivers.is_empty();
+        is_judged.then_some(RuleVerdicts { reading: None, verdicts }).into_iter().collect()
     }
 }

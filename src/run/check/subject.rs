@@ -1,6 +1,6 @@
 //! The checked case and its neighbours: the same case with one number changed.
 
-use crate::engine::{Constants, Headway, LaneCase, Outcome, Step, Trace, check_time_step};
+use crate::engine::{Constants, Headway, LaneCase, Outcome, Step, Trace};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::grid::{CaseQuantity, Point, without_reaction};
@@ -160,13 +160,11 @@ impl Subject {
     /// The case with its initial gap, for a plan whose lanes start where their cases do.
     ///
     /// # Errors
-    /// As [`Subject::lane`], and a time step too long for the case.
+    /// As [`Subject::lane`].
     pub(super) fn encode(&self, profile: &Profile, tables: &mut Tables<f64>) -> Result<LaneCase<f64>> {
         let case = self.case(profile, self.point())?;
         let gap_m = headway(self.point()).start().gap(case.ego_speed_mps);
-        let case = LaneCase::encode(&case, profile, tables);
-        check_time_step(&case, tables, profile.frame.dt_s, Place::default)?;
-        Ok(case.ahead_by(gap_m))
+        Ok(LaneCase::encode(&case, profile, tables).ahead_by(gap_m))
     }
 }
 

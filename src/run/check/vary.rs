@@ -6,6 +6,7 @@ use super::{CaseVerdicts, MAX_STEPS, StepBudget, Verdict};
 use crate::model::profile::Profile;
 use crate::random::Sobol;
 use crate::run::grid::{MapParameter, Point};
+use crate::scenario::{CaseQuantity, Category};
 use crate::{Error, Place, Result};
 
 /// A varied quantity with its range, in the unit of its name.
@@ -172,7 +173,16 @@ fn varied(subject: &Subject, ranges: &[VariedRange], place: &[f64], profile: &Pr
         }
         point.replace(parameter, value);
     }
-    let varied = Subject::Plain(*case, point.resolved());
+    let mut point = point.resolved();
+    // A leader deceleration begins at equal speeds, unless the leader's own speed varies or differs.
+    let follows = from.get(CaseQuantity::EgoSpeed).filter(|_| case.category == Category::Lvd);
+    if follows.is_some_and(|ego_mps| from.get(CaseQuantity::OtherSpeed) == Some(ego_mps))
+        && ranges.iter().all(|range| range.parameter.quantity != CaseQuantity::OtherSpeed)
+        && let Some(ego_mps) = point.get(CaseQuantity::EgoSpeed)
+    {
+        point = point.with(CaseQuantity::OtherSpeed, ego_mps);
+    }
+    let varied = Subject::Plain(*case, point);
     let lane = varied.lane(profile, varied.point()).ok()?;
     let budget = StepBudget { profile, left: std::cell::Cell::new(MAX_STEPS) };
     let verdicts: CaseVerdicts = super::verdicts(&lane, varied.point(), profile, case.category, &budget);
@@ -183,7 +193,7 @@ fn varied(subject: &Subject, ranges: &[VariedRange], place: &[f64], profile: &Pr
 mod tests {
     use super::*;
     use crate::engine::Headway;
-    use crate::scenario::{CaseParameters, CaseQuantity, Category};
+    use crate::scenario::CaseParameters;
 
     fn base() -> (Subject, Profile) {
         let profile = Profile::load("un-r157").unwrap();
@@ -228,6 +238,28 @@ mod tests {
         );
         assert_eq!(of("outside").len() as u32 + found.left_out, 8);
         assert!(of("outside").iter().all(|place| place.iter().filter(|p| !within(**p)).count() == 1));
+    }
+
+    /// Annex 3 has leaders that decelerate from the ego's speed.
+    #[test]
+    fn a_leader_that_starts_at_the_speed_of_the_ego_keeps_to_it() {
+        let profile = Profile::load("un-r157").unwrap();
+        let mut case = CaseParameters {
+            category: Some("lvd".to_owned()),
+            ego_speed: Some(20.0),
+            gap: Some(30.0),
+            acceleration: Some(-6.0),
+            ..CaseParameters::default()
+        };
+        let plain = case.checked_case(&profile.frame, &mut Default::default()).unwrap();
+        let subject = Subject::plain(&plain, Headway::GapM(30.0));
+        let parameter = MapParameter::find(Category::Lvd, "ego_speed_kmh", "range").unwrap();
+        let ranges = [VariedRange { parameter, from: 50.0, to: 110.0 }];
+        let counts = VariationCounts { inside: 8, ..VariationCounts::default() };
+        for case in vary(&subject, &ranges, counts, 1, &profile).unwrap().cases {
+            let speed = |of| case.subject.point().get(of).unwrap();
+            assert_eq!(speed(CaseQuantity::EgoSpeed), speed(CaseQuantity::OtherSpeed), "{}", case.id);
+        }
     }
 
     #[test]

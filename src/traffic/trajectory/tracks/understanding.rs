@@ -110,6 +110,10 @@ pub struct Understanding {
     pub speed_noise_mps: f64,
     /// The same of accelerations, m/s².
     pub acceleration_noise_mps2: f64,
+    /// The same of positions along the road, m.
+    pub position_noise_m: f64,
+    /// The same of positions across the road, m.
+    pub lateral_noise_m: f64,
     /// Positions over integrated speeds; 1 if they fit together.
     pub positions_over_speeds: Option<f64>,
     /// Vehicles left out because of their class.
@@ -330,6 +334,7 @@ impl Understanding {
         self.km = recording.tracks.iter().map(moved).sum::<f64>() / 1000.0;
         let noise = Noise::of(&recording);
         (self.speed_noise_mps, self.acceleration_noise_mps2) = (noise.speed_mps, noise.acceleration_mps2);
+        (self.position_noise_m, self.lateral_noise_m) = (noise.position_m, noise.lateral_m);
         recording
     }
 
@@ -408,6 +413,20 @@ impl Understanding {
                 noise(self.acceleration_noise_mps2)
             ),
         ));
+        // A gap is the difference of two positions.
+        let errors = [
+            ("gap", std::f64::consts::SQRT_2 * self.position_noise_m, "m"),
+            ("ego_speed", self.speed_noise_mps, "m/s"),
+            ("speed", self.speed_noise_mps, "m/s"),
+            ("lateral_distance", self.lateral_noise_m, "m"),
+        ];
+        let errors = errors.iter().filter(|(_, error, _)| *error >= 1e-6);
+        let errors: Vec<String> =
+            errors.map(|(name, error, unit)| format!("{name}={}{unit}", significant(*error, 2))).collect();
+        if !errors.is_empty() {
+            let list = errors.join(",");
+            lines.push(("input errors", format!("{list}: this noise, for option `uncertain` of a check; no offset")));
+        }
         if self.ignored > 0 || self.excluded > 0 {
             lines.push(("left out", format!("{} by class, {} as doubtful", count(self.ignored), count(self.excluded))));
         }
