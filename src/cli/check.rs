@@ -68,7 +68,7 @@ pub(super) struct Check {
     /// Profiles; the first one decides [default: un-r157, and the five others]
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Models and criteria")]
     profiles: Vec<String>,
-    /// Also write a page for printing: the sheet of a case, or the worst of a table
+    /// Also write a page to print: a case, or the worst of a table
     #[arg(long, value_name = "FILE.html", help_heading = "Output")]
     sheet: Option<PathBuf>,
     /// Also write a table's answers, one row per case: .csv, .jsonl or .parquet
