@@ -1,6 +1,6 @@
 //! `lanesweep fit`: fits densities to the parameters of scenarios.
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
 use clap::Args;
 
@@ -11,14 +11,15 @@ use super::format::FormatFlag;
 use super::lists;
 use super::source::{self, SourceFlags};
 use super::{Exit, Output};
+use crate::report::coverage::{self, CoverageSheet};
 use crate::report::density;
 use crate::report::host::SettingRecord;
 use crate::report::records;
-use crate::scenario::DataProvenance;
 use crate::scenario::parameterization::Parameterization;
+use crate::scenario::{DataProvenance, Scenario};
 use crate::stats::density::{DensityModel, FitOptions, write_density};
 use crate::support::error::push_once;
-use crate::support::files::{check_folder_of, make_folder_of};
+use crate::support::files::{check_folder_of, file_name, make_folder_of, write_atomically};
 use crate::support::readable::counted;
 use crate::support::run_folder::RunFolder;
 use crate::{Error, Place, Result};
@@ -56,6 +57,14 @@ pub(super) struct Fit {
     /// not the recordings.
     #[arg(long, help_heading = "Models and criteria", hide_short_help = true)]
     without_scenarios: bool,
+    /// Tested cases, whose coverage is shown in place of that of the recorded ones
+    ///
+    /// A table of cases, such as cases.csv of `vary`, or a scenario file. They do not enter the density.
+    #[arg(long, value_name = "FILE", help_heading = "Data")]
+    tested: Option<PathBuf>,
+    /// Range of a parameter for the coverage [default: that of the recorded cases]; repeatable
+    #[arg(long, value_name = "NAME=FROM..TO", help_heading = "Scenario")]
+    range: Vec<String>,
     #[command(flatten)]
     exposure: lists::ExposureFlags,
     #[command(flatten)]
@@ -63,7 +72,7 @@ pub(super) struct Fit {
 }
 
 from_arguments!(
-    Fit { out, with_thw, no_comparison, without_scenarios }
+    Fit { out, with_thw, no_comparison, without_scenarios, tested, range }
     groups { data, categories, parameterizations, exposure, format }
 );
 
@@ -82,11 +91,17 @@ impl Fit {
             representativeness: !self.no_comparison,
         };
         let files = self.files(&ids, configured)?;
+        let ranges = self.ranges()?;
+        // Of any filter: what was tested counts.
+        let tested = match &self.tested {
+            Some(path) => Some((file_name(path), source::scenarios_of(path, self.data.policy())?.0)),
+            None => None,
+        };
         let (collection, facts) = self.data.load_with_exposure(configured, typed)?;
 
         // A single file needs no folder.
         let folder = (!self.is_single()).then(|| RunFolder::open_without_record(&self.out)).transpose()?;
-        let mut fitted: Vec<(PathBuf, DensityModel)> = Vec::new();
+        let mut fitted: Vec<FittedFile> = Vec::new();
         let (mut failed, mut complete) = (Vec::new(), collection.problems.is_empty());
         configured.with_bar(Total::Exact(ids.len() as u64), "fitting", |bar| {
             for (id, file) in ids.iter().zip(files) {
@@ -105,10 +120,18 @@ impl Fit {
                     result.model.scenarios.clear();
                 }
                 complete &= result.left_out.is_empty();
-                fitted.push((file, result.model));
+                let coverage = covered(&result.model, tested.as_ref(), &ranges, options.seed)?;
+                fitted.push(FittedFile { file, model: result.model, coverage });
             }
             Ok(())
         })?;
+        let is_known = |name: &str| {
+            fitted.iter().flat_map(|of| of.model.space.parameters()).any(|parameter| parameter.name == name)
+        };
+        if let Some((unknown, _)) = ranges.iter().find(|(name, _)| !fitted.is_empty() && !is_known(name)) {
+            let problem = format!("no fitted density has the parameter `{unknown}`");
+            return Err(Error::usage(Place::item("--range"), problem, "the table of a density names its parameters"));
+        }
         if fitted.is_empty() && !failed.is_empty() {
             return Err(failed.swap_remove(0));
         }
@@ -119,6 +142,10 @@ impl Fit {
         let output = self.format.output(exit, || text(&facts, &fitted), json)?;
         tracing::info!("{} written to {}", counted(fitted.len(), "density file"), self.out.display());
         Ok(output)
+    }
+
+    fn ranges(&self) -> Result<Vec<(String, [f64; 2])>> {
+        self.range.iter().map(|text| lists::range(text).map(|(name, ends)| (name.to_owned(), ends))).collect()
     }
 
     /// The parameterizations to fit, in the registry's order.
@@ -142,7 +169,9 @@ impl Fit {
         };
         let files: Vec<PathBuf> = ids.iter().map(name).collect();
         let beside: Vec<PathBuf> = self.data.scenarios.as_deref().map(DataProvenance::path_of).into_iter().collect();
-        for file in &files {
+        let beside: Vec<PathBuf> = beside.into_iter().chain(self.tested.clone()).collect();
+        for file in files.iter().flat_map(|file| [file.clone(), page_of(file)]) {
+            let file = &file;
             self.data.refuse_overwriting(file, configured, "--out")?;
             source::refuse_overwriting(file, &beside, "--out")?;
             check_folder_of(file)?;
@@ -155,30 +184,64 @@ impl Fit {
     }
 }
 
+/// A density with its file and its coverage.
+struct FittedFile {
+    file: PathBuf,
+    model: DensityModel,
+    coverage: CoverageSheet,
+}
+
+/// The page beside a density file: `cut-in-2-coverage.html`.
+fn page_of(file: &Path) -> PathBuf {
+    file.with_file_name(format!("{}-coverage.html", file.file_stem().unwrap_or_default().to_string_lossy()))
+}
+
+/// The coverage of a density by its recorded cases, or by those tested cases of its category that have its parameters.
+fn covered(
+    model: &DensityModel,
+    tested: Option<&(String, Vec<Scenario>)>,
+    ranges: &[(String, [f64; 2])],
+    seed: u64,
+) -> Result<CoverageSheet> {
+    let points = tested.map(|(name, scenarios)| {
+        let of_category = scenarios.iter().filter(|scenario| scenario.category == model.category());
+        let (points, left_out): (Vec<_>, Vec<_>) =
+            of_category.map(|scenario| model.space.point(scenario)).partition(Result::is_ok);
+        if !left_out.is_empty() {
+            let of = model.space.id().name();
+            tracing::warn!("{} of {name} have not the parameters of {of}", counted(left_out.len(), "case"));
+        }
+        (name.as_str(), points.into_iter().flatten().collect())
+    });
+    coverage::sheet(model, points, ranges, seed)
+}
+
 /// Publishes all densities together. Each is an independent result with its checksum, so those of other runs are kept.
-fn write(fitted: &[(PathBuf, DensityModel)], folder: Option<&RunFolder>) -> Result<()> {
+fn write(fitted: &[FittedFile], folder: Option<&RunFolder>) -> Result<()> {
     let Some(folder) = folder else {
-        return fitted.iter().try_for_each(|(path, model)| {
-            make_folder_of(path)?;
-            write_density(path, model)
+        return fitted.iter().try_for_each(|of| {
+            make_folder_of(&of.file)?;
+            write_density(&of.file, &of.model)?;
+            write_atomically(&page_of(&of.file), of.coverage.html.as_bytes())
         });
     };
     let mut results = folder.results()?;
-    for (path, model) in fitted {
-        let name = path.file_name().and_then(|name| name.to_str()).unwrap_or_default();
-        results.add(name, &model.to_json()?)?;
+    for of in fitted {
+        results.add(&file_name(&of.file), &of.model.to_json()?)?;
+        results.add(&file_name(&page_of(&of.file)), of.coverage.html.as_bytes())?;
     }
     results.publish_each()
 }
 
-fn text(facts: &DataProvenance, fitted: &[(PathBuf, DensityModel)]) -> String {
+fn text(facts: &DataProvenance, fitted: &[FittedFile]) -> String {
     let mut text = format!("{}\n\n", facts.data);
-    for (path, model) in fitted {
-        text.push_str(&density::text(model));
-        text.push_str(&format!("file       {}\n\n", path.display()));
+    for of in fitted {
+        text.push_str(&density::text(&of.model));
+        text.push_str(&format!("coverage   {}\n", of.coverage.text));
+        text.push_str(&format!("file       {}\n\n", of.file.display()));
     }
     if fitted.len() > 1 {
-        let models: Vec<&DensityModel> = fitted.iter().map(|(_, model)| model).collect();
+        let models: Vec<&DensityModel> = fitted.iter().map(|of| &of.model).collect();
         text.push_str(&density::summary(&models));
     }
     if facts.synthetic {
@@ -187,10 +250,11 @@ fn text(facts: &DataProvenance, fitted: &[(PathBuf, DensityModel)]) -> String {
     text
 }
 
-fn document(facts: &DataProvenance, fitted: &[(PathBuf, DensityModel)], settings: &[SettingRecord]) -> Result<String> {
-    let densities = fitted.iter().map(|(path, model)| {
-        let mut record = density::record(model);
-        record["file"] = path.display().to_string().into();
+fn document(facts: &DataProvenance, fitted: &[FittedFile], settings: &[SettingRecord]) -> Result<String> {
+    let densities = fitted.iter().map(|of| {
+        let mut record = density::record(&of.model);
+        record["coverage"] = of.coverage.json.clone();
+        record["file"] = of.file.display().to_string().into();
         record
     });
     records::document(&serde_json::json!({

@@ -8,6 +8,7 @@ use super::arguments::from_arguments;
 use super::case_flags::{CaseFlags, GivenCase, all_cases, from_toml};
 use super::configured::Configured;
 use super::format::FormatFlag;
+use super::lists;
 use super::source::PlausibilityFlag;
 use super::{Exit, Output};
 use crate::model::driver::ModelId;
@@ -154,14 +155,7 @@ impl Vary {
 
     fn ranges(&self, category: Category) -> Result<Vec<VariedRange>> {
         let range = |text: &String| {
-            let wrong = || {
-                let help = "write NAME=FROM..TO with two numbers, the smaller first, for instance gap_m=5..40";
-                Error::usage(Place::item("--range"), format!("`{text}` is no range"), help)
-            };
-            let (name, ends) = text.split_once('=').ok_or_else(wrong)?;
-            let number = |end: &str| end.trim().parse::<f64>().ok().filter(|value| value.is_finite());
-            let ends = ends.split_once("..").and_then(|(from, to)| number(from).zip(number(to)));
-            let (from, to) = ends.filter(|(from, to)| from < to).ok_or_else(wrong)?;
+            let (name, [from, to]) = lists::range(text)?;
             let axis = GridAxis::parse(category, &format!("{name}={from},{to}"), "--range")?;
             Ok(VariedRange { parameter: axis.parameter, from, to })
         };
