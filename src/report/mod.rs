@@ -13,6 +13,7 @@ pub mod case_sheet;
 pub mod case_table;
 mod case_uncertainty;
 pub mod compare;
+mod credibility;
 pub mod density;
 pub mod dossier;
 mod dossier_page;
