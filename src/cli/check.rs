@@ -13,7 +13,7 @@ use super::format::FormatFlag;
 use super::signals::CANCEL;
 use super::source::{PlausibilityFlag, refuse_overwriting, scenarios_of};
 use super::uncertain_flags::UncertainFlags;
-use super::{Exit, Output};
+use super::{COMMIT, Exit, Output};
 use crate::engine::{CpuBackend, Executor};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -222,7 +222,7 @@ impl Check {
     /// What identifies the sheet besides the case.
     fn identity(&self) -> Result<CaseIdentity> {
         Ok(CaseIdentity {
-            commit: env!("LANESWEEP_COMMIT"),
+            commit: COMMIT,
             file_sha256: self.file.as_deref().map(input_file::sha256).transpose()?,
             date: self.date.clone(),
             author: self.author.clone(),

@@ -15,7 +15,7 @@ use super::arguments::{Arguments, NEEDS, Value};
 use super::console::{self, Total, Verbosity};
 use super::help::{DATA, MODELS, OUTPUT, RUN};
 use super::signals::CANCEL;
-use super::{Cli, Verb};
+use super::{COMMIT, Cli, Verb};
 use crate::cli::settings::{Assignment, FILE_VARIABLE, Key, KeyKind, Layers, Origin, Setting, Settings};
 use crate::engine::{BackendChoice, DeviceName, Executor, OpenBackend};
 use crate::model::profile::Profile;
@@ -320,7 +320,7 @@ impl Configured {
 
     /// The record of the host, at the end of the run.
     pub(super) fn host(&self, opened: &OpenBackend, rechecked_lanes: u64, has_plan: bool) -> Host {
-        Host::of(opened, rechecked_lanes, self.started, self.record(has_plan))
+        Host::of(COMMIT, opened, rechecked_lanes, self.started, self.record(has_plan))
     }
 
     /// Does work with a bar.

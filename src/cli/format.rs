@@ -124,7 +124,7 @@ impl TablesFlag {
         let shown = || if self.tables { report.text(width) } else { answer() };
         let printed = format.output(exit, shown, || report.json())?;
         let page = out.join("report.html");
-        tracing::info!("{} files written; start with {}", files.len() + 1, page.display());
+        tracing::info!("{} files written; start with {}", files.files.len() + 1, page.display());
         Ok(printed)
     }
 }

@@ -115,6 +115,7 @@ impl Justify {
             dossier: &dossier,
             options: &options,
             provenance: &facts,
+            recordings: &collection.recordings,
             profile: &profile,
             author: self.author.clone(),
             date: self.date.clone(),

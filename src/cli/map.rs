@@ -10,7 +10,7 @@ use super::configured::Configured;
 use super::console::Total;
 use super::format::FormatFlag;
 use super::source::PlausibilityFlag;
-use super::{Exit, Output, lists};
+use super::{COMMIT, Exit, Output, lists};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::report::host::{Host, SweepRecord};
@@ -145,7 +145,7 @@ impl Map {
         let (units, started) = (Total::Exact(map.unit_count()), Instant::now());
         let MapResult { grids, summary } =
             configured.with_progress(units, "sweeping", &executor, |executor| map.run(executor))?;
-        let host = Host::of(&opened, summary.rechecked_lanes, started, configured.record(false));
+        let host = Host::of(COMMIT, &opened, summary.rechecked_lanes, started, configured.record(false));
         let sweep = SweepRecord::of(&summary, RECHECK_SEED);
         let preset = self.preset.clone();
         let report = MapReport { grids, criterion, against, profile, preset, host, sweep, plan_s };
@@ -153,7 +153,7 @@ impl Map {
         let output = self.format.output(Exit::Ok, || report.text(), || report.json(&written))?;
         let (simulations, seconds) = (count(report.simulations()), value(report.host.seconds));
         tracing::info!("{simulations} simulations in {seconds} s on {}", report.host.backend);
-        tracing::info!("{} files written to {}", written.len() + 1, self.out.display());
+        tracing::info!("{} files written to {}", written.files.len() + 1, self.out.display());
         Ok(output)
     }
 

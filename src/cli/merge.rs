@@ -6,7 +6,7 @@ use clap::Args;
 
 use super::arguments::from_arguments;
 use super::format::{FormatFlag, TablesFlag};
-use super::{Exit, Output};
+use super::{COMMIT, Exit, Output};
 use crate::Result;
 use crate::report::host::{Host, Timings};
 use crate::report::sampling::SampleReport;
@@ -46,13 +46,13 @@ impl Merge {
             Merged::Study(merged) => {
                 let (study, result) = *merged;
                 let (swept, timings) = (&result.summary, Timings::default());
-                let host = Host::of_parts(result.parts, swept.rechecked_lanes);
+                let host = Host::of_parts(COMMIT, result.parts, swept.rechecked_lanes);
                 let report = StudyReport::of(&study, &result.counts, None, host, swept, timings)?;
                 self.tables.finish(report, folder.results()?, study.facts().incomplete, self.format)
             }
             Merged::Sample(merged) => {
                 let (sample, result) = *merged;
-                let host = Host::of_parts(result.parts, result.rechecked_lanes);
+                let host = Host::of_parts(COMMIT, result.parts, result.rechecked_lanes);
                 let mut report = SampleReport::of_sample(&sample, &result, host)?;
                 let files = report.write(folder.results()?, &sample, &result)?;
                 self.format.output_in(&self.folder, Exit::Ok, || report.text(), || report.json(&files))

@@ -45,6 +45,9 @@ mod verify;
 
 pub use exit::Exit;
 
+/// Commit that the program is built from; empty if unknown.
+const COMMIT: &str = env!("LANESWEEP_COMMIT");
+
 use std::ffi::OsString;
 use std::process::ExitCode;
 

@@ -11,7 +11,7 @@ use super::console::{self, Total};
 use super::format::{FormatFlag, TablesFlag};
 use super::shard_flags::ShardFlags;
 use super::source::{self, SourceFlags};
-use super::{Exit, Output, lists};
+use super::{COMMIT, Exit, Output, lists};
 use crate::Result;
 use crate::engine::{Chunk, Headway, LanePlan, OpenBackend};
 use crate::report::host::{Host, Timings};
@@ -236,7 +236,7 @@ impl Study {
         }
         let comparison = self.compare_reference.then(|| ReferenceComparison::of_study(study.cases())).transpose()?;
         let settings = configured.record(self.shards.plan.is_some());
-        let mut host = Host::of(opened, swept.rechecked_lanes, started, settings);
+        let mut host = Host::of(COMMIT, opened, swept.rechecked_lanes, started, settings);
         if let (Some(stand_in), 1..) = (executor.fallback, swept.redone_lanes) {
             host.backend += &format!("; after its failure {}", stand_in.describe());
         }

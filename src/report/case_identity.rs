@@ -17,12 +17,9 @@ use crate::run::grid::{PARAMETERS, Perturbation};
 use crate::support::readable::value;
 use crate::support::table::{Column, NumberText, Table};
 
-/// What a check does not consider. The chapter for assessors has the same list.
+/// What no simulation of the program considers. The chapter for assessors has the same list.
 pub const NOT_CONSIDERED: [(&str, &str); 9] = [
-    (
-        "The system under assessment",
-        "only reference drivers are simulated; the sheet says nothing of what the system does",
-    ),
+    ("The system under assessment", "only reference drivers are simulated; nothing is said of what the system does"),
     (
         "Steering",
         "no vehicle evades; the ego stays in the middle of its lane, the others keep to the motion of the case",
@@ -60,15 +57,6 @@ pub struct CaseIdentity {
 }
 
 impl CaseIdentity {
-    /// The commit by its first digits.
-    fn commit(&self, digits: usize) -> String {
-        let (commit, changes) = self.commit.split_at(self.commit.find(' ').unwrap_or(self.commit.len()));
-        match commit {
-            "" => "commit unknown".to_owned(),
-            commit => format!("commit {}{changes}", commit.get(..digits).unwrap_or(commit)),
-        }
-    }
-
     /// The file by the first digits of its hash, behind other words; empty without a file.
     pub(super) fn mark(&self) -> String {
         self.file_sha256.as_ref().map_or(String::new(), |sha256| format!(", file {}", &sha256[..12]))
@@ -79,7 +67,7 @@ impl CaseIdentity {
         let file = self.file_sha256.as_ref().map(|sha256| format!("{origin}\nSHA-256 {sha256}"));
         let profile_sha256 = format!("SHA-256 {}", profile_sha256(profile).unwrap_or_default());
         Section::new("identity", "Identity")
-            .fact("program", format!("{PROGRAM}, {}, engine {ENGINE_VERSION}", self.commit(40)))
+            .fact("program", program(self.commit, 40))
             .fact("data", file.unwrap_or_else(|| origin.to_owned()))
             .fact(&format!("profile {}", profile.name), profile_sha256)
             .fact("command", command)
@@ -102,6 +90,16 @@ impl CaseIdentity {
     pub(super) fn not_considered() -> Section {
         Section::new("not-considered", "Not considered").facts(NOT_CONSIDERED)
     }
+}
+
+/// Program, version, commit by its first digits, and version of the lanes.
+pub(super) fn program(commit: &str, digits: usize) -> String {
+    let (commit, changes) = commit.split_at(commit.find(' ').unwrap_or(commit.len()));
+    let commit = match commit {
+        "" => "commit unknown".to_owned(),
+        commit => format!("commit {}{changes}", commit.get(..digits).unwrap_or(commit)),
+    };
+    format!("{PROGRAM}, {commit}, engine {ENGINE_VERSION}")
 }
 
 impl CaseSheet<'_> {
@@ -140,7 +138,7 @@ impl CaseSheet<'_> {
         let profiles =
             self.profiles.iter().map(|profile| format!("{} {}", profile.name, short(profile_sha256(profile))));
         let parts = [
-            Some(format!("program: {PROGRAM}, {}, engine {ENGINE_VERSION}", self.identity.commit(12))),
+            Some(format!("program: {}", program(self.identity.commit, 12))),
             self.identity.file_sha256.as_ref().map(|sha256| format!("file: {}", short(Ok(sha256.clone())))),
             Some(self.mark()),
             Some(
@@ -179,26 +177,14 @@ impl CaseSheet<'_> {
 
     /// Every constant of the first profile with its source.
     pub(super) fn assumptions_section(&self) -> Section {
-        let assumptions = self.profiles[0].assumptions();
-        let table = Table::of(&assumptions)
-            .column("constant", |of| of.key.as_str())
-            .column("meaning", |of| of.meaning.as_deref().unwrap_or("not recorded"))
-            .column("source", source)
-            .column("value", |of| NumberText(plain(&of.value)))
-            .column("unit", |of| NumberText(of.unit.to_owned()));
         let name = &self.profiles[0].name;
         let others = self.profiles[1..].iter();
         let others = others.map(|profile| {
             (format!("profile {}", profile.name), format!("SHA-256 {}", profile_sha256(profile).unwrap_or_default()))
         });
         Section::new("assumptions", "Assumptions")
-            .intro(format!(
-                "Every constant and option of {name}: {}. \"Ours\": no source gives it. UN R157 is the 01 series; its tables and \
-                 data sheets were at hand, the running text of Annex 3, 3.4.2, was not. Paper: arXiv 2409.01117. JRC: its public \
-                 simulator of 2021.",
-                self.profiles[0].description
-            ))
-            .tables([table.build().captioned(format!("Constants of {name}"))])
+            .intro(format!("Every constant and option of {name}: {}. {SOURCES}", self.profiles[0].description))
+            .tables([assumptions_table(&self.profiles[0])])
             .facts(others)
     }
 
@@ -254,6 +240,22 @@ pub(super) fn profile_sha256(profile: &Profile) -> Result<String> {
     let mut canonical = Canonical::new("profile");
     canonical.value(profile)?;
     Ok(canonical.finish())
+}
+
+/// What the sources of [`assumptions_table`] mean.
+pub(super) const SOURCES: &str = "\"Ours\": no source gives it. UN R157 is the 01 series; its tables and data sheets were at hand, \
+     the running text of Annex 3, 3.4.2, was not. Paper: arXiv 2409.01117. JRC: its public simulator of 2021.";
+
+/// Every constant and option of a profile with its source.
+pub(super) fn assumptions_table(profile: &Profile) -> Table {
+    let assumptions = profile.assumptions();
+    let table = Table::of(&assumptions)
+        .column("constant", |of| of.key.as_str())
+        .column("meaning", |of| of.meaning.as_deref().unwrap_or("not recorded"))
+        .column("source", source)
+        .column("value", |of| NumberText(plain(&of.value)))
+        .column("unit", |of| NumberText(of.unit.to_owned()));
+    table.build().captioned(format!("Constants of {}", profile.name))
 }
 
 fn source(of: &Assumption) -> &str {

@@ -20,7 +20,7 @@ use crate::scenario::DataProvenance;
 use crate::stats::density::{DensityKind, Representativeness, normal_quantile};
 use crate::stats::estimate::{Enough, Ratio, RatioVerdict};
 use crate::support::readable;
-use crate::support::run_folder::Results;
+use crate::support::run_folder::{ResultFiles, Results};
 use crate::support::table::{Column, Digits, NumberText, Table};
 
 /// A comparison with the facts that its files state.
@@ -44,7 +44,7 @@ impl CompareReport<'_> {
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn write(&self, mut results: Results) -> Result<Vec<String>> {
+    pub fn write(&self, mut results: Results) -> Result<ResultFiles> {
         results.add("compare.csv", self.csv().as_bytes())?;
         results.add("compare.txt", self.text().as_bytes())?;
         let mut figures = Vec::new();
@@ -67,7 +67,7 @@ impl CompareReport<'_> {
     ///
     /// # Errors
     /// None for a record of this program.
-    pub fn json(&self, files: &[String]) -> Result<String> {
+    pub fn json(&self, files: &ResultFiles) -> Result<String> {
         let (plan, options) = (self.compare.lane_plan(), self.compare.options());
         let DataProvenance { data, synthetic, scenarios_sha256, driven } = self.compare.provenance();
         document(&record! {
@@ -88,7 +88,8 @@ impl CompareReport<'_> {
             left_out: &self.left_out,
             categories: &self.categories,
             settings: &self.host.settings,
-            files: &files,
+            #[serde(flatten)]
+            files: files,
             host: &self.host,
         })
     }

@@ -3,9 +3,10 @@
 use serde_json::json;
 
 use super::host::Host;
-use super::records::{self, PROGRAM, smallest_gap_m};
+use super::records::{self, PROGRAM, record, smallest_gap_m};
 use super::trace::{TraceFigure, TracePanels, TraceSeries};
 use crate::Result;
+use crate::engine::ENGINE_VERSION;
 use crate::model::profile::Profile;
 use crate::run::justify::{Dossier, Hidden, JustifyOptions, REGULATION, Scored, Share};
 use crate::run::sampling::RateRecord;
@@ -13,8 +14,9 @@ use crate::scenario::DataProvenance;
 use crate::scenario::parameterization::Parameterization;
 use crate::stats::estimate::Ratio;
 use crate::support::readable::{count, value};
-use crate::support::run_folder::Results;
+use crate::support::run_folder::{ResultFiles, Results};
 use crate::support::table::{Column, NumberText, Table};
+use crate::traffic::mining::RecordingSummary;
 
 /// Maximum number of hidden failures on the page; `hidden.csv` has all.
 pub(super) const SHOWN: usize = 20;
@@ -27,6 +29,8 @@ pub struct DossierReport<'a> {
     pub options: &'a JustifyOptions,
     /// Provenance of the scenarios.
     pub provenance: &'a DataProvenance,
+    /// The recordings that were mined; none for scenarios of a file.
+    pub recordings: &'a [RecordingSummary],
     /// Profile.
     pub profile: &'a Profile,
     /// The person responsible, if given.
@@ -44,8 +48,8 @@ impl DossierReport<'_> {
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn write(&self, mut results: Results) -> Result<Vec<String>> {
-        results.add("report.html", self.html().as_bytes())?;
+    pub fn write(&self, mut results: Results) -> Result<ResultFiles> {
+        results.add("report.html", self.html()?.as_bytes())?;
         results.add("hidden.csv", self.hidden_csv().as_bytes())?;
         if let Some(svg) = self.example() {
             results.add("hidden.svg", svg.as_bytes())?;
@@ -189,7 +193,7 @@ impl DossierReport<'_> {
     ///
     /// # Errors
     /// None for what this program made.
-    pub fn json(&self, files: &[String]) -> Result<String> {
+    pub fn json(&self, files: &ResultFiles) -> Result<String> {
         let dossier = self.dossier;
         let scored = |scored: &Scored| {
             let one = |share: &Share| json!({"value": share.value, "interval": share.interval});
@@ -222,47 +226,51 @@ impl DossierReport<'_> {
                 }),
             })
         });
-        records::document(&json!({
-            "program": PROGRAM,
-            "data": self.provenance.data,
-            "synthetic": self.provenance.synthetic,
-            "scenarios_sha256": self.provenance.scenarios_sha256,
-            "profile": self.profile,
-            "parameterization": dossier.parameterization.key,
-            "category": dossier.parameterization.category.key(),
-            "model": dossier.model.name(),
-            "criterion": dossier.criterion.key(),
-            "author": self.author,
-            "date": self.date,
-            "conclusion": dossier.conclusion,
-            "sentence": self.answer(),
-            "rules": self.options.rules,
-            "margin": self.options.compare.enough.margin,
-            "confidence": self.options.score.confidence,
-            "min_failures": self.options.score.min_failures,
-            "findings": dossier.findings,
-            "rule": self.rule(),
-            "found": dossier.found,
-            "scenarios": dossier.scenarios,
-            "simulations": dossier.lanes,
-            "headways": dossier.headways.iter().map(ToString::to_string).collect::<Vec<_>>(),
-            "close_following": dossier.close_following,
-            "scores": scored(&dossier.scored),
-            "regulation": dossier.regulation.as_ref().map(|of| json!({"profile": REGULATION, "scores": scored(of)})),
-            "groups": groups.collect::<Vec<_>>(),
-            "compared": dossier.compared,
-            "coverage": coverage,
-            "no_density": dossier.no_density.as_ref().map(ToString::to_string),
-            "alternatives": alternatives.collect::<Vec<_>>(),
-            "hidden": dossier.hidden.len(),
-            "plan_sha256": dossier.plan_sha256,
-            "density_sha256": dossier.density_sha256,
-            "left_out": dossier.left_out.iter().map(ToString::to_string).collect::<Vec<_>>(),
-            "command": self.command,
-            "settings": self.host.settings,
-            "files": files,
-            "host": self.host,
-        }))
+        records::document(&record! {
+            program: PROGRAM,
+            engine: ENGINE_VERSION,
+            commit: self.host.commit(),
+            data: &self.provenance.data,
+            synthetic: &self.provenance.synthetic,
+            scenarios_sha256: &self.provenance.scenarios_sha256,
+            recordings: &self.recordings,
+            profile: &self.profile,
+            parameterization: &dossier.parameterization.key,
+            category: dossier.parameterization.category.key(),
+            model: dossier.model.name(),
+            criterion: dossier.criterion.key(),
+            author: &self.author,
+            date: &self.date,
+            conclusion: &dossier.conclusion,
+            sentence: self.answer(),
+            rules: &self.options.rules,
+            margin: &self.options.compare.enough.margin,
+            confidence: &self.options.score.confidence,
+            min_failures: &self.options.score.min_failures,
+            findings: &dossier.findings,
+            rule: self.rule(),
+            found: &dossier.found,
+            scenarios: &dossier.scenarios,
+            simulations: &dossier.lanes,
+            headways: dossier.headways.iter().map(ToString::to_string).collect::<Vec<_>>(),
+            close_following: &dossier.close_following,
+            scores: scored(&dossier.scored),
+            regulation: dossier.regulation.as_ref().map(|of| json!({"profile": REGULATION, "scores": scored(of)})),
+            groups: groups.collect::<Vec<_>>(),
+            compared: &dossier.compared,
+            coverage: coverage,
+            no_density: dossier.no_density.as_ref().map(ToString::to_string),
+            alternatives: alternatives.collect::<Vec<_>>(),
+            hidden: dossier.hidden.len(),
+            plan_sha256: &dossier.plan_sha256,
+            density_sha256: &dossier.density_sha256,
+            left_out: dossier.left_out.iter().map(ToString::to_string).collect::<Vec<_>>(),
+            command: &self.command,
+            settings: &self.host.settings,
+            #[serde(flatten)]
+            files: files,
+            host: &self.host,
+        })
     }
 }
 

@@ -1,14 +1,16 @@
 //! The dossier's page: its chapters.
 
+use super::credibility::{RunKind, annex};
 use super::dossier::{DossierReport, SHOWN, share};
 use super::html::{Page, PageFigure, Section};
-use super::records::PROGRAM;
+use crate::Result;
 use crate::support::readable::{count, value};
+use crate::support::run_folder::ResultFiles;
 
 impl DossierReport<'_> {
     /// The dossier as a page.
-    pub(super) fn html(&self) -> String {
-        Page {
+    pub(super) fn html(&self) -> Result<String> {
+        let page = Page {
             title: format!("Is {} appropriate under {}?", self.dossier.parameterization.name(), self.profile.name),
             lead: format!("{}. {} {} {}", self.answer(), self.recall(), self.coverage(), self.provenance.data),
             synthetic: self.provenance.synthetic,
@@ -31,13 +33,12 @@ impl DossierReport<'_> {
                          precision alone.",
                     )
                     .tables([self.alternatives().captioned("Alternatives, [interval over scenarios]")]),
-                self.credibility_section(),
                 Section::new("limits", "Limits of use").facts(self.limits()),
-                self.reproduction_section(),
+                annex(RunKind::Dossier, &self.json(&ResultFiles::default())?)?.host(self.host.facts()),
                 Section::new("signature", "Signature").facts(self.signature()),
             ],
-        }
-        .html()
+        };
+        Ok(page.html())
     }
 
     fn conclusion_section(&self) -> Section {
@@ -115,28 +116,5 @@ impl DossierReport<'_> {
                 format!("{} %", value(100.0 * coverage.valid_fraction)),
             )
             .fact("representativeness", coverage.representativeness.map_or_else(unknown, represents))
-    }
-
-    fn credibility_section(&self) -> Section {
-        let recheck = format!(
-            "{} lanes were computed again on the CPU with every step, and were equal to the bit",
-            count(self.host.rechecked_lanes)
-        );
-        Section::new("credibility", "Credibility of the simulation")
-            .fact("exactness", recheck)
-            .fact("not covered", "perception faults, vehicle dynamics beyond a deceleration with a jerk limit")
-    }
-
-    fn reproduction_section(&self) -> Section {
-        Section::new("reproduction", "Reproduction")
-            .fact("command", &self.command)
-            .fact("program", format!("{PROGRAM}, engine {}", crate::engine::ENGINE_VERSION))
-            .fact("data", &self.provenance.data)
-            .fact("SHA-256 of the scenarios", &self.provenance.scenarios_sha256)
-            .fact("SHA-256 of the plan", &self.dossier.plan_sha256)
-            .fact("SHA-256 of the density", self.dossier.density_sha256.as_deref().unwrap_or("–"))
-            .fact("profile", format!("{}, time step {} s", self.profile.name, self.profile.frame.dt_s))
-            .host([self.host.computed_by()])
-            .parts([Section::options(format!("Profile {}", self.profile.name), self.profile)])
     }
 }

@@ -151,29 +151,21 @@ impl DossierReport<'_> {
     }
 
     /// Purposes that the conclusion does not support.
-    pub(super) fn limits(&self) -> [(&'static str, String); 6] {
+    pub(super) fn limits(&self) -> [(&'static str, String); 4] {
         let headways = if Headway::is_observed(&self.dossier.headways) {
             "each scenario starts from its recorded gap; other traffic has others".to_owned()
         } else {
             format!("{}: rates and scores are those of these headways, not of traffic", self.headways())
         };
-        let (model, profile) = (self.dossier.model.name(), &self.profile.name);
+        let profile = &self.profile.name;
         let (scenarios, found) = (count(self.dossier.scenarios), count(self.dossier.found));
         let data = format!("these {scenarios} scenarios of {found} found; no other road, country or year");
         let profile = format!(
             "the constants of {profile}; under another profile, model or criterion the conclusion can be another"
         );
-        let system = format!("{model} is a reference driver: nothing here is measured on the system to be assessed");
         let intervals =
             "over scenarios: they hold neither the choice of recordings nor errors of mining, profile or model";
-        [
-            ("data", data),
-            ("headways", headways),
-            ("profile", profile),
-            ("system", system),
-            ("other vehicles", "they move as recorded or drawn and do not react to the ego".to_owned()),
-            ("intervals", intervals.to_owned()),
-        ]
+        [("data", data), ("headways", headways), ("profile", profile), ("intervals", intervals.to_owned())]
     }
 
     /// Signatory and date, given or blank.

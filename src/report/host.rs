@@ -5,11 +5,14 @@ use std::time::Instant;
 use serde::Serialize;
 
 use crate::engine::{DeviceRecord, OpenBackend, SweepSummary};
-use crate::support::readable::counted;
+use crate::support::readable::{count, counted};
 
 /// Facts about the machine.
 #[derive(Debug, Clone, Serialize)]
 pub struct Host {
+    /// Commit of the program; empty if unknown. Records have it beside the program's version.
+    #[serde(skip)]
+    pub commit: &'static str,
     /// Backend.
     pub backend: String,
     /// The device, if one computed.
@@ -27,8 +30,15 @@ pub struct Host {
 
 impl Host {
     /// For a run that started at `started`.
-    pub fn of(opened: &OpenBackend, rechecked_lanes: u64, started: Instant, settings: Vec<SettingRecord>) -> Host {
+    pub fn of(
+        commit: &'static str,
+        opened: &OpenBackend,
+        rechecked_lanes: u64,
+        started: Instant,
+        settings: Vec<SettingRecord>,
+    ) -> Host {
         Host {
+            commit,
             backend: opened.backend().describe(),
             device: opened.device().cloned(),
             rechecked_lanes,
@@ -39,8 +49,9 @@ impl Host {
     }
 
     /// For the merged parts of a run, which had their own machines and commands.
-    pub fn of_parts(parts: usize, rechecked_lanes: u64) -> Host {
+    pub fn of_parts(commit: &'static str, parts: usize, rechecked_lanes: u64) -> Host {
         Host {
+            commit,
             backend: format!("{} merged", counted(parts, "part")),
             device: None,
             rechecked_lanes,
@@ -60,9 +71,27 @@ impl Host {
         ("seconds", format!("{:.2} on {} threads", self.seconds, self.threads))
     }
 
-    /// What computed, with the device.
+    /// What computed, whether a device computed as the CPU does, and the options that are not the default.
     pub(super) fn facts(&self) -> Vec<(&'static str, String)> {
-        std::iter::once(self.computed_by()).chain(self.device.iter().map(|device| ("device", device.line()))).collect()
+        let equal = match &self.device {
+            None => "no device computed a lane".to_owned(),
+            Some(device) if device.exact_path => format!("{}: operations reach the driver unchanged", device.line()),
+            Some(device) => format!("{}: the self-check before the run found no difference", device.line()),
+        };
+        let again = match self.rechecked_lanes {
+            0 => "no lane was computed again".to_owned(),
+            lanes => format!("{} lanes computed again on the CPU with every step made, all equal", count(lanes)),
+        };
+        let set = self.settings.iter().filter(|setting| setting.source != "default");
+        let set: Vec<String> =
+            set.map(|setting| format!("{} = {} ({})", setting.key, setting.value, setting.source)).collect();
+        let set = (!set.is_empty()).then(|| ("options that are set", set.join("\n")));
+        [self.computed_by(), ("GPU = CPU", equal), ("checked", again)].into_iter().chain(set).collect()
+    }
+
+    /// The commit for records; null if unknown.
+    pub(super) fn commit(&self) -> Option<&'static str> {
+        Some(self.commit).filter(|commit| !commit.is_empty())
     }
 }
 

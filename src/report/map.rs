@@ -1,16 +1,17 @@
 //! The files, sheets and page of a `map` run. Tables are in `map_tables.rs`, `map.json` in `map_record.rs`.
 
+use super::credibility::{RunKind, annex};
 use super::host::{Host, SweepRecord};
 use super::html::{Page, PageFigure, Section};
 use super::map_sheet::{MapSheet, agreement, outcome};
-use super::records::{PROGRAM, publish};
+use super::records::publish;
 use crate::Result;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::grid::{Against, Agreement, CaseStyle, CellOutcome, Grid, GridPlan, MappedGrid};
 use crate::support::readable::count;
-use crate::support::run_folder::Results;
+use crate::support::run_folder::{ResultFiles, Results};
 
 /// A complete run.
 pub struct MapReport {
@@ -58,7 +59,7 @@ impl MapReport {
     ///
     /// # Errors
     /// [`crate::Error::Io`] if the folder cannot be written to.
-    pub fn write(&self, mut results: Results) -> Result<Vec<String>> {
+    pub fn write(&self, mut results: Results) -> Result<ResultFiles> {
         let mut figures = Vec::new();
         let (outcomes, agreements) = (self.shown_outcomes(), self.shown_agreements());
         for mapped in &self.grids {
@@ -87,7 +88,7 @@ impl MapReport {
             );
             figures.push(PageFigure::add_svg(&mut results, &name, &svg, "differences.csv")?);
         }
-        results.add("report.html", self.html(figures).as_bytes())?;
+        results.add("report.html", self.html(figures)?.as_bytes())?;
         results.add_with("cells.csv", |out| self.write_cells(out))?;
         if !differences.is_empty() {
             results.add_with("differences.csv", |out| self.write_differences(&differences, out))?;
@@ -96,24 +97,14 @@ impl MapReport {
     }
 
     /// Renders the run as one page.
-    fn html(&self, figures: Vec<PageFigure>) -> String {
+    fn html(&self, figures: Vec<PageFigure>) -> Result<String> {
         let is_known = self.grids.iter().any(|mapped| mapped.known_percent.iter().any(Option::is_some));
         let shares = Section::new("shares", "Shares")
             .intro(if is_known { "Known shares are those of the JRC's evidence." } else { "" })
             .text(self.text());
-        let hashes = self.grids.iter().flat_map(|mapped| {
-            let name = format!("SHA-256 of the plan of {}", mapped.plan.grid.name());
-            mapped.plan.parts.iter().map(move |part| (name.clone(), part.plan.hash()))
-        });
-        let reproduction = Section::new("reproduction", "Reproduction")
-            .intro("The same grid and profile give the same cells, on any machine. map.json holds all of it.")
-            .fact("program", PROGRAM)
-            .fact("profile", &self.profile.name)
-            .facts(hashes)
-            .host(self.host.facts())
-            .parts([Section::options("Profile", &self.profile)])
-            .folded();
-        Page {
+        let record = self.json(&ResultFiles::default())?;
+        let annex = annex(RunKind::Map, &record)?.host(self.host.facts()).folded();
+        let page = Page {
             title: "Outcomes over a grid".to_owned(),
             lead: format!(
                 "{} simulations: {} over a grid of parameters, profile {}.",
@@ -121,10 +112,10 @@ impl MapReport {
                 self.criterion.label(),
                 self.profile.name
             ),
-            sections: vec![shares, Section::new("maps", "Maps").figures(figures), reproduction],
+            sections: vec![shares, Section::new("maps", "Maps").figures(figures), annex],
             ..Page::default()
-        }
-        .html()
+        };
+        Ok(page.html())
     }
 
     pub(super) fn is_robust(&self) -> bool {

@@ -7,17 +7,21 @@ use serde::Serialize;
 use super::map::{Difference, MapReport};
 use super::records::{PROGRAM, document, record};
 use crate::Result;
+use crate::engine::ENGINE_VERSION;
 use crate::run::grid::{Against, CellOutcome, GridAxis, MappedGrid, count};
+use crate::support::run_folder::ResultFiles;
 
 impl MapReport {
     /// `map.json`: fractions, differences and everything needed to reproduce them; `files` are in the same folder.
     ///
     /// # Errors
     /// None for a record of this program.
-    pub fn json(&self, files: &[String]) -> Result<String> {
+    pub fn json(&self, files: &ResultFiles) -> Result<String> {
         let (shown, host) = (self.shown_outcomes(), &self.host);
         document(&record! {
             program: PROGRAM,
+            engine: ENGINE_VERSION,
+            commit: host.commit(),
             preset: &self.preset,
             criterion: self.criterion.key(),
             against: self.against.as_ref().map(|_| self.against_name()),
@@ -32,7 +36,8 @@ impl MapReport {
                 _ => None,
             },
             settings: &host.settings,
-            files: &files,
+            #[serde(flatten)]
+            files: files,
             host: record! {
                 backend: &host.backend,
                 device: &host.device,
@@ -84,6 +89,12 @@ impl MapReport {
             cases: grid.style(),
             native_gap: grid.has_native_gap(),
             cells: map.cell_count(),
+            verdicts: map.cell_count() * map.models.len(),
+            // Verdicts that a perturbation changes, if perturbed cases were swept.
+            undecided: map.has_undecided().then(|| {
+                let of = |model| map.outcomes(model, self.criterion)[CellOutcome::Undecided as usize];
+                (0..map.models.len()).map(of).sum::<u64>()
+            }),
             // Cut-outs: cells in which the vehicle that cuts out drives through the one ahead of it.
             drives_through: mapped.drives_through.iter().filter(|drives| **drives).count(),
             // Whether the grid was chosen to match a known fraction.

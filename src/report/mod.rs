@@ -14,6 +14,7 @@ pub mod case_table;
 mod case_uncertainty;
 pub mod compare;
 pub mod coverage;
+mod credibility;
 pub mod density;
 pub mod dossier;
 mod dossier_page;

@@ -8,7 +8,7 @@ pub(super) const PROGRAM: &str = concat!("lanesweep ", env!("CARGO_PKG_VERSION")
 
 use crate::engine::{NO_STEP, Outcome};
 use crate::model::criterion::Criterion;
-use crate::support::run_folder::Results;
+use crate::support::run_folder::{ResultFiles, Results};
 use crate::support::table::json_number;
 use crate::{Error, Result};
 
@@ -69,9 +69,11 @@ pub(crate) fn smallest_gap_m(outcome: &Outcome<f64>) -> f64 {
     if outcome.contact_step == NO_STEP { outcome.min_gap } else { outcome.min_gap.min(0.0) }
 }
 
-/// Publishes results with their record, which has the names of the other files; returns these.
-pub(super) fn publish(results: Results, record: impl FnOnce(&[String]) -> Result<String>) -> Result<Vec<String>> {
-    let files = results.names();
+/// Publishes results with their record, which has the names and checksums of the other files; returns these. The page is without
+/// one: it has the times of the run, and equal inputs give equal checksums.
+pub(super) fn publish(results: Results, record: impl FnOnce(&ResultFiles) -> Result<String>) -> Result<ResultFiles> {
+    let mut files = results.files();
+    files.files_sha256.remove("report.html");
     results.publish(record(&files)?.as_bytes())?;
     Ok(files)
 }

@@ -17,6 +17,7 @@ use crate::scenario::Category;
 use crate::stats::density::{DensityKind, DensityModel, Provenance};
 use crate::stats::estimate::{IntervalKind, Ratio, SearchRound, StopReason, WeightFigures};
 use crate::support::readable::{count, count_of, significant, value};
+use crate::support::run_folder::ResultFiles;
 use crate::support::table::{Column, Digits, NumberText, Table, TableOf};
 
 /// The density of a run.
@@ -151,12 +152,13 @@ impl SampleReport {
     ///
     /// # Errors
     /// None for a record of this program.
-    pub fn json(&self, files: &[String]) -> Result<String> {
+    pub fn json(&self, files: &ResultFiles) -> Result<String> {
         document(&record! {
             lanesweep_estimate: 1,
             program: PROGRAM,
             // Identifies the bits of the program's lanes.
             engine: ENGINE_VERSION,
+            commit: self.host.commit(),
             // With `mc`, rows of rare failures may be of importance sampling.
             estimator: self.options.estimator.key(),
             density: &self.density,
@@ -179,7 +181,8 @@ impl SampleReport {
             reproducible: self.is_reproducible(),
             estimates: &self.estimates,
             search: &self.search,
-            files: &files,
+            #[serde(flatten)]
+            files: files,
             worst_sha256: &self.worst_sha256,
             host: &self.host,
         })

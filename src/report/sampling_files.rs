@@ -12,7 +12,7 @@ use crate::engine::LanePlan;
 use crate::run::sampling::{CrudeRun, Estimator, Sample, SampleResult, WorstLane, proposal_text};
 use crate::stats::density::DensityModel;
 use crate::support::plain_text::hex;
-use crate::support::run_folder::Results;
+use crate::support::run_folder::{ResultFiles, Results};
 use crate::{Error, Result};
 
 impl SampleReport {
@@ -36,7 +36,7 @@ impl SampleReport {
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn write(&mut self, mut results: Results, sample: &Sample, result: &SampleResult) -> Result<Vec<String>> {
+    pub fn write(&mut self, mut results: Results, sample: &Sample, result: &SampleResult) -> Result<ResultFiles> {
         let (density, mut figures) = (sample.density(), Vec::new());
         if let (Some(crude), Some(plan)) = (&result.crude, sample.lane_plan()) {
             figures = self.crude_files(&mut results, plan, density, crude)?;
@@ -113,12 +113,12 @@ impl SampleReport {
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn publish(&self, mut results: Results, mut figures: Vec<PageFigure>) -> Result<Vec<String>> {
+    pub fn publish(&self, mut results: Results, mut figures: Vec<PageFigure>) -> Result<ResultFiles> {
         if let Some(figure) = self.headways_figure() {
             figures.insert(0, PageFigure::add(&mut results, "headways", &figure)?);
         }
         results.add("estimates.csv", self.csv().as_bytes())?;
-        results.add("report.html", self.html(figures).as_bytes())?;
+        results.add("report.html", self.html(figures)?.as_bytes())?;
         publish(results, |files| self.json(files))
     }
 }

@@ -1,21 +1,23 @@
 //! A sampling run as one page.
 
+use super::credibility::{RunKind, annex};
 use super::html::{Page, PageFigure, Section};
 use super::plot::{AxisScale, Figure, Mark, Plot, PlotAxis, Series, Value, is_few};
-use super::records::PROGRAM;
 use super::sampling::{
     SampleReport, VERDICTS, interval_text, rate_text, ratio_text, short, three_digits, verdicts, weight,
 };
+use crate::Result;
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::sampling::EstimateRow;
 use crate::support::readable::{count, count_of, value};
+use crate::support::run_folder::ResultFiles;
 use crate::support::table::{Column, Digits, NumberText};
 
 impl SampleReport {
     /// `report.html`, with the figures of the run.
-    pub(super) fn html(&self, figures: Vec<PageFigure>) -> String {
+    pub(super) fn html(&self, figures: Vec<PageFigure>) -> Result<String> {
         let density = &self.density;
         let mut warnings = Vec::new();
         if let Some(given) = self.given_list() {
@@ -26,11 +28,12 @@ impl SampleReport {
         }
         let mut sections = vec![self.estimates_section()];
         sections.extend((!figures.is_empty()).then(|| Section::new("figures", "Figures").figures(figures)));
-        sections.push(self.reproduction());
+        let annex = annex(RunKind::Sample, &self.json(&ResultFiles::default())?)?.host(self.host.facts());
+        sections.push(annex.host((self.host.seconds > 0.0).then(|| self.host.wall_clock())).folded());
         // Importance sampling seldom needs the maximum that it may draw; its runs include the search.
         let runs = self.estimates.iter().map(|row| row.estimate.runs).max();
         let drawn = self.draws.as_ref().map(|draws| draws.samples).or(runs).unwrap_or(self.options.stop.samples);
-        Page {
+        let page = Page {
             title: format!("Probability of failure: {}", self.name()),
             lead: format!(
                 "{} samples of {}, estimator {}, profile {}. {}",
@@ -49,8 +52,8 @@ impl SampleReport {
             synthetic: density.provenance.synthetic,
             warnings,
             sections,
-        }
-        .html()
+        };
+        Ok(page.html())
     }
 
     /// `cut-in 2`.
@@ -165,41 +168,5 @@ impl SampleReport {
             plots: self.options.models.iter().map(panel).collect(),
             ..Figure::default()
         })
-    }
-
-    fn reproduction(&self) -> Section {
-        let draws = self.draws.as_ref().map(|draws| {
-            let percent = 100.0 * draws.rejected_share;
-            let text = format!(
-                "{} samples, {} lanes, {percent:.2} % of the draws invalid and drawn again, {} samples void, \
-                 {} lanes at the time cap",
-                count(draws.samples),
-                count(draws.lanes),
-                count(draws.voids),
-                count(draws.capped_lanes)
-            );
-            ("draws", text)
-        });
-        let rechecked = count(self.host.rechecked_lanes);
-        let checked = format!("{rechecked} lanes computed again on the CPU with every step made, all equal");
-        Section::new("reproduction", "Reproduction")
-            .intro(
-                "The same density, options and seed give the same numbers, on any machine, whole or in shards. \
-                 estimate.json holds all of it; `simulate` reruns a lane from it.",
-            )
-            .fact("program", PROGRAM)
-            .fact("estimator", self.options.estimator.key())
-            .fact("points", self.options.source.key())
-            .fact("seed", self.options.seed.to_string())
-            .fact("profile", &self.profile.name)
-            .fact("time step", format!("{} s", value(self.profile.frame.dt_s)))
-            .fact("SHA-256 of the density", &self.density.sha256)
-            .facts(self.plan_sha256.iter().map(|sha| ("SHA-256 of the plan", sha)))
-            .facts(draws)
-            .host(self.host.facts())
-            .host([("checked", checked)])
-            .host((self.host.seconds > 0.0).then(|| self.host.wall_clock()))
-            .parts([Section::options("Profile", &self.profile)])
-            .folded()
     }
 }

@@ -15,7 +15,7 @@ use crate::model::profile::Profile;
 use crate::run::search::{Candidate, Evaluated, Front, FrontPoint, Judged, Scope, Scored, SearchResult};
 use crate::scenario::parameterization::ModeShape;
 use crate::support::readable::{count, counted};
-use crate::support::run_folder::Results;
+use crate::support::run_folder::{ResultFiles, Results};
 use crate::support::table::{Table, WIDTH};
 
 /// Approximate number of candidates of a figure, in even steps of their scores; the paper's are all drawn.
@@ -373,7 +373,7 @@ impl SearchReport<'_> {
     ///
     /// # Errors
     /// None for a record of this program.
-    pub fn json(&self, files: &[String]) -> Result<String> {
+    pub fn json(&self, files: &ResultFiles) -> Result<String> {
         let result = self.result;
         let winner = result.fronts.first().and_then(|front| Some(&front.points[front.winner?]));
         records::document(&json!({
@@ -410,7 +410,8 @@ impl SearchReport<'_> {
             "folds_are_recordings": result.is_by_recording,
             "fronts": self.front_csv().records(),
             "settings": self.host.settings,
-            "files": files,
+            "files": files.files,
+            "files_sha256": files.files_sha256,
             "host": self.host,
         }))
     }
@@ -462,7 +463,7 @@ impl SearchReport<'_> {
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn write(&self, mut results: Results) -> Result<Vec<String>> {
+    pub fn write(&self, mut results: Results) -> Result<ResultFiles> {
         let mut figures = vec![("front", self.front_figure()), ("error", self.error_figure())];
         if !self.modes.is_empty() {
             let figure = Figure {

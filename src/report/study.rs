@@ -13,11 +13,13 @@ use crate::Result;
 use crate::engine::{CLOSE_HEADWAY_S, ENGINE_VERSION, Headway, Partial, SweepSummary};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
-use crate::run::score::{Best, CategoryScores, Misfit, ScoreTable, f1, published_failures, published_lvd_f1};
+use crate::run::score::{
+    Best, CategoryScores, Misfit, ScoreCell, ScoreTable, f1, published_failures, published_lvd_f1,
+};
 use crate::run::study::{CategoryNumbers, ReferenceComparison, Study, StudyEvaluation, StudyProvenance};
 use crate::scenario::Category;
 use crate::scenario::parameterization::Parameterization;
-use crate::support::run_folder::Results;
+use crate::support::run_folder::{ResultFiles, Results};
 use crate::support::table::{Column, Digits, Table};
 use serde::Serialize;
 use serde_json::Value;
@@ -135,7 +137,7 @@ impl<'a> StudyReport<'a> {
     ///
     /// # Errors
     /// [`crate::Error::Io`].
-    pub fn write(&self, mut results: Results) -> Result<Vec<String>> {
+    pub fn write(&self, mut results: Results) -> Result<ResultFiles> {
         let data = if self.facts().synthetic { "synthetic" } else { "recorded" };
         results.add("failures.csv", tables::failure_records(&self.evaluation.scores, data)?.csv().as_bytes())?;
         results.add("f1.csv", tables::f1_records(&self.evaluation.scores, data).csv().as_bytes())?;
@@ -162,7 +164,7 @@ impl<'a> StudyReport<'a> {
         if let Some(comparison) = &self.comparison {
             results.add("reference.csv", tables::reference_table(comparison).csv().as_bytes())?;
         }
-        results.add("report.html", self.html(figures).as_bytes())?;
+        results.add("report.html", self.html(figures)?.as_bytes())?;
         publish(results, |files| self.record(files))
     }
 
@@ -257,6 +259,8 @@ pub(super) struct CategoryRecord<'a> {
     pub capped_lanes: u64,
     /// Cells of the score table whose F1 is 0/0.
     pub undefined_f1: u64,
+    /// Intervals of F1 over scenarios: cells, those with an interval, its median and largest width.
+    f1_intervals: Value,
     /// Cumulative explained variance of the decomposition's first coefficients, if there is one.
     svd_explained: &'a [f64],
     /// Number of folds, with cross-validation.
@@ -266,12 +270,13 @@ pub(super) struct CategoryRecord<'a> {
 
 impl StudyReport<'_> {
     /// `run.json`; `files` are in the same folder.
-    pub(super) fn record(&self, files: &[String]) -> Result<String> {
+    pub(super) fn record(&self, files: &ResultFiles) -> Result<String> {
         let (plan, facts) = (self.study.plan(), self.study.facts());
         document(&record! {
             program: PROGRAM,
             // Identifies the bits of the program's lanes.
             engine: ENGINE_VERSION,
+            commit: self.host.commit(),
             data: &facts.data,
             synthetic: facts.synthetic,
             backend: &self.host.backend,
@@ -285,12 +290,20 @@ impl StudyReport<'_> {
             notes: &facts.notes,
             categories: self.categories(),
             lanes: plan.lane_count(),
+            models: &plan.models,
+            // Verdicts that differ between binary32 and binary64, if both were run.
+            reference: self.comparison.as_ref().map(|of| record! {
+                lanes: of.lanes,
+                verdicts: of.lanes * Criterion::ALL.len() as u64,
+                differing: of.differences.len(),
+            }),
             profile: &plan.profile,
             mining: &facts.mining,
             parameterization: &facts.parameterization,
             score: &facts.score,
             settings: &self.host.settings,
-            files: &files,
+            #[serde(flatten)]
+            files: files,
             timings: &self.timings,
         })
     }
@@ -310,12 +323,21 @@ impl StudyReport<'_> {
                 lanes: plan.lanes_per_unit(block) * block.units.len(),
                 capped_lanes: scored.map_or(0, |c| c.capped.iter().sum()),
                 undefined_f1: cells().filter(|c| f1(&c.counts).is_none()).count() as u64,
+                f1_intervals: f1_widths(cells()),
                 svd_explained: &of.svd_explained,
                 folds: of.folds.iter().map(|(_, fold)| fold + 1).max(),
             }
         });
         records.collect()
     }
+}
+
+fn f1_widths<'c>(cells: impl Iterator<Item = &'c ScoreCell> + Clone) -> Value {
+    let widths = cells.clone().filter_map(|cell| cell.f1_interval.map(|interval| interval.high - interval.low));
+    let mut widths: Vec<f64> = widths.collect();
+    widths.sort_by(f64::total_cmp);
+    let (median, widest) = (widths.get(widths.len() / 2), widths.last());
+    serde_json::json!({"cells": cells.count(), "known": widths.len(), "median_width": median, "widest": widest})
 }
 
 /// A best parameterization; undefined numbers are null.

@@ -1,13 +1,15 @@
 //! A study as one page.
 
+use super::credibility::{RunKind, annex};
 use super::host::Timings;
 use super::html::{Page, PageFigure, Section};
-use super::records::PROGRAM;
 use super::study::StudyReport;
 use super::tables;
+use crate::Result;
 use crate::run::score::{CategoryScores, ClaimVerdict, Misfit};
 use crate::scenario::parameterization::Parameterization;
 use crate::support::readable::{count, value};
+use crate::support::run_folder::ResultFiles;
 use crate::support::table::Table;
 use crate::traffic::mining::RecordingSummary;
 
@@ -16,7 +18,7 @@ const MAX_RECORDINGS: usize = 200;
 
 impl StudyReport<'_> {
     /// `report.html`, with the figures of each category.
-    pub(super) fn html(&self, figures: Vec<Vec<PageFigure>>) -> String {
+    pub(super) fn html(&self, figures: Vec<Vec<PageFigure>>) -> Result<String> {
         let facts = self.facts();
         let mut warnings = Vec::new();
         if !facts.left_out.is_empty() {
@@ -43,8 +45,8 @@ impl StudyReport<'_> {
             Section::new("reference", "Lane arithmetic against double precision")
                 .text(tables::reference_text(comparison))
         }));
-        sections.extend([self.data(), self.reproduction()]);
-        Page {
+        sections.extend([self.data(), self.credibility()?]);
+        let page = Page {
             title: "Parameterized against recorded scenarios".to_owned(),
             lead: format!(
                 "{} {} lanes: every scenario as recorded (S) and parameterized (S'), from {}, against {} \
@@ -58,8 +60,8 @@ impl StudyReport<'_> {
             synthetic: facts.synthetic,
             warnings,
             sections: std::iter::once(answer).chain(sections.into_iter().map(Section::folded)).collect(),
-        }
-        .html()
+        };
+        Ok(page.html())
     }
 
     fn data(&self) -> Section {
@@ -138,37 +140,19 @@ impl StudyReport<'_> {
         (!table.rows.is_empty()).then(|| section.tables([table.captioned("Claims")]))
     }
 
-    fn reproduction(&self) -> Section {
-        let (facts, plan) = (self.facts(), self.study.plan());
-        let mut host = self.host.facts();
-        let checked = match self.host.rechecked_lanes {
-            0 => "no lane: every one made every step by itself".to_owned(),
-            lanes => format!("{} lanes computed again on the CPU with every step made, all equal", count(lanes)),
-        };
-        host.push(("checked", checked));
+    fn credibility(&self) -> Result<Section> {
+        let (facts, mut host) = (self.facts(), self.host.facts());
         let Timings { mine_s, plan_s, sweep_s, score_s } = self.timings;
         // Merged parts have their own times, which are not added up.
         if sweep_s > 0.0 {
             let text = format!("mining {mine_s:.2}, planning {plan_s:.2}, lanes {sweep_s:.2}, scores {score_s:.2}");
             host.push(("seconds", text));
         }
-        Section::new("reproduction", "Reproduction")
-            .intro(
-                "The same input, profile and seed give the same numbers, on any machine. run.json holds all of it; \
-                 `lanesweep verify` compares a device with the CPU word by word.",
-            )
-            .fact("program", PROGRAM)
-            .fact("profile", &plan.profile.name)
-            .fact("time step", format!("{} s", value(plan.profile.frame.dt_s)))
-            .fact("seed of the lanes computed again", facts.score.seed.to_string())
-            .fact("SHA-256 of the plan", plan.hash())
-            .facts(facts.scenario_file_sha256.iter().map(|sha| ("SHA-256 of the scenario file", sha)))
-            .host(host)
-            .parts([
-                Section::options("Profile", &plan.profile),
-                Section::options("Options of the parameterizations", &facts.parameterization),
-                Section::options("Options of the scores", &facts.score),
-            ])
+        let annex = annex(RunKind::Study, &self.record(&ResultFiles::default())?)?;
+        Ok(annex.host(host).parts([
+            Section::options("Options of the parameterizations", &facts.parameterization),
+            Section::options("Options of the scores", &facts.score),
+        ]))
     }
 }
 

@@ -8,9 +8,12 @@
 //!
 //! Parts of a run use the folder together and exclude whole runs: `parts`.
 
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
+
+use serde::Serialize;
+use sha2::{Digest, Sha256};
 
 use crate::support::atomic_file::folder_of;
 use crate::support::atomic_file::{AtomicFile, Live, StagedFile, clear_stale, refuse_link, sync_folder};
@@ -20,6 +23,7 @@ pub use crate::support::file_list::{
 use crate::support::file_list::{FileList, LIST, RECORDS, RunFiles};
 use crate::support::files::make_folder;
 use crate::support::lock::FolderLock;
+use crate::support::plain_text::hex;
 use crate::{Error, Place, Result};
 
 /// The lock of the whole folder.
@@ -99,7 +103,8 @@ impl RunFolder {
         // It existed before the work. If it vanished meanwhile, create it anew to save the result.
         make_folder(&self.dir)?;
         let (kept, named) = (BTreeSet::new(), BTreeSet::new());
-        Ok(Results { folder: self, staged: Vec::new(), elsewhere: Vec::new(), kept, named })
+        let (staged, sha256, elsewhere) = (Vec::new(), BTreeMap::new(), Vec::new());
+        Ok(Results { folder: self, staged, sha256, elsewhere, kept, named })
     }
 
     fn refuse_another_verb(&self, record: &str) -> Result<()> {
@@ -154,10 +159,20 @@ impl Drop for RunFolder {
     }
 }
 
+/// The files of a run, for its record.
+#[derive(Debug, Clone, Default, Serialize)]
+pub struct ResultFiles {
+    /// Sorted names.
+    pub files: Vec<String>,
+    /// SHA-256 of each file that this run has written itself, by its name.
+    pub files_sha256: BTreeMap<String, String>,
+}
+
 /// Results of a run under hidden names; dropping them before [`Results::publish`] removes them.
 pub struct Results<'a> {
     folder: &'a RunFolder,
     staged: Vec<(String, StagedFile)>,
+    sha256: BTreeMap<String, String>,
     elsewhere: Vec<StagedFile>,
     kept: BTreeSet<String>,
     /// Files in this folder whose paths the user gave; they may replace any file.
@@ -184,9 +199,10 @@ impl Results<'_> {
     /// As [`Results::add`].
     pub fn add_with(&mut self, name: &str, produce: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
         let path = self.folder.dir.join(name);
-        let mut file = AtomicFile::create_inside(&path)?;
-        produce(&mut file).map_err(|e| Error::io(&path, "write", e))?;
-        self.staged.push((name.to_owned(), file.stage()?.closed()));
+        let mut hashing = Hashing { file: AtomicFile::create_inside(&path)?, hash: Sha256::new() };
+        produce(&mut hashing).map_err(|e| Error::io(&path, "write", e))?;
+        self.sha256.insert(name.to_owned(), hex(&hashing.hash.finalize()));
+        self.staged.push((name.to_owned(), hashing.file.stage()?.closed()));
         Ok(())
     }
 
@@ -208,10 +224,15 @@ impl Results<'_> {
         self.kept = self.folder.former().into_iter().filter(is_there).collect();
     }
 
-    /// The sorted names of all files in the folder, for the record.
+    /// The sorted names of all files in the folder.
     pub fn names(&self) -> Vec<String> {
         let names = self.staged.iter().map(|(name, _)| name);
         names.chain(&self.kept).cloned().collect::<BTreeSet<String>>().into_iter().collect()
+    }
+
+    /// All files in the folder, for the record.
+    pub fn files(&self) -> ResultFiles {
+        ResultFiles { files: self.names(), files_sha256: self.sha256.clone() }
     }
 
     /// Replaces the former run's results by these; the record is renamed last.
@@ -263,6 +284,24 @@ impl Results<'_> {
     fn refuse_foreign<const N: usize>(&self, record: [&str; N]) -> Result<()> {
         let staged = self.staged.iter().map(|(name, _)| name.as_str()).filter(|name| !self.named.contains(*name));
         self.folder.refuse_foreign(staged.chain(record))
+    }
+}
+
+/// A file that is hashed while it is written.
+struct Hashing {
+    file: AtomicFile,
+    hash: Sha256,
+}
+
+impl Write for Hashing {
+    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
+        let written = self.file.write(bytes)?;
+        self.hash.update(&bytes[..written]);
+        Ok(written)
+    }
+
+    fn flush(&mut self) -> std::io::Result<()> {
+        self.file.flush()
     }
 }
 

@@ -153,6 +153,9 @@ pub fn without_host(mut files: Files) -> Files {
         if let Some(files) = record["files"].as_array_mut() {
             files.retain(|file| file != "run-plan.json");
         }
+        if let Some(files) = record["files_sha256"].as_object_mut() {
+            files.remove("run-plan.json");
+        }
     };
     settled(files, &record, &page::without_host)
 }
