@@ -29,6 +29,7 @@ use crate::stats::density::DensityModel;
     "density" | "distribution" | "category" | "rename" | "set" | "models" | "thw" | "map" | "given" | "proposal" => {
         arg.conflicts_with("plan")
     }
+    "injury" => arg.conflicts_with_all(["plan", "distribution"]),
     "rows" => arg.conflicts_with("plan_only"),
     _ => arg,
 }))]
@@ -64,6 +65,8 @@ pub(crate) struct Sample {
     pub(super) set: Vec<(String, f64)>,
     #[command(flatten)]
     models: lists::ModelsFlag,
+    #[command(flatten)]
+    pub(super) injury: lists::InjuryFlag,
     /// Time headways, s [default: the density's, else paper]
     ///
     /// paper is 2.0, 1.8, … 0.2. observed (or sampled): the headway is drawn from the recorded ones, as a parameter of
@@ -107,7 +110,7 @@ pub(crate) struct Sample {
 from_arguments!(
     Sample { density, distribution, category, thw, map, rows, proposal, other_profile, simultaneous, out }
     each { rename: str::parse, set: given, given: given }
-    groups { models, plausibility, format, shards }
+    groups { models, injury, plausibility, format, shards }
     others { settings: SampleSettings::default() }
 );
 
