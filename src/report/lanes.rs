@@ -22,7 +22,7 @@ const PET: &str =
     "Post-encroachment time of a cut-in; infinite if the ego stops before the place, null if there is none.";
 
 /// A table for the lanes of a study; see [`write_study_chunk`]. It is written chunk by chunk, so that memory does not
-/// grow with the lanes. Curves add the [severity](severity_columns).
+/// grow with the lanes. Curves of injury risk add changes of speed and risks.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Usage`] for an unknown ending of the name.

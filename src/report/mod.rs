@@ -35,6 +35,7 @@ pub mod sampling;
 mod sampling_figures;
 mod sampling_files;
 mod sampling_page;
+mod sampling_severity;
 pub mod sampling_tables;
 pub mod search;
 pub mod study;

@@ -25,6 +25,7 @@ impl SampleReport {
             warnings.push("Ended by the clock: another machine ends elsewhere.".to_owned());
         }
         let mut sections = vec![self.estimates_section()];
+        sections.extend(self.severity_sections());
         sections.extend((!figures.is_empty()).then(|| Section::new("figures", "Figures").figures(figures)));
         sections.push(self.reproduction());
         // Importance sampling seldom needs the maximum that it may draw; its runs include the search.
