@@ -36,6 +36,7 @@ pub mod sampling;
 mod sampling_figures;
 mod sampling_files;
 mod sampling_page;
+mod sampling_severity;
 pub mod sampling_tables;
 pub mod search;
 pub mod study;
