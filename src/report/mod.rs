@@ -16,6 +16,7 @@ pub mod compare;
 mod credibility;
 pub mod density;
 pub mod dossier;
+pub mod dossier_changes;
 mod dossier_page;
 mod dossier_sentences;
 mod dots;
