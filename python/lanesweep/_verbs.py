@@ -484,10 +484,11 @@ def search(
 def justify(
     recordings: Path | None = None,
     *,
-    parameterization: str | Int | Path,
-    models: Models,
+    parameterization: str | Int | Path | None = None,
+    models: Models | None = None,
     criterion: Criterion | None = None,
     thw: Headways | None = None,
+    against: Path | None = None,
     author: str | None = None,
     date: str | None = None,
     out: Path | None = None,
@@ -502,15 +503,18 @@ def justify(
     Parameters
     ----------
     recordings : path, optional
-        Folder of recordings, or a track file; by default recordings are generated.
+        Folder of recordings, or a track file; by default recordings are generated. With `against` also the folder of a dossier, or its
+        dossier.json: nothing is simulated then, and the answer is what differs.
     parameterization : str
-        A key, or a file of `search`.
+        A key, or a file of `search`; needed unless two dossiers are compared.
     models : str or Driver
-        One driver model.
+        One driver model; needed unless two dossiers are compared.
     criterion : {"collision", "ttc", "btn"}
         Criterion, by default collision.
     thw : list of float
         Time headways, s, as in `study`.
+    against : path
+        Another dossier, its folder or its dossier.json, from which the changes are listed.
     author : str
         Person responsible for the dossier; by default a line to fill in.
     date : str

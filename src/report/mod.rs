@@ -17,6 +17,7 @@ pub mod coverage;
 mod credibility;
 pub mod density;
 pub mod dossier;
+pub mod dossier_changes;
 mod dossier_page;
 mod dossier_sentences;
 mod dots;
