@@ -51,10 +51,20 @@ impl SampleReport {
 
     /// A sentence per rate that has a target.
     fn target_sentences(&self) -> Vec<String> {
+        let is_uncovered = |row: &TargetRow| {
+            let of = (row.of, row.model, &row.headway);
+            self.injuries
+                .iter()
+                .any(|injury| (injury.curve, injury.model, &injury.headway) == of && injury.uncovered > 0)
+        };
         let sentence = |row: &TargetRow| {
             let [target, low, high] = [row.target, row.rate.low, row.rate.high].map(short);
             let level = value(100.0 * self.level());
             let more = match (row.samples, row.hours) {
+                _ if row.rate.estimate <= row.target && is_uncovered(row) => {
+                    "contacts that the curve does not cover count as injuries in the upper bound, so more samples do not decide"
+                        .to_owned()
+                }
                 (None, None) => {
                     "no number of samples alone and no number of recorded hours alone would decide".to_owned()
                 }
@@ -90,10 +100,16 @@ impl SampleReport {
 
     /// The chapters of injuries and target, if the run has them.
     pub(super) fn severity_sections(&self) -> Vec<Section> {
-        let injuries =
-            || Section::new("injuries", "Injuries").intro(self.injuries_notes()).tables([self.injuries_table(false)]);
-        let target =
-            || Section::new("target", "Target").intro(self.target_sentences().join(" ")).tables([self.targets_table()]);
+        let injuries = || {
+            Section::new("injuries", "Injuries").intro(self.injuries_notes()).tables([self
+                .injuries_table(false)
+                .captioned("Contacts, their mean risk, and injuries per hour of driving")])
+        };
+        let target = || {
+            Section::new("target", "Target")
+                .intro(self.target_sentences().join(" "))
+                .tables([self.targets_table().captioned("Rates per hour of driving against the target")])
+        };
         let injuries = (!self.injuries.is_empty()).then(injuries);
         injuries.into_iter().chain((!self.targets.is_empty()).then(target)).collect()
     }
