@@ -80,7 +80,7 @@ pub(super) struct Check {
     /// Another simulator's results for a table, to be compared with --models NAME
     ///
     /// The table has the columns id and collision, and where known t_react_s, t_brake_s, min_gap_m, min_ttc_s, t_crash_s,
-    /// impact_speed_mps (the ego's speed at the contact, not the closing speed). Exit status: 0 all agree, 5 they differ, 4 cases have no result.
+    /// impact_speed_mps (the ego's speed at the contact, not the closing speed). Exit status: 0 nothing differs in any case, 5 something does, 4 cases have no result.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["nominal", "sheets"], help_heading = "Data")]
     results: Option<PathBuf>,
     /// Only the computed answers of a table, by lanes: a million rows take seconds
@@ -118,6 +118,8 @@ struct CheckRequest {
     origin: String,
     is_synthetic: bool,
     incomplete: bool,
+    /// What is implausible and was let pass.
+    doubts: Vec<String>,
 }
 
 impl Check {
@@ -181,6 +183,7 @@ impl Check {
             subject: &check.subject,
             origin: request.origin,
             is_synthetic: request.is_synthetic,
+            doubts: &request.doubts,
             profiles: &check.profiles,
             judgements: &judgements,
             uncertainty: uncertainty.as_ref(),
@@ -308,7 +311,7 @@ impl Check {
         let mut doubts = Doubts::new(self.plausibility.policy());
         let subject = given.subject(profile, &mut doubts)?;
         doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
-        Ok(CheckRequest { subject, origin, is_synthetic: false, incomplete: false })
+        Ok(CheckRequest { subject, origin, is_synthetic: false, incomplete: false, doubts: doubts.sentences() })
     }
 
     fn of_scenario(&self, scenario: Scenario, origin: String, incomplete: bool) -> Result<CheckRequest> {
@@ -321,7 +324,8 @@ impl Check {
             ));
         }
         let is_synthetic = scenario.synthetic;
-        Ok(CheckRequest { subject: Subject::recorded(scenario, headway)?, origin, is_synthetic, incomplete })
+        let subject = Subject::recorded(scenario, headway)?;
+        Ok(CheckRequest { subject, origin, is_synthetic, incomplete, doubts: Vec::new() })
     }
 
     /// Outputs must have the right file ending and must not replace an input.

@@ -81,8 +81,7 @@ impl ComparedTable<'_> {
             make_folder_of(path)?;
             report.rows().save(path, &TableMetadata { table: "results", ..TableMetadata::default() })?;
         }
-        let agrees = comparison.agreeing() == comparison.cases.len() && comparison.cause().is_none();
-        let exit = match (agrees, by_id.is_empty()) {
+        let exit = match (comparison.is_equal(), by_id.is_empty()) {
             (false, _) => Exit::VerificationFailed,
             (true, false) => Exit::Incomplete,
             (true, true) => Exit::Ok,
@@ -146,7 +145,9 @@ fn results(path: &Path) -> Result<Vec<(Place, TheirResult)>> {
                     let number = number.ok_or_else(|| {
                         wrong(of.column, format!("{other} is not a number"), "give a number, or leave it empty")
                     })?;
-                    number.is_finite().then_some(number)
+                    let infinite =
+                        || wrong(of.column, format!("{number} is not finite"), "leave it empty if it is unknown");
+                    Some(number.is_finite().then_some(number).ok_or_else(infinite)?)
                 }
             };
         }

@@ -159,6 +159,7 @@ impl CheckedTable<'_> {
             subject: &check.subject,
             origin: format!("{}, row {row}", self.path.display()),
             is_synthetic: false,
+            doubts: &[],
             profiles: &check.profiles,
             judgements: &judgements,
             uncertainty: None,

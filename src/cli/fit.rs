@@ -10,7 +10,8 @@ use super::console::{self, Total};
 use super::format::FormatFlag;
 use super::lists;
 use super::source::{self, SourceFlags};
-use super::{Exit, Output};
+use super::{COMMIT, Exit, Output};
+use crate::report::case_identity::program;
 use crate::report::coverage::{self, CoverageSheet};
 use crate::report::density;
 use crate::report::host::SettingRecord;
@@ -20,6 +21,7 @@ use crate::scenario::{DataProvenance, Scenario};
 use crate::stats::density::{DensityModel, FitOptions, write_density};
 use crate::support::error::push_once;
 use crate::support::files::{check_folder_of, file_name, make_folder_of, write_atomically};
+use crate::support::input_file;
 use crate::support::readable::counted;
 use crate::support::run_folder::RunFolder;
 use crate::{Error, Place, Result};
@@ -93,8 +95,12 @@ impl Fit {
         let files = self.files(&ids, configured)?;
         let ranges = self.ranges()?;
         // Of any filter: what was tested counts.
+        let mut about = vec![("program", program(COMMIT, 40))];
         let tested = match &self.tested {
-            Some(path) => Some((file_name(path), source::scenarios_of(path, self.data.policy())?.0)),
+            Some(path) => {
+                about.push(("SHA-256 of the tested cases", input_file::sha256(path)?));
+                Some((file_name(path), source::scenarios_of(path, self.data.policy())?.0))
+            }
             None => None,
         };
         let (collection, facts) = self.data.load_with_exposure(configured, typed)?;
@@ -120,7 +126,7 @@ impl Fit {
                     result.model.scenarios.clear();
                 }
                 complete &= result.left_out.is_empty();
-                let coverage = covered(&result.model, tested.as_ref(), &ranges, options.seed)?;
+                let coverage = covered(&result.model, tested.as_ref(), &ranges, options.seed, &about)?;
                 fitted.push(FittedFile { file, model: result.model, coverage });
             }
             Ok(())
@@ -202,6 +208,7 @@ fn covered(
     tested: Option<&(String, Vec<Scenario>)>,
     ranges: &[(String, [f64; 2])],
     seed: u64,
+    about: &[(&'static str, String)],
 ) -> Result<CoverageSheet> {
     let points = tested.map(|(name, scenarios)| {
         let of_category = scenarios.iter().filter(|scenario| scenario.category == model.category());
@@ -211,9 +218,15 @@ fn covered(
             let of = model.space.id().name();
             tracing::warn!("{} of {name} have not the parameters of {of}", counted(left_out.len(), "case"));
         }
-        (name.as_str(), points.into_iter().flatten().collect())
+        (name.as_str(), points.into_iter().flatten().collect::<Vec<Vec<f64>>>())
     });
-    coverage::sheet(model, points, ranges, seed)
+    if let Some((name, _)) = points.as_ref().filter(|(_, points)| points.is_empty()) {
+        let problem =
+            format!("{name} has no {} with the parameters of {}", model.category().label(), model.space.id().name());
+        let help = "give cases of this kind, or name other categories and parameterizations";
+        return Err(Error::usage(Place::item("--tested"), problem, help));
+    }
+    coverage::sheet(model, points, ranges, seed, about)
 }
 
 /// Publishes all densities together. Each is an independent result with its checksum, so those of other runs are kept.

@@ -93,7 +93,7 @@ impl CaseIdentity {
 }
 
 /// Program, version, commit by its first digits, and version of the lanes.
-pub(super) fn program(commit: &str, digits: usize) -> String {
+pub fn program(commit: &str, digits: usize) -> String {
     let (commit, changes) = commit.split_at(commit.find(' ').unwrap_or(commit.len()));
     let commit = match commit {
         "" => "commit unknown".to_owned(),

@@ -116,6 +116,7 @@ impl CaseSheet<'_> {
         let above: Vec<&str> = first.models.iter().filter(above).map(|judged| judged.trace.model.name()).collect();
         let mut all =
             vec![format!("Robust refers to these changes, each alone, as far as the case has the input: {VARIED}")];
+        all.extend(self.doubts.iter().map(|doubt| format!("Implausible input: {doubt}")));
         if !above.is_empty() {
             all.push(format!(
                 "A BTN above 1 does not contradict an avoided collision ({}): it asks whether braking that begins at that \

@@ -56,7 +56,7 @@ impl CaseSheet<'_> {
         });
         let masses = format!(
             "A central contact in line, by conservation of momentum: masses of {ego_kg} kg (ego) and {other_kg} kg by length, restitution \
-             {RESTITUTION} (ours). –: a side contact, which is not of this kind; a risk beyond the data of its curve, or of the occupants of a truck. A risk is one of the crashes that a curve was fitted to, not of this vehicle."
+             {RESTITUTION} (ours). A vehicle that moves sideways into the front half of the ego counts as one. –: a side contact, which is not of this kind; a risk beyond the data of its curve, or of the occupants of a truck. A risk is one of the crashes that a curve was fitted to, not of this vehicle."
         );
         std::iter::once(masses).chain(curves).collect::<Vec<_>>().join(" ")
     }

@@ -21,9 +21,9 @@ use crate::support::table::{Column, NumberText, Table, json_number};
 /// What the columns of the drivers show.
 const DRIVERS: &str = "Smallest gap to a vehicle in the ego's path, smallest TTC, largest BTN. At a contact while the gap \
      closes, TTC is 0 and BTN ∞ by definition. Touches: no contact, but the smallest gap is below 1 cm, or becomes so as the \
-     time step goes to 0. None: there is nothing to avoid. Open: the gap still closes at the end of the run. Contact: rear-end \
-     where the ego's front hits, side where the other vehicle hits the ego's side or rear; closing is the ego's speed minus the \
-     other's. Times count from the start of the case. Brakes: the time from which the ego brakes; CCHDM's coasting is no braking. \
+     time step goes to 0. None: there is nothing to avoid. Open: the gap still closes at the end of the run. Contact: side \
+     where the centre of the other vehicle lies behind that of the ego, else rear-end, also of a vehicle that moves sideways into \
+     the ego; closing is the ego's speed minus the other's. Times count from the start of the case. Brakes: the time from which the ego brakes; CCHDM's coasting is no braking. \
      –: not before the end of the run; for TTC: the gap does not close. A row that equals that of a profile above is left out";
 /// What the columns of the boundaries show.
 const BOUNDARIES: &str = "One number is changed, all others stay, in 100 steps to either end of its range (JSON: searched). \
@@ -39,6 +39,8 @@ pub struct CaseSheet<'a> {
     pub origin: String,
     /// Whether the data are synthetic.
     pub is_synthetic: bool,
+    /// What is implausible about the numbers of the case.
+    pub doubts: &'a [String],
     /// The profiles, in the order of the judgements.
     pub profiles: &'a [Profile],
     /// One judgement per profile, at least one; the first decides.

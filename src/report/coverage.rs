@@ -38,10 +38,11 @@ struct Coverage<'a> {
     draws: Vec<Vec<f64>>,
     ranges: Vec<[f64; 2]>,
     seed: u64,
+    about: &'a [(&'static str, String)],
     boxes: Vec<EmptyBox>,
 }
 
-/// The coverage by the recorded cases, or by `tested` ones with their name. Ranges that are not given are those of the recorded
+/// The coverage by the recorded cases, or by `tested` ones with their name; the page tells `about` the run. Ranges that are not given are those of the recorded
 /// cases.
 ///
 /// # Errors
@@ -51,6 +52,7 @@ pub fn sheet(
     tested: Option<(&str, Vec<Vec<f64>>)>,
     given: &[(String, [f64; 2])],
     seed: u64,
+    about: &[(&'static str, String)],
 ) -> Result<CoverageSheet> {
     let recorded = density.kde.points();
     let (cases, points) = match tested {
@@ -68,7 +70,7 @@ pub fn sheet(
     let mut boxes = if is_searched { empty_boxes(&points, &draws, &ranges) } else { Vec::new() };
     // A rectangle over a whole range says less than the interval of its other quantity.
     boxes.retain(|of| of.sides.len() == 1 || of.sides.iter().all(|(at, side)| *side != ranges[*at]));
-    let of = Coverage { density, cases, points, draws, ranges, seed, boxes };
+    let of = Coverage { density, cases, points, draws, ranges, seed, about, boxes };
     Ok(CoverageSheet { html: of.html(), json: of.json(), text: of.text() })
 }
 
@@ -199,7 +201,8 @@ impl Coverage<'_> {
                     .intro(boxes)
                     .tables([self.boxes()])
                     .fact("seed of the draws", self.seed.to_string())
-                    .fact("SHA-256 of the density", self.density.content_sha256().unwrap_or_default()),
+                    .fact("SHA-256 of the density", self.density.content_sha256().unwrap_or_default())
+                    .facts(self.about.iter().cloned()),
                 Section::new("quantities", "Quantities")
                     .tables([self.quantities()])
                     .figures([PageFigure::new(&self.marginals().svg(), &[])]),

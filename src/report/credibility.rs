@@ -109,7 +109,9 @@ pub(super) fn annex(kind: RunKind, record: &str) -> Result<Section> {
     ];
     let reproducible = match record["reproducible"] == false {
         true => "The clock ended this run, so another machine ends elsewhere.",
-        false => "The same input, profile, options and program give the same numbers on any machine.",
+        false => {
+            "The same input, profile, options and program give the same numbers on any CPU, and on a device whose lanes are equal."
+        }
     };
     Ok(Section::new("credibility", "Credibility")
         .intro(format!(

@@ -32,8 +32,11 @@ pub struct ResultReport<'a> {
     pub identity: &'a CaseIdentity,
 }
 
+/// Maximum number of cases listed; the table of option `rows` has all.
+const MAX_ROWS: usize = 200;
 const LEGEND: &str = "Differences are theirs minus ours. Up to the tolerance they count as none. Decides: the first quantity, \
-                      in the order of cause and effect, that differs by more, or that only they have.";
+                      in the order of cause and effect, that differs by more, or that only they have. Only ours: cases in which their field is \
+                      empty, which is taken as unknown.";
 
 impl ResultReport<'_> {
     /// How many cases agree, with an interval.
@@ -65,7 +68,16 @@ impl ResultReport<'_> {
                 .to_owned();
         }
         let Some(cause) = self.comparison.cause() else {
-            return "No quantity differs beyond its tolerance in most cases.".to_owned();
+            let some = self.comparison.differences.iter().filter(|of| of.beyond > 0);
+            let some = some.map(|of| format!("{} in {} of {}", COMPARED[of.quantity].column, of.beyond, of.cases));
+            let some: Vec<String> = some.collect();
+            return match some.is_empty() {
+                true => "No quantity differs beyond its tolerance in any case.".to_owned(),
+                false => format!(
+                    "No quantity differs beyond its tolerance in most cases, but in some: {} cases. See which these are.",
+                    some.join(", ")
+                ),
+            };
         };
         let compared = &COMPARED[cause.quantity];
         let [min, median, max] = cause.range.map(|by| significant(by.abs(), 3));
@@ -89,6 +101,8 @@ impl ResultReport<'_> {
             .column("quantity", |of| COMPARED[of.quantity].column)
             .column("cases", |of| of.cases)
             .column("beyond", |of| of.beyond)
+            .column("only ours", |of| of.only[0])
+            .column("only theirs", |of| of.only[1])
             .column("tolerance", |of| COMPARED[of.quantity].tolerance)
             .column(Column::from("min").digits(Digits::Signed(3)), |of| of.range[0])
             .column(Column::from("median").digits(Digits::Signed(3)), |of| of.range[1])
@@ -101,16 +115,21 @@ impl ResultReport<'_> {
         rows(self.comparison.cases.iter())
     }
 
-    /// The cases with another answer; `None` if there are none.
+    /// The cases that differ, those with another answer first; `None` if there are none.
     fn differing(&self) -> Option<Table> {
-        let mut differing = self.comparison.cases.iter().filter(|case| case.collides[0] != case.collides[1]).peekable();
+        let is_other = |case: &&ComparedCase| case.collides[0] != case.collides[1];
+        let cases = &self.comparison.cases;
+        let beyond = cases.iter().filter(|case| !is_other(case) && case.decides.is_some());
+        let mut differing = cases.iter().filter(is_other).chain(beyond).take(MAX_ROWS).peekable();
         differing.peek()?;
         Some(rows(differing))
     }
 
     /// The comparison as text.
     pub fn text(&self, width: usize) -> String {
-        let differing = self.differing().map_or(String::new(), |rows| format!("\nOther answers\n{}", rows.text()));
+        let differing = self
+            .differing()
+            .map_or(String::new(), |rows| format!("\nCases that differ, at most {MAX_ROWS}\n{}", rows.text()));
         format!(
             "{}\n{}{differing}{}\n",
             wrap(&format!("{} {}", self.agreement(), self.cause()), width),
@@ -122,7 +141,9 @@ impl ResultReport<'_> {
     /// The comparison as a page.
     pub fn html(&self) -> String {
         let model = self.comparison.model.name();
-        let others = self.differing().map(|rows| rows.captioned("Cases with another answer"));
+        let others = self.differing().map(|rows| {
+            rows.captioned(format!("Cases that differ, those with another answer first, at most {MAX_ROWS}"))
+        });
         Page {
             title: format!("{} beside {model} under {}", self.theirs, self.profile.name),
             lead: format!("{} {}", self.agreement(), self.cause()),

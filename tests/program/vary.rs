@@ -75,6 +75,20 @@ fn an_error_of_a_tenth_of_a_second_in_a_delay_is_found_and_named() {
     text = text.replace("name = \"un-r157\"", "name = \"planted\"").replace("delay_s = 0.75", "delay_s = 0.85");
     std::fs::write(dir.join("planted.toml"), text).unwrap();
     std::fs::write(dir.join("late.csv"), results_of(dir, "planted.toml", 1)).unwrap();
+    // An error in a few cases is no cause of most differences, and no agreement either.
+    let same = std::fs::read_to_string(dir.join("same.csv")).unwrap();
+    let late = std::fs::read_to_string(dir.join("late.csv")).unwrap();
+    let fields = |line: &str| line.split(',').map(str::to_owned).collect::<Vec<_>>();
+    let later = |own: &&str| {
+        late.lines().map(fields).find(|of| of[0] == fields(own)[0]).filter(|of| of[3].parse::<f64>().is_ok())
+    };
+    let own = same.lines().skip(1).find(|own| later(own).is_some_and(|of| of[1] == fields(own)[1])).unwrap();
+    let mut few = fields(own);
+    few[3] = later(&own).unwrap()[3].clone();
+    std::fs::write(dir.join("few.csv"), same.replace(own, &few.join(","))).unwrap();
+    let (code, few) = compare("few.csv");
+    assert_eq!((code, &few["agreeing"], &few["cause"]), (5, &few["cases"], &Value::Null), "{few}");
+    assert!(few["cause_sentence"].as_str().unwrap().contains("t_brake_s in 1 of"), "{few}");
     let (code, late) = compare("late.csv");
     assert_eq!((code, &late["cause"], &late["without_result"]), (5, &"t_brake_s".into(), &1.into()), "{late}");
     let sentence = late["cause_sentence"].as_str().unwrap();
@@ -101,6 +115,7 @@ fn results_without_a_case_an_id_or_a_driver_are_refused_by_name() {
         ("id,collision\na,maybe\n", "CCHDM", 3, "neither true nor false"),
         ("id,crash\na,0\n", "CCHDM", 3, "`collision`: it is missing"),
         ("id,collision,t_break_s\na,0,1\n", "CCHDM", 3, "there is no such column"),
+        ("id,collision,t_brake_s\na,0,nan\n", "CCHDM", 3, "is not finite"),
         ("id,collision\n", "CCHDM", 3, "it has no rows"),
         ("id,collision\na,0\n", "CCHDM,FSM", 2, "one driver"),
     ] {
@@ -111,6 +126,9 @@ fn results_without_a_case_an_id_or_a_driver_are_refused_by_name() {
     }
     let (code, _, error) = run(dir, &[&["vary"], &CASE[..], &["--range", "gap_m=40..5"]].concat());
     assert!(code == 2 && error.contains("--range"), "{error}");
+    let both = ["--range", "gap_m=5..40", "--range", "thw_s=0.5..2"];
+    let (code, _, error) = run(dir, &[&["vary"], &CASE[..], &both].concat());
+    assert!(code == 2 && error.contains("say the same twice"), "{error}");
     let (code, _, error) = run(dir, &[&["vary"], &CASE[..]].concat());
     assert!(code == 2 && error.contains("range"), "{error}");
 }

@@ -229,6 +229,10 @@ fn a_hole_in_the_tested_cases_is_found_with_its_exposure() {
 
     let unknown = run(&["--range", "speed=1..2"]);
     assert!(code(&unknown) == 2 && stderr(&unknown).contains("no fitted density has the parameter `speed`"));
+    assert!(page.contains("SHA-256 of the tested cases"));
+    std::fs::write(&tested, "category,ego_speed_mps,gap_m,acceleration\nlvd,20,30,-5\n").unwrap();
+    let other = run(&["--tested", text(&tested)]);
+    assert!(code(&other) == 2 && stderr(&other).contains("tested.csv has no cut-in"), "{}", stderr(&other));
     let twice = run(&["--tested", text(&out)]);
     assert_eq!(code(&twice), 2, "{}", stderr(&twice));
 }

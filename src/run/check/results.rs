@@ -91,8 +91,10 @@ pub struct ComparedCase {
     pub collides: [bool; 2],
     /// Per quantity: theirs minus ours, where both have it.
     pub differences: [Option<f64>; COMPARED.len()],
-    /// Index of the first quantity that differs by more than its tolerance, or that only one of both has.
+    /// Index of the first quantity that differs by more than its tolerance, or that only they have.
     pub decides: Option<usize>,
+    /// Per quantity, whether we have it and they have it.
+    has: [[bool; 2]; COMPARED.len()],
 }
 
 /// A quantity over all cases.
@@ -104,6 +106,8 @@ pub struct Difference {
     pub cases: usize,
     /// Cases in which it differs by more than the tolerance.
     pub beyond: usize,
+    /// Cases in which only we have it, and in which only they have it.
+    pub only: [usize; 2],
     /// Minimum, median and maximum of theirs minus ours.
     pub range: [f64; 3],
 }
@@ -135,10 +139,18 @@ impl ResultComparison {
             all.sort_by(f64::total_cmp);
             let beyond = all.iter().filter(|by| by.abs() > compared.tolerance).count();
             let range = [*all.first()?, all[all.len() / 2], *all.last()?];
-            Some(Difference { quantity, cases: all.len(), beyond, range })
+            let alone = |who: usize| {
+                cases.iter().filter(|case| case.has[quantity][who] && !case.has[quantity][1 - who]).count()
+            };
+            Some(Difference { quantity, cases: all.len(), beyond, only: [alone(0), alone(1)], range })
         };
         let differences = COMPARED.iter().enumerate().filter_map(difference).collect();
         Ok(ResultComparison { model, cases, differences })
+    }
+
+    /// Whether nothing differs in any case.
+    pub fn is_equal(&self) -> bool {
+        self.cases.iter().all(|case| case.decides.is_none() && case.collides[0] == case.collides[1])
     }
 
     /// Cases with the same answer to whether the vehicles touch.
@@ -169,6 +181,7 @@ impl ComparedCase {
         };
         let collides = [trace.step_of(StepMark::Contact).is_some(), theirs.collides];
         let decides = (0..COMPARED.len()).find(differs);
-        ComparedCase { id: theirs.id.clone(), collides, differences, decides }
+        let has = std::array::from_fn(|k| [ours[k].is_some(), theirs.values[k].is_some()]);
+        ComparedCase { id: theirs.id.clone(), collides, differences, decides, has }
     }
 }
