@@ -66,7 +66,13 @@ _GROUPS = ("options", "case")
 #: Arguments that take names with values.
 _TABLES = ("config", "given", "panel", "rename", "set")
 #: Files of a result that stand for it.
-_FILES = {"plan": "plan.json", "external": "winner.json", "parameterization": "winner.json", "parameterizations": "winner.json"}
+_FILES = {
+    "plan": "plan.json",
+    "against": "dossier.json",
+    "external": "winner.json",
+    "parameterization": "winner.json",
+    "parameterizations": "winner.json",
+}
 
 
 def plain(value: Any, name: str) -> Any:

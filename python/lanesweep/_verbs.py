@@ -85,6 +85,7 @@ def study(
     reference: bool = False,
     compare_reference: bool = False,
     rows: Path | None = None,
+    injury: Keys | None = None,
     keep_plan: Literal["auto", "always", "never"] | None = None,
     seed: Int | None = None,
     out: Path | None = None,
@@ -120,6 +121,8 @@ def study(
         Run both arithmetics and list every verdict that differs.
     rows : path
         Also write one row per lane: .csv, .jsonl or .parquet.
+    injury : list of str
+        With `rows`: curves of injury risk, as of `check`, for columns of contacts.
     keep_plan : {"auto", "always", "never"}
         Keep the plan in `out`, with which `trace` repeats each lane. ``"auto"``, the default: up to 256 MiB.
     seed : int
@@ -278,6 +281,8 @@ def sample(
     proposal: Paths | None = None,
     time_limit: Float | None = None,
     other_profile: Path | None = None,
+    injury: Keys | None = None,
+    target: Values | None = None,
     map: str | Collection[str] | None = None,
     rows: Path | None = None,
     worst: Int | None = None,
@@ -327,6 +332,10 @@ def sample(
         Stop at the first check after this time, s; not reproducible.
     other_profile : str or path
         Also run the samples under this profile, and give the ratios.
+    injury : list of str
+        Curves of injury risk, as of `check`: injuries per hour, and columns of `rows`.
+    target : mapping
+        Rates per hour to compare with, ``{"collision": 1e-7, "injury": 1e-8}``. There is no default.
     map : pair of str
         Parameters of the failure map, or ``"none"``; by default the first two.
     rows : path
@@ -475,10 +484,11 @@ def search(
 def justify(
     recordings: Path | None = None,
     *,
-    parameterization: str | Int | Path,
-    models: Models,
+    parameterization: str | Int | Path | None = None,
+    models: Models | None = None,
     criterion: Criterion | None = None,
     thw: Headways | None = None,
+    against: Path | None = None,
     author: str | None = None,
     date: str | None = None,
     out: Path | None = None,
@@ -493,15 +503,18 @@ def justify(
     Parameters
     ----------
     recordings : path, optional
-        Folder of recordings, or a track file; by default recordings are generated.
+        Folder of recordings, or a track file; by default recordings are generated. With `against` also the folder of a dossier, or its
+        dossier.json: nothing is simulated then, and the answer is what differs.
     parameterization : str
-        A key, or a file of `search`.
+        A key, or a file of `search`; needed unless two dossiers are compared.
     models : str or Driver
-        One driver model.
+        One driver model; needed unless two dossiers are compared.
     criterion : {"collision", "ttc", "btn"}
         Criterion, by default collision.
     thw : list of float
         Time headways, s, as in `study`.
+    against : path
+        Another dossier, its folder or its dossier.json, from which the changes are listed.
     author : str
         Person responsible for the dossier; by default a line to fill in.
     date : str

@@ -10,6 +10,7 @@ use super::check_results::ComparedTable;
 use super::check_table::CheckedTable;
 use super::configured::Configured;
 use super::format::FormatFlag;
+use super::lists;
 use super::signals::CANCEL;
 use super::source::{PlausibilityFlag, refuse_overwriting, scenarios_of};
 use super::uncertain_flags::UncertainFlags;
@@ -17,7 +18,6 @@ use super::{COMMIT, Exit, Output};
 use crate::engine::{CpuBackend, Executor};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::model::severity::{INJURY_CURVES, InjuryCurve};
 use crate::report::case_identity::CaseIdentity;
 use crate::report::case_sheet::CaseSheet;
 use crate::report::trace;
@@ -91,15 +91,8 @@ pub(super) struct Check {
     /// Also write every step of every model under the first profile
     #[arg(long, value_name = "FILE.csv", help_heading = "Output", hide_short_help = true)]
     series: Option<PathBuf>,
-    /// Injury risks of contacts, by published curves (nhtsa-2022-frontal-mais3, joksch-1993-fatal, …)
-    #[arg(
-        long,
-        value_name = "LIST",
-        value_delimiter = ',',
-        help_heading = "Models and criteria",
-        hide_short_help = true
-    )]
-    injury: Vec<String>,
+    #[command(flatten)]
+    injury: lists::InjuryFlag,
     /// Date of the run, as the sheet is to show it; the clock is not asked
     #[arg(long, value_name = "TEXT", help_heading = "Output", hide_short_help = true)]
     date: Option<String>,
@@ -115,8 +108,8 @@ pub(super) struct Check {
 }
 
 from_arguments!(
-    Check { file, row, scenario, profiles, sheet, rows, sheets, results, nominal, series, injury, date, author }
-    groups { case, uncertain, plausibility, format }
+    Check { file, row, scenario, profiles, sheet, rows, sheets, results, nominal, series, date, author }
+    groups { case, injury, uncertain, plausibility, format }
 );
 
 /// The checked case, with facts for the reader.
@@ -191,7 +184,7 @@ impl Check {
             profiles: &check.profiles,
             judgements: &judgements,
             uncertainty: uncertainty.as_ref(),
-            injury: &self.injury_curves()?,
+            injury: &self.injury.curves()?,
             command: configured.command.clone(),
             identity: self.identity()?,
         };
@@ -205,18 +198,6 @@ impl Check {
         // If input was skipped the answer is incomplete.
         let exit = if request.incomplete { Exit::Incomplete } else { status(judgements[0].verdict()) };
         self.format.output(exit, || sheet.text(), || sheet.json())
-    }
-
-    /// The named curves of injury risk.
-    fn injury_curves(&self) -> Result<Vec<&'static InjuryCurve>> {
-        let curve = |name: &String| {
-            InjuryCurve::find(name.trim()).ok_or_else(|| {
-                let names: Vec<&str> = INJURY_CURVES.iter().map(|curve| curve.name).collect();
-                let problem = format!("there is no curve `{name}`");
-                Error::usage(Place::item("--injury"), problem, format!("there are {}", names.join(", ")))
-            })
-        };
-        self.injury.iter().map(curve).collect()
     }
 
     /// What identifies the sheet besides the case.
@@ -244,7 +225,7 @@ impl Check {
             ("--date", self.date.is_some() && !has_pages),
             ("--author", self.author.is_some() && !has_pages),
             ("--uncertain", self.uncertain.is_given()),
-            ("--injury", !self.injury.is_empty()),
+            ("--injury", self.injury.is_given()),
             ("--profiles", self.profiles.len() > 1),
         ];
         match of_one.iter().find(|(_, is_given)| *is_given) {

@@ -12,6 +12,7 @@ use super::source::SourceFlags;
 use super::{Exit, Output, lists};
 use crate::model::driver::ModelId;
 use crate::report::dossier::DossierReport;
+use crate::report::dossier_changes::DossierFile;
 use crate::run::compare::CompareOptions;
 use crate::run::justify::{Conclusion, JustifyOptions, justify};
 use crate::run::study::StudyOptions;
@@ -41,14 +42,19 @@ pub(super) struct Justify {
     data: SourceFlags,
     /// Parameterization: 1…7 (cut-in), a…g (cut-out), i…v (LVD), or a file of `search`
     #[arg(long, value_name = "KEY|FILE", help_heading = "Scenario")]
-    parameterization: String,
+    parameterization: Option<String>,
     /// Driver model: Reg157, CCHDM, RSS, FSM
     #[arg(long, value_name = "NAME", help_heading = "Models and criteria")]
-    models: String,
+    models: Option<String>,
     #[command(flatten)]
     criterion: lists::CriterionFlag,
     #[command(flatten)]
     headways: lists::HeadwaysFlag,
+    /// Another dossier (folder or dossier.json): list what differs from it
+    ///
+    /// Where DIR is a dossier too, nothing is simulated: both are compared, without their data.
+    #[arg(long, value_name = "DOSSIER", help_heading = "Data")]
+    against: Option<PathBuf>,
     /// Person responsible for the dossier [default: a line to fill in]
     #[arg(long, value_name = "NAME", help_heading = "Output", hide_short_help = true)]
     author: Option<String>,
@@ -63,17 +69,22 @@ pub(super) struct Justify {
 }
 
 from_arguments!(
-    Justify { parameterization, models, author, out }
+    Justify { parameterization, models, against, author, out }
     parsed { date: date }
     groups { data, criterion, headways, format }
 );
 
 impl Justify {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
+        let against = self.against.as_deref().map(DossierFile::read).transpose()?;
+        if let Some(path) = self.data.recordings.as_deref().filter(|path| DossierFile::is_at(path)) {
+            return self.compared(&DossierFile::read(path)?, against.as_ref());
+        }
         let config = &configured.settings;
-        let id = parameterization(&self.parameterization)?;
-        let model = ModelId::parse(self.models.trim()).ok_or_else(|| {
-            let problem = format!("`{}` is not one driver model", self.models);
+        let id = parameterization(given(&self.parameterization, "--parameterization", "name one, such as 2 or iii")?)?;
+        let models = given(&self.models, "--models", "name one driver model")?;
+        let model = ModelId::parse(models.trim()).ok_or_else(|| {
+            let problem = format!("`{models}` is not one driver model");
             Error::usage(Place::item("--models"), problem, format!("use one of {}", ModelId::names()))
         })?;
         let criterion = self.criterion.get()?;
@@ -121,16 +132,36 @@ impl Justify {
             date: self.date.clone(),
             command: configured.command.clone(),
             host: configured.host(&opened, dossier.summary.rechecked_lanes, false),
+            against: against.as_ref(),
         };
         let files = report.write(folder.results()?)?;
         let is_complete = collection.problems.is_empty() && dossier.left_out.is_empty();
-        let exit = match dossier.conclusion {
-            _ if !is_complete => Exit::Incomplete,
-            Conclusion::Appropriate => Exit::Ok,
-            Conclusion::NotAppropriate => Exit::NotAppropriate,
-            Conclusion::Undecided => Exit::Undecided,
-        };
-        self.format.output_in(&self.out, exit, || report.text(), || report.json(&files))
+        let exit = if is_complete { exit_of(dossier.conclusion) } else { Exit::Incomplete };
+        let text = report.text()?;
+        self.format.output_in(&self.out, exit, || text, || report.json(&files))
+    }
+
+    /// Compares two dossiers; the status is the conclusion of the first.
+    fn compared(&self, this: &DossierFile, against: Option<&DossierFile>) -> Result<Output> {
+        let other = against.ok_or_else(|| {
+            let help = "give option `against`, or recordings in its place";
+            Error::usage(Place::item("DIR"), "it is a dossier, and nothing to compare it with is given", help)
+        })?;
+        let changes = this.changes_from(other);
+        self.format.output(exit_of(this.conclusion), || changes.text(), || changes.json())
+    }
+}
+
+/// A word that only the comparison of two dossiers does without.
+fn given<'a>(word: &'a Option<String>, flag: &'static str, help: &str) -> Result<&'a str> {
+    word.as_deref().ok_or_else(|| Error::usage(Place::item(flag), "it is missing", help))
+}
+
+fn exit_of(conclusion: Conclusion) -> Exit {
+    match conclusion {
+        Conclusion::Appropriate => Exit::Ok,
+        Conclusion::NotAppropriate => Exit::NotAppropriate,
+        Conclusion::Undecided => Exit::Undecided,
     }
 }
 

@@ -9,13 +9,14 @@ use super::format::FormatFlag;
 use super::lists;
 use super::shard_flags::ShardFlags;
 use super::source::PlausibilityFlag;
-use crate::Result;
 use crate::cli::settings::{EstimatorKind, SampleSettings};
 use crate::engine::Headway;
+use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::report::openscenario::Rename;
-use crate::run::sampling::{SampleHeadways, SampleSource};
+use crate::run::sampling::{SampleHeadways, SampleSource, Target};
 use crate::stats::density::DensityModel;
+use crate::{Error, Place, Result};
 
 /// How likely does a driver fail?
 ///
@@ -29,6 +30,7 @@ use crate::stats::density::DensityModel;
     "density" | "distribution" | "category" | "rename" | "set" | "models" | "thw" | "map" | "given" | "proposal" => {
         arg.conflicts_with("plan")
     }
+    "injury" | "target" => arg.conflicts_with_all(["plan", "distribution"]),
     "rows" => arg.conflicts_with("plan_only"),
     _ => arg,
 }))]
@@ -64,6 +66,14 @@ pub(crate) struct Sample {
     pub(super) set: Vec<(String, f64)>,
     #[command(flatten)]
     models: lists::ModelsFlag,
+    #[command(flatten)]
+    pub(super) injury: lists::InjuryFlag,
+    /// Rate per hour of driving to compare with (collision=1e-7, injury=1e-8, …); repeatable
+    ///
+    /// Names are collision, ttc, btn and, with --injury, injury. Says whether the interval lies below or above, or what would
+    /// decide. The density must know the driven hours.
+    #[arg(long, value_name = "NAME=RATE", value_parser = given, help_heading = "Models and criteria", hide_short_help = true)]
+    target: Vec<(String, f64)>,
     /// Time headways, s [default: the density's, else paper]
     ///
     /// paper is 2.0, 1.8, … 0.2. observed (or sampled): the headway is drawn from the recorded ones, as a parameter of
@@ -106,8 +116,8 @@ pub(crate) struct Sample {
 
 from_arguments!(
     Sample { density, distribution, category, thw, map, rows, proposal, other_profile, simultaneous, out }
-    each { rename: str::parse, set: given, given: given }
-    groups { models, plausibility, format, shards }
+    each { rename: str::parse, set: given, given: given, target: given }
+    groups { models, injury, plausibility, format, shards }
     others { settings: SampleSettings::default() }
 );
 
@@ -119,6 +129,19 @@ impl Sample {
             Some("paper") => Ok(Some(Headway::paper())),
             Some(list) => lists::headways(list, "or `paper`").map(Some),
         }
+    }
+
+    /// The target rates.
+    pub(super) fn targets(&self) -> Result<Vec<Target>> {
+        let refused = |problem: String, help: &str| Error::usage(Place::item("--target"), problem, help);
+        let target = |(name, per_hour): &(String, f64)| match Criterion::parse(name) {
+            _ if *per_hour <= 0.0 => Err(refused(format!("{per_hour} is no rate"), "give a number above 0")),
+            None if name != "injury" => {
+                Err(refused(format!("there is no rate `{name}`"), "use collision, ttc, btn or injury"))
+            }
+            criterion => Ok(Target { criterion, per_hour: *per_hour }),
+        };
+        self.target.iter().map(target).collect()
     }
 
     pub(super) fn is_crude(&self) -> bool {

@@ -8,7 +8,9 @@ use super::source::file_of;
 use crate::cli::settings::{EstimatorKind, IntervalKind};
 use crate::model::driver::ModelId;
 use crate::report::lanes::table_format;
-use crate::run::sampling::{Estimator, MapAxes, SampleHeadways, SampleOptions, SampleSource, read_proposal};
+use crate::run::sampling::{
+    Estimator, InjuryOptions, MapAxes, SampleHeadways, SampleOptions, SampleSource, read_proposal,
+};
 use crate::stats::density::{DensityModel, Mixture};
 use crate::stats::estimate::{BinomialInterval, Checkpoints, Goal, Search, StopRule};
 use crate::support::plausibility::{Doubts, HELP};
@@ -50,10 +52,17 @@ impl Sample {
             given: self.given.clone(),
             worst: self.settings.worst,
             source: self.settings.points,
+            injury: self.injury(density)?,
+            targets: self.targets()?,
             map: if self.is_crude() { self.map_axes(density)? } else { None },
             ..SampleOptions::new(self.estimator(density)?, samples, headways)
         };
         Ok(if self.simultaneous { options.together(self.settings.level) } else { options })
+    }
+
+    fn injury(&self, density: &DensityModel) -> Result<Option<InjuryOptions>> {
+        let curves: Vec<String> = self.injury.curves()?.iter().map(|curve| curve.name.to_owned()).collect();
+        Ok((!curves.is_empty()).then_some(InjuryOptions { curves, sizes: density.sizes }))
     }
 
     /// Checks the values of `--given`, and warns about doubtful ones.

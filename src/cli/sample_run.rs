@@ -152,14 +152,15 @@ impl Sample {
         let is_empty = run.units().is_empty();
         let (density, lane_plan) = (&sample.density, sample.lane_plan());
         let rows = self.rows.as_deref().filter(|_| !is_empty).zip(lane_plan);
-        let mut table = rows.map(|(path, plan)| lanes::sampled_table(path, plan, density)).transpose()?;
+        let injury = self.injury.curves()?;
+        let mut table = rows.map(|(path, plan)| lanes::sampled_table(path, plan, density, &injury)).transpose()?;
         let units = match sample.options.stop.is_fixed() {
             true => Total::Exact(missing),
             false => Total::AtMost(missing),
         };
-        let mut write_chunk = table
-            .as_mut()
-            .map(|table| |plan: &LanePlan, chunk: &Chunk| lanes::write_sampled_chunk(table, plan, density, chunk));
+        let mut write_chunk = table.as_mut().map(|table| {
+            |plan: &LanePlan, chunk: &Chunk| lanes::write_sampled_chunk(table, plan, (density, &injury), chunk)
+        });
         let each = write_chunk.as_mut().map(|write| write as &mut EachChunk);
         configured.with_progress(units, "sampling", executor, |executor| run.compute(executor, each))?;
         let rows = table.map(TableWriter::stage).transpose()?;

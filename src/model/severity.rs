@@ -3,6 +3,9 @@
 //! A contact is central and in line, as of two bodies on one path: what a rear-end contact of boxes can say. The curves were
 //! fitted to occupants of passenger cars in crashes on roads; beyond the speeds of their data they are not evaluated.
 
+use crate::model::criterion::Contact;
+use crate::{Error, Place, Result};
+
 /// Mass of a passenger car, kg (ours: a mid-size car with its driver).
 pub const CAR_KG: f64 = 1500.0;
 /// Mass of a heavy vehicle, kg (ours: a partly laden truck of 16 t).
@@ -21,6 +24,14 @@ pub fn mass_kg(length_m: f64) -> f64 {
 /// (1 + e) · m_other/(m_own + m_other) · closing speed.
 pub fn delta_v_mps(closing_mps: f64, own_kg: f64, other_kg: f64) -> f64 {
     (1.0 + RESTITUTION) * other_kg / (own_kg + other_kg) * closing_mps.abs()
+}
+
+/// Changes of speed of ego and other vehicle of these lengths in a contact, m/s; `None` unless it is central: a side contact, and a
+/// vehicle that drives away, are not.
+pub fn contact_delta_v_mps(contact: Contact, closing_mps: f64, lengths_m: [f64; 2]) -> Option<[f64; 2]> {
+    let [ego_kg, other_kg] = lengths_m.map(mass_kg);
+    let both = [delta_v_mps(closing_mps, ego_kg, other_kg), delta_v_mps(closing_mps, other_kg, ego_kg)];
+    (contact == Contact::Frontal && closing_mps > 0.0).then_some(both)
 }
 
 /// A published curve of the probability of an injury over the change of speed of the occupant's vehicle.
@@ -83,12 +94,24 @@ pub const INJURY_CURVES: [InjuryCurve; 3] = [
 
 impl InjuryCurve {
     /// Finds a curve by name.
-    pub fn find(name: &str) -> Option<&'static InjuryCurve> {
-        INJURY_CURVES.iter().find(|curve| curve.name == name)
+    ///
+    /// # Errors
+    /// [`Error::Usage`] with the names that there are.
+    pub fn find(name: &str) -> Result<&'static InjuryCurve> {
+        INJURY_CURVES.iter().find(|curve| curve.name == name.trim()).ok_or_else(|| {
+            let help = format!("there are {}", INJURY_CURVES.map(|curve| curve.name).join(", "));
+            Error::usage(Place::option("injury"), format!("there is no curve `{name}`"), help)
+        })
+    }
+
+    /// The risk of the ego's occupants in a contact with these [changes of speed](contact_delta_v_mps); `None` beyond the data, and for
+    /// a truck, of which the curves are not.
+    pub fn ego_risk(&self, delta_v_mps: Option<[f64; 2]>, ego_length_m: f64) -> Option<f64> {
+        self.risk(delta_v_mps.filter(|_| mass_kg(ego_length_m) == CAR_KG)?[0])
     }
 
     /// Probability of the injury at a change of speed, m/s; `None` beyond the data.
-    pub fn risk(&self, delta_v_mps: f64) -> Option<f64> {
+    fn risk(&self, delta_v_mps: f64) -> Option<f64> {
         (delta_v_mps <= self.valid_to_mps).then(|| match self.form {
             Form::Logistic(a, b, per_mps) => 1.0 / (1.0 + libm::exp(-(a + b * delta_v_mps * per_mps))),
             Form::FourthPower(v_mps) => (delta_v_mps / v_mps).powi(4),

@@ -3,32 +3,26 @@
 use super::case_sheet::CaseSheet;
 use super::html::Section;
 use super::tables::{WIDTH, wrap};
-use crate::model::criterion::Contact;
-use crate::model::severity::{CAR_KG, InjuryCurve, RESTITUTION, delta_v_mps, mass_kg};
+use crate::model::severity::{InjuryCurve, RESTITUTION, contact_delta_v_mps, mass_kg};
 use crate::run::check::Judged;
 use crate::scenario::{CaseQuantity, KMH};
 use crate::support::readable::value;
 use crate::support::table::{Column, Digits, Table};
 
 impl CaseSheet<'_> {
-    /// Changes of speed of ego and other vehicle in the contact of a driver's run, m/s; `None` without one.
+    /// Changes of speed of ego and other vehicle in the contact of a driver's run, m/s; `None` without a central one.
     pub(super) fn delta_v_mps(&self, judged: &Judged) -> Option<[f64; 2]> {
-        // A side contact, and a vehicle that drives away, have no central contact.
-        let is_central = judged.trace.outcome.contact == Contact::Frontal;
-        let closing_mps = judged.impact_closing_mps().filter(|mps| is_central && *mps > 0.0)?;
-        let [ego_kg, other_kg] = self.masses_kg()?;
-        Some([delta_v_mps(closing_mps, ego_kg, other_kg), delta_v_mps(closing_mps, other_kg, ego_kg)])
+        contact_delta_v_mps(judged.trace.outcome.contact, judged.impact_closing_mps()?, self.lengths_m()?)
     }
 
-    /// The risk of the ego's occupants; `None` beyond the curve's data, and for a truck, of which the curves are not.
+    /// As [`InjuryCurve::ego_risk`].
     pub(super) fn injury_risk(&self, delta_v_mps: Option<[f64; 2]>, curve: &InjuryCurve) -> Option<f64> {
-        let is_car = self.masses_kg().is_some_and(|[ego_kg, _]| ego_kg == CAR_KG);
-        curve.risk(delta_v_mps.filter(|_| is_car)?[0])
+        curve.ego_risk(delta_v_mps, self.lengths_m()?[0])
     }
 
-    fn masses_kg(&self) -> Option<[f64; 2]> {
+    fn lengths_m(&self) -> Option<[f64; 2]> {
         let length_m = |quantity| self.subject.point().get(quantity);
-        Some([mass_kg(length_m(CaseQuantity::EgoLength)?), mass_kg(length_m(CaseQuantity::Length)?)])
+        Some([length_m(CaseQuantity::EgoLength)?, length_m(CaseQuantity::Length)?])
     }
 
     fn severity(&self) -> Table {
@@ -52,7 +46,7 @@ impl CaseSheet<'_> {
 
     /// What the numbers rest on.
     fn severity_notes(&self) -> String {
-        let [ego_kg, other_kg] = self.masses_kg().unwrap_or_default().map(value);
+        let [ego_kg, other_kg] = self.lengths_m().unwrap_or_default().map(|length_m| value(mass_kg(length_m)));
         let curves = self.injury.iter().map(|curve| {
             let to_kmh = value((curve.valid_to_mps * KMH).round());
             format!(

@@ -13,7 +13,6 @@ use crate::model::assumptions::differences;
 use crate::model::profile::Profile;
 use crate::support::input_file;
 use crate::support::readable::{count, value};
-use crate::support::run_folder::{DOSSIER_RECORD, ESTIMATE_RECORD, MAP_RECORD, STUDY_RECORD};
 use crate::support::table::Table;
 use crate::{Error, Place, Result};
 
@@ -29,33 +28,37 @@ pub(super) enum RunKind {
     Dossier,
 }
 
-use RunKind::{Dossier, Map, Sample, Study};
-
-/// The file.
+/// The file, which describes its fields.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct ValidationFile {
     question: Vec<Question>,
-    row: Vec<ValidationRow>,
+    validation: Vec<ValidationRow>,
+    discrepancy: Vec<ValidationRow>,
 }
 
-/// What the annex asks of a run; the file describes the fields.
 #[derive(Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 struct Question {
     group: String,
     name: String,
-    #[serde(default)]
-    missing: BTreeMap<RunKind, String>,
-    #[serde(default)]
-    none: BTreeMap<RunKind, String>,
+    r#for: BTreeMap<RunKind, Answer>,
 }
 
-/// What was measured about the program, or is known to be wrong; the file describes the fields.
 #[derive(Debug, Default, Deserialize)]
 #[serde(deny_unknown_fields, default)]
+struct Answer {
+    measured: Option<String>,
+    needs: String,
+    each: String,
+    item: String,
+    none: Option<String>,
+    missing: Option<String>,
+}
+
+#[derive(Debug, Clone, Default, Deserialize)]
+#[serde(deny_unknown_fields, default)]
 struct ValidationRow {
-    kind: RowKind,
     profile: String,
     runs: Vec<RunKind>,
     what: String,
@@ -63,14 +66,6 @@ struct ValidationRow {
     result: String,
     chapter: String,
     command: String,
-}
-
-#[derive(Debug, Clone, Copy, Default, PartialEq, Eq, Deserialize)]
-#[serde(rename_all = "lowercase")]
-enum RowKind {
-    #[default]
-    Validation,
-    Discrepancy,
 }
 
 const MISSING: &str = "MISSING";
@@ -81,212 +76,86 @@ const MISSING: &str = "MISSING";
 /// [`Error::Internal`] for a record that is not one of this program.
 pub(super) fn annex(kind: RunKind, record: &str) -> Result<Section> {
     let unread = |e: serde_json::Error| Error::Internal(format!("a record cannot be read: {e}"));
-    let record = Record { kind, of: serde_json::from_str(record).map_err(unread)? };
-    let profile: Profile = Profile::deserialize(record.at("/profile")).map_err(unread)?;
+    let mut record: Value = serde_json::from_str(record).map_err(unread)?;
+    record["widest"] = widest(&record);
+    let profile: Profile = Profile::deserialize(&record["profile"]).map_err(unread)?;
     let file = input_file::parse_toml::<ValidationFile>(VALIDATION, &Place::item("validation.toml"), "")?;
-    let pairs = |rows: &[(String, String)], [what, how]: [&'static str; 2], caption: &str| {
-        Table::of(rows).column(what, |row| row.0.as_str()).column(how, |row| row.1.as_str()).build().captioned(caption)
+    let answers = |group: &str| -> Vec<(String, &str, String)> {
+        let of_group = file.question.iter().filter(|of| of.group == group);
+        of_group.filter_map(|of| of.r#for.get(&kind)?.row(&of.name, &record)).collect()
     };
-    let answers = |group: &str, caption: &str| {
-        let rows: Vec<_> =
-            file.question.iter().filter(|of| of.group == group).map(|of| record.answer(of, &profile)).collect();
-        let table = Table::of(&rows).column("question", |row| row.0).column("state", |row| row.1);
+    let asked = |group: &str, caption: &str| {
+        let rows = answers(group);
+        let table = Table::of(&rows).column("question", |row| row.0.as_str()).column("state", |row| row.1);
         table.column("result, or what would measure it", |row| row.2.as_str()).build().captioned(caption)
     };
-    let reproducible = match record.at("/reproducible") == false {
+    let told = |group: &str, others: Vec<(String, String)>, caption: &str| {
+        let own = answers(group).into_iter().map(|(what, state, text)| match state {
+            MISSING => (what, format!("{MISSING}: {text}")),
+            _ => (what, text),
+        });
+        let rows: Vec<_> = own.chain(others).collect();
+        Table::of(&rows)
+            .column("what", |row| row.0.as_str())
+            .column("value", |row| row.1.as_str())
+            .build()
+            .captioned(caption)
+    };
+    let limits = NOT_CONSIDERED.map(|(what, how)| (format!("Not considered: {what}"), how.to_owned()));
+    let commit = record["commit"].as_str().unwrap_or_default();
+    let identity = vec![
+        (format!("profile {}", profile.name), format!("SHA-256 {}", profile_sha256(&profile)?)),
+        ("program".to_owned(), program(commit, 40)),
+    ];
+    let reproducible = match record["reproducible"] == false {
         true => "The clock ended this run, so another machine ends elsewhere.",
         false => "The same input, profile, options and program give the same numbers on any machine.",
     };
     Ok(Section::new("credibility", "Credibility")
         .intro(format!(
-            "For an assessment of the simulation's credibility. Every entry stands in {}, the record beside this page, or in the \
-             list of what was measured about the program. {reproducible}",
-            record.file()
+            "For an assessment of the simulation's credibility: what the record beside this page holds, and what is known of the program. \
+             {reproducible}"
         ))
         .tables([
-            pairs(&record.scope(), ["what", "how"], "Scope and limits"),
-            answers("numerical error", "Numerical error"),
-            answers("uncertainty by source", "Uncertainty by source"),
+            told("scope", limits.into(), "Scope and limits"),
+            asked("numerical error", "Numerical error"),
+            asked("uncertainty by source", "Uncertainty by source"),
+            rows_of(kind, &profile, &file.validation, true).captioned("Validation of the program"),
+            rows_of(kind, &profile, &file.discrepancy, false).captioned("Known discrepancies"),
+            told("chain", identity, "Chain from inputs to numbers"),
         ])
-        .tables(validation(kind, &profile, &file.row))
-        .tables([pairs(&record.chain(&profile), ["step", "identity"], "Chain from inputs to numbers")])
         .parts([Section::new("", format!("Assumptions: every constant of {}", profile.name))
             .intro(format!("{}. {SOURCES}", profile.description))
             .tables([assumptions_table(&profile)])]))
 }
 
-/// A record with its kind.
-struct Record {
-    kind: RunKind,
-    of: Value,
+/// The estimate over all headways whose interval is the widest, among those that tell the parts of their variance.
+fn widest(record: &Value) -> Value {
+    let all = list(&record["estimates"]);
+    let is_overall = |row: &&Value| row["headway"] == "all" || all.iter().all(|row| row["headway"] != "all");
+    let width = |row: &Value| at(row, "/estimate/relative_half_width").as_f64().unwrap_or(0.0);
+    let known = all.iter().filter(is_overall).filter(|row| row["uncertainty"].is_object());
+    known.max_by(|a, b| width(a).total_cmp(&width(b))).cloned().unwrap_or_default()
 }
 
-impl Record {
-    fn at(&self, pointer: &str) -> &Value {
-        at(&self.of, pointer)
-    }
-
-    /// The first of several values that there is.
-    fn first(&self, pointers: &[&str]) -> Option<&Value> {
-        pointers.iter().map(|pointer| self.at(pointer)).find(|of| !of.is_null())
-    }
-
-    fn file(&self) -> &'static str {
-        match self.kind {
-            Study => STUDY_RECORD,
-            Sample => ESTIMATE_RECORD,
-            Map => MAP_RECORD,
-            Dossier => DOSSIER_RECORD,
-        }
-    }
-
-    fn scope(&self) -> Vec<(String, String)> {
-        let simulated = match self.kind {
-            Study => join(self.at("/categories"), "{category}: {kept} of {found} found scenarios, {lanes} lanes"),
-            Sample if self.at("/density/kernels") == 0 => fill("distributions of {/density/parameters}", &self.of),
-            Sample => fill(
-                "{/density/category} {/density/parameterization}: density over {/density/kernels} scenarios; \
-                 {/density/provenance/found} found, {/density/provenance/kept} kept",
-                &self.of,
-            ),
-            Map => join(self.at("/grids"), "{name}: {cells} cells"),
-            Dossier => fill(
-                "{category} {parameterization}: {scenarios} of {found} found scenarios, {simulations} simulations of S",
-                &self.of,
-            ),
-        };
-        let drivers = match self.kind {
-            Map => join(self.at("/grids/0/shares"), "{model}"),
-            _ => self.first(&["/models", "/model"]).map(shown).unwrap_or_default(),
-        };
-        let data = self.first(&["/data", "/density/provenance/data"]).map(shown);
-        let facts = [("data", data), ("simulated", Some(simulated)), ("drivers", Some(drivers))];
-        let facts = facts.into_iter().filter_map(|(what, how)| Some((what.to_owned(), how?)));
-        let limits = NOT_CONSIDERED.map(|(what, how)| (format!("Not considered: {what}"), how.to_owned()));
-        facts.chain(limits).collect()
-    }
-
-    /// A question, its state, and the result or what would measure it.
-    fn answer<'q>(&self, of: &'q Question, profile: &Profile) -> (&'q str, &'static str, String) {
-        let (state, text) = match (self.measured(&of.name, profile), of.none.get(&self.kind)) {
-            (Some(text), _) => ("measured", text),
+impl Answer {
+    /// The name of a question, its state, and its text; `None` if it is not asked.
+    fn row(&self, name: &str, record: &Value) -> Option<(String, &'static str, String)> {
+        let measured = self.measured.as_ref().filter(|_| self.needs.is_empty() || !at(record, &self.needs).is_null());
+        let (state, text) = match (measured, &self.none) {
+            (Some(text), _) => {
+                let items: Vec<String> = list(at(record, &self.each)).iter().map(|of| fill(&self.item, of)).collect();
+                ("measured", fill(&text.replace("{*}", &items.join("; ")), record))
+            }
             (None, Some(reason)) => ("does not apply", reason.clone()),
-            (None, None) => (MISSING, of.missing.get(&self.kind).cloned().unwrap_or_default()),
+            (None, None) => (MISSING, self.missing.clone()?),
         };
-        (&of.name, state, text)
-    }
-
-    /// What the record says to a question of the file.
-    fn measured(&self, question: &str, profile: &Profile) -> Option<String> {
-        let here = |text: &str, needed: &str| (!self.at(needed).is_null()).then(|| fill(text, &self.of));
-        match (question, self.kind) {
-            ("precision: binary32 against binary64", _) => {
-                let text =
-                    "{/reference/differing} of {/reference/verdicts} verdicts of {/reference/lanes} lanes differ";
-                here(text, "/reference")
-            }
-            ("time step" | "inputs", Map) => {
-                let text = "{name}: {undecided} of {verdicts} verdicts";
-                let what = "verdicts that a tenth of the step (in binary64) or an error of an input changes";
-                (!self.at("/grids/0/undecided").is_null()).then(|| format!("{what}: {}", join(self.at("/grids"), text)))
-            }
-            ("time cap", Study) => {
-                let capped = join(self.at("/categories"), "{category}: {capped_lanes} of {lanes}");
-                Some(format!("lanes that end undecided at {} s: {capped}", value(profile.frame.time_cap_s)))
-            }
-            ("time cap", Sample) => here(
-                "lanes that end undecided at {/profile/frame/time_cap_s} s: {/draws/capped_lanes} of {/draws/lanes}",
-                "/draws",
-            ),
-            ("data", Study) => {
-                let text = "{category}: {/f1_intervals/known} of {/f1_intervals/cells}, of median width \
-                            {/f1_intervals/median_width}, at most {/f1_intervals/widest}";
-                Some(format!("F1 with an interval over scenarios: {}", join(self.at("/categories"), text)))
-            }
-            ("data", Dossier) => {
-                let text = "over scenarios: recall {/scores/recall}, precision {/scores/precision}, F1 {/scores/f1}";
-                Some(fill(text, &self.of))
-            }
-            ("parameterization", Study) => {
-                Some("it is the result of the study: the F1 of every S' (f1.csv)".to_owned())
-            }
-            ("density, against recorded scenarios", Dossier) => {
-                here("risk ratio P/S {/compared/sampled/ratio}", "/compared")
-            }
-            ("parameterization", Dossier) => {
-                here("ratio S'/S {/compared/replayed/ratio}; {hidden} hidden failures", "/compared")
-            }
-            ("draws", Dossier) => {
-                here("rate of the density, over the draws alone: {/compared/sampled/rate}", "/compared")
-            }
-            (_, Sample) => self.of_widest(question),
-            _ => None,
-        }
-    }
-
-    /// What the estimate over all headways with the widest interval says of a source of uncertainty.
-    fn of_widest(&self, question: &str) -> Option<String> {
-        let all = list(self.at("/estimates"));
-        let is_overall = |row: &&Value| row["headway"] == "all" || all.iter().all(|row| row["headway"] != "all");
-        let width = |row: &Value| at(row, "/estimate/relative_half_width").as_f64().unwrap_or(0.0);
-        let known = |row: &&Value| row["uncertainty"].is_object();
-        let widest = all.iter().filter(is_overall).filter(known).max_by(|a, b| width(a).total_cmp(&width(b)))?;
-        let (text, needed) = match question {
-            "data" => (
-                "{/uncertainty/scenarios} of the variance of ln risk from scenarios, {/uncertainty/exposure} from their frequency",
-                "/uncertainty",
-            ),
-            "density, against recorded scenarios" => ("risk ratio P/S {/recorded/sampled}", "/recorded/sampled"),
-            "parameterization" => ("ratio S'/S {/recorded/replayed}", "/recorded/replayed"),
-            "draws" => ("{/uncertainty/draws} of the variance of ln risk", "/uncertainty"),
-            _ => return None,
-        };
-        let interval = "{model} {criterion}, the widest of all estimates: P {/estimate/probability} [{/estimate/interval/low} {/estimate/interval/high}]; ";
-        (!at(widest, needed).is_null()).then(|| fill(interval, widest) + &fill(text, widest))
-    }
-
-    /// From input files to result files. A step without a checksum is named.
-    fn chain(&self, profile: &Profile) -> Vec<(String, String)> {
-        let files: usize = list(self.at("/recordings")).iter().map(|of| list(&of["files"]).len()).sum();
-        let inputs = match (self.kind, self.at("/scenario_file_sha256")) {
-            (Map, _) => "none: the grids stand in the record".to_owned(),
-            (Sample, _) => format!("{MISSING}: a density names its scenarios, not their recordings"),
-            (_, sha) if sha.is_string() => fill("scenario file, SHA-256 {scenario_file_sha256}", &self.of),
-            _ if files > 0 => format!("{files} files of recordings, SHA-256 of each in `recordings` of the record"),
-            _ if list(self.at("/recordings")).is_empty() => "the scenario file of the next step".to_owned(),
-            _ => "none: the recordings are generated, by `settings` of the record".to_owned(),
-        };
-        let sha = |step: &str, of: Option<&Value>| Some((step.to_owned(), format!("SHA-256 {}", of?.as_str()?)));
-        let scenarios = self.first(&["/scenarios_sha256", "/density/provenance/scenarios_sha256"]);
-        let without_plan = (self.kind == Sample && self.at("/plan_sha256").is_null())
-            .then(|| ("plan".to_owned(), format!("{MISSING}: importance sampling has no plan")));
-        let plans =
-            list(self.at("/grids")).iter().flat_map(|grid| list(&grid["plans"]).iter().map(move |of| (grid, of)));
-        let plans = plans.filter_map(|(grid, of)| sha(&fill("plan of {name}", grid), Some(&of["plan_sha256"])));
-        let seeds = [("seed of draws", "/seed"), ("seed of intervals", "/score/seed")];
-        let seeds = seeds.into_iter().filter_map(|(what, of)| Some((what.to_owned(), shown(self.first(&[of])?))));
-        let command = self.first(&["/command"]).map(|of| ("command".to_owned(), shown(of)));
-        let commit = self.at("/commit").as_str().unwrap_or_default();
-        let results = format!("SHA-256 of every table and figure in `files_sha256` of {}", self.file());
-        std::iter::once(("input files".to_owned(), inputs))
-            .chain(sha("scenarios", scenarios))
-            .chain(sha("density", self.first(&["/density/sha256", "/density_sha256"])))
-            .chain([(
-                format!("profile {}", profile.name),
-                format!("SHA-256 {}", profile_sha256(profile).unwrap_or_default()),
-            )])
-            .chain(sha("plan, with every case", self.first(&["/plan_sha256"])))
-            .chain(without_plan)
-            .chain(plans)
-            .chain(seeds)
-            .chain(command)
-            .chain([("program".to_owned(), program(commit, 40)), ("result files".to_owned(), results)])
-            .collect()
+        Some((name.to_owned(), state, text))
     }
 }
 
-/// The program's own validation with this profile, and the discrepancies known of it.
-fn validation(kind: RunKind, profile: &Profile, rows: &[ValidationRow]) -> [Table; 2] {
+/// The rows that belong to a run with this profile; with a word if none is of the profile itself.
+fn rows_of(kind: RunKind, profile: &Profile, rows: &[ValidationRow], is_told: bool) -> Table {
     let shipped = Profile::names().find(|name| *name == profile.name).and_then(|name| Profile::load(name).ok());
     let changed = shipped.map(|shipped| differences(profile, &shipped));
     let is_shipped = changed.as_ref().is_some_and(Vec::is_empty);
@@ -294,37 +163,29 @@ fn validation(kind: RunKind, profile: &Profile, rows: &[ValidationRow]) -> [Tabl
     let changed = changed.iter().flatten().map(key).collect::<Vec<_>>().join(", ");
     let missing = ValidationRow {
         what: format!("profile {}{}{changed}", profile.name, if changed.is_empty() { "" } else { " with " }),
-        result: format!("{MISSING}: this profile is not validated; the rows below hold for every profile"),
+        result: format!("{MISSING}: no validation of this profile; the rows below do not depend on the profile"),
         ..ValidationRow::default()
     };
     let is_own = |row: &&ValidationRow| {
         let is_of_profile = row.profile == "every" || is_shipped && row.profile == profile.name;
         is_of_profile && (row.runs.is_empty() || row.runs.contains(&kind))
     };
-    let rows: Vec<_> = (!is_shipped).then_some(&missing).into_iter().chain(rows.iter().filter(is_own)).collect();
-    let tables = [(RowKind::Validation, "Validation of the program"), (RowKind::Discrepancy, "Known discrepancies")];
-    tables.map(|(kind, caption)| {
-        Table::of(rows.iter().filter(|row| row.kind == kind))
-            .column("what", |row| row.what.as_str())
-            .column("against", |row| row.against.as_str())
-            .column("result", |row| row.result.as_str())
-            .column("source", |row| format!("{}\n{}", row.chapter, row.command).trim().to_owned())
-            .build()
-            .captioned(caption)
-    })
+    let own: Vec<&ValidationRow> = rows.iter().filter(is_own).collect();
+    let is_missing = is_told && own.iter().all(|row| row.profile == "every");
+    Table::of(is_missing.then_some(&missing).into_iter().chain(own))
+        .column("what", |row| row.what.as_str())
+        .column("against", |row| row.against.as_str())
+        .column("result", |row| row.result.as_str())
+        .column("chapter of the book, command", |row| format!("{}\n{}", row.chapter, row.command).trim().to_owned())
+        .build()
 }
 
 fn at<'a>(of: &'a Value, pointer: &str) -> &'a Value {
     of.pointer(pointer).unwrap_or(&Value::Null)
 }
 
-fn list(of: &Value) -> &[Value] {
+pub(super) fn list(of: &Value) -> &[Value] {
     of.as_array().map_or(&[], Vec::as_slice)
-}
-
-/// The text for every item, filled in.
-fn join(of: &Value, text: &str) -> String {
-    list(of).iter().map(|of| fill(text, of)).collect::<Vec<_>>().join("; ")
 }
 
 /// A text with the values that it names in braces, as keys or as pointers.
@@ -347,7 +208,7 @@ pub(super) fn shown(of: &Value) -> String {
         Value::Number(number) => number.as_u64().map_or_else(|| value(number.as_f64().unwrap_or(f64::NAN)), count),
         Value::Array(all) => all.iter().map(shown).collect::<Vec<_>>().join(", "),
         Value::Object(of) => {
-            let name = ["value", "ratio", "rate"].into_iter().find(|name| of.contains_key(*name));
+            let name = ["value", "ratio", "rate", "estimate"].into_iter().find(|name| of.contains_key(*name));
             let one = name.map_or(&Value::Null, |name| &of[name]);
             let end = |at: usize, key: &str| of.get("interval").map_or(of.get(key), |interval| interval.get(at));
             let end = |at, key| end(at, key).filter(|end| !end.is_null()).map_or("–".to_owned(), shown);
@@ -362,6 +223,7 @@ mod tests {
 
     use serde_json::json;
 
+    use super::RunKind::{Dossier, Map, Sample, Study};
     use super::*;
 
     fn file() -> ValidationFile {
@@ -369,19 +231,15 @@ mod tests {
     }
 
     fn state(kind: RunKind, record: &Value, name: &str) -> (&'static str, String) {
-        let record = Record { kind, of: record.clone() };
-        let (file, profile) = (file(), Profile::load("paper").unwrap());
-        let question = file.question.iter().find(|of| of.name == name).unwrap();
-        let (_, state, text) = record.answer(question, &profile);
+        let file = file();
+        let question = file.question.iter().find(|of| of.name == name && of.group != "scope").unwrap();
+        let (_, state, text) = question.r#for[&kind].row(name, record).unwrap();
         (state, text)
     }
 
     fn rows(kind: RunKind, profile: &Profile) -> Vec<String> {
-        validation(kind, profile, &file().row)
-            .iter()
-            .flat_map(|table| table.shown().1)
-            .map(|row| row.join(" | "))
-            .collect()
+        let rows = rows_of(kind, profile, &file().validation, true).shown().1;
+        rows.iter().map(|row| row.join(" | ")).collect()
     }
 
     /// Text in one line, without marks of emphasis and of tables.
@@ -409,7 +267,8 @@ mod tests {
     #[test]
     fn every_row_has_a_shipped_profile_and_stands_in_the_chapter_that_it_names() {
         let book = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/src/");
-        for row in file().row {
+        let ValidationFile { validation, discrepancy, .. } = file();
+        for row in validation.into_iter().chain(discrepancy) {
             assert!(row.profile == "every" || Profile::names().any(|name| name == row.profile), "{row:?}");
             let (chapter, anchor) = row.chapter.split_once('#').unwrap();
             let chapter = std::fs::read_to_string(format!("{book}{chapter}")).unwrap();
@@ -429,9 +288,18 @@ mod tests {
         assert_eq!(state(Study, &compared, question), ("measured", "1 of 12 verdicts of 4 lanes differ".to_owned()));
         assert_eq!(state(Map, &json!({"grids": [{"undecided": null}]}), "inputs").0, MISSING);
         assert_eq!(state(Study, &json!({}), "draws").0, "does not apply");
-        for question in file().question {
+    }
+
+    /// Every table asks every kind of run; a question without an answer has what would measure it, or a reason.
+    #[test]
+    fn no_question_on_error_or_uncertainty_is_left_out_of_a_kind_of_run() {
+        for question in file()
+            .question
+            .iter()
+            .filter(|of| ["numerical error", "uncertainty by source"].contains(&of.group.as_str()))
+        {
             for kind in [Study, Sample, Map, Dossier] {
-                let (state, text) = state(kind, &json!({}), &question.name);
+                let (_, state, text) = question.r#for[&kind].row(&question.name, &json!({})).unwrap();
                 assert!(!text.is_empty(), "{kind:?} {}: {state}", question.name);
             }
         }
@@ -463,9 +331,14 @@ mod tests {
             of_changed[0].starts_with("profile un-r157 with cchdm.delay_s = 0.7 in place of 0.75 | "),
             "{of_changed:?}"
         );
-        assert!(of_changed[0].contains("not validated") && !of_changed.iter().any(|row| row.contains("twenty cases")));
+        assert!(
+            of_changed[0].contains("no validation of this profile")
+                && !of_changed.iter().any(|row| row.contains("twenty cases"))
+        );
         let own = rows(Map, &Profile { name: "mine".to_owned(), ..shipped });
-        assert!(own[0].starts_with("profile mine | ") && own[0].contains("not validated"), "{own:?}");
+        assert!(own[0].starts_with("profile mine | ") && own[0].contains("no validation of this profile"), "{own:?}");
         assert_eq!(own.len(), of_changed.len());
+        // A shipped profile may lack one, too.
+        assert!(rows(Study, &Profile::load("paper-fit").unwrap())[0].starts_with("profile paper-fit | "));
     }
 }

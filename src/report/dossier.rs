@@ -2,10 +2,10 @@
 
 use serde_json::json;
 
+use super::dossier_changes::{DossierChanges, DossierFile, VERSION};
 use super::host::Host;
 use super::records::{self, PROGRAM, record, smallest_gap_m};
 use super::trace::{TraceFigure, TracePanels, TraceSeries};
-use crate::Result;
 use crate::engine::ENGINE_VERSION;
 use crate::model::profile::Profile;
 use crate::run::justify::{Dossier, Hidden, JustifyOptions, REGULATION, Scored, Share};
@@ -17,6 +17,7 @@ use crate::support::readable::{count, value};
 use crate::support::run_folder::{ResultFiles, Results};
 use crate::support::table::{Column, NumberText, Table};
 use crate::traffic::mining::RecordingSummary;
+use crate::{Error, Result};
 
 /// Maximum number of hidden failures on the page; `hidden.csv` has all.
 pub(super) const SHOWN: usize = 20;
@@ -41,6 +42,8 @@ pub struct DossierReport<'a> {
     pub command: String,
     /// Facts about the machine.
     pub host: Host,
+    /// Another dossier, from which the changes are listed.
+    pub against: Option<&'a DossierFile>,
 }
 
 impl DossierReport<'_> {
@@ -55,6 +58,14 @@ impl DossierReport<'_> {
             results.add("hidden.svg", svg.as_bytes())?;
         }
         records::publish(results, |files| self.json(files))
+    }
+
+    /// What differs from the other dossier, if there is one.
+    pub(super) fn changes(&self) -> Result<Option<DossierChanges>> {
+        let Some(other) = self.against else { return Ok(None) };
+        let this =
+            DossierFile::of(self.document(&ResultFiles::default(), None)?.as_bytes()).map_err(Error::Internal)?;
+        Ok(Some(this.changes_from(other)))
     }
 
     pub(super) fn findings(&self) -> Table {
@@ -147,7 +158,10 @@ impl DossierReport<'_> {
     }
 
     /// The dossier as text.
-    pub fn text(&self) -> String {
+    ///
+    /// # Errors
+    /// None for what this program made.
+    pub fn text(&self) -> Result<String> {
         let lines = |sentences: &[String]| {
             let present = sentences.iter().filter(|sentence| !sentence.is_empty());
             present.map(|sentence| format!("{sentence}\n")).collect::<String>()
@@ -162,14 +176,15 @@ impl DossierReport<'_> {
                 lines(&[self.beside(5)])
             ),
         };
-        format!(
-            "{}\n{}\n{}{}{hidden}\nThe alternatives, by the rules for recall and precision alone\n{}",
+        let changes = self.changes()?.map_or(String::new(), |changes| format!("\n{}", changes.text()));
+        Ok(format!(
+            "{}\n{}\n{}{}{hidden}\nThe alternatives, by the rules for recall and precision alone\n{}{changes}",
             self.provenance.data,
             lines(&[self.answer(), self.recall(), self.coverage(), self.close_following(), need]),
             self.findings().text(),
             lines(&[self.rule(), self.limits_of_rules()]),
             self.alternatives().text()
-        )
+        ))
     }
 
     /// All hidden failures as CSV.
@@ -194,6 +209,10 @@ impl DossierReport<'_> {
     /// # Errors
     /// None for what this program made.
     pub fn json(&self, files: &ResultFiles) -> Result<String> {
+        self.document(files, self.changes()?)
+    }
+
+    fn document(&self, files: &ResultFiles, changes: Option<DossierChanges>) -> Result<String> {
         let dossier = self.dossier;
         let scored = |scored: &Scored| {
             let one = |share: &Share| json!({"value": share.value, "interval": share.interval});
@@ -227,6 +246,7 @@ impl DossierReport<'_> {
             })
         });
         records::document(&record! {
+            lanesweep_dossier: VERSION,
             program: PROGRAM,
             engine: ENGINE_VERSION,
             commit: self.host.commit(),
@@ -266,6 +286,8 @@ impl DossierReport<'_> {
             density_sha256: &dossier.density_sha256,
             left_out: dossier.left_out.iter().map(ToString::to_string).collect::<Vec<_>>(),
             command: &self.command,
+            #[serde(flatten)]
+            changes: changes.map(|changes| record! { changes: changes }),
             settings: &self.host.settings,
             #[serde(flatten)]
             files: files,

@@ -15,8 +15,9 @@ impl DossierReport<'_> {
             lead: format!("{}. {} {} {}", self.answer(), self.recall(), self.coverage(), self.provenance.data),
             synthetic: self.provenance.synthetic,
             warnings: Vec::new(),
-            sections: vec![
-                self.conclusion_section(),
+            sections: std::iter::once(self.conclusion_section())
+                .chain(self.changes()?.map(|changes| changes.section()))
+                .chain([
                 self.hidden_section(),
                 Section::new("groups", "By headway, speed and severity")
                     .intro(
@@ -36,7 +37,8 @@ impl DossierReport<'_> {
                 Section::new("limits", "Limits of use").facts(self.limits()),
                 annex(RunKind::Dossier, &self.json(&ResultFiles::default())?)?.host(self.host.facts()),
                 Section::new("signature", "Signature").facts(self.signature()),
-            ],
+            ])
+            .collect(),
         };
         Ok(page.html())
     }
@@ -45,9 +47,8 @@ impl DossierReport<'_> {
         let significance = format!("intervals of {} % over scenarios", value(100.0 * self.options.score.confidence));
         Section::new("conclusion", "Conclusion")
             .intro([self.need().unwrap_or_default(), self.close_following()].join(" ").trim())
-            .tables([self.findings().captioned("What each rule finds; the worst decides")])
+            .tables([self.findings().captioned("What each rule finds; the worst decides"), self.limits_table()])
             .fact("rule", self.rule())
-            .fact("source of the limits", self.limits_of_rules())
             .fact("statistical significance", significance)
     }
 

@@ -2,8 +2,9 @@
 
 use super::dossier::{DossierReport, share};
 use crate::engine::{CLOSE_HEADWAY_S, Headway};
-use crate::run::justify::{Conclusion, Need, REGULATION, Rules, Share};
+use crate::run::justify::{Conclusion, LIMITS, Need, REGULATION, Share};
 use crate::support::readable::{count, value};
+use crate::support::table::{NumberText, Table};
 
 /// A line to be filled in by hand.
 const BLANK: &str = "______________________________";
@@ -40,15 +41,34 @@ impl DossierReport<'_> {
         )
     }
 
-    /// Where the limits come from, and how to change them.
+    /// Every limit: key, value, who set it, reason of the default.
+    fn limits_set(&self) -> impl Iterator<Item = (&'static str, String, &str, &'static str)> {
+        let of = |(key, reason)| (self.host.settings.iter().find(|setting| setting.key == key), key, reason);
+        LIMITS.into_iter().map(of).filter_map(|(setting, key, reason)| {
+            let setting = setting?;
+            Some((key, setting.value.to_string(), setting.source.as_str(), reason))
+        })
+    }
+
+    /// Whose the limits are, and what they are.
     pub(super) fn limits_of_rules(&self) -> String {
-        let Rules { min_recall, min_precision, min_coverage } = self.options.rules;
+        let all: Vec<String> =
+            self.limits_set().map(|(key, value, source, _)| format!("{key} = {value} ({source})")).collect();
         format!(
-            "The limits are conventions of this program, not of a standard. Keys of the configuration change them: \
-             justify.min_recall ({min_recall}), justify.min_precision ({min_precision}), justify.min_coverage ({min_coverage}), \
-             compare.margin ({}), score.min_failures ({}), score.confidence ({}).",
-            self.options.compare.enough.margin, self.options.score.min_failures, self.options.score.confidence
+            "The limits are the user's; a default is a convention of this program, not of a standard: {}.",
+            all.join(", ")
         )
+    }
+
+    /// The limits with the reasons of their defaults.
+    pub(super) fn limits_table(&self) -> Table {
+        let limits: Vec<_> = self.limits_set().collect();
+        let table = Table::of(&limits)
+            .column("key", |row| row.0)
+            .column("set by", |row| row.2)
+            .column("reason of the default", |row| row.3)
+            .column("limit", |row| NumberText(row.1.clone()));
+        table.build().captioned("Limits of appropriate")
     }
 
     /// Coverage of the kept and of the found scenarios; empty if there is no density.

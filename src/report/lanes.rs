@@ -5,8 +5,10 @@ use std::path::Path;
 
 use crate::engine::{Chunk, Headway, LanePlan, Outcome};
 use crate::model::criterion::Criterion;
+use crate::model::severity::InjuryCurve;
 use crate::report::records::{at_contact, smallest_gap_m, time_s};
 use crate::run::study::{Study, robust_lanes};
+use crate::scenario::parameterization::Sizes;
 use crate::stats::density::DensityModel;
 use crate::support::files::make_folder_of;
 use crate::support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter};
@@ -20,23 +22,30 @@ const PET: &str =
     "Post-encroachment time of a cut-in; infinite if the ego stops before the place, null if there is none.";
 
 /// A table for the lanes of a study; see [`write_study_chunk`]. It is written chunk by chunk, so that memory does not
-/// grow with the lanes.
+/// grow with the lanes. Curves of injury risk add changes of speed and risks.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Usage`] for an unknown ending of the name.
-pub fn study_table(path: &Path, study: &Study) -> Result<TableWriter> {
+pub fn study_table(path: &Path, study: &Study, injury: &[&InjuryCurve]) -> Result<TableWriter> {
     make_folder_of(path)?;
     let facts = study.facts();
     let value = if facts.reference { ColumnKind::Binary64 } else { ColumnKind::Binary32 };
-    create(path, "lanes", study.plan(), facts.synthetic, columns(value))
+    let columns = [columns(value), severity_columns(injury)].concat();
+    create(path, "lanes", study.plan(), facts.synthetic, columns)
 }
 
 /// A table for the lanes of a sampling run; see [`write_sampled_chunk`].
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Usage`] for an unknown ending of the name.
-pub fn sampled_table(path: &Path, plan: &LanePlan, density: &DensityModel) -> Result<TableWriter> {
-    create(path, "samples", plan, density.provenance.synthetic, sampled_columns(density))
+pub fn sampled_table(
+    path: &Path,
+    plan: &LanePlan,
+    density: &DensityModel,
+    injury: &[&InjuryCurve],
+) -> Result<TableWriter> {
+    let columns = [sampled_columns(density), severity_columns(injury)].concat();
+    create(path, "samples", plan, density.provenance.synthetic, columns)
 }
 
 /// The format of a table of lanes, from its file name.
@@ -93,7 +102,12 @@ pub fn columns(value: ColumnKind) -> Vec<Column> {
 ///
 /// # Errors
 /// As [`TableWriter::row`].
-pub fn write_study_chunk(table: &mut TableWriter, plan: &LanePlan, chunk: &Chunk) -> Result<()> {
+pub fn write_study_chunk(
+    table: &mut TableWriter,
+    (study, injury): (&Study, &[&InjuryCurve]),
+    plan: &LanePlan,
+    chunk: &Chunk,
+) -> Result<()> {
     let dt = plan.profile.frame.dt_s;
     let robust = robust_lanes(plan, chunk);
     for (at, outcome) in chunk.outcomes.iter().enumerate() {
@@ -107,7 +121,7 @@ pub fn write_study_chunk(table: &mut TableWriter, plan: &LanePlan, chunk: &Chunk
         let judged = |c: Criterion| Cell::Flag(outcome.verdicts.failed(c));
         let time = |step: u32| Cell::number(time_s(step, dt));
         let id = block.units.name(key.unit);
-        table.row(&[
+        let mut row = vec![
             Cell::text(id.as_ref()),
             Cell::text(block.category.key()),
             Cell::text(block.variants[key.variant].as_str()),
@@ -129,9 +143,41 @@ pub fn write_study_chunk(table: &mut TableWriter, plan: &LanePlan, chunk: &Chunk
             time(outcome.tet_steps),
             Cell::Number(outcome.tit),
             Cell::number(outcome.pet),
-        ])?;
+        ];
+        let sizes = study.cases().sizes(block.first_unit + key.unit);
+        row.extend(severity_cells(outcome, sizes, injury));
+        table.row(&row)?;
     }
     Ok(())
+}
+
+/// Changes of speed, and a column per curve; none without a curve.
+fn severity_columns(injury: &[&InjuryCurve]) -> Vec<Column> {
+    let c = |name: String, unit: &str, description: String| {
+        Column::new(name, ColumnKind::Binary64, unit.to_owned(), description)
+    };
+    let delta_v = |of: &str| {
+        let description =
+            format!("Change of speed of the {of} vehicle in a central contact, masses by length; null without one.");
+        c(format!("delta_v_{of}_mps"), "m/s", description)
+    };
+    let risk = |curve: &&InjuryCurve| {
+        let description = format!(
+            "Probability of {} of the ego's occupants; null without a central contact, beyond the curve's data, and of a truck.",
+            curve.injury
+        );
+        c(format!("injury_{}", curve.name.replace('-', "_")), "1", description)
+    };
+    let delta_v = if injury.is_empty() { Vec::new() } else { vec![delta_v("ego"), delta_v("other")] };
+    delta_v.into_iter().chain(injury.iter().map(risk)).collect()
+}
+
+/// The values of [`severity_columns`].
+fn severity_cells(outcome: &Outcome<f64>, sizes: Option<Sizes>, injury: &[&InjuryCurve]) -> Vec<Cell<'static>> {
+    let delta_v = sizes.and_then(|sizes| outcome.delta_v_mps(&sizes));
+    let ego_m = sizes.map_or(f64::NAN, |sizes| sizes.ego.length_m);
+    let both = [0, 1].map(|of| delta_v.map(|both| both[of])).into_iter().take(if injury.is_empty() { 0 } else { 2 });
+    both.chain(injury.iter().map(|curve| curve.ego_risk(delta_v, ego_m))).map(Cell::number).collect()
 }
 
 /// How a lane ended: units are in the names.
@@ -231,7 +277,7 @@ fn sampled_columns(density: &DensityModel) -> Vec<Column> {
 pub fn write_sampled_chunk(
     table: &mut TableWriter,
     plan: &LanePlan,
-    density: &DensityModel,
+    (density, injury): (&DensityModel, &[&InjuryCurve]),
     chunk: &Chunk,
 ) -> Result<()> {
     let Some(generator) = plan.generator() else {
@@ -260,6 +306,7 @@ pub fn write_sampled_chunk(
             ];
             row.extend(outcome_cells(outcome, dt));
             row.extend(point.iter().map(|&v| Cell::Number(v)));
+            row.extend(severity_cells(outcome, Some(density.sizes), injury));
             table.row(&row)?;
         }
     }

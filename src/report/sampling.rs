@@ -12,7 +12,7 @@ use crate::engine::generated::ATTEMPTS;
 use crate::engine::{ENGINE_VERSION, Headway, LanePlan};
 use crate::model::profile::Profile;
 use crate::run::close_following::CloseFollowing;
-use crate::run::sampling::{EstimateRow, RiskRate, SampleOptions, SampleTally};
+use crate::run::sampling::{EstimateRow, InjuryRow, RiskRate, SampleOptions, SampleTally, TargetRow};
 use crate::scenario::Category;
 use crate::stats::density::{DensityKind, DensityModel, Provenance};
 use crate::stats::estimate::{IntervalKind, Ratio, SearchRound, StopReason, WeightFigures};
@@ -113,6 +113,10 @@ pub struct SampleReport {
     pub draws: Option<DrawRecord>,
     /// Estimates.
     pub estimates: Vec<EstimateRow>,
+    /// Expected injuries; only with curves.
+    pub injuries: Vec<InjuryRow>,
+    /// Rates against the target of the options.
+    pub targets: Vec<TargetRow>,
     /// Rounds of the search of importance sampling.
     pub search: Vec<SearchRound>,
     /// SHA-256 of `worst.csv`, if written.
@@ -142,6 +146,8 @@ impl SampleReport {
             plan_sha256: None,
             draws: None,
             estimates,
+            injuries: Vec::new(),
+            targets: Vec::new(),
             search: Vec::new(),
             worst_sha256: None,
             host,
@@ -180,6 +186,9 @@ impl SampleReport {
             stopped: self.stopped(),
             reproducible: self.is_reproducible(),
             estimates: &self.estimates,
+            // Empty without curves, and without a target.
+            injuries: &self.injuries,
+            targets: &self.targets,
             search: &self.search,
             #[serde(flatten)]
             files: files,
@@ -265,6 +274,7 @@ impl SampleReport {
                 .column("from the density", weight(|w| NumberText(format!("{:.1} %", 100.0 * w.crude_fraction))));
             text.push_str(&weights.build().text());
         }
+        text.push_str(&self.severity_text());
         text.push_str(&self.close_following());
         let intervals = format!(
             "Intervals at {} %{}. ± is the half-width of P's interval divided by P. ≤ is an upper bound where nothing failed.",

@@ -29,6 +29,7 @@ impl SampleReport {
             file.draws = Some(DrawRecord::of(&crude.tally, plan));
         }
         file.search = result.search.clone();
+        (file.injuries, file.targets) = (result.injuries.clone(), sample.targets(result));
         Ok(file)
     }
 
@@ -118,6 +119,11 @@ impl SampleReport {
             figures.insert(0, PageFigure::add(&mut results, "headways", &figure)?);
         }
         results.add("estimates.csv", self.csv().as_bytes())?;
+        for (name, table) in [("injuries.csv", self.injuries_table(true)), ("targets.csv", self.targets_table())] {
+            if !table.rows.is_empty() {
+                results.add(name, table.csv().as_bytes())?;
+            }
+        }
         results.add("report.html", self.html(figures)?.as_bytes())?;
         publish(results, |files| self.json(files))
     }

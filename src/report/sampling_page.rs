@@ -27,6 +27,7 @@ impl SampleReport {
             warnings.push("Ended by the clock: another machine ends elsewhere.".to_owned());
         }
         let mut sections = vec![self.estimates_section()];
+        sections.extend(self.severity_sections());
         sections.extend((!figures.is_empty()).then(|| Section::new("figures", "Figures").figures(figures)));
         let annex = annex(RunKind::Sample, &self.json(&ResultFiles::default())?)?.host(self.host.facts());
         sections.push(annex.host((self.host.seconds > 0.0).then(|| self.host.wall_clock())).folded());

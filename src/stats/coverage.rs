@@ -73,6 +73,8 @@ fn boxes_of(of: &[usize], points: &[Vec<f64>], draws: &[Vec<f64>], ranges: &[[f6
     let candidates = if of.len() == 1 { intervals(points, range) } else { rectangles(points, range) };
     let mut choosing: Vec<[f64; 2]> = draws.iter().step_by(2).map(place).collect();
     choosing.sort_by(|a, b| a[0].total_cmp(&b[0]));
+    let mut heights: Vec<f64> = choosing.iter().map(|draw| draw[1]).collect();
+    heights.sort_by(f64::total_cmp);
     let measuring: Vec<[f64; 2]> = draws.iter().skip(1).step_by(2).map(place).collect();
     let length = |side: &[f64; 2], range: &[f64; 2]| match range[1].is_finite() {
         true => (side[1] - side[0]) / (range[1] - range[0]),
@@ -87,7 +89,9 @@ fn boxes_of(of: &[usize], points: &[Vec<f64>], draws: &[Vec<f64>], ranges: &[[f6
         }
         let from = choosing.partition_point(|draw| draw[0] <= sides[0][0]);
         let to = choosing.partition_point(|draw| draw[0] < sides[0][1]).max(from);
-        if exposed.is_none_or(|(best, _)| to - from > best) {
+        let [below, above] = sides[1].map(|end| heights.partition_point(|height| *height < end));
+        // No more are inside than between its ends in one quantity.
+        if exposed.is_none_or(|(best, _)| to - from > best && above - below > best) {
             let inside = choosing[from..to].iter().filter(|draw| is_inside(draw, &sides)).count();
             if exposed.is_none_or(|(best, _)| inside > best) {
                 exposed = Some((inside, sides));

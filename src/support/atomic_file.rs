@@ -282,6 +282,14 @@ impl StagedFile {
         self
     }
 
+    /// SHA-256 of the content, in hexadecimal.
+    ///
+    /// # Errors
+    /// [`Error::Io`] if it cannot be read back.
+    pub(super) fn sha256(&self) -> Result<String> {
+        crate::support::input_file::sha256(&self.path)
+    }
+
     /// The final path.
     pub(super) fn target(&self) -> &Path {
         &self.target

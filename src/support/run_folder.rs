@@ -13,7 +13,6 @@ use std::io::{ErrorKind, Write};
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
-use sha2::{Digest, Sha256};
 
 use crate::support::atomic_file::folder_of;
 use crate::support::atomic_file::{AtomicFile, Live, StagedFile, clear_stale, refuse_link, sync_folder};
@@ -23,7 +22,6 @@ pub use crate::support::file_list::{
 use crate::support::file_list::{FileList, LIST, RECORDS, RunFiles};
 use crate::support::files::make_folder;
 use crate::support::lock::FolderLock;
-use crate::support::plain_text::hex;
 use crate::{Error, Place, Result};
 
 /// The lock of the whole folder.
@@ -199,10 +197,11 @@ impl Results<'_> {
     /// As [`Results::add`].
     pub fn add_with(&mut self, name: &str, produce: impl FnOnce(&mut dyn Write) -> std::io::Result<()>) -> Result<()> {
         let path = self.folder.dir.join(name);
-        let mut hashing = Hashing { file: AtomicFile::create_inside(&path)?, hash: Sha256::new() };
-        produce(&mut hashing).map_err(|e| Error::io(&path, "write", e))?;
-        self.sha256.insert(name.to_owned(), hex(&hashing.hash.finalize()));
-        self.staged.push((name.to_owned(), hashing.file.stage()?.closed()));
+        let mut file = AtomicFile::create_inside(&path)?;
+        produce(&mut file).map_err(|e| Error::io(&path, "write", e))?;
+        let file = file.stage()?.closed();
+        self.sha256.insert(name.to_owned(), file.sha256()?);
+        self.staged.push((name.to_owned(), file));
         Ok(())
     }
 
@@ -284,24 +283,6 @@ impl Results<'_> {
     fn refuse_foreign<const N: usize>(&self, record: [&str; N]) -> Result<()> {
         let staged = self.staged.iter().map(|(name, _)| name.as_str()).filter(|name| !self.named.contains(*name));
         self.folder.refuse_foreign(staged.chain(record))
-    }
-}
-
-/// A file that is hashed while it is written.
-struct Hashing {
-    file: AtomicFile,
-    hash: Sha256,
-}
-
-impl Write for Hashing {
-    fn write(&mut self, bytes: &[u8]) -> std::io::Result<usize> {
-        let written = self.file.write(bytes)?;
-        self.hash.update(&bytes[..written]);
-        Ok(written)
-    }
-
-    fn flush(&mut self) -> std::io::Result<()> {
-        self.file.flush()
     }
 }
 

@@ -1,5 +1,8 @@
 //! The dossier: its numbers are the study's, and its conclusion follows from its rules.
 
+use std::fs;
+use std::path::Path;
+
 use assert_cmd::Command;
 use lanesweep::engine::{CpuBackend, Executor, Headway};
 use lanesweep::model::criterion::Criterion;
@@ -17,6 +20,9 @@ use lanesweep::stats::density::{DensityModel, FitOptions};
 use lanesweep::stats::estimate::{Clusters, Enough, RatioMethod, RatioVerdict, paired_ratio};
 use lanesweep::traffic::mining::{Collection, MiningOptions, mine_generated};
 use lanesweep::traffic::trajectory::generator::GeneratorOptions;
+use serde_json::Value;
+
+use crate::common::program;
 
 fn recordings(count: usize) -> Collection {
     let options = GeneratorOptions { recordings: count, ..GeneratorOptions::default() };
@@ -287,11 +293,17 @@ fn the_conclusion_names_its_profile_and_the_page_has_limits_credibility_and_room
         "under un-r157, a reading of UN R157",
         " kept scenarios are points of the parameter space (coverage ",
         "Where the interval contains a limit, neither is shown: undecided.",
-        "The limits are conventions of this program, not of a standard.",
-        "justify.min_recall (0.9)",
     ] {
         assert!(text.contains(words) && page.contains(words), "{words}: {text}");
     }
+    assert!(
+        text.contains(
+            "a default is a convention of this program, not of a standard: justify.min_recall = 0.9 (default)"
+        )
+    );
+    let limit =
+        "<td class=\"text\">justify.min_recall</td><td class=\"text\">default</td><td class=\"text\">a hidden failure";
+    assert!(page.contains(limit) && page.contains("MISSING") && page.contains("Known discrepancies"));
     assert!(text.contains("failures of S come from headways below 0.5 s"), "{text}");
     assert!(page.contains("Limits of use") && page.contains("reference driver") && page.contains("<dt>signature</dt>"));
     assert!(page.contains("<dt>date</dt><dd>____"), "a date is never the machine's");
@@ -306,4 +318,89 @@ fn the_conclusion_names_its_profile_and_the_page_has_limits_credibility_and_room
     let (text, page, _) = made("signed", &signed);
     assert!(text.contains("Under profile jrc-2021, LVD i is"), "{text}");
     assert!(page.contains("<dt>author</dt><dd>A. Assessor</dd>") && page.contains("<dt>date</dt><dd>2026-11-24</dd>"));
+}
+
+/// A dossier of few generated recordings in a folder of this name, with more arguments: its status and text.
+fn made(dir: &Path, name: &str, more: &[&str]) -> (i32, String) {
+    let args =
+        ["-q", "justify", "--synth-recordings", "2", "--parameterization", "1", "--models", "Reg157", "--out", name];
+    let (code, text, error) = program::lanesweep(dir, &[&args[..], more].concat());
+    assert_eq!(code, 11, "{error}");
+    (code, text)
+}
+
+fn json(text: &str) -> Value {
+    serde_json::from_str(text).unwrap()
+}
+
+#[test]
+fn the_record_has_the_checksum_of_every_table_and_figure_and_the_same_inputs_give_the_same() {
+    let dir = tempfile::tempdir().unwrap();
+    let of = |name: &str| {
+        made(dir.path(), name, &[]);
+        json(&fs::read_to_string(dir.path().join(name).join("dossier.json")).unwrap())["files_sha256"].clone()
+    };
+    let files = of("a");
+    assert_eq!(files, of("b"));
+    assert_eq!(files.as_object().unwrap().keys().collect::<Vec<_>>(), ["hidden.csv", "hidden.svg"]);
+    for (name, sha256) in files.as_object().unwrap() {
+        let found = lanesweep::support::input_file::sha256(&dir.path().join("a").join(name)).unwrap();
+        assert_eq!(&found, sha256.as_str().unwrap(), "{name}");
+    }
+}
+
+#[test]
+fn two_dossiers_are_compared_without_their_data_and_a_changed_constant_is_named() {
+    let dir = tempfile::tempdir().unwrap();
+    made(dir.path(), "a", &[]);
+    let compare = |this: &str, other: &str| {
+        let (code, text, error) =
+            program::lanesweep(dir.path(), &["justify", this, "--against", other, "--format", "json"]);
+        assert_eq!(code, 11, "the conclusion of the first: {error}");
+        json(&text)
+    };
+    let same = compare("a", "a/dossier.json");
+    assert_eq!(
+        (&same["changes"], &same["numbers"]),
+        (&Value::from(Vec::<i32>::new()), &Value::from(Vec::<i32>::new()))
+    );
+    assert!(same["sentences"][1].as_str().unwrap().ends_with("options and numbers are the same."), "{same}");
+
+    let (_, text) = made(dir.path(), "b", &["--profile", "paper-fit", "--against", "a"]);
+    let changes = compare("b/dossier.json", "a");
+    let keys: Vec<&str> = changes["changes"].as_array().unwrap().iter().map(|of| of["key"].as_str().unwrap()).collect();
+    assert_eq!(keys, ["cchdm.delay_s", "frame.time_cap_s"]);
+    assert!(changes["changes"].as_array().unwrap().iter().all(|of| of["kind"] == "profile"));
+    let record = json(&fs::read_to_string(dir.path().join("b/dossier.json")).unwrap());
+    assert_eq!(record["changes"], changes, "the record of a new dossier has the same");
+    let page = fs::read_to_string(dir.path().join("b/report.html")).unwrap();
+    for shown in [&text, &page] {
+        assert!(shown.contains("Changes since the other dossier") && shown.contains("frame.time_cap_s"), "{text}");
+    }
+    assert_eq!(program::names(dir.path()).len(), 2, "nothing else is written: {:?}", program::names(dir.path()));
+}
+
+#[test]
+fn a_damaged_dossier_and_one_that_is_alone_are_refused_with_what_to_do() {
+    let dir = tempfile::tempdir().unwrap();
+    made(dir.path(), "a", &[]);
+    let refusal = |args: &[&str]| {
+        let (code, _, error) = program::lanesweep(dir.path(), &[&["justify"], args].concat());
+        (code, program::flat(&error))
+    };
+    let (code, error) = refusal(&["a"]);
+    assert!(code == 2 && error.contains("it is a dossier") && error.contains("--against"), "{code}: {error}");
+    let (code, error) = refusal(&["--models", "Reg157"]);
+    assert!(code == 2 && error.contains("--parameterization: it is missing"), "{code}: {error}");
+    let whole = fs::read(dir.path().join("a/dossier.json")).unwrap();
+    fs::write(dir.path().join("cut-dossier.json"), &whole[..whole.len() / 2]).unwrap();
+    for args in [["a", "--against", "cut-dossier.json"], ["cut-dossier.json", "--against", "a"]] {
+        let (code, error) = refusal(&args);
+        assert!(
+            code == 3 && error.contains("it is no dossier") && error.contains("its dossier.json"),
+            "{code}: {error}"
+        );
+    }
+    let (code, error) = refusal(&["a", "--against", "nowhere"]);
+    assert!(code != 0 && error.contains("nowhere"), "{code}: {error}");
 }

@@ -17,4 +17,5 @@ mod parts;
 mod reruns;
 mod sampling;
 mod search;
+mod severity;
 mod strange_files;

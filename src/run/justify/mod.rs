@@ -7,7 +7,7 @@
 mod rules;
 mod scores;
 
-pub use rules::{Conclusion, Finding, Need, Rules};
+pub use rules::{Conclusion, Finding, LIMITS, Need, Rules};
 use scores::Replay;
 pub use scores::{Group, Scored, Share};
 

@@ -30,8 +30,18 @@ settings! {
     }
 }
 
+/// Keys of the limits, with the reason of each default. The user sets them; no standard does.
+pub const LIMITS: [(&str, &str); 6] = [
+    ("justify.min_recall", "a hidden failure is the error that an assessment must not make"),
+    ("justify.min_precision", "false alarms cost effort, not safety"),
+    ("justify.min_coverage", "a density says nothing of scenarios that are no points of its space"),
+    ("compare.margin", "0.8 to 1.25 are the limits within which two drugs count as equivalent"),
+    ("score.min_failures", "coverage of the intervals was measured with ten failures or more"),
+    ("score.confidence", "the usual level"),
+];
+
 /// Conclusion of one rule or of all rules.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Conclusion {
     /// Every rule holds.
@@ -194,6 +204,16 @@ mod tests {
     use crate::stats::estimate::{RatioMethod, RatioVerdict};
 
     const MARGIN: f64 = 1.25;
+
+    #[test]
+    fn the_default_configuration_has_the_reason_of_every_limit() {
+        let file = concat!(env!("CARGO_MANIFEST_DIR"), "/../../configs/default.toml");
+        let file = std::fs::read_to_string(file).unwrap().replace('#', " ");
+        let file = file.split_whitespace().collect::<Vec<_>>().join(" ");
+        for (key, reason) in LIMITS {
+            assert!(file.contains(reason), "{key}: {reason}");
+        }
+    }
 
     /// A ratio with enough failing scenarios; `verdict` is that of `compare`.
     fn ratio((low, high): (f64, f64)) -> Ratio {

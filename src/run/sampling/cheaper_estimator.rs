@@ -53,7 +53,14 @@ impl Sample {
     /// # Errors
     /// Those of the lanes.
     pub fn choice(&self, half_width: f64, executor: &Executor) -> Result<Choice> {
-        let pilot = SampleOptions { stop: StopRule::samples(PILOT), worst: 0, map: None, ..self.options.clone() };
+        let pilot = SampleOptions {
+            stop: StopRule::samples(PILOT),
+            worst: 0,
+            map: None,
+            injury: None,
+            targets: Vec::new(),
+            ..self.options.clone()
+        };
         let pilot = Sample::plan(self.density.clone(), &self.profile, &pilot)?;
         let started = Instant::now();
         let rows = pilot.run(executor)?.rows;
@@ -123,6 +130,8 @@ impl Sample {
             questions: questions.clone(),
             worst: 0,
             map: None,
+            injury: None,
+            targets: Vec::new(),
             ..self.options.clone()
         };
         let rare = Sample::plan(self.density.clone(), &self.profile, &options)?.run(executor)?;

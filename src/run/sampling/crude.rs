@@ -131,6 +131,8 @@ pub fn sample_into(
             let every_value = each.as_ref().is_some_and(|(every_value, _)| *every_value);
             let wanted = match (every_value, options.worst) {
                 (true, _) => Wanted::Outcomes,
+                // Contacts are too many to be computed one by one.
+                _ if options.injury.is_some() => Wanted::Outcomes,
                 (false, 0) => Wanted::Verdicts,
                 (false, _) => {
                     // Whole segments only, so that a resumed run requests the same results in a segment as the first

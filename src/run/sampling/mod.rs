@@ -10,6 +10,7 @@ mod crude;
 mod estimate_rows;
 mod failure_map;
 mod generator;
+mod injuries;
 mod kernel_counts;
 mod limit_state;
 mod model_ratios;
@@ -20,6 +21,7 @@ mod result;
 mod sample_options;
 mod sample_run;
 mod tally;
+mod target;
 mod uncertainty;
 mod weighted;
 mod worst;
@@ -34,6 +36,7 @@ pub use crude::{Checkpoint, CheckpointRow, CrudeRun, cuts, sample_crude, sample_
 pub use estimate_rows::{EstimateRow, RecordedRatios, Risk, RiskRate};
 pub use failure_map::{MAP_CELLS, MapAxes, MapAxis, MapCounts};
 pub use generator::{SAMPLE_PURPOSE, SampleSource, generator_of, generator_of_points};
+pub use injuries::{InjuryOptions, InjuryRow};
 pub use kernel_counts::KernelCounts;
 pub(crate) use limit_state::marks_of;
 pub use limit_state::{LaneLimitState, limit_state, truncated};
@@ -45,6 +48,7 @@ pub use result::{ModelRatio, ProfileRatios, SampleResult};
 pub use sample_options::{Estimator, Question, SampleHeadways, SampleOptions};
 pub use sample_run::{CrudeJob, SampleJob, WeightedJob};
 pub use tally::{SampleTally, WorstSample};
+pub use target::{Target, TargetRow, TargetVerdict};
 pub use uncertainty::Uncertainty;
 pub use weighted::WeightedTally;
 pub use worst::WorstLane;
@@ -138,6 +142,7 @@ impl Sample {
     /// # Errors
     /// [`Error::Usage`] for options that contradict one another or the density.
     pub fn plan(density: DensityModel, profile: &Profile, options: &SampleOptions) -> Result<Sample> {
+        options.check_severity(&density)?;
         let kind = match &options.estimator {
             Estimator::Crude { .. } => {
                 let mixture = mixture_of(&density, &options.given)?;

@@ -49,7 +49,7 @@ impl Sample {
             ));
         };
         let stop = StopRule::samples(crude.tally.covered().iter().map(|range| range.end).max().unwrap_or_default());
-        let options = SampleOptions { stop, worst: 0, map: None, ..self.options.clone() };
+        let options = SampleOptions { stop, worst: 0, map: None, injury: None, ..self.options.clone() };
         let theirs = plan_samples(&self.density, &mixture_of(&self.density, &options.given)?, other, &options)?;
         let run = sample_crude(&theirs, 0..theirs.unit_count(), executor, &options, None, None)?;
         let level = result.rows.first().map_or(options.level, |row| row.estimate.interval.level);

@@ -4,6 +4,7 @@ use serde::Serialize;
 
 use super::crude::CrudeRun;
 use super::estimate_rows::EstimateRow;
+use super::injuries::InjuryRow;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::stats::density::Mixture;
@@ -14,6 +15,8 @@ use crate::stats::estimate::{Ratio, SearchRound};
 pub struct SampleResult {
     /// The estimates.
     pub rows: Vec<EstimateRow>,
+    /// Expected injuries, by crude Monte Carlo with curves.
+    pub injuries: Vec<InjuryRow>,
     /// Ratios of the rates of two models by importance sampling.
     pub ratios: Vec<ModelRatio>,
     /// Ratios to the rates under another profile, if it was asked for.

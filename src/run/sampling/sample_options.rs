@@ -4,11 +4,14 @@ use serde::{Deserialize, Serialize};
 
 use super::failure_map::MapAxes;
 use super::generator::SampleSource;
+use super::injuries::InjuryOptions;
+use super::target::Target;
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
-use crate::stats::density::Mixture;
+use crate::stats::density::{DensityModel, Mixture};
 use crate::stats::estimate::{BinomialInterval, Goal, Search, StopRule};
+use crate::{Error, Place, Result};
 
 /// How probabilities are estimated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -104,6 +107,12 @@ pub struct SampleOptions {
     pub worst: usize,
     /// Axes of the failure map (crude).
     pub map: Option<MapAxes>,
+    /// Curves of injury risk (crude); the values of every lane are then computed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub injury: Option<InjuryOptions>,
+    /// Rates that the estimates are compared with.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub targets: Vec<Target>,
 }
 
 impl SampleOptions {
@@ -123,7 +132,31 @@ impl SampleOptions {
             given: Vec::new(),
             worst: 0,
             map: None,
+            injury: None,
+            targets: Vec::new(),
         }
+    }
+
+    /// Checks that what is asked about injuries and rates can be answered.
+    pub(super) fn check_severity(&self, density: &DensityModel) -> Result<()> {
+        if self.injury.is_some() && !matches!(self.estimator, Estimator::Crude { .. }) {
+            let help = "use option `estimator = mc`, or leave it out";
+            return Err(Error::usage(Place::option("injury"), "this belongs to crude Monte Carlo", help));
+        }
+        if self.targets.is_empty() {
+            return Ok(());
+        }
+        let refused = |problem: &str, help: &str| Err(Error::usage(Place::option("target"), problem, help));
+        if !self.given.is_empty() || density.exposure.is_none_or(|exposure| exposure.per_hour.is_none()) {
+            return refused(
+                "no rate per hour is known",
+                "fit the density with the driven hours, and give no condition",
+            );
+        }
+        if self.targets.iter().any(|target| target.criterion.is_none()) && self.injury.is_none() {
+            return refused("injuries need a curve", "name one by option `injury`");
+        }
+        Ok(())
     }
 
     /// The same with intervals that hold together at `level`: Bonferroni over the rows of the estimates.

@@ -4,6 +4,7 @@ use std::ops::Range;
 use std::path::Path;
 
 use super::crude::{crude_of_segments, cuts, sample_into};
+use super::injuries::injury_rows;
 use super::plan_file::SEARCH_FILE;
 use super::result::SampleResult;
 use super::tally::SampleTally;
@@ -145,9 +146,10 @@ impl Job for CrudeJob<'_> {
             return Err(Error::input(place, problem, "make them again"));
         }
         let (rows, rechecked_lanes) = (std::mem::take(&mut run.rows), run.summary.rechecked_lanes);
-        let parts = computed.parts;
+        let (parts, injuries) = (computed.parts, injury_rows(self.plan, &run.tally, options, (&rows, exposure)));
         self.sample.against_recorded(SampleResult {
             rows,
+            injuries,
             rechecked_lanes,
             parts,
             crude: Some(run),

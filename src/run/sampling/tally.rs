@@ -7,6 +7,7 @@ use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
 use super::failure_map::{MAP_CELLS, MapAxes, MapCounts};
+use super::injuries::InjurySums;
 use super::kernel_counts::{KernelCounts, NO_KERNEL, add_counts};
 use super::limit_state::limit_state;
 use super::sample_options::SampleOptions;
@@ -75,6 +76,9 @@ pub struct SampleTally {
     pub map: Option<MapCounts>,
     /// Samples and failures by kernel; `None` if the points do not come from kernels.
     pub by_kernel: Option<KernelCounts>,
+    /// Sums of injury risks: curve × (headways, all) × model.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub(super) injuries: Vec<InjurySums>,
 }
 
 impl SampleTally {
@@ -95,6 +99,7 @@ impl SampleTally {
             worst_limit: options.worst,
             map: options.map.as_ref().map(|axes| MapCounts::new(axes.clone(), headways * models)),
             by_kernel: KernelCounts::empty(plan),
+            injuries: vec![[0; 4]; options.injury_sums(plan)],
         }
     }
 
@@ -183,7 +188,8 @@ impl SampleTally {
         chunk.check(plan)?;
         let has_values = !chunk.outcomes.is_empty() || chunk.valued.is_some();
         let has_lanes = chunk.counted.is_some() || !chunk.verdicts.is_empty();
-        if !has_lanes || (options.worst > 0 && !has_values) {
+        let has_outcomes = chunk.outcomes.len() == chunk.verdicts.len();
+        if !has_lanes || (options.worst > 0 && !has_values) || (options.injury.is_some() && !has_outcomes) {
             return Err(Error::Internal("a chunk does not have the lanes that are to be counted".to_owned()));
         }
         let units = chunk.units.clone();
@@ -276,6 +282,9 @@ impl SampleTally {
                 *square += k * k;
             }
         }
+        if let Some(injury) = &options.injury {
+            injury.count(&mut self.injuries, &chunk.outcomes[first..first + headways * models], models);
+        }
         if let (Some(map), Some(cell)) = (&mut self.map, cell) {
             map.samples[cell] += 1;
             for (failures, verdicts) in map.failures.iter_mut().zip(lanes) {
@@ -304,6 +313,7 @@ impl SampleTally {
         if let (Some(ours), Some(theirs)) = (&mut self.by_kernel, &other.by_kernel) {
             ours.add(theirs);
         }
+        self.injuries.iter_mut().zip(&other.injuries).for_each(|(ours, theirs)| add_counts(ours, theirs));
     }
 
     /// Merges the counts of other samples of the same plan: associative and commutative.
@@ -344,10 +354,19 @@ impl SampleTally {
     }
 
     /// Sizes of the lists of counts, which follow from models, headways and criteria.
-    fn shape(&self) -> [usize; 7] {
+    fn shape(&self) -> [usize; 8] {
         let [groups, counts] = self.by_kernel.as_ref().map_or([0, 0], KernelCounts::shape);
         let close = self.close_failures.len();
-        [self.failures.len(), self.squares.len(), self.capped.len(), self.worst.len(), groups, counts, close]
+        [
+            self.failures.len(),
+            self.squares.len(),
+            self.capped.len(),
+            self.worst.len(),
+            groups,
+            counts,
+            close,
+            self.injuries.len(),
+        ]
     }
 
     /// Lanes and failures, in total and from short headways.
