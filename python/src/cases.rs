@@ -16,8 +16,8 @@ use lanesweep::model::profile::Profile;
 use lanesweep::report::lanes::{case_columns, case_row};
 use lanesweep::run::cases::Cases;
 use lanesweep::scenario::{CaseParameters, NamedNumber, Written};
-use lanesweep::support::plausibility::Implausible;
 use lanesweep::support::plain_text::nearest;
+use lanesweep::support::plausibility::Implausible;
 use lanesweep::support::table::ArrowRows;
 use lanesweep::{Error, Place, Result};
 use pyo3::prelude::*;
@@ -114,7 +114,11 @@ fn carried(batch: &RecordBatch, outcome: &Schema) -> Result<Vec<(String, Carried
     let of = |(field, array): (&Arc<Field>, &ArrayRef)| {
         let name = field.name();
         if outcome.index_of(name).is_ok() {
-            return Err(of_column(name, "the result has a column of this name".to_owned(), "rename it, or leave it out"));
+            return Err(of_column(
+                name,
+                "the result has a column of this name".to_owned(),
+                "rename it, or leave it out",
+            ));
         }
         let known = NamedNumber::names();
         if let Some(near) = nearest(name, known.iter().map(AsRef::as_ref), 0.75) {

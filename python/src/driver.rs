@@ -223,10 +223,7 @@ pub fn register(
     attention: &str,
 ) -> PyResult<()> {
     let stands_for = ModelId::parse(attention).ok_or_else(|| {
-        usage_error(format!(
-            "`attention` names no built-in model: `{attention}`; use one of {}",
-            ModelId::names()
-        ))
+        usage_error(format!("`attention` names no built-in model: `{attention}`; use one of {}", ModelId::names()))
     })?;
     let python = PythonDriver { name: name.clone(), driver, may_accelerate, stands_for };
     ModelId::register(&name, fingerprint, Arc::new(python)).map(drop).map_err(|error| exception(py, &error))

@@ -6,7 +6,7 @@ use pyo3::create_exception;
 use pyo3::exceptions::{PyException, PyFileNotFoundError, PyOSError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::sync::PyOnceLock;
-use pyo3::types::{PyTuple, PyType};
+use pyo3::types::{PyDict, PyTuple, PyType};
 
 create_exception!(lanesweep._core, LanesweepError, PyException, "An error of lanesweep; see `help` and `exit_code`.");
 create_exception!(lanesweep._core, DeviceError, LanesweepError, "There is no usable device, or it failed.");
@@ -27,18 +27,22 @@ impl Classes {
     fn get(py: Python<'_>) -> PyResult<&'static Classes> {
         static CLASSES: PyOnceLock<Classes> = PyOnceLock::new();
         CLASSES.get_or_try_init(py, || {
-            let class = |name, says, of: [Bound<'_, PyType>; 2]| {
-                PyErr::new_type(py, name, Some(says), Some(PyTuple::new(py, of)?.as_any()), None)
+            let class = |name: &str, says: &str, of: [Bound<'_, PyType>; 2]| -> PyResult<Py<PyType>> {
+                let about = PyDict::new(py);
+                about.set_item("__module__", "lanesweep._core")?;
+                about.set_item("__doc__", says)?;
+                let made = py.get_type::<PyType>().call1((name, PyTuple::new(py, of)?, about))?;
+                Ok(made.cast_into::<PyType>()?.unbind())
             };
             let base = py.get_type::<LanesweepError>();
             let value = || [base.clone(), py.get_type::<PyValueError>()];
-            let usage = class(c"lanesweep._core.UsageError", c"An argument, a key or a profile cannot be used.", value())?;
-            let input = class(c"lanesweep._core.InputError", c"The data are invalid.", value())?;
+            let usage = class("UsageError", "An argument, a key or a profile cannot be used.", value())?;
+            let input = class("InputError", "The data are invalid.", value())?;
             let system = [base.clone(), py.get_type::<PyOSError>()];
-            let says = c"The system refused to read, write or start a thread.";
-            let refusal = class(c"lanesweep._core.SystemRefusal", says, system)?;
+            let says = "The system refused to read, write or start a thread.";
+            let refusal = class("SystemRefusal", says, system)?;
             let missing = [refusal.bind(py).clone(), py.get_type::<PyFileNotFoundError>()];
-            let missing = class(c"lanesweep._core.MissingFile", c"There is no such file or folder.", missing)?;
+            let missing = class("MissingFile", "There is no such file or folder.", missing)?;
             Ok(Classes { usage, input, refusal, missing })
         })
     }

@@ -15,7 +15,7 @@ use lanesweep::support::table::{ArrowRows, Cell, Column, ColumnKind};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::{PyKeyError, PyTypeError};
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyCapsule, PyDict, PyFloat, PyIterator, PyList};
+use pyo3::types::{PyBytes, PyCapsule, PyDict, PyFloat, PyIterator, PyList, PyString};
 use serde_json::Value;
 
 use crate::error::{InternalError, exception, input_error};
@@ -99,7 +99,8 @@ impl Frame {
     /// a table of these columns.
     fn __getitem__<'py>(&self, py: Python<'py>, name: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
         if let Ok(names) = name.cast::<PyList>() {
-            let at: Vec<usize> = names.iter().map(|name| self.at(&name.extract::<String>()?)).collect::<PyResult<_>>()?;
+            let at: Vec<usize> =
+                names.iter().map(|name| self.at(&name.extract::<String>()?)).collect::<PyResult<_>>()?;
             let failed = |error: ArrowError| InternalError::new_err(format!("a table: {error}"));
             let schema = Arc::new(self.schema.project(&at).map_err(failed)?);
             let batches = self.batches.iter().map(|batch| batch.project(&at)).collect::<Result<_, _>>();
@@ -140,7 +141,7 @@ impl Frame {
         let py = slf.py();
         let columns = PyDict::new(py);
         for name in slf.get().columns() {
-            columns.set_item(&name, slf.get().__getitem__(py, name.into_pyobject(py)?.as_any())?)?;
+            columns.set_item(&name, slf.get().__getitem__(py, PyString::new(py, &name).as_any())?)?;
         }
         py.import("pandas")?.call_method1("DataFrame", (columns,))
     }
