@@ -23,6 +23,7 @@ from ._core import (
     InputError,
     InternalError,
     LanesweepError,
+    MissingFile,
     RunStopped,
     SystemRefusal,
     UsageError,
@@ -48,6 +49,7 @@ __all__ = [
     "InternalError",
     "LanesweepError",
     "LimitState",
+    "MissingFile",
     "Result",
     "RunStopped",
     "SystemRefusal",
@@ -60,5 +62,6 @@ __all__ = [
     "options",
     "profile",
     "simulate",
-    *_functions,
+    # Python's own `map` stays what it is after `from lanesweep import *`.
+    *(name for name in _functions if name != "map"),
 ]

@@ -17,7 +17,6 @@ from ._core import Frame, frame_of_columns, frame_of_records
 
 #: What the exit code of a result means; other codes are exceptions.
 STATUS = {
-    0: "ok",
     1: "not preventable",
     4: "incomplete",
     8: "undecided",
@@ -25,6 +24,9 @@ STATUS = {
     10: "outside Annex 3",
     11: "not appropriate",
 }
+
+#: The word of a function whose result answers a question.
+_ANSWERS = {"check": "preventable", "justify": "appropriate"}
 
 #: Columns whose values are names, even where all of them look like numbers.
 _NAMES = {"id", "scenario", "param", "parameterization", "variant", "headway", "category", "model", "criterion", "lane", "claim"}
@@ -63,7 +65,8 @@ class Result:
     Attributes
     ----------
     status : str
-        ``"ok"``, ``"incomplete"`` if parts of the input were left out, or the answer of `check` or `justify`.
+        The answer of `check` (``"preventable"``, …) or `justify` (``"appropriate"``, …); else ``"ok"``; ``"incomplete"`` if parts
+        of the input were left out.
     text : str
         The result for people, as the command line prints it; `print` shows it.
     document : dict
@@ -78,7 +81,7 @@ class Result:
         self, verb: str, code: int, text: str, document: str, messages: list[str], path: Path | None, keep: Any
     ) -> None:
         self.verb = verb
-        self.status = STATUS.get(code, str(code))
+        self.status = _ANSWERS.get(verb, "ok") if code == 0 else STATUS.get(code, str(code))
         self.text = text or "\n".join(messages)
         self.messages = messages
         self.path = path

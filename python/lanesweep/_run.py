@@ -138,6 +138,29 @@ def path_of(value: Any, name: str) -> str:
         raise TypeError(f"`{name}`: {error}") from None
 
 
+def is_table(value: Any) -> bool:
+    """Whether an argument is a table in memory: of pandas, Polars, pyarrow, or with the Arrow interface."""
+    return hasattr(value, "__arrow_c_stream__") or hasattr(value, "to_csv")
+
+
+def table_file(table: Any, path: Path) -> Path:
+    """Write a table into a file: Parquet, or CSV without pyarrow."""
+    if hasattr(table, "write_parquet"):
+        table.write_parquet(path.with_suffix(".parquet"))
+        return path.with_suffix(".parquet")
+    try:
+        parquet: Any = importlib.import_module("pyarrow.parquet")
+    except ImportError:
+        if not hasattr(table, "to_csv"):
+            raise
+        table.to_csv(path.with_suffix(".csv"), index=False)
+        return path.with_suffix(".csv")
+    arrow: Any = importlib.import_module("pyarrow")
+    made = arrow.Table.from_pandas(table, preserve_index=False) if hasattr(table, "to_csv") else arrow.table(table)
+    parquet.write_table(made, path.with_suffix(".parquet"))
+    return path.with_suffix(".parquet")
+
+
 def _texts(value: Any) -> Iterator[str]:
     """The texts in a value."""
     if isinstance(value, str):
@@ -163,14 +186,17 @@ def run(function: str, arguments: Mapping[str, Any], *, default_out: str | None 
         result = given.get(name)
         if isinstance(result, Result) and result.folder is not None and (result.folder / file).is_file():
             given[name] = result.folder / file
+    keep = None
+    if is_table(given.get("scenarios")):
+        keep = temporary()
+        given["scenarios"] = table_file(given["scenarios"], Path(keep.name) / "scenarios")
     data = given.get("recordings")
     if function != "mine" and isinstance(data, (str, os.PathLike)) and path_of(data, "recordings").endswith(".jsonl"):
         raise _core.UsageError("`recordings`: this is a scenario file\n  help: give it as `scenarios`")
     named = {"from" if name == "from_" else name: value for name, value in given.items() if value is not None}
     values = {name: plain(value, name) for name, value in named.items()}
-    keep = None
     if "out" not in values and default_out is not None:
-        keep = temporary()
+        keep = keep or temporary()
         values["out"] = Path(keep.name) / default_out
     if "out" in values:
         path = values["out"]

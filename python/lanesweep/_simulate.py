@@ -76,7 +76,8 @@ def simulate(
         `thw`, `lateral_speed`, `lateral_distance`, `acceleration`, `end_speed_kmh`, `ahead_speed_kmh`, `ahead_gap`, `length`,
         `width`, `ego_length`, `ego_width`, `lane_width`, `duration`. They mean what the arguments of `trace` mean; a null is a value that is not given. A speed along
         the road has its unit in the column's name or in the value (``"60km/h"``); a bare number other than 0 is refused.
-        Other columns are in m, s, m/s and m/s², and may say so (`gap_m`). A column `id` may name the cases, each by its own.
+        Other quantities are in m, s, m/s and m/s², and may say so (`gap_m`). A column `id` may name the cases, each by its own. The
+        result repeats it in every row of its case, like any other column (`site`, `weather`) and the index of pandas.
     category : str, optional
         Kind of all cases, in place of the column.
     models : str, Driver or list of these, optional
@@ -107,8 +108,9 @@ def simulate(
     if isinstance(cases, Mapping):
         cases = _frame_of(cases)
     elif library == "pandas" and hasattr(cases, "reset_index"):
-        # Rows are counted from 0, whatever the index says; it is no column.
-        cases = cases.reset_index(drop=True)
+        # Rows are counted from 0. An index that only counts is no column.
+        counts = type(cases.index).__name__ == "RangeIndex" and cases.index.name is None
+        cases = cases.reset_index(drop=counts)
         if not _has_arrow(cases):
             cases = _frame_of({name: cases[name].to_numpy() for name in cases.columns})
     elif library == "polars" and hasattr(cases, "schema"):

@@ -71,8 +71,8 @@ class Data(Plausibility, total=False):
 
     Attributes
     ----------
-    scenarios : path
-        Scenario file (.jsonl, .parquet, .csv), instead of recordings.
+    scenarios : path or table
+        Scenario file (.jsonl, .parquet, .csv) or a table of pandas, Polars or pyarrow with its columns, instead of recordings.
     preset : str or path
         Format of the recordings: ``"exid"``, ``"sumo-fcd"``, … or a TOML file; by default the names of the columns tell it.
     synth_recordings : int

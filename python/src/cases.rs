@@ -1,13 +1,14 @@
 //! `simulate`: a table of concrete cases becomes a table of outcomes.
 
 use std::collections::HashMap;
+use std::sync::Arc;
 
 use arrow_array::cast::AsArray;
 use arrow_array::types::{
     Float32Type, Float64Type, Int8Type, Int16Type, Int32Type, Int64Type, UInt8Type, UInt16Type, UInt32Type, UInt64Type,
 };
-use arrow_array::{Array, RecordBatch};
-use arrow_schema::DataType;
+use arrow_array::{Array, ArrayRef, BooleanArray, Float64Array, Int64Array, RecordBatch, StringArray};
+use arrow_schema::{DataType, Field, Schema};
 use lanesweep::cli::embedded;
 use lanesweep::engine::{Headway, OpenBackend};
 use lanesweep::model::driver::ModelId;
@@ -15,12 +16,13 @@ use lanesweep::model::profile::Profile;
 use lanesweep::report::lanes::{case_columns, case_row};
 use lanesweep::run::cases::Cases;
 use lanesweep::scenario::{CaseParameters, NamedNumber, Written};
+use lanesweep::support::plain_text::nearest;
 use lanesweep::support::plausibility::Implausible;
 use lanesweep::support::table::ArrowRows;
 use lanesweep::{Error, Place, Result};
 use pyo3::prelude::*;
 
-use crate::error::InputError;
+use crate::error::input_error;
 use crate::frame::{Frame, stream_of};
 use crate::verb::watched;
 
@@ -63,6 +65,71 @@ fn texts(array: &dyn Array) -> Option<Vec<Option<String>>> {
 
 fn of_column(name: &str, problem: String, help: &str) -> Error {
     Error::input(Place::default().column(name), problem, help)
+}
+
+/// A column of the given table that the result repeats in every row of its case.
+enum Carried {
+    Numbers(Vec<Option<f64>>),
+    Whole(Vec<Option<i64>>),
+    Flags(Vec<Option<bool>>),
+    Texts(Vec<Option<String>>),
+}
+
+impl Carried {
+    fn of(name: &str, array: &dyn Array) -> Result<Carried> {
+        if array.data_type().is_integer()
+            && let Some(values) = numbers(array)
+        {
+            return Ok(Carried::Whole(values.into_iter().map(|value| value.map(|value| value as i64)).collect()));
+        }
+        if let Some(flags) = array.as_boolean_opt() {
+            return Ok(Carried::Flags(flags.iter().collect()));
+        }
+        let found = numbers(array).map(Carried::Numbers).or_else(|| texts(array).map(Carried::Texts));
+        found.ok_or_else(|| {
+            let problem = format!("holds values of the type {}, which the result cannot repeat", array.data_type());
+            of_column(name, problem, "leave it out, or turn it into texts or numbers")
+        })
+    }
+
+    /// With every value so many times.
+    fn repeated(&self, times: usize) -> ArrayRef {
+        fn each<T: Clone>(values: &[Option<T>], times: usize) -> impl Iterator<Item = Option<T>> + '_ {
+            values.iter().flat_map(move |value| std::iter::repeat_n(value.clone(), times))
+        }
+        match self {
+            Carried::Numbers(values) => Arc::new(each(values, times).collect::<Float64Array>()),
+            Carried::Whole(values) => Arc::new(each(values, times).collect::<Int64Array>()),
+            Carried::Flags(values) => Arc::new(each(values, times).collect::<BooleanArray>()),
+            Carried::Texts(values) => Arc::new(each(values, times).collect::<StringArray>()),
+        }
+    }
+}
+
+/// The columns of a batch that say nothing of a case: its id, and others.
+fn carried(batch: &RecordBatch, outcome: &Schema) -> Result<Vec<(String, Carried)>> {
+    let is_own = |name: &str| name == "category" || matches!(NamedNumber::find(name), Err(_) | Ok(Some(_)));
+    let columns = batch.schema();
+    let columns = columns.fields().iter().zip(batch.columns()).filter(|(field, _)| !is_own(field.name()));
+    let of = |(field, array): (&Arc<Field>, &ArrayRef)| {
+        let name = field.name();
+        if outcome.index_of(name).is_ok() {
+            return Err(of_column(
+                name,
+                "the result has a column of this name".to_owned(),
+                "rename it, or leave it out",
+            ));
+        }
+        let known = NamedNumber::names();
+        if name != "id"
+            && let Some(near) = nearest(name, known.iter().map(AsRef::as_ref), 0.75)
+        {
+            let help = format!("call it `{near}` if this is meant; a column of your own needs another name");
+            return Err(of_column(name, "there is no such column".to_owned(), &help));
+        }
+        Ok((name.clone(), Carried::of(name, array.as_ref())?))
+    };
+    columns.map(of).collect()
 }
 
 /// The cases of a batch. `ids` has the row of every id so far.
@@ -109,11 +176,8 @@ fn rows_of(
             Error::Usage { problem, help, .. } => of_column(name, problem, &help),
             other => other,
         });
-        let Some(number) = found? else {
-            let known = NamedNumber::names().join(", ");
-            let help = format!("leave it out, or use one of id, category, {known}; speeds also with _kmh");
-            return Err(of_column(name, "there is no such column".to_owned(), &help));
-        };
+        // The result repeats other columns.
+        let Some(number) = found? else { continue };
         if let Some(other) = seen.insert(number.key(), name) {
             return Err(of_column(name, format!("column `{other}` says the same"), "leave out one of the two"));
         }
@@ -245,12 +309,14 @@ pub fn simulate(
     let stream = stream_of(cases)?;
     let batches: Vec<RecordBatch> = stream
         .collect::<std::result::Result<_, _>>()
-        .map_err(|error| InputError::new_err(format!("the table cannot be read: {error}")))?;
+        .map_err(|error| input_error(format!("the table cannot be read: {error}")))?;
     watched(py, None, on_message, move || {
         embedded::exclusively(|| {
             let options =
                 options(category, &models, &thw, &profile, dt, &backend, device.as_deref(), accept_implausible)?;
             let mut rows = ArrowRows::new(&case_columns(), HashMap::new());
+            let outcome = rows.schema();
+            let mut schema = outcome.clone();
             let (mut frames, mut notes, mut first_row, mut ids) = (Vec::new(), Vec::new(), 0, HashMap::new());
             let pieces = batches.iter().flat_map(|batch| {
                 (0..batch.num_rows().div_ceil(CASES))
@@ -261,12 +327,22 @@ pub fn simulate(
                 notes.extend(missing_speed(&of_piece, first_row));
                 notes.extend(run(of_piece, first_row, &options, &mut rows)?);
                 first_row += piece.num_rows() as u64;
-                frames.push(rows.batch()?);
+                let batch = rows.batch()?;
+                let of_result = carried(&piece, &outcome)?;
+                let times = batch.num_rows() / piece.num_rows().max(1);
+                let (mut fields, mut columns) = (outcome.fields().to_vec(), batch.columns().to_vec());
+                for (name, values) in of_result {
+                    columns.push(values.repeated(times));
+                    fields.push(Arc::new(Field::new(name, columns[columns.len() - 1].data_type().clone(), true)));
+                }
+                schema = Arc::new(Schema::new_with_metadata(fields, outcome.metadata().clone()));
+                let joined = RecordBatch::try_new(schema.clone(), columns);
+                frames.push(joined.map_err(|error| Error::Internal(format!("a table: {error}")))?);
             }
             if first_row == 0 {
                 return Err(Error::input(Place::item("cases"), "the table has no rows", "give at least one case"));
             }
-            Ok((Frame::new(rows.schema(), frames), notes))
+            Ok((Frame::new(schema, frames), notes))
         })
     })
 }

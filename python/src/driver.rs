@@ -1,5 +1,6 @@
 //! Drivers in Python: called once per step with arrays over all running lanes.
 
+use std::cell::Cell;
 use std::sync::{Arc, Mutex, PoisonError};
 
 use lanesweep::cli::embedded;
@@ -9,10 +10,19 @@ use numpy::{PyArray1, PyReadonlyArray1, PyUntypedArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 
-use crate::error::{UsageError, exception};
+use crate::error::{exception, usage_error};
 
 /// The exception that ended the driver of the running work.
 static RAISED: Mutex<Option<PyErr>> = Mutex::new(None);
+
+thread_local! {
+    /// This thread is within a call of a driver: work that it asks for would wait for itself.
+    static IS_CALLING: Cell<bool> = const { Cell::new(false) };
+}
+
+pub fn is_calling() -> bool {
+    IS_CALLING.get()
+}
 
 pub fn take_exception() -> Option<PyErr> {
     RAISED.lock().unwrap_or_else(PoisonError::into_inner).take()
@@ -163,6 +173,12 @@ impl VectorDriver for PythonDriver {
 
 /// Calls Python, unless the interpreter is ending.
 fn attached<T>(work: impl for<'py> FnOnce(Python<'py>) -> Result<T>) -> Result<T> {
+    let work = |py: Python<'_>| {
+        IS_CALLING.set(true);
+        let done = work(py);
+        IS_CALLING.set(false);
+        done
+    };
     let ending = || Error::Interrupted { done: "the interpreter ends".to_owned(), is_kept: false };
     Python::try_attach(work).unwrap_or_else(|| Err(ending()))
 }
@@ -185,13 +201,13 @@ fn accelerations(
         1 => found.extract()?,
         ndim => {
             let shape = found.getattr("shape")?;
-            return Err(UsageError::new_err(format!(
+            return Err(usage_error(format!(
                 "`acceleration` returned an array of {ndim} dimensions and the shape {shape}; expected one number per lane: ({count},)"
             )));
         }
     };
     if found.len() != count {
-        return Err(UsageError::new_err(format!("`acceleration` returned {} numbers for {count} lanes", found.len())));
+        return Err(usage_error(format!("`acceleration` returned {} numbers for {count} lanes", found.len())));
     }
     Ok(found.as_array().to_vec())
 }
@@ -207,10 +223,7 @@ pub fn register(
     attention: &str,
 ) -> PyResult<()> {
     let stands_for = ModelId::parse(attention).ok_or_else(|| {
-        UsageError::new_err(format!(
-            "`attention` names no built-in model: `{attention}`; use one of {}",
-            ModelId::names()
-        ))
+        usage_error(format!("`attention` names no built-in model: `{attention}`; use one of {}", ModelId::names()))
     })?;
     let python = PythonDriver { name: name.clone(), driver, may_accelerate, stands_for };
     ModelId::register(&name, fingerprint, Arc::new(python)).map(drop).map_err(|error| exception(py, &error))

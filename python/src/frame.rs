@@ -8,15 +8,17 @@ use arrow_array::cast::AsArray;
 use arrow_array::ffi_stream::{FFI_ArrowArrayStream, RecordBatchStreamReader};
 use arrow_array::types::{Float32Type, Float64Type, Int32Type, Int64Type};
 use arrow_array::{Array, ArrayRef, Float64Array, RecordBatch, RecordBatchIterator, RecordBatchReader, StringArray};
-use arrow_schema::{DataType, Field, Schema, SchemaRef};
+use arrow_ipc::reader::StreamReader;
+use arrow_ipc::writer::StreamWriter;
+use arrow_schema::{ArrowError, DataType, Field, Schema, SchemaRef};
 use lanesweep::support::table::{ArrowRows, Cell, Column, ColumnKind};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::{PyKeyError, PyTypeError};
 use pyo3::prelude::*;
-use pyo3::types::{PyCapsule, PyDict, PyFloat, PyList};
+use pyo3::types::{PyBytes, PyCapsule, PyDict, PyFloat, PyIterator, PyList, PyString};
 use serde_json::Value;
 
-use crate::error::{InputError, InternalError, exception};
+use crate::error::{InternalError, exception, input_error};
 
 const STREAM: &std::ffi::CStr = c"arrow_array_stream";
 
@@ -73,11 +75,38 @@ impl Frame {
         PyCapsule::new_with_value(py, FFI_ArrowArrayStream::new(reader), STREAM)
     }
 
-    /// A column as a NumPy array; texts as a list. Null is NaN in columns of numbers and None in others.
-    fn __getitem__<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
-        let at = self.schema.index_of(name).map_err(|_| {
-            PyKeyError::new_err(format!("there is no column `{name}`; there are {}", self.columns().join(", ")))
-        })?;
+    /// Numbers of rows and columns.
+    #[getter]
+    fn shape(&self) -> (usize, usize) {
+        (self.__len__(), self.schema.fields().len())
+    }
+
+    /// The rows, as dictionaries.
+    fn __iter__<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyIterator>> {
+        self.rows(py, None)?.try_iter()
+    }
+
+    /// A copy by way of Arrow's format for streams.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> PyResult<(Bound<'py, PyAny>, (Bound<'py, PyBytes>,))> {
+        let failed = |error: ArrowError| InternalError::new_err(format!("a table: {error}"));
+        let mut writer = StreamWriter::try_new(Vec::new(), &self.schema).map_err(failed)?;
+        self.batches.iter().try_for_each(|batch| writer.write(batch)).map_err(failed)?;
+        let bytes = writer.into_inner().map_err(failed)?;
+        Ok((py.import("lanesweep._core")?.getattr("frame_of_stream")?, (PyBytes::new(py, &bytes),)))
+    }
+
+    /// A column as a NumPy array; texts as a list. Null is NaN in columns of numbers and None in others. Of a list of names:
+    /// a table of these columns.
+    fn __getitem__<'py>(&self, py: Python<'py>, name: &Bound<'py, PyAny>) -> PyResult<Bound<'py, PyAny>> {
+        if let Ok(names) = name.cast::<PyList>() {
+            let at: Vec<usize> =
+                names.iter().map(|name| self.at(&name.extract::<String>()?)).collect::<PyResult<_>>()?;
+            let failed = |error: ArrowError| InternalError::new_err(format!("a table: {error}"));
+            let schema = Arc::new(self.schema.project(&at).map_err(failed)?);
+            let batches = self.batches.iter().map(|batch| batch.project(&at)).collect::<Result<_, _>>();
+            return Ok(Bound::new(py, Frame::new(schema, batches.map_err(failed)?))?.into_any());
+        }
+        let at = self.at(&name.extract::<String>()?)?;
         let arrays: Vec<&dyn Array> = self.batches.iter().map(|batch| batch.column(at).as_ref()).collect();
         let has_null = arrays.iter().any(|array| array.null_count() > 0);
         match self.schema.field(at).data_type() {
@@ -112,7 +141,7 @@ impl Frame {
         let py = slf.py();
         let columns = PyDict::new(py);
         for name in slf.get().columns() {
-            columns.set_item(&name, slf.get().__getitem__(py, &name)?)?;
+            columns.set_item(&name, slf.get().__getitem__(py, PyString::new(py, &name).as_any())?)?;
         }
         py.import("pandas")?.call_method1("DataFrame", (columns,))
     }
@@ -178,6 +207,12 @@ impl Frame {
 }
 
 impl Frame {
+    /// Position of a column.
+    fn at(&self, name: &str) -> PyResult<usize> {
+        let unknown = || format!("there is no column `{name}`; there are {}", self.columns().join(", "));
+        self.schema.index_of(name).map_err(|_| PyKeyError::new_err(unknown()))
+    }
+
     fn metadata(&self, key: &str) -> HashMap<String, String> {
         let of = |field: &Arc<arrow_schema::Field>| {
             let text = field.metadata().get(key).filter(|text| !text.is_empty())?;
@@ -227,7 +262,16 @@ pub fn stream_of(table: &Bound<'_, PyAny>) -> PyResult<RecordBatchStreamReader> 
     // SAFETY: a capsule of this name holds a valid stream, and the reader moves it out.
     #[allow(unsafe_code)] // the C interface has no safe form
     let reader = unsafe { RecordBatchStreamReader::from_raw(pointer.as_ptr()) };
-    reader.map_err(|error| InputError::new_err(format!("the table cannot be read: {error}")))
+    reader.map_err(|error| input_error(format!("the table cannot be read: {error}")))
+}
+
+/// The table of a stream in Arrow's format.
+#[pyfunction]
+pub fn frame_of_stream(bytes: &[u8]) -> PyResult<Frame> {
+    let failed = |error: ArrowError| input_error(format!("a table: {error}"));
+    let reader = StreamReader::try_new(bytes, None).map_err(failed)?;
+    let schema = reader.schema();
+    Ok(Frame::new(schema, reader.collect::<Result<_, _>>().map_err(failed)?))
 }
 
 /// A table of columns: arrays of numbers, and lists of texts.
@@ -247,7 +291,7 @@ pub fn frame_of_columns(columns: &Bound<'_, PyDict>) -> PyResult<Frame> {
     }
     let schema = Arc::new(Schema::new(fields));
     let batch = RecordBatch::try_new(schema.clone(), arrays);
-    Ok(Frame::new(schema, vec![batch.map_err(|error| InputError::new_err(format!("the columns: {error}")))?]))
+    Ok(Frame::new(schema, vec![batch.map_err(|error| input_error(format!("the columns: {error}")))?]))
 }
 
 /// A table of records: a list of objects with equal keys, as JSON; columns in this order, then the others. A column has

@@ -3,11 +3,12 @@
 
 use std::ffi::OsString;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, AtomicU32, Ordering};
 use std::sync::mpsc::{self, RecvTimeoutError};
 use std::time::Duration;
 
 use lanesweep::cli::embedded::{self, Value};
-use lanesweep::{Error, Result};
+use lanesweep::{Error, Place, Result};
 use pyo3::exceptions::{PyException, PyKeyboardInterrupt};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString};
@@ -18,7 +19,40 @@ use crate::error::{exception, in_arguments};
 /// How often the calling thread looks for signals.
 const LOOK: Duration = Duration::from_millis(20);
 
-/// Runs work on a thread with the program's stack and waits for it. A signal (Ctrl-C) requests the end of the work and is
+/// The turn of this process to work: threads take turns.
+struct Turn;
+
+/// The process whose turn it is; 0 if nobody's. A forked child does not wait for its parent's.
+static OWNER: AtomicU32 = AtomicU32::new(0);
+/// The work of this turn went on without its caller, who was interrupted twice.
+static IS_LEFT_ALONE: AtomicBool = AtomicBool::new(false);
+
+impl Turn {
+    /// Waits for the turn. Work that a driver asks for, and work behind one that nobody waits for, is refused.
+    fn take(py: Python<'_>) -> PyResult<Turn> {
+        loop {
+            let (me, owner) = (std::process::id(), OWNER.load(Ordering::Acquire));
+            if owner != me && OWNER.compare_exchange(owner, me, Ordering::AcqRel, Ordering::Relaxed).is_ok() {
+                IS_LEFT_ALONE.store(false, Ordering::Release);
+                return Ok(Turn);
+            }
+            if driver::is_calling() || IS_LEFT_ALONE.load(Ordering::Acquire) {
+                let problem = "another run of lanesweep is in progress here".to_owned();
+                return Err(exception(py, &Error::Busy { place: Box::new(Place::item("this process")), problem }));
+            }
+            py.detach(|| std::thread::sleep(LOOK));
+            py.check_signals()?;
+        }
+    }
+}
+
+impl Drop for Turn {
+    fn drop(&mut self) {
+        OWNER.store(0, Ordering::Release);
+    }
+}
+
+/// Runs work on a thread with the program's stack, after that of other threads, and waits for it. A signal (Ctrl-C) requests the end of the work and is
 /// raised after it.
 pub fn watched<T: Send + 'static>(
     py: Python<'_>,
@@ -26,10 +60,15 @@ pub fn watched<T: Send + 'static>(
     on_message: Option<&Bound<'_, PyAny>>,
     work: impl FnOnce() -> Result<T> + Send + 'static,
 ) -> PyResult<T> {
+    let turn = Turn::take(py)?;
     let (send, done) = mpsc::channel();
     let done = Mutex::new(done);
     let thread = std::thread::Builder::new().name("lanesweep".to_owned()).stack_size(embedded::STACK_BYTES);
-    let started = thread.spawn(move || drop(send.send(work())));
+    let started = thread.spawn(move || {
+        let result = work();
+        drop(turn);
+        drop(send.send(result));
+    });
     started.map_err(|error| exception(py, &Error::io("a thread", "start", error)))?;
     let mut ended: Option<PyErr> = None;
     let result = loop {
@@ -41,6 +80,7 @@ pub fn watched<T: Send + 'static>(
             embedded::cancel();
             if ended.is_some() && result.is_err() && error.is_instance_of::<PyKeyboardInterrupt>(py) {
                 // The work does not look for the request: it goes on alone, and the next call is refused until it ends.
+                IS_LEFT_ALONE.store(true, Ordering::Release);
                 return Err(error);
             }
             ended = ended.or(Some(error));

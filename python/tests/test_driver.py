@@ -53,7 +53,7 @@ def test_a_driver_is_scored_sampled_and_mapped_like_the_built_in_ones(scenarios,
     compared = lanesweep.compare(**small, categories="cut-in", parameterizations=2, samples=300)
     assert {row["model"] for row in compared.table("compare").rows()} == {numpy.name}
     justified = lanesweep.justify(**small, parameterization=1, criterion="ttc")
-    statuses = {"appropriate": "ok", "not_appropriate": "not appropriate", "undecided": "undecided"}
+    statuses = {"appropriate": "appropriate", "not_appropriate": "not appropriate", "undecided": "undecided"}
     assert justified.status == statuses[justified.document["conclusion"]]
 
 
@@ -119,17 +119,22 @@ def test_drivers_of_one_name_are_told_apart_in_threads() -> None:
 
     def run(a: float) -> None:
         for _ in range(10):
-            while True:
-                try:
-                    found.append((a, lanesweep.simulate(CASES, category="cut-in", models=[Wrong(a)])["collision"].sum()))
-                    break
-                except lanesweep.BusyError:
-                    continue
+            found.append((a, lanesweep.simulate(CASES, category="cut-in", models=[Wrong(a)])["collision"].sum()))
 
     threads = [threading.Thread(target=run, args=(a,)) for a in expected]
     [thread.start() for thread in threads]
     [thread.join() for thread in threads]
     assert len(found) == 30 and all(expected[a] == count for a, count in found)
+
+
+def test_work_that_a_driver_asks_for_is_refused() -> None:
+    def nested(view: lanesweep.View) -> float:
+        lanesweep.simulate(CASES, category="cut-in", models="FSM")
+        return 0.0
+
+    with pytest.raises(lanesweep.InputError) as raised:
+        lanesweep.simulate(CASES, category="cut-in", models=[Wrong(nested)])
+    assert isinstance(raised.value.__cause__, lanesweep.BusyError)
 
 
 def test_names_that_cannot_be_are_refused() -> None:

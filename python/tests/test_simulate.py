@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import time
 import warnings
@@ -108,7 +109,9 @@ def test_cases_of_any_number_are_those_of_their_parts() -> None:
         ({"ego_speed_mps": [30.0, float("inf"), 33.0]}, "row 1.*ego_speed|ego_speed.*row 1"),
         ({"ego_speed_mps": [30.0, 300.0, 33.0]}, "ego_speed.*row 1|row 1.*ego_speed"),
         ({"ego_speed_mps": ["fast", "slow", "30"]}, "ego_speed"),
-        ({"colour": ["red"] * 3}, "colour.*no such column"),
+        ({"lateral_sped": [1.0] * 3}, "lateral_sped.*no such column"),
+        ({"model": ["a"] * 3}, "model.*the result has a column of this name"),
+        ({"when": np.array(["2026-01-01"] * 3, dtype="M8[s]")}, "when"),
         ({"gap": [1.0, 2.0, 3.0]}, "gap.*says the same"),
         ({"thw_s": [1.0, 1.0, 1.0]}, "both gap and time headway"),
         ({"gap_m": []}, "differ in length"),
@@ -121,9 +124,33 @@ def test_wrong_cases_are_named(change, message) -> None:
         lanesweep.simulate({**CASES, **change}, category="cut-in")
 
 
-def test_an_index_is_no_column_and_missing_values_are_not_given() -> None:
+def test_other_columns_ids_and_the_index_are_repeated_for_every_lane_of_their_case() -> None:
+    own = {"id": ["a", "b", "c"], "site": ["x", None, "y"], "lane": [1, 2, 3], "wet": [True, False, True]}
+    frame = pd.DataFrame({**CASES, **own}, index=pd.Index([7, 5, 9], name="run"))
+    found = lanesweep.simulate(frame, category="cut-in", models=["FSM", "RSS"]).to_pandas()
+    assert list(found["run"]) == [7, 7, 5, 5, 9, 9] and list(found["id"]) == list("aabbcc")
+    assert list(found["lane"]) == [1, 1, 2, 2, 3, 3] and list(found["wet"]) == [True, True, False, False, True, True]
+    assert found["site"].where(found["site"].notna(), None).tolist() == ["x", "x", None, None, "y", "y"]
+    # They change no outcome.
+    outcomes = lanesweep.simulate(CASES, category="cut-in", models=["FSM", "RSS"]).to_pandas()
+    pd.testing.assert_frame_equal(found[list(outcomes)], outcomes)
+
+
+def test_a_frame_has_a_shape_rows_several_columns_and_a_pickle() -> None:
+    frame = lanesweep.simulate(CASES, category="cut-in", models=["FSM", "RSS"])
+    assert frame.shape == (6, len(frame.columns)) and [row["case"] for row in frame] == [0, 0, 1, 1, 2, 2]
+    some = frame[["model", "min_gap_m"]]
+    assert some.columns == ["model", "min_gap_m"] and some.units == {"min_gap_m": "m"} and some.shape == (6, 2)
+    copy = pickle.loads(pickle.dumps(frame))
+    assert copy.rows() == frame.rows() and copy.units == frame.units and copy.descriptions == frame.descriptions
+    with pytest.raises(KeyError, match="no column `gap`"):
+        frame[["model", "gap"]]
+
+
+def test_an_index_that_only_counts_is_no_column_and_missing_values_are_not_given() -> None:
     frame = pd.DataFrame(CASES)
     shuffled = frame.iloc[[2, 0, 1]]
+    assert "index" not in lanesweep.simulate(frame, category="cut-in", models="FSM").columns
     ours = lanesweep.simulate(shuffled, category="cut-in", models="FSM")["min_gap_m"]
     theirs = lanesweep.simulate(frame, category="cut-in", models="FSM")["min_gap_m"]
     assert np.array_equal(ours, theirs[[2, 0, 1]])

@@ -9,11 +9,14 @@ import re
 import signal
 import threading
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import lanesweep
 import numpy as np
 import pandas as pd
+import polars as pl
+import pyarrow as pa
 import pytest
 from lanesweep import _core, _verbs
 from lanesweep._result import _read_csv
@@ -115,7 +118,7 @@ def test_a_time_limit_is_no_interrupt(density, tmp_path) -> None:
 
 def test_a_check_has_its_answer_as_status() -> None:
     safe = lanesweep.check(category="cut-in", ego_speed="60km/h", speed="40km/h", gap=30, lateral_speed=1)
-    assert safe.status == "ok" and "preventable" in str(safe.document).lower()
+    assert safe.status == "preventable" and "preventable" in str(safe.document).lower()
     close = lanesweep.check(category="cut-in", ego_speed="60km/h", speed="20km/h", gap=10, lateral_speed=1)
     assert close.status == "not preventable"
 
@@ -170,16 +173,40 @@ def test_input_that_is_left_out_is_named_in_the_messages(tmp_path) -> None:
     assert mined.status == "incomplete" and any("02_tracks.csv" in line for line in mined.messages)
 
 
-def test_a_second_run_of_the_process_is_refused_and_harms_nothing(density) -> None:
-    done: list[object] = []
-    thread = threading.Thread(target=lambda: done.append(lanesweep.sample(density, samples=3 * 10**6, thw=1.2, backend="cpu")))
-    thread.start()
-    time.sleep(0.5)
-    if thread.is_alive():
-        with pytest.raises(lanesweep.BusyError):
-            lanesweep.sample(density, samples=100, thw=1.2, backend="cpu")
-    thread.join()
-    assert done[0].status == "ok"  # type: ignore[attr-defined]
+def test_runs_of_two_threads_take_turns(density) -> None:
+    def probability(seed: int) -> object:
+        return lanesweep.sample(density, samples=20_000, thw=1.2, models="FSM", backend="cpu", seed=seed).document["estimates"]
+
+    expected = [probability(seed) for seed in (1, 2, 3, 4)]
+    with ThreadPoolExecutor(4) as pool:
+        assert list(pool.map(probability, (1, 2, 3, 4))) == expected
+
+
+def test_errors_are_those_of_python_too(tmp_path) -> None:
+    for call in (lambda: lanesweep.study(tmp_path / "none"), lambda: lanesweep.check(tmp_path / "none.csv")):
+        with pytest.raises(FileNotFoundError) as raised:
+            call()
+        assert isinstance(raised.value, lanesweep.MissingFile) and raised.value.help == "check the path for typing errors"
+    with pytest.raises(ValueError, match="no driver model `X`"):
+        lanesweep.study(models="X")
+    with pytest.raises(ValueError):
+        lanesweep.simulate({"ego_speed_mps": [-1.0], "gap": [9.0], "acceleration": [-5.0]}, category="lvd")
+
+
+def test_a_table_in_memory_is_a_scenario_file(tmp_path) -> None:
+    rows = {"id": ["a", "b", "c"], "category": "cut-in", "ego_speed_kmh": [90.0, 100.0, 110.0], "speed_kmh": 70.0, "lateral_speed": 1.0}
+    table = pd.DataFrame(rows)
+    table.to_csv(tmp_path / "scenarios.csv", index=False)
+    options = {"categories": "cut-in", "thw": [0.6], "backend": "cpu"}
+    expected = lanesweep.study(scenarios=tmp_path / "scenarios.csv", **options).table("failures").rows()
+    for given in (table, pl.DataFrame(rows), pa.Table.from_pandas(table)):
+        assert lanesweep.study(scenarios=given, **options).table("failures").rows() == expected
+
+
+def test_a_star_import_leaves_the_names_of_python_alone() -> None:
+    names: dict[str, object] = {}
+    exec("from lanesweep import *", names)
+    assert "map" not in names and "study" in names and callable(lanesweep.map)
 
 
 def test_the_command_line_is_complete(program) -> None:
