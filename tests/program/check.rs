@@ -152,7 +152,8 @@ fn a_contact_has_its_kind_and_the_sign_of_its_closing_speed() {
     let (_, out, error) = cut_in("60", "45", "24", "1.0", "--acceleration -5");
     let words = out.split_whitespace().collect::<Vec<_>>().join(" ");
     assert!(
-        words.contains("rear-end where the ego's front hits") && words.contains("closing is the ego's speed minus"),
+        words.contains("side where the centre of the other vehicle lies behind that of the ego, else rear-end")
+            && words.contains("closing is the ego's speed minus"),
         "{out}"
     );
     let row = out.lines().find(|line| line.contains("| CCHDM  | COLLIDES")).unwrap_or_else(|| panic!("{out} {error}"));

@@ -46,7 +46,11 @@ pub const COMPARED: [Compared; 6] = [
         words: "the smallest gap",
         unit: "m",
         tolerance: 0.1,
-        of: |trace| finite(trace.outcome.min_gap),
+        // Vehicles that touch have no gap left.
+        of: |trace| match trace.step_of(StepMark::Contact) {
+            Some(_) => Some(trace.outcome.min_gap.min(0.0)),
+            None => finite(trace.outcome.min_gap),
+        },
     },
     Compared {
         column: "min_ttc_s",

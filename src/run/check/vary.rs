@@ -73,6 +73,11 @@ pub fn vary(
         return Err(Error::usage(Place::option("range"), "nothing is to vary", "name a quantity: gap_m=10..40"));
     }
     MapParameter::refuse_repeats(&ranges.iter().map(|range| range.parameter).collect::<Vec<_>>())?;
+    let has = |quantity| ranges.iter().any(|range| range.parameter.quantity == quantity);
+    if has(CaseQuantity::Gap) && has(CaseQuantity::Thw) {
+        let problem = "a gap and a time headway say the same twice";
+        return Err(Error::usage(Place::option("range"), problem, "keep one of them"));
+    }
     let sobol = Sobol::new(seed, ranges.len() as u32 + 1)?;
     let dimensions = ranges.len();
     let unit = |index: u64, dimension: usize| {

@@ -85,12 +85,7 @@ impl MapParameter {
     /// [`Error::Usage`] that names both.
     pub fn refuse_repeats(given: &[&MapParameter]) -> Result<()> {
         for (at, parameter) in given.iter().enumerate() {
-            // A gap and a headway are one start.
-            let is_start = |quantity| [CaseQuantity::Gap, CaseQuantity::Thw].contains(&quantity);
-            let says_the_same = |p: &&&MapParameter| {
-                p.quantity == parameter.quantity || is_start(p.quantity) && is_start(parameter.quantity)
-            };
-            if let Some(before) = given[..at].iter().find(says_the_same) {
+            if let Some(before) = given[..at].iter().find(|p| p.quantity == parameter.quantity) {
                 let problem = format!("`{}` and `{}` say the same twice", before.key, parameter.key);
                 return Err(Error::usage(Place::item(parameter.key), problem, "keep one of them"));
             }
