@@ -122,7 +122,7 @@ fn carried(batch: &RecordBatch, outcome: &Schema) -> Result<Vec<(String, Carried
         }
         let known = NamedNumber::names();
         if name != "id"
-            && let Some(near) = nearest(name, known.iter().map(AsRef::as_ref), 0.75)
+            && let Some(near) = nearest(name, known.iter().map(AsRef::as_ref), 0.92)
         {
             let help = format!("call it `{near}` if this is meant; a column of your own needs another name");
             return Err(of_column(name, "there is no such column".to_owned(), &help));

@@ -130,7 +130,7 @@ def test_other_columns_ids_and_the_index_are_repeated_for_every_lane_of_their_ca
     found = lanesweep.simulate(frame, category="cut-in", models=["FSM", "RSS"]).to_pandas()
     assert list(found["run"]) == [7, 7, 5, 5, 9, 9] and list(found["id"]) == list("aabbcc")
     assert list(found["lane"]) == [1, 1, 2, 2, 3, 3] and list(found["wet"]) == [True, True, False, False, True, True]
-    assert found["site"].where(found["site"].notna(), None).tolist() == ["x", "x", None, None, "y", "y"]
+    assert found["site"].fillna("-").tolist() == ["x", "x", "-", "-", "y", "y"]
     # They change no outcome.
     outcomes = lanesweep.simulate(CASES, category="cut-in", models=["FSM", "RSS"]).to_pandas()
     pd.testing.assert_frame_equal(found[list(outcomes)], outcomes)
