@@ -127,9 +127,9 @@ impl CaseSheet<'_> {
         Ok(canonical.finish())
     }
 
-    /// The case by the first digits of its hash.
+    /// The first digits of the case's hash.
     pub(super) fn mark(&self) -> String {
-        format!("case {}", self.case_sha256().map_or(String::new(), |sha256| sha256[..12].to_owned()))
+        self.case_sha256().map_or(String::new(), |sha256| sha256[..12].to_owned())
     }
 
     /// The sheet's identity as text: hashes by their first 12 digits.
@@ -140,7 +140,7 @@ impl CaseSheet<'_> {
         let parts = [
             Some(format!("program: {}", program(self.identity.commit, 12))),
             self.identity.file_sha256.as_ref().map(|sha256| format!("file: {}", short(Ok(sha256.clone())))),
-            Some(self.mark()),
+            Some(format!("case: {}", self.mark())),
             Some(
                 wrap(&format!("profiles: {}", profiles.collect::<Vec<_>>().join(", ")), WIDTH - 2)
                     .replace('\n', "\n  "),

@@ -361,7 +361,7 @@ impl CaseSheet<'_> {
             .assumptions_section()
             .parts([Section::options(format!("Profile {}", first.profile), &self.profiles[0])]);
         Page {
-            title: format!("One {} under {}, {}", self.subject.category().label(), first.profile, self.mark()),
+            title: format!("One {} under {}, case {}", self.subject.category().label(), first.profile, self.mark()),
             lead: format!("{}. {}.", self.case(), self.answer()),
             synthetic: self.is_synthetic,
             warnings,

@@ -60,7 +60,7 @@ pub struct Uncertainty {
     pub outside_annex: u64,
     /// Draws by answer, in the order of [`Answer::ALL`].
     pub answers: [u64; Answer::ALL.len()],
-    /// Per model, in the order of [`ModelId::ALL`]: draws with a conflict in which it does not collide.
+    /// Per model, in the order of [`ModelId::ALL`](crate::model::driver::ModelId::ALL): draws with a conflict in which it does not collide.
     pub avoids: [u64; MODELS],
     /// Pairs of draws per index.
     pub pairs: u64,
