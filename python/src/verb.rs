@@ -64,14 +64,11 @@ pub fn watched<T: Send + 'static>(
     let (send, done) = mpsc::channel();
     let done = Mutex::new(done);
     let thread = std::thread::Builder::new().name("lanesweep".to_owned()).stack_size(embedded::STACK_BYTES);
-    let started = thread.spawn(move || {
-        let result = work();
-        drop(turn);
-        drop(send.send(result));
-    });
+    let started = thread.spawn(move || drop(send.send((work(), turn))));
     started.map_err(|error| exception(py, &Error::io("a thread", "start", error)))?;
     let mut ended: Option<PyErr> = None;
-    let result = loop {
+    // The turn ends after messages and exceptions of this work are taken, or with the work if nobody waits for it.
+    let (result, _turn) = loop {
         let result = py.detach(|| match done.lock() {
             Ok(done) => done.recv_timeout(LOOK),
             Err(_) => Err(RecvTimeoutError::Disconnected),
@@ -86,8 +83,8 @@ pub fn watched<T: Send + 'static>(
             ended = ended.or(Some(error));
         }
         match result {
-            Ok(result) => break result,
-            Err(RecvTimeoutError::Disconnected) => break Err(Error::Internal("the work panicked".to_owned())),
+            Ok((result, turn)) => break (result, Some(turn)),
+            Err(RecvTimeoutError::Disconnected) => break (Err(Error::Internal("the work panicked".to_owned())), None),
             Err(RecvTimeoutError::Timeout) => {}
         }
     };

@@ -52,7 +52,7 @@ impl ComparedTable<'_> {
             subjects.push((id, subject));
         }
         doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
-        let results = results(self.results)?;
+        let (given, results) = results(self.results)?;
         let mut by_id: HashMap<&str, &Subject> = subjects.iter().map(|(id, of)| (id.as_str(), of)).collect();
         let pairs = results.iter().map(|(place, theirs)| {
             let unknown = || {
@@ -63,7 +63,7 @@ impl ComparedTable<'_> {
             Ok((by_id.remove(theirs.id.as_str()).ok_or_else(unknown)?, theirs))
         });
         let pairs: Vec<(&Subject, &TheirResult)> = pairs.collect::<Result<_>>()?;
-        let comparison = ResultComparison::new(&pairs, self.profile, *model)?;
+        let comparison = ResultComparison::new(&pairs, given, self.profile, *model)?;
         let report = ResultReport {
             comparison: &comparison,
             profile: self.profile,
@@ -90,8 +90,8 @@ impl ComparedTable<'_> {
     }
 }
 
-/// Reads another simulator's results.
-fn results(path: &Path) -> Result<Vec<(Place, TheirResult)>> {
+/// Reads another simulator's results: which quantities the table has, and its rows.
+fn results(path: &Path) -> Result<([bool; COMPARED.len()], Vec<(Place, TheirResult)>)> {
     let format = TableFormat::of(path, &[TableFormat::Csv, TableFormat::Parquet], "--results")?;
     let mut table = TableReader::open(path, format)?;
     let help = || format!("the columns are id, collision (true or false) and, where known, {}", columns());
@@ -156,5 +156,5 @@ fn results(path: &Path) -> Result<Vec<(Place, TheirResult)>> {
     if all.is_empty() {
         return Err(Error::input(Place::file(path), "it has no rows", help()));
     }
-    Ok(all)
+    Ok((std::array::from_fn(|quantity| found[quantity + 2].is_some()), all))
 }

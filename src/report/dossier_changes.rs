@@ -61,7 +61,7 @@ pub struct DossierFile {
 /// What a change is of.
 const KINDS: [&str; 5] = ["question", "data", "program", "profile", "options"];
 
-/// Something that differs and is no result.
+/// A difference in question, data, program, profile or options.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 struct Change {
     kind: &'static str,
@@ -70,7 +70,7 @@ struct Change {
     other: Value,
 }
 
-/// A result that differs.
+/// A difference in a result.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 struct NumberChange {
     quantity: String,

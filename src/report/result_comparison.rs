@@ -80,8 +80,9 @@ impl ResultReport<'_> {
             };
         };
         let compared = &COMPARED[cause.quantity];
-        let [min, median, max] = cause.range.map(|by| significant(by.abs(), 3));
-        let direction = match (compared.unit, cause.range[1] > 0.0) {
+        let range = cause.range.unwrap_or_default();
+        let [min, median, max] = range.map(|by| significant(by.abs(), 3));
+        let direction = match (compared.unit, range[1] > 0.0) {
             ("s", true) => "later",
             ("s", false) => "earlier",
             (_, true) => "larger",
@@ -104,9 +105,9 @@ impl ResultReport<'_> {
             .column("only ours", |of| of.only[0])
             .column("only theirs", |of| of.only[1])
             .column("tolerance", |of| COMPARED[of.quantity].tolerance)
-            .column(Column::from("min").digits(Digits::Signed(3)), |of| of.range[0])
-            .column(Column::from("median").digits(Digits::Signed(3)), |of| of.range[1])
-            .column(Column::from("max").digits(Digits::Signed(3)), |of| of.range[2])
+            .column(Column::from("min").digits(Digits::Signed(3)).null("–"), |of| of.range.map(|range| range[0]))
+            .column(Column::from("median").digits(Digits::Signed(3)).null("–"), |of| of.range.map(|range| range[1]))
+            .column(Column::from("max").digits(Digits::Signed(3)).null("–"), |of| of.range.map(|range| range[2]))
             .build()
     }
 

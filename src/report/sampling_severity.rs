@@ -82,8 +82,13 @@ impl SampleReport {
                     format!("the target of {target} per hour lies within {low} to {high}, undecided; {more}")
                 }
             };
-            let headway = if row.headway == "all" { "all headways".to_owned() } else { format!("THW {}", row.headway) };
-            format!("{}, {}, {headway}: {verdict} (intervals at {level} %).", row.model.name(), row.of)
+            let headway = match row.headway.as_str() {
+                _ if self.headways == ["sampled"] => "drawn headways".to_owned(),
+                "all" => format!("imposed headways {}", self.headways.join(", ")),
+                one => format!("imposed headway {one}"),
+            };
+            let (model, profile) = (row.model.name(), &self.profile.name);
+            format!("{model} under {profile}, {}, {headway}: {verdict} (intervals at {level} %).", row.of)
         };
         self.targets.iter().map(sentence).collect()
     }

@@ -89,6 +89,20 @@ fn an_error_of_a_tenth_of_a_second_in_a_delay_is_found_and_named() {
     let (code, few) = compare("few.csv");
     assert_eq!((code, &few["agreeing"], &few["cause"]), (5, &few["cases"], &Value::Null), "{few}");
     assert!(few["cause_sentence"].as_str().unwrap().contains("t_brake_s in 1 of"), "{few}");
+    // A column of empty fields is counted, not dropped.
+    let without: String = same
+        .lines()
+        .enumerate()
+        .map(|(row, line)| {
+            let mut of = fields(line);
+            of[3] = if row == 0 { of[3].clone() } else { String::new() };
+            of.join(",") + "\n"
+        })
+        .collect();
+    std::fs::write(dir.join("without.csv"), without).unwrap();
+    let (_, found) = compare("without.csv");
+    let brakes = found["differences"].as_array().unwrap().iter().find(|of| of["quantity"] == "t_brake_s").unwrap();
+    assert!(brakes["cases"] == 0 && brakes["only ours"].as_u64() > Some(0), "{brakes}");
     let (code, late) = compare("late.csv");
     assert_eq!((code, &late["cause"], &late["without_result"]), (5, &"t_brake_s".into(), &1.into()), "{late}");
     let sentence = late["cause_sentence"].as_str().unwrap();

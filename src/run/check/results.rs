@@ -112,8 +112,8 @@ pub struct Difference {
     pub beyond: usize,
     /// Cases in which only we have it, and in which only they have it.
     pub only: [usize; 2],
-    /// Minimum, median and maximum of theirs minus ours.
-    pub range: [f64; 3],
+    /// Minimum, median and maximum of theirs minus ours; `None` if no case has both.
+    pub range: Option<[f64; 3]>,
 }
 
 /// All cases.
@@ -123,16 +123,22 @@ pub struct ResultComparison {
     pub model: ModelId,
     /// In the order of the results.
     pub cases: Vec<ComparedCase>,
-    /// The quantities that both have in some case, in the order of [`COMPARED`].
+    /// The quantities that their table has, in the order of [`COMPARED`].
     pub differences: Vec<Difference>,
 }
 
 impl ResultComparison {
-    /// Compares results with the lanes of a driver, in binary64; a pair per case that both have.
+    /// Compares results with the lanes of a driver, in binary64; a pair per case that both have. `given`: the quantities that
+    /// their table has.
     ///
     /// # Errors
     /// As [`Subject::lane`].
-    pub fn new(pairs: &[(&Subject, &TheirResult)], profile: &Profile, model: ModelId) -> Result<ResultComparison> {
+    pub fn new(
+        pairs: &[(&Subject, &TheirResult)],
+        given: [bool; COMPARED.len()],
+        profile: &Profile,
+        model: ModelId,
+    ) -> Result<ResultComparison> {
         let cases = pairs.iter().map(|(subject, theirs)| {
             let trace = subject.lane(profile, subject.point())?.trace(profile, subject.category(), model);
             Ok(ComparedCase::of(&trace, theirs))
@@ -142,11 +148,17 @@ impl ResultComparison {
             let mut all: Vec<f64> = cases.iter().filter_map(|case| case.differences[quantity]).collect();
             all.sort_by(f64::total_cmp);
             let beyond = all.iter().filter(|by| by.abs() > compared.tolerance).count();
-            let range = [*all.first()?, all[all.len() / 2], *all.last()?];
+            let range = all.first().zip(all.last()).map(|(min, max)| [*min, all[all.len() / 2], *max]);
             let alone = |who: usize| {
                 cases.iter().filter(|case| case.has[quantity][who] && !case.has[quantity][1 - who]).count()
             };
-            Some(Difference { quantity, cases: all.len(), beyond, only: [alone(0), alone(1)], range })
+            given[quantity].then(|| Difference {
+                quantity,
+                cases: all.len(),
+                beyond,
+                only: [alone(0), alone(1)],
+                range,
+            })
         };
         let differences = COMPARED.iter().enumerate().filter_map(difference).collect();
         Ok(ResultComparison { model, cases, differences })
