@@ -90,8 +90,11 @@ impl ComparedTable<'_> {
     }
 }
 
-/// Reads another simulator's results: which quantities the table has, and its rows.
-fn results(path: &Path) -> Result<([bool; COMPARED.len()], Vec<(Place, TheirResult)>)> {
+/// Which quantities a table of results has, and its rows with their places.
+type Results = ([bool; COMPARED.len()], Vec<(Place, TheirResult)>);
+
+/// Reads another simulator's results.
+fn results(path: &Path) -> Result<Results> {
     let format = TableFormat::of(path, &[TableFormat::Csv, TableFormat::Parquet], "--results")?;
     let mut table = TableReader::open(path, format)?;
     let help = || format!("the columns are id, collision (true or false) and, where known, {}", columns());
