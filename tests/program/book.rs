@@ -51,8 +51,8 @@ fn chapters() -> Vec<Document> {
 
 /// The chapters and what stands beside them for readers of the repository.
 fn documents() -> Vec<Document> {
-    let beside = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md", "docs/README.md"];
-    let folders = ["deploy", "configs", "examples", "shaders"].map(markdown_below).concat();
+    let beside = ["README.md", "ARCHITECTURE.md", "CONTRIBUTING.md", "CHANGELOG.md", "RELEASING.md", "docs/README.md"];
+    let folders = ["deploy", "configs", "examples", "paper", "shaders"].map(markdown_below).concat();
     let paths = beside.map(str::to_owned).into_iter().chain(folders).chain(["benches/README.md".to_owned()]);
     paths.map(|path| Document::read(root(), &path)).chain(chapters()).collect()
 }

@@ -31,6 +31,26 @@ fn every_combination_of_features_is_built() {
     assert!(run.contains("for features in gpu,parquet cli,arrow; do"), "a combination is not built");
 }
 
+/// A release is named alike wherever it is cited, packaged or archived (RELEASING.md).
+#[test]
+fn every_description_of_the_release_has_its_name_and_version() {
+    let read = |name: &str| std::fs::read_to_string(root().join(name)).expect(name);
+    let version = env!("CARGO_PKG_VERSION");
+    let zenodo: serde_json::Value = serde_json::from_str(&read(".zenodo.json")).expect(".zenodo.json");
+    assert_eq!((zenodo["title"].as_str(), zenodo["version"].as_str()), (Some("lanesweep"), Some(version)));
+    for (file, title, versioned) in [
+        ("CITATION.cff", "title: lanesweep", format!("version: {version}")),
+        ("python/pyproject.toml", "name = \"lanesweep\"", format!("version = \"{version}\"")),
+        ("recipe/recipe.yaml", "  name: lanesweep", format!("  version: \"{version}\"")),
+        ("CHANGELOG.md", "# Changelog", format!("## {version},")),
+    ] {
+        let text = read(file);
+        for expected in [title, &versioned] {
+            assert!(text.lines().any(|line| line.starts_with(expected)), "{file} has no line `{expected}`");
+        }
+    }
+}
+
 /// Packages with their features in the dependency tree of these edges and features of the crate.
 fn features_of(edges: &str, features: &[&str]) -> BTreeMap<String, String> {
     let cargo = Command::new(env!("CARGO"))
