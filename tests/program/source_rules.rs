@@ -40,7 +40,8 @@ fn every_description_of_the_release_has_its_name_and_version() {
     assert_eq!((zenodo["title"].as_str(), zenodo["version"].as_str()), (Some("lanesweep"), Some(version)));
     for (file, title, versioned) in [
         ("CITATION.cff", "title: lanesweep", format!("version: {version}")),
-        ("python/pyproject.toml", "name = \"lanesweep\"", format!("version = \"{version}\"")),
+        // The crate of the module has the workspace's version.
+        ("python/pyproject.toml", "name = \"lanesweep\"", "dynamic = [\"version\"]".to_owned()),
         ("recipe/recipe.yaml", "  name: lanesweep", format!("  version: \"{version}\"")),
         ("CHANGELOG.md", "# Changelog", format!("## {version},")),
     ] {
