@@ -639,7 +639,7 @@ def check(
         Profiles; the first one decides. By default un-r157, the two of EU 2022/1426, jrc-2021, paper and paper-fit.
     results : path
         Another simulator's results for a table of cases, compared with those of one driver: columns id and collision, and where known
-        t_react_s, t_brake_s, min_gap_m, min_ttc_s, t_crash_s, impact_speed_mps.
+        reaction_s, braking_s, min_gap_m, min_ttc_s, contact_s, impact_speed_mps.
     nominal : bool
         Only the computed answers of a table, by lanes: a million rows take seconds. No perturbation, clause or boundary is examined.
     sheet : path

@@ -79,7 +79,7 @@ pub(super) struct Check {
     sheets: Option<PathBuf>,
     /// Another simulator's results for a table, to be compared with --models NAME
     ///
-    /// The table has the columns id and collision, and where known t_react_s, t_brake_s, min_gap_m, min_ttc_s, t_crash_s,
+    /// The table has the columns id and collision, and where known reaction_s, braking_s, min_gap_m, min_ttc_s, contact_s,
     /// impact_speed_mps (the ego's speed at the contact, not the closing speed). Exit status: 0 nothing differs in any case, 5 something does, 4 cases have no result.
     #[arg(long, value_name = "FILE", conflicts_with_all = ["nominal", "sheets"], help_heading = "Data")]
     results: Option<PathBuf>,

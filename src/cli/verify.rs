@@ -11,6 +11,7 @@ use super::{Exit, Output};
 use crate::engine::verify::{RandomOptions, ThresholdOptions, compare, random_plan, threshold_plan};
 use crate::engine::{Backend, LanePlan, LaneRunner, Wanted};
 use crate::model::profile::Profile;
+use crate::report::lanes::outcome_json;
 use crate::report::{records, verification};
 use crate::run::study::{StudyOptions, plan_study};
 use crate::scenario::Category;
@@ -184,7 +185,7 @@ impl Verify {
             Exit::Ok,
             || format!("Under test: {}\n{}", tested.describe(), verification::lane(text, names, &outcomes)),
             || {
-                let [reference, cpu, theirs] = outcomes.map(|o| records::outcome(&o, plan.profile.frame.dt_s));
+                let [reference, cpu, theirs] = outcomes.map(|o| outcome_json(&o, plan.profile.frame.dt_s));
                 records::document(&serde_json::json!({
                     "under_test": tested.describe(),
                     "lane": text,

@@ -5,6 +5,7 @@ use serde_json::{Map, Value, json};
 
 use super::case_sheet::CaseSheet;
 use super::html::Section;
+use super::lanes::outcome_json;
 use super::records::{self, PROGRAM};
 use super::tables::{WIDTH, wrap};
 use crate::Result;
@@ -284,7 +285,7 @@ fn change(by: f64) -> NumberText {
 pub(super) fn finer_json(judgement: &Judgement) -> Value {
     let Some(finer) = &judgement.finer else { return Value::Null };
     let models = judgement.models.iter().zip(&finer.outcomes).map(|(judged, outcome)| {
-        let mut outcome = records::outcome(outcome, finer.dt_s);
+        let mut outcome = outcome_json(outcome, finer.dt_s);
         outcome["model"] = json!(judged.trace.model.name());
         outcome
     });

@@ -5,6 +5,7 @@ use serde_json::{Value, json};
 
 use super::case_identity::{self, CaseIdentity, NOT_CONSIDERED, assumptions_json};
 use super::html::{Page, PageFigure, Section};
+use super::lanes::outcome_json;
 use super::records::{self, PROGRAM};
 use super::tables::{WIDTH, wrap};
 use super::trace::{TraceFigure, TracePanels, TraceSeries};
@@ -202,7 +203,7 @@ impl CaseSheet<'_> {
     pub fn json(&self) -> Result<String> {
         let judgement = |(judgement, profile): (&Judgement, &Profile)| {
             let models = judgement.models.iter().map(|judged| {
-                let mut outcome = records::outcome(&judged.trace.outcome, judged.trace.dt_s);
+                let mut outcome = outcome_json(&judged.trace.outcome, judged.trace.dt_s);
                 outcome["model"] = json!(judged.trace.model.name());
                 let delta_v_mps = self.delta_v_mps(judged);
                 outcome["delta_v_ego_mps"] = json!(delta_v_mps.map(|both| both[0]));
@@ -216,7 +217,7 @@ impl CaseSheet<'_> {
                     };
                     outcome["injury_risk_ego"] = json!(self.injury.iter().map(risk).collect::<Vec<_>>());
                 }
-                outcome["t_brake_s"] = json!(judged.braking_s());
+                outcome["braking_s"] = json!(judged.braking_s());
                 outcome["changes_with"] = json!(judged.flips);
                 outcome["is_contact_like"] = json!(judged.touches);
                 outcome

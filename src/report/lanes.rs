@@ -11,7 +11,7 @@ use crate::run::study::{Study, robust_lanes};
 use crate::scenario::parameterization::Sizes;
 use crate::stats::density::DensityModel;
 use crate::support::files::make_folder_of;
-use crate::support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter};
+use crate::support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter, json_value};
 use crate::{Error, Result};
 
 const MIN_THW: &str = "Smallest time headway; infinite if no vehicle was evaluated while the ego moved.";
@@ -180,54 +180,42 @@ fn severity_cells(outcome: &Outcome<f64>, sizes: Option<Sizes>, injury: &[&Injur
     both.chain(injury.iter().map(|curve| curve.ego_risk(delta_v, ego_m))).map(Cell::number).collect()
 }
 
-/// How a lane ended: units are in the names.
+/// How a lane ended, as tables and JSON documents have it: name with its unit, type, unit, meaning, value. Null: did not happen.
 #[rustfmt::skip] // a table: one line per column
-fn outcome_columns() -> Vec<Column> {
-    let c = Column::new;
-    vec![
-        c("collision", ColumnKind::Flag, "", "Failed the criterion collision."),
-        c("ttc", ColumnKind::Flag, "", "Failed the criterion TTC."),
-        c("btn", ColumnKind::Flag, "", "Failed the criterion BTN."),
-        c("capped", ColumnKind::Flag, "", "Ended by the time cap."),
-        c("min_ttc_s", ColumnKind::Binary32, "s", "Smallest time to collision; infinite where the vehicles never approached."),
-        c("max_btn", ColumnKind::Binary32, "1", "Largest Brake Threat Number; infinite where no braking avoids the contact."),
-        c("min_gap_m", ColumnKind::Binary32, "m", "Smallest gap to a vehicle that TTC and BTN evaluate, bumper to bumper; at most 0 where vehicles touched, infinite where none was evaluated."),
-        c("contact_type", ColumnKind::Whole, "1", "Kind of contact; 0 without one."),
-        c("reaction_s", ColumnKind::Binary64, "s", "When the driver first reacted; null if never."),
-        c("end_s", ColumnKind::Binary64, "s", "When the run ended."),
-        c("impact_speed_mps", ColumnKind::Binary32, "m/s", "Speed of the ego at contact; null without one."),
-        c("impact_closing_speed_mps", ColumnKind::Binary32, "m/s", "Closing speed at contact; null without one."),
-        c("min_thw_s", ColumnKind::Binary32, "s", MIN_THW),
-        c("max_drac_mps2", ColumnKind::Binary32, "m/s²", MAX_DRAC),
-        c("tet_s", ColumnKind::Binary64, "s", TET),
-        c("tit_s2", ColumnKind::Binary32, "s²", TIT),
-        c("pet_s", ColumnKind::Binary32, "s", PET),
-    ]
+static OUTCOME: [(&str, ColumnKind, &str, &str, OutcomeValue); 18] = [
+    ("collision", ColumnKind::Flag, "", "Failed the criterion collision.", |o, _| Cell::Flag(o.verdicts.failed(Criterion::Collision))),
+    ("ttc", ColumnKind::Flag, "", "Failed the criterion TTC.", |o, _| Cell::Flag(o.verdicts.failed(Criterion::Ttc))),
+    ("btn", ColumnKind::Flag, "", "Failed the criterion BTN.", |o, _| Cell::Flag(o.verdicts.failed(Criterion::Btn))),
+    ("capped", ColumnKind::Flag, "", "Ended by the time cap.", |o, _| Cell::Flag(o.verdicts.capped())),
+    ("min_ttc_s", ColumnKind::Binary32, "s", "Smallest time to collision; infinite where the vehicles never approached.", |o, _| Cell::Number(o.min_ttc)),
+    ("max_btn", ColumnKind::Binary32, "1", "Largest Brake Threat Number; infinite where no braking avoids the contact.", |o, _| Cell::Number(o.max_btn)),
+    ("min_gap_m", ColumnKind::Binary32, "m", "Smallest gap to a vehicle that TTC and BTN evaluate, bumper to bumper; at most 0 where vehicles touched, infinite where none was evaluated.", |o, _| Cell::Number(smallest_gap_m(o))),
+    ("contact_type", ColumnKind::Whole, "1", "Kind of contact; 0 without one.", |o, _| Cell::Whole(i64::from(o.contact.code()))),
+    ("reaction_s", ColumnKind::Binary64, "s", "When the driver first reacted; null if never.", |o, dt_s| Cell::number(time_s(o.reaction_step, dt_s))),
+    ("contact_s", ColumnKind::Binary64, "s", "When vehicles touched; null if never.", |o, dt_s| Cell::number(time_s(o.contact_step, dt_s))),
+    ("end_s", ColumnKind::Binary64, "s", "When the run ended.", |o, dt_s| Cell::number(time_s(o.end_step, dt_s))),
+    ("impact_speed_mps", ColumnKind::Binary32, "m/s", "Speed of the ego at contact; null without one.", |o, _| Cell::number(at_contact(o, o.impact_speed))),
+    ("impact_closing_speed_mps", ColumnKind::Binary32, "m/s", "Closing speed at contact; null without one.", |o, _| Cell::number(at_contact(o, o.impact_closing_speed))),
+    ("min_thw_s", ColumnKind::Binary32, "s", MIN_THW, |o, _| Cell::Number(o.min_thw)),
+    ("max_drac_mps2", ColumnKind::Binary32, "m/s²", MAX_DRAC, |o, _| Cell::Number(o.max_drac)),
+    ("tet_s", ColumnKind::Binary64, "s", TET, |o, dt_s| Cell::number(time_s(o.tet_steps, dt_s))),
+    ("tit_s2", ColumnKind::Binary32, "s²", TIT, |o, _| Cell::Number(o.tit)),
+    ("pet_s", ColumnKind::Binary32, "s", PET, |o, _| Cell::number(o.pet)),
+];
+type OutcomeValue = fn(&Outcome<f64>, f64) -> Cell<'static>;
+
+fn outcome_columns() -> impl Iterator<Item = Column> {
+    OUTCOME.iter().map(|&(name, kind, unit, meaning, _)| Column::new(name, kind, unit, meaning))
 }
 
-/// The values of [`outcome_columns`]. Null: did not happen.
-fn outcome_cells(outcome: &Outcome<f64>, dt_s: f64) -> [Cell<'static>; 17] {
-    let time = |step: u32| Cell::number(time_s(step, dt_s));
-    let [collision, ttc, btn] = Criterion::ALL.map(|c| Cell::Flag(outcome.verdicts.failed(c)));
-    [
-        collision,
-        ttc,
-        btn,
-        Cell::Flag(outcome.verdicts.capped()),
-        Cell::Number(outcome.min_ttc),
-        Cell::Number(outcome.max_btn),
-        Cell::Number(smallest_gap_m(outcome)),
-        Cell::Whole(i64::from(outcome.contact.code())),
-        time(outcome.reaction_step),
-        time(outcome.end_step),
-        Cell::number(at_contact(outcome, outcome.impact_speed)),
-        Cell::number(at_contact(outcome, outcome.impact_closing_speed)),
-        Cell::Number(outcome.min_thw),
-        Cell::Number(outcome.max_drac),
-        time(outcome.tet_steps),
-        Cell::Number(outcome.tit),
-        Cell::number(outcome.pet),
-    ]
+fn outcome_cells(outcome: &Outcome<f64>, dt_s: f64) -> [Cell<'static>; 18] {
+    std::array::from_fn(|at| OUTCOME[at].4(outcome, dt_s))
+}
+
+/// How a lane ended, for a JSON document, in binary64.
+pub fn outcome_json(outcome: &Outcome<f64>, dt_s: f64) -> serde_json::Value {
+    let value = |value: OutcomeValue| json_value(ColumnKind::Binary64, &value(outcome, dt_s));
+    OUTCOME.iter().map(|&(name, .., of)| (name.to_owned(), value(of))).collect()
 }
 
 /// The columns of [concrete cases](crate::run::cases), in their order.

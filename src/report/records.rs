@@ -1,16 +1,13 @@
 //! Documents in JSON, of `--format json` and of the records in the folders of runs.
 
 use serde::Serialize;
-use serde_json::Value;
+
+use crate::engine::{NO_STEP, Outcome};
+use crate::support::run_folder::{ResultFiles, Results};
+use crate::{Error, Result};
 
 /// Program and version.
 pub(super) const PROGRAM: &str = concat!("lanesweep ", env!("CARGO_PKG_VERSION"));
-
-use crate::engine::{NO_STEP, Outcome};
-use crate::model::criterion::Criterion;
-use crate::support::run_folder::{ResultFiles, Results};
-use crate::support::table::json_number;
-use crate::{Error, Result};
 
 /// An object whose keys stand in the order given: `record! { program: PROGRAM, lanes: 3 }`.
 macro_rules! record {
@@ -26,32 +23,6 @@ macro_rules! record {
     }};
 }
 pub(super) use record;
-
-/// How a lane ended. Times in seconds; null for events that did not happen.
-pub fn outcome(outcome: &Outcome<f64>, dt_s: f64) -> Value {
-    let time = |step: u32| time_s(step, dt_s);
-    let failed = |c: Criterion| outcome.verdicts.failed(c);
-    serde_json::json!({
-        "collision": failed(Criterion::Collision),
-        "ttc": failed(Criterion::Ttc),
-        "btn": failed(Criterion::Btn),
-        "capped": outcome.verdicts.capped(),
-        "min_ttc_s": json_number(outcome.min_ttc),
-        "max_btn": json_number(outcome.max_btn),
-        "min_gap_m": json_number(smallest_gap_m(outcome)),
-        "crash_type": outcome.contact.code(),
-        "t_react_s": time(outcome.reaction_step),
-        "t_crash_s": time(outcome.contact_step),
-        "impact_speed_mps": at_contact(outcome, outcome.impact_speed),
-        "impact_closing_speed_mps": at_contact(outcome, outcome.impact_closing_speed),
-        "t_end_s": time(outcome.end_step),
-        "min_thw_s": json_number(outcome.min_thw),
-        "max_drac_mps2": json_number(outcome.max_drac),
-        "tet_s": time(outcome.tet_steps),
-        "tit_s2": json_number(outcome.tit),
-        "pet_s": outcome.pet.map(json_number),
-    })
-}
 
 /// When an event happened, s, without the rounding error of the product; `None` if it did not.
 pub(super) fn time_s(step: u32, dt_s: f64) -> Option<f64> {

@@ -384,7 +384,7 @@ fn braking_begins_at_one_time_in_table_figure_series_and_json() {
     let sheet = json(&[&case[..], &more, &files].concat());
     let (page, series) = (std::fs::read_to_string(&page).unwrap(), std::fs::read_to_string(&series).unwrap());
     for model in sheet["profiles"][0]["models"].as_array().unwrap() {
-        let (name, brakes_s) = (model["model"].as_str().unwrap(), model["t_brake_s"].as_f64().unwrap());
+        let (name, brakes_s) = (model["model"].as_str().unwrap(), model["braking_s"].as_f64().unwrap());
         let marked = series.lines().find(|row| row.starts_with(name) && row.ends_with("braking")).unwrap();
         let of_series: f64 = marked.split(',').nth(1).unwrap().parse().unwrap();
         assert!((of_series - brakes_s).abs() < 1e-9, "{name}: {of_series} {brakes_s}");
@@ -487,7 +487,7 @@ fn a_leader_that_brakes_harder_later_is_reacted_to_as_early_as_one_that_does_not
     let braking = |id: &str| {
         let sheet = json(&["check", text(&file), "--scenario", id, "--gap", "12", "--profiles", "un-r157"]);
         let models = sheet["profiles"][0]["models"].as_array().unwrap().clone();
-        models.iter().find(|model| model["model"] == "CCHDM").unwrap()["t_brake_s"].as_f64().unwrap()
+        models.iter().find(|model| model["model"] == "CCHDM").unwrap()["braking_s"].as_f64().unwrap()
     };
     assert_eq!(braking("a"), braking("b"));
     assert!((braking("a") - 0.76).abs() < 1e-9, "{}", braking("a"));
@@ -504,8 +504,8 @@ fn no_driver_of_the_regulation_begins_its_delay_on_an_opening_gap() {
     let of = |name: &str| models.iter().find(|model| model["model"] == name).unwrap();
     let cchdm = of("CCHDM");
     assert_eq!(cchdm["collision"], true);
-    assert!((cchdm["t_react_s"].as_f64().unwrap() - 2.382).abs() < 0.011, "{cchdm}");
-    assert!((cchdm["t_brake_s"].as_f64().unwrap() - 3.132).abs() < 0.011, "{cchdm}");
+    assert!((cchdm["reaction_s"].as_f64().unwrap() - 2.382).abs() < 0.011, "{cchdm}");
+    assert!((cchdm["braking_s"].as_f64().unwrap() - 3.132).abs() < 0.011, "{cchdm}");
     assert_eq!(of("FSM")["collision"], true);
 }
 

@@ -151,7 +151,7 @@ fn a_recorded_motion_is_drawn_for_the_seconds_that_decide() {
     let until_s: f64 = said.split(' ').next().unwrap().parse().unwrap();
     // Every contact and braking is shown.
     let models = document["profiles"][0]["models"].as_array().unwrap();
-    let last = models.iter().flat_map(|model| [&model["t_brake_s"], &model["t_crash_s"]]).filter_map(Value::as_f64);
+    let last = models.iter().flat_map(|model| [&model["braking_s"], &model["contact_s"]]).filter_map(Value::as_f64);
     let last_s = last.fold(0.0, f64::max);
     assert!(last_s < until_s && until_s < 20.0, "{last_s} {until_s}");
     // A case of plain numbers has no recorded motion.

@@ -19,7 +19,7 @@ const RANGES: [&str; 4] = ["--range", "gap_m=5..45", "--range", "lateral_speed_m
 
 /// Results of a simulator that is ours, with a profile of its own; it has no row of the first case.
 fn results_of(dir: &Path, profile: &str, leave_out: usize) -> String {
-    let mut table = "id,collision,t_react_s,t_brake_s,min_gap_m\n".to_owned();
+    let mut table = "id,collision,reaction_s,braking_s,min_gap_m\n".to_owned();
     let cases = std::fs::read_to_string(dir.join("out/cases.csv")).unwrap();
     for (row, line) in cases.lines().skip(1).enumerate().skip(leave_out) {
         let row = (row + 1).to_string();
@@ -32,8 +32,8 @@ fn results_of(dir: &Path, profile: &str, leave_out: usize) -> String {
             "{},{},{},{},{}\n",
             line.split(',').next().unwrap(),
             model["collision"],
-            field("t_react_s"),
-            field("t_brake_s"),
+            field("reaction_s"),
+            field("braking_s"),
             field("min_gap_m")
         );
     }
@@ -88,7 +88,7 @@ fn an_error_of_a_tenth_of_a_second_in_a_delay_is_found_and_named() {
     std::fs::write(dir.join("few.csv"), same.replace(own, &few.join(","))).unwrap();
     let (code, few) = compare("few.csv");
     assert_eq!((code, &few["agreeing"], &few["cause"]), (5, &few["cases"], &Value::Null), "{few}");
-    assert!(few["cause_sentence"].as_str().unwrap().contains("t_brake_s in 1 of"), "{few}");
+    assert!(few["cause_sentence"].as_str().unwrap().contains("braking_s in 1 of"), "{few}");
     // A column of empty fields is counted, not dropped.
     let without: String = same
         .lines()
@@ -101,10 +101,10 @@ fn an_error_of_a_tenth_of_a_second_in_a_delay_is_found_and_named() {
         .collect();
     std::fs::write(dir.join("without.csv"), without).unwrap();
     let (_, found) = compare("without.csv");
-    let brakes = found["differences"].as_array().unwrap().iter().find(|of| of["quantity"] == "t_brake_s").unwrap();
+    let brakes = found["differences"].as_array().unwrap().iter().find(|of| of["quantity"] == "braking_s").unwrap();
     assert!(brakes["cases"] == 0 && brakes["only ours"].as_u64() > Some(0), "{brakes}");
     let (code, late) = compare("late.csv");
-    assert_eq!((code, &late["cause"], &late["without_result"]), (5, &"t_brake_s".into(), &1.into()), "{late}");
+    assert_eq!((code, &late["cause"], &late["without_result"]), (5, &"braking_s".into(), &1.into()), "{late}");
     let sentence = late["cause_sentence"].as_str().unwrap();
     assert!(sentence.contains("the beginning of the braking is 0.100 s later there"), "{sentence}");
     // The page has the sentence, and what identifies both tables.
@@ -129,7 +129,7 @@ fn results_without_a_case_an_id_or_a_driver_are_refused_by_name() {
         ("id,collision\na,maybe\n", "CCHDM", 3, "neither true nor false"),
         ("id,crash\na,0\n", "CCHDM", 3, "`collision`: it is missing"),
         ("id,collision,t_break_s\na,0,1\n", "CCHDM", 3, "there is no such column"),
-        ("id,collision,t_brake_s\na,0,nan\n", "CCHDM", 3, "is not finite"),
+        ("id,collision,braking_s\na,0,nan\n", "CCHDM", 3, "is not finite"),
         ("id,collision\n", "CCHDM", 3, "it has no rows"),
         ("id,collision\na,0\n", "CCHDM,FSM", 2, "one driver"),
     ] {

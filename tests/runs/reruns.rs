@@ -93,20 +93,20 @@ fn compare_with_row(dir: &Path, from: &str, row: &Row, wide: bool) {
     };
     same("min_ttc", &word("min_ttc_s"));
     same("max_btn", &word("max_btn"));
-    same("t_end", &word("t_end_s"));
-    assert_eq!(row["t_react"].is_empty(), outcome["t_react_s"].is_null(), "{key}");
+    same("t_end", &word("end_s"));
+    assert_eq!(row["t_react"].is_empty(), outcome["reaction_s"].is_null(), "{key}");
     assert_eq!(row["t_react"].is_empty(), summary.contains("reacted: never"), "{key}: {summary}");
     if !row["t_react"].is_empty() {
-        same("t_react", &word("t_react_s"));
+        same("t_react", &word("reaction_s"));
     }
     let contact = ["nothing", "side contact, closing at ", "rear-end contact, closing at "];
     let contact = contact[row["crash_type"].parse::<usize>().unwrap()];
     assert_eq!(row["crash_type"] == "0", !summary.contains("contact, closing at"), "{key}: {summary}");
     if row["crash_type"] != "0" {
         assert!(summary.contains(contact), "{key}: {summary}");
-        assert_eq!(word("crash_type"), row["crash_type"]);
+        assert_eq!(word("contact_type"), row["crash_type"]);
         same("impact_speed", &word("impact_speed_mps"));
-        same("t_crash", &word("t_crash_s"));
+        same("t_crash", &word("contact_s"));
     }
     let last = series.lines().last().unwrap();
     same("t_end", last.split(',').next().unwrap());

@@ -122,7 +122,7 @@ fn maps_traces_and_checks_print_documents() {
     assert!(lanes.len() >= 4);
     for lane in lanes {
         let outcome = &lane["outcome"];
-        assert_eq!(outcome["collision"] == Value::Bool(true), outcome["t_crash_s"].is_number(), "{lane}");
+        assert_eq!(outcome["collision"] == Value::Bool(true), outcome["contact_s"].is_number(), "{lane}");
     }
 
     let verify =

@@ -4,6 +4,7 @@ use super::{TraceFigure, TracePanels, TraceSeries, table};
 use crate::Result;
 use crate::engine::{EndReason, NO_STEP, Outcome, Trace};
 use crate::model::criterion::Criterion;
+use crate::report::lanes::outcome_json;
 use crate::report::records::{self, PROGRAM};
 use crate::run::reopen::{TracedLane, TracedLanes};
 use crate::support::readable::value;
@@ -42,13 +43,13 @@ impl TraceReport<'_> {
     /// None for a document of this program.
     pub fn json(&self) -> Result<String> {
         let outcomes = self.0.lanes.iter().map(|lane| {
-            let reference = lane.reference.as_ref().map(|reference| records::outcome(reference, lane.trace.dt_s));
+            let reference = lane.reference.as_ref().map(|reference| outcome_json(reference, lane.trace.dt_s));
             serde_json::json!({
                 "lane": lane.key,
                 "category": lane.trace.category.key(),
                 "model": lane.trace.model.name(),
                 "initial_gap_m": lane.trace.initial_gap_m,
-                "outcome": records::outcome(&lane.trace.outcome, lane.trace.dt_s),
+                "outcome": outcome_json(&lane.trace.outcome, lane.trace.dt_s),
                 "reference": reference,
             })
         });

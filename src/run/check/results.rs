@@ -28,14 +28,14 @@ fn finite(value: f64) -> Option<f64> {
 /// The quantities, a cause before its effects.
 pub const COMPARED: [Compared; 6] = [
     Compared {
-        column: "t_react_s",
+        column: "reaction_s",
         words: "the driver's first reaction",
         unit: "s",
         tolerance: 0.05,
         of: |trace| trace.step_of(StepMark::Reaction).map(|step| trace.time_s(step)),
     },
     Compared {
-        column: "t_brake_s",
+        column: "braking_s",
         words: "the beginning of the braking",
         unit: "s",
         tolerance: 0.05,
@@ -60,7 +60,7 @@ pub const COMPARED: [Compared; 6] = [
         of: |trace| finite(trace.outcome.min_ttc),
     },
     Compared {
-        column: "t_crash_s",
+        column: "contact_s",
         words: "the contact",
         unit: "s",
         tolerance: 0.05,

@@ -205,7 +205,7 @@ pub fn json_number(number: f64) -> Value {
 }
 
 /// Converts a cell to JSON.
-pub(super) fn json_value(kind: ColumnKind, cell: &Cell) -> Value {
+pub fn json_value(kind: ColumnKind, cell: &Cell) -> Value {
     match cell {
         Cell::Null => Value::Null,
         Cell::Text(text) => Value::from(text.as_ref()),
