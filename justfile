@@ -19,3 +19,7 @@ long:
 # Alarm for lanes that became slower
 bench:
     .ci/bench
+
+# The book, an example of each page and the benchmark of rare failures as static pages, in target/site
+site:
+    docs/site/build

@@ -24,12 +24,12 @@ import tempfile
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import TYPE_CHECKING
 
-import numpy as np
-
-from rare_failures import Case, Limit, cases
-
-Array = np.ndarray
+# The table and the figure need neither NumPy nor the cases.
+if TYPE_CHECKING:
+    import numpy as np
+    from rare_failures import Case, Limit
 
 
 class Counted:
@@ -38,7 +38,9 @@ class Counted:
     def __init__(self, limit: Limit) -> None:
         self.limit, self.calls = limit, 0
 
-    def __call__(self, points: object) -> Array:
+    def __call__(self, points: object) -> np.ndarray:
+        import numpy as np
+
         points = np.atleast_2d(np.asarray(points, dtype=float))
         self.calls += len(points)
         return self.limit(points)
@@ -98,6 +100,7 @@ CURRENT: Counted
 
 
 def uqpy(limit: Counted, dimensions: int, seed: int) -> Iterator[tuple[str, Run]]:
+    import numpy as np
     from UQpy.distributions import JointIndependent, Normal
     from UQpy.reliability import SubsetSimulation
     from UQpy.run_model import PythonModel, RunModel
@@ -251,6 +254,8 @@ def main(ours: Path, what: str, calls: int) -> None:
         text = figure(by_case) if what.endswith(".svg") else table(by_case, counted)
         Path(what).write_text(text, encoding="utf-8")
         return
+    from rare_failures import cases
+
     repeats = int(what)
     print("case,truth,method,repeats,calls,median_error,off_by_half,mean_over_truth,coverage,misses_second", flush=True)
     for case in cases():
