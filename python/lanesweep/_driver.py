@@ -8,6 +8,7 @@ import threading
 from collections.abc import Iterable
 from typing import Any, ClassVar
 
+import numpy as np
 import numpy.typing as npt
 
 from . import _core
@@ -104,6 +105,8 @@ def register(driver: Driver, known_as: str | None = None) -> str:
     name, attention = name_of(driver), driver.attention
     if not isinstance(name, str) or not isinstance(attention, str):
         raise TypeError(f"driver {type(driver).__name__}: `name` and `attention` are texts, not {name!r} and {attention!r}")
+    if not isinstance(driver.may_accelerate, (bool, np.bool_)):
+        raise TypeError(f"driver {name}: `may_accelerate` is True or False, not {driver.may_accelerate!r}")
     identity = f"{name}@{fingerprint(driver)}"
     if known_as not in (None, identity):
         raise _core.InputError(

@@ -122,7 +122,10 @@ class Result:
         has_file = path is not None and path.is_file()
         # Types are those of the document, unless its rows hold more than values.
         if _is_table(value) and not (has_file and any(isinstance(one, dict) for row in value for one in row.values())):
-            return frame_of_records(_json(value), _header(path) if path is not None and has_file else [])
+            header, *rows = _rows(path) if path is not None and has_file else [[]]
+            # What the file says of the data as a whole: that they are synthetic.
+            said = {name: rows[0][at] for at, name in enumerate(header) if name == "data" and rows and name not in value[0]}
+            return frame_of_records(_json([row | said for row in value]), header)
         if path is None or not has_file:
             raise KeyError(f"there is no table `{name}`; there are {', '.join(self.tables)}")
         return _read_csv(path)
@@ -201,10 +204,10 @@ def _json(records: list[dict[str, Any]]) -> str:
     return json.dumps([{key: finite(value) for key, value in record.items()} for record in records])
 
 
-def _header(path: Path) -> list[str]:
-    """Names of the columns of a CSV file."""
-    with path.open(encoding="utf-8", newline="") as file:
-        return next(csv.reader(file), [])
+def _rows(path: str | os.PathLike[str]) -> list[list[str]]:
+    """Header and rows of a CSV file."""
+    with open(path, encoding="utf-8", newline="") as file:
+        return list(csv.reader(file))
 
 
 def _typed(values: list[str]) -> list[Any]:
@@ -219,8 +222,7 @@ def _typed(values: list[str]) -> list[Any]:
 
 def _read_csv(path: str | os.PathLike[str]) -> Frame:
     """Read a CSV table that lanesweep wrote."""
-    with open(path, encoding="utf-8", newline="") as file:
-        header, *rows = csv.reader(file)
+    header, *rows = _rows(path)
     columns = {}
     for at, name in enumerate(header):
         texts = [row[at] for row in rows]

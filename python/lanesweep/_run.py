@@ -190,6 +190,13 @@ def run(function: str, arguments: Mapping[str, Any], *, default_out: str | None 
     if is_table(given.get("scenarios")):
         keep = temporary()
         given["scenarios"] = table_file(given["scenarios"], Path(keep.name) / "scenarios")
+    external = given.get("external")
+    tables = external if isinstance(external, Mapping) else {"external": external} if is_table(external) else {}
+    if tables:
+        keep = keep or temporary()
+        given["external"] = [
+            table_file(one, Path(keep.name) / str(name)) if is_table(one) else one for name, one in tables.items()
+        ]
     data = given.get("recordings")
     if function != "mine" and isinstance(data, (str, os.PathLike)) and path_of(data, "recordings").endswith(".jsonl"):
         raise _core.UsageError("`recordings`: this is a scenario file\n  help: give it as `scenarios`")

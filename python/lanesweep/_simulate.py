@@ -108,8 +108,9 @@ def simulate(
     if isinstance(cases, Mapping):
         cases = _frame_of(cases)
     elif library == "pandas" and hasattr(cases, "reset_index"):
-        # Rows are counted from 0. An index that only counts is no column.
-        counts = type(cases.index).__name__ == "RangeIndex" and cases.index.name is None
+        # Rows are counted from 0. An index that counts them as well is no column.
+        index = cases.index
+        counts = type(index).__name__ == "RangeIndex" and index.name is None and index.start == 0 and index.step == 1
         cases = cases.reset_index(drop=counts)
         if not _has_arrow(cases):
             cases = _frame_of({name: cases[name].to_numpy() for name in cases.columns})
@@ -117,18 +118,25 @@ def simulate(
         # Columns without any value have no type, and nothing to say.
         cases = cases.select([name for name, kind in cases.schema.items() if str(kind) != "Null"])
     headways = [] if thw is None else plain(thw, "thw")
-    frame, notes = _core.simulate(
-        cases,
-        category=category,
-        models=names_of(models),
-        thw=[str(one) for one in (headways if isinstance(headways, list) else [headways])],
-        profile=path_of(profile, "profile"),
-        dt=dt,
-        backend=backend,
-        device=None if device is None else str(device),
-        accept_implausible=accept_implausible,
-        on_message=on_message,
-    )
+    try:
+        frame, notes = _core.simulate(
+            cases,
+            category=category,
+            models=names_of(models),
+            thw=[str(one) for one in (headways if isinstance(headways, list) else [headways])],
+            profile=path_of(profile, "profile"),
+            dt=dt,
+            backend=backend,
+            device=None if device is None else str(device),
+            accept_implausible=accept_implausible,
+            on_message=on_message,
+        )
+    except (TypeError, ValueError) as error:
+        # Of pyarrow, where a column holds values of several types.
+        if not type(error).__module__.startswith("pyarrow"):
+            raise
+        problem = f"the table cannot be handed over: {error}"
+        raise _core.InputError(f"{problem}\n  help: give every column values of one type") from None
     for note in notes:
         warnings.warn(note, stacklevel=2)
     return frame
@@ -245,6 +253,8 @@ class LimitState(_core.LimitState):
 
     def draw(self, count: int, rng: np.random.Generator | int | None = None) -> npt.NDArray[np.float64]:
         """Draw valid points of the density, by rejection, with a generator or seed of NumPy (not the numbers of `sample`)."""
+        if count < 0:
+            raise ValueError(f"{count} points; give at least 0")
         seed = int(np.random.default_rng(rng).integers(2**63))
         return super()._draw(count, seed) if count > 0 else np.empty((0, len(self.parameters)))
 

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection
-from typing import TYPE_CHECKING, Literal
+from collections.abc import Collection, Mapping
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
@@ -79,7 +79,7 @@ def study(
     categories: Categories | None = None,
     models: Models | None = None,
     thw: Headways | None = None,
-    external: Paths | None = None,
+    external: Paths | Mapping[str, Any] | None = None,
     cross_validate: bool = False,
     published: bool = False,
     reference: bool = False,
@@ -107,9 +107,9 @@ def study(
     thw : list of float
         Time headways, s. ``"paper"``, the default: 2.0, 1.8, … 0.2, which the paper's claims need. ``"r157"``: the minimum following
         distance of UN R157, 5.2.3.3, at the ego's speed; a list may contain it. ``"observed"``: the recorded gaps.
-    external : list of paths
+    external : list of paths, or mapping of names to tables
         S' of another program: scenario files with the ids of S, whose series may have any sample rate and length; or
-        winner.json of `search`.
+        winner.json of `search`. Tables of pandas, Polars or pyarrow have a name each.
     cross_validate : bool
         Also replay scenarios by bases that have not seen them: each decomposition gets a variant, such as ``5-cv``. A basis fitted on
         the scenarios that it replays flatters itself.

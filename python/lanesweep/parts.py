@@ -66,8 +66,12 @@ def plan(function: Callable[..., Result], *args: Any, shards: int = 8, **argumen
     -------
     Plan
     """
+    if not callable(function):
+        raise TypeError(f"`function` is {function!r:.80}; give lanesweep.study or lanesweep.sample itself")
     if function.__name__ not in ("study", "sample"):
         raise ValueError(f"{function.__name__} cannot be split; study and sample can")
+    if not isinstance(shards, int):
+        raise TypeError(f"`shards` is {shards!r:.80}; give a whole number")
     if shards < 1:
         raise ValueError(f"{shards} parts; give at least 1")
     models = arguments.get("models")
@@ -126,6 +130,10 @@ def join(plan: Plan, parts: Iterable[Part], *, out: str | os.PathLike[str] | Non
                 raise InputError(f"{name} is there twice: give every part once")
             names.add(name)
             (folder / name).write_bytes(content)
+    missing = [k for k in range(plan.shards) if not any(name.startswith(f"part-{k:05}-of-") for name in names)]
+    if missing:
+        listed = ", ".join(map(str, missing))
+        raise InputError(f"{len(missing)} of {plan.shards} parts are missing: {listed}\n  help: run(plan, {missing[0]}) makes one")
     result = merge(folder)
     for name in names | {"plan.json"}:
         (folder / name).unlink(missing_ok=True)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import logging
 import os
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 import numpy as np
@@ -15,6 +16,8 @@ from ._result import Result
 from ._simulate import LimitState
 
 __all__ = ["limit_state", "run", "sample", "study"]
+
+_LOG = logging.getLogger("lanesweep")
 
 
 def run(
@@ -50,6 +53,10 @@ def run(
     -------
     Result
     """
+    if ray.available_resources().get("CPU", 0) < num_cpus:
+        _LOG.warning(
+            "fewer than %s cores of the cluster are free: parts wait for them (a limit_state keeps its cores until it is closed)", num_cpus
+        )
     task: Any = ray.remote(num_cpus=num_cpus, max_retries=max_retries, **options)(parts.run)
     shared = ray.put(plan)
     pending = [task.remote(shared, shard, backend=backend, threads=max(1, int(num_cpus))) for shard in range(plan.shards)]
@@ -70,6 +77,8 @@ def run(
 
 def _planned(function: Callable[..., Result]) -> Callable[..., Result]:
     def planned(*args: Any, shards: int = 8, out: Any = None, cluster: dict[str, Any] | None = None, **arguments: Any) -> Result:
+        if not isinstance(cluster, (Mapping, type(None))):
+            raise TypeError(f"`cluster` is {cluster!r:.80}; give options of `run`, such as {{'num_cpus': 2}}")
         plan = parts.plan(function, *args, shards=shards, **arguments)
         return run(plan, out=out, **(cluster or {}))
 
@@ -104,11 +113,9 @@ class _Evaluator:
         return self.limit_state(points)
 
 
-def limit_state(
-    *arguments: Any, workers: int = 2, num_cpus: int = 1, **options: Any
-) -> Callable[[npt.ArrayLike], npt.NDArray[np.float64]]:
-    """Open a `LimitState` in several workers: every call is one batch of tasks, so that an adaptive estimator makes one
-    batch per round. A lost worker is started again.
+class limit_state:
+    """A `LimitState` in several workers: every call is one batch of tasks, so that an adaptive estimator makes one
+    batch per round. A lost worker is started again. The workers keep their cores until `close`, or the end of a ``with`` block.
 
     Parameters
     ----------
@@ -118,17 +125,28 @@ def limit_state(
         Number of workers.
     num_cpus : int
         Cores of a worker.
-
-    Returns
-    -------
-    callable
-        Takes an array of shape (n, d), returns n values.
     """
-    actor: Any = ray.remote(num_cpus=num_cpus, max_restarts=-1, max_task_retries=3)(_Evaluator)
-    actors = [actor.remote(arguments, options) for _ in range(workers)]
 
-    def values(points: npt.ArrayLike) -> npt.NDArray[np.float64]:
-        batches = np.array_split(np.ascontiguousarray(points, dtype=np.float64), workers)
-        return np.concatenate(ray.get([a.values.remote(batch) for a, batch in zip(actors, batches, strict=True) if len(batch)]))
+    def __init__(self, *arguments: Any, workers: int = 2, num_cpus: int = 1, **options: Any) -> None:
+        actor: Any = ray.remote(num_cpus=num_cpus, max_restarts=-1, max_task_retries=3)(_Evaluator)
+        self._actors = [actor.remote(arguments, options) for _ in range(workers)]
 
-    return values
+    def __call__(self, points: npt.ArrayLike) -> npt.NDArray[np.float64]:
+        """Return the n values of an array of shape (n, d)."""
+        if not self._actors:
+            raise ValueError("the limit state is closed")
+        batches = np.array_split(np.ascontiguousarray(points, dtype=np.float64), len(self._actors))
+        pairs = zip(self._actors, batches, strict=True)
+        return np.concatenate(ray.get([actor.values.remote(batch) for actor, batch in pairs if len(batch)]))
+
+    def close(self) -> None:
+        """End the workers and free their cores."""
+        actors, self._actors = self._actors, []
+        for actor in actors:
+            ray.kill(actor)
+
+    def __enter__(self) -> limit_state:
+        return self
+
+    def __exit__(self, *error: object) -> None:
+        self.close()

@@ -15,9 +15,10 @@ use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::report::lanes::{case_columns, case_row};
 use lanesweep::run::cases::Cases;
-use lanesweep::scenario::{CaseParameters, NamedNumber, Written};
+use lanesweep::scenario::{CaseParameters, Category, NamedNumber, Written};
 use lanesweep::support::plain_text::nearest;
 use lanesweep::support::plausibility::Implausible;
+use lanesweep::support::readable::counted;
 use lanesweep::support::table::ArrowRows;
 use lanesweep::{Error, Place, Result};
 use pyo3::prelude::*;
@@ -106,6 +107,30 @@ impl Carried {
     }
 }
 
+/// What a table of cases may say elsewhere and all rows share here.
+fn elsewhere(name: &str) -> Option<&'static str> {
+    match name {
+        "models" => Some("give the argument `models`, which holds for all rows"),
+        "rate_hz" => Some("leave it out: rows run exactly, without samples"),
+        _ => None,
+    }
+}
+
+/// A note on columns of numbers that are repeated although they look like quantities of a case.
+fn looks_like_a_quantity(name: &str, array: &dyn Array) -> Option<String> {
+    const WORDS: [&str; 8] = ["speed", "gap", "accel", "decel", "headway", "lateral", "length", "width"];
+    const UNITS: [&str; 4] = ["kmh", "mps", "mps2", "thw"];
+    let name_lower = name.to_lowercase();
+    let looks =
+        WORDS.iter().any(|word| name_lower.contains(word)) || name_lower.split('_').any(|part| UNITS.contains(&part));
+    (looks && array.data_type().is_numeric()).then(|| {
+        format!(
+            "column `{name}` is repeated and not used: no quantity of a case has this name (the others are `{}`)",
+            NamedNumber::names().join("`, `")
+        )
+    })
+}
+
 /// The columns of a batch that say nothing of a case: its id, and others.
 fn carried(batch: &RecordBatch, outcome: &Schema) -> Result<Vec<(String, Carried)>> {
     let is_own = |name: &str| name == "category" || matches!(NamedNumber::find(name), Err(_) | Ok(Some(_)));
@@ -119,6 +144,9 @@ fn carried(batch: &RecordBatch, outcome: &Schema) -> Result<Vec<(String, Carried
                 "the result has a column of this name".to_owned(),
                 "rename it, or leave it out",
             ));
+        }
+        if let Some(help) = elsewhere(name) {
+            return Err(of_column(name, "a row cannot choose it here".to_owned(), help));
         }
         let known = NamedNumber::names();
         if name != "id"
@@ -210,16 +238,12 @@ fn rows_of(
     Ok(rows)
 }
 
-/// A note on rows without a speed in a table that has speeds: the ego's is taken.
-fn missing_speed(rows: &[CaseParameters], first_row: u64) -> Option<String> {
-    let missing = rows.iter().filter(|row| row.speed.is_none()).count();
-    let first = rows.iter().position(|row| row.speed.is_none())?;
-    (missing < rows.len()).then(|| {
-        format!(
-            "column `speed`: {missing} rows, the first of them row {}, have no value: the ego's speed is used",
-            first_row + first as u64
-        )
-    })
+/// The rows without a speed, in a table that has speeds or of cut-ins: the ego's is taken.
+fn without_speed(rows: &[CaseParameters]) -> impl Iterator<Item = usize> + '_ {
+    let has_speeds = rows.iter().any(|row| row.speed.is_some());
+    let is_cut_in = |row: &CaseParameters| row.category.as_deref().and_then(Category::parse) == Some(Category::CutIn);
+    let is_doubtful = move |row: &CaseParameters| row.speed.is_none() && (has_speeds || is_cut_in(row));
+    rows.iter().enumerate().filter(move |(_, row)| is_doubtful(row)).map(|(at, _)| at)
 }
 
 /// What all cases share.
@@ -318,13 +342,21 @@ pub fn simulate(
             let outcome = rows.schema();
             let mut schema = outcome.clone();
             let (mut frames, mut notes, mut first_row, mut ids) = (Vec::new(), Vec::new(), 0, HashMap::new());
+            let mut speedless: Option<(u64, usize)> = None;
             let pieces = batches.iter().flat_map(|batch| {
                 (0..batch.num_rows().div_ceil(CASES))
                     .map(|k| batch.slice(k * CASES, CASES.min(batch.num_rows() - k * CASES)))
             });
             for piece in pieces {
                 let of_piece = rows_of(&piece, options.category.as_deref(), first_row, &mut ids)?;
-                notes.extend(missing_speed(&of_piece, first_row));
+                for at in without_speed(&of_piece) {
+                    speedless.get_or_insert((first_row + at as u64, 0)).1 += 1;
+                }
+                if first_row == 0 {
+                    let columns = piece.schema_ref().fields().iter().zip(piece.columns());
+                    let own = columns.filter(|(field, _)| matches!(NamedNumber::find(field.name()), Ok(None)));
+                    notes.extend(own.filter_map(|(field, array)| looks_like_a_quantity(field.name(), array.as_ref())));
+                }
                 notes.extend(run(of_piece, first_row, &options, &mut rows)?);
                 first_row += piece.num_rows() as u64;
                 let batch = rows.batch()?;
@@ -339,6 +371,12 @@ pub fn simulate(
                 let joined = RecordBatch::try_new(schema.clone(), columns);
                 frames.push(joined.map_err(|error| Error::Internal(format!("a table: {error}")))?);
             }
+            notes.extend(speedless.map(|(first, missing)| {
+                let rows = counted(missing, "row");
+                format!(
+                    "column `speed`: {rows} without a value, the first of them row {first}: the ego's speed is used"
+                )
+            }));
             if first_row == 0 {
                 return Err(Error::input(Place::item("cases"), "the table has no rows", "give at least one case"));
             }

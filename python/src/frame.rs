@@ -15,7 +15,7 @@ use lanesweep::support::table::{ArrowRows, Cell, Column, ColumnKind};
 use numpy::{PyArray1, PyReadonlyArray1};
 use pyo3::exceptions::{PyKeyError, PyTypeError};
 use pyo3::prelude::*;
-use pyo3::types::{PyBytes, PyCapsule, PyDict, PyFloat, PyIterator, PyList, PyString};
+use pyo3::types::{IntoPyDict, PyBytes, PyCapsule, PyDict, PyFloat, PyIterator, PyList, PyString};
 use serde_json::Value;
 
 use crate::error::{InternalError, exception, input_error};
@@ -50,14 +50,14 @@ impl Frame {
 
     /// Unit of every column that has one.
     #[getter]
-    fn units(&self) -> HashMap<String, String> {
-        self.metadata("unit")
+    fn units<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        self.metadata("unit").into_py_dict(py)
     }
 
     /// One sentence per column that has one.
     #[getter]
-    fn descriptions(&self) -> HashMap<String, String> {
-        self.metadata("description")
+    fn descriptions<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        self.metadata("description").into_py_dict(py)
     }
 
     /// The Arrow C stream of the table.
@@ -164,7 +164,7 @@ impl Frame {
         const SHOWN: usize = 20;
         let escape = |text: &str| text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;");
         let mut html = String::from("<table><thead><tr>");
-        let descriptions = self.descriptions();
+        let descriptions: HashMap<String, String> = self.metadata("description").into_iter().collect();
         for name in self.columns() {
             let title = descriptions.get(&name).map_or("", |text| text.as_str());
             html += &format!("<th title=\"{}\">{}</th>", escape(title), escape(&name));
@@ -213,7 +213,8 @@ impl Frame {
         self.schema.index_of(name).map_err(|_| PyKeyError::new_err(unknown()))
     }
 
-    fn metadata(&self, key: &str) -> HashMap<String, String> {
+    /// What the columns say under a key, in their order.
+    fn metadata(&self, key: &str) -> Vec<(String, String)> {
         let of = |field: &Arc<arrow_schema::Field>| {
             let text = field.metadata().get(key).filter(|text| !text.is_empty())?;
             Some((field.name().clone(), text.clone()))

@@ -7,6 +7,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+import lanesweep
+import pandas as pd
+
 EXAMPLES = Path(__file__).parents[1] / "examples"
 
 
@@ -18,3 +21,13 @@ def test_an_autoencoder_goes_through_external_s_prime(scenarios: Path, tmp_path:
         rows = {row["variant"]: row for row in csv.DictReader(lines)}
     assert {"iii", "iii-cv", "autoencoder-3"} <= rows.keys()
     assert 0 < float(rows["autoencoder-3"]["RMSE"]) < 1
+
+
+def test_tables_are_external_s_prime_by_their_names(scenarios: Path, tmp_path: Path) -> None:
+    lanesweep.mine(scenarios.parent / "recordings", out=tmp_path / "scenarios.parquet")
+    frame = pd.read_parquet(tmp_path / "scenarios.parquet")
+    options = {"scenarios": scenarios, "categories": "lvd", "models": "FSM", "thw": 0.6}
+    study = lanesweep.study(external={"same": frame}, **options)
+    found = study.table("f1").to_pandas()
+    assert "same" in set(found["parameterization"]) and (found["data"] == "synthetic").all()
+    assert "external" in set(lanesweep.study(external=frame, **options).table("f1").to_pandas()["parameterization"])

@@ -82,3 +82,13 @@ def test_missing_parts_and_verbs_that_cannot_be_split_are_errors(density) -> Non
         parts.plan(lanesweep.check)
     with pytest.raises(lanesweep.UsageError):
         parts.run(plan, 3)
+
+
+def test_a_missing_part_is_named_and_wrong_arguments_are_refused(density) -> None:
+    plan = parts.plan(lanesweep.sample, density, samples=600, thw=1.2, shards=3)
+    with pytest.raises(lanesweep.InputError, match=r"1 of 3 parts are missing: 1\n  help: run\(plan, 1\)"):
+        parts.join(plan, [parts.run(plan, 0), parts.run(plan, 2)])
+    with pytest.raises(TypeError, match="lanesweep.sample itself"):
+        parts.plan("sample", density)  # type: ignore[arg-type]
+    with pytest.raises(TypeError, match="whole number"):
+        parts.plan(lanesweep.sample, density, shards=2.0)  # type: ignore[arg-type]

@@ -53,11 +53,20 @@ def test_a_run_on_ray_whose_worker_is_killed_has_the_bytes_of_the_whole(density)
     assert contents(result, FILES) == contents(whole, FILES)
 
 
-def test_a_limit_state_on_ray_is_the_limit_state(density) -> None:
+def test_a_limit_state_on_ray_is_the_limit_state(density, caplog) -> None:
     here = lanesweep.LimitState(density, model="FSM", criterion="ttc", thw=0.6)
     there = on_ray.limit_state(str(density), model="FSM", criterion="ttc", thw=0.6, workers=2)
     points = here.draw(301)
     assert (there(points) == here(points)).all()
+    # Its workers hold both cores: a run says why it waits.
+    threading.Timer(2, there.close).start()
+    with caplog.at_level("WARNING", logger="lanesweep"):
+        on_ray.sample(density, samples=200, thw=1.2, shards=2)
+    assert "keeps its cores until it is closed" in caplog.text
+    with pytest.raises(ValueError, match="closed"):
+        there(points)
+    with pytest.raises(TypeError, match="dictionary|options of `run`"):
+        on_ray.sample(density, samples=200, thw=1.2, shards=2, cluster=4)
 
 
 def test_an_exception_of_a_task_reaches_the_caller(density) -> None:

@@ -249,3 +249,31 @@ def test_an_empty_list_is_refused_and_never_everything() -> None:
     for thw in (object(), [None], {"a": object()}, [[1.0]]):
         with pytest.raises(TypeError, match="`thw`"):
             lanesweep.simulate(case, category="cut-in", thw=thw)
+
+
+def test_a_quantity_under_another_name_is_a_warning_and_what_a_row_cannot_choose_is_refused() -> None:
+    without = {key: values for key, values in CASES.items() if not key.startswith("speed")}
+    speeds = np.array([20.0, 20.0, 20.0])
+    for name in ("target_speed_kmh", "speedkmh", "relative_speed_mps", "v_target_mps"):
+        with pytest.warns(UserWarning) as said:
+            lanesweep.simulate({**without, name: speeds}, category="cut-in", models="FSM")
+        texts = [str(one.message) for one in said]
+        assert any(f"`{name}` is repeated and not used" in text for text in texts), texts
+        assert any("column `speed`: 3 rows without a value" in text for text in texts), texts
+    for name in ("models", "rate_hz"):
+        with pytest.raises(lanesweep.InputError, match=f"{name}.*\n? *a row cannot choose it"):
+            lanesweep.simulate(pd.DataFrame(CASES).assign(**{name: "FSM"}), category="cut-in")
+    with pytest.raises(lanesweep.InputError, match="values of one type"):
+        lanesweep.simulate(pd.DataFrame(CASES).assign(site=["a", 1, None]), category="cut-in")
+
+
+def test_an_index_of_some_rows_is_repeated() -> None:
+    frame = pd.DataFrame(CASES)
+    assert lanesweep.simulate(frame.iloc[1:], category="cut-in", models="FSM")["index"].tolist() == [1, 2]
+    assert lanesweep.simulate(frame.iloc[::2], category="cut-in", models="FSM")["index"].tolist() == [0, 2]
+
+
+def test_units_and_descriptions_stand_in_the_order_of_the_columns() -> None:
+    frame = lanesweep.simulate(CASES, category="cut-in", models="FSM")
+    for texts in (frame.units, frame.descriptions):
+        assert list(texts) == [name for name in frame.columns if name in texts]

@@ -198,7 +198,9 @@ impl SampleReport {
         }
         let (low, high) = few.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), few| (low.min(*few), high.max(*few)));
         if !few.is_empty() {
-            let (low, high) = (format!("{low:.1}"), format!("{high:.1}"));
+            // Rounded down: 9.96 scenarios are fewer than 10.
+            let (low, high) =
+                (format!("{:.1}", (low * 10.0).floor() / 10.0), format!("{:.1}", (high * 10.0).floor() / 10.0));
             let range = if low == high { low } else { format!("{low} to {high}") };
             remarks.push((
                 counted(few.len(), "row"),

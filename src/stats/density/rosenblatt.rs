@@ -44,14 +44,18 @@ impl Mixture {
 fn quantile(parts: &[[f64; 3]], u: f64) -> f64 {
     let total: f64 = parts.iter().map(|[weight, ..]| weight).sum();
     let side = if u > 0.0 { -1.0 } else { 1.0 };
-    let wanted = libm::log(normal_cdf(side * u));
-    let kept = || parts.iter().filter(|[weight, ..]| *weight > 0.0);
-    let ends = kept().map(|[_, mean, deviation]| mean + u * deviation);
+    let tail_of_u = normal_cdf(side * u);
+    let wanted = libm::log(tail_of_u);
+    // What all others together add to the tail is less than its rounding.
+    let negligible = 0.25 * f64::EPSILON * tail_of_u * total / parts.len() as f64;
+    let kept: Vec<&[f64; 3]> = parts.iter().filter(|[weight, ..]| *weight > negligible).collect();
+    let ends = kept.iter().map(|[_, mean, deviation]| mean + u * deviation);
     let (mut low, mut high) = ends.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), x| (a.min(x), b.max(x)));
+    let narrowest = kept.iter().map(|[.., deviation]| *deviation).fold(f64::INFINITY, f64::min);
     let mut x = 0.5 * (low + high);
     for _ in 0..STEPS {
         let (mut tail, mut slope) = (0.0, 0.0);
-        for [weight, mean, deviation] in kept() {
+        for &&[weight, mean, deviation] in &kept {
             let z = (x - mean) / deviation;
             tail += weight * normal_cdf(side * z);
             slope += weight * libm::exp(-0.5 * z * z) / deviation;
@@ -68,11 +72,12 @@ fn quantile(parts: &[[f64; 3]], u: f64) -> f64 {
         }
         let derivative = side * slope / ((2.0 * std::f64::consts::PI).sqrt() * tail);
         let next = x - off / derivative;
-        let next = if next > low && next < high { next } else { 0.5 * (low + high) };
-        if (next - x).abs() <= 2.0 * f64::EPSILON * x.abs() {
+        let is_inside = next > low && next < high;
+        // Newton's steps square the error: what is left after a step this small is below the rounding.
+        if is_inside && (next - x).abs() <= 1e-9 * narrowest {
             return next;
         }
-        x = next;
+        x = if is_inside { next } else { 0.5 * (low + high) };
     }
     x
 }
