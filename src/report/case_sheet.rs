@@ -3,7 +3,7 @@
 
 use serde_json::{Value, json};
 
-use super::case_identity::{self, CaseIdentity, NOT_CONSIDERED, assumptions_json};
+use super::case_identity::{self, CaseIdentity, NOT_CONSIDERED};
 use super::html::{Page, PageFigure, Section};
 use super::lanes::outcome_json;
 use super::records::{self, PROGRAM};
@@ -284,7 +284,7 @@ impl CaseSheet<'_> {
             "uncertainty": self.uncertainty.map(|of| self.uncertainty_record(of)),
             "cautions": self.cautions(),
             "profiles": self.judgements.iter().zip(self.profiles).map(judgement).collect::<Vec<_>>(),
-            "assumptions": assumptions_json(&self.profiles[0]),
+            "assumptions": self.profiles[0].assumptions(),
             "not_considered": NOT_CONSIDERED.map(|(what, how)| format!("{what}: {how}")),
         }))
     }
