@@ -1,11 +1,13 @@
 //! The tables of a sampling run as CSV: numbers in full precision, empty where undefined. Also the sentences that
 //! explain them on the terminal and the page.
 
+use serde::Serialize;
+
 use super::records::{at_contact, smallest_gap_m};
 use super::sampling::{SampleReport, short};
 use crate::model::criterion::Criterion;
 use crate::run::sampling::{Checkpoint, EstimateRow, ModelRatio, ProfileRatios, RiskRate, Uncertainty, WorstLane};
-use crate::stats::estimate::{IntervalKind, Ratio, RatioMethod, RatioVerdict, Warning, WeightFigures};
+use crate::stats::estimate::{Ratio, RatioMethod, RatioVerdict, Warning, WeightFigures};
 use crate::support::readable::{counted, significant, value};
 use crate::support::table::{NamedValue, Table, TableOf};
 
@@ -45,7 +47,7 @@ impl SampleReport {
             .column("low", |row| known(row.estimate.interval.low))
             .column("high", |row| known(row.estimate.interval.high))
             .column("level", |row| known(row.estimate.interval.level))
-            .column("interval", |row| kind_name(row.estimate.interval.kind))
+            .column("interval", |row| word(row.estimate.interval.kind))
             .column("draws_low", |row| known(row.draws[0]))
             .column("draws_high", |row| known(row.draws[1]))
             .column("failing_scenarios", |row| row.failing_scenarios.and_then(known))
@@ -160,16 +162,9 @@ fn known(value: f64) -> Option<f64> {
     Some(value).filter(|v| !v.is_nan())
 }
 
-fn kind_name(kind: IntervalKind) -> &'static str {
-    match kind {
-        IntervalKind::Wilson => "wilson",
-        IntervalKind::ClopperPearson => "clopper_pearson",
-        IntervalKind::RuleOfThree => "rule_of_three",
-        IntervalKind::LogStudent => "log_student",
-        IntervalKind::Gamma => "gamma",
-        IntervalKind::Clusters => "clusters",
-        IntervalKind::Nothing => "nothing",
-    }
+/// The word of a choice, as records have it.
+pub(super) fn word(choice: impl Serialize) -> Option<String> {
+    serde_json::to_value(choice).ok()?.as_str().map(str::to_owned)
 }
 
 impl SampleReport {

@@ -169,11 +169,8 @@ settings! {
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum EstimatorKind {
     #[default]
-    #[allow(missing_docs)]
     Auto,
-    #[allow(missing_docs)]
     Mc,
-    #[allow(missing_docs)]
     Is,
 }
 
@@ -182,9 +179,7 @@ pub(crate) enum EstimatorKind {
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum IntervalKind {
     #[default]
-    #[allow(missing_docs)]
     Wilson,
-    #[allow(missing_docs)]
     ClopperPearson,
 }
 
