@@ -6,7 +6,6 @@ use clap::Args;
 
 use super::arguments::from_arguments;
 use super::case_flags::{CaseFlags, GivenCase, from_table, from_toml};
-use super::check_results::ComparedTable;
 use super::check_table::CheckedTable;
 use super::configured::Configured;
 use super::format::FormatFlag;
@@ -133,22 +132,7 @@ impl Check {
         let mut profiles = names.iter().map(|name| Profile::load(name.trim())).collect::<Result<Vec<_>>>()?;
         let models = self.case.named_models()?.unwrap_or_else(|| ModelId::ALL.to_vec());
         if let Some(path) = self.whole_table()? {
-            if let Some(results) = &self.results {
-                let compared = ComparedTable {
-                    path,
-                    results,
-                    profile: &profiles[0],
-                    models: &models,
-                    case: &self.case,
-                    implausible: self.plausibility.policy(),
-                    rows: self.rows.as_deref(),
-                    page: self.sheet.as_deref(),
-                    command: &configured.command,
-                    identity: self.identity()?,
-                };
-                return compared.run(self.format);
-            }
-            let batch = CheckedTable {
+            let table = CheckedTable {
                 path,
                 profile: &profiles[0],
                 models: &models,
@@ -160,7 +144,10 @@ impl Check {
                 sheets: self.sheets.as_deref(),
                 identity: self.identity()?,
             };
-            return batch.run(configured, self.format);
+            return match &self.results {
+                Some(results) => table.compare(results, configured, self.format),
+                None => table.run(configured, self.format),
+            };
         }
         self.refuse_of_tables()?;
         let request = self.request(&profiles[0])?;

@@ -3,39 +3,24 @@
 use std::collections::HashMap;
 use std::path::Path;
 
-use super::case_flags::{CaseFlags, all_cases};
+use super::case_flags::all_cases;
 use super::check::write;
+use super::check_table::CheckedTable;
+use super::configured::Configured;
 use super::console;
 use super::format::FormatFlag;
 use super::{Exit, Output};
-use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::report::case_identity::CaseIdentity;
 use crate::report::result_comparison::{ResultReport, columns};
 use crate::run::check::{COMPARED, ResultComparison, Subject, TheirResult};
 use crate::support::files::make_folder_of;
 use crate::support::input_file;
-use crate::support::plausibility::{Doubts, Implausible};
+use crate::support::plausibility::Doubts;
 use crate::support::table::{Row, TableFormat, TableMetadata, TableReader};
 use crate::{Error, Place, Result};
 
-/// A table of cases with another simulator's results.
-pub(super) struct ComparedTable<'a> {
-    pub path: &'a Path,
-    pub results: &'a Path,
-    pub profile: &'a Profile,
-    pub models: &'a [ModelId],
-    pub case: &'a CaseFlags,
-    pub implausible: Implausible,
-    pub rows: Option<&'a Path>,
-    pub page: Option<&'a Path>,
-    pub command: &'a str,
-    pub identity: CaseIdentity,
-}
-
-impl ComparedTable<'_> {
-    /// Compares every case that has a result.
-    pub(super) fn run(&self, format: FormatFlag) -> Result<Output> {
+impl CheckedTable<'_> {
+    /// Compares every case that has a result of another simulator in the table `theirs`.
+    pub(super) fn compare(&self, theirs: &Path, configured: &Configured, format: FormatFlag) -> Result<Output> {
         let [model] = self.models else {
             let problem = "results are those of one driver";
             return Err(Error::usage(Place::item("--results"), problem, "name it: --models CCHDM"));
@@ -52,15 +37,15 @@ impl ComparedTable<'_> {
             subjects.push((id, subject));
         }
         doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));
-        let (given, results) = results(self.results)?;
+        let (given, results) = results(theirs)?;
         let mut by_id: HashMap<&str, &Subject> = subjects.iter().map(|(id, of)| (id.as_str(), of)).collect();
-        let pairs = results.iter().map(|(place, theirs)| {
+        let pairs = results.iter().map(|(place, their)| {
             let unknown = || {
                 let problem =
-                    format!("`{}` is the id of no case of {}, or of two results", theirs.id, self.path.display());
+                    format!("`{}` is the id of no case of {}, or of two results", their.id, self.path.display());
                 Error::input(place.clone().column("id"), problem, "give one result per case, with the case's id")
             };
-            Ok((by_id.remove(theirs.id.as_str()).ok_or_else(unknown)?, theirs))
+            Ok((by_id.remove(their.id.as_str()).ok_or_else(unknown)?, their))
         });
         let pairs: Vec<(&Subject, &TheirResult)> = pairs.collect::<Result<_>>()?;
         let comparison = ResultComparison::new(&pairs, given, self.profile, *model)?;
@@ -68,10 +53,10 @@ impl ComparedTable<'_> {
             comparison: &comparison,
             profile: self.profile,
             origin: self.path.display().to_string(),
-            theirs: self.results.display().to_string(),
-            theirs_sha256: input_file::sha256(self.results)?,
+            theirs: theirs.display().to_string(),
+            theirs_sha256: input_file::sha256(theirs)?,
             missing: by_id.len(),
-            command: self.command,
+            command: &configured.command,
             identity: &self.identity,
         };
         if let Some(path) = self.page {

@@ -31,8 +31,7 @@ impl FromArguments for Cluster {
 
 impl Cluster {
     pub(super) fn run(&self) -> Result<Output> {
-        match &self.verb {
-            ClusterVerb::Merge(verb) => verb.run(),
-        }
+        let ClusterVerb::Merge(verb) = &self.verb;
+        verb.run()
     }
 }

@@ -12,9 +12,7 @@ use super::source::SourceFlags;
 use super::{Exit, Output, lists};
 use crate::report::compare::CompareReport;
 use crate::run::compare::{self, CompareOptions, CompareResult};
-use crate::run::study::StudyOptions;
 use crate::stats::density::DensityKind;
-use crate::stats::estimate::Enough;
 use crate::support::files::check_folder;
 use crate::support::readable::count;
 use crate::support::run_folder::{COMPARE_RECORD, RunFolder};
@@ -75,22 +73,7 @@ impl Compare {
         let opened = configured.open()?;
         let (collection, facts) = self.data.load_with_exposure(configured, typed)?;
 
-        let options = CompareOptions {
-            study: StudyOptions {
-                categories,
-                models,
-                headways,
-                parameterization: config.of_densities(),
-                folds: None,
-                searched: ids.iter().filter(|id| id.fitted_basis().is_some()).cloned().collect(),
-                external: Vec::new(),
-            },
-            parameterizations: ids,
-            samples: config.compare.samples,
-            every_form: self.forms,
-            seed: config.compare.seed,
-            enough: Enough { clusters: config.score.min_failures.into(), margin: config.compare.margin },
-        };
+        let options = CompareOptions { every_form: self.forms, ..config.comparison(categories, models, headways, ids) };
         let compare = compare::Compare::plan(&collection.scenarios, &facts, profile, options)?;
         let plan = compare.lane_plan();
         let folder = RunFolder::open(&self.out, COMPARE_RECORD)?;

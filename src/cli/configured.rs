@@ -111,10 +111,7 @@ fn flags_of(verb: &str) -> impl Iterator<Item = KeyFlag> {
 
 /// Adds the flags that set keys.
 fn with_flags(mut command: Command, keys: &[Key]) -> Command {
-    let names: Vec<String> = command.get_subcommands().map(|verb| verb.get_name().to_owned()).collect();
-    for name in names {
-        command = command.mut_subcommand(name, |command| with_flags(command, keys));
-    }
+    command = command.mut_subcommands(|verb| with_flags(verb, keys));
     let has = |id: &str| command.get_arguments().any(|arg| arg.get_id() == id);
     let (has_plan, has_data) = (has("plan"), has("scenarios"));
     let verb = command.get_name().to_owned();
@@ -193,16 +190,12 @@ fn is_of_plan(key: &str) -> bool {
 
 /// Adds `--config` at each level separately: clap drops a global flag's values before the verb if it also occurs after
 /// the verb.
-fn with_config(mut command: Command) -> Command {
-    let names: Vec<String> = command.get_subcommands().map(|verb| verb.get_name().to_owned()).collect();
-    for name in names {
-        command = command.mut_subcommand(name, with_config);
-    }
+fn with_config(command: Command) -> Command {
     let help = "Configuration file, or one key of it; repeatable";
     let more = "`lanesweep config init` writes such a file. Without --config, LANESWEEP_CONFIG names it.";
     let arg =
         Arg::new("config").long("config").value_name("FILE|KEY=VALUE").action(ArgAction::Append).help_heading(RUN);
-    command.arg(arg.help(help).long_help(format!("{help}\n\n{more}")))
+    command.mut_subcommands(with_config).arg(arg.help(help).long_help(format!("{help}\n\n{more}")))
 }
 
 impl Configured {

@@ -38,9 +38,8 @@ enum Format {
 
 impl Export {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
-        match &self.format {
-            Format::Xosc(xosc) => xosc.run(configured),
-        }
+        let Format::Xosc(xosc) = &self.format;
+        xosc.run(configured)
     }
 }
 

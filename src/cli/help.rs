@@ -51,12 +51,8 @@ fn root_flags() -> String {
 
 /// Sorts the flags of a verb and its subverbs by their headings.
 fn with_groups(mut command: Command) -> Command {
-    let names: Vec<String> = command.get_subcommands().map(|verb| verb.get_name().to_owned()).collect();
-    for name in names {
-        command = command.mut_subcommand(&name, with_groups);
-    }
     let help = Arg::new("help").short('h').long("help").action(ArgAction::Help).help("Print help; --help has more");
-    command = command.disable_help_flag(true).arg(help.help_heading(RUN));
+    command = command.mut_subcommands(with_groups).disable_help_flag(true).arg(help.help_heading(RUN));
     for heading in HEADINGS {
         let ids = |is_seldom: bool| {
             let of_heading = command.get_arguments().filter(|arg| arg.get_help_heading() == Some(heading));

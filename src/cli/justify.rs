@@ -13,13 +13,10 @@ use super::{Exit, Output, lists};
 use crate::model::driver::ModelId;
 use crate::report::dossier::DossierReport;
 use crate::report::dossier_changes::DossierFile;
-use crate::run::compare::CompareOptions;
 use crate::run::justify::{Conclusion, JustifyOptions, justify};
-use crate::run::study::StudyOptions;
 use crate::scenario::Category;
 use crate::scenario::Driven;
 use crate::scenario::parameterization::Parameterization;
-use crate::stats::estimate::Enough;
 use crate::support::files::check_folder;
 use crate::support::run_folder::{DOSSIER_RECORD, RunFolder};
 use crate::{Error, Place, Result};
@@ -97,27 +94,9 @@ impl Justify {
         let opened = configured.open()?;
         let collection = self.data.report_and_load(configured)?;
         let facts = self.data.source(configured).provenance(&collection, Driven { hours: None, kilometres: None })?;
-        let options = JustifyOptions {
-            compare: CompareOptions {
-                study: StudyOptions {
-                    categories: vec![id.category],
-                    models: vec![model],
-                    headways,
-                    parameterization: config.of_densities(),
-                    folds: Some(config.search.folds),
-                    searched: id.fitted_basis().map(|_| id.clone()).into_iter().collect(),
-                    external: Vec::new(),
-                },
-                parameterizations: vec![id],
-                samples: config.compare.samples,
-                every_form: false,
-                seed: config.compare.seed,
-                enough: Enough { clusters: config.score.min_failures.into(), margin: config.compare.margin },
-            },
-            criterion,
-            score: config.score.clone(),
-            rules: config.justify.clone(),
-        };
+        let mut compare = config.comparison(vec![id.category], vec![model], headways, vec![id]);
+        compare.study.folds = Some(config.search.folds);
+        let options = JustifyOptions { compare, criterion, score: config.score.clone(), rules: config.justify.clone() };
         let folder = RunFolder::open(&self.out, DOSSIER_RECORD)?;
         let executor = opened.executor().with_recheck(config.compare.seed);
         let dossier = justify(&collection.scenarios, &facts, &profile, &options, &executor)?;

@@ -122,10 +122,7 @@ fn after_long_help() -> String {
 
 impl Map {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
-        let category = Category::parse(&self.category).ok_or_else(|| {
-            let problem = format!("there is no category `{}`", self.category);
-            Error::usage(Place::item("CATEGORY"), problem, "use cut-in, cut-out or lvd")
-        })?;
+        let category = Category::named(&self.category, Place::item("CATEGORY"))?;
         let criterion = self.criterion.get()?;
         let profile = self.profile(configured)?;
         let options = MapOptions {

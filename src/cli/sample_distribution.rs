@@ -43,11 +43,7 @@ pub(super) fn run(flags: &Sample, configured: &Configured, path: &Path) -> Resul
             help,
         ));
     }
-    let name = flags.category.as_deref().unwrap_or_default();
-    let category = Category::parse(name).ok_or_else(|| {
-        let problem = format!("there is no category `{name}`");
-        Error::usage(Place::item("--category"), problem, "use cut-in, cut-out or lvd")
-    })?;
+    let category = Category::named(flags.category.as_deref().unwrap_or_default(), Place::item("--category"))?;
     let sampled = SampledFile::read(path, category, &flags.rename, &flags.set)?;
     let samples = sampled.samples()?;
     samples.ignored_texts.iter().for_each(|ignored| tracing::warn!("{ignored}"));

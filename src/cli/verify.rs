@@ -61,9 +61,8 @@ const MAX_LANES: u64 = 100_000_000;
 
 impl Verify {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
-        match &self.verb {
-            Some(VerifyVerb::Devices(verb)) => return verb.run(),
-            None => (),
+        if let Some(VerifyVerb::Devices(verb)) = &self.verb {
+            return verb.run();
         }
         for (flag, value, max) in [
             ("--random-lanes", self.random_lanes, MAX_LANES),

@@ -1,7 +1,7 @@
 //! The assumptions of a profile: every constant and option with its meaning and the source of its value, from
 //! `configs/constants.toml`. A source belongs to a value: a changed one has none.
 
-use serde::Deserialize;
+use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
 use crate::Place;
@@ -23,7 +23,7 @@ pub struct Constant {
 }
 
 /// A constant or option of a profile.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Assumption {
     /// Key: `cchdm.delay_s`.
     pub key: String,

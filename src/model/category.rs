@@ -2,6 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
+use crate::{Error, Place, Result};
+
 /// The three kinds of scenario of UN R157, Annex 3.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -40,5 +42,14 @@ impl Category {
     pub fn parse(text: &str) -> Option<Category> {
         let folded = text.to_ascii_lowercase().replace('-', "_");
         Category::ALL.into_iter().find(|c| c.key() == folded)
+    }
+
+    /// Parses the name that stands at a place.
+    ///
+    /// # Errors
+    /// [`Error::Usage`] for an unknown name.
+    pub fn named(text: &str, place: Place) -> Result<Category> {
+        let unknown = || Error::usage(place, format!("there is no category `{text}`"), "use cut-in, cut-out or lvd");
+        Category::parse(text).ok_or_else(unknown)
     }
 }

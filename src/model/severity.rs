@@ -60,28 +60,20 @@ enum Form {
 
 /// Miles per hour in one metre per second.
 const MPH: f64 = 1.0 / 0.447_04;
-const NHTSA_FRONTAL: &str =
-    "Wang, MAIS(05/08) injury probability curves as functions of delta V, NHTSA DOT HS 813 219, 2022, table A-6";
-/// The data of NHTSA's curves reach 60 mph.
-const NHTSA_TO_MPS: f64 = 60.0 / MPH;
 
-const fn nhtsa(
-    name: &'static str,
-    injury: &'static str,
-    source: &'static str,
-    of: &'static str,
-    (a, b): (f64, f64),
-) -> InjuryCurve {
-    InjuryCurve { name, injury, source, of, valid_to_mps: NHTSA_TO_MPS, form: Form::Logistic(a, b, MPH) }
+/// A curve of frontal crashes by NHTSA, whose data reach 60 mph.
+const fn nhtsa(name: &'static str, injury: &'static str, (a, b): (f64, f64)) -> InjuryCurve {
+    let source =
+        "Wang, MAIS(05/08) injury probability curves as functions of delta V, NHTSA DOT HS 813 219, 2022, table A-6";
+    let of = "occupants of cars in frontal crashes, United States, 2010 to 2015";
+    InjuryCurve { name, injury, source, of, valid_to_mps: 60.0 / MPH, form: Form::Logistic(a, b, MPH) }
 }
-
-const FRONTAL: &str = "occupants of cars in frontal crashes, United States, 2010 to 2015";
 
 #[rustfmt::skip] // a table: one line per curve
 /// All curves.
 pub const INJURY_CURVES: [InjuryCurve; 3] = [
-    nhtsa("nhtsa-2022-frontal-mais3", "MAIS3+", NHTSA_FRONTAL, FRONTAL, (-6.9774, 0.1620)),
-    nhtsa("nhtsa-2022-frontal-fatal", "death", NHTSA_FRONTAL, FRONTAL, (-9.0422, 0.1571)),
+    nhtsa("nhtsa-2022-frontal-mais3", "MAIS3+", (-6.9774, 0.1620)),
+    nhtsa("nhtsa-2022-frontal-fatal", "death", (-9.0422, 0.1571)),
     InjuryCurve {
         name: "joksch-1993-fatal",
         injury: "death",

@@ -296,12 +296,6 @@ pub(super) fn finer_json(judgement: &Judgement) -> Value {
     })
 }
 
-/// The assumptions for programs.
-pub(super) fn assumptions_json(profile: &Profile) -> Vec<Value> {
-    let of = |of: Assumption| json!({"key": of.key, "value": of.value, "unit": of.unit, "meaning": of.meaning, "source": of.source});
-    profile.assumptions().into_iter().map(of).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::NOT_CONSIDERED;

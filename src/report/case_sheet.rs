@@ -3,7 +3,7 @@
 
 use serde_json::{Value, json};
 
-use super::case_identity::{self, CaseIdentity, NOT_CONSIDERED, assumptions_json};
+use super::case_identity::{self, CaseIdentity, NOT_CONSIDERED};
 use super::html::{Page, PageFigure, Section};
 use super::lanes::outcome_json;
 use super::records::{self, PROGRAM};
@@ -13,7 +13,7 @@ use crate::Result;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::model::severity::InjuryCurve;
-use crate::run::check::{Boundary, Change, Demand, Judged, Judgement, Reading, RunEnd, Subject, Uncertainty, Verdict};
+use crate::run::check::{Boundary, Change, Judged, Judgement, Reading, RunEnd, Subject, Uncertainty, Verdict};
 use crate::run::grid::VARIED;
 use crate::scenario::{CaseQuantity, KMH, NUMBERS};
 use crate::support::readable::value;
@@ -251,11 +251,7 @@ impl CaseSheet<'_> {
                 "verdict": judgement.verdict().label(),
                 "nominal_answer": is_answer.then(|| judgement.verdicts.answer().label()),
                 "clause": judgement.clause,
-                "demanded": judgement.demand().map(|demand| match demand {
-                    Demand::Avoid => "avoid",
-                    Demand::Nothing => "nothing",
-                    Demand::Unknown => "unknown",
-                }),
+                "demanded": judgement.demand(),
                 "demand_changes_with": judgement.demand_flips,
                 "outside_annex_3": judgement.outside_annex,
                 "silent": judgement.silent,
@@ -284,7 +280,7 @@ impl CaseSheet<'_> {
             "uncertainty": self.uncertainty.map(|of| self.uncertainty_record(of)),
             "cautions": self.cautions(),
             "profiles": self.judgements.iter().zip(self.profiles).map(judgement).collect::<Vec<_>>(),
-            "assumptions": assumptions_json(&self.profiles[0]),
+            "assumptions": self.profiles[0].assumptions(),
             "not_considered": NOT_CONSIDERED.map(|(what, how)| format!("{what}: {how}")),
         }))
     }

@@ -21,7 +21,7 @@ use crate::stats::density::{DensityKind, Representativeness, normal_quantile};
 use crate::stats::estimate::{Enough, Ratio, RatioVerdict};
 use crate::support::readable;
 use crate::support::run_folder::{ResultFiles, Results};
-use crate::support::table::{Column, Digits, NumberText, Table};
+use crate::support::table::{Column, Digits, NamedValue, NumberText, Table};
 
 /// A comparison with the facts that its files state.
 pub struct CompareReport<'a> {
@@ -102,12 +102,10 @@ impl CompareReport<'_> {
                 cells.map(move |(s, cell)| (category.category, of, s, &cell.replayed, &cell.sampled))
             })
         });
-        type Pick = fn(RiskRate) -> f64;
-        let risks: [(&str, Pick); 2] = [("", |risk| risk.estimate), ("_sd", |risk| risk.standard_deviation)];
-        type End = fn(&RateRecord) -> f64;
-        let ends: [(&str, End); 3] = [("rate", |r| r.rate), ("low", |r| r.low), ("high", |r| r.high)];
-        type RatioEnd = fn(&Ratio) -> Option<f64>;
-        let ratios: [(&str, RatioEnd); 3] =
+        let risks: [NamedValue<RiskRate, f64>; 2] =
+            [("", |risk| risk.estimate), ("_sd", |risk| risk.standard_deviation)];
+        let ends: [NamedValue<RateRecord, f64>; 3] = [("rate", |r| r.rate), ("low", |r| r.low), ("high", |r| r.high)];
+        let ratios: [NamedValue<Ratio, Option<f64>>; 3] =
             [("ratio", |r| r.ratio), ("ratio_low", |r| r.low), ("ratio_high", |r| r.high)];
         let first =
             self.categories.iter().flat_map(|category| &category.parameterizations).find(|of| !of.forms.is_empty());
@@ -141,10 +139,18 @@ impl CompareReport<'_> {
                     of.forms.iter().find(|other| other.form == form).map(|other| end(&other.rates[at]))
                 },
             )
-            .columns(risks, |of| format!("s_per_hour{}", of.0), |(_, _, s, ..), of| s.risk.per_hour.map(of.1))
-            .columns(risks, |of| format!("s_per_1000_km{}", of.0), |(_, _, s, ..), of| s.risk.per_1000_km.map(of.1))
-            .columns(risks, |of| format!("density_per_hour{}", of.0), |(.., s), of| s.risk.per_hour.map(of.1))
-            .columns(risks, |of| format!("density_per_1000_km{}", of.0), |(.., s), of| s.risk.per_1000_km.map(of.1))
+            .columns(risks, |of| format!("s_per_hour{}", of.0), |(_, _, s, ..), of| s.risk.per_hour.as_ref().map(of.1))
+            .columns(
+                risks,
+                |of| format!("s_per_1000_km{}", of.0),
+                |(_, _, s, ..), of| s.risk.per_1000_km.as_ref().map(of.1),
+            )
+            .columns(risks, |of| format!("density_per_hour{}", of.0), |(.., s), of| s.risk.per_hour.as_ref().map(of.1))
+            .columns(
+                risks,
+                |of| format!("density_per_1000_km{}", of.0),
+                |(.., s), of| s.risk.per_1000_km.as_ref().map(of.1),
+            )
             .column("data", |_| self.compare.provenance().data.as_str())
             .build()
             .csv()
@@ -269,8 +275,8 @@ impl CompareReport<'_> {
             e if e > 0.0 => format!("{} ± {}", short(e), short(r.standard_deviation)),
             _ => format!("≤ {}", short(r.high)),
         };
-        type Pick = fn(&RecordedCell) -> Option<RiskRate>;
-        let risks: [(&str, Pick); 2] = [("S /h", |c| c.risk.per_hour), ("S /1000 km", |c| c.risk.per_1000_km)];
+        let risks: [NamedValue<RecordedCell, Option<RiskRate>>; 2] =
+            [("S /h", |c| c.risk.per_hour), ("S /1000 km", |c| c.risk.per_1000_km)];
         for (name, pick) in risks {
             let values: Option<Vec<String>> = recorded.iter().map(|c| pick(c).map(risk)).collect();
             rows.extend(values.map(|values| (name.to_owned(), values)));
@@ -327,8 +333,7 @@ fn uncertainty(category: &CategoryComparison) -> String {
     if rows.iter().all(|(_, of)| of.is_none()) {
         return String::new();
     }
-    type Pick = fn(&Uncertainty) -> Option<f64>;
-    let parts: [(&str, Pick); 5] = [
+    let parts: [NamedValue<Uncertainty, Option<f64>>; 5] = [
         ("draws", |u| Some(u.draws)),
         ("scenarios", |u| Some(u.scenarios)),
         ("frequency", |u| Some(u.exposure)),
@@ -370,8 +375,7 @@ fn goodness(category: &CategoryComparison) -> String {
     if rows.is_empty() {
         return String::new();
     }
-    type Pick = fn(&Representativeness) -> Option<f64>;
-    let figures: [(&str, Pick); 3] = [
+    let figures: [NamedValue<Representativeness, Option<f64>>; 3] = [
         ("log-likelihood", |r| r.log_likelihood),
         ("W(gen, test)", |r| Some(r.generated_test)),
         ("Sinkhorn", |r| r.sinkhorn),

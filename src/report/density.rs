@@ -6,7 +6,7 @@ use crate::stats::density::{
     DensityModel, Exposure, Rate, Refused, Representativeness, SearchEnd, ValidFraction, standard_deviation,
 };
 use crate::support::readable::{count, count_of, counted, significant};
-use crate::support::table::{Column, Digits, Table};
+use crate::support::table::{Column, Digits, NamedValue, Table};
 
 /// One density without its kernels.
 pub fn text(model: &DensityModel) -> String {
@@ -159,8 +159,7 @@ fn compared(r: &Representativeness) -> String {
 
 /// One row per density.
 pub fn summary(models: &[&DensityModel]) -> String {
-    type Pick = fn(&Representativeness) -> f64;
-    let distances: [(&str, Pick); 4] = [
+    let distances: [NamedValue<Representativeness, f64>; 4] = [
         ("M", |r| r.metric),
         ("W(gen, test)", |r| r.generated_test),
         ("W(train, test)", |r| r.train_test),

@@ -14,13 +14,6 @@ use crate::support::files::make_folder_of;
 use crate::support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter, json_value};
 use crate::{Error, Result};
 
-const MIN_THW: &str = "Smallest time headway; infinite if no vehicle was evaluated while the ego moved.";
-const MAX_DRAC: &str = "Largest deceleration rate to avoid the crash; infinite at contact.";
-const TET: &str = "Time exposed TTC: time with a TTC below the profile's tet_threshold_s.";
-const TIT: &str = "Time integrated TTC: integral of threshold minus TTC over that time.";
-const PET: &str =
-    "Post-encroachment time of a cut-in; infinite if the ego stops before the place, null if there is none.";
-
 /// A table for the lanes of a study; see [`write_study_chunk`]. It is written chunk by chunk, so that memory does not
 /// grow with the lanes. Curves of injury risk add changes of speed and risks.
 ///
@@ -72,29 +65,36 @@ fn create(
 #[rustfmt::skip] // a table: one line per column
 pub fn columns(value: ColumnKind) -> Vec<Column> {
     let c = Column::new;
-    vec![
+    let mut columns = vec![
         c("id", ColumnKind::Text, "", "Scenario."),
         c("category", ColumnKind::Name, "", "Kind of scenario: cut_in, cut_out or lvd (leader decelerates)."),
         c("param", ColumnKind::Name, "", "Variant: S (as recorded) or the key of a parameterization."),
         c("thw", ColumnKind::Binary64, "s", "Initial time headway; null where the start is a gap."),
         c("model", ColumnKind::Name, "", "Driver model."),
-        c("collision", ColumnKind::Flag, "", "Failed the criterion collision."),
-        c("ttc", ColumnKind::Flag, "", "Failed the criterion TTC."),
-        c("btn", ColumnKind::Flag, "", "Failed the criterion BTN."),
-        c("min_ttc", value, "s", "Smallest time to collision; infinite where the vehicles never approached."),
-        c("max_btn", value, "1", "Largest Brake Threat Number; infinite where no braking avoids the contact."),
-        c("crash_type", ColumnKind::Whole, "1", "Kind of contact; 0 without one."),
-        c("t_react", ColumnKind::Binary64, "s", "When the driver first reacted; null if never."),
-        c("t_crash", ColumnKind::Binary64, "s", "When vehicles touched; null if never."),
-        c("impact_speed", value, "m/s", "Speed of the ego at contact; null without one."),
-        c("t_end", ColumnKind::Binary64, "s", "When the run ended."),
-        c("robust", ColumnKind::Flag, "", "Moving the initial gap by 1e-9 m changes neither verdict nor contact in binary64; null for drivers outside the registry."),
-        c("min_thw", value, "s", MIN_THW),
-        c("max_drac", value, "m/s²", MAX_DRAC),
-        c("tet", ColumnKind::Binary64, "s", TET),
-        c("tit", value, "s²", TIT),
-        c("pet", value, "s", PET),
-    ]
+    ];
+    columns.extend(ends_of_lanes().map(|(name, (_, kind, unit, meaning, _))| {
+        let kind = if *kind == ColumnKind::Binary32 { value } else { *kind };
+        Column::new(name, kind, *unit, *meaning)
+    }));
+    let robust = "Moving the initial gap by 1e-9 m changes neither verdict nor contact in binary64; null for drivers outside the registry.";
+    columns.insert(ROBUST, c("robust", ColumnKind::Flag, "", robust));
+    columns
+}
+
+/// How a lane of a study ended: names as in golden lanes, and those of [`OUTCOME`].
+#[rustfmt::skip] // pairs
+const ENDS: [[&str; 2]; 15] = [
+    ["collision", "collision"], ["ttc", "ttc"], ["btn", "btn"], ["min_ttc", "min_ttc_s"], ["max_btn", "max_btn"],
+    ["crash_type", "contact_type"], ["t_react", "reaction_s"], ["t_crash", "contact_s"], ["impact_speed", "impact_speed_mps"],
+    ["t_end", "end_s"], ["min_thw", "min_thw_s"], ["max_drac", "max_drac_mps2"], ["tet", "tet_s"], ["tit", "tit_s2"],
+    ["pet", "pet_s"],
+];
+
+/// Place of the column that has no counterpart in [`OUTCOME`].
+const ROBUST: usize = 15;
+
+fn ends_of_lanes() -> impl Iterator<Item = (&'static str, &'static OutcomeColumn)> {
+    ENDS.into_iter().filter_map(|[name, of]| Some((name, OUTCOME.iter().find(|column| column.0 == of)?)))
 }
 
 /// Writes the lanes of a chunk with outcomes, in the plan's order. Null: did not happen. `robust` is false if moving
@@ -110,6 +110,7 @@ pub fn write_study_chunk(
 ) -> Result<()> {
     let dt = plan.profile.frame.dt_s;
     let robust = robust_lanes(plan, chunk);
+    let ends: Vec<OutcomeValue> = ends_of_lanes().map(|(_, column)| column.4).collect();
     for (at, outcome) in chunk.outcomes.iter().enumerate() {
         let Some(key) = plan.key(chunk.first_lane + at as u64) else { continue };
         let block = &plan.blocks[key.block];
@@ -118,8 +119,6 @@ pub fn write_study_chunk(
             Headway::ThwS(thw) => Cell::Decimal(thw),
             Headway::GapM(_) | Headway::MinFollowing | Headway::Observed => Cell::Null,
         };
-        let judged = |c: Criterion| Cell::Flag(outcome.verdicts.failed(c));
-        let time = |step: u32| Cell::number(time_s(step, dt));
         let id = block.units.name(key.unit);
         let mut row = vec![
             Cell::text(id.as_ref()),
@@ -127,23 +126,9 @@ pub fn write_study_chunk(
             Cell::text(block.variants[key.variant].as_str()),
             thw,
             Cell::text(plan.models[key.model].name()),
-            judged(Criterion::Collision),
-            judged(Criterion::Ttc),
-            judged(Criterion::Btn),
-            Cell::Number(outcome.min_ttc),
-            Cell::Number(outcome.max_btn),
-            Cell::Whole(i64::from(outcome.contact.code())),
-            time(outcome.reaction_step),
-            time(outcome.contact_step),
-            Cell::number(at_contact(outcome, outcome.impact_speed)),
-            time(outcome.end_step),
-            robust[at].map_or(Cell::Null, Cell::Flag),
-            Cell::Number(outcome.min_thw),
-            Cell::Number(outcome.max_drac),
-            time(outcome.tet_steps),
-            Cell::Number(outcome.tit),
-            Cell::number(outcome.pet),
         ];
+        row.extend(ends.iter().map(|end| end(outcome, dt)));
+        row.insert(ROBUST, robust[at].map_or(Cell::Null, Cell::Flag));
         let sizes = study.cases().sizes(block.first_unit + key.unit);
         row.extend(severity_cells(outcome, sizes, injury));
         table.row(&row)?;
@@ -182,7 +167,7 @@ fn severity_cells(outcome: &Outcome<f64>, sizes: Option<Sizes>, injury: &[&Injur
 
 /// How a lane ended, as tables and JSON documents have it: name with its unit, type, unit, meaning, value. Null: did not happen.
 #[rustfmt::skip] // a table: one line per column
-static OUTCOME: [(&str, ColumnKind, &str, &str, OutcomeValue); 18] = [
+static OUTCOME: [OutcomeColumn; 18] = [
     ("collision", ColumnKind::Flag, "", "Failed the criterion collision.", |o, _| Cell::Flag(o.verdicts.failed(Criterion::Collision))),
     ("ttc", ColumnKind::Flag, "", "Failed the criterion TTC.", |o, _| Cell::Flag(o.verdicts.failed(Criterion::Ttc))),
     ("btn", ColumnKind::Flag, "", "Failed the criterion BTN.", |o, _| Cell::Flag(o.verdicts.failed(Criterion::Btn))),
@@ -196,12 +181,13 @@ static OUTCOME: [(&str, ColumnKind, &str, &str, OutcomeValue); 18] = [
     ("end_s", ColumnKind::Binary64, "s", "When the run ended.", |o, dt_s| Cell::number(time_s(o.end_step, dt_s))),
     ("impact_speed_mps", ColumnKind::Binary32, "m/s", "Speed of the ego at contact; null without one.", |o, _| Cell::number(at_contact(o, o.impact_speed))),
     ("impact_closing_speed_mps", ColumnKind::Binary32, "m/s", "Closing speed at contact; null without one.", |o, _| Cell::number(at_contact(o, o.impact_closing_speed))),
-    ("min_thw_s", ColumnKind::Binary32, "s", MIN_THW, |o, _| Cell::Number(o.min_thw)),
-    ("max_drac_mps2", ColumnKind::Binary32, "m/s²", MAX_DRAC, |o, _| Cell::Number(o.max_drac)),
-    ("tet_s", ColumnKind::Binary64, "s", TET, |o, dt_s| Cell::number(time_s(o.tet_steps, dt_s))),
-    ("tit_s2", ColumnKind::Binary32, "s²", TIT, |o, _| Cell::Number(o.tit)),
-    ("pet_s", ColumnKind::Binary32, "s", PET, |o, _| Cell::number(o.pet)),
+    ("min_thw_s", ColumnKind::Binary32, "s", "Smallest time headway; infinite if no vehicle was evaluated while the ego moved.", |o, _| Cell::Number(o.min_thw)),
+    ("max_drac_mps2", ColumnKind::Binary32, "m/s²", "Largest deceleration rate to avoid the crash; infinite at contact.", |o, _| Cell::Number(o.max_drac)),
+    ("tet_s", ColumnKind::Binary64, "s", "Time exposed TTC: time with a TTC below the profile's tet_threshold_s.", |o, dt_s| Cell::number(time_s(o.tet_steps, dt_s))),
+    ("tit_s2", ColumnKind::Binary32, "s²", "Time integrated TTC: integral of threshold minus TTC over that time.", |o, _| Cell::Number(o.tit)),
+    ("pet_s", ColumnKind::Binary32, "s", "Post-encroachment time of a cut-in; infinite if the ego stops before the place, null if there is none.", |o, _| Cell::number(o.pet)),
 ];
+type OutcomeColumn = (&'static str, ColumnKind, &'static str, &'static str, OutcomeValue);
 type OutcomeValue = fn(&Outcome<f64>, f64) -> Cell<'static>;
 
 fn outcome_columns() -> impl Iterator<Item = Column> {

@@ -1,12 +1,12 @@
 //! Which driver decides on a map: cells that are preventable by each rule, and those that the rule turns.
 
-use serde_json::{Value, json};
+use serde_json::Value;
 
 use super::map::MapReport;
 use crate::model::criterion::Criterion;
 use crate::run::check::DriverRule;
 use crate::run::grid::MappedGrid;
-use crate::support::table::{Column, Digits, Table};
+use crate::support::table::{Column, Digits, Table, TableOf};
 
 /// The cells of a map by a rule.
 #[derive(Clone, Copy)]
@@ -66,26 +66,24 @@ impl MapReport {
 
     fn rule_table(&self) -> Table {
         let percent = |of: RuleCells| (of.conflicts > 0).then(|| 100.0 * of.turned as f64 / of.conflicts as f64);
-        Table::of(self.rule_cells())
-            .column("map", |of| of.map)
-            .column("rule", |of| of.rule.label())
-            .column("conflict", |of| of.conflicts)
-            .column("preventable", |of| of.preventable)
+        self.preventable_cells()
             .column("not preventable", |of| of.conflicts - of.preventable)
             .column("turned", |of| of.turned)
             .column(Column::from("turned %").digits(Digits::Fixed(2)).null("-"), percent)
             .build()
     }
 
+    fn preventable_cells(&self) -> TableOf<RuleCells<'_>> {
+        Table::of(self.rule_cells())
+            .column("map", |of| of.map)
+            .column("rule", |of| of.rule.label())
+            .column("conflict", |of| of.conflicts)
+            .column("preventable", |of| of.preventable)
+    }
+
     /// The cells by rule as records.
-    pub(super) fn rule_records(&self) -> Vec<Value> {
-        let record = |of: RuleCells| {
-            json!({
-                "map": of.map, "rule": of.rule.label(), "conflict": of.conflicts, "preventable": of.preventable,
-                "turned": of.turned,
-            })
-        };
-        self.rule_cells().into_iter().map(record).collect()
+    pub(super) fn rule_records(&self) -> Value {
+        self.preventable_cells().column("turned", |of| of.turned).build().records()
     }
 
     /// The cells by rule as text; empty where there are none.

@@ -148,8 +148,6 @@ impl ResultReport<'_> {
         Page {
             title: format!("{} beside {model} under {}", self.theirs, self.profile.name),
             lead: format!("{} {}", self.agreement(), self.cause()),
-            synthetic: false,
-            warnings: Vec::new(),
             sections: vec![
                 Section::new("differences", "Differences")
                     .intro(LEGEND)
@@ -160,6 +158,7 @@ impl ResultReport<'_> {
                     .fact("results", format!("{}\nSHA-256 {}", self.theirs, self.theirs_sha256)),
                 self.identity.signatures(),
             ],
+            ..Page::default()
         }
         .html()
     }

@@ -2,6 +2,7 @@
 
 use super::html::Section;
 use super::sampling::{SampleReport, short, three_digits};
+use super::sampling_tables::word;
 use super::tables::{WIDTH, wrap};
 use crate::model::severity::{InjuryCurve, mass_kg};
 use crate::run::sampling::{InjuryRow, RiskRate, TargetRow, TargetVerdict};
@@ -125,11 +126,7 @@ impl SampleReport {
             .column("of", |row| row.of)
             .column("model", |row| row.model.name())
             .column("headway", |row| row.headway.as_str())
-            .column("verdict", |row| match row.verdict {
-                TargetVerdict::Below => "below",
-                TargetVerdict::Above => "above",
-                TargetVerdict::Undecided => "undecided",
-            })
+            .column("verdict", |row| word(row.verdict))
             .column(three_digits("target_per_hour"), |row| row.target)
             .column(three_digits("per_hour"), |row| row.rate.estimate)
             .column(three_digits("low"), |row| row.rate.low)

@@ -1,30 +1,28 @@
 //! The tables of a sampling run as CSV: numbers in full precision, empty where undefined. Also the sentences that
 //! explain them on the terminal and the page.
 
+use serde::Serialize;
+
 use super::records::{at_contact, smallest_gap_m};
 use super::sampling::{SampleReport, short};
 use crate::model::criterion::Criterion;
 use crate::run::sampling::{Checkpoint, EstimateRow, ModelRatio, ProfileRatios, RiskRate, Uncertainty, WorstLane};
-use crate::stats::estimate::{IntervalKind, Ratio, RatioMethod, RatioVerdict, Warning, WeightFigures};
+use crate::stats::estimate::{Ratio, RatioMethod, RatioVerdict, Warning, WeightFigures};
 use crate::support::readable::{counted, significant, value};
-use crate::support::table::{Table, TableOf};
+use crate::support::table::{NamedValue, Table, TableOf};
 
 impl SampleReport {
     /// `estimates.csv`.
     pub(super) fn csv(&self) -> String {
-        type Weight = fn(&WeightFigures) -> f64;
-        let weights: [(&str, Weight); 3] = [
+        let weights: [NamedValue<WeightFigures, f64>; 3] = [
             ("ess_failures", |w| w.effective_failures),
             ("largest_weight_fraction", |w| w.largest_fraction),
             ("crude_fraction", |w| w.crude_fraction),
         ];
-        type Pick = fn(RiskRate) -> f64;
-        let risks: [(&str, Pick); 4] =
+        let risks: [NamedValue<RiskRate, f64>; 4] =
             [("", |r| r.estimate), ("_sd", |r| r.standard_deviation), ("_low", |r| r.low), ("_high", |r| r.high)];
-        type End = fn(Ratio) -> Option<f64>;
-        let ends: [(&str, End); 3] = [("", |r| r.ratio), ("_low", |r| r.low), ("_high", |r| r.high)];
-        type Source = fn(&Uncertainty) -> Option<f64>;
-        let sources: [(&str, Source); 5] = [
+        let ends: [NamedValue<Ratio, Option<f64>>; 3] = [("", |r| r.ratio), ("_low", |r| r.low), ("_high", |r| r.high)];
+        let sources: [NamedValue<Uncertainty, Option<f64>>; 5] = [
             ("variance_from_draws", |u| Some(u.draws)),
             ("variance_from_scenarios", |u| Some(u.scenarios)),
             ("variance_from_exposure", |u| Some(u.exposure)),
@@ -49,7 +47,7 @@ impl SampleReport {
             .column("low", |row| known(row.estimate.interval.low))
             .column("high", |row| known(row.estimate.interval.high))
             .column("level", |row| known(row.estimate.interval.level))
-            .column("interval", |row| kind_name(row.estimate.interval.kind))
+            .column("interval", |row| word(row.estimate.interval.kind))
             .column("draws_low", |row| known(row.draws[0]))
             .column("draws_high", |row| known(row.draws[1]))
             .column("failing_scenarios", |row| row.failing_scenarios.and_then(known))
@@ -57,21 +55,21 @@ impl SampleReport {
             .column("coefficient_of_variation", |row| known(row.estimate.coefficient_of_variation))
             .column("variance_reduction", |row| known(row.estimate.variance_reduction))
             .columns(weights, |(name, _)| name, |row, (_, of)| row.estimate.weights.as_ref().and_then(|w| known(of(w))))
-            .columns(risks, |(end, _)| format!("{hour}{end}"), |row, (_, of)| per_hour(row).and_then(|r| known(of(r))))
+            .columns(risks, |(end, _)| format!("{hour}{end}"), |row, (_, of)| per_hour(row).and_then(|r| known(of(&r))))
             .columns(
                 risks,
                 |(end, _)| format!("{kilometres}{end}"),
-                |row, (_, of)| per_1000_km(row).and_then(|r| known(of(r))),
+                |row, (_, of)| per_1000_km(row).and_then(|r| known(of(&r))),
             )
             .columns(
                 ends,
                 |(end, _)| format!("replayed_ratio{end}"),
-                |row, (_, of)| replayed(row).and_then(of).and_then(known),
+                |row, (_, of)| replayed(row).and_then(|ratio| of(&ratio)).and_then(known),
             )
             .columns(
                 ends,
                 |(end, _)| format!("sampled_ratio{end}"),
-                |row, (_, of)| sampled(row).and_then(of).and_then(known),
+                |row, (_, of)| sampled(row).and_then(|ratio| of(&ratio)).and_then(known),
             )
             .columns(
                 sources,
@@ -164,16 +162,9 @@ fn known(value: f64) -> Option<f64> {
     Some(value).filter(|v| !v.is_nan())
 }
 
-fn kind_name(kind: IntervalKind) -> &'static str {
-    match kind {
-        IntervalKind::Wilson => "wilson",
-        IntervalKind::ClopperPearson => "clopper_pearson",
-        IntervalKind::RuleOfThree => "rule_of_three",
-        IntervalKind::LogStudent => "log_student",
-        IntervalKind::Gamma => "gamma",
-        IntervalKind::Clusters => "clusters",
-        IntervalKind::Nothing => "nothing",
-    }
+/// The word of a choice, as records have it.
+pub(super) fn word(choice: impl Serialize) -> Option<String> {
+    serde_json::to_value(choice).ok()?.as_str().map(str::to_owned)
 }
 
 impl SampleReport {

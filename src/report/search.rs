@@ -16,7 +16,7 @@ use crate::run::search::{Candidate, Evaluated, Front, FrontPoint, Judged, Scope,
 use crate::scenario::parameterization::ModeShape;
 use crate::support::readable::{count, counted};
 use crate::support::run_folder::{ResultFiles, Results};
-use crate::support::table::{Table, WIDTH};
+use crate::support::table::{NamedValue, Table, WIDTH};
 
 /// Approximate number of candidates of a figure, in even steps of their scores; the paper's are all drawn.
 const MAX_DRAWN: usize = 400;
@@ -25,8 +25,7 @@ const FRONT: &str = "#0072b2";
 const HELD_OUT: &str = "#d55e00";
 
 /// The scores of a description, by their columns.
-type ScoreOf = fn(&Judged) -> Option<Scored>;
-const SCORES: [(&str, ScoreOf); 3] = [
+const SCORES: [NamedValue<Judged, Option<Scored>>; 3] = [
     ("cross_validated", |judged| Some(judged.cross_validated)),
     ("in_sample", |judged| Some(judged.in_sample)),
     ("held_out", |judged| judged.held_out),
@@ -339,8 +338,7 @@ impl SearchReport<'_> {
             let paper = front.paper.iter().map(move |point| (front.scope, "paper", point));
             paper.chain(front.points.iter().map(move |point| (front.scope, "found", point)))
         });
-        type End = fn(&Scored) -> Option<f64>;
-        let ends: [(&str, End); 3] = [
+        let ends: [NamedValue<Scored, Option<f64>>; 3] = [
             ("", |scored| scored.value),
             ("_low", |scored| scored.interval.map(|i| i.low)),
             ("_high", |scored| scored.interval.map(|i| i.high)),

@@ -44,29 +44,24 @@ pub fn comparison(comparison: &Comparison) -> String {
 
 /// The same as [`comparison`], as JSON.
 pub fn record(comparison: &Comparison) -> serde_json::Value {
-    let tallies = comparison.tallies.iter().map(|tally| {
-        let mut record = serde_json::json!({
-            "category": tally.category.key(),
-            "model": tally.model.name(),
-            "lanes": tally.lanes,
-            "steps": tally.steps,
-            "lanes_differing": tally.lanes_differing,
-            "words_differing": tally.words_differing,
-            "verdicts_differing": tally.verdicts_differing,
-            "reference_differing": tally.reference_differing,
-        });
-        for criterion in Criterion::ALL {
-            record[format!("{}_failures", criterion.key())] = tally.failed[criterion.index()].into();
-        }
-        record
-    });
+    let tallies = Table::of(&comparison.tallies)
+        .column("category", |tally| tally.category.key())
+        .column("model", |tally| tally.model.name())
+        .column("lanes", |tally| tally.lanes)
+        .column("steps", |tally| tally.steps)
+        .column("lanes_differing", |tally| tally.lanes_differing)
+        .column("words_differing", |tally| tally.words_differing)
+        .column("verdicts_differing", |tally| tally.verdicts_differing)
+        .column("reference_differing", |tally| tally.reference_differing)
+        .columns(Criterion::ALL, |of| format!("{}_failures", of.key()), |tally, of| tally.failed[of.index()])
+        .build();
     let worst = comparison.worst.iter().map(|lane| serde_json::json!({"lane": lane.key, "words": lane.names()}));
     serde_json::json!({
         "set": comparison.set,
         "plan_sha256": comparison.plan_sha256,
         "equal": comparison.is_equal(),
         "modes_differing": comparison.modes_differing,
-        "tallies": tallies.collect::<Vec<_>>(),
+        "tallies": tallies.records(),
         "worst": worst.collect::<Vec<_>>(),
     })
 }

@@ -26,6 +26,17 @@ pub fn check_folder(dir: &Path) -> Result<()> {
     Ok(())
 }
 
+/// Removes a file, if there is one.
+///
+/// # Errors
+/// [`Error::Io`].
+pub fn remove_file(path: &Path) -> Result<()> {
+    match std::fs::remove_file(path) {
+        Err(e) if e.kind() != ErrorKind::NotFound => Err(Error::io(path, "remove", e)),
+        _ => Ok(()),
+    }
+}
+
 /// Checks that the folder of a run that is to be read is no file.
 ///
 /// # Errors

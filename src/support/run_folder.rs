@@ -9,7 +9,7 @@
 //! Parts of a run use the folder together and exclude whole runs: `parts`.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::io::{ErrorKind, Write};
+use std::io::Write;
 use std::path::{Path, PathBuf};
 
 use serde::Serialize;
@@ -20,7 +20,7 @@ pub use crate::support::file_list::{
     COMPARE_RECORD, DOSSIER_RECORD, ESTIMATE_RECORD, MAP_RECORD, SEARCH_RECORD, STUDY_RECORD,
 };
 use crate::support::file_list::{FileList, LIST, RECORDS, RunFiles};
-use crate::support::files::make_folder;
+use crate::support::files::{make_folder, remove_file};
 use crate::support::lock::FolderLock;
 use crate::{Error, Place, Result};
 
@@ -255,9 +255,9 @@ impl Results<'_> {
         let last = last.stage()?;
         let stale: Vec<String> = folder.former().into_iter().filter(|file| !names.contains(file)).collect();
         folder.list(names.iter().chain(&stale).cloned().collect(), false)?;
-        remove(&dir.join(name))?;
+        remove_file(&dir.join(name))?;
         sync_folder(dir);
-        stale.iter().try_for_each(|file| remove(&dir.join(file)))?;
+        stale.iter().try_for_each(|file| remove_file(&dir.join(file)))?;
         self.elsewhere.drain(..).try_for_each(StagedFile::publish)?;
         self.staged.drain(..).try_for_each(|(_, file)| file.place())?;
         sync_folder(dir);
@@ -283,13 +283,6 @@ impl Results<'_> {
     fn refuse_foreign<const N: usize>(&self, record: [&str; N]) -> Result<()> {
         let staged = self.staged.iter().map(|(name, _)| name.as_str()).filter(|name| !self.named.contains(*name));
         self.folder.refuse_foreign(staged.chain(record))
-    }
-}
-
-fn remove(path: &Path) -> Result<()> {
-    match std::fs::remove_file(path) {
-        Err(e) if e.kind() != ErrorKind::NotFound => Err(Error::io(path, "remove", e)),
-        _ => Ok(()),
     }
 }
 

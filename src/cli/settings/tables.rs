@@ -3,12 +3,15 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::engine::BackendChoice;
+use crate::engine::{BackendChoice, Headway};
 use crate::model::criterion::Criterion;
-use crate::model::driver::Bound;
+use crate::model::driver::{Bound, ModelId};
+use crate::run::compare::CompareOptions;
 use crate::run::sampling::SampleSource;
 use crate::run::score::ScoreOptions;
-use crate::scenario::parameterization::{ParameterizationOptions, SvdLateral};
+use crate::run::study::StudyOptions;
+use crate::scenario::Category;
+use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, SvdLateral};
 use crate::settings;
 use crate::stats::density::{BandwidthRule, DensityKind, FitOptions};
 use crate::stats::estimate::Enough;
@@ -46,6 +49,32 @@ impl Settings {
     /// Options of the parameterizations of densities, and of the replays compared with them.
     pub(crate) fn of_densities(&self) -> ParameterizationOptions {
         ParameterizationOptions { svd_lateral: self.fit.svd_lateral, ..self.parameterization.clone() }
+    }
+
+    /// Options of comparing scenarios, their replays and densities, with the densities' usual form alone.
+    pub(crate) fn comparison(
+        &self,
+        categories: Vec<Category>,
+        models: Vec<ModelId>,
+        headways: Vec<Headway>,
+        parameterizations: Vec<Parameterization>,
+    ) -> CompareOptions {
+        CompareOptions {
+            study: StudyOptions {
+                categories,
+                models,
+                headways,
+                parameterization: self.of_densities(),
+                folds: None,
+                searched: parameterizations.iter().filter(|id| id.fitted_basis().is_some()).cloned().collect(),
+                external: Vec::new(),
+            },
+            parameterizations,
+            samples: self.compare.samples,
+            every_form: false,
+            seed: self.compare.seed,
+            enough: Enough { clusters: self.score.min_failures.into(), margin: self.compare.margin },
+        }
     }
 }
 
@@ -140,11 +169,8 @@ settings! {
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum EstimatorKind {
     #[default]
-    #[allow(missing_docs)]
     Auto,
-    #[allow(missing_docs)]
     Mc,
-    #[allow(missing_docs)]
     Is,
 }
 
@@ -153,9 +179,7 @@ pub(crate) enum EstimatorKind {
 #[serde(rename_all = "kebab-case")]
 pub(crate) enum IntervalKind {
     #[default]
-    #[allow(missing_docs)]
     Wilson,
-    #[allow(missing_docs)]
     ClopperPearson,
 }
 

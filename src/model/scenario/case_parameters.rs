@@ -120,13 +120,7 @@ impl CaseParameters {
     /// [`Error::Usage`] if it is missing or unknown.
     pub fn category(&self) -> Result<Category> {
         let text = self.category.as_ref().ok_or_else(|| missing("category"))?;
-        Category::parse(text).ok_or_else(|| {
-            Error::usage(
-                Place::item("category"),
-                format!("there is no category `{text}`"),
-                "use cut-in, cut-out or lvd",
-            )
-        })
+        Category::named(text, Place::item("category"))
     }
 
     /// Sets speeds that are noise of a standing vehicle to 0 and counts them; `place` returns the place of a key.

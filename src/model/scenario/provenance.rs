@@ -5,7 +5,7 @@ use std::path::{Path, PathBuf};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-use crate::support::files::write_atomically;
+use crate::support::files::{remove_file, write_atomically};
 use crate::support::input_file;
 use crate::{Error, Place, Result};
 
@@ -86,11 +86,7 @@ impl DataProvenance {
     /// # Errors
     /// [`Error::Io`].
     pub fn remove_beside(scenarios: &Path) -> Result<()> {
-        let path = Self::path_of(scenarios);
-        match std::fs::remove_file(&path) {
-            Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io(&path, "remove", e)),
-            _ => Ok(()),
-        }
+        remove_file(&Self::path_of(scenarios))
     }
 
     /// Writes the provenance file of a scenario file atomically, with the options of the command; nothing if time and

@@ -199,8 +199,7 @@ impl<'a> Shown<'a> {
         for vehicle in 0..vehicles {
             for (look, trace) in self.courses(vehicle, &|other| other.v_mps) {
                 is_shared &= look.colour == GREY;
-                let speed = |other: &TracedVehicle| other.is_present.then_some((other.v_mps, true));
-                curves.extend(runs(look, self.steps(trace), &|step| speed(&step.others[vehicle])));
+                curves.extend(runs(look, self.steps(trace), &of_other(vehicle, &|other| other.v_mps, true)));
             }
         }
         curves.extend(self.curves(&|step| Some((step.v_ego_mps, false))));
@@ -214,10 +213,7 @@ impl<'a> Shown<'a> {
     /// The speed of another vehicle alone.
     fn speed_of(&self, vehicle: usize) -> Plot {
         let courses = self.courses(vehicle, &|other| other.v_mps);
-        let speed = |step: &TracedStep| {
-            let other = &step.others[vehicle];
-            other.is_present.then_some((other.v_mps, false))
-        };
+        let speed = of_other(vehicle, &|other| other.v_mps, false);
         let curves: Vec<Curve> =
             courses.into_iter().flat_map(|(look, trace)| runs(look, self.steps(trace), &speed)).collect();
         let name = if vehicle == 0 { "of the other vehicle" } else { "of the vehicle ahead of it" };
@@ -275,12 +271,9 @@ impl<'a> Shown<'a> {
     }
 
     fn surrogate(&self, title: &str, hint: &str, vehicle: usize, value: &dyn Fn(&TracedVehicle) -> f64) -> Plot {
-        let present = |step: &TracedStep| {
-            let other = &step.others[vehicle];
-            other.is_present.then(|| (value(other), false))
-        };
+        let curves = self.curves(&of_other(vehicle, value, false));
         // The axis extends a little beyond 0 and 1, where most of the curves are.
-        self.panel(title, hint, 58.0, (-0.1, 1.1), Vec::new(), with_marks(self.curves(&present), Vec::new()))
+        self.panel(title, hint, 58.0, (-0.1, 1.1), Vec::new(), with_marks(curves, Vec::new()))
     }
 
     fn lateral(&self, vehicle: usize) -> Plot {
@@ -290,11 +283,7 @@ impl<'a> Shown<'a> {
         let mut edges = vec![half_lane_m, -half_lane_m, ego_half_m, -ego_half_m];
         for (look, trace) in self.courses(vehicle, &|other| other.y_m) {
             let half_m = trace.widths_m[vehicle] / 2.0;
-            let centre = |step: &TracedStep| {
-                let other = &step.others[vehicle];
-                other.is_present.then_some((other.y_m, false))
-            };
-            for run in runs(look, self.steps(trace), &centre) {
+            for run in runs(look, self.steps(trace), &of_other(vehicle, &|other| other.y_m, false)) {
                 let side = |&(x, y): &(f64, f64)| Value { interval: Some((y - half_m, y + half_m)), ..(x, y).into() };
                 edges.extend(run.points.iter().flat_map(|point| [point.1 - half_m, point.1 + half_m]));
                 bands.push(Series::new("", &[Mark::Band], run.points.iter().map(side)).with_look(look));
@@ -373,6 +362,15 @@ impl<'a> Shown<'a> {
         }
         marks
     }
+}
+
+/// A value of another vehicle while it is present, as a thin curve or not.
+fn of_other(
+    vehicle: usize,
+    value: &dyn Fn(&TracedVehicle) -> f64,
+    is_thin: bool,
+) -> impl Fn(&TracedStep) -> Option<(f64, bool)> {
+    move |step| Some(&step.others[vehicle]).filter(|other| other.is_present).map(|other| (value(other), is_thin))
 }
 
 /// A value over time as runs without a gap, also split where thin drawing begins or ends; such neighbours have a common

@@ -1,6 +1,8 @@
 //! The clauses of UN R157 applied to a case: each threshold with the value of the case. The numbers of a clause are
 //! those of the profile, so that a reading shows what the lane did.
 
+use serde::Serialize;
+
 use crate::engine::{Trace, TracedStep, TracedVehicle};
 use crate::model::driver::{BelowTrigger, ModelId, lane_centre};
 use crate::model::profile::Profile;
@@ -61,7 +63,8 @@ impl Holds {
 }
 
 /// What the clause of cut-ins demands of the system.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "snake_case")]
 pub enum Demand {
     /// It has to avoid the collision.
     Avoid,

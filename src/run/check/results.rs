@@ -25,54 +25,38 @@ fn finite(value: f64) -> Option<f64> {
     value.is_finite().then_some(value)
 }
 
+fn time_s(trace: &Trace, mark: StepMark) -> Option<f64> {
+    trace.step_of(mark).map(|step| trace.time_s(step))
+}
+
+/// The smallest gap, m. Vehicles that touch have no gap left.
+fn min_gap_m(trace: &Trace) -> Option<f64> {
+    match trace.step_of(StepMark::Contact) {
+        Some(_) => Some(trace.outcome.min_gap.min(0.0)),
+        None => finite(trace.outcome.min_gap),
+    }
+}
+
+const fn compared(
+    (column, unit): (&'static str, &'static str),
+    words: &'static str,
+    tolerance: f64,
+    of: fn(&Trace) -> Option<f64>,
+) -> Compared {
+    Compared { column, words, unit, tolerance, of }
+}
+
 /// The quantities, a cause before its effects.
+#[rustfmt::skip] // a table: one line per quantity
 pub const COMPARED: [Compared; 6] = [
-    Compared {
-        column: "reaction_s",
-        words: "the driver's first reaction",
-        unit: "s",
-        tolerance: 0.05,
-        of: |trace| trace.step_of(StepMark::Reaction).map(|step| trace.time_s(step)),
-    },
-    Compared {
-        column: "braking_s",
-        words: "the beginning of the braking",
-        unit: "s",
-        tolerance: 0.05,
-        of: |trace| trace.step_of(StepMark::Braking).map(|step| trace.time_s(step)),
-    },
-    Compared {
-        column: "min_gap_m",
-        words: "the smallest gap",
-        unit: "m",
-        tolerance: 0.1,
-        // Vehicles that touch have no gap left.
-        of: |trace| match trace.step_of(StepMark::Contact) {
-            Some(_) => Some(trace.outcome.min_gap.min(0.0)),
-            None => finite(trace.outcome.min_gap),
-        },
-    },
-    Compared {
-        column: "min_ttc_s",
-        words: "the smallest TTC",
-        unit: "s",
-        tolerance: 0.05,
-        of: |trace| finite(trace.outcome.min_ttc),
-    },
-    Compared {
-        column: "contact_s",
-        words: "the contact",
-        unit: "s",
-        tolerance: 0.05,
-        of: |trace| trace.step_of(StepMark::Contact).map(|step| trace.time_s(step)),
-    },
-    Compared {
-        column: "impact_speed_mps",
-        words: "the ego's speed at the contact",
-        unit: "m/s",
-        tolerance: 0.2,
-        of: |trace| trace.step_of(StepMark::Contact).map(|_| trace.outcome.impact_speed),
-    },
+    compared(("reaction_s", "s"), "the driver's first reaction", 0.05, |trace| time_s(trace, StepMark::Reaction)),
+    compared(("braking_s", "s"), "the beginning of the braking", 0.05, |trace| time_s(trace, StepMark::Braking)),
+    compared(("min_gap_m", "m"), "the smallest gap", 0.1, min_gap_m),
+    compared(("min_ttc_s", "s"), "the smallest TTC", 0.05, |trace| finite(trace.outcome.min_ttc)),
+    compared(("contact_s", "s"), "the contact", 0.05, |trace| time_s(trace, StepMark::Contact)),
+    compared(("impact_speed_mps", "m/s"), "the ego's speed at the contact", 0.2, |trace| {
+        trace.step_of(StepMark::Contact).map(|_| trace.outcome.impact_speed)
+    }),
 ];
 
 /// One row of the other simulator.

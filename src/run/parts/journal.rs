@@ -15,6 +15,7 @@ use sha2::{Digest, Sha256};
 use super::sealed::json_line;
 use crate::engine::ENGINE_VERSION;
 use crate::support::atomic_file::{is_named, refuse_link};
+use crate::support::files::remove_file;
 use crate::support::plain_text::hex;
 use crate::{Error, Place, Result};
 
@@ -203,10 +204,7 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
     /// [`Error::Io`].
     pub fn remove(mut self) -> Result<()> {
         self.file = None;
-        match std::fs::remove_file(&self.path) {
-            Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io(&self.path, "remove", e)),
-            _ => Ok(()),
-        }
+        remove_file(&self.path)
     }
 
     /// The path of the file.

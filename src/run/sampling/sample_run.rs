@@ -12,6 +12,7 @@ use super::weighted::WeightedTally;
 use super::{Sample, SampleKind, Weighted};
 use crate::engine::{Executor, LanePlan, SweepSummary};
 use crate::run::parts::{Computed, EachChunk, Job, Ledger, MergeableCounts, PLAN_FILE, Shard, leave_plan};
+use crate::support::files::remove_file;
 use crate::support::run_folder::ESTIMATE_RECORD;
 use crate::{Error, Place, Result};
 
@@ -188,14 +189,7 @@ impl Job for WeightedJob<'_> {
     /// The journal depends on the file of the search and is deleted next; without the file the next run's search gives the
     /// same bits.
     fn tidy(&self, out: &Path) -> Result<()> {
-        if self.weighted.search.is_none() {
-            return Ok(());
-        }
-        let path = out.join(SEARCH_FILE);
-        match std::fs::remove_file(&path) {
-            Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(Error::io(&path, "remove", e)),
-            _ => Ok(()),
-        }
+        if self.weighted.search.is_some() { remove_file(&out.join(SEARCH_FILE)) } else { Ok(()) }
     }
 
     fn result(&self, counts: Vec<WeightedTally>, computed: Computed, place: Place) -> Result<SampleResult> {

@@ -20,6 +20,9 @@ pub struct Table {
     pub rows: Vec<Vec<Cell<'static>>>,
 }
 
+/// The name of a column, or a part of it, and the value that an item has there.
+pub type NamedValue<T, V> = (&'static str, fn(&T) -> V);
+
 /// A table under construction: each added column has a value per item.
 pub struct TableOf<T> {
     items: Vec<T>,

@@ -23,7 +23,7 @@ mod writer;
 #[cfg(feature = "arrow")]
 pub use arrow::ArrowRows;
 pub use column::{Cell, Column, ColumnKind, Digits, Row, TableMetadata, TableRows};
-pub use memory::{CellValue, NumberText, Table, TableOf};
+pub use memory::{CellValue, NamedValue, NumberText, Table, TableOf};
 pub use names::{NameUnit, Named, Resolved, nearest, resolve};
 #[cfg(feature = "parquet")]
 pub use parquet_reader::is_panic_caught;
