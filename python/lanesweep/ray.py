@@ -53,7 +53,8 @@ def run(
     -------
     Result
     """
-    if ray.available_resources().get("CPU", 0) < num_cpus:
+    free: Callable[[], dict[str, float]] = ray.available_resources
+    if free().get("CPU", 0) < num_cpus:
         _LOG.warning(
             "fewer than %s cores of the cluster are free: parts wait for them (a limit_state keeps its cores until it is closed)", num_cpus
         )

@@ -96,7 +96,7 @@ def test_a_result_has_tables_figures_and_a_page(scenarios) -> None:
     assert "<svg" in result.figure("radar-cut-in").svg
     assert "<iframe" in result._repr_html_() and "SYNTHETIC" in str(result)
     header = (Path(result) / "f1.csv").read_text().splitlines()[0].split(",")
-    assert result.table("f1").columns == [name for name in header if name != "data"]
+    assert result.table("f1").columns == header and (frame["data"] == "synthetic").all()
     with pytest.raises(KeyError, match="there are .*f1"):
         result.table("f2")
     folder = Path(result)
