@@ -148,7 +148,12 @@ impl Sample {
             return Ok(Exit::Ok.into());
         };
         let missing = run.missing()?;
-        tracing::info!("{} samples on {}", count(missing), executor.backend.describe());
+        let crude = match &sample.kind {
+            SampleKind::Weighted(weighted) => missing.saturating_mul(weighted.draws.crude_per_draw),
+            _ => 0,
+        };
+        let beside = if crude > 0 { format!(", and {} draws of the density,", count(crude)) } else { String::new() };
+        tracing::info!("{} samples{beside} on {}", count(missing), executor.backend.describe());
         let is_empty = run.units().is_empty();
         let (density, lane_plan) = (&sample.density, sample.lane_plan());
         let rows = self.rows.as_deref().filter(|_| !is_empty).zip(lane_plan);
