@@ -323,22 +323,17 @@ fn the_last_figure_is_what_its_command_draws() {
 }
 
 #[test]
-fn the_code_of_the_chapter_on_driver_models_is_that_of_the_example_which_a_test_builds() {
-    let chapter = Document::read(root(), "docs/src/extend/driver-model.md");
-    let blocks: Vec<String> = chapter.blocks().map(|block| block.content.trim().to_owned()).collect();
-    for file in ["aeb.rs", "aeb.wgsl", "registry-line.txt"] {
-        let code = fs::read_to_string(root().join("examples/adding-a-driver-model").join(file)).unwrap();
-        assert!(blocks.iter().any(|block| block == code.trim()), "no block of the chapter is {file}");
+fn files_that_chapters_include_exist_and_bash_can_read_the_slurm_script() {
+    let mut included = 0;
+    for chapter in chapters() {
+        for part in chapter.text.split("{{#include ").skip(1) {
+            let file = root().join(&chapter.path).parent().unwrap().join(part.split("}}").next().unwrap());
+            assert!(file.is_file(), "{}: {}", chapter.path, file.display());
+            included += 1;
+        }
     }
-}
-
-#[test]
-fn the_slurm_script_of_the_chapter_on_clusters_is_the_one_to_deploy_and_bash_can_read_it() {
-    let script = root().join("deploy/slurm-array.sh");
-    let text = fs::read_to_string(&script).unwrap();
-    let chapter = Document::read(root(), "docs/src/on-a-cluster.md");
-    assert!(chapter.blocks().any(|block| block.content == text), "no block of the chapter is the script");
-    assert!(Command::new("bash").arg("-n").arg(&script).status().unwrap().success());
+    assert!(included >= 3, "{included}");
+    assert!(Command::new("bash").arg("-n").arg(root().join("deploy/slurm-array.sh")).status().unwrap().success());
 }
 
 #[test]
