@@ -1,4 +1,4 @@
-//! `lanesweep verify devices`: the compute devices of this machine.
+//! `lanesweep devices`: the compute devices of this machine.
 
 use clap::Args;
 
@@ -8,26 +8,48 @@ use crate::Result;
 
 /// List the compute devices and the one that is used
 ///
-/// Every device of every driver, with its limits, and the one that `--backend auto` selects. CUDA_VISIBLE_DEVICES and
-/// Slurm's GPU list are respected.
+/// Each device of each driver, by name, interface and PCI bus id, and whether it has the exact path; then what `--backend
+/// auto` selects: the first GPU, discrete before virtual before integrated, never software.
 #[derive(Debug, Args)]
-#[command(after_help = "Example:\n  lanesweep verify devices --format json")]
+#[command(after_help = "Example:\n  lanesweep devices --format json")]
 pub(super) struct Devices {
     #[command(flatten)]
     format: FormatFlag,
-    /// Leave out the self-check, which opens every device
-    #[arg(long, help_heading = "Run")]
-    no_self_check: bool,
 }
 
 impl Devices {
     #[cfg(feature = "gpu")]
     pub(super) fn run(&self) -> Result<Output> {
-        super::device_list::list(&self.format, self.no_self_check)
+        use crate::engine::BackendChoice;
+        use crate::engine::gpu::{Adapters, choose};
+        let adapters = Adapters::enumerate();
+        let cards = adapters.cards();
+        let auto = choose(cards, BackendChoice::Auto, None)?;
+        let text = || {
+            let path = |is_exact: bool| if is_exact { "exact path" } else { "plain path" };
+            let mut text: String =
+                cards.iter().map(|card| format!("{}, {}\n", card.one_line(), path(card.exact_path))).collect();
+            if cards.is_empty() {
+                text += NOTHING;
+            }
+            text + &match auto {
+                Some(index) => format!("--backend auto selects device {index}.\n"),
+                None => "--backend auto selects the CPU: there is no GPU.\n".to_owned(),
+            }
+        };
+        let json = || crate::report::records::document(&serde_json::json!({"devices": cards, "auto": auto}));
+        self.format.output(super::Exit::Ok, text, json)
     }
 
     #[cfg(not(feature = "gpu"))]
-    pub(crate) fn run(&self) -> Result<Output> {
-        Err(crate::engine::no_gpu("lanesweep verify devices"))
+    pub(super) fn run(&self) -> Result<Output> {
+        Err(crate::engine::no_gpu("lanesweep devices"))
     }
 }
+
+#[cfg(feature = "gpu")]
+const NOTHING: &str = "No compute device: no driver of Vulkan, Metal, Direct3D 12 or OpenGL shows one.
+A GPU needs its vendor's driver with Vulkan (on Debian for AMD and Intel: libvulkan1 mesa-vulkan-drivers).
+Software, for tests: libvulkan1 mesa-vulkan-drivers (Debian), which brings llvmpipe.
+In a container the GPU and its graphics driver must be passed in (NVIDIA_DRIVER_CAPABILITIES=all).
+";

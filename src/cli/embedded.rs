@@ -34,7 +34,7 @@ const FUNCTIONS: [Function; 15] = [
     ("trace", &["simulate"], |given| Ok(Verb::Simulate(of(given)?))),
     ("export_xosc", &["export", "xosc"], |given| Ok(Verb::Export(of(given)?))),
     ("synth", &["synth"], |given| Ok(Verb::Synth(of(given)?))),
-    ("merge", &["cluster", "merge"], |given| Ok(Verb::Cluster(of(given)?))),
+    ("merge", &["merge"], |given| Ok(Verb::Merge(of(given)?))),
 ];
 
 fn of<T: FromArguments>(arguments: &mut Arguments) -> Result<T> {

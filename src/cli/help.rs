@@ -8,8 +8,8 @@ const VERBS: [(&str, &[&str]); 5] = [
     ("Study a data set", &["tracks", "study", "mine", "search", "compare", "justify"]),
     ("Probabilities", &["fit", "sample"]),
     ("Single cases and grids", &["check", "simulate", "map", "vary", "export"]),
-    ("More machines", &["cluster"]),
-    ("Tools", &["verify", "config", "synth"]),
+    ("More machines", &["merge"]),
+    ("Tools", &["verify", "devices", "config", "synth"]),
 ];
 
 pub(super) const DATA: &str = "Data";

@@ -1,4 +1,4 @@
-//! `lanesweep cluster merge`: merges the parts of a run into the result of the whole run, bit for bit.
+//! `lanesweep merge`: merges the parts of a run into the result of the whole run, bit for bit.
 
 use std::path::PathBuf;
 
@@ -22,7 +22,7 @@ use crate::support::plain_text::quoted_word;
 /// result is written to DIR; it equals, bit for bit, the result of the unsplit run.
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  lanesweep study --shard 0/2 --out result\n  lanesweep study --shard 1/2 --out \
-                        result\n  lanesweep cluster merge result")]
+                        result\n  lanesweep merge result")]
 pub(super) struct Merge {
     /// The run's folder
     #[arg(value_name = "DIR", help_heading = "Data")]

@@ -6,13 +6,10 @@ mod case_flags;
 mod check;
 mod check_results;
 mod check_table;
-mod cluster;
 mod compare;
 mod config;
 mod configured;
 mod console;
-#[cfg(feature = "gpu")]
-mod device_list;
 mod devices;
 pub mod embedded;
 mod exit;
@@ -113,8 +110,9 @@ enum Verb {
     Check(check::Check),
     Vary(vary::Vary),
     Export(export::Export),
-    Cluster(cluster::Cluster),
+    Merge(merge::Merge),
     Verify(Box<verify::Verify>),
+    Devices(devices::Devices),
     Config(config::Config),
 }
 
@@ -202,8 +200,9 @@ impl Verb {
             Verb::Check(verb) => verb.run(configured),
             Verb::Vary(verb) => verb.run(configured),
             Verb::Export(verb) => verb.run(configured),
-            Verb::Cluster(verb) => verb.run(),
+            Verb::Merge(verb) => verb.run(),
             Verb::Verify(verb) => verb.run(configured),
+            Verb::Devices(verb) => verb.run(),
             Verb::Config(verb) => verb.run(configured),
         }
     }

@@ -12,7 +12,7 @@ use crate::{Error, Place, Result};
 /// Flags of every verb that can be split.
 #[derive(Debug, Clone, Args)]
 pub(super) struct ShardFlags {
-    /// Compute shard I of N (from 0); `cluster merge` merges them
+    /// Compute shard I of N (from 0); `merge` merges them
     ///
     /// The part is written to --out. `auto/N` takes I from a Kubernetes Indexed Job or a Slurm array.
     #[arg(long, value_name = "I/N", help_heading = "Run")]

@@ -43,7 +43,7 @@ fn collect(name: String, command: &clap::Command, pages: &mut Vec<(String, clap:
 
 /// Write the manual pages into a folder
 ///
-/// One page for the program and one per verb: lanesweep.1, lanesweep-study.1, lanesweep-cluster-merge.1, …
+/// One page for the program and one per verb: lanesweep.1, lanesweep-study.1, lanesweep-merge.1, …
 #[derive(Debug, Args)]
 #[command(after_help = "Example:\n  lanesweep config man man1")]
 pub(super) struct Man {

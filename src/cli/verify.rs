@@ -1,10 +1,9 @@
 //! `lanesweep verify`: checks that a device computes the same as the CPU.
 
-use clap::{Args, Subcommand};
+use clap::Args;
 
 use super::configured::Configured;
 use super::console::{self, Total};
-use super::devices::Devices;
 use super::format::FormatFlag;
 use super::source::SourceFlags;
 use super::{Exit, Output};
@@ -25,14 +24,9 @@ use crate::{Error, Place, Result};
 /// rule, and a study. Every output word of the device must equal the CPU's; otherwise the exit code is 5. Without a
 /// GPU, use a software device (--device llvmpipe), or verify the CPU backend itself (--backend cpu).
 #[derive(Debug, Args)]
-#[command(
-    args_conflicts_with_subcommands = true,
-    after_help = "Examples:\n  lanesweep verify\n  lanesweep verify --device llvmpipe --random-lanes 20000\n  lanesweep \
-                        verify --device 0 --lane random-cut-in-seed157-0000123/S/1.2s/FSM"
-)]
+#[command(after_help = "Examples:\n  lanesweep verify\n  lanesweep verify --device llvmpipe --random-lanes 20000\n  lanesweep \
+                        verify --device 0 --lane random-cut-in-seed157-0000123/S/1.2s/FSM")]
 pub(super) struct Verify {
-    #[command(subcommand)]
-    verb: Option<VerifyVerb>,
     #[command(flatten)]
     data: SourceFlags,
     /// Random lanes per model and category
@@ -51,19 +45,11 @@ pub(super) struct Verify {
     format: FormatFlag,
 }
 
-#[derive(Debug, Subcommand)]
-enum VerifyVerb {
-    Devices(Devices),
-}
-
 /// Maximum number of random lanes per model and category: their units have individual names.
 const MAX_LANES: u64 = 100_000_000;
 
 impl Verify {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
-        if let Some(VerifyVerb::Devices(verb)) = &self.verb {
-            return verb.run();
-        }
         for (flag, value, max) in [
             ("--random-lanes", self.random_lanes, MAX_LANES),
             ("--threshold-units", self.threshold_units, MAX_LANES / 1000),

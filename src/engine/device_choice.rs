@@ -11,7 +11,7 @@ use crate::{Error, Place, Result};
 /// A device as a user names it.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub enum DeviceName {
-    /// Position in the list of `lanesweep verify devices`.
+    /// Position in the list of `lanesweep devices`.
     Index(usize),
     /// Place on the PCI bus, as `pci_bus_id` writes it.
     Pci(String),
@@ -26,7 +26,7 @@ impl FromStr for DeviceName {
     /// [`Error::Usage`] for an empty text, or for `pci:` without a bus id.
     fn from_str(text: &str) -> Result<Self> {
         let text = text.trim();
-        let help = "write the index, a part of the name or pci:BUS of a device; `lanesweep verify devices` lists them";
+        let help = "write the index, a part of the name or pci:BUS of a device; `lanesweep devices` lists them";
         if text.is_empty() {
             return Err(Error::usage(Place::option("device"), "no device is named", help));
         }
@@ -83,7 +83,7 @@ impl FromStr for BackendChoice {
             _ => Err(Error::usage(
                 Place::option("backend"),
                 format!("there is no backend `{text}`"),
-                "write auto, cpu or gpu; a certain device: option `device`, see `lanesweep verify devices`",
+                "write auto, cpu or gpu; a certain device: option `device`, see `lanesweep devices`",
             )),
         }
     }

@@ -95,10 +95,9 @@ impl OpenBackend {
 /// Opens a device; `None` if the CPU is to compute.
 #[cfg(feature = "gpu")]
 fn open_device(choice: BackendChoice, device: Option<&DeviceName>, is_checked: bool) -> Result<Option<OpenBackend>> {
-    use super::gpu::{Adapters, GpuBackend, GpuOptions, choose, visible_here};
+    use super::gpu::{Adapters, GpuBackend, GpuOptions, choose};
     let adapters = Adapters::enumerate();
-    let visible = visible_here()?;
-    let Some(index) = choose(adapters.cards(), choice, device, visible.as_deref())? else { return Ok(None) };
+    let Some(index) = choose(adapters.cards(), choice, device)? else { return Ok(None) };
     let opened = GpuBackend::open(&adapters, index, GpuOptions::default());
     match opened.and_then(|gpu| if is_checked { checked(gpu) } else { Ok(gpu) }) {
         Ok(gpu) => {
@@ -132,7 +131,7 @@ fn checked(gpu: super::gpu::GpuBackend) -> Result<super::gpu::GpuBackend> {
 #[cfg(feature = "gpu")]
 fn nothing_to_verify() -> Error {
     let problem = "it compares a device with the CPU, and there is no GPU that it may use";
-    let help = "name a device with option `device` (`lanesweep verify devices` lists them), such as option `device = \
+    let help = "name a device with option `device` (`lanesweep devices` lists them), such as option `device = \
                 llvmpipe`; option `backend = cpu` compares the CPU's vector instructions with its scalar code";
     Error::device("lanesweep verify", problem, help)
 }

@@ -67,7 +67,7 @@ fn whole_and_shards(counts: &[u64]) {
                 };
                 done(dir, &[&[run[0], "--plan", &plan, "--shard", &part, "--out", &out], backend].concat());
             }
-            assert_eq!(done(dir, &["cluster", "merge", &out]), whole, "{out}");
+            assert_eq!(done(dir, &["merge", &out]), whole, "{out}");
             let (merged, expected) = (results(&dir.join(&out)), results(&dir.join(name)));
             let names = |files: &[(String, Vec<u8>)]| files.iter().map(|(name, _)| name.clone()).collect::<Vec<_>>();
             assert_eq!(names(&merged), names(&expected), "{out}");

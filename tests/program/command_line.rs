@@ -331,7 +331,7 @@ fn a_reader_that_goes_away_is_no_error() {
 #[test]
 fn help_names_every_verb_and_every_exit_code() {
     let help = String::from_utf8(lanesweep(&["--help"]).stdout).unwrap();
-    for word in ["study", "mine", "synth", "simulate", "verify", "cluster", "Exit codes"] {
+    for word in ["study", "mine", "synth", "simulate", "verify", "merge", "Exit codes"] {
         assert!(help.contains(word), "{word}");
     }
     for exit in lanesweep::cli::Exit::ALL {

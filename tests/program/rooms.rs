@@ -26,7 +26,7 @@ fn code(path: &Path) -> String {
 }
 
 /// Verbs that hold other verbs.
-const GROUPS: [(&str, &[&str]); 3] = [("cluster", &["merge"]), ("verify", &["devices"]), ("config", &["shell"])];
+const GROUPS: [(&str, &[&str]); 1] = [("config", &["shell"])];
 
 /// A verb's file is `VERB.rs`, its further parts are `VERB_*.rs`.
 #[test]

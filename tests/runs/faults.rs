@@ -173,7 +173,7 @@ fn an_output_that_is_a_file_or_inside_one_is_refused_before_the_work() {
         "compare --scenarios scenarios.jsonl --samples 1000 --out @",
         "fit --scenarios scenarios.jsonl --out @",
         "synth @",
-        "cluster merge @",
+        "merge @",
         "simulate --from @ --lane a/S/1.0s/FSM",
     ];
     for command in commands {

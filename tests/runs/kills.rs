@@ -62,7 +62,7 @@ const VERBS: [Verb; 18] = [
         "merge",
         Some("run.json"),
         Some("study --synth-recordings 1 --config generator.duration_s=120 --compare-reference --out out"),
-        "cluster merge out",
+        "merge out",
     ),
     verb(
         "sample mc",

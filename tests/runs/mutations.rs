@@ -88,7 +88,7 @@ fn changed_files_of_a_run_are_refused_or_have_no_effect() {
     let journal = "journal/part-00000-of-00002.journal";
     std::fs::write(dir.join(journal), journal_of(&lines)).unwrap();
 
-    let merge = |results| vec!["-q", "cluster", "merge", results];
+    let merge = |results| vec!["-q", "merge", results];
     let sample = ["-q", "sample", "densities/cut-in-2.json", "--samples", "200", "--thw", "0.6", "--backend", "cpu"];
     let inputs = [
         Input { file: "study/plan.json", reader: merge("study"), results: "study" },

@@ -387,7 +387,7 @@ fn flags_that_would_not_be_heeded_and_absurd_numbers_of_threads_are_refused() {
         refused(&[&["study", "--synth-recordings", "2"], data].concat(), "cannot be used with");
     }
     refused(&["study", "--tables", "--format", "json"], "leave out one of the two");
-    refused(&["cluster", "merge", "run", "--tables", "--format", "json"], "leave out one of the two");
+    refused(&["merge", "run", "--tables", "--format", "json"], "leave out one of the two");
 }
 
 /// What a folder of results or a document says of its data.

@@ -36,14 +36,14 @@ fn a_study_in_shards_is_the_study_in_one_piece() {
     for shard in ["2/3", "0/3", "1/3"] {
         done(dir, &[&STUDY[..], &["--out", "three", "--shard", shard]].concat());
     }
-    assert_eq!(done(dir, &["-q", "cluster", "merge", "three"]), whole);
+    assert_eq!(done(dir, &["-q", "merge", "three"]), whole);
     same(&dir.join("whole"), &dir.join("three"));
     // A second merge changes nothing, and a finished part is left alone.
     let part = dir.join("three/part-00001-of-00003.json");
     let before = std::fs::metadata(&part).unwrap().modified().unwrap();
     done(dir, &[&STUDY[..], &["--out", "three", "--shard", "1/3"]].concat());
     assert_eq!(std::fs::metadata(&part).unwrap().modified().unwrap(), before);
-    done(dir, &["-q", "cluster", "merge", "three"]);
+    done(dir, &["-q", "merge", "three"]);
     same(&dir.join("whole"), &dir.join("three"));
     // From one plan: the data are not read again. Shards without a unit are in `run/parts/folder.rs`.
     done(dir, &[&STUDY[..], &["--out", "plan", "--plan-only"]].concat());
@@ -56,7 +56,7 @@ fn a_study_in_shards_is_the_study_in_one_piece() {
             &["-q", "study", "--plan", "plan/plan.json", "--out", "seven", "--shard", &shard, "--backend", "cpu"],
         );
     }
-    assert_eq!(done(dir, &["-q", "cluster", "merge", "seven"]), whole);
+    assert_eq!(done(dir, &["-q", "merge", "seven"]), whole);
     same(&dir.join("whole"), &dir.join("seven"));
     assert_eq!(done(dir, &["-q", "study", "--plan", "plan/plan.json", "--out", "planned", "--backend", "cpu"]), whole);
     same(&dir.join("whole"), &dir.join("planned"));
@@ -71,7 +71,7 @@ fn samples_in_shards_are_the_run_in_one_piece_with_its_convergence() {
     for shard in ["6/7", "0/7", "3/7", "1/7", "5/7", "2/7", "4/7"] {
         done(dir, &[&SAMPLE[..], &["--out", "seven", "--shard", shard]].concat());
     }
-    assert_eq!(done(dir, &["-q", "cluster", "merge", "seven"]), whole);
+    assert_eq!(done(dir, &["-q", "merge", "seven"]), whole);
     same(&dir.join("whole"), &dir.join("seven"));
     assert!(dir.join("seven/convergence.svg").exists());
 }
@@ -90,21 +90,21 @@ fn a_folder_that_cannot_give_a_result_says_why_and_what_makes_it() {
         assert!(out.is_empty(), "{out}");
     };
     std::fs::create_dir(dir.join("empty")).unwrap();
-    refused(&["cluster", "merge", "empty"], 3, &["plan.json is missing"]);
-    refused(&["cluster", "merge", "nowhere"], 3, &["no such folder"]);
+    refused(&["merge", "empty"], 3, &["plan.json is missing"]);
+    refused(&["merge", "nowhere"], 3, &["no such folder"]);
     std::fs::write(dir.join("empty/run.json"), "{}").unwrap();
-    refused(&["cluster", "merge", "empty"], 3, &["an unsplit run"]);
+    refused(&["merge", "empty"], 3, &["an unsplit run"]);
     let shard = |shard: &str, out: &str| done(dir, &[&SAMPLE[..], &["--out", out, "--shard", shard]].concat());
     shard("0/3", "p");
     shard("2/3", "p");
     refused(
-        &["cluster", "merge", "p"],
+        &["merge", "p"],
         3,
         &["10000 of 30000 units are missing", "--plan p/plan.json --shard 1/3 --out p"],
     );
     shard("1/3", "p");
     shard("0/1", "p");
-    refused(&["cluster", "merge", "p"], 3, &["doubled"]);
+    refused(&["merge", "p"], 3, &["doubled"]);
     std::fs::remove_file(dir.join("p/part-00000-of-00001.json")).unwrap();
     // Damaged: one byte.
     let part = dir.join("p/part-00001-of-00003.json");
@@ -113,19 +113,19 @@ fn a_folder_that_cannot_give_a_result_says_why_and_what_makes_it() {
     let middle = damaged.len() / 2;
     damaged[middle] ^= 1;
     std::fs::write(&part, &damaged).unwrap();
-    refused(&["cluster", "merge", "p"], 3, &["part-00001-of-00003.json", "--shard 1/3"]);
+    refused(&["merge", "p"], 3, &["part-00001-of-00003.json", "--shard 1/3"]);
     std::fs::write(&part, &whole[..middle]).unwrap();
-    refused(&["cluster", "merge", "p"], 3, &["part-00001-of-00003.json", "no whole part"]);
+    refused(&["merge", "p"], 3, &["part-00001-of-00003.json", "no whole part"]);
     // Foreign: the same interval of another run.
     let other = [&SAMPLE[..], &["--out", "q", "--seed", "8", "--shard", "1/3"]].concat();
     done(dir, &other);
     std::fs::copy(dir.join("q/part-00001-of-00003.json"), &part).unwrap();
-    refused(&["cluster", "merge", "p"], 3, &["foreign"]);
+    refused(&["merge", "p"], 3, &["foreign"]);
     // Under another part's name.
     std::fs::write(&part, std::fs::read(dir.join("p/part-00000-of-00003.json")).unwrap()).unwrap();
-    refused(&["cluster", "merge", "p"], 3, &["its name stands for"]);
+    refused(&["merge", "p"], 3, &["its name stands for"]);
     std::fs::write(&part, &whole).unwrap();
-    done(dir, &["-q", "cluster", "merge", "p"]);
+    done(dir, &["-q", "merge", "p"]);
     // Another run into the same folder.
     let other = [&SAMPLE[1..], &["--out", "p", "--seed", "8", "--shard", "1/3"]].concat();
     refused(&other, 3, &["holds the plan of another run"]);
@@ -133,7 +133,7 @@ fn a_folder_that_cannot_give_a_result_says_why_and_what_makes_it() {
     refused(&["study", "--plan", "p/plan.json", "--seed", "3"], 2, &["cannot be used with"]);
     refused(&["study", "--plan", "p/plan.json", "--out", "x"], 3, &["a `study plan` is needed"]);
     std::fs::write(dir.join("p/plan.json"), "{}").unwrap();
-    refused(&["cluster", "merge", "p"], 3, &["no whole file of a run in parts"]);
+    refused(&["merge", "p"], 3, &["no whole file of a run in parts"]);
 }
 
 /// Replaces the first occurrence of a text in a file.
@@ -164,7 +164,7 @@ fn files_of_another_engine_or_an_earlier_version_are_neither_merged_nor_continue
             let path = dir.join(name).join(file);
             let whole = std::fs::read(&path).unwrap();
             edit(&path, &engine, &another);
-            refused(dir, &["cluster", "merge", name], &is_of_another);
+            refused(dir, &["merge", name], &is_of_another);
             if file != "plan.json" {
                 refused(dir, &shard("1/2"), &is_of_another);
             } else {
@@ -175,7 +175,7 @@ fn files_of_another_engine_or_an_earlier_version_are_neither_merged_nor_continue
             let earlier = r#""version":1,"sha256":"00","content":"#;
             std::fs::write(&path, &whole).unwrap();
             edit(&path, &format!("\"version\":2,{engine}"), earlier);
-            refused(dir, &["cluster", "merge", name], "its version is 1, this program reads 2");
+            refused(dir, &["merge", name], "its version is 1, this program reads 2");
             if file == "plan.json" {
                 let plan = format!("{name}/plan.json");
                 let said = format!("{plan}: its version is 1, this program reads 2");
@@ -183,7 +183,7 @@ fn files_of_another_engine_or_an_earlier_version_are_neither_merged_nor_continue
             }
             std::fs::write(&path, &whole).unwrap();
         }
-        done(dir, &["-q", "cluster", "merge", name]);
+        done(dir, &["-q", "merge", name]);
     }
     // The records of whole runs say it too.
     let record =
@@ -222,7 +222,7 @@ fn a_shard_reads_its_interval_of_the_plan_and_the_merge_none() {
     }
     std::fs::write(&path, &whole).unwrap();
     let _ = ["1/3", "2/3"].map(|of| done(dir, &shard(of)));
-    done(dir, &["-q", "cluster", "merge", "p"]);
+    done(dir, &["-q", "merge", "p"]);
 }
 
 #[test]
@@ -324,7 +324,7 @@ fn an_interrupted_run_continues_and_ends_as_if_undisturbed() {
         }
         assert!(interruptions > 0, "the run is too short to be interrupted");
     }
-    done(dir, &["-q", "cluster", "merge", "parts"]);
+    done(dir, &["-q", "merge", "parts"]);
     same(&dir.join("whole"), &dir.join("run"));
     same(&dir.join("whole"), &dir.join("parts"));
 }
@@ -355,7 +355,7 @@ fn parts_share_a_folder_and_keep_whole_runs_and_merges_out() {
     let shard = |index: &'static str| [&run[..], &["--shard", index]].concat();
     let mut first = start(dir, &shard("0/2"));
     wait_for_run(&mut first, "the lock is taken", || dir.join("run/part-00000-of-00002.lock").exists());
-    let others = [&run[..], &["-q", "cluster", "merge", "run"], &shard("0/2")].map(|args| lanesweep(dir, args));
+    let others = [&run[..], &["-q", "merge", "run"], &shard("0/2")].map(|args| lanesweep(dir, args));
     let beside = lanesweep(dir, &[&shard("1/2")[..], &["--stop-after", "0.3"]].concat());
     kill(first);
     for (code, _, err) in others {

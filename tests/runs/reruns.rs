@@ -227,7 +227,7 @@ fn a_lane_of_a_run_in_parts_can_be_looked_at_before_and_after_the_merge() {
     let of_whole = trace("whole");
     assert_eq!(trace("parts"), of_whole);
     done(dir, &[&study[..], &["--out", "parts", "--shard", "1/2"]].concat());
-    done(dir, &["-q", "cluster", "merge", "parts"]);
+    done(dir, &["-q", "merge", "parts"]);
     assert_eq!(trace("parts"), of_whole);
     // A sampling run's parts as well.
     let fit = ["-q", "fit", "--synth-recordings", "3", "--categories", "cut-in", "--parameterizations", "2"];

@@ -158,7 +158,7 @@ fn a_run_in_parts_is_the_run_in_one_and_its_lanes_can_be_run_again() {
     run(&[&base[..], &["--out", "whole", "--rows", "rows.csv"]].concat());
     run(&[&base[..], &["--out", "joined", "--shard", "1/2"]].concat());
     run(&[&base[..], &["--out", "joined", "--shard", "0/2"]].concat());
-    let (code, _, err) = lanesweep(dir.path(), &["-q", "cluster", "merge", "joined"]);
+    let (code, _, err) = lanesweep(dir.path(), &["-q", "merge", "joined"]);
     assert_eq!(code, 0, "{err}");
     let read = |path: &str| std::fs::read_to_string(dir.path().join(path)).unwrap();
     let files = ["estimates.csv", "worst.csv", "map-FSM.csv", "map-Reg157.svg", "density.json", "convergence.csv"];
@@ -220,7 +220,7 @@ fn a_searched_proposal_can_be_sampled_again_and_in_shards() {
         assert_eq!(code, 0, "{args:?}: {err}");
     };
     let merged = |folder: &str| {
-        let (code, _, err) = lanesweep(dir.path(), &["-q", "cluster", "merge", folder]);
+        let (code, _, err) = lanesweep(dir.path(), &["-q", "merge", folder]);
         assert_eq!(code, 0, "{err}");
         estimates(dir.path(), folder)
     };

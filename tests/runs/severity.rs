@@ -84,7 +84,7 @@ fn injuries_are_those_of_the_rows_and_shards_give_the_same_bits() {
     for shard in ["2/3", "0/3", "1/3"] {
         done(dir, &[&whole[..], &["--threads", "1", "--out", "three", "--shard", shard]].concat());
     }
-    done(dir, &["-q", "cluster", "merge", "three"]);
+    done(dir, &["-q", "merge", "three"]);
     for file in ["injuries.csv", "targets.csv", "estimates.csv"] {
         let read = |folder: &str| std::fs::read(dir.join(folder).join(file)).unwrap();
         assert!(read("whole") == read("three"), "{file}");

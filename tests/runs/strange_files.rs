@@ -137,7 +137,7 @@ fn strange_files_inside_a_folder_that_is_named_are_refused_at_once() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     let names = [
-        ("merge", "plan.json", vec!["cluster", "merge", "in"]),
+        ("merge", "plan.json", vec!["merge", "in"]),
         ("rerun", "estimate.json", vec!["simulate", "--from", "in", "--lane", "a/S/1.0s/FSM"]),
     ];
     for (what, name, args) in names {
@@ -259,7 +259,7 @@ fn plans_parts_journals_and_densities_that_are_zeros_or_cut_off_are_refused_with
     };
     let cases = [
         ("d.json", "sample d.json --samples 10 --out other"),
-        ("out/plan.json", "cluster merge out"),
+        ("out/plan.json", "merge out"),
         ("out/part-00000-of-00002.json", &*format!("{sample} --shard 0/2")),
         ("study/plan.json", "study --plan study/plan.json --backend cpu --shard 1/2 --out study"),
         ("study/part-00000-of-00002.json", "study --plan study/plan.json --backend cpu --shard 0/2 --out study"),
@@ -422,7 +422,7 @@ fn a_command_that_is_suggested_can_be_pasted_whatever_the_folder_is_called() {
     let part = ["-q", "study", "--synth-recordings", "1", "--config", "generator.duration_s=120", "--shard", "0/2"];
     let (code, _, err) = program::lanesweep(dir.path(), &[&part[..], &["--out", "it's; mine"]].concat());
     assert_eq!(code, 0, "{err}");
-    let (code, said) = lanesweep(dir.path(), &["cluster", "merge", "it's; mine"]);
+    let (code, said) = lanesweep(dir.path(), &["merge", "it's; mine"]);
     assert_eq!(code, 3, "{said}");
     assert!(said.contains(r"--plan 'it'\''s; mine/plan.json' --shard 1/2 --out 'it'\''s; mine'"), "{said}");
 }

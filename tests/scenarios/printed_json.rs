@@ -68,7 +68,7 @@ fn a_study_prints_its_tables_and_a_merged_one_the_same() {
         let args = study(&["--shard", shard, "--out", "parts"]);
         lanesweep(dir.path(), &args.iter().map(String::as_str).collect::<Vec<_>>());
     }
-    let merged = json(dir.path(), &["cluster", "merge", "parts"]);
+    let merged = json(dir.path(), &["merge", "parts"]);
     for name in ["failures", "f1", "claims", "data", "plan_sha256", "lanes"] {
         assert_eq!(merged[name], whole[name], "{name}");
     }

@@ -89,7 +89,7 @@ settings! {
         pub threads: Option<usize> = None,
         /// Backend; auto: a GPU if there is one.
         pub backend: BackendChoice = BackendChoice::Auto,
-        /// Device, by part of its name, PCI bus id or index. `lanesweep verify devices` lists the devices. The default
+        /// Device, by part of its name, PCI bus id or index. `lanesweep devices` lists the devices. The default
         /// is the first GPU.
         #[serde(skip_serializing_if = "Option::is_none")]
         pub device: Option<String> = None,

@@ -200,13 +200,6 @@ impl AdapterCard {
         matches!(self.kind, DeviceKind::Discrete | DeviceKind::Virtual | DeviceKind::Integrated)
     }
 
-    /// Whether the environment hides it (`visible()`). It hides GPUs that are not in the list of allowed PCI
-    /// bus ids or have no id, but never software rasterizers.
-    pub fn is_hidden_by(&self, visible: Option<&[String]>) -> bool {
-        let Some(visible) = visible else { return false };
-        self.kind != DeviceKind::Software && !self.pci_bus_id.as_ref().is_some_and(|bus| visible.contains(bus))
-    }
-
     /// Index, name, interface and PCI bus id, for messages.
     pub fn one_line(&self) -> String {
         let bus = self.pci_bus_id.as_ref().map(|bus| format!(", pci:{bus}")).unwrap_or_default();

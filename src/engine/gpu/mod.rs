@@ -17,7 +17,6 @@ mod session;
 pub mod shader;
 mod spirv;
 mod tally;
-mod visible;
 
 pub use adapters::{AdapterCard, AdapterLimits, Adapters, Api, DeviceKind};
 pub use choice::choose;
@@ -25,4 +24,3 @@ pub use device::{BeforeJob, GpuOptions, Tampering};
 pub use records::{DrawnRecord, Generation, Launch, OutcomeRecord, StartRecord, Tally};
 pub use session::GpuBackend;
 pub use spirv::exact_spirv;
-pub use visible::visible_here;

@@ -84,8 +84,7 @@ fn called(arguments: &[String]) -> Option<Called> {
     let flags = arguments.iter().filter(|word| word.len() > 1 && word.starts_with('-') && !is_number(word));
     let flags = flags.map(|word| word.split('=').next().unwrap_or_default().to_owned()).collect();
     let has_inner = |inner: &str| match verb.as_str() {
-        "config" | "export" | "cluster" => true,
-        "verify" => inner == "devices",
+        "config" | "export" => true,
         _ => false,
     };
     let inner = arguments.iter().skip_while(|word| *word != verb).nth(1).filter(|inner| has_inner(inner)).cloned();
