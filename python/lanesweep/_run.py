@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from . import _core
-from ._driver import Driver, names_of, refresh
+from ._driver import names_of, refresh
 from ._result import Result, temporary
 
 _log = logging.getLogger("lanesweep")
@@ -180,8 +180,6 @@ def run(function: str, arguments: Mapping[str, Any], *, default_out: str | None 
         given |= arguments.get(group, {})
     if given.get("models") is not None:
         given["models"] = names_of(given["models"])
-    if isinstance(given.get("against"), Driver):
-        (given["against"],) = names_of(given["against"])
     for name, file in _FILES.items():
         result = given.get(name)
         if isinstance(result, Result) and result.folder is not None and (result.folder / file).is_file():

@@ -7,7 +7,6 @@ from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 
-from ._driver import Driver
 from ._result import Result
 from ._run import run
 from .options import (
@@ -542,7 +541,6 @@ def map(
     set: Values | None = None,
     models: Models | None = None,
     criterion: Criterion | None = None,
-    against: Path | Driver | None = None,
     robust: bool = False,
     closing: bool = False,
     native_gap: bool = False,
@@ -552,7 +550,7 @@ def map(
     out: Path | None = None,
     **options: Unpack[_Map],
 ) -> Result:
-    """Map outcomes over two parameters, and where two models or profiles differ; every cell is a concrete case.
+    """Map outcomes over two parameters; every cell is a concrete case.
 
     Parameters
     ----------
@@ -570,8 +568,6 @@ def map(
         Driver models, by default all, or those of the preset.
     criterion : {"collision", "ttc", "btn"}
         Criterion, by default collision.
-    against : str or path
-        Model, driver or profile to compare with.
     robust : bool
         Mark cells whose outcome changes with a tenth of the time step, 1 cm or 0.1 km/h: they are undecided.
     closing : bool

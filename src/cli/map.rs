@@ -11,12 +11,11 @@ use super::console::Total;
 use super::format::FormatFlag;
 use super::source::PlausibilityFlag;
 use super::{COMMIT, Exit, Output, lists};
-use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::report::host::{Host, SweepRecord};
 use crate::report::map::MapReport;
 use crate::report::openscenario::{Names, Rename, read_distribution, variations};
-use crate::run::grid::{self, Against, Grid, GridText, MapGrids, MapOptions, MapResult, PARAMETERS, presets::Presets};
+use crate::run::grid::{self, Grid, GridText, MapGrids, MapOptions, MapResult, PARAMETERS, presets::Presets};
 use crate::scenario::Category;
 use crate::support::plausibility::Doubts;
 use crate::support::readable::{count, value};
@@ -26,11 +25,11 @@ use crate::{Error, Place, Result};
 /// Seed of the random selection of device lanes that the CPU recomputes.
 const RECHECK_SEED: u64 = 1;
 
-/// Map outcomes over two parameters, and where two models or profiles differ
+/// Map outcomes over two parameters
 ///
 /// Every cell is one concrete case. --preset takes the grids of the JRC's evidence (jrc) or of the regulation's Annex 3
 /// (r157, to 60 and to 130 km/h); --x, --y, --panel and --set define any other grid. Writes a sheet per grid and model
-/// (SVG), cells.csv, differences.csv and map.json. The percentages of cells with a failure go to stdout.
+/// (SVG), cells.csv and map.json. The percentages of cells with a failure go to stdout.
 #[derive(Debug, Args)]
 #[command(after_help = EXAMPLES, after_long_help = after_long_help())]
 pub(super) struct Map {
@@ -75,9 +74,6 @@ pub(super) struct Map {
     models: lists::ModelsFlag,
     #[command(flatten)]
     criterion: lists::CriterionFlag,
-    /// Model or profile to compare with; maps the differences
-    #[arg(long, value_name = "MODEL|PROFILE", help_heading = "Models and criteria")]
-    against: Option<String>,
     /// Mark cells whose outcome changes with a tenth of the time step, 1 cm or 0.1 km/h
     ///
     /// They are undecided. Each cell is simulated eight times; sheets show undecided cells in their own colour.
@@ -96,7 +92,7 @@ pub(super) struct Map {
 }
 
 from_arguments!(
-    Map { category, preset, distribution, x, y, panel, set, closing, native_gap, against, robust, reference, out }
+    Map { category, preset, distribution, x, y, panel, set, closing, native_gap, robust, reference, out }
     each { rename: str::parse }
     groups { models, criterion, plausibility, format }
 );
@@ -109,9 +105,8 @@ const MORE_EXAMPLES: &str = "Examples (the repository has the .xosc file in docs
                              lanesweep map cut-in --preset jrc --out maps\n  \
                              lanesweep map cut-in --x gap_m=1..60/1 --y lateral_speed_mps=0.1..1.8/0.1 \\\n      \
                              --panel ego_speed_kmh=60,90,120 --panel other_speed_kmh=30,50 \\\n      \
-                             --models FSM,RSS --against un-r157\n  \
-                             lanesweep map lvd --x deceleration_mps2=1..9/0.25 --y ego_speed_kmh=30..130/5 --set thw_s=1.2 \\\n      \
-                             --against FSM\n  \
+                             --models FSM,RSS\n  \
+                             lanesweep map lvd --x deceleration_mps2=1..9/0.25 --y ego_speed_kmh=30..130/5 --set thw_s=1.2\n  \
                              lanesweep map cut-in --distribution cut-in-deterministic.xosc \\\n      \
                              --rename Ego_Speed_kph=ego_speed_kmh --rename Other_Speed_kph=other_speed_kmh";
 
@@ -125,15 +120,9 @@ impl Map {
         let category = Category::named(&self.category, Place::item("CATEGORY"))?;
         let criterion = self.criterion.get()?;
         let profile = self.profile(configured)?;
-        let options = MapOptions {
-            grids: self.grids(category)?,
-            models: self.models.named()?,
-            criterion,
-            against: self.against.as_deref().map(|text| against(text, configured)).transpose()?,
-            robust: self.robust,
-        };
+        let options =
+            MapOptions { grids: self.grids(category)?, models: self.models.named()?, criterion, robust: self.robust };
         let started = Instant::now();
-        let against = options.against.clone();
         let map = grid::Map::plan(options, &profile)?;
         let plan_s = started.elapsed().as_secs_f64();
         let opened = if self.reference { configured.open_reference()? } else { configured.open()? };
@@ -145,7 +134,7 @@ impl Map {
         let host = Host::of(COMMIT, &opened, summary.rechecked_lanes, started, configured.record(false));
         let sweep = SweepRecord::of(&summary, RECHECK_SEED);
         let preset = self.preset.clone();
-        let report = MapReport { grids, criterion, against, profile, preset, host, sweep, plan_s };
+        let report = MapReport { grids, criterion, profile, preset, host, sweep, plan_s };
         let written = report.write(folder.results()?)?;
         let output = self.format.output(Exit::Ok, || report.text(), || report.json(&written))?;
         let (simulations, seconds) = (count(report.simulations()), value(report.host.seconds));
@@ -196,19 +185,4 @@ impl Map {
             }
         }
     }
-}
-
-/// Parses the name of a model or a profile.
-fn against(text: &str, configured: &Configured) -> Result<Against> {
-    if let Some(model) = ModelId::parse(text) {
-        return Ok(Against::Model(model));
-    }
-    let profile = configured.profile_of(text).map_err(|error| match error {
-        Error::Usage { place, problem: _, help } if *place == Place::option("profile") => {
-            let problem = format!("there is neither a driver model nor a profile `{text}`");
-            Error::usage(Place::item("--against"), problem, format!("{help}. Models: {}", ModelId::names()))
-        }
-        other => other,
-    })?;
-    Ok(Against::Profile(Box::new(profile)))
 }

@@ -24,8 +24,10 @@ use crate::{Error, Place, Result};
 /// rule, and a study. Every output word of the device must equal the CPU's; otherwise the exit code is 5. Without a
 /// GPU, use a software device (--device llvmpipe), or verify the CPU backend itself (--backend cpu).
 #[derive(Debug, Args)]
-#[command(after_help = "Examples:\n  lanesweep verify\n  lanesweep verify --device llvmpipe --random-lanes 20000\n  lanesweep \
-                        verify --device 0 --lane random-cut-in-seed157-0000123/S/1.2s/FSM")]
+#[command(
+    after_help = "Examples:\n  lanesweep verify\n  lanesweep verify --device llvmpipe --random-lanes 20000\n  lanesweep \
+                        verify --device 0 --lane random-cut-in-seed157-0000123/S/1.2s/FSM"
+)]
 pub(super) struct Verify {
     #[command(flatten)]
     data: SourceFlags,

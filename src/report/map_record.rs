@@ -4,15 +4,15 @@ use std::collections::BTreeMap;
 
 use serde::Serialize;
 
-use super::map::{Difference, MapReport};
+use super::map::MapReport;
 use super::records::{PROGRAM, document, record};
 use crate::Result;
 use crate::engine::ENGINE_VERSION;
-use crate::run::grid::{Against, CellOutcome, GridAxis, MappedGrid, count};
+use crate::run::grid::{CellOutcome, GridAxis, MappedGrid};
 use crate::support::run_folder::ResultFiles;
 
 impl MapReport {
-    /// `map.json`: fractions, differences and everything needed to reproduce them; `files` are in the same folder.
+    /// `map.json`: fractions and everything needed to reproduce them; `files` are in the same folder.
     ///
     /// # Errors
     /// None for a record of this program.
@@ -24,17 +24,9 @@ impl MapReport {
             commit: host.commit(),
             preset: &self.preset,
             criterion: self.criterion.key(),
-            against: self.against.as_ref().map(|_| self.against_name()),
             simulations: self.simulations(),
             grids: self.grids.iter().map(|mapped| self.grid_record(mapped, &shown)).collect::<Vec<_>>(),
-            differences: self.differences().iter().map(difference_record).collect::<Vec<_>>(),
-            // Preventable conflict cells, and those that a rule turns, by the driver that decides.
-            driver_rules: self.rule_records(),
             profile: &self.profile,
-            other_profile: match &self.against {
-                Some(Against::Profile(profile)) => Some(profile),
-                _ => None,
-            },
             settings: &host.settings,
             #[serde(flatten)]
             files: files,
@@ -68,9 +60,8 @@ impl MapReport {
                 known_percent: mapped.known_percent[at],
             }
         });
-        let others = mapped.other.iter().flat_map(|(_, plan, _)| &plan.parts);
         // The same hash means the same lanes.
-        let plans = mapped.plan.parts.iter().chain(others).map(|part| {
+        let plans = mapped.plan.parts.iter().map(|part| {
             record! {
                 models: part.plan.models.iter().map(|m| m.name()).collect::<Vec<_>>(),
                 profile: &part.plan.profile.name,
@@ -102,22 +93,5 @@ impl MapReport {
             shares: shares.collect::<Vec<_>>(),
             plans: plans.collect::<Vec<_>>(),
         }
-    }
-}
-
-/// Cells by agreement of two verdicts.
-fn difference_record(of: &Difference) -> impl Serialize + use<> {
-    let [pass, fail, only_first, only_second, none, open] = count(&of.cells);
-    record! {
-        map: of.grid.name().to_owned(),
-        model: of.model.name(),
-        first: of.first.clone(),
-        second: of.second.clone(),
-        both_pass: pass,
-        both_fail: fail,
-        only_first_fails: only_first,
-        only_second_fails: only_second,
-        no_conflict: none,
-        undecided: open,
     }
 }

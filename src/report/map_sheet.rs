@@ -6,7 +6,7 @@
 
 use super::plot::{Cells, Figure, Fill, FilledCell, Height, INK, Plot, PlotAxis, Rule};
 use crate::run::check::Answer;
-use crate::run::grid::{Agreement, CellOutcome, Grid, boundary, runs};
+use crate::run::grid::{CellOutcome, Grid, boundary, runs};
 
 /// A sheet.
 pub(super) struct MapSheet<'a> {
@@ -16,10 +16,10 @@ pub(super) struct MapSheet<'a> {
     pub subtitle: String,
     /// The grid.
     pub grid: &'a Grid,
-    /// Kinds of cells: name and colour.
-    pub kinds: Vec<(String, &'static str)>,
-    /// Kind of every cell, in the grid's order.
-    pub cells: Vec<u8>,
+    /// Outcomes that tables and legends count.
+    pub outcomes: &'a [CellOutcome],
+    /// Outcome of every cell, in the grid's order.
+    pub cells: Vec<CellOutcome>,
     /// Per cell: whether it is not preventable. Its boundary is drawn if known.
     pub not_preventable: Option<Vec<bool>>,
     /// Notes at the foot.
@@ -32,34 +32,16 @@ const BOUNDARY: &str = "#c40000";
 const MAX_NARROW: usize = 3;
 const MAX_COLUMNS: usize = 8;
 
-/// Name and colour of an outcome.
-pub(super) fn outcome(outcome: CellOutcome) -> (String, &'static str) {
-    let colour = match outcome {
-        CellOutcome::NoConflict => NO_CONFLICT,
+/// Colour of an outcome.
+fn colour(outcome: CellOutcome) -> &'static str {
+    match outcome {
+        CellOutcome::NoConflict => "#ffffff",
         CellOutcome::Pass => "#f3dfa2",
         CellOutcome::Fail => "#4a6fa5",
         CellOutcome::FailByReaction => "#14203c",
-        CellOutcome::Undecided => UNDECIDED,
-    };
-    (outcome.label().to_owned(), colour)
-}
-
-/// Name and colour of an agreement of two verdicts.
-pub(super) fn agreement(agreement: Agreement, first: &str, second: &str) -> (String, &'static str) {
-    let label = agreement.label().to_owned();
-    match agreement {
-        Agreement::BothPass => (label, "#f3dfa2"),
-        Agreement::BothFail => (label, "#7d7d7d"),
-        Agreement::OnlyFirst => (format!("only {first} fails"), "#0b4f8a"),
-        Agreement::OnlySecond => (format!("only {second} fails"), "#4a0f08"),
-        Agreement::NoConflict => (label, NO_CONFLICT),
-        Agreement::Undecided => (label, UNDECIDED),
+        CellOutcome::Undecided => "#e69f00",
     }
 }
-
-/// The same in every map.
-const NO_CONFLICT: &str = "#ffffff";
-const UNDECIDED: &str = "#e69f00";
 
 impl MapSheet<'_> {
     /// The sheet as a figure.
@@ -114,13 +96,13 @@ impl MapSheet<'_> {
     /// `first`: of the panel's values, those from here on are in the heading.
     fn plot(&self, panel: usize, first: usize) -> Plot {
         let (across, up) = (self.grid.x().edges(), self.grid.y().edges());
-        let kind = |i: usize, j: usize| usize::from(self.cells[self.grid.cell(panel, i, j)]);
+        let kind = |i: usize, j: usize| self.cells[self.grid.cell(panel, i, j)] as usize;
         let mut cells = Cells { key: self.key(), ..Cells::default() };
-        for (number, (_, colour)) in self.kinds.iter().enumerate() {
+        for outcome in self.outcomes {
             for j in 0..self.grid.y().len() {
-                for (from, to) in runs(self.grid.x().len(), &|i| kind(i, j) == number) {
+                for (from, to) in runs(self.grid.x().len(), &|i| kind(i, j) == *outcome as usize) {
                     let corners = [(across[from], up[j]), (across[to], up[j + 1])];
-                    cells.cells.push(FilledCell { corners, fill: flat(colour), ..FilledCell::default() });
+                    cells.cells.push(FilledCell { corners, fill: flat(colour(*outcome)), ..FilledCell::default() });
                 }
             }
         }
@@ -155,13 +137,14 @@ impl MapSheet<'_> {
         }
     }
 
-    /// The kinds that occur, with their counts.
+    /// The outcomes that occur, with their counts.
     fn key(&self) -> Vec<(String, Fill)> {
-        let named = |(number, (name, colour)): (usize, &(String, &'static str))| {
-            let count = self.cells.iter().filter(|c| usize::from(**c) == number).count();
-            (count > 0).then(|| (format!("{name}: {count} of {}", self.cells.len()), flat(colour)))
+        let named = |outcome: &CellOutcome| {
+            let count = self.cells.iter().filter(|of| *of == outcome).count();
+            let name = outcome.label();
+            (count > 0).then(|| (format!("{name}: {count} of {}", self.cells.len()), flat(colour(*outcome))))
         };
-        self.kinds.iter().enumerate().filter_map(named).collect()
+        self.outcomes.iter().filter_map(named).collect()
     }
 
     /// `ego 90 km/h`.
@@ -197,12 +180,9 @@ mod tests {
 
     #[test]
     fn in_a_grey_print_the_kinds_of_a_sheet_are_told_apart() {
-        let outcomes = CellOutcome::ALL.map(|kind| outcome(kind).1).to_vec();
-        let agreements = Agreement::ALL.map(|kind| agreement(kind, "a", "b").1).to_vec();
-        for mut kinds in [outcomes, agreements] {
-            kinds.sort_by(|a, b| lightness(a).total_cmp(&lightness(b)));
-            let steps = kinds.windows(2).map(|pair| lightness(pair[1]) - lightness(pair[0]));
-            assert!(steps.clone().all(|step| step > 9.0), "{kinds:?} {:?}", steps.collect::<Vec<_>>());
-        }
+        let mut kinds = CellOutcome::ALL.map(colour);
+        kinds.sort_by(|a, b| lightness(a).total_cmp(&lightness(b)));
+        let steps = kinds.windows(2).map(|pair| lightness(pair[1]) - lightness(pair[0]));
+        assert!(steps.clone().all(|step| step > 9.0), "{kinds:?} {:?}", steps.collect::<Vec<_>>());
     }
 }

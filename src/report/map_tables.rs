@@ -1,17 +1,17 @@
-//! The tables of a `map` run: cells by outcome for the terminal, every cell and difference as CSV.
+//! The tables of a `map` run: cells by outcome for the terminal, every cell as CSV.
 
 use std::io::{self, Write};
 
-use super::map::{Difference, MapReport};
+use super::map::MapReport;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
-use crate::run::grid::{CaseQuantity, CellOutcome, Grid, MapParameter, MappedGrid, VARIED, count};
+use crate::run::grid::{CaseQuantity, CellOutcome, MappedGrid, VARIED};
 use crate::scenario::Category;
 use crate::support::readable;
-use crate::support::table::{Column, Digits, NumberText, Table, csv_field};
+use crate::support::table::{Column, Digits, NumberText, Table};
 
 impl MapReport {
-    /// Fractions and differences as tables.
+    /// Fractions as a table.
     pub fn text(&self) -> String {
         let criterion = self.criterion.label();
         let any_known = self.grids.iter().any(|mapped| mapped.known_percent.iter().any(Option::is_some));
@@ -53,18 +53,6 @@ impl MapReport {
             );
         }
         text.push_str(&self.words_of_outcomes(&outcomes));
-        text.push_str(&self.rule_text());
-        let differences = self.differences();
-        if !differences.is_empty() {
-            let shown = self.shown_agreements();
-            let table = Table::of(&differences)
-                .column("map", |of| of.grid.name())
-                .column("first", |of| of.first.as_str())
-                .column("second", |of| of.second.as_str())
-                .columns(shown.iter(), |kind| kind.label(), |of, kind| count(&of.cells)[*kind as usize])
-                .build();
-            text.push_str(&format!("\nDifferences in {criterion}\n{}", table.text()));
-        }
         text
     }
 
@@ -132,12 +120,16 @@ impl MapReport {
         let mut out = io::BufWriter::new(out);
         let is_robust = self.is_robust();
         let columns = "initial_gap_m,model,collision,ttc,btn,capped,failed,conflict,outcome,drives_through";
-        write_header(&mut out, &self.grids, &format!("{columns}{}", if is_robust { ",undecided" } else { "" }))?;
+        // All grids of a run have the same parameters.
+        let grid = self.grids.first().map(|mapped| mapped.plan.grid.values(0)).unwrap_or_default();
+        let keys: Vec<&str> = grid.iter().map(|(parameter, _)| parameter.key).collect();
+        writeln!(out, "map,{},{columns}{}", keys.join(","), if is_robust { ",undecided" } else { "" })?;
         for MappedGrid { plan, map, drives_through, .. } in &self.grids {
             let profile = &plan.parts[0].plan.profile;
             for (cell, drives_through) in drives_through.iter().enumerate() {
                 let drives_through = u8::from(*drives_through);
-                let place = place_of(&plan.grid, cell);
+                let values: Vec<String> = plan.grid.values(cell).iter().map(|(_, value)| value.to_string()).collect();
+                let place = format!("{},{}", plan.grid.name(), values.join(","));
                 for (at, &model) in map.models.iter().enumerate() {
                     let verdicts = map.verdicts(at, cell);
                     let [collision, ttc, btn] = Criterion::ALL.map(|c| u8::from(verdicts.failed(c)));
@@ -156,30 +148,4 @@ impl MapReport {
         }
         out.flush()
     }
-
-    pub(super) fn write_differences(&self, differences: &[Difference], out: &mut dyn Write) -> io::Result<()> {
-        let mut out = io::BufWriter::new(out);
-        write_header(&mut out, &self.grids, "first,second,difference")?;
-        for Difference { grid, first, second, cells, .. } in differences {
-            let (first, second) = (csv_field(first), csv_field(second));
-            for (cell, kind) in cells.iter().enumerate() {
-                writeln!(out, "{},{first},{second},{}", place_of(grid, cell), kind.key())?;
-            }
-        }
-        out.flush()
-    }
-}
-
-/// The columns of a cell's position; all grids of a run have the same parameters.
-fn write_header(out: &mut dyn Write, grids: &[MappedGrid], columns: &str) -> io::Result<()> {
-    let keys: Vec<&str> = match grids.first() {
-        Some(mapped) => mapped.plan.grid.values(0).iter().map(|(p, _): &(&MapParameter, f64)| p.key).collect(),
-        None => Vec::new(),
-    };
-    writeln!(out, "map,{},{columns}", keys.join(","))
-}
-
-fn place_of(grid: &Grid, cell: usize) -> String {
-    let values: Vec<String> = grid.values(cell).iter().map(|(_, value)| value.to_string()).collect();
-    format!("{},{}", grid.name(), values.join(","))
 }

@@ -26,7 +26,6 @@ mod html;
 pub mod lanes;
 pub mod map;
 mod map_record;
-mod map_rules;
 mod map_sheet;
 mod map_tables;
 pub mod openscenario;

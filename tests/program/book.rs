@@ -266,17 +266,12 @@ fn every_printed_command_has_a_verb_and_flags_that_exist() {
 const OF_ROWS: &str = "rare-failures.svg";
 
 /// Figures of the book: file, the command that draws it, and where. The last takes a minute.
-const FIGURES: [(&str, &str, &str); 4] = [
+const FIGURES: [(&str, &str, &str); 3] = [
     ("f1-cut-in.svg", "study --out OUT", "f1-cut-in.svg"),
     (
         "case.svg",
         "simulate --category cut-in --models all --ego-speed 30m/s --speed 20m/s --thw 1.2 --lateral-speed 1.0 --plot OUT/case.svg",
         "case.svg",
-    ),
-    (
-        "lvd_cchdm_against_fsm.svg",
-        "map lvd --x deceleration_mps2=1..9/0.25 --y ego_speed_kmh=30..130/5 --set thw_s=1.2 --against FSM --out OUT",
-        "lvd_cchdm_against_fsm.svg",
     ),
     (
         "cut_in_to_60_cchdm.svg",

@@ -104,7 +104,7 @@ const VERBS: [Verb; 18] = [
         "map",
         Some("map.json"),
         Some(
-            "map cut-in --x gap_m=1..20/1 --y lateral_speed_mps=0.5,1 --set ego_speed_kmh=90 --set other_speed_kmh=50 --models FSM,RSS --against RSS --out out",
+            "map cut-in --x gap_m=1..20/1 --y lateral_speed_mps=0.5,1 --set ego_speed_kmh=90 --set other_speed_kmh=50 --models FSM,RSS --out out",
         ),
         "map lvd --x deceleration_mps2=1..9/0.5 --y ego_speed_kmh=30..130/5 --set thw_s=1.2 --out out",
     ),

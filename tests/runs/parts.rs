@@ -97,11 +97,7 @@ fn a_folder_that_cannot_give_a_result_says_why_and_what_makes_it() {
     let shard = |shard: &str, out: &str| done(dir, &[&SAMPLE[..], &["--out", out, "--shard", shard]].concat());
     shard("0/3", "p");
     shard("2/3", "p");
-    refused(
-        &["merge", "p"],
-        3,
-        &["10000 of 30000 units are missing", "--plan p/plan.json --shard 1/3 --out p"],
-    );
+    refused(&["merge", "p"], 3, &["10000 of 30000 units are missing", "--plan p/plan.json --shard 1/3 --out p"]);
     shard("1/3", "p");
     shard("0/1", "p");
     refused(&["merge", "p"], 3, &["doubled"]);

@@ -102,16 +102,10 @@ fn densities_and_samples_print_what_their_files_hold() {
 fn maps_traces_and_checks_print_documents() {
     let dir = tempfile::tempdir().unwrap();
     let map = ["map", "lvd", "--x", "deceleration_mps2=1..9/2", "--y", "ego_speed_kmh=60,120", "--set", "thw_s=0.6"];
-    let map: Vec<&str> = map.iter().chain(&["--against", "FSM", "--backend", "cpu", "--out", "m"]).copied().collect();
+    let map: Vec<&str> = map.iter().chain(&["--backend", "cpu", "--out", "m"]).copied().collect();
     let printed = json(dir.path(), &map);
     let file: Value = serde_json::from_slice(&std::fs::read(dir.path().join("m/map.json")).unwrap()).unwrap();
     assert_eq!(printed, file);
-    let cells = printed["grids"][0]["cells"].as_u64().unwrap();
-    for row in printed["differences"].as_array().unwrap() {
-        let of = |name: &str| row[name].as_u64().unwrap();
-        let sum = of("both_pass") + of("both_fail") + of("only_first_fails") + of("only_second_fails");
-        assert_eq!(sum, cells, "{row}");
-    }
 
     let case =
         ["--category", "cut-in", "--ego-speed", "30m/s", "--speed", "20m/s", "--thw", "0.4", "--lateral-speed", "1.5"];

@@ -14,11 +14,7 @@ use crate::{Error, Place, Result};
 /// # Errors
 /// [`Error::Usage`]: a device together with `Cpu`; a name of no device or of several. [`Error::Device`]: `Gpu`
 /// without a GPU.
-pub fn choose(
-    cards: &[AdapterCard],
-    backend: BackendChoice,
-    device: Option<&DeviceName>,
-) -> Result<Option<usize>> {
+pub fn choose(cards: &[AdapterCard], backend: BackendChoice, device: Option<&DeviceName>) -> Result<Option<usize>> {
     match (backend, device) {
         (BackendChoice::Cpu, _) => backend.check(device).map(|()| None),
         (_, Some(device)) => named(cards, device).map(|card| Some(card.index)),

@@ -1,4 +1,4 @@
-//! A swept grid: the verdicts of every cell and model, outcomes per cell, counts, and the difference of two maps.
+//! A swept grid: the verdicts of every cell and model, outcomes per cell and counts.
 
 use crate::engine::{Executor, LanePlan, LaneRunner, SweepSummary, Verdicts, Wanted};
 use crate::model::criterion::Criterion;
@@ -23,69 +23,6 @@ pub struct GridMap {
     settles: bool,
     /// Per model and criterion: the cells whose outcome a perturbation changes; empty if none was swept.
     undecided: Vec<[Vec<bool>; Criterion::ALL.len()]>,
-}
-
-/// Comparison of two verdicts on one cell.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum Agreement {
-    /// Neither fails.
-    BothPass,
-    /// Both fail.
-    BothFail,
-    /// The first fails alone.
-    OnlyFirst,
-    /// The second fails alone.
-    OnlySecond,
-    /// Both pass, and no collision occurs even if the ego never reacts.
-    NoConflict,
-    /// They differ, but one of them is undecided.
-    Undecided,
-}
-
-impl Agreement {
-    /// All, in the order of tables.
-    pub const ALL: [Agreement; 6] = [
-        Agreement::BothPass,
-        Agreement::BothFail,
-        Agreement::OnlyFirst,
-        Agreement::OnlySecond,
-        Agreement::NoConflict,
-        Agreement::Undecided,
-    ];
-
-    /// The agreement of two verdicts.
-    pub(crate) fn of(first_fails: bool, second_fails: bool) -> Agreement {
-        match (first_fails, second_fails) {
-            (false, false) => Agreement::BothPass,
-            (true, true) => Agreement::BothFail,
-            (true, false) => Agreement::OnlyFirst,
-            (false, true) => Agreement::OnlySecond,
-        }
-    }
-
-    /// Name in files: `both_pass`, `both_fail`, `only_first`, `only_second`, `no_conflict`, `undecided`.
-    pub fn key(self) -> &'static str {
-        match self {
-            Agreement::BothPass => "both_pass",
-            Agreement::BothFail => "both_fail",
-            Agreement::OnlyFirst => "only_first",
-            Agreement::OnlySecond => "only_second",
-            Agreement::NoConflict => "no_conflict",
-            Agreement::Undecided => "undecided",
-        }
-    }
-
-    /// Text for tables and legends.
-    pub fn label(self) -> &'static str {
-        match self {
-            Agreement::BothPass => "both pass",
-            Agreement::BothFail => "both fail",
-            Agreement::OnlyFirst => "only first fails",
-            Agreement::OnlySecond => "only second fails",
-            Agreement::NoConflict => CellOutcome::NoConflict.label(),
-            Agreement::Undecided => CellOutcome::Undecided.label(),
-        }
-    }
 }
 
 impl GridMap {
@@ -221,27 +158,6 @@ impl GridMap {
     pub fn failures(&self, model: usize, criterion: Criterion) -> u64 {
         self.verdicts[model].iter().filter(|v| v.failed(criterion)).count() as u64
     }
-
-    /// Agreement of two models' verdicts, cell by cell; the second model may be of another map of the same grid.
-    pub fn difference(&self, first: usize, (other, second): (&GridMap, usize), criterion: Criterion) -> Vec<Agreement> {
-        let agreement = |cell: usize| {
-            let found = Agreement::of(
-                self.verdicts[first][cell].failed(criterion),
-                other.verdicts[second][cell].failed(criterion),
-            );
-            let is_undecided = self.is_undecided(first, cell, criterion) || other.is_undecided(second, cell, criterion);
-            let is_open = self.is_open(first, cell, criterion) || other.is_open(second, cell, criterion);
-            let no_conflict =
-                criterion == Criterion::Collision && !self.is_conflict(first, cell) && !other.is_conflict(second, cell);
-            match found {
-                Agreement::BothPass if is_open => Agreement::Undecided,
-                Agreement::BothPass if no_conflict => Agreement::NoConflict,
-                Agreement::OnlyFirst | Agreement::OnlySecond if is_undecided => Agreement::Undecided,
-                found => found,
-            }
-        };
-        (0..self.cell_count()).map(agreement).collect()
-    }
 }
 
 /// Sweeps the lanes of a part; `take` receives the model's index in the plan, the cell and the verdict.
@@ -269,11 +185,6 @@ fn meets(plan: &LanePlan) -> bool {
     let runner = LaneRunner::<f32>::new(plan);
     let keys = (0..plan.lane_count()).filter_map(|lane| plan.key(lane));
     keys.map(|key| runner.run(&key)).any(|outcome| outcome.min_gap < f32::INFINITY)
-}
-
-/// Counts of the agreements, in the order of [`Agreement::ALL`].
-pub fn count(cells: &[Agreement]) -> [u64; Agreement::ALL.len()] {
-    Agreement::ALL.map(|kind| cells.iter().filter(|c| **c == kind).count() as u64)
 }
 
 /// Boundary lines between neighbouring cells of a panel that differ in kind. Each line follows cell edges from `(x, y)`

@@ -1,7 +1,7 @@
 //! Grids of concrete cases: what `map` sweeps.
 //!
 //! This module contains parameters and axes, the conversion of cells to cases and of grids to lane plans, the presets,
-//! and the swept map with its differences. It contains no physics and no drawing. Cases and plans go to
+//! and the swept map. It contains no physics and no drawing. Cases and plans go to
 //! [`crate::engine`], maps to the report. The conformance tests use the cases of
 //! the JRC's simulator.
 
@@ -18,12 +18,12 @@ mod run;
 pub use axis::{GridAxis, MAX_VALUES};
 pub use grid_text::{GridText, Variations};
 use jrc_case::Front;
-pub use map::{Agreement, CellOutcome, GridMap, boundary, count, runs};
+pub use map::{CellOutcome, GridMap, boundary, runs};
 pub use parameter::{MapParameter, PARAMETERS, Point};
 pub use plan::{GridPart, GridPlan};
 pub(crate) use robustness::without_reaction;
 pub use robustness::{Perturbation, VARIED};
-pub use run::{Against, Map, MapGrids, MapOptions, MapResult, MappedGrid};
+pub use run::{Map, MapGrids, MapOptions, MapResult, MappedGrid};
 
 pub use crate::scenario::CaseQuantity;
 

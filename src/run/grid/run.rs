@@ -1,5 +1,4 @@
-//! Maps: the grids of a category under a profile, and their comparison with another model or profile; planned, then
-//! swept.
+//! Maps: the grids of a category under a profile, planned, then swept.
 
 use std::sync::Arc;
 
@@ -8,12 +7,12 @@ use super::map::GridMap;
 use super::plan::GridPlan;
 use super::presets::{self, Preset, Presets};
 use super::robustness::Perturbation;
+use crate::Result;
 use crate::engine::{CpuBackend, Executor, SweepSummary};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::scenario::Category;
-use crate::{Error, Place, Result};
 
 /// The cells of a map.
 #[derive(Debug, Clone)]
@@ -24,15 +23,6 @@ pub enum MapGrids {
     Own(Box<Grid>),
 }
 
-/// The other side of a comparison.
-#[derive(Debug, Clone, PartialEq)]
-pub enum Against {
-    /// Another model of the same map.
-    Model(ModelId),
-    /// The same model under another profile.
-    Profile(Box<Profile>),
-}
-
 /// Options of maps.
 #[derive(Debug, Clone)]
 pub struct MapOptions {
@@ -40,10 +30,8 @@ pub struct MapOptions {
     pub grids: MapGrids,
     /// Models; `None`: those of the presets, or all models for a user's grid.
     pub models: Option<Vec<ModelId>>,
-    /// Criterion of counts and differences.
+    /// Criterion of the published results.
     pub criterion: Criterion,
-    /// Comparison with another model or profile.
-    pub against: Option<Against>,
     /// Also sweep every grid with each [`Perturbation`]: cells whose verdict changes are undecided.
     pub robust: bool,
 }
@@ -63,7 +51,6 @@ pub struct MapOptions {
 ///     grids: MapGrids::Preset(Presets::Jrc, Category::Lvd),
 ///     models: Some(vec![ModelId::Rss]),
 ///     criterion: Criterion::Collision,
-///     against: None,
 ///     robust: false,
 /// };
 /// let map = Map::plan(options, &Profile::load("jrc-2021")?)?;
@@ -78,17 +65,11 @@ pub struct Map {
 }
 
 struct PlannedGrid {
-    own: Planned,
-    known_percent: Vec<Option<f64>>,
-    is_chosen_to_match: bool,
-    other: Option<(String, Planned)>,
-}
-
-/// A grid under one profile.
-struct Planned {
     plan: GridPlan,
     /// Perturbed plans of the same cells.
     perturbed: Vec<(Perturbation, GridPlan)>,
+    known_percent: Vec<Option<f64>>,
+    is_chosen_to_match: bool,
 }
 
 /// A swept grid with its published results.
@@ -101,8 +82,6 @@ pub struct MappedGrid {
     pub known_percent: Vec<Option<f64>>,
     /// The grid was chosen to reproduce a published rate, so agreement confirms nothing.
     pub is_chosen_to_match: bool,
-    /// The same grid under another profile, with the profile's name.
-    pub other: Option<(String, GridPlan, GridMap)>,
     /// Cut-outs: per cell, whether the vehicle that cuts out drives through the one ahead of it.
     pub drives_through: Vec<bool>,
 }
@@ -131,12 +110,6 @@ impl MapOptions {
             if let Some(models) = &self.models {
                 preset.models.clone_from(models);
             }
-            if let Some(Against::Model(model)) = self.against
-                && !preset.models.contains(&model)
-            {
-                preset.models.push(model);
-                preset.models.sort();
-            }
         }
         Ok(presets)
     }
@@ -146,41 +119,20 @@ impl Map {
     /// Plans every cell of every grid with every model.
     ///
     /// # Errors
-    /// [`Error::Usage`] without a model, for an invalid case, and if a map would be compared with itself.
+    /// [`crate::Error::Usage`] without a model, and for an invalid case.
     pub fn plan(options: MapOptions, profile: &Profile) -> Result<Map> {
-        let itself = match (&options.against, options.models.as_deref()) {
-            (Some(Against::Profile(other)), _) if **other == *profile => Some(other.name.as_str()),
-            (Some(Against::Model(model)), Some([one])) if one == model => Some(model.name()),
-            _ => None,
-        };
-        if let Some(name) = itself {
-            let problem = format!("`{name}` runs anyway: there is nothing to compare");
-            return Err(Error::usage(Place::option("against"), problem, "name another model or profile"));
-        }
         let is_published = matches!(options.grids, MapGrids::Preset(Presets::Jrc, _))
             && options.criterion == Criterion::Collision
             && *profile == Profile::load(presets::JRC_PROFILE)?;
-        let others = match &options.against {
-            // The same cells; the cases of a preset follow the other profile.
-            Some(Against::Profile(other)) => Some((&**other, options.presets(other)?)),
-            _ => None,
-        };
         let mut grids = Vec::new();
         for preset in options.presets(profile)? {
-            let planned = |grid: &Grid, profile: &Profile| -> Result<Planned> {
-                let plan = GridPlan::new(grid.clone(), profile, &preset.models)?;
-                let all = plan.grid.perturbations().into_iter().filter(|_| options.robust);
-                let perturbed = all.map(|by| Ok((by, plan.perturbed(profile, by)?))).collect::<Result<_>>()?;
-                Ok(Planned { plan, perturbed })
-            };
-            let under = |(other, presets): &(&Profile, Vec<Preset>)| -> Result<(String, Planned)> {
-                let same = presets.iter().find(|p| p.grid.name() == preset.grid.name()).unwrap_or(&preset);
-                Ok((other.name.clone(), planned(&same.grid, other)?))
-            };
+            let plan = GridPlan::new(preset.grid.clone(), profile, &preset.models)?;
+            let all = plan.grid.perturbations().into_iter().filter(|_| options.robust);
+            let perturbed = all.map(|by| Ok((by, plan.perturbed(profile, by)?))).collect::<Result<_>>()?;
             let known = |model: &ModelId| if is_published { preset.known(*model) } else { None };
             grids.push(PlannedGrid {
-                other: others.as_ref().map(under).transpose()?,
-                own: planned(&preset.grid, profile)?,
+                plan,
+                perturbed,
                 known_percent: preset.models.iter().map(known).collect(),
                 is_chosen_to_match: preset.is_chosen_to_match && is_published,
             });
@@ -190,8 +142,7 @@ impl Map {
 
     /// Every grid's plans.
     fn plans(&self) -> impl Iterator<Item = &GridPlan> {
-        let all = self.grids.iter().flat_map(|grid| grid.other.iter().map(|(_, other)| other).chain([&grid.own]));
-        all.flat_map(|of| of.perturbed.iter().map(|(_, plan)| plan).chain([&of.plan]))
+        self.grids.iter().flat_map(|grid| grid.perturbed.iter().map(|(_, plan)| plan).chain([&grid.plan]))
     }
 
     /// Number of units that the run sweeps, including those of the unreacting ego.
@@ -213,24 +164,19 @@ impl Map {
         let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
         let reference = CpuBackend::reference();
         let binary64 = Executor { backend: Arc::new(&reference), fallback: None, recheck: None, ..executor.clone() };
-        let mut swept = |Planned { plan, perturbed }: Planned| -> Result<(GridPlan, GridMap)> {
-            let mut sweep = |plan: &GridPlan, executor: &Executor| -> Result<GridMap> {
-                let (map, of_map) = GridMap::sweep(plan, executor)?;
-                summary.add(&of_map);
-                Ok(map)
-            };
+        let mut sweep = |plan: &GridPlan, executor: &Executor| -> Result<GridMap> {
+            let (map, of_map) = GridMap::sweep(plan, executor)?;
+            summary.add(&of_map);
+            Ok(map)
+        };
+        let mut grids = Vec::new();
+        for PlannedGrid { plan, perturbed, known_percent, is_chosen_to_match } in self.grids {
             let mut map = sweep(&plan, executor)?;
             for (by, plan) in perturbed {
                 map.mark_undecided(&sweep(&plan, if by.is_binary64() { &binary64 } else { executor })?);
             }
-            Ok((plan, map))
-        };
-        let mut grids = Vec::new();
-        for PlannedGrid { own, known_percent, is_chosen_to_match, other } in self.grids {
-            let (plan, map) = swept(own)?;
-            let other = other.map(|(name, other)| swept(other).map(|(plan, map)| (name, plan, map))).transpose()?;
             let drives_through = plan.drives_through()?;
-            grids.push(MappedGrid { plan, map, known_percent, is_chosen_to_match, other, drives_through });
+            grids.push(MappedGrid { plan, map, known_percent, is_chosen_to_match, drives_through });
         }
         Ok(MapResult { grids, summary })
     }

@@ -29,7 +29,7 @@ pub use names::{NameUnit, Named, Resolved, nearest, resolve};
 pub use parquet_reader::is_panic_caught;
 pub use reader::TableReader;
 pub use text::WIDTH;
-pub use writer::{TableWriter, csv_field, json_number, json_value, text_of_cell};
+pub use writer::{TableWriter, json_number, json_value, text_of_cell};
 
 use std::path::Path;
 

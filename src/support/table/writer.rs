@@ -176,7 +176,7 @@ pub fn text_of_cell(field: &str) -> &str {
 }
 
 /// A text as a CSV field, quoted if needed.
-pub fn csv_field(text: &str) -> String {
+fn csv_field(text: &str) -> String {
     let field = cell_text(text);
     match field.contains([',', '"', '\n', '\r']) {
         true => format!("\"{}\"", field.replace('"', "\"\"")),
