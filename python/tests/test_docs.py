@@ -1,4 +1,4 @@
-"""The code of the book's chapter and of the README runs, block after block, in an empty folder."""
+"""The code of the book's chapters and of the README runs, block after block, in an empty folder."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import pytest
 ROOT = Path(__file__).parents[2]
 
 
-@pytest.mark.parametrize("document", ["docs/src/python.md", "README.md", "python/README.md"])
+@pytest.mark.parametrize("document", ["docs/src/python.md", "docs/src/recipes.md", "README.md", "python/README.md"])
 def test_the_code_of_a_document_runs(document, tmp_path, monkeypatch) -> None:
     monkeypatch.chdir(tmp_path)
     blocks = re.findall(r"^```python\n(.*?)^```", (ROOT / document).read_text(encoding="utf-8"), re.M | re.S)

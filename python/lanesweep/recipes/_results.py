@@ -1,0 +1,112 @@
+"""Results of another simulator beside a driver's lanes."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+from .. import _verbs
+from .._result import temporary
+from .._simulate import simulate
+from ..options import Path as PathLike
+from ._shared import extra, table
+
+if TYPE_CHECKING:
+    import polars as pl
+
+#: Quantities of `compare_results`, a cause before its effects, with the differences that count as none: half of a time step of
+#: 0.1 s, 0.1 m and 0.2 m/s.
+TOLERANCES = {
+    "reaction_s": 0.05,
+    "braking_s": 0.05,
+    "min_gap_m": 0.1,
+    "min_ttc_s": 0.05,
+    "contact_s": 0.05,
+    "impact_speed_mps": 0.2,
+}
+
+
+class Comparison(NamedTuple):
+    """What `compare_results` finds.
+
+    Attributes
+    ----------
+    cases : DataFrame
+        A row per result: the difference of every quantity, theirs minus ours, and `first`, the first quantity that differs.
+    causes : DataFrame
+        A row per quantity that is the first one in some cases: their number, and median, minimum and maximum of its difference
+        in these cases. The quantity with the most cases leads.
+    agreement : tuple of float
+        Fraction of the cases with the same answer to whether the vehicles touch, with its interval (95 %, Clopper and Pearson).
+    """
+
+    cases: pl.DataFrame
+    causes: pl.DataFrame
+    agreement: tuple[float, float, float]
+
+
+def compare_results(
+    cases: Any,
+    theirs: Any,
+    *,
+    model: str = "CCHDM",
+    profile: PathLike = "un-r157",
+    tolerances: Mapping[str, float] = TOLERANCES,
+) -> Comparison:
+    """Compare another simulator's results with a driver's lanes: the first quantity that differs, in the cases that differ.
+
+    `cases` is a table of cases with an `id`, `theirs` one with `id`, `collision` and, where known, quantities of `TOLERANCES`. A field
+    without a value is unknown. Infinite is a value: a time that never comes, a gap that never closes.
+    """
+    with extra():
+        import polars as pl
+        from statsmodels.stats.proportion import proportion_confint
+    results = _as_values(table(theirs))
+    both = results.join(_lanes(table(cases), results.columns, model, profile), on="id", suffix="_ours", validate="1:1")
+    if both.height < results.height:
+        raise ValueError(f"{results.height - both.height} results have the id of no case")
+    most = {name: by for name, by in tolerances.items() if name in results.columns} | {"collision": 0.0}
+    # Infinite minus infinite is no difference.
+    minus = {name: pl.when(pl.col(name) == pl.col(f"{name}_ours")).then(0.0).otherwise(pl.col(name) - pl.col(f"{name}_ours")) for name in most}
+    compared = both.select("id", **minus)
+    # What equals a tolerance is not beyond it, whatever its last bits.
+    beyond = [pl.when(pl.col(name).abs().round(4) > by).then(pl.lit(name)) for name, by in most.items()]
+    compared = compared.with_columns(first=pl.coalesce(beyond))
+    of = [(name, compared.filter(first=name)[name]) for name in most]
+    causes = {"quantity": [name for name, _ in of], "cases": [len(by) for _, by in of]}
+    causes |= {what: [getattr(by, what)() for _, by in of] for what in ("median", "min", "max")}
+    ordered = pl.DataFrame(causes).filter(pl.col("cases") > 0).sort("cases", descending=True, maintain_order=True)
+    agreeing = compared.filter(collision=0.0).height
+    low, high = proportion_confint(agreeing, compared.height, method="beta")
+    return Comparison(compared, ordered, (agreeing / compared.height, low, high))
+
+
+def _lanes(cases: pl.DataFrame, columns: list[str], model: str, profile: PathLike) -> pl.DataFrame:
+    """The driver's outcomes. An event that does not happen has an infinite time."""
+    import polars as pl
+
+    found = table(simulate(cases, models=model, profile=profile))
+    if "braking_s" in columns:
+        keep = temporary()
+        file = Path(keep.name) / "cases.parquet"
+        cases.write_parquet(file)
+        traces = (_verbs.trace(table=file, row=row + 1, models=model, profile=profile).document for row in range(len(cases)))
+        braking = [next((step["t_s"] for step in of["steps"] if "braking" in (step["mark"] or "")), None) for of in traces]
+        found = found.with_columns(braking_s=pl.Series(braking, dtype=pl.Float64))
+    times = [name for name in ("reaction_s", "braking_s", "contact_s") if name in found.columns]
+    return _as_values(found.with_columns(pl.col(*times).fill_null(float("inf"))))
+
+
+def _as_values(rows: pl.DataFrame) -> pl.DataFrame:
+    """Numbers, and texts as ids. Vehicles that touch have no gap left, and others never touch."""
+    import polars as pl
+
+    known = [name for name in TOLERANCES if name in rows.columns]
+    found = rows.select(pl.col("id").cast(pl.String), pl.col("collision", *known).cast(pl.Float64))
+    if "min_gap_m" in known:
+        found = found.with_columns(pl.col("min_gap_m").clip(lower_bound=0.0))
+    if "contact_s" in known:
+        never = pl.when(pl.col("collision") == 0).then(float("inf")).otherwise(pl.col("contact_s"))
+        found = found.with_columns(contact_s=never)
+    return found

@@ -1,0 +1,98 @@
+"""A case whose inputs have errors: how often each answer is, and which input matters most."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import TYPE_CHECKING, Any, NamedTuple
+
+import numpy as np
+
+from ..options import Path
+from ._shared import answers, extra
+
+if TYPE_CHECKING:
+    import polars as pl
+
+
+class Uncertainty(NamedTuple):
+    """What `uncertain` finds.
+
+    Attributes
+    ----------
+    answers : DataFrame
+        Number and share of the draws with each answer, of those that are a case, with an interval (Clopper and Pearson).
+    drivers : DataFrame
+        Per driver, the draws in which it avoids the collision, of those in which an ego that never reacts collides.
+    indices : DataFrame
+        Per input, the first-order index: the fraction of the variance of the answer that its error alone explains.
+    draws : DataFrame
+        Every draw with its answer; null where the numbers are no case.
+    """
+
+    answers: pl.DataFrame
+    drivers: pl.DataFrame
+    indices: pl.DataFrame
+    draws: pl.DataFrame
+
+
+def uncertain(
+    case: Mapping[str, Any],
+    errors: Mapping[str, Any],
+    *,
+    draws: int = 20_000,
+    seed: int = 157,
+    profile: Path = "un-r157",
+) -> Uncertainty:
+    """Draw the errors of a case's columns, independent of one another, and count the computed answers.
+
+    An error is a standard deviation, of a normal distribution, or any distribution of `scipy.stats`: ``uniform(-0.5, 1.0)``. The shares
+    are of the model: they do not say whether your sensors have these errors.
+    """
+    with extra():
+        import polars as pl
+        from scipy import stats
+    generator = np.random.default_rng(seed)
+    known = {name: stats.norm(scale=error) if np.isscalar(error) else error for name, error in errors.items()}
+    drawn = {name: case[name] + error.rvs(draws, random_state=generator) for name, error in known.items()}
+    cases = pl.DataFrame({**case, **drawn})
+    found = answers(cases, profile)
+    judged = found.drop_nulls("verdict")
+    conflicts = judged.filter(pl.col("verdict").is_in(["preventable", "not preventable"]))
+    counts = judged["verdict"].value_counts(sort=True)
+    drivers: list[str] = [name for name in ("Reg157", "CCHDM", "RSS", "FSM") if name in found.columns]
+    avoiding = [conflicts.filter(pl.col(name) != "COLLIDES").height for name in drivers]
+    own = answers(pl.DataFrame(dict(case)), profile)["verdict"][0]
+    inputs = cases.select(list(drawn)).with_columns(is_own=found["verdict"] == own).drop_nulls()
+    return Uncertainty(
+        _shares("answer", counts["verdict"].to_list(), counts["count"].to_list(), judged.height),
+        _shares("driver", drivers, avoiding, conflicts.height),
+        _indices(inputs, seed),
+        cases.with_columns(answer=found["verdict"]),
+    )
+
+
+def _shares(what: str, names: list[str], counts: list[int], of: int) -> pl.DataFrame:
+    with extra():
+        import polars as pl
+        from statsmodels.stats.proportion import proportion_confint
+    if not of:
+        names, counts, of = [], [], 1
+    low, high = proportion_confint(np.array(counts), of, method="beta")
+    share = np.array(counts) / of
+    return pl.DataFrame({what: names, "draws": counts, "of": of, "share": share, "low": low, "high": high})
+
+
+def _indices(inputs: pl.DataFrame, seed: int) -> pl.DataFrame:
+    """First-order indices of "the answer is that of the case without errors", from the draws themselves (RBD-FAST)."""
+    with extra():
+        import polars as pl
+        from SALib.analyze import rbd_fast
+    names = inputs.columns[:-1]
+    some = inputs.head(1 << 14)
+    is_own = some["is_own"].to_numpy().astype(np.float64)
+    if min(is_own.sum(), len(some) - is_own.sum()) < 30:
+        # Too few draws have another answer, or this one.
+        return pl.DataFrame({"input": names, "index": None, "half_width": None})
+    problem = {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
+    found = rbd_fast.analyze(problem, some.select(names).to_numpy(), is_own, seed=seed)
+    return pl.DataFrame({"input": names, "index": found["S1"], "half_width": found["S1_conf"]})
