@@ -81,11 +81,8 @@ def study(
     external: Paths | Mapping[str, Any] | None = None,
     cross_validate: bool = False,
     published: bool = False,
-    reference: bool = False,
-    compare_reference: bool = False,
     rows: Path | None = None,
     injury: Keys | None = None,
-    keep_plan: Literal["auto", "always", "never"] | None = None,
     seed: Int | None = None,
     out: Path | None = None,
     **options: Unpack[_Study],
@@ -114,16 +111,10 @@ def study(
         the scenarios that it replays flatters itself.
     published : bool
         Add the paper's published numbers (of highD) to tables and page.
-    reference : bool
-        Compute in binary64 on the CPU, not in the binary32 arithmetic of lanes.
-    compare_reference : bool
-        Run both arithmetics and list every verdict that differs.
     rows : path
         Also write one row per lane: .csv, .jsonl or .parquet.
     injury : list of str
         With `rows`: curves of injury risk, as of `check`, for columns of contacts.
-    keep_plan : {"auto", "always", "never"}
-        Keep the plan in `out`, with which `trace` repeats each lane. ``"auto"``, the default: up to 256 MiB.
     seed : int
         Chooses the lanes that are checked on the CPU; no score depends on it.
     out : path, optional
@@ -208,7 +199,6 @@ def fit(
     parameterizations: Keys | None = None,
     with_thw: bool = False,
     density: Literal["kernel", "mixture", "copula"] | None = None,
-    bandwidth_rule: Literal["reduction", "wide"] | None = None,
     hours: Float | None = None,
     km: Float | None = None,
     no_comparison: bool = False,
@@ -236,8 +226,6 @@ def fit(
         Add the observed time headway as a parameter (thw_s).
     density : {"kernel", "mixture", "copula"}
         Form of the density, by default kernel. Intervals of a mixture or copula cover the draws alone, and they have no ratio to recorded scenarios.
-    bandwidth_rule : {"reduction", "wide"}
-        Search interval of the bandwidth.
     hours, km : float
         Driven time, h, and distance, km, of all egos; by default those of the recordings.
     no_comparison : bool
@@ -274,8 +262,6 @@ def sample(
     estimator: Literal["auto", "mc", "is"] | None = None,
     level: Float | None = None,
     simultaneous: bool = False,
-    interval: Literal["wilson", "clopper-pearson"] | None = None,
-    points: Literal["random", "sobol"] | None = None,
     given: Values | None = None,
     proposal: Paths | None = None,
     time_limit: Float | None = None,
@@ -319,10 +305,6 @@ def sample(
         Level of the intervals, by default 0.95.
     simultaneous : bool
         Intervals of all rows hold together at this level (Bonferroni).
-    interval : {"wilson", "clopper-pearson"}
-        Interval of crude Monte Carlo, by default wilson.
-    points : {"random", "sobol"}
-        Points of crude Monte Carlo, by default random.
     given : mapping
         Draw from the density conditional on these values: ``{"v_ego_mps": 30}``.
     proposal : list of paths
@@ -542,11 +524,8 @@ def map(
     models: Models | None = None,
     criterion: Criterion | None = None,
     robust: bool = False,
-    closing: bool = False,
-    native_gap: bool = False,
     distribution: Path | None = None,
     rename: Values | None = None,
-    reference: bool = False,
     out: Path | None = None,
     **options: Unpack[_Map],
 ) -> Result:
@@ -570,16 +549,10 @@ def map(
         Criterion, by default collision.
     robust : bool
         Mark cells whose outcome changes with a tenth of the time step, 1 cm or 0.1 km/h: they are undecided.
-    closing : bool
-        Only panels in which the ego is faster than the other vehicle.
-    native_gap : bool
-        Start each model at its following distance in the JRC's simulator, not at gap_m or thw_s.
     distribution : path
         OpenSCENARIO file with deterministic distributions: its first two parameters with several values are the axes.
     rename : mapping
         With `distribution`: its names and ours, as in `sample`.
-    reference : bool
-        Compute in binary64 on the CPU.
     out : path, optional
         Folder of the files; without it they go with the result.
     **options

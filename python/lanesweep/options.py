@@ -122,14 +122,11 @@ class Split(Sweep, total=False):
         Run a plan that `plan_only` wrote.
     plan_only : bool
         Write the plan, plan.json in `out`, and stop.
-    stop_after : float
-        After this time, s, finish the present chunk and stop; the same call continues.
     """
 
     shard: str
     plan: Path
     plan_only: bool
-    stop_after: Float
 
 
 class Case(Plausibility, Run, total=False):

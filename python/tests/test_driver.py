@@ -336,7 +336,7 @@ def test_what_the_code_reads_is_a_part_of_the_driver_wherever_it_stands(tmp_path
 def test_a_resumed_run_does_not_mix_drivers_whose_constant_changed(density, tmp_path) -> None:
     module = tmp_path / "constant_driver.py"
     script = "import sys, lanesweep\nfrom constant_driver import Constant\ndensity, out, *rest = sys.argv[1:]\n"
-    script += "lanesweep.sample(density, models=[Constant()], samples=100_000, thw=0.6, out=out, stop_after=rest[0] if rest else None)\n"
+    script += "lanesweep.sample(density, models=[Constant()], samples=100_000, thw=0.6, out=out, config={'run': {'stop_after_s': rest[0]}} if rest else None)\n"
     (tmp_path / "run.py").write_text(script)
 
     def run(decel: float, out: str, *words: str) -> str:
@@ -421,5 +421,5 @@ def test_importance_sampling_with_a_driver_moves_a_bar_and_ends(density, monkeyp
     assert all(total < 500_000 for what, _, total in bounded if what == "searching")
     # One that may accelerate is slow, and that is said before it starts.
     with caplog.at_level("WARNING", logger="lanesweep"), pytest.raises(lanesweep.RunStopped):
-        lanesweep.sample(density, models=[IDM()], **options, stop_after=1)
+        lanesweep.sample(density, models=[IDM()], **options, config={"run": {"stop_after_s": 1}})
     assert "IDM may accelerate" in caplog.text and "3,000 steps" in caplog.text

@@ -64,7 +64,7 @@ def test_a_run_is_not_resumed_with_another_driver_of_its_name(density, tmp_path)
 
     options = {"samples": 300_000, "thw": 1.2}
     with pytest.raises(lanesweep.RunStopped):
-        lanesweep.sample(density, **options, models=[made(-1.0)], stop_after=0.3, out=tmp_path / "out")
+        lanesweep.sample(density, **options, models=[made(-1.0)], config={"run": {"stop_after_s": 0.3}}, out=tmp_path / "out")
     ours = lanesweep.sample(density, **{**options, "samples": 20_000}, models=[made(-8.0)], out=tmp_path / "out")
     fresh = lanesweep.sample(density, **{**options, "samples": 20_000}, models=[made(-8.0)])
     assert contents(ours, ["estimates.csv"]) == contents(fresh, ["estimates.csv"])

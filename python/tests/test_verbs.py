@@ -113,7 +113,7 @@ def test_a_figure_outlives_its_result(scenarios) -> None:
 def test_a_time_limit_is_no_interrupt(density, tmp_path) -> None:
     options = {"samples": 10**8, "thw": 1.2, "models": "FSM", "backend": "cpu"}
     with pytest.raises(lanesweep.RunStopped, match="continues"):
-        lanesweep.sample(density, **options, stop_after=0.5, out=tmp_path)
+        lanesweep.sample(density, **options, config={"run": {"stop_after_s": 0.5}}, out=tmp_path)
 
 
 def test_a_check_has_its_answer_as_status() -> None:
@@ -149,7 +149,7 @@ def test_an_interrupt_ends_a_run_and_a_next_one_works(density) -> None:
     threading.Timer(1.0, lambda: signal.raise_signal(signal.SIGINT)).start()
     start = time.monotonic()
     with pytest.raises(KeyboardInterrupt):
-        lanesweep.sample(density, samples=10**10, thw=1.2, backend="cpu", stop_after=60)
+        lanesweep.sample(density, samples=10**10, thw=1.2, backend="cpu", config={"run": {"stop_after_s": 60}})
     assert time.monotonic() - start < 15
     assert lanesweep.sample(density, samples=100, thw=1.2, backend="cpu").status == "ok"
 

@@ -47,7 +47,7 @@ const SIMULATING: &[&str] =
 const GENERATING: &[&str] = &["study", "search", "fit", "compare", "justify", "verify", "show"];
 
 #[rustfmt::skip] // a table: one line per flag
-pub(super) const FLAGS: [KeyFlag; 29] = [
+pub(super) const FLAGS: [KeyFlag; 26] = [
     ("run.threads", "threads", "", RUN, true, &["lanesweep"]),
     ("run.backend", "backend", "", RUN, false, SWEEPING),
     ("run.device", "device", "NAME|pci:BUS|INDEX", RUN, false, SWEEPING),
@@ -59,13 +59,10 @@ pub(super) const FLAGS: [KeyFlag; 29] = [
     ("generator.recordings", "synth_recordings", "", DATA, false, &["synth"]),
     ("score.seed", "seed", "", RUN, false, &["study"]),
     ("fit.density", "density", "", MODELS, false, &["fit"]),
-    ("fit.bandwidth_rule", "bandwidth_rule", "", MODELS, true, &["fit"]),
     ("fit.seed", "seed", "", RUN, false, &["fit"]),
     ("sample.estimator", "estimator", "", MODELS, false, &["sample"]),
     ("sample.samples", "samples", "", MODELS, false, &["sample"]),
     ("sample.criterion", "criterion", "", MODELS, false, &["sample"]),
-    ("sample.points", "points", "", MODELS, true, &["sample"]),
-    ("sample.interval", "interval", "", MODELS, true, &["sample"]),
     ("sample.level", "level", "", MODELS, true, &["sample"]),
     ("sample.half_width", "half_width", "", MODELS, false, &["sample"]),
     ("sample.time_limit_s", "time_limit", "", MODELS, true, &["sample"]),
@@ -80,12 +77,33 @@ pub(super) const FLAGS: [KeyFlag; 29] = [
 ];
 
 /// Tables and keys that determine a plan's lanes; a plan file already contains them.
-const OF_THE_PLAN: [&str; 8] =
-    ["generator.", "mining.", "parameterization.", "score.", "sample.", "search.folds", "run.profile", "run.dt_s"];
+const OF_THE_PLAN: [&str; 9] = [
+    "generator.",
+    "mining.",
+    "parameterization.",
+    "score.",
+    "sample.",
+    "search.folds",
+    "study.reference",
+    "run.profile",
+    "run.dt_s",
+];
 
 /// Flags of earlier versions, with the keys that replaced them.
-const REMOVED: [(&str, &str); 2] =
-    [("--synth-seed", "generator.seed=N"), ("--synth-duration", "generator.duration_s=SECONDS")];
+const REMOVED: [(&str, &str); 12] = [
+    ("--bandwidth-rule", "fit.bandwidth_rule=RULE"),
+    ("--closing", "map.closing=true"),
+    ("--compare-reference", "study.compare_reference=true"),
+    ("--interval", "sample.interval=KIND"),
+    ("--keep-plan", "study.keep_plan=WHEN"),
+    ("--native-gap", "map.native_gap=true"),
+    ("--points", "sample.points=KIND"),
+    ("--reference", "study.reference=true' or '--config map.reference=true"),
+    ("--stop-after", "run.stop_after_s=SECONDS"),
+    ("--synth-duration", "generator.duration_s=SECONDS"),
+    ("--synth-seed", "generator.seed=N"),
+    ("--threshold-units", "verify.threshold_units=N"),
+];
 
 /// Adds what replaced a removed flag to the error about it.
 pub(super) fn name_replacement(error: &mut clap::Error) {
@@ -216,8 +234,7 @@ impl Configured {
                 layers.flag(key, &flag_name(id), Value::Text(word.to_owned()))?;
             }
         }
-        let is_reference = last.try_contains_id("reference").is_ok_and(|known| known) && last.get_flag("reference");
-        let configured = Configured::combined(layers, is_reference, command, cli.common.verbosity())?;
+        let configured = Configured::combined(layers, command, cli.common.verbosity())?;
         configured.fill(&mut cli.verb);
         Ok((cli, configured))
     }
@@ -234,8 +251,7 @@ impl Configured {
                 layers.flag(key, &flag_name(id), value)?;
             }
         }
-        let is_reference = arguments.is_given("reference");
-        Configured::combined(layers, is_reference, arguments.call().to_owned(), Verbosity::Normal)
+        Configured::combined(layers, arguments.call().to_owned(), Verbosity::Normal)
     }
 
     /// Gives a verb its settings.
@@ -245,17 +261,11 @@ impl Configured {
         }
     }
 
-    fn combined(layers: Layers, is_reference: bool, command: String, verbosity: Verbosity) -> Result<Configured> {
+    fn combined(layers: Layers, command: String, verbosity: Verbosity) -> Result<Configured> {
         let mut settings = layers.settings()?;
-        // Like every flag, a flag that allows only one backend overrides a file's backend.
         let layer = |key: &str| layers.get(key).map_or(0, |setting| setting.origin.layer());
-        let flags = Origin::Flag(String::new()).layer();
-        if is_reference && layer("run.backend") < flags {
-            settings.run.backend = BackendChoice::default();
-        }
-        // A backend without devices also overrides a device of an earlier source.
-        let is_cpu = settings.run.backend == BackendChoice::Cpu && layer("run.backend") > layer("run.device");
-        if is_cpu || (is_reference && layer("run.device") < flags) {
+        // A backend without devices overrides a device of an earlier source.
+        if settings.run.backend == BackendChoice::Cpu && layer("run.backend") > layer("run.device") {
             settings.run.device = None;
         }
         Ok(Configured { settings, layers, command, verbosity, started: Instant::now() })
@@ -467,6 +477,23 @@ impl Configured {
         Ok(OpenBackend::open(backend, device.as_ref())?.with_cancel(CANCEL.clone()))
     }
 
+    /// The same, or the CPU in binary64, which allows no other backend.
+    ///
+    /// # Errors
+    /// As [`Configured::open`]; [`Error::Usage`] if a device is requested for binary64.
+    pub(super) fn open_in(&self, is_binary64: bool) -> Result<OpenBackend> {
+        if !is_binary64 {
+            return self.open();
+        }
+        let run = &self.settings.run;
+        if run.backend == BackendChoice::Gpu || run.device.is_some() {
+            let problem = "binary64 is computed on the CPU; a device computes in binary32";
+            let help = "choose option `backend = cpu`, or leave out the key `reference`";
+            return Err(Error::usage(Place::item("reference"), problem, help));
+        }
+        Ok(OpenBackend::reference().with_cancel(CANCEL.clone()))
+    }
+
     /// Opens the backend to be verified.
     ///
     /// # Errors
@@ -474,19 +501,6 @@ impl Configured {
     pub(super) fn open_to_verify(&self) -> Result<OpenBackend> {
         let (backend, device) = self.backend()?;
         OpenBackend::open_to_verify(backend, device.as_ref())
-    }
-
-    /// The CPU in binary64, for `--reference`, which allows no other backend.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] if another backend or a device is requested.
-    pub(super) fn open_reference(&self) -> Result<OpenBackend> {
-        let run = &self.settings.run;
-        if run.backend == BackendChoice::Gpu || run.device.is_some() {
-            let problem = "it computes in binary64 on the CPU; a device computes in binary32".to_owned();
-            return Err(Error::usage(Place::item("--reference"), problem, "leave out --backend and --device"));
-        }
-        Ok(OpenBackend::reference().with_cancel(CANCEL.clone()))
     }
 }
 

@@ -35,7 +35,7 @@ pub enum Exit {
     NotAppropriate = 11,
     /// A defect of the program.
     Internal = 70,
-    /// A signal or `--stop-after` ended the run early; progress is kept, and the same command resumes.
+    /// A signal or `run.stop_after_s` ended the run early; progress is kept, and the same command resumes.
     Interrupted = crate::cli::signals::EXIT_STATUS,
 }
 

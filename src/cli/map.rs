@@ -9,6 +9,7 @@ use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::console::Total;
 use super::format::FormatFlag;
+use super::settings::MapSettings;
 use super::source::PlausibilityFlag;
 use super::{COMMIT, Exit, Output, lists};
 use crate::model::profile::Profile;
@@ -37,7 +38,7 @@ pub(super) struct Map {
     #[arg(value_name = "CATEGORY", help_heading = "Scenario")]
     category: String,
     /// Predefined grids with their models: jrc, r157
-    #[arg(long, value_name = "NAME", conflicts_with_all = ["x", "y", "panel", "set", "closing", "native_gap"], help_heading = "Scenario")]
+    #[arg(long, value_name = "NAME", conflicts_with_all = ["x", "y", "panel", "set"], help_heading = "Scenario")]
     preset: Option<String>,
     /// OpenSCENARIO file with deterministic distributions
     ///
@@ -64,12 +65,6 @@ pub(super) struct Map {
     /// Constant parameter; repeatable
     #[arg(long, value_name = "NAME=VALUE", help_heading = "Scenario")]
     set: Vec<String>,
-    /// Only panels in which the ego is faster than the other vehicle
-    #[arg(long, help_heading = "Scenario", hide_short_help = true)]
-    closing: bool,
-    /// Start each model at its following distance in the JRC's simulator, not gap_m or thw_s
-    #[arg(long, help_heading = "Scenario", hide_short_help = true)]
-    native_gap: bool,
     #[command(flatten)]
     models: lists::ModelsFlag,
     #[command(flatten)]
@@ -83,16 +78,13 @@ pub(super) struct Map {
     plausibility: PlausibilityFlag,
     #[command(flatten)]
     format: FormatFlag,
-    /// Compute in binary64 on the CPU: the reference of the lane arithmetic
-    #[arg(long, help_heading = "Models and criteria", hide_short_help = true)]
-    reference: bool,
     /// Folder of the results
     #[arg(long, value_name = "DIR", default_value = "lanesweep-map", help_heading = "Output")]
     out: PathBuf,
 }
 
 from_arguments!(
-    Map { category, preset, distribution, x, y, panel, set, closing, native_gap, robust, reference, out }
+    Map { category, preset, distribution, x, y, panel, set, robust, out }
     each { rename: str::parse }
     groups { models, criterion, plausibility, format }
 );
@@ -120,12 +112,16 @@ impl Map {
         let category = Category::named(&self.category, Place::item("CATEGORY"))?;
         let criterion = self.criterion.get()?;
         let profile = self.profile(configured)?;
-        let options =
-            MapOptions { grids: self.grids(category)?, models: self.models.named()?, criterion, robust: self.robust };
+        let options = MapOptions {
+            grids: self.grids(category, &configured.settings.map)?,
+            models: self.models.named()?,
+            criterion,
+            robust: self.robust,
+        };
         let started = Instant::now();
         let map = grid::Map::plan(options, &profile)?;
         let plan_s = started.elapsed().as_secs_f64();
-        let opened = if self.reference { configured.open_reference()? } else { configured.open()? };
+        let opened = configured.open_in(configured.settings.map.reference)?;
         let folder = RunFolder::open(&self.out, MAP_RECORD)?;
         let executor = opened.executor().with_recheck(RECHECK_SEED);
         let (units, started) = (Total::Exact(map.unit_count()), Instant::now());
@@ -151,8 +147,8 @@ impl Map {
         }
     }
 
-    /// Builds the grids from the flags.
-    fn grids(&self, category: Category) -> Result<MapGrids> {
+    /// Builds the grids from flags and settings.
+    fn grids(&self, category: Category, settings: &MapSettings) -> Result<MapGrids> {
         match self.preset.as_deref() {
             Some(name) => match Presets::find(name) {
                 Some(presets) => Ok(MapGrids::Preset(presets, category)),
@@ -174,8 +170,8 @@ impl Map {
                     y: self.y.clone(),
                     panel: self.panel.clone(),
                     set: self.set.clone(),
-                    native_gap: self.native_gap,
-                    closing_only: self.closing,
+                    native_gap: settings.native_gap,
+                    closing_only: settings.closing,
                 };
                 let parts = text.parts(category, self.distribution.as_ref().map(read).transpose()?)?;
                 let mut doubts = Doubts::new(self.plausibility.policy());

@@ -185,6 +185,9 @@ fn without_panic<T>(work: impl FnOnce() -> Result<T>) -> Result<T> {
 
 impl Verb {
     fn run(&self, configured: &Configured) -> Result<Output> {
+        if let Some(seconds) = configured.settings.run.stop_after_s {
+            signals::CANCEL.stop_after(seconds);
+        }
         match self {
             Verb::Study(verb) => verb.run(configured),
             Verb::Tracks(verb) => verb.run(configured),

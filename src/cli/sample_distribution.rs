@@ -36,9 +36,9 @@ pub(super) fn run(flags: &Sample, configured: &Configured, path: &Path) -> Resul
         return Err(only_crude("--distribution"));
     }
     if settings.points == SampleSource::Sobol {
-        let help = "leave out --points: draws of a distribution file are independent";
+        let help = "leave it out: draws of a distribution file are independent";
         return Err(Error::usage(
-            Place::item("--points"),
+            Place::item("sample.points"),
             "Sobol points are not available for a distribution file",
             help,
         ));

@@ -165,7 +165,7 @@ impl Sample {
             ("--map", self.map.is_some()),
             ("--given", !self.given.is_empty()),
             ("--other-profile", self.other_profile.is_some()),
-            ("--points sobol", settings.points == SampleSource::Sobol),
+            ("sample.points=sobol", settings.points == SampleSource::Sobol),
         ];
         if let Some((flag, _)) = belongs_to_crude.iter().find(|(_, given)| *given && !is_crude) {
             return Err(only_crude(flag));

@@ -28,7 +28,6 @@ const FEW_SCENARIOS: f64 = 5.0;
 impl Sample {
     pub(crate) fn run(&self, configured: &Configured) -> Result<Output> {
         self.check()?;
-        self.shards.start()?;
         if let Some(path) = &self.shards.plan {
             configured.refuse_with_plan()?;
             let sample = sampling::Sample::read(path)?;

@@ -5,9 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::arguments::from_arguments;
-use super::signals::CANCEL;
 use crate::run::parts::Shard;
-use crate::{Error, Place, Result};
 
 /// Flags of every verb that can be split.
 #[derive(Debug, Clone, Args)]
@@ -23,28 +21,11 @@ pub(super) struct ShardFlags {
     /// Write the plan, plan.json in --out, and stop
     #[arg(long, conflicts_with = "shard", help_heading = "Run", hide_short_help = true)]
     pub plan_only: bool,
-    /// After this time, finish the current chunk and stop, as after Ctrl-C; the same command resumes
-    #[arg(long, value_name = "s", help_heading = "Run", hide_short_help = true)]
-    pub stop_after: Option<f64>,
 }
 
-from_arguments!(ShardFlags { plan, plan_only, stop_after } parsed { shard: str::parse });
+from_arguments!(ShardFlags { plan, plan_only } parsed { shard: str::parse });
 
 impl ShardFlags {
-    /// Starts the time limit of --stop-after.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] for an invalid time.
-    pub(super) fn start(&self) -> Result<()> {
-        let Some(seconds) = self.stop_after else { return Ok(()) };
-        if !(seconds > 0.0 && seconds < 1e9) {
-            let problem = format!("{seconds} s is out of range");
-            return Err(Error::usage(Place::item("--stop-after"), problem, "give seconds above 0"));
-        }
-        CANCEL.stop_after(seconds);
-        Ok(())
-    }
-
     /// Whether this is a part of a run, to be merged with others.
     pub(super) fn is_part(&self) -> bool {
         self.shard.is_some()

@@ -16,7 +16,7 @@ pub(super) const EXIT_STATUS: u8 = 75;
 /// present chunk, or before the first one, is lost.
 pub(crate) const LONGEST_WAIT: Duration = Duration::from_secs(4);
 
-/// The cancellation token of this process: signals and `--stop-after` set it, and runs hold it.
+/// The cancellation token of this process: signals and `run.stop_after_s` set it, and runs hold it.
 pub static CANCEL: LazyLock<Cancel> = LazyLock::new(Cancel::default);
 
 /// Starts to handle SIGINT, SIGTERM and SIGHUP on a separate thread; a second call does nothing. SIGXFSZ is handled

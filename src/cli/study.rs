@@ -5,14 +5,14 @@ use std::time::Instant;
 
 use clap::Args;
 
-use super::arguments::{choices, from_arguments};
+use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::console::{self, Total};
 use super::format::{FormatFlag, TablesFlag};
+use super::settings::KeepPlan;
 use super::shard_flags::ShardFlags;
 use super::source::{self, SourceFlags};
 use super::{COMMIT, Exit, Output, lists};
-use crate::Result;
 use crate::engine::{Chunk, Headway, LanePlan, OpenBackend};
 use crate::report::host::{Host, Timings};
 use crate::report::lanes::{study_table, table_format, write_study_chunk};
@@ -24,6 +24,7 @@ use crate::support::input_file;
 use crate::support::readable;
 use crate::support::run_folder::Results;
 use crate::traffic::Source;
+use crate::{Error, Place, Result};
 
 /// How far do parameterized scenarios agree with recorded ones?
 ///
@@ -32,11 +33,11 @@ use crate::traffic::Source;
 /// generated recordings. The answer goes to stdout, tables and figures to --out.
 #[derive(Debug, Args)]
 #[command(mut_args(|arg| match arg.get_id().as_str() {
-    "recordings" | "scenarios" | "accept_implausible" | "categories" | "models" | "thw" | "published" | "reference"
+    "recordings" | "scenarios" | "accept_implausible" | "categories" | "models" | "thw" | "published"
     | "cross_validate" | "external" => {
         arg.conflicts_with("plan")
     }
-    "rows" | "compare_reference" | "keep_plan" => arg.conflicts_with_all(["shard", "plan_only"]),
+    "rows" => arg.conflicts_with_all(["shard", "plan_only"]),
     "injury" => arg.requires("rows"),
     _ => arg,
 }))]
@@ -54,18 +55,6 @@ pub(super) struct Study {
     /// Add the paper's published numbers (of highD) to tables and page
     #[arg(long, help_heading = "Models and criteria")]
     published: bool,
-    /// Compute in binary64 on the CPU, not in the f32 lane arithmetic
-    #[arg(long, help_heading = "Models and criteria")]
-    reference: bool,
-    /// Run both arithmetics and list every verdict that differs (reference.csv in --out)
-    #[arg(long, conflicts_with = "reference", help_heading = "Models and criteria", hide_short_help = true)]
-    compare_reference: bool,
-    /// Keep the plan in --out for `simulate --from`
-    ///
-    /// The plan is run-plan.json; with it you can repeat each lane. auto keeps it up to 256 MiB, about 135,000
-    /// scenarios.
-    #[arg(long, value_name = "auto|always|never", value_enum, hide_possible_values = true, default_value_t = KeepPlan::Auto, help_heading = "Output", hide_short_help = true)]
-    keep_plan: KeepPlan,
     #[command(flatten)]
     categories: lists::CategoriesFlag,
     #[command(flatten)]
@@ -94,51 +83,24 @@ pub(super) struct Study {
 }
 
 from_arguments!(
-    Study { out, rows, published, reference, compare_reference, keep_plan, cross_validate, external }
+    Study { out, rows, published, cross_validate, external }
     groups { data, categories, models, headways, injury, tables, format, shards }
 );
-choices!(KeepPlan);
-
-/// When a run in one piece leaves its plan.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, clap::ValueEnum)]
-enum KeepPlan {
-    /// Unless it is large.
-    Auto,
-    /// However large.
-    Always,
-    /// Never.
-    Never,
-}
-
-impl KeepPlan {
-    /// Maximum size of a kept plan, bytes.
-    fn max_bytes(self) -> Option<u64> {
-        match self {
-            KeepPlan::Auto => Some(256 << 20),
-            KeepPlan::Always => Some(u64::MAX),
-            KeepPlan::Never => None,
-        }
-    }
-}
-
 impl Study {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
         self.guard_inputs(configured)?;
         check_folder(&self.out)?;
         self.rows.as_deref().map_or(Ok(()), check_folder_of)?;
-        self.shards.start()?;
+        let is_binary64 = configured.settings.study.reference;
         if let Some(path) = &self.shards.plan {
             configured.refuse_with_plan()?;
-            let mut opened = configured.open()?;
             let study = study::Study::read(path, self.shards.shard)?;
-            if study.facts().reference {
-                opened = configured.open_reference()?;
-            }
+            let opened = configured.open_in(study.facts().reference)?;
             return self.sweep(&study, &opened, configured, Timings::default());
         }
         if self.shards.plan_only {
-            if self.reference {
-                configured.open_reference()?;
+            if is_binary64 {
+                configured.open_in(true)?;
             }
             let (study, _) = self.prepare(configured)?;
             study.write_plan(&self.out)?;
@@ -146,7 +108,7 @@ impl Study {
             return self.format.planned(exit, study.plan().lane_count(), &self.out.join(PLAN_FILE));
         }
         // Open before the work, so that a missing device is reported at once.
-        let opened = if self.reference { configured.open_reference()? } else { configured.open()? };
+        let opened = configured.open_in(is_binary64)?;
         let (study, timings) = self.prepare(configured)?;
         self.sweep(&study, &opened, configured, timings)
     }
@@ -194,7 +156,7 @@ impl Study {
             // Synthetic recordings are calibrated to the published numbers, so both are shown if the headways are the
             // same.
             .published(self.published || (collection.synthetic && has_paper_headways))
-            .reference(self.reference);
+            .reference(config.study.reference);
         let study = timed(&mut timings.plan_s, || builder.plan())?;
         console::warn(study.cases().left_out());
         Ok((study, timings))
@@ -240,13 +202,14 @@ impl Study {
         if let Some(rows) = rows {
             results.join(rows.stage()?);
         }
-        let comparison = self.compare_reference.then(|| ReferenceComparison::of_study(study.cases())).transpose()?;
+        let comparison = configured.settings.study.compare_reference;
+        let comparison = comparison.then(|| ReferenceComparison::of_study(study.cases())).transpose()?;
         let settings = configured.record(self.shards.plan.is_some());
         let mut host = Host::of(COMMIT, opened, swept.rechecked_lanes, started, settings);
         if let (Some(stand_in), 1..) = (executor.fallback, swept.redone_lanes) {
             host.backend += &format!("; after its failure {}", stand_in.describe());
         }
-        self.leave_plan(study, &mut results)?;
+        self.leave_plan(study, configured.settings.study.keep_plan, &mut results)?;
         let report = StudyReport::of(study, &counts, comparison, host, &swept, timings)?;
         let output = self.tables.finish(report, results, study.facts().incomplete, self.format)?;
         run.close()?;
@@ -254,12 +217,16 @@ impl Study {
     }
 
     /// Keeps the plan for `simulate --from`.
-    fn leave_plan(&self, study: &study::Study, results: &mut Results) -> Result<()> {
-        let Some(max_bytes) = self.keep_plan.max_bytes() else { return Ok(()) };
+    fn leave_plan(&self, study: &study::Study, keep: KeepPlan, results: &mut Results) -> Result<()> {
+        let max_bytes = match keep {
+            KeepPlan::Auto => 256 << 20,
+            KeepPlan::Always => u64::MAX,
+            KeepPlan::Never => return Ok(()),
+        };
         if !study.keep(results, RUN_PLAN_FILE, max_bytes)? {
             tracing::info!(
                 "the plan is not kept in {}: it has more than {} MiB; \
-                 `--keep-plan always` keeps it for `simulate --from`",
+                 `--config study.keep_plan=always` keeps it for `simulate --from`",
                 self.out.display(),
                 max_bytes >> 20
             );
@@ -270,6 +237,10 @@ impl Study {
     /// Checks that every flag has an effect, and that the lane table replaces neither an input nor another result.
     fn guard_inputs(&self, configured: &Configured) -> Result<()> {
         self.tables.check(self.format)?;
+        if configured.settings.study.compare_reference && (self.shards.is_part() || self.shards.plan_only) {
+            let problem = "a part of a run cannot compare the arithmetics of the whole run";
+            return Err(Error::usage(Place::item("study.compare_reference"), problem, "leave it out"));
+        }
         let Some(lanes) = &self.rows else { return Ok(()) };
         let results = ["failures.csv", "f1.csv", "claims.csv", "report.txt", "reference.csv", "run.json"];
         let results = results.into_iter().chain([PLAN_FILE, RUN_PLAN_FILE]);

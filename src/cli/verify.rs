@@ -34,9 +34,6 @@ pub(super) struct Verify {
     /// Random lanes per model and category
     #[arg(long, value_name = "N", default_value_t = 100_000, value_parser = super::arguments::whole::<u64>, help_heading = "Models and criteria")]
     random_lanes: u64,
-    /// Units of 12 lanes per model, threshold and category
-    #[arg(long, value_name = "N", default_value_t = 64, value_parser = super::arguments::whole::<u64>, help_heading = "Models and criteria", hide_short_help = true)]
-    threshold_units: u64,
     /// Seed of the random lanes and of those on thresholds
     #[arg(long, value_name = "N", default_value_t = 157, help_heading = "Run")]
     seed: u64,
@@ -52,14 +49,9 @@ const MAX_LANES: u64 = 100_000_000;
 
 impl Verify {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
-        for (flag, value, max) in [
-            ("--random-lanes", self.random_lanes, MAX_LANES),
-            ("--threshold-units", self.threshold_units, MAX_LANES / 1000),
-        ] {
-            if value == 0 || value > max {
-                let problem = format!("{value} is not usable; expected 1 to {max}");
-                return Err(Error::usage(Place::item(flag), problem, "choose a number in this range"));
-            }
+        if self.random_lanes == 0 || self.random_lanes > MAX_LANES {
+            let problem = format!("{} is not usable; expected 1 to {MAX_LANES}", self.random_lanes);
+            return Err(Error::usage(Place::item("--random-lanes"), problem, "choose a number in this range"));
         }
         let profile = configured.profile()?;
         let opened = configured.open_to_verify()?;
@@ -76,7 +68,7 @@ impl Verify {
         let (mut equal, mut lanes, mut differing) = (true, 0, 0);
         for (name, plan) in [
             ("Random lanes", self.random(&profile)?),
-            ("Lanes on thresholds", self.thresholds(&profile)?),
+            ("Lanes on thresholds", self.thresholds(configured, &profile)?),
             ("Study", self.study(configured, &profile)?),
         ] {
             let comparison = configured.with_bar(Total::Exact(plan.lane_count()), name, |bar| {
@@ -121,8 +113,8 @@ impl Verify {
         random_plan(profile, &RandomOptions { seed: self.seed, lanes_per_model_and_category, ..Default::default() })
     }
 
-    fn thresholds(&self, profile: &Profile) -> Result<LanePlan> {
-        let units_per_threshold = self.threshold_units;
+    fn thresholds(&self, configured: &Configured, profile: &Profile) -> Result<LanePlan> {
+        let units_per_threshold = configured.settings.verify.threshold_units;
         threshold_plan(profile, &ThresholdOptions { seed: self.seed, units_per_threshold, ..Default::default() })
     }
 
@@ -148,7 +140,7 @@ impl Verify {
         let own = |prefix: &str| text.starts_with(prefix) && text.contains(&format!("-seed{}-", self.seed));
         let plan = match () {
             () if own("random-") => self.random(profile)?,
-            () if own("threshold-") => self.thresholds(profile)?,
+            () if own("threshold-") => self.thresholds(configured, profile)?,
             () => self.study(configured, profile)?,
         };
         let key = plan.parse_key(text).ok_or_else(|| {

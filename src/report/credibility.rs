@@ -285,7 +285,7 @@ mod tests {
     fn what_was_not_compared_is_missing_and_says_what_would_measure_it() {
         let question = "precision: binary32 against binary64";
         let (state_of, text) = state(Study, &json!({"reference": null}), question);
-        assert_eq!((state_of, text.as_str()), (MISSING, "the same study with option `compare_reference`"));
+        assert_eq!((state_of, text.as_str()), (MISSING, "the same study with key `study.compare_reference`"));
         let compared = json!({"reference": {"lanes": 4, "verdicts": 12, "differing": 1}});
         assert_eq!(state(Study, &compared, question), ("measured", "1 of 12 verdicts of 4 lanes differ".to_owned()));
         assert_eq!(state(Map, &json!({"grids": [{"undecided": null}]}), "inputs").0, MISSING);

@@ -76,7 +76,7 @@ fn a_study_on_a_device_writes_the_same_files_as_on_the_cpu() {
 #[test]
 fn verify_passes_on_the_software_device_and_says_what_it_compared() {
     let Some(device) = device() else { return };
-    let args = ["-q", "verify", "--device", &device, "--random-lanes", "400", "--threshold-units", "2"];
+    let args = ["-q", "verify", "--device", &device, "--random-lanes", "400", "--config", "verify.threshold_units=2"];
     let output = lanesweep(&[&args[..], &SMALL].concat());
     assert_eq!(code(&output), 0, "{}", stderr(&output));
     let text = stdout(&output);
@@ -101,7 +101,7 @@ fn a_lane_can_be_run_again_from_its_key() {
 
 #[test]
 fn the_cpu_backend_can_be_verified_without_any_device() {
-    let args = ["-q", "verify", "--backend", "cpu", "--random-lanes", "400", "--threshold-units", "1"];
+    let args = ["-q", "verify", "--backend", "cpu", "--random-lanes", "400", "--config", "verify.threshold_units=1"];
     let output = lanesweep(&[&args[..], &SMALL].concat());
     assert_eq!(code(&output), 0, "{}", stderr(&output));
     assert!(stdout(&output).contains("Under test: CPU"));
@@ -130,8 +130,8 @@ fn a_gpu_that_is_not_there_has_its_own_exit_code_and_nothing_is_written() {
 fn contradicting_flags_are_answered_with_what_to_write() {
     let cases: [(&[&str], &str); 6] = [
         (&["study", "--backend", "cpu", "--device", "0"], "--device"),
-        (&["study", "--reference", "--backend", "gpu"], "--reference"),
-        (&["study", "--reference", "--device", "llvmpipe"], "--reference"),
+        (&["study", "--config", "study.reference=true", "--backend", "gpu"], "binary64"),
+        (&["study", "--config", "study.reference=true", "--device", "llvmpipe"], "binary64"),
         (&["study", "--backend", "tpu"], "tpu"),
         (&["study", "--device", "no such device"], "no such device"),
         (&["verify", "--backend", "cpu", "--random-lanes", "0"], "--random-lanes"),
@@ -145,7 +145,7 @@ fn contradicting_flags_are_answered_with_what_to_write() {
 
 #[test]
 fn recordings_without_a_scenario_are_an_input_that_cannot_be_verified() {
-    let args = ["-q", "verify", "--backend", "cpu", "--random-lanes", "40", "--threshold-units", "1"];
+    let args = ["-q", "verify", "--backend", "cpu", "--random-lanes", "40", "--config", "verify.threshold_units=1"];
     let output = lanesweep(&[&args[..], &["--synth-recordings", "1", "--config", "generator.duration_s=1"]].concat());
     assert_eq!(code(&output), 3, "{}", stderr(&output));
     assert!(stderr(&output).contains("no scenario to simulate"), "{}", stderr(&output));

@@ -218,7 +218,8 @@ fn gives_the_same_words_on_a_device() {
     if software_device().is_none() {
         return;
     }
-    let verify = "-q verify --device llvmpipe --random-lanes 2000 --threshold-units 2 --synth-recordings 1";
+    let verify =
+        "-q verify --device llvmpipe --random-lanes 2000 --config verify.threshold_units=2 --synth-recordings 1";
     let output = lanesweep(&verify.split(' ').collect::<Vec<_>>());
     let text = said(&output);
     assert!(output.status.success(), "{text}");

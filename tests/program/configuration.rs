@@ -295,7 +295,7 @@ fn what_is_configured_yields_to_a_flag_that_contradicts_it() {
     let [device, gpu, both, small] =
         ["device.toml", "gpu.toml", "both.toml", "small.toml"].map(|file| [("LANESWEEP_CONFIG", file)]);
     good(dir, &device, &["-q", "study", "--backend", "cpu"]);
-    good(dir, &gpu, &["-q", "study", "--reference"]);
+    good(dir, &gpu, &["-q", "study", "--config", "study.reference=true", "--backend", "cpu"]);
     refused(dir, &device, &["-q", "study"]);
     let said = refused(dir, &both, &["-q", "study"]);
     assert!(said.contains("both.toml, line 3, `run.device`: `0` is named") && !said.contains("--backend"), "{said}");

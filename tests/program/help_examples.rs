@@ -84,7 +84,7 @@ fn smaller(line: &str) -> String {
         // One lane is little already.
         "verify" if !["--lane", "devices"].iter().any(|word| words.contains(word)) => {
             words.retain(|word| !matches!(*word, "--random-lanes" | "20000"));
-            words.extend(["--random-lanes", "200", "--threshold-units", "1", "--synth-recordings", "1"]);
+            words.extend(["--random-lanes", "200", "--config", "verify.threshold_units=1", "--synth-recordings", "1"]);
         }
         _ => {}
     }

@@ -127,7 +127,7 @@ fn a_full_standard_output_is_told_and_the_result_is_whole() {
 #[test]
 fn a_folder_that_vanishes_in_mid_run_is_told_or_made_again_and_nothing_is_claimed_that_is_lost() {
     let bench = Bench::new();
-    let long = [SAMPLE, &["--stop-after", "100000"]].concat();
+    let long = [SAMPLE, &["--config", "run.stop_after_s=100000"]].concat();
     let whole = shared().join("sample");
     let out = bench.path().join("out");
     let (mut reported, mut made_again) = (0, 0);

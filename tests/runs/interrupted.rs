@@ -96,7 +96,7 @@ fn study_interrupted_by(signal: &str) -> i32 {
     let dir = tempfile::tempdir().unwrap();
     let lanes = dir.path().join("lanes.csv");
     std::fs::write(&lanes, "of an earlier run").unwrap();
-    let study = "-q --threads 1 study --reference --synth-recordings 2 --config generator.duration_s=300 --out out --rows lanes.csv";
+    let study = "-q --threads 1 study --config study.reference=true --synth-recordings 2 --config generator.duration_s=300 --out out --rows lanes.csv";
     let mut study = start(dir.path(), &study.split(' ').collect::<Vec<_>>());
     wait_for_run(&mut study, "rows are being written", || {
         let in_middle = |path: &PathBuf| std::fs::metadata(path).is_ok_and(|file| file.len() > 0);
@@ -136,7 +136,7 @@ fn a_signal_ends_a_run_within_five_seconds_also_in_its_first_chunk() {
     let dir = tempfile::tempdir().unwrap();
     // The first chunk alone, a scenario, takes 15 s.
     let scenarios = long_scenarios(dir.path());
-    let study = "-q --threads 1 study --reference --dt 0.0001 --out out --scenarios";
+    let study = "-q --threads 1 study --config study.reference=true --dt 0.0001 --out out --scenarios";
     let study = [&study.split(' ').collect::<Vec<_>>()[..], &[scenarios.to_str().unwrap()]].concat();
     let mut study = start(dir.path(), &study);
     wait_for_run(&mut study, "the folder is locked", || dir.path().join("out/run.lock").exists());

@@ -47,21 +47,25 @@ const VERBS: [Verb; 18] = [
         "study",
         Some("run.json"),
         Some(
-            "study --synth-recordings 1 --config generator.duration_s=120 --compare-reference --rows out/lanes.csv --out out",
+            "study --synth-recordings 1 --config generator.duration_s=120 --config study.compare_reference=true --rows out/lanes.csv --out out",
         ),
         "study --plan plan/plan.json --threads 1 --out out",
     ),
     verb(
         "study --rows",
         Some("run.json"),
-        Some("study --synth-recordings 1 --config generator.duration_s=120 --compare-reference --out out"),
+        Some(
+            "study --synth-recordings 1 --config generator.duration_s=120 --config study.compare_reference=true --out out",
+        ),
         "study --synth-recordings 1 --categories cut-in --rows rows/lanes.csv --out out",
     ),
     verb("study --shard", None, None, "study --plan plan/plan.json --shard 0/2 --threads 1 --out out"),
     verb(
         "merge",
         Some("run.json"),
-        Some("study --synth-recordings 1 --config generator.duration_s=120 --compare-reference --out out"),
+        Some(
+            "study --synth-recordings 1 --config generator.duration_s=120 --config study.compare_reference=true --out out",
+        ),
         "merge out",
     ),
     verb(
@@ -206,7 +210,7 @@ fn put(dir: &Path, from: Option<&str>) {
 fn furnish(dir: &Path) {
     let fit = "fit --synth-recordings 2 --categories cut-in --parameterizations 2 --no-comparison";
     done(dir, &format!("{fit} --out d.json"));
-    let plan = "study --synth-recordings 1 --reference --dt 0.02 --plan-only";
+    let plan = "study --synth-recordings 1 --config study.reference=true --dt 0.02 --plan-only";
     done(dir, &format!("{plan} --out plan"));
     done(dir, &format!("{plan} --out parts"));
     done(dir, "study --plan plan/plan.json --shard 0/2 --out parts");

@@ -371,7 +371,8 @@ fn the_same_files_come_from_any_number_of_threads() {
             "ego_speed_kmh=60,90,120",
             "--panel",
             "other_speed_kmh=20,70",
-            "--closing",
+            "--config",
+            "map.closing=true",
             "--models",
             "FSM,CCHDM",
             "--backend",
@@ -432,7 +433,7 @@ fn known_shares_stand_beside_the_presets_under_the_profile_of_the_jrc_only() {
     assert!(cut_in.contains("known %") && !cut_in.contains('*') && cut_in.contains("15,930"), "{cut_in}");
     assert!(!shares(&["--profile", "paper"]).contains("known %"));
     assert!(!shares(&["--criterion", "ttc"]).contains("known %"));
-    let reference = shares(&["--reference"]);
+    let reference = shares(&["--config", "map.reference=true"]);
     assert!(reference.lines().any(|line| line.contains("| FSM ") && line.contains("|    0.00 |")), "{reference}");
 }
 
@@ -458,12 +459,12 @@ fn what_makes_no_map_is_answered_with_what_would() {
         (&[&x, &y], "needs the ego's speed"),
         (&[&x, &["--y", "thw_s=1..2/1"], &set, &["--set", "lateral_speed_mps=1"]], "given twice"),
         (&[&x, &y, &["--set", "ego_speed_kmh=90,100"]], "has 2 values"),
-        (&[&x, &y, &set, &["--set", "other_speed_kmh=100", "--closing"]], "in no panel"),
-        (&[&x, &y, &set, &["--closing"]], "must be the panel's or fixed"),
+        (&[&x, &y, &set, &["--set", "other_speed_kmh=100", "--config", "map.closing=true"]], "in no panel"),
+        (&[&x, &y, &set, &["--config", "map.closing=true"]], "must be the panel's or fixed"),
         (&[&x, &y, &set, &["--criterion", "thw"]], "collision, ttc or btn"),
         (&[&x, &set], "give both --x and --y"),
         (&[&["--preset", "jcr"]], "there is no preset"),
-        (&[&x, &y, &set, &["--reference", "--backend", "gpu"]], "--reference"),
+        (&[&x, &y, &set, &["--config", "map.reference=true", "--backend", "gpu"]], "binary64"),
     ];
     let dir = tempfile::tempdir().unwrap();
     for (flags, words) in cases {

@@ -79,7 +79,7 @@ fn what_an_earlier_run_left_in_the_folder_does_not_stay_beside_a_new_record() {
         let output = lanesweep(&[&args[..], more].concat());
         assert!(output.status.success(), "{output:?}");
     };
-    run(&["--compare-reference"]);
+    run(&["--config", "study.compare_reference=true"]);
     assert!(out.join("radar-cut-in.svg").exists() && out.join("reference.csv").exists());
     std::fs::write(out.join("notes.txt"), "mine").unwrap();
     run(&["--categories", "lvd"]);

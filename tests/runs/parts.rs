@@ -309,7 +309,7 @@ fn an_interrupted_run_continues_and_ends_as_if_undisturbed() {
     for out in [&["--out", "run"][..], &["--out", "parts", "--shard", "0/1"]] {
         let mut interruptions = 0;
         loop {
-            let (code, _, err) = lanesweep(dir, &[&long[..], &["--stop-after", "0.3"], out].concat());
+            let (code, _, err) = lanesweep(dir, &[&long[..], &["--config", "run.stop_after_s=0.3"], out].concat());
             match code {
                 0 => break,
                 75 => assert!(flat(&err).contains("are done and kept") && err.contains("it continues"), "{err}"),
@@ -352,7 +352,7 @@ fn parts_share_a_folder_and_keep_whole_runs_and_merges_out() {
     let mut first = start(dir, &shard("0/2"));
     wait_for_run(&mut first, "the lock is taken", || dir.join("run/part-00000-of-00002.lock").exists());
     let others = [&run[..], &["-q", "merge", "run"], &shard("0/2")].map(|args| lanesweep(dir, args));
-    let beside = lanesweep(dir, &[&shard("1/2")[..], &["--stop-after", "0.3"]].concat());
+    let beside = lanesweep(dir, &[&shard("1/2")[..], &["--config", "run.stop_after_s=0.3"]].concat());
     kill(first);
     for (code, _, err) in others {
         assert_eq!(code, 75, "{err}");

@@ -204,7 +204,7 @@ fn a_rerun_takes_profile_time_step_options_and_arithmetic_from_the_run() {
     std::fs::write(dir.join("study.toml"), "[parameterization]\nafter_duration = \"unlimited\"\n").unwrap();
     let base =
         ["-q", "study", "--synth-recordings", "2", "--config", "study.toml", "--profile", "un-r157", "--dt", "0.1"];
-    for (out, flags) in [("narrow", &["--backend", "cpu"][..]), ("wide", &["--reference"])] {
+    for (out, flags) in [("narrow", &["--backend", "cpu"][..]), ("wide", &["--config", "study.reference=true"])] {
         let lanes = format!("{out}.csv");
         done(dir, &[&base[..], flags, &["--out", out, "--rows", &lanes]].concat());
         let table = rows(&dir.join(&lanes));
@@ -284,7 +284,7 @@ fn a_folder_without_its_plan_says_how_to_make_it() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     let study = ["-q", "study", "--synth-recordings", "2", "--backend", "cpu"];
-    done(dir, &[&study[..], &["--out", "r", "--keep-plan", "never", "--rows", "lanes.csv"]].concat());
+    done(dir, &[&study[..], &["--out", "r", "--config", "study.keep_plan=never", "--rows", "lanes.csv"]].concat());
     assert!(!dir.join("r/run-plan.json").exists());
     let key = key_of(&rows(&dir.join("lanes.csv"))[0]);
     let rerun = ["simulate", "--from", "r", "--lane", &key];

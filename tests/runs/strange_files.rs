@@ -367,7 +367,7 @@ fn foreign_text_reaches_a_terminal_as_text_and_never_as_commands_to_it() {
         (&["simulate", "--scenarios", "s.jsonl", "--lane", &lane, "--compare", "all", "--models", "all"], 0),
         (&["simulate", "--scenarios", "s.jsonl", "--lane", &lane, "--format", "json"], 0),
         (&["simulate", "--scenarios", "s.jsonl", "--lane", "\u{1b}[2J/S/1.2s/FSM"], 2),
-        (&["study", "--scenarios", "s.jsonl", "--backend", "cpu", "--compare-reference"], 0),
+        (&["study", "--scenarios", "s.jsonl", "--backend", "cpu", "--config", "study.compare_reference=true"], 0),
         (&["study", "--scenarios", "broken.jsonl"], 3),
         (&["study", "--scenarios", named], 6),
         (&["study", "--profile", "key.toml"], 2),
@@ -396,7 +396,18 @@ fn a_table_for_spreadsheets_begins_no_formula_with_foreign_text_and_reads_back_t
     let dir = dir.path();
     for id in ["=HYPERLINK(1)", "@a", "-2+3", "+x,y", "'=q"] {
         scenarios_with(dir, id);
-        let study = ["-q", "study", "--scenarios", "s.jsonl", "--reference", "--rows", "lanes.csv", "--thw", "1.2"];
+        let study = [
+            "-q",
+            "study",
+            "--scenarios",
+            "s.jsonl",
+            "--config",
+            "study.reference=true",
+            "--rows",
+            "lanes.csv",
+            "--thw",
+            "1.2",
+        ];
         let (code, _, err) =
             program::lanesweep(dir, &[&study[..], &["--models", "FSM", "--categories", "cut-in"]].concat());
         assert_eq!(code, 0, "{err}");

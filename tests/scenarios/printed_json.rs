@@ -51,7 +51,7 @@ fn a_study_prints_its_tables_and_a_merged_one_the_same() {
         let args = study(more);
         json(dir.path(), &args.iter().map(String::as_str).collect::<Vec<_>>())
     };
-    let whole = run(&["--out", "whole", "--published", "--compare-reference"]);
+    let whole = run(&["--out", "whole", "--published", "--config", "study.compare_reference=true"]);
     for (name, file) in
         [("failures", "failures.csv"), ("f1", "f1.csv"), ("claims", "claims.csv"), ("reference", "reference.csv")]
     {
@@ -119,8 +119,17 @@ fn maps_traces_and_checks_print_documents() {
         assert_eq!(outcome["collision"] == Value::Bool(true), outcome["contact_s"].is_number(), "{lane}");
     }
 
-    let verify =
-        ["verify", "--backend", "cpu", "--random-lanes", "24", "--threshold-units", "1", "--synth-recordings", "1"];
+    let verify = [
+        "verify",
+        "--backend",
+        "cpu",
+        "--random-lanes",
+        "24",
+        "--config",
+        "verify.threshold_units=1",
+        "--synth-recordings",
+        "1",
+    ];
     let printed = json(dir.path(), &verify);
     let sets = printed["sets"].as_array().unwrap();
     assert_eq!((printed["equal"].as_bool(), sets.len()), (Some(true), 3));

@@ -92,7 +92,7 @@ fn a_study_gives_the_same_bytes_from_parquet_and_from_json_lines() {
     lanesweep(at, &["-q", "synth", "rec", "--synth-recordings", "3"]);
     lanesweep(at, &["-q", "mine", "rec", "--out", "s.jsonl"]);
     lanesweep(at, &["-q", "mine", "rec", "--out", "s.parquet"]);
-    let study = ["-q", "study", "--backend", "cpu", "--keep-plan", "never"];
+    let study = ["-q", "study", "--backend", "cpu", "--config", "study.keep_plan=never"];
     for (file, out, threads) in [("s.jsonl", "a", "2"), ("s.parquet", "b", "1")] {
         for ending in ["csv", "parquet", "jsonl"] {
             let lanes = format!("{out}.{ending}");

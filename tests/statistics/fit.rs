@@ -162,7 +162,7 @@ fn wrong_words_are_answered_with_what_to_write_instead() {
         (&["fit", "--parameterizations", "9"], 2, "LVD: i ii iii iv v"),
         (&["fit", "--categories", "cut-in", "--parameterizations", "ii"], 2, "of cut-in"),
         (&["fit", "--categories", "cutin"], 2, "use cut-in, cut-out, lvd"),
-        (&["fit", "--bandwidth-rule", "best"], 2, "reduction"),
+        (&["fit", "--config", "fit.bandwidth_rule=best"], 2, "reduction"),
         (&["fit", "--hours", "-1"], 2, "--hours"),
         (&["fit", "--km", "nan"], 2, "--km"),
         (&["fit", "--out", text(&file)], 2, "is one file, but 19 densities"),

@@ -33,10 +33,16 @@ pub(crate) struct Settings {
     pub parameterization: ParameterizationOptions,
     /// Scores of a study and its claims.
     pub score: ScoreOptions,
+    /// `lanesweep study`.
+    pub study: StudySettings,
     /// `lanesweep fit`.
     pub fit: FitSettings,
     /// `lanesweep sample`.
     pub sample: SampleSettings,
+    /// `lanesweep map`.
+    pub map: MapSettings,
+    /// `lanesweep verify`.
+    pub verify: VerifySettings,
     /// `lanesweep compare`.
     pub compare: CompareSettings,
     /// `lanesweep search`, and cross-validation.
@@ -100,7 +106,38 @@ settings! {
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(extend("minimum" = Bound::TIME_STEP.smallest, "maximum" = Bound::TIME_STEP.largest))]
         pub dt_s: Option<f64> = None,
+        /// After this time, finish the current chunk and stop, as after Ctrl-C; the same command resumes, s. Without it:
+        /// no limit.
+        #[serde(skip_serializing_if = "Option::is_none")]
+        #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1e9))]
+        pub stop_after_s: Option<f64> = None,
     }
+}
+
+settings! {
+    /// `lanesweep study`.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+    #[serde(deny_unknown_fields, default)]
+    pub(crate) struct StudySettings {
+        /// Compute in binary64 on the CPU, not in the f32 lane arithmetic.
+        pub reference: bool = false,
+        /// Run both arithmetics and list every verdict that differs (reference.csv).
+        pub compare_reference: bool = false,
+        /// Keep the plan, run-plan.json, for `simulate --from`.
+        pub keep_plan: KeepPlan = KeepPlan::Auto,
+    }
+}
+
+/// When a run in one piece leaves its plan.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub(crate) enum KeepPlan {
+    /// Up to 256 MiB, about 135,000 scenarios.
+    Auto,
+    /// However large.
+    Always,
+    /// Never.
+    Never,
 }
 
 settings! {
@@ -181,6 +218,31 @@ pub(crate) enum IntervalKind {
     #[default]
     Wilson,
     ClopperPearson,
+}
+
+settings! {
+    /// `lanesweep map`.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+    #[serde(deny_unknown_fields, default)]
+    pub(crate) struct MapSettings {
+        /// Compute in binary64 on the CPU, not in the f32 lane arithmetic.
+        pub reference: bool = false,
+        /// Only panels in which the ego is faster than the other vehicle; not of presets.
+        pub closing: bool = false,
+        /// Start each model at its following distance in the JRC's simulator, not gap_m or thw_s; not of presets.
+        pub native_gap: bool = false,
+    }
+}
+
+settings! {
+    /// `lanesweep verify`.
+    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+    #[serde(deny_unknown_fields, default)]
+    pub(crate) struct VerifySettings {
+        /// Units of 12 lanes per model, threshold and category.
+        #[schemars(range(min = 1, max = 100_000))]
+        pub threshold_units: u64 = 64,
+    }
 }
 
 settings! {

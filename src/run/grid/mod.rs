@@ -161,8 +161,8 @@ impl Grid {
         for panel in &self.panels {
             let Some((ego_mps, other_mps)) = speeds(&self.panel_point(panel)) else {
                 let problem = "the speeds of both vehicles must be the panel's or fixed".to_owned();
-                let help = "give both by option `panel` or option `set`, or leave option `closing` out";
-                return Err(Error::usage(Place::option("closing"), problem, help));
+                let help = "give both by option `panel` or option `set`, or leave `map.closing` out";
+                return Err(Error::usage(Place::item("map.closing"), problem, help));
             };
             if ego_mps > other_mps {
                 kept.push(panel.clone());
@@ -171,9 +171,9 @@ impl Grid {
         if kept.is_empty() {
             let problem = "in no panel is the ego faster than the other vehicle".to_owned();
             return Err(Error::usage(
-                Place::option("closing"),
+                Place::item("map.closing"),
                 problem,
-                "give other speeds, or leave option `closing` out",
+                "give other speeds, or leave `map.closing` out",
             ));
         }
         self.panels = kept;
@@ -408,11 +408,11 @@ pub fn check_complete(
     }
     if has(CaseQuantity::Gap) && has(CaseQuantity::Thw) || native_gap && has_gap {
         let problem = "the initial distance is given twice".to_owned();
-        let help = "keep one of gap_m, thw_s and option `native_gap`";
+        let help = "keep one of gap_m, thw_s and `map.native_gap`";
         return Err(Error::usage(Place::item("gap_m, thw_s"), problem, help));
     }
     if !native_gap && !has_gap {
-        return missing("the initial distance", "thw_s=2 (or option `native_gap`)");
+        return missing("the initial distance", "thw_s=2 (or key `map.native_gap`)");
     }
     Ok(())
 }

@@ -128,7 +128,7 @@ pub(super) fn study_of(dir: &Path) -> Result<Study> {
     let run = &dir.join(STUDY_RECORD);
     let wrong = |problem: String| {
         let help = "make the plan again with the study's own command and option `plan_only`, into this folder; a study \
-                    keeps it up to 256 MiB, and always with option `keep_plan = always`";
+                    keeps it up to 256 MiB, and always with `study.keep_plan=always`";
         Error::input(Place::file(run), problem, help)
     };
     let text = read_json(run, MAX_TABLE_BYTES, "the record of a study", "run the study into this folder again")?;

@@ -132,7 +132,7 @@ fn a_disk_that_becomes_read_only_keeps_what_is_done() {
     let bench = Bench::new();
     let whole = shared().join("sample");
     let script = "\
-        \"$0\" \"$@\" --out \"$DISK/out\" --stop-after 0.3 >/dev/null; echo stopped $?\n\
+        \"$0\" \"$@\" --out \"$DISK/out\" --config run.stop_after_s=0.3 >/dev/null; echo stopped $?\n\
         mount -o remount,ro \"$DISK\"\n\
         \"$0\" \"$@\" --out \"$DISK/out\" >/dev/null; echo kept $?\n\
         \"$0\" \"$@\" --out \"$DISK/new\" >/dev/null; echo new $?\n\
