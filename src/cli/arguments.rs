@@ -352,7 +352,7 @@ impl Arguments {
 /// Names of a verb's arguments.
 pub(super) fn names(command: &Command) -> impl Iterator<Item = &str> {
     // Of the command line alone: a function prints nothing.
-    let printing = ["help", "version", "quiet", "verbose", "format", "tables"];
+    let printing = ["help", "version", "quiet", "verbose", "format"];
     command.get_arguments().map(|arg| arg.get_id().as_str()).filter(move |name| !printing.contains(name))
 }
 

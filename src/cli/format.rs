@@ -1,14 +1,14 @@
-//! `--format` and `--tables`: output for people or for programs.
+//! `--format`: output for people or for programs.
 
 use clap::{Args, ValueEnum};
 
-use super::arguments::{Arguments, FromArguments, from_arguments};
+use super::arguments::{Arguments, FromArguments};
 use super::{Exit, Output, console};
+use crate::Result;
 use crate::report::study::StudyReport;
 use crate::report::tables;
 use crate::support::readable::count;
 use crate::support::run_folder::Results;
-use crate::{Error, Place, Result};
 
 /// How tables are printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
@@ -27,7 +27,7 @@ pub(super) enum Format {
 pub(super) struct FormatFlag {
     /// Output on stdout
     ///
-    /// text: tables; json: one document with the same numbers.
+    /// text: for people; json: the record of the run, or one document with the same numbers.
     #[arg(long, value_name = "text|json", value_enum, hide_possible_values = true, default_value_t = Format::Text, help_heading = "Output")]
     pub format: Format,
 }
@@ -65,6 +65,20 @@ impl FormatFlag {
         Ok(output)
     }
 
+    /// Writes the files of a study and prints its answer.
+    pub(super) fn study(self, report: &StudyReport, results: Results, is_incomplete: bool) -> Result<Output> {
+        let page = results.dir().join("report.html");
+        let files = report.write(results)?;
+        let width = console::width();
+        let claims = if report.evaluation.claims.is_empty() { "" } else { ", claims" };
+        let rest = format!("TTC, BTN, every interval{claims}: report.html and the CSV files.");
+        let answer = || format!("{}{}\n", report.answer(width), tables::wrap(&rest, width));
+        let exit = if is_incomplete { Exit::Incomplete } else { Exit::Ok };
+        let printed = self.output(exit, answer, || report.json(&files))?;
+        tracing::info!("{} files written; start with {}", files.files.len() + 1, page.display());
+        Ok(printed)
+    }
+
     /// The answer about a plan that `--plan-only` wrote.
     pub(super) fn planned(self, exit: Exit, lanes: u64, path: &std::path::Path) -> Result<Output> {
         let text = || format!("{} lanes planned in {}\n", count(lanes), path.display());
@@ -77,54 +91,5 @@ impl FormatFlag {
 impl FromArguments for FormatFlag {
     fn from_arguments(_: &mut Arguments) -> Result<FormatFlag> {
         Ok(FormatFlag { format: Format::Both })
-    }
-}
-
-/// The flag of every verb that ends in a study's report.
-#[derive(Debug, Clone, Copy, Args)]
-pub(super) struct TablesFlag {
-    /// Print all tables instead of the answer; they are in report.txt too
-    #[arg(long, help_heading = "Output")]
-    pub tables: bool,
-}
-
-from_arguments!(TablesFlag { tables });
-
-impl TablesFlag {
-    /// Refuses the flag where it would have no effect.
-    ///
-    /// # Errors
-    /// [`Error::Usage`].
-    pub(super) fn check(self, format: FormatFlag) -> Result<()> {
-        match self.tables && format.is_json() {
-            true => {
-                let problem = "--format json prints one document, which has the numbers of all tables";
-                Err(Error::usage(Place::item("--tables"), problem, "leave out one of the two"))
-            }
-            false => Ok(()),
-        }
-    }
-
-    /// Writes the files and prints the answer, or all tables.
-    pub(super) fn finish(
-        self,
-        report: StudyReport,
-        results: Results,
-        is_incomplete: bool,
-        format: FormatFlag,
-    ) -> Result<Output> {
-        let out = results.dir().to_path_buf();
-        let files = report.write(results)?;
-        let width = console::width();
-        let claims = if report.evaluation.claims.is_empty() { "" } else { ", claims" };
-        let all = if format.format == Format::Both { "" } else { "--tables, or " };
-        let rest = format!("TTC, BTN, every interval{claims}: {all}report.html and report.txt.");
-        let answer = || format!("{}{}\n", report.answer(width), tables::wrap(&rest, width));
-        let exit = if is_incomplete { Exit::Incomplete } else { Exit::Ok };
-        let shown = || if self.tables { report.text(width) } else { answer() };
-        let printed = format.output(exit, shown, || report.json())?;
-        let page = out.join("report.html");
-        tracing::info!("{} files written; start with {}", files.files.len() + 1, page.display());
-        Ok(printed)
     }
 }

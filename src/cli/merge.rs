@@ -5,7 +5,7 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::arguments::from_arguments;
-use super::format::{FormatFlag, TablesFlag};
+use super::format::FormatFlag;
 use super::{COMMIT, Exit, Output};
 use crate::Result;
 use crate::report::host::{Host, Timings};
@@ -28,16 +28,13 @@ pub(super) struct Merge {
     #[arg(value_name = "DIR", help_heading = "Data")]
     folder: PathBuf,
     #[command(flatten)]
-    tables: TablesFlag,
-    #[command(flatten)]
     format: FormatFlag,
 }
 
-from_arguments!(Merge { folder } groups { tables, format });
+from_arguments!(Merge { folder } groups { format });
 
 impl Merge {
     pub(super) fn run(&self) -> Result<Output> {
-        self.tables.check(self.format)?;
         let [plan, out] =
             [&self.folder.join(PLAN_FILE), &self.folder].map(|path| quoted_word(&path.display().to_string()));
         let again = |verb: &str, shard| format!("lanesweep {verb} --plan {plan} --shard {shard} --out {out}");
@@ -48,7 +45,7 @@ impl Merge {
                 let (swept, timings) = (&result.summary, Timings::default());
                 let host = Host::of_parts(COMMIT, result.parts, swept.rechecked_lanes);
                 let report = StudyReport::of(&study, &result.counts, None, host, swept, timings)?;
-                self.tables.finish(report, folder.results()?, study.facts().incomplete, self.format)
+                self.format.study(&report, folder.results()?, study.facts().incomplete)
             }
             Merged::Sample(merged) => {
                 let (sample, result) = *merged;

@@ -8,7 +8,7 @@ use clap::Args;
 use super::arguments::from_arguments;
 use super::configured::Configured;
 use super::console::{self, Total};
-use super::format::{FormatFlag, TablesFlag};
+use super::format::FormatFlag;
 use super::settings::KeepPlan;
 use super::shard_flags::ShardFlags;
 use super::source::{self, SourceFlags};
@@ -75,8 +75,6 @@ pub(super) struct Study {
     #[arg(long, value_name = "FILE", help_heading = "Data")]
     external: Vec<PathBuf>,
     #[command(flatten)]
-    tables: TablesFlag,
-    #[command(flatten)]
     format: FormatFlag,
     #[command(flatten)]
     shards: ShardFlags,
@@ -84,7 +82,7 @@ pub(super) struct Study {
 
 from_arguments!(
     Study { out, rows, published, cross_validate, external }
-    groups { data, categories, models, headways, injury, tables, format, shards }
+    groups { data, categories, models, headways, injury, format, shards }
 );
 impl Study {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
@@ -211,7 +209,7 @@ impl Study {
         }
         self.leave_plan(study, configured.settings.study.keep_plan, &mut results)?;
         let report = StudyReport::of(study, &counts, comparison, host, &swept, timings)?;
-        let output = self.tables.finish(report, results, study.facts().incomplete, self.format)?;
+        let output = self.format.study(&report, results, study.facts().incomplete)?;
         run.close()?;
         Ok(output)
     }
@@ -236,13 +234,12 @@ impl Study {
 
     /// Checks that every flag has an effect, and that the lane table replaces neither an input nor another result.
     fn guard_inputs(&self, configured: &Configured) -> Result<()> {
-        self.tables.check(self.format)?;
         if configured.settings.study.compare_reference && (self.shards.is_part() || self.shards.plan_only) {
             let problem = "a part of a run cannot compare the arithmetics of the whole run";
             return Err(Error::usage(Place::item("study.compare_reference"), problem, "leave it out"));
         }
         let Some(lanes) = &self.rows else { return Ok(()) };
-        let results = ["failures.csv", "f1.csv", "claims.csv", "report.txt", "reference.csv", "run.json"];
+        let results = ["failures.csv", "f1.csv", "claims.csv", "reference.csv", "run.json"];
         let results = results.into_iter().chain([PLAN_FILE, RUN_PLAN_FILE]);
         let mut others: Vec<PathBuf> = results.map(|name| self.out.join(name)).collect();
         others.extend(self.data.scenarios.clone());

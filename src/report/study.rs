@@ -1,5 +1,5 @@
-//! A study as text for the terminal, as one JSON document and as files in the output folder; the last is `run.json`,
-//! with data, program and settings, so that its numbers can be reproduced.
+//! A study as files in the output folder; the last is the record, `run.json`, with data, program and settings, so that its
+//! numbers can be reproduced.
 
 use super::host::{Host, SweepRecord, Timings};
 use super::html::PageFigure;
@@ -8,9 +8,9 @@ use super::records::{PROGRAM, document, publish, record};
 use super::study_figures::{
     distributions, f1_by_parameters, f1_intervals, headways, modes, radar, recall_and_precision,
 };
-use super::tables::{self, CloseRow, close_following};
+use super::tables;
 use crate::Result;
-use crate::engine::{CLOSE_HEADWAY_S, ENGINE_VERSION, Headway, Partial, SweepSummary};
+use crate::engine::{ENGINE_VERSION, Headway, Partial, SweepSummary};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::score::{
@@ -70,26 +70,6 @@ impl<'a> StudyReport<'a> {
         self.evaluation.scores.categories.iter().zip(&self.evaluation.categories)
     }
 
-    /// All tables, at most `width` columns wide; only a long word in the data's description (a path) can exceed this.
-    pub fn text(&self, width: usize) -> String {
-        let StudyProvenance { synthetic, published, .. } = *self.facts();
-        let data = tables::wrap(&self.facts().data, width);
-        let mut parts = vec![format!("{data}\n")];
-        if published {
-            parts.push("Published numbers are those of highD: other data agrees in shape at best.\n".to_owned());
-        }
-        parts.push(tables::failures(&self.evaluation.scores, published, width));
-        parts.push(self.close_following(width));
-        parts.extend(self.evaluation.scores.categories.iter().map(|c| tables::f1_table(c, published, width)));
-        parts.extend(self.given_table().map(|table| table.fitted(2, width)));
-        parts.extend(Some(tables::claims(&self.evaluation.claims, width)).filter(|text| !text.is_empty()));
-        parts.extend(self.comparison.iter().map(tables::reference_text));
-        if synthetic {
-            parts.push(format!("{data}\nNo number above is a statement about real traffic.\n"));
-        }
-        parts.join("\n")
-    }
-
     /// Error of the motions beside the mean F1 of every variant; `None` unless S' are given as series or cross-validated.
     pub(super) fn given_table(&self) -> Option<Table> {
         let rows = self.scored().flat_map(|(scores, pictures)| {
@@ -123,15 +103,6 @@ impl<'a> StudyReport<'a> {
         }
     }
 
-    /// Failures of S from close following.
-    pub(super) fn close_following(&self, width: usize) -> String {
-        let rows = self.scored().filter_map(|(scores, pictures)| {
-            let close = pictures.close_following.as_ref()?;
-            Some(CloseRow { category: scores.category, models: &scores.models, close })
-        });
-        close_following(&rows.collect::<Vec<_>>(), "S", &self.evaluation.scores.headways, width)
-    }
-
     /// Writes CSV tables, figures, the files already in `results` and `run.json` to the folder; returns their names
     /// without the record's.
     ///
@@ -142,7 +113,6 @@ impl<'a> StudyReport<'a> {
         results.add("failures.csv", tables::failure_records(&self.evaluation.scores, data)?.csv().as_bytes())?;
         results.add("f1.csv", tables::f1_records(&self.evaluation.scores, data).csv().as_bytes())?;
         results.add("claims.csv", tables::claim_records(&self.evaluation.claims, data).csv().as_bytes())?;
-        results.add("report.txt", self.text(tables::WIDTH).as_bytes())?;
         results.add("headways.csv", self.headways(data).csv().as_bytes())?;
         let mut figures = Vec::new();
         for (at, scores) in self.evaluation.scores.categories.iter().enumerate() {
@@ -165,7 +135,7 @@ impl<'a> StudyReport<'a> {
             results.add("reference.csv", tables::reference_table(comparison).csv().as_bytes())?;
         }
         results.add("report.html", self.html(figures)?.as_bytes())?;
-        publish(results, |files| self.record(files))
+        publish(results, |files| self.json(files))
     }
 
     /// The figures of a category, with the prefixes of their file names; figures without data are skipped.
@@ -207,41 +177,6 @@ impl<'a> StudyReport<'a> {
     }
 }
 
-impl StudyReport<'_> {
-    /// The same tables as one JSON document; undefined values are null. Published numbers are included if requested.
-    ///
-    /// # Errors
-    /// None for a document of this program.
-    pub fn json(&self) -> Result<String> {
-        let mut value = serde_json::json!({
-            "program": PROGRAM,
-            "data": self.facts().data,
-            "synthetic": self.facts().synthetic,
-            "plan_sha256": self.study.plan().hash(),
-            "lanes": self.lanes(),
-            "left_out": self.facts().left_out,
-            "failures": tables::failure_records(&self.evaluation.scores, "")?.records(),
-            "f1": tables::f1_records(&self.evaluation.scores, "").records(),
-            "claims": tables::claim_records(&self.evaluation.claims, "").records(),
-        });
-        value["best"] = self.evaluation.best.iter().map(best).collect();
-        let close = self.scored().map(|(scores, pictures)| {
-            serde_json::json!({
-                "category": scores.category.key(), "models": scores.models, "below_s": CLOSE_HEADWAY_S,
-                "counts": pictures.close_following,
-            })
-        });
-        value["close_following"] = close.collect();
-        if self.facts().published {
-            value["published"] = published(&self.evaluation.scores);
-        }
-        if let Some(comparison) = &self.comparison {
-            value["reference"] = tables::reference_table(comparison).records();
-        }
-        document(&value)
-    }
-}
-
 /// Found and kept scenarios of a category, and counts of their lanes.
 #[derive(Serialize)]
 pub(super) struct CategoryRecord<'a> {
@@ -270,7 +205,10 @@ pub(super) struct CategoryRecord<'a> {
 
 impl StudyReport<'_> {
     /// `run.json`; `files` are in the same folder.
-    pub(super) fn record(&self, files: &ResultFiles) -> Result<String> {
+    ///
+    /// # Errors
+    /// None for a record of this program.
+    pub fn json(&self, files: &ResultFiles) -> Result<String> {
         let (plan, facts) = (self.study.plan(), self.study.facts());
         document(&record! {
             program: PROGRAM,
@@ -291,6 +229,9 @@ impl StudyReport<'_> {
             categories: self.categories(),
             lanes: plan.lane_count(),
             models: &plan.models,
+            best: self.evaluation.best.iter().map(best).collect::<Vec<_>>(),
+            // The paper's numbers, if they are shown.
+            published: facts.published.then(|| published(&self.evaluation.scores)),
             // Verdicts that differ between binary32 and binary64, if both were run.
             reference: self.comparison.as_ref().map(|of| record! {
                 lanes: of.lanes,

@@ -111,7 +111,7 @@ impl StudyReport<'_> {
         }
         let more = self.evaluation.best.len().saturating_sub(MAX_ROWS);
         if more > 0 {
-            lines.push(format!("… and {} more: report.txt", count_of(more)));
+            lines.push(format!("… and {} more: f1.csv", count_of(more)));
         }
         lines
     }

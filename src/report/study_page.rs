@@ -105,7 +105,7 @@ impl StudyReport<'_> {
         let misfit = Misfit::of(scores).filter(|_| published).map(|misfit| misfit.sentence());
         Section::new("failures", "Failures of the recorded scenarios")
             .intro([intro.to_owned()].into_iter().chain(misfit).collect::<Vec<_>>().join(" "))
-            .tables([tables::failure_table(scores, published, "at the time cap").captioned("Failed simulations of S")])
+            .tables([tables::failure_table(scores, published).captioned("Failed simulations of S")])
     }
 
     fn category(&self, scores: &CategoryScores, figures: Vec<PageFigure>) -> Section {
@@ -119,7 +119,7 @@ impl StudyReport<'_> {
                 scores.scenarios, scores.simulations
             ))
             .tables([
-                tables::f1_scores(scores, self.facts().published, "S fails")
+                tables::f1_scores(scores, self.facts().published)
                     .captioned(format!("F1 with its {level} % interval over scenarios")),
                 tables::share_table(scores).captioned("Recall / precision"),
                 variants_table(scores),
@@ -129,7 +129,7 @@ impl StudyReport<'_> {
 
     /// `None` if no claim could be computed, for instance with a single model.
     fn claims(&self) -> Option<Section> {
-        let table = tables::claim_table(&self.evaluation.claims, usize::MAX);
+        let table = tables::claim_table(&self.evaluation.claims);
         let level = value(100.0 * self.evaluation.scores.options.confidence);
         let section = Section::new("claims", "The paper's claims on this data").intro(format!(
             "What de Gelder and Op den Camp found on highD, tested here. A cell holds or contradicts a claim where \
@@ -148,7 +148,7 @@ impl StudyReport<'_> {
             let text = format!("mining {mine_s:.2}, planning {plan_s:.2}, lanes {sweep_s:.2}, scores {score_s:.2}");
             host.push(("seconds", text));
         }
-        let annex = annex(RunKind::Study, &self.record(&ResultFiles::default())?)?;
+        let annex = annex(RunKind::Study, &self.json(&ResultFiles::default())?)?;
         Ok(annex.host(host).parts([
             Section::options("Options of the parameterizations", &facts.parameterization),
             Section::options("Options of the scores", &facts.score),

@@ -6,8 +6,8 @@ use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::close_following::CloseFollowing;
 use crate::run::score::{
-    CategoryScores, ClaimResult, ClaimVerdict, Misfit, PublishedFailures, ScoreCell, ScoreInterval, ScoreTable, f1,
-    precision, published_failures, published_lvd_f1, recall,
+    CategoryScores, ClaimResult, ClaimVerdict, PublishedFailures, ScoreCell, ScoreInterval, ScoreTable, f1, precision,
+    published_failures, published_lvd_f1, recall,
 };
 use crate::run::study::ReferenceComparison;
 use crate::scenario::Category;
@@ -17,16 +17,9 @@ pub use crate::support::table::WIDTH;
 use crate::support::table::{Column, Digits, NumberText, Table};
 use crate::{Error, Result};
 
-/// The table of failures with its heading and the misfit.
-pub fn failures(scores: &ScoreTable, published: bool, width: usize) -> String {
-    let misfit = Misfit::of(scores).filter(|_| published).map(|misfit| wrap(&misfit.sentence(), width) + "\n");
-    let table = failure_table(scores, published, "capped").fitted(2, width);
-    format!("Failures of the recorded scenarios (S)\n{table}{}", misfit.unwrap_or_default())
-}
-
 /// Failures of S per category, model and criterion, as in the paper's table. With `published`, the fractions of
 /// collision, TTC and BTN and the published ones.
-pub(super) fn failure_table(scores: &ScoreTable, published: bool, capped: &'static str) -> Table {
+pub(super) fn failure_table(scores: &ScoreTable, published: bool) -> Table {
     let rows = scores.categories.iter().flat_map(|c| (0..c.models.len()).map(move |at| (c, at, c.models[at])));
     let failures =
         |c: &CategoryScores, model, criterion| c.index(0, model, criterion).map_or(0, |cell| c.cells[cell].counts.tp);
@@ -39,7 +32,7 @@ pub(super) fn failure_table(scores: &ScoreTable, published: bool, capped: &'stat
             |(c, _, model), (criterion, _)| failures(c, model, criterion),
         )
         .column("simulations", |(c, ..)| c.simulations)
-        .column(capped, |(c, at, _)| c.capped[at]);
+        .column("at the time cap", |(c, at, _)| c.capped[at]);
     if !published {
         return table.build();
     }
@@ -57,26 +50,14 @@ pub(super) fn failure_table(scores: &ScoreTable, published: bool, capped: &'stat
         .build()
 }
 
-/// The table of F1 with its heading.
-pub fn f1_table(scores: &CategoryScores, published: bool, width: usize) -> String {
-    let heading = format!(
-        "{}: F1 of S' against S over {} scenarios, [interval]; - is undefined (0/0), [few]: S fails \
-         in too few scenarios",
-        scores.category.label(),
-        readable::count(scores.scenarios)
-    );
-    format!("{}\n{}", wrap(&heading, width), f1_scores(scores, published, "fails").fitted(3, width))
-}
-
-/// F1 per parameterization, model and criterion, with its interval; `fails` is the name of the column with the failures
-/// of S.
-pub(super) fn f1_scores(scores: &CategoryScores, published: bool, fails: &'static str) -> Table {
+/// F1 per parameterization, model and criterion, with its interval.
+pub(super) fn f1_scores(scores: &CategoryScores, published: bool) -> Table {
     let text = |s: &ScoreCell, variant: usize| {
         let text = same(scores, s, variant).map_or("-".to_owned(), |c| f1_text(f1(&c.counts), c.f1_interval));
         let theirs = published_lvd_f1(&scores.variants[variant], s.model, s.criterion).filter(|_| published);
         NumberText(text + &theirs.map_or(String::new(), |theirs| format!("\npaper {theirs:.3}")))
     };
-    per_variant(scores, Some(fails), text)
+    per_variant(scores, Some("S fails"), text)
 }
 
 /// Recall and precision per parameterization, model and criterion.
@@ -121,22 +102,11 @@ fn short(value: f64) -> String {
     text.strip_prefix('0').map_or_else(|| format!("{value:.1}"), str::to_owned)
 }
 
-/// The table of claims with its heading and rule; empty if no claim could be computed.
-pub fn claims(results: &[ClaimResult], width: usize) -> String {
-    let table = claim_table(results, 34);
-    if table.rows.is_empty() {
-        return String::new();
-    }
-    let rule = wrap(ClaimVerdict::RULE, width);
-    format!("The paper's claims on this data\n{}{rule}\n", table.fitted(1, width))
-}
-
-/// The paper's claims with their numbers and verdicts, without those that could not be computed; statements are wrapped
-/// to `width` characters.
-pub(super) fn claim_table(results: &[ClaimResult], width: usize) -> Table {
+/// The paper's claims with their numbers and verdicts, without those that could not be computed.
+pub(super) fn claim_table(results: &[ClaimResult]) -> Table {
     Table::of(results.iter().filter(|result| result.verdict != ClaimVerdict::NotRun))
         .column("claim", |result| result.claim.id)
-        .column("the paper says", |result| wrap(result.claim.statement, width))
+        .column("the paper says", |result| result.claim.statement)
         .column("failing\nscenarios", |result| result.failing_scenarios)
         .column(Column::from("mean\ndifference").digits(Digits::Signed(3)).null("-"), |result| result.mean)
         .column("verdict", |result| result.verdict.text())

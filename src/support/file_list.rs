@@ -24,7 +24,7 @@ pub const DOSSIER_RECORD: &str = "dossier.json";
 /// Records of runs that write files with the same names, such as `report.html`: a folder holds one of them. With the other
 /// files that every such run writes: a user's file of such a name is detected before the work starts.
 pub(super) const RECORDS: [(&str, &[&str]); 6] = [
-    (STUDY_RECORD, &["failures.csv", "f1.csv", "claims.csv", "headways.csv", "report.txt", "report.html"]),
+    (STUDY_RECORD, &["failures.csv", "f1.csv", "claims.csv", "headways.csv", "report.html"]),
     (ESTIMATE_RECORD, &["estimates.csv", "report.html"]),
     (MAP_RECORD, &["cells.csv", "report.html"]),
     (COMPARE_RECORD, &["compare.csv", "compare.txt", "report.html"]),

@@ -190,16 +190,9 @@ fn stands_in_every_table_of_a_study() {
     let dir = tempfile::tempdir().unwrap();
     let out = dir.path().join("result");
     let lanes = dir.path().join("lanes.csv");
-    let study =
-        ["-q", "study", "--synth-recordings", "1", "--tables", "--published", "--out", out.to_str().unwrap(), "--rows"];
+    let study = ["-q", "study", "--synth-recordings", "1", "--out", out.to_str().unwrap(), "--rows"];
     let output = lanesweep(&[&study[..], &[lanes.to_str().unwrap()]].concat());
     assert!(output.status.success(), "{}", said(&output));
-    let tables = String::from_utf8(output.stdout).unwrap();
-    for category in ["cut-in", "cut-out", "LVD"] {
-        let is_row = |l: &&str| l.to_lowercase().contains(&category.to_lowercase()) && l.contains("| AEB ");
-        let row = tables.lines().find(is_row).unwrap_or_else(|| panic!("{category}: {tables}"));
-        assert!(row.trim_end_matches(['|', ' ']).ends_with('-'), "the paper has no number for it: {row}");
-    }
     let read = |path: &Path| fs::read_to_string(path).unwrap();
     for name in ["failures.csv", "f1.csv"] {
         assert!(read(&out.join(name)).contains(",AEB,"), "{name}");

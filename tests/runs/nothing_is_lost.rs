@@ -58,7 +58,7 @@ fn an_output_never_replaces_an_input_or_another_result() {
     };
     study(&scenarios);
     std::fs::create_dir(&out).unwrap();
-    study(&out.join("report.txt"));
+    study(&out.join("f1.csv"));
 }
 
 #[test]
@@ -386,8 +386,6 @@ fn flags_that_would_not_be_heeded_and_absurd_numbers_of_threads_are_refused() {
     for data in [&["--scenarios", text(&scenarios)][..], &["recordings"]] {
         refused(&[&["study", "--synth-recordings", "2"], data].concat(), "cannot be used with");
     }
-    refused(&["study", "--tables", "--format", "json"], "leave out one of the two");
-    refused(&["merge", "run", "--tables", "--format", "json"], "leave out one of the two");
 }
 
 /// What a folder of results or a document says of its data.
