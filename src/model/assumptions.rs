@@ -120,22 +120,4 @@ mod tests {
         assert_eq!((delay.key.as_str(), delay.value.as_f64(), delay.unit), ("cchdm.delay_s", Some(0.7), "s"));
         assert!(delay.meaning.is_some());
     }
-
-    #[test]
-    fn the_chapter_on_profiles_has_the_meaning_range_and_sources_of_every_key() {
-        let (profile, constants) = (Profile::load("paper").unwrap(), Constant::all());
-        let bounds = profile.bounds();
-        let row = |of: Assumption| {
-            let range =
-                bounds.iter().find(|bound| bound.0 == of.key).map_or("–".to_owned(), |bound| bound.2.to_string());
-            let source = |(value, source): &(Value, String)| format!("`{value}` {source}");
-            let constant = constants.iter().find(|constant| constant.key == of.key).unwrap();
-            let sources: Vec<String> = constant.sources.iter().map(source).collect();
-            format!("| `{}` | {} | {range} | {} |\n", of.key, constant.meaning, sources.join("; "))
-        };
-        let rows: String = profile.assumptions().into_iter().map(row).collect();
-        let chapter = concat!(env!("CARGO_MANIFEST_DIR"), "/../../docs/src/methods/profiles.md");
-        let chapter = std::fs::read_to_string(chapter).unwrap();
-        assert!(chapter.contains(&rows), "the chapter needs these rows:\n{rows}");
-    }
 }
