@@ -271,10 +271,6 @@ def sample(
     map: str | Collection[str] | None = None,
     rows: Path | None = None,
     worst: Int | None = None,
-    distribution: Path | None = None,
-    category: Category | None = None,
-    rename: Values | None = None,
-    set: Values | None = None,
     seed: Int | None = None,
     out: Path | None = None,
     **options: Unpack[_Sample],
@@ -323,14 +319,6 @@ def sample(
         Also write one row per lane: .csv, .jsonl or .parquet.
     worst : int
         Worst lanes to list per model, by default 20; 0 runs faster.
-    distribution : path
-        OpenSCENARIO file with stochastic distributions, in place of a density.
-    category : {"cut-in", "cut-out", "lvd"}
-        With `distribution`: kind of scenario.
-    rename : mapping
-        With `distribution`: its names and ours, with a factor: ``{"Ego_Speed_kph": "ego_speed_kmh", "Gap_cm": "gap_m*0.01"}``.
-    set : mapping
-        With `distribution`: constant parameters.
     seed : int
         Seed of the draws.
     out : path, optional
@@ -524,8 +512,6 @@ def map(
     models: Models | None = None,
     criterion: Criterion | None = None,
     robust: bool = False,
-    distribution: Path | None = None,
-    rename: Values | None = None,
     out: Path | None = None,
     **options: Unpack[_Map],
 ) -> Result:
@@ -538,7 +524,7 @@ def map(
     preset : {"jrc", "r157"}
         Grids of the JRC's evidence, or of the regulation's Annex 3 (to 60 and to 130 km/h), with their models.
     x, y : str
-        Parameter of an axis: ``"gap_m=5..40/1"``, ``"gap_m=5,10,20"``; with `distribution` also the name alone, of one that varies there.
+        Parameter of an axis: ``"gap_m=5..40/1"``, ``"gap_m=5,10,20"``.
     panel : mapping
         Parameters of the panels: ``{"ego_speed_kmh": [60, 90]}``; several give one panel per combination.
     set : mapping
@@ -549,10 +535,6 @@ def map(
         Criterion, by default collision.
     robust : bool
         Mark cells whose outcome changes with a tenth of the time step, 1 cm or 0.1 km/h: they are undecided.
-    distribution : path
-        OpenSCENARIO file with deterministic distributions: its first two parameters with several values are the axes.
-    rename : mapping
-        With `distribution`: its names and ours, as in `sample`.
     out : path, optional
         Folder of the files; without it they go with the result.
     **options

@@ -256,7 +256,6 @@ def test_messages_name_arguments_and_no_flags(density) -> None:
         (lambda: lanesweep.study(synth_recordings=1, thw=False), lanesweep.UsageError, "`thw`: False is not a value of it"),
         (lambda: lanesweep.study(synth_recordings=1, backnd="cpu"), lanesweep.UsageError, "`backnd`: study has no such argument"),
         (lambda: lanesweep.study("recordings", scenarios="a.jsonl"), lanesweep.UsageError, "cannot be used with"),
-        (lambda: lanesweep.map("lvd", rename={"a": "gap_m"}), lanesweep.UsageError, "`rename`: it needs `distribution`"),
         (lambda: lanesweep.mine([]), ValueError, "`recordings` is empty"),
         (lambda: lanesweep.study(synth_recordings=1, categories=object()), TypeError, "`categories` has the value <object"),
         (lambda: lanesweep.study(synth_recordings=1, dt=[object()]), TypeError, "`dt` has the value <object"),

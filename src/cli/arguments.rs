@@ -203,7 +203,7 @@ pub(super) fn choice<T: ValueEnum>(value: &Value) -> std::result::Result<T, Stri
 }
 
 /// An argument that means nothing without another one, by verb.
-pub(super) const NEEDS: [(&[&str], &str, &str); 18] = [
+pub(super) const NEEDS: [(&[&str], &str, &str); 13] = [
     (&["study", "search", "compare", "justify", "fit", "verify", "mine"], "preset", "recordings"),
     (&["check"], "scenario", "file"),
     (&["check"], "row", "file"),
@@ -213,11 +213,6 @@ pub(super) const NEEDS: [(&[&str], &str, &str); 18] = [
     (&["xosc"], "worst", "from"),
     (&["xosc"], "criterion", "worst"),
     (&["xosc"], "variant", "worst"),
-    (&["map"], "rename", "distribution"),
-    (&["sample"], "distribution", "category"),
-    (&["sample"], "category", "distribution"),
-    (&["sample"], "rename", "distribution"),
-    (&["sample"], "set", "distribution"),
     (&["simulate"], "scenarios", "lane"),
     (&["simulate"], "from", "lane"),
     (&["simulate"], "compare", "lane"),

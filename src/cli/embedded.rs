@@ -167,8 +167,7 @@ mod tests {
         let text = |text: &str| Value::Text(text.into());
         let both = [("recordings", text("a")), ("scenarios", text("b.jsonl"))];
         assert_eq!(refusal("study", &both), "`recordings`: it cannot be used with `scenarios`");
-        let renamed = [("category", text("lvd")), ("rename", text("a=gap_m"))];
-        assert_eq!(refusal("map", &renamed), "`rename`: it needs `distribution`");
+        assert_eq!(refusal("trace", &[("plot_end", Value::Number(3.0))]), "`plot_end`: it needs `plot`");
         assert_eq!(refusal("map", &[]), "`category`: it is needed");
         assert_eq!(refusal("study", &[("backnd", text("cpu"))]), "`backnd`: study has no such argument");
         assert_eq!(refusal("study", &[("thw", Value::Boolean(false))]), "`thw`: False is not a value of it");

@@ -11,9 +11,7 @@ use super::format::FormatFlag;
 use super::lists;
 use super::source::{PlausibilityFlag, scenarios_of};
 use super::{Exit, Output};
-use crate::report::openscenario::{
-    Concrete, EgoMotion, PlayOptions, concrete_case, concrete_lanes, export_folder, reopen,
-};
+use crate::report::openscenario::{Concrete, EgoMotion, PlayOptions, concrete_case, concrete_lanes, export_folder};
 use crate::report::records::document;
 use crate::run::reopen::{Reopened, WorstOptions};
 use crate::scenario::Side;
@@ -167,7 +165,7 @@ impl Xosc {
             }
             (Some(dir), scenarios) => {
                 configured.refuse_assigned("is decided by the run (--from)", "leave it out")?;
-                let reopened = reopen(dir, self.lane.first().map_or("", String::as_str))?;
+                let reopened = Reopened::run(dir, self.lane.first().map_or("", String::as_str))?;
                 self.refuse_for(&reopened)?;
                 let (mined, incomplete) = scenarios.as_ref().map(read).transpose()?.unwrap_or_default();
                 let keys = match self.worst {
@@ -219,10 +217,6 @@ impl Xosc {
         let (has_scenarios, has_variants) = (self.scenarios.is_some(), !self.variant.is_empty());
         if reopened.as_study().is_some() || !(has_scenarios || has_variants) {
             return Ok(());
-        }
-        if reopened.density().is_none() {
-            let problem = "a run of distributions has neither scenarios nor variants";
-            return wrong("--scenarios, --variant", problem, "leave them out");
         }
         if has_scenarios {
             return wrong("--scenarios", "sampled lanes have the mean sizes of their density", "leave it out");

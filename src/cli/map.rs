@@ -15,7 +15,6 @@ use super::{COMMIT, Exit, Output, lists};
 use crate::model::profile::Profile;
 use crate::report::host::{Host, SweepRecord};
 use crate::report::map::MapReport;
-use crate::report::openscenario::{Names, Rename, read_distribution, variations};
 use crate::run::grid::{self, Grid, GridText, MapGrids, MapOptions, MapResult, PARAMETERS, presets::Presets};
 use crate::scenario::Category;
 use crate::support::plausibility::Doubts;
@@ -40,18 +39,7 @@ pub(super) struct Map {
     /// Predefined grids with their models: jrc, r157
     #[arg(long, value_name = "NAME", conflicts_with_all = ["x", "y", "panel", "set"], help_heading = "Scenario")]
     preset: Option<String>,
-    /// OpenSCENARIO file with deterministic distributions
-    ///
-    /// The first two parameters with several values are the axes, unless --x and --y name others; the others define
-    /// the panels.
-    #[arg(long, value_name = "FILE", conflicts_with = "preset", help_heading = "Data")]
-    distribution: Option<PathBuf>,
-    /// With --distribution: map a parameter of the file to one of lanesweep, times a factor, or to `none`; repeatable
-    #[arg(long, value_name = "THEIRS=OURS[*FACTOR]", help_heading = "Scenario")]
-    rename: Vec<Rename>,
     /// Parameter of the x axis: NAME=FROM..TO/STEP or NAME=A,B,C
-    ///
-    /// With --distribution also a NAME of the file.
     #[arg(long, value_name = "NAME=RANGE", help_heading = "Scenario")]
     x: Option<String>,
     /// Parameter of the y axis
@@ -84,8 +72,7 @@ pub(super) struct Map {
 }
 
 from_arguments!(
-    Map { category, preset, distribution, x, y, panel, set, robust, out }
-    each { rename: str::parse }
+    Map { category, preset, x, y, panel, set, robust, out }
     groups { models, criterion, plausibility, format }
 );
 
@@ -93,14 +80,12 @@ const EXAMPLES: &str = "Examples (--help has the parameters and more):\n  \
                         lanesweep map cut-in --preset jrc --out maps\n  \
                         lanesweep map lvd --x deceleration_mps2=1..9/0.25 --y ego_speed_kmh=30..130/5 --set thw_s=1.2";
 
-const MORE_EXAMPLES: &str = "Examples (the repository has the .xosc file in docs/examples):\n  \
+const MORE_EXAMPLES: &str = "Examples:\n  \
                              lanesweep map cut-in --preset jrc --out maps\n  \
                              lanesweep map cut-in --x gap_m=1..60/1 --y lateral_speed_mps=0.1..1.8/0.1 \\\n      \
                              --panel ego_speed_kmh=60,90,120 --panel other_speed_kmh=30,50 \\\n      \
                              --models FSM,RSS\n  \
-                             lanesweep map lvd --x deceleration_mps2=1..9/0.25 --y ego_speed_kmh=30..130/5 --set thw_s=1.2\n  \
-                             lanesweep map cut-in --distribution cut-in-deterministic.xosc \\\n      \
-                             --rename Ego_Speed_kph=ego_speed_kmh --rename Other_Speed_kph=other_speed_kmh";
+                             lanesweep map lvd --x deceleration_mps2=1..9/0.25 --y ego_speed_kmh=30..130/5 --set thw_s=1.2";
 
 fn after_long_help() -> String {
     let names: Vec<&str> = PARAMETERS.iter().map(|p| p.key).collect();
@@ -159,12 +144,6 @@ impl Map {
                 }
             },
             None => {
-                let read = |path: &PathBuf| {
-                    let names = Names { category, renames: &self.rename, path };
-                    let file = read_distribution(path)?;
-                    names.ignored_texts(&file)?.iter().for_each(|ignored| tracing::warn!("{ignored}"));
-                    variations(&file, &names)
-                };
                 let text = GridText {
                     x: self.x.clone(),
                     y: self.y.clone(),
@@ -173,7 +152,7 @@ impl Map {
                     native_gap: settings.native_gap,
                     closing_only: settings.closing,
                 };
-                let parts = text.parts(category, self.distribution.as_ref().map(read).transpose()?)?;
+                let parts = text.parts(category)?;
                 let mut doubts = Doubts::new(self.plausibility.policy());
                 parts.check_plausible(&mut doubts)?;
                 doubts.sentences().iter().for_each(|doubt| tracing::warn!("{doubt}"));

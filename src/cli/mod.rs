@@ -23,7 +23,6 @@ mod map;
 mod merge;
 mod mine;
 mod sample;
-mod sample_distribution;
 mod sample_options;
 mod sample_run;
 mod search;

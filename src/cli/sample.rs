@@ -13,7 +13,6 @@ use crate::cli::settings::{EstimatorKind, SampleSettings};
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
-use crate::report::openscenario::Rename;
 use crate::run::sampling::{SampleHeadways, SampleSource, Target};
 use crate::stats::density::DensityModel;
 use crate::{Error, Place, Result};
@@ -27,43 +26,18 @@ use crate::{Error, Place, Result};
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(mut_args(|arg| match arg.get_id().as_str() {
-    "density" | "distribution" | "category" | "rename" | "set" | "models" | "thw" | "map" | "given" | "proposal" => {
-        arg.conflicts_with("plan")
-    }
-    "injury" | "target" => arg.conflicts_with_all(["plan", "distribution"]),
+    "density" | "models" | "thw" | "map" | "given" | "proposal" | "injury" | "target" => arg.conflicts_with("plan"),
     "rows" => arg.conflicts_with("plan_only"),
     _ => arg,
 }))]
-#[command(
-    after_help = "Examples (--help has more):\n  \
+#[command(after_help = "Examples:\n  \
                   lanesweep sample lanesweep-densities/cut-in-2.json --samples 1e6\n  \
                   lanesweep sample cut-in-1.json --models FSM --thw 2 --half-width 0.1\n  \
-                  lanesweep sample cut-in-1.json --samples 1e8 --shard 0/2 --out big",
-    after_long_help = "Examples (the repository has the .xosc file in docs/examples):\n  \
-                  lanesweep sample lanesweep-densities/cut-in-2.json --samples 1e6\n  \
-                  lanesweep sample cut-in-1.json --models FSM --thw 2 --half-width 0.1\n  \
-                  lanesweep sample cut-in-1.json --samples 1e8 --shard 0/2 --out big\n  \
-                  lanesweep sample --distribution cut-in-stochastic.xosc --category cut-in \\\n      \
-                  --rename Ego_Speed_kph=ego_speed_kmh --rename Other_Speed_kph=other_speed_kmh"
-)]
+                  lanesweep sample cut-in-1.json --samples 1e8 --shard 0/2 --out big")]
 pub(crate) struct Sample {
     /// Density file
-    #[arg(value_name = "DENSITY", required_unless_present_any = ["plan", "distribution"], help_heading = "Data")]
+    #[arg(value_name = "DENSITY", required_unless_present = "plan", help_heading = "Data")]
     pub density: Option<PathBuf>,
-    /// OpenSCENARIO file with stochastic distributions, not a density
-    ///
-    /// Its numberOfTestRuns and randomSeed are the defaults of --samples and --seed.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["density", "plan", "given", "proposal", "map", "rows", "shard", "plan_only"], help_heading = "Data")]
-    pub(super) distribution: Option<PathBuf>,
-    /// With --distribution: kind of scenario: cut-in, cut-out, lvd
-    #[arg(long, value_name = "NAME", help_heading = "Scenario", hide_short_help = true)]
-    pub(super) category: Option<String>,
-    /// With --distribution: map a parameter of the file to one of lanesweep, times a factor, or to `none`; repeatable
-    #[arg(long, value_name = "THEIRS=OURS[*FACTOR]", help_heading = "Scenario", hide_short_help = true)]
-    pub(super) rename: Vec<Rename>,
-    /// With --distribution: constant parameter; repeatable
-    #[arg(long, value_name = "NAME=VALUE", value_parser = given, help_heading = "Scenario", hide_short_help = true)]
-    pub(super) set: Vec<(String, f64)>,
     #[command(flatten)]
     models: lists::ModelsFlag,
     #[command(flatten)]
@@ -95,7 +69,7 @@ pub(crate) struct Sample {
     #[arg(long, value_name = "FILE", help_heading = "Data")]
     pub(super) proposal: Vec<PathBuf>,
     /// Also run the samples under this profile and write ratios to profiles.csv (mc)
-    #[arg(long, value_name = "NAME|FILE", conflicts_with_all = ["plan", "distribution", "shard", "plan_only"], help_heading = "Models and criteria", hide_short_help = true)]
+    #[arg(long, value_name = "NAME|FILE", conflicts_with_all = ["plan", "shard", "plan_only"], help_heading = "Models and criteria", hide_short_help = true)]
     pub(super) other_profile: Option<String>,
     /// Intervals of all rows hold together at --level (Bonferroni), not each on its own
     #[arg(long, conflicts_with = "plan", help_heading = "Output", hide_short_help = true)]
@@ -115,22 +89,13 @@ pub(crate) struct Sample {
 }
 
 from_arguments!(
-    Sample { density, distribution, category, thw, map, rows, proposal, other_profile, simultaneous, out }
-    each { rename: str::parse, set: given, given: given, target: given }
+    Sample { density, thw, map, rows, proposal, other_profile, simultaneous, out }
+    each { given: given, target: given }
     groups { models, injury, plausibility, format, shards }
     others { settings: SampleSettings::default() }
 );
 
 impl Sample {
-    /// The headways of `--thw`, unless they are sampled.
-    pub(super) fn listed_headways(&self) -> Result<Option<Vec<Headway>>> {
-        match self.thw.as_deref().map(str::trim) {
-            None => Ok(None),
-            Some("paper") => Ok(Some(Headway::paper())),
-            Some(list) => lists::headways(list, "or `paper`").map(Some),
-        }
-    }
-
     /// The target rates.
     pub(super) fn targets(&self) -> Result<Vec<Target>> {
         let refused = |problem: String, help: &str| Error::usage(Place::item("--target"), problem, help);
@@ -152,7 +117,6 @@ impl Sample {
     pub(super) fn is_refined(&self) -> bool {
         let needs_crude = !self.given.is_empty()
             || self.rows.is_some()
-            || self.distribution.is_some()
             || self.settings.points == SampleSource::Sobol
             || self.settings.time_limit_s.is_some()
             || self.shards.is_part()

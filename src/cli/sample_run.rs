@@ -4,7 +4,7 @@ use super::configured::Configured;
 use super::console::Total;
 use super::sample::Sample;
 use super::sample_options::{guard, only_crude};
-use super::{Exit, Output, sample_distribution};
+use super::{Exit, Output};
 use crate::engine::{Chunk, Executor, LanePlan, OpenBackend};
 use crate::model::profile::Profile;
 use crate::report::lanes;
@@ -38,9 +38,6 @@ impl Sample {
                 guard(rows, &self.out, std::iter::once(path))?;
             }
             return self.run_sample(sample, (&configured.open()?, None), configured);
-        }
-        if let Some(path) = &self.distribution {
-            return sample_distribution::run(self, configured, path);
         }
         let (sample, data) = self.planned(configured)?;
         let other = self.other_profile.as_deref().map(|name| configured.profile_of(name)).transpose()?;

@@ -11,7 +11,6 @@ use super::console::{self, Verbosity};
 use super::format::FormatFlag;
 use super::source::{PlausibilityFlag, refuse_overwriting, scenarios_of};
 use super::{Exit, Output};
-use crate::report::openscenario::reopen;
 use crate::report::trace::TraceReport;
 use crate::run::reopen::{Reopened, TracedLanes};
 use crate::support::files::{make_folder_of, write_atomically};
@@ -115,7 +114,7 @@ impl Simulate {
         let (reopened, incomplete) = match (&self.from, &self.scenarios) {
             (Some(dir), _) => {
                 configured.refuse_assigned("is decided by the run (--from)", "leave it out")?;
-                (reopen(dir, key)?, false)
+                (Reopened::run(dir, key)?, false)
             }
             (None, Some(path)) => {
                 let profile = configured.profile()?;

@@ -2,7 +2,6 @@
 
 use lanesweep_engine::engine;
 use lanesweep_model::{model, scenario};
-use lanesweep_random::random;
 use lanesweep_run::run;
 use lanesweep_stats::stats;
 use lanesweep_support::{Error, Place, Result, support};

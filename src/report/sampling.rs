@@ -31,10 +31,10 @@ pub struct DensityRecord {
     pub parameterization: String,
     /// Names of the parameters.
     pub parameters: Vec<String>,
-    /// Number of scenarios in its fit; 0 for a distribution written by hand.
+    /// Number of scenarios in its fit.
     pub kernels: usize,
-    /// Its form; `None` for a distribution written by hand.
-    pub form: Option<DensityKind>,
+    /// Its form.
+    pub form: DensityKind,
     /// Provenance of its data.
     pub provenance: Provenance,
 }
@@ -51,7 +51,7 @@ impl DensityRecord {
             parameterization: density.space.id().key.to_string(),
             parameters: density.space.parameters().iter().map(|p| p.name.clone()).collect(),
             kernels: density.kde.points().len(),
-            form: Some(density.kind()),
+            form: density.kind(),
             provenance: density.provenance.clone(),
         })
     }
@@ -80,7 +80,7 @@ pub struct DrawRecord {
 
 impl DrawRecord {
     /// The draws of one tally.
-    pub fn of(tally: &SampleTally, plan: &LanePlan) -> DrawRecord {
+    pub(super) fn of(tally: &SampleTally, plan: &LanePlan) -> DrawRecord {
         let rejected = tally.tries - tally.valid().min(tally.tries);
         DrawRecord {
             ranges: tally.covered().iter().map(|r| [r.start, r.end]).collect(),
@@ -126,34 +126,6 @@ pub struct SampleReport {
 }
 
 impl SampleReport {
-    /// What is common to all runs, to which draws and search are added where they exist; `is_sampled_headway`: the
-    /// headway is a parameter of the density.
-    pub fn of(
-        density: DensityRecord,
-        is_sampled_headway: bool,
-        (profile, options): (&Profile, &SampleOptions),
-        estimates: Vec<EstimateRow>,
-        host: Host,
-    ) -> SampleReport {
-        let headways = options.headways();
-        let names = headways.iter().map(Headway::to_string);
-        SampleReport {
-            density,
-            profile: profile.clone(),
-            options: options.clone(),
-            headways: if is_sampled_headway { vec!["sampled".to_owned()] } else { names.collect() },
-            plan_headways: headways.to_vec(),
-            plan_sha256: None,
-            draws: None,
-            estimates,
-            injuries: Vec::new(),
-            targets: Vec::new(),
-            search: Vec::new(),
-            worst_sha256: None,
-            host,
-        }
-    }
-
     /// `estimate.json`; `files` are in the same folder.
     ///
     /// # Errors
@@ -217,13 +189,9 @@ impl SampleReport {
             "{} {}: {} ({})",
             density.category.label(),
             density.parameterization,
-            match density.kernels {
-                0 => format!("distributions of {}", density.parameters.join(", ")),
-                kernels => {
-                    let form = density.form.filter(|form| *form != DensityKind::Kernel);
-                    let form = form.map_or(String::new(), |form| format!("{} ", form.key()));
-                    format!("{form}density over {} scenarios", count_of(kernels))
-                }
+            match density.form {
+                DensityKind::Kernel => format!("density over {} scenarios", count_of(density.kernels)),
+                form => format!("{} density over {} scenarios", form.key(), count_of(density.kernels)),
             },
             density.provenance.data
         );
@@ -285,17 +253,14 @@ impl SampleReport {
             text += &paragraph(&rule);
         }
         // A density of N scenarios is based on no data below a probability of 1/N.
-        let resolved = 1.0 / self.density.kernels.max(1) as f64;
-        let is_fitted = self.density.kernels > 0;
-        if is_fitted
-            && self.estimates.iter().any(|r| r.is_overall(&self.estimates) && r.estimate.probability < resolved)
-        {
+        let resolved = 1.0 / self.density.kernels as f64;
+        if self.estimates.iter().any(|r| r.is_overall(&self.estimates) && r.estimate.probability < resolved) {
             let _ = writeln!(
                 text,
                 "Probabilities below {} (one in {} scenarios) come from the tails of the density{}, not from data",
                 short(resolved),
                 count_of(self.density.kernels),
-                if self.density.form == Some(DensityKind::Kernel) { "'s kernels" } else { "" }
+                if self.density.form == DensityKind::Kernel { "'s kernels" } else { "" }
             );
         }
         if self.density.provenance.synthetic {

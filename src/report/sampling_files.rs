@@ -8,7 +8,7 @@ use super::records::publish;
 use super::sampling::{DensityRecord, DrawRecord, SampleReport};
 use super::sampling_figures::{FailureMaps, convergence};
 use super::sampling_tables::{convergence_csv, model_ratios_csv, profile_ratios_csv, worst_csv};
-use crate::engine::LanePlan;
+use crate::engine::{Headway, LanePlan};
 use crate::run::sampling::{CrudeRun, Estimator, Sample, SampleResult, WorstLane, proposal_text};
 use crate::stats::density::DensityModel;
 use crate::support::plain_text::hex;
@@ -21,16 +21,26 @@ impl SampleReport {
     /// # Errors
     /// As [`DensityModel::content_sha256`].
     pub fn of_sample(sample: &Sample, result: &SampleResult, host: Host) -> Result<SampleReport> {
-        let (density, is_sampled) = (DensityRecord::of(&sample.density)?, sample.density.space.has_thw());
-        let of = (&sample.profile, &sample.options);
-        let mut file = SampleReport::of(density, is_sampled, of, result.rows.clone(), host);
-        if let (Some(crude), Some(plan)) = (&result.crude, sample.lane_plan()) {
-            file.plan_sha256 = Some(plan.hash().to_owned());
-            file.draws = Some(DrawRecord::of(&crude.tally, plan));
-        }
-        file.search = result.search.clone();
-        (file.injuries, file.targets) = (result.injuries.clone(), sample.targets(result));
-        Ok(file)
+        let plan_headways = sample.options.headways().to_vec();
+        let drawn = result.crude.as_ref().zip(sample.lane_plan());
+        Ok(SampleReport {
+            density: DensityRecord::of(&sample.density)?,
+            profile: sample.profile.clone(),
+            options: sample.options.clone(),
+            headways: match sample.density.space.has_thw() {
+                true => vec!["sampled".to_owned()],
+                false => plan_headways.iter().map(Headway::to_string).collect(),
+            },
+            plan_headways,
+            plan_sha256: drawn.map(|(_, plan)| plan.hash().to_owned()),
+            draws: drawn.map(|(crude, plan)| DrawRecord::of(&crude.tally, plan)),
+            estimates: result.rows.clone(),
+            injuries: result.injuries.clone(),
+            targets: sample.targets(result),
+            search: result.search.clone(),
+            worst_sha256: None,
+            host,
+        })
     }
 
     /// Writes every file of the run to its folder, the record last; returns the names of the others.
@@ -101,7 +111,7 @@ impl SampleReport {
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn add_worst(&mut self, results: &mut Results, lanes: &[WorstLane], names: &[String]) -> Result<()> {
+    fn add_worst(&mut self, results: &mut Results, lanes: &[WorstLane], names: &[String]) -> Result<()> {
         if self.options.worst == 0 {
             return Ok(());
         }
@@ -114,7 +124,7 @@ impl SampleReport {
     ///
     /// # Errors
     /// [`Error::Io`].
-    pub fn publish(&self, mut results: Results, mut figures: Vec<PageFigure>) -> Result<ResultFiles> {
+    fn publish(&self, mut results: Results, mut figures: Vec<PageFigure>) -> Result<ResultFiles> {
         if let Some(figure) = self.headways_figure() {
             figures.insert(0, PageFigure::add(&mut results, "headways", &figure)?);
         }

@@ -37,12 +37,9 @@ impl SampleReport {
         let page = Page {
             title: format!("Probability of failure: {}", self.name()),
             lead: format!(
-                "{} samples of {}, estimator {}, profile {}. {}",
+                "{} samples of a density over {} mined scenarios, estimator {}, profile {}. {}",
                 count(drawn),
-                match density.kernels {
-                    0 => format!("distributions of {}", density.parameters.join(", ")),
-                    kernels => format!("a density over {} mined scenarios", count_of(kernels)),
-                },
+                count_of(density.kernels),
                 match self.has_rare() {
                     true => format!("{}, rare failures by is", self.options.estimator.key()),
                     false => self.options.estimator.key().to_owned(),
@@ -106,16 +103,11 @@ impl SampleReport {
             .intro(format!(
                 "Verdicts: on the draws, on the density, on the data. Draws are sound where their interval holds P of this \
                  density as often as its level says. The density agrees with recorded scenarios, differs from them, or the \
-                 question is open. Enough scenarios fail, or few. ≤ bounds from above where nothing failed. {}{}",
-                match self.density.kernels {
-                    0 => String::new(),
-                    kernels => format!(
-                        "Probabilities below {} (one in {} scenarios) come from the tails of the density's \
-                         kernels, not from data. ",
-                        short(1.0 / kernels as f64),
-                        count_of(kernels)
-                    ),
-                },
+                 question is open. Enough scenarios fail, or few. ≤ bounds from above where nothing failed. \
+                 Probabilities below {} (one in {} scenarios) come from the tails of the density's kernels, not from data. \
+                 {}",
+                short(1.0 / self.density.kernels as f64),
+                count_of(self.density.kernels),
                 self.rules().map(|rule| rule + ". ").collect::<String>()
             ))
             .tables(tables)

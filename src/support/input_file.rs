@@ -17,8 +17,6 @@ use crate::{Error, Place, Result};
 /// Maximum size of a settings file (configurations, profiles, exposures), bytes; those that the program writes have a
 /// few kilobytes.
 pub const MAX_SETTINGS_BYTES: u64 = 1 << 20;
-/// Maximum size of an XML file, bytes; an OpenSCENARIO file of distributions has a few kilobytes.
-pub const MAX_XML_BYTES: u64 = 4 << 20;
 /// Maximum size of a table that is held in memory, bytes: a few million rows.
 pub const MAX_TABLE_BYTES: u64 = 256 << 20;
 

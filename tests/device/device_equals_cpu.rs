@@ -58,7 +58,6 @@ fn lanes_that_start_at_the_minimum_following_distance_are_equal() {
         style: CaseStyle::Plain,
         native_gap: false,
         closing_only: false,
-        panel_rows: None,
     })
     .unwrap();
     let profile = Profile::load("un-r157").unwrap();

@@ -124,10 +124,6 @@ fn every_example_of_the_help_runs() {
                     std::fs::copy(fitted, dir.join(name)).unwrap();
                 }
             }
-            for name in ["cut-in-stochastic.xosc", "cut-in-deterministic.xosc"] {
-                let shipped = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/examples").join(name);
-                std::fs::copy(shipped, dir.join(name)).unwrap();
-            }
             let case = "category,ego_speed_mps,speed_mps,gap,lateral_speed\n";
             std::fs::write(dir.join("cases.csv"), format!("{case}cut-in,30,20,20,1\ncut-in,30,20,40,1\n")).unwrap();
             std::fs::write(dir.join("fcd.csv"), fcd()).unwrap();

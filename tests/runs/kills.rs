@@ -42,7 +42,7 @@ impl Verb {
 
 const SAMPLE: &str = "sample d.json --thw 0.6 --models RSS --samples 3000 --worst 3 --out out";
 
-const VERBS: [Verb; 18] = [
+const VERBS: [Verb; 17] = [
     verb(
         "study",
         Some("run.json"),
@@ -97,12 +97,6 @@ const VERBS: [Verb; 18] = [
         Some("estimate.json"),
         Some(SAMPLE),
         "sample d.json --half-width 0.5 --thw 0.4,1.6 --models FSM --out out",
-    ),
-    verb(
-        "sample --distribution",
-        Some("estimate.json"),
-        Some(SAMPLE),
-        "sample --distribution d.xosc --category cut-in --rename Ego_Speed_kph=ego_speed_kmh --rename Other_Speed_kph=other_speed_kmh --samples 2000 --models FSM --out out",
     ),
     verb(
         "map",
@@ -220,8 +214,6 @@ fn furnish(dir: &Path) {
     done(dir, "synth recordings --synth-recordings 2 --config generator.duration_s=60");
     done(dir, "synth more --synth-recordings 6");
     done(dir, "mine more --out scenarios.jsonl");
-    let examples = Path::new(env!("CARGO_MANIFEST_DIR")).join("docs/examples");
-    std::fs::copy(examples.join("cut-in-stochastic.xosc"), dir.join("d.xosc")).unwrap();
 }
 
 /// Where `out` starts from: parts for a merge, the older result.

@@ -249,7 +249,6 @@ fn moved(grid: &Grid, gap_m: f64, lateral_mps: f64) -> Grid {
         style: grid.style(),
         native_gap: grid.has_native_gap(),
         closing_only: grid.category() == Category::CutIn,
-        panel_rows: None,
     })
     .unwrap()
 }

@@ -4,7 +4,6 @@
 mod common;
 
 mod openscenario;
-mod openscenario_import;
 mod printed_json;
 mod reduction_goldens;
 mod scenario_file;

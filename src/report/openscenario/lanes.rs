@@ -110,11 +110,7 @@ fn lanes<R: Real>(
             Some(_) => widened(&case),
             None => plan.case(key.block, key.unit, key.variant),
         };
-        let size = VehicleSize { length_m: wide.others[0].half_lengths, width_m: wide.ego_width };
-        let alike =
-            || Sizes { ego: size, target: size, lead: (wide.pair != 0).then_some(size), lane_width_m: wide.lane_width };
-        let known = reopened.density().map(|d| d.sizes).or_else(|| scenario.map(Sizes::of));
-        let sizes = known.or_else(|| reopened.has_one_size().then(alike));
+        let sizes = reopened.density().map(|density| density.sizes).or_else(|| scenario.map(Sizes::of));
         are_lengths_known &= sizes.is_some();
         let facts = LaneFacts {
             key: plan.key_text(key),

@@ -1,9 +1,8 @@
-//! Makes a grid from the text of options, and from the variations of a distribution file. Describes the fixed values of
-//! all its cells.
+//! Makes a grid from the text of options. Describes the fixed values of all its cells.
 
 use super::axis::GridAxis;
 use super::parameter::MapParameter;
-use super::{CaseStyle, Grid, GridParts, MAX_PANELS, jrc_case};
+use super::{CaseStyle, Grid, GridParts, jrc_case};
 use crate::model::profile::Profile;
 use crate::scenario::{CaseQuantity, Category, LANE_WIDTH_M};
 use crate::support::plausibility::Doubts;
@@ -12,9 +11,9 @@ use crate::{Error, Place, Result};
 /// A grid as text: an axis is `NAME=FROM..TO/STEP` or `NAME=A,B,C`.
 #[derive(Debug, Clone, Default)]
 pub struct GridText {
-    /// Horizontal axis; with variations also the name of one of them.
+    /// Horizontal axis.
     pub x: Option<String>,
-    /// Vertical axis, as `x`.
+    /// Vertical axis.
     pub y: Option<String>,
     /// Axes of the panels.
     pub panel: Vec<String>,
@@ -26,88 +25,26 @@ pub struct GridText {
     pub closing_only: bool,
 }
 
-/// The variations of a distribution file.
-#[derive(Debug, Clone, PartialEq)]
-pub struct Variations {
-    /// Independent parameters in the file's order; values ascend.
-    pub axes: Vec<GridAxis>,
-    /// Parameters that vary together; values are those of all rows.
-    pub set_axes: Vec<GridAxis>,
-    /// Their rows: every combination of the file's value sets. One empty row if there are none.
-    pub set_rows: Vec<Vec<f64>>,
-}
-
 impl GridText {
-    /// Makes the grid. With variations, the first two parameters with several values are the axes, unless `x` and `y`
-    /// name others; the remaining ones make the panels.
+    /// Makes the grid.
     ///
     /// # Errors
-    /// [`Error::Usage`] with the option that is missing, is not an axis, or makes too many panels.
-    pub fn parts(&self, category: Category, variations: Option<Variations>) -> Result<GridParts> {
-        let is_of_file = variations.is_some();
-        let none = Variations { axes: Vec::new(), set_axes: Vec::new(), set_rows: vec![Vec::new()] };
-        let Variations { axes: mut left, set_axes, set_rows: mut rows } = variations.unwrap_or(none);
-        let mut axis = |text: &Option<String>, name: &str| -> Result<GridAxis> {
-            let wrong = |problem: String, help: String| Error::usage(Place::item(name), problem, help);
-            match text.as_deref().map(str::trim) {
-                Some(text) if text.contains('=') || !is_of_file => GridAxis::parse(category, text, name),
-                None if !is_of_file => {
-                    let help = "give both option `x` and option `y`, or option `preset`";
-                    Err(wrong("it is missing".to_owned(), help.to_owned()))
-                }
-                Some(key) => {
-                    let parameter = MapParameter::find(category, key, name)?;
-                    let at = left.iter().position(|axis| axis.parameter == parameter);
-                    at.map(|at| left.remove(at)).ok_or_else(|| {
-                        let problem = format!("the file has no separate distribution of `{key}`");
-                        wrong(problem, format!("give its values: {name} {key}=FROM..TO/STEP"))
-                    })
-                }
-                None => {
-                    // Panels can leave out relative speeds that are none, axes cannot.
-                    let has_relative = left.iter().any(|axis| axis.parameter.is_relative);
-                    let is_speed = |axis: &GridAxis| {
-                        let is_ego = axis.parameter.quantity == CaseQuantity::EgoSpeed;
-                        has_relative && (is_ego || axis.parameter.is_relative)
-                    };
-                    let several = left.iter().position(|axis| axis.len() > 1 && !is_speed(axis));
-                    let several = several.or_else(|| left.iter().position(|axis| axis.len() > 1));
-                    let at = several.or(if left.is_empty() { None } else { Some(0) });
-                    at.map(|at| left.remove(at)).ok_or_else(|| {
-                        let problem = "the file has fewer than two parameters with separate distributions";
-                        let help = format!("a map has two axes: give one by {name} NAME=FROM..TO/STEP");
-                        wrong(problem.to_owned(), help)
-                    })
-                }
+    /// [`Error::Usage`] with the option that is missing or is not an axis.
+    pub fn parts(&self, category: Category) -> Result<GridParts> {
+        let axis = |text: &Option<String>, name: &str| match text.as_deref().map(str::trim) {
+            Some(text) => GridAxis::parse(category, text, name),
+            None => {
+                let help = "give both option `x` and option `y`, or option `preset`";
+                Err(Error::usage(Place::item(name), "it is missing", help))
             }
         };
-        // Excludes the parameter of `y` from the candidates for `x`.
-        let (x, y) = if self.x.is_none() && self.y.is_some() {
-            let y = axis(&self.y, "option `y`")?;
-            (axis(&self.x, "option `x`")?, y)
-        } else {
-            let x = axis(&self.x, "option `x`")?;
-            (x, axis(&self.y, "option `y`")?)
-        };
-        let mut fixed = self.set.iter().map(|text| value(category, text)).collect::<Result<Vec<_>>>()?;
-        fixed.extend(left.iter().filter(|axis| axis.len() == 1).map(|axis| (axis.parameter, axis.values[0])));
-        left.retain(|axis| axis.len() > 1);
+        let (x, y) = (axis(&self.x, "option `x`")?, axis(&self.y, "option `y`")?);
         let panel = |text: &String| GridAxis::parse(category, text, "option `panel`");
-        left.extend(self.panel.iter().map(panel).collect::<Result<Vec<_>>>()?);
-        for axis in left.iter().filter(|_| is_of_file) {
-            if rows.len().saturating_mul(axis.len()) > MAX_PANELS {
-                let help = format!("give fewer values: a sheet has at most {MAX_PANELS} panels");
-                return Err(Error::usage(Place::option("distribution"), "too many panels", help));
-            }
-            let with = |row: &Vec<f64>, value: f64| [&row[..], &[value]].concat();
-            rows = rows.iter().flat_map(|row| axis.values.iter().map(move |v| with(row, *v))).collect();
-        }
         Ok(GridParts {
-            panel_axes: set_axes.into_iter().chain(left).collect(),
-            fixed,
+            fixed: self.set.iter().map(|text| value(category, text)).collect::<Result<_>>()?,
+            panel_axes: self.panel.iter().map(panel).collect::<Result<_>>()?,
             native_gap: self.native_gap,
             closing_only: self.closing_only,
-            panel_rows: is_of_file.then_some(rows),
             ..GridParts::new(category.key(), category, x, y)
         })
     }

@@ -16,7 +16,7 @@ mod robustness;
 mod run;
 
 pub use axis::{GridAxis, MAX_VALUES};
-pub use grid_text::{GridText, Variations};
+pub use grid_text::GridText;
 use jrc_case::Front;
 pub use map::{CellOutcome, GridMap, boundary, runs};
 pub use parameter::{MapParameter, PARAMETERS, Point};
@@ -37,7 +37,7 @@ use crate::{Error, Place, Result};
 const MAX_CELLS: usize = 1_000_000;
 
 /// Maximum number of panels of a grid: a sheet shows every one.
-pub const MAX_PANELS: usize = 1000;
+const MAX_PANELS: usize = 1000;
 
 /// How a point becomes a case.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, serde::Serialize)]
@@ -81,8 +81,6 @@ pub struct GridParts {
     pub native_gap: bool,
     /// Skips panels in which the ego is not faster than the other vehicle.
     pub closing_only: bool,
-    /// Explicit panels, if they are not every combination: a value for each of `panel_axes`.
-    pub panel_rows: Option<Vec<Vec<f64>>>,
 }
 
 impl GridParts {
@@ -98,7 +96,6 @@ impl GridParts {
             style: CaseStyle::Plain,
             native_gap: false,
             closing_only: false,
-            panel_rows: None,
         }
     }
 }
@@ -108,7 +105,7 @@ impl Grid {
     ///
     /// # Errors
     /// [`Error::Usage`] with the parameter.
-    pub fn new(mut parts: GridParts) -> Result<Grid> {
+    pub fn new(parts: GridParts) -> Result<Grid> {
         let axes = || [&parts.x, &parts.y].into_iter().chain(&parts.panel_axes);
         let fixed = parts.fixed.iter().map(|(parameter, _)| *parameter);
         let given: Vec<&MapParameter> = axes().map(|axis| axis.parameter).chain(fixed).collect();
@@ -117,11 +114,8 @@ impl Grid {
             refuse_repeats(|| Place::item(axis.parameter.key), axis.values.iter().map(|v| (v.to_bits(), v)))?;
         }
         let has = |quantity| given.iter().any(|p| p.quantity == quantity);
-        check_complete(parts.category, parts.native_gap, &has, FOR_A_MAP)?;
-        let panels = match parts.panel_rows.take() {
-            Some(rows) => checked(rows, &parts.panel_axes)?,
-            None => combinations(&parts.panel_axes)?,
-        };
+        check_complete(parts.category, parts.native_gap, &has)?;
+        let panels = combinations(&parts.panel_axes)?;
         let (nx, ny) = (parts.x.len(), parts.y.len());
         let cells = panels.len().saturating_mul(nx).saturating_mul(ny);
         if cells > MAX_CELLS {
@@ -364,38 +358,15 @@ fn run_up(style: CaseStyle, point: &Point, dt_s: f64) -> u32 {
     }
 }
 
-/// A required quantity, and how it is specified.
-type Needing = (&'static str, &'static str);
-const FOR_A_MAP: Needing = ("a map", "give it by option `x`, option `y`, option `panel` or option `set`");
-
-/// Explicit panels, with each value in its parameter's range.
-fn checked(rows: Vec<Vec<f64>>, axes: &[GridAxis]) -> Result<Vec<Vec<f64>>> {
-    if rows.is_empty() || rows.len() > MAX_PANELS {
-        let problem = format!("they make {} panels", rows.len());
-        let help = format!("give fewer values: a sheet has {MAX_PANELS} panels at most");
-        return Err(Error::usage(Place::item("panels"), problem, help));
-    }
-    if rows.iter().any(|row| row.len() != axes.len()) {
-        return Err(Error::Internal("a panel has another number of values than there are parameters".to_owned()));
-    }
-    let text = |row: &Vec<f64>| row.iter().map(f64::to_string).collect::<Vec<_>>().join(", ");
-    refuse_repeats(|| Place::item("panels"), rows.iter().map(text).map(|row| (row.clone(), row)))?;
-    Ok(rows)
-}
-
 /// Checks that all quantities required by the category are given once.
 ///
 /// # Errors
 /// [`Error::Usage`] with the quantity that is missing or duplicate.
-pub fn check_complete(
-    category: Category,
-    native_gap: bool,
-    has: &dyn Fn(CaseQuantity) -> bool,
-    (needing, how): Needing,
-) -> Result<()> {
+fn check_complete(category: Category, native_gap: bool, has: &dyn Fn(CaseQuantity) -> bool) -> Result<()> {
     let missing = |what: &str, example: &str| {
-        let problem = format!("{needing} of {}s needs {what}", category.label());
-        Err(Error::usage(Place::item(what), problem, format!("{how} {example}")))
+        let problem = format!("a map of {}s needs {what}", category.label());
+        let help = format!("give it by option `x`, option `y`, option `panel` or option `set` {example}");
+        Err(Error::usage(Place::item(what), problem, help))
     };
     let has_gap = has(CaseQuantity::Gap) || has(CaseQuantity::Thw);
     let has_parameter = |key: &str| NUMBERS.iter().any(|number| number.key == key && has(number.quantity));

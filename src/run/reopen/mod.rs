@@ -41,38 +41,24 @@ pub struct Reopened {
 enum Lanes {
     Study(Box<Study>),
     Sample(Box<LanePlan>, Box<DensityModel>),
-    Distribution(Box<LanePlan>),
     Scenarios(Box<LanePlan>),
 }
 
-/// The file of a sampling run of a user's distributions; the plan is remade from it and the record.
-pub const DISTRIBUTION_FILE: &str = "distribution.json";
-
 impl Reopened {
     /// Reopens the run in a folder. If the folder has the results of a study and of a sampling run, the key decides:
-    /// samples are numbered. `of_distribution` plans a run with a [`DISTRIBUTION_FILE`] and returns its provenance.
+    /// samples are numbered.
     ///
     /// # Errors
     /// [`Error::Io`]; [`Error::Input`] for a folder without a run's plan, or with that of another run.
-    pub fn run(
-        dir: &Path,
-        key: &str,
-        of_distribution: impl FnOnce(&Path, &SampleRecord) -> Result<(LanePlan, String)>,
-    ) -> Result<Reopened> {
+    pub fn run(dir: &Path, key: &str) -> Result<Reopened> {
         check_run_folder(dir)?;
         let has = |name: &str| dir.join(name).exists();
         if has(STUDY_RECORD) && !(has(ESTIMATE_RECORD) && key.starts_with('#')) {
             return Ok(Reopened::study(record::study_of(dir)?));
         }
         if has(ESTIMATE_RECORD) {
-            let record = SampleRecord::read(dir)?;
-            if !has(DISTRIBUTION_FILE) {
-                let (plan, density) = record.plan(dir)?;
-                return Ok(Reopened::sample(plan, density));
-            }
-            let (plan, data) = of_distribution(dir, &record)?;
-            let lanes = Lanes::Distribution(Box::new(plan));
-            return Ok(Reopened { lanes, data, is_synthetic: false, is_reference: false });
+            let (plan, density) = SampleRecord::read(dir)?.plan(dir)?;
+            return Ok(Reopened::sample(plan, density));
         }
         let plan = dir.join(PLAN_FILE);
         if !plan.exists() {
@@ -132,7 +118,7 @@ impl Reopened {
     pub(crate) fn plan(&self) -> &LanePlan {
         match &self.lanes {
             Lanes::Study(study) => study.plan(),
-            Lanes::Sample(plan, _) | Lanes::Distribution(plan) | Lanes::Scenarios(plan) => plan,
+            Lanes::Sample(plan, _) | Lanes::Scenarios(plan) => plan,
         }
     }
 
@@ -150,11 +136,6 @@ impl Reopened {
             Lanes::Study(study) => Some(study),
             _ => None,
         }
-    }
-
-    /// Whether all vehicles have the same size.
-    pub fn has_one_size(&self) -> bool {
-        matches!(self.lanes, Lanes::Distribution(_))
     }
 
     /// Passes the plan with the cases of these lanes to `work`.

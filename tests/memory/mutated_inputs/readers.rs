@@ -4,9 +4,7 @@ use std::path::Path;
 
 use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, Partial, Wanted};
 use lanesweep::model::criterion::Criterion;
-use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
-use lanesweep::report::openscenario::{DistributionSamples, Distributions, Names, read_distribution, variations};
 use lanesweep::run::parts::{Counted, Journal, Ledger, MergeableCounts, read_part, read_sealed_line};
 use lanesweep::run::sampling::{
     Estimator, SampleHeadways, SampleOptions, SampleTally, WeightedTally, plan_samples, read_proposal,
@@ -58,7 +56,6 @@ pub fn all(seeds: &Seeds) -> Vec<Reader> {
         plain("track XML", &seeds.track_xml, |b, d, _, _| tracks_named("own.xml", b, d)),
         plain("track JSON", &seeds.track_json, |b, d, _, _| tracks_named("own.json", b, d)),
         plain("preset", &seeds.presets, preset),
-        plain("distribution", &seeds.distributions, distribution),
     ];
     readers.push(Reader { reseal: Some(reseal_density), ..plain("density", &seeds.densities, density) });
     readers.push(Reader { reseal: Some(reseal_searched), ..plain("searched", &seeds.searched, searched) });
@@ -105,25 +102,6 @@ fn preset(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
         std::fs::remove_file(path).expect("the temporary folder can be written to");
     }
     read.map(drop)
-}
-
-/// As a map of what is deterministic, as samples of what is not.
-fn distribution(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> {
-    let path = file(bytes, dir, "distribution.xosc");
-    let read = read_distribution(&path)?;
-    let names = Names { category: Category::CutIn, renames: &[], path: &path };
-    if matches!(read.distributions, Distributions::Deterministic(_)) {
-        return variations(&read, &names).map(drop);
-    }
-    let samples = DistributionSamples::of(&read, &names, Vec::new())?;
-    let count = if heavy { samples.runs } else { samples.runs.min(20) };
-    let (plan, _) = samples.plan(
-        (count.min(2000), samples.seed.unwrap_or(1)),
-        &seeds.profile,
-        &[ModelId::Fsm],
-        &[Headway::ThwS(1.0)],
-    )?;
-    run_some(&plan, 20)
 }
 
 fn file(bytes: &[u8], dir: &Path, name: &str) -> std::path::PathBuf {

@@ -49,7 +49,6 @@ pub struct Seeds {
     pub track_xml: Vec<Vec<u8>>,
     pub track_json: Vec<Vec<u8>>,
     pub presets: Vec<Vec<u8>>,
-    pub distributions: Vec<Vec<u8>>,
     pub parts: Vec<Vec<u8>>,
     pub plans: Vec<Vec<u8>>,
     pub journals: Vec<Vec<u8>>,
@@ -67,17 +66,6 @@ pub fn density_of(seeds: &Seeds) -> &DensityModel {
 
 fn first_of(scenarios: &[Scenario], category: Category, n: usize) -> Vec<Scenario> {
     scenarios.iter().filter(|s| s.category == category && s.kept).take(n).cloned().collect()
-}
-
-/// An example of a distribution file, with our names.
-fn distribution(kind: &str) -> Vec<u8> {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(format!("docs/examples/cut-in-{kind}.xosc"));
-    std::fs::read_to_string(path)
-        .unwrap()
-        .replace("Speed_kph", "speed_kmh")
-        .replace("\"Ego_", "\"ego_")
-        .replace("\"Other_", "\"other_")
-        .into_bytes()
 }
 
 /// What a writer leaves in a file.
@@ -333,7 +321,6 @@ impl Seeds {
                 .chain(&others)
                 .map(|d| written(|p| write_density(p, d).unwrap()))
                 .collect(),
-            distributions: ["stochastic", "deterministic"].map(distribution).to_vec(),
             exid: exid(),
             track_tables: track_tables(),
             track_xml: vec![FCD.as_bytes().to_vec(), commonroad()],
