@@ -1,0 +1,154 @@
+"""What the formats share: reading XML and JSON, and the columns of the table."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import logging
+import os
+import re
+import xml.etree.ElementTree as ET
+import zlib
+from collections.abc import Iterable, Iterator, Mapping
+from pathlib import Path
+from typing import IO, Any, cast
+
+import polars as pl
+
+from .._core import InputError
+from ..options import Path as File
+
+LOG = logging.getLogger("lanesweep")
+#: Errors of a compressed file that ends early.
+_BROKEN = (EOFError, zlib.error, gzip.BadGzipFile)
+_TEXTS = ("vehicle_id", "class", "lane")
+#: The columns in their order.
+COLUMNS = (
+    *("vehicle_id", "frame", "time_s", "x_m", "y_m", "s_m", "d_m", "heading_deg", "speed_mps", "vx_mps", "vy_mps"),
+    *("forward_speed_mps", "leftward_speed_mps", "acceleration_mps2", "ax_mps2", "ay_mps2", "length_m", "width_m"),
+    *("class", "lane", "direction"),
+)
+
+
+def bad(path: File, place: str, problem: str, help: str) -> InputError:
+    """Return the error of a file."""
+    return InputError(f"{os.fspath(path)}: {place}: {problem}\n  help: {help}")
+
+
+def number(path: File, place: str, text: str | float | None) -> float:
+    """Return the number that a text is."""
+    try:
+        return float(text if text is not None else "")
+    except ValueError:
+        raise bad(path, place, f"{text!r} is not a number", "correct the value") from None
+
+
+def warn_left_out(path: File, names: Iterable[Any], what: str) -> None:
+    """Name what of a file is not in the table."""
+    several = sorted(set(map(str, names)))
+    if several:
+        more = ", …" if len(several) > 5 else ""
+        LOG.warning("%s: %d %s left out: %s%s", os.fspath(path), len(several), what, ", ".join(several[:5]), more)
+
+
+def opened(path: File) -> IO[bytes]:
+    """Open a file, through gzip if its name ends in ``.gz``."""
+    return cast(IO[bytes], gzip.open(path)) if os.fspath(path).endswith(".gz") else Path(path).open("rb")
+
+
+def read_table(path: File) -> pl.DataFrame:
+    """Read Parquet, or delimited texts with a header."""
+    try:
+        if os.fspath(path).endswith(".parquet"):
+            return pl.read_parquet(Path(path))
+        with opened(path) as file:
+            text = file.read()
+        return pl.read_csv(text, separator=";" if b";" in text[: text.find(b"\n")] else ",", infer_schema=False)
+    except (pl.exceptions.PolarsError, *_BROKEN) as error:
+        raise bad(path, "the file", f"no table, or truncated ({error})", "export the file again") from None
+
+
+def elements(path: File, *tags: str) -> Iterator[ET.Element]:
+    """Elements of an XML file at their ends, with what is inside; the root comes last and has lost its children."""
+    around: list[ET.Element] = []
+    with opened(path) as file:
+        try:
+            for event, element in ET.iterparse(file, ("start", "end")):
+                if event == "start":
+                    around.append(element)
+                    continue
+                around.pop()
+                if element.tag in tags:
+                    yield element
+                if len(around) == 1:
+                    del around[0][:]
+        except (ET.ParseError, *_BROKEN) as error:
+            place = f"inside `{around[-1].tag}`" if around else "at its beginning"
+            raise bad(path, place, f"not well-formed XML, or truncated ({error})", "export the file again") from None
+
+
+def json_vehicles(path: File, key: str = "") -> list[dict[str, Any]]:
+    """Objects of a JSON list, of the list under a key, or one object per line; numbers stay texts."""
+    decoder = json.JSONDecoder(parse_float=str, parse_int=str, parse_constant=str)
+    found: list[dict[str, Any]] = []
+    try:
+        with opened(path) as file:
+            text = file.read().decode("utf-8-sig").strip()
+        at = 0
+        while at < len(text):
+            document, at = decoder.raw_decode(text, at)
+            at = re.compile(r"\s*").match(text, at).end()  # type: ignore[union-attr]
+            of_key = document.get(key, document) if isinstance(document, dict) else document
+            found += of_key if isinstance(of_key, list) else [of_key]
+    except (ValueError, *_BROKEN) as error:
+        raise bad(path, "not JSON, or truncated", str(error), "export the file again") from None
+    for number, vehicle in enumerate(found, 1):
+        if not isinstance(vehicle, dict):
+            raise bad(path, f"vehicle {number} of the list", f"{vehicle!r:.40} is not an object", "give a list of vehicles")
+    return found
+
+
+def unpacked(path: File, vehicles: pl.DataFrame, columns: Mapping[str, str]) -> pl.DataFrame:
+    """A row per item of the lists of the vehicles; `columns` has our names by theirs."""
+    for theirs in columns:
+        if theirs not in vehicles.columns:
+            raise bad(path, f"column `{theirs}`", f"not there; the file has {', '.join(vehicles.columns)}", "check that it has this format")
+    frame = vehicles.select(pl.col(theirs).alias(ours) for theirs, ours in columns.items())
+    packed = [name for name, dtype in frame.schema.items() if isinstance(dtype, pl.List)]
+    if not packed:
+        return frame
+    length = frame[packed[0]].list.len()
+    for name in packed[1:]:
+        differs = frame[name].list.len().ne_missing(length)
+        if differs.any():
+            problem = f"the lists of `{packed[0]}` and `{name}` differ in length"
+            raise bad(path, f"vehicle {differs.to_list().index(True) + 1} of the list", problem, "give lists of equal length")
+    return frame.filter(length > 0).explode(packed)
+
+
+def json_lists(path: File, vehicles: list[dict[str, Any]], columns: Mapping[str, str]) -> pl.DataFrame:
+    """The same of vehicles from JSON."""
+    frame = {}
+    for theirs in columns:
+        cells = [vehicle.get(theirs) for vehicle in vehicles]
+        packed = any(isinstance(cell, list) for cell in cells)
+        for number, cell in enumerate(cells, 1):
+            if packed != isinstance(cell, list):
+                raise bad(path, f"vehicle {number} of the list", f"`{theirs}` is {cell!r:.40}", "give every vehicle the same keys")
+        frame[theirs] = pl.Series(theirs, cells, dtype=pl.List(pl.String) if packed else pl.String, strict=False)
+    return unpacked(path, pl.DataFrame(frame), columns)
+
+
+def canonical(path: File, frame: pl.DataFrame) -> pl.DataFrame:
+    """The columns in their order and with their types; a text that is no number is an error."""
+    names = [name for name in COLUMNS if name in frame.columns]
+    types = {name: pl.String if name in _TEXTS else pl.Int64 if name == "frame" else pl.Float64 for name in names}
+    table = frame.select(pl.col(name).cast(dtype, strict=False) for name, dtype in types.items())
+    for name in names:
+        wrong = frame.filter(table[name].is_null() & frame[name].is_not_null())
+        if len(wrong):
+            place = ", ".join(f"{of} {wrong[of][0]}" for of in ("vehicle_id", "frame", "time_s") if of in wrong.columns)
+            raise bad(path, place, f"`{name}` is {wrong[name][0]!r}; expected a number", "correct the value")
+    if table.is_empty():
+        raise bad(path, "the file", "there is no vehicle", "check that it has this format")
+    return table
