@@ -8,7 +8,6 @@ pub use crate::run::cases::Cases;
 pub use crate::run::check::{Check, Subject};
 pub use crate::run::compare::{Compare, CompareOptions};
 pub use crate::run::grid::{Map, MapOptions};
-pub use crate::run::justify::{JustifyOptions, justify};
 pub use crate::run::parts::{Job, Shard};
 pub use crate::run::sampling::{Sample, SampleHeadways, SampleOptions};
 pub use crate::run::score::{ScoreOptions, f1, precision, recall};

@@ -22,11 +22,10 @@ STATUS = {
     8: "undecided",
     9: "no conflict",
     10: "outside Annex 3",
-    11: "not appropriate",
 }
 
 #: The word of a function whose result answers a question.
-_ANSWERS = {"check": "preventable", "justify": "appropriate"}
+_ANSWERS = {"check": "preventable"}
 
 #: Columns whose values are names, even where all of them look like numbers.
 _NAMES = {"id", "scenario", "param", "parameterization", "variant", "headway", "category", "model", "criterion", "lane", "claim"}
@@ -65,8 +64,7 @@ class Result:
     Attributes
     ----------
     status : str
-        The answer of `check` (``"preventable"``, …) or `justify` (``"appropriate"``, …); else ``"ok"``; ``"incomplete"`` if parts
-        of the input were left out.
+        The answer of `check` (``"preventable"``, …); else ``"ok"``; ``"incomplete"`` if parts of the input were left out.
     text : str
         The result for people, as the command line prints it; `print` shows it.
     document : dict

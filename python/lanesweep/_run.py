@@ -68,9 +68,7 @@ _TABLES = ("config", "given", "panel", "set")
 #: Files of a result that stand for it.
 _FILES = {
     "plan": "plan.json",
-    "against": "dossier.json",
     "external": "winner.json",
-    "parameterization": "winner.json",
     "parameterizations": "winner.json",
 }
 

@@ -38,7 +38,6 @@ __all__ = [
     "compare",
     "export_xosc",
     "fit",
-    "justify",
     "map",
     "merge",
     "mine",
@@ -408,7 +407,7 @@ def search(
 
     Fits descriptions of many families and sizes: decompositions, physical features, polynomials, splines, constant accelerations, and
     decompositions whose weights are tuned to the outcomes. Scores each by cross-validation over recordings. The best of each size form a
-    front beside the paper's parameterizations. The winner, winner.json, is a file for `study`, `fit`, `sample` and `justify`.
+    front beside the paper's parameterizations. The winner, winner.json, is a file for `study`, `fit` and `sample`.
 
     Parameters
     ----------
@@ -448,57 +447,6 @@ def search(
     Result
     """
     return run("search", locals(), default_out="search")
-
-
-def justify(
-    recordings: Path | None = None,
-    *,
-    parameterization: str | Int | Path | None = None,
-    models: Models | None = None,
-    criterion: Criterion | None = None,
-    thw: Headways | None = None,
-    against: Path | None = None,
-    author: str | None = None,
-    date: str | None = None,
-    out: Path | None = None,
-    **options: Unpack[_Replays],
-) -> Result:
-    """Judge whether a parameterization is appropriate for a driver model, kind of scenario and criterion.
-
-    Replays the recorded scenarios as recorded (S) and parameterized (S'), fits a density, and applies the rules of [justify] in the
-    configuration. The dossier lists the failures that S' hides, shows the worst of them, and gives the risk ratio, the coverage and the
-    alternatives.
-
-    Parameters
-    ----------
-    recordings : path, optional
-        Folder of recordings, or a track file; by default recordings are generated. With `against` also the folder of a dossier, or its
-        dossier.json: nothing is simulated then, and the answer is what differs.
-    parameterization : str
-        A key, or a file of `search`; needed unless two dossiers are compared.
-    models : str or Driver
-        One driver model; needed unless two dossiers are compared.
-    criterion : {"collision", "ttc", "btn"}
-        Criterion, by default collision.
-    thw : list of float
-        Time headways, s, as in `study`.
-    against : path
-        Another dossier, its folder or its dossier.json, from which the changes are listed.
-    author : str
-        Person responsible for the dossier; by default a line to fill in.
-    date : str
-        Date of the dossier, such as ``"2026-11-24"``; by default a line to fill in.
-    out : path, optional
-        Folder of the dossier; without it the files go with the result.
-    **options
-        `Data` and `Sweep` of `lanesweep.options`.
-
-    Returns
-    -------
-    Result
-        Its status is ``"ok"`` (appropriate), ``"not appropriate"``, ``"undecided"``, or ``"incomplete"``.
-    """
-    return run("justify", locals(), default_out="dossier")
 
 
 def map(

@@ -41,10 +41,10 @@ pub(super) struct Configured {
 /// `--help` shows it, and its verbs. Range, default and help are the key's.
 type KeyFlag = (&'static str, &'static str, &'static str, &'static str, bool, &'static [&'static str]);
 
-const SWEEPING: &[&str] = &["study", "search", "sample", "compare", "justify", "map", "verify", "show"];
+const SWEEPING: &[&str] = &["study", "search", "sample", "compare", "map", "verify", "show"];
 const SIMULATING: &[&str] =
-    &["study", "search", "sample", "compare", "justify", "map", "verify", "show", "simulate", "xosc"];
-const GENERATING: &[&str] = &["study", "search", "fit", "compare", "justify", "verify", "show"];
+    &["study", "search", "sample", "compare", "map", "verify", "show", "simulate", "xosc"];
+const GENERATING: &[&str] = &["study", "search", "fit", "compare", "verify", "show"];
 
 #[rustfmt::skip] // a table: one line per flag
 pub(super) const FLAGS: [KeyFlag; 26] = [

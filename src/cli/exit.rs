@@ -8,7 +8,7 @@ use crate::Error;
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u8)]
 pub enum Exit {
-    /// Complete. `check`: the case is preventable, and the answer is robust. `justify`: the parameterization is appropriate.
+    /// Complete. `check`: the case is preventable, and the answer is robust.
     Ok = 0,
     /// The checked case is not preventable; the sheet was written.
     NotPreventable = 1,
@@ -24,15 +24,12 @@ pub enum Exit {
     Io = 6,
     /// No usable compute device, or the device failed.
     NoDevice = 7,
-    /// `check`: a small change of the case or of the time step changes the answer. `justify`: the data does not decide. The
-    /// sheet or dossier was written.
+    /// A small change of the checked case or of the time step changes the answer; the sheet was written.
     Undecided = 8,
     /// Nothing collides in the checked case even if the ego never reacts; the sheet was written.
     NoConflict = 9,
     /// Annex 3 does not describe the checked case, so its drivers give no answer; the sheet was written.
     OutsideAnnex = 10,
-    /// The parameterization is not appropriate by the rules; the dossier was written.
-    NotAppropriate = 11,
     /// A defect of the program.
     Internal = 70,
     /// A signal or `run.stop_after_s` ended the run early; progress is kept, and the same command resumes.
@@ -41,7 +38,7 @@ pub enum Exit {
 
 impl Exit {
     /// All codes, for documentation.
-    pub const ALL: [Exit; 14] = [
+    pub const ALL: [Exit; 13] = [
         Exit::Ok,
         Exit::NotPreventable,
         Exit::Usage,
@@ -53,7 +50,6 @@ impl Exit {
         Exit::Undecided,
         Exit::NoConflict,
         Exit::OutsideAnnex,
-        Exit::NotAppropriate,
         Exit::Internal,
         Exit::Interrupted,
     ];
@@ -66,7 +62,7 @@ impl Exit {
     /// Its meaning in a few words.
     pub fn meaning(self) -> &'static str {
         match self {
-            Exit::Ok => "done; the case is preventable (check), the parameterization appropriate (justify)",
+            Exit::Ok => "done; the checked case is preventable (check)",
             Exit::NotPreventable => "the checked case is not preventable (check)",
             Exit::Usage => "invalid flag, key or profile; nothing was done",
             Exit::BadInput => "invalid data; nothing was written",
@@ -74,10 +70,9 @@ impl Exit {
             Exit::VerificationFailed => "a check failed",
             Exit::Io => "the system refused to read, to write, to start a thread or to give memory",
             Exit::NoDevice => "no usable device, or the device failed",
-            Exit::Undecided => "the answer is undecided (check, justify)",
+            Exit::Undecided => "the answer is undecided (check)",
             Exit::NoConflict => "the checked case has no conflict: nothing to prevent (check)",
             Exit::OutsideAnnex => "Annex 3 of UN R157 does not describe the checked case (check)",
-            Exit::NotAppropriate => "the parameterization is not appropriate by the rules (justify)",
             Exit::Internal => "a program error",
             Exit::Interrupted => "interrupted, or another process uses the folder; the same command resumes",
         }

@@ -17,7 +17,6 @@ mod export;
 mod fit;
 mod format;
 mod help;
-mod justify;
 mod lists;
 mod map;
 mod merge;
@@ -102,7 +101,6 @@ enum Verb {
     Sample(Box<sample::Sample>),
     Search(Box<search::Search>),
     Compare(Box<compare::Compare>),
-    Justify(Box<justify::Justify>),
     Synth(synth::Synth),
     Map(Box<map::Map>),
     Simulate(simulate::Simulate),
@@ -195,7 +193,6 @@ impl Verb {
             Verb::Sample(verb) => verb.run(configured),
             Verb::Search(verb) => verb.run(configured),
             Verb::Compare(verb) => verb.run(configured),
-            Verb::Justify(verb) => verb.run(configured),
             Verb::Synth(verb) => verb.run(configured),
             Verb::Map(verb) => verb.run(configured),
             Verb::Simulate(verb) => verb.run(configured),

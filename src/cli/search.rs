@@ -25,7 +25,7 @@ use crate::{Error, Place, Result};
 /// Fits descriptions of many families and sizes: decompositions, physical features, polynomials, splines, constant
 /// accelerations, and decompositions whose weights are tuned to the outcomes. Scores each by cross-validation over
 /// recordings. The best of each size form a front beside the paper's parameterizations. The winner is a file for `study`,
-/// `fit`, `sample`, `justify` and `export`. Without data it uses generated recordings.
+/// `fit`, `sample` and `export`. Without data it uses generated recordings.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:\n  lanesweep search --category lvd --criterion ttc\n  \
                         lanesweep search recordings --category cut-in --held-out others --out found")]

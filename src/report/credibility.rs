@@ -25,7 +25,6 @@ pub(super) enum RunKind {
     Study,
     Sample,
     Map,
-    Dossier,
 }
 
 /// The file, which describes its fields.
@@ -186,7 +185,7 @@ fn at<'a>(of: &'a Value, pointer: &str) -> &'a Value {
     of.pointer(pointer).unwrap_or(&Value::Null)
 }
 
-pub(super) fn list(of: &Value) -> &[Value] {
+fn list(of: &Value) -> &[Value] {
     of.as_array().map_or(&[], Vec::as_slice)
 }
 
@@ -202,7 +201,7 @@ fn fill(text: &str, of: &Value) -> String {
 }
 
 /// A value as people read it. Of a number with an interval: both.
-pub(super) fn shown(of: &Value) -> String {
+fn shown(of: &Value) -> String {
     match of {
         Value::Null => "unknown".to_owned(),
         Value::String(text) => text.clone(),
@@ -225,7 +224,7 @@ mod tests {
 
     use serde_json::json;
 
-    use super::RunKind::{Dossier, Map, Sample, Study};
+    use super::RunKind::{Map, Sample, Study};
     use super::*;
 
     fn file() -> ValidationFile {
@@ -300,7 +299,7 @@ mod tests {
             .iter()
             .filter(|of| ["numerical error", "uncertainty by source"].contains(&of.group.as_str()))
         {
-            for kind in [Study, Sample, Map, Dossier] {
+            for kind in [Study, Sample, Map] {
                 let (_, state, text) = question.r#for[&kind].row(&question.name, &json!({})).unwrap();
                 assert!(!text.is_empty(), "{kind:?} {}: {state}", question.name);
             }

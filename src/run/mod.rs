@@ -1,7 +1,7 @@
 //! Runs: what is planned, computed in parts, merged and scored.
 //!
 //! [`study`] compares parameterizations with recordings, [`sampling`] estimates probabilities, [`compare`] compares the
-//! two. [`grid`] sweeps maps, [`cases`] tables of concrete cases, [`check`] evaluates single ones, [`justify`] a parameterization.
+//! two. [`grid`] sweeps maps, [`cases`] tables of concrete cases, [`check`] evaluates single ones.
 //! [`close_following`] counts the failures from headways below 0.5 s. [`reopen`] reruns
 //! single lanes of a finished run. [`parts`] splits and journals runs, [`Merged`] is the result of merged parts.
 //! [`score`] computes recall, precision and F1 from a study's counts.
@@ -11,7 +11,6 @@ pub mod check;
 pub mod close_following;
 pub mod compare;
 pub mod grid;
-pub mod justify;
 mod motion_error;
 pub mod parts;
 #[cfg(test)]

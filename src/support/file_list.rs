@@ -18,18 +18,15 @@ pub const MAP_RECORD: &str = "map.json";
 pub const COMPARE_RECORD: &str = "compare.json";
 /// Record of a search.
 pub const SEARCH_RECORD: &str = "search.json";
-/// Record of a dossier.
-pub const DOSSIER_RECORD: &str = "dossier.json";
 
 /// Records of runs that write files with the same names, such as `report.html`: a folder holds one of them. With the other
 /// files that every such run writes: a user's file of such a name is detected before the work starts.
-pub(super) const RECORDS: [(&str, &[&str]); 6] = [
+pub(super) const RECORDS: [(&str, &[&str]); 5] = [
     (STUDY_RECORD, &["failures.csv", "f1.csv", "claims.csv", "headways.csv", "report.html"]),
     (ESTIMATE_RECORD, &["estimates.csv", "report.html"]),
     (MAP_RECORD, &["cells.csv", "report.html"]),
     (COMPARE_RECORD, &["compare.csv", "compare.txt", "report.html"]),
     (SEARCH_RECORD, &["fronts.csv", "candidates.csv", "report.html"]),
-    (DOSSIER_RECORD, &["hidden.csv", "report.html"]),
 ];
 
 /// Lists the files of the runs in a folder.

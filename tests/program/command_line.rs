@@ -257,13 +257,12 @@ fn a_list_with_a_value_twice_is_refused_with_the_value() {
     let export = ["export", "xosc", "--scenarios", text(&scenarios), "--lane", lane, "--lane"];
     let case = "--category lvd --ego-speed 20m/s --gap 20 --acceleration -6 --models FSM,fsm";
     let case: Vec<&str> = case.split(' ').collect();
-    let lists: [(&[&str], &str); 17] = [
+    let lists: [(&[&str], &str); 16] = [
         (&["study", "--thw", "0.6,0.6"], "--thw: `0.6` is given twice"),
         (&["study", "--thw", "0.6,1, 0.60"], "--thw: `0.60` repeats `0.6`"),
         (&["study", "--thw", "0.6,0.6000000001"], "--thw: `0.6000000001` repeats `0.6`"),
         (&["study", "--thw", "r157,1,r157"], "--thw: `r157` is given twice"),
         (&["compare", "--thw", "1,1.0"], "--thw: `1.0` repeats `1`"),
-        (&["justify", "--parameterization", "2", "--models", "FSM", "--thw", "1,1"], "--thw: `1` is given twice"),
         (&["study", "--models", "FSM,RSS,FSM"], "--models: `FSM` is given twice"),
         (&["study", "--models", "FSM", "--models", "all"], "--models: `all` repeats `FSM`"),
         (&["study", "--categories", "lvd,cut-in,cut_in"], "--categories: `cut_in` repeats `cut-in`"),

@@ -7,7 +7,6 @@ mod against_recorded;
 mod compare;
 mod faults;
 mod interrupted;
-mod justify;
 mod kills;
 mod map;
 mod mutations;

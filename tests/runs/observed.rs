@@ -223,11 +223,6 @@ fn every_verb_takes_observed_headways_and_says_how_many_failures_come_from_close
     let compared = run(&[&args[..], &["--backend", "cpu", "--out", &out], &small[..]].concat());
     assert!(compared.contains("from their recorded gaps") && compared.contains("headways below 0.5 s"), "{compared}");
     assert!(!compared.contains("imposed"), "{compared}");
-    let out = path("dossier");
-    let args = ["-q", "justify", "--parameterization", "i", "--models", "FSM", "--thw", "observed"];
-    let (code, dossier, err) = lanesweep(&[&args[..], &["--backend", "cpu", "--out", &out], &small[..]].concat());
-    assert_eq!(code, Some(8), "undecided: {err}");
-    assert!(dossier.contains("recorded gap"), "{dossier}");
     let density = path("i.json");
     run(&[&["-q", "fit", "--parameterizations", "i", "--with-thw", "--out", &density], &small[..]].concat());
     let args = ["-q", "sample", &density, "--samples", "2000", "--thw", "observed", "--backend", "cpu", "--out"];

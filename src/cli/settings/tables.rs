@@ -47,8 +47,6 @@ pub(crate) struct Settings {
     pub compare: CompareSettings,
     /// `lanesweep search`, and cross-validation.
     pub search: crate::run::search::SearchLimits,
-    /// `lanesweep justify`: when a parameterization is appropriate.
-    pub justify: crate::run::justify::Rules,
 }
 
 impl Settings {
@@ -150,7 +148,7 @@ settings! {
         pub density: DensityKind = FitOptions::default().kind,
         /// Search interval of the bandwidth.
         pub bandwidth_rule: BandwidthRule = FitOptions::default().rule,
-        /// Sign of the lateral series of densities and of the replays that `compare` and `justify` compare with them.
+        /// Sign of the lateral series of densities and of the replays that are compared with them.
         pub svd_lateral: SvdLateral = FitOptions::default().parameterization.svd_lateral,
         /// Seed of P_valid and of the splits for M.
         pub seed: u64 = FitOptions::default().seed,
