@@ -6,7 +6,6 @@ pub use crate::model::driver::{Accelerations, LaneColumns, ModelId, VectorDriver
 pub use crate::model::profile::Profile;
 pub use crate::run::cases::Cases;
 pub use crate::run::check::{Check, Subject};
-pub use crate::run::compare::{Compare, CompareOptions};
 pub use crate::run::grid::{Map, MapOptions};
 pub use crate::run::parts::{Job, Shard};
 pub use crate::run::sampling::{Sample, SampleHeadways, SampleOptions};

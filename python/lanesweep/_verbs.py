@@ -35,7 +35,6 @@ if TYPE_CHECKING:
 
 __all__ = [
     "check",
-    "compare",
     "export_xosc",
     "fit",
     "map",
@@ -330,59 +329,6 @@ def sample(
     Result
     """
     return run("sample", locals(), default_out="sample")
-
-
-def compare(
-    recordings: Path | None = None,
-    *,
-    categories: Categories | None = None,
-    parameterizations: Keys | None = None,
-    models: Models | None = None,
-    thw: Headways | None = None,
-    samples: Int | None = None,
-    forms: bool = False,
-    hours: Float | None = None,
-    km: Float | None = None,
-    seed: Int | None = None,
-    out: Path | None = None,
-    **options: Unpack[_Replays],
-) -> Result:
-    """Find which parameterizations give the right risk, not only the right labels.
-
-    Simulates the recorded scenarios (S) and their parameterized replays (S'), fits a density per parameterization on the same
-    scenarios, draws scenarios from each, and compares the rates of failure, with the ratio to S and its interval. A ratio agrees if its
-    interval lies within the margin.
-
-    Parameters
-    ----------
-    recordings : path, optional
-        Folder of recordings, or a track file; by default recordings are generated.
-    categories : list of {"cut-in", "cut-out", "lvd"}
-        Kinds of scenario, by default all.
-    parameterizations : list of str
-        Keys, or files of `search`; by default all.
-    models : list of str or Driver
-        Driver models, by default Reg157, CCHDM, RSS and FSM.
-    thw : list of float
-        Time headways, s, as in `study`.
-    samples : int
-        Samples of each density, by default 20,000; each runs from every headway.
-    forms : bool
-        Sample Gaussian mixtures and copulas too, to see what the form of the density changes.
-    hours, km : float
-        Driven time, h, and distance, km, of all egos; by default those of the recordings.
-    seed : int
-        Seed of the draws.
-    out : path, optional
-        Folder of the files; without it they go with the result.
-    **options
-        `Data` and `Sweep` of `lanesweep.options`.
-
-    Returns
-    -------
-    Result
-    """
-    return run("compare", locals(), default_out="compare")
 
 
 def search(

@@ -41,13 +41,13 @@ pub(super) struct Configured {
 /// `--help` shows it, and its verbs. Range, default and help are the key's.
 type KeyFlag = (&'static str, &'static str, &'static str, &'static str, bool, &'static [&'static str]);
 
-const SWEEPING: &[&str] = &["study", "search", "sample", "compare", "map", "verify", "show"];
+const SWEEPING: &[&str] = &["study", "search", "sample", "map", "verify", "show"];
 const SIMULATING: &[&str] =
-    &["study", "search", "sample", "compare", "map", "verify", "show", "simulate", "xosc"];
-const GENERATING: &[&str] = &["study", "search", "fit", "compare", "verify", "show"];
+    &["study", "search", "sample", "map", "verify", "show", "simulate", "xosc"];
+const GENERATING: &[&str] = &["study", "search", "fit", "verify", "show"];
 
 #[rustfmt::skip] // a table: one line per flag
-pub(super) const FLAGS: [KeyFlag; 26] = [
+pub(super) const FLAGS: [KeyFlag; 24] = [
     ("run.threads", "threads", "", RUN, true, &["lanesweep"]),
     ("run.backend", "backend", "", RUN, false, SWEEPING),
     ("run.device", "device", "NAME|pci:BUS|INDEX", RUN, false, SWEEPING),
@@ -72,8 +72,6 @@ pub(super) const FLAGS: [KeyFlag; 26] = [
     ("search.max_parameters", "max_parameters", "", MODELS, false, &["search"]),
     ("search.studies", "studies", "", MODELS, false, &["search"]),
     ("search.seed", "seed", "", RUN, false, &["search"]),
-    ("compare.samples", "samples", "", MODELS, false, &["compare"]),
-    ("compare.seed", "seed", "", RUN, false, &["compare"]),
 ];
 
 /// Tables and keys that determine a plan's lanes; a plan file already contains them.

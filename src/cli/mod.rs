@@ -6,7 +6,6 @@ mod case_flags;
 mod check;
 mod check_results;
 mod check_table;
-mod compare;
 mod config;
 mod configured;
 mod console;
@@ -100,7 +99,6 @@ enum Verb {
     Fit(fit::Fit),
     Sample(Box<sample::Sample>),
     Search(Box<search::Search>),
-    Compare(Box<compare::Compare>),
     Synth(synth::Synth),
     Map(Box<map::Map>),
     Simulate(simulate::Simulate),
@@ -192,7 +190,6 @@ impl Verb {
             Verb::Fit(verb) => verb.run(configured),
             Verb::Sample(verb) => verb.run(configured),
             Verb::Search(verb) => verb.run(configured),
-            Verb::Compare(verb) => verb.run(configured),
             Verb::Synth(verb) => verb.run(configured),
             Verb::Map(verb) => verb.run(configured),
             Verb::Simulate(verb) => verb.run(configured),

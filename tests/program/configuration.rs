@@ -76,16 +76,13 @@ fn every_verb_takes_its_values_from_all_layers() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     let tables = "[run]\nbackend = \"cpu\"\n[generator]\nrecordings = 2\nduration_s = 100\n[score]\nseed = 11\n\
-                  min_failures = 20\n[fit]\nseed = 12\nvalid_draws = 1000\n[sample]\nseed = 13\nsamples = 1e2\n\
-                  [compare]\nseed = 14\nsamples = 50\n";
+                  min_failures = 20\n[fit]\nseed = 12\nvalid_draws = 1000\n[sample]\nseed = 13\nsamples = 1e2\n";
     std::fs::write(dir.join("a.toml"), tables).unwrap();
     let fit = ["fit", "--categories", "lvd", "--parameterizations", "i", "--no-comparison", "--out", "lvd-i.json"];
-    let compare = ["compare", "--categories", "lvd", "--parameterizations", "i", "--models", "FSM", "--thw", "1"];
-    let verbs: [(&[&str], &str, &str, &str, u64); 4] = [
+    let verbs: [(&[&str], &str, &str, &str, u64); 3] = [
         (&["study"], "lanesweep-out/run.json", "/score/seed", "score", 11),
         (&fit, "lvd-i.json", "/p_valid/seed", "fit", 12),
         (&["sample", "lvd-i.json"], "lanesweep-sample/estimate.json", "/seed", "sample", 13),
-        (&compare, "lanesweep-compare/compare.json", "/seed", "compare", 14),
     ];
     for (verb, result, pointer, table, in_file) in verbs {
         let assignment = format!("{table}.seed=31");
@@ -138,7 +135,7 @@ fn changed(key: &Key) -> Value {
         (_, "run.dt_s") => 0.05.into(),
         (_, "generator.recordings" | "run.threads") => 2.into(),
         (_, "generator.duration_s") => 100.0.into(),
-        (_, "sample.samples" | "compare.samples") => 2000.into(),
+        (_, "sample.samples") => 2000.into(),
         (_, "sample.estimator") => "mc".into(),
         (_, "fit.valid_draws") => 1000.into(),
         (_, "search.studies") => 24.into(),
@@ -167,7 +164,6 @@ fn every_record_names_every_setting_with_its_source() {
         json(&dir.join(record))
     };
     let fit = ["fit", "--parameterizations", "i", "--no-comparison", "--out", "i.json", "--format", "json"];
-    let compare = ["compare", "--parameterizations", "i", "--models", "FSM", "--thw", "1"];
     let map = ["map", "lvd", "--x", "deceleration_mps2=5,6", "--y", "ego_speed_kmh=60,70", "--set", "thw_s=1"];
     let records = [
         ("study", recorded("lanesweep-out/run.json", &["study", "--categories", "lvd"])),
@@ -177,7 +173,6 @@ fn every_record_names_every_setting_with_its_source() {
         }),
         ("fit", printed(&fit)),
         ("sample", recorded("lanesweep-sample/estimate.json", &["sample", "i.json", "--models", "FSM", "--thw", "1"])),
-        ("compare", recorded("lanesweep-compare/compare.json", &compare)),
         ("map", recorded("lanesweep-map/map.json", &map)),
         ("search", recorded("lanesweep-search/search.json", &["search", "--category", "lvd", "--criterion", "ttc"])),
     ];

@@ -78,7 +78,6 @@ fn smaller(line: &str) -> String {
         words[at + 1] = "300";
     }
     match words[1] {
-        "compare" if !words.contains(&"--samples") => words.extend(["--samples", "50"]),
         "search" => words.extend(["--studies", "24", "--max-parameters", "3", "--config", "generator.recordings=4"]),
         "fit" => words.extend(["--no-comparison", "--config", "fit.valid_draws=1000"]),
         // One lane is little already.

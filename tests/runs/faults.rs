@@ -170,7 +170,6 @@ fn an_output_that_is_a_file_or_inside_one_is_refused_before_the_work() {
         "sample density.json --samples 1000 --out @",
         "sample density.json --samples 1000 --out @ --shard 0/2",
         "sample density.json --samples 1000 --out @ --estimator is",
-        "compare --scenarios scenarios.jsonl --samples 1000 --out @",
         "fit --scenarios scenarios.jsonl --out @",
         "synth @",
         "merge @",

@@ -107,12 +107,6 @@ const VERBS: [Verb; 17] = [
         "map lvd --x deceleration_mps2=1..9/0.5 --y ego_speed_kmh=30..130/5 --set thw_s=1.2 --out out",
     ),
     verb(
-        "compare",
-        Some("compare.json"),
-        Some("compare --synth-recordings 1 --categories cut-in --parameterizations 1 --samples 50 --thw 1.0 --out out"),
-        "compare --synth-recordings 2 --categories lvd --parameterizations i --samples 300 --thw 1.0,0.6 --out out",
-    ),
-    verb(
         "search",
         Some("search.json"),
         Some(

@@ -4,7 +4,6 @@
 mod common;
 
 mod against_recorded;
-mod compare;
 mod faults;
 mod interrupted;
 mod kills;

@@ -218,11 +218,6 @@ fn every_verb_takes_observed_headways_and_says_how_many_failures_come_from_close
     let out = path("study");
     let answer = run(&[&["-q", "study", "--thw", "observed", "--backend", "cpu", "--out", &out], &small[..]].concat());
     assert!(answer.contains("recorded THW"), "{answer}");
-    let out = path("compare");
-    let args = ["-q", "compare", "--parameterizations", "2,i", "--samples", "2000", "--thw", "observed"];
-    let compared = run(&[&args[..], &["--backend", "cpu", "--out", &out], &small[..]].concat());
-    assert!(compared.contains("from their recorded gaps") && compared.contains("headways below 0.5 s"), "{compared}");
-    assert!(!compared.contains("imposed"), "{compared}");
     let density = path("i.json");
     run(&[&["-q", "fit", "--parameterizations", "i", "--with-thw", "--out", &density], &small[..]].concat());
     let args = ["-q", "sample", &density, "--samples", "2000", "--thw", "observed", "--backend", "cpu", "--out"];

@@ -64,12 +64,6 @@ fn densities_and_samples_print_what_their_files_hold() {
     let printed = json(dir.path(), &sample);
     let file: Value = serde_json::from_slice(&std::fs::read(dir.path().join("s/estimate.json")).unwrap()).unwrap();
     assert_eq!(printed, file);
-
-    let compare = ["compare", "--samples", "100", "--parameterizations", "i", "--categories", "lvd", "--out", "c"];
-    let compare: Vec<&str> = compare.iter().chain(&SMALL).copied().collect();
-    let printed = json(dir.path(), &compare);
-    let file: Value = serde_json::from_slice(&std::fs::read(dir.path().join("c/compare.json")).unwrap()).unwrap();
-    assert_eq!(printed, file);
 }
 
 #[test]

@@ -3,7 +3,7 @@
 
 use lanesweep::stats::density::{Mixture, normal_cdf};
 use lanesweep::stats::estimate::{
-    AdaptiveRun, BlockSums, Density, Enough, Estimate, Goal, Importance, LimitState, Search, StandardNormal, Truncated,
+    AdaptiveRun, BlockSums, Density, Estimate, Goal, Importance, LimitState, Search, StandardNormal, Truncated,
     Verdict, Warning, WeightSums, adaptive, from_weight_sums, importance, importance_sums, weighted_ratio,
 };
 
@@ -240,7 +240,7 @@ fn the_ratio_of_two_questions_about_the_same_draws_is_known_better_than_either()
         let options = Importance { seed, draws: 2000, crude_per_draw: 1 };
         let sums = importance_sums(&density, &proposal, &TwoLevels, &options, 0..2000, &[[1, 0]]).unwrap();
         let [near, far, both] = [0, 1, 2].map(|at| sums[at].total().unwrap());
-        let ratio = weighted_ratio([&far, &near, &both], Enough::default(), 0.95);
+        let ratio = weighted_ratio([&far, &near, &both], 0.95);
         let (low, high) = ratio.interval().unwrap();
         held += u64::from((low..=high).contains(&truth));
         let width = |sums: &WeightSums| {

@@ -3,18 +3,14 @@
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-use crate::engine::{BackendChoice, Headway};
+use crate::engine::BackendChoice;
 use crate::model::criterion::Criterion;
-use crate::model::driver::{Bound, ModelId};
-use crate::run::compare::CompareOptions;
+use crate::model::driver::Bound;
 use crate::run::sampling::SampleSource;
 use crate::run::score::ScoreOptions;
-use crate::run::study::StudyOptions;
-use crate::scenario::Category;
-use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, SvdLateral};
+use crate::scenario::parameterization::{ParameterizationOptions, SvdLateral};
 use crate::settings;
 use crate::stats::density::{BandwidthRule, DensityKind, FitOptions};
-use crate::stats::estimate::Enough;
 use crate::traffic::mining::MiningOptions;
 use crate::traffic::trajectory::generator::GeneratorOptions;
 
@@ -43,8 +39,6 @@ pub(crate) struct Settings {
     pub map: MapSettings,
     /// `lanesweep verify`.
     pub verify: VerifySettings,
-    /// `lanesweep compare`.
-    pub compare: CompareSettings,
     /// `lanesweep search`, and cross-validation.
     pub search: crate::run::search::SearchLimits,
 }
@@ -53,32 +47,6 @@ impl Settings {
     /// Options of the parameterizations of densities, and of the replays compared with them.
     pub(crate) fn of_densities(&self) -> ParameterizationOptions {
         ParameterizationOptions { svd_lateral: self.fit.svd_lateral, ..self.parameterization.clone() }
-    }
-
-    /// Options of comparing scenarios, their replays and densities, with the densities' usual form alone.
-    pub(crate) fn comparison(
-        &self,
-        categories: Vec<Category>,
-        models: Vec<ModelId>,
-        headways: Vec<Headway>,
-        parameterizations: Vec<Parameterization>,
-    ) -> CompareOptions {
-        CompareOptions {
-            study: StudyOptions {
-                categories,
-                models,
-                headways,
-                parameterization: self.of_densities(),
-                folds: None,
-                searched: parameterizations.iter().filter(|id| id.fitted_basis().is_some()).cloned().collect(),
-                external: Vec::new(),
-            },
-            parameterizations,
-            samples: self.compare.samples,
-            every_form: false,
-            seed: self.compare.seed,
-            enough: Enough { clusters: self.score.min_failures.into(), margin: self.compare.margin },
-        }
     }
 }
 
@@ -240,21 +208,5 @@ settings! {
         /// Units of 12 lanes per model, threshold and category.
         #[schemars(range(min = 1, max = 100_000))]
         pub threshold_units: u64 = 64,
-    }
-}
-
-settings! {
-    /// `lanesweep compare`.
-    #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
-    #[serde(deny_unknown_fields, default)]
-    pub(crate) struct CompareSettings {
-        /// Samples of each density; each runs from every headway.
-        #[schemars(range(min = 1, max = 281_474_976_710_655_u64))]
-        pub samples: u64 = 20_000,
-        /// Seed of the draws.
-        pub seed: u64 = 157,
-        /// Rates agree if the interval of their ratio lies between 1/margin and margin (1.25).
-        #[schemars(extend("exclusiveMinimum" = 1.0, "maximum" = 100.0))]
-        pub margin: f64 = Enough::default().margin,
     }
 }

@@ -110,7 +110,7 @@ impl EstimateRow {
         let of_rate = rate.map_or(0.0, |rate| (rate.standard_deviation / rate.estimate).powi(2));
         // The variance of ln X is about ln(1 + relative variance of X).
         let parts = [of_draws / square, of_data / square, of_rate].map(libm::log1p);
-        self.uncertainty = Uncertainty::new(parts, None, None);
+        self.uncertainty = Uncertainty::new(parts);
         self
     }
 }

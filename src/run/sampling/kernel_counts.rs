@@ -6,7 +6,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::engine::{Chunk, LanePlan, Verdicts};
 use crate::model::criterion::Criterion;
-use crate::stats::estimate::{ClusterRate, Clusters, Enough, Ratio, cluster_rate, paired_ratio};
+use crate::stats::estimate::{ClusterRate, Clusters, Ratio, cluster_rate, paired_ratio};
 
 /// Maximum number of groups of kernels: kernel k counts in group k mod 512. With fewer kernels, each is a group. With
 /// more kernels, groups vary as much as kernels do, and a journal stays small.
@@ -110,7 +110,7 @@ impl KernelCounts {
     pub(super) fn ratio(&self, cells: &[usize], (other, of_other): (&KernelCounts, &[usize]), level: f64) -> Ratio {
         let ((runs, failures), (other_runs, other_failures)) = (self.over(cells), other.over(of_other));
         let other = Clusters { runs: &other_runs, failures: &other_failures };
-        paired_ratio(Clusters { runs: &runs, failures: &failures }, other, Enough::default(), level)
+        paired_ratio(Clusters { runs: &runs, failures: &failures }, other, level)
     }
 
     /// Lanes and failed lanes over some cells, group by group.

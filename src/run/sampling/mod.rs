@@ -5,7 +5,6 @@
 
 mod against_recorded;
 mod cheaper_estimator;
-mod compare;
 mod crude;
 mod estimate_rows;
 mod failure_map;
@@ -27,11 +26,6 @@ mod weighted;
 mod worst;
 
 pub use cheaper_estimator::Choice;
-pub use compare::{
-    CategoryComparison, ComparedCell, ComparedForm, ComparedParameterization, RateRecord, RecordedCell, ReplayedCell,
-    SampledCell, SampledScenarios, ScenarioCounts, kernel_scenarios, sample_by_scenario,
-};
-pub(crate) use compare::{compare_cells, recorded_cells};
 pub use crude::{Checkpoint, CheckpointRow, CrudeRun, cuts, sample_crude, sample_into};
 pub use estimate_rows::{EstimateRow, RecordedRatios, Risk, RiskRate};
 pub use failure_map::{MAP_CELLS, MapAxes, MapAxis, MapCounts};

@@ -14,12 +14,6 @@ pub struct Uncertainty {
     pub scenarios: f64,
     /// Fraction caused by the frequency of scenarios: more recordings reduce it.
     pub exposure: f64,
-    /// Fraction caused by the form of the density, from the spread over several; `None` if only one was sampled.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub form: Option<f64>,
-    /// Fraction caused by the parameterization, from the spread over several; `None` if only one was sampled.
-    #[serde(skip_serializing_if = "Option::is_none")]
-    pub parameterization: Option<f64>,
     /// Factor on the recorded hours that halves the interval; `None` if the other parts alone keep it wider.
     pub hours_factor: Option<f64>,
     /// Factor on the samples that halves the interval; `None` if the other parts alone keep it wider.
@@ -28,13 +22,8 @@ pub struct Uncertainty {
 
 impl Uncertainty {
     /// From the variances of ln of the risk, part by part. `None` if their sum is 0 or not finite.
-    pub(super) fn new(
-        [draws, scenarios, exposure]: [f64; 3],
-        form: Option<f64>,
-        parameterization: Option<f64>,
-    ) -> Option<Uncertainty> {
-        let choices = form.unwrap_or(0.0) + parameterization.unwrap_or(0.0);
-        let sum = draws + scenarios + exposure + choices;
+    pub(super) fn new([draws, scenarios, exposure]: [f64; 3]) -> Option<Uncertainty> {
+        let sum = draws + scenarios + exposure;
         let is_known = sum.is_finite() && sum > 0.0;
         // Half the width is a quarter of the variance.
         let factor = |reduced: f64| Some(reduced / (0.25 * sum - (sum - reduced))).filter(|factor| *factor > 0.0);
@@ -43,8 +32,6 @@ impl Uncertainty {
             draws: draws / sum,
             scenarios: scenarios / sum,
             exposure: exposure / sum,
-            form: form.map(|form| form / sum),
-            parameterization: parameterization.map(|of| of / sum),
             hours_factor: factor(scenarios + exposure),
             samples_factor: factor(draws),
         })
@@ -57,23 +44,15 @@ mod tests {
 
     #[test]
     fn parts_sum_to_one_and_the_factors_halve_the_width() {
-        let of = Uncertainty::new([0.0001, 0.02, 0.003], None, None).unwrap();
+        let of = Uncertainty::new([0.0001, 0.02, 0.003]).unwrap();
         assert!((of.draws + of.scenarios + of.exposure - 1.0).abs() < 1e-12);
         let factor = of.hours_factor.unwrap();
         let after = of.draws + (of.scenarios + of.exposure) / factor;
         assert!((after - 0.25).abs() < 1e-12, "{after}");
         assert_eq!(of.samples_factor, None, "the recordings alone are wider");
-        let of = Uncertainty::new([0.02, 0.0001, 0.0], None, None).unwrap();
+        let of = Uncertainty::new([0.02, 0.0001, 0.0]).unwrap();
         assert!((of.draws / of.samples_factor.unwrap() + of.scenarios - 0.25).abs() < 1e-12);
-        assert_eq!(Uncertainty::new([f64::NAN, 0.0, 0.0], None, None), None);
-        assert_eq!(Uncertainty::new([0.0; 3], None, None), None);
-    }
-
-    #[test]
-    fn choices_that_data_cannot_settle_are_parts_too() {
-        let of = Uncertainty::new([0.01, 0.05, 0.01], Some(0.02), Some(0.11)).unwrap();
-        let choices = of.form.unwrap() + of.parameterization.unwrap();
-        assert!((choices - 0.65).abs() < 1e-12 && (of.deviation - 0.2_f64.sqrt()).abs() < 1e-12);
-        assert_eq!((of.hours_factor, of.samples_factor), (None, None), "neither halves the interval");
+        assert_eq!(Uncertainty::new([f64::NAN, 0.0, 0.0]), None);
+        assert_eq!(Uncertainty::new([0.0; 3]), None);
     }
 }

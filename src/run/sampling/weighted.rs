@@ -13,7 +13,7 @@ use super::{Sample, Weighted};
 use crate::engine::{CpuBackend, Executor, lanes_within_seconds};
 use crate::run::parts::{Ledger, MergeableCounts};
 use crate::stats::estimate::{
-    BlockSums, Enough, Estimate, Found, Importance, Search, WeightSums, from_weight_sums, importance_sums, search,
+    BlockSums, Estimate, Found, Importance, Search, WeightSums, from_weight_sums, importance_sums, search,
     weighted_ratio,
 };
 use crate::support::cancel::Cancel;
@@ -151,7 +151,7 @@ impl Sample {
                 other: other.model,
                 criterion: question.criterion,
                 headway: options.headway_name(question.headway),
-                ratio: weighted_ratio([&of(ours), &of(theirs), &of(both)], Enough::default(), options.level),
+                ratio: weighted_ratio([&of(ours), &of(theirs), &of(both)], options.level),
             }
         };
         let ratios = options.pairs().into_iter().zip(&tally.pairs).map(ratio).collect();

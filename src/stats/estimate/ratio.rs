@@ -95,7 +95,7 @@ pub fn cluster_rate(clusters: Clusters, level: f64) -> ClusterRate {
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RatioVerdict {
-    /// The interval of the ratio lies within [1/margin, margin].
+    /// The interval of the ratio lies within 0.8 to 1.25.
     Agrees,
     /// The interval is above 1 and extends beyond the margin.
     TooHigh,
@@ -106,20 +106,6 @@ pub enum RatioVerdict {
 }
 
 impl RatioVerdict {
-    /// All, in the order of every table.
-    pub const ALL: [RatioVerdict; 4] =
-        [RatioVerdict::Agrees, RatioVerdict::TooHigh, RatioVerdict::TooLow, RatioVerdict::Undecided];
-
-    /// Text for reports.
-    pub fn text(self) -> &'static str {
-        match self {
-            RatioVerdict::Agrees => "agrees",
-            RatioVerdict::TooHigh => "too high",
-            RatioVerdict::TooLow => "too low",
-            RatioVerdict::Undecided => "undecided",
-        }
-    }
-
     /// One-character symbol.
     pub fn mark(self) -> char {
         match self {
@@ -150,21 +136,12 @@ pub enum RatioMethod {
     Draws,
 }
 
-/// Requirements of a verdict: failing clusters on each side for the paired interval, and a margin for agreement.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
-pub struct Enough {
-    /// Required number of clusters with a failed run.
-    pub clusters: u64,
-    /// Ratio up to which rates count as equal, above 1.
-    pub margin: f64,
-}
+/// Failing clusters on each side that the paired interval requires.
+const MIN_FAILING: u64 = 10;
 
-impl Default for Enough {
-    fn default() -> Self {
-        // 0.8 … 1.25: the limits of bioequivalence of two drugs (European Medicines Agency, CPMP/EWP/QWP/1401/98).
-        Enough { clusters: 10, margin: 1.25 }
-    }
-}
+/// Ratio up to which rates count as equal. 0.8 … 1.25 are the limits of bioequivalence of two drugs (European Medicines
+/// Agency, CPMP/EWP/QWP/1401/98).
+const MARGIN: f64 = 1.25;
 
 /// A ratio of rates. Values that are not finite are `None`.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -183,23 +160,17 @@ pub struct Ratio {
 
 impl Ratio {
     /// From the standard deviation of the logarithm.
-    fn of_logarithm(ratio: f64, sigma: f64, freedom: f64, method: RatioMethod, enough: Enough, level: f64) -> Ratio {
+    fn of_logarithm(ratio: f64, sigma: f64, freedom: f64, method: RatioMethod, level: f64) -> Ratio {
         let finite = |v: f64| v.is_finite().then_some(v);
         let factor = libm::exp(student_quantile(0.5 + 0.5 * level, freedom) * sigma);
         let (low, high) = (ratio / factor, ratio * factor);
         let verdict = match () {
-            () if low >= 1.0 / enough.margin && high <= enough.margin => RatioVerdict::Agrees,
+            () if low >= 1.0 / MARGIN && high <= MARGIN => RatioVerdict::Agrees,
             () if low > 1.0 => RatioVerdict::TooHigh,
             () if high < 1.0 => RatioVerdict::TooLow,
             () => RatioVerdict::Undecided,
         };
         Ratio { ratio: Some(ratio), low: finite(low), high: finite(high), method, verdict }
-    }
-
-    /// Both ends; the upper end is ∞ if the denominator never fails and the numerator does.
-    pub fn interval(&self) -> Option<(f64, f64)> {
-        let open = self.low.filter(|low| self.ratio.is_none() && *low > 0.0);
-        self.low.zip(self.high).or(open.map(|low| (low, f64::INFINITY)))
     }
 }
 
@@ -214,10 +185,10 @@ impl Ratio {
 ///
 /// With too few failing clusters the interval is [P_low/S_high, P_high/S_low] of [`cluster_rate`]. If it excludes 1, it
 /// still decides; otherwise the verdict is undecided, not agreement.
-pub fn paired_ratio(numerator: Clusters, denominator: Clusters, enough: Enough, level: f64) -> Ratio {
+pub fn paired_ratio(numerator: Clusters, denominator: Clusters, level: f64) -> Ratio {
     let finite = |v: f64| v.is_finite().then_some(v);
     let (p, s) = (numerator.rate(), denominator.rate());
-    let side = |c: Clusters| c.failing() >= enough.clusters.max(2);
+    let side = |c: Clusters| c.failing() >= MIN_FAILING;
     if !(side(numerator) && side(denominator)) {
         let (above, below) = (cluster_rate(numerator, level).interval, cluster_rate(denominator, level).interval);
         let (low, high) = (above.low / below.high, above.high / below.low);
@@ -234,12 +205,12 @@ pub fn paired_ratio(numerator: Clusters, denominator: Clusters, enough: Enough, 
     let squares: f64 = pairs.map(|(z, y)| (z / p - y / s) * (z / p - y / s)).sum();
     let sigma = (n / (n - 1.0) * squares).sqrt();
     let freedom = numerator.failing().min(denominator.failing()) as f64 - 1.0;
-    Ratio::of_logarithm(p / s, sigma, freedom, RatioMethod::Paired, enough, level)
+    Ratio::of_logarithm(p / s, sigma, freedom, RatioMethod::Paired, level)
 }
 
 /// The ratio of two probabilities from the same weighted draws (common random numbers); `both` has the sums over the
 /// draws that fail both questions. Delta method on the logarithm.
-pub fn weighted_ratio([numerator, denominator, both]: [&WeightSums; 3], enough: Enough, level: f64) -> Ratio {
+pub fn weighted_ratio([numerator, denominator, both]: [&WeightSums; 3], level: f64) -> Ratio {
     let (p, s) = (numerator.probability(), denominator.probability());
     if p <= 0.0 || s <= 0.0 {
         let ratio = (s > 0.0).then_some(0.0);
@@ -251,7 +222,7 @@ pub fn weighted_ratio([numerator, denominator, both]: [&WeightSums; 3], enough: 
     let sigma = (own - 2.0 * covariance / (p * s)).max(0.0).sqrt();
     let effective = |sums: &WeightSums| sums.figures().effective_failures;
     let freedom = effective(numerator).min(effective(denominator)) - 1.0;
-    Ratio::of_logarithm(p / s, sigma, freedom, RatioMethod::Draws, enough, level)
+    Ratio::of_logarithm(p / s, sigma, freedom, RatioMethod::Draws, level)
 }
 
 #[cfg(test)]
@@ -296,14 +267,10 @@ mod tests {
         let runs = vec![10; 40];
         let denominator: Vec<u64> = (0..40).map(|k| [0, 6, 0, 0][k % 4]).collect();
         let numerator: Vec<u64> = (0..40).map(|k| [0, 3, 0, 4][k % 4]).collect();
-        let of = |margin: f64| {
-            let enough = Enough { margin, ..Enough::default() };
-            let side = |failures| Clusters { runs: &runs, failures };
-            paired_ratio(side(&numerator), side(&denominator), enough, 0.95)
-        };
-        let (narrow, wide) = (of(1.25), of(3.0));
-        assert!(narrow.low < Some(1.0) && narrow.high > Some(1.25), "{narrow:?}");
-        assert_eq!((narrow.verdict, wide.verdict), (RatioVerdict::Undecided, RatioVerdict::Agrees));
+        let side = |failures| Clusters { runs: &runs, failures };
+        let ratio = paired_ratio(side(&numerator), side(&denominator), 0.95);
+        assert!(ratio.low < Some(1.0) && ratio.high > Some(1.25), "{ratio:?}");
+        assert_eq!(ratio.verdict, RatioVerdict::Undecided);
     }
 
     #[test]
@@ -312,9 +279,9 @@ mod tests {
         let failures: Vec<u64> = (0..100).map(|k| [0, 0, 4, 10][k % 4]).collect();
         let half: Vec<u64> = failures.iter().map(|k| k / 2).collect();
         let all = Clusters { runs: &runs, failures: &failures };
-        let same = paired_ratio(all, all, Enough::default(), 0.95);
+        let same = paired_ratio(all, all, 0.95);
         assert_eq!((same.low, same.high, same.verdict), (Some(1.0), Some(1.0), RatioVerdict::Agrees));
-        let low = paired_ratio(Clusters { runs: &runs, failures: &half }, all, Enough::default(), 0.95);
+        let low = paired_ratio(Clusters { runs: &runs, failures: &half }, all, 0.95);
         assert_eq!((low.ratio, low.verdict), (Some(0.5), RatioVerdict::TooLow));
     }
 
@@ -327,7 +294,7 @@ mod tests {
             let failures = with(failing);
             let some = Clusters { runs: &runs, failures: &failures };
             let nothing = Clusters { runs: &runs, failures: &none };
-            let ratio = |a, b| paired_ratio(a, b, Enough::default(), 0.95);
+            let ratio = |a, b| paired_ratio(a, b, 0.95);
             (ratio(some, nothing).verdict, ratio(nothing, some).verdict)
         };
         assert_eq!(of(0), (RatioVerdict::Undecided, RatioVerdict::Undecided));
@@ -357,7 +324,7 @@ mod tests {
             }
             let runs = vec![m; n as usize];
             let over = Clusters { runs: &draws, failures: &sampled };
-            let ratio = paired_ratio(over, Clusters { runs: &runs, failures: &recorded }, Enough::default(), 0.95);
+            let ratio = paired_ratio(over, Clusters { runs: &runs, failures: &recorded }, 0.95);
             let (low, high) = (ratio.low.unwrap(), ratio.high.unwrap());
             held += u64::from(low <= 0.8 && 0.8 <= high);
             width += libm::log(high / low) / repeats as f64;
