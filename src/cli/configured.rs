@@ -42,8 +42,7 @@ pub(super) struct Configured {
 type KeyFlag = (&'static str, &'static str, &'static str, &'static str, bool, &'static [&'static str]);
 
 const SWEEPING: &[&str] = &["study", "search", "sample", "map", "verify", "show"];
-const SIMULATING: &[&str] =
-    &["study", "search", "sample", "map", "verify", "show", "simulate", "xosc"];
+const SIMULATING: &[&str] = &["study", "search", "sample", "map", "verify", "show", "simulate", "xosc"];
 const GENERATING: &[&str] = &["study", "search", "fit", "verify", "show"];
 
 #[rustfmt::skip] // a table: one line per flag

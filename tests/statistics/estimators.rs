@@ -241,7 +241,7 @@ fn the_ratio_of_two_questions_about_the_same_draws_is_known_better_than_either()
         let sums = importance_sums(&density, &proposal, &TwoLevels, &options, 0..2000, &[[1, 0]]).unwrap();
         let [near, far, both] = [0, 1, 2].map(|at| sums[at].total().unwrap());
         let ratio = weighted_ratio([&far, &near, &both], 0.95);
-        let (low, high) = ratio.interval().unwrap();
+        let (low, high) = (ratio.low.unwrap(), ratio.high.unwrap());
         held += u64::from((low..=high).contains(&truth));
         let width = |sums: &WeightSums| {
             let interval = from_weight_sums(sums, 0.95).interval;

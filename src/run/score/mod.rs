@@ -83,7 +83,7 @@ pub fn f1_interval<'a>(
 /// The interval of a share of hits among all, from the counts of each scenario as clusters.
 ///
 /// `None` if fewer than [`ScoreOptions::min_failures`] scenarios have any.
-pub(crate) fn share_interval<'a>(
+fn share_interval<'a>(
     scenarios: impl Iterator<Item = &'a Confusion<u32>>,
     missed: fn(&Confusion<u32>) -> u32,
     options: &ScoreOptions,

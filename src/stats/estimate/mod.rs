@@ -30,9 +30,7 @@ pub use interval::{Interval, IntervalKind, clopper_pearson, gamma, wilson};
 pub use kernels::{KernelShares, kernel_shares};
 pub use limit_state::{ATTEMPTS, Density, Draw, Failure, LimitState, StandardNormal, Truncated};
 pub use monte_carlo::{BinomialInterval, Counts, from_clusters, from_counts};
-pub use ratio::{
-    ClusterRate, Clusters, Ratio, RatioMethod, RatioVerdict, cluster_rate, paired_ratio, weighted_ratio,
-};
+pub use ratio::{ClusterRate, Clusters, Ratio, RatioMethod, RatioVerdict, cluster_rate, paired_ratio, weighted_ratio};
 pub use search::{Found, Search, SearchRound, SearchRun, search};
 pub use stop::{Checkpoints, StopReason, StopRule};
 pub use summary::Estimate;
