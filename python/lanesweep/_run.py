@@ -65,12 +65,6 @@ def progress() -> tuple[Callable[[str, int, int], None] | None, Callable[[], Non
 _GROUPS = ("options", "case")
 #: Arguments that take names with values.
 _TABLES = ("config", "given", "panel", "set")
-#: Files of a result that stand for it.
-_FILES = {
-    "plan": "plan.json",
-    "external": "winner.json",
-    "parameterizations": "winner.json",
-}
 
 
 def plain(value: Any, name: str) -> Any:
@@ -178,10 +172,9 @@ def run(function: str, arguments: Mapping[str, Any], *, default_out: str | None 
         given |= arguments.get(group, {})
     if given.get("models") is not None:
         given["models"] = names_of(given["models"])
-    for name, file in _FILES.items():
-        result = given.get(name)
-        if isinstance(result, Result) and result.folder is not None and (result.folder / file).is_file():
-            given[name] = result.folder / file
+    plan = given.get("plan")
+    if isinstance(plan, Result) and plan.folder is not None and (plan.folder / "plan.json").is_file():
+        given["plan"] = plan.folder / "plan.json"
     keep = None
     if is_table(given.get("scenarios")):
         keep = temporary()

@@ -41,7 +41,6 @@ __all__ = [
     "merge",
     "mine",
     "sample",
-    "search",
     "study",
     "synth",
     "trace",
@@ -55,9 +54,6 @@ class _Mining(Plausibility, Run, total=False):
 
 
 class _Fit(Data, Run, total=False): ...
-
-
-class _Replays(Data, Sweep, total=False): ...
 
 
 class _Study(Data, Split, total=False): ...
@@ -102,8 +98,8 @@ def study(
         Time headways, s. ``"paper"``, the default: 2.0, 1.8, … 0.2, which the paper's claims need. ``"r157"``: the minimum following
         distance of UN R157, 5.2.3.3, at the ego's speed; a list may contain it. ``"observed"``: the recorded gaps.
     external : list of paths, or mapping of names to tables
-        S' of another program: scenario files with the ids of S, whose series may have any sample rate and length; or
-        winner.json of `search`. Tables of pandas, Polars or pyarrow have a name each.
+        S' of another program: scenario files with the ids of S, whose series may have any sample rate and length.
+        Tables of pandas, Polars or pyarrow have a name each.
     cross_validate : bool
         Also replay scenarios by bases that have not seen them: each decomposition gets a variant, such as ``5-cv``. A basis fitted on
         the scenarios that it replays flatters itself.
@@ -219,7 +215,7 @@ def fit(
     categories : list of {"cut-in", "cut-out", "lvd"}
         Kinds of scenario, by default all.
     parameterizations : list of str
-        1 to 7 of cut-ins, a to g of cut-outs, i to v of leader decelerations, or files of `search`; by default all.
+        1 to 7 of cut-ins, a to g of cut-outs, i to v of leader decelerations; by default all.
     with_thw : bool
         Add the observed time headway as a parameter (thw_s).
     density : {"kernel", "mixture", "copula"}
@@ -329,70 +325,6 @@ def sample(
     Result
     """
     return run("sample", locals(), default_out="sample")
-
-
-def search(
-    recordings: Path | None = None,
-    *,
-    category: Category,
-    models: Models | None = None,
-    criterion: Criterion | None = None,
-    objective: Literal["f1", "recall", "risk"] | None = None,
-    thw: Headways | None = None,
-    held_out: Path | None = None,
-    max_parameters: Int | None = None,
-    studies: Int | None = None,
-    folds: Int | None = None,
-    shuffled: bool = False,
-    shard: str | None = None,
-    seed: Int | None = None,
-    out: Path | None = None,
-    **options: Unpack[_Replays],
-) -> Result:
-    """Search for the parameterization with the fewest parameters that keeps the outcomes.
-
-    Fits descriptions of many families and sizes: decompositions, physical features, polynomials, splines, constant accelerations, and
-    decompositions whose weights are tuned to the outcomes. Scores each by cross-validation over recordings. The best of each size form a
-    front beside the paper's parameterizations. The winner, winner.json, is a file for `study`, `fit` and `sample`.
-
-    Parameters
-    ----------
-    recordings : path, optional
-        Folder of recordings, or a track file; by default recordings are generated.
-    category : {"cut-in", "cut-out", "lvd"}
-        Kind of scenario.
-    models : list of str or Driver
-        Driver models, by default Reg157, CCHDM, RSS and FSM.
-    criterion : {"collision", "ttc", "btn"}
-        Criterion, by default collision.
-    objective : {"f1", "recall", "risk"}
-        What to keep: F1, the default, recall, or the ratio of failure rates.
-    thw : list of float
-        Time headways, s, as in `study`.
-    held_out : path
-        Recordings or scenario file that the search does not read, to judge its front.
-    max_parameters : int
-        Maximum number of parameters, the duration counted; 8 by default.
-    studies : int
-        Studies for the optimiser of the weights; 8,000 by default.
-    folds : int
-        Folds of the cross-validation; 5 by default.
-    shuffled : bool
-        Give every scenario the outcomes of another one: no gain may be left on held-out data.
-    shard : str
-        ``"0/8"``: evaluate part 0 of 8 only; parts share `out`. The call without it, with the same `out`, concludes.
-    seed : int
-        Seed of the optimiser.
-    out : path, optional
-        Folder of results and journals; without it they go with the result.
-    **options
-        `Data` and `Sweep` of `lanesweep.options`.
-
-    Returns
-    -------
-    Result
-    """
-    return run("search", locals(), default_out="search")
 
 
 def map(

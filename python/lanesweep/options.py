@@ -29,8 +29,8 @@ Criterion: TypeAlias = Literal["collision", "ttc", "btn"]
 Models: TypeAlias = "str | Driver | Collection[str | Driver] | npt.NDArray[Any]"
 #: Seconds; ``"paper"``, ``"r157"``, ``"observed"``.
 Headways: TypeAlias = "str | Float | Collection[str | Float] | npt.NDArray[Any]"
-#: Keys of parameterizations, or files of `search`.
-Keys: TypeAlias = "str | Int | Path | Collection[str | Int | Path] | npt.NDArray[Any]"
+#: Keys of parameterizations.
+Keys: TypeAlias = "str | Int | Collection[str | Int] | npt.NDArray[Any]"
 #: A speed with its unit: ``"60km/h"``, ``"16.7m/s"``; or 0.
 Speed: TypeAlias = "str | Literal[0]"
 #: A file, or keys with their values: ``{"mining.leader_max_thw_s": 2.5}``.

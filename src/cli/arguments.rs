@@ -204,7 +204,7 @@ pub(super) fn choice<T: ValueEnum>(value: &Value) -> std::result::Result<T, Stri
 
 /// An argument that means nothing without another one, by verb.
 pub(super) const NEEDS: [(&[&str], &str, &str); 13] = [
-    (&["study", "search", "fit", "verify", "mine"], "preset", "recordings"),
+    (&["study", "fit", "verify", "mine"], "preset", "recordings"),
     (&["check"], "scenario", "file"),
     (&["check"], "row", "file"),
     (&["check"], "draws", "uncertain"),

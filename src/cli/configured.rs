@@ -41,12 +41,12 @@ pub(super) struct Configured {
 /// `--help` shows it, and its verbs. Range, default and help are the key's.
 type KeyFlag = (&'static str, &'static str, &'static str, &'static str, bool, &'static [&'static str]);
 
-const SWEEPING: &[&str] = &["study", "search", "sample", "map", "verify", "show"];
-const SIMULATING: &[&str] = &["study", "search", "sample", "map", "verify", "show", "simulate", "xosc"];
-const GENERATING: &[&str] = &["study", "search", "fit", "verify", "show"];
+const SWEEPING: &[&str] = &["study", "sample", "map", "verify", "show"];
+const SIMULATING: &[&str] = &["study", "sample", "map", "verify", "show", "simulate", "xosc"];
+const GENERATING: &[&str] = &["study", "fit", "verify", "show"];
 
 #[rustfmt::skip] // a table: one line per flag
-pub(super) const FLAGS: [KeyFlag; 24] = [
+pub(super) const FLAGS: [KeyFlag; 20] = [
     ("run.threads", "threads", "", RUN, true, &["lanesweep"]),
     ("run.backend", "backend", "", RUN, false, SWEEPING),
     ("run.device", "device", "NAME|pci:BUS|INDEX", RUN, false, SWEEPING),
@@ -67,10 +67,6 @@ pub(super) const FLAGS: [KeyFlag; 24] = [
     ("sample.time_limit_s", "time_limit", "", MODELS, true, &["sample"]),
     ("sample.worst", "worst", "", OUTPUT, true, &["sample"]),
     ("sample.seed", "seed", "", RUN, false, &["sample"]),
-    ("search.folds", "folds", "", MODELS, true, &["search"]),
-    ("search.max_parameters", "max_parameters", "", MODELS, false, &["search"]),
-    ("search.studies", "studies", "", MODELS, false, &["search"]),
-    ("search.seed", "seed", "", RUN, false, &["search"]),
 ];
 
 /// Tables and keys that determine a plan's lanes; a plan file already contains them.
@@ -80,7 +76,7 @@ const OF_THE_PLAN: [&str; 9] = [
     "parameterization.",
     "score.",
     "sample.",
-    "search.folds",
+    "study.folds",
     "study.reference",
     "run.profile",
     "run.dt_s",

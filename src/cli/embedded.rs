@@ -19,13 +19,12 @@ pub const STACK_BYTES: usize = 8 << 20;
 type Function = (&'static str, &'static [&'static str], fn(&mut Arguments) -> Result<Verb>);
 
 #[rustfmt::skip] // a table
-const FUNCTIONS: [Function; 13] = [
+const FUNCTIONS: [Function; 12] = [
     ("study", &["study"], |given| Ok(Verb::Study(of(given)?))),
     ("tracks", &["tracks"], |given| Ok(Verb::Tracks(of(given)?))),
     ("mine", &["mine"], |given| Ok(Verb::Mine(of(given)?))),
     ("fit", &["fit"], |given| Ok(Verb::Fit(of(given)?))),
     ("sample", &["sample"], |given| Ok(Verb::Sample(of(given)?))),
-    ("search", &["search"], |given| Ok(Verb::Search(of(given)?))),
     ("map", &["map"], |given| Ok(Verb::Map(of(given)?))),
     ("check", &["check"], |given| Ok(Verb::Check(of(given)?))),
     ("vary", &["vary"], |given| Ok(Verb::Vary(of(given)?))),

@@ -5,7 +5,7 @@ use clap::{Arg, ArgAction, Command};
 
 /// Verbs by purpose.
 const VERBS: [(&str, &[&str]); 5] = [
-    ("Study a data set", &["tracks", "study", "mine", "search"]),
+    ("Study a data set", &["tracks", "study", "mine"]),
     ("Probabilities", &["fit", "sample"]),
     ("Single cases and grids", &["check", "simulate", "map", "vary", "export"]),
     ("More machines", &["merge"]),

@@ -95,30 +95,12 @@ pub(super) fn range(text: &str) -> Result<(&str, [f64; 2])> {
     Ok((name.trim(), [from, to]))
 }
 
-/// Whether the name of a parameterization is that of a file.
-pub(super) fn is_file(name: &str) -> bool {
-    name.trim().ends_with(".json")
-}
-
-/// The parameterization of a file, which must be of one of the categories.
-///
-/// # Errors
-/// As [`Parameterization::read`]; [`Error::Usage`] for another category.
-pub(super) fn of_file(name: &str, categories: &[Category]) -> Result<Parameterization> {
-    let id = Parameterization::read(name.trim().as_ref())?;
-    if categories.contains(&id.category) {
-        return Ok(id);
-    }
-    let problem = format!("{} is for a {}, which is not among the categories", name.trim(), id.category.label());
-    Err(Error::usage(Place::file(name.trim()), problem, "choose its category, or leave it out"))
-}
-
 /// `--parameterizations`.
 #[derive(Debug, Clone, Args)]
 pub(super) struct ParameterizationsFlag {
-    /// Parameterizations: 1…7, a…g, i…v, files of `search` [default: all]
+    /// Parameterizations: 1…7, a…g, i…v [default: all]
     ///
-    /// 1…7 are for cut-ins, a…g for cut-outs, i…v for leader decelerations. A name that ends in .json is a file.
+    /// 1…7 are for cut-ins, a…g for cut-outs, i…v for leader decelerations.
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Scenario")]
     parameterizations: Vec<String>,
 }
@@ -131,22 +113,7 @@ impl ParameterizationsFlag {
     /// # Errors
     /// As [`parameterizations`].
     pub(super) fn list(&self, categories: &[Category]) -> Result<Vec<Parameterization>> {
-        let (files, keys): (Vec<&String>, Vec<&String>) = self.parameterizations.iter().partition(|name| is_file(name));
-        let keys: Vec<String> = keys.into_iter().cloned().collect();
-        // Files alone are meant alone.
-        let mut found = match keys.is_empty() && !files.is_empty() {
-            true => Vec::new(),
-            false => parameterizations(categories, &keys)?,
-        };
-        for file in files {
-            let id = of_file(file, categories)?;
-            if found.iter().any(|known| (known.category, &known.key) == (id.category, &id.key)) {
-                let problem = format!("{} is given twice", id.name());
-                return Err(Error::usage(Place::item("--parameterizations"), problem, "name each once"));
-            }
-            found.push(id);
-        }
-        Ok(found)
+        parameterizations(categories, &self.parameterizations)
     }
 }
 
@@ -330,8 +297,8 @@ fn parameterizations(categories: &[Category], list: &[String]) -> Result<Vec<Par
     let of_categories = || Parameterization::ALL.into_iter().filter(|p| categories.contains(&p.category));
     let wanted: Vec<&str> = list.iter().map(|key| key.trim()).collect();
     let of_all = wanted.iter().filter(|key| **key == "all");
-    let every = of_all.flat_map(|all| of_categories().map(|p| (p.key.into_owned(), *all)));
-    let named = wanted.iter().filter(|key| **key != "all").map(|key| ((*key).to_owned(), *key));
+    let every = of_all.flat_map(|all| of_categories().map(|p| (p.key, *all)));
+    let named = wanted.iter().filter(|key| **key != "all").map(|key| (*key, *key));
     refuse_repeats(|| Place::item("--parameterizations"), every.chain(named))?;
     if wanted.is_empty() || wanted.contains(&"all") {
         return Ok(of_categories().collect());
@@ -348,5 +315,5 @@ fn parameterizations(categories: &[Category], list: &[String]) -> Result<Vec<Par
             format!("use {}, or all", Category::ALL.iter().map(of).collect::<Vec<_>>().join("; ")),
         ));
     }
-    Ok(of_categories().filter(|p| wanted.contains(&p.key.as_ref())).collect())
+    Ok(of_categories().filter(|p| wanted.contains(&p.key)).collect())
 }

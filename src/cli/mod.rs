@@ -23,7 +23,6 @@ mod mine;
 mod sample;
 mod sample_options;
 mod sample_run;
-mod search;
 pub mod settings;
 mod shard_flags;
 mod shell;
@@ -98,7 +97,6 @@ enum Verb {
     Mine(mine::Mine),
     Fit(fit::Fit),
     Sample(Box<sample::Sample>),
-    Search(Box<search::Search>),
     Synth(synth::Synth),
     Map(Box<map::Map>),
     Simulate(simulate::Simulate),
@@ -189,7 +187,6 @@ impl Verb {
             Verb::Mine(verb) => verb.run(configured),
             Verb::Fit(verb) => verb.run(configured),
             Verb::Sample(verb) => verb.run(configured),
-            Verb::Search(verb) => verb.run(configured),
             Verb::Synth(verb) => verb.run(configured),
             Verb::Map(verb) => verb.run(configured),
             Verb::Simulate(verb) => verb.run(configured),

@@ -65,13 +65,13 @@ pub(super) struct Study {
     injury: lists::InjuryFlag,
     /// Also replay scenarios by bases that have not seen them
     ///
-    /// Scenarios are divided into folds by recording ([search] folds). Each decomposition gets a variant, 5-cv. A
+    /// Scenarios are divided into folds by recording ([study] folds). Each decomposition gets a variant, 5-cv. A
     /// basis fitted on the scenarios that it replays flatters itself.
     #[arg(long, help_heading = "Models and criteria")]
     cross_validate: bool,
-    /// S' of another program (scenario file), or winner.json of `search`
+    /// S' of another program, a scenario file
     ///
-    /// A scenario file has the ids of S; its series may have any sample rate and length. Repeatable.
+    /// It has the ids of S; its series may have any sample rate and length. Repeatable.
     #[arg(long, value_name = "FILE", help_heading = "Data")]
     external: Vec<PathBuf>,
     #[command(flatten)]
@@ -120,8 +120,7 @@ impl Study {
             models: self.models.list()?,
             headways: self.headways.list()?,
             parameterization: config.parameterization.clone(),
-            folds: self.cross_validate.then_some(config.search.folds),
-            searched: Vec::new(),
+            folds: self.cross_validate.then_some(config.study.folds),
             external: Vec::new(),
         };
         let source = self.data.source(configured);
@@ -133,16 +132,12 @@ impl Study {
         let mut timings = Timings::default();
         let collection = timed(&mut timings.mine_s, || self.data.load(configured))?;
         for path in &self.external {
-            if lists::is_file(&path.to_string_lossy()) {
-                options.searched.push(lists::of_file(&path.to_string_lossy(), &options.categories)?);
-            } else {
-                options.external.extend(ExternalReplay::read(
-                    path,
-                    &collection.scenarios,
-                    &options.categories,
-                    self.data.policy(),
-                )?);
-            }
+            options.external.extend(ExternalReplay::read(
+                path,
+                &collection.scenarios,
+                &options.categories,
+                self.data.policy(),
+            )?);
         }
         let data = source.describe(collection.synthetic);
         let builder = study::Study::builder(&collection, profile)

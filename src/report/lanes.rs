@@ -274,7 +274,7 @@ pub fn write_sampled_chunk(
             let mut row = vec![
                 Cell::Whole(unit as i64),
                 Cell::text(density.category().key()),
-                Cell::text(density.space.id().key.as_ref()),
+                Cell::text(density.space.id().key),
                 Cell::text(headway),
                 Cell::text(plan.models[at % models].name()),
             ];

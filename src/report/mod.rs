@@ -33,7 +33,6 @@ mod sampling_files;
 mod sampling_page;
 mod sampling_severity;
 pub mod sampling_tables;
-pub mod search;
 pub mod study;
 mod study_answer;
 mod study_figures;

@@ -1,4 +1,4 @@
-//! Studies, samples, maps, checks and searches. The rooms that its modules may use stand below; `lanesweep` is the crate for users.
+//! Studies, samples, maps and checks. The rooms that its modules may use stand below; `lanesweep` is the crate for users.
 
 use lanesweep_engine::engine;
 use lanesweep_model::{model, scenario};

@@ -9,14 +9,12 @@ pub mod cases;
 pub mod check;
 pub mod close_following;
 pub mod grid;
-mod motion_error;
 pub mod parts;
 #[cfg(test)]
 mod pinned_lanes;
 pub mod reopen;
 pub mod sampling;
 pub mod score;
-pub mod search;
 pub mod study;
 
 use std::path::Path;

@@ -74,7 +74,7 @@ fn reduction(category: Category, options: &ParameterizationOptions) -> Reduction
     let weights = vec![0.5; mean.len()];
     let mean = mean.iter().map(|value| value * 0.5).collect();
     let basis = SvdBasis { weights, mean, singular_values: Vec::new(), directions, rows: 8 };
-    Reduction::from_parts(category, basis, options, None).unwrap()
+    Reduction::from_parts(category, basis, options).unwrap()
 }
 
 /// Two scenarios of every category with every parameterization.

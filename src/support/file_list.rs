@@ -14,16 +14,13 @@ pub const STUDY_RECORD: &str = "run.json";
 pub const ESTIMATE_RECORD: &str = "estimate.json";
 /// Record of a map.
 pub const MAP_RECORD: &str = "map.json";
-/// Record of a search.
-pub const SEARCH_RECORD: &str = "search.json";
 
 /// Records of runs that write files with the same names, such as `report.html`: a folder holds one of them. With the other
 /// files that every such run writes: a user's file of such a name is detected before the work starts.
-pub(super) const RECORDS: [(&str, &[&str]); 4] = [
+pub(super) const RECORDS: [(&str, &[&str]); 3] = [
     (STUDY_RECORD, &["failures.csv", "f1.csv", "claims.csv", "headways.csv", "report.html"]),
     (ESTIMATE_RECORD, &["estimates.csv", "report.html"]),
     (MAP_RECORD, &["cells.csv", "report.html"]),
-    (SEARCH_RECORD, &["fronts.csv", "candidates.csv", "report.html"]),
 ];
 
 /// Lists the files of the runs in a folder.

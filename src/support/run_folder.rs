@@ -16,7 +16,7 @@ use serde::Serialize;
 
 use crate::support::atomic_file::folder_of;
 use crate::support::atomic_file::{AtomicFile, Live, StagedFile, clear_stale, refuse_link, sync_folder};
-pub use crate::support::file_list::{ESTIMATE_RECORD, MAP_RECORD, SEARCH_RECORD, STUDY_RECORD};
+pub use crate::support::file_list::{ESTIMATE_RECORD, MAP_RECORD, STUDY_RECORD};
 use crate::support::file_list::{FileList, LIST, RECORDS, RunFiles};
 use crate::support::files::{make_folder, remove_file};
 use crate::support::lock::FolderLock;

@@ -108,7 +108,7 @@ pub fn files(dir: &Path) -> Files {
     names(dir).into_iter().map(|name| (name.clone(), std::fs::read(dir.join(name)).unwrap())).collect()
 }
 
-const RECORDS: [&str; 4] = ["run.json", "estimate.json", "map.json", "search.json"];
+const RECORDS: [&str; 3] = ["run.json", "estimate.json", "map.json"];
 
 /// The same with records and pages changed.
 fn settled(files: Files, record: &dyn Fn(&mut serde_json::Value), page: &dyn Fn(&str) -> String) -> Files {

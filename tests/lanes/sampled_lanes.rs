@@ -16,9 +16,7 @@ use lanesweep::run::sampling::{
 };
 use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::DataProvenance;
-use lanesweep::scenario::parameterization::{
-    Feature, FunctionKind, LinearFamily, LinearSpec, Parameterization, ParameterizationOptions, Signal,
-};
+use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions};
 use lanesweep::scenario::{Category, Scenario, Tables};
 use lanesweep::stats::density::{DensityKind, DensityModel, FitOptions, Mixture};
 use lanesweep::stats::random::Stream;
@@ -31,21 +29,6 @@ fn scenarios() -> &'static [Scenario] {
         let generator = GeneratorOptions { recordings: 12, ..GeneratorOptions::default() };
         mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap().scenarios
     })
-}
-
-/// Descriptions of other families, fitted on the kept scenarios.
-fn searched() -> Vec<Parameterization> {
-    let svd = |signal| LinearFamily::Svd { coefficients: 3, signal, emphasis: Vec::new() };
-    let of = |category: Category, family: LinearFamily| {
-        let kept: Vec<&Scenario> = scenarios().iter().filter(|s| s.kept && s.category == category).collect();
-        let spec = LinearSpec { family, mirrored: true, registered: false };
-        Parameterization::linear("found", spec.fit(category, &kept, &ParameterizationOptions::default()).unwrap())
-    };
-    vec![
-        of(Category::CutIn, LinearFamily::Features(vec![Feature::EgoSpeed, Feature::TargetSpeed, Feature::Duration])),
-        of(Category::CutOut, svd(Signal::Changes)),
-        of(Category::Lvd, LinearFamily::Functions { kind: FunctionKind::Lines, sizes: vec![3] }),
-    ]
 }
 
 fn density(id: Parameterization, with_thw: bool) -> DensityModel {
@@ -77,8 +60,8 @@ fn outcomes(plan: &LanePlan, backend: &dyn Backend, cuts: &[u64]) -> Vec<[u64; 1
 #[test]
 fn a_case_made_for_a_lane_is_the_case_that_the_host_makes() {
     for profile in ["paper", "un-r157"].map(|name| Profile::load(name).unwrap()) {
-        for id in Parameterization::ALL.into_iter().chain(searched()) {
-            let density = density(id.clone(), false);
+        for id in Parameterization::ALL {
+            let density = density(id, false);
             let points: Vec<Vec<f64>> = density.kde.points().to_vec();
             let generator = generator_of_points(&density.space, &points, &density.sizes, &profile).unwrap();
             let mut late = 0;
@@ -166,7 +149,7 @@ fn samples_are_the_same_whatever_the_chunks_threads_and_instructions() {
     let profile = Profile::load("paper").unwrap();
     for id in Parameterization::ALL {
         for (source, n) in [(SampleSource::Random, 300), (SampleSource::Sobol, 100)] {
-            let density = density(id.clone(), false);
+            let density = density(id, false);
             let plan = plan_samples(&density, &density.mixture().unwrap(), &profile, &options(n, source)).unwrap();
             let whole = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
             assert!(whole == outcomes(&plan, &CpuBackend::scalar(), &[0, 1, 37, n]), "{id:?} scalar, other chunks");
@@ -189,7 +172,7 @@ fn a_device_makes_the_same_lanes_of_the_same_samples() {
         for id in Parameterization::ALL {
             for (source, with_thw) in [(SampleSource::Random, false), (SampleSource::Sobol, false)] {
                 let n = 400;
-                let density = density(id.clone(), with_thw);
+                let density = density(id, with_thw);
                 let mixture = density.mixture().unwrap();
                 let plan = plan_samples(&density, &mixture, &profile, &options(n, source)).unwrap();
                 let ours = outcomes(&plan, &CpuBackend::lane_arithmetic(), &[0, n]);
@@ -262,7 +245,7 @@ fn a_device_draws_headways_weighted_components_and_given_points_alike() {
     let n = 500;
     for id in [("1", Category::CutIn), ("b", Category::CutOut), ("f", Category::CutOut), ("ii", Category::Lvd)] {
         let id = Parameterization::find(id.1, id.0).unwrap();
-        let density = density(id.clone(), true);
+        let density = density(id, true);
         let kernels = density.mixture().unwrap();
         // A second mixture of another shape beside: weights and two factors.
         let mean = kernels.mean(0).to_vec();

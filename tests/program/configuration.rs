@@ -138,8 +138,7 @@ fn changed(key: &Key) -> Value {
         (_, "sample.samples") => 2000.into(),
         (_, "sample.estimator") => "mc".into(),
         (_, "fit.valid_draws") => 1000.into(),
-        (_, "search.studies") => 24.into(),
-        (_, "search.folds" | "search.max_parameters" | "score.min_failures") => 3.into(),
+        (_, "study.folds" | "score.min_failures") => 3.into(),
         (KeyKind::Boolean, _) => (!default.as_bool().unwrap()).into(),
         (KeyKind::Choice(words), _) => words.iter().find(|word| default != *word.word).unwrap().word.clone().into(),
         (KeyKind::Number(range), _) if range.is_whole => (default.as_u64().unwrap() + 1).into(),
@@ -174,7 +173,6 @@ fn every_record_names_every_setting_with_its_source() {
         ("fit", printed(&fit)),
         ("sample", recorded("lanesweep-sample/estimate.json", &["sample", "i.json", "--models", "FSM", "--thw", "1"])),
         ("map", recorded("lanesweep-map/map.json", &map)),
-        ("search", recorded("lanesweep-search/search.json", &["search", "--category", "lvd", "--criterion", "ttc"])),
     ];
     for (verb, record) in records {
         let settings = record["settings"].as_array().unwrap_or_else(|| panic!("{verb}"));

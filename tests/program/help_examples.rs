@@ -78,7 +78,6 @@ fn smaller(line: &str) -> String {
         words[at + 1] = "300";
     }
     match words[1] {
-        "search" => words.extend(["--studies", "24", "--max-parameters", "3", "--config", "generator.recordings=4"]),
         "fit" => words.extend(["--no-comparison", "--config", "fit.valid_draws=1000"]),
         // One lane is little already.
         "verify" if !["--lane", "devices"].iter().any(|word| words.contains(word)) => {
@@ -129,9 +128,6 @@ fn every_example_of_the_help_runs() {
             let own = fcd().replace("vehicle_", "").replace("timestep_", "");
             std::fs::write(dir.join("own.csv"), own.replace("angle;", "").replace(";90;", ";")).unwrap();
             std::fs::write(dir.join("study.toml"), "[score]\nmin_failures = 5\n").unwrap();
-            if verb == "search" && !dir.join("others").exists() {
-                run(dir, "lanesweep synth others --synth-recordings 4 --config generator.seed=2");
-            }
             // A draft asks.
             if let Ok(draft) = std::fs::read_to_string(dir.join("own.toml")) {
                 let answered = draft.replace("reference = \"?\"", "reference = \"front\"");

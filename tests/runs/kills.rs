@@ -107,14 +107,6 @@ const VERBS: [Verb; 15] = [
         "map lvd --x deceleration_mps2=1..9/0.5 --y ego_speed_kmh=30..130/5 --set thw_s=1.2 --out out",
     ),
     verb(
-        "search",
-        Some("search.json"),
-        Some(
-            "search --category cut-in --scenarios scenarios.jsonl --studies 24 --max-parameters 4 --criterion btn --out out",
-        ),
-        "search --category cut-in --scenarios scenarios.jsonl --studies 24 --max-parameters 4 --criterion ttc --out out",
-    ),
-    verb(
         "fit",
         None,
         Some(
@@ -136,7 +128,7 @@ const VERBS: [Verb; 15] = [
 
 fn start(dir: &Path, line: &str) -> Child {
     let mut args = [&["-q"][..], &line.split(' ').collect::<Vec<_>>()].concat();
-    if ["study --plan", "sample", "map", "search"].iter().any(|verb| line.starts_with(verb)) {
+    if ["study --plan", "sample", "map"].iter().any(|verb| line.starts_with(verb)) {
         args.extend(["--backend", "cpu"]);
     }
     program::start(dir, &args)
@@ -147,7 +139,7 @@ fn done(dir: &Path, line: &str) {
     assert!(code == 0, "{code}, {line}: {said}");
 }
 
-/// The search that a sample keeps while it draws, and the record of `search`.
+/// The search that a sample keeps while it draws.
 const SEARCH: &str = "search.json";
 
 /// Not a result: the plan, and what is there only while a run is at work.
@@ -171,7 +163,7 @@ fn files(dir: &Path) -> Files {
 /// The results of a folder; the search that a sample keeps until it ends is none.
 fn results(dir: &Path, verb: &Verb) -> Files {
     let mut files = files(dir);
-    files.retain(|name, _| name != SEARCH || verb.record == Some(SEARCH));
+    files.retain(|name, _| name != SEARCH);
     files
 }
 

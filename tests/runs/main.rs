@@ -4,6 +4,7 @@
 mod common;
 
 mod against_recorded;
+mod external_replays;
 mod faults;
 mod interrupted;
 mod kills;
@@ -14,6 +15,5 @@ mod observed;
 mod parts;
 mod reruns;
 mod sampling;
-mod search;
 mod severity;
 mod strange_files;

@@ -277,13 +277,9 @@ fn a_journal_replaces_no_file_of_the_users_follows_no_link_and_has_one_writer() 
     ran(&[&fit[..], &["--no-comparison", "--out", text(&density)]].concat());
     std::fs::write(&precious, "mine").unwrap();
     let (data, shard) = (["--scenarios", text(&scenarios)], ["--shard", "0/2"]);
-    let search =
-        [&["-q", "search", "--category", "cut-in", "--studies", "24", "--max-parameters", "4"], &data[..]].concat();
     let study = [&["-q", "study", "--categories", "lvd"], &data[..], &shard].concat();
     let sample = [&["-q", "sample", text(&density), "--samples", "1000"][..], &shard].concat();
-    let runs: [(&[&str], &str, &str); 4] = [
-        (&search, "search.journal", "run.lock"),
-        (&[&search[..], &shard].concat(), "search-0-of-2.journal", "search-0-of-2.lock"),
+    let runs: [(&[&str], &str, &str); 2] = [
         (&study, "part-00000-of-00002.journal", "part-00000-of-00002.lock"),
         (&sample, "part-00000-of-00002.journal", "part-00000-of-00002.lock"),
     ];
@@ -305,29 +301,6 @@ fn a_journal_replaces_no_file_of_the_users_follows_no_link_and_has_one_writer() 
         ran(&run[1..]);
         std::fs::remove_dir_all(&out).unwrap();
     }
-}
-
-#[test]
-fn results_copied_without_the_list_and_a_finished_searchs_folder_are_used_again() {
-    let dir = tempfile::tempdir().unwrap();
-    let at = |name: &str| dir.path().join(name);
-    let ran = |args: &[&str]| {
-        let output = lanesweep(&[&["-q"], args].concat());
-        assert!(output.status.success(), "{args:?}: {output:?}");
-    };
-    ran(&["synth", text(&at("data")), "--synth-recordings", "2"]);
-    ran(&["mine", text(&at("data")), "--out", text(&at("s.jsonl"))]);
-    let (scenarios, out) = (at("s.jsonl"), at("out"));
-    let fixed = ["search", "--category", "cut-in", "--studies", "24", "--max-parameters", "4"];
-    let search = [&fixed[..], &["--scenarios", text(&scenarios), "--out", text(&out), "--criterion"]].concat();
-    ran(&[&search[..], &["collision"]].concat());
-    let first = std::fs::read(out.join("candidates.csv")).unwrap();
-    std::fs::remove_file(out.join("lanesweep-files.json")).unwrap();
-    ran(&[&search[..], &["btn"]].concat());
-    assert!(std::fs::read(out.join("candidates.csv")).unwrap() != first);
-    // The journal of a search that is not finished is kept.
-    std::fs::remove_file(out.join("search.json")).unwrap();
-    refused_with(3, &[&search[..], &["ttc"]].concat(), "belongs to another run");
 }
 
 #[test]

@@ -39,8 +39,6 @@ pub(crate) struct Settings {
     pub map: MapSettings,
     /// `lanesweep verify`.
     pub verify: VerifySettings,
-    /// `lanesweep search`, and cross-validation.
-    pub search: crate::run::search::SearchLimits,
 }
 
 impl Settings {
@@ -91,6 +89,9 @@ settings! {
         pub compare_reference: bool = false,
         /// Keep the plan, run-plan.json, for `simulate --from`.
         pub keep_plan: KeepPlan = KeepPlan::Auto,
+        /// Folds of `--cross-validate`.
+        #[schemars(range(min = 2, max = 100))]
+        pub folds: usize = 5,
     }
 }
 

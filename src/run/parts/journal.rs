@@ -213,13 +213,6 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
     }
 }
 
-/// The run that a journal belongs to; `None` for another kind of file, and without a complete first line.
-pub(crate) fn run_of_journal(path: &Path) -> Option<String> {
-    refuse_link(path).ok()?;
-    let line = json_line(&mut BufReader::new(File::open(path).ok()?), MAX_HEAD_BYTES).ok()??;
-    serde_json::from_slice::<Head>(checked(&line)?).ok().map(|head| head.run_sha256)
-}
-
 /// Formats a record as `checksum content` and a line end.
 fn line_of<R: Serialize>(record: &R) -> Result<Vec<u8>> {
     let body =

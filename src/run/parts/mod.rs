@@ -14,7 +14,6 @@ mod shared_plan;
 pub use folder::{Part, read_part, write_part};
 pub(crate) use job::units_of;
 pub use job::{Computed, EachChunk, Job, JobRun};
-pub(crate) use journal::run_of_journal;
 pub use journal::{Journal, Records};
 pub use ledger::{Counted, Ledger, MergeableCounts};
 pub(crate) use sealed::{kind_of, read_sealed};

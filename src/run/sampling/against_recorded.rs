@@ -29,7 +29,6 @@ fn replay(
         models: models.to_vec(),
         headways: headways.to_vec(),
         parameterization: density.space.options().clone(),
-        searched: id.fitted_basis().map(|_| id.clone()).into_iter().collect(),
         ..StudyOptions::default()
     };
     let plan = match plan_study(&density.scenarios, profile, &options) {

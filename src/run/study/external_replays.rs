@@ -1,13 +1,12 @@
-//! S' given as series: of other programs, of a searched description, and of decompositions that have not seen the
-//! scenario they replay.
+//! S' given as series: of other programs, and of decompositions that have not seen the scenario they replay.
 
 use std::collections::BTreeMap;
 use std::path::Path;
 
 use rayon::prelude::*;
 
+use super::folds::folds;
 use crate::run::score::CROSS_VALIDATED;
-use crate::run::search::folds;
 use crate::scenario::parameterization::{Parameterization, ParameterizationOptions, ReducedScenario, Reduction};
 use crate::scenario::{Category, Scenario, ScenarioFile, read_scenario_file};
 use crate::support::plausibility::Implausible;
@@ -103,21 +102,6 @@ impl ExternalReplay {
     }
 }
 
-/// S' by a searched description as it is fitted, and with folds each scenario by a basis of the other folds.
-///
-/// # Errors
-/// As [`held_out`].
-pub(super) fn searched(id: &Parameterization, kept: &[&Scenario], folds: Option<usize>) -> Result<Vec<ExternalReplay>> {
-    let (Some(fitted), Some(d)) = (id.fitted_basis(), id.coefficients()) else { return Ok(Vec::new()) };
-    let reduced = kept.iter().map(|scenario| Ok((scenario.id.clone(), fitted.reduce(scenario, d)?)));
-    let scenarios = reduced.collect::<Result<_>>()?;
-    let mut replays = vec![ExternalReplay { category: id.category, key: id.key.to_string(), scenarios }];
-    if let Some(count) = folds {
-        replays.extend(of_folds(kept, count, &[(&id.key, d)], |train| fitted.refit(train))?);
-    }
-    Ok(replays)
-}
-
 /// S' of every decomposition of the paper, each scenario by a basis of the other folds.
 ///
 /// # Errors
@@ -128,31 +112,18 @@ pub(super) fn held_out(
     options: &ParameterizationOptions,
     count: usize,
 ) -> Result<Vec<ExternalReplay>> {
-    let ids: Vec<Parameterization> = Parameterization::of(category).collect();
-    let sizes: Vec<(&str, usize)> = ids.iter().filter_map(|id| Some((id.key.as_ref(), id.coefficients()?))).collect();
-    of_folds(kept, count, &sizes, |train| Reduction::fit(category, train, options))
-}
-
-fn of_folds(
-    kept: &[&Scenario],
-    count: usize,
-    sizes: &[(&str, usize)],
-    fit: impl Fn(&[&Scenario]) -> Result<Reduction> + Sync,
-) -> Result<Vec<ExternalReplay>> {
     let of = folds(kept, count)?;
     let train = |fold: usize| -> Vec<&Scenario> {
         kept.iter().zip(&of).filter(|(_, of)| **of != fold).map(|(scenario, _)| *scenario).collect()
     };
-    let fitted: Vec<Reduction> = (0..count).into_par_iter().map(|fold| fit(&train(fold))).collect::<Result<_>>()?;
-    let replay = |(key, d): &(&str, usize)| {
+    let fit = |fold: usize| Reduction::fit(category, &train(fold), options);
+    let fitted: Vec<Reduction> = (0..count).into_par_iter().map(fit).collect::<Result<_>>()?;
+    let replay = |(key, d): (&str, usize)| {
         let reduced =
-            kept.iter().zip(&of).map(|(scenario, fold)| Ok((scenario.id.clone(), fitted[*fold].reduce(scenario, *d)?)));
-        let category = fitted[0].category;
-        Ok(ExternalReplay {
-            category,
-            key: format!("{key}{CROSS_VALIDATED}"),
-            scenarios: reduced.collect::<Result<_>>()?,
-        })
+            kept.iter().zip(&of).map(|(scenario, fold)| Ok((scenario.id.clone(), fitted[*fold].reduce(scenario, d)?)));
+        let key = format!("{key}{CROSS_VALIDATED}");
+        Ok(ExternalReplay { category, key, scenarios: reduced.collect::<Result<_>>()? })
     };
-    sizes.iter().map(replay).collect()
+    let decompositions = Parameterization::of(category).filter_map(|id| Some((id.key, id.coefficients()?)));
+    decompositions.map(replay).collect()
 }

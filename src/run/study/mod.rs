@@ -4,6 +4,8 @@
 mod cases;
 mod evaluation;
 mod external_replays;
+mod folds;
+mod motion_error;
 mod plan;
 pub(crate) mod plan_file;
 mod provenance;

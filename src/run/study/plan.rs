@@ -4,10 +4,10 @@ use crate::engine::plan::{Headway, LanePlan};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::study::cases::{StudyCases, entries_per_step, parameterizations};
-use crate::run::study::external_replays::{ExternalReplay, held_out, searched};
+use crate::run::study::external_replays::{ExternalReplay, held_out};
 use crate::run::study::plan_file::{BlockHead, StudyHead, stripped};
 use crate::scenario::parameterization::{
-    Parameterization, ParameterizationOptions, ReducedScenario, Reduction, SvdFit, TimeGrid, steps_of, vehicle_ahead,
+    ParameterizationOptions, ReducedScenario, Reduction, SvdFit, TimeGrid, steps_of, vehicle_ahead,
 };
 use crate::scenario::{Category, Scenario};
 use crate::support::ranges::refuse_repeats;
@@ -27,8 +27,6 @@ pub struct StudyOptions {
     /// Folds of a cross-validation: each decomposition gets a variant whose scenarios are replayed by a basis that has
     /// not seen them.
     pub folds: Option<usize>,
-    /// Searched parameterizations, beside those of the paper.
-    pub searched: Vec<Parameterization>,
     /// S' of other programs.
     pub external: Vec<ExternalReplay>,
 }
@@ -41,7 +39,6 @@ impl Default for StudyOptions {
             headways: Headway::paper(),
             parameterization: ParameterizationOptions::default(),
             folds: None,
-            searched: Vec::new(),
             external: Vec::new(),
         }
     }
@@ -99,22 +96,12 @@ pub fn outline_study(scenarios: &[Scenario], profile: &Profile, options: &StudyO
             Err(error) => return Err(error),
         };
         let mut replays = Vec::new();
-        let mut add = |made: Result<Vec<ExternalReplay>>| match made {
-            Ok(made) => {
-                replays.extend(made);
-                Ok(())
-            }
-            Err(error @ Error::Input { .. }) => {
-                left_out.push(error);
-                Ok(())
-            }
-            Err(error) => Err(error),
-        };
         if let Some(count) = options.folds.filter(|_| reduction.is_some()) {
-            add(held_out(category, &kept, parameterization, count))?;
-        }
-        for id in options.searched.iter().filter(|id| id.category == category) {
-            add(searched(id, &kept, options.folds))?;
+            match held_out(category, &kept, parameterization, count) {
+                Ok(made) => replays.extend(made),
+                Err(error @ Error::Input { .. }) => left_out.push(error),
+                Err(error) => return Err(error),
+            }
         }
         replays.extend(options.external.iter().filter(|replay| replay.category == category).cloned());
         let given = |scenario: &Scenario| -> Result<Vec<ReducedScenario>> {

@@ -5,12 +5,12 @@ use serde::{Deserialize, Serialize};
 
 use super::StudyOptions;
 use super::cases::{StudyCases, WINDOW};
+use super::folds::folds;
+use super::motion_error::{MotionError, MotionSpread};
 use crate::Result;
 use crate::engine::{Block, Headway};
 use crate::run::close_following::close_units;
-use crate::run::motion_error::{MotionError, MotionSpread};
 use crate::run::score::{CROSS_VALIDATED, ScoreOptions};
-use crate::run::search::folds;
 use crate::scenario::parameterization::{
     ModeShape, Parameter, Parameterization, ParameterizationOptions, Reduction, SpeedProfile,
 };

@@ -22,12 +22,12 @@ impl StudyHead {
         for block in &self.blocks {
             let (from, end) = (first_held.clamp(first, first + block.units), first + block.units);
             let names: Vec<String> = ids.by_ref().take((end_held.clamp(from, end) - from) as usize).collect();
-            let variants = parameterizations(block.category, block.basis.is_some()).map(|id| id.key.into_owned());
+            let variants = parameterizations(block.category, block.basis.is_some()).map(|id| id.key.to_owned());
             let variants = variants.chain(block.replays.iter().cloned());
             let variants = std::iter::once("S".to_owned()).chain(variants).collect();
             blocks.push(Block::new(block.category, Units::Held(block.units, from - first, names.into()), variants));
             let basis = block.basis.clone();
-            let of_basis = |basis| Reduction::from_parts(block.category, basis, &self.parameterization, None);
+            let of_basis = |basis| Reduction::from_parts(block.category, basis, &self.parameterization);
             reductions.push(basis.map(of_basis).transpose()?);
             first = end;
         }

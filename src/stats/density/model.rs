@@ -140,7 +140,7 @@ impl DensityModel {
             return Err(Error::input(Place::item(id.category.label()), found, help));
         }
         let reduction = reduction(&id, scenarios, &kept, options)?;
-        let space = ParameterSpace::new(id.clone(), &options.parameterization, reduction.as_ref(), options.with_thw)?;
+        let space = ParameterSpace::new(id, &options.parameterization, reduction.as_ref(), options.with_thw)?;
         let (mut used, mut points, mut left_out) = (Vec::new(), Vec::new(), Vec::new());
         for &scenario in &kept {
             let point = space.point(scenario).and_then(|p| match space.check(&p) {
@@ -246,7 +246,7 @@ fn reduction(
     kept: &[&Scenario],
     options: &FitOptions,
 ) -> Result<Option<Reduction>> {
-    if id.coefficients().is_none() || id.fitted_basis().is_some() {
+    if id.coefficients().is_none() {
         return Ok(None);
     }
     let fitted: Vec<&Scenario> = match options.parameterization.svd_fit {

@@ -19,7 +19,7 @@ use super::representativeness::Representativeness;
 use super::transformed::{TransformedMixture, TransformedRecord};
 use super::valid::ValidFraction;
 use crate::scenario::parameterization::{
-    Encoder, LinearSpec, Parameter, Parameterization, ParameterizationOptions, Reduction, Sizes, SvdBasis,
+    Parameter, Parameterization, ParameterizationOptions, Reduction, Sizes, SvdBasis,
 };
 use crate::scenario::{Category, Scenario, problem_of};
 use crate::support::atomic_file::AtomicFile;
@@ -62,9 +62,6 @@ struct File {
     options: ParameterizationOptions,
     /// The decomposition of a parameterization by SVD.
     basis: Option<Basis>,
-    /// Specification and encoder of a searched parameterization.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    searched: Option<(LinearSpec, Encoder)>,
     /// One row per scenario, in the order of the parameters.
     kernels: Vec<Vec<f64>>,
     /// f̂, if it is not over the kernels.
@@ -117,10 +114,6 @@ impl File {
             sizes: model.sizes,
             options: space.options().clone(),
             basis,
-            searched: space
-                .reduction()
-                .and_then(Reduction::linear_parts)
-                .map(|(spec, encoder, _)| (spec.clone(), encoder.clone())),
             kernels: model.kde.points().to_vec(),
             mixture: model.transformed.as_ref().map(TransformedMixture::record),
             scenarios: model.scenarios.clone(),
@@ -148,17 +141,10 @@ impl File {
                 directions: b.directions,
                 rows: b.rows,
             };
-            let d = basis.directions.len().min(self.parameters.len());
-            let linear = self.searched.map(|(spec, encoder)| (spec, encoder, self.parameters[..d].to_vec()));
-            Reduction::from_parts(self.category, basis, &self.options, linear)
+            Reduction::from_parts(self.category, basis, &self.options)
         });
         let reduction = reduction.transpose().map_err(below)?;
-        let searched = reduction.as_ref().filter(|reduction| reduction.spec().is_some());
-        let found = match searched {
-            Some(fitted) => Some(Parameterization::linear(self.parameterization.clone(), fitted.clone())),
-            None => Parameterization::find(self.category, &self.parameterization),
-        };
-        let Some(id) = found else {
+        let Some(id) = Parameterization::find(self.category, &self.parameterization) else {
             let problem = format!("there is no `{}` of category {}", self.parameterization, self.category.label());
             return wrong("parameterization", problem);
         };

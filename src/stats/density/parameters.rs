@@ -105,8 +105,6 @@ impl ParameterSpace {
         reduction: Option<&Reduction>,
         with_thw: bool,
     ) -> Result<ParameterSpace> {
-        // A fitted description has the options of its fit.
-        let options = id.fitted_basis().map_or(options, Reduction::options);
         options.validate()?;
         id.validate()?;
         let place = || Place::item(id.name());
@@ -121,15 +119,10 @@ impl ParameterSpace {
                 "use lateral_start = lane-width",
             ));
         }
-        let reduction = match (&id.family, reduction) {
+        let reduction = match (id.family, reduction) {
             (Family::Kinematic(_), _) => None,
-            (Family::Linear(Linear(fitted)), _) if fitted.is_registered() => {
-                let problem = "its series are aligned in time, which samples cannot be";
-                return Err(Error::usage(place(), problem, "use a description without `registered`"));
-            }
-            (Family::Linear(Linear(fitted)), _) => Some((**fitted).clone()),
-            (&Family::Svd(d), Some(r)) if r.category == id.category && r.basis.directions.len() >= d => Some(r.clone()),
-            (&Family::Svd(d), _) => {
+            (Family::Svd(d), Some(r)) if r.category == id.category && r.basis.directions.len() >= d => Some(r.clone()),
+            (Family::Svd(d), _) => {
                 let problem = format!("needs a decomposition of its category with {d} directions");
                 return Err(Error::usage(place(), problem, "fit one on at least as many scenarios and one more"));
             }

@@ -136,8 +136,8 @@ fn one_split(
         shuffled.swap(last, draws.below(last + 1));
     }
     let (test, train) = shuffled.split_at(test);
-    let reduction = space.reduction().map(|r| r.refit(train)).transpose()?;
-    let fitted = ParameterSpace::new(space.id().refit(train)?, space.options(), reduction.as_ref(), space.has_thw())?;
+    let reduction = space.reduction().map(|r| Reduction::fit(r.category, train, space.options())).transpose()?;
+    let fitted = ParameterSpace::new(*space.id(), space.options(), reduction.as_ref(), space.has_thw())?;
     let points = |set: &[&Scenario]| set.iter().map(|s| fitted.point(s)).collect::<Result<Vec<_>>>();
     let train_points = points(train)?;
     let names: Vec<&str> = space.parameters().iter().map(|p| p.name.as_str()).collect();

@@ -58,7 +58,6 @@ pub fn all(seeds: &Seeds) -> Vec<Reader> {
         plain("preset", &seeds.presets, preset),
     ];
     readers.push(Reader { reseal: Some(reseal_density), ..plain("density", &seeds.densities, density) });
-    readers.push(Reader { reseal: Some(reseal_searched), ..plain("searched", &seeds.searched, searched) });
     readers.push(plain("external S'", &seeds.scenario_files[..1], external));
     readers.push(plain("part", &seeds.parts, part));
     readers.push(plain("plan", &seeds.plans, plan));
@@ -195,27 +194,6 @@ fn density(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> {
     if heavy { run_some(&plan, 2) } else { Ok(()) }
 }
 
-/// A searched parameterization: S' of every scenario, its folds, and the space of its densities.
-fn searched(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> {
-    let id = Parameterization::read(&file(bytes, dir, "found.json"))?;
-    let options = StudyOptions {
-        categories: vec![id.category],
-        headways: vec![Headway::ThwS(1.0)],
-        folds: Some(2),
-        searched: vec![id.clone()],
-        ..StudyOptions::default()
-    };
-    let plan = plan_study(&seeds.scenarios, &seeds.profile, &options)?;
-    if heavy {
-        run_some(&plan, 1)?;
-    }
-    // Aligned series have no density.
-    if id.fitted_basis().is_some_and(Reduction::is_registered) {
-        return Ok(());
-    }
-    ParameterSpace::new(id, &ParameterizationOptions::default(), None, false).map(drop)
-}
-
 /// S' of another program.
 fn external(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> {
     let path = file(bytes, dir, "other.jsonl");
@@ -234,10 +212,6 @@ fn proposal(bytes: &[u8], dir: &Path, seeds: &Seeds, heavy: bool) -> Result<()> 
 /// The message of a density file whose content was changed says which checksum would fit.
 fn reseal_density(bytes: &[u8], dir: &Path, _: &Seeds) -> Option<Vec<u8>> {
     with_named_checksum(bytes, &read_density(&file(bytes, dir, "d.json")).err()?)
-}
-
-fn reseal_searched(bytes: &[u8], dir: &Path, _: &Seeds) -> Option<Vec<u8>> {
-    with_named_checksum(bytes, &Parameterization::read(&file(bytes, dir, "found.json")).err()?)
 }
 
 fn with_named_checksum(bytes: &[u8], error: &Error) -> Option<Vec<u8>> {

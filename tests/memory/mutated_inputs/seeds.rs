@@ -237,17 +237,6 @@ impl Seeds {
             let id = Parameterization::find(category, key).unwrap();
             DensityModel::fit(id, &first_of(&mined, category, n), &facts, &options).unwrap().model
         };
-        let searched = |category, family, registered| {
-            let spec = LinearSpec { family, mirrored: true, registered };
-            let some = first_of(&mined, category, 12);
-            let some: Vec<&Scenario> = some.iter().collect();
-            let fitted = spec.fit(category, &some, &ParameterizationOptions::default()).unwrap();
-            Parameterization::linear("found", fitted).to_json("synthetic").unwrap()
-        };
-        let searched = vec![
-            searched(Category::CutIn, LinearFamily::Features(vec![Feature::EgoSpeed, Feature::CrossingTime]), false),
-            searched(Category::Lvd, LinearFamily::Functions { kind: FunctionKind::Lines, sizes: vec![2] }, true),
-        ];
         let density = fit(Category::CutIn, "2", 8);
         let others = [fit(Category::Lvd, "ii", 6), fit(Category::Lvd, "iii", 8), fit(Category::CutOut, "b", 10)];
         let plan = small_plan(&density, &density.mixture().unwrap(), &profile).unwrap();
@@ -326,7 +315,6 @@ impl Seeds {
             track_xml: vec![FCD.as_bytes().to_vec(), commonroad()],
             track_json: vec![AUTOMATUM.as_bytes().to_vec(), I24.as_bytes().to_vec()],
             presets: presets(),
-            searched,
             proposals: vec![proposal_text(&density, &density.mixture().unwrap()).unwrap().into_bytes()],
             parts: parts.into(),
             plans: vec![{

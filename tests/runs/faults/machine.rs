@@ -81,49 +81,26 @@ fn recordings_that_do_not_fit_leave_no_folder_that_looks_whole() {
     }
 }
 
-/// Files of a search with the command in them, or with lines in the order in which threads ended.
-const OF_THE_COMMAND: &str = "report.html search.json search.journal";
-
 #[test]
-fn a_search_and_mined_scenarios_that_do_not_fit_end_well_once_there_is_space() {
+fn mined_scenarios_that_do_not_fit_end_well_once_there_is_space() {
     let bench = Bench::new();
-    let search: &[&str] = &[
-        "-q",
-        "search",
-        "--scenarios",
-        "more.jsonl",
-        "--category",
-        "cut-in",
-        "--studies",
-        "24",
-        "--max-parameters",
-        "4",
-    ];
     done(bench.path(), &["-q", "synth", "recordings", "--synth-recordings", "6"]);
-    done(bench.path(), &["-q", "mine", "recordings", "--out", "more.jsonl"]);
-    let mine: &[&str] = &["-q", "mine", "recordings"];
-    for (name, run, out) in [("search", search, "out"), ("mine", mine, "out/s.jsonl")] {
-        std::fs::create_dir_all(bench.path().join(name)).unwrap();
-        done(bench.path(), &[run, &["--out", &format!("{name}{}", &out[3..])]].concat());
-        for file in OF_THE_COMMAND.split(' ') {
-            let _ = std::fs::remove_file(bench.path().join(name).join(file));
-        }
-        let script = format!(
-            "mkdir -p \"$DISK/out\"\n\
-            \"$0\" \"$@\" --out \"$DISK/{out}\" >/dev/null; echo full $?\n\
-            ls \"$DISK/out\" | grep -c 'json'\n\
-            mount -o remount,size=64m \"$DISK\"\n\
-            \"$0\" \"$@\" --out \"$DISK/{out}\" >/dev/null; echo freed $?\n\
-            cp -r \"$DISK/out\" copy; cd copy; rm -f {OF_THE_COMMAND}"
-        );
-        for size in ["8k", "24k"] {
-            let Some(output) = on_a_disk(&bench, size, &script, run) else { return };
-            let said = unbroken(&output.stderr);
-            assert_eq!(lines(&output), ["full 6", "0", "freed 0"], "{name}, {size}: {said}");
-            assert!(said.contains("the disk is full"), "{name}, {size}: {said}");
-            same(&bench.path().join("copy"), &bench.path().join(name), &format!("{name}, {size}"));
-            std::fs::remove_dir_all(bench.path().join("copy")).unwrap();
-        }
+    let run = ["-q", "mine", "recordings"];
+    std::fs::create_dir_all(bench.path().join("mine")).unwrap();
+    done(bench.path(), &[&run[..], &["--out", "mine/s.jsonl"]].concat());
+    let script = "mkdir -p \"$DISK/out\"\n\
+        \"$0\" \"$@\" --out \"$DISK/out/s.jsonl\" >/dev/null; echo full $?\n\
+        ls \"$DISK/out\" | grep -c 'json'\n\
+        mount -o remount,size=64m \"$DISK\"\n\
+        \"$0\" \"$@\" --out \"$DISK/out/s.jsonl\" >/dev/null; echo freed $?\n\
+        cp -r \"$DISK/out\" copy";
+    for size in ["8k", "24k"] {
+        let Some(output) = on_a_disk(&bench, size, script, &run) else { return };
+        let said = unbroken(&output.stderr);
+        assert_eq!(lines(&output), ["full 6", "0", "freed 0"], "{size}: {said}");
+        assert!(said.contains("the disk is full"), "{size}: {said}");
+        same(&bench.path().join("copy"), &bench.path().join("mine"), size);
+        std::fs::remove_dir_all(bench.path().join("copy")).unwrap();
     }
 }
 

@@ -7,10 +7,7 @@
 //! A [`Parameterization`] is data: its parameters, description, encoding and decoding follow from its category and its
 //! [`Family`]. To add one of an existing family: a line in [`Parameterization::ALL`].
 
-mod description_file;
-mod features;
 mod kinematic;
-mod linear;
 mod options;
 mod parameter;
 mod reduction;
@@ -18,15 +15,10 @@ mod series;
 mod sizes;
 mod svd;
 
-use std::borrow::Cow;
-use std::sync::Arc;
-
-pub use features::Feature;
 pub use kinematic::{Kinematic, LaneChange, SpeedProfile};
-pub use linear::{EMPHASIS_KNOTS, FunctionKind, Linear, LinearFamily, LinearSpec, Signal};
 pub use options::{AfterDuration, LateralStart, ParameterizationOptions, SeriesScale, SvdFit, SvdLateral};
 pub use parameter::{MAX_DURATION_S, MIN_DURATION_S, Parameter, Variable};
-pub use reduction::{Encoder, ModeShape, ReducedScenario, ReducedSeries, Reduction};
+pub use reduction::{ModeShape, ReducedScenario, ReducedSeries, Reduction};
 pub use series::steps_of;
 pub use series::{TimeGrid, recorded_case};
 pub use sizes::vehicle_ahead;
@@ -37,34 +29,31 @@ use crate::scenario::{Case, Category, Scenario};
 use crate::{Error, Place, Result};
 
 /// How a parameterization represents a scenario.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub enum Family {
     /// By physical variables.
     Kinematic(Kinematic),
     /// By this many coefficients of a singular value decomposition.
     Svd(usize),
-    /// By a fitted description of another family.
-    Linear(Linear),
 }
 
 impl Family {
     /// `kinematic` or `SVD`.
-    pub fn name(&self) -> &'static str {
+    pub fn name(self) -> &'static str {
         match self {
             Family::Kinematic(_) => "kinematic",
             Family::Svd(_) => "SVD",
-            Family::Linear(_) => "searched",
         }
     }
 }
 
 /// The specification of one parameterization.
-#[derive(Debug, Clone, PartialEq, Eq, Hash)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
 pub struct Parameterization {
     /// Kind of scenario.
     pub category: Category,
     /// Name, unique in its category; in the paper `1`…`7`, `a`…`g`, `i`…`v`.
-    pub key: Cow<'static, str>,
+    pub key: &'static str,
     /// How it represents a scenario.
     pub family: Family,
 }
@@ -76,11 +65,11 @@ const fn kinematic(
     lane_change: LaneChange,
 ) -> Parameterization {
     let family = Family::Kinematic(Kinematic { speed, lane_change });
-    Parameterization { category, key: Cow::Borrowed(key), family }
+    Parameterization { category, key, family }
 }
 
 const fn svd(category: Category, key: &'static str, coefficients: usize) -> Parameterization {
-    Parameterization { category, key: Cow::Borrowed(key), family: Family::Svd(coefficients) }
+    Parameterization { category, key, family: Family::Svd(coefficients) }
 }
 
 impl Parameterization {
@@ -117,34 +106,6 @@ impl Parameterization {
         Self::ALL.into_iter().filter(move |p| p.category == category)
     }
 
-    /// A fitted description under a name.
-    pub fn linear(key: impl Into<Cow<'static, str>>, fitted: Reduction) -> Parameterization {
-        Parameterization {
-            category: fitted.category,
-            key: key.into(),
-            family: Family::Linear(Linear(Arc::new(fitted))),
-        }
-    }
-
-    /// The same with its basis fitted on other scenarios.
-    ///
-    /// # Errors
-    /// As [`Reduction::refit`].
-    pub fn refit(&self, scenarios: &[&Scenario]) -> Result<Parameterization> {
-        match &self.family {
-            Family::Linear(Linear(fitted)) => Ok(Parameterization::linear(self.key.clone(), fitted.refit(scenarios)?)),
-            Family::Kinematic(_) | Family::Svd(_) => Ok(self.clone()),
-        }
-    }
-
-    /// The fitted description; `None` for a parameterization of the paper.
-    pub fn fitted_basis(&self) -> Option<&Reduction> {
-        match &self.family {
-            Family::Linear(Linear(fitted)) => Some(fitted),
-            Family::Kinematic(_) | Family::Svd(_) => None,
-        }
-    }
-
     /// Finds one by category and name.
     pub fn find(category: Category, key: &str) -> Option<Parameterization> {
         Self::of(category).find(|p| p.key == key)
@@ -162,19 +123,17 @@ impl Parameterization {
 
     /// The kept features in one line.
     pub fn description(&self) -> String {
-        match &self.family {
+        match self.family {
             Family::Kinematic(features) => features.description(self.category),
             Family::Svd(coefficients) => format!("SVD, {coefficients} coefficients"),
-            Family::Linear(Linear(fitted)) => fitted.spec().map_or(String::new(), |spec| spec.describe(self.category)),
         }
     }
 
     /// Number of SVD coefficients; `None` for a kinematic one, which needs no fit.
     pub fn coefficients(&self) -> Option<usize> {
-        match &self.family {
+        match self.family {
             Family::Kinematic(_) => None,
-            Family::Svd(coefficients) => Some(*coefficients),
-            Family::Linear(Linear(fitted)) => Some(fitted.basis.directions.len()),
+            Family::Svd(coefficients) => Some(coefficients),
         }
     }
 
@@ -182,7 +141,7 @@ impl Parameterization {
     pub fn features(&self) -> Option<Kinematic> {
         match self.family {
             Family::Kinematic(features) => Some(features),
-            Family::Svd(_) | Family::Linear(_) => None,
+            Family::Svd(_) => None,
         }
     }
 
@@ -193,9 +152,8 @@ impl Parameterization {
 
     /// Names, units and bounds of a point's numbers, without the headway.
     pub fn parameters(&self, options: &ParameterizationOptions) -> Vec<Parameter> {
-        match &self.family {
-            Family::Svd(coefficients) => (0..*coefficients).map(Parameter::coefficient).collect(),
-            Family::Linear(Linear(fitted)) => fitted.parameters(fitted.basis.directions.len()),
+        match self.family {
+            Family::Svd(coefficients) => (0..coefficients).map(Parameter::coefficient).collect(),
             Family::Kinematic(_) => self.variables().into_iter().map(|v| v.parameter(self.category, options)).collect(),
         }
     }
@@ -238,10 +196,9 @@ impl Parameterization {
         reduction: Option<&Reduction>,
     ) -> Result<Vec<f64>> {
         self.check_scenario(scenario)?;
-        let expected = self.coefficients().unwrap_or_default();
         match self.family {
             Family::Kinematic(_) => self.variables().into_iter().map(|v| v.of(scenario, options)).collect(),
-            _ => self.fitted(reduction)?.coefficients(scenario, expected),
+            Family::Svd(coefficients) => self.needed(reduction)?.coefficients(scenario, coefficients),
         }
     }
 
@@ -266,9 +223,7 @@ impl Parameterization {
         match self.family {
             Family::Kinematic(features) => features.decode(self.category, point, sizes, grid.into(), options),
             // A point has no side, so its lateral series is not mirrored.
-            Family::Svd(_) | Family::Linear(_) => {
-                self.fitted(reduction)?.rebuild(point, 1.0).case(self.category, sizes, grid.into())
-            }
+            Family::Svd(_) => self.needed(reduction)?.rebuild(point, 1.0).case(self.category, sizes, grid.into()),
         }
     }
 
@@ -286,7 +241,7 @@ impl Parameterization {
         self.check_scenario(scenario)?;
         match self.family {
             Family::Kinematic(features) => features.replay(scenario, grid.into(), options),
-            _ => self.fitted(reduction)?.case(scenario, self.coefficients().unwrap_or_default(), grid),
+            Family::Svd(coefficients) => self.needed(reduction)?.case(scenario, coefficients, grid),
         }
     }
 
@@ -298,11 +253,7 @@ impl Parameterization {
         Err(Error::Internal(format!("{} is no {}", scenario.id, self.category.label())))
     }
 
-    /// The basis: its own, else the given one.
-    fn fitted<'a>(&'a self, reduction: Option<&'a Reduction>) -> Result<&'a Reduction> {
-        if let Family::Linear(Linear(fitted)) = &self.family {
-            return Ok(fitted);
-        }
+    fn needed<'a>(&self, reduction: Option<&'a Reduction>) -> Result<&'a Reduction> {
         reduction.ok_or_else(|| Error::Internal(format!("{} needs a decomposition", self.name())))
     }
 }

@@ -4,10 +4,8 @@
 use serde::{Deserialize, Serialize};
 
 use super::Parameterization;
-use super::features::{Feature, crossing};
-use super::linear::LinearSpec;
 use super::options::{ParameterizationOptions, SvdLateral};
-use super::parameter::{MIN_DURATION_S, Parameter, Variable};
+use super::parameter::{MIN_DURATION_S, Variable};
 use super::series::{SeriesCase, TimeGrid, at};
 use super::sizes::{Sizes, vehicle_ahead};
 use super::svd::{SvdBasis, fit_svd};
@@ -29,7 +27,7 @@ pub enum ReducedSeries {
 }
 
 /// The layout of a category's vector: its series one after another, then single numbers, T last.
-pub(super) fn layout(category: Category) -> (&'static [ReducedSeries], &'static [Variable]) {
+fn layout(category: Category) -> (&'static [ReducedSeries], &'static [Variable]) {
     use Variable::{Duration, EgoSpeed, LeadGap};
     match category {
         Category::CutIn => (&[ReducedSeries::Lateral, ReducedSeries::TargetSpeed], &[EgoSpeed, Duration]),
@@ -41,55 +39,14 @@ pub(super) fn layout(category: Category) -> (&'static [ReducedSeries], &'static 
     }
 }
 
-/// How the coefficients of a basis follow from a scenario.
-#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Encoder {
-    /// Projections on the directions.
-    Directions,
-    /// Affine functions of the vector z: a row and a constant per coefficient.
-    Affine(Vec<(Vec<f64>, f64)>),
-    /// Physical features.
-    Features(Vec<Feature>),
-}
-
-/// A decomposition of one category's scenarios, or another basis with the same decoding.
+/// A decomposition of one category's scenarios.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Reduction {
     /// Kind of scenario.
     pub category: Category,
     /// Weights, mean, directions.
     pub basis: SvdBasis,
-    pub(super) options: ParameterizationOptions,
-    /// Specification, encoder and parameters of a basis that is not the paper's decomposition.
-    pub(super) linear: Option<(LinearSpec, Encoder, Vec<Parameter>)>,
-}
-
-/// Range of the instant of a landmark, in units of T.
-const LANDMARKS: [f64; 2] = [0.05, 0.95];
-
-/// The instant of the landmark, in units of T: half of the lane change, or of the loss of speed.
-fn landmark(scenario: &Scenario, options: &ParameterizationOptions) -> f64 {
-    let v = &scenario.target.v;
-    let end = v[v.len() - 1];
-    let at = match scenario.category {
-        Category::CutIn | Category::CutOut => crossing(&scenario.target.y, options.lane_change_m / 2.0),
-        Category::Lvd => {
-            let above: Vec<f64> = v.iter().map(|v| v - end).collect();
-            crossing(&above, 0.5 * (v[0] - end))
-        }
-    };
-    at.clamp(LANDMARKS[0], LANDMARKS[1])
-}
-
-/// Time in units of T at which the aligned time is u; the landmark is at u = 1/2.
-fn unaligned(u: f64, landmark: f64) -> f64 {
-    if u < 0.5 { 2.0 * landmark * u } else { landmark + (2.0 * u - 1.0) * (1.0 - landmark) }
-}
-
-/// The inverse of [`unaligned`].
-fn aligned(t: f64, landmark: f64) -> f64 {
-    if t < landmark { 0.5 * t / landmark } else { 0.5 + 0.5 * (t - landmark) / (1.0 - landmark) }
+    options: ParameterizationOptions,
 }
 
 /// A scenario reconstructed from few coefficients; within its physical range.
@@ -114,56 +71,17 @@ impl Reduction {
     /// Fits the decomposition to scenarios of one category. Their number must exceed the maximum number of
     /// coefficients.
     pub fn fit(category: Category, scenarios: &[&Scenario], options: &ParameterizationOptions) -> Result<Reduction> {
-        let rows = scenarios.iter().map(|s| vector(s, options, false)).collect::<Result<Vec<_>>>()?;
+        let rows = scenarios.iter().map(|s| vector(s, options)).collect::<Result<Vec<_>>>()?;
         let needed = Parameterization::max_coefficients(category);
         let name = format!("{} scenarios", category.label());
         let series = layout(category).0;
         let lateral = series.contains(&ReducedSeries::Lateral).then_some(options.svd_lateral);
         let of = (series.len(), lateral);
         let basis = fit_svd(&rows, of, options.svd_instants, needed, options.series_scale, &name)?;
-        Ok(Reduction { category, basis, options: options.clone(), linear: None })
+        Ok(Reduction { category, basis, options: options.clone() })
     }
 
-    /// The same specification fitted on other scenarios.
-    ///
-    /// # Errors
-    /// As [`Reduction::fit`] and [`LinearSpec::fit`].
-    pub fn refit(&self, scenarios: &[&Scenario]) -> Result<Reduction> {
-        match &self.linear {
-            Some((spec, ..)) => spec.fit(self.category, scenarios, &self.options),
-            None => Reduction::fit(self.category, scenarios, &self.options),
-        }
-    }
-
-    /// The specification; `None` for the paper's decomposition.
-    pub fn spec(&self) -> Option<&LinearSpec> {
-        self.linear.as_ref().map(|(spec, ..)| spec)
-    }
-
-    /// The parameters of `d` coefficients.
-    pub(crate) fn parameters(&self, d: usize) -> Vec<Parameter> {
-        match &self.linear {
-            Some((.., parameters)) => parameters.iter().take(d).cloned().collect(),
-            None => (0..d).map(Parameter::coefficient).collect(),
-        }
-    }
-
-    /// Options of the fit.
-    pub fn options(&self) -> &ParameterizationOptions {
-        &self.options
-    }
-
-    /// Description, encoder and parameters of a searched linear description.
-    pub fn linear_parts(&self) -> Option<&(LinearSpec, Encoder, Vec<Parameter>)> {
-        self.linear.as_ref()
-    }
-
-    /// Series are aligned in time.
-    pub fn is_registered(&self) -> bool {
-        self.spec().is_some_and(|spec| spec.registered)
-    }
-
-    /// A previously fitted decomposition, as a density file holds it, or a basis of another family.
+    /// A previously fitted decomposition, as a density file holds it.
     ///
     /// # Errors
     /// [`Error::Input`] if lengths do not match the category and the number of instants, a number is not finite, or a
@@ -172,11 +90,9 @@ impl Reduction {
         category: Category,
         basis: SvdBasis,
         options: &ParameterizationOptions,
-        linear: Option<(LinearSpec, Encoder, Vec<Parameter>)>,
     ) -> Result<Reduction> {
         let (series, extras) = layout(category);
-        let is_registered = linear.as_ref().is_some_and(|(spec, ..)| spec.registered);
-        let p = series.len() * options.svd_instants + extras.len() + usize::from(is_registered);
+        let p = series.len() * options.svd_instants + extras.len();
         let wrong = |problem: String| Err(Error::input(crate::Place::item("basis"), problem, "fit it again"));
         let lengths = [basis.weights.len(), basis.mean.len()].into_iter().chain(basis.directions.iter().map(Vec::len));
         if let Some(other) = lengths.into_iter().find(|&length| length != p) {
@@ -186,51 +102,17 @@ impl Reduction {
         if numbers.any(|v| !v.is_finite()) || basis.weights.iter().any(|w| !(w.is_finite() && *w > 0.0)) {
             return wrong("a number is not finite or a weight is not above 0".to_owned());
         }
-        if let Some((spec, encoder, parameters)) = &linear {
-            spec.validate(category)?;
-            let d = spec.parameter_count(category);
-            let of_encoder = match encoder {
-                Encoder::Directions => d,
-                Encoder::Affine(rows) if rows.iter().all(|(row, _)| row.len() == p) => rows.len(),
-                Encoder::Affine(_) => 0,
-                Encoder::Features(features) => features.len(),
-            };
-            if [basis.directions.len(), of_encoder, parameters.len()] != [d; 3] {
-                return wrong(format!("its parts do not have {d} parameters"));
-            }
-        }
-        Ok(Reduction { category, basis, options: options.clone(), linear })
+        Ok(Reduction { category, basis, options: options.clone() })
     }
 
     /// A mined scenario as the vector z: series at n_t equidistant points over [0, T], then the extras.
     pub fn vector(&self, scenario: &Scenario) -> Result<Vec<f64>> {
-        vector(scenario, &self.options, self.is_registered())
+        vector(scenario, &self.options)
     }
 
     /// The first `d` coefficients of a mined scenario.
     pub fn coefficients(&self, scenario: &Scenario, d: usize) -> Result<Vec<f64>> {
-        match &self.linear {
-            Some((_, Encoder::Features(features), _)) => {
-                features[..d].iter().map(|feature| feature.of(scenario, &self.options)).collect()
-            }
-            _ => self.encode_vector(&self.vector(scenario)?, d),
-        }
-    }
-
-    /// The first `d` coefficients of a vector z.
-    ///
-    /// # Errors
-    /// [`Error::Internal`] for features, which are no functions of the vector.
-    pub fn encode_vector(&self, z: &[f64], d: usize) -> Result<Vec<f64>> {
-        match self.linear.as_ref().map(|(_, encoder, _)| encoder) {
-            None | Some(Encoder::Directions) => Ok(self.basis.coefficients(z, d)),
-            Some(Encoder::Affine(rows)) => {
-                let of =
-                    |(row, constant): &(Vec<f64>, f64)| row.iter().zip(z).map(|(a, z)| a * z).sum::<f64>() + constant;
-                Ok(rows[..d].iter().map(of).collect())
-            }
-            Some(Encoder::Features(_)) => Err(Error::Internal("features need the scenario".to_owned())),
-        }
+        Ok(self.basis.coefficients(&self.vector(scenario)?, d))
     }
 
     /// The scenario reconstructed from its first `d` coefficients.
@@ -278,16 +160,10 @@ impl Reduction {
         };
         let series =
             |series| self.series_column(series).map_or(&[][..], |first| &z[first..first + self.options.svd_instants]);
-        let landmark = self.is_registered().then(|| z[z.len() - 1].clamp(LANDMARKS[0], LANDMARKS[1]));
-        let last = (self.options.svd_instants - 1) as f64;
-        let in_time = |values: &[f64]| -> Vec<f64> {
-            let Some(landmark) = landmark.filter(|_| !values.is_empty()) else { return values.to_vec() };
-            (0..values.len()).map(|k| at(values, last, aligned(k as f64 / last, landmark))).collect()
-        };
-        let speeds = |of| in_time(series(of)).into_iter().map(|v| v.max(0.0)).collect::<Vec<f64>>();
+        let speeds = |of| series(of).iter().map(|v| v.max(0.0)).collect::<Vec<f64>>();
         let number = |variable| self.column(variable).map_or(0.0, |column| z[column]);
         ReducedScenario {
-            y: in_time(series(ReducedSeries::Lateral)).into_iter().map(|y| y * mirror).collect(),
+            y: series(ReducedSeries::Lateral).iter().map(|y| y * mirror).collect(),
             v: speeds(ReducedSeries::TargetSpeed),
             v_lead: speeds(ReducedSeries::LeadSpeed),
             v_ego: number(Variable::EgoSpeed).max(0.0),
@@ -401,9 +277,8 @@ pub struct ModeShape {
     pub along: Vec<Vec<f64>>,
 }
 
-/// Converts a scenario to a vector: series at n_t equidistant points over [0, T], then the extras. A registered one has
-/// equidistant points before and after its landmark, and the landmark as last extra.
-pub(super) fn vector(scenario: &Scenario, options: &ParameterizationOptions, registered: bool) -> Result<Vec<f64>> {
+/// Converts a scenario to a vector: series at n_t equidistant points over [0, T], then the extras.
+fn vector(scenario: &Scenario, options: &ParameterizationOptions) -> Result<Vec<f64>> {
     let n = options.svd_instants;
     if n < 2 {
         return Err(Error::usage(
@@ -413,13 +288,8 @@ pub(super) fn vector(scenario: &Scenario, options: &ParameterizationOptions, reg
         ));
     }
     let duration_s = scenario.duration_s();
-    let landmark = registered.then(|| landmark(scenario, options));
-    let time_s = |k: usize| match landmark {
-        Some(landmark) => duration_s * unaligned(k as f64 / (n - 1) as f64, landmark),
-        None => duration_s * k as f64 / (n - 1) as f64,
-    };
     let sample = |series: &[f64], sign: f64| -> Vec<f64> {
-        (0..n).map(|k| sign * at(series, scenario.fps, time_s(k))).collect()
+        (0..n).map(|k| sign * at(series, scenario.fps, duration_s * k as f64 / (n - 1) as f64)).collect()
     };
     let sign = match options.svd_lateral {
         SvdLateral::Signed => scenario.side.sign(),
@@ -438,6 +308,5 @@ pub(super) fn vector(scenario: &Scenario, options: &ParameterizationOptions, reg
     for extra in extras {
         z.push(extra.of(scenario, options)?);
     }
-    z.extend(landmark);
     Ok(z)
 }

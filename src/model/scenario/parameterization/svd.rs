@@ -53,7 +53,7 @@ pub fn fit_svd(
 ///
 /// # Errors
 /// [`Error::Input`] for a series or extra that is equal in all rows.
-pub(super) fn column_weights(
+fn column_weights(
     rows: &[Vec<f64>],
     (series, lateral): (usize, Option<SvdLateral>),
     instants: usize,
@@ -94,7 +94,7 @@ pub(super) fn column_weights(
 ///
 /// # Errors
 /// [`Error::Input`] if it does not converge.
-pub(super) fn decompose(rows: &[Vec<f64>], weights: Vec<f64>, name: &str) -> Result<SvdBasis> {
+fn decompose(rows: &[Vec<f64>], weights: Vec<f64>, name: &str) -> Result<SvdBasis> {
     let (n, p) = (rows.len(), weights.len());
     let mean: Vec<f64> = (0..p).map(|c| rows.iter().map(|r| r[c] * weights[c]).sum::<f64>() / n as f64).collect();
     let x = Mat::from_fn(n, p, |r, c| rows[r][c] * weights[c] - mean[c]);

@@ -13,15 +13,17 @@
 //! `show` prints each number of the paper beside that of every seed: shares, traffic figures, the F1 of LVD and the
 //! verdicts of the claims.
 
+mod cma_es;
+
 use std::error::Error;
 
+use cma_es::CmaEs;
 use lanesweep::engine::{CpuBackend, Executor};
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::Job;
 use lanesweep::run::score::{
     CategoryScores, ClaimResult, Misfit, ScoreTable, check_claims, f1, published_failures, published_lvd_f1,
 };
-use lanesweep::run::search::CmaEs;
 use lanesweep::run::study::Study;
 use lanesweep::scenario::Category;
 use lanesweep::traffic::mining::{Collection, MiningOptions, count, mine};

@@ -4,14 +4,11 @@
 //! Strategy: A Tutorial", arXiv 1604.00772. Equation numbers below are those of its appendix A; the constants are those of
 //! its table 1 for positive weights. A point is a function of seed, generation and values: the same on every machine.
 
+use lanesweep::stats::random::{Stream, standard_normal};
 use nalgebra::{DMatrix, DVector, SymmetricEigen};
-
-use crate::stats::random::{Stream, standard_normal};
 
 /// Purpose of the random stream.
 const PURPOSE: u32 = 0x434d_4145;
-/// Maximum ratio of the longest to the shortest axis: beyond it, C has the condition number 10¹⁴.
-const MAX_AXIS_RATIO: f64 = 1e7;
 
 /// A search between two generations. [`CmaEs::ask`] gives points, [`CmaEs::tell`] takes their values.
 #[derive(Debug, Clone)]
@@ -129,13 +126,6 @@ impl CmaEs {
         self.lengths = eigen.eigenvalues.map(|value| value.max(0.0).sqrt());
         self.generation += 1;
     }
-
-    /// Whether the search cannot get on: its largest standard deviation is below `min_step`, or C is degenerate.
-    pub(super) fn has_ended(&self, min_step: f64) -> bool {
-        let (longest, shortest) = (self.lengths.max(), self.lengths.min());
-        let goes_on = self.step * longest >= min_step && longest <= MAX_AXIS_RATIO * shortest;
-        !(goes_on && self.step.is_finite())
-    }
 }
 
 impl Rates {
@@ -154,94 +144,5 @@ impl Rates {
             chi: n.sqrt() * (1.0 - 1.0 / (4.0 * n) + 1.0 / (21.0 * n * n)),
             fading: (1.0 - c_step) * (1.0 - c_step),
         }
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn sphere(x: &[f64]) -> f64 {
-        x.iter().map(|x| x * x).sum()
-    }
-
-    /// Condition number 10⁶.
-    fn ellipsoid(x: &[f64]) -> f64 {
-        let last = x.len() as f64 - 1.0;
-        x.iter().enumerate().map(|(at, x)| libm::pow(1e6, at as f64 / last) * x * x).sum()
-    }
-
-    fn rosenbrock(x: &[f64]) -> f64 {
-        x.windows(2).map(|w| 100.0 * (w[0] * w[0] - w[1]).powi(2) + (w[0] - 1.0).powi(2)).sum()
-    }
-
-    /// Evaluations until a value is below 10⁻⁸, and the last mean.
-    fn evaluations(n: usize, start: f64, seed: u64, function: impl Fn(&[f64]) -> f64) -> (usize, DVector<f64>) {
-        let population = 4 + (3.0 * libm::log(n as f64)) as usize;
-        let mut search = CmaEs::new(&vec![start; n], 0.5, population, seed);
-        for generation in 1..2000 {
-            let values: Vec<f64> = search.ask().iter().map(|x| function(x)).collect();
-            if values.iter().any(|value| *value < 1e-8) {
-                return (generation * population, search.mean);
-            }
-            search.tell(&values);
-        }
-        panic!("not found: {search:?}");
-    }
-
-    #[test]
-    fn minima_are_found_within_the_usual_number_of_evaluations() {
-        for (n, of_sphere, of_ellipsoid, of_rosenbrock) in [(5, 900, 2600, 3000), (10, 1900, 7000, 8500)] {
-            for (name, limit, found) in [
-                ("sphere", of_sphere, evaluations(n, 1.0, 157, sphere).0),
-                ("ellipsoid", of_ellipsoid, evaluations(n, 1.0, 157, ellipsoid).0),
-                ("Rosenbrock", of_rosenbrock, evaluations(n, 0.0, 157, rosenbrock).0),
-            ] {
-                println!("{name} in {n} dimensions: {found} evaluations");
-                assert!(found <= limit, "{name} in {n} dimensions: {found} evaluations");
-            }
-        }
-    }
-
-    #[test]
-    fn a_seed_gives_the_same_bits_again_and_another_seed_does_not() {
-        let bits = |seed| {
-            let (count, mean) = evaluations(5, 1.0, seed, ellipsoid);
-            (count, mean.iter().map(|x| x.to_bits()).collect::<Vec<u64>>())
-        };
-        assert_eq!(bits(1), bits(1));
-        assert_ne!(bits(1), bits(2));
-    }
-
-    #[test]
-    fn a_rotation_changes_the_number_of_evaluations_little() {
-        let n = 10;
-        let random = DMatrix::from_fn(n, n, |row, column| {
-            f64::from(standard_normal(Stream { seed: 3, purpose: 0 }.words((row * n + column) as u64, 0)[0]))
-        });
-        let rotation = random.qr().q();
-        let rotated = |function: fn(&[f64]) -> f64| {
-            let rotation = &rotation;
-            move |x: &[f64]| function((rotation * DVector::from_column_slice(x)).as_slice())
-        };
-        for (name, function) in [("sphere", sphere as fn(&[f64]) -> f64), ("ellipsoid", ellipsoid)] {
-            let mean =
-                |of: &dyn Fn(&[f64]) -> f64| (0..5).map(|seed| evaluations(n, 1.0, seed, of).0).sum::<usize>() / 5;
-            let (plain, turned) = (mean(&function), mean(&rotated(function)));
-            println!("{name}: {plain} and {turned} evaluations");
-            assert!(plain.abs_diff(turned) * 10 < plain, "{name}: {plain} and {turned} evaluations");
-        }
-    }
-
-    #[test]
-    fn a_search_ends_at_its_smallest_step_and_survives_values_that_are_none() {
-        let mut search = CmaEs::new(&[1.0, 1.0], 0.5, 8, 7);
-        let mut generations = 0;
-        while !search.has_ended(1e-3) {
-            let values: Vec<f64> = search.ask().iter().map(|x| if x[0] > 1.5 { f64::NAN } else { sphere(x) }).collect();
-            search.tell(&values);
-            generations += 1;
-        }
-        assert!(generations < 100 && search.mean.norm() < 1e-2, "{generations} {search:?}");
     }
 }

@@ -6,7 +6,7 @@ use crate::scenario::Scenario;
 use crate::{Error, Place, Result};
 
 /// Whether there are enough recordings, so that each stays whole.
-pub(crate) fn is_by_recording(scenarios: &[&Scenario], count: usize) -> bool {
+fn is_by_recording(scenarios: &[&Scenario], count: usize) -> bool {
     scenarios.iter().map(|scenario| &scenario.recording).collect::<BTreeSet<_>>().len() >= count
 }
 
@@ -15,10 +15,10 @@ pub(crate) fn is_by_recording(scenarios: &[&Scenario], count: usize) -> bool {
 ///
 /// # Errors
 /// [`Error::Usage`] for fewer than two folds or than scenarios.
-pub fn folds(scenarios: &[&Scenario], count: usize) -> Result<Vec<usize>> {
+pub(super) fn folds(scenarios: &[&Scenario], count: usize) -> Result<Vec<usize>> {
     if count < 2 || scenarios.len() < count {
         let problem = format!("{} scenarios cannot be divided into {count} folds", scenarios.len());
-        return Err(Error::usage(Place::item("[search] folds"), problem, "use fewer folds, or more data"));
+        return Err(Error::usage(Place::item("[study] folds"), problem, "use fewer folds, or more data"));
     }
     let by_recording = is_by_recording(scenarios, count);
     let mut recordings: BTreeMap<&str, Vec<usize>> = BTreeMap::new();
@@ -42,4 +42,32 @@ pub fn folds(scenarios: &[&Scenario], count: usize) -> Result<Vec<usize>> {
         members.into_iter().for_each(|at| of[at] = fold);
     }
     Ok(of)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::scenario::Category;
+    use crate::traffic::mining::{MiningOptions, mine_generated};
+    use crate::traffic::trajectory::generator::GeneratorOptions;
+
+    #[test]
+    fn scenarios_of_a_recording_stay_together() {
+        let options = GeneratorOptions { recordings: 6, ..GeneratorOptions::default() };
+        let mined = mine_generated(&options, &MiningOptions::default(), || Ok(())).unwrap().scenarios;
+        let all: Vec<&Scenario> = mined.iter().filter(|s| s.kept && s.category == Category::Lvd).collect();
+        let of = folds(&all, 3).unwrap();
+        let mut by_recording: BTreeMap<&str, BTreeSet<usize>> = BTreeMap::new();
+        for (scenario, fold) in all.iter().zip(&of) {
+            by_recording.entry(&scenario.recording).or_default().insert(*fold);
+        }
+        assert!(by_recording.len() >= 3 && by_recording.values().all(|folds| folds.len() == 1), "{by_recording:?}");
+        assert_eq!(of.iter().collect::<BTreeSet<_>>().len(), 3, "no fold is empty");
+        // One recording is cut into stretches of time.
+        let one: Vec<&Scenario> = all.iter().filter(|s| s.recording == all[0].recording).copied().collect();
+        let mut in_time: Vec<(i64, usize)> = one.iter().map(|s| s.frame0).zip(folds(&one, 2).unwrap()).collect();
+        in_time.sort_unstable();
+        assert!(in_time.windows(2).all(|pair| pair[0].1 <= pair[1].1), "{in_time:?}");
+        assert!(folds(&one, 1).is_err() && folds(&one[..1], 2).is_err());
+    }
 }

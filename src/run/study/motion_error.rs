@@ -8,7 +8,7 @@ const SERIES: usize = 3;
 
 /// Sums over scenarios.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct MotionSpread {
+pub(super) struct MotionSpread {
     count: f64,
     sums: [f64; SERIES],
     squares: [f64; SERIES],
@@ -16,7 +16,7 @@ pub(crate) struct MotionSpread {
 
 /// Mean squared differences of one S' from S, summed over scenarios.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct MotionError {
+pub(super) struct MotionError {
     scenarios: f64,
     squares: [f64; SERIES],
 }
