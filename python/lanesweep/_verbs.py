@@ -197,16 +197,14 @@ def fit(
     km: Float | None = None,
     no_comparison: bool = False,
     without_scenarios: bool = False,
-    tested: Path | None = None,
-    range: Keys | dict[str, str] | None = None,
     seed: Int | None = None,
     out: Path | None = None,
     **options: Unpack[_Fit],
 ) -> Result:
     """Fit densities to the parameters of scenarios, a file per category and parameterization.
 
-    Beside each a page shows how the recorded or tested cases cover its ranges. Also computes the physically possible share of each density, how often such scenarios occur, and how well drawn scenarios
-    represent unseen recorded ones.
+    Also computes the physically possible share of each density, how often such scenarios occur, and how well drawn scenarios represent
+    unseen recorded ones.
 
     Parameters
     ----------
@@ -226,10 +224,6 @@ def fit(
         Skip the comparison of drawn with unseen scenarios.
     without_scenarios : bool
         Leave the recorded series out of the files, which can then be shared; `sample` cannot compare its rates with theirs.
-    tested : path, optional
-        Tested cases, a table of cases or a scenario file: the pages show their coverage in place of that of the recorded cases.
-    range : list of str, or mapping
-        Parameters with their ranges for the coverage: ``{"v_ego_mps": "10..40"}``; by default those of the recorded cases.
     seed : int
         Seed of P_valid and of the splits of the comparison.
     out : path, optional

@@ -12,7 +12,6 @@ mod case_severity;
 pub mod case_sheet;
 pub mod case_table;
 mod case_uncertainty;
-pub mod coverage;
 mod credibility;
 pub mod density;
 mod dots;

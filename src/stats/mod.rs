@@ -2,7 +2,6 @@
 //!
 //! Nothing here steps a lane: estimators ask a limit state, which the run answers with lanes.
 
-pub mod coverage;
 pub mod density;
 pub mod estimate;
 

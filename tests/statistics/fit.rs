@@ -53,8 +53,6 @@ fn recordings_their_scenario_file_and_the_generator_give_the_same_densities() {
         let read = |dir: &Path| std::fs::read(dir.join(name)).unwrap();
         assert!(read(&a) == read(&b), "{name}: generated against written recordings");
         assert!(read(&b) == read(&c), "{name}: recordings against the scenario file");
-        let page = |dir: &Path| std::fs::read_to_string(dir.join(name.replace(".json", "-coverage.html"))).unwrap();
-        assert!(page(&a) == page(&b), "{name}: one thread gives the page of all");
         let model = read_density(&a.join(name)).unwrap();
         assert!(model.provenance.synthetic && model.provenance.data.contains("SYNTHETIC"));
         let exposure = model.exposure.expect("recordings tell what was driven");
@@ -184,55 +182,4 @@ fn wrong_words_are_answered_with_what_to_write_instead() {
     let help = String::from_utf8(lanesweep(&["fit", "--help"]).stdout).unwrap();
     assert!(help.starts_with("How are the parameters of scenarios distributed?"), "{help}");
     assert!(help.contains("lanesweep fit recordings --out densities"), "{help}");
-}
-
-/// Cases on a grid of both speeds with a hole, in ranges of ours: the hole is the largest box of the pair, and a density met it as
-/// often as its draws say.
-#[test]
-fn a_hole_in_the_tested_cases_is_found_with_its_exposure() {
-    let dir = tempfile::tempdir().unwrap();
-    let [out, tested] = ["d.json", "tested.csv"].map(|name| dir.path().join(name));
-    let mut table = "category,ego_speed_mps,speed_mps,gap_m,lateral_speed_mps\n".to_owned();
-    for ego in 10..=50 {
-        for other in 10..=40 {
-            let in_hole = (26..34).contains(&ego) && (20..30).contains(&other);
-            table += &if in_hole { String::new() } else { format!("cut-in,{ego},{other},30,1\n") };
-        }
-    }
-    std::fs::write(&tested, table).unwrap();
-    let ranges = ["--range", "v_ego_mps=10..50", "--range", "v_target_mps=10..40"];
-    let fit =
-        ["-q", "fit", "--categories", "cut-in", "--parameterizations", "3", "--no-comparison", "--format", "json"];
-    let run = |more: &[&str]| lanesweep(&[&fit, &SMALL[..], &["--out", text(&out)], more].concat());
-    let output = run(&[&["--tested", text(&tested)], &ranges[..]].concat());
-    assert_eq!(code(&output), 0, "{}", stderr(&output));
-    let document: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    let coverage = &document["densities"][0]["coverage"];
-    let place = |name: &str| {
-        let quantities = coverage["quantities"].as_array().unwrap();
-        quantities.iter().position(|of| of["quantity"] == name).unwrap() as u64
-    };
-    let (ego, other) = (place("v_ego_mps"), place("v_target_mps"));
-    assert_eq!(coverage["quantities"][ego as usize]["cases_inside"], 41 * 31 - 80);
-    let boxes = coverage["boxes"].as_array().unwrap();
-    let of_both = |of: &&serde_json::Value| {
-        let sides = of["sides"].as_array().unwrap();
-        sides.len() == 2 && sides.iter().all(|side| [ego, other].contains(&side[0].as_u64().unwrap()))
-    };
-    let hole = boxes.iter().filter(of_both).find(|of| of["is_largest"] == true).unwrap();
-    let ends = |of: u64| hole["sides"].as_array().unwrap().iter().find(|side| side[0] == of).unwrap()[1].clone();
-    assert_eq!((ends(ego), ends(other)), (serde_json::json!([25.0, 34.0]), serde_json::json!([19.0, 30.0])));
-    assert!((hole["size"].as_f64().unwrap() - 9.0 * 11.0 / 1200.0).abs() < 1e-12);
-    assert!(hole["exposure"][0].as_f64().unwrap() > 0.01, "{hole}");
-    let page = std::fs::read_to_string(dir.path().join("d-coverage.html")).unwrap();
-    assert!(page.contains("cases of tested.csv") && page.contains("Not considered"));
-
-    let unknown = run(&["--range", "speed=1..2"]);
-    assert!(code(&unknown) == 2 && stderr(&unknown).contains("no fitted density has the parameter `speed`"));
-    assert!(page.contains("SHA-256 of the tested cases"));
-    std::fs::write(&tested, "category,ego_speed_mps,gap_m,acceleration\nlvd,20,30,-5\n").unwrap();
-    let other = run(&["--tested", text(&tested)]);
-    assert!(code(&other) == 2 && stderr(&other).contains("tested.csv has no cut-in"), "{}", stderr(&other));
-    let twice = run(&["--tested", text(&out)]);
-    assert_eq!(code(&twice), 2, "{}", stderr(&twice));
 }
