@@ -405,7 +405,7 @@ fn an_instance_that_no_registry_lists_encodes_and_decodes() {
     let options = ParameterizationOptions::default();
     let kept = kept(Category::Lvd);
     let reduction = Reduction::fit(Category::Lvd, &kept, &options).unwrap();
-    let six = Parameterization { category: Category::Lvd, key: format!("svd-{}", 6).into(), family: Family::Svd(6) };
+    let six = Parameterization { category: Category::Lvd, key: "svd-6", family: Family::Svd(6) };
     let point = six.encode(kept[0], &options, Some(&reduction)).unwrap();
     assert_eq!(point.len(), six.parameters(&options).len());
     let decoded = six.decode(&point, &Sizes::of(kept[0]), 0.04, &options, Some(&reduction)).unwrap();

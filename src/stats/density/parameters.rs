@@ -20,7 +20,7 @@
 //! them.
 
 use crate::scenario::parameterization::{
-    Family, LateralStart, Linear, MAX_DURATION_S, MIN_DURATION_S, Parameter, Parameterization, ParameterizationOptions,
+    Family, LateralStart, MAX_DURATION_S, MIN_DURATION_S, Parameter, Parameterization, ParameterizationOptions,
     ReducedScenario, ReducedSeries, Reduction, Sizes, Variable,
 };
 use crate::scenario::{Case, Category, Scenario};

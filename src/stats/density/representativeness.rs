@@ -26,6 +26,7 @@ use super::transformed::{DensityKind, TransformedMixture};
 use super::transport::{mean_distance, sinkhorn, wasserstein};
 use crate::random::Stream;
 use crate::scenario::Scenario;
+use crate::scenario::parameterization::Reduction;
 use crate::{Error, Place, Result};
 
 /// β of the metric.

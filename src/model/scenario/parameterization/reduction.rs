@@ -86,11 +86,7 @@ impl Reduction {
     /// # Errors
     /// [`Error::Input`] if lengths do not match the category and the number of instants, a number is not finite, or a
     /// weight is not above 0.
-    pub fn from_parts(
-        category: Category,
-        basis: SvdBasis,
-        options: &ParameterizationOptions,
-    ) -> Result<Reduction> {
+    pub fn from_parts(category: Category, basis: SvdBasis, options: &ParameterizationOptions) -> Result<Reduction> {
         let (series, extras) = layout(category);
         let p = series.len() * options.svd_instants + extras.len();
         let wrong = |problem: String| Err(Error::input(crate::Place::item("basis"), problem, "fit it again"));
