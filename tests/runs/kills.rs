@@ -161,7 +161,7 @@ fn files(dir: &Path) -> Files {
 }
 
 /// The results of a folder; the search that a sample keeps until it ends is none.
-fn results(dir: &Path, verb: &Verb) -> Files {
+fn results(dir: &Path) -> Files {
     let mut files = files(dir);
     files.retain(|name, _| name != SEARCH);
     files
@@ -237,7 +237,7 @@ fn a_killed_run_of_any_verb_leaves_one_runs_files_and_ends_as_if_undisturbed() {
             (started.elapsed(), without_times(files(&dir.join("out"))))
         });
         put(dir, from.as_deref());
-        let before = results(&dir.join("out"), verb);
+        let before = results(&dir.join("out"));
         let mut child = start(dir, verb.run);
         if round % 2 == 0 && verb.record.is_some() {
             // As soon as the files get their names, or shortly after.
@@ -256,7 +256,7 @@ fn a_killed_run_of_any_verb_leaves_one_runs_files_and_ends_as_if_undisturbed() {
 
         let out = dir.join("out");
         continued += usize::from(names(&out).iter().any(|name| name.ends_with(".journal")));
-        let found = results(&out, verb);
+        let found = results(&out);
         match verb.record {
             Some(record) if found.contains_key(record) => {
                 recorded += 1;

@@ -12,9 +12,9 @@ use lanesweep::run::sampling::{
 use lanesweep::run::score::ScoreOptions;
 use lanesweep::run::study::{ExternalReplay, StudyHead, StudyOptions, plan_study};
 use lanesweep::scenario::DataProvenance;
-use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions, Reduction};
+use lanesweep::scenario::parameterization::ParameterizationOptions;
 use lanesweep::scenario::{Category, Scenario, read_scenarios};
-use lanesweep::stats::density::{DensityModel, Exposure, ParameterSpace, read_density};
+use lanesweep::stats::density::{DensityModel, Exposure, read_density};
 use lanesweep::support::plausibility::Implausible;
 use lanesweep::traffic::mining::{MiningOptions, mine, mine_folder};
 use lanesweep::traffic::trajectory::Inputs;

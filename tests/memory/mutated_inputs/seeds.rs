@@ -11,9 +11,7 @@ use lanesweep::run::sampling::{
 };
 use lanesweep::run::score::ScoreOptions;
 use lanesweep::run::study::{StudyOptions, outline_study};
-use lanesweep::scenario::parameterization::{
-    Feature, FunctionKind, LinearFamily, LinearSpec, Parameterization, ParameterizationOptions,
-};
+use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions};
 use lanesweep::scenario::{Category, Scenario, write_scenarios};
 use lanesweep::scenario::{DataProvenance, Driven};
 use lanesweep::stats::density::{DensityModel, FitOptions, write_density};
@@ -43,7 +41,6 @@ pub struct Seeds {
     pub score: Vec<Vec<u8>>,
     pub densities: Vec<Vec<u8>>,
     pub proposals: Vec<Vec<u8>>,
-    pub searched: Vec<Vec<u8>>,
     pub exid: Vec<Vec<u8>>,
     pub track_tables: Vec<Vec<u8>>,
     pub track_xml: Vec<Vec<u8>>,
