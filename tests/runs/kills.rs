@@ -42,7 +42,7 @@ impl Verb {
 
 const SAMPLE: &str = "sample d.json --thw 0.6 --models RSS --samples 3000 --worst 3 --out out";
 
-const VERBS: [Verb; 15] = [
+const VERBS: [Verb; 14] = [
     verb(
         "study",
         Some("run.json"),
