@@ -45,7 +45,6 @@ __all__ = [
     "synth",
     "trace",
     "tracks",
-    "vary",
 ]
 
 
@@ -76,7 +75,6 @@ def study(
     cross_validate: bool = False,
     published: bool = False,
     rows: Path | None = None,
-    injury: Keys | None = None,
     seed: Int | None = None,
     out: Path | None = None,
     **options: Unpack[_Study],
@@ -107,8 +105,6 @@ def study(
         Add the paper's published numbers (of highD) to tables and page.
     rows : path
         Also write one row per lane: .csv, .jsonl or .parquet.
-    injury : list of str
-        With `rows`: curves of injury risk, as of `check`, for columns of contacts.
     seed : int
         Chooses the lanes that are checked on the CPU; no score depends on it.
     out : path, optional
@@ -298,7 +294,7 @@ def sample(
     other_profile : str or path
         Also run the samples under this profile, and give the ratios.
     injury : list of str
-        Curves of injury risk, as of `check`: injuries per hour, and columns of `rows`.
+        Curves of injury risk (``"nhtsa-2022-frontal-mais3"``, …): injuries per hour, and columns of `rows`.
     target : mapping
         Rates per hour to compare with, ``{"collision": 1e-7, "injury": 1e-8}``. There is no default.
     map : pair of str
@@ -374,20 +370,14 @@ def check(
     scenario: str | None = None,
     models: Models | None = None,
     profiles: Paths | None = None,
-    results: Path | None = None,
     nominal: bool = False,
     sheet: Path | None = None,
     rows: Path | None = None,
-    sheets: Path | None = None,
     series: Path | None = None,
     backend: Literal["auto", "cpu", "gpu"] | None = None,
     device: str | Int | None = None,
-    injury: Keys | None = None,
     date: str | None = None,
     author: str | None = None,
-    uncertain: Values | None = None,
-    draws: Int | None = None,
-    seed: Int | None = None,
     **case: Unpack[Case],
 ) -> Result:
     """Check whether the reference drivers of UN R157 avoid the collision of a concrete case.
@@ -408,36 +398,20 @@ def check(
         Driver models, by default Reg157, CCHDM, RSS and FSM.
     profiles : list of str or path
         Profiles; the first one decides. By default un-r157, the two of EU 2022/1426, jrc-2021, paper and paper-fit.
-    results : path
-        Another simulator's results for a table of cases, compared with those of one driver: columns id and collision, and where known
-        reaction_s, braking_s, min_gap_m, min_ttc_s, contact_s, impact_speed_mps.
     nominal : bool
         Only the computed answers of a table, by lanes: a million rows take seconds. No perturbation, clause or boundary is examined.
     sheet : path
-        Also write the case sheet as an HTML page; of a table, a page with the worst cases on top.
+        Also write the case sheet as an HTML page.
     rows : path
         Also write a table's answers, one row per case: .csv, .jsonl or .parquet.
-    sheets : path
-        Also write a sheet of every row of a table into this folder.
     series : path
         Also write every step of every model under the first profile, as CSV.
     backend : {"auto", "cpu", "gpu"}
         Of `nominal`. ``"auto"``: a GPU if there is one.
     device : str or int
         Device of `nominal`, by part of its name, PCI bus id or index.
-    injury : list of str
-        Injury risks of contacts by published curves: ``"nhtsa-2022-frontal-mais3"``, ``"nhtsa-2022-frontal-fatal"``,
-        ``"joksch-1993-fatal"``.
     date, author : str
         Date of the run and author, as the sheet is to show them. The clock is not asked.
-    uncertain : dict, list of str or str
-        Errors of inputs, ``{"gap": "0.5m", "ego_speed": "1km/h"}``: independent normal errors with these standard errors, or uniform ones
-        (``"+-0.5m"``). A name in a list has its usual error; ``"all"`` is every input of the case. The sheet then has the fraction of
-        draws with each answer, and the input that matters most.
-    draws : int
-        With `uncertain`: number of draws, by default 100,000.
-    seed : int
-        With `uncertain`: seed of the draws.
     **case
         `Case` of `lanesweep.options`; it overrides values of a file.
 
@@ -569,56 +543,6 @@ def export_xosc(
     Result
     """
     return run("export_xosc", locals(), default_out="xosc")
-
-
-def vary(
-    file: Path | None = None,
-    *,
-    range: Keys | dict[str, str],
-    inside: Int | None = None,
-    edge: Int | None = None,
-    outside: Int | None = None,
-    boundary: Int | None = None,
-    seed: Int | None = None,
-    xosc: bool = False,
-    models: Models | None = None,
-    profile: Path | None = None,
-    out: Path | None = None,
-    **case: Unpack[Case],
-) -> Result:
-    """Make concrete cases around a case: inside, at and outside ranges, and where the answer changes.
-
-    The same seed gives the same cases. `check` compares another simulator's results for them (`results`).
-
-    Parameters
-    ----------
-    file : path, optional
-        TOML file, or table (.csv, .parquet), with the case or cases; every row of a table is varied.
-    range : list of str, or mapping
-        Quantities with their ranges: ``{"gap_m": "5..40"}``.
-    inside, edge, outside : int
-        Numbers of cases inside all ranges (by default 64), at an end of one (16), and outside of one by up to a quarter of it (16).
-    boundary : int
-        Pairs of cases on both sides of a boundary between two answers, by default 8.
-    seed : int
-        Seed of the cases.
-    xosc : bool
-        Also write every case as OpenSCENARIO, for your own controller of the ego.
-    models : list of str or Driver
-        Not used.
-    profile : str or path
-        Profile that answers, by default un-r157.
-    out : path
-        Folder of cases.csv, by default a new one.
-    **case
-        `Case` of `lanesweep.options`; it overrides values of a file.
-
-    Returns
-    -------
-    Result
-        Its status is ``"ok"``.
-    """
-    return run("vary", locals(), default_out="vary")
 
 
 def synth(folder: Path, *, synth_recordings: Int | None = None, **options: Unpack[Run]) -> Result:

@@ -131,7 +131,7 @@ macro_rules! whole_values {
         }
     )*};
 }
-whole_values!(usize, u32, u64);
+whole_values!(usize, u64);
 
 impl FromValue for f64 {
     fn of(value: Value) -> std::result::Result<Self, String> {
@@ -203,12 +203,10 @@ pub(super) fn choice<T: ValueEnum>(value: &Value) -> std::result::Result<T, Stri
 }
 
 /// An argument that means nothing without another one, by verb.
-pub(super) const NEEDS: [(&[&str], &str, &str); 13] = [
+pub(super) const NEEDS: [(&[&str], &str, &str); 11] = [
     (&["study", "fit", "verify", "mine"], "preset", "recordings"),
     (&["check"], "scenario", "file"),
     (&["check"], "row", "file"),
-    (&["check"], "draws", "uncertain"),
-    (&["check"], "seed", "uncertain"),
     (&["simulate"], "row", "table"),
     (&["xosc"], "worst", "from"),
     (&["xosc"], "criterion", "worst"),

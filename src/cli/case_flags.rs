@@ -216,7 +216,7 @@ pub(super) fn from_toml(path: &Path) -> Result<GivenCase> {
 }
 
 /// A CSV or Parquet table of cases.
-pub(super) struct CaseTable {
+pub(super) struct GivenCases {
     rows: ParameterRows,
     row: usize,
     /// Where each id was first.
@@ -225,11 +225,11 @@ pub(super) struct CaseTable {
     doubled: HashMap<String, u64>,
 }
 
-impl CaseTable {
-    pub(super) fn open(path: &Path) -> Result<CaseTable> {
+impl GivenCases {
+    pub(super) fn open(path: &Path) -> Result<GivenCases> {
         let format = TableFormat::of(path, &[TableFormat::Csv, TableFormat::Parquet], "--table")?;
         let rows = ParameterRows::new(TableReader::open(path, format)?)?;
-        Ok(CaseTable { rows, row: 0, lines: HashMap::new(), doubled: HashMap::new() })
+        Ok(GivenCases { rows, row: 0, lines: HashMap::new(), doubled: HashMap::new() })
     }
 
     /// Number of the last row, from 1 after the header.
@@ -265,22 +265,9 @@ impl CaseTable {
     }
 }
 
-/// All rows of a table; a row that is no case is an error.
-pub(super) fn all_cases(path: &Path) -> Result<Vec<GivenCase>> {
-    let mut table = CaseTable::open(path)?;
-    let mut all = Vec::new();
-    while let Some(given) = table.next()? {
-        all.push(given?);
-    }
-    if all.is_empty() {
-        return Err(Error::input(Place::file(path), "it has no rows", "give a case per row"));
-    }
-    Ok(all)
-}
-
 /// Reads a case from a row of a table; rows count from 1 after the header. Without a number the table has one row.
 pub(super) fn from_table(path: &Path, row: Option<usize>) -> Result<GivenCase> {
-    let mut table = CaseTable::open(path)?;
+    let mut table = GivenCases::open(path)?;
     let (wanted, help) = (row.unwrap_or(1), "rows count from 1 after the header");
     let missing = || Error::usage(Place::file(path), format!("there is no row {wanted}"), help);
     for _ in 1..wanted {

@@ -9,20 +9,16 @@ use super::case_flags::{CaseFlags, GivenCase, from_table, from_toml};
 use super::check_table::CheckedTable;
 use super::configured::Configured;
 use super::format::FormatFlag;
-use super::lists;
-use super::signals::CANCEL;
 use super::source::{PlausibilityFlag, refuse_overwriting, scenarios_of};
-use super::uncertain_flags::UncertainFlags;
 use super::{COMMIT, Exit, Output};
-use crate::engine::{CpuBackend, Executor};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::report::case_identity::CaseIdentity;
 use crate::report::case_sheet::CaseSheet;
 use crate::report::trace;
-use crate::run::check::{Answer, Check as Checked, Subject, Uncertain, Verdict};
+use crate::run::check::{Check as Checked, Subject};
 use crate::scenario::{Category, Scenario};
-use crate::support::files::{make_folder_of, write_atomically};
+use crate::support::files::write_atomically;
 use crate::support::input_file;
 use crate::support::plausibility::Doubts;
 use crate::support::table::TableFormat;
@@ -67,21 +63,12 @@ pub(super) struct Check {
     /// Profiles; the first one decides [default: un-r157, and the five others]
     #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Models and criteria")]
     profiles: Vec<String>,
-    /// Also write a page to print: a case, or the worst of a table
+    /// Also write the sheet of a case, a page to print
     #[arg(long, value_name = "FILE.html", help_heading = "Output")]
     sheet: Option<PathBuf>,
     /// Also write a table's answers, one row per case: .csv, .jsonl or .parquet
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     rows: Option<PathBuf>,
-    /// Also write a sheet of every row of a table into this folder
-    #[arg(long, value_name = "DIR", conflicts_with = "nominal", help_heading = "Output", hide_short_help = true)]
-    sheets: Option<PathBuf>,
-    /// Another simulator's results for a table, to be compared with --models NAME
-    ///
-    /// The table has the columns id and collision, and where known reaction_s, braking_s, min_gap_m, min_ttc_s, contact_s,
-    /// impact_speed_mps (the ego's speed at the contact, not the closing speed). Exit status: 0 nothing differs in any case, 5 something does, 4 cases have no result.
-    #[arg(long, value_name = "FILE", conflicts_with_all = ["nominal", "sheets"], help_heading = "Data")]
-    results: Option<PathBuf>,
     /// Only the computed answers of a table, by lanes: a million rows take seconds
     ///
     /// No perturbation, clause or boundary is examined, so that no answer is robust.
@@ -90,8 +77,6 @@ pub(super) struct Check {
     /// Also write every step of every model under the first profile
     #[arg(long, value_name = "FILE.csv", help_heading = "Output", hide_short_help = true)]
     series: Option<PathBuf>,
-    #[command(flatten)]
-    injury: lists::InjuryFlag,
     /// Date of the run, as the sheet is to show it; the clock is not asked
     #[arg(long, value_name = "TEXT", help_heading = "Output", hide_short_help = true)]
     date: Option<String>,
@@ -99,16 +84,14 @@ pub(super) struct Check {
     #[arg(long, value_name = "TEXT", help_heading = "Output", hide_short_help = true)]
     author: Option<String>,
     #[command(flatten)]
-    uncertain: UncertainFlags,
-    #[command(flatten)]
     plausibility: PlausibilityFlag,
     #[command(flatten)]
     format: FormatFlag,
 }
 
 from_arguments!(
-    Check { file, row, scenario, profiles, sheet, rows, sheets, results, nominal, series, date, author }
-    groups { case, injury, uncertain, plausibility, format }
+    Check { file, row, scenario, profiles, sheet, rows, nominal, series, date, author }
+    groups { case, plausibility, format }
 );
 
 /// The checked case, with facts for the reader.
@@ -131,7 +114,9 @@ impl Check {
         let names = if self.profiles.is_empty() { PROFILES.map(str::to_owned).to_vec() } else { self.profiles.clone() };
         let mut profiles = names.iter().map(|name| Profile::load(name.trim())).collect::<Result<Vec<_>>>()?;
         let models = self.case.named_models()?.unwrap_or_else(|| ModelId::ALL.to_vec());
-        if let Some(path) = self.whole_table()? {
+        let table = self.whole_table();
+        self.guard_flags(table)?;
+        if let Some(path) = table {
             let table = CheckedTable {
                 path,
                 profile: &profiles[0],
@@ -139,17 +124,10 @@ impl Check {
                 case: &self.case,
                 implausible: self.plausibility.policy(),
                 is_nominal: self.nominal,
-                page: self.sheet.as_deref(),
                 rows: self.rows.as_deref(),
-                sheets: self.sheets.as_deref(),
-                identity: self.identity()?,
             };
-            return match &self.results {
-                Some(results) => table.compare(results, configured, self.format),
-                None => table.run(configured, self.format),
-            };
+            return table.run(configured, self.format);
         }
-        self.refuse_of_tables()?;
         let request = self.request(&profiles[0])?;
         // A profile that only adds its own cut-in clause does not apply to other cases.
         if self.profiles.is_empty() && request.subject.category() != Category::CutIn {
@@ -159,13 +137,8 @@ impl Check {
             };
             profiles.retain(|profile| profile.name == first.name || !is_first(profile));
         }
-        let uncertain = self.uncertain.of(&request.subject)?;
         let check = Checked { subject: request.subject, profiles, models };
         let judgements = check.run()?;
-        let executor = Executor::new(CpuBackend::lane_arithmetic()).with_cancel(CANCEL.clone());
-        let drawn =
-            |of: Uncertain| of.run(&check.subject, &check.profiles[0], judgements[0].verdicts.answer(), &executor);
-        let uncertainty = uncertain.map(drawn).transpose()?;
         let sheet = CaseSheet {
             subject: &check.subject,
             origin: request.origin,
@@ -173,79 +146,62 @@ impl Check {
             doubts: &request.doubts,
             profiles: &check.profiles,
             judgements: &judgements,
-            uncertainty: uncertainty.as_ref(),
-            injury: &self.injury.curves()?,
             command: configured.command.clone(),
-            identity: self.identity()?,
+            identity: CaseIdentity {
+                commit: COMMIT,
+                file_sha256: self.file.as_deref().map(input_file::sha256).transpose()?,
+                date: self.date.clone(),
+                author: self.author.clone(),
+            },
         };
         if let Some(path) = &self.sheet {
-            write(path, sheet.html().as_bytes())?;
+            write_atomically(path, sheet.html().as_bytes())?;
         }
         if let Some(path) = &self.series {
             let named = judgements[0].models.iter().map(|judged| (judged.trace.model.name().to_owned(), &judged.trace));
-            write(path, trace::table(&named.collect::<Vec<_>>()).csv().as_bytes())?;
+            write_atomically(path, trace::table(&named.collect::<Vec<_>>()).csv().as_bytes())?;
         }
         // If input was skipped the answer is incomplete.
-        let exit = if request.incomplete { Exit::Incomplete } else { status(judgements[0].verdict()) };
+        let exit = if request.incomplete { Exit::Incomplete } else { Exit::from(judgements[0].verdict()) };
         self.format.output(exit, || sheet.text(), || sheet.json())
     }
 
-    /// What identifies the sheet besides the case.
-    fn identity(&self) -> Result<CaseIdentity> {
-        Ok(CaseIdentity {
-            commit: COMMIT,
-            file_sha256: self.file.as_deref().map(input_file::sha256).transpose()?,
-            date: self.date.clone(),
-            author: self.author.clone(),
-        })
-    }
-
     /// The table to be judged with all rows.
-    fn whole_table(&self) -> Result<Option<&Path>> {
-        let Some(path) = &self.file else { return Ok(None) };
-        let is_table = ["csv", "parquet"]
-            .iter()
-            .any(|table| path.extension().is_some_and(|ending| ending.eq_ignore_ascii_case(table)));
-        if !is_table || self.row.is_some() || self.scenario.is_some() {
-            return Ok(None);
-        }
-        let has_pages = self.sheets.is_some() || self.sheet.is_some();
-        let of_one = [
-            ("--series", self.series.is_some()),
-            ("--date", self.date.is_some() && !has_pages),
-            ("--author", self.author.is_some() && !has_pages),
-            ("--uncertain", self.uncertain.is_given()),
-            ("--injury", self.injury.is_given()),
-            ("--profiles", self.profiles.len() > 1),
-        ];
-        match of_one.iter().find(|(_, is_given)| *is_given) {
-            Some(("--profiles", _)) => {
-                let problem = format!("{} is judged with all its rows, under one profile", path.display());
-                Err(Error::usage(Place::item("--profiles"), problem, "name one profile, or choose a row: --row N"))
-            }
-            Some((flag, _)) => {
-                let problem = format!("it shows one case, and {} is judged with all its rows", path.display());
-                Err(Error::usage(Place::item(*flag), problem, "choose a row: --row N, from 1 after the header"))
-            }
-            None => Ok(Some(path)),
-        }
+    fn whole_table(&self) -> Option<&Path> {
+        let path = self.file.as_deref().filter(|_| self.row.is_none() && self.scenario.is_none())?;
+        let ending = path.extension()?;
+        ["csv", "parquet"].iter().any(|table| ending.eq_ignore_ascii_case(table)).then_some(path)
     }
 
-    /// Refuses the flags of whole tables.
-    fn refuse_of_tables(&self) -> Result<()> {
-        let of_tables = [
-            ("--rows", self.rows.is_some()),
-            ("--sheets", self.sheets.is_some()),
-            ("--results", self.results.is_some()),
-            ("--nominal", self.nominal),
+    /// Refuses flags of one case for a whole table, and flags of a table for one case.
+    fn guard_flags(&self, table: Option<&Path>) -> Result<()> {
+        let of_one = [
+            ("--sheet", self.sheet.is_some()),
+            ("--series", self.series.is_some()),
+            ("--date", self.date.is_some()),
+            ("--author", self.author.is_some()),
         ];
-        match of_tables.iter().find(|(_, is_given)| *is_given) {
-            Some((flag, _)) => {
-                let help = "give a table (.csv, .parquet) without --row, or leave it out";
-                Err(Error::usage(Place::item(*flag), "it is of a table of cases, and this is one case", help))
-            }
-            None => Ok(()),
-        }
+        let of_tables = [("--rows", self.rows.is_some()), ("--nominal", self.nominal)];
+        let given =
+            |flags: &[(&'static str, bool)]| flags.iter().find(|(_, is_given)| *is_given).map(|(flag, _)| *flag);
+        let (flag, problem, help) = match table {
+            Some(path) if self.profiles.len() > 1 => (
+                Some("--profiles"),
+                format!("{} is judged with all its rows, under one profile", path.display()),
+                "name one profile, or choose a row: --row N",
+            ),
+            Some(path) => (
+                given(&of_one),
+                format!("it shows one case, and {} is judged with all its rows", path.display()),
+                "choose a row: --row N, from 1 after the header",
+            ),
+            None => (
+                given(&of_tables),
+                "it is of a table of cases, and this is one case".to_owned(),
+                "give a table (.csv, .parquet) without --row, or leave it out",
+            ),
+        };
+        flag.map_or(Ok(()), |flag| Err(Error::usage(Place::item(flag), problem, help)))
     }
 
     fn request(&self, profile: &Profile) -> Result<CheckRequest> {
@@ -320,7 +276,6 @@ impl Check {
         let inputs: Vec<PathBuf> = self.file.iter().cloned().collect();
         if let Some(path) = &self.rows {
             TableFormat::of(path, &TableFormat::EVERY, "--rows")?;
-            let inputs: Vec<PathBuf> = inputs.iter().chain(&self.results).cloned().collect();
             refuse_overwriting(path, &inputs, "--rows")?;
         }
         let outputs = [(&self.sheet, "html", "--sheet"), (&self.series, "csv", "--series")];
@@ -336,17 +291,6 @@ impl Check {
     }
 }
 
-/// The exit status of an answer.
-pub(super) fn status(verdict: Verdict) -> Exit {
-    match verdict {
-        Verdict::Undecided | Verdict::Answer(Answer::Open) => Exit::Undecided,
-        Verdict::OutsideAnnex | Verdict::NotJudged => Exit::OutsideAnnex,
-        Verdict::Answer(Answer::Preventable) => Exit::Ok,
-        Verdict::Answer(Answer::NotPreventable) => Exit::NotPreventable,
-        Verdict::Answer(Answer::NoConflict) => Exit::NoConflict,
-    }
-}
-
 fn unknown(path: &Path, id: &str, scenarios: &[Scenario]) -> Error {
     let example = scenarios
         .iter()
@@ -358,9 +302,4 @@ fn unknown(path: &Path, id: &str, scenarios: &[Scenario]) -> Error {
         problem,
         format!("give the id of one of its {} scenarios{example}", scenarios.len()),
     )
-}
-
-pub(super) fn write(path: &Path, bytes: &[u8]) -> Result<()> {
-    make_folder_of(path)?;
-    write_atomically(path, bytes)
 }

@@ -4,8 +4,7 @@ use std::path::Path;
 
 use rayon::prelude::*;
 
-use super::case_flags::{CaseFlags, CaseTable, GivenCase};
-use super::check::{status, write};
+use super::case_flags::{CaseFlags, GivenCase, GivenCases};
 use super::configured::Configured;
 use super::console::{self, Total};
 use super::format::FormatFlag;
@@ -17,11 +16,10 @@ use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::report::case_identity::CaseIdentity;
 use crate::report::case_sheet::CaseSheet;
-use crate::report::case_table::{CaseAnswer, CaseTable as Answers};
+use crate::report::case_table::{CaseAnswer, CaseAnswers};
 use crate::run::check::{Check, Subject, nominal_verdicts};
 use crate::support::files::make_folder_of;
 use crate::support::plausibility::{Doubts, Implausible};
-use crate::support::run_folder::RunFolder;
 use crate::{Error, Place, Result};
 
 /// Rows that are judged together, and rows whose lanes are planned together.
@@ -37,12 +35,7 @@ pub(super) struct CheckedTable<'a> {
     pub implausible: Implausible,
     /// Only the answers of lanes.
     pub is_nominal: bool,
-    pub page: Option<&'a Path>,
     pub rows: Option<&'a Path>,
-    /// Folder of a sheet per row.
-    pub sheets: Option<&'a Path>,
-    /// What identifies page and sheets besides their cases.
-    pub identity: CaseIdentity,
 }
 
 /// A row with its case, or why it has none.
@@ -51,11 +44,9 @@ type Row = (usize, Result<(Subject, GivenCase)>);
 impl CheckedTable<'_> {
     /// Judges every row.
     pub(super) fn run(&self, configured: &Configured, format: FormatFlag) -> Result<Output> {
-        let mut table = CaseTable::open(self.path)?;
+        let mut table = GivenCases::open(self.path)?;
         let mut doubts = Doubts::new(self.implausible);
         let opened = self.is_nominal.then(|| configured.open()).transpose()?;
-        let folder = self.sheets.map(RunFolder::open_without_record).transpose()?;
-        let mut sheets = folder.as_ref().map(RunFolder::results).transpose()?;
         let (mut cases, mut broken, mut is_end) = (Vec::new(), Vec::new(), false);
         configured.with_bar(Total::AtMost(u64::MAX), "judging", |bar| {
             while !is_end {
@@ -74,17 +65,12 @@ impl CheckedTable<'_> {
                 bar.inc(rows.len() as u64);
                 let answers = match &opened {
                     Some(opened) => self.nominal(rows, &opened.executor())?,
-                    None => self.judged(rows, configured),
+                    None => self.judged(rows),
                 };
                 // In the order of the rows.
                 for answer in answers {
                     match answer {
-                        Ok((answer, sheet)) => {
-                            if let (Some(sheet), Some(sheets)) = (sheet, &mut sheets) {
-                                sheets.add(&format!("row-{}.html", answer.row), sheet.as_bytes())?;
-                            }
-                            cases.push(answer);
-                        }
+                        Ok(answer) => cases.push(answer),
                         Err(error) => broken.push(error),
                     }
                 }
@@ -107,29 +93,23 @@ impl CheckedTable<'_> {
         }
         let broken: Vec<String> = broken.iter().map(ToString::to_string).collect();
         let is_complete = broken.is_empty();
-        let answers = Answers {
+        let answers = CaseAnswers {
             origin: self.path.display().to_string(),
-            profile: self.profile.clone(),
+            profile: self.profile.name.clone(),
             cases,
             broken,
             is_nominal: self.is_nominal,
-            command: configured.command.clone(),
-            identity: self.identity.clone(),
         };
         if let Some(path) = self.rows {
             make_folder_of(path)?;
             answers.save(path)?;
         }
-        if let Some(path) = self.page {
-            write(path, answers.html().as_bytes())?;
-        }
-        sheets.map_or(Ok(()), |sheets| sheets.publish_each())?;
-        let exit = if is_complete { status(answers.worst()) } else { Exit::Incomplete };
+        let exit = if is_complete { Exit::from(answers.worst()) } else { Exit::Incomplete };
         format.output(exit, || answers.text(console::width()), || answers.json())
     }
 
     /// Runs the lanes of some rows.
-    fn nominal(&self, rows: Vec<Row>, executor: &Executor) -> Result<Vec<Result<Answered>>> {
+    fn nominal(&self, rows: Vec<Row>, executor: &Executor) -> Result<Vec<Result<CaseAnswer>>> {
         let subjects = rows.iter().filter_map(|(_, row)| row.as_ref().ok().map(|(subject, _)| subject.clone()));
         let subjects: Vec<Subject> = subjects.collect();
         let mut verdicts = nominal_verdicts(&subjects, self.profile, executor)?.into_iter();
@@ -137,24 +117,23 @@ impl CheckedTable<'_> {
             let (_, given) = of?;
             let missing = || Err(Error::Internal("a case has no verdict".to_owned()));
             let verdicts = given.located(verdicts.next().unwrap_or_else(missing))?;
-            Ok((CaseAnswer::nominal(row, given.id, &verdicts, self.models), None))
+            Ok(CaseAnswer::nominal(row, given.id, &verdicts, self.models))
         });
         Ok(answers.collect())
     }
 
-    /// Judges some rows, with a sheet of each if sheets are wanted.
-    fn judged(&self, rows: Vec<Row>, configured: &Configured) -> Vec<Result<Answered>> {
+    /// Judges some rows.
+    fn judged(&self, rows: Vec<Row>) -> Vec<Result<CaseAnswer>> {
         let answers = rows.into_par_iter().map(|(row, of)| {
             let (subject, given) = of?;
-            given.located(self.judge(row, given.id.clone(), subject, &configured.command))
+            given.located(self.judge(row, given.id.clone(), subject))
         });
         answers.collect()
     }
 
-    fn judge(&self, row: usize, id: Option<String>, subject: Subject, command: &str) -> Result<Answered> {
+    fn judge(&self, row: usize, id: Option<String>, subject: Subject) -> Result<CaseAnswer> {
         let check = Check { subject, profiles: vec![self.profile.clone()], models: self.models.to_vec() };
-        let has_sheet = self.sheets.is_some();
-        let judgements = if has_sheet { check.run()? } else { check.run_without_boundaries()? };
+        let judgements = check.run_without_boundaries()?;
         let sheet = CaseSheet {
             subject: &check.subject,
             origin: format!("{}, row {row}", self.path.display()),
@@ -162,14 +141,9 @@ impl CheckedTable<'_> {
             doubts: &[],
             profiles: &check.profiles,
             judgements: &judgements,
-            uncertainty: None,
-            injury: &[],
-            command: command.to_owned(),
-            identity: self.identity.clone(),
+            command: String::new(),
+            identity: CaseIdentity::default(),
         };
-        Ok((CaseAnswer::new(row, id, &sheet), has_sheet.then(|| sheet.html())))
+        Ok(CaseAnswer::new(row, id, &sheet))
     }
 }
-
-/// The answer of a row, and its sheet.
-type Answered = (CaseAnswer, Option<String>);

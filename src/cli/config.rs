@@ -12,7 +12,7 @@ use crate::cli::settings::{
     Assignment, DEFAULT_FILE, DEFAULT_FILE_NAME, Layers, Setting, profile_schema, settings_schema, text_of,
 };
 use crate::report::records::document;
-use crate::support::files::{make_folder_of, write_atomically};
+use crate::support::files::write_atomically;
 use crate::support::plain_text::quoted_word;
 use crate::{Error, Place, Result};
 
@@ -125,7 +125,6 @@ impl Init {
             let help = "choose another name, or move it away; `lanesweep config init -` prints the file";
             return Err(Error::usage(Place::file(&self.file), "it exists already and is not overwritten", help));
         }
-        make_folder_of(&self.file)?;
         write_atomically(&self.file, DEFAULT_FILE.as_bytes())?;
         let file = self.file.display().to_string();
         let text = format!("{file} written; use it with --config {}\n", quoted_word(&file));

@@ -19,7 +19,7 @@ pub const STACK_BYTES: usize = 8 << 20;
 type Function = (&'static str, &'static [&'static str], fn(&mut Arguments) -> Result<Verb>);
 
 #[rustfmt::skip] // a table
-const FUNCTIONS: [Function; 12] = [
+const FUNCTIONS: [Function; 11] = [
     ("study", &["study"], |given| Ok(Verb::Study(of(given)?))),
     ("tracks", &["tracks"], |given| Ok(Verb::Tracks(of(given)?))),
     ("mine", &["mine"], |given| Ok(Verb::Mine(of(given)?))),
@@ -27,7 +27,6 @@ const FUNCTIONS: [Function; 12] = [
     ("sample", &["sample"], |given| Ok(Verb::Sample(of(given)?))),
     ("map", &["map"], |given| Ok(Verb::Map(of(given)?))),
     ("check", &["check"], |given| Ok(Verb::Check(of(given)?))),
-    ("vary", &["vary"], |given| Ok(Verb::Vary(of(given)?))),
     ("trace", &["simulate"], |given| Ok(Verb::Simulate(of(given)?))),
     ("export_xosc", &["export", "xosc"], |given| Ok(Verb::Export(of(given)?))),
     ("synth", &["synth"], |given| Ok(Verb::Synth(of(given)?))),

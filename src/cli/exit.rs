@@ -3,6 +3,7 @@
 use std::process::ExitCode;
 
 use crate::Error;
+use crate::run::check::{Answer, Verdict};
 
 /// Exit codes of every verb.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
@@ -103,6 +104,18 @@ impl From<&Error> for Exit {
             Error::Verification(_) => Exit::VerificationFailed,
             Error::Internal(_) => Exit::Internal,
             Error::Interrupted { .. } | Error::Busy { .. } => Exit::Interrupted,
+        }
+    }
+}
+
+impl From<Verdict> for Exit {
+    fn from(verdict: Verdict) -> Exit {
+        match verdict {
+            Verdict::Undecided | Verdict::Answer(Answer::Open) => Exit::Undecided,
+            Verdict::OutsideAnnex | Verdict::NotJudged => Exit::OutsideAnnex,
+            Verdict::Answer(Answer::Preventable) => Exit::Ok,
+            Verdict::Answer(Answer::NotPreventable) => Exit::NotPreventable,
+            Verdict::Answer(Answer::NoConflict) => Exit::NoConflict,
         }
     }
 }

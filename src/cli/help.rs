@@ -7,7 +7,7 @@ use clap::{Arg, ArgAction, Command};
 const VERBS: [(&str, &[&str]); 5] = [
     ("Study a data set", &["tracks", "study", "mine"]),
     ("Probabilities", &["fit", "sample"]),
-    ("Single cases and grids", &["check", "simulate", "map", "vary", "export"]),
+    ("Single cases and grids", &["check", "simulate", "map", "export"]),
     ("More machines", &["merge"]),
     ("Tools", &["verify", "devices", "config", "synth"]),
 ];

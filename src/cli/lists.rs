@@ -73,26 +73,6 @@ impl InjuryFlag {
     pub(super) fn curves(&self) -> Result<Vec<&'static InjuryCurve>> {
         self.injury.iter().map(|name| InjuryCurve::find(name)).collect()
     }
-
-    pub(super) fn is_given(&self) -> bool {
-        !self.injury.is_empty()
-    }
-}
-
-/// `NAME=FROM..TO` of `--range`.
-///
-/// # Errors
-/// [`Error::Usage`] for another text, and if the ends are not two numbers, the smaller first.
-pub(super) fn range(text: &str) -> Result<(&str, [f64; 2])> {
-    let wrong = || {
-        let help = "write NAME=FROM..TO with two numbers, the smaller first, for instance gap_m=5..40";
-        Error::usage(Place::item("--range"), format!("`{text}` is no range"), help)
-    };
-    let (name, ends) = text.split_once('=').ok_or_else(wrong)?;
-    let number = |end: &str| end.trim().parse::<f64>().ok().filter(|value| value.is_finite());
-    let ends = ends.split_once("..").and_then(|(from, to)| number(from).zip(number(to)));
-    let (from, to) = ends.filter(|(from, to)| from < to).ok_or_else(wrong)?;
-    Ok((name.trim(), [from, to]))
 }
 
 /// `--parameterizations`.

@@ -4,7 +4,6 @@
 mod arguments;
 mod case_flags;
 mod check;
-mod check_results;
 mod check_table;
 mod config;
 mod configured;
@@ -32,8 +31,6 @@ mod source;
 mod study;
 mod synth;
 mod tracks;
-mod uncertain_flags;
-mod vary;
 mod verify;
 
 pub use exit::Exit;
@@ -101,7 +98,6 @@ enum Verb {
     Map(Box<map::Map>),
     Simulate(simulate::Simulate),
     Check(check::Check),
-    Vary(vary::Vary),
     Export(export::Export),
     Merge(merge::Merge),
     Verify(Box<verify::Verify>),
@@ -191,7 +187,6 @@ impl Verb {
             Verb::Map(verb) => verb.run(configured),
             Verb::Simulate(verb) => verb.run(configured),
             Verb::Check(verb) => verb.run(configured),
-            Verb::Vary(verb) => verb.run(configured),
             Verb::Export(verb) => verb.run(configured),
             Verb::Merge(verb) => verb.run(),
             Verb::Verify(verb) => verb.run(configured),

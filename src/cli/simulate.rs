@@ -13,7 +13,7 @@ use super::source::{PlausibilityFlag, refuse_overwriting, scenarios_of};
 use super::{Exit, Output};
 use crate::report::trace::TraceReport;
 use crate::run::reopen::{Reopened, TracedLanes};
-use crate::support::files::{make_folder_of, write_atomically};
+use crate::support::files::write_atomically;
 use crate::support::run_folder::is_listed;
 use crate::{Error, Place, Result};
 
@@ -86,7 +86,6 @@ impl Simulate {
         let report = TraceReport(&lanes);
         if let Some(path) = &self.plot {
             // Write the figure before the table: a closed stdout must not prevent it.
-            make_folder_of(path)?;
             write_atomically(path, report.figure(self.plot_end).svg().as_bytes())?;
         }
         let exit = if incomplete { Exit::Incomplete } else { Exit::Ok };

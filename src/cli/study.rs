@@ -38,7 +38,6 @@ use crate::{Error, Place, Result};
         arg.conflicts_with("plan")
     }
     "rows" => arg.conflicts_with_all(["shard", "plan_only"]),
-    "injury" => arg.requires("rows"),
     _ => arg,
 }))]
 #[command(after_help = "Examples:\n  lanesweep study\n  lanesweep study recordings --out result\n  lanesweep study \
@@ -61,8 +60,6 @@ pub(super) struct Study {
     models: lists::ModelsFlag,
     #[command(flatten)]
     headways: lists::HeadwaysFlag,
-    #[command(flatten)]
-    injury: lists::InjuryFlag,
     /// Also replay scenarios by bases that have not seen them
     ///
     /// Scenarios are divided into folds by recording ([study] folds). Each decomposition gets a variant, 5-cv. A
@@ -82,7 +79,7 @@ pub(super) struct Study {
 
 from_arguments!(
     Study { out, rows, published, cross_validate, external }
-    groups { data, categories, models, headways, injury, format, shards }
+    groups { data, categories, models, headways, format, shards }
 );
 impl Study {
     pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
@@ -177,11 +174,8 @@ impl Study {
         let lanes = plan.first_lane_of(units.end) - plan.first_lane_of(units.start);
         tracing::info!("{} lanes on {}", readable::count(lanes), backend.describe());
         let missing = Total::Exact(run.missing()?);
-        let injury = self.injury.curves()?;
-        let mut rows = self.rows.as_deref().map(|path| study_table(path, study, &injury)).transpose()?;
-        let mut write = rows
-            .as_mut()
-            .map(|rows| |plan: &LanePlan, chunk: &Chunk| write_study_chunk(rows, (study, &injury), plan, chunk));
+        let mut rows = self.rows.as_deref().map(|path| study_table(path, study)).transpose()?;
+        let mut write = rows.as_mut().map(|rows| |plan: &LanePlan, chunk: &Chunk| write_study_chunk(rows, plan, chunk));
         timed(&mut timings.sweep_s, || {
             let each = write.as_mut().map(|write| write as &mut EachChunk);
             configured.with_progress(missing, "sweeping", &executor, |executor| run.compute(executor, each))

@@ -87,12 +87,6 @@ impl Profile {
     }
 }
 
-/// The constants and options whose values differ between two profiles: key, value of the first, value of the second.
-pub fn differences(first: &Profile, second: &Profile) -> Vec<(String, Value, Value)> {
-    let both = first.assumptions().into_iter().zip(second.assumptions());
-    both.filter(|(a, b)| a.value != b.value).map(|(a, b)| (a.key, a.value, b.value)).collect()
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;

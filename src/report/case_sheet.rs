@@ -3,7 +3,7 @@
 
 use serde_json::{Value, json};
 
-use super::case_identity::{self, CaseIdentity, NOT_CONSIDERED};
+use super::case_identity::{CaseIdentity, NOT_CONSIDERED, profile_sha256};
 use super::html::{Page, PageFigure, Section};
 use super::lanes::outcome_json;
 use super::records::{self, PROGRAM};
@@ -12,8 +12,7 @@ use super::trace::{TraceFigure, TracePanels, TraceSeries};
 use crate::Result;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
-use crate::model::severity::InjuryCurve;
-use crate::run::check::{Boundary, Change, Judged, Judgement, Reading, RunEnd, Subject, Uncertainty, Verdict};
+use crate::run::check::{Boundary, Change, Judged, Judgement, Reading, RunEnd, Subject, Verdict};
 use crate::run::grid::VARIED;
 use crate::scenario::{CaseQuantity, KMH, NUMBERS};
 use crate::support::readable::value;
@@ -46,10 +45,6 @@ pub struct CaseSheet<'a> {
     pub profiles: &'a [Profile],
     /// One judgement per profile, at least one; the first decides.
     pub judgements: &'a [Judgement],
-    /// What draws of uncertain inputs say under the first profile, if they were asked for.
-    pub uncertainty: Option<&'a Uncertainty>,
-    /// Curves of injury risk to be shown; usually none.
-    pub injury: &'a [&'static InjuryCurve],
     /// Command that reproduces the sheet.
     pub command: String,
     /// What the user and the build say of it.
@@ -191,7 +186,7 @@ impl CaseSheet<'_> {
             self.first().profile,
             self.clauses().text(),
             wrap(&format!("Where the answer changes under {}. {BOUNDARIES}", self.first().profile), WIDTH),
-            self.boundaries().text() + &self.by_rule_text() + &self.uncertainty_text() + &self.severity_text(),
+            self.boundaries().text() + &self.by_rule_text(),
             self.identity_text(),
         )
     }
@@ -205,18 +200,6 @@ impl CaseSheet<'_> {
             let models = judgement.models.iter().map(|judged| {
                 let mut outcome = outcome_json(&judged.trace.outcome, judged.trace.dt_s);
                 outcome["model"] = json!(judged.trace.model.name());
-                let delta_v_mps = self.delta_v_mps(judged);
-                outcome["delta_v_ego_mps"] = json!(delta_v_mps.map(|both| both[0]));
-                outcome["delta_v_other_mps"] = json!(delta_v_mps.map(|both| both[1]));
-                if !self.injury.is_empty() {
-                    let risk = |curve: &&InjuryCurve| {
-                        json!({
-                            "curve": curve.name, "injury": curve.injury, "source": curve.source,
-                            "risk": self.injury_risk(delta_v_mps, curve),
-                        })
-                    };
-                    outcome["injury_risk_ego"] = json!(self.injury.iter().map(risk).collect::<Vec<_>>());
-                }
                 outcome["braking_s"] = json!(judged.braking_s());
                 outcome["changes_with"] = json!(judged.flips);
                 outcome["is_contact_like"] = json!(judged.touches);
@@ -244,10 +227,10 @@ impl CaseSheet<'_> {
             let is_answer = matches!(judgement.verdict(), Verdict::Answer(_) | Verdict::Undecided);
             json!({
                 "profile": judgement.profile,
-                "sha256": case_identity::profile_sha256(profile).unwrap_or_default(),
+                "sha256": profile_sha256(profile).unwrap_or_default(),
                 "dt_s": profile.frame.dt_s,
                 "time_cap_s": profile.frame.time_cap_s,
-                "finer_step": case_identity::finer_json(judgement),
+                "finer_step": Self::finer_json(judgement),
                 "verdict": judgement.verdict().label(),
                 "nominal_answer": is_answer.then(|| judgement.verdicts.answer().label()),
                 "clause": judgement.clause,
@@ -277,7 +260,6 @@ impl CaseSheet<'_> {
             "silent": self.silent(),
             "rule": self.rule(),
             "by_rule": self.by_rule_records(),
-            "uncertainty": self.uncertainty.map(|of| self.uncertainty_record(of)),
             "cautions": self.cautions(),
             "profiles": self.judgements.iter().zip(self.profiles).map(judgement).collect::<Vec<_>>(),
             "assumptions": self.profiles[0].assumptions(),
@@ -366,8 +348,6 @@ impl CaseSheet<'_> {
                 .into_iter()
                 .chain(self.by_rule_section())
                 .chain([clauses, boundaries])
-                .chain(self.severity_section())
-                .chain(self.uncertainty.map(|of| self.uncertainty_section(of)))
                 .chain([self.numerics_section(), assumptions, CaseIdentity::not_considered()])
                 .collect(),
         }
@@ -398,7 +378,7 @@ fn without_repeats(mut table: Table, first: usize) -> Table {
     table
 }
 
-pub(super) fn nearest(change: &Change, from: f64) -> Option<f64> {
+fn nearest(change: &Change, from: f64) -> Option<f64> {
     let distance = |at: &f64| (at - from).abs();
     change.below.into_iter().chain(change.above).min_by(|a, b| distance(a).total_cmp(&distance(b)))
 }
@@ -424,6 +404,6 @@ fn ends(change: &Change) -> Value {
 }
 
 /// A number with its sign.
-pub(super) fn signed(number: f64) -> String {
+fn signed(number: f64) -> String {
     format!("{}{}", if number < 0.0 { "-" } else { "+" }, value(number.abs()))
 }

@@ -1,23 +1,19 @@
-//! A table of concrete cases against the regulation: a row per case with its answer, as text, as JSON, as a table file
-//! and as a page.
+//! A table of concrete cases against the regulation: a row per case with its answer, as text, as JSON and as a table file.
 
 use std::iter::once;
 use std::path::Path;
 
 use serde_json::json;
 
-use super::case_identity::CaseIdentity;
 use super::case_sentences::{drives_through, past_the_cap, touching};
 use super::case_sheet::{CaseSheet, verdict_of};
-use super::html::{Page, Section};
 use super::records::{self, PROGRAM};
 use super::tables::wrap;
 use crate::Result;
 use crate::model::driver::ModelId;
-use crate::model::profile::Profile;
-use crate::run::check::{Answer, CaseVerdicts, Demand, DriverRule, Judgement, RuleVerdicts, RunEnd, Verdict};
+use crate::run::check::{Answer, CaseVerdicts, Demand, Judgement, RunEnd, Verdict};
 use crate::support::readable::counted;
-use crate::support::table::{Column, Digits, Table, TableMetadata, TableOf};
+use crate::support::table::{Column, Table, TableMetadata, TableOf};
 
 /// All verdicts, the worst first: those without a driver of Annex 3 that avoids the collision, then those with one, then
 /// those without a collision.
@@ -53,7 +49,6 @@ pub struct CaseAnswer {
     collisions: Vec<(&'static str, &'static str)>,
     /// The only reference driver that avoids the collision.
     rests_on: &'static str,
-    by_rule: Vec<RuleVerdicts>,
     note: String,
 }
 
@@ -78,7 +73,6 @@ impl CaseAnswer {
             },
             collisions: models.map(|judged| (judged.trace.model.name(), verdict_of(judgement, judged))).collect(),
             rests_on: rests_on(judgement.verdict(), &judgement.verdicts),
-            by_rule: judgement.by_rule.clone(),
             note: once(note(judgement))
                 .chain(sheet.silent())
                 .chain(drives_through(judgement))
@@ -106,7 +100,6 @@ impl CaseAnswer {
             demanded: "",
             collisions: models.iter().map(|model| (model.name(), collision(*model))).collect(),
             rests_on: rests_on(verdicts.verdict(), verdicts),
-            by_rule: verdicts.by_rule(),
             note: String::new(),
         }
     }
@@ -143,29 +136,23 @@ fn note(judgement: &Judgement) -> String {
 }
 
 /// The answers of a whole table, under one profile.
-pub struct CaseTable {
+pub struct CaseAnswers {
     /// The file, as the user named it.
     pub origin: String,
-    /// Profile.
-    pub profile: Profile,
+    /// Name of the profile.
+    pub profile: String,
     /// At least one case, in the order of the file.
     pub cases: Vec<CaseAnswer>,
     /// Why the other rows could not be judged, with file, line and column.
     pub broken: Vec<String>,
     /// The answers are those of lanes: no perturbation, clause or boundary was examined.
     pub is_nominal: bool,
-    /// Command that reproduces the table.
-    pub command: String,
-    /// What identifies it: commit, file, date, author.
-    pub identity: CaseIdentity,
 }
 
-/// What the table of rules shows.
-const BY_RULE: &str = "By rule: the cases if this driver alone decides; if any of the reference drivers suffices (in force); if all \
-                       of them have to avoid the collision. Turned: cases whose verdict is not that of the table.";
-/// Maximum number of rows in the text, and on the page; the table file has all.
-const MAX_ROWS: [usize; 2] = [200, 1000];
-impl CaseTable {
+/// Maximum number of rows in the text; the table file has all.
+const MAX_ROWS: usize = 200;
+
+impl CaseAnswers {
     /// The worst verdict.
     pub fn worst(&self) -> Verdict {
         let has = |verdict: &Verdict| self.cases.iter().any(|case| case.verdict == *verdict);
@@ -184,7 +171,7 @@ impl CaseTable {
             0 => String::new(),
             count => format!("; {} cannot be judged", counted(count, "row")),
         };
-        format!("{} under {}: {}{broken}", counted(self.cases.len(), "case"), self.profile.name, counts.join(", "))
+        format!("{} under {}: {}{broken}", counted(self.cases.len(), "case"), self.profile, counts.join(", "))
     }
 
     /// How many preventable cases only one reference driver avoids; empty if none.
@@ -200,62 +187,25 @@ impl CaseTable {
         format!("Of {} called preventable, one driver alone decides in {}.", counted(all, "case"), alone.join(", "))
     }
 
-    fn legend(&self) -> &'static str {
-        LEGENDS[usize::from(self.is_nominal)]
-    }
-
-    /// Which driver decides: the cases by rule and, where sheets were made, by reading.
-    fn by_rule(&self) -> Table {
-        type RuleCases = (Option<&'static str>, DriverRule, [usize; WORST_FIRST.len()], usize);
-        let mut all: Vec<RuleCases> = Vec::new();
-        for case in &self.cases {
-            for (rules, (rule, verdict)) in
-                case.by_rule.iter().flat_map(|of| of.verdicts.iter().map(move |by| (of, by)))
-            {
-                let known = all.iter().position(|(reading, of, ..)| (reading, of) == (&rules.reading, rule));
-                let at = known.unwrap_or_else(|| {
-                    all.push((rules.reading, *rule, [0; WORST_FIRST.len()], 0));
-                    all.len() - 1
-                });
-                let (.., counts, turned) = &mut all[at];
-                let of_verdict = counts.iter_mut().zip(WORST_FIRST).filter(|(_, of)| of == verdict);
-                of_verdict.for_each(|(count, _)| *count += 1);
-                *turned += usize::from(*verdict != case.verdict);
-            }
-        }
-        let present = |at: &usize| all.iter().any(|(.., counts, _)| counts[*at] > 0);
-        let present: Vec<usize> = (0..WORST_FIRST.len()).filter(present).collect();
-        Table::of(all)
-            .column("reading", |(reading, ..)| reading.unwrap_or("as it is"))
-            .column("rule", |(_, rule, ..)| rule.label())
-            .columns(present, |at| WORST_FIRST[at].label(), |(.., counts, _), at| counts[at])
-            .column("turned", |(.., turned)| turned)
-            .column(Column::from("turned %").digits(Digits::Fixed(2)), |(.., counts, turned)| {
-                100.0 * turned as f64 / counts.iter().sum::<usize>() as f64
-            })
-            .build()
-    }
-
     /// The rows to be shown: all in the order of the file, or the worst of many.
-    fn shown(&self, max: usize) -> Vec<&CaseAnswer> {
-        if self.cases.len() <= max { self.cases.iter().collect() } else { self.worst_first(max) }
-    }
-
-    fn worst_first(&self, max: usize) -> Vec<&CaseAnswer> {
+    fn shown(&self) -> Vec<&CaseAnswer> {
+        if self.cases.len() <= MAX_ROWS {
+            return self.cases.iter().collect();
+        }
         let of = |verdict: Verdict| self.cases.iter().filter(move |case| case.verdict == verdict);
-        WORST_FIRST.into_iter().flat_map(of).take(max).collect()
+        WORST_FIRST.into_iter().flat_map(of).take(MAX_ROWS).collect()
     }
 
-    fn left_out(&self, max: usize) -> String {
-        match self.cases.len().saturating_sub(max) {
+    fn left_out(&self) -> String {
+        match self.cases.len().saturating_sub(MAX_ROWS) {
             0 => String::new(),
-            left => format!("The worst {max} rows; {left} more are in the table of option `rows`."),
+            left => format!("The worst {MAX_ROWS} rows; {left} more are in the table of option `rows`."),
         }
     }
 
-    fn columns<'c>(&'c self, cases: &[&'c CaseAnswer]) -> TableOf<&'c CaseAnswer> {
+    fn columns<'c>(&'c self, cases: Vec<&'c CaseAnswer>) -> TableOf<&'c CaseAnswer> {
         let models = self.cases.first().map_or(0, |case| case.collisions.len());
-        let mut table = Table::of(cases.iter().copied()).column("row", |case| case.row);
+        let mut table = Table::of(cases).column("row", |case| case.row);
         if self.cases.iter().any(|case| case.id.is_some()) {
             table = table.column("id", |case| case.id.clone());
         }
@@ -270,7 +220,7 @@ impl CaseTable {
 
     /// All columns of all rows.
     fn all(&self) -> Table {
-        self.columns(&self.shown(usize::MAX))
+        self.columns(self.cases.iter().collect())
             .column("case", |case| case.case.as_str())
             .column("answer", |case| case.answer.as_str())
             .column("demand", |case| case.demand.join(". "))
@@ -284,46 +234,16 @@ impl CaseTable {
     /// [`Error::Io`](crate::Error::Io), and for an unknown ending.
     pub fn save(&self, path: &Path) -> Result<()> {
         let metadata =
-            TableMetadata { table: "cases", profile: Some(self.profile.name.clone()), ..TableMetadata::default() };
+            TableMetadata { table: "cases", profile: Some(self.profile.clone()), ..TableMetadata::default() };
         self.all().save(path, &metadata)
-    }
-
-    /// The page: counts, then the cases with the worst on top.
-    pub fn html(&self) -> String {
-        let counts = Table::of(WORST_FIRST.iter().filter(|verdict| self.count(**verdict) > 0))
-            .column("answer", |verdict| verdict.label())
-            .column("cases", |verdict| self.count(*verdict))
-            .build();
-        let cases = self.columns(&self.worst_first(MAX_ROWS[1])).build();
-        let broken = Section::new("", format!("{} cannot be judged", counted(self.broken.len(), "row")));
-        Page {
-            title: format!("{} under {}{}", counted(self.cases.len(), "case"), self.profile.name, self.identity.mark()),
-            lead: format!("{}. {}", self.summary(), self.rests_on()),
-            synthetic: false,
-            warnings: self.is_nominal.then(|| self.legend().to_owned()).into_iter().collect(),
-            sections: vec![
-                Section::new("counts", "Answers").tables([counts.captioned("Cases by answer, the worst first")]),
-                Section::new("cases", "Cases")
-                    .intro(format!("The worst answer on top. {} {}", self.legend(), self.left_out(MAX_ROWS[1])))
-                    .tables([cases.captioned("Cases")])
-                    .parts((!self.broken.is_empty()).then(|| broken.text(self.broken.join("\n")))),
-                Section::new("rule", "Which driver decides")
-                    .intro(format!("{BY_RULE} {}.", DriverRule::SOURCE))
-                    .tables([self.by_rule().captioned("Cases by rule")]),
-                self.identity.section(&self.origin, &self.profile, &self.command),
-                self.identity.signatures(),
-                CaseIdentity::not_considered(),
-            ],
-        }
-        .html()
     }
 
     /// The table as text.
     pub fn text(&self, width: usize) -> String {
-        let notes = [self.legend(), &self.left_out(MAX_ROWS[0]), &self.rests_on(), BY_RULE].map(str::to_owned);
+        let notes = [LEGENDS[usize::from(self.is_nominal)], &self.left_out(), &self.rests_on()].map(str::to_owned);
         let notes: Vec<String> = notes.into_iter().filter(|note| !note.is_empty()).collect();
-        let rows = self.columns(&self.shown(MAX_ROWS[0])).build().text();
-        format!("{}\n{rows}\n{}{}\n", self.summary(), self.by_rule().text(), wrap(&notes.join(" "), width))
+        let rows = self.columns(self.shown()).build().text();
+        format!("{}\n{rows}{}\n", self.summary(), wrap(&notes.join(" "), width))
     }
 
     /// The table as one document.
@@ -335,11 +255,10 @@ impl CaseTable {
         records::document(&json!({
             "program": PROGRAM,
             "data": self.origin,
-            "profile": self.profile.name,
+            "profile": self.profile,
             "verdict": self.worst().label(),
             "counts": serde_json::Map::from_iter(counts),
             "nominal": self.is_nominal,
-            "by_rule": self.by_rule().records(),
             "cases": self.all().records(),
             "cannot_be_judged": self.broken,
         }))

@@ -4,7 +4,10 @@ use std::time::Instant;
 
 use serde::Serialize;
 
+use super::case_identity::program;
+use super::html::Section;
 use crate::engine::{DeviceRecord, OpenBackend, SweepSummary};
+use crate::model::profile::Profile;
 use crate::support::readable::{count, counted};
 
 /// Facts about the machine.
@@ -59,6 +62,19 @@ impl Host {
             threads: rayon::current_num_threads(),
             settings: Vec::new(),
         }
+    }
+
+    /// The chapter on what repeats a run.
+    pub(super) fn section(&self, profile: &Profile) -> Section {
+        Section::new("reproduction", "Reproduction")
+            .intro(
+                "The same input, profile, options and program give the same numbers on any machine. The record beside this page \
+                 holds them, with checksums.",
+            )
+            .fact("program", program(self.commit, 40))
+            .fact("profile", &profile.name)
+            .host(self.facts())
+            .parts([Section::options("Profile", profile)])
     }
 
     /// What computed, for a page.

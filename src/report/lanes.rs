@@ -15,16 +15,15 @@ use crate::support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata
 use crate::{Error, Result};
 
 /// A table for the lanes of a study; see [`write_study_chunk`]. It is written chunk by chunk, so that memory does not
-/// grow with the lanes. Curves of injury risk add changes of speed and risks.
+/// grow with the lanes.
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Usage`] for an unknown ending of the name.
-pub fn study_table(path: &Path, study: &Study, injury: &[&InjuryCurve]) -> Result<TableWriter> {
+pub fn study_table(path: &Path, study: &Study) -> Result<TableWriter> {
     make_folder_of(path)?;
     let facts = study.facts();
     let value = if facts.reference { ColumnKind::Binary64 } else { ColumnKind::Binary32 };
-    let columns = [columns(value), severity_columns(injury)].concat();
-    create(path, "lanes", study.plan(), facts.synthetic, columns)
+    create(path, "lanes", study.plan(), facts.synthetic, columns(value))
 }
 
 /// A table for the lanes of a sampling run; see [`write_sampled_chunk`].
@@ -102,12 +101,7 @@ fn ends_of_lanes() -> impl Iterator<Item = (&'static str, &'static OutcomeColumn
 ///
 /// # Errors
 /// As [`TableWriter::row`].
-pub fn write_study_chunk(
-    table: &mut TableWriter,
-    (study, injury): (&Study, &[&InjuryCurve]),
-    plan: &LanePlan,
-    chunk: &Chunk,
-) -> Result<()> {
+pub fn write_study_chunk(table: &mut TableWriter, plan: &LanePlan, chunk: &Chunk) -> Result<()> {
     let dt = plan.profile.frame.dt_s;
     let robust = robust_lanes(plan, chunk);
     let ends: Vec<OutcomeValue> = ends_of_lanes().map(|(_, column)| column.4).collect();
@@ -129,8 +123,6 @@ pub fn write_study_chunk(
         ];
         row.extend(ends.iter().map(|end| end(outcome, dt)));
         row.insert(ROBUST, robust[at].map_or(Cell::Null, Cell::Flag));
-        let sizes = study.cases().sizes(block.first_unit + key.unit);
-        row.extend(severity_cells(outcome, sizes, injury));
         table.row(&row)?;
     }
     Ok(())

@@ -1,6 +1,5 @@
 //! The files, sheets and page of a `map` run. Tables are in `map_tables.rs`, `map.json` in `map_record.rs`.
 
-use super::credibility::{RunKind, annex};
 use super::host::{Host, SweepRecord};
 use super::html::{Page, PageFigure, Section};
 use super::map_sheet::MapSheet;
@@ -54,20 +53,19 @@ impl MapReport {
                 figures.push(PageFigure::add_svg(&mut results, &name, &svg, "cells.csv")?);
             }
         }
-        results.add("report.html", self.html(figures)?.as_bytes())?;
+        results.add("report.html", self.html(figures).as_bytes())?;
         results.add_with("cells.csv", |out| self.write_cells(out))?;
         publish(results, |files| self.json(files))
     }
 
     /// Renders the run as one page.
-    fn html(&self, figures: Vec<PageFigure>) -> Result<String> {
+    fn html(&self, figures: Vec<PageFigure>) -> String {
         let is_known = self.grids.iter().any(|mapped| mapped.known_percent.iter().any(Option::is_some));
         let shares = Section::new("shares", "Shares")
             .intro(if is_known { "Known shares are those of the JRC's evidence." } else { "" })
             .text(self.text());
-        let record = self.json(&ResultFiles::default())?;
-        let annex = annex(RunKind::Map, &record)?.host(self.host.facts()).folded();
-        let page = Page {
+        let reproduction = self.host.section(&self.profile).folded();
+        Page {
             title: "Outcomes over a grid".to_owned(),
             lead: format!(
                 "{} simulations: {} over a grid of parameters, profile {}.",
@@ -75,10 +73,10 @@ impl MapReport {
                 self.criterion.label(),
                 self.profile.name
             ),
-            sections: vec![shares, Section::new("maps", "Maps").figures(figures), annex],
+            sections: vec![shares, Section::new("maps", "Maps").figures(figures), reproduction],
             ..Page::default()
-        };
-        Ok(page.html())
+        }
+        .html()
     }
 
     pub(super) fn is_robust(&self) -> bool {

@@ -5,14 +5,12 @@
 //! user.
 
 mod case_course;
+mod case_evidence;
 pub mod case_identity;
 mod case_sensitivity;
 mod case_sentences;
-mod case_severity;
 pub mod case_sheet;
 pub mod case_table;
-mod case_uncertainty;
-mod credibility;
 pub mod density;
 mod dots;
 pub mod host;
@@ -25,7 +23,6 @@ mod map_tables;
 pub mod openscenario;
 mod plot;
 pub mod records;
-pub mod result_comparison;
 pub mod sampling;
 mod sampling_figures;
 mod sampling_files;
@@ -39,5 +36,4 @@ mod study_page;
 pub mod tables;
 pub mod trace;
 pub mod tracks;
-pub mod varied_cases;
 pub mod verification;

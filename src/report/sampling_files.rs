@@ -134,7 +134,7 @@ impl SampleReport {
                 results.add(name, table.csv().as_bytes())?;
             }
         }
-        results.add("report.html", self.html(figures)?.as_bytes())?;
+        results.add("report.html", self.html(figures).as_bytes())?;
         publish(results, |files| self.json(files))
     }
 }

@@ -1,23 +1,20 @@
 //! A sampling run as one page.
 
-use super::credibility::{RunKind, annex};
 use super::html::{Page, PageFigure, Section};
 use super::plot::{AxisScale, Figure, Mark, Plot, PlotAxis, Series, Value, is_few};
 use super::sampling::{
     SampleReport, VERDICTS, interval_text, rate_text, ratio_text, short, three_digits, verdicts, weight,
 };
-use crate::Result;
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::sampling::EstimateRow;
 use crate::support::readable::{count, count_of, value};
-use crate::support::run_folder::ResultFiles;
 use crate::support::table::{Column, Digits, NumberText};
 
 impl SampleReport {
     /// `report.html`, with the figures of the run.
-    pub(super) fn html(&self, figures: Vec<PageFigure>) -> Result<String> {
+    pub(super) fn html(&self, figures: Vec<PageFigure>) -> String {
         let density = &self.density;
         let mut warnings = Vec::new();
         if let Some(given) = self.given_list() {
@@ -29,12 +26,13 @@ impl SampleReport {
         let mut sections = vec![self.estimates_section()];
         sections.extend(self.severity_sections());
         sections.extend((!figures.is_empty()).then(|| Section::new("figures", "Figures").figures(figures)));
-        let annex = annex(RunKind::Sample, &self.json(&ResultFiles::default())?)?.host(self.host.facts());
-        sections.push(annex.host((self.host.seconds > 0.0).then(|| self.host.wall_clock())).folded());
+        let clock = (self.host.seconds > 0.0).then(|| self.host.wall_clock());
+        let reproduction = self.host.section(&self.profile).fact("SHA-256 of the density", &self.density.sha256);
+        sections.push(reproduction.host(clock).folded());
         // Importance sampling seldom needs the maximum that it may draw; its runs include the search.
         let runs = self.estimates.iter().map(|row| row.estimate.runs).max();
         let drawn = self.draws.as_ref().map(|draws| draws.samples).or(runs).unwrap_or(self.options.stop.samples);
-        let page = Page {
+        Page {
             title: format!("Probability of failure: {}", self.name()),
             lead: format!(
                 "{} samples of a density over {} mined scenarios, estimator {}, profile {}. {}",
@@ -50,8 +48,8 @@ impl SampleReport {
             synthetic: density.provenance.synthetic,
             warnings,
             sections,
-        };
-        Ok(page.html())
+        }
+        .html()
     }
 
     /// `cut-in 2`.

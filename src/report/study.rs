@@ -134,7 +134,7 @@ impl<'a> StudyReport<'a> {
         if let Some(comparison) = &self.comparison {
             results.add("reference.csv", tables::reference_table(comparison).csv().as_bytes())?;
         }
-        results.add("report.html", self.html(figures)?.as_bytes())?;
+        results.add("report.html", self.html(figures).as_bytes())?;
         publish(results, |files| self.json(files))
     }
 

@@ -1,15 +1,12 @@
 //! A study as one page.
 
-use super::credibility::{RunKind, annex};
 use super::host::Timings;
 use super::html::{Page, PageFigure, Section};
 use super::study::StudyReport;
 use super::tables;
-use crate::Result;
 use crate::run::score::{CategoryScores, ClaimVerdict, Misfit};
 use crate::scenario::parameterization::Parameterization;
 use crate::support::readable::{count, value};
-use crate::support::run_folder::ResultFiles;
 use crate::support::table::Table;
 use crate::traffic::mining::RecordingSummary;
 
@@ -18,7 +15,7 @@ const MAX_RECORDINGS: usize = 200;
 
 impl StudyReport<'_> {
     /// `report.html`, with the figures of each category.
-    pub(super) fn html(&self, figures: Vec<Vec<PageFigure>>) -> Result<String> {
+    pub(super) fn html(&self, figures: Vec<Vec<PageFigure>>) -> String {
         let facts = self.facts();
         let mut warnings = Vec::new();
         if !facts.left_out.is_empty() {
@@ -45,8 +42,8 @@ impl StudyReport<'_> {
             Section::new("reference", "Lane arithmetic against double precision")
                 .text(tables::reference_text(comparison))
         }));
-        sections.extend([self.data(), self.credibility()?]);
-        let page = Page {
+        sections.extend([self.data(), self.reproduction()]);
+        Page {
             title: "Parameterized against recorded scenarios".to_owned(),
             lead: format!(
                 "{} {} lanes: every scenario as recorded (S) and parameterized (S'), from {}, against {} \
@@ -60,8 +57,8 @@ impl StudyReport<'_> {
             synthetic: facts.synthetic,
             warnings,
             sections: std::iter::once(answer).chain(sections.into_iter().map(Section::folded)).collect(),
-        };
-        Ok(page.html())
+        }
+        .html()
     }
 
     fn data(&self) -> Section {
@@ -140,19 +137,19 @@ impl StudyReport<'_> {
         (!table.rows.is_empty()).then(|| section.tables([table.captioned("Claims")]))
     }
 
-    fn credibility(&self) -> Result<Section> {
-        let (facts, mut host) = (self.facts(), self.host.facts());
+    fn reproduction(&self) -> Section {
+        let (facts, plan) = (self.facts(), self.study.plan());
         let Timings { mine_s, plan_s, sweep_s, score_s } = self.timings;
         // Merged parts have their own times, which are not added up.
-        if sweep_s > 0.0 {
+        let seconds = (sweep_s > 0.0).then(|| {
             let text = format!("mining {mine_s:.2}, planning {plan_s:.2}, lanes {sweep_s:.2}, scores {score_s:.2}");
-            host.push(("seconds", text));
-        }
-        let annex = annex(RunKind::Study, &self.json(&ResultFiles::default())?)?;
-        Ok(annex.host(host).parts([
+            ("seconds", text)
+        });
+        let plan_sha256 = plan.hash();
+        self.host.section(&plan.profile).fact("SHA-256 of the plan", plan_sha256).host(seconds).parts([
             Section::options("Options of the parameterizations", &facts.parameterization),
             Section::options("Options of the scores", &facts.score),
-        ]))
+        ])
     }
 }
 

@@ -80,8 +80,12 @@ pub fn make_folder_of(file: &Path) -> Result<()> {
 }
 
 /// Writes a file under a temporary name beside it, syncs, and renames: a reader sees the old or the new content, never
-/// a part.
+/// a part. Its folder is created if needed.
+///
+/// # Errors
+/// [`Error::Io`].
 pub fn write_atomically(path: &Path, content: &[u8]) -> Result<()> {
+    make_folder_of(path)?;
     let mut file = AtomicFile::create(path)?;
     file.write_all(content).map_err(|e| Error::io(path, "write", e))?;
     file.stage()?.publish()

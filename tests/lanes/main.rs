@@ -13,5 +13,4 @@ mod partial;
 mod sampled_lanes;
 mod score;
 mod simd_equals_scalar;
-mod uncertain_inputs;
 mod verify_sets;

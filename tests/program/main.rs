@@ -18,4 +18,3 @@ mod report_width;
 mod rooms;
 mod shell;
 mod source_rules;
-mod vary;

@@ -71,7 +71,7 @@ fn a_study_says_everything_on_its_page_and_every_figure_has_its_files() {
     lanesweep(dir.path(), &["study", "--synth-recordings", "2", "--published", "--backend", "cpu", "--out", "s"]);
     let out = dir.path().join("s");
     let html = page(&out);
-    let plan = "<td class=\"text\">plan, with every case</td><td class=\"text\">SHA-256 ";
+    let plan = "<dt>SHA-256 of the plan</dt>";
     for said in ["SYNTHETIC DATA", "Failed simulations of S", "published", plan, "seed", "Claims"] {
         assert!(html.contains(said), "{said}");
     }
@@ -122,7 +122,7 @@ fn sampling_runs_maps_and_comparisons_have_their_page() {
     let sample = ["sample", "d/cut-in-2.json", "--backend", "cpu", "--samples", "3000"];
     lanesweep(dir, &[&sample[..], &["--thw", "1,0.6,0.2", "--out", "mc"]].concat());
     let html = page(&dir.join("mc"));
-    let density = "<td class=\"text\">density</td><td class=\"text\">SHA-256 ";
+    let density = "<dt>SHA-256 of the density</dt>";
     for said in ["convergence.svg", "headways.csv", "map-FSM.svg", density, "verdict"] {
         assert!(html.contains(said), "{said}");
     }

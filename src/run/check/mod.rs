@@ -8,11 +8,8 @@ mod boundary;
 mod clauses;
 mod finer;
 mod nominal;
-mod results;
 mod sensitivity;
 mod subject;
-mod uncertainty;
-mod vary;
 mod verdict;
 
 use std::cell::Cell;
@@ -23,13 +20,10 @@ pub use boundary::{Boundary, Change};
 pub use clauses::{Demand, Holds, Reading, Relation};
 pub use finer::FinerStep;
 pub use nominal::nominal_verdicts;
-pub use results::{COMPARED, Compared, ComparedCase, Difference, ResultComparison, TheirResult};
-pub use sensitivity::{DriverRule, RuleVerdicts};
+pub use sensitivity::RuleVerdicts;
 pub use subject::{Lane, Subject};
-pub use uncertainty::{UNCERTAIN_DRAWS, UNCERTAIN_LEVEL, Uncertain, UncertainInput, Uncertainty};
-pub use vary::{VariationCounts, Variations, VariedCase, VariedRange, vary};
 use verdict::settled;
-pub use verdict::{Answer, CaseVerdicts, RunEnd, Verdict};
+pub use verdict::{Answer, CaseVerdicts, DriverRule, RunEnd, Verdict};
 
 use crate::engine::{NO_STEP, Outcome, StepMark, Trace, check_time_step};
 use crate::model::criterion::Criterion;
@@ -98,8 +92,8 @@ pub struct Judgement {
     pub boundaries: Vec<Boundary>,
     /// The runs with a tenth of the time step; `None` without the boundaries.
     pub finer: Option<FinerStep>,
-    /// The verdicts by rule, of the profile as it is and, with boundaries, of each other reading; empty without reference
-    /// drivers.
+    /// The verdicts by rule, of the profile as it is and of each other reading; empty without reference drivers or without the
+    /// boundaries.
     pub by_rule: Vec<RuleVerdicts>,
     /// Maximum duration of a run, s.
     pub time_cap_s: f64,
@@ -241,7 +235,7 @@ impl Check {
     }
 
     /// Like [`Check::run`], without the values at which the answer changes, which need by far the most lanes, and without
-    /// the verdicts under other readings.
+    /// the verdicts by rule.
     ///
     /// # Errors
     /// As [`Check::run`].
@@ -307,7 +301,10 @@ impl Check {
             finer: with_boundaries
                 .then(|| FinerStep::run(&self.subject, profile, &self.models, &budget))
                 .transpose()?,
-            by_rule: self.by_rule(profile, (&changed, &touching), with_boundaries, &budget)?,
+            by_rule: match with_boundaries {
+                true => self.by_rule(profile, (&changed, &touching), &budget)?,
+                false => Vec::new(),
+            },
             touching,
             time_cap_s: profile.frame.time_cap_s,
             drives_through_s: self.subject.case(profile, self.subject.point())?.drives_through_s(profile),

@@ -4,7 +4,6 @@ use crate::engine::{Constants, Headway, LaneCase, Outcome, Step, Trace};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::grid::{CaseQuantity, Point, without_reaction};
-use crate::run::reopen::TracedCase;
 use crate::scenario::parameterization::{TimeGrid, recorded_case};
 use crate::scenario::{Case, Category, Lateral, PlainCase, Scenario, Speed, Tables};
 use crate::{Error, Place, Result};
@@ -149,14 +148,6 @@ impl Subject {
         Ok(Lane { case, tables, headway: headway(point) })
     }
 
-    /// The case with every step of some models.
-    ///
-    /// # Errors
-    /// As [`TracedCase::run`].
-    pub fn traced(&self, profile: &Profile, models: &[ModelId]) -> Result<TracedCase> {
-        TracedCase::run(&self.case(profile, self.point())?, headway(self.point()), profile, models)
-    }
-
     /// The case with its initial gap, for a plan whose lanes start where their cases do.
     ///
     /// # Errors
@@ -169,7 +160,7 @@ impl Subject {
 }
 
 /// The initial headway or gap of a point.
-pub(super) fn headway(point: &Point) -> Headway {
+fn headway(point: &Point) -> Headway {
     match (point.get(CaseQuantity::Thw), point.get(CaseQuantity::Gap)) {
         (Some(thw_s), _) => Headway::ThwS(thw_s),
         (None, gap_m) => Headway::GapM(gap_m.unwrap_or(0.0)),

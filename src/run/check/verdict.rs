@@ -1,6 +1,5 @@
 //! The answer of a check, derived from the ends of the runs of the drivers and of an ego that never reacts.
 
-use super::sensitivity::DriverRule;
 use super::subject::LaneRun;
 use crate::engine::EndReason;
 use crate::model::criterion::Criterion;
@@ -55,6 +54,47 @@ impl Verdict {
             Verdict::Undecided => Answer::Open.label(),
             Verdict::OutsideAnnex => "outside Annex 3",
             Verdict::NotJudged => "not judged",
+        }
+    }
+}
+
+/// Which reference drivers have to avoid a collision, so that it is preventable.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DriverRule {
+    /// This one.
+    Alone(ModelId),
+    /// Any of them: the rule in force.
+    Any,
+    /// All of them.
+    All,
+}
+
+impl DriverRule {
+    /// Where the rule in force comes from. Annex 3 has two drivers and does not say which of them decides.
+    pub const SOURCE: &'static str = "This is a reading of ours (profile key `reference_drivers`): no paragraph of UN R157 \
+                                      prescribes that one driver suffices";
+
+    /// The rules for some reference drivers, in the order of tables.
+    pub(super) fn of(references: &[ModelId]) -> Vec<DriverRule> {
+        let alone = references.iter().map(|model| DriverRule::Alone(*model));
+        alone.chain([DriverRule::Any, DriverRule::All]).collect()
+    }
+
+    /// Heading of a column.
+    pub fn label(self) -> String {
+        match self {
+            DriverRule::Alone(model) => format!("{} alone", model.name()),
+            DriverRule::Any => "any (in force)".to_owned(),
+            DriverRule::All => "all".to_owned(),
+        }
+    }
+
+    /// Whether a collision that threatens is preventable.
+    fn holds(self, references: &[ModelId], avoids: impl Fn(ModelId) -> bool) -> bool {
+        match self {
+            DriverRule::Alone(model) => avoids(model),
+            DriverRule::Any => references.iter().any(|model| avoids(*model)),
+            DriverRule::All => references.iter().all(|model| avoids(*model)),
         }
     }
 }

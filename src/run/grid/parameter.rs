@@ -171,29 +171,6 @@ impl Point {
         })
     }
 
-    /// Sets a quantity of a complete point: a gap replaces a headway, a headway a gap, a relative speed the other
-    /// vehicle's.
-    pub(crate) fn replace(&mut self, parameter: &MapParameter, value: f64) {
-        let replaced = match parameter.quantity {
-            CaseQuantity::Gap => Some(CaseQuantity::Thw),
-            CaseQuantity::Thw => Some(CaseQuantity::Gap),
-            CaseQuantity::OtherSpeed => Some(CaseQuantity::OtherSpeed),
-            _ => None,
-        };
-        if let Some(replaced) = replaced {
-            self.values[replaced as usize] = None;
-        }
-        self.set(parameter, value);
-    }
-
-    /// The same point with the other vehicle's speed itself in place of a relative one.
-    #[must_use]
-    pub(crate) fn resolved(mut self) -> Point {
-        self.values[CaseQuantity::OtherSpeed as usize] = self.get(CaseQuantity::OtherSpeed);
-        self.relative_mps = None;
-        self
-    }
-
     /// The value of a quantity that a case has; one that is not set follows from others: the other vehicle is as fast
     /// as the ego, all vehicles have one size, a lane change covers one lane.
     pub(super) fn value(&self, quantity: CaseQuantity) -> Option<f64> {

@@ -58,11 +58,6 @@ impl StudyCases {
         self.first_held..self.first_held + self.held.len() as u64
     }
 
-    /// Sizes of the vehicles of a unit, if it is held.
-    pub fn sizes(&self, unit: u64) -> Option<Sizes> {
-        self.scenario(unit).map(Sizes::of)
-    }
-
     /// The scenario of a unit, if it is held.
     pub(super) fn scenario(&self, unit: u64) -> Option<&Scenario> {
         self.held.get(usize::try_from(unit.checked_sub(self.first_held)?).ok()?)

@@ -8,7 +8,6 @@
 mod adaptive;
 mod blocks;
 mod evaluated_points;
-mod first_order;
 mod importance;
 mod interval;
 mod kernels;
@@ -24,7 +23,6 @@ mod weights;
 
 pub use adaptive::{AdaptiveRun, Goal, adaptive};
 pub use blocks::{BlockSums, Join};
-pub use first_order::{FirstOrder, first_order};
 pub use importance::{Importance, from_weight_sums, importance, importance_of_points, importance_sums};
 pub use interval::{Interval, IntervalKind, clopper_pearson, gamma, wilson};
 pub use kernels::{KernelShares, kernel_shares};

@@ -425,7 +425,7 @@ impl Understanding {
             errors.map(|(name, error, unit)| format!("{name}={}{unit}", significant(*error, 2))).collect();
         if !errors.is_empty() {
             let list = errors.join(",");
-            lines.push(("input errors", format!("{list}: this noise, for option `uncertain` of a check; no offset")));
+            lines.push(("input errors", format!("{list}: this noise; no offset")));
         }
         if self.ignored > 0 || self.excluded > 0 {
             lines.push(("left out", format!("{} by class, {} as doubtful", count(self.ignored), count(self.excluded))));

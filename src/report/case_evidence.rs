@@ -1,0 +1,207 @@
+//! What a case sheet rests on: identity with hashes, assumptions, and the effect of the time step.
+
+use serde_json::{Map, Value, json};
+
+use super::case_identity::{CaseIdentity, profile_sha256, program};
+use super::case_sheet::CaseSheet;
+use super::html::Section;
+use super::lanes::outcome_json;
+use super::records;
+use super::tables::{WIDTH, wrap};
+use crate::Result;
+use crate::engine::version::Canonical;
+use crate::engine::{ENGINE_VERSION, Outcome};
+use crate::model::assumptions::Assumption;
+use crate::model::profile::Profile;
+use crate::run::check::{Judged, Judgement, Subject};
+use crate::run::grid::{PARAMETERS, Perturbation};
+use crate::support::readable::value;
+use crate::support::table::{Column, NumberText, Table};
+
+impl CaseSheet<'_> {
+    /// The numbers of the case by key, in SI units.
+    pub(super) fn case_numbers(&self) -> Map<String, Value> {
+        let point = self.subject.point();
+        let is_si = PARAMETERS.iter().filter(|parameter| parameter.per_si == 1.0 && !parameter.is_relative);
+        is_si
+            .filter_map(|parameter| Some((parameter.key.to_owned(), json!(point.get(parameter.quantity)?))))
+            .chain(self.subject.duration_s().map(|duration_s| ("duration_s".to_owned(), json!(duration_s))))
+            .collect()
+    }
+
+    /// SHA-256 of the case in canonical form: category, numbers and, if recorded, the scenario with its series.
+    ///
+    /// # Errors
+    /// None for a case of this program.
+    fn case_sha256(&self) -> Result<String> {
+        let mut canonical = Canonical::new("case");
+        canonical.text(self.subject.category().key());
+        canonical.value(&self.case_numbers())?;
+        if let Subject::Recorded(scenario, _) = self.subject {
+            canonical.value(scenario)?;
+        }
+        Ok(canonical.finish())
+    }
+
+    /// The first digits of the case's hash.
+    pub(super) fn mark(&self) -> String {
+        self.case_sha256().map_or(String::new(), |sha256| sha256[..12].to_owned())
+    }
+
+    /// The sheet's identity as text: hashes by their first 12 digits.
+    pub(super) fn identity_text(&self) -> String {
+        let short = |hash: Result<String>| hash.map_or(String::new(), |hash| hash[..12].to_owned());
+        let profiles =
+            self.profiles.iter().map(|profile| format!("{} {}", profile.name, short(profile_sha256(profile))));
+        let parts = [
+            Some(format!("program: {}", program(self.identity.commit, 12))),
+            self.identity.file_sha256.as_ref().map(|sha256| format!("file: {}", short(Ok(sha256.clone())))),
+            Some(format!("case: {}", self.mark())),
+            Some(
+                wrap(&format!("profiles: {}", profiles.collect::<Vec<_>>().join(", ")), WIDTH - 2)
+                    .replace('\n', "\n  "),
+            ),
+            self.identity.date.as_ref().map(|date| format!("date: {date}")),
+            self.identity.author.as_ref().map(|author| format!("author: {author}")),
+        ];
+        let parts: Vec<String> = parts.into_iter().flatten().map(|part| format!("  {part}\n")).collect();
+        format!("Identity, with the first 12 digits of each SHA-256\n{}", parts.concat())
+    }
+
+    /// The sheet's identity for programs.
+    ///
+    /// # Errors
+    /// None for a sheet of this program.
+    pub(super) fn identity_json(&self) -> Result<Value> {
+        let CaseIdentity { commit, file_sha256, date, author } = &self.identity;
+        Ok(json!({
+            "commit": (!commit.is_empty()).then_some(commit),
+            "engine_version": ENGINE_VERSION,
+            "case_sha256": self.case_sha256()?,
+            "file_sha256": file_sha256,
+            "command": self.command,
+            "date": date,
+            "author": author,
+        }))
+    }
+
+    /// The identity as the first chapter of the page.
+    pub(super) fn identity_section(&self) -> Section {
+        let file = self.identity.file_sha256.as_ref().map(|sha256| format!("{}\nSHA-256 {sha256}", self.origin));
+        Section::new("identity", "Identity")
+            .fact("program", program(self.identity.commit, 40))
+            .fact("data", file.unwrap_or_else(|| self.origin.clone()))
+            .facts([profile_fact(&self.profiles[0])])
+            .fact("command", &self.command)
+            .fact("case, canonical", format!("SHA-256 {}", self.case_sha256().unwrap_or_default()))
+    }
+
+    /// Every constant of the first profile with its source.
+    pub(super) fn assumptions_section(&self) -> Section {
+        let name = &self.profiles[0].name;
+        Section::new("assumptions", "Assumptions")
+            .intro(format!("Every constant and option of {name}: {}. {SOURCES}", self.profiles[0].description))
+            .tables([assumptions_table(&self.profiles[0])])
+            .facts(self.profiles[1..].iter().map(profile_fact))
+    }
+
+    /// Time step, cap, arithmetic, and what a tenth of the step changes.
+    pub(super) fn numerics_section(&self) -> Section {
+        let (first, frame) = (self.first(), &self.profiles[0].frame);
+        let finer = first
+            .finer
+            .iter()
+            .flat_map(|finer| first.models.iter().zip(&finer.outcomes).map(|both| (both, finer.dt_s)));
+        type Finer<'a> = ((&'a Judged, &'a Outcome<f64>), f64);
+        let by = |of: Finer, value: &dyn Fn(&Outcome<f64>, f64) -> Option<f64>| {
+            let ((judged, outcome), dt_s) = of;
+            let (coarse, fine) = (value(&judged.trace.outcome, judged.trace.dt_s), value(outcome, dt_s));
+            match (coarse, fine) {
+                (Some(coarse), Some(fine)) if coarse.is_finite() && fine.is_finite() => Some(change(fine - coarse)),
+                (Some(_), None) => Some(NumberText("ceases".to_owned())),
+                (None, Some(_)) => Some(NumberText("begins".to_owned())),
+                _ => None,
+            }
+        };
+        let column = |name: &'static str| Column::from(name).null("–");
+        let table = Table::of(finer)
+            .column("driver", |((judged, _), _)| judged.trace.model.name())
+            .column("collision verdict", |((judged, _), _)| {
+                if judged.flips.contains(&Perturbation::FinerStep.label()) { "CHANGES" } else { "the same" }
+            })
+            .column(column("smallest gap m"), |of| by(of, &|outcome, _| Some(records::smallest_gap_m(outcome))))
+            .column(column("smallest TTC s"), |of| by(of, &|outcome, _| outcome.approach_ttc()))
+            .column(column("largest BTN"), |of| by(of, &|outcome, _| Some(outcome.max_btn)))
+            .column(column("reacts s"), |of| by(of, &|outcome, dt_s| records::time_s(outcome.reaction_step, dt_s)))
+            .column(column("contact s"), |of| by(of, &|outcome, dt_s| records::time_s(outcome.contact_step, dt_s)));
+        let dt_s = first.finer.as_ref().map_or(frame.dt_s, |finer| finer.dt_s);
+        Section::new("numerics", "Arithmetic and time step")
+            .fact("arithmetic", "IEEE 754 binary64 in a fixed order, without random numbers")
+            .fact("time step", format!("{} s", value(frame.dt_s)))
+            .fact("cap", format!("a run ends after {} s", value(frame.time_cap_s)))
+            .fact(
+                "answer with a tenth of the step",
+                if first.turns_with_a_finer_step() { "CHANGES" } else { "the same" },
+            )
+            .tables([table
+                .build()
+                .captioned(format!("What a time step of {dt_s} s in place of {} s adds", frame.dt_s))])
+    }
+
+    /// The runs with a tenth of the time step for programs; null without them.
+    pub(super) fn finer_json(judgement: &Judgement) -> Value {
+        let Some(finer) = &judgement.finer else { return Value::Null };
+        let models = judgement.models.iter().zip(&finer.outcomes).map(|(judged, outcome)| {
+            let mut outcome = outcome_json(outcome, finer.dt_s);
+            outcome["model"] = json!(judged.trace.model.name());
+            outcome
+        });
+        json!({
+            "dt_s": finer.dt_s,
+            "changes_answer": judgement.turns_with_a_finer_step(),
+            "models": models.collect::<Vec<_>>(),
+        })
+    }
+}
+
+fn profile_fact(profile: &Profile) -> (String, String) {
+    (format!("profile {}", profile.name), format!("SHA-256 {}", profile_sha256(profile).unwrap_or_default()))
+}
+
+/// What the sources of [`assumptions_table`] mean.
+const SOURCES: &str = "\"Ours\": no source gives it. UN R157 is the 01 series; its tables and data sheets were at hand, \
+     the running text of Annex 3, 3.4.2, was not. Paper: arXiv 2409.01117. JRC: its public simulator of 2021.";
+
+/// Every constant and option of a profile with its source.
+fn assumptions_table(profile: &Profile) -> Table {
+    let assumptions = profile.assumptions();
+    let table = Table::of(&assumptions)
+        .column("constant", |of| of.key.as_str())
+        .column("meaning", |of| of.meaning.as_deref().unwrap_or("not recorded"))
+        .column("source", source)
+        .column("value", |of| NumberText(plain(&of.value)))
+        .column("unit", |of| NumberText(of.unit.to_owned()));
+    table.build().captioned(format!("Constants of {}", profile.name))
+}
+
+fn source(of: &Assumption) -> &str {
+    of.source.as_deref().unwrap_or("no source recorded: the profile's own value")
+}
+
+/// A value without quotes.
+fn plain(of: &Value) -> String {
+    match of {
+        Value::String(text) => text.clone(),
+        Value::Array(list) => list.iter().map(plain).collect::<Vec<_>>().join(", "),
+        other => other.to_string(),
+    }
+}
+
+fn change(by: f64) -> NumberText {
+    // Below the digits that the sheet prints, and without a sign of rounding.
+    NumberText(if by.abs() < 1e-6 {
+        "0".to_owned()
+    } else {
+        format!("{}{}", if by < 0.0 { "-" } else { "+" }, value(by.abs()))
+    })
+}
