@@ -1,12 +1,13 @@
-"""SUMO's own output read directly, beside an independent conversion to highD's format: the same scenarios?
+"""SUMO's own output read by `lanesweep.tracks`, beside an independent conversion to highD's format: the same scenarios?
 
     python gen_sumo.py SIM --lanes 3 --flow 3600 --truck 0.2 --dur 120 --warm 220 --seed 1 --kg 0.7 --kr 0.7
     python gen_sumo.py SIM --lanes 3 --flow 4200 --truck 0.18 --ramp --wave --dur 120 --warm 220 --seed 4 --kg 0.7 --kr 0.7
     python fcd2highd.py SIM HIGHD 1 --nosmooth
-    python sumo_tracks.py LANESWEEP SIM HIGHD [PRESET]
+    python sumo_tracks.py LANESWEEP SIM HIGHD [straight]
 
 The conversion keeps the vehicles whose box is inside a window of 420 m, with at least 27 frames; here the rows of fcd.csv are
-cut in the same way (PRESET: a copy of sumo-fcd.toml without `heading` tells what headings do), so that both hold the same samples. Scenarios are compared by category, vehicles and frames."""
+cut in the same way (`straight`: with the angles of the road, which tells what headings do), so that both hold the same samples.
+Scenarios are compared by category, vehicles and frames. Needs `lanesweep[tracks]`."""
 import csv
 import json
 import pathlib
@@ -14,9 +15,11 @@ import subprocess
 import sys
 import tempfile
 
+from lanesweep.tracks import sumo
 
-def scenarios(program, path, preset=None):
-    command = [program, "-q", "mine", path] + (["--preset", preset] if preset else [])
+
+def scenarios(program, path):
+    command = [program, "-q", "mine", path]
     return [json.loads(line) for line in subprocess.run(command, check=True, capture_output=True, text=True).stdout.splitlines()]
 
 
@@ -25,6 +28,8 @@ def main():
     sim = pathlib.Path(sim)
     meta = json.load(open(sim / "meta.json"))
     rows = list(csv.DictReader(open(sim / "fcd.csv"), delimiter=";"))
+    if sys.argv[4:] == ["straight"]:
+        rows = [{**row, "vehicle_angle": "270" if row["vehicle_id"].startswith("fw") else "90"} for row in rows]
     kept = {}
     for row in rows:
         size = meta["types"][row["vehicle_type"]]
@@ -52,7 +57,8 @@ def main():
             for name, size in meta["types"].items()
         )
         (pathlib.Path(folder) / "types.rou.xml").write_text(f"<routes>{types}</routes>")
-        ours = scenarios(program, str(path), sys.argv[4] if len(sys.argv) > 4 else None)
+        sumo(path, path.with_name("types.rou.xml")).write_parquet(path.with_suffix(".parquet"))
+        ours = scenarios(program, str(path.with_suffix(".parquet")))
     theirs = scenarios(program, highd)
     key = lambda row: (row["category"], row["ego_id"], row["target_id"])
     for name in ("cut_in", "cut_out", "lvd"):
