@@ -102,7 +102,7 @@ def study(
         Also replay scenarios by bases that have not seen them: each decomposition gets a variant, such as ``5-cv``. A basis fitted on
         the scenarios that it replays flatters itself.
     published : bool
-        Add the paper's published numbers (of highD) to tables and page.
+        Set the paper's published numbers (of highD) beside ours: on the page and in run.json.
     rows : path
         Also write one row per lane: .csv, .jsonl or .parquet.
     seed : int

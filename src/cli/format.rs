@@ -10,10 +10,10 @@ use crate::report::tables;
 use crate::support::readable::count;
 use crate::support::run_folder::Results;
 
-/// How tables are printed.
+/// What is printed.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, ValueEnum)]
 pub(super) enum Format {
-    /// Tables for people.
+    /// Text for people.
     Text,
     /// One JSON document.
     Json,
@@ -22,7 +22,7 @@ pub(super) enum Format {
     Both,
 }
 
-/// The flag of every verb that prints tables.
+/// `--format`.
 #[derive(Debug, Clone, Copy, Args)]
 pub(super) struct FormatFlag {
     /// Output on stdout

@@ -51,7 +51,7 @@ pub(super) struct Study {
     /// Also write one row per lane: .csv, .jsonl or .parquet
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     rows: Option<PathBuf>,
-    /// Add the paper's published numbers (of highD) to tables and page
+    /// Set the paper's published numbers (of highD) beside ours: on the page and in run.json
     #[arg(long, help_heading = "Models and criteria")]
     published: bool,
     #[command(flatten)]
