@@ -151,3 +151,172 @@ def test_draws_that_are_no_case_have_no_answer_and_one_answer_has_no_index() -> 
     invalid = found.draws.filter(pl.col("gap") < 0)
     assert invalid["answer"].null_count() == invalid.height == 500 - found.answers["of"][0] > 100
     assert found.answers["answer"].to_list() == ["not preventable"] and found.indices["index"].to_list() == [None]
+
+
+@pytest.fixture(scope="module")
+def study(scenarios: Path, tmp_path_factory: pytest.TempPathFactory) -> tuple[pl.DataFrame, pl.DataFrame]:
+    """Lanes and F1 of leader decelerations, with decompositions that have not seen what they replay."""
+    rows = tmp_path_factory.mktemp("study") / "lanes.parquet"
+    found = lanesweep.study(scenarios=scenarios, categories="lvd", models="Reg157", cross_validate=True, rows=rows)
+    return pl.read_parquet(rows), pl.DataFrame(found.table("f1"))
+
+
+@pytest.mark.parametrize("key", ["i", "iii-cv"])
+def test_a_justification_has_the_scores_and_intervals_of_the_study(study: tuple[pl.DataFrame, pl.DataFrame], key: str) -> None:
+    lanes, f1 = study
+    for criterion in ("collision", "ttc"):
+        found = recipes.justification(lanes, key.removesuffix("-cv"), model="Reg157", criterion=criterion)
+        (of,) = f1.filter(parameterization=key, criterion=criterion).to_dicts()
+        scores = {row["quantity"]: row for row in found.scores.to_dicts()}
+        for name, column in {"recall": "recall", "precision": "precision", "F1": "f1"}.items():
+            assert scores[name]["value"] == pytest.approx(of[column])
+        if of["f1_low"] is not None:
+            assert [scores["F1"]["low"], scores["F1"]["high"]] == pytest.approx([of["f1_low"], of["f1_high"]])
+        assert scores["S'/S"]["value"] == pytest.approx((of["tp"] + of["fp"]) / (of["tp"] + of["fn"]))
+        assert found.hidden.height == of["fn"] and not found.hidden[f"{criterion}_parameterized"].any()
+
+
+def test_limits_are_the_users_and_an_interval_over_a_limit_is_undecided(study: tuple[pl.DataFrame, pl.DataFrame]) -> None:
+    limits = {"recall": (0.0, 1.0), "precision": (1.0, 1.0), "F1": (0.0, 0.01)}
+    found = recipes.justification(study[0], "i", model="Reg157", criterion="ttc", limits=limits).scores
+    assert dict(found.select("quantity", "within").iter_rows()) == {
+        "recall": "yes", "precision": "undecided", "F1": "no", "S'/S": None,
+    }  # fmt: skip
+    with pytest.raises(ValueError, match="no parameterization"):
+        recipes.justification(study[0], "1", model="Reg157")
+
+
+@pytest.fixture(scope="module")
+def sampled(density: Path, tmp_path_factory: pytest.TempPathFactory) -> pl.DataFrame:
+    """Lanes of two drivers."""
+    rows = tmp_path_factory.mktemp("sample") / "rows.parquet"
+    lanesweep.sample(density, samples=2000, models=["CCHDM", "FSM"], thw=[0.6, 1.2], rows=rows)
+    return pl.read_parquet(rows)
+
+
+def test_risk_has_the_estimates_of_every_density(density: Path) -> None:
+    found = recipes.risk({"one": density, "other": density}, samples=500, models="FSM", thw=0.6)
+    assert found["name"].unique(maintain_order=True).to_list() == ["one", "other"]
+    own = pl.DataFrame(lanesweep.sample(density, samples=500, models="FSM", thw=0.6).table("estimates"))
+    for name in ("probability", "replayed_ratio", "sampled_ratio_low", "sampled_ratio_high"):
+        assert found.filter(name="one")[name].to_list() == found.filter(name="other")[name].to_list() == own[name].to_list()
+
+
+def test_the_ratio_of_two_drivers_is_that_of_their_counts(sampled: pl.DataFrame) -> None:
+    fsm, cchdm = sampled.filter(model="FSM"), sampled.filter(model="CCHDM")
+    found = recipes.failure_ratio(fsm, cchdm)
+    assert found["headway"].to_list() == ["all", "0.6s", "1.2s"]
+    assert found["ratio"][0] == pytest.approx(fsm["collision"].sum() / cchdm["collision"].sum())
+    turned = recipes.failure_ratio(cchdm, fsm)
+    assert turned["low"][1] == pytest.approx(1 / found["high"][1]) and found["low"][1] < found["ratio"][1] < found["high"][1]
+    assert recipes.failure_ratio(fsm, fsm).row(0)[1:] == (1.0, 1.0, 1.0)
+    with pytest.raises(ValueError, match="other cases"):
+        recipes.failure_ratio(fsm, cchdm.head(10))
+
+
+def test_a_map_counts_every_lane_once(sampled: pl.DataFrame) -> None:
+    found = recipes.failure_map(sampled, "v_target_mps", "v_ego_mps", bins=10)
+    assert found["lanes"].sum() == sampled.height and found["failures"].sum() == sampled["collision"].sum()
+    assert found["v_ego_mps_high"].max() == pytest.approx(sampled["v_ego_mps"].max())
+    cell = found.sort("lanes").row(-1, named=True)
+    inside = [pl.col(name).is_between(cell[f"{name}_low"], cell[f"{name}_high"], closed="left") for name in ("v_target_mps", "v_ego_mps")]
+    assert sampled.filter(*inside, model=cell["model"]).height == cell["lanes"]
+
+
+def test_the_worst_lanes_have_the_fastest_contacts(sampled: pl.DataFrame) -> None:
+    found = recipes.worst(sampled, 3)
+    assert found["model"].to_list() == ["CCHDM"] * 3 + ["FSM"] * 3
+    fastest = sampled.filter(model="FSM")["impact_closing_speed_mps"].drop_nulls().sort(descending=True).head(3)
+    assert found["impact_closing_speed_mps"].tail(3).to_list() == fastest.to_list()
+    assert recipes.worst(sampled, 1, criterion="ttc")["min_ttc_s"].max() == 0.0
+
+
+def test_momentum_divides_the_closing_speed_and_curves_have_the_numbers_of_their_sources() -> None:
+    rows = {"contact_type": [2, 1, 2, 0], "impact_closing_speed_mps": [10.0, 10.0, -1.0, None]}
+    equal, truck = recipes.delta_v(rows), recipes.delta_v(rows, other_kg=16_000)
+    assert equal["delta_v_ego_mps"].to_list() == [5.0, None, None, None]
+    assert truck["delta_v_ego_mps"][0] == pytest.approx(10 * 16_000 / 17_500)
+    mph = 0.44704
+    for curve, at, risk in [
+        ("nhtsa-2022-frontal-mais3", 30, 0.1074),
+        ("nhtsa-2022-frontal-fatal", 55, 0.4009),
+        ("joksch-1993-fatal", 35.5, 1 / 16),
+    ]:
+        assert recipes.injury_risk([at * mph], curve)[0] == pytest.approx(risk, abs=1e-4)
+        assert np.isnan(recipes.injury_risk(72 * mph, curve)) and recipes.INJURY_CURVES[curve].source
+
+
+def test_the_largest_gap_is_between_neighbours_or_to_an_end(density: Path) -> None:
+    found = recipes.largest_gap({"a": [1, 2, 4, 9.0], "b": [0.0, 4.0, 5, 10]}, {"a": (0, 10), "b": (5, 8)})
+    assert found.rows() == [("b", 5.0, 8.0, 1.0), ("a", 4.0, 9.0, 0.5)]
+    limit_state = lanesweep.LimitState(density, model="FSM", thw=1.0)
+    draws = dict(zip(limit_state.parameters, limit_state.draw(1000, 1).T, strict=True))
+    (likely,) = recipes.largest_gap({"v_ego_mps": [10.0, 60.0]}, {"v_ego_mps": (10, 60)}, draws=draws).to_dicts()
+    assert 0.98 < likely["low"] < likely["exposure"] < likely["high"] <= 1.0
+
+
+XOSC = """<OpenSCENARIO><FileHeader revMajor="1" revMinor="2"/><ParameterValueDistribution><ScenarioFile filepath="a.xosc"/>
+{}</ParameterValueDistribution></OpenSCENARIO>"""
+
+
+def test_listed_values_become_every_combination(tmp_path: Path) -> None:
+    one = "<DeterministicSingleParameterDistribution parameterName='{}'>{}</DeterministicSingleParameterDistribution>"
+    sets = "".join(
+        f"<ParameterValueSet><ParameterAssignment parameterRef='ego_speed_kmh' value='{ego}'/>"
+        f"<ParameterAssignment parameterRef='speed_kmh' value='{other}'/></ParameterValueSet>"
+        for ego, other in ((60, 30), (120, 80))
+    )
+    multi = "<DeterministicMultiParameterDistribution><ValueSetDistribution>{}</ValueSetDistribution></DeterministicMultiParameterDistribution>"
+    parts = [
+        one.format("gap_m", "<DistributionRange stepWidth='0.1'><Range lowerLimit='20' upperLimit='20.3'/></DistributionRange>"),
+        one.format("road", "<DistributionSet><Element value='left'/><Element value='right'/></DistributionSet>"),
+        multi.format(sets),
+    ]
+    file = tmp_path / "grid.xosc"
+    file.write_text(XOSC.format(f"<Deterministic>{''.join(parts)}</Deterministic>"), encoding="utf-8-sig")
+    found = recipes.logical_scenario(file)
+    assert found.height == 4 * 2 * 2 and found["gap_m"].unique().sort().to_list() == [20.0, 20.1, 20.2, 20.3]
+    assert found.columns == ["gap_m", "road", "ego_speed_kmh", "speed_kmh"]
+    assert set(found.select("ego_speed_kmh", "speed_kmh").iter_rows()) == {(60.0, 30.0), (120.0, 80.0)}
+    outcomes = lanesweep.simulate(found.with_columns(lateral_speed=1.0), category="cut-in", models="FSM")
+    assert len(outcomes) == 16 and set(outcomes["road"]) == {"left", "right"}
+    reference = one.format("a", "<DistributionSet><Element value='$b'/></DistributionSet>")
+    file.write_text(XOSC.format(f"<Deterministic>{reference}</Deterministic>"))
+    with pytest.raises(ValueError, match="not evaluated"):
+        recipes.logical_scenario(file)
+
+
+def test_random_values_are_drawn_within_their_ranges(tmp_path: Path) -> None:
+    ends = "<Range lowerLimit='{}' upperLimit='{}'/>"
+    kinds = {
+        "normal": f"<NormalDistribution expectedValue='100' variance='225'>{ends.format(60, 130)}</NormalDistribution>",
+        "uniform": f"<UniformDistribution>{ends.format(50, 90)}</UniformDistribution>",
+        "poisson": f"<PoissonDistribution expectedValue='0.5'>{ends.format(0, 2)}</PoissonDistribution>",
+        "bins": f"<Histogram><Bin weight='1'>{ends.format(0, 1)}</Bin><Bin weight='3'>{ends.format(2, 4)}</Bin></Histogram>",
+        "set": "<ProbabilityDistributionSet><Element value='0.5' weight='3'/><Element value='1' weight='1'/></ProbabilityDistributionSet>",
+    }
+    parts = "".join(f"<StochasticDistribution parameterName='{name}'>{of}</StochasticDistribution>" for name, of in kinds.items())
+    file = tmp_path / "random.xosc"
+    file.write_text(XOSC.format(f"<Stochastic numberOfTestRuns='20000' randomSeed='0.5'>{parts}</Stochastic>"))
+    found = recipes.logical_scenario(file)
+    assert found.height == 20_000 and found.equals(recipes.logical_scenario(file))
+    assert not found.equals(recipes.logical_scenario(file, seed=1)) and recipes.logical_scenario(file, draws=7).height == 7
+    # Kolmogorov and Smirnov; frequencies within five standard errors.
+    cut = stats.truncnorm(-40 / 15, 2, 100, 15)
+    for name, of in {"normal": cut, "uniform": stats.uniform(50, 40)}.items():
+        assert stats.kstest(found[name].to_numpy(), of.cdf).pvalue > 1e-3
+    expected = stats.poisson(0.5).pmf([0, 1, 2]) / stats.poisson(0.5).cdf(2)
+    assert [(found["poisson"] == k).mean() for k in range(3)] == pytest.approx(expected, abs=0.018)
+    assert (found["set"] == 0.5).mean() == pytest.approx(0.75, abs=0.016)
+    assert (found["bins"] < 1).mean() == pytest.approx(0.25, abs=0.016) and found["bins"].is_between(1, 2).sum() == 0
+
+
+def test_a_description_without_emphasis_is_the_decomposition_of_the_study(scenarios: Path, tmp_path: Path) -> None:
+    mined = lanesweep.mine(scenarios.parent / "recordings", out=tmp_path / "scenarios.parquet")
+    kept = pl.read_parquet(Path(mined)).filter(pl.col("kept"), category="lvd")
+    ours = recipes.replayed(recipes.fit_description(kept, 3), kept)
+    f1 = pl.DataFrame(lanesweep.study(scenarios=kept, categories="lvd", external={"ours": ours}).table("f1"))
+    counts = {key: f1.filter(parameterization=key).select("tp", "fn", "fp", "tn").rows() for key in ("iii", "ours")}
+    assert counts["ours"] == counts["iii"] and len(counts["iii"]) == 12
+    emphasis, score = recipes.found_emphasis(kept, 3, evaluations=12)
+    assert emphasis.shape == (5,) and 0.5 < score <= 1.0

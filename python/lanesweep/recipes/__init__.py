@@ -3,8 +3,36 @@
 They need the extra: ``pip install 'lanesweep[recipes]'``.
 """
 
+from ._justification import Justification, justification
+from ._lanes import INJURY_CURVES, InjuryCurve, delta_v, failure_map, injury_risk, largest_gap, worst
+from ._linear import Description, fit_description, found_emphasis, replayed
+from ._logical_scenario import logical_scenario
 from ._results import TOLERANCES, Comparison, compare_results
+from ._risk import failure_ratio, risk
 from ._uncertain import Uncertainty, uncertain
 from ._variations import variations
 
-__all__ = ["TOLERANCES", "Comparison", "Uncertainty", "compare_results", "uncertain", "variations"]
+__all__ = [
+    "INJURY_CURVES",
+    "TOLERANCES",
+    "Comparison",
+    "Description",
+    "InjuryCurve",
+    "Justification",
+    "Uncertainty",
+    "compare_results",
+    "delta_v",
+    "failure_map",
+    "failure_ratio",
+    "fit_description",
+    "found_emphasis",
+    "injury_risk",
+    "justification",
+    "largest_gap",
+    "logical_scenario",
+    "replayed",
+    "risk",
+    "uncertain",
+    "variations",
+    "worst",
+]

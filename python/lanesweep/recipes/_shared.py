@@ -40,7 +40,7 @@ def table(rows: Any) -> pl.DataFrame:
             rows = pl.read_csv(path, infer_schema_length=None)
         else:
             rows = pl.read_parquet(path) if path.suffix == ".parquet" else pl.read_ndjson(path, infer_schema_length=None)
-    found = pl.DataFrame(dict(rows) if isinstance(rows, Mapping) else rows)
+    found = pl.DataFrame(dict(rows) if isinstance(rows, Mapping) else rows, strict=False)
     return found.with_columns(select.float().fill_nan(None))
 
 
