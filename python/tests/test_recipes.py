@@ -197,6 +197,8 @@ def sampled(density: Path, tmp_path_factory: pytest.TempPathFactory) -> pl.DataF
 def test_risk_has_the_estimates_of_every_density(density: Path) -> None:
     found = recipes.risk({"one": density, "other": density}, samples=500, models="FSM", thw=0.6)
     assert found["name"].unique(maintain_order=True).to_list() == ["one", "other"]
+    fitted = lanesweep.fit(synth_recordings=2, categories="lvd", parameterizations=["i", "ii"])
+    assert set(recipes.risk(fitted, samples=100, models="FSM", thw=0.6)["name"]) == {"lvd-i", "lvd-ii"}
     own = pl.DataFrame(lanesweep.sample(density, samples=500, models="FSM", thw=0.6).table("estimates"))
     for name in ("probability", "replayed_ratio", "sampled_ratio_low", "sampled_ratio_high"):
         assert found.filter(name="one")[name].to_list() == found.filter(name="other")[name].to_list() == own[name].to_list()

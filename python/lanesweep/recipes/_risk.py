@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from typing import TYPE_CHECKING, Any
 
 from .. import _verbs
+from .._result import Result
 from ..options import Path
 from . import _clusters
 from ._shared import extra, table
@@ -14,17 +15,18 @@ if TYPE_CHECKING:
     import polars as pl
 
 
-def risk(densities: Mapping[str, Path], **options: Any) -> pl.DataFrame:
-    """Sample every density of a fit, and return the estimates of all with the name of the density.
+def risk(densities: Result | Mapping[str, Path], **options: Any) -> pl.DataFrame:
+    """Sample every density of a fit, or densities by their names, and return the estimates of all with the name of the density.
 
     `options` are those of `sample`. `replayed_ratio` is S'/S, the error of the parameterization itself; `sampled_ratio` is the rate of
     the density over that of the recorded scenarios, P/S. Both have intervals over scenarios (`…_low`, `…_high`).
     """
     with extra():
         import polars as pl
+    named = densities.densities if isinstance(densities, Result) else densities
     estimates = [
         table(_verbs.sample(density, **options).table("estimates")).insert_column(0, pl.lit(name).alias("name"))
-        for name, density in densities.items()
+        for name, density in named.items()
     ]
     return pl.concat(estimates, how="diagonal_relaxed")
 
