@@ -6,7 +6,7 @@ use crate::{Error, Place, Result};
 use super::parameter::MapParameter;
 
 /// Maximum number of values of one axis.
-pub const MAX_VALUES: usize = 100_000;
+const MAX_VALUES: usize = 100_000;
 
 /// A parameter with its values.
 #[derive(Debug, Clone, PartialEq)]
@@ -55,14 +55,6 @@ impl GridAxis {
     pub fn range(category: Category, key: &str, ends: (f64, f64), step: f64) -> Result<GridAxis> {
         let parameter = MapParameter::find(category, key, "preset")?;
         Ok(GridAxis { parameter, values: range(ends, step, key, "preset")? })
-    }
-
-    /// The values of an interval at steps, both ends included if the steps reach them; `what` names it in errors.
-    ///
-    /// # Errors
-    /// [`Error::Usage`] for an invalid step, an empty interval, and too many values.
-    pub fn steps(ends: (f64, f64), step: f64, what: &str) -> Result<Vec<f64>> {
-        range(ends, step, what, what)
     }
 
     /// Number of values.

@@ -15,7 +15,7 @@ pub mod presets;
 mod robustness;
 mod run;
 
-pub use axis::{GridAxis, MAX_VALUES};
+pub use axis::GridAxis;
 pub use grid_text::GridText;
 use jrc_case::Front;
 pub use map::{CellOutcome, GridMap, boundary, runs};
