@@ -8,7 +8,7 @@ use crate::engine::version::Canonical;
 use crate::model::profile::Profile;
 
 /// What no simulation of the program considers. The chapter for assessors has the same list.
-pub const NOT_CONSIDERED: [(&str, &str); 9] = [
+pub(super) const NOT_CONSIDERED: [(&str, &str); 9] = [
     ("The system under assessment", "only reference drivers are simulated; nothing is said of what the system does"),
     (
         "Steering",
@@ -64,7 +64,7 @@ impl CaseIdentity {
 }
 
 /// Program, version, commit by its first digits, and version of the lanes.
-pub fn program(commit: &str, digits: usize) -> String {
+pub(super) fn program(commit: &str, digits: usize) -> String {
     let (commit, changes) = commit.split_at(commit.find(' ').unwrap_or(commit.len()));
     let commit = match commit {
         "" => "commit unknown".to_owned(),

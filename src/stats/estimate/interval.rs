@@ -81,7 +81,7 @@ pub fn wilson(failures: f64, runs: f64, level: f64) -> Interval {
 
 /// The exact interval of Clopper and Pearson (Biometrika 26, 1934): its coverage is at least `level` for every true
 /// value.
-pub fn clopper_pearson(failures: u64, runs: u64, level: f64) -> Interval {
+pub(super) fn clopper_pearson(failures: u64, runs: u64, level: f64) -> Interval {
     if runs == 0 {
         return Interval::nothing(level);
     }

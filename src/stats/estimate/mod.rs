@@ -24,7 +24,7 @@ mod weights;
 pub use adaptive::{AdaptiveRun, Goal, adaptive};
 pub use blocks::{BlockSums, Join};
 pub use importance::{Importance, from_weight_sums, importance, importance_of_points, importance_sums};
-pub use interval::{Interval, IntervalKind, clopper_pearson, gamma, wilson};
+pub use interval::{Interval, IntervalKind, gamma, wilson};
 pub use kernels::{KernelShares, kernel_shares};
 pub use limit_state::{ATTEMPTS, Density, Draw, Failure, LimitState, StandardNormal, Truncated};
 pub use monte_carlo::{BinomialInterval, Counts, from_clusters, from_counts};
