@@ -151,8 +151,8 @@ fn changed(key: &Key) -> Value {
 fn every_record_names_every_setting_with_its_source() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
-    // A device needs another backend; a width and a time decide how many samples are drawn.
-    let unset = ["run.device", "sample.half_width", "sample.time_limit_s"];
+    // A device needs another backend; a width and a time decide how many samples are drawn, and what ends.
+    let unset = ["run.device", "run.stop_after_s", "sample.half_width", "sample.time_limit_s"];
     let keys: Vec<Key> = Key::all().into_iter().filter(|key| !unset.contains(&key.name.as_str())).collect();
     let line = |key: &Key| format!("{} = {}\n", key.name, changed(key));
     std::fs::write(dir.join("all.toml"), keys.iter().map(line).collect::<String>()).unwrap();
@@ -163,7 +163,8 @@ fn every_record_names_every_setting_with_its_source() {
         json(&dir.join(record))
     };
     let fit = ["fit", "--parameterizations", "i", "--no-comparison", "--out", "i.json", "--format", "json"];
-    let map = ["map", "lvd", "--x", "deceleration_mps2=5,6", "--y", "ego_speed_kmh=60,70", "--set", "thw_s=1"];
+    // A preset has its own initial distances and panels.
+    let map = ["map", "lvd", "--preset", "jrc", "--models", "FSM"];
     let records = [
         ("study", recorded("lanesweep-out/run.json", &["study", "--categories", "lvd"])),
         ("mine", {

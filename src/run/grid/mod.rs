@@ -383,7 +383,7 @@ fn check_complete(category: Category, native_gap: bool, has: &dyn Fn(CaseQuantit
         return Err(Error::usage(Place::item("gap_m, thw_s"), problem, help));
     }
     if !native_gap && !has_gap {
-        return missing("the initial distance", "thw_s=2 (or key `map.native_gap`)");
+        return missing("the initial distance", "thw_s=2 (or `map.native_gap`)");
     }
     Ok(())
 }
