@@ -34,7 +34,7 @@ fn main() {
     let repetitions = value("--repetitions").map_or(3, |n| n.parse().expect("--repetitions N"));
     let name = value("--device").map(|n| n.parse::<DeviceName>().expect("--device NAME"));
     let adapters = Adapters::enumerate();
-    let index = choose(adapters.cards(), BackendChoice::Gpu, name.as_ref(), None).expect("a device").expect("a device");
+    let index = choose(adapters.cards(), BackendChoice::Gpu, name.as_ref()).expect("a device").expect("a device");
     let mut per_invocation: Vec<Option<u32>> = args
         .windows(2)
         .filter(|pair| pair[0] == "--lanes-per-invocation")

@@ -1,6 +1,5 @@
 //! Sampled lanes: wall time of crude Monte Carlo over one density per kind of parameterization, and memory at 10⁶,
-//! 10⁷ and 10⁸ samples (with `-- --large` at 10⁹ too). `-- --worst` only sets 10⁷ samples with the default list of worst
-//! lanes beside as many without, in turn.
+//! 10⁷ and 10⁸ samples (with `-- --large` at 10⁹ too).
 //!
 //! `cargo bench --bench sampling` prints one CSV row per run to stdout and a summary to stderr. Synthetic data of the
 //! default size, profile `paper`, THW 1 s, all threads of the pool.
@@ -13,7 +12,7 @@ use common::{density, peak_memory_bytes};
 use lanesweep::engine::{CpuBackend, Executor, Headway};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
-use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, plan_samples, sample_crude};
+use lanesweep::run::sampling::{Estimator, Sample, SampleHeadways, SampleOptions};
 use lanesweep::scenario::Category;
 use lanesweep::stats::density::DensityModel;
 use lanesweep::traffic::mining::{MiningOptions, mine_generated};
@@ -24,20 +23,10 @@ fn main() {
     if !std::env::args().any(|arg| arg == "--bench") {
         return;
     }
-    println!("part,density,models,samples,lanes,worst,seconds,peak_bytes,failures");
+    println!("part,density,models,samples,lanes,seconds,peak_bytes,failures");
     let generator = GeneratorOptions { recordings: 24, ..GeneratorOptions::default() };
     let scenarios = mine_generated(&generator, &MiningOptions::default(), || Ok(())).unwrap().scenarios;
     let million = 1_000_000;
-    if std::env::args().any(|arg| arg == "--worst") {
-        for (category, key) in [(Category::CutIn, "2"), (Category::CutOut, "b"), (Category::Lvd, "ii")] {
-            let density = density(category, key, &scenarios);
-            for _ in 0..2 {
-                run("list", &density, &ModelId::ALL, 10 * million, 20);
-                run("no list", &density, &ModelId::ALL, 10 * million, 0);
-            }
-        }
-        return;
-    }
     for (category, key) in [
         (Category::CutIn, "2"),
         (Category::CutIn, "6"),
@@ -48,35 +37,33 @@ fn main() {
         (Category::Lvd, "iv"),
     ] {
         let density = density(category, key, &scenarios);
-        run("speed", &density, &ModelId::ALL, million, 20);
+        run("speed", &density, &ModelId::ALL, million);
     }
     let density = density(Category::CutIn, "2", &scenarios);
-    run("no list", &density, &ModelId::ALL, 10 * million, 0);
-    run("ten million", &density, &ModelId::ALL, 10 * million, 20);
+    run("ten million", &density, &ModelId::ALL, 10 * million);
     let large = std::env::args().any(|arg| arg == "--large");
     for samples in [million, 10 * million, 100 * million, 1000 * million].into_iter().take(if large { 4 } else { 3 }) {
-        run("memory", &density, &[ModelId::Fsm], samples, 20);
+        run("memory", &density, &[ModelId::Fsm], samples);
     }
 }
 
-fn run(part: &str, density: &DensityModel, models: &[ModelId], samples: u64, worst: usize) {
+fn run(part: &str, density: &DensityModel, models: &[ModelId], samples: u64) {
     let options = SampleOptions {
         models: models.to_vec(),
-        worst,
         ..SampleOptions::new(Estimator::CRUDE, samples, SampleHeadways::Each(vec![Headway::ThwS(1.0)]))
     };
     let profile = Profile::load("paper").unwrap();
-    let plan = plan_samples(density, &density.mixture().unwrap(), &profile, &options).unwrap();
+    let sample = Sample::plan(density.clone(), &profile, &options).unwrap();
     let backend = CpuBackend::lane_arithmetic();
     let executor = Executor::new(&backend);
     let start = Instant::now();
-    let run = sample_crude(&plan, 0..samples, &executor, &options, None, None).unwrap();
+    let run = sample.run(&executor).unwrap().crude.unwrap();
     let seconds = start.elapsed().as_secs_f64();
     let id = density.space.id();
     let name = format!("{} {}", id.category.key(), id.key);
-    let (lanes, failures) = (plan.lane_count(), run.tally.failures.iter().sum::<u64>());
+    let (lanes, failures) = (sample.lane_count(), run.tally.failures.iter().sum::<u64>());
     let peak = peak_memory_bytes().unwrap_or(0);
-    println!("{part},{name},{},{samples},{lanes},{worst},{seconds},{peak},{failures}", models.len());
+    println!("{part},{name},{},{samples},{lanes},{seconds},{peak},{failures}", models.len());
     eprintln!(
         "{part}: {name}, {samples} samples, {lanes} lanes in {seconds:.2} s, {:.2} M lanes/s, peak {:.1} MB so far",
         lanes as f64 / seconds / 1e6,

@@ -17,8 +17,6 @@ struct Generation {
     first_factor: u32,
     first_factor_of: u32,
     first_knot: u32,
-    // Edges of the map's cells: those of the horizontal axis, then those of the vertical one.
-    first_edge: u32,
     // Entries of each sample in the table of instants.
     stride: u32,
 }
@@ -32,14 +30,6 @@ struct Generation {
 @group(0) @binding(6) var<storage, read_write> cases: array<LaneCase>;
 @group(0) @binding(7) var<storage, read_write> speed_table: array<f32>;
 @group(0) @binding(8) var<storage, read_write> drawn_records: array<DrawnRecord>;
-
-// Parameters along the axes of the map, or NO_SLOT.
-override map_x: u32;
-override map_y: u32;
-// A drawn headway below this is close following, s.
-override close_headway: f32;
-
-const MAP_CELLS: u32 = 20u;
 
 const WORKGROUP: u32 = 64u;
 
@@ -58,34 +48,11 @@ fn generate(
     let drawn = draw_point(index);
     if drawn.tries > ATTEMPTS {
         cases[at] = void_case();
-        drawn_records[at] = DrawnRecord(drawn.tries, 0u, NO_SLOT, 0u);
+        drawn_records[at] = DrawnRecord(drawn.tries, 0u);
     } else {
-        let thw = quantity(drawn.values, TIME_HEADWAY);
-        let is_close = (slot_time_headway != NO_SLOT) & (thw < close_headway);
-        drawn_records[at] =
-            DrawnRecord(drawn.tries, drawn.component, map_cell(drawn.values), select(0u, 1u, is_close));
+        drawn_records[at] = DrawnRecord(drawn.tries, drawn.component);
         cases[at] = decode_case(drawn.values, at * generation.stride);
     }
-}
-
-// Cell of a point in the map: twin of `MapAxes::cell`.
-fn map_cell(point: array<f32, MAX_PARAMETERS>) -> u32 {
-    if (map_x == NO_SLOT) | (map_y == NO_SLOT) {
-        return NO_SLOT;
-    }
-    let x = edges_below(generation.first_edge, value_of(point, map_x));
-    let y = edges_below(generation.first_edge + MAP_CELLS + 1u, value_of(point, map_y));
-    let inside = (x > 0u) & (x <= MAP_CELLS) & (y > 0u) & (y <= MAP_CELLS);
-    return select(NO_SLOT, (y - 1u) * MAP_CELLS + (x - 1u), inside);
-}
-
-// Edges of the cells along an axis that a value has reached.
-fn edges_below(first: u32, value: f32) -> u32 {
-    var reached = 0u;
-    for (var k = 0u; k < MAP_CELLS + 1u; k++) {
-        reached = reached + select(0u, 1u, value >= number(first + k));
-    }
-    return reached;
 }
 
 // A sample has no such table.

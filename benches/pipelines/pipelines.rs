@@ -25,7 +25,7 @@ use lanesweep::engine::gpu::{exact_spirv, shader};
 use lanesweep::engine::{Constants, CountLayout, DeviceScene, Headway, LanePlan, LaneRunner, Step};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
-use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, SampleTally, plan_samples};
+use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, plan_samples};
 use lanesweep::run::study::{StudyOptions, plan_study};
 use lanesweep::scenario::Category;
 use lanesweep::scenario::parameterization::Parameterization;
@@ -82,13 +82,11 @@ fn kernels(profiles: &[&str], values: bool) -> Vec<Kernel> {
     for (id, plan) in &plans {
         let generator = plan.generator().expect("a plan of samples");
         let name = format!("generator.{}.{}", id.category.label(), id.key);
-        add(name, shader::GENERATE, shader::assemble_generator(), generator.shader_constants(None), 9);
+        add(name, shader::GENERATE, shader::assemble_generator(), generator.shader_constants(), 9);
     }
     let (_, plan) = &plans[0];
-    let options = SampleOptions::new(Estimator::CRUDE, 1000, SampleHeadways::Each(plan.headways.clone()));
-    let counting = SampleTally::counting(plan, &options);
-    let constants = CountLayout::new(plan, &counting).shader_constants(counting.criterion);
-    add("tally".to_owned(), shader::COUNT, shader::assemble_tally(), constants, 5);
+    let constants = CountLayout::new(plan).shader_constants();
+    add("tally".to_owned(), shader::COUNT, shader::assemble_tally(), constants, 4);
     for profile_name in profiles {
         let profile = Profile::load(profile_name).expect("a profile");
         for model in ModelId::ALL {
@@ -97,10 +95,10 @@ fn kernels(profiles: &[&str], values: bool) -> Vec<Kernel> {
                 let of_samples = plans
                     .iter()
                     .filter(|(id, _)| id.category == category)
-                    .map(|(id, plan)| (id.key.clone(), plan.generator().expect("a plan of samples").scene()));
+                    .map(|(id, plan)| (id.key, plan.generator().expect("a plan of samples").scene()));
                 let any = ("any".into(), DeviceScene::unknown(category == Category::CutOut));
                 for (scene_name, scene) in of_samples.chain([any]) {
-                    let specialization = shader::Specialization { scene, values, watched: false, queue: true };
+                    let specialization = shader::Specialization { scene, values, queue: true };
                     let constants = shader::constants(&resolved, model, specialization);
                     let name = format!("{profile_name}.{}.{}.{scene_name}", category.label(), model.name());
                     add(name, shader::ENTRY, shader::assemble(model), constants, 8);

@@ -1,8 +1,8 @@
 """Where do rare failures lie? One panel per case: the points that collide, of crude samples, in the two parameters that
 tell them best from the kernels, with the kernels.
 
-    lanesweep sample DENSITY --models MODEL --thw T --samples N --worst 2000 --map none --out RUN
-    python regions.py OUT.svg "TITLE=DENSITY,RUN/worst.csv" ...
+    lanesweep sample DENSITY --models MODEL --thw T --samples N --config sample.failures_limit=2000 --failures FAILURES.csv
+    python regions.py OUT.svg "TITLE=DENSITY,FAILURES.csv" ...
 
 The nearest kernel of a point is that of the smallest distance in units of the kernels' own deviation. Needs matplotlib."""
 import csv
@@ -18,12 +18,12 @@ import matplotlib.pyplot as plt
 plt.rcParams.update({"svg.hashsalt": "lanesweep", "font.size": 8, "svg.fonttype": "none"})
 
 
-def case(density, worst):
+def case(density, failures):
     model = json.load(open(density))
     names = [parameter["name"] for parameter in model["parameters"]]
     scale = [model["bandwidth"]["value"] * value for value in model["scale"]]
     kernels = model["kernels"]
-    points = [[float(row[name]) for name in names] for row in csv.DictReader(open(worst)) if row["collision"] == "1"]
+    points = [[float(row[name]) for name in names] for row in csv.DictReader(open(failures)) if row["collision"] == "1"]
     nearest, away = set(), []
     for point in points:
         distance = lambda kernel: sum(((a - b) / s) ** 2 for a, b, s in zip(point, kernel, scale))

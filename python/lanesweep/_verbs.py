@@ -245,16 +245,11 @@ def sample(
     half_width: Float | None = None,
     estimator: Literal["auto", "mc", "is"] | None = None,
     level: Float | None = None,
-    simultaneous: bool = False,
     given: Values | None = None,
     proposal: Paths | None = None,
     time_limit: Float | None = None,
-    other_profile: Path | None = None,
-    injury: Keys | None = None,
-    target: Values | None = None,
-    map: str | Collection[str] | None = None,
     rows: Path | None = None,
-    worst: Int | None = None,
+    failures: Path | None = None,
     seed: Int | None = None,
     out: Path | None = None,
     **options: Unpack[_Sample],
@@ -274,7 +269,7 @@ def sample(
         Time headways, s; by default that of the density, else ``"paper"``: 2.0, 1.8, … 0.2. ``"observed"``: drawn as a parameter of the
         density, which needs ``fit(with_thw=True)``.
     criterion : {"collision", "ttc", "btn"}
-        Criterion to estimate to `half_width`, to map and to rank by; by default collision.
+        Criterion to estimate to `half_width`; by default collision.
     samples : int
         Number of samples, by default 100,000 or as many as needed; with a half-width the maximum.
     half_width : float
@@ -283,26 +278,17 @@ def sample(
         Crude Monte Carlo, importance sampling, or the cheaper one for each question. ``"auto"`` without a half-width is ``"mc"``.
     level : float
         Level of the intervals, by default 0.95.
-    simultaneous : bool
-        Intervals of all rows hold together at this level (Bonferroni).
     given : mapping
         Draw from the density conditional on these values: ``{"v_ego_mps": 30}``.
     proposal : list of paths
         Proposals to sample, with ``estimator="is"``; several are mixed with equal weights.
     time_limit : float
         Stop at the first check after this time, s; not reproducible.
-    other_profile : str or path
-        Also run the samples under this profile, and give the ratios.
-    injury : list of str
-        Curves of injury risk (``"nhtsa-2022-frontal-mais3"``, …): injuries per hour, and columns of `rows`.
-    target : mapping
-        Rates per hour to compare with, ``{"collision": 1e-7, "injury": 1e-8}``. There is no default.
-    map : pair of str
-        Parameters of the failure map, or ``"none"``; by default the first two.
     rows : path
         Also write one row per lane: .csv, .jsonl or .parquet.
-    worst : int
-        Worst lanes to list per model, by default 20; 0 runs faster.
+    failures : path
+        Also write the first failing lanes of each model and criterion, at most 1000 of each (key ``sample.failures_limit``), with the
+        columns of `rows`.
     seed : int
         Seed of the draws.
     out : path, optional
@@ -486,9 +472,6 @@ def export_xosc(
     *,
     from_: Path | None = None,
     lane: str | Collection[str] | None = None,
-    worst: Int | None = None,
-    criterion: Criterion | None = None,
-    variant: Keys | None = None,
     scenarios: Path | None = None,
     case_file: Path | None = None,
     models: Models | None = None,
@@ -508,15 +491,9 @@ def export_xosc(
     Parameters
     ----------
     from_ : path
-        Folder of a study or sample, for `lane` or `worst`.
+        Folder of a study or sample, for `lane`.
     lane : list of str
         Keys of lanes: scenario/variant/headway/model.
-    worst : int
-        The worst lanes of the run per model.
-    criterion : {"collision", "ttc", "btn"}
-        Criterion of `worst`; for a sampling run that of worst.csv.
-    variant : list of str
-        Variants of `worst`: S, keys of parameterizations; by default all.
     scenarios : path
         Scenario file, for `lane`; with a study: its scenarios, for sizes, side and lane width.
     case_file : path
@@ -564,7 +541,7 @@ def synth(folder: Path, *, synth_recordings: Int | None = None, **options: Unpac
     return run("synth", locals(), path=folder)
 
 
-def merge(folder: Path, **options: Unpack[Run]) -> Result:
+def merge(folder: Path, *, failures: Path | None = None, **options: Unpack[Run]) -> Result:
     """Merge the parts of a run into its result, bit for bit that of the whole run.
 
     Checks that the parts belong to the plan in the folder, are complete, and cover every lane exactly once. Names each missing, double,
@@ -574,6 +551,8 @@ def merge(folder: Path, **options: Unpack[Run]) -> Result:
     ----------
     folder : path
         Folder of the run, with its plan and parts.
+    failures : path
+        Of a sampling run: also write the first failing lanes, as of `sample`.
     **options
         `Run` of `lanesweep.options`.
 

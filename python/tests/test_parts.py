@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from lanesweep import parts
 
-FILES = ["estimates.csv", "worst.csv", "convergence.csv", "convergence.svg"]
+FILES = ["estimates.csv", "convergence.csv", "convergence.svg"]
 
 
 def contents(result: lanesweep.Result, names: list[str]) -> dict[str, bytes]:

@@ -151,7 +151,7 @@ fn approach_of(
     let closing = ego.v - place.speed;
     var safe = larger(safe_gap(ego.v, place.speed), 0.0);
     if closing > 0.0 {
-        safe = select(larger(safe, ttc_limit_s() * closing), safe, state.record.ttc.failed);
+        safe = select(larger(safe, criteria_ttc_threshold * closing), safe, state.record.ttc.failed);
         let of_btn = closing * btn_ramp_delay + closing * closing * btn_inverse_two_a_limit;
         safe = select(larger(safe, of_btn), safe, state.record.btn.failed);
     }

@@ -19,8 +19,6 @@ override frame_abort_above_ttc: f32;
 override frame_model: u32;
 // The sweep returns continuous values, not only verdicts.
 override frame_values: bool;
-// A watch replaces the threshold of the TTC and marks contacts.
-override frame_watched: bool;
 // An invocation whose lane has ended takes the next one of its workgroup.
 override frame_queue: bool;
 // Steps between two looks for lanes that have ended, at most.

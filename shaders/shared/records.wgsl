@@ -69,10 +69,6 @@ struct Launch {
     lanes_per_group: u32,
     // A burst begins at this step of the longest one. No compiler knows it, so that none unrolls a burst.
     burst_from: u32,
-    // A TTC below this fails, s: the threshold of the profile or of a watch.
-    ttc_threshold_s: f32,
-    // Verdicts mark contacts with at least this closing speed, m/s.
-    marks_contacts_from: f32,
 }
 
 // Result of a finished lane. Infinite minima are bits, because WGSL has no infinite literal.
@@ -104,8 +100,4 @@ struct DrawnRecord {
     tries: u32,
     // Component of the mixture.
     component: u32,
-    // Cell of the map, row by row from below; a larger number outside.
-    cell: u32,
-    // 1 if the sample draws a headway below the limit of close following.
-    is_close: u32,
 }

@@ -3,14 +3,6 @@
 // s
 override criteria_ttc_threshold: f32;
 
-// A TTC below this fails, s: the threshold of the profile or of a watch.
-fn ttc_limit_s() -> f32 {
-    if frame_watched {
-        return launch.ttc_threshold_s;
-    }
-    return criteria_ttc_threshold;
-}
-
 // Minimum TTC so far, as a quotient, so that a step never divides.
 struct TtcMinimum {
     gap: f32,
@@ -35,7 +27,7 @@ fn ttc_value_bits(minimum: TtcMinimum) -> u32 {
 // Takes one step of a vehicle that is `seen` into account: fails iff max(g, 0) < threshold·dv, dv > 0. A threshold is
 // not negative, so that the product is positive only if dv is.
 fn ttc_update(minimum: TtcMinimum, seen: bool, signed_gap: f32, closing: f32) -> TtcMinimum {
-    let limit = ttc_limit_s() * closing;
+    let limit = criteria_ttc_threshold * closing;
     let fails = seen & (limit > 0.0) & (signed_gap < limit);
     let gap = larger(signed_gap, 0.0);
     let is_smaller = frame_values & seen & (closing > 0.0) & (gap * minimum.closing < minimum.gap * closing);

@@ -203,14 +203,11 @@ pub(super) fn choice<T: ValueEnum>(value: &Value) -> std::result::Result<T, Stri
 }
 
 /// An argument that means nothing without another one, by verb.
-pub(super) const NEEDS: [(&[&str], &str, &str); 11] = [
+pub(super) const NEEDS: [(&[&str], &str, &str); 8] = [
     (&["study", "fit", "verify", "mine"], "preset", "recordings"),
     (&["check"], "scenario", "file"),
     (&["check"], "row", "file"),
     (&["simulate"], "row", "table"),
-    (&["xosc"], "worst", "from"),
-    (&["xosc"], "criterion", "worst"),
-    (&["xosc"], "variant", "worst"),
     (&["simulate"], "scenarios", "lane"),
     (&["simulate"], "from", "lane"),
     (&["simulate"], "compare", "lane"),

@@ -13,7 +13,7 @@ use indicatif::ProgressBar;
 
 use super::arguments::{Arguments, NEEDS, Value};
 use super::console::{self, Total, Verbosity};
-use super::help::{DATA, MODELS, OUTPUT, RUN};
+use super::help::{DATA, MODELS, RUN};
 use super::signals::CANCEL;
 use super::{COMMIT, Cli, Verb};
 use crate::cli::settings::{Assignment, FILE_VARIABLE, Key, KeyKind, Layers, Origin, Setting, Settings};
@@ -46,7 +46,7 @@ const SIMULATING: &[&str] = &["study", "sample", "map", "verify", "show", "simul
 const GENERATING: &[&str] = &["study", "fit", "verify", "show"];
 
 #[rustfmt::skip] // a table: one line per flag
-pub(super) const FLAGS: [KeyFlag; 20] = [
+pub(super) const FLAGS: [KeyFlag; 19] = [
     ("run.threads", "threads", "", RUN, true, &["lanesweep"]),
     ("run.backend", "backend", "", RUN, false, SWEEPING),
     ("run.device", "device", "NAME|pci:BUS|INDEX", RUN, false, SWEEPING),
@@ -65,7 +65,6 @@ pub(super) const FLAGS: [KeyFlag; 20] = [
     ("sample.level", "level", "", MODELS, true, &["sample"]),
     ("sample.half_width", "half_width", "", MODELS, false, &["sample"]),
     ("sample.time_limit_s", "time_limit", "", MODELS, true, &["sample"]),
-    ("sample.worst", "worst", "", OUTPUT, true, &["sample"]),
     ("sample.seed", "seed", "", RUN, false, &["sample"]),
 ];
 
@@ -196,7 +195,7 @@ fn word(value: &serde_json::Value) -> String {
 }
 
 fn is_of_plan(key: &str) -> bool {
-    OF_THE_PLAN.iter().any(|part| key.starts_with(part))
+    key != "sample.failures_limit" && OF_THE_PLAN.iter().any(|part| key.starts_with(part))
 }
 
 /// Adds `--config` at each level separately: clap drops a global flag's values before the verb if it also occurs after

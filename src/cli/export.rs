@@ -8,12 +8,11 @@ use super::arguments::{Arguments, FromArguments, choices, from_arguments};
 use super::case_flags::{CaseFlags, from_toml, time_s};
 use super::configured::Configured;
 use super::format::FormatFlag;
-use super::lists;
 use super::source::{PlausibilityFlag, scenarios_of};
 use super::{Exit, Output};
 use crate::report::openscenario::{Concrete, EgoMotion, PlayOptions, concrete_case, concrete_lanes, export_folder};
 use crate::report::records::document;
-use crate::run::reopen::{Reopened, WorstOptions};
+use crate::run::reopen::Reopened;
 use crate::scenario::Side;
 use crate::support::files::check_folder;
 use crate::support::readable::counted;
@@ -43,14 +42,14 @@ impl Export {
 
 /// Write lanes as ASAM OpenSCENARIO XML 1.2 with an OpenDRIVE road
 ///
-/// Exports named lanes of a study, a sampling run or a scenario file, the worst lanes of a run, or one case from flags.
+/// Exports named lanes of a study, a sampling run or a scenario file, or one case from flags.
 /// Every lane becomes NNN-KEY.xosc and NNN-KEY.xodr; index.csv lists them with their outcomes. The other vehicles
 /// follow their own motion, step by step. The ego follows the path that the driver model drove; with --ego external
 /// only its position and speed at the start are written.
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(after_help = "Examples:\n  \
-                  lanesweep export xosc --from lanesweep-out --worst 5 --models FSM --ego external --out worst\n  \
+                  lanesweep export xosc --from lanesweep-out --lane 01_cut_in_97_91_957/2/1.2s/RSS --ego external\n  \
                   lanesweep export xosc --scenarios scenarios.jsonl --lane 01_cut_in_97_91_957/S/1.2s/RSS\n  \
                   lanesweep export xosc --category cut-in --models FSM --ego-speed 30m/s --speed 20m/s --thw 1.2 \\\n      \
                   --lateral-speed 1.0 --out played")]
@@ -62,7 +61,7 @@ struct Xosc {
     /// TOML file with the case
     #[arg(long, value_name = "FILE", conflicts_with_all = ["from", "scenarios"], help_heading = "Data")]
     case_file: Option<PathBuf>,
-    /// Folder (--out) of a study or sample, for --lane or --worst
+    /// Folder (--out) of a study or sample, for --lane
     #[arg(long, value_name = "DIR", conflicts_with_all = ["profile", "dt"], help_heading = "Data")]
     from: Option<PathBuf>,
     /// Scenario file for --lane
@@ -73,20 +72,6 @@ struct Xosc {
     /// Lane key: scenario/variant/headway/model; repeatable
     #[arg(long, value_name = "KEY", help_heading = "Data")]
     lane: Vec<String>,
-    /// The N worst lanes of the run per model
-    ///
-    /// For a sampling run: the lanes of worst.csv. For a study: the scenarios with the smallest margin of --criterion,
-    /// each with its worst lane.
-    #[arg(long, value_name = "N", conflicts_with = "lane", help_heading = "Output")]
-    worst: Option<usize>,
-    /// Criterion of --worst [default: collision]
-    ///
-    /// For a sampling run it must be the criterion of worst.csv.
-    #[arg(long, value_name = "collision|ttc|btn", help_heading = "Models and criteria")]
-    criterion: Option<String>,
-    /// Variants of --worst: S, keys of parameterizations [default: all]
-    #[arg(long, value_name = "LIST", value_delimiter = ',', help_heading = "Scenario", hide_short_help = true)]
-    variant: Vec<String>,
     /// Driver of the ego
     #[arg(long, value_enum, default_value_t, help_heading = "Scenario")]
     ego: EgoFlag,
@@ -104,7 +89,7 @@ struct Xosc {
 }
 
 from_arguments!(
-    Xosc { case_file, from, scenarios, lane, worst, criterion, variant, ego, side, out }
+    Xosc { case_file, from, scenarios, lane, ego, side, out }
     parsed { duration: time_s }
     groups { case, format, plausibility }
 );
@@ -160,22 +145,13 @@ impl Xosc {
         let (implausible, models) = (self.plausibility.policy(), models.as_deref());
         let read = |path: &PathBuf| scenarios_of(path, implausible);
         let (reopened, keys, mined, incomplete) = match (&self.from, &self.scenarios) {
-            (Some(_), _) if self.lane.is_empty() && self.worst.is_none() => {
-                return wrong("--from", "a run has many lanes", "add --lane KEY, or --worst N");
-            }
+            (Some(_), _) if self.lane.is_empty() => return wrong("--from", "a run has many lanes", "add --lane KEY"),
             (Some(dir), scenarios) => {
                 configured.refuse_assigned("is decided by the run (--from)", "leave it out")?;
                 let reopened = Reopened::run(dir, self.lane.first().map_or("", String::as_str))?;
                 self.refuse_for(&reopened)?;
                 let (mined, incomplete) = scenarios.as_ref().map(read).transpose()?.unwrap_or_default();
-                let keys = match self.worst {
-                    Some(count) => {
-                        let criterion = self.criterion.as_deref().map(lists::criterion).transpose()?;
-                        let variants = &self.variant;
-                        reopened.worst(dir, &WorstOptions { count, criterion, variants, models })?
-                    }
-                    None => reopened.named(&self.lane, models)?,
-                };
+                let keys = reopened.named(&self.lane, models)?;
                 (reopened, keys, mined, incomplete)
             }
             (None, Some(path)) if self.lane.is_empty() => {
@@ -211,17 +187,13 @@ impl Xosc {
         Ok((scenarios, incomplete))
     }
 
-    /// Refuses flags that only apply to a study.
+    /// Refuses a flag that only applies to a study.
     fn refuse_for(&self, reopened: &Reopened) -> Result<()> {
-        let wrong = |flag: &str, problem: &str, help: &str| Err(Error::usage(Place::item(flag), problem, help));
-        let (has_scenarios, has_variants) = (self.scenarios.is_some(), !self.variant.is_empty());
-        if reopened.as_study().is_some() || !(has_scenarios || has_variants) {
+        if reopened.as_study().is_some() || self.scenarios.is_none() {
             return Ok(());
         }
-        if has_scenarios {
-            return wrong("--scenarios", "sampled lanes have the mean sizes of their density", "leave it out");
-        }
-        wrong("--variant", "a sampling run has one variant", "leave it out")
+        let problem = "sampled lanes have the mean sizes of their density";
+        Err(Error::usage(Place::item("--scenarios"), problem, "leave it out"))
     }
 
     fn play_options(&self) -> Result<PlayOptions> {

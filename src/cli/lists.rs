@@ -7,7 +7,6 @@ use super::arguments::from_arguments;
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
-use crate::model::severity::InjuryCurve;
 use crate::scenario::Category;
 use crate::scenario::Driven;
 use crate::scenario::parameterization::Parameterization;
@@ -48,30 +47,6 @@ impl CategoriesFlag {
     /// [`Error::Usage`] for an unknown category.
     pub(super) fn list(&self) -> Result<Vec<Category>> {
         categories(&self.categories, "--categories")
-    }
-}
-
-/// `--injury`.
-#[derive(Debug, Clone, Default, Args)]
-pub(super) struct InjuryFlag {
-    /// Injury risks of contacts, by published curves (nhtsa-2022-frontal-mais3, joksch-1993-fatal, …)
-    #[arg(
-        long,
-        value_name = "LIST",
-        value_delimiter = ',',
-        help_heading = "Models and criteria",
-        hide_short_help = true
-    )]
-    injury: Vec<String>,
-}
-
-from_arguments!(InjuryFlag { injury });
-
-impl InjuryFlag {
-    /// # Errors
-    /// [`Error::Usage`] for an unknown curve.
-    pub(super) fn curves(&self) -> Result<Vec<&'static InjuryCurve>> {
-        self.injury.iter().map(|name| InjuryCurve::find(name)).collect()
     }
 }
 
@@ -162,9 +137,7 @@ pub(super) fn models_help() -> String {
 /// `--criterion`.
 #[derive(Debug, Clone, Args)]
 pub(super) struct CriterionFlag {
-    /// Criterion to map, rank or estimate
-    ///
-    /// For worst lanes, failure maps, fractions, stop rules and the adaptive estimators.
+    /// Criterion to evaluate
     #[arg(long, value_name = "collision|ttc|btn", default_value = "collision", help_heading = "Models and criteria")]
     criterion: String,
 }

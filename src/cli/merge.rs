@@ -5,15 +5,19 @@ use std::path::PathBuf;
 use clap::Args;
 
 use super::arguments::from_arguments;
+use super::configured::Configured;
 use super::format::FormatFlag;
+use super::sample_options::guard;
+use super::sample_run::list_failures;
 use super::{COMMIT, Exit, Output};
-use crate::Result;
 use crate::report::host::{Host, Timings};
+use crate::report::lanes::sampled_table;
 use crate::report::sampling::SampleReport;
 use crate::report::study::StudyReport;
 use crate::run::parts::PLAN_FILE;
 use crate::run::{Merged, merge};
 use crate::support::plain_text::quoted_word;
+use crate::{Error, Place, Result};
 
 /// Merge the parts of a run into its result
 ///
@@ -27,19 +31,29 @@ pub(super) struct Merge {
     /// The run's folder
     #[arg(value_name = "DIR", help_heading = "Data")]
     folder: PathBuf,
+    /// Of a sampling run: also write the first failing lanes, as `sample --failures`
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    failures: Option<PathBuf>,
     #[command(flatten)]
     format: FormatFlag,
 }
 
-from_arguments!(Merge { folder } groups { format });
+from_arguments!(Merge { folder, failures } groups { format });
 
 impl Merge {
-    pub(super) fn run(&self) -> Result<Output> {
+    pub(super) fn run(&self, configured: &Configured) -> Result<Output> {
+        if let Some(failures) = &self.failures {
+            guard(failures, "--failures", &self.folder, std::iter::empty())?;
+        }
         let [plan, out] =
             [&self.folder.join(PLAN_FILE), &self.folder].map(|path| quoted_word(&path.display().to_string()));
         let again = |verb: &str, shard| format!("lanesweep {verb} --plan {plan} --shard {shard} --out {out}");
         let (folder, merged) = merge(&self.folder, &again)?;
         match merged {
+            Merged::Study(_) if self.failures.is_some() => {
+                let help = "leave it out; `study --rows` writes every lane";
+                Err(Error::usage(Place::item("--failures"), "this is a study, not a sampling run", help))
+            }
             Merged::Study(merged) => {
                 let (study, result) = *merged;
                 let (swept, timings) = (&result.summary, Timings::default());
@@ -50,8 +64,12 @@ impl Merge {
             Merged::Sample(merged) => {
                 let (sample, result) = *merged;
                 let host = Host::of_parts(COMMIT, result.parts, result.rechecked_lanes);
-                let mut report = SampleReport::of_sample(&sample, &result, host)?;
-                let files = report.write(folder.results()?, &sample, &result)?;
+                let table = self.failures.as_deref().map(|path| sampled_table(path, &sample)).transpose()?;
+                let table = table.map(|table| list_failures(table, &sample, &result, configured)).transpose()?;
+                let mut results = folder.results()?;
+                table.into_iter().for_each(|table| results.join(table));
+                let report = SampleReport::of_sample(&sample, &result, host)?;
+                let files = report.write(results, &sample, &result)?;
                 self.format.output_in(&self.folder, Exit::Ok, || report.text(), || report.json(&files))
             }
         }

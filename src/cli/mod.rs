@@ -188,7 +188,7 @@ impl Verb {
             Verb::Simulate(verb) => verb.run(configured),
             Verb::Check(verb) => verb.run(configured),
             Verb::Export(verb) => verb.run(configured),
-            Verb::Merge(verb) => verb.run(),
+            Verb::Merge(verb) => verb.run(configured),
             Verb::Verify(verb) => verb.run(configured),
             Verb::Devices(verb) => verb.run(),
             Verb::Config(verb) => verb.run(configured),

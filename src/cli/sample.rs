@@ -9,13 +9,12 @@ use super::format::FormatFlag;
 use super::lists;
 use super::shard_flags::ShardFlags;
 use super::source::PlausibilityFlag;
+use crate::Result;
 use crate::cli::settings::{EstimatorKind, SampleSettings};
 use crate::engine::Headway;
-use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
-use crate::run::sampling::{SampleHeadways, SampleSource, Target};
+use crate::run::sampling::{SampleHeadways, SampleSource};
 use crate::stats::density::DensityModel;
-use crate::{Error, Place, Result};
 
 /// How likely does a driver fail?
 ///
@@ -26,8 +25,9 @@ use crate::{Error, Place, Result};
 #[derive(Debug, Args)]
 #[command(allow_negative_numbers = true)]
 #[command(mut_args(|arg| match arg.get_id().as_str() {
-    "density" | "models" | "thw" | "map" | "given" | "proposal" | "injury" | "target" => arg.conflicts_with("plan"),
+    "density" | "models" | "thw" | "given" | "proposal" => arg.conflicts_with("plan"),
     "rows" => arg.conflicts_with("plan_only"),
+    "failures" => arg.conflicts_with_all(["shard", "plan_only"]),
     _ => arg,
 }))]
 #[command(after_help = "Examples:\n  \
@@ -40,26 +40,20 @@ pub(crate) struct Sample {
     pub density: Option<PathBuf>,
     #[command(flatten)]
     models: lists::ModelsFlag,
-    #[command(flatten)]
-    pub(super) injury: lists::InjuryFlag,
-    /// Rate per hour of driving to compare with (collision=1e-7, injury=1e-8, …); repeatable
-    ///
-    /// Names are collision, ttc, btn and, with --injury, injury. Says whether the interval lies below or above, or what would
-    /// decide. The density must know the driven hours.
-    #[arg(long, value_name = "NAME=RATE", value_parser = given, help_heading = "Models and criteria", hide_short_help = true)]
-    target: Vec<(String, f64)>,
     /// Time headways, s [default: the density's, else paper]
     ///
     /// paper is 2.0, 1.8, … 0.2. observed (or sampled): the headway is drawn from the recorded ones, as a parameter of
     /// the density, which needs `fit --with-thw`.
     #[arg(long, value_name = "LIST", help_heading = "Scenario")]
     thw: Option<String>,
-    /// Failure map over two parameters, or `none` [default: the first two]
-    #[arg(long, value_name = "X,Y|none", help_heading = "Output")]
-    pub(super) map: Option<String>,
     /// Also write one row per lane: .csv, .jsonl or .parquet
     #[arg(long, value_name = "FILE", help_heading = "Output")]
     pub(super) rows: Option<PathBuf>,
+    /// Also write the first failing lanes of each model and criterion: .csv, .jsonl or .parquet
+    ///
+    /// The first 1000, or sample.failures_limit; with the columns of --rows. For a run in parts: `merge --failures`.
+    #[arg(long, value_name = "FILE", help_heading = "Output")]
+    pub(super) failures: Option<PathBuf>,
     /// Draw from the density conditional on this value (mc); repeatable
     #[arg(long, value_name = "NAME=VALUE", value_parser = given, help_heading = "Scenario")]
     pub(super) given: Vec<(String, f64)>,
@@ -68,12 +62,6 @@ pub(crate) struct Sample {
     /// Several are mixed with equal weights.
     #[arg(long, value_name = "FILE", help_heading = "Data")]
     pub(super) proposal: Vec<PathBuf>,
-    /// Also run the samples under this profile and write ratios to profiles.csv (mc)
-    #[arg(long, value_name = "NAME|FILE", conflicts_with_all = ["plan", "shard", "plan_only"], help_heading = "Models and criteria", hide_short_help = true)]
-    pub(super) other_profile: Option<String>,
-    /// Intervals of all rows hold together at --level (Bonferroni), not each on its own
-    #[arg(long, conflicts_with = "plan", help_heading = "Output", hide_short_help = true)]
-    pub(super) simultaneous: bool,
     /// Folder for estimate.json, tables and figures
     #[arg(long, value_name = "DIR", default_value = "lanesweep-sample", help_heading = "Output")]
     pub(super) out: PathBuf,
@@ -89,26 +77,13 @@ pub(crate) struct Sample {
 }
 
 from_arguments!(
-    Sample { density, thw, map, rows, proposal, other_profile, simultaneous, out }
-    each { given: given, target: given }
-    groups { models, injury, plausibility, format, shards }
+    Sample { density, thw, rows, failures, proposal, out }
+    each { given: given }
+    groups { models, plausibility, format, shards }
     others { settings: SampleSettings::default() }
 );
 
 impl Sample {
-    /// The target rates.
-    pub(super) fn targets(&self) -> Result<Vec<Target>> {
-        let refused = |problem: String, help: &str| Error::usage(Place::item("--target"), problem, help);
-        let target = |(name, per_hour): &(String, f64)| match Criterion::parse(name) {
-            _ if *per_hour <= 0.0 => Err(refused(format!("{per_hour} is no rate"), "give a number above 0")),
-            None if name != "injury" => {
-                Err(refused(format!("there is no rate `{name}`"), "use collision, ttc, btn or injury"))
-            }
-            criterion => Ok(Target { criterion, per_hour: *per_hour }),
-        };
-        self.target.iter().map(target).collect()
-    }
-
     pub(super) fn is_crude(&self) -> bool {
         self.settings.estimator != EstimatorKind::Is && self.proposal.is_empty()
     }

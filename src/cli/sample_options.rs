@@ -8,9 +8,7 @@ use super::source::file_of;
 use crate::cli::settings::{EstimatorKind, IntervalKind};
 use crate::model::driver::ModelId;
 use crate::report::lanes::table_format;
-use crate::run::sampling::{
-    Estimator, InjuryOptions, MapAxes, SampleHeadways, SampleOptions, SampleSource, read_proposal,
-};
+use crate::run::sampling::{Estimator, SampleHeadways, SampleOptions, SampleSource, read_proposal};
 use crate::stats::density::{DensityModel, Mixture};
 use crate::stats::estimate::{BinomialInterval, Checkpoints, Goal, Search, StopRule};
 use crate::support::plausibility::{Doubts, HELP};
@@ -43,26 +41,16 @@ impl Sample {
         });
         self.check_given(density)?;
         let headways = self.headways(density)?;
-        let options = SampleOptions {
+        Ok(SampleOptions {
             models: self.models()?,
             criterion: self.settings.criterion,
             seed: self.settings.seed,
             level: self.settings.level,
             stop: self.stop(samples),
             given: self.given.clone(),
-            worst: self.settings.worst,
             source: self.settings.points,
-            injury: self.injury(density)?,
-            targets: self.targets()?,
-            map: if self.is_crude() { self.map_axes(density)? } else { None },
             ..SampleOptions::new(self.estimator(density)?, samples, headways)
-        };
-        Ok(if self.simultaneous { options.together(self.settings.level) } else { options })
-    }
-
-    fn injury(&self, density: &DensityModel) -> Result<Option<InjuryOptions>> {
-        let curves: Vec<String> = self.injury.curves()?.iter().map(|curve| curve.name.to_owned()).collect();
-        Ok((!curves.is_empty()).then_some(InjuryOptions { curves, sizes: density.sizes }))
+        })
     }
 
     /// Checks the values of `--given`, and warns about doubtful ones.
@@ -119,22 +107,6 @@ impl Sample {
             IntervalKind::ClopperPearson => BinomialInterval::ClopperPearson,
         }
     }
-
-    fn map_axes(&self, density: &DensityModel) -> Result<Option<MapAxes>> {
-        let parameters = density.space.parameters();
-        match self.map.as_deref() {
-            Some("none") => Ok(None),
-            None if parameters.len() < 2 => Ok(None),
-            None => MapAxes::of(density, &parameters[0].name, &parameters[1].name).map(Some),
-            Some(text) => {
-                let (x, y) = text.split_once(',').ok_or_else(|| {
-                    let problem = format!("`{text}` does not name two parameters");
-                    Error::usage(Place::item("--map"), problem, "give two, separated by a comma, or `none`")
-                })?;
-                MapAxes::of(density, x.trim(), y.trim()).map(Some)
-            }
-        }
-    }
 }
 
 /// Number of samples if none is given.
@@ -162,9 +134,7 @@ impl Sample {
         let is_crude = self.is_crude();
         let belongs_to_crude = [
             ("--rows", self.rows.is_some()),
-            ("--map", self.map.is_some()),
             ("--given", !self.given.is_empty()),
-            ("--other-profile", self.other_profile.is_some()),
             ("sample.points=sobol", settings.points == SampleSource::Sobol),
         ];
         if let Some((flag, _)) = belongs_to_crude.iter().find(|(_, given)| *given && !is_crude) {
@@ -200,10 +170,10 @@ impl Sample {
     }
 }
 
-/// Checks that the rows replace neither an input nor another result.
-pub(super) fn guard<'a>(rows: &Path, out: &Path, inputs: impl Iterator<Item = &'a PathBuf>) -> Result<()> {
-    let results = ["estimate.json", "estimates.csv", "worst.csv", "convergence.csv", "density.json"];
+/// Checks that a table of lanes replaces neither an input nor another result.
+pub(super) fn guard<'a>(table: &Path, flag: &str, out: &Path, inputs: impl Iterator<Item = &'a PathBuf>) -> Result<()> {
+    let results = ["estimate.json", "estimates.csv", "convergence.csv", "density.json"];
     let others: Vec<PathBuf> = results.iter().map(|name| out.join(name)).chain(inputs.cloned()).collect();
-    super::source::refuse_overwriting(rows, &others, "--rows")?;
-    table_format(rows).map(drop)
+    super::source::refuse_overwriting(table, &others, flag)?;
+    table_format(table).map(drop)
 }

@@ -1,17 +1,19 @@
 //! `lanesweep sample`: plans the run, executes it whole or as a shard, and writes the result.
 
+use std::path::PathBuf;
+
 use super::configured::Configured;
 use super::console::Total;
 use super::sample::Sample;
 use super::sample_options::{guard, only_crude};
+use super::signals::CANCEL;
 use super::{Exit, Output};
-use crate::engine::{Chunk, Executor, LanePlan, OpenBackend};
-use crate::model::profile::Profile;
+use crate::engine::{Chunk, CpuBackend, Executor, LanePlan, OpenBackend};
 use crate::report::lanes;
 use crate::report::sampling::SampleReport;
 use crate::run::parts::{EachChunk, Job, PLAN_FILE};
 use crate::run::sampling::{
-    self, EstimateRow, SampleJob, SampleKind, SampleOptions, SampleResult, SampleSource, conditional,
+    self, EstimateRow, FailingLane, SampleJob, SampleKind, SampleOptions, SampleResult, SampleSource, conditional,
 };
 use crate::stats::density::read_density;
 use crate::stats::estimate::{Search, StopRule};
@@ -31,20 +33,17 @@ impl Sample {
         if let Some(path) = &self.shards.plan {
             configured.refuse_with_plan()?;
             let sample = sampling::Sample::read(path)?;
-            if let Some(rows) = &self.rows {
-                if sample.lane_plan().is_none() {
-                    return Err(only_crude("--rows"));
-                }
-                guard(rows, &self.out, std::iter::once(path))?;
+            if self.rows.is_some() && sample.lane_plan().is_none() {
+                return Err(only_crude("--rows"));
             }
-            return self.run_sample(sample, (&configured.open()?, None), configured);
+            self.guard_tables(std::iter::once(path))?;
+            return self.run_sample(sample, &configured.open()?, configured);
         }
         let (sample, data) = self.planned(configured)?;
-        let other = self.other_profile.as_deref().map(|name| configured.profile_of(name)).transpose()?;
         let opened = configured.open()?;
         tracing::info!("{data}");
         let sample = if self.is_refined() { self.chosen(sample, &opened)? } else { sample };
-        self.run_sample(sample, (&opened, other.as_ref()), configured)
+        self.run_sample(sample, &opened, configured)
     }
 
     /// The run of crude Monte Carlo with as many samples as are cheaper than importance sampling.
@@ -85,21 +84,25 @@ impl Sample {
         check_folder(&self.out)?;
         let profile = configured.profile()?;
         let options = self.options(&density)?;
-        if let Some(rows) = &self.rows {
-            guard(rows, &self.out, self.density.iter().chain(&self.proposal))?;
-        }
+        self.guard_tables(self.density.iter().chain(&self.proposal))?;
         let data = density.provenance.data.clone();
         Ok((sampling::Sample::plan(density, &profile, &options)?, data))
     }
 
+    /// Checks that no table of lanes replaces an input or another result.
+    fn guard_tables<'a>(&'a self, inputs: impl Iterator<Item = &'a PathBuf> + Clone) -> Result<()> {
+        if let Some(rows) = &self.rows {
+            guard(rows, "--rows", &self.out, inputs.clone())?;
+        }
+        match &self.failures {
+            Some(failures) => guard(failures, "--failures", &self.out, inputs.chain(&self.rows)),
+            None => Ok(()),
+        }
+    }
+
     /// Executes a plan, whole or a shard of it.
-    fn run_sample(
-        &self,
-        sample: sampling::Sample,
-        opened: (&OpenBackend, Option<&Profile>),
-        configured: &Configured,
-    ) -> Result<Output> {
-        let executor = &opened.0.executor().with_recheck(sample.options.seed);
+    fn run_sample(&self, sample: sampling::Sample, opened: &OpenBackend, configured: &Configured) -> Result<Output> {
+        let executor = &opened.executor().with_recheck(sample.options.seed);
         let is_split = self.shards.plan_only || self.shards.is_part();
         let sample = match sample.kind {
             SampleKind::Search(search) => {
@@ -133,7 +136,7 @@ impl Sample {
         &self,
         job: &impl Job<Result = SampleResult>,
         sample: &sampling::Sample,
-        (opened, other): (&OpenBackend, Option<&Profile>),
+        opened: &OpenBackend,
         executor: &Executor,
         configured: &Configured,
     ) -> Result<Output> {
@@ -151,17 +154,16 @@ impl Sample {
         let beside = if crude > 0 { format!(", and {} draws of the density,", count(crude)) } else { String::new() };
         tracing::info!("{} samples{beside} on {}", count(missing), executor.backend.describe());
         let is_empty = run.units().is_empty();
-        let (density, lane_plan) = (&sample.density, sample.lane_plan());
-        let rows = self.rows.as_deref().filter(|_| !is_empty).zip(lane_plan);
-        let injury = self.injury.curves()?;
-        let mut table = rows.map(|(path, plan)| lanes::sampled_table(path, plan, density, &injury)).transpose()?;
+        let rows = self.rows.as_deref().filter(|_| !is_empty);
+        let mut table = rows.map(|path| lanes::sampled_table(path, sample)).transpose()?;
+        let failures = self.failures.as_deref().map(|path| lanes::sampled_table(path, sample)).transpose()?;
         let units = match sample.options.stop.is_fixed() {
             true => Total::Exact(missing),
             false => Total::AtMost(missing),
         };
-        let mut write_chunk = table.as_mut().map(|table| {
-            |plan: &LanePlan, chunk: &Chunk| lanes::write_sampled_chunk(table, plan, (density, &injury), chunk)
-        });
+        let mut write_chunk = table
+            .as_mut()
+            .map(|table| |plan: &LanePlan, chunk: &Chunk| lanes::write_sampled_chunk(table, sample, plan, chunk));
         let each = write_chunk.as_mut().map(|write| write as &mut EachChunk);
         configured.with_progress(units, "sampling", executor, |executor| run.compute(executor, each))?;
         let rows = table.map(TableWriter::stage).transpose()?;
@@ -179,10 +181,6 @@ impl Sample {
                 sample.refined(result, &search, half_width, executor)
             })?;
         }
-        if let Some(other) = other {
-            tracing::info!("the same samples under profile {}", other.name);
-            result.profiles = Some(sample.profile_ratios(&result, other, executor)?);
-        }
         if let Some(asked) = self.settings.half_width {
             let of_criterion = |row: &&EstimateRow| row.criterion == self.settings.criterion && row.headway != "all";
             let rows: Vec<&EstimateRow> = result.rows.iter().filter(of_criterion).collect();
@@ -195,15 +193,38 @@ impl Sample {
                 );
             }
         }
+        let failures = failures.map(|table| list_failures(table, sample, &result, configured)).transpose()?;
         let host = configured.host(opened, result.rechecked_lanes, self.shards.plan.is_some());
         let mut results = run.results()?;
-        rows.into_iter().for_each(|table| results.join(table));
-        let mut report = SampleReport::of_sample(sample, &result, host)?;
+        rows.into_iter().chain(failures).for_each(|table| results.join(table));
+        let report = SampleReport::of_sample(sample, &result, host)?;
         let files = report.write(results, sample, &result)?;
         let output = self.format.output_in(&self.out, Exit::Ok, || report.text(), || report.json(&files))?;
         run.close()?;
         Ok(output)
     }
+}
+
+/// Fills the table of the first failing lanes.
+pub(super) fn list_failures(
+    mut table: TableWriter,
+    sample: &sampling::Sample,
+    result: &SampleResult,
+    configured: &Configured,
+) -> Result<StagedFile> {
+    let samples = match (&result.crude, &sample.kind) {
+        (Some(run), _) => run.tally.samples(),
+        (None, SampleKind::Weighted(weighted)) => weighted.draws.draws,
+        (None, _) => 0,
+    };
+    let cpu = CpuBackend::lane_arithmetic();
+    let executor = Executor::new(&cpu).with_cancel(CANCEL.clone());
+    configured.with_progress(Total::AtMost(samples), "failing lanes", &executor, |executor| {
+        let limit = configured.settings.sample.failures_limit;
+        let each = &mut |lane: &FailingLane| lanes::write_failing_lane(&mut table, sample, lane);
+        sample.failing_lanes(result, limit, executor, each)
+    })?;
+    table.stage()
 }
 
 /// The maximum number of points of a search, which may end long before it. Warns where it takes long.

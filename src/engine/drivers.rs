@@ -108,14 +108,13 @@ macro_rules! declare_constants {
             pub(super) fn run_stream<E: Ending>(
                 &self,
                 id: ModelId,
-                criteria: &Criteria<f32>,
                 instructions: Instructions,
                 stream: &Lanes<'_>,
                 entries: &[f32],
                 each: impl FnMut(usize, E),
             ) {
                 let model_index = id.index();
-                let frame = &self.frames[model_index];
+                let (frame, criteria) = (&self.frames[model_index], &self.criteria);
                 let scene = Scene::of(stream.cases, model_index, stream.may_cross);
                 match id {
                     $(ModelId::$model => {

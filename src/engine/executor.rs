@@ -4,19 +4,11 @@
 use std::ops::Range;
 use std::sync::Arc;
 
-use rayon::prelude::*;
-
-use super::backend::{Backend, Chunk, Session, Wanted, Watch};
-use super::counting::Counting;
-use super::cpu::runner::LaneRunner;
-use super::outcome::Verdicts;
+use super::backend::{Backend, Chunk, Session, Wanted};
 use super::plan::LanePlan;
 use super::recheck::{Recheck, RecheckOptions};
 use crate::support::cancel::Cancel;
 use crate::{Error, Result};
-
-/// Lanes of one task that computes values of marked lanes.
-const VALUING_TASK: usize = 4096;
 
 /// The backend of a run, its fallback, and the lanes to recheck. `Executor<'static>` owns its backends;
 /// `Executor::new(&backend)` borrows one and lives as long as the backend.
@@ -35,8 +27,6 @@ pub struct Executor<'a> {
     pub cancel: Cancel,
     /// Called with the number of units of every finished chunk.
     pub progress: Option<Arc<dyn Fn(u64) + Send + Sync>>,
-    /// The sweep needs counts and no verdicts of single lanes: a chunk may be [`Chunk::counted`].
-    pub counting: Option<Arc<Counting>>,
 }
 
 /// Summary of a sweep.
@@ -75,7 +65,6 @@ impl<'a> Executor<'a> {
             chunk_lanes: None,
             cancel: Cancel::default(),
             progress: None,
-            counting: None,
         }
     }
 
@@ -136,16 +125,12 @@ impl<'a> Executor<'a> {
         recheck: Option<&Recheck>,
         mut each: impl FnMut(Chunk) -> Result<()>,
     ) -> Result<SweepSummary> {
-        let Executor { backend, fallback, chunk_lanes, counting, .. } = self;
+        let Executor { backend, fallback, chunk_lanes, .. } = self;
         let fallback = fallback.as_deref();
         let max_lanes = chunk_lanes.unwrap_or(u64::MAX);
         let mut summary = SweepSummary::default();
         let mut redo: Option<Box<dyn Session + '_>> = None;
-        let prepared = match counting {
-            Some(counting) if wanted != Wanted::Outcomes => backend.prepare_counting(plan, counting),
-            _ => backend.prepare(plan),
-        };
-        let mut session = match (prepared, fallback) {
+        let mut session = match (backend.prepare(plan), fallback) {
             (Ok(session), _) => Some(session),
             (Err(error), Some(fallback)) => {
                 tracing::warn!("{error}; {} computes instead", fallback.describe());
@@ -153,14 +138,10 @@ impl<'a> Executor<'a> {
             }
             (Err(error), None) => return Err(error),
         };
-        let valuing = wanted.watch().map(|watch| (watch, LaneRunner::of_few(plan)));
-        // Computes the values of the marked lanes of a chunk, rechecks the chunk and passes it on.
+        // Rechecks a chunk and passes it on.
         let mut deliver = |mut chunk: Chunk, computed_by: &dyn Backend, redone: u64| {
-            if let Some((watch, runner)) = &valuing {
-                value_marked(plan, watch, runner, &mut chunk);
-            }
             let by = computed_by.rechecked_by(wanted);
-            let rechecked = recheck.map(|recheck| recheck.check(&chunk, wanted, &computed_by.describe(), by));
+            let rechecked = recheck.map(|recheck| recheck.check(&chunk, &computed_by.describe(), by));
             let rechecked = rechecked.transpose()?.unwrap_or(0);
             let lanes = plan.first_lane_of(chunk.units.end) - chunk.first_lane;
             chunk.redone_and_rechecked = [redone * lanes, rechecked];
@@ -227,40 +208,6 @@ fn compute(plan: &LanePlan, session: &mut dyn Session, units: &Range<u64>, wante
     let chunk = session.run(units.clone(), wanted)?;
     chunk.check_requested(plan, units, wanted)?;
     Ok(chunk)
-}
-
-/// Computes the values of the marked lanes of a chunk one by one, and sets their own verdicts. Does nothing if the
-/// backend returned every outcome.
-fn value_marked(plan: &LanePlan, watch: &Watch, runner: &LaneRunner<'_, f32>, chunk: &mut Chunk) {
-    if !chunk.outcomes.is_empty() {
-        return;
-    }
-    let first_lane = chunk.first_lane;
-    let value = |verdicts: Verdicts, lane: u64| {
-        let is_marked = watch.marks(plan.models[plan.model_of(lane)], verdicts);
-        let key = if is_marked { plan.key(lane) } else { None };
-        Some((lane, runner.run(&key?).widen()))
-    };
-    let valued = if let Some(counted) = &chunk.counted {
-        // Every marked lane is one of a sample that was left.
-        let of_unit = |unit: &u64| {
-            let lanes = plan.first_lane_of(*unit)..plan.first_lane_of(*unit + 1);
-            lanes.filter_map(|lane| value(counted.verdicts((lane - first_lane) as usize), lane))
-        };
-        counted.left.par_iter().flat_map_iter(of_unit).collect()
-    } else {
-        let tasks = chunk.verdicts.par_chunks_mut(VALUING_TASK).enumerate();
-        let valued = tasks.flat_map_iter(|(task, lanes)| {
-            let lanes = lanes.iter_mut().zip(first_lane + (task * VALUING_TASK) as u64..);
-            lanes.filter_map(|(verdicts, lane)| {
-                let valued = value(*verdicts, lane)?;
-                *verdicts = valued.1.verdicts;
-                Some(valued)
-            })
-        });
-        valued.collect()
-    };
-    chunk.valued = Some(valued);
 }
 
 /// Splits an interval of units into chunks of about 131,072 lanes, at least one unit each.

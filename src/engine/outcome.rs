@@ -2,8 +2,6 @@
 
 use crate::model::criterion::{Contact, Criterion};
 use crate::model::scalar::Real;
-use crate::model::severity::contact_delta_v_mps;
-use crate::scenario::parameterization::Sizes;
 
 /// "Did not happen" as a step index.
 pub const NO_STEP: u32 = u32::MAX;
@@ -17,8 +15,6 @@ pub struct Verdicts(pub u8);
 impl Verdicts {
     /// The lane ended at the time cap.
     pub const CAPPED: u8 = 1 << 3;
-    /// A contact that a [watch](super::Watch) marks: no lane ends both by contact and at the cap.
-    pub const MARKED_CONTACT: u8 = Verdicts::CAPPED | 1 << Criterion::Collision as u8;
 
     /// Whether this criterion failed.
     pub fn failed(self, criterion: Criterion) -> bool {
@@ -87,12 +83,6 @@ pub struct Outcome<R> {
 }
 
 impl Outcome<f64> {
-    /// Changes of speed of ego and other vehicle in a central contact, m/s, with masses by length; `None` without one.
-    pub fn delta_v_mps(&self, sizes: &Sizes) -> Option<[f64; 2]> {
-        let other = if self.contact_with == 1 { sizes.lead? } else { sizes.target };
-        contact_delta_v_mps(self.contact, self.impact_closing_speed, [sizes.ego.length_m, other.length_m])
-    }
-
     /// Placeholder for a lane that has not been computed.
     pub(super) const NONE: Self = Outcome {
         verdicts: Verdicts(0),

@@ -24,8 +24,6 @@ use super::version::Canonical;
 const R157: &str = "r157";
 /// Text of [`Headway::Observed`].
 const OBSERVED: &str = "observed";
-/// Headways below this are close following, s: reports state how many failures come from them.
-pub const CLOSE_HEADWAY_S: f64 = 0.5;
 
 /// Headway of a lane.
 #[derive(Debug, Clone, Copy, PartialEq, serde::Serialize, serde::Deserialize)]

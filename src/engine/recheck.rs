@@ -5,7 +5,7 @@ use std::ops::Range;
 
 use rayon::prelude::*;
 
-use super::backend::{Chunk, RecheckBy, Wanted};
+use super::backend::{Chunk, RecheckBy};
 use super::cpu::runner::LaneRunner;
 use super::cpu::simd::Instructions;
 use super::outcome::{Outcome, Verdicts};
@@ -77,7 +77,7 @@ impl<'p> Recheck<'p> {
     ///
     /// # Errors
     /// [`Error::Verification`] with the first lane that differs.
-    pub(super) fn check(&self, chunk: &Chunk, wanted: Wanted, backend: &str, by: RecheckBy) -> Result<u64> {
+    pub(super) fn check(&self, chunk: &Chunk, backend: &str, by: RecheckBy) -> Result<u64> {
         let end = self.plan.first_lane_of(chunk.units.end);
         if end == chunk.first_lane || by == RecheckBy::Nothing {
             return Ok(0);
@@ -89,7 +89,7 @@ impl<'p> Recheck<'p> {
         keys.sort_by_key(|key| (key.block, key.model));
         let groups = keys.chunk_by(|a, b| (a.block, a.model) == (b.block, b.model));
         let tasks: Vec<&[LaneKey]> = groups.flat_map(|group| group.chunks(TASK)).collect();
-        let differing = tasks.into_par_iter().filter_map(|keys| self.first_differing(chunk, wanted, by, keys));
+        let differing = tasks.into_par_iter().filter_map(|keys| self.first_differing(chunk, by, keys));
         match differing.min() {
             Some(lane) => Err(self.mismatch(chunk, lane, backend, by)),
             None => Ok(keys.len() as u64),
@@ -97,7 +97,7 @@ impl<'p> Recheck<'p> {
     }
 
     /// The first lane of one block and model that differs.
-    fn first_differing(&self, chunk: &Chunk, wanted: Wanted, by: RecheckBy, keys: &[LaneKey]) -> Option<u64> {
+    fn first_differing(&self, chunk: &Chunk, by: RecheckBy, keys: &[LaneKey]) -> Option<u64> {
         let mut first: Option<u64> = None;
         let mut compare = |key: &LaneKey, is_same: &dyn Fn(usize) -> bool| {
             let lane = self.plan.lane(key);
@@ -111,29 +111,13 @@ impl<'p> Recheck<'p> {
             let ours = self.recompute.single(key);
             compare(key, &|at| match chunk.outcomes.get(at) {
                 Some(theirs) => same_words(&ours.widen(), theirs),
-                None => self.verdicts(chunk, at) == ours.verdicts && !self.misses_mark(chunk, wanted, key, &ours),
+                None => chunk.verdicts_of(at) == ours.verdicts,
             });
         }
         if is_batched {
-            self.recompute.batched(keys, &mut |at, ours| compare(&keys[at], &|at| self.verdicts(chunk, at) == ours));
+            self.recompute.batched(keys, &mut |at, ours| compare(&keys[at], &|at| chunk.verdicts_of(at) == ours));
         }
         first
-    }
-
-    /// A lane's own verdicts: those of a marked lane come with its values.
-    fn verdicts(&self, chunk: &Chunk, at: usize) -> Verdicts {
-        let lane = chunk.first_lane + at as u64;
-        match chunk.valued_lane(lane) {
-            Some(outcome) => outcome.verdicts,
-            None => chunk.verdicts_of(at),
-        }
-    }
-
-    /// Whether the chunk lacks the values of a lane that should be marked.
-    fn misses_mark(&self, chunk: &Chunk, wanted: Wanted, key: &LaneKey, ours: &Outcome<f32>) -> bool {
-        let model = self.plan.models[key.model];
-        wanted.watch().is_some_and(|watch| watch.means(model, &ours.widen()))
-            && chunk.valued_lane(self.plan.lane(key)).is_none()
     }
 
     /// Whether a lane that is rechecked in a batch is also rechecked as a single lane.
@@ -157,7 +141,7 @@ impl<'p> Recheck<'p> {
         let verdict_bits = |verdicts: Verdicts| format!("verdict bits {:#06b}", verdicts.0);
         let (found, expected) = match chunk.outcomes.get(at) {
             Some(theirs) => (format!("{theirs:?}"), format!("{:?}", ours.widen())),
-            None => (verdict_bits(self.verdicts(chunk, at)), verdict_bits(ours.verdicts)),
+            None => (verdict_bits(chunk.verdicts_of(at)), verdict_bits(ours.verdicts)),
         };
         let lane = self.plan.key_text(&key);
         let model = self.plan.models[key.model].name();
@@ -391,15 +375,7 @@ mod tests {
             let mut verdicts = vec![Verdicts::default(); keys.len()];
             Instead::run(self, &keys, self.every_step, |at, of| verdicts[at] = of);
             let outcomes = Vec::new();
-            Ok(Chunk {
-                units,
-                first_lane,
-                verdicts,
-                outcomes,
-                valued: None,
-                counted: None,
-                redone_and_rechecked: [0; 2],
-            })
+            Ok(Chunk { units, first_lane, verdicts, outcomes, counted: None, redone_and_rechecked: [0; 2] })
         }
     }
 

@@ -13,4 +13,3 @@ pub mod criterion;
 pub mod motion;
 pub mod profile;
 pub mod scalar;
-pub mod severity;

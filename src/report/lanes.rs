@@ -5,10 +5,10 @@ use std::path::Path;
 
 use crate::engine::{Chunk, Headway, LanePlan, Outcome};
 use crate::model::criterion::Criterion;
-use crate::model::severity::InjuryCurve;
+use crate::model::driver::ModelId;
 use crate::report::records::{at_contact, smallest_gap_m, time_s};
+use crate::run::sampling::{FailingLane, Sample};
 use crate::run::study::{Study, robust_lanes};
-use crate::scenario::parameterization::Sizes;
 use crate::stats::density::DensityModel;
 use crate::support::files::make_folder_of;
 use crate::support::table::{Cell, Column, ColumnKind, TableFormat, TableMetadata, TableWriter, json_value};
@@ -23,21 +23,18 @@ pub fn study_table(path: &Path, study: &Study) -> Result<TableWriter> {
     make_folder_of(path)?;
     let facts = study.facts();
     let value = if facts.reference { ColumnKind::Binary64 } else { ColumnKind::Binary32 };
-    create(path, "lanes", study.plan(), facts.synthetic, columns(value))
+    let of = (study.plan().profile.name.clone(), Some(study.plan().hash().to_owned()));
+    create(path, "lanes", of, facts.synthetic, columns(value))
 }
 
-/// A table for the lanes of a sampling run; see [`write_sampled_chunk`].
+/// A table for lanes of a sampling run; see [`write_sampled_chunk`] and [`write_failing_lane`].
 ///
 /// # Errors
 /// [`Error::Io`]; [`Error::Usage`] for an unknown ending of the name.
-pub fn sampled_table(
-    path: &Path,
-    plan: &LanePlan,
-    density: &DensityModel,
-    injury: &[&InjuryCurve],
-) -> Result<TableWriter> {
-    let columns = [sampled_columns(density), severity_columns(injury)].concat();
-    create(path, "samples", plan, density.provenance.synthetic, columns)
+pub fn sampled_table(path: &Path, sample: &Sample) -> Result<TableWriter> {
+    let (density, plan_sha256) = (&sample.density, sample.lane_plan().map(|plan| plan.hash().to_owned()));
+    let profile = sample.profile.name.clone();
+    create(path, "samples", (profile, plan_sha256), density.provenance.synthetic, sampled_columns(density))
 }
 
 /// The format of a table of lanes, from its file name.
@@ -51,12 +48,12 @@ pub fn table_format(path: &Path) -> Result<TableFormat> {
 fn create(
     path: &Path,
     table: &'static str,
-    plan: &LanePlan,
+    (profile, plan_sha256): (String, Option<String>),
     synthetic: bool,
     columns: Vec<Column>,
 ) -> Result<TableWriter> {
-    let (profile, plan_sha256) = (Some(plan.profile.name.clone()), Some(plan.hash().to_owned()));
-    TableWriter::create(path, table_format(path)?, columns, &TableMetadata { table, profile, plan_sha256, synthetic })
+    let metadata = TableMetadata { table, profile: Some(profile), plan_sha256, synthetic };
+    TableWriter::create(path, table_format(path)?, columns, &metadata)
 }
 
 /// The columns of a study's lanes, in their order. `value` is the arithmetic of the numbers: binary32, or binary64 of
@@ -126,35 +123,6 @@ pub fn write_study_chunk(table: &mut TableWriter, plan: &LanePlan, chunk: &Chunk
         table.row(&row)?;
     }
     Ok(())
-}
-
-/// Changes of speed, and a column per curve; none without a curve.
-fn severity_columns(injury: &[&InjuryCurve]) -> Vec<Column> {
-    let c = |name: String, unit: &str, description: String| {
-        Column::new(name, ColumnKind::Binary64, unit.to_owned(), description)
-    };
-    let delta_v = |of: &str| {
-        let description =
-            format!("Change of speed of the {of} vehicle in a central contact, masses by length; null without one.");
-        c(format!("delta_v_{of}_mps"), "m/s", description)
-    };
-    let risk = |curve: &&InjuryCurve| {
-        let description = format!(
-            "Probability of {} of the ego's occupants; null without a central contact, beyond the curve's data, and of a truck.",
-            curve.injury
-        );
-        c(format!("injury_{}", curve.name.replace('-', "_")), "1", description)
-    };
-    let delta_v = if injury.is_empty() { Vec::new() } else { vec![delta_v("ego"), delta_v("other")] };
-    delta_v.into_iter().chain(injury.iter().map(risk)).collect()
-}
-
-/// The values of [`severity_columns`].
-fn severity_cells(outcome: &Outcome<f64>, sizes: Option<Sizes>, injury: &[&InjuryCurve]) -> Vec<Cell<'static>> {
-    let delta_v = sizes.and_then(|sizes| outcome.delta_v_mps(&sizes));
-    let ego_m = sizes.map_or(f64::NAN, |sizes| sizes.ego.length_m);
-    let both = [0, 1].map(|of| delta_v.map(|both| both[of])).into_iter().take(if injury.is_empty() { 0 } else { 2 });
-    both.chain(injury.iter().map(|curve| curve.ego_risk(delta_v, ego_m))).map(Cell::number).collect()
 }
 
 /// How a lane ended, as tables and JSON documents have it: name with its unit, type, unit, meaning, value. Null: did not happen.
@@ -240,17 +208,11 @@ fn sampled_columns(density: &DensityModel) -> Vec<Column> {
 ///
 /// # Errors
 /// As [`TableWriter::row`]; [`Error::Internal`] for a plan that is not sampled.
-pub fn write_sampled_chunk(
-    table: &mut TableWriter,
-    plan: &LanePlan,
-    (density, injury): (&DensityModel, &[&InjuryCurve]),
-    chunk: &Chunk,
-) -> Result<()> {
+pub fn write_sampled_chunk(table: &mut TableWriter, sample: &Sample, plan: &LanePlan, chunk: &Chunk) -> Result<()> {
     let Some(generator) = plan.generator() else {
         return Err(Error::Internal("the plan has no generator".to_owned()));
     };
-    let dt = plan.profile.frame.dt_s;
-    let dimensions = density.space.dimensions();
+    let dimensions = sample.density.space.dimensions();
     let (headways, models) = (plan.headways.len(), plan.models.len());
     for (unit, lanes) in chunk.units.clone().zip(chunk.outcomes.chunks(headways * models)) {
         let drawn = generator.draw(unit);
@@ -259,22 +221,38 @@ pub fn write_sampled_chunk(
         }
         let point: Vec<f64> = drawn.values[..dimensions].iter().map(|&v| f64::from(v)).collect();
         for (at, outcome) in lanes.iter().enumerate() {
-            let headway = match density.space.thw_s(&point) {
-                Some(_) => "sampled".to_owned(),
-                None => plan.headways[at / models].to_string(),
-            };
-            let mut row = vec![
-                Cell::Whole(unit as i64),
-                Cell::text(density.category().key()),
-                Cell::text(density.space.id().key),
-                Cell::text(headway),
-                Cell::text(plan.models[at % models].name()),
-            ];
-            row.extend(outcome_cells(outcome, dt));
-            row.extend(point.iter().map(|&v| Cell::Number(v)));
-            row.extend(severity_cells(outcome, Some(density.sizes), injury));
-            table.row(&row)?;
+            let lane = (unit, at / models, plan.models[at % models]);
+            table.row(&sampled_row(sample, lane, &point, outcome))?;
         }
     }
     Ok(())
+}
+
+/// Writes a failing lane, as [`write_sampled_chunk`].
+///
+/// # Errors
+/// As [`TableWriter::row`].
+pub fn write_failing_lane(table: &mut TableWriter, sample: &Sample, lane: &FailingLane) -> Result<()> {
+    let of = (lane.sample, lane.headway, lane.model);
+    table.row(&sampled_row(sample, of, &lane.point, &lane.outcome))
+}
+
+/// A row of [`sampled_columns`].
+fn sampled_row<'a>(
+    sample: &'a Sample,
+    (index, headway, model): (u64, usize, ModelId),
+    point: &[f64],
+    outcome: &Outcome<f64>,
+) -> Vec<Cell<'a>> {
+    let id = sample.density.space.id();
+    let mut row = vec![
+        Cell::Whole(index as i64),
+        Cell::text(id.category.key()),
+        Cell::text(id.key),
+        Cell::text(sample.options.headway_name(headway)),
+        Cell::text(model.name()),
+    ];
+    row.extend(outcome_cells(outcome, sample.profile.frame.dt_s));
+    row.extend(point.iter().map(|&v| Cell::Number(v)));
+    row
 }

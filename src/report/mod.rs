@@ -27,7 +27,6 @@ pub mod sampling;
 mod sampling_figures;
 mod sampling_files;
 mod sampling_page;
-mod sampling_severity;
 pub mod sampling_tables;
 pub mod study;
 mod study_answer;

@@ -6,13 +6,12 @@ use serde::Serialize;
 
 use super::host::Host;
 use super::records::{PROGRAM, document, record};
-use super::tables::{CloseRow, WIDTH, close_following, paragraph};
+use super::tables::paragraph;
 use crate::Result;
 use crate::engine::generated::ATTEMPTS;
-use crate::engine::{ENGINE_VERSION, Headway, LanePlan};
+use crate::engine::{ENGINE_VERSION, Headway, LanePlan, SampleTally};
 use crate::model::profile::Profile;
-use crate::run::close_following::CloseFollowing;
-use crate::run::sampling::{EstimateRow, InjuryRow, RiskRate, SampleOptions, SampleTally, TargetRow};
+use crate::run::sampling::{EstimateRow, RiskRate, SampleOptions};
 use crate::scenario::Category;
 use crate::stats::density::{DensityKind, DensityModel, Provenance};
 use crate::stats::estimate::{IntervalKind, Ratio, SearchRound, StopReason, WeightFigures};
@@ -74,8 +73,6 @@ pub struct DrawRecord {
     pub lanes: u64,
     /// Lanes that ended at the time cap.
     pub capped_lanes: u64,
-    /// Failures from headways below 0.5 s.
-    pub close_following: CloseFollowing,
 }
 
 impl DrawRecord {
@@ -90,7 +87,6 @@ impl DrawRecord {
             rejected_share: rejected as f64 / tally.tries.max(1) as f64,
             lanes: tally.samples() * plan.lanes_per_unit(&plan.blocks[0]),
             capped_lanes: tally.capped.iter().sum(),
-            close_following: tally.close_following(),
         }
     }
 }
@@ -113,14 +109,8 @@ pub struct SampleReport {
     pub draws: Option<DrawRecord>,
     /// Estimates.
     pub estimates: Vec<EstimateRow>,
-    /// Expected injuries; only with curves.
-    pub injuries: Vec<InjuryRow>,
-    /// Rates against the target of the options.
-    pub targets: Vec<TargetRow>,
     /// Rounds of the search of importance sampling.
     pub search: Vec<SearchRound>,
-    /// SHA-256 of `worst.csv`, if written.
-    pub worst_sha256: Option<String>,
     /// The machine.
     pub host: Host,
 }
@@ -147,8 +137,6 @@ impl SampleReport {
             points: self.options.source.key(),
             samples: self.options.stop.samples,
             seed: self.options.seed,
-            // Level at which all intervals hold together; null if each holds on its own.
-            together: self.options.together,
             // Parameters with given values; the estimates are conditional on them.
             given: &self.options.given,
             plan_sha256: &self.plan_sha256,
@@ -158,13 +146,9 @@ impl SampleReport {
             stopped: self.stopped(),
             reproducible: self.is_reproducible(),
             estimates: &self.estimates,
-            // Empty without curves, and without a target.
-            injuries: &self.injuries,
-            targets: &self.targets,
             search: &self.search,
             #[serde(flatten)]
             files: files,
-            worst_sha256: &self.worst_sha256,
             host: &self.host,
         })
     }
@@ -242,8 +226,6 @@ impl SampleReport {
                 .column("from the density", weight(|w| NumberText(format!("{:.1} %", 100.0 * w.crude_fraction))));
             text.push_str(&weights.build().text());
         }
-        text.push_str(&self.severity_text());
-        text.push_str(&self.close_following());
         let intervals = format!(
             "Intervals at {} %{}. ± is the half-width of P's interval divided by P. ≤ is an upper bound where nothing failed.",
             value(100.0 * self.level()),
@@ -267,14 +249,6 @@ impl SampleReport {
             text.push_str("SYNTHETIC DATA: no number above is a statement about real traffic\n");
         }
         text
-    }
-
-    /// Failures from close following; only for crude Monte Carlo.
-    fn close_following(&self) -> String {
-        let Some(draws) = &self.draws else { return String::new() };
-        let row =
-            CloseRow { category: self.density.category, models: &self.options.models, close: &draws.close_following };
-        close_following(&[row], "the density", &self.plan_headways, WIDTH)
     }
 
     /// The table of some estimates.

@@ -24,7 +24,6 @@ impl SampleReport {
             warnings.push("Ended by the clock: another machine ends elsewhere.".to_owned());
         }
         let mut sections = vec![self.estimates_section()];
-        sections.extend(self.severity_sections());
         sections.extend((!figures.is_empty()).then(|| Section::new("figures", "Figures").figures(figures)));
         let clock = (self.host.seconds > 0.0).then(|| self.host.wall_clock());
         let reproduction = self.host.section(&self.profile).fact("SHA-256 of the density", &self.density.sha256);

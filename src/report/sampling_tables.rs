@@ -3,13 +3,11 @@
 
 use serde::Serialize;
 
-use super::records::{at_contact, smallest_gap_m};
 use super::sampling::{SampleReport, short};
-use crate::model::criterion::Criterion;
-use crate::run::sampling::{Checkpoint, EstimateRow, ModelRatio, ProfileRatios, RiskRate, Uncertainty, WorstLane};
-use crate::stats::estimate::{Ratio, RatioMethod, RatioVerdict, Warning, WeightFigures};
-use crate::support::readable::{counted, significant, value};
-use crate::support::table::{NamedValue, Table, TableOf};
+use crate::run::sampling::{Checkpoint, EstimateRow, RiskRate, Uncertainty};
+use crate::stats::estimate::{Ratio, Warning, WeightFigures};
+use crate::support::readable::{counted, significant};
+use crate::support::table::{NamedValue, Table};
 
 impl SampleReport {
     /// `estimates.csv`.
@@ -98,61 +96,6 @@ pub fn convergence_csv(checkpoints: &[Checkpoint]) -> String {
         .column("low_with_data", |(_, row)| row.with_data.and_then(|(ends, _)| known(ends[0])))
         .column("high_with_data", |(_, row)| row.with_data.and_then(|(ends, _)| known(ends[1])))
         .column("failing_scenarios", |(_, row)| row.with_data.and_then(|(_, scenarios)| known(scenarios)))
-        .build()
-        .csv()
-}
-
-/// `models.csv`: the rates of two driver models on the same samples. They are equal if the interval of their ratio lies
-/// within a quarter of 1.
-pub(super) fn model_ratios_csv(ratios: &[ModelRatio]) -> String {
-    let sides = Table::of(ratios).column("model", |row| row.model.name()).column("other", |row| row.other.name());
-    ratio_columns(sides).build().csv()
-}
-
-/// `profiles.csv`: the same for a model under the profile of the run and under another one.
-pub(super) fn profile_ratios_csv(profile: &str, of: &ProfileRatios) -> String {
-    let sides = Table::of(&of.ratios).column("model", |row| row.model.name());
-    let sides = sides.column("profile", |_| profile).column("other", |_| of.other.as_str());
-    ratio_columns(sides).build().csv()
-}
-
-/// The columns that tables of ratios share.
-fn ratio_columns(sides: TableOf<&ModelRatio>) -> TableOf<&ModelRatio> {
-    sides
-        .column("criterion", |row| row.criterion.key())
-        .column("headway", |row| row.headway.as_str())
-        .column("ratio", |row| row.ratio.ratio)
-        .column("low", |row| row.ratio.low)
-        .column("high", |row| row.ratio.high)
-        .column("covers", |row| match row.ratio.method {
-            RatioMethod::Draws => "draws",
-            RatioMethod::Paired | RatioMethod::Separate => "draws and scenarios",
-        })
-        .column("verdict", |row| match row.ratio.verdict {
-            RatioVerdict::Agrees => "equal",
-            RatioVerdict::TooHigh => "higher",
-            RatioVerdict::TooLow => "lower",
-            RatioVerdict::Undecided => "undecided",
-        })
-}
-
-/// `worst.csv`: the lanes with the smallest limit state of `criterion`, rerunnable by key.
-pub(super) fn worst_csv(rows: &[WorstLane], parameters: &[String], criterion: Criterion) -> String {
-    Table::of(rows)
-        .column("model", |row| row.model.name())
-        .column("rank", |row| row.rank)
-        .column("lane", |row| row.key.as_str())
-        .column("sample", |row| row.sample)
-        .column("headway", |row| row.headway.as_str())
-        .column("criterion", |_| criterion.key())
-        .column("limit_state", |row| row.lane.value)
-        .columns(Criterion::ALL, |of| of.key(), |row, of| u8::from(row.outcome.verdicts.failed(of)))
-        .column("min_ttc_s", |row| row.outcome.min_ttc)
-        .column("max_btn", |row| row.outcome.max_btn)
-        .column("min_gap_m", |row| smallest_gap_m(&row.outcome))
-        .column("impact_speed_mps", |row| at_contact(&row.outcome, row.outcome.impact_speed))
-        .column("impact_closing_speed_mps", |row| at_contact(&row.outcome, row.outcome.impact_closing_speed))
-        .columns(parameters.iter().enumerate(), |(_, name)| name.clone(), |row, (at, _)| row.point[at])
         .build()
         .csv()
 }
@@ -279,19 +222,14 @@ impl SampleReport {
         })
     }
 
-    /// What the intervals cover in addition to the draws, and whether all of them hold together.
-    pub(super) fn interval_rule(&self) -> String {
-        let covered = if self.density.kernels == 0 {
+    /// What the intervals cover in addition to the draws.
+    pub(super) fn interval_rule(&self) -> &'static str {
+        if self.density.kernels == 0 {
             ""
         } else if self.estimates.iter().all(|row| row.failing_scenarios.is_some()) {
             " cover the draws and what other scenarios would change, at fixed bandwidth and scale"
         } else {
             " cover the draws alone, not what other scenarios would change"
-        };
-        let together = self
-            .options
-            .together
-            .map(|level| format!("; all rows of estimates.csv hold together at {} %", value(100.0 * level)));
-        format!("{covered}{}", together.unwrap_or_default())
+        }
     }
 }

@@ -1,13 +1,11 @@
 //! Runs: what is planned, computed in parts, merged and scored.
 //!
 //! [`study`] compares parameterizations with recordings, [`sampling`] estimates probabilities. [`grid`] sweeps maps, [`cases`] tables of concrete cases, [`check`] evaluates single ones.
-//! [`close_following`] counts the failures from headways below 0.5 s. [`reopen`] reruns
-//! single lanes of a finished run. [`parts`] splits and journals runs, [`Merged`] is the result of merged parts.
+//! [`reopen`] reruns single lanes of a finished run. [`parts`] splits and journals runs, [`Merged`] is the result of merged parts.
 //! [`score`] computes recall, precision and F1 from a study's counts.
 
 pub mod cases;
 pub mod check;
-pub mod close_following;
 pub mod grid;
 pub mod parts;
 #[cfg(test)]

@@ -92,7 +92,6 @@ pub fn chunk(
         first_lane,
         verdicts: lanes.iter().map(|l| l.0).collect(),
         outcomes: if with_outcomes { lanes.iter().map(outcome).collect() } else { Vec::new() },
-        valued: None,
         counted: None,
         redone_and_rechecked: [0; 2],
     }

@@ -15,7 +15,7 @@ use lanesweep::engine::generated::{
 use lanesweep::engine::gpu::shader::{self, GENERATOR, RANDOM, SHARED, Specialization, TALLY, driver_shader};
 use lanesweep::engine::gpu::{DrawnRecord, Generation, Launch, OutcomeRecord, StartRecord, Tally, exact_spirv};
 use lanesweep::engine::{
-    Constants, CountLayout, DeviceScene, EndReason, LaneCase, LaneOther, MAP_CELLS, MotionKind, NO_STEP, Verdicts,
+    Constants, CountLayout, DeviceScene, EndReason, LaneCase, LaneOther, MotionKind, NO_STEP, Verdicts,
 };
 use lanesweep::model::criterion::{BtnForm, Contact, Criteria, Criterion, LateralGate};
 use lanesweep::model::driver::{AttentionRule, MODELS, ModelId, NEVER};
@@ -61,7 +61,7 @@ fn records() -> Vec<Record> {
         record!("Start", StartRecord, { kind: u32, value: f32 }),
         record!("Launch", Launch, {
             lanes: u32, headways: u32, first_case: u32, case_step: u32, first_lane: u32, lanes_between: u32, first_word: u32, first_outcome: u32,
-            finished_word: u32, lanes_per_group: u32, burst_from: u32, ttc_threshold_s: f32, marks_contacts_from: f32,
+            finished_word: u32, lanes_per_group: u32, burst_from: u32,
         }),
         record!("OutcomeRecord", OutcomeRecord, {
             word: u32, reaction_step: u32, end_step: u32, impact_speed: f32, impact_closing_speed: f32,
@@ -90,10 +90,10 @@ fn generator_records() -> Vec<Record> {
             half_lengths: [f32; 2], half_widths: [f32; 2], principal_length: f32, ego_width: f32, lane_width: f32,
             attention: [AttentionRule<f32>; MODELS],
         }),
-        record!("DrawnRecord", DrawnRecord, { tries: u32, component: u32, cell: u32, is_close: u32 }),
+        record!("DrawnRecord", DrawnRecord, { tries: u32, component: u32 }),
         record!("Generation", Generation, {
             index_low: u32, index_high: u32, count: u32, seed_low: u32, seed_high: u32, purpose: u32,
-            components: u32, first_mean: u32, first_factor: u32, first_factor_of: u32, first_knot: u32, first_edge: u32,
+            components: u32, first_mean: u32, first_factor: u32, first_factor_of: u32, first_knot: u32,
             stride: u32,
         }),
     ]
@@ -124,7 +124,7 @@ fn generator_constants() -> Vec<(&'static str, f64)> {
         knots: Vec::new(),
     };
     let generator = generated::Generator { points, recipe, basis: Vec::new() };
-    let given = generator.shader_constants(None);
+    let given = generator.shader_constants();
     assert_eq!(names.collect::<BTreeSet<_>>(), given.iter().map(|(name, _)| (*name).to_owned()).collect());
     given
 }
@@ -135,7 +135,7 @@ fn sine(at: usize) -> u32 {
 }
 
 fn specialization(paired: bool) -> Specialization {
-    Specialization { scene: DeviceScene::unknown(paired), values: paired, watched: paired, queue: !paired }
+    Specialization { scene: DeviceScene::unknown(paired), values: paired, queue: !paired }
 }
 
 #[test]
@@ -183,7 +183,6 @@ fn the_generator_has_the_records_the_numbers_and_the_arithmetic_of_its_rust_twin
         ("MAX_PARAMETERS", MAX_PARAMETERS as u32),
         ("MAX_BOUNDS", MAX_BOUNDS as u32),
         ("ATTEMPTS", ATTEMPTS),
-        ("MAP_CELLS", MAP_CELLS as u32),
         ("PIECES", lanesweep::stats::random::PIECES as u32),
         ("NO_SLOT", NO_SLOT),
         ("TARGET_SPEED", Variable::TargetSpeed as u32),
@@ -218,11 +217,8 @@ fn the_counting_has_the_records_and_the_places_of_its_rust_twins() {
     let source = shader::assemble_tally();
     let (module, info) = parse(&source);
     let records = [
-        record!("DrawnRecord", DrawnRecord, { tries: u32, component: u32, cell: u32, is_close: u32 }),
-        record!("Tally", Tally, {
-            samples: u32, first_drawn: u32, words: u32, max_left: u32, close_headways: u32, drawn_headways: u32,
-            marks: u32,
-        }),
+        record!("DrawnRecord", DrawnRecord, { tries: u32, component: u32 }),
+        record!("Tally", Tally, { samples: u32, first_drawn: u32, words: u32 }),
     ];
     for (name, size, ours) in records {
         assert_eq!(fields(&module, name), (size, ours), "{name}");
@@ -232,10 +228,8 @@ fn the_counting_has_the_records_and_the_places_of_its_rust_twins() {
         ("CRITERIA", Criterion::ALL.len() as u32),
         ("LANES_PER_WORD", u32::BITS / 4),
         ("CAPPED", Verdicts::CAPPED.into()),
-        ("MARKED_CONTACT", Verdicts::MARKED_CONTACT.into()),
         ("VOIDS", CountLayout::VOIDS as u32),
         ("TRIES", CountLayout::TRIES as u32),
-        ("CLOSE_LANES", CountLayout::CLOSE_LANES as u32),
         ("GATHERED", CountLayout::GATHERED as u32),
         ("WORKGROUP", shader::WORKGROUP),
     ] {
@@ -243,7 +237,7 @@ fn the_counting_has_the_records_and_the_places_of_its_rust_twins() {
     }
     let found = float_operations(&module, &info);
     assert_eq!((found.forbidden, found.divided_in), (vec![], vec![]));
-    assert_eq!(unbounded_loops(&module), (5, vec![]));
+    assert_eq!(unbounded_loops(&module), (3, vec![]));
     let [entry] = module.entry_points.as_slice() else { panic!("one entry point") };
     assert_eq!(entry.name, shader::COUNT);
 }

@@ -123,7 +123,7 @@ fn sampling_runs_maps_and_comparisons_have_their_page() {
     lanesweep(dir, &[&sample[..], &["--thw", "1,0.6,0.2", "--out", "mc"]].concat());
     let html = page(&dir.join("mc"));
     let density = "<dt>SHA-256 of the density</dt>";
-    for said in ["convergence.svg", "headways.csv", "map-FSM.svg", density, "verdict"] {
+    for said in ["convergence.svg", "headways.csv", density, "verdict"] {
         assert!(html.contains(said), "{said}");
     }
     let is = ["--estimator", "is", "--thw", "0.2", "--models", "RSS", "--out", "is"];

@@ -276,7 +276,7 @@ impl Session for AskedSession<'_> {
         let first_lane = self.0.first_lane_of(units.start);
         let verdicts = vec![Verdicts::default(); (self.0.first_lane_of(units.end) - first_lane) as usize];
         let outcomes = Vec::new();
-        Ok(Chunk { units, first_lane, verdicts, outcomes, valued: None, counted: None, redone_and_rechecked: [0; 2] })
+        Ok(Chunk { units, first_lane, verdicts, outcomes, counted: None, redone_and_rechecked: [0; 2] })
     }
 
     fn chunk_lanes(&self, wanted: Wanted) -> u64 {

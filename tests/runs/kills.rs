@@ -40,7 +40,7 @@ impl Verb {
     }
 }
 
-const SAMPLE: &str = "sample d.json --thw 0.6 --models RSS --samples 3000 --worst 3 --out out";
+const SAMPLE: &str = "sample d.json --thw 0.6 --models RSS --samples 3000 --out out";
 
 const VERBS: [Verb; 14] = [
     verb(
@@ -78,7 +78,7 @@ const VERBS: [Verb; 14] = [
         "sample --rows",
         Some("estimate.json"),
         Some(SAMPLE),
-        "sample d.json --samples 20000 --thw 1.0 --models FSM --map none --rows rows/rows.csv --out out",
+        "sample d.json --samples 20000 --thw 1.0 --models FSM --rows rows/rows.csv --out out",
     ),
     verb(
         "sample of a proposal",
@@ -122,7 +122,7 @@ const VERBS: [Verb; 14] = [
         Some(
             "export xosc --category cut-in --models FSM --ego-speed 30m/s --speed 20m/s --thw 1.2 --lateral-speed 1 --out out",
         ),
-        "export xosc --from old-study --worst 3 --ego external --out out",
+        "export xosc --category cut-in --models FSM,RSS,Reg157 --ego-speed 30m/s --speed 20m/s --thw 0.6 --lateral-speed 1 --ego external --out out",
     ),
 ];
 
@@ -188,7 +188,6 @@ fn furnish(dir: &Path) {
     done(dir, "study --plan plan/plan.json --shard 0/2 --out parts");
     done(dir, "study --plan plan/plan.json --shard 1/2 --out parts");
     done(dir, "sample d.json --estimator is --samples 100 --out pilot --thw 0.6 --models RSS");
-    done(dir, "study --synth-recordings 1 --config generator.duration_s=200 --categories cut-in --out old-study");
     done(dir, "synth recordings --synth-recordings 2 --config generator.duration_s=60");
     done(dir, "synth more --synth-recordings 6");
     done(dir, "mine more --out scenarios.jsonl");

@@ -15,5 +15,4 @@ mod observed;
 mod parts;
 mod reruns;
 mod sampling;
-mod severity;
 mod strange_files;

@@ -73,13 +73,12 @@ fn changed_files_of_a_run_are_refused_or_have_no_effect() {
             done(dir, &[run, &["--shard", shard, "--out", name]].concat());
         }
     }
-    done(dir, &[&SAMPLE[..], &["--worst", "3", "--out", "worst"]].concat());
     // A journal of a shard: a part's segments as its records.
     let part: serde_json::Value =
         serde_json::from_slice(&std::fs::read(dir.join("sample/part-00000-of-00002.json")).unwrap()).unwrap();
     let (content, engine) = (&part["content"], &part["engine"]);
     let head = serde_json::json!({
-        "lanesweep_journal": 3, "engine": engine, "run_sha256": content["run_sha256"], "units": content["units"],
+        "lanesweep_journal": 4, "engine": engine, "run_sha256": content["run_sha256"], "units": content["units"],
     });
     let records = content["segments"].as_array().unwrap().iter().take(2);
     let records = records.map(|segment| serde_json::json!({"counts": segment, "redone_and_rechecked": [0, 0]}));
@@ -98,11 +97,6 @@ fn changed_files_of_a_run_are_refused_or_have_no_effect() {
         Input { file: "is/plan.json", reader: merge("is"), results: "is" },
         Input { file: "is/part-00000-of-00002.json", reader: merge("is"), results: "is" },
         Input { file: "densities/cut-in-2.json", reader: [&sample[..], &["--out", "few"]].concat(), results: "few" },
-        Input {
-            file: "worst/worst.csv",
-            reader: vec!["-q", "export", "xosc", "--from", "worst", "--worst", "2", "--models", "FSM", "--out", "xosc"],
-            results: "xosc",
-        },
         Input {
             file: journal,
             reader: [&SAMPLE[..], &["--shard", "0/2", "--out", "journal"]].concat(),

@@ -1,10 +1,10 @@
 //! What the estimators of rare failures promise, on problems whose probability is known. Coverage over many repeats:
 //! `tests/statistics/estimator_coverage.rs`.
 
-use lanesweep::stats::density::{Mixture, normal_cdf};
+use lanesweep::stats::density::Mixture;
 use lanesweep::stats::estimate::{
     AdaptiveRun, BlockSums, Density, Estimate, Goal, Importance, LimitState, Search, StandardNormal, Truncated,
-    Verdict, Warning, WeightSums, adaptive, from_weight_sums, importance, importance_sums, weighted_ratio,
+    Verdict, Warning, WeightSums, adaptive, importance, importance_sums,
 };
 
 use crate::common::reliability::{four_branch, four_branch_probability, linear, tail, two_sided, unit_mixture};
@@ -72,7 +72,7 @@ fn sums_of_a_proposal_are_the_same_bits_in_any_division_of_the_indices() {
     let density = StandardNormal { dimensions: 2 };
     let proposal = Mixture::of_kernels(vec![vec![2.0, 2.0]], &[0.7, 0.7]).unwrap();
     let options = Importance { seed: 9, draws: 20_000, crude_per_draw: 3 };
-    let of = |range| importance_sums(&density, &proposal, &linear(3.0), &options, range, &[]).unwrap().remove(0);
+    let of = |range| importance_sums(&density, &proposal, &linear(3.0), &options, range).unwrap().remove(0);
     let whole = of(0..20_000);
     let mut parts = of(7001..20_000);
     parts.merge(of(0..123)).unwrap();
@@ -215,40 +215,4 @@ fn a_search_without_failures_is_followed_by_draws_of_the_density_that_bound_the_
     assert_eq!((estimate.probability, estimate.trust.draws()), (0.0, Verdict::Doubtful));
     assert!((3.6e-6..3.8e-6).contains(&estimate.interval.high), "{estimate:?}");
     assert!(estimate.trust.warnings.contains(&Warning::NoFailures));
-}
-
-/// Two questions about the same points: x_0 > 3 and x_0 > 3.2.
-struct TwoLevels;
-
-impl LimitState for TwoLevels {
-    fn questions(&self) -> usize {
-        2
-    }
-
-    fn evaluate(&self, points: &[Vec<f64>]) -> lanesweep::Result<Vec<f64>> {
-        Ok(points.iter().flat_map(|point| [3.0 - point[0], 3.2 - point[0]]).collect())
-    }
-}
-
-#[test]
-fn the_ratio_of_two_questions_about_the_same_draws_is_known_better_than_either() {
-    let density = StandardNormal { dimensions: 2 };
-    let proposal = Mixture::of_kernels(vec![vec![3.2, 0.0]], &[1.0, 1.0]).unwrap();
-    let truth = normal_cdf(-3.2) / normal_cdf(-3.0);
-    let (repeats, mut held, mut narrower) = (300, 0, 0);
-    for seed in 0..repeats {
-        let options = Importance { seed, draws: 2000, crude_per_draw: 1 };
-        let sums = importance_sums(&density, &proposal, &TwoLevels, &options, 0..2000, &[[1, 0]]).unwrap();
-        let [near, far, both] = [0, 1, 2].map(|at| sums[at].total().unwrap());
-        let ratio = weighted_ratio([&far, &near, &both], 0.95);
-        let (low, high) = (ratio.low.unwrap(), ratio.high.unwrap());
-        held += u64::from((low..=high).contains(&truth));
-        let width = |sums: &WeightSums| {
-            let interval = from_weight_sums(sums, 0.95).interval;
-            (interval.high / interval.low).ln()
-        };
-        narrower += u64::from((high / low).ln() < width(&far).hypot(width(&near)));
-    }
-    assert!((276..=297).contains(&held), "{held} of {repeats} intervals hold {truth}");
-    assert_eq!(narrower, repeats, "what the draws have in common cancels");
 }

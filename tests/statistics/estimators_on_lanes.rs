@@ -11,9 +11,7 @@ use lanesweep::engine::{CpuBackend, Executor, Headway};
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
-use lanesweep::run::sampling::{
-    Estimator, LaneLimitState, Question, SampleHeadways, SampleOptions, plan_samples, sample_crude, truncated,
-};
+use lanesweep::run::sampling::{Estimator, LaneLimitState, Question, Sample, SampleHeadways, SampleOptions, truncated};
 use lanesweep::scenario::DataProvenance;
 use lanesweep::scenario::parameterization::Parameterization;
 use lanesweep::scenario::{Category, Scenario};
@@ -39,10 +37,8 @@ fn crude(density: &DensityModel, profile: &Profile, model: ModelId, thw_s: f64, 
         level: LEVEL,
         ..SampleOptions::new(Estimator::CRUDE, samples, SampleHeadways::Each(vec![Headway::ThwS(thw_s)]))
     };
-    let plan = plan_samples(density, &density.mixture().unwrap(), profile, &options).unwrap();
     let backend = CpuBackend::lane_arithmetic();
-    let executor = Executor::new(&backend);
-    let run = sample_crude(&plan, 0..samples, &executor, &options, None, None).unwrap();
+    let run = Sample::plan(density.clone(), profile, &options).unwrap().run(&Executor::new(&backend)).unwrap();
     run.rows.into_iter().find(|r| r.criterion == Criterion::Collision).unwrap().estimate
 }
 

@@ -139,7 +139,7 @@ settings! {
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(range(min = 1))]
         pub samples: Option<u64> = None,
-        /// Criterion to map, rank or estimate.
+        /// Criterion of importance sampling and of a half-width.
         pub criterion: Criterion = Criterion::Collision,
         /// Kind of points of `mc`.
         pub points: SampleSource = SampleSource::Random,
@@ -157,8 +157,9 @@ settings! {
         #[serde(skip_serializing_if = "Option::is_none")]
         #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1e9))]
         pub time_limit_s: Option<f64> = None,
-        /// Worst lanes to list per model; 0 runs faster.
-        pub worst: usize = 20,
+        /// Lanes of each model and criterion in the table of failures, at most.
+        #[schemars(range(min = 1))]
+        pub failures_limit: u64 = 1000,
         /// Maximum number of lanes of the density itself, in the search of `is` and of the rare rows of `auto` and
         /// again beside its final draws. They meet the failures that the proposal misses, or bound them.
         #[schemars(range(min = 1))]

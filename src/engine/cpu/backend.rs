@@ -7,7 +7,7 @@ use std::ops::Range;
 use rayon::prelude::*;
 
 use crate::Result;
-use crate::engine::backend::{Backend, Chunk, RecheckBy, Session, Wanted, Watch};
+use crate::engine::backend::{Backend, Chunk, RecheckBy, Session, Wanted};
 use crate::engine::cpu::foreign::BATCH_LANES;
 use crate::engine::cpu::runner::LaneRunner;
 use crate::engine::cpu::series::max_entries;
@@ -101,7 +101,7 @@ impl Backend for CpuBackend<f32> {
     fn rechecked_by(&self, wanted: Wanted) -> RecheckBy {
         let makes_every_step = self.every_step || self.instructions == Instructions::Scalar;
         match wanted {
-            Wanted::Verdicts | Wanted::Watched(_) if !makes_every_step => RecheckBy::Batches,
+            Wanted::Verdicts | Wanted::Counts if !makes_every_step => RecheckBy::Batches,
             _ => RecheckBy::Nothing,
         }
     }
@@ -146,8 +146,8 @@ trait RunUnits<R>: Sync {
     /// Passes each outcome with its position, counted from the first unit.
     fn outcomes(&self, block: usize, units: Range<u64>, each: &mut dyn FnMut(usize, Outcome<R>));
 
-    /// Verdicts only, with the marks of a watch.
-    fn verdicts(&self, block: usize, units: Range<u64>, watch: Option<&Watch>, verdicts: &mut [Verdicts]);
+    /// Verdicts only.
+    fn verdicts(&self, block: usize, units: Range<u64>, verdicts: &mut [Verdicts]);
 }
 
 /// Lanes in batches.
@@ -158,11 +158,11 @@ struct InBatches<'p> {
 
 impl RunUnits<f32> for InBatches<'_> {
     fn outcomes(&self, block: usize, units: Range<u64>, each: &mut dyn FnMut(usize, Outcome<f32>)) {
-        self.runner.run_units(self.instructions, block, units, None, each);
+        self.runner.run_units(self.instructions, block, units, each);
     }
 
-    fn verdicts(&self, block: usize, units: Range<u64>, watch: Option<&Watch>, verdicts: &mut [Verdicts]) {
-        self.runner.run_units(self.instructions, block, units, watch, |at, verdict| verdicts[at] = verdict);
+    fn verdicts(&self, block: usize, units: Range<u64>, verdicts: &mut [Verdicts]) {
+        self.runner.run_units(self.instructions, block, units, |at, verdict| verdicts[at] = verdict);
     }
 }
 
@@ -172,7 +172,7 @@ impl<R: Real> RunUnits<R> for LaneRunner<'_, R> {
         run_one_by_one(self, block, units, true, each);
     }
 
-    fn verdicts(&self, block: usize, units: Range<u64>, _watch: Option<&Watch>, verdicts: &mut [Verdicts]) {
+    fn verdicts(&self, block: usize, units: Range<u64>, verdicts: &mut [Verdicts]) {
         run_one_by_one(self, block, units, false, |at, outcome| verdicts[at] = outcome.verdicts);
     }
 }
@@ -234,9 +234,6 @@ impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
     }
 
     fn run(&mut self, units: Range<u64>, wanted: Wanted) -> Result<Chunk> {
-        // Single lanes compute the values anyway.
-        let has_marks = self.in_batches && !self.has_foreign();
-        let wanted = if has_marks || wanted.watch().is_none() { wanted } else { Wanted::Outcomes };
         let plan = self.plan;
         let run = &self.run;
         let first_lane = plan.first_lane_of(units.start);
@@ -251,11 +248,9 @@ impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
             let from = verdicts.len();
             verdicts.resize(from + count * per_unit, Verdicts::default());
             match wanted {
-                Wanted::Verdicts | Wanted::Watched(_) => {
-                    let watch = wanted.watch();
-                    verdicts[from..].par_chunks_mut(task_lanes).enumerate().for_each(|(k, lanes)| {
-                        run.verdicts(block, task(k), watch.as_ref(), lanes);
-                    });
+                Wanted::Verdicts | Wanted::Counts => {
+                    let tasks = verdicts[from..].par_chunks_mut(task_lanes).enumerate();
+                    tasks.for_each(|(k, lanes)| run.verdicts(block, task(k), lanes));
                 }
                 Wanted::Outcomes => {
                     outcomes.resize(from + count * per_unit, Outcome::NONE);
@@ -283,6 +278,6 @@ impl<F: RunUnits<R>, R: Real> Session for CpuSession<'_, F, R> {
             }
         }
         let redone_and_rechecked = [0; 2];
-        Ok(Chunk { units, first_lane, verdicts, outcomes, valued: None, counted: None, redone_and_rechecked })
+        Ok(Chunk { units, first_lane, verdicts, outcomes, counted: None, redone_and_rechecked })
     }
 }

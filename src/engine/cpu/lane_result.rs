@@ -68,17 +68,14 @@ fn verdicts<R: Real, M>(
 ) -> Verdicts {
     let [first, second] = last_seen(simulation, lane, state, places);
     let scene = simulation.scene;
-    let by_first = is_touched(scene, &first, &lane.others[0]);
-    let mut touched = by_first;
+    let mut touched = is_touched(scene, &first, &lane.others[0]);
     if scene.is_pair {
         touched = touched | is_touched(scene, &second, &lane.others[1]);
     }
-    let closing = state.v_ego - by_first.choose(places[0].speed, places[1].speed);
-    let is_marked = touched.holds() && closing.abs() >= simulation.criteria.marks_contacts_from;
     let record = &state.record;
     let bit = |criterion: Criterion, failed: Flag| u8::from(failed.holds()) << criterion.index();
     // The only remaining reason is the time cap.
-    let capped = if state.over.holds() && !is_marked { 0 } else { Verdicts::CAPPED };
+    let capped = if state.over.holds() { 0 } else { Verdicts::CAPPED };
     let contact_counts = Flag::of(simulation.criteria.btn_contact == BtnContact::Any);
     Verdicts(
         bit(Criterion::Collision, touched)

@@ -5,7 +5,6 @@ use std::ops::Range;
 use std::sync::Mutex;
 
 use crate::Result;
-use crate::engine::backend::Watch;
 use crate::engine::cpu::foreign::{Setting, run_lanes};
 use crate::engine::cpu::lane_result::Ending;
 use crate::engine::cpu::pending_lanes::Lanes;
@@ -195,13 +194,12 @@ impl LaneRunner<'_, f32> {
 
 impl LaneRunner<'_, f32> {
     /// Runs all lanes of some units of a block in batches, except those of drivers outside the registry; passes the position, counted from the first unit, and the
-    /// result. The order is unspecified. Verdicts show the marks of a watch.
+    /// result. The order is unspecified.
     pub(super) fn run_units<E: Ending>(
         &self,
         instructions: Instructions,
         block: usize,
         units: Range<u64>,
-        watch: Option<&Watch>,
         mut each: impl FnMut(usize, E),
     ) {
         let variants = self.plan.blocks[block].variants.len();
@@ -228,9 +226,7 @@ impl LaneRunner<'_, f32> {
         for (at_model, &model) in self.plan.models.iter().enumerate().filter(|(_, model)| model.foreign().is_none()) {
             let each = |lane: usize, end: E| each(lane * models + at_model, end);
             if in_batches {
-                let watched = watch.map(|watch| watch.criteria(&self.plan.profile, model, constants.criteria));
-                let criteria = watched.as_ref().unwrap_or(&constants.criteria);
-                constants.run_stream(model, criteria, instructions, &stream, series.entries(), each);
+                constants.run_stream(model, instructions, &stream, series.entries(), each);
             } else {
                 self.one_by_one(block, &cases, tables, model, each);
             }
@@ -267,8 +263,7 @@ impl LaneRunner<'_, f32> {
         let may_cross = cases.iter().any(|case| may_cross(case, fastest_in(&tables), self.dt()));
         let (cases, tracks, starts) = (&cases[..], &tracks[..], &starts[..]);
         let stream = Lanes { cases, tracks, starts, one_start_each: true, every_step: true, may_cross };
-        let (model, criteria) = (self.plan.models[model], &constants.criteria);
-        constants.run_stream(model, criteria, instructions, &stream, series.entries(), each);
+        constants.run_stream(self.plan.models[model], instructions, &stream, series.entries(), each);
     }
 
     /// Runs all lanes of a model one by one.

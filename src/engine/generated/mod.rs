@@ -16,9 +16,8 @@ use crate::model::scalar::Real;
 use crate::scenario::Tables;
 use crate::scenario::parameterization::Variable;
 
-use super::counting::Counting;
 use super::lane_case::LaneCase;
-use super::plan::{CLOSE_HEADWAY_S, CaseSource};
+use super::plan::CaseSource;
 use super::scene::{DeviceScene, MotionKind, stays_behind};
 
 /// A case generator: where points come from and what they mean.
@@ -136,7 +135,7 @@ impl Generator {
 
     /// What is the same for all samples and decides what a device's generator does: constants of its pipeline, by their
     /// names in the shaders.
-    pub fn shader_constants(&self, counting: Option<&Counting>) -> Vec<(&'static str, f64)> {
+    pub fn shader_constants(&self) -> Vec<(&'static str, f64)> {
         let (recipe, points) = (&self.recipe, &self.points);
         let flag = |is_set: bool| f64::from(u8::from(is_set));
         let source = match points.source {
@@ -144,13 +143,7 @@ impl Generator {
             PointSource::Sobol(_) => 1.0,
             PointSource::Given => 2.0,
         };
-        let [map_x, map_y] = counting
-            .and_then(|counting| counting.map.as_ref())
-            .map_or([NO_SLOT; 2], |axes| axes.each_ref().map(|axis| axis.parameter as u32));
         let mut all = vec![
-            ("map_x", f64::from(map_x)),
-            ("map_y", f64::from(map_y)),
-            ("close_headway", CLOSE_HEADWAY_S),
             ("points_source", source),
             ("points_weighted", flag(points.weights.is_some())),
             ("points_transformed", flag(!points.knots.is_empty())),

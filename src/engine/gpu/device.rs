@@ -396,7 +396,7 @@ fn generator_entries() -> Vec<wgpu::BindGroupLayoutEntry> {
 
 /// The bindings of `shaders/tally.wgsl`, in their order: tally, samples and verdicts, counts and samples left.
 fn tally_entries() -> Vec<wgpu::BindGroupLayoutEntry> {
-    buffer_entries(2, 2, false)
+    buffer_entries(2, 1, false)
 }
 
 /// A uniform buffer, inputs, results.

@@ -4,8 +4,8 @@ use super::device::Device;
 use super::records::{DrawnRecord, Generation};
 use super::shader::WORKGROUP;
 use crate::Result;
+use crate::engine::LaneCase;
 use crate::engine::generated::{Generator, PointSource, Recipe};
-use crate::engine::{Counting, LaneCase};
 use crate::random::normal_table;
 
 /// The tables of a session.
@@ -43,7 +43,7 @@ pub(super) struct GeneratorSetup {
 }
 
 impl GeneratorSetup {
-    pub(super) fn new(generator: &Generator, counting: Option<&Counting>) -> Self {
+    pub(super) fn new(generator: &Generator) -> Self {
         let points = &generator.points;
         let bits = |values: &[f32]| values.iter().map(|v| v.to_bits()).collect::<Vec<_>>();
         let mut numbers = bits(&generator.basis);
@@ -55,17 +55,12 @@ impl GeneratorSetup {
         numbers.extend(&points.factor_of);
         let first_knot = numbers.len() as u32;
         numbers.extend(bits(&points.knots));
-        let first_edge = numbers.len() as u32;
-        for axis in counting.and_then(|counting| counting.map.as_ref()).into_iter().flatten() {
-            numbers.extend(bits(&axis.edges));
-        }
         let mut generation = Generation {
             components: points.components(),
             first_mean,
             first_factor,
             first_factor_of,
             first_knot,
-            first_edge,
             stride: generator.case_instants(),
             ..Generation::default()
         };
@@ -80,7 +75,7 @@ impl GeneratorSetup {
             PointSource::Given => (),
         }
         let aliases = points.weights.as_ref().map_or(Vec::new(), |table| table.table().to_vec());
-        let (recipe, constants) = (generator.recipe, generator.shader_constants(counting));
+        let (recipe, constants) = (generator.recipe, generator.shader_constants());
         GeneratorSetup { generation, recipe, constants, numbers, aliases, sobol: sobol_words }
     }
 

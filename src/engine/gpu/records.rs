@@ -72,10 +72,6 @@ pub struct Launch {
     pub lanes_per_group: u32,
     /// A burst begins at this step of the longest one.
     pub burst_from: u32,
-    /// A TTC below this fails, s: the threshold of the profile or of a watch.
-    pub ttc_threshold_s: f32,
-    /// Verdicts mark contacts with at least this closing speed, m/s.
-    pub marks_contacts_from: f32,
 }
 
 /// Result of a finished lane.
@@ -184,8 +180,6 @@ pub struct Generation {
     pub first_factor_of: u32,
     /// Offset of the transformation's knots.
     pub first_knot: u32,
-    /// Offset of the edges of the map's cells.
-    pub first_edge: u32,
     /// Entries of each sample in the table of instants.
     pub stride: u32,
 }
@@ -198,10 +192,6 @@ pub struct DrawnRecord {
     pub tries: u32,
     /// Component of the mixture.
     pub component: u32,
-    /// Cell of the map, row by row from below; a larger number outside.
-    pub cell: u32,
-    /// 1 if the sample draws a close headway.
-    pub is_close: u32,
 }
 
 /// One dispatch of the counting.
@@ -214,12 +204,4 @@ pub struct Tally {
     pub first_drawn: u32,
     /// Verdict words of each model.
     pub words: u32,
-    /// Samples that the list of those left to the host holds.
-    pub max_left: u32,
-    /// Bit of each headway below the limit of close following.
-    pub close_headways: u32,
-    /// Bit of each headway that the sample draws.
-    pub drawn_headways: u32,
-    /// How verdicts mark lanes: two bits per model.
-    pub marks: u32,
 }

@@ -10,7 +10,6 @@ use super::generator::Inputs;
 use super::pacing::Sharing;
 use super::records::{Launch, OutcomeRecord, Tally};
 use super::shader::{LONGEST_BURST, WORKGROUP};
-use crate::model::criterion::Criteria;
 use crate::{Error, Result};
 
 /// Maximum number of jobs in flight.
@@ -43,13 +42,7 @@ pub(super) struct TallyJob {
     pub constants: Vec<(&'static str, f64)>,
     /// Number of counts.
     pub counts: usize,
-    pub close_headways: u32,
-    pub drawn_headways: u32,
-    pub marks: u32,
 }
-
-/// Samples of a job that may be left to the host; with more, the host counts all of them.
-pub(super) const MAX_LEFT: u32 = 1 << 16;
 
 /// The lanes of one model with all cases of a job, or with those of one variant.
 #[derive(Debug, Clone)]
@@ -59,7 +52,6 @@ pub(super) struct Dispatch {
     pub model: usize,
     /// The variant; `None`: all.
     pub variant: Option<u32>,
-    pub criteria: Criteria<f32>,
 }
 
 impl Job {
@@ -70,7 +62,7 @@ impl Job {
 
     /// The lanes of a dispatch; `at` is its position. The device decides how invocations share them.
     fn launch(&self, at: usize) -> Launch {
-        let Dispatch { model, variant, criteria, .. } = &self.dispatches[at];
+        let Dispatch { model, variant, .. } = &self.dispatches[at];
         let step = if variant.is_some() { self.variants } else { 1 };
         let first = variant.unwrap_or(0);
         Launch {
@@ -85,9 +77,6 @@ impl Job {
             finished_word: at as u32,
             lanes_per_group: WORKGROUP,
             burst_from: 0,
-            ttc_threshold_s: criteria.ttc.threshold,
-            // f32::MAX replaces ∞: no closing speed reaches it.
-            marks_contacts_from: criteria.marks_contacts_from.min(f32::MAX),
         }
     }
 
@@ -109,8 +98,6 @@ pub(super) struct Answer {
     pub outcomes: Vec<Vec<OutcomeRecord>>,
     /// Counts, if requested.
     pub counts: Vec<u32>,
-    /// Samples left to the host, counted from the first of the job; `None` if they are too many.
-    pub left: Option<Vec<u32>>,
     /// Time of each dispatch, s, if the device measures it.
     pub seconds: Vec<f64>,
     /// Time of the slowest dispatch, s.
@@ -132,7 +119,6 @@ struct Buffers {
     finished: wgpu::Buffer,
     tally: wgpu::Buffer,
     counts: wgpu::Buffer,
-    left: wgpu::Buffer,
     readback: wgpu::Buffer,
     timing: Option<(wgpu::QuerySet, wgpu::Buffer)>,
     dispatches: usize,
@@ -145,7 +131,6 @@ struct ResultSizes {
     outcomes: u64,
     finished: u64,
     counts: u64,
-    left: u64,
     times: u64,
 }
 
@@ -156,14 +141,13 @@ impl ResultSizes {
             outcomes: (job.models * job.records() * size_of::<OutcomeRecord>()) as u64,
             finished: (job.dispatches.len() * 4) as u64,
             counts: job.tally.as_ref().map_or(0, |tally| tally.counts as u64 * 4),
-            left: if job.tally.is_some() { u64::from(MAX_LEFT + 1) * 4 } else { 0 },
             times: (job.dispatches.len() * 16) as u64,
         }
     }
 
     fn total(&self) -> u64 {
         // Times are 64-bit words, so they start at a multiple of 8 bytes.
-        (self.verdicts + self.outcomes + self.finished + self.counts + self.left).next_multiple_of(8) + self.times
+        (self.verdicts + self.outcomes + self.finished + self.counts).next_multiple_of(8) + self.times
     }
 }
 
@@ -228,7 +212,6 @@ impl Slot {
             (&buffers.outcomes, parts.outcomes),
             (&buffers.finished, parts.finished),
             (&buffers.counts, parts.counts),
-            (&buffers.left, parts.left),
         ];
         for (buffer, bytes) in results.into_iter().filter(|(_, bytes)| *bytes > 0) {
             encoder.clear_buffer(buffer, 0, Some(bytes));
@@ -245,17 +228,9 @@ impl Slot {
             pass.set_bind_group(0, &group, &[at as u32 * stride]);
             pass.dispatch_workgroups(x, y, 1);
         }
-        if let (Some(tally), Some(pipeline)) = (&job.tally, &tally_pipeline) {
+        if let Some(pipeline) = &tally_pipeline {
             let samples = job.cases;
-            let record = Tally {
-                samples,
-                first_drawn: job.first_case,
-                words: job.words() as u32,
-                max_left: MAX_LEFT,
-                close_headways: tally.close_headways,
-                drawn_headways: tally.drawn_headways,
-                marks: tally.marks,
-            };
+            let record = Tally { samples, first_drawn: job.first_case, words: job.words() as u32 };
             device.queue.write_buffer(&buffers.tally, 0, bytemuck::bytes_of(&record));
             let group = device.device.create_bind_group(&wgpu::BindGroupDescriptor {
                 label: Some("tally"),
@@ -265,7 +240,6 @@ impl Slot {
                     binding(1, inputs.drawn.as_entire_binding()),
                     binding(2, buffers.verdicts.as_entire_binding()),
                     binding(3, buffers.counts.as_entire_binding()),
-                    binding(4, buffers.left.as_entire_binding()),
                 ],
             });
             let (x, y) = device.grid(samples.div_ceil(WORKGROUP));
@@ -345,7 +319,6 @@ impl Slot {
                 && b.outcomes.size() >= parts.outcomes
                 && b.finished.size() >= parts.finished
                 && b.counts.size() >= parts.counts
-                && b.left.size() >= parts.left
                 && b.readback.size() >= parts.total()
         });
         if enough {
@@ -364,7 +337,6 @@ impl Slot {
             finished: device.buffer("finished", room(parts.finished, max_bytes), results),
             tally: device.buffer("tally", size_of::<Tally>() as u64, Use::UNIFORM | Use::COPY_DST),
             counts: device.buffer("counts", room(parts.counts, max_bytes), results),
-            left: device.buffer("samples left", parts.left, results),
             readback: device.buffer(
                 "results",
                 room(parts.total(), limits.max_buffer_size),
@@ -398,13 +370,8 @@ fn read(device: &Device, flight: &Flight, bytes: &[u8], wall_s: f64) -> Result<A
     let (verdicts, rest) = bytes.split_at(parts.verdicts as usize);
     let (outcomes, rest) = rest.split_at(parts.outcomes as usize);
     let (finished, rest) = rest.split_at(parts.finished as usize);
-    let (counts, rest) = rest.split_at(parts.counts as usize);
+    let counts = &rest[..parts.counts as usize];
     let finished: Vec<u32> = bytemuck::pod_collect_to_vec(finished);
-    let left: Vec<u32> = bytemuck::pod_collect_to_vec(&rest[..parts.left as usize]);
-    let left = match left.first() {
-        None => Some(Vec::new()),
-        Some(&number) => left.get(1..=number as usize).map(<[u32]>::to_vec),
-    };
     let times = &bytes[(parts.total() - parts.times) as usize..parts.total() as usize];
     let expected = |at: usize| job.launch(at).lanes;
     if let Some(at) = (0..finished.len()).find(|&at| finished[at] != expected(at)) {
@@ -437,7 +404,6 @@ fn read(device: &Device, flight: &Flight, bytes: &[u8], wall_s: f64) -> Result<A
             })
             .collect(),
         counts: bytemuck::pod_collect_to_vec(counts),
-        left,
         slowest_s: if timed { slowest_s } else { wall_s },
         device_s: if timed { device_s } else { wall_s },
         seconds: if timed { measured } else { Vec::new() },

@@ -16,12 +16,12 @@ use super::pacing::Pacer;
 use super::records::StartRecord;
 use super::ring::{Answer, Dispatch, Job, RING, TallyJob};
 use super::shader::{self, Specialization};
-use super::tally::{MAX_COUNTED, counter, mark_bits};
+use super::tally::{MAX_COUNTED, counter};
 use crate::engine::counting::PackedLanes;
 use crate::engine::generated::Generator;
 use crate::engine::{
-    Backend, Chunk, Constants, CountLayout, Counted, Counting, DeviceRecord, DeviceScene, LaneCase, LanePlan, Outcome,
-    Session, Verdicts, Wanted,
+    Backend, Chunk, Constants, CountLayout, Counted, DeviceRecord, DeviceScene, LaneCase, LanePlan, Outcome, Session,
+    Verdicts, Wanted,
 };
 use crate::model::driver::ModelId;
 use crate::scenario::Tables;
@@ -54,14 +54,12 @@ pub(super) struct GpuSession<'p> {
     window: Option<(usize, Range<u64>, Vec<DeviceScene>)>,
     /// Time of all dispatches so far, s.
     device_s: f64,
-    /// Counts lanes on the device.
+    /// How the device counts lanes, if it can.
     counting: Option<(CountLayout, TallyJob)>,
     /// Units of the call after the next one.
     announced: Option<Range<u64>>,
     /// Jobs of announced units.
     ahead: Option<Ahead>,
-    /// A job of this call left too many samples.
-    uncounted: bool,
 }
 
 /// Jobs that were sent before their call.
@@ -81,13 +79,7 @@ struct Piece {
 }
 
 impl<'p> GpuSession<'p> {
-    fn new(
-        plan: &'p LanePlan,
-        counting: Option<&Counting>,
-        device: String,
-        commands: Sender<Command>,
-        options: &GpuOptions,
-    ) -> Result<Self> {
+    fn new(plan: &'p LanePlan, device: String, commands: Sender<Command>, options: &GpuOptions) -> Result<Self> {
         ModelId::refuse_foreign(&plan.models, "a device")?;
         let queue = options.lanes_per_invocation != Some(1);
         let constants: Vec<Constants<f32>> =
@@ -98,14 +90,14 @@ impl<'p> GpuSession<'p> {
         let made_scene = plan.generator().map(Generator::scene);
         if let Some(scene) = made_scene {
             for resolved in &constants {
-                pipelines.extend(specs(plan, resolved, Specialization { scene, values: false, watched: false, queue }));
+                pipelines.extend(specs(plan, resolved, Specialization { scene, values: false, queue }));
             }
         }
         let setup = Box::new(Setup {
             starts: plan.headways.iter().map(|h| StartRecord::from(h.start::<f32>())).collect(),
             speed: tables.speed,
             lateral: tables.lateral,
-            generator: plan.generator().map(|generator| GeneratorSetup::new(generator, counting)),
+            generator: plan.generator().map(GeneratorSetup::new),
             models: plan.models.len() as u64,
             pipelines,
         });
@@ -113,7 +105,7 @@ impl<'p> GpuSession<'p> {
         commands.send(Command::Prepare { setup, reply }).map_err(|_| owner::gone(&device))?;
         let prepared = answer.recv().map_err(|_| owner::gone(&device))??;
         let pacer = Pacer::new(options.first_lanes.min(FIRST_STEPS / u64::from(plan.profile.step_cap().max(1))));
-        let counting = counting.and_then(|counting| counter(plan, counting));
+        let counting = counter(plan);
         let split_scenes = options.split_scenes.unwrap_or(true);
         let (window, device_s, announced, ahead) = (None, 0.0, None, None);
         Ok(GpuSession {
@@ -132,7 +124,6 @@ impl<'p> GpuSession<'p> {
             counting,
             announced,
             ahead,
-            uncounted: false,
         })
     }
 
@@ -173,11 +164,7 @@ impl<'p> GpuSession<'p> {
             return Err(Error::Internal("no cases are on the device".to_owned()));
         };
         let has_outcomes = wanted == Wanted::Outcomes;
-        let tally = self
-            .counting
-            .as_ref()
-            .filter(|_| !has_outcomes)
-            .map(|(_, tally)| TallyJob { marks: mark_bits(plan, wanted.watch()), ..tally.clone() });
+        let tally = self.counting.as_ref().filter(|_| wanted == Wanted::Counts).map(|(_, tally)| tally.clone());
         let count = self.pacer.units(per_unit, max_lanes).min(if tally.is_some() { MAX_COUNTED } else { u64::MAX });
         let end = units.end.min(units.start + count).min(held.end);
         let constants = &self.constants[block];
@@ -187,16 +174,10 @@ impl<'p> GpuSession<'p> {
             let is_void_told = has_outcomes && self.made_scene.is_some();
             let of_values = DeviceScene { is_all_paired: false, always_there: false, ..known };
             let scene = if is_void_told { of_values } else { known };
-            let watched = wanted.watch().is_some();
-            let specialization = Specialization { scene, values: has_outcomes, watched, queue: self.queue };
+            let specialization = Specialization { scene, values: has_outcomes, queue: self.queue };
             let variant = (scenes.len() > 1).then_some(variant);
-            for (model, pipeline) in specs(plan, constants, specialization).into_iter().enumerate() {
-                let criteria = match wanted.watch() {
-                    Some(watch) => watch.criteria(&plan.profile, plan.models[model], constants.criteria),
-                    None => constants.criteria,
-                };
-                dispatches.push(Dispatch { pipeline, model, variant, criteria });
-            }
+            let pipelines = specs(plan, constants, specialization).into_iter().enumerate();
+            dispatches.extend(pipelines.map(|(model, pipeline)| Dispatch { pipeline, model, variant }));
         }
         let job = Job {
             dispatches,
@@ -242,10 +223,6 @@ impl<'p> GpuSession<'p> {
         if let Some(counted) = &mut chunk.counted {
             for (sum, count) in counted.counts.iter_mut().zip(answer.counts) {
                 *sum += u64::from(count);
-            }
-            match answer.left {
-                Some(left) => counted.left.extend(left.iter().map(|sample| piece.units.start + u64::from(*sample))),
-                None => self.uncounted = true,
             }
             counted.packed.push(PackedLanes { first: (from / models) as u64, words: answer.words });
             return Ok(());
@@ -319,10 +296,9 @@ impl<'p> GpuSession<'p> {
         let plan = self.plan;
         let first_lane = plan.first_lane_of(units.start);
         let lanes = (plan.first_lane_of(units.end) - first_lane) as usize;
-        let counted = self.counting.as_ref().filter(|_| wanted != Wanted::Outcomes).map(|(layout, _)| Counted {
+        let counted = self.counting.as_ref().filter(|_| wanted == Wanted::Counts).map(|(layout, _)| Counted {
             layout: *layout,
             counts: vec![0; layout.total()],
-            left: Vec::new(),
             packed: Vec::new(),
         });
         let mut chunk = Chunk {
@@ -330,11 +306,9 @@ impl<'p> GpuSession<'p> {
             first_lane,
             verdicts: vec![Verdicts::default(); if counted.is_some() { 0 } else { lanes }],
             outcomes: Vec::new(),
-            valued: None,
             counted,
             redone_and_rechecked: [0; 2],
         };
-        self.uncounted = false;
         let (mut pending, mut from) = self.take_ahead(&units, wanted);
         loop {
             while pending.len() < RING
@@ -348,14 +322,6 @@ impl<'p> GpuSession<'p> {
             }
             let Some(oldest) = pending.pop_front() else { break };
             self.collect(oldest, &mut chunk, wanted)?;
-        }
-        if let Some(counted) = &mut chunk.counted {
-            counted.left.sort_unstable();
-            if self.uncounted {
-                // Too many samples were left: the host counts them all.
-                chunk.verdicts = (0..lanes).into_par_iter().map(|at| counted.verdicts(at)).collect();
-                chunk.counted = None;
-            }
         }
         Ok(chunk)
     }
@@ -514,11 +480,6 @@ impl Backend for GpuBackend {
 
     fn prepare<'p>(&self, plan: &'p LanePlan) -> Result<Box<dyn Session + 'p>> {
         let commands = self.commands.clone();
-        Ok(Box::new(GpuSession::new(plan, None, self.card.name.clone(), commands, &self.options)?))
-    }
-
-    fn prepare_counting<'p>(&self, plan: &'p LanePlan, counting: &Counting) -> Result<Box<dyn Session + 'p>> {
-        let commands = self.commands.clone();
-        Ok(Box::new(GpuSession::new(plan, Some(counting), self.card.name.clone(), commands, &self.options)?))
+        Ok(Box::new(GpuSession::new(plan, self.card.name.clone(), commands, &self.options)?))
     }
 }

@@ -129,8 +129,6 @@ pub struct Specialization {
     pub scene: DeviceScene,
     /// The pipeline returns continuous values, not only verdicts.
     pub values: bool,
-    /// A watch replaces the threshold of the TTC and marks contacts.
-    pub watched: bool,
     /// An invocation whose lane has ended takes the next one of its workgroup.
     pub queue: bool,
 }
@@ -145,10 +143,10 @@ pub fn constants(
     model: ModelId,
     specialization: Specialization,
 ) -> Vec<(&'static str, f64)> {
-    let Specialization { scene, values, watched, queue } = specialization;
+    let Specialization { scene, values, queue } = specialization;
     let mut all = resolved.frames[model.index()].shader_constants();
     all.push(("frame_model", model.index() as f64));
-    for (name, is_set) in [("frame_values", values), ("frame_watched", watched), ("frame_queue", queue)] {
+    for (name, is_set) in [("frame_values", values), ("frame_queue", queue)] {
         all.push((name, f64::from(u8::from(is_set))));
     }
     let frame = &resolved.frames[model.index()];

@@ -147,7 +147,7 @@ mod tests {
     #[test]
     fn every_float_operation_of_every_model_may_not_be_contracted() {
         let scene = DeviceScene::unknown(true);
-        let every = shader::Specialization { scene, values: true, watched: true, queue: true };
+        let every = shader::Specialization { scene, values: true, queue: true };
         for name in Profile::names() {
             let profile = Profile::load(name).unwrap();
             for model in ModelId::ALL {

@@ -123,8 +123,6 @@ pub struct Criteria<R> {
     pub keeps_values: bool,
     /// Whether [`Measures`] are computed too. Some loops keep values where only verdicts are returned.
     pub keeps_measures: bool,
-    /// Verdicts mark contacts at or above this closing speed, m/s; infinite: none.
-    pub marks_contacts_from: R,
 }
 
 impl CriteriaProfile {
@@ -138,7 +136,6 @@ impl CriteriaProfile {
             tet_threshold: R::from_f64(self.tet_threshold_s),
             keeps_values: true,
             keeps_measures: true,
-            marks_contacts_from: R::INFINITY,
         }
     }
 }

@@ -1,8 +1,8 @@
-//! The surroundings of a plot: ticks with their numbers, names, the colour scale.
+//! The surroundings of a plot: ticks with their numbers, and names.
 
 use super::axis::{Axis, Tick, on_circle};
 use super::svg::{Anchor, Canvas, GREY, GRID, Paint, Position, Type};
-use super::{ColourBar, NAME_GAP_PX, NAME_PX, Name, Plot, RADIUS_PX, SPOKE_PX, TEXT, TICK};
+use super::{NAME_GAP_PX, NAME_PX, Name, Plot, RADIUS_PX, SPOKE_PX, TEXT, TICK};
 
 impl Plot {
     /// Draws the horizontal axis: grid, ticks, numbers.
@@ -87,28 +87,6 @@ pub(super) fn spoke_name(canvas: &mut Canvas, name: &Name, centre: Position, tur
     // The cosine goes from 1 (the block ends at y) through 0 (centred on y) to -1 (it starts at y).
     let top = y - set.height_px(&name.words, SPOKE_PX) * (1.0 + libm::cos(turn)) / 2.0;
     canvas.block((x, top), &name.words, set, SPOKE_PX, anchor);
-}
-
-/// Draws the scale from zero to a round number at or above the maximum.
-pub(super) fn colour_bar(canvas: &mut Canvas, bar: &ColourBar, (left, right): (f64, f64), (top, bottom): (f64, f64)) {
-    const BANDS: u32 = 100;
-    const BAR_TEXT_PX: f64 = 62.0;
-    canvas.block((left, top - 4.0), bar.label, TICK, BAR_TEXT_PX, Anchor::Start);
-    let top = top + TICK.height_px(bar.label, BAR_TEXT_PX) + 2.0;
-    let bottom = bottom.max(top + 90.0).min(top + 300.0);
-    let edge = |k: u32| bottom + (top - bottom) * f64::from(k) / f64::from(BANDS);
-    canvas.group("shape-rendering=\"crispEdges\" class=\"scale\"", "", |canvas| {
-        for k in 0..BANDS {
-            let colour = (bar.colour)((f64::from(k) + 0.5) / f64::from(BANDS));
-            canvas.rect((left, edge(k)), (right, edge(k + 1)), Paint::fill(&colour));
-        }
-    });
-    canvas.rect((left, top), (right, bottom), Paint::line(GREY, 1.0));
-    for tick in Axis::exactly((0.0, bar.largest), (bottom, top)).ticks(6) {
-        let mark = vec![(right, tick.at_px), (right + 5.0, tick.at_px)];
-        canvas.path(&[mark], false, Paint::line(GREY, 1.0));
-        canvas.text((right + 8.0, tick.at_px + 4.5), tick.label.as_deref().unwrap_or(""), TICK, Anchor::Start);
-    }
 }
 
 #[cfg(test)]

@@ -357,17 +357,6 @@ pub struct FilledCell {
     pub tip: String,
 }
 
-/// A colour scale from zero to a maximum, at the right of the plots.
-#[derive(Debug, Clone, Copy)]
-pub struct ColourBar {
-    /// Quantity of the colours.
-    pub label: &'static str,
-    /// The maximum.
-    pub largest: f64,
-    /// Colour of a position between 0 and 1.
-    pub colour: fn(f64) -> String,
-}
-
 /// Rectangles behind everything else.
 #[derive(Debug, Clone, Default)]
 pub struct Cells {

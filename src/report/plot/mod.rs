@@ -13,7 +13,7 @@ mod svg;
 use std::f64::consts::TAU;
 
 pub(super) use axis::AxisScale;
-pub(super) use layer::{Cells, ColourBar, Fill, FilledCell, Mark, Rule, Series, Value};
+pub(super) use layer::{Cells, Fill, FilledCell, Mark, Rule, Series, Value};
 pub(super) use look::{Look, Symbol};
 
 pub(super) use axis::{logarithmic_reach, number, plain_end, quantity};
@@ -25,7 +25,7 @@ pub(super) use svg::{Anchor, Canvas, GREY, INK, Type, set};
 
 use crate::support::table::Table;
 use axis::{Axes, on_circle};
-use frame::{colour_bar, numbers_left, spoke_name};
+use frame::{numbers_left, spoke_name};
 use svg::{GRID, Paint, Position, WHITE};
 
 /// Width of a figure: type of 13 px becomes 6 pt at the 252 pt of a paper's column.
@@ -38,8 +38,6 @@ const SAMPLE_PX: f64 = 38.0;
 const SAMPLE_TEXT_PX: f64 = 46.0;
 /// Maximum width of the texts left and right of a plot whose vertical axis has named ticks.
 const NAME_PX: f64 = 150.0;
-/// Width of a colour scale with its numbers.
-const BAR_PX: f64 = 74.0;
 /// Radius of the outer ring of a polar plot, distance of the names from it, and their width.
 const RADIUS_PX: f64 = 150.0;
 const NAME_GAP_PX: f64 = 14.0;
@@ -62,8 +60,6 @@ pub struct Figure {
     pub columns: usize,
     /// Twice as wide.
     pub is_wide: bool,
-    /// Colour scale of the cells.
-    pub bar: Option<ColourBar>,
     /// Explains the marks; wrapped when long.
     pub caption: String,
     /// A bold heading and lines at the foot; omitted without lines.
@@ -279,10 +275,10 @@ impl Figure {
         };
         let rooms: Vec<(f64, f64)> = (0..columns).map(room).collect();
         let left_px = |column: usize| if shares_y && column > 0 { 0.0 } else { rooms[column].0 };
-        let gaps_px = GAP_PX * (columns - 1) as f64 + if self.bar.is_some() { BAR_PX } else { 0.0 };
+        let gaps_px = GAP_PX * (columns - 1) as f64;
         let taken_px: f64 = (0..columns).map(|column| left_px(column) + rooms[column].1).sum();
         let frame_px = (self.width_px() - gaps_px - taken_px) / columns as f64;
-        let (mut y, mut first_frame) = (top, None);
+        let mut y = top;
         for (row, in_row) in self.plots.chunks(columns).enumerate() {
             if let Some(heading) = in_row.first().map(|plot| &plot.row).filter(|heading| !heading.is_empty()) {
                 y = canvas.paragraph((MARGIN_PX, y), heading, HEADING, self.width_px()) + 2.0;
@@ -333,18 +329,13 @@ impl Figure {
                     end = canvas.block((middle, end), &plot.x.label, TICK, across.1 - from, Anchor::Middle);
                 }
                 bottom = bottom.max(end);
-                first_frame.get_or_insert(down);
             }
             y = bottom + 8.0;
         }
         if let Some(plot) = self.plots.first().filter(|_| shares_x) {
-            let right = self.width_px() - rooms[columns - 1].1 - if self.bar.is_some() { BAR_PX } else { 0.0 };
+            let right = self.width_px() - rooms[columns - 1].1;
             let (from, to) = (MARGIN_PX + left_px(0), MARGIN_PX + right);
             y = canvas.block(((from + to) / 2.0, y - 6.0), &plot.x.label, TICK, to - from, Anchor::Middle) + 6.0;
-        }
-        if let Some((bar, down)) = self.bar.as_ref().zip(first_frame).filter(|(bar, _)| bar.largest > 0.0) {
-            let left = MARGIN_PX + self.width_px() - BAR_PX + 12.0;
-            colour_bar(canvas, bar, (left, left + 16.0), down);
         }
         y
     }

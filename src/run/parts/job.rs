@@ -61,8 +61,8 @@ pub trait Job: Sized {
     /// [`Error::Input`] if the folder holds the plan of another run; [`Error::Io`].
     fn write_plan(&self, out: &Path) -> Result<()>;
 
-    /// Units at which the counts of an interval are kept apart.
-    fn cuts(&self, _units: &Range<u64>) -> Vec<u64> {
+    /// Units at which counts are kept apart.
+    fn cuts(&self) -> Vec<u64> {
         Vec::new()
     }
 
@@ -96,8 +96,7 @@ pub trait Job: Sized {
     /// # Errors
     /// As [`Job::compute`] and [`Job::result`].
     fn run(&self, executor: &Executor) -> Result<Self::Result> {
-        let units = 0..self.unit_count();
-        let mut ledger = Ledger::new(units.clone(), &self.cuts(&units));
+        let mut ledger = Ledger::new(0..self.unit_count(), &self.cuts());
         let computed = self.compute(&mut ledger, executor, None)?;
         self.result(ledger.finish()?.0, computed, Place::item("units"))
     }
@@ -125,7 +124,7 @@ pub trait Job: Sized {
                 (folder, Some(lock))
             }
         };
-        let mut ledger = Ledger::new(units.clone(), &self.cuts(&units));
+        let mut ledger = Ledger::new(units.clone(), &self.cuts());
         if is_journalled {
             let run = &run_sha256[..16.min(run_sha256.len())];
             let name = shard.map_or(format!("run-{run}"), |shard| shard.stem()) + ".journal";

@@ -67,7 +67,7 @@ impl<T: Serialize + DeserializeOwned> Journal<T> {
     /// [`Error::Io`]; [`Error::Input`] if the file is the journal of another run or interval.
     pub fn open(path: &Path, run_sha256: &str, units: Range<u64>) -> Result<(Journal<T>, Records<T>)> {
         let engine = ENGINE_VERSION;
-        let head = Head { lanesweep_journal: 3, engine, run_sha256: run_sha256.to_owned(), units };
+        let head = Head { lanesweep_journal: 4, engine, run_sha256: run_sha256.to_owned(), units };
         let due = Instant::now() + MIN_WAIT;
         let mut journal =
             Journal { path: path.to_path_buf(), head, file: None, due, spent: Duration::ZERO, kind: PhantomData };
@@ -322,7 +322,7 @@ mod tests {
         assert_eq!(std::fs::read(&path).unwrap(), before);
         // Journals of another engine, whose version is part of the first line and its checksum, and of earlier formats.
         let units = 0..10;
-        let head = Head { lanesweep_journal: 3, engine: ENGINE_VERSION + 1, run_sha256: "run".to_owned(), units };
+        let head = Head { lanesweep_journal: 4, engine: ENGINE_VERSION + 1, run_sha256: "run".to_owned(), units };
         let earlier =
             serde_json::json!({"lanesweep_journal": 1, "run_sha256": "run", "units": {"start": 0, "end": 10}});
         let mine = b"notes of a user\n".to_vec();

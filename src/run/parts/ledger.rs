@@ -6,7 +6,7 @@ use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
 use super::journal::{Journal, Records};
-use crate::engine::Partial;
+use crate::engine::{Partial, SampleTally};
 use crate::{Error, Result};
 
 /// Counts over a set of units of one plan that can be merged in any order.
@@ -84,11 +84,6 @@ impl<T: MergeableCounts> Ledger<T> {
         let (first, last) = (covered.first()?, covered.last()?);
         let segment = self.segment_of(first.start);
         (first.start >= self.units.start && last.end <= *self.ends.get(segment)?).then_some(segment)
-    }
-
-    /// First unit of the segment of a unit.
-    pub(crate) fn segment_start(&self, unit: u64) -> u64 {
-        self.segment_of(unit).checked_sub(1).map_or(self.units.start, |before| self.ends[before])
     }
 
     fn place(&mut self, Counted { counts, redone_and_rechecked }: Counted<T>) -> Result<()> {
@@ -261,6 +256,16 @@ fn add(sum: &mut [u64; 2], more: [u64; 2]) {
 impl MergeableCounts for Partial {
     fn covered(&self) -> Vec<Range<u64>> {
         Partial::covered(self)
+    }
+
+    fn join(self, other: Self) -> Result<Self> {
+        self.merge(other)
+    }
+}
+
+impl MergeableCounts for SampleTally {
+    fn covered(&self) -> Vec<Range<u64>> {
+        SampleTally::covered(self).to_vec()
     }
 
     fn join(self, other: Self) -> Result<Self> {

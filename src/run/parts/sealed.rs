@@ -14,7 +14,7 @@ use crate::support::input_file::{ends, open, read};
 use crate::support::plain_text::hex;
 use crate::{Error, Place, Result};
 
-const VERSION: u64 = 2;
+const VERSION: u64 = 3;
 
 #[derive(Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]

@@ -5,13 +5,11 @@
 
 mod record;
 mod traced;
-mod worst;
 
 use std::path::Path;
 
 pub use record::SampleRecord;
 pub use traced::{TracedCase, TracedLane, TracedLanes};
-pub use worst::WorstOptions;
 
 use crate::engine::{Headway, LaneKey, LanePlan};
 use crate::model::driver::ModelId;
@@ -177,7 +175,9 @@ impl Reopened {
     /// [`Error::Usage`] for a lane that does not exist, and for a void sample, which has no case.
     pub(crate) fn find(&self, text: &str) -> Result<LaneKey> {
         let plan = self.plan();
-        let key = plan.parse_key(text).ok_or_else(|| {
+        // Rows of a density that draws the headway have this word in place of it.
+        let written = if self.density().is_some() { text.replace("/sampled/", "/0m/") } else { text.to_owned() };
+        let key = plan.parse_key(&written).ok_or_else(|| {
             let why = wrong_part(plan, text);
             let example = plan.key(0).map_or(String::new(), |key| format!(", for instance {}", plan.key_text(&key)));
             Error::usage(

@@ -38,8 +38,6 @@ pub struct SampleRecord {
     pub profile: Profile,
     /// Hash of the plan of crude Monte Carlo.
     pub plan_sha256: Option<String>,
-    /// Checksum of the table of worst lanes.
-    pub worst_sha256: Option<String>,
 }
 
 impl SampleRecord {

@@ -4,15 +4,14 @@
 
 use super::Sample;
 use super::estimate_rows::{EstimateRow, RecordedRatios};
-use super::kernel_counts::{KernelCounts, cell_of};
 use super::result::SampleResult;
 use super::sample_options::SampleHeadways;
-use crate::engine::{CpuBackend, Executor, Headway, Wanted};
+use crate::engine::{CpuBackend, Executor, Headway, KernelCounts, Wanted, cell_of};
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
 use crate::run::study::{StudyOptions, plan_study};
 use crate::stats::density::DensityModel;
-use crate::stats::estimate::{Ratio, RatioVerdict, Warning};
+use crate::stats::estimate::{Clusters, Ratio, RatioVerdict, Warning, paired_ratio};
 use crate::{Error, Result};
 
 /// The lanes of S and of S' under the density's parameterization, with scenarios as kernels. `None` if the density
@@ -82,7 +81,12 @@ impl Sample {
         let sampled = result.crude.as_ref().and_then(|crude| crude.tally.by_kernel.as_ref());
         for row in &mut result.rows {
             let cells = cells_of(row, &options.models, &headways);
-            let ratio = |of: &KernelCounts| of.ratio(&cells, (&recorded, &cells), options.level);
+            let (runs, failures) = recorded.over(&cells);
+            let ratio = |of: &KernelCounts| {
+                let (their_runs, their_failures) = of.over(&cells);
+                let theirs = Clusters { runs: &their_runs, failures: &their_failures };
+                paired_ratio(theirs, Clusters { runs: &runs, failures: &failures }, options.level)
+            };
             let ratios = RecordedRatios { replayed: ratio(&replayed), sampled: sampled.map(ratio) };
             warn(row, &ratios);
             row.recorded = Some(ratios);

@@ -53,14 +53,7 @@ impl Sample {
     /// # Errors
     /// Those of the lanes.
     pub fn choice(&self, half_width: f64, executor: &Executor) -> Result<Choice> {
-        let pilot = SampleOptions {
-            stop: StopRule::samples(PILOT),
-            worst: 0,
-            map: None,
-            injury: None,
-            targets: Vec::new(),
-            ..self.options.clone()
-        };
+        let pilot = SampleOptions { stop: StopRule::samples(PILOT), ..self.options.clone() };
         let pilot = Sample::plan(self.density.clone(), &self.profile, &pilot)?;
         let started = Instant::now();
         let rows = pilot.run(executor)?.rows;
@@ -128,10 +121,6 @@ impl Sample {
             estimator: Estimator::Search(*search),
             stop: StopRule { relative_half_width: Some(half_width), ..StopRule::samples(MAX_DRAWS) },
             questions: questions.clone(),
-            worst: 0,
-            map: None,
-            injury: None,
-            targets: Vec::new(),
             ..self.options.clone()
         };
         let rare = Sample::plan(self.density.clone(), &self.profile, &options)?.run(executor)?;
@@ -140,7 +129,7 @@ impl Sample {
                 *old = row;
             }
         }
-        Ok(SampleResult { ratios: rare.ratios, search: rare.search, proposal: rare.proposal, ..result })
+        Ok(SampleResult { search: rare.search, proposal: rare.proposal, ..result })
     }
 
     fn is_row_of(&self, row: &EstimateRow, question: &Question) -> bool {

@@ -1,17 +1,13 @@
 //! Crude Monte Carlo: sampled lanes on a backend, counted chunk by chunk. Memory does not grow with the number of
-//! samples. After the first samples, values are computed only for lanes that may still be among the worst.
+//! samples.
 
-use std::ops::Range;
-use std::sync::Arc;
 use std::time::Instant;
 
 use serde::Serialize;
 
 use super::estimate_rows::{EstimateRow, crude_rows};
-use super::limit_state::marks_of;
-use super::sample_options::{SampleHeadways, SampleOptions};
-use super::tally::SampleTally;
-use crate::engine::{Executor, LanePlan, SweepSummary, Wanted, Watch};
+use super::sample_options::SampleOptions;
+use crate::engine::{Executor, LanePlan, SampleTally, SweepSummary, Wanted};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::run::parts::{Computed, EachChunk, Ledger};
@@ -57,51 +53,25 @@ pub struct CrudeRun {
     pub summary: SweepSummary,
 }
 
-/// Samples `range` of a plan that generates its own cases; risks follow from the exposure. The stop rules are evaluated
-/// after 4,096·2^k samples. `each` receives every chunk, not with every outcome; without it, a device counts lanes where they
-/// are.
-///
-/// # Errors
-/// [`Error::Usage`] for stop rules with a partial range, or for an end beyond the plan; those of the backends and of
-/// `each`.
-pub fn sample_crude(
-    plan: &LanePlan,
-    range: Range<u64>,
-    executor: &Executor,
-    options: &SampleOptions,
-    exposure: Option<&Exposure>,
-    each: Option<&mut EachChunk>,
-) -> Result<CrudeRun> {
-    let mut ledger = Ledger::new(range.clone(), &cuts(plan.unit_count(), &range));
-    let each = each.map(|each| (false, each));
-    let computed = sample_into(plan, &mut ledger, executor, options, exposure, each)?;
-    crude_of_segments(plan, ledger.take()?, options, exposure, &computed)
-}
-
-/// The sample sizes at which a run of `samples` samples is evaluated.
-pub(crate) fn checkpoints(samples: u64) -> Vec<u64> {
+/// The sample sizes at which a run of `samples` samples is evaluated, and at which its counts are cut.
+pub(super) fn checkpoints(samples: u64) -> Vec<u64> {
     let next = |at: &u64| Some(Checkpoints::Doubling.next(*at)).filter(|next| *next > *at);
     std::iter::successors(next(&0), next).take_while(|at| *at < samples).chain([samples]).collect()
 }
 
-/// Units at which the counts of an interval are cut: the checkpoints, and the samples at which the watch of lanes
-/// changes.
-pub fn cuts(samples: u64, range: &Range<u64>) -> Vec<u64> {
-    checkpoints(samples).into_iter().chain(ends(range)).collect()
-}
-
-/// The same for samples that the ledger does not hold; its cuts must be those of [`cuts`]. `each` receives every chunk,
-/// with the outcome of every lane if its flag is set.
+/// Samples the units that the ledger does not hold; its cuts must be the [`checkpoints`]. The stop rules are evaluated there.
+/// `each` receives every chunk with its outcomes; without it, a device counts lanes where they are.
 ///
 /// # Errors
-/// As [`sample_crude`], and those of the ledger's journal; [`Error::Interrupted`].
-pub fn sample_into(
+/// [`Error::Usage`] for stop rules with a part of the samples; those of the backends, of `each` and of the ledger's journal;
+/// [`Error::Interrupted`].
+pub(super) fn sample_into(
     plan: &LanePlan,
     ledger: &mut Ledger<SampleTally>,
     executor: &Executor,
     options: &SampleOptions,
     exposure: Option<&Exposure>,
-    mut each: Option<(bool, &mut EachChunk)>,
+    mut each: Option<&mut EachChunk>,
 ) -> Result<Computed> {
     let started = Instant::now();
     let range = ledger.units();
@@ -118,9 +88,8 @@ pub fn sample_into(
         let problem = "a part of a run cannot tell when the whole is good enough";
         return Err(Error::usage(Place::option("shard"), problem, "leave the stop rules out, or option `shard`"));
     }
-    let counting = each.is_none().then(|| Arc::new(SampleTally::counting(plan, options)));
-    let executor = &Executor { counting, ..executor.clone() };
-    let mut tally = SampleTally::empty(plan, options);
+    let wanted = if each.is_some() { Wanted::Outcomes } else { Wanted::Counts };
+    let mut tally = SampleTally::empty(plan);
     let mut summary = SweepSummary { device_s: Some(0.0), ..SweepSummary::default() };
     let looks = checkpoints(plan.unit_count());
     let mut at = range.start;
@@ -128,27 +97,14 @@ pub fn sample_into(
         let look = looks[looks.partition_point(|look| *look <= at).min(looks.len() - 1)];
         let next = if is_whole { look } else { range.end };
         for missing in ledger.missing(at..next)? {
-            let every_value = each.as_ref().is_some_and(|(every_value, _)| *every_value);
-            let wanted = match (every_value, options.worst) {
-                (true, _) => Wanted::Outcomes,
-                // Contacts are too many to be computed one by one.
-                _ if options.injury.is_some() => Wanted::Outcomes,
-                (false, 0) => Wanted::Verdicts,
-                (false, _) => {
-                    // Whole segments only, so that a resumed run requests the same results in a segment as the first
-                    // run.
-                    let known = ledger.counts(range.start..ledger.segment_start(missing.start))?;
-                    known.map_or(Wanted::Outcomes, |known| wanted(plan, &known, options))
-                }
-            };
             // The first chunk of a sweep is a short one.
             let mut is_checked = executor.recheck.is_none();
             let part = executor.sweep(plan, missing, wanted, |chunk| {
                 if !std::mem::replace(&mut is_checked, true) {
-                    SampleTally::check_counted(plan, &chunk, options, &executor.backend.describe())?;
+                    SampleTally::check_counted(plan, &chunk, &executor.backend.describe())?;
                 }
-                each.as_mut().map_or(Ok(()), |(_, each)| each(plan, &chunk))?;
-                ledger.add(SampleTally::of_chunk(plan, &chunk, options)?, chunk.redone_and_rechecked)
+                each.as_mut().map_or(Ok(()), |each| each(plan, &chunk))?;
+                ledger.add(SampleTally::of_chunk(plan, &chunk)?, chunk.redone_and_rechecked)
             });
             summary.add(&ledger.kept(part)?);
         }
@@ -160,7 +116,7 @@ pub fn sample_into(
             true => (at >= range.end).then_some(StopReason::Samples),
             false => {
                 tally = ledger.counts(before..at)?.into_iter().try_fold(tally, SampleTally::merge)?;
-                let rows = rows_of(plan, &tally, options, exposure, StopReason::Samples);
+                let rows = crude_rows(plan, &tally, options, exposure, StopReason::Samples);
                 stopped(options, &rows, at, range.end, started)
             }
         };
@@ -174,7 +130,7 @@ pub fn sample_into(
 ///
 /// # Errors
 /// [`Error::Input`] if parts are of different runs or contain the same samples.
-pub(crate) fn crude_of_segments(
+pub(super) fn crude_of_segments(
     plan: &LanePlan,
     mut segments: Vec<SampleTally>,
     options: &SampleOptions,
@@ -183,7 +139,7 @@ pub(crate) fn crude_of_segments(
 ) -> Result<CrudeRun> {
     segments.sort_by_key(|segment| segment.covered().first().map_or(0, |range| range.start));
     let looks = checkpoints(plan.unit_count());
-    let mut tally = SampleTally::empty(plan, options);
+    let mut tally = SampleTally::empty(plan);
     let mut convergence = Vec::new();
     for segment in segments {
         tally = tally.merge(segment)?;
@@ -192,23 +148,12 @@ pub(crate) fn crude_of_segments(
             && covered.start == 0
             && looks.contains(&covered.end)
         {
-            let rows = overall(&rows_of(plan, &tally, options, exposure, StopReason::Samples));
+            let rows = overall(&crude_rows(plan, &tally, options, exposure, StopReason::Samples));
             convergence.push(Checkpoint { samples: covered.end, rows });
         }
     }
-    let rows = rows_of(plan, &tally, options, exposure, computed.stopped);
+    let rows = crude_rows(plan, &tally, options, exposure, computed.stopped);
     Ok(CrudeRun { tally, rows, convergence, summary: computed.summary })
-}
-
-fn rows_of(
-    plan: &LanePlan,
-    tally: &SampleTally,
-    options: &SampleOptions,
-    exposure: Option<&Exposure>,
-    stopped: StopReason,
-) -> Vec<EstimateRow> {
-    let is_sampled_headway = options.headways == SampleHeadways::Sampled;
-    crude_rows(plan, tally, exposure, is_sampled_headway, options.estimator.interval(), options.level, stopped)
 }
 
 /// The rows over all headways.
@@ -236,38 +181,4 @@ fn stopped(
     let widest = judged.max_by(|a, b| a.draws_half_width().total_cmp(&b.draws_half_width()))?;
     let rule = StopRule { samples: end, ..options.stop };
     rule.at(samples, widest.estimate.failures, widest.draws_half_width(), started)
-}
-
-/// Values of all lanes of the first samples are computed.
-const FIRST_SAMPLES: u64 = 4096;
-/// If more than one in this many lanes would be marked, all values are computed: recomputing a single lane costs about
-/// forty times its verdicts.
-const MARKED_ONE_IN: f64 = 1000.0;
-
-/// Ends of pieces of an interval of samples. Each piece is as long as all earlier ones together, so that a list of
-/// worst lanes finds as many new lanes in each piece.
-fn ends(range: &Range<u64>) -> impl Iterator<Item = u64> {
-    let (first, end) = (range.start, range.end);
-    std::iter::successors(Some(FIRST_SAMPLES), |length| length.checked_mul(2))
-        .map(move |length| first.saturating_add(length))
-        .take_while(move |to| *to < end)
-}
-
-/// Results that lanes of further samples must return, so that the lists of worst lanes equal those from all values.
-/// `options.worst` is at least 1, and the lanes of `tally` have smaller indices.
-fn wanted(plan: &LanePlan, tally: &SampleTally, options: &SampleOptions) -> Wanted {
-    let (mut watch, mut marked) = (Watch::NOTHING, 0.0);
-    let lanes_per_model = (tally.valid() * plan.headways.len() as u64).max(1) as f64;
-    for (at, model) in plan.models.iter().enumerate() {
-        let last = tally.worst[at].get(options.worst - 1);
-        let marks = last.and_then(|last| marks_of(&plan.profile, options.criterion, last.value));
-        let Some((of_model, failures_of)) = marks else { return Wanted::Outcomes };
-        watch.0[model.index()] = of_model;
-        if let Some(criterion) = failures_of {
-            let cells = tally.failures.chunks(Criterion::ALL.len()).skip(at).step_by(plan.models.len());
-            let failures: u64 = cells.map(|cell| cell[criterion.index()]).sum();
-            marked += failures as f64 / lanes_per_model / plan.models.len() as f64;
-        }
-    }
-    if marked * MARKED_ONE_IN > 1.0 { Wanted::Outcomes } else { Wanted::Watched(watch) }
 }

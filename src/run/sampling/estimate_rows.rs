@@ -3,15 +3,14 @@
 
 use serde::Serialize;
 
-use super::kernel_counts::cell_of;
-use super::tally::SampleTally;
+use super::sample_options::SampleOptions;
 use super::uncertainty::Uncertainty;
-use crate::engine::LanePlan;
+use crate::engine::{LanePlan, SampleTally, cell_of};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::stats::density::{Exposure, Rate, normal_quantile};
 use crate::stats::estimate::{
-    BinomialInterval, Counts, Estimate, Interval, Ratio, StopReason, Warning, from_clusters, from_counts,
+    Clusters, Counts, Estimate, Interval, Ratio, StopReason, Warning, cluster_rate, from_clusters, from_counts,
 };
 
 /// An estimate with its model, criterion and headway.
@@ -115,21 +114,15 @@ impl EstimateRow {
     }
 }
 
-/// Name of a plan's headway in tables.
-pub(crate) fn headway_name(plan: &LanePlan, headway: usize, is_sampled: bool) -> String {
-    if is_sampled { "sampled".to_owned() } else { plan.headways[headway].to_string() }
-}
-
 /// All rows of crude Monte Carlo. Headways share their samples, so the mean over them treats samples as clusters.
 pub(crate) fn crude_rows(
     plan: &LanePlan,
     tally: &SampleTally,
+    options: &SampleOptions,
     exposure: Option<&Exposure>,
-    is_sampled: bool,
-    interval: BinomialInterval,
-    level: f64,
     stopped: StopReason,
 ) -> Vec<EstimateRow> {
+    let (interval, level) = (options.estimator.interval(), options.level);
     let (headways, models, criteria) = (plan.headways.len(), plan.models.len(), Criterion::ALL.len());
     let runs = tally.valid();
     let mut rows = Vec::new();
@@ -137,8 +130,11 @@ pub(crate) fn crude_rows(
         for criterion in Criterion::ALL {
             let cell = |headway: usize| cell_of(models, headway, model, criterion);
             let mut push = |headway: String, estimate: Estimate, cells: &[usize]| {
-                let clusters = tally.by_kernel.as_ref().map(|counts| counts.rate(cells, level));
-                let with = clusters.map(|of| (estimate.clone().over_scenarios(&of), of.effective_failing));
+                let with = tally.by_kernel.as_ref().map(|counts| {
+                    let (runs, failures) = counts.over(cells);
+                    let of = cluster_rate(Clusters { runs: &runs, failures: &failures }, level);
+                    (estimate.clone().over_scenarios(&of), of.effective_failing)
+                });
                 let row = EstimateRow::of_draws(id, criterion, headway, estimate, exposure);
                 rows.push(row.with_data(with, exposure));
             };
@@ -153,7 +149,7 @@ pub(crate) fn crude_rows(
                 let failures = tally.failures[cell(headway)];
                 let counts = Counts { runs, failures, voids: tally.voids, tries: tally.tries };
                 let estimate = from_counts(&counts, interval, level, stopped);
-                push(headway_name(plan, headway, is_sampled), estimate, &[cell(headway)]);
+                push(options.headway_name(headway), estimate, &[cell(headway)]);
             }
         }
     }

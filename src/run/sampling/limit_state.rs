@@ -6,7 +6,7 @@ use std::ops::Range;
 use super::plan::{plan_draws, plan_points};
 use super::sample_options::{Question, SampleHeadways};
 use crate::Result;
-use crate::engine::{Executor, Marks, Outcome, Wanted};
+use crate::engine::{Executor, Outcome, Wanted};
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
 use crate::model::profile::Profile;
@@ -171,25 +171,4 @@ pub(crate) fn scenario_shares(
     }
     let nominal = truncated(lanes.density)?;
     kernel_shares(nominal.kernels(), &nominal, proposal, lanes, (seed, crude))
-}
-
-/// The marks of lanes with a smaller [limit state](limit_state()) than the last one of a list. Also the criterion whose
-/// failures all have these marks, if there is one; the few failures that enter the list always have them. `None` if
-/// values of all lanes are needed.
-pub(crate) fn marks_of(profile: &Profile, criterion: Criterion, last: f64) -> Option<(Marks, Option<Criterion>)> {
-    let criteria = &profile.criteria;
-    let below = |ttc_s: f64| {
-        let is_rare = ttc_s > criteria.ttc_threshold_s;
-        (Marks::TtcBelow(ttc_s.max(criteria.ttc_threshold_s)), (!is_rare).then_some(Criterion::Ttc))
-    };
-    match criterion {
-        Criterion::Collision if last <= 0.0 => Some((Marks::Contacts(-last), None)),
-        Criterion::Collision => Some(below(last)),
-        // No value is smaller, and among equal values the first lane comes first.
-        Criterion::Ttc if last <= -criteria.ttc_threshold_s => Some((Marks::Nothing, None)),
-        Criterion::Btn if last <= criteria.btn_threshold - MAX_BTN => Some((Marks::Nothing, None)),
-        Criterion::Ttc => Some(below(last + criteria.ttc_threshold_s)),
-        Criterion::Btn if last <= 0.0 => Some((Marks::BtnFailures, Some(Criterion::Btn))),
-        Criterion::Btn => None,
-    }
 }

@@ -7,45 +7,33 @@ mod against_recorded;
 mod cheaper_estimator;
 mod crude;
 mod estimate_rows;
-mod failure_map;
+mod failing_lanes;
 mod generator;
-mod injuries;
-mod kernel_counts;
 mod limit_state;
-mod model_ratios;
 mod plan;
 pub(crate) mod plan_file;
 mod proposal_file;
 mod result;
 mod sample_options;
 mod sample_run;
-mod tally;
-mod target;
 mod uncertainty;
 mod weighted;
-mod worst;
 
 pub use cheaper_estimator::Choice;
-pub use crude::{Checkpoint, CheckpointRow, CrudeRun, cuts, sample_crude, sample_into};
+pub use crude::{Checkpoint, CheckpointRow, CrudeRun};
 pub use estimate_rows::{EstimateRow, RecordedRatios, Risk, RiskRate};
-pub use failure_map::{MAP_CELLS, MapAxes, MapAxis, MapCounts};
+pub use failing_lanes::FailingLane;
 pub use generator::{SAMPLE_PURPOSE, SampleSource, generator_of, generator_of_points};
-pub use injuries::{InjuryOptions, InjuryRow};
-pub use kernel_counts::KernelCounts;
-pub(crate) use limit_state::marks_of;
 pub use limit_state::{LaneLimitState, limit_state, truncated};
 pub(crate) use plan::mixture_of;
 pub use plan::{Conditional, conditional, plan_points, plan_samples};
 use plan_file::{KIND, SEARCH_FILE};
 pub use proposal_file::{proposal_from_text, proposal_text, read_proposal};
-pub use result::{ModelRatio, ProfileRatios, SampleResult};
+pub use result::SampleResult;
 pub use sample_options::{Estimator, Question, SampleHeadways, SampleOptions};
 pub use sample_run::{CrudeJob, SampleJob, WeightedJob};
-pub use tally::{SampleTally, WorstSample};
-pub use target::{Target, TargetRow, TargetVerdict};
 pub use uncertainty::Uncertainty;
 pub use weighted::WeightedTally;
-pub use worst::WorstLane;
 
 use std::path::Path;
 
@@ -136,7 +124,6 @@ impl Sample {
     /// # Errors
     /// [`Error::Usage`] for options that contradict one another or the density.
     pub fn plan(density: DensityModel, profile: &Profile, options: &SampleOptions) -> Result<Sample> {
-        options.check_severity(&density)?;
         let kind = match &options.estimator {
             Estimator::Crude { .. } => {
                 let mixture = mixture_of(&density, &options.given)?;

@@ -2,16 +2,12 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::failure_map::MapAxes;
 use super::generator::SampleSource;
-use super::injuries::InjuryOptions;
-use super::target::Target;
 use crate::engine::Headway;
 use crate::model::criterion::Criterion;
 use crate::model::driver::ModelId;
-use crate::stats::density::{DensityModel, Mixture};
+use crate::stats::density::Mixture;
 use crate::stats::estimate::{BinomialInterval, Goal, Search, StopRule};
-use crate::{Error, Place, Result};
 
 /// How probabilities are estimated.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
@@ -91,7 +87,7 @@ pub struct SampleOptions {
     pub models: Vec<ModelId>,
     /// Headways.
     pub headways: SampleHeadways,
-    /// Criterion of importance sampling, of the worst lanes, of the map and of the stop rules.
+    /// Criterion of importance sampling and of the stop rules.
     pub criterion: Criterion,
     /// What importance sampling is asked; empty: every model from every headway under the criterion.
     pub questions: Vec<Question>,
@@ -99,20 +95,8 @@ pub struct SampleOptions {
     pub seed: u64,
     /// Level of the intervals.
     pub level: f64,
-    /// Level at which the intervals of all rows hold together (Bonferroni); `None` if each holds on its own.
-    pub together: Option<f64>,
     /// Given parameters with their values (crude).
     pub given: Vec<(String, f64)>,
-    /// Number of worst lanes listed per model (crude); with 0, only verdicts are computed.
-    pub worst: usize,
-    /// Axes of the failure map (crude).
-    pub map: Option<MapAxes>,
-    /// Curves of injury risk (crude); the values of every lane are then computed.
-    #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub injury: Option<InjuryOptions>,
-    /// Rates that the estimates are compared with.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub targets: Vec<Target>,
 }
 
 impl SampleOptions {
@@ -128,48 +112,8 @@ impl SampleOptions {
             questions: Vec::new(),
             seed: 157,
             level: 0.95,
-            together: None,
             given: Vec::new(),
-            worst: 0,
-            map: None,
-            injury: None,
-            targets: Vec::new(),
         }
-    }
-
-    /// Checks that what is asked about injuries and rates can be answered.
-    pub(super) fn check_severity(&self, density: &DensityModel) -> Result<()> {
-        if self.injury.is_some() && !matches!(self.estimator, Estimator::Crude { .. }) {
-            let help = "use option `estimator = mc`, or leave it out";
-            return Err(Error::usage(Place::option("injury"), "this belongs to crude Monte Carlo", help));
-        }
-        if self.targets.is_empty() {
-            return Ok(());
-        }
-        let refused = |problem: &str, help: &str| Err(Error::usage(Place::option("target"), problem, help));
-        if !self.given.is_empty() || density.exposure.is_none_or(|exposure| exposure.per_hour.is_none()) {
-            return refused(
-                "no rate per hour is known",
-                "fit the density with the driven hours, and give no condition",
-            );
-        }
-        if self.targets.iter().any(|target| target.criterion.is_none()) && self.injury.is_none() {
-            return refused("injuries need a curve", "name one by option `injury`");
-        }
-        Ok(())
-    }
-
-    /// The same with intervals that hold together at `level`: Bonferroni over the rows of the estimates.
-    pub fn together(self, level: f64) -> SampleOptions {
-        let headways = self.headways().len().max(1);
-        let rows = match &self.estimator {
-            // One more for the mean over all headways.
-            Estimator::Crude { .. } => {
-                self.models.len() * Criterion::ALL.len() * (headways + usize::from(headways > 1))
-            }
-            _ => self.asked().len(),
-        };
-        SampleOptions { level: 1.0 - (1.0 - level) / rows as f64, together: Some(level), ..self }
     }
 
     /// What importance sampling is asked.
@@ -180,17 +124,6 @@ impl SampleOptions {
         let of = |(headway, model): (usize, &ModelId)| Question { model: *model, criterion: self.criterion, headway };
         let headways = 0..self.headways().len().max(1);
         self.models.iter().flat_map(|model| headways.clone().map(move |headway| (headway, model))).map(of).collect()
-    }
-
-    /// Pairs of asked questions that differ in the driver model alone.
-    pub(super) fn pairs(&self) -> Vec<[usize; 2]> {
-        let asked = self.asked();
-        let is_pair = |[a, b]: &[usize; 2]| {
-            let (a, b) = (&asked[*a], &asked[*b]);
-            a.model != b.model && (a.criterion, a.headway) == (b.criterion, b.headway)
-        };
-        let all = (0..asked.len()).flat_map(|a| (a + 1..asked.len()).map(move |b| [a, b]));
-        all.filter(is_pair).collect()
     }
 
     /// The accuracy that importance sampling aims at after a search with at most `max_crude` draws of the density.
@@ -208,7 +141,7 @@ impl SampleOptions {
     }
 
     /// A headway's name in tables.
-    pub(crate) fn headway_name(&self, headway: usize) -> String {
+    pub fn headway_name(&self, headway: usize) -> String {
         self.headways().get(headway).map_or_else(|| "sampled".to_owned(), Headway::to_string)
     }
 }

@@ -1,16 +1,13 @@
 //! Sampling runs as jobs, one per kind of estimator.
 
-use std::ops::Range;
 use std::path::Path;
 
-use super::crude::{crude_of_segments, cuts, sample_into};
-use super::injuries::injury_rows;
+use super::crude::{checkpoints, crude_of_segments, sample_into};
 use super::plan_file::SEARCH_FILE;
 use super::result::SampleResult;
-use super::tally::SampleTally;
 use super::weighted::WeightedTally;
 use super::{Sample, SampleKind, Weighted};
-use crate::engine::{Executor, LanePlan, SweepSummary};
+use crate::engine::{Executor, LanePlan, SampleTally, SweepSummary};
 use crate::run::parts::{Computed, EachChunk, Job, Ledger, MergeableCounts, PLAN_FILE, Shard, leave_plan};
 use crate::support::files::remove_file;
 use crate::support::run_folder::ESTIMATE_RECORD;
@@ -122,8 +119,8 @@ impl Job for CrudeJob<'_> {
         self.sample.leave_plan(out)
     }
 
-    fn cuts(&self, units: &Range<u64>) -> Vec<u64> {
-        cuts(self.unit_count(), units)
+    fn cuts(&self) -> Vec<u64> {
+        checkpoints(self.unit_count())
     }
 
     fn compute(
@@ -136,7 +133,7 @@ impl Job for CrudeJob<'_> {
             return Ok(Computed::whole(SweepSummary::default()));
         }
         let (options, exposure) = (&self.sample.options, self.sample.exposure());
-        sample_into(self.plan, ledger, executor, options, exposure, each.map(|each| (true, each)))
+        sample_into(self.plan, ledger, executor, options, exposure, each)
     }
 
     fn result(&self, counts: Vec<SampleTally>, computed: Computed, place: Place) -> Result<SampleResult> {
@@ -147,10 +144,9 @@ impl Job for CrudeJob<'_> {
             return Err(Error::input(place, problem, "make them again"));
         }
         let (rows, rechecked_lanes) = (std::mem::take(&mut run.rows), run.summary.rechecked_lanes);
-        let (parts, injuries) = (computed.parts, injury_rows(self.plan, &run.tally, options, (&rows, exposure)));
+        let parts = computed.parts;
         self.sample.against_recorded(SampleResult {
             rows,
-            injuries,
             rechecked_lanes,
             parts,
             crude: Some(run),

@@ -7,14 +7,13 @@ use serde::{Deserialize, Serialize};
 
 use super::estimate_rows::EstimateRow;
 use super::limit_state::{LaneLimitState, scenario_shares, truncated};
-use super::result::{ModelRatio, SampleResult};
+use super::result::SampleResult;
 use super::sample_options::Question;
 use super::{Sample, Weighted};
 use crate::engine::{CpuBackend, Executor, lanes_within_seconds};
 use crate::run::parts::{Ledger, MergeableCounts};
 use crate::stats::estimate::{
     BlockSums, Estimate, Found, Importance, Search, WeightSums, from_weight_sums, importance_sums, search,
-    weighted_ratio,
 };
 use crate::support::cancel::Cancel;
 use crate::{Error, Place, Result};
@@ -92,11 +91,8 @@ impl Sample {
             let mut at = missing.start;
             while at < missing.end {
                 let next = (at / chunk + 1).saturating_mul(chunk).min(missing.end);
-                let (asked, pairs) = (self.options.asked(), self.options.pairs());
-                let mut sums =
-                    importance_sums(&nominal, &weighted.proposal, &lanes, &weighted.draws, at..next, &pairs)?;
-                let pairs = sums.split_off(asked.len());
-                ledger.add(WeightedTally { sums: asked.into_iter().zip(sums).collect(), pairs }, [0; 2])?;
+                let sums = importance_sums(&nominal, &weighted.proposal, &lanes, &weighted.draws, at..next)?;
+                ledger.add(WeightedTally { sums: self.options.asked().into_iter().zip(sums).collect() }, [0; 2])?;
                 executor.progress.iter().for_each(|progress| progress(next - at));
                 at = next;
                 ledger.kept(executor.check_cancelled(at - units.start, units.end - units.start))?;
@@ -143,21 +139,9 @@ impl Sample {
             let row = EstimateRow::of_draws(question.model, question.criterion, headway, estimate, exposure);
             rows.push(row.with_data(with, exposure));
         }
-        let of = |sums: &BlockSums<WeightSums>| sums.total().unwrap_or_default();
-        let ratio = |([a, b], both): ([usize; 2], &BlockSums<WeightSums>)| {
-            let ((question, ours), (other, theirs)) = (&tally.sums[a], &tally.sums[b]);
-            ModelRatio {
-                model: question.model,
-                other: other.model,
-                criterion: question.criterion,
-                headway: options.headway_name(question.headway),
-                ratio: weighted_ratio([&of(ours), &of(theirs), &of(both)], options.level),
-            }
-        };
-        let ratios = options.pairs().into_iter().zip(&tally.pairs).map(ratio).collect();
         let proposal = weighted.search.as_ref().and_then(|search| search.proposal.clone());
         let search = weighted.search.as_ref().map(|search| search.rounds.clone()).unwrap_or_default();
-        Ok(SampleResult { rows, ratios, proposal, search, ..SampleResult::default() })
+        Ok(SampleResult { rows, proposal, search, ..SampleResult::default() })
     }
 }
 
@@ -168,8 +152,6 @@ impl Sample {
 pub struct WeightedTally {
     /// Question by question.
     pub sums: Vec<(Question, BlockSums<WeightSums>)>,
-    /// Draws that fail two questions: those of two models, for each criterion and headway.
-    pub pairs: Vec<BlockSums<WeightSums>>,
 }
 
 impl WeightedTally {
@@ -184,14 +166,11 @@ impl MergeableCounts for WeightedTally {
     }
 
     fn join(mut self, other: Self) -> Result<Self> {
-        if self.questions() != other.questions() || self.pairs.len() != other.pairs.len() {
+        if self.questions() != other.questions() {
             let help = "join only counts of one run: same density, proposal, flags and seed";
             return Err(Error::input(Place::item("weighted sums"), "they answer other questions", help));
         }
         for ((_, ours), (_, theirs)) in self.sums.iter_mut().zip(other.sums) {
-            ours.merge(theirs)?;
-        }
-        for (ours, theirs) in self.pairs.iter_mut().zip(other.pairs) {
             ours.merge(theirs)?;
         }
         Ok(self)
@@ -228,7 +207,7 @@ mod tests {
             sums
         };
         let sums = || BlockSums::of_leaves(range.start, &range.clone().map(leaf).collect::<Vec<_>>());
-        WeightedTally { sums: models.iter().map(|model| (question(model), sums())).collect(), pairs: vec![sums()] }
+        WeightedTally { sums: models.iter().map(|model| (question(model), sums())).collect() }
     }
 
     #[test]

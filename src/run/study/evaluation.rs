@@ -4,7 +4,6 @@ use super::{CategoryProvenance, ParameterHistogram, Study};
 use crate::Result;
 use crate::engine::Partial;
 use crate::model::criterion::Criterion;
-use crate::run::close_following::CloseFollowing;
 use crate::run::score::{Best, ClaimResult, HeadwayFailures, MeanF1, ScoreTable, best_parameterizations, check_claims};
 use crate::scenario::parameterization::ModeShape;
 
@@ -25,8 +24,6 @@ pub struct CategoryNumbers {
     pub folds: Vec<(String, usize)>,
     /// Error of the motions of each variant, if S' are given as series or cross-validated.
     pub rmse: Vec<f64>,
-    /// Failures of S from headways below 0.5 s; `None` where the headways are gaps in metres.
-    pub close_following: Option<CloseFollowing>,
 }
 
 /// The evaluation of a whole study.
@@ -61,7 +58,6 @@ impl Study {
                 svd_explained: of.svd_explained.clone(),
                 folds: of.folds.clone(),
                 rmse: of.rmse.clone(),
-                close_following: CloseFollowing::of_recorded(plan, counts, block, &of.close_units)?,
             })
         };
         let categories = self.facts().categories.iter().enumerate().map(numbers).collect::<Result<_>>()?;

@@ -8,8 +8,7 @@ use super::cases::{StudyCases, WINDOW};
 use super::folds::folds;
 use super::motion_error::{MotionError, MotionSpread};
 use crate::Result;
-use crate::engine::{Block, Headway};
-use crate::run::close_following::close_units;
+use crate::engine::Block;
 use crate::run::score::{CROSS_VALIDATED, ScoreOptions};
 use crate::scenario::parameterization::{
     ModeShape, Parameter, Parameterization, ParameterizationOptions, Reduction, SpeedProfile,
@@ -40,9 +39,6 @@ pub struct CategoryProvenance {
     /// are given as series or cross-validated.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub rmse: Vec<f64>,
-    /// Indices among the kept scenarios of those whose recorded headway is below 0.5 s; empty if headways are imposed.
-    #[serde(default, skip_serializing_if = "Vec::is_empty")]
-    pub close_units: Vec<u64>,
 }
 
 /// Data of a report in addition to the lanes' outcomes.
@@ -92,14 +88,12 @@ pub(super) fn category_provenance(
             collection.scenarios.iter().filter(|s| s.category == block.category && s.kept).collect();
         let modes = reduction.map_or(Ok(Vec::new()), |reduction| reduction.mode_shapes(&kept))?;
         let parameters = parameter_histograms(block.category, &kept, &options.parameterization)?;
-        let is_observed = Headway::is_observed(&planned.outline().headways);
         let folds = match options.folds {
             Some(count) if block.variants.iter().any(|name| name.ends_with(CROSS_VALIDATED)) => {
                 kept.iter().map(|scenario| scenario.id.clone()).zip(folds(&kept, count)?).collect()
             }
             _ => Vec::new(),
         };
-        let close_units = if is_observed { close_units(kept.iter().copied()) } else { Vec::new() };
         Ok(CategoryProvenance {
             found: of.found,
             kept: of.kept,
@@ -108,7 +102,6 @@ pub(super) fn category_provenance(
             modes,
             folds,
             rmse: rmse.get(at).cloned().unwrap_or_default(),
-            close_units,
         })
     };
     planned.outline().blocks.iter().zip(&planned.reductions).enumerate().map(facts).collect()

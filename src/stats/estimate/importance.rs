@@ -38,6 +38,12 @@ impl Importance {
         let crude = self.crude_per_draw.saturating_mul(self.draws);
         Importance { draws, crude_per_draw: crude.div_ceil(draws.max(1)).max(1), ..self }
     }
+
+    /// The draw of the proposal of this index; `None` for an invalid one.
+    pub fn draw(&self, nominal: &dyn Density, proposal: &Mixture, index: u64) -> Option<Vec<f64>> {
+        let stream = Stream { seed: self.seed, purpose: purpose::PROPOSAL };
+        Some(proposal.draw(&stream, index, 0)).filter(|point| nominal.is_valid(point))
+    }
 }
 
 /// A failing draw of the proposal or of the density.
@@ -80,8 +86,7 @@ pub(super) fn weighted_failures(
 }
 
 /// Draws, evaluates and weights a range of draws of the proposal, and the draws of the density that belong to them. Returns
-/// the sums of every question, then those of every pair of questions, over the draws that fail both. Sums of disjoint
-/// ranges merge to those of their union, bit for bit.
+/// the sums of every question. Sums of disjoint ranges merge to those of their union, bit for bit.
 ///
 /// # Errors
 /// Those of the limit state.
@@ -91,18 +96,15 @@ pub fn importance_sums(
     limit_state: &dyn LimitState,
     options: &Importance,
     indices: Range<u64>,
-    pairs: &[[usize; 2]],
 ) -> Result<Vec<BlockSums<WeightSums>>> {
-    let each = (0..limit_state.questions()).map(|question| [question; 2]);
-    let asked: Vec<[usize; 2]> = each.chain(pairs.iter().copied()).collect();
     let purposes = [purpose::PROPOSAL, purpose::BESIDE_PROPOSAL];
     let unfailed = WeightSums { draws: 1, crude: options.crude_per_draw, ..WeightSums::default() };
-    let mut sums: Vec<BlockSums<WeightSums>> = vec![BlockSums::default(); asked.len()];
+    let mut sums: Vec<BlockSums<WeightSums>> = vec![BlockSums::default(); limit_state.questions()];
     for batch in batches(indices) {
         let failures = weighted_failures(nominal, proposal, limit_state, options, purposes, batch.clone())?;
-        for (of, sums) in asked.iter().zip(&mut sums) {
+        for (question, sums) in sums.iter_mut().enumerate() {
             let mut leaves = vec![unfailed; (batch.end - batch.start) as usize];
-            for failure in failures.iter().filter(|failure| of.iter().all(|question| failure.of.fails[*question])) {
+            for failure in failures.iter().filter(|failure| failure.of.fails[question]) {
                 leaves[(failure.of.index - batch.start) as usize].add_failure(failure.weight, failure.is_crude);
             }
             sums.merge(BlockSums::of_leaves(batch.start, &leaves))?;
@@ -135,7 +137,7 @@ pub fn importance(
     options: &Importance,
     level: f64,
 ) -> Result<Vec<Estimate>> {
-    let sums = importance_sums(nominal, proposal, limit_state, options, 0..options.draws, &[])?;
+    let sums = importance_sums(nominal, proposal, limit_state, options, 0..options.draws)?;
     Ok(sums.iter().map(|sums| from_weight_sums(&sums.total().unwrap_or_default(), level)).collect())
 }
 

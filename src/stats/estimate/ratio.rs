@@ -4,7 +4,6 @@
 use serde::Serialize;
 
 use super::interval::{Interval, IntervalKind, rule_of_three, student_factor, student_quantile, wilson};
-use super::weights::WeightSums;
 
 /// Runs and failures, one number per cluster; both slices have the same length.
 #[derive(Debug, Clone, Copy)]
@@ -132,8 +131,6 @@ pub enum RatioMethod {
     Paired,
     /// The interval of one rate divided by that of the other: too few failing clusters for the logarithm.
     Separate,
-    /// Student's t on the logarithm, over weighted draws: without the uncertainty of the data.
-    Draws,
 }
 
 /// Failing clusters on each side that the paired interval requires.
@@ -160,7 +157,7 @@ pub struct Ratio {
 
 impl Ratio {
     /// From the standard deviation of the logarithm.
-    fn of_logarithm(ratio: f64, sigma: f64, freedom: f64, method: RatioMethod, level: f64) -> Ratio {
+    fn of_logarithm(ratio: f64, sigma: f64, freedom: f64, level: f64) -> Ratio {
         let finite = |v: f64| v.is_finite().then_some(v);
         let factor = libm::exp(student_quantile(0.5 + 0.5 * level, freedom) * sigma);
         let (low, high) = (ratio / factor, ratio * factor);
@@ -170,7 +167,7 @@ impl Ratio {
             () if high < 1.0 => RatioVerdict::TooLow,
             () => RatioVerdict::Undecided,
         };
-        Ratio { ratio: Some(ratio), low: finite(low), high: finite(high), method, verdict }
+        Ratio { ratio: Some(ratio), low: finite(low), high: finite(high), method: RatioMethod::Paired, verdict }
     }
 }
 
@@ -205,24 +202,7 @@ pub fn paired_ratio(numerator: Clusters, denominator: Clusters, level: f64) -> R
     let squares: f64 = pairs.map(|(z, y)| (z / p - y / s) * (z / p - y / s)).sum();
     let sigma = (n / (n - 1.0) * squares).sqrt();
     let freedom = numerator.failing().min(denominator.failing()) as f64 - 1.0;
-    Ratio::of_logarithm(p / s, sigma, freedom, RatioMethod::Paired, level)
-}
-
-/// The ratio of two probabilities from the same weighted draws (common random numbers); `both` has the sums over the
-/// draws that fail both questions. Delta method on the logarithm.
-pub fn weighted_ratio([numerator, denominator, both]: [&WeightSums; 3], level: f64) -> Ratio {
-    let (p, s) = (numerator.probability(), denominator.probability());
-    if p <= 0.0 || s <= 0.0 {
-        let ratio = (s > 0.0).then_some(0.0);
-        let (method, verdict) = (RatioMethod::Draws, RatioVerdict::Undecided);
-        return Ratio { ratio, low: None, high: None, method, verdict };
-    }
-    let covariance = WeightSums::covariance(numerator, denominator, both);
-    let own = numerator.variance() / (p * p) + denominator.variance() / (s * s);
-    let sigma = (own - 2.0 * covariance / (p * s)).max(0.0).sqrt();
-    let effective = |sums: &WeightSums| sums.figures().effective_failures;
-    let freedom = effective(numerator).min(effective(denominator)) - 1.0;
-    Ratio::of_logarithm(p / s, sigma, freedom, RatioMethod::Draws, level)
+    Ratio::of_logarithm(p / s, sigma, freedom, level)
 }
 
 #[cfg(test)]

@@ -69,15 +69,9 @@ impl WeightSums {
 
     /// Variance of the estimate.
     pub(crate) fn variance(&self) -> f64 {
-        WeightSums::covariance(self, self, self).max(0.0)
-    }
-
-    /// Covariance of the estimates of two questions about the same draws; `both` sums those that fail both.
-    pub(crate) fn covariance(a: &WeightSums, b: &WeightSums, both: &WeightSums) -> f64 {
-        let proposal = |of: &WeightSums| of.failing - of.crude_failing;
-        let means =
-            ratio(proposal(a) * proposal(b), a.draws as f64) + ratio(a.crude_failing * b.crude_failing, a.crude as f64);
-        ratio(both.failing_squared - means, (a.draws as f64).powi(2))
+        let square = |sum: f64, draws: u64| ratio(sum * sum, draws as f64);
+        let means = square(self.failing - self.crude_failing, self.draws) + square(self.crude_failing, self.crude);
+        ratio(self.failing_squared - means, (self.draws as f64).powi(2)).max(0.0)
     }
 
     /// Interval of the estimate. With draws of the density no failure weighs more than one of these, whether it was found

@@ -2,13 +2,11 @@
 
 use std::path::Path;
 
-use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, Partial, Wanted};
+use lanesweep::engine::{Backend, CpuBackend, Headway, LanePlan, Partial, SampleTally, Wanted};
 use lanesweep::model::criterion::Criterion;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::{Counted, Journal, Ledger, MergeableCounts, read_part, read_sealed_line};
-use lanesweep::run::sampling::{
-    Estimator, SampleHeadways, SampleOptions, SampleTally, WeightedTally, plan_samples, read_proposal,
-};
+use lanesweep::run::sampling::{Estimator, SampleHeadways, SampleOptions, WeightedTally, plan_samples, read_proposal};
 use lanesweep::run::score::ScoreOptions;
 use lanesweep::run::study::{ExternalReplay, StudyHead, StudyOptions, plan_study};
 use lanesweep::scenario::DataProvenance;
@@ -228,12 +226,9 @@ fn part(bytes: &[u8], dir: &Path, seeds: &Seeds, _: bool) -> Result<()> {
     for tally in read.segments {
         tally.samples();
         tally.valid();
-        let axes = tally.map.as_ref().map(|map| map.axes.clone());
-        let defaults = SampleOptions::new(Estimator::CRUDE, 20, SampleHeadways::Sampled);
-        let options = SampleOptions { worst: tally.worst_limit(), criterion: CRITERION, map: axes, ..defaults };
         let plan = small_plan(density_of(seeds), &density_of(seeds).mixture()?, &seeds.profile)?;
-        let joined = SampleTally::empty(&plan, &options).merge(tally.clone())?;
-        let back = tally.clone().merge(SampleTally::empty(&plan, &options))?;
+        let joined = SampleTally::empty(&plan).merge(tally.clone())?;
+        let back = tally.clone().merge(SampleTally::empty(&plan))?;
         joined.samples();
         // The same part twice has to be refused.
         assert!(back.samples() == 0 || back.merge(tally).is_err());

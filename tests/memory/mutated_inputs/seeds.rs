@@ -2,13 +2,11 @@
 
 use std::path::Path;
 
-use lanesweep::engine::{Backend, CpuBackend, LanePlan, Partial, Wanted};
+use lanesweep::engine::{Backend, CpuBackend, LanePlan, Partial, SampleTally, Wanted};
 use lanesweep::model::driver::ModelId;
 use lanesweep::model::profile::Profile;
 use lanesweep::run::parts::{Counted, Journal, Part, seal, write_part};
-use lanesweep::run::sampling::{
-    Estimator, MapAxes, Question, SampleHeadways, SampleOptions, SampleTally, WeightedTally, proposal_text,
-};
+use lanesweep::run::sampling::{Question, WeightedTally, proposal_text};
 use lanesweep::run::score::ScoreOptions;
 use lanesweep::run::study::{StudyOptions, outline_study};
 use lanesweep::scenario::parameterization::{Parameterization, ParameterizationOptions};
@@ -237,30 +235,15 @@ impl Seeds {
         let density = fit(Category::CutIn, "2", 8);
         let others = [fit(Category::Lvd, "ii", 6), fit(Category::Lvd, "iii", 8), fit(Category::CutOut, "b", 10)];
         let plan = small_plan(&density, &density.mixture().unwrap(), &profile).unwrap();
-        let names: Vec<&str> = density.space.parameters().iter().map(|p| p.name.as_str()).collect();
-        let map = MapAxes::of(&density, names[0], names[1]).unwrap();
         let chunk = CpuBackend::<f64>::reference().prepare(&plan).unwrap().run(PART_UNITS, Wanted::Outcomes).unwrap();
-        let parts = [None, Some(map)].map(|map| {
-            let defaults = SampleOptions::new(Estimator::CRUDE, 20, SampleHeadways::Sampled);
-            let options = SampleOptions { worst: 3, criterion: CRITERION, map, ..defaults };
-            let tally = SampleTally::of_chunk(&plan, &chunk, &options).unwrap();
-            (
-                tally.clone(),
-                Part {
-                    run_sha256: "00".to_owned(),
-                    units: PART_UNITS,
-                    lanes_redone_and_rechecked: [0, 0],
-                    segments: vec![tally],
-                },
-            )
+        let tally = SampleTally::of_chunk(&plan, &chunk).unwrap();
+        let journal = written(|path| {
+            let (mut journal, _) = Journal::open(path, "00", PART_UNITS).unwrap();
+            journal.append(&[Counted { counts: tally.clone(), redone_and_rechecked: [0; 2] }]).unwrap();
         });
-        let journals = parts.each_ref().map(|(tally, _)| {
-            written(|path| {
-                let (mut journal, _) = Journal::open(path, "00", PART_UNITS).unwrap();
-                journal.append(&[Counted { counts: tally.clone(), redone_and_rechecked: [0; 2] }]).unwrap();
-            })
-        });
-        let parts = parts.map(|(_, part)| written(|path| write_part(path, &part).unwrap()));
+        let (run_sha256, lanes_redone_and_rechecked) = ("00".to_owned(), [0; 2]);
+        let part = Part { run_sha256, units: PART_UNITS, lanes_redone_and_rechecked, segments: vec![tally] };
+        let part = written(|path| write_part(path, &part).unwrap());
         let sums = |k: u64| WeightSums { draws: k, failing: 0.5, ..WeightSums::default() };
         let leaves: Vec<WeightSums> = (0..9).map(sums).collect();
         let question = |model| Question { model, criterion: CRITERION, headway: 0 };
@@ -269,7 +252,7 @@ impl Seeds {
             run_sha256: "00".to_owned(),
             units: WEIGHTED_UNITS,
             lanes_redone_and_rechecked: [0; 2],
-            segments: vec![WeightedTally { sums, pairs: Vec::new() }],
+            segments: vec![WeightedTally { sums }],
         };
         let study = plans::plan(&[(Category::CutIn, 2, &["1"]), (Category::Lvd, 2, &["i"])]);
         let lane = |lane: u64| (lanesweep::engine::Verdicts((lane % 16) as u8), lane as f64 / 8.0);
@@ -313,14 +296,14 @@ impl Seeds {
             track_json: vec![AUTOMATUM.as_bytes().to_vec(), I24.as_bytes().to_vec()],
             presets: presets(),
             proposals: vec![proposal_text(&density, &density.mixture().unwrap()).unwrap().into_bytes()],
-            parts: parts.into(),
+            parts: vec![part],
             plans: vec![{
                 let outlined = outline_study(&few, &profile, &StudyOptions::default()).unwrap();
                 let (head, mut plan) = (seal("plan", outlined.head()).unwrap().0, Vec::new());
                 outlined.write_file(&head, &mut plan).unwrap();
                 plan
             }],
-            journals: journals.into(),
+            journals: vec![journal],
             weighted_parts: vec![written(|p| write_part(p, &weighted).unwrap())],
             study_parts: vec![written(|p| write_part(p, &study_part).unwrap())],
             profile,

@@ -1,12 +1,13 @@
 //! Samples and failures by the kernel that they were drawn from. A kernel is one scenario, so these counts give the
-//! uncertainty of the estimate caused by the data.
+//! uncertainty of an estimate caused by the data.
 
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 
-use crate::engine::{Chunk, LanePlan, Verdicts};
+use crate::engine::backend::Chunk;
+use crate::engine::outcome::Verdicts;
+use crate::engine::plan::LanePlan;
 use crate::model::criterion::Criterion;
-use crate::stats::estimate::{ClusterRate, Clusters, Ratio, cluster_rate, paired_ratio};
 
 /// Maximum number of groups of kernels: kernel k counts in group k mod 512. With fewer kernels, each is a group. With
 /// more kernels, groups vary as much as kernels do, and a journal stays small.
@@ -21,7 +22,7 @@ pub(super) fn add_counts(ours: &mut [u64], theirs: &[u64]) {
 }
 
 /// Index of a cell among headway × model × criterion, the last innermost.
-pub(super) fn cell_of(plan_models: usize, headway: usize, model: usize, criterion: Criterion) -> usize {
+pub fn cell_of(plan_models: usize, headway: usize, model: usize, criterion: Criterion) -> usize {
     (headway * plan_models + model) * Criterion::ALL.len() + criterion.index()
 }
 
@@ -47,7 +48,7 @@ impl KernelCounts {
     }
 
     /// Counts of zero of so many kernels and lanes of a sample.
-    pub(super) fn zero(kernels: usize, lanes: usize) -> KernelCounts {
+    pub fn zero(kernels: usize, lanes: usize) -> KernelCounts {
         let groups = kernels.min(MAX_GROUPS);
         KernelCounts { samples: vec![0; groups], failures: vec![0; lanes * Criterion::ALL.len() * groups] }
     }
@@ -75,11 +76,8 @@ impl KernelCounts {
         KernelCounts { samples: samples.to_vec(), failures: failures.to_vec() }
     }
 
-    /// Counts one sample; `verdicts` has one per lane of it.
-    pub(super) fn count_sample(&mut self, kernel: u32, verdicts: &[Verdicts]) {
-        if kernel == NO_KERNEL {
-            return;
-        }
+    /// Counts one sample of a kernel; `verdicts` has one per lane of it.
+    pub fn count_sample(&mut self, kernel: u32, verdicts: &[Verdicts]) {
         let groups = self.samples.len();
         let group = kernel as usize % groups;
         self.samples[group] += 1;
@@ -95,26 +93,18 @@ impl KernelCounts {
         add_counts(&mut self.failures, &other.failures);
     }
 
+    /// Number of groups.
+    pub fn groups(&self) -> usize {
+        self.samples.len()
+    }
+
     /// Number of groups and of counts.
     pub(super) fn shape(&self) -> [usize; 2] {
         [self.samples.len(), self.failures.len()]
     }
 
-    /// The rate of failed lanes over some cells (headway × model × criterion), with kernels as clusters.
-    pub(super) fn rate(&self, cells: &[usize], level: f64) -> ClusterRate {
-        let (runs, failures) = self.over(cells);
-        cluster_rate(Clusters { runs: &runs, failures: &failures }, level)
-    }
-
-    /// The ratio of the rate over some cells to that of other counts over others, group by group.
-    pub(super) fn ratio(&self, cells: &[usize], (other, of_other): (&KernelCounts, &[usize]), level: f64) -> Ratio {
-        let ((runs, failures), (other_runs, other_failures)) = (self.over(cells), other.over(of_other));
-        let other = Clusters { runs: &other_runs, failures: &other_failures };
-        paired_ratio(Clusters { runs: &runs, failures: &failures }, other, level)
-    }
-
-    /// Lanes and failed lanes over some cells, group by group.
-    fn over(&self, cells: &[usize]) -> (Vec<u64>, Vec<u64>) {
+    /// Lanes and failed lanes over some cells (headway × model × criterion), group by group.
+    pub fn over(&self, cells: &[usize]) -> (Vec<u64>, Vec<u64>) {
         let groups = self.samples.len();
         let runs = self.samples.iter().map(|n| n * cells.len() as u64).collect();
         let of_group = |group: usize| cells.iter().map(|cell| self.failures[cell * groups + group]).sum();
@@ -182,9 +172,8 @@ mod tests {
     }
 
     #[test]
-    fn a_rate_over_cells_is_that_of_their_failures() {
+    fn lanes_and_failures_of_cells_are_summed_group_by_group() {
         let counts = KernelCounts { samples: vec![5, 6], failures: vec![1, 2, 0, 4] };
-        let rate = counts.rate(&[0, 1], 0.95);
-        assert_eq!(rate.rate, 7.0 / 22.0);
+        assert_eq!(counts.over(&[0, 1]), (vec![10, 12], vec![1, 6]));
     }
 }
