@@ -1,6 +1,8 @@
 //! The program. [`lanesweep::cli`] does the work; this file only sets what affects the whole process. A program that
 //! uses the library keeps its own environment, panic hook and allocator.
 
+#![allow(clippy::disallowed_methods, reason = "the process is the program's")]
+
 use std::process::ExitCode;
 
 use lanesweep::cli::Exit;

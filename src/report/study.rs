@@ -309,7 +309,7 @@ fn published(scores: &ScoreTable) -> Value {
     let lvd = Parameterization::of(Category::Lvd);
     let f1 = lvd.flat_map(|id| {
         cells().filter_map(move |(model, criterion)| {
-            let theirs = published_lvd_f1(&id.key, model, criterion)?;
+            let theirs = published_lvd_f1(id.key, model, criterion)?;
             Some(serde_json::json!({
                 "category": id.category.key(), "parameterization": id.key, "model": model.name(),
                 "criterion": criterion.key(), "f1": theirs,

@@ -1,4 +1,5 @@
 //! What no input may ask for: both files need the allocator that counts.
+#![allow(clippy::disallowed_methods, clippy::undocumented_unsafe_blocks, reason = "a program of its own")]
 
 #[path = "../common/mod.rs"]
 mod common;

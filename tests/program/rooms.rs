@@ -25,40 +25,6 @@ fn code(path: &Path) -> String {
     text[..end].lines().filter(is_code).collect::<Vec<_>>().join("\n")
 }
 
-/// Verbs that hold other verbs.
-const GROUPS: [(&str, &[&str]); 1] = [("config", &["shell"])];
-
-/// A verb's file is `VERB.rs`, its further parts are `VERB_*.rs`.
-#[test]
-fn no_verb_imports_another() {
-    let cli = Path::new(env!("CARGO_MANIFEST_DIR")).join("src/cli");
-    let main = code(&cli.join("mod.rs"));
-    let listed = main.split("enum Verb {").nth(1).unwrap().split('}').next().unwrap();
-    let listed = listed.split('(').skip(1).filter_map(|rest| rest.trim_start_matches("Box<").split("::").next());
-    let verbs: Vec<&str> = listed.chain(GROUPS.iter().flat_map(|(_, verbs)| *verbs).copied()).collect();
-    assert!(verbs.len() >= 12, "{verbs:?}");
-    let mut found = Vec::new();
-    files(&cli, &mut found);
-    for path in &found {
-        let stem = path.file_stem().unwrap().to_str().unwrap();
-        let own = |verb: &&str| stem == *verb || stem.starts_with(&format!("{verb}_"));
-        let Some(own) = verbs.iter().find(|verb| own(verb)) else { continue };
-        let held = GROUPS.iter().find(|(group, _)| group == own).map_or(&[][..], |(_, verbs)| verbs);
-        let code = code(path);
-        // `super::fit`, `super::{fit, lists}`, `crate::cli::fit`
-        for named in code.split("super::").skip(1).chain(code.split("crate::cli::").skip(1)) {
-            let names = match named.strip_prefix('{') {
-                Some(list) => list.split('}').next().unwrap_or_default(),
-                None => named.split(|c: char| !(c.is_ascii_alphanumeric() || c == '_')).next().unwrap_or_default(),
-            };
-            for name in names.split([',', ':', ' ']) {
-                let is_other = verbs.contains(&name) && name != *own && !held.contains(&name);
-                assert!(!is_other, "{} imports the verb `{name}`", path.display());
-            }
-        }
-    }
-}
-
 /// Messages, reports and pages of the library name options; the command line makes flags of them.
 #[test]
 fn the_library_names_no_flag() {
